@@ -1,0 +1,132 @@
+"""Physical constants and conversions, each with its source, and the one grammar for numbers with units.
+
+Constants are CODATA 2022 (exact ones are SI 2019 definitions); a test holds them against `scipy.constants`,
+which is not imported here because it would double the time that `import rotor` takes.
+"""
+
+import math
+import re
+
+import numpy as np
+from numpy.typing import NDArray
+
+CODATA_EDITION = "2022"
+
+SPEED_OF_LIGHT_M_PER_S = 299792458.0  # exact
+PLANCK_J_S = 6.62607015e-34  # exact
+BOLTZMANN_J_PER_K = 1.380649e-23  # exact
+ELEMENTARY_CHARGE_C = 1.602176634e-19  # exact
+AVOGADRO_PER_MOL = 6.02214076e23  # exact
+ATOMIC_MASS_KG = 1.66053906892e-27  # CODATA 2022
+BOHR_RADIUS_ANGSTROM = 0.529177210544  # CODATA 2022
+VACUUM_PERMITTIVITY_F_PER_M = 8.8541878188e-12  # CODATA 2022
+
+MHZ_PER_CM = 29979.2458  # 1 cm^-1 in MHz, exact
+MHZ_PER_K = BOLTZMANN_J_PER_K / PLANCK_J_S * 1e-6  # 1 K in MHz, exact ratio: 20836.6191...
+DEBYE_C_M = 1e-21 / SPEED_OF_LIGHT_M_PER_S  # 1 D = 1e-18 esu cm, exact by definition
+DEBYE_PER_E_ANGSTROM = ELEMENTARY_CHARGE_C * 1e-10 / DEBYE_C_M  # 4.80320...
+
+# A = hbar / (4 pi I): MHz times u angstrom^2
+ROTATIONAL_MHZ_U_ANGSTROM2 = PLANCK_J_S / (8 * math.pi**2 * ATOMIC_MASS_KG * 1e-20) * 1e-6
+
+_FREQUENCY = {"Hz": 1e-6, "kHz": 1e-3, "MHz": 1.0, "GHz": 1e3, "THz": 1e6, "cm-1": MHZ_PER_CM, "K": MHZ_PER_K}
+_KINDS: dict[str, dict[str, float]] = {
+    "frequency": _FREQUENCY,
+    "temperature": {"mK": 1e-3, "K": 1.0},
+    "length": {"pm": 0.01, "angstrom": 1.0, "Å": 1.0, "nm": 10.0, "bohr": BOHR_RADIUS_ANGSTROM, "m": 1e10},
+    "dipole": {"D": 1.0, "debye": 1.0, "e*angstrom": DEBYE_PER_E_ANGSTROM, "C*m": 1.0 / DEBYE_C_M},
+    "time": {"fs": 1e-3, "ps": 1.0, "ns": 1e3, "us": 1e6, "s": 1e12},
+    "field": {"V/cm": 1e-3, "kV/cm": 1.0, "V/m": 1e-5, "MV/m": 10.0},
+    "mass": {"u": 1.0, "amu": 1.0, "Da": 1.0, "kg": 1.0 / ATOMIC_MASS_KG},
+    "pressure": {"Pa": 1e-5, "mbar": 1e-3, "kPa": 1e-2, "bar": 1.0, "Torr": 1.33322368421e-3, "atm": 1.01325},
+}
+_ALIASES = {"cm^-1": "cm-1", "cm⁻¹": "cm-1", "1/cm": "cm-1", "μs": "us", "Debye": "debye", "Angstrom": "angstrom"}
+_NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(\S.*?)?\s*$")
+
+
+def _kind_of(unit: str) -> str:
+    return next(kind for kind, table in _KINDS.items() if unit in table)
+
+
+def _factor(unit: str, wanted: str, text: str) -> float:
+    unit = _ALIASES.get(unit, unit)
+    table = _KINDS[_kind_of(wanted)]
+    if unit not in table:
+        known = any(unit in other for other in _KINDS.values())
+        what = "does not measure the same thing as" if known else "is not a known unit; the default is"
+        raise ValueError(f"{text!r}: unit {unit!r} {what} {wanted!r}; use one of {', '.join(table)}")
+    return table[unit] / table[wanted]
+
+
+def _number(text: str) -> tuple[float, str | None]:
+    """The number and the unit, if any, of `"9.2 GHz"`; a unicode minus is a minus."""
+    match = _NUMBER.match(text.replace("−", "-"))
+    if not match:
+        raise ValueError(f"{text!r} is not a number with an optional unit, such as '9.2' or '9.2 GHz'")
+    return float(match[1]), match[2]
+
+
+def parse_quantity(value: float | str, unit: str) -> float:
+    """A number in `unit`, from a float already in it or from a string that may carry another unit.
+
+    Raises ValueError for text that is no number, a unit of another kind, or a value that is not finite.
+
+    >>> parse_quantity("9.2 GHz", "MHz")
+    9200.0
+    >>> parse_quantity("1 cm-1", "MHz")
+    29979.2458
+    """
+    if isinstance(value, str):
+        number, given = _number(value)
+        value = number * (_factor(given, unit, value) if given else 1.0)
+    if not math.isfinite(value):
+        raise ValueError(f"{value!r} is not a finite number of {unit}")
+    return float(value)
+
+
+def _bounds(text: str, unit: str) -> tuple[float, float, str | None]:
+    """Both ends of `start:stop` in `unit`, one unit at the end of either bound, and the count's text."""
+    parts = text.split(":")
+    if len(parts) not in (2, 3) or not all(part.strip() for part in parts):
+        raise ValueError(f"{text!r} is not a range; write start:stop or start:stop:count, such as '2:18GHz'")
+
+    (start, unit_1), (stop, unit_2) = _number(parts[0]), _number(parts[1])
+    shared = unit_2 or unit_1
+    first, last = (
+        number * (_factor(own or shared, unit, text) if (own or shared) else 1.0)
+        for number, own in ((start, unit_1), (stop, unit_2))
+    )
+    if not first < last:
+        raise ValueError(f"{text!r}: the range must rise, but {first:g} {unit} is not below {last:g} {unit}")
+    return first, last, parts[2] if len(parts) == 3 else None
+
+
+def parse_range(text: str, unit: str) -> tuple[float, float]:
+    """The two ends of `start:stop`, in `unit`; one unit at the end of either bound serves both.
+
+    >>> parse_range("2:18GHz", "MHz")
+    (2000.0, 18000.0)
+    """
+    first, last, count = _bounds(text, unit)
+    if count is not None:
+        raise ValueError(f"{text!r}: a plain range start:stop is wanted here, without a count")
+    return first, last
+
+
+def parse_grid(text: str, unit: str) -> NDArray[np.float64]:
+    """Points in `unit` from `start:stop:count` or a comma list whose last item may carry the unit.
+
+    >>> parse_grid("0:200kV/cm:3", "kV/cm")
+    array([  0., 100., 200.])
+    >>> parse_grid("1,2,5 GHz", "MHz")
+    array([1000., 2000., 5000.])
+    """
+    if ":" not in text:
+        numbers = [_number(item) for item in text.split(",")]
+        shared = numbers[-1][1]
+        return np.array([n * (_factor(u or shared, unit, text) if (u or shared) else 1.0) for n, u in numbers])
+
+    first, last, count = _bounds(text, unit)
+    if count is None or not count.strip().isdecimal() or int(count) < 2:
+        raise ValueError(f"{text!r}: a grid is start:stop:count with a whole count of 2 or more, or a comma list")
+    return np.linspace(first, last, int(count))
