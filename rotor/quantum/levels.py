@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from rotor.effects import QuantumEffect
 from rotor.quantum.basis import WangBlock, ka_kc, wang_blocks
-from rotor.quantum.watson import Centrifugal, Operators, Rigid, block_bands, scalar_energy
+from rotor.quantum.watson import Centrifugal, Multiplet, Operators, Rigid, block_bands, scalar_energy
 from rotor.weights import SpinWeights
 
 if TYPE_CHECKING:
@@ -202,10 +202,10 @@ def solve_j(
     operators: Operators, j: int, representation: str, vectors: bool = True
 ) -> list[tuple[WangBlock, Floats, Floats]]:
     """The Wang blocks of one J solved: (block, energies in MHz, eigenvectors) in the order ee, eo, oe, oo."""
-    scalar = scalar_energy(operators, j)
+    scalar, multiplet = scalar_energy(operators, j), Multiplet(operators, j)
     out = []
     for block in wang_blocks(j, representation):
-        energies, states = diagonalise(block_bands(operators, block), vectors)
+        energies, states = diagonalise(block_bands(multiplet, block), vectors)
         out.append((block, energies + scalar, states))
     return out
 
@@ -216,20 +216,26 @@ def diagonalise(bands: list[Floats], vectors: bool = True) -> tuple[Floats, Floa
     Tridiagonal matrices go to LAPACK's divide and conquer (dstevd), wider ones to its dense form (dsyevd).
     Raises ValueError where LAPACK does not converge or the matrix has numbers that are not finite.
     """
+    if len(bands[0]) == 1:
+        return bands[0], np.ones((1, 1))
     if not all(np.isfinite(band).all() for band in bands):
         raise ValueError("a block of the Hamiltonian overflows: J max is too high for these distortion constants")
     if len(bands) > 2:
         return _dense(bands, vectors)
+    if len(bands) == 1:
+        return _diagonal(bands[0], vectors)
 
     from scipy.linalg.lapack import dstevd
 
-    off = bands[1] if len(bands) == 2 else np.zeros(0)
-    if len(bands[0]) == 1:
-        return bands[0].copy(), np.ones((1, 1))
-    energies, states, info = dstevd(bands[0], off, compute_v=int(vectors))
+    energies, states, info = dstevd(bands[0], bands[1], compute_v=int(vectors))
     if info:
-        raise ValueError(f"LAPACK dstevd did not converge on a block of size {len(off) + 1} (info = {info})")
+        raise ValueError(f"LAPACK dstevd did not converge on a block of size {len(bands[0])} (info = {info})")
     return energies, states
+
+
+def _diagonal(band: Floats, vectors: bool) -> tuple[Floats, Floats]:
+    order = np.argsort(band, kind="stable")
+    return band[order], np.eye(len(band))[:, order] if vectors else np.zeros((0, 0))
 
 
 def _dense(bands: list[Floats], vectors: bool) -> tuple[Floats, Floats]:

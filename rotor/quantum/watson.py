@@ -119,44 +119,65 @@ def scalar_energy(operators: Operators, j: int) -> float:
     return float(sum(c * x**p for (p, q, n), c in operators.items() if q == n == 0))
 
 
-def _ladder(j: int, k: NDArray[np.int64], n: int) -> NDArray[np.float64]:
-    """√∏_{i<2n} (J-K-i)(J+K+i+1): what J₊^2n makes of |J K⟩; zero where it leaves the multiplet."""
-    product = np.ones(k.shape)
-    for i in range(2 * n):
-        product *= np.sqrt(np.maximum((j - k - i) * (j + k + i + 1), 0))
-    return product
+class Multiplet:
+    """Matrix elements of all |J K⟩ of one J, from which its four Wang blocks are cut; the scalar part left out."""
+
+    def __init__(self, operators: Operators, j: int) -> None:
+        self.order = max((n for _, _, n in operators), default=0)
+        self._margin = 2 * self.order  # K starts at -margin, so that folded elements are at hand
+        k = np.arange(-self._margin, j + 1)
+        steps = _ladder_steps(j, np.arange(-self._margin, j + self._margin + 1))
+        self._elements = [_elements(operators, j, k, n, steps) for n in range(self.order + 1)]
+
+    def folded(self, low: int, n: int) -> float:
+        """⟨2n - low|H|-low⟩, which connects K = low and K = 2n - low of a Wang block."""
+        return float(self._elements[n][self._margin - low])
+
+    def band(self, block: WangBlock, n: int) -> NDArray[np.float64]:
+        """⟨K+2n|H|K⟩ over the K of a block, size - n of them."""
+        first = self._margin + block.first_k
+        return self._elements[n][first : first + 2 * (block.size - n) : 2].copy()
 
 
-def _element(operators: Operators, j: int, k: NDArray[np.int64], n: int) -> NDArray[np.float64]:
-    """⟨K+2n|H|K⟩ for an array of K, positive or negative."""
+def _ladder_steps(j: int, k: NDArray[np.int64]) -> NDArray[np.float64]:
+    """√(J(J+1) - K(K+1)), what J₊ makes of |J K⟩; zero outside the multiplet."""
+    return np.sqrt(np.maximum((j - k) * (j + k + 1), 0))
+
+
+def _elements(
+    operators: Operators, j: int, k: NDArray[np.int64], n: int, steps: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """⟨K+2n|H|K⟩ = ½[P((K+2n)²) + P(K²)] times the ladder, P(y) = Σ_q y^q Σ_p c X^p."""
     x = float(j * (j + 1))
-    squares, raised = k.astype(float) ** 2, (k + 2.0 * n) ** 2
-    total = np.zeros(k.shape)
-    for (p, q, order), c in operators.items():
-        if order == n and (n or q):
-            total += c * x**p * 0.5 * (raised**q + squares**q)
-    return total * _ladder(j, k, n) if n else total
+    powers = [(p, q, c) for (p, q, order), c in operators.items() if order == n and (n or q)]
+    coefficients = np.zeros(1 + max((q for _, q, _ in powers), default=0))
+    for p, q, c in powers:
+        coefficients[-1 - q] += c * x**p
+
+    squares = (k * k).astype(float)
+    if n == 0:
+        return np.asarray(np.polyval(coefficients, squares))
+    total = 0.5 * (np.polyval(coefficients, squares) + np.polyval(coefficients, (k + 2.0 * n) ** 2))
+    for i in range(2 * n):
+        total *= steps[i : i + len(k)]
+    return np.asarray(total)
 
 
-def block_bands(operators: Operators, block: WangBlock) -> list[NDArray[np.float64]]:
+def block_bands(multiplet: Multiplet, block: WangBlock) -> list[NDArray[np.float64]]:
     """Diagonals of the block's matrix, without the scalar part: the n-th has the elements (i+n, i), size - n of them.
 
     ⟨K' s|H|K s⟩ = ⟨K'|H|K⟩ + s ⟨K'|H|-K⟩, times √2 where one of them is K = 0. The second term is there where
     K + K' = 2n and folds an operator of high n back to lower diagonals.
     """
-    order = max((n for _, _, n in operators), default=0)
-    k = block.k
-    bands = []
-    for n in range(min(order, block.size - 1) + 1):
-        band = _element(operators, block.j, k[: block.size - n], n)
-        if n and block.first_k == 0:
+    bands = [multiplet.band(block, n) for n in range(min(multiplet.order, block.size - 1) + 1)]
+    if block.first_k == 0:
+        for band in bands[1:]:
             band[0] *= np.sqrt(2)
-        bands.append(band)
 
-    for n in range(1, order + 1):
-        for low in range(max(block.first_k, 1), n + 1):
+    last = block.first_k + 2 * (block.size - 1)
+    for n in range(1, multiplet.order + 1):
+        for low in range(max(block.first_k, 2 - block.first_k % 2), n + 1, 2):
             high = 2 * n - low
-            if (low - block.first_k) % 2 == 0 and high <= block.k[-1]:
-                folded = _element(operators, block.j, np.array([-low]), n)[0]
-                bands[(high - low) // 2][(low - block.first_k) // 2] += block.sign * folded
+            if high <= last:
+                bands[(high - low) // 2][(low - block.first_k) // 2] += block.sign * multiplet.folded(low, n)
     return bands

@@ -12,7 +12,8 @@ three dipole components connect different pairs of symmetry species, so they nev
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -56,37 +57,35 @@ def allowed_pairs(levels: Levels, dipole_abc: tuple[float, float, float]) -> Ite
                     yield PairOfBlocks(up, low, str(axis))
 
 
-def _along(j: int, rise: int, k: Floats) -> Floats:
-    """Reduced amplitude of Φz from J to J + rise, K → K."""
+@lru_cache(maxsize=16)
+def _along(j: int, rise: int) -> Floats:
+    """Reduced amplitude of Φz from J to J + rise, K → K, for K = 0 ... J."""
+    k = np.arange(j + 1.0)
     if rise:
         return np.sqrt((j + 1 - k) * (j + 1 + k) / (j + 1))
     return k * np.sqrt((2 * j + 1) / (j * (j + 1)))
 
 
-def _across(j: int, rise: int, k: Floats, step: int) -> Floats:
-    """Size of the reduced amplitude of Φx and Φy from J to J + rise, K → K + step."""
+@lru_cache(maxsize=16)  # the pairs of blocks come J by J
+def _across(j: int, rise: int, step: int) -> Floats:
+    """Reduced amplitude of Φy from J to J + rise, K → K + step, for K = 0 ... J in the Wang basis (√2 where a K is 0)."""
+    k = np.arange(j + 1.0)
+    up, half = step * k, np.where((k == 0) | (k + step == 0), 0.5, 0.25)
     if rise:
-        return np.sqrt((j + step * k + 1) * (j + step * k + 2) / (4 * (j + 1)))
-    return np.sqrt((2 * j + 1) * (j - step * k) * (j + step * k + 1) / (4 * j * (j + 1)))
+        return np.sqrt((j + up + 1) * (j + up + 2) * (half / (j + 1)))
+    return step * np.sqrt((j - up) * (j + up + 1) * (half * (2 * j + 1) / (j * (j + 1))))
 
 
-def _sign(rise: int, along_x: bool, step: int) -> int:
-    if rise:
-        return -step if along_x else 1
-    return 1 if along_x else step
+def _x_over_y(rise: int, step: int) -> int:
+    """Sign of the amplitude of Φx where that of Φy is as `_across` has it."""
+    return -step if rise else step
 
 
-def _turned(low: SolvedBlock, up: WangBlock, shift: int, amplitude: Callable[[Floats], Floats]) -> Floats:
-    """Rows of amplitude(K) × vectors of `low`, moved from K to K + shift and set on the K of `up`."""
-    first = (up.first_k - shift - low.basis.first_k) // 2  # row of `low` that lands on row 0 of `up`
-    rows = np.arange(max(first, 0), min(low.basis.size, first + up.size))
-    out = np.zeros((up.size, low.basis.size))
-    k = low.basis.k[rows].astype(float)
-    factor = amplitude(k)
-    if shift:
-        factor = np.where((k == 0) | (k + shift == 0), np.sqrt(2) * factor, factor)
-    out[rows - first] = factor[:, None] * low.vectors[rows]
-    return out
+def _shifted(low: SolvedBlock, up: WangBlock, step: int) -> tuple[slice, slice]:
+    """Which K of `low` land on which K of `up` when K changes by `step`."""
+    first = (up.first_k - step - low.basis.first_k) // 2  # place in `low` that lands on place 0 of `up`
+    start, stop = max(first, 0), min(low.basis.size, first + up.size)
+    return slice(start, stop), slice(start - first, stop - first)
 
 
 def amplitudes(pair: PairOfBlocks, axes: str) -> Floats:
@@ -96,10 +95,13 @@ def amplitudes(pair: PairOfBlocks, axes: str) -> Floats:
     """
     up, low, axis = pair
     j, rise = low.basis.j, up.basis.j - low.basis.j
-    if axis == axes[2]:
-        moved = _turned(low, up.basis, 0, lambda k: _along(j, rise, k))
-    else:
-        along_x = axis == axes[0]
-        moved = _turned(low, up.basis, 1, lambda k: _sign(rise, along_x, 1) * _across(j, rise, k, 1))
-        moved += _turned(low, up.basis, -1, lambda k: _sign(rise, along_x, -1) * _across(j, rise, k, -1))
-    return up.vectors.T @ moved
+    states = low.vectors.T
+    moved = np.zeros((low.basis.size, up.basis.size))
+    for step in (0,) if axis == axes[2] else (1, -1):
+        source, target = _shifted(low, up.basis, step)
+        table = _across(j, rise, step) if step else _along(j, rise)
+        amplitude = table[low.basis.first_k :: 2][source]
+        if step and axis == axes[0]:
+            amplitude = _x_over_y(rise, step) * amplitude
+        moved[:, target] += states[:, source] * amplitude
+    return np.asarray(up.vectors.T @ moved.T)

@@ -5,7 +5,7 @@ Nothing weak is left out here but what an `IntensityCut` or a range of frequenci
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +18,7 @@ from rotor.spectra.strengths import PairOfBlocks, allowed_pairs, amplitudes
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int32]
 EVERYTHING = (0.0, float("inf"))
+LONG_LIST = 1_000_000  # lines above which the compiled loop is loaded
 
 
 @dataclass(frozen=True)
@@ -80,28 +81,48 @@ def _joined(pieces: list[Transitions]) -> Transitions:
 
 def _every_pair(pairs: list[PairOfBlocks], axes: str, dipole_abc: tuple[float, float, float]) -> Transitions:
     """All lines of all pairs, written straight into columns of their final length."""
-    total = sum(p.up.basis.size * p.low.basis.size for p in pairs)
+    sizes = [pair.up.basis.size * pair.low.basis.size for pair in pairs]
+    total = sum(sizes)
     out = Transitions(np.empty(total), np.empty(total), np.empty(total, np.int32), np.empty(total, np.int32))
+    fill = _fill_of(total)
+
     at = 0
-    for pair in pairs:
-        n_up, n_low = pair.up.basis.size, pair.low.basis.size
-        here, shape = slice(at, at + n_up * n_low), (n_up, n_low)
-        at += n_up * n_low
-
-        strength = out.strength_debye2[here].reshape(shape)
-        amplitude = amplitudes(pair, axes)
-        np.multiply(amplitude, amplitude, out=strength)
-        strength *= dipole_abc["abc".index(pair.axis)] ** 2
-
-        difference = out.frequency_mhz[here].reshape(shape)
-        np.subtract.outer(pair.up.energies_mhz, pair.low.energies_mhz, out=difference)
-        first = np.arange(pair.up.start, pair.up.start + n_up, dtype=np.int32)[:, None]
-        second = np.arange(pair.low.start, pair.low.start + n_low, dtype=np.int32)[None, :]
-        falling = difference < 0
-        out.upper[here].reshape(shape)[...] = np.where(falling, second, first)
-        out.lower[here].reshape(shape)[...] = np.where(falling, first, second)
-        np.abs(difference, out=difference)
+    for pair, size in zip(pairs, sizes, strict=True):
+        here = slice(at, at + size)
+        at += size
+        up, low = pair.up, pair.low
+        fill(
+            up.energies_mhz, low.energies_mhz, amplitudes(pair, axes), dipole_abc["abc".index(pair.axis)] ** 2,
+            up.start, low.start,
+            out.frequency_mhz[here], out.strength_debye2[here], out.upper[here], out.lower[here],
+        )  # fmt: skip
     return out
+
+
+def _fill_of(total: int) -> Callable[..., None]:
+    """The compiled loop for lists so long that loading the compiler pays."""
+    if total < LONG_LIST:
+        return _fill_pair
+    from rotor.spectra._kernels import fill_pair
+
+    return fill_pair  # type: ignore[no-any-return]
+
+
+def _fill_pair(
+    energies_up: Floats, energies_low: Floats, amplitude: Floats, dipole2: float, start_up: int, start_low: int,
+    frequency: Floats, strength: Floats, upper: Indices, lower: Indices,
+) -> None:  # fmt: skip
+    """Frequency, strength and states of all lines between two blocks, the upper state being the one higher in energy."""
+    shape = amplitude.shape
+    difference = np.subtract.outer(energies_up, energies_low)
+    np.abs(difference, out=frequency.reshape(shape))
+    np.multiply(amplitude * amplitude, dipole2, out=strength.reshape(shape))
+
+    first = np.arange(start_up, start_up + shape[0], dtype=np.int32)[:, None]
+    second = np.arange(start_low, start_low + shape[1], dtype=np.int32)[None, :]
+    falls = difference < 0
+    upper.reshape(shape)[...] = np.where(falls, second, first)
+    lower.reshape(shape)[...] = np.where(falls, first, second)
 
 
 def _chosen(
