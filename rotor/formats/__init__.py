@@ -1,0 +1,1 @@
+"""File formats of the field, one file a format; a folder where a format has several files."""

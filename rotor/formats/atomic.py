@@ -1,0 +1,53 @@
+"""Results are written beside and renamed: whoever opens the path finds the whole file, the old one, or none."""
+
+from __future__ import annotations
+
+import os
+import secrets
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import IO, Any
+
+
+@contextmanager
+def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
+    """A path in the same folder to write to; renamed to `path` when the block ends, removed when it fails.
+
+    A link is followed, so that the file it names is replaced and the link stays. What is no regular file (a pipe,
+    a device such as /dev/null) cannot be renamed over and is handed out as it is.
+
+    Raises FileNotFoundError when the folder does not exist, IsADirectoryError when `path` is a folder.
+
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     with atomic_path(Path(folder) / "a.txt") as unfinished:
+    ...         _ = unfinished.write_text("whole")
+    ...     [(file.name, file.read_text()) for file in Path(folder).iterdir()]
+    [('a.txt', 'whole')]
+    """
+    target = Path(path).resolve()
+    if target.is_dir():
+        raise IsADirectoryError(f"{path}: is a folder; give the name of a file to write")
+    if not target.parent.is_dir():
+        raise FileNotFoundError(f"{path}: there is no folder {target.parent}; make it first")
+    if target.exists() and not target.is_file():
+        yield target
+        return
+
+    unfinished = target.with_name(f".{target.name}.{secrets.token_hex(4)}.part")
+    try:
+        yield unfinished
+        os.replace(unfinished, target)
+    finally:
+        unfinished.unlink(missing_ok=True)
+
+
+@contextmanager
+def open_atomic(path: str | os.PathLike[str], mode: str = "wb", **options: Any) -> Iterator[IO[Any]]:
+    """An open file, text or binary by `mode`, that takes the place of `path` when the block ends without an error.
+
+    `options` are those of `open`, such as `encoding` and `newline`.
+    """
+    with atomic_path(path) as unfinished, open(unfinished, mode, **options) as handle:
+        yield handle

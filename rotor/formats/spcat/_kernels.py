@@ -1,0 +1,136 @@
+"""Catalogue lines as characters, compiled: `put_rows` of rows.py, line by line and three times as fast."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+import numba
+import numpy as np
+
+from rotor.formats.spcat.fields import BLANK, QUANTUM_RANGE
+from rotor.formats.spcat.rows import QUANTA, Columns, Mask, Text, degeneracy_table, quantum_table
+
+_Function = TypeVar("_Function", bound=Callable[..., Any])
+
+_QUANTA_TEXT = quantum_table()
+_DEGENERACY_TEXT = degeneracy_table()
+_PAIRS = np.frombuffer("".join(f"{i:02d}" for i in range(100)).encode(), dtype=np.uint8).reshape(100, 2)
+_LOWEST, _NO_QUANTUM = QUANTUM_RANGE[0], BLANK
+_SPACE, _MINUS, _POINT, _ZERO = np.uint8(32), np.uint8(45), np.uint8(46), np.uint8(48)
+
+
+def compiled(function: _Function) -> _Function:
+    """The function compiled, the machine code kept on disk; compiled anew each time where no folder can be written."""
+    try:
+        kept: _Function = numba.njit(cache=True)(function)
+    except RuntimeError:  # numba found neither its own cache folder nor the user's writable
+        kept = numba.njit(function)
+    return kept
+
+
+@compiled
+def _put_digits(row, start, stop, left, negative):  # type: ignore[no-untyped-def]
+    """A whole number with its sign, right-justified in row[start:stop]; false where it needs more room."""
+    at = stop
+    while left >= 100 and at - 2 >= start:
+        pair = left % 100
+        left = left // 100
+        at -= 2
+        row[at] = _PAIRS[pair, 0]
+        row[at + 1] = _PAIRS[pair, 1]
+    while at > start and (left > 0 or at == stop):
+        at -= 1
+        row[at] = _ZERO + left % 10
+        left = left // 10
+    if negative:
+        if at == start:
+            return False
+        at -= 1
+        row[at] = _MINUS
+    while at > start:
+        at -= 1
+        row[at] = _SPACE
+    return left == 0
+
+
+@compiled
+def _put_decimal(row, start, stop, value, decimals, scale):  # type: ignore[no-untyped-def]
+    """A number rounded as printf rounds it; see `rows.round_decimal` for why the sign of `above_half` decides."""
+    a = abs(value)
+    if not a * scale < 4503599627370496.0:  # 2^52; also false for nan
+        return False
+    product = a * scale
+    split = a * 134217729.0
+    upper = split - (split - a)
+    rest = (upper * scale - product) + (a - upper) * scale
+    whole = np.int64(product)
+    above_half = (product - whole - 0.5) + rest
+    if above_half > 0.0 or (above_half == 0.0 and whole & 1):
+        whole += 1
+
+    point = stop - 1 - decimals
+    left = np.uint64(whole)
+    at = stop
+    while at - 2 > point:
+        pair = left % np.uint64(100)
+        left = left // np.uint64(100)
+        at -= 2
+        row[at] = _PAIRS[pair, 0]
+        row[at + 1] = _PAIRS[pair, 1]
+    if at - 1 > point:
+        at -= 1
+        row[at] = _ZERO + left % np.uint64(10)
+        left = left // np.uint64(10)
+    row[point] = _POINT
+    return _put_digits(row, start, point, np.uint32(left), np.signbit(value)) and left < np.uint64(4294967296)
+
+
+@compiled
+def _put_quanta(row, start, quanta):  # type: ignore[no-untyped-def]
+    for i in range(quanta.shape[0]):
+        value = np.int64(quanta[i])
+        index = 0 if value == _NO_QUANTUM else value - _LOWEST + 1
+        if index < 0 or index >= _QUANTA_TEXT.shape[0] or (index == 0 and value != _NO_QUANTUM):
+            return False
+        row[start + 2 * i] = _QUANTA_TEXT[index, 0]
+        row[start + 2 * i + 1] = _QUANTA_TEXT[index, 1]
+    return True
+
+
+@compiled
+def _put_whole(row, start, stop, value):  # type: ignore[no-untyped-def]
+    wide = np.int64(value)
+    return _put_digits(row, start, stop, np.uint32(abs(wide)), wide < 0)
+
+
+@compiled
+def _fill(out, plain, frequency, error, lgint, dr, energy, g_upper, tag, qnfmt, upper, lower, decimals, scales):  # type: ignore[no-untyped-def]
+    width = 2 * upper.shape[1]
+    for i in range(out.shape[0]):
+        row = out[i]
+        fits = _put_decimal(row, 0, 13, frequency[i], decimals[0], scales[0])
+        fits &= _put_decimal(row, 13, 21, error[i], decimals[1], scales[1])
+        fits &= _put_decimal(row, 21, 29, lgint[i], decimals[2], scales[2])
+        fits &= _put_whole(row, 29, 31, dr[i])
+        fits &= _put_decimal(row, 31, 41, energy[i], decimals[3], scales[3])
+        known = 0 <= g_upper[i] < _DEGENERACY_TEXT.shape[0]
+        for column in range(3):
+            row[41 + column] = _DEGENERACY_TEXT[g_upper[i] if known else 0, column]
+        fits &= _put_whole(row, 44, 51, tag[i])
+        fits &= _put_whole(row, 51, 55, qnfmt[i])
+        fits &= _put_quanta(row, 55, upper[i])
+        fits &= _put_quanta(row, 55 + width, lower[i])
+        for column in range(55 + 2 * width, out.shape[1]):
+            row[column] = _SPACE
+        plain[i] = fits and known
+
+
+def put_rows(out: Text, columns: Columns, decimals: tuple[int, int, int, int]) -> Mask:
+    """Fill `out` with the lines of `columns` and tell which fit, as `rows.put_rows` does."""
+    if out.shape[1] < QUANTA + 4 * columns.quanta_upper.shape[1]:
+        raise ValueError(f"rows of {out.shape[1]} characters have no room for {columns.quanta_upper.shape[1]} quantum numbers")
+    plain = np.zeros(len(out), dtype=np.bool_)
+    scales = tuple(10.0**d for d in decimals)
+    _fill(out, plain, *columns, decimals, scales)
+    return plain
