@@ -127,9 +127,8 @@ class Lines:
         )
 
     def sorted(self) -> Lines:
-        """The same lines, rising in frequency, then E″."""
-        order = np.argsort(self.frequency_mhz, kind="stable")
-        return self.where(order)
+        """The same lines, rising in frequency."""
+        return self.where(np.argsort(self.frequency_mhz))
 
     def strongest(self, count: int) -> Lines:
         """The `count` most intense lines, strongest first."""
