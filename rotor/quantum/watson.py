@@ -127,7 +127,8 @@ class Multiplet:
         self._margin = 2 * self.order  # K starts at -margin, so that folded elements are at hand
         k = np.arange(-self._margin, j + 1)
         steps = _ladder_steps(j, np.arange(-self._margin, j + self._margin + 1))
-        self._elements = [_elements(operators, j, k, n, steps) for n in range(self.order + 1)]
+        with np.errstate(over="ignore", invalid="ignore"):  # said where the block is diagonalised
+            self._elements = [_elements(operators, j, k, n, steps) for n in range(self.order + 1)]
 
     def folded(self, low: int, n: int) -> float:
         """⟨2n - low|H|-low⟩, which connects K = low and K = 2n - low of a Wang block."""
