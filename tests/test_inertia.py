@@ -62,7 +62,9 @@ def test_tetrahedral_frame():
     corners = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]], dtype=float)
     assert kind_from_moments(principal_frame(point_masses([1] * 4, corners)).moments).kind == "spherical"
     one_heavy = principal_frame(point_masses([1.1, 1, 1, 1], corners), [1.1, 1, 1, 1], corners)
-    assert kind_from_moments(one_heavy.moments).kind == "prolate" or kind_from_moments(one_heavy.moments).kind == "oblate"
+    assert (
+        kind_from_moments(one_heavy.moments).kind == "prolate" or kind_from_moments(one_heavy.moments).kind == "oblate"
+    )
 
 
 def test_momentum_is_along_the_angular_velocity_off_a_principal_axis_only_where_moments_coincide():

@@ -30,8 +30,13 @@ CHIRAL = Molecule(
     [[0, 0, 0], [0.6, 0.6, 0.7], [0.8, -0.8, -0.75], [-1.0, 1.05, -1.0], [-1.1, -1.1, 1.15]],
     dipole_debye=[0.3, -0.7, 0.4],
 )
-AMMONIA = Molecule(("N", "H", "H", "H"), [[0, 0, 0.1173], *([0.9377 * np.cos(t), 0.9377 * np.sin(t), -0.2738] for t in (0, 2 * np.pi / 3, 4 * np.pi / 3))])
-METHANE = Molecule(("C", "H", "H", "H", "H"), 0.629 * np.array([[0, 0, 0], [1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]))
+AMMONIA = Molecule(
+    ("N", "H", "H", "H"),
+    [[0, 0, 0.1173], *([0.9377 * np.cos(t), 0.9377 * np.sin(t), -0.2738] for t in (0, 2 * np.pi / 3, 4 * np.pi / 3))],
+)
+METHANE = Molecule(
+    ("C", "H", "H", "H", "H"), 0.629 * np.array([[0, 0, 0], [1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]])
+)
 
 
 def shaken(molecule: Molecule, seed: int) -> Molecule:
@@ -103,11 +108,15 @@ def test_linear_in_any_orientation(seed):
     assert top.kappa is None
 
 
-@pytest.mark.parametrize(("bend_degrees", "kind"), [(0.0, "linear"), (0.01, "linear"), (0.5, "asymmetric"), (5.0, "asymmetric")])
+@pytest.mark.parametrize(
+    ("bend_degrees", "kind"), [(0.0, "linear"), (0.01, "linear"), (0.5, "asymmetric"), (5.0, "asymmetric")]
+)
 def test_near_linear_says_by_which_number(bend_degrees, kind):
     """Hard case 9: OCS bent a little; I_a/I_c against 1e-6 decides and is told with its margin."""
     t = np.radians(bend_degrees)
-    top = Top.from_molecule(Molecule(("O", "C", "S"), [[0, 0, 1.156], [0, 0, 0], [1.561 * np.sin(t), 0, -1.561 * np.cos(t)]]))
+    top = Top.from_molecule(
+        Molecule(("O", "C", "S"), [[0, 0, 1.156], [0, 0, 0], [1.561 * np.sin(t), 0, -1.561 * np.cos(t)]])
+    )
     assert top.kind == kind
     assert top.kind_of_top.margin > 1
     assert (top.kind_of_top.linearity < top.kind_of_top.linear_below) == (kind == "linear")
@@ -170,7 +179,9 @@ def test_averaged_masses_would_be_seen(shared: Path):
 def deviation(entry: dict) -> float:
     """Largest relative difference between constants of the geometry and those measured."""
     rows = [line.split() for line in entry["xyz"].splitlines() if line.strip()]
-    top = Top.from_molecule(Molecule(tuple(r[0] for r in rows), [[float(x) for x in r[1:4]] for r in rows], charge=entry["charge"]))
+    top = Top.from_molecule(
+        Molecule(tuple(r[0] for r in rows), [[float(x) for x in r[1:4]] for r in rows], charge=entry["charge"])
+    )
     measured = np.array(sorted((x for x in entry["rot_cm1"] if x), reverse=True)) * units.MHZ_PER_CM
     a, b, c = top.rotational_constants_mhz
     ours = {1: [c], 2: [b, c] if top.kind == "linear" else [a, c], 3: [a, b, c]}[len(measured)]

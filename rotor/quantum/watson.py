@@ -68,7 +68,9 @@ def rigid_operators(constants: Constants) -> Operators:
     if constants.kind in ("linear", "spherical"):
         return {(1, 0, 0): constants["B"]}
     if constants.kind in ("prolate", "oblate"):
-        along, across = (constants["A"], constants["B"]) if constants.kind == "prolate" else (constants["C"], constants["B"])
+        along, across = (
+            (constants["A"], constants["B"]) if constants.kind == "prolate" else (constants["C"], constants["B"])
+        )
         return {(1, 0, 0): across, (0, 1, 0): along - across}
 
     axes = REPRESENTATIONS[str(constants.representation)]
@@ -142,7 +144,7 @@ class Multiplet:
 
 def _ladder_steps(j: int, k: NDArray[np.int64]) -> NDArray[np.float64]:
     """√(J(J+1) - K(K+1)), what J₊ makes of |J K⟩; zero outside the multiplet."""
-    return np.sqrt(np.maximum((j - k) * (j + k + 1), 0))
+    return np.asarray(np.sqrt(np.maximum((j - k) * (j + k + 1), 0)))
 
 
 def _elements(
