@@ -48,6 +48,14 @@ class SpinWeights:
         """The weights by class name, as `from_mapping` takes them; empty for the rule "none"."""
         return {} if self.rule == "none" else dict(zip(self.classes, self.values, strict=True))
 
+    @property
+    def mean(self) -> float:
+        """The weight of one component averaged over many levels: what the classical limit of Q carries."""
+        if self.rule == "irrep":
+            j = np.arange(12)  # the counts of irreps repeat with J modulo 12
+            return float(self.of_spherical(j).sum() / (2 * j + 1).sum())
+        return sum(self.values) / len(self.values)
+
     def of_ka_kc(self, species: str) -> int:
         """Weight of an asymmetric-top level whose parities of Ka and Kc are `species`."""
         if self.rule == "none":
@@ -55,20 +63,29 @@ class SpinWeights:
         self._require("KaKc", "an asymmetric top")
         return self.values[self.classes.index(species)]
 
-    def of_k(self, k: ArrayLike) -> NDArray[np.int64]:
-        """Weights of symmetric-top levels with the given |K|, one component of the K doublet each."""
+    def of_symmetric(self, j: ArrayLike, k: ArrayLike) -> NDArray[np.int64]:
+        """Weights of symmetric-top levels (J, |K|), summed over both signs of K.
+
+        Weights are by K modulo n, of one component; a K doublet counts twice.
+        """
         k = np.asarray(k)
+        both = np.where(k == 0, 1, 2)
         if self.rule == "none":
-            return np.ones(k.shape, dtype=np.int64)
+            return both
         self._require("K", "a symmetric top")
-        return np.array(self.values, dtype=np.int64)[k % len(self.values)]
+        return both * np.array(self.values, dtype=np.int64)[k % len(self.values)]
+
+    def of_spherical(self, j: ArrayLike) -> NDArray[np.int64]:
+        """Weights of a spherical top's levels of each J, summed over the irreps that its 2J+1 components of K hold."""
+        j = np.asarray(j)
+        if self.rule == "none":
+            return 2 * j + 1
+        self._require("irrep", "a spherical top")
+        counts = _irreps_in_j(j, self.classes)
+        return sum((w * n for w, n in zip(self.values, counts, strict=True)), np.zeros_like(j))
 
     def of_j(self, j: ArrayLike) -> NDArray[np.int64]:
-        """Weights of linear-molecule levels, or of a spherical top's levels summed over the irreps in each J.
-
-        For a spherical top the number is the weight times the number of levels: of 2J+1 components of K,
-        how many spin-weighted ones exist.
-        """
+        """Weights of linear-molecule levels, by parity of J."""
         j = np.asarray(j)
         if self.rule == "none":
             return np.ones(j.shape, dtype=np.int64)
@@ -81,6 +98,26 @@ class SpinWeights:
                 f"spin weights by {self.rule} ({', '.join(self.classes)}) do not fit {what}; "
                 f"give {_EXAMPLES[rule]} or none"
             )
+
+
+def _irreps_in_j(j: NDArray[np.int64], classes: tuple[str, ...]) -> list[NDArray[np.int64]]:
+    """How often each irrep of T or O stands in the 2J+1 components of K; E counts pairs, F triples.
+
+    By characters: χ(C3) = 1, 0, -1 for J mod 3; χ(C2) = (-1)^J; χ(C4) = 1, 1, -1, -1 for J mod 4 (Bunker and Jensen,
+    table B-2).
+    """
+    n = 2 * j + 1
+    c2, c3 = 1 - 2 * (j % 2), np.array([1, 0, -1])[j % 3]
+    if len(classes) == 3:
+        return [(n + 3 * c2 + 8 * c3) // 12, (n + 3 * c2 - 4 * c3) // 12, (n - c2) // 4]
+    c4 = np.array([1, 1, -1, -1])[j % 4]
+    return [
+        (n + 8 * c3 + 6 * c2 + 6 * c4 + 3 * c2) // 24,
+        (n + 8 * c3 - 6 * c2 - 6 * c4 + 3 * c2) // 24,
+        (2 * n - 8 * c3 + 6 * c2) // 24,
+        (3 * n - 6 * c2 + 6 * c4 - 3 * c2) // 24,
+        (3 * n + 6 * c2 - 6 * c4 - 3 * c2) // 24,
+    ]
 
 
 _EXAMPLES = {

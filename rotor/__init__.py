@@ -1,0 +1,57 @@
+"""Molecular rotation: a molecule goes in, a rotational spectrum comes out.
+
+    import rotor
+    top = rotor.read("water")
+    lines = rotor.line_list(top, temperature_k=300, jmax=20)
+    rotor.write(lines, "water.cat")
+
+The public names stand below. They are loaded when first used, so that `import rotor` does no work.
+"""
+
+from importlib import import_module
+from importlib.metadata import PackageNotFoundError, version
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rotor.constants import Constants as Constants
+    from rotor.formats import read as read
+    from rotor.formats import write as write
+    from rotor.molecules.molecule import Molecule as Molecule
+    from rotor.quantum.levels import Levels as Levels
+    from rotor.quantum.levels import solve_levels as solve_levels
+    from rotor.spectra.lines import Lines as Lines
+    from rotor.spectra.lines import line_list as line_list
+    from rotor.spectra.spectrum import Spectrum as Spectrum
+    from rotor.thermo import partition_function as partition_function
+    from rotor.top import Top as Top
+
+_HOME = {
+    "Constants": "rotor.constants",
+    "Levels": "rotor.quantum.levels",
+    "Lines": "rotor.spectra.lines",
+    "Molecule": "rotor.molecules.molecule",
+    "Spectrum": "rotor.spectra.spectrum",
+    "Top": "rotor.top",
+    "line_list": "rotor.spectra.lines",
+    "partition_function": "rotor.thermo",
+    "read": "rotor.formats",
+    "solve_levels": "rotor.quantum.levels",
+    "write": "rotor.formats",
+}
+
+__all__ = [*sorted(_HOME), "__version__"]
+
+
+def __getattr__(name: str) -> Any:
+    if name == "__version__":
+        try:
+            return version("molrotor")
+        except PackageNotFoundError:  # run from a source tree that was never installed
+            return "0+source"
+    if name in _HOME:
+        return getattr(import_module(_HOME[name]), name)
+    raise AttributeError(f"module 'rotor' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return list(__all__)

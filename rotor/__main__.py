@@ -1,0 +1,5 @@
+"""`python -m rotor` is the command `rotor`."""
+
+from rotor.cli import main
+
+main()

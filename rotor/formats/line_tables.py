@@ -1,0 +1,121 @@
+"""A line list as a file: .cat, .csv, .parquet, .json, each with its provenance inside or in a file beside it."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rotor.formats.atomic import atomic_path, open_atomic
+from rotor.formats.spcat.cat import write_cat
+from rotor.formats.spcat.catalogue import Catalogue
+from rotor.formats.spcat.fields import BLANK
+from rotor.spectra.lines import Lines
+
+_QNFMT = {("j",): 101, ("j", "k"): 202, ("j", "ka", "kc"): 303}
+MAX_TAG = 999_999
+
+
+def catalogue(lines: Lines, tag: int = 0) -> Catalogue:
+    """The lines as a catalogue of the 80-column format.
+
+    Lines of zero strength have no logarithm and are left out; ERR is 0, since the constants' uncertainties are not
+    carried to the lines. Raises ValueError for a tag that has no place in its six digits.
+    """
+    if not 0 <= tag <= MAX_TAG:
+        raise ValueError(f"tag {tag}: a catalogue's tag has at most six digits")
+    lgint = lines.lgint
+    if not np.isfinite(lgint).all():
+        lines, lgint = lines.where(np.isfinite(lgint)), lgint[np.isfinite(lgint)]
+
+    n, width = len(lines), len(lines.quanta_names)
+    quanta = [np.full((n, 6), BLANK, dtype=np.int16) for _ in range(2)]
+    quanta[0][:, :width], quanta[1][:, :width] = lines.quanta(lines.upper), lines.quanta(lines.lower)
+    return Catalogue(
+        frequency_mhz=lines.frequency_mhz,
+        error_mhz=np.zeros(n),
+        lgint=lgint,
+        dr=np.full(n, 2 if lines.levels.kind == "linear" else 3, dtype=np.int16),
+        energy_lower_cm=lines.energy_lower_cm,
+        g_upper=lines.g_upper.astype(np.int32),
+        tag=np.full(n, tag, dtype=np.int32),
+        qnfmt=np.full(n, _QNFMT[lines.quanta_names], dtype=np.int32),
+        quanta_upper=quanta[0],
+        quanta_lower=quanta[1],
+    )
+
+
+def provenance(lines: Lines) -> dict[str, Any]:
+    """What the lines were made from: version, constants and their source, dipole, weights, settings, Q."""
+    import rotor
+
+    top = lines.top
+    return {
+        "program": "rotor",
+        "version": rotor.__version__,
+        "name": top.name,
+        "kind": top.kind,
+        "constants": top.constants.text(),
+        "reduction": top.constants.reduction,
+        "representation": top.constants.representation,
+        "constants_source": top.source,
+        "dipole_abc_debye": top.dipole_abc_debye,
+        "dipole_source": top.dipole_source,
+        "spin_weights": top.spin_weights.to_mapping(),
+        "spin_weights_source": top.weights_source,
+        "temperature_k": lines.temperature_k,
+        "jmax": lines.jmax,
+        "min_lgint": _finite(lines.min_lgint),
+        "range_mhz": [_finite(bound) for bound in lines.range_mhz],
+        "q": lines.q,
+        "q_source": lines.partition.source,
+        "lines": len(lines),
+        "notes": list(top.notes),
+    }
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def write_lines(lines: Lines, path: str | os.PathLike[str], settings: Mapping[str, Any] | None = None) -> None:
+    """Write lines in the format that the suffix of `path` names: .cat, .cat.gz, .csv, .parquet or .json.
+
+    settings: what else the provenance shall say (the command line, for instance); its key "tag" is the tag of a .cat.
+    Parquet and JSON carry the provenance inside, the others in a file beside, `path` + ".provenance.json".
+    """
+    name = Path(path).name.lower()
+    story = provenance(lines) | {k: v for k, v in (settings or {}).items() if k != "tag"}
+    if name.endswith((".cat", ".cat.gz")):
+        write_cat(catalogue(lines, int((settings or {}).get("tag", 0))), path)
+        _write_beside(path, story)
+    elif name.endswith(".csv"):
+        with open_atomic(path) as handle:
+            lines.to_polars().write_csv(handle)
+        _write_beside(path, story)
+    elif name.endswith(".parquet"):
+        with atomic_path(path) as unfinished:
+            lines.to_polars().write_parquet(unfinished, metadata={"provenance": json.dumps(story)})
+    elif name.endswith(".json"):
+        with open_atomic(path, "w", encoding="utf-8") as handle:
+            json.dump({"provenance": story, "lines": records(lines)}, handle, indent=1, allow_nan=False)
+    else:
+        raise ValueError(f"{path}: lines can be written as .cat, .cat.gz, .csv, .parquet or .json; the suffix names the format")
+
+
+def records(lines: Lines) -> list[dict[str, float | int | None]]:
+    """The lines as a list of plain records, numbers that are not finite as None."""
+    columns = {name: column.tolist() for name, column in lines.columns.items()}
+    rows = zip(*columns.values(), strict=True)
+    return [{k: None if v != v or v in (math.inf, -math.inf) else v for k, v in zip(columns, row, strict=True)} for row in rows]
+
+
+def _write_beside(path: str | os.PathLike[str], story: Mapping[str, Any]) -> None:
+    with open_atomic(f"{os.fspath(path)}.provenance.json", "w", encoding="utf-8") as handle:
+        json.dump(story, handle, indent=1, ensure_ascii=False)
+        handle.write("\n")

@@ -1,0 +1,275 @@
+"""A molecule: symbols, isotopes, positions, and its dipole and polarizability in the same frame.
+
+Nothing here knows of rotation: a `Molecule` is what a file or a program says, checked once, and carried with
+where it came from and how far it can be trusted.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rotor.molecules.nuclei import Isotope, isotope
+from rotor.units import DEBYE_PER_E_ANGSTROM
+
+_UNTURNED = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+CLOSEST_ANGSTROM = 0.1  # no two nuclei of a molecule come nearer; H2 has 0.74 Å
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Molecule:
+    """Nuclei at fixed positions, checked.
+
+    symbols : n element symbols; isotope names such as `"D"` or `"13C"` are taken apart into symbol and mass number
+    positions_angstrom : (n, 3) array, Å
+    mass_numbers : n mass numbers; left out, they are those of `symbols` or of the most abundant isotopes
+    charge : in elementary charges
+    dipole_debye : (3,) array in the frame of the positions, D, pointing from negative to positive; that of an ion
+        refers to its centre of mass. None: not known
+    dipole_source : where the dipole is from
+    polarizability_angstrom3 : (3, 3) symmetric array in the same frame, polarizability volume in Å³. None: not known
+    name, source : what it is called, where the geometry is from
+    uncertainty : typical relative error of the rotational constants that follow from the geometry. None: not known
+    notes : what a user must be told
+
+    Raises ValueError for no atoms, positions that are not n triples of finite numbers, a symbol or mass number that
+    is no isotope, two atoms nearer than 0.1 Å, or a dipole or tensor of the wrong shape. Arrays are read-only copies.
+
+    >>> water = Molecule(("O", "H", "H"), [[0, 0, 0.1173], [0, 0.7572, -0.4692], [0, -0.7572, -0.4692]])
+    >>> water.formula, water.mass_u
+    ('H2O', 18.010564683056)
+    >>> water.with_isotopes({2: "D"}).formula
+    'H[2H]O'
+    """
+
+    symbols: tuple[str, ...]
+    positions_angstrom: Floats
+    mass_numbers: tuple[int, ...] = ()
+    charge: int = 0
+    dipole_debye: Floats | None = None
+    dipole_source: str = ""
+    polarizability_angstrom3: Floats | None = None
+    name: str = ""
+    source: str = ""
+    uncertainty: float | None = None
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        nuclei = _nuclei(self.symbols, self.mass_numbers)
+        positions = _checked(self.positions_angstrom, (len(nuclei), 3), "positions_angstrom")
+        _refuse_coincident(positions, nuclei)
+        for key, shape in (("dipole_debye", (3,)), ("polarizability_angstrom3", (3, 3))):
+            if getattr(self, key) is not None:
+                object.__setattr__(self, key, _checked(getattr(self, key), shape, key))
+        _refuse_lopsided(self.polarizability_angstrom3)
+        if int(self.charge) != self.charge:
+            raise ValueError(f"charge {self.charge}: a whole number of elementary charges is wanted")
+
+        object.__setattr__(self, "symbols", tuple(one.symbol for one in nuclei))
+        object.__setattr__(self, "mass_numbers", tuple(one.mass_number for one in nuclei))
+        object.__setattr__(self, "positions_angstrom", positions)
+        object.__setattr__(self, "charge", int(self.charge))
+        object.__setattr__(self, "notes", tuple(self.notes))
+
+    @property
+    def nuclei(self) -> tuple[Isotope, ...]:
+        """The isotope of each atom, with its mass, spin and moments."""
+        return tuple(isotope(s, a) for s, a in zip(self.symbols, self.mass_numbers, strict=True))
+
+    @property
+    def masses_u(self) -> Floats:
+        """Masses (n,) of the atoms in u."""
+        return np.array([one.mass_u for one in self.nuclei])
+
+    @property
+    def mass_u(self) -> float:
+        """Total mass in u; the electrons that an ion lacks or has more (5.5e-4 u each) are left out."""
+        return float(self.masses_u.sum())
+
+    @property
+    def centre_of_mass_angstrom(self) -> Floats:
+        """Centre of mass (3,) in Å, in the frame of the positions."""
+        return np.asarray(self.masses_u @ self.positions_angstrom / self.mass_u, dtype=np.float64)
+
+    @property
+    def formula(self) -> str:
+        """Formula in Hill's order; isotopes that are not the most abundant are marked, as in `"C[13C]H6O"`."""
+        return _hill(self.nuclei) + _charge_text(self.charge)
+
+    def with_isotopes(self, changes: Mapping[int | str, str] | str) -> Molecule:
+        """The same geometry with other isotopes, in the same frame.
+
+        Parameters
+        ----------
+        changes : mapping or str
+            Isotope names by 1-based atom number or by element (then every atom of it): `{1: "2H"}`, `{"O": "18O"}`,
+            or as text `"1=2H,O=18O"`. Atom numbers win over elements.
+
+        Returns
+        -------
+        Molecule
+            The dipole of an ion is moved on to the new centre of mass, μ' = μ - q (R' - R); that of a neutral
+            molecule and the geometry stay (the change of the r₀ structure, of the order of 0.001 Å, is neglected).
+
+        Raises
+        ------
+        ValueError
+            An atom or element that the molecule does not have, or an isotope of another element.
+
+        >>> Molecule(("C", "O"), [[0, 0, 0], [0, 0, 1.128]]).with_isotopes("O=18O").mass_numbers
+        (12, 18)
+        """
+        table = _parse_changes(changes) if isinstance(changes, str) else dict(changes)
+        numbers = list(self.mass_numbers)
+        for key, name in sorted(table.items(), key=lambda item: isinstance(item[0], int)):
+            for atom in self._atoms_named(key):
+                numbers[atom] = _same_element(self.symbols[atom], name, atom).mass_number
+        changed = replace(self, mass_numbers=tuple(numbers))
+        if self.dipole_debye is None or not self.charge:
+            return changed
+        shift = changed.centre_of_mass_angstrom - self.centre_of_mass_angstrom
+        return replace(changed, dipole_debye=self.dipole_debye - self.charge * DEBYE_PER_E_ANGSTROM * shift)
+
+    def _atoms_named(self, key: int | str) -> list[int]:
+        """Indices of the atoms that an atom number or an element means."""
+        if isinstance(key, int):
+            if not 1 <= key <= len(self.symbols):
+                raise ValueError(f"atom {key} to substitute: {self.formula} has atoms 1 to {len(self.symbols)}")
+            return [key - 1]
+        atoms = [i for i, symbol in enumerate(self.symbols) if symbol == key]
+        if not atoms:
+            raise ValueError(f"element {key!r} to substitute is not in {self.formula}; use one of it or an atom number")
+        return atoms
+
+    def moved(self, rotation: ArrayLike = _UNTURNED, shift_angstrom: ArrayLike = (0.0, 0.0, 0.0)) -> Molecule:
+        """The molecule turned about the origin, then shifted: r' = R r + s; dipole R μ, polarizability R α Rᵀ.
+
+        Raises ValueError for a matrix (3, 3) that is no proper rotation (a mirror image would be another molecule).
+
+        >>> rod = Molecule(("H", "F"), [[0, 0, 0.917], [0, 0, 0]], dipole_debye=[0, 0, 1.8265])
+        >>> rod.moved([[0, 0, 1], [1, 0, 0], [0, 1, 0]]).dipole_debye
+        array([1.8265, 0.    , 0.    ])
+        """
+        r = _checked(rotation, (3, 3), "rotation")
+        if not np.allclose(r @ r.T, np.eye(3), atol=1e-6) or np.linalg.det(r) < 0:
+            raise ValueError(f"rotation {r.tolist()} is not a proper rotation: R Rᵀ = 1 and det R = 1 are wanted")
+        shift = _checked(shift_angstrom, (3,), "shift_angstrom")
+        dipole, alpha = self.dipole_debye, self.polarizability_angstrom3
+        return replace(
+            self,
+            positions_angstrom=self.positions_angstrom @ r.T + shift,
+            dipole_debye=None if dipole is None else r @ dipole,
+            polarizability_angstrom3=None if alpha is None else r @ alpha @ r.T,
+        )
+
+
+def _nuclei(symbols: Iterable[str], mass_numbers: Iterable[int]) -> tuple[Isotope, ...]:
+    """Isotopes of the atoms; mistakes are told with the 1-based number of the atom."""
+    names = (symbols,) if isinstance(symbols, str) else tuple(symbols)
+    numbers: tuple[int | None, ...] = tuple(mass_numbers) or (None,) * len(names)
+    if not names:
+        raise ValueError("a molecule without atoms: give one atom or more")
+    if len(numbers) != len(names):
+        raise ValueError(f"{len(names)} symbols but {len(numbers)} mass numbers; give one each, or none")
+    found = []
+    for i, (name, number) in enumerate(zip(names, numbers, strict=True), start=1):
+        try:
+            found.append(isotope(name, number))
+        except ValueError as reason:
+            raise ValueError(f"atom {i}: {reason}") from None
+    return tuple(found)
+
+
+def _checked(values: ArrayLike, shape: tuple[int, ...], what: str) -> Floats:
+    """A read-only copy as floats, of that shape and finite."""
+    try:
+        array = np.array(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise ValueError(f"{what}: numbers in an array of shape {shape} are wanted, not {values!r:.80}") from None
+    if array.shape != shape:
+        raise ValueError(f"{what} has shape {array.shape}; {shape} is wanted")
+    if not np.isfinite(array).all():
+        row = int(np.argwhere(~np.isfinite(array))[0][0]) + 1
+        where = f"atom {row}" if what == "positions_angstrom" else f"row {row}"
+        raise ValueError(f"{what}, {where}: {array[row - 1]} is not finite; every number must be")
+    array.setflags(write=False)
+    return array
+
+
+def _refuse_lopsided(tensor: Floats | None) -> None:
+    if tensor is not None and not np.allclose(tensor, tensor.T, atol=1e-6 * max(1.0, float(np.abs(tensor).max()))):
+        raise ValueError(f"polarizability_angstrom3 {tensor.tolist()} is not symmetric; a static one is")
+
+
+def _refuse_coincident(positions: Floats, nuclei: tuple[Isotope, ...]) -> None:
+    """ValueError for the first two atoms nearer than `CLOSEST_ANGSTROM`.
+
+    Atoms are sorted along the longest side of the molecule and compared with those next in that order, until all
+    gaps along that side are wide enough; about n^(5/3) comparisons for a drop of n atoms, not n².
+    """
+    side = int(np.argmax(np.ptp(positions, axis=0)))
+    order = np.argsort(positions[:, side], kind="stable")
+    sorted_positions = positions[order]
+    for apart in range(1, len(order)):
+        gaps = sorted_positions[apart:] - sorted_positions[:-apart]
+        if gaps[:, side].min() > CLOSEST_ANGSTROM:
+            return
+        distances = np.linalg.norm(gaps, axis=1)
+        if distances.min() < CLOSEST_ANGSTROM:
+            k = int(np.argmin(distances))
+            first, second = sorted((int(order[k]), int(order[k + apart])))
+            raise ValueError(
+                f"atoms {first + 1} ({nuclei[first].symbol}) and {second + 1} ({nuclei[second].symbol}) are "
+                f"{distances[k]:.3g} Å apart, nearer than {CLOSEST_ANGSTROM} Å: one on top of the other; remove one, "
+                "or check that the positions are in Å"
+            )
+
+
+def _parse_changes(text: str) -> dict[int | str, str]:
+    """`"1=2H,O=18O"` as a mapping."""
+    table: dict[int | str, str] = {}
+    for item in text.split(","):
+        match = re.fullmatch(r"\s*(\w+)\s*=\s*(\w+)\s*", item)
+        if not match:
+            raise ValueError(f"isotopes {text!r}: {item!r} is not of the kind of '1=2H' or 'O=18O'")
+        table[int(match[1]) if match[1].isdecimal() else match[1]] = match[2]
+    return table
+
+
+def _same_element(symbol: str, name: str, atom: int) -> Isotope:
+    one = isotope(name)
+    if one.symbol != symbol:
+        raise ValueError(f"atom {atom + 1} is {symbol}: {name!r} is an isotope of {one.symbol}, not of {symbol}")
+    return one
+
+
+def _hill(nuclei: tuple[Isotope, ...]) -> str:
+    """Carbon first, then hydrogen, then the alphabet; without carbon the alphabet alone (Hill 1900)."""
+    counts = Counter((one.symbol, 0 if one == isotope(one.symbol) else one.mass_number) for one in nuclei)
+    first = ("C", "H") if any(symbol == "C" for symbol, _ in counts) else ()
+
+    def place(key: tuple[str, int]) -> tuple[int, str, int]:
+        symbol, mass_number = key
+        return first.index(symbol) if symbol in first else len(first), symbol, mass_number
+
+    def text(key: tuple[str, int]) -> str:
+        symbol, mass_number = key
+        label = f"[{mass_number}{symbol}]" if mass_number else symbol
+        return f"{label}{counts[key] if counts[key] > 1 else ''}"
+
+    return "".join(text(key) for key in sorted(counts, key=place))
+
+
+def _charge_text(charge: int) -> str:
+    if not charge:
+        return ""
+    sign = "+" if charge > 0 else "-"
+    return sign if abs(charge) == 1 else f"({abs(charge)}{sign})"

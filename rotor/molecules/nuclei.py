@@ -1,0 +1,185 @@
+"""Isotopes: mass, natural abundance, spin and quadrupole moment of every nucleus, from data/isotopes.csv.
+
+Masses are those of isotopes (AME2020), never averages over the natural mixture: an element named without a mass
+number means its most abundant isotope, or the longest-lived one where nature has none.
+"""
+
+import csv
+import difflib
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+_OWN_NAMES = {"D": ("H", 2), "T": ("H", 3)}
+_MASS_FIRST = re.compile(r"(\d+)-?([A-Za-z]{1,2})")
+_MASS_LAST = re.compile(r"([A-Za-z]{1,2})-?(\d+)")
+
+
+@dataclass(frozen=True)
+class Isotope:
+    """One nucleus, as the tables give it.
+
+    symbol : of the element, `"H"` for deuterium too (`label` tells them apart)
+    element_number, mass_number : protons, nucleons
+    mass_u : mass of the neutral atom in u (AME2020)
+    abundance : fraction of the natural element, 0 to 1
+    half_life_s : infinite for a stable nucleus
+    spin : in units of h/2π
+    g_factor : magnetic moment over spin and nuclear magneton; None where the tables give none
+    quadrupole_barn : spectroscopic electric quadrupole moment, 1 barn = 1e-28 m²; None where unknown
+    """
+
+    symbol: str
+    element_number: int
+    mass_number: int
+    mass_u: float
+    abundance: float
+    half_life_s: float
+    spin: float
+    g_factor: float | None
+    quadrupole_barn: float | None
+
+    @property
+    def label(self) -> str:
+        """Mass number and symbol, such as `"13C"`."""
+        return f"{self.mass_number}{self.symbol}"
+
+
+def data_folder() -> Path:
+    """The folder of data files: `rotor/data` of an installed package, else `data` beside `rotor` in the source tree."""
+    package = Path(__file__).resolve().parents[1]
+    for folder in (package / "data", package.parent / "data"):
+        if (folder / "isotopes.csv").is_file():
+            return folder
+    raise FileNotFoundError(f"isotopes.csv is neither in {package / 'data'} nor in {package.parent / 'data'}")
+
+
+@cache
+def _table() -> dict[str, dict[int, Isotope]]:
+    """Every isotope by symbol and mass number."""
+    with (data_folder() / "isotopes.csv").open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
+    table: dict[str, dict[int, Isotope]] = {}
+    for row in rows:
+        one = Isotope(
+            symbol=row["symbol"],
+            element_number=int(row["element_number"]),
+            mass_number=int(row["mass_number"]),
+            mass_u=float(row["mass_u"]),
+            abundance=float(row["abundance"]),
+            half_life_s=float(row["half_life_s"]),
+            spin=float(row["spin"]),
+            g_factor=float(row["g_factor"]) if row["g_factor"] else None,
+            quadrupole_barn=float(row["quadrupole_barn"]) if row["quadrupole_barn"] else None,
+        )
+        table.setdefault(one.symbol, {})[one.mass_number] = one
+    return table
+
+
+def isotope(symbol: str, mass_number: int | None = None) -> Isotope:
+    """The isotope of that name; the most abundant one of the element where no mass number is given.
+
+    An element that does not occur in nature means the isotope with the longest half-life known.
+
+    Parameters
+    ----------
+    symbol : str
+        `"H"`, `"2H"`, `"D"`, `"T"`, `"13C"`, `"C13"`, `"C-13"`; case of the letters counts.
+    mass_number : int, optional
+        Instead of one inside `symbol`.
+
+    Returns
+    -------
+    Isotope
+
+    Raises
+    ------
+    ValueError
+        A name or mass number that the table does not have, with near matches; two mass numbers that differ.
+
+    >>> isotope("Cl").mass_number
+    35
+    >>> isotope("D").mass_u, isotope("2H").spin
+    (2.014101777844, 1.0)
+    """
+    element, own_number = _split(symbol)
+    if own_number is not None and mass_number not in (None, own_number):
+        raise ValueError(f"isotope {symbol!r} with mass number {mass_number}: the two differ; give one of them")
+    wanted = own_number if own_number is not None else mass_number
+    isotopes = _table()[element]
+    if wanted is None:
+        return max(isotopes.values(), key=lambda one: (one.abundance, one.half_life_s))
+    if wanted not in isotopes:
+        near = sorted(isotopes, key=lambda number: (abs(number - wanted), number))[:3]
+        names = ", ".join(f"{number}{element}" for number in sorted(near))
+        raise ValueError(f"isotope {wanted}{element} is not in data/isotopes.csv; near it are {names}")
+    return isotopes[wanted]
+
+
+def _split(name: str) -> tuple[str, int | None]:
+    """Element and mass number of `"13C"`, `"C13"`, `"D"` or `"C"`; the element is one of the table."""
+    name = name.strip()
+    if name in _OWN_NAMES:
+        return _OWN_NAMES[name]
+    if match := _MASS_FIRST.fullmatch(name):
+        element, number = match[2], int(match[1])
+    elif match := _MASS_LAST.fullmatch(name):
+        element, number = match[1], int(match[2])
+    else:
+        element, number = name, None
+    if element not in _table():
+        raise ValueError(f"{name!r} is not an element or isotope{_near(element)}; write 'C', '13C' or 'D'")
+    return element, number
+
+
+def _near(element: str) -> str:
+    """A phrase that names the elements most like a wrong symbol; empty where none is."""
+    known = list(_table())
+    near = [symbol for symbol in known if symbol.lower() == element.lower()]
+    near += [symbol for symbol in difflib.get_close_matches(element, known, n=3) if symbol not in near]
+    return f" (near it: {', '.join(near)})" if near else ""
+
+
+def element_symbol(number: int) -> str:
+    """The symbol of element `number`.
+
+    >>> element_symbol(6)
+    'C'
+    """
+    for symbol, isotopes in _table().items():
+        if next(iter(isotopes.values())).element_number == number:
+            return symbol
+    raise ValueError(f"{number} is not the atomic number of an element in data/isotopes.csv; hydrogen is 1, carbon 6")
+
+
+def isotope_of_mass(symbol: str, mass_u: float, within_u: float = 0.01) -> Isotope:
+    """The isotope of an element that has a given mass in u; ValueError where none is within `within_u`.
+
+    >>> isotope_of_mass("Cl", 36.966).label
+    '37Cl'
+    """
+    element, _ = _split(symbol)
+    nearest = min(_table()[element].values(), key=lambda one: abs(one.mass_u - mass_u))
+    if not abs(nearest.mass_u - mass_u) <= within_u:
+        raise ValueError(
+            f"a mass of {mass_u:g} u is not that of an isotope of {element}; the nearest is {nearest.label} with "
+            f"{nearest.mass_u:.6f} u, and the mass must be within {within_u:g} u of it"
+        )
+    return nearest
+
+
+def masses(symbols: Sequence[str], mass_numbers: Sequence[int | None] = ()) -> NDArray[np.float64]:
+    """Masses (n,) in u of named nuclei; without mass numbers, of the most abundant isotopes.
+
+    >>> masses(["O", "H", "D"])
+    array([15.99491462,  1.00782503,  2.01410178])
+    """
+    if len(mass_numbers) not in (0, len(symbols)):
+        raise ValueError(f"{len(symbols)} symbols but {len(mass_numbers)} mass numbers; give one each, or none")
+    numbers = mass_numbers or [None] * len(symbols)
+    return np.array([isotope(s, a).mass_u for s, a in zip(symbols, numbers, strict=True)], dtype=np.float64)

@@ -1,0 +1,1 @@
+"""The quantum half: basis, Hamiltonian terms, levels."""

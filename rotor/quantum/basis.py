@@ -1,0 +1,73 @@
+"""Wang's symmetry-adapted basis of one J: which states, in what order, and what symmetry they have.
+
+|J K s⟩ = (|J K⟩ + s |J -K⟩)/√2 for K > 0 and |J 0⟩ for K = 0, s = ±1. States whose K have one parity and one s form
+a Wang block: E+ (K = 0, 2, ...), E- (2, 4, ...), O+ and O- (1, 3, ...). Under the rotations by π about x, y, z of the
+molecule a state of the block has the characters (Bunker and Jensen, Molecular Symmetry and Spectroscopy, table 12-1)
+
+    C2x: s (-1)^J,    C2y: s (-1)^(J+K),    C2z: (-1)^K,
+
+and since (-1)^Ka and (-1)^Kc are the characters under C2a and C2c, whatever the representation, a block is known by
+J and the parities of Ka and Kc.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+REPRESENTATIONS = {"Ir": "bca", "Il": "cba", "IIr": "cab", "IIl": "acb", "IIIr": "abc", "IIIl": "bac"}  # axes at x, y, z
+
+_WANG = ((0, 1), (2, -1), (1, 1), (1, -1))  # E+, E-, O+, O-: lowest K and s
+
+
+class WangBlock(NamedTuple):
+    """One block: its J, parities of (Ka, Kc), lowest K, sign s and number of states; K = first_k, first_k + 2, ..."""
+
+    j: int
+    species: str
+    first_k: int
+    sign: int
+    size: int
+
+    @property
+    def k(self) -> NDArray[np.int64]:
+        """K of the basis states, (size,)."""
+        return self.first_k + 2 * np.arange(self.size)
+
+
+def _parity(character: int) -> str:
+    return "e" if character > 0 else "o"
+
+
+def _species(j: int, first_k: int, sign: int, axes: str) -> str:
+    k_even, j_even = (-1) ** first_k, (-1) ** j
+    character = {axes[0]: sign * j_even, axes[1]: sign * j_even * k_even, axes[2]: k_even}
+    return _parity(character["a"]) + _parity(character["c"])
+
+
+def wang_blocks(j: int, representation: str) -> list[WangBlock]:
+    """The non-empty blocks of `j`, in the order ee, eo, oe, oo.
+
+    >>> [(b.species, b.size) for b in wang_blocks(1, "Ir")]
+    [('eo', 1), ('oe', 1), ('oo', 1)]
+    """
+    axes = REPRESENTATIONS[representation]
+    sized = [(first, sign, (j - first) // 2 + 1) for first, sign in _WANG if j >= first]
+    return sorted(WangBlock(j, _species(j, first, sign, axes), first, sign, size) for first, sign, size in sized)
+
+
+def ka_kc(j: int, species: str, size: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Ka and Kc of the states of a block in order of energy.
+
+    Ka rises by two through the block; Kc is what leaves Ka + Kc = J or J + 1 with the right parity.
+
+    >>> ka_kc(2, "ee", 2)
+    (array([0, 2]), array([2, 0]))
+    """
+    ka_odd, kc_odd = species[0] == "o", species[1] == "o"
+    at_j = (ka_odd + kc_odd) % 2 == j % 2  # Ka + Kc = J, else J + 1
+    first = 1 if ka_odd else (0 if at_j else 2)
+    ka = first + 2 * np.arange(size)
+    return ka, (j if at_j else j + 1) - ka

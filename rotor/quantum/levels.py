@@ -1,0 +1,248 @@
+"""Levels: adds the terms it is given, diagonalises block by block, labels.
+
+Linear, spherical and symmetric tops have closed forms; asymmetric ones are solved in Wang blocks, each by itself, so
+that labels are parity-correct by construction: inside a block, states in order of energy take (Ka, Kc) in order.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor.effects import QuantumEffect
+from rotor.quantum.basis import WangBlock, ka_kc, wang_blocks
+from rotor.quantum.watson import Centrifugal, Multiplet, Operators, Rigid, block_bands, scalar_energy
+from rotor.weights import SpinWeights
+
+if TYPE_CHECKING:
+    from rotor.top import Top
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+SEMI_RIGID: tuple[QuantumEffect, ...] = (Rigid(), Centrifugal())
+
+
+@dataclass(frozen=True)
+class SolvedBlock:
+    """One Wang block solved: energies (n,) in MHz, rising, and eigenvectors (n, n) in columns over `basis.k`.
+
+    `start` is the place of its first state in the arrays of `Levels`.
+    """
+
+    basis: WangBlock
+    energies_mhz: Floats
+    vectors: Floats
+    start: int
+
+    @property
+    def jz_squared(self) -> Floats:
+        """⟨Jz²⟩ of every state, (n,): how prolate (or oblate) it is along the z of the representation."""
+        k = self.basis.k
+        return (self.vectors**2).T @ (k * k).astype(float)
+
+
+@dataclass(frozen=True)
+class Levels:
+    """Rotational levels as columns of equal length; the key of a level is (J, block, rank in the block).
+
+    energy_mhz: E/h in MHz from the Hamiltonian's zero. j, ka, kc: quantum numbers; a symmetric top has K in `ka` (one
+    row for both signs of K, `components` = 2) and -1 in `kc`, linear and spherical tops -1 in both. components: levels
+    that coincide in the row (2J+1 for a spherical top). weight: nuclear-spin weight summed over the components.
+    degeneracy: (2J+1) times that. representation: of the Wang blocks, None for closed forms. blocks: the solved Wang blocks of an asymmetric top, empty for closed forms.
+    """
+
+    kind: str
+    representation: str | None
+    jmax: int
+    energy_mhz: Floats
+    j: Ints
+    ka: Ints
+    kc: Ints
+    components: Ints
+    weight: Ints
+    blocks: tuple[SolvedBlock, ...] = field(default=(), repr=False)
+
+    def __len__(self) -> int:
+        return len(self.energy_mhz)
+
+    @property
+    def degeneracy(self) -> Ints:
+        """(2J+1) times the spin weight, over all components of the row."""
+        return (2 * self.j + 1) * self.weight
+
+    @property
+    def ground_mhz(self) -> float:
+        """The lowest energy of a level that exists (spin weight above zero)."""
+        return float(self.energy_mhz[self.weight > 0].min())
+
+    def unordered(self) -> list[tuple[int, str]]:
+        """(J, species) of blocks where the order of energy is not that of ⟨Jz²⟩, so that Ka is only a count.
+
+        Distortion that outgrows the rigid energies does it (quartic-only water from J = 15 on).
+        """
+        return [(b.basis.j, b.basis.species) for b in self.blocks if _disordered(b.jz_squared)]
+
+    def to_pandas(self):  # type: ignore[no-untyped-def]
+        """The columns as a pandas DataFrame."""
+        import pandas as pd
+
+        names = ("j", "ka", "kc", "energy_mhz", "components", "weight", "degeneracy")
+        return pd.DataFrame({name: getattr(self, name) for name in names})
+
+
+def _disordered(jz_squared: Floats) -> bool:
+    """Whether ⟨Jz²⟩ neither rises nor falls through a block; a change of 1e-6 is round-off or a near-degeneracy."""
+    steps = np.diff(jz_squared)
+    slack = 1e-6 * (1 + np.abs(jz_squared[1:]))
+    return bool((steps < -slack).any() and (steps > slack).any())
+
+
+def hamiltonian(top: Top, effects: Sequence[QuantumEffect] = SEMI_RIGID) -> Operators:
+    """The operators of all effects added: {(p, q, n): MHz}, zeros left out."""
+    total: Operators = {}
+    for effect in effects:
+        for powers, value in effect.operators(top).items():
+            total[powers] = total.get(powers, 0.0) + value
+    return {powers: value for powers, value in total.items() if value}
+
+
+def solve_levels(
+    top: Top,
+    jmax: int,
+    *,
+    jmin: int = 0,
+    effects: Sequence[QuantumEffect] = SEMI_RIGID,
+    vectors: bool = True,
+    executor: Executor | None = None,
+) -> Levels:
+    """All rotational levels from J = `jmin` to `jmax`.
+
+    effects: what the Hamiltonian consists of. vectors: False leaves the eigenvectors of an asymmetric top out.
+    executor: any `concurrent.futures.Executor`; J are spread over it. Energies are true eigenvalues of the truncated
+    effective Hamiltonian; nothing is treated to first order. Raises ValueError for a J max below zero.
+
+    >>> from rotor.top import Top
+    >>> levels = solve_levels(Top.from_constants("A=10 B=6 C=4 MHz"), 1)
+    >>> levels.energy_mhz.tolist(), levels.ka.tolist(), levels.kc.tolist()
+    ([0.0, 10.0, 16.0, 14.0], [0, 0, 1, 1], [0, 1, 0, 1])
+    """
+    if jmax < 0 or jmin < 0 or jmin > jmax:
+        raise ValueError(f"J from {jmin} to {jmax}: J max must be 0 or more and not below J min")
+
+    operators = hamiltonian(top, effects)
+    if top.kind == "asymmetric":
+        return _asymmetric(top, operators, jmin, jmax, vectors, executor)
+    if top.kind in ("prolate", "oblate"):
+        return _symmetric(top.kind, operators, top.spin_weights, jmin, jmax)
+    return _one_per_j(top.kind, operators, top.spin_weights, jmin, jmax)
+
+
+def _one_per_j(kind: str, operators: Operators, weights: SpinWeights, jmin: int, jmax: int) -> Levels:
+    """Linear and spherical tops: E = Σ c X^p, with 2J+1 components of K at one energy in a spherical top."""
+    j = np.arange(jmin, jmax + 1)
+    energy = np.array([scalar_energy(operators, int(value)) for value in j])
+    components = 2 * j + 1 if kind == "spherical" else np.ones_like(j)
+    weight = weights.of_spherical(j) if kind == "spherical" else weights.of_j(j)
+    none = np.full(j.shape, -1)
+    return Levels(kind, None, jmax, energy, j, none, none, components, weight)
+
+
+def _symmetric(kind: str, operators: Operators, weights: SpinWeights, jmin: int, jmax: int) -> Levels:
+    """Symmetric tops: E(J, K) = Σ c X^p K^2q, one row for ±K."""
+    j = np.repeat(np.arange(jmin, jmax + 1), np.arange(jmin, jmax + 1) + 1)
+    k = np.concatenate([np.arange(value + 1) for value in range(jmin, jmax + 1)])
+    x, squares = (j * (j + 1)).astype(float), (k * k).astype(float)
+    energy = np.zeros(j.shape)
+    for (p, q, _), c in operators.items():
+        energy += c * x**p * squares**q
+
+    components = np.where(k == 0, 1, 2)
+    weight = weights.of_symmetric(j, k)
+    return Levels(kind, None, jmax, energy, j, k, np.full(j.shape, -1), components, weight)
+
+
+def _asymmetric(
+    top: Top, operators: Operators, jmin: int, jmax: int, vectors: bool, executor: Executor | None
+) -> Levels:
+    pieces = [(operators, j, str(top.constants.representation), vectors) for j in range(jmin, jmax + 1)]
+    solved = executor.map(solve_j, *zip(*pieces, strict=True)) if executor else (solve_j(*piece) for piece in pieces)
+    blocks = tuple(_placed(block for of_one_j in solved for block in of_one_j))
+
+    labels = [ka_kc(b.basis.j, b.basis.species, b.basis.size) for b in blocks]
+    sizes = [b.basis.size for b in blocks]
+    weight = np.repeat([top.spin_weights.of_ka_kc(b.basis.species) for b in blocks], sizes)
+    return Levels(
+        kind="asymmetric",
+        representation=str(top.constants.representation),
+        jmax=jmax,
+        energy_mhz=np.concatenate([b.energies_mhz for b in blocks]),
+        j=np.repeat([b.basis.j for b in blocks], sizes),
+        ka=np.concatenate([ka for ka, _ in labels]),
+        kc=np.concatenate([kc for _, kc in labels]),
+        components=np.ones(sum(sizes), dtype=np.int64),
+        weight=weight,
+        blocks=blocks if vectors else (),
+    )
+
+
+def _placed(solved: Iterator[tuple[WangBlock, Floats, Floats]]) -> Iterator[SolvedBlock]:
+    start = 0
+    for basis, energies, vectors in solved:
+        yield SolvedBlock(basis, energies, vectors, start)
+        start += basis.size
+
+
+def solve_j(
+    operators: Operators, j: int, representation: str, vectors: bool = True
+) -> list[tuple[WangBlock, Floats, Floats]]:
+    """The Wang blocks of one J solved: (block, energies in MHz, eigenvectors) in the order ee, eo, oe, oo."""
+    scalar, multiplet = scalar_energy(operators, j), Multiplet(operators, j)
+    out = []
+    for block in wang_blocks(j, representation):
+        energies, states = diagonalise(block_bands(multiplet, block), vectors)
+        out.append((block, energies + scalar, states))
+    return out
+
+
+def diagonalise(bands: list[Floats], vectors: bool = True) -> tuple[Floats, Floats]:
+    """Eigenvalues, rising, and eigenvectors in columns of a symmetric matrix given by its diagonals.
+
+    Tridiagonal matrices go to LAPACK's divide and conquer (dstevd), wider ones to its dense form (dsyevd).
+    Raises ValueError where LAPACK does not converge or the matrix has numbers that are not finite.
+    """
+    if len(bands[0]) == 1:
+        return bands[0], np.ones((1, 1))
+    if not all(np.isfinite(band).all() for band in bands):
+        raise ValueError("a block of the Hamiltonian overflows: J max is too high for these distortion constants")
+    if len(bands) > 2:
+        return _dense(bands, vectors)
+    if len(bands) == 1:
+        return _diagonal(bands[0], vectors)
+
+    from scipy.linalg.lapack import dstevd
+
+    energies, states, info = dstevd(bands[0], bands[1], compute_v=int(vectors))
+    if info:
+        raise ValueError(f"LAPACK dstevd did not converge on a block of size {len(bands[0])} (info = {info})")
+    return energies, states
+
+
+def _diagonal(band: Floats, vectors: bool) -> tuple[Floats, Floats]:
+    order = np.argsort(band, kind="stable")
+    return band[order], np.eye(len(band))[:, order] if vectors else np.zeros((0, 0))
+
+
+def _dense(bands: list[Floats], vectors: bool) -> tuple[Floats, Floats]:
+    matrix = np.diag(bands[0])
+    for n, band in enumerate(bands[1:], 1):
+        matrix += np.diag(band, -n)  # eigh reads the lower triangle
+    if vectors:
+        energies, states = np.linalg.eigh(matrix)
+        return energies, states
+    return np.linalg.eigvalsh(matrix), np.zeros((0, 0))

@@ -1,0 +1,248 @@
+"""A line list: which transitions exist, how strong they are, and their columns.
+
+    I(T) = (8π³/3hc) ν g_I S μ² [exp(-E″/kT) - exp(-E′/kT)] / Q(T)      absorption, integrated, nm² MHz
+    A    = (64π⁴ν³/3hc³) S μ² / (2J′+1)                                 1/s
+
+(H. M. Pickett et al., J. Quant. Spectrosc. Radiat. Transf. 60, 883 (1998), eqs. 1 and 3). S μ² is summed over M and over
+all components that coincide in the line, g_I is the spin weight of one component, Q carries the same g_I.
+"""
+
+from __future__ import annotations
+
+import math
+from concurrent.futures import Executor
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor import units
+from rotor.quantum.levels import Levels, solve_levels
+from rotor.spectra.reach import jmax_for_cut
+from rotor.spectra.transitions import IntensityCut, all_transitions
+from rotor.thermo import PartitionFunction, partition_function
+
+if TYPE_CHECKING:
+    from rotor.top import Top
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+INTENSITY_NM2_MHZ = 4.16231e-5  # 8π³/3hc for MHz and D² as catalogues use it; CODATA 2022 gives 4.16238e-5 (7e-6 in log10)
+EINSTEIN_PER_MHZ3 = 1.1639654e-20  # 64π⁴/3hc³ for MHz and D², CODATA 2022
+DEFAULT_MIN_LGINT = -12.0
+
+
+@dataclass(frozen=True)
+class Lines:
+    """Lines as columns of equal length, rising in frequency unless they were asked for unsorted.
+
+    frequency_mhz, strength_debye2 (S μ², all components): (n,) float64. upper, lower: (n,) int32, rows of `levels`.
+    All other columns are computed when asked for. min_lgint, range_mhz and jmax say where the list was cut.
+    """
+
+    top: Top
+    levels: Levels
+    frequency_mhz: Floats
+    strength_debye2: Floats
+    upper: NDArray[np.int32]
+    lower: NDArray[np.int32]
+    temperature_k: float
+    min_lgint: float
+    range_mhz: tuple[float, float]
+    given_partition: PartitionFunction | None = None
+
+    def __len__(self) -> int:
+        return len(self.frequency_mhz)
+
+    @property
+    def jmax(self) -> int:
+        """The highest J of a level in the list's making."""
+        return self.levels.jmax
+
+    @cached_property
+    def partition(self) -> PartitionFunction:
+        """Q(T) behind the intensities, summed when first asked for unless it was given."""
+        return self.given_partition or partition_function(self.top, self.temperature_k)
+
+    @property
+    def q(self) -> float:
+        """The value of Q(T)."""
+        return self.partition.q
+
+    @property
+    def energy_lower_cm(self) -> Floats:
+        """E″ in cm⁻¹ from the lowest level that exists."""
+        return (self.levels.energy_mhz[self.lower] - self.levels.ground_mhz) / units.MHZ_PER_CM
+
+    @property
+    def g_upper(self) -> Ints:
+        """Degeneracy of the upper state with its spin weight, over all components of the line."""
+        return self.levels.degeneracy[self.upper]
+
+    @property
+    def intensity_nm2_mhz(self) -> Floats:
+        """Integrated absorption I(T) in nm² MHz."""
+        levels = self.levels
+        per_component = (levels.weight / levels.components)[self.lower]
+        scaled = INTENSITY_NM2_MHZ * self.frequency_mhz * per_component * self.strength_debye2 / self.q
+        lower_k = (levels.energy_mhz[self.lower] - levels.ground_mhz) / units.MHZ_PER_K
+        photon_k = self.frequency_mhz / units.MHZ_PER_K
+        return scaled * np.exp(-lower_k / self.temperature_k) * -np.expm1(-photon_k / self.temperature_k)
+
+    @property
+    def lgint(self) -> Floats:
+        """log10 of I(T) in nm² MHz."""
+        with np.errstate(divide="ignore"):  # a line of zero strength is -inf, as it should be
+            return np.log10(self.intensity_nm2_mhz)
+
+    @property
+    def einstein_a_per_s(self) -> Floats:
+        """Einstein coefficient of spontaneous emission, 1/s, of one component and M averaged."""
+        upper = self.upper
+        states = (2 * self.levels.j + 1) * self.levels.components
+        return EINSTEIN_PER_MHZ3 * self.frequency_mhz**3 * self.strength_debye2 / states[upper]
+
+    @property
+    def quanta_names(self) -> tuple[str, ...]:
+        """Which quantum numbers label a state: J; J, K; or J, Ka, Kc."""
+        return quanta_names(self.levels)
+
+    def quanta(self, rows: NDArray[np.int32]) -> Ints:
+        """Quantum numbers (n, 1 to 3) of the states `rows` (`lines.upper` or `lines.lower`)."""
+        columns = (self.levels.j, self.levels.ka, self.levels.kc)[: len(self.quanta_names)]
+        return np.stack([column[rows] for column in columns], axis=1)
+
+    def where(self, chosen: NDArray[Any]) -> Lines:
+        """The lines that a boolean mask or an array of indices chooses, in its order."""
+        return replace(
+            self,
+            frequency_mhz=self.frequency_mhz[chosen],
+            strength_debye2=self.strength_debye2[chosen],
+            upper=self.upper[chosen],
+            lower=self.lower[chosen],
+            given_partition=self.__dict__.get("partition", self.given_partition),
+        )
+
+    def sorted(self) -> Lines:
+        """The same lines, rising in frequency."""
+        return self.where(np.argsort(self.frequency_mhz))
+
+    def strongest(self, count: int) -> Lines:
+        """The `count` most intense lines, strongest first."""
+        return self.where(np.argsort(-self.intensity_nm2_mhz, kind="stable")[:count])
+
+    @cached_property
+    def columns(self) -> dict[str, NDArray[Any]]:
+        """Every column by its name with unit, quantum numbers last (j_upper, ..., kc_lower)."""
+        names = ("frequency_mhz", "lgint", "energy_lower_cm", "g_upper", "einstein_a_per_s", "strength_debye2")
+        out: dict[str, NDArray[Any]] = {name: getattr(self, name) for name in names}
+        for suffix, rows in (("upper", self.upper), ("lower", self.lower)):
+            for name, column in zip(self.quanta_names, self.quanta(rows).T, strict=True):
+                out[f"{name}_{suffix}"] = column
+        return out
+
+    def to_pandas(self) -> Any:
+        """All columns as a pandas DataFrame."""
+        import pandas as pd
+
+        return pd.DataFrame(self.columns)
+
+    def to_polars(self) -> Any:
+        """All columns as a polars DataFrame."""
+        import polars as pl
+
+        return pl.DataFrame(self.columns)
+
+
+def quanta_names(levels: Levels) -> tuple[str, ...]:
+    """Names of the quantum numbers that label the levels."""
+    if levels.kind in ("linear", "spherical"):
+        return ("j",)
+    return ("j", "ka", "kc") if (levels.kc >= 0).any() else ("j", "k")
+
+
+def line_list(
+    top: Top,
+    *,
+    temperature_k: float = 300.0,
+    jmax: int | None = None,
+    min_lgint: float | None = DEFAULT_MIN_LGINT,
+    range_mhz: tuple[float, float] = (0.0, math.inf),
+    q: float | None = None,
+    vibrational_factor: float = 1.0,
+    sort: bool = True,
+    executor: Executor | None = None,
+) -> Lines:
+    """Electric-dipole lines of a top: every transition that the selection rules allow, cut only where you say.
+
+    temperature_k: for intensities. jmax: the highest J; by default the one beyond which no line can reach
+    `min_lgint`. min_lgint: log10 of nm² MHz below which lines are left out, None for none left out. range_mhz: first
+    and last frequency. q: partition function to use instead of the summed one, spin weights reduced by their common
+    divisor. vibrational_factor: multiplies the summed Q. executor: J are spread over it.
+
+    Neglected: all but electric dipole, nuclear hyperfine structure, vibrational states, dependence of μ on J.
+    Raises ValueError where the top has no known dipole, for a temperature not above 0, and for J max below 0.
+
+    >>> from rotor.top import Top
+    >>> lines = line_list(Top.from_constants("B=57635.968 MHz", dipole_abc_debye=(0.11, 0, 0)), jmax=2)
+    >>> [round(float(f), 3) for f in lines.frequency_mhz]
+    [115271.936, 230543.872]
+    """
+    if not (math.isfinite(temperature_k) and temperature_k > 0):
+        raise ValueError(f"temperature {temperature_k} K: a temperature is above 0 K")
+    dipole = _dipole_of(top)
+    least = -math.inf if min_lgint is None else min_lgint
+    given = _given_partition(top, temperature_k, q, vibrational_factor)
+    if given is None and (jmax is None or math.isfinite(least)):
+        given = partition_function(top, temperature_k)
+    if jmax is None:
+        jmax = jmax_for_cut(top, dipole, temperature_k, given.q if given else 1.0, least)
+
+    levels = solve_levels(top, jmax, executor=executor)
+    cut = _intensity_cut(levels, temperature_k, given.q, least) if given and math.isfinite(least) else None
+    found = all_transitions(levels, dipole, range_mhz, cut)
+    lines = Lines(
+        top=top,
+        levels=levels,
+        frequency_mhz=found.frequency_mhz,
+        strength_debye2=found.strength_debye2,
+        upper=found.upper,
+        lower=found.lower,
+        temperature_k=temperature_k,
+        min_lgint=least,
+        range_mhz=range_mhz,
+        given_partition=given,
+    )
+    return lines.sorted() if sort else lines
+
+
+def _dipole_of(top: Top) -> tuple[float, float, float]:
+    if top.dipole_abc_debye is None:
+        raise ValueError(f"the dipole of {top.name or 'this top'} is not known; give one, in principal axes or in the input's frame")
+    return top.dipole_abc_debye
+
+
+def _given_partition(
+    top: Top, temperature_k: float, q: float | None, vibrational_factor: float
+) -> PartitionFunction | None:
+    """Q as the user gave it, or the summed one times a vibrational factor; None where it is to be summed as it is."""
+    for name, value in (("Q", q), ("vibrational factor", vibrational_factor)):
+        if value is not None and not (math.isfinite(value) and value > 0):
+            raise ValueError(f"{name} = {value}: a finite number above 0 is wanted")
+    if q is not None:
+        return PartitionFunction(temperature_k, q * vibrational_factor, None, math.nan, "given")
+    if vibrational_factor == 1.0:
+        return None
+    summed = partition_function(top, temperature_k)
+    source = f"{summed.source}, times a vibrational factor of {vibrational_factor:g}"
+    return replace(summed, q=summed.q * vibrational_factor, source=source)
+
+
+def _intensity_cut(levels: Levels, temperature_k: float, q: float, least: float) -> IntensityCut:
+    above_k = (levels.energy_mhz - levels.ground_mhz) / units.MHZ_PER_K
+    per_component = levels.weight / levels.components
+    population = INTENSITY_NM2_MHZ / q * per_component * np.exp(-above_k / temperature_k)
+    return IntensityCut(population, temperature_k * units.MHZ_PER_K, 10.0**least)

@@ -1,0 +1,236 @@
+"""A top: inertia, principal axes, rotational constants, kind, dipole and spin weights. The waist of the package.
+
+A molecule becomes a top here; the quantum and the classical half know tops only. Someone with constants alone starts at
+`Top.from_constants`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rotor import units
+from rotor.constants import Constants
+from rotor.inertia import EQUAL_MOMENTS, Body, PrincipalFrame, point_masses, principal_frame
+from rotor.weights import SpinWeights
+
+if TYPE_CHECKING:
+    from rotor.molecules.molecule import Molecule
+
+Floats = NDArray[np.float64]
+
+LINEAR_BELOW = 1e-6  # I_a / I_c below which a geometry is linear
+_KINDS = ("linear", "spherical", "prolate", "oblate", "asymmetric")
+
+
+@dataclass(frozen=True)
+class KindOfTop:
+    """Which kind a geometry is, by which numbers: I_a/I_c, the relative differences of moments, and the tolerances."""
+
+    kind: str
+    linearity: float  # I_a / I_c
+    ab: float  # (I_b - I_a) / I_b
+    bc: float  # (I_c - I_b) / I_c
+    linear_below: float = LINEAR_BELOW
+    equal_within: float = EQUAL_MOMENTS
+    reason: str = ""
+
+    @property
+    def margin(self) -> float:
+        """The factor by which the deciding number is away from its tolerance; near 1 the choice is doubtful."""
+        deciding = {
+            "linear": [self.linear_below / max(self.linearity, 1e-300)],
+            "spherical": [self.equal_within / max(self.ab, self.bc, 1e-300)],
+            "prolate": [self.equal_within / max(self.bc, 1e-300), self.ab / self.equal_within],
+            "oblate": [self.equal_within / max(self.ab, 1e-300), self.bc / self.equal_within],
+            "asymmetric": [self.ab / self.equal_within, self.bc / self.equal_within],
+        }[self.kind]
+        if self.kind not in ("linear",):
+            deciding.append(self.linearity / self.linear_below)
+        return min(deciding)
+
+
+def kind_from_moments(
+    moments: ArrayLike, *, linear_below: float = LINEAR_BELOW, equal_within: float = EQUAL_MOMENTS
+) -> KindOfTop:
+    """Kind of top of principal moments I_a ≤ I_b ≤ I_c (any unit): linear, spherical, prolate, oblate, asymmetric.
+
+    Linear when I_a/I_c < `linear_below`; two moments are equal when they differ by less than `equal_within` of the larger.
+
+    >>> kind_from_moments([1.0, 2.0, 2.0]).kind
+    'prolate'
+    """
+    a, b, c = (float(m) for m in np.asarray(moments, dtype=float))
+    if not c > 0:
+        raise ValueError("all moments of inertia are zero: a single atom (or atoms at one point) does not rotate")
+    linearity, ab, bc = a / c, (b - a) / b, (c - b) / c
+    if linearity < linear_below:
+        kind = "linear"
+    else:
+        kind = {(True, True): "spherical", (True, False): "oblate", (False, True): "prolate"}.get(
+            (ab < equal_within, bc < equal_within), "asymmetric"
+        )
+    return KindOfTop(kind, linearity, ab, bc, linear_below, equal_within)
+
+
+@dataclass(frozen=True)
+class Top:
+    """A rigid or semi-rigid rotor.
+
+    constants: named constants in MHz. dipole_abc_debye: (μa, μb, μc) or None where it is not known. spin_weights:
+    nuclear-spin weights. mass_u: for Doppler widths. moments_u_angstrom2, frame: of a geometry, None without one.
+    kind_of_top: how the kind was decided. source: where the constants are from. notes: what a user must be told.
+    """
+
+    constants: Constants
+    dipole_abc_debye: tuple[float, float, float] | None = None
+    spin_weights: SpinWeights = SpinWeights()
+    name: str = ""
+    mass_u: float | None = None
+    frame: PrincipalFrame | None = None
+    kind_of_top: KindOfTop | None = None
+    molecule: Molecule | None = None
+    source: str = ""
+    dipole_source: str = ""
+    weights_source: str = ""
+    notes: tuple[str, ...] = ()
+
+    @classmethod
+    def from_constants(
+        cls,
+        constants: Constants | str,
+        *,
+        dipole_abc_debye: Sequence[float] | None = None,
+        spin_weights: SpinWeights | dict[str, int] | None = None,
+        **others: Any,
+    ) -> Top:
+        """A top from named constants, or from their text such as "A=835840.288 B=435351.717 C=278138.7 MHz".
+
+        others: any further field of `Top`. Raises ValueError for unknown names, units or an impossible set.
+        """
+        if isinstance(constants, str):
+            constants = Constants.parse(constants)
+        if not isinstance(spin_weights, SpinWeights):
+            spin_weights = SpinWeights.from_mapping(spin_weights) if spin_weights else SpinWeights()
+        return cls(constants, _three(dipole_abc_debye), spin_weights, **others)
+
+    @classmethod
+    def from_molecule(
+        cls, molecule: Molecule, *, linear_below: float = LINEAR_BELOW, equal_within: float = EQUAL_MOMENTS
+    ) -> Top:
+        """A rigid top from a geometry: principal axes, A, B, C, kind, and its dipole turned along.
+
+        Raises ValueError for a single atom. Neglected: everything that vibration and centrifugal distortion do, about
+        0.3 to 1 % between an equilibrium geometry and measured constants.
+
+        >>> from rotor.molecules.molecule import Molecule
+        >>> top = Top.from_molecule(Molecule(("C", "O"), [[0, 0, 0], [0, 0, 1.128323]]))
+        >>> top.kind, round(top.constants["B"], 0)
+        ('linear', 57898.0)
+        """
+        if len(molecule.symbols) < 2:
+            raise ValueError(f"{molecule.name or 'the input'} is a single atom: it has no rotation; give 2 atoms or more")
+        body = point_masses(molecule.masses_u, molecule.positions_angstrom)
+        frame = principal_frame(body, molecule.masses_u, molecule.positions_angstrom, equal_within)
+        kind = kind_from_moments(frame.moments, linear_below=linear_below, equal_within=equal_within)
+        dipole = molecule.dipole_debye
+        return cls(
+            constants=constants_of_moments(frame.moments, kind.kind),
+            dipole_abc_debye=None if dipole is None else _three(frame.axes @ np.asarray(dipole)),
+            name=molecule.name,
+            mass_u=float(np.sum(molecule.masses_u)),
+            frame=frame,
+            kind_of_top=kind,
+            molecule=molecule,
+            source=molecule.source,
+            dipole_source=molecule.dipole_source,
+            notes=tuple(molecule.notes),
+        )
+
+    @classmethod
+    def from_body(cls, body: Body, **others: Any) -> Top:
+        """A top from a body of point masses, plates or solids, in u and Å."""
+        frame = principal_frame(body)
+        kind = kind_from_moments(frame.moments)
+        constants = constants_of_moments(frame.moments, kind.kind)
+        return cls(constants, frame=frame, kind_of_top=kind, mass_u=body.mass, **others)
+
+    @property
+    def kind(self) -> str:
+        """linear, spherical, prolate, oblate or asymmetric."""
+        return self.constants.kind
+
+    @property
+    def rotational_constants_mhz(self) -> tuple[float, float, float]:
+        """A, B, C in MHz, whatever the kind; A of a linear top is infinite."""
+        c = self.constants
+        return {
+            "linear": lambda: (math.inf, c["B"], c["B"]),
+            "spherical": lambda: (c["B"], c["B"], c["B"]),
+            "prolate": lambda: (c["A"], c["B"], c["B"]),
+            "oblate": lambda: (c["B"], c["B"], c["C"]),
+            "asymmetric": lambda: (c["A"], c["B"], c["C"]),
+        }[self.kind]()
+
+    @property
+    def moments_u_angstrom2(self) -> tuple[float, float, float]:
+        """I_a, I_b, I_c in u Å², from the constants: 505379.008/A; I_a of a linear top is 0."""
+        a, b, c = (units.ROTATIONAL_MHZ_U_ANGSTROM2 / x for x in self.rotational_constants_mhz)
+        return a, b, c
+
+    @property
+    def kappa(self) -> float | None:
+        """Ray's asymmetry parameter (2B - A - C)/(A - C), -1 prolate to +1 oblate; None where A = C or linear."""
+        a, b, c = self.rotational_constants_mhz
+        return (2 * b - a - c) / (a - c) if math.isfinite(a) and a > c else None
+
+    @property
+    def planar_moments_u_angstrom2(self) -> tuple[float, float, float]:
+        """P_aa, P_bb, P_cc = Σ m a², Σ m b², Σ m c² in u Å²."""
+        a, b, c = self.moments_u_angstrom2
+        return (b + c - a) / 2, (a + c - b) / 2, (a + b - c) / 2
+
+    @property
+    def inertial_defect_u_angstrom2(self) -> float:
+        """I_c - I_a - I_b in u Å²: 0 for a rigid planar molecule, slightly positive for a real one."""
+        a, b, c = self.moments_u_angstrom2
+        return c - a - b
+
+    def with_dipole(self, dipole_abc_debye: Sequence[float], source: str) -> Top:
+        """The same top with another dipole in principal axes."""
+        return replace(self, dipole_abc_debye=_three(dipole_abc_debye), dipole_source=source)
+
+    def with_weights(self, weights: dict[str, int], source: str) -> Top:
+        """The same top with other spin weights."""
+        return replace(self, spin_weights=SpinWeights.from_mapping(weights), weights_source=source)
+
+
+def constants_of_moments(moments: ArrayLike, kind: str) -> Constants:
+    """The rigid constants that a kind of top has, from moments in u Å²; degenerate ones are averaged."""
+    if kind not in _KINDS:
+        raise ValueError(f"kind {kind!r} is none of {', '.join(_KINDS)}")
+    ia, ib, ic = (float(m) for m in np.asarray(moments))
+    f = units.ROTATIONAL_MHZ_U_ANGSTROM2
+    if kind == "linear":
+        return Constants(B=f / ((ib + ic) / 2), kind=kind)
+    if kind == "spherical":
+        return Constants(B=f / ((ia + ib + ic) / 3), kind=kind)
+    if kind == "prolate":
+        return Constants(A=f / ia, B=f / ((ib + ic) / 2), kind=kind)
+    if kind == "oblate":
+        return Constants(B=f / ((ia + ib) / 2), C=f / ic, kind=kind)
+    return Constants(A=f / ia, B=f / ib, C=f / ic, kind=kind)
+
+
+def _three(vector: ArrayLike | None) -> tuple[float, float, float] | None:
+    if vector is None:
+        return None
+    values = np.asarray(vector, dtype=float)
+    if values.shape != (3,) or not np.isfinite(values).all():
+        raise ValueError(f"a dipole is three finite numbers (μa, μb, μc) in debye, not {values.tolist()}")
+    return float(values[0]), float(values[1]), float(values[2])
