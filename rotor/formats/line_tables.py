@@ -105,14 +105,19 @@ def write_lines(lines: Lines, path: str | os.PathLike[str], settings: Mapping[st
         with open_atomic(path, "w", encoding="utf-8") as handle:
             json.dump({"provenance": story, "lines": records(lines)}, handle, indent=1, allow_nan=False)
     else:
-        raise ValueError(f"{path}: lines can be written as .cat, .cat.gz, .csv, .parquet or .json; the suffix names the format")
+        raise ValueError(
+            f"{path}: lines can be written as .cat, .cat.gz, .csv, .parquet or .json; the suffix names the format"
+        )
 
 
 def records(lines: Lines) -> list[dict[str, float | int | None]]:
     """The lines as a list of plain records, numbers that are not finite as None."""
     columns = {name: column.tolist() for name, column in lines.columns.items()}
     rows = zip(*columns.values(), strict=True)
-    return [{k: None if v != v or v in (math.inf, -math.inf) else v for k, v in zip(columns, row, strict=True)} for row in rows]
+    return [
+        {k: None if v != v or v in (math.inf, -math.inf) else v for k, v in zip(columns, row, strict=True)}
+        for row in rows
+    ]
 
 
 def _write_beside(path: str | os.PathLike[str], story: Mapping[str, Any]) -> None:
