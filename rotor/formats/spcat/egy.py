@@ -21,7 +21,7 @@ class Level(NamedTuple):
     """The numbers of one level; the names are those of `LevelList`."""
 
     block: int
-    index: int
+    rank: int
     energy_cm: float
     error_cm: float
     mixing: float
@@ -33,14 +33,14 @@ class Level(NamedTuple):
 class LevelList:
     """Levels, columns of equal length n.
 
-    block, index (n,): where in the program's Hamiltonian. energy_cm, error_cm (n,): cm⁻¹. mixing (n,): share of the
+    block, rank (n,): where in the program's Hamiltonian. energy_cm, error_cm (n,): cm⁻¹. mixing (n,): share of the
     state that gives the label. degeneracy (n,): of M and of nuclear spins. quanta (n, w): -32768 where there is none.
     texts: what was read that is not written so from the numbers: derivatives and vectors among the levels, other
     spacing; it begins with what stands before the level. rest: what follows the last level.
     """
 
     block: NDArray[np.int32]
-    index: NDArray[np.int32]
+    rank: NDArray[np.int32]
     energy_cm: NDArray[np.float64]
     error_cm: NDArray[np.float64]
     mixing: NDArray[np.float64]
@@ -54,7 +54,7 @@ class LevelList:
 
     def level(self, index: int) -> Level:
         """The numbers of one level."""
-        columns = (self.block, self.index, self.energy_cm, self.error_cm, self.mixing, self.degeneracy)
+        columns = (self.block, self.rank, self.energy_cm, self.error_cm, self.mixing, self.degeneracy)
         quanta = tuple(q for q in self.quanta[index].tolist() if q != BLANK)
         return Level._make([*(column[index].item() for column in columns), quanta])
 
@@ -134,7 +134,7 @@ def _quanta(line: Line, first: int) -> tuple[int, ...]:
 def format_level(level: Level) -> str:
     """The line of a level as SPCAT writes it."""
     numbers = f"{level.energy_cm:17.6f} {level.error_cm:17.6f} {level.mixing:10.6f} {level.degeneracy:4d}"
-    text = f"{level.block:6d} {level.index:4d} {numbers}:"
+    text = f"{level.block:6d} {level.rank:4d} {numbers}:"
     if len(text) != _COLON + 1 or any(not -99 <= q <= 999 for q in level.quanta):
         raise ValueError(f"{level} does not fit the columns of an .egy file")
     return text + "".join(f"{q:3d}" for q in level.quanta) + "\n"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass, field
+from typing import Any
 
 from rotor.formats.atomic import open_atomic
 from rotor.formats.spcat.freeform import Line, encode, number, read_lines, read_words, whole
@@ -82,13 +83,13 @@ def _title(line: Line) -> str:
 
 def _request(line: Line) -> Request:
     words, _ = read_words(line, 0, len(_REQUEST))
-    counts, amounts = {}, {}
+    values: dict[str, Any] = {}
     for index, (key, default) in enumerate(_REQUEST.items()):
         if isinstance(default, int):
-            counts[key] = whole(line, words, index, _NAMES[index], default)
+            values[key] = whole(line, words, index, _NAMES[index], default)
         else:
-            amounts[key] = number(line, words, index, _NAMES[index], default)
-    return Request(**counts, **amounts, text=line.text)
+            values[key] = number(line, words, index, _NAMES[index], default)
+    return Request(**values, text=line.text)
 
 
 def _dipole(line: Line) -> Dipole:

@@ -163,8 +163,8 @@ def _line_text(lines: LineList, index: int) -> str:
     wrong = next((q for q in measured.quanta if not -99 <= q <= 999), None)
     if wrong is not None or not measured.quanta or len(measured.quanta) % 2:
         raise ValueError(
-            f"line {index + 1} cannot be written: quantum numbers {measured.quanta}; as many for the upper state as for "
-            "the lower, from -99 to 999, fit the format"
+            f"line {index + 1} cannot be written: quantum numbers {measured.quanta}; as many for the upper as for "
+            "the lower state, from -99 to 999, fit the format"
         )
     quanta = "".join(f"{q:3d}" for q in measured.quanta)
     return f"{quanta:<{_WIDTH}} {measured.frequency!r:>16} {measured.error!r:>10} {measured.weight!r}\n"
@@ -185,9 +185,7 @@ def line_list(quanta_upper: Any, quanta_lower: Any, frequency_mhz: Any, error_mh
     upper, lower = np.asarray(quanta_upper), np.asarray(quanta_lower)
     frequency = np.asarray(frequency_mhz, dtype=np.float64)
     if upper.shape != lower.shape or upper.ndim != 2 or upper.shape[1] > 6 or len(upper) != len(frequency):
-        raise ValueError(
-            f"quantum numbers of shapes {upper.shape}, {lower.shape} for {len(frequency)} lines; (n, k <= 6)"
-        )
+        raise ValueError(f"quantum numbers of shapes {upper.shape}, {lower.shape} for {len(frequency)} lines; (n, k)")
     quanta = np.full((len(upper), QUANTA_FIELDS), BLANK, dtype=np.int16)
     quanta[:, : 2 * upper.shape[1]] = np.concatenate([upper, lower], axis=1)
     error, share = (np.broadcast_to(np.asarray(v, dtype=np.float64), frequency.shape) for v in (error_mhz, weight))

@@ -1,4 +1,4 @@
-"""The parameter file of SPFIT and SPCAT, .par and .var: header, options, coded parameters, correlation kept as it is."""
+"""The parameter file of SPFIT and SPCAT, .par and .var: header, options, coded parameters, correlation as it is."""
 
 from __future__ import annotations
 
@@ -94,9 +94,7 @@ def read_par(source: str | os.PathLike[str] | bytes) -> ParameterFile:
     lines = read_lines(source)
     if len(lines) < 3:
         name = lines[0].file if lines else "the text given"
-        raise ValueError(
-            f"{name}: {len(lines)} lines; a title, a line of limits, an option line and parameters are wanted"
-        )
+        raise ValueError(f"{name}: {len(lines)} lines; a title, limits, options and parameters are wanted")
     header = _header(lines[1])
     options = [_options(lines[2])]
     while options[-1].vsym < 0:
