@@ -13,6 +13,7 @@ from rotor.formats.spcat.fields import BLANK
 from rotor.formats.spcat.line import Record
 from rotor.formats.spcat.rows import Columns
 
+
 @dataclass(frozen=True)
 class Layout:
     """What a catalogue's text holds beyond its numbers, so that it is written as it was read.
@@ -34,7 +35,7 @@ class Layout:
     ending: bytes = b""
 
 
-DTYPES = {
+DTYPES: dict[str, type[np.generic]] = {
     "frequency_mhz": np.float64,
     "error_mhz": np.float64,
     "lgint": np.float64,
@@ -98,11 +99,12 @@ class Catalogue:
 
     def columns(self, start: int, stop: int) -> Columns:
         """The numbers of lines `start` to `stop`."""
-        return Columns(*(getattr(self, name)[start:stop] for name in DTYPES))
+        return Columns._make(getattr(self, name)[start:stop] for name in DTYPES)
 
     def record(self, index: int) -> Record:
         """The numbers of one line."""
-        return Record(*(tuple(v.tolist()) if v.ndim else v.item() for v in (getattr(self, n)[index] for n in DTYPES)))
+        values = [getattr(self, name)[index] for name in DTYPES]
+        return Record._make(tuple(value.tolist()) if value.ndim else value.item() for value in values)
 
 
 def _column(name: str, values: Any, dtype: type[np.generic]) -> NDArray[Any]:
@@ -110,7 +112,7 @@ def _column(name: str, values: Any, dtype: type[np.generic]) -> NDArray[Any]:
     given = np.asarray(values)
     axes = 2 if name.startswith("quanta") else 1
     if given.ndim != axes:
-        raise ValueError(f"{name} has shape {given.shape}; an array of {axes} ax{'is' if axes == 1 else 'es'} is wanted")
+        raise ValueError(f"{name} has shape {given.shape}; shape {'(n, 6)' if axes == 2 else '(n,)'} is wanted")
     if given.dtype == dtype:
         return given
     with np.errstate(invalid="ignore"):
