@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 LINEAR_BELOW = 1e-6  # I_a / I_c below which a geometry is linear
+NO_WEIGHTS = SpinWeights()
 _KINDS = ("linear", "spherical", "prolate", "oblate", "asymmetric")
 
 
@@ -89,7 +90,7 @@ class Top:
 
     constants: Constants
     dipole_abc_debye: tuple[float, float, float] | None = None
-    spin_weights: SpinWeights = SpinWeights()
+    spin_weights: SpinWeights = NO_WEIGHTS
     name: str = ""
     mass_u: float | None = None
     frame: PrincipalFrame | None = None
@@ -134,7 +135,9 @@ class Top:
         ('linear', 57898.0)
         """
         if len(molecule.symbols) < 2:
-            raise ValueError(f"{molecule.name or 'the input'} is a single atom: it has no rotation; give 2 atoms or more")
+            raise ValueError(
+                f"{molecule.name or 'the input'} is a single atom: it has no rotation; give 2 atoms or more"
+            )
         body = point_masses(molecule.masses_u, molecule.positions_angstrom)
         frame = principal_frame(body, molecule.masses_u, molecule.positions_angstrom, equal_within)
         kind = kind_from_moments(frame.moments, linear_below=linear_below, equal_within=equal_within)

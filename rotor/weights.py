@@ -69,20 +69,23 @@ class SpinWeights:
         Weights are by K modulo n, of one component; a K doublet counts twice.
         """
         k = np.asarray(k)
-        both = np.where(k == 0, 1, 2)
+        both: NDArray[np.int64] = np.where(k == 0, 1, 2)
         if self.rule == "none":
             return both
         self._require("K", "a symmetric top")
-        return both * np.array(self.values, dtype=np.int64)[k % len(self.values)]
+        return np.asarray(both * np.array(self.values, dtype=np.int64)[k % len(self.values)])
 
     def of_spherical(self, j: ArrayLike) -> NDArray[np.int64]:
         """Weights of a spherical top's levels of each J, summed over the irreps that its 2J+1 components of K hold."""
         j = np.asarray(j)
         if self.rule == "none":
-            return 2 * j + 1
+            return np.asarray(2 * j + 1)
         self._require("irrep", "a spherical top")
         counts = _irreps_in_j(j, self.classes)
-        return sum((w * n for w, n in zip(self.values, counts, strict=True)), np.zeros_like(j))
+        total = np.zeros(j.shape, dtype=np.int64)
+        for weight, count in zip(self.values, counts, strict=True):
+            total += weight * count
+        return total
 
     def of_j(self, j: ArrayLike) -> NDArray[np.int64]:
         """Weights of linear-molecule levels, by parity of J."""
@@ -139,4 +142,6 @@ def _rule_of(names: set[str]) -> tuple[str, tuple[str, ...]]:
     by_k = tuple(str(i) for i in range(len(names)))
     if len(names) > 1 and names == set(by_k):
         return "K", by_k
-    raise ValueError(f"spin weights by {sorted(names)}: no rule has these classes; write " + " or ".join(_EXAMPLES.values()))
+    raise ValueError(
+        f"spin weights by {sorted(names)}: no rule has these classes; write " + " or ".join(_EXAMPLES.values())
+    )

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from rotor.effects import QuantumEffect
 from rotor.quantum.basis import WangBlock, ka_kc, wang_blocks
-from rotor.quantum.watson import Centrifugal, Multiplet, Operators, Rigid, block_bands, scalar_energy
+from rotor.quantum.watson import Centrifugal, Multiplet, Operators, Rigid, block_bands, rigid_operators, scalar_energy
 from rotor.weights import SpinWeights
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ class SolvedBlock:
     def jz_squared(self) -> Floats:
         """⟨Jz²⟩ of every state, (n,): how prolate (or oblate) it is along the z of the representation."""
         k = self.basis.k
-        return (self.vectors**2).T @ (k * k).astype(float)
+        return np.asarray((self.vectors**2).T @ (k * k).astype(float))
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,8 @@ class Levels:
     energy_mhz: E/h in MHz from the Hamiltonian's zero. j, ka, kc: quantum numbers; a symmetric top has K in `ka` (one
     row for both signs of K, `components` = 2) and -1 in `kc`, linear and spherical tops -1 in both. components: levels
     that coincide in the row (2J+1 for a spherical top). weight: nuclear-spin weight summed over the components.
-    degeneracy: (2J+1) times that. representation: of the Wang blocks, None for closed forms. blocks: the solved Wang blocks of an asymmetric top, empty for closed forms.
+    degeneracy: (2J+1) times that. representation: of the Wang blocks, None for closed forms. blocks: the solved Wang
+    blocks of an asymmetric top, empty for closed forms.
     """
 
     kind: str
@@ -81,13 +82,6 @@ class Levels:
         """The lowest energy of a level that exists (spin weight above zero)."""
         return float(self.energy_mhz[self.weight > 0].min())
 
-    def unordered(self) -> list[tuple[int, str]]:
-        """(J, species) of blocks where the order of energy is not that of ⟨Jz²⟩, so that Ka is only a count.
-
-        Distortion that outgrows the rigid energies does it (quartic-only water from J = 15 on).
-        """
-        return [(b.basis.j, b.basis.species) for b in self.blocks if _disordered(b.jz_squared)]
-
     def to_pandas(self):  # type: ignore[no-untyped-def]
         """The columns as a pandas DataFrame."""
         import pandas as pd
@@ -96,11 +90,28 @@ class Levels:
         return pd.DataFrame({name: getattr(self, name) for name in names})
 
 
-def _disordered(jz_squared: Floats) -> bool:
-    """Whether ⟨Jz²⟩ neither rises nor falls through a block; a change of 1e-6 is round-off or a near-degeneracy."""
-    steps = np.diff(jz_squared)
-    slack = 1e-6 * (1 + np.abs(jz_squared[1:]))
-    return bool((steps < -slack).any() and (steps > slack).any())
+def disordered_blocks(top: Top, levels: Levels) -> list[tuple[int, str]]:
+    """(J, species) of Wang blocks where the order of energy is not that of the rigid energy ⟨A Ja² + B Jb² + C Jc²⟩.
+
+    There Ka and Kc only count states: distortion has outgrown the rigid energies (quartic-only water from J = 15 on).
+    ⟨Jz²⟩ itself (`SolvedBlock.jz_squared`) is not the measure, since it falls by a little near the separatrix of a
+    rigid top, where labels are in perfect order.
+    """
+    out = []
+    for block in levels.blocks:
+        bands = block_bands(Multiplet(rigid_operators(top.constants), block.basis.j), block.basis)
+        rigid = _expectations(bands, block.vectors)
+        if (np.diff(rigid) < -1e-9 * np.abs(rigid).max()).any():
+            out.append((block.basis.j, block.basis.species))
+    return out
+
+
+def _expectations(bands: list[Floats], vectors: Floats) -> Floats:
+    """⟨v|H|v⟩ for every column of `vectors`, H given by its diagonals."""
+    total = bands[0] @ vectors**2
+    for n, band in enumerate(bands[1:], 1):
+        total += 2 * (band @ (vectors[:-n] * vectors[n:]))
+    return np.asarray(total)
 
 
 def hamiltonian(top: Top, effects: Sequence[QuantumEffect] = SEMI_RIGID) -> Operators:
@@ -242,7 +253,7 @@ def _dense(bands: list[Floats], vectors: bool) -> tuple[Floats, Floats]:
     matrix = np.diag(bands[0])
     for n, band in enumerate(bands[1:], 1):
         matrix += np.diag(band, -n)  # eigh reads the lower triangle
-    if vectors:
-        energies, states = np.linalg.eigh(matrix)
-        return energies, states
-    return np.linalg.eigvalsh(matrix), np.zeros((0, 0))
+    if not vectors:
+        return np.asarray(np.linalg.eigvalsh(matrix), dtype=np.float64), np.zeros((0, 0))
+    solved = np.linalg.eigh(matrix)
+    return np.asarray(solved.eigenvalues, dtype=np.float64), np.asarray(solved.eigenvectors, dtype=np.float64)

@@ -30,7 +30,9 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-INTENSITY_NM2_MHZ = 4.16231e-5  # 8π³/3hc for MHz and D² as catalogues use it; CODATA 2022 gives 4.16238e-5 (7e-6 in log10)
+INTENSITY_NM2_MHZ = (
+    4.16231e-5  # 8π³/3hc for MHz and D² as catalogues use it; CODATA 2022 gives 4.16238e-5 (7e-6 in log10)
+)
 EINSTEIN_PER_MHZ3 = 1.1639654e-20  # 64π⁴/3hc³ for MHz and D², CODATA 2022
 DEFAULT_MIN_LGINT = -12.0
 
@@ -221,7 +223,9 @@ def line_list(
 
 def _dipole_of(top: Top) -> tuple[float, float, float]:
     if top.dipole_abc_debye is None:
-        raise ValueError(f"the dipole of {top.name or 'this top'} is not known; give one, in principal axes or in the input's frame")
+        raise ValueError(
+            f"the dipole of {top.name or 'this top'} is not known; give one, in principal axes or in the input's frame"
+        )
     return top.dipole_abc_debye
 
 

@@ -105,7 +105,8 @@ def _fill_of(total: int) -> Callable[..., None]:
         return _fill_pair
     from rotor.spectra._kernels import fill_pair
 
-    return fill_pair  # type: ignore[no-any-return]
+    compiled: Callable[..., None] = fill_pair
+    return compiled
 
 
 def _fill_pair(
@@ -167,9 +168,7 @@ def _closed_form(
         keep = (frequency >= range_mhz[0]) & (frequency <= range_mhz[1]) & (levels.weight[lower] > 0)
         if cut is not None:
             keep &= cut.keeps(frequency, strength, cut.population[lower])
-        yield Transitions(
-            frequency[keep], strength[keep], upper[keep].astype(np.int32), lower[keep].astype(np.int32)
-        )
+        yield Transitions(frequency[keep], strength[keep], upper[keep].astype(np.int32), lower[keep].astype(np.int32))
 
 
 def _split(kind: str, dipole_abc: tuple[float, float, float]) -> tuple[float, float]:

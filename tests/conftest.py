@@ -1,0 +1,43 @@
+"""Where the shared reference files are, and the count of oracles that ran."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+SHARED = Path(__file__).resolve().parents[1].parent / "shared"
+
+
+@pytest.fixture(scope="session")
+def shared() -> Path:
+    """The folder of reference files beside the project."""
+    if not SHARED.is_dir():
+        pytest.skip("no ../shared beside the project: reference files are not on this machine")
+    return SHARED
+
+
+def _oracle_reports(reporter, outcomes: tuple[str, ...]) -> list:
+    reports = (report for outcome in outcomes for report in reporter.stats.get(outcome, []))
+    return [r for r in reports if "oracle" in getattr(r, "keywords", {})]
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
+    """A skipped oracle is a failure where the reference files are there."""
+    reporter = session.config.pluginmanager.get_plugin("terminalreporter")
+    if reporter and SHARED.is_dir() and _oracle_reports(reporter, ("skipped",)) and exitstatus == 0:
+        session.exitstatus = pytest.ExitCode.TESTS_FAILED
+
+
+def pytest_terminal_summary(terminalreporter) -> None:
+    """Say how many comparisons with reference files ran."""
+    ran = len(_oracle_reports(terminalreporter, ("passed", "failed")))
+    skipped = len(_oracle_reports(terminalreporter, ("skipped",)))
+    verdict = " (a failure: ../shared is here)" if skipped and SHARED.is_dir() else ""
+    terminalreporter.write_line(f"oracles: {ran} ran, {skipped} skipped{verdict}")
+
+
+@pytest.fixture(autouse=True)
+def _quiet_matplotlib(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("MPLBACKEND", "Agg")
