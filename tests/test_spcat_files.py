@@ -1,4 +1,4 @@
-"""The .par/.var, .int, .lin and .egy files: read without loss, free-form numbers, refusals with file, line and column."""
+"""The .par/.var, .int, .lin and .egy files: nothing lost, free-form numbers, refusals with file, line and column."""
 
 import gzip
 from collections.abc import Callable
@@ -258,7 +258,7 @@ def test_a_new_line_list_reads_back(tmp_path):
         (b"  1  x" + b" " * 30 + b" 5.0 0.1\n", "line 1, column 4: quantum number reads '  x'"),
         (
             b"  1  0" + b" " * 30 + b" 5.0 0.1 Smith 1973\n",
-            "line 1, column 46: 'Smith' is no number.* a comment begins",
+            "column 46: 'Smith' is no number.* a comment begins",
         ),
     ],
 )
@@ -268,7 +268,7 @@ def test_an_unreadable_line_is_refused(text, words):
 
 
 def test_lines_that_do_not_fit_are_refused():
-    with pytest.raises(ValueError, match="line 1 cannot be written: quantum numbers .1000"):
+    with pytest.raises(ValueError, match=r"line 1 cannot be written: quantum numbers .1000"):
         format_lin(line_list([[1000]], [[999]], [1.0], 0.1))
     with pytest.raises(ValueError, match="not negative"):
         line_list([[1]], [[0]], [1.0], -0.1)
@@ -341,6 +341,13 @@ def small_texts() -> list[tuple[Format, bytes]]:
     return [(format_of(path), b"".join(path.read_bytes().splitlines(keepends=True)[:12])) for path in paths]
 
 
+def read_or_refuse(form: Format, text: bytes) -> object:
+    try:
+        return form.read(text)
+    except ValueError as refusal:
+        return str(refusal)
+
+
 def survive(mutations: int, seed: int) -> tuple[int, int]:
     """How many mutated texts were read and how many refused; anything else fails."""
     rng, texts = np.random.default_rng(seed), small_texts()
@@ -348,14 +355,13 @@ def survive(mutations: int, seed: int) -> tuple[int, int]:
     for i in range(mutations):
         form, text = texts[i % len(texts)]
         text = mutated(text, rng)
-        try:
-            thing = form.read(text)
-        except ValueError as error:
-            assert str(error).startswith("the text given"), (error, text)
+        thing = read_or_refuse(form, text)
+        if isinstance(thing, str):
+            assert thing.startswith("the text given"), (thing, text)
             refused += 1
-            continue
-        assert form.text(thing) == text, text
-        read += 1
+        else:
+            assert form.text(thing) == text, text
+            read += 1
     return read, refused
 
 
