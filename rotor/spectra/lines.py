@@ -117,8 +117,8 @@ class Lines:
         columns = (self.levels.j, self.levels.ka, self.levels.kc)[: len(self.quanta_names)]
         return np.stack([column[rows] for column in columns], axis=1)
 
-    def where(self, chosen: NDArray[Any]) -> Lines:
-        """The lines that a boolean mask or an array of indices chooses, in its order."""
+    def where(self, chosen: NDArray[Any] | slice) -> Lines:
+        """The lines that a slice, a boolean mask or an array of indices chooses, in its order."""
         return replace(
             self,
             frequency_mhz=self.frequency_mhz[chosen],

@@ -22,9 +22,9 @@ def compiled(function: _Function) -> _Function:
     """The function compiled, the machine code kept on disk; compiled anew each time where no folder can be written."""
     kept: Any
     try:
-        kept = numba.njit(cache=True)(function)
+        kept = numba.njit(cache=True, nogil=True)(function)
     except RuntimeError:  # numba found neither its own cache folder nor the user's writable
-        kept = numba.njit(function)
+        kept = numba.njit(nogil=True)(function)
     return cast("_Function", kept)
 
 
