@@ -31,8 +31,8 @@ ROTATIONAL_MHZ_U_ANGSTROM2 = PLANCK_J_S / (8 * math.pi**2 * ATOMIC_MASS_KG * 1e-
 
 _FREQUENCY = {"Hz": 1e-6, "kHz": 1e-3, "MHz": 1.0, "GHz": 1e3, "THz": 1e6, "cm-1": MHZ_PER_CM, "K": MHZ_PER_K}
 _KINDS: dict[str, dict[str, float]] = {
+    "temperature": {"mK": 1e-3, "K": 1.0},  # first, so that K wanted is a temperature, K given also an energy
     "frequency": _FREQUENCY,
-    "temperature": {"mK": 1e-3, "K": 1.0},
     "length": {"pm": 0.01, "angstrom": 1.0, "Å": 1.0, "nm": 10.0, "bohr": BOHR_RADIUS_ANGSTROM, "m": 1e10},
     "dipole": {"D": 1.0, "debye": 1.0, "e*angstrom": DEBYE_PER_E_ANGSTROM, "C*m": 1.0 / DEBYE_C_M},
     "time": {"fs": 1e-3, "ps": 1.0, "ns": 1e3, "us": 1e6, "s": 1e12},

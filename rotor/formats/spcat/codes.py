@@ -54,9 +54,12 @@ def _named(codes: Mapping[str, int], minus: Iterable[str]) -> tuple[Named, ...]:
 
 
 _OCTIC = {"LJ": 400, "LJJK": 1300, "LJK": 2200, "LKKJ": 3100, "LK": 4000}
+_DECIC = {"PJ": 500, "PJJK": 1400, "PJK": 2300, "PKJ": 3200, "PKKJ": 4100, "PK": 5000}
 _SYMMETRIC_CODES = {
     "DJ": 200, "DJK": 1100, "DK": 2000,
-    "HJ": 300, "HJK": 1200, "HKJ": 2100, "HK": 3000, **_OCTIC,
+    "HJ": 300, "HJK": 1200, "HKJ": 2100, "HK": 3000,
+    **_OCTIC,
+    **_DECIC,
 }  # fmt: skip
 LINEAR = _named({"D": 200, "H": 300, "L": 400}, ["D"])
 SYMMETRIC = _named(_SYMMETRIC_CODES, ["DJ", "DJK", "DK"])
@@ -74,6 +77,7 @@ A_REDUCTION = _named(
         "DeltaJ": 200, "DeltaJK": 1100, "DeltaK": 2000, "deltaJ": 40100, "deltaK": 41000,
         "PhiJ": 300, "PhiJK": 1200, "PhiKJ": 2100, "PhiK": 3000, "phiJ": 40200, "phiJK": 41100, "phiK": 42000,
         **_OCTIC, "lJ": 40300, "lJK": 41200, "lKJ": 42100, "lK": 43000,
+        **_DECIC,
     },
     ["DeltaJ", "DeltaJK", "DeltaK", "deltaJ", "deltaK"],
 )  # fmt: skip

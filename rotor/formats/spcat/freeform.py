@@ -38,12 +38,19 @@ class Line(NamedTuple):
 
 
 def read_lines(source: str | os.PathLike[str] | bytes) -> list[Line]:
-    """The lines of a file or of its bytes, ends included; bytes that are no UTF-8 survive a round trip."""
+    """The lines of a file or of its bytes, ends included; bytes that are no UTF-8 survive a round trip.
+
+    Lines end with a line feed, a carriage return before it or not; one anywhere else is an error.
+    """
     data, name = load(source)
     text = data.decode("utf-8", "surrogateescape")
     pieces = text.split("\n")
     ended = [piece + "\n" for piece in pieces[:-1]] + ([pieces[-1]] if pieces[-1] else [])
-    return [Line(piece, number, name) for number, piece in enumerate(ended, 1)]
+    lines = [Line(piece, number, name) for number, piece in enumerate(ended, 1)]
+    for line in lines:
+        if "\r" in line.body:
+            raise line.error(line.body.index("\r"), "a carriage return inside a line; end lines with line feeds")
+    return lines
 
 
 def encode(texts: Sequence[str]) -> bytes:
@@ -72,7 +79,7 @@ def read_words(line: Line, start: int, count: int) -> tuple[list[Word], int]:
     while len(words) < count:
         while at < len(text) and text[at] in _GAP:
             at += 1
-        if at == len(text) or text[at] == "/":
+        if at >= len(text) or text[at] == "/":
             break
         if text[at] == ",":
             if pending_comma:
