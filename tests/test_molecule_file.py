@@ -23,7 +23,7 @@ names = ["HDO"]
 [geometry]
 kind = "re"
 source = "r = 1 Å, 90°, invented"
-atoms = [["O", 0, 0, 0], ["H", 1, 0, 0], ["D", 0, 1, 0]]
+atoms = [["O", 0, 0, 0], ["H", 0, 1, 0], ["D", 0, 0, 1]]
 
 [constants]
 unit = "GHz"
