@@ -171,14 +171,7 @@ class Top:
     @property
     def rotational_constants_mhz(self) -> tuple[float, float, float]:
         """A, B, C in MHz, whatever the kind; A of a linear top is infinite."""
-        c = self.constants
-        return {
-            "linear": lambda: (math.inf, c["B"], c["B"]),
-            "spherical": lambda: (c["B"], c["B"], c["B"]),
-            "prolate": lambda: (c["A"], c["B"], c["B"]),
-            "oblate": lambda: (c["B"], c["B"], c["C"]),
-            "asymmetric": lambda: (c["A"], c["B"], c["C"]),
-        }[self.kind]()
+        return self.constants.rigid
 
     @property
     def moments_u_angstrom2(self) -> tuple[float, float, float]:

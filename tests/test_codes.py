@@ -296,3 +296,22 @@ def test_the_symmetry_axis_is_where_the_kind_says():
     along_z = IntensityFile("t", Request(), (Dipole(1, 1.5),))
     assert model.top_of(file_of((100, 5.0), (1000, 2.0)), along_z).dipole_abc_debye == (1.5, 0.0, 0.0)
     assert model.top_of(file_of((100, 5.0), (1000, -2.0)), along_z).dipole_abc_debye == (0.0, 0.0, 1.5)
+
+
+def test_mutated_parameter_files_make_a_top_or_a_refusal():
+    rng = np.random.default_rng(5)
+    texts = [(SAMPLES / f"{case}.var").read_bytes() for case in CASES]
+    made = refused = 0
+    for i in range(1_500):
+        data = bytearray(texts[i % len(texts)])
+        start = data.index(b"\n", data.index(b"\n") + 1)  # option line and parameters
+        for _ in range(int(rng.integers(1, 3))):
+            data[int(rng.integers(start, len(data)))] = int(rng.choice(list(b" 0123456789.+-E/")))
+        try:
+            top = model.top_of(read_par(bytes(data)))
+        except ValueError:
+            refused += 1
+        else:
+            assert model.parameter_file(top, 10).parameters
+            made += 1
+    assert min(made, refused) > 300  # both outcomes are really tried

@@ -50,6 +50,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rotor.constants import Constants
 from rotor.inertia import point_masses, principal_frame
@@ -252,14 +253,14 @@ def _molecule(
     return replace(molecule, dipole_debye=np.array(dipole) @ axes, dipole_source=dipole_table.text("source"))
 
 
-def _atoms(table: _Reader) -> tuple[tuple[str, ...], list[list[float]]]:
+def _atoms(table: _Reader) -> tuple[tuple[str, ...], NDArray[np.float64]]:
     rows = table.content.get("atoms")
     if not isinstance(rows, list) or not rows:
         raise table.error("atoms", 'a list of ["symbol", x, y, z] in Å is wanted')
     for i, row in enumerate(rows, start=1):
         if not (isinstance(row, list) and len(row) == 4 and isinstance(row[0], str) and all(map(_is_number, row[1:]))):
             raise ValueError(f'{table.place}, atoms, atom {i} = {row!r}: ["symbol", x, y, z] in Å is wanted')
-    return tuple(row[0] for row in rows), [row[1:] for row in rows]
+    return tuple(row[0] for row in rows), np.array([row[1:] for row in rows], dtype=np.float64)
 
 
 def _constants(table: _Reader | None) -> Constants | None:

@@ -53,11 +53,12 @@ DTYPES: dict[str, type[np.generic]] = {
 class Catalogue:
     """Lines of a catalogue as columns of equal length n.
 
-    frequency_mhz, error_mhz (n,): MHz; a negative error says that both are in cm⁻¹. Errors beyond 999.9999 are
-    written so. lgint (n,): log10 of the intensity in nm² MHz. dr (n,): degrees of freedom of rotation in Q, 0, 2
-    or 3. energy_lower_cm (n,): cm⁻¹. g_upper (n,): degeneracy of the upper state. tag (n,): the species; negative
-    for a line measured in a laboratory, whose frequency and error are then the laboratory's. qnfmt (n,): what the
-    quantum numbers are, its last digit how many. quanta_upper, quanta_lower (n, 6) or wider; -32768 is blank.
+    frequency_mhz, error_mhz (n,): FREQ and ERR as the file has them: MHz, but cm⁻¹ both where the error is negative
+    and in infrared catalogues (six decimals in `layout`); errors beyond 999.9999 are written so. lgint (n,): log10 of
+    the intensity in nm² MHz. dr (n,): degrees of freedom of rotation in Q, 0, 2 or 3. energy_lower_cm (n,): cm⁻¹.
+    g_upper (n,): degeneracy of the upper state. tag (n,): the species; negative for a line measured in a laboratory,
+    whose frequency and error are then the laboratory's. qnfmt (n,): what the quantum numbers are, its last digit how
+    many. quanta_upper, quanta_lower (n, 6) or wider; -32768 is blank.
 
     Source: Pickett, Poynter, Cohen, Delitsky, Pearson, Müller, J. Quant. Spectrosc. Radiat. Transf. 60, 883 (1998).
     """

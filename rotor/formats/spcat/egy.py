@@ -83,7 +83,7 @@ def read_egy(source: str | os.PathLike[str] | bytes) -> LevelList:
             before += line.text
             continue
         level = read_level(line)
-        if before or format_level(level) != line.text:
+        if before or _plain_text(level) != line.text:
             texts[len(levels)] = before + line.text
         levels.append(level)
         before = ""
@@ -132,12 +132,16 @@ def _quanta(line: Line, first: int) -> tuple[int, ...]:
 
 
 def format_level(level: Level) -> str:
-    """The line of a level as SPCAT writes it."""
-    numbers = f"{level.energy_cm:17.6f} {level.error_cm:17.6f} {level.mixing:10.6f} {level.degeneracy:4d}"
-    text = f"{level.block:6d} {level.rank:4d} {numbers}:"
-    if len(text) != _COLON + 1 or any(not -99 <= q <= 999 for q in level.quanta):
+    """The line of a level as SPCAT writes it; ValueError for numbers that do not fit its columns."""
+    text = _plain_text(level)
+    if text.find(":") != _COLON or any(not -99 <= q <= 999 for q in level.quanta):
         raise ValueError(f"{level} does not fit the columns of an .egy file")
-    return text + "".join(f"{q:3d}" for q in level.quanta) + "\n"
+    return text
+
+
+def _plain_text(level: Level) -> str:
+    numbers = f"{level.energy_cm:17.6f} {level.error_cm:17.6f} {level.mixing:10.6f} {level.degeneracy:4d}"
+    return f"{level.block:6d} {level.rank:4d} {numbers}:" + "".join(f"{q:3d}" for q in level.quanta) + "\n"
 
 
 def format_egy(levels: LevelList) -> bytes:
