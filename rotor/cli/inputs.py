@@ -112,7 +112,9 @@ def weights(name: str, text: str) -> dict[str, int]:
     for item in text.split(","):
         key, equals, number = (part.strip() for part in item.partition("="))
         if not (key and equals and number.isdecimal()) or key in table:
-            raise ValueError(f"{name}: {item.strip()!r} in {text!r}: class=number is wanted, each class once, such as ee=1")
+            raise ValueError(
+                f"{name}: {item.strip()!r} in {text!r}: class=number is wanted, each class once, such as ee=1"
+            )
         table[key] = int(number)
     return table
 
@@ -147,7 +149,9 @@ def _refuse_contradictions(given: Input) -> None:
 def _from_constants(given: Input) -> Top:
     from rotor.top import Top
 
-    return option("--constants", given.constants or "", lambda text: Top.from_constants(text, source="given (--constants)"))
+    return option(
+        "--constants", given.constants or "", lambda text: Top.from_constants(text, source="given (--constants)")
+    )
 
 
 def _from_source(given: Input) -> Top:
@@ -162,7 +166,7 @@ def _from_source(given: Input) -> Top:
 def _with_dipole_of_input(top: Top, dipole_debye: tuple[float, float, float]) -> Top:
     if top.frame is None:
         raise ValueError("--dipole is in the frame of a geometry, and there is none here; use --dipole-abc")
-    return top.with_dipole(top.frame.axes @ dipole_debye, "given in the frame of the input (--dipole)")
+    return top.with_dipole((top.frame.axes @ dipole_debye).tolist(), "given in the frame of the input (--dipole)")
 
 
 def _refuse_weights_of_another_kind(top: Top) -> None:
@@ -185,5 +189,4 @@ def with_some_dipole(top: Top) -> Top:
     if dipole is None:
         raise ValueError(f"{said}: {remedy}")
     note(said)
-    return replace(top.with_dipole(top.frame.axes @ dipole, CHARGES_SOURCE), notes=(*top.notes, said))
-
+    return replace(top.with_dipole((top.frame.axes @ dipole).tolist(), CHARGES_SOURCE), notes=(*top.notes, said))
