@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from rotor.classical.theta import CIRCULATING, SEPARATRIX, STEADY, Array, Rows
+from rotor.classical.theta import CIRCULATING, SEPARATRIX, STEADY, Rows
+from rotor.rotations import Array
 
 SPLITTER = 134217729.0  # 2^27 + 1
 
@@ -122,7 +123,7 @@ def _placed(left: Any, right: Any, w: float, x: float, y: float, z: float, half_
 
 @njit(cache=True, nogil=True)
 def evaluate(rows: Rows, times: Array, low: float, momentum: Array, attitude: Array) -> None:
-    """Momentum (n, t, 3) and attitude (n, t, 4) of n bodies at t times; `low` = 1 keeps the low halves, 0 drops them."""
+    """Momentum (n, t, 3) and attitude (n, t, 4) of n bodies at t times; `low` is 1, or 0 to drop the low halves."""
     for b in range(rows.kind.shape[0]):
         kind, rate, c, sign, axis = rows.kind[b], rows.rates[b], rows.series[b], rows.signs[b], rows.axes[b]
         for i in range(times.shape[0]):

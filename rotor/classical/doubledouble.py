@@ -9,12 +9,11 @@ Algorithms: T. J. Dekker, Numer. Math. 18, 224 (1971); M. Joldes, J.-M. Muller, 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-Array: TypeAlias = NDArray[np.float64]
+from rotor.rotations import Array
 
 SPLITTER = 134217729.0  # 2^27 + 1, cuts a double into two halves of 26 bits
 

@@ -17,11 +17,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from rotor.rotations import multiply, rotate
-
-Array = NDArray[np.float64]
+from rotor.rotations import Array, multiply, rotate
 
 LINEAR_MISMATCH = 1e-12  # the two moments of a linear rotor are the same number but for round-off
 

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rotor.classical.euler import checked_moments, checked_momentum
-from rotor.classical.theta import SEPARATRIX, STEADY, Array, Rows, moving_rows, steady_rows
-from rotor.rotations import IDENTITY, conjugate, multiply, normalised
+from rotor.classical.theta import SEPARATRIX, STEADY, Rows, moving_rows, steady_rows
+from rotor.rotations import IDENTITY, Array, conjugate, multiply, normalised
 
 Phases = Literal["double-double", "double"]
 
@@ -28,7 +28,7 @@ class FreeMotion:
     period: (...), of the momentum in the body; infinite where it stands still and on the separatrix.
     turning_rate: (...), mean rate, rad per time, at which the body turns about L in space. After one period the body
     has turned about L by this rate times the period, up to whole turns.
-    steady, separatrix: (...), whether the momentum stands still in the body, and whether it runs into the unstable axis.
+    steady, separatrix: (...), whether the momentum stands still in the body, or runs into the unstable axis.
     rows: the constants for the compiled evaluation.
     """
 
@@ -74,8 +74,8 @@ def free_motion(moments: ArrayLike, momentum0: ArrayLike, attitude0: ArrayLike =
     turned). Any coherent units, axes in any order; shapes broadcast. Spherical, symmetric, asymmetric and linear
     bodies, rest, spin about an axis and the separatrix itself are all exact members of one family.
 
-    >>> float(free_motion([0.6, 0.8, 1.0], [1.8, 0.4, -0.9]).period)  # classical mechanics' 4K/λ
-    6.862616178058116
+    >>> float(free_motion([0.6, 0.8, 1.0], [1.8, 0.4, -0.9]).period)  # 4K/λ
+    6.862616178058115
     """
     moments, momentum0 = checked_moments(moments), np.asarray(momentum0, dtype=np.float64)
     momentum0 = checked_momentum(momentum0, moments)
@@ -89,8 +89,10 @@ def free_motion(moments: ArrayLike, momentum0: ArrayLike, attitude0: ArrayLike =
     pace = np.abs(rows.rates[:, 0])
     period = np.divide(2.0, pace, out=np.full_like(pace, np.inf), where=~(steady | separatrix))
     turning = rows.rates[:, 4] * (4.0 * np.pi)
-    period, turning, steady, separatrix = (a.reshape(shape) for a in (period, turning, steady, separatrix))
-    return FreeMotion(moments, momentum0, attitude0, period, turning, steady, separatrix, rows)
+    period, turning = period.reshape(shape), turning.reshape(shape)
+    return FreeMotion(
+        moments, momentum0, attitude0, period, turning, steady.reshape(shape), separatrix.reshape(shape), rows
+    )
 
 
 def _rows(moments: Array, momentum: Array) -> Rows:
@@ -121,7 +123,7 @@ def _merged(first: NDArray[np.bool_], yes: Rows, no: Rows) -> Rows:
 
 
 def _stands_still(moments: Array, momentum: Array) -> NDArray[np.bool_]:
-    """Whether L x ω vanishes exactly: spin about a principal axis, a sphere, a linear body, a symmetric top's equator."""
+    """Whether L x ω is exactly zero: spin about a principal axis, a sphere, a linear body, a symmetric top's equator."""
     size = np.max(np.abs(momentum), axis=-1, keepdims=True)
     if np.any((momentum != 0.0) & (np.abs(momentum) < SMALLEST_PART * size)):
         raise ValueError(

@@ -9,7 +9,7 @@ D_i = G² - 2T J_i. Then, with sn, cn, dn of u and parameter mc = k'² = 1 - k²
 
 (Jacobi 1849; Landau and Lifshitz, section 37). The attitude needs one more phase. Write the rotation that takes the
 body frame to one with L along its third axis as the quaternion w + i x + j y + k z and put α = w + i z, β = x + i y.
-Euler's equations make β/α = (L2 - i L1)/(G + L3), an elliptic function of u whose one zero per cell lies at dn u = G/B3.
+Euler's equations make β/α = (L2 - i L1)/(G + L3), an elliptic function of u whose one zero in a cell has dn u = G/B3.
 With z = πu/2K, q = exp(-πK'/K) and θ functions of the nome q²,
 
     α = e^{iΩt/2} θ4(z - iη | q²),  β = e^{iΩt/2} θ1(z - iη | q²)   up to one common real factor,
@@ -31,9 +31,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor.classical.doubledouble import PI, Array, DoubleDouble, choose, exact_sum, products
+from rotor.classical.doubledouble import PI, DoubleDouble, choose, exact_sum, products
 from rotor.classical.elliptic import carlson_rf, complete
-from rotor.rotations import conjugate, from_matrix, multiply
+from rotor.rotations import Array, from_matrix, multiply
 
 STEADY, CIRCULATING, NEAR_SEPARATRIX, SEPARATRIX = 0.0, 1.0, 2.0, 3.0
 TRANSFORM_BELOW = 0.2  # mc under which q' is the smaller nome for both kinds of series: q, q' stay below 0.1
@@ -146,9 +146,10 @@ def moving_rows(moments: Array, momentum: Array) -> Rows:
     # πK/K' and πK'/K; the second is infinite for a symmetric top, whose nome is zero
     long = np.pi * np.divide(other_mean, c.mean, out=np.full_like(c.mean, np.inf), where=~frame.separatrix)
     short = np.pi * np.divide(c.mean, other_mean, out=np.full_like(c.mean, np.inf), where=other_mean > 0.0)
-    plain = _series(c.b, np.exp(-short), np.exp(-c.mean * y_rest), 2.0 * c.mean * y)
+    nome, other_nome = np.where(near, 0.0, np.exp(-short)), np.where(near, np.exp(-long), 0.0)
+    plain = _series(c.b, nome, np.exp(-c.mean * y_rest), 2.0 * c.mean * y)
     phi = np.where(near, 0.5 * other_mean * np.where(near, y, 0.0), 0.0)
-    bent = _transformed_series(c.b, np.exp(-long), phi)
+    bent = _transformed_series(c.b, other_nome, phi)
     shift = np.stack([np.where(frame.separatrix, 0.0, long), 2.0 * phi], axis=-1)
     half_turns = c.turning / (PI * 4.0)
     return Rows(
@@ -166,12 +167,12 @@ def moving_rows(moments: Array, momentum: Array) -> Rows:
 
 def steady_rows(moments: Array, momentum: Array) -> Rows:
     """Rows of bodies (n, 3) whose momentum stays in the body: they turn about L at the rate 2T/|L|."""
-    inverse = [np.where(j > 0.0, j, np.inf) for j in moments.T]
     squares = [DoubleDouble.product(m, m) for m in momentum.T]
+    divisors = [np.where(j > 0.0, j, 1.0) for j in moments.T]  # where a moment is zero, so is the square above it
     total = squares[0] + squares[1] + squares[2]
     moves = total.hi > 0.0
     g = choose(moves, total.sqrt(), DoubleDouble.of(np.ones_like(total.hi)))
-    twice_energy = squares[0] / inverse[0] + squares[1] / inverse[1] + squares[2] / inverse[2]
+    twice_energy = squares[0] / divisors[0] + squares[1] / divisors[1] + squares[2] / divisors[2]
     half_turns = twice_energy / g / (PI * 4.0)
     n, zero = len(moments), np.zeros_like(total.hi)
     return Rows(
@@ -257,7 +258,7 @@ def _rows_of_axes(frame: Frame) -> Array:
 
 
 def _turn_to_third(direction: Array) -> Array:
-    """A rotation that takes each unit vector to the third axis, by way of a half turn about the second if it is down."""
+    """A rotation that takes each unit vector to the third axis, after a half turn about the second if it is down."""
     up = direction[:, 2:] >= 0.0
     x, y, z = np.where(up, direction, direction * [-1.0, 1.0, -1.0]).T
     half = np.sqrt(0.5 * (1.0 + z))
