@@ -94,8 +94,8 @@ def separatrix_ratio(moments: ArrayLike) -> Array:
 def precession_rates(moments: ArrayLike, momentum: ArrayLike) -> tuple[Array, Array]:
     """Of a symmetric top (I, I, I3) with L (..., 3) in the body: rate in the body (I3/I - 1) ω3, rate in space |L|/I.
 
-    The first is the rate, with its sign, at which L turns about the body's axis as seen in the body's own frame,
-    reversed; the second that of the axis about L in space (Landau and Lifshitz, section 33).
+    The first, with its sign, is the rate at which L and ω turn about the third axis as the body sees them (Landau and
+    Lifshitz, equation 36.6), the second that of the axis about L in space (section 33).
 
     >>> [float(rate) for rate in precession_rates([1.0, 1.0, 2.0], [0.0, 3.0, 4.0])]
     [2.0, 5.0]

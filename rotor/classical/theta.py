@@ -220,7 +220,11 @@ def _amplitude_integrals(frame: Frame, c: Constants) -> tuple[Array, Array, Arra
 def _series(b: tuple[Array, Array, Array], q: Array, x: Array, two_eta: Array) -> Array:
     """Amplitudes of L and coefficients of the series in the nomes q (for L) and q² (for α and β).
 
+    Columns: 0-2 amplitudes; 3-5 of θ1, θ2; 6-9 of θ3, θ4 (NIST DLMF 20.2); then, with w = z - iη,
+    θ4(w) = 1 + Σ (-1)^n [a_n cos 2nz + i b_n sin 2nz]: 10-12 a, 13-15 b, n = 1, 2, 3;
+    θ1(w) ~ Σ (-1)^n [c_n sin kz - i d_n cos kz], k = 2n + 1: 16-18 c, 19-21 d, n = 0, 1, 2.
     x = √q e^η and Y = e^-2η keep every product finite when the top becomes symmetric: q -> 0, η -> infinity.
+    What is left out is below 1e-20 for q < 0.1.
     """
     theta2, theta3 = 1 + q**2 + q**6 + q**12, 1 + 2 * (q + q**4 + q**9 + q**16)
     theta4 = 1 - 2 * (q - q**4 + q**9 - q**16)
@@ -236,7 +240,10 @@ def _series(b: tuple[Array, Array, Array], q: Array, x: Array, two_eta: Array) -
 
 
 def _transformed_series(b: tuple[Array, Array, Array], q: Array, phi: Array) -> Array:
-    """Amplitudes of L and coefficients after Jacobi's transformation: powers of q', cos kφ and sin kφ, k = 1 to 9."""
+    """Amplitudes of L and coefficients after Jacobi's transformation (NIST DLMF 20.7.30 to 20.7.33).
+
+    Columns: 0-2 amplitudes; 3-9 powers 1, 1/2, 2, 4, 9/2, 6, 8 of q'; 10-14 cos kφ, 15-19 sin kφ, k = 1, 3, ... 9.
+    """
     theta2, theta3 = 1 + q**2 + q**6 + q**12, 1 + 2 * (q + q**4 + q**9 + q**16)
     theta4 = 1 - 2 * (q - q**4 + q**9 - q**16)
     columns = [b[0] * theta2 / theta4, b[1] * theta3 / theta4, b[2] * theta2 / theta3]
