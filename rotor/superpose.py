@@ -9,8 +9,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from rotor.rotations import Array, from_matrix, nearest_rotation
 
-RANK = 1e-10  # relative size of a singular value below which a direction counts as absent
-
 
 @dataclass(frozen=True)
 class Superposition:
@@ -77,7 +75,7 @@ def superpose(mobile: ArrayLike, target: ArrayLike, weights: ArrayLike | None = 
     rest = dx @ np.swapaxes(rotation, -1, -2) - dy
     rmsd = np.sqrt(np.sum(w * np.sum(rest * rest, axis=-1), axis=-1))
     translation = y0 - (rotation @ x0[..., None])[..., 0]
-    return Superposition(rotation, from_matrix(rotation), translation, rmsd, _determined(covariance))
+    return Superposition(rotation, from_matrix(rotation), translation, rmsd, fit.unique)
 
 
 def polar(gradient: ArrayLike) -> Polar:
@@ -88,9 +86,9 @@ def polar(gradient: ArrayLike) -> Polar:
     ([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]], [1.0, 2.0, 1.0])
     """
     f = np.asarray(gradient, dtype=np.float64)
-    rotation = nearest_rotation(f).rotation
-    turned_back = np.swapaxes(rotation, -1, -2)
-    return Polar(rotation, _symmetric_part(turned_back @ f), _symmetric_part(f @ turned_back), _determined(f))
+    fit = nearest_rotation(f)
+    turned_back = np.swapaxes(fit.rotation, -1, -2)
+    return Polar(fit.rotation, _symmetric_part(turned_back @ f), _symmetric_part(f @ turned_back), fit.unique)
 
 
 def flow_gradient(gradient: ArrayLike) -> FlowGradient:
@@ -112,13 +110,6 @@ def flow_gradient(gradient: ArrayLike) -> FlowGradient:
 
 def _symmetric_part(matrix: Array) -> Array:
     return np.asarray(0.5 * (matrix + np.swapaxes(matrix, -1, -2)))
-
-
-def _determined(matrix: Array) -> NDArray[np.bool_]:
-    """Whether the proper rotation of the polar form is unique: σ2 + sign(det) σ3 > 0."""
-    sigma = np.linalg.svd(matrix, compute_uv=False)
-    smallest = np.where(np.linalg.det(matrix) < 0.0, -sigma[..., 2], sigma[..., 2])
-    return np.asarray(sigma[..., 1] + smallest > RANK * sigma[..., 0])
 
 
 def _clouds(mobile: ArrayLike, target: ArrayLike) -> tuple[Array, Array]:

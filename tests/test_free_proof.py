@@ -239,8 +239,8 @@ def hard_bodies(rng):
         pair = [i[0], i[0] * (1.0 + 1e-12), i[2]] if rng.uniform() < 0.5 else [i[0], i[2], i[2] * (1.0 + 1e-12)]
         near["I1 = I2 (1 + 1e-12)"].append((np.array(pair), m))
     for k, (i, m) in enumerate(random_bodies(rng, 6)):
-        small = (1e-6, 1e-9, 1e-12)[k // 2]
-        along = np.sqrt(small) if k % 2 else 1.0  # thermal, or with a momentum about the axis like about the others
+        small = 1e-6 if k < 3 else 1e-12
+        along = (1.0, np.sqrt(small), 0.05 * np.sqrt(small))[k % 3]  # spin about the axis: fast, thermal, little
         near["near-linear"].append(
             (np.array([small, i[1], i[1] * (1.0 + 0.5 * (k % 2)) + small]), m * [along, 1.0, 1.0])
         )
@@ -305,7 +305,23 @@ HARD = (
 @pytest.mark.parametrize("name", HARD)
 def test_sample_of_hard_cases(name):
     rng = np.random.default_rng(26)
-    check(hard_bodies(rng)[name][:2], (1, 1e10), rng, name)
+    bodies = hard_bodies(rng)[name]
+    check([bodies[0], bodies[-1]], (1, 1e10), rng, name)
+
+
+def test_within_1e_31_of_the_separatrix():
+    """a² - 3 b² = 1 (Pell) makes D2 of I = (1, 2, 3), L = (b, L2, a) one unit in 1e31: only an exact sum sees it."""
+    a, b = 2, 1
+    while 2 * a + 3 * b < 2**53:
+        a, b = 2 * a + 3 * b, a + 2 * b
+    bodies = [((1.0, 2.0, 3.0), (sign * b, 0.3 * b, a)) for sign in (1.0, -1.0)]
+    check(bodies, (1, 1e3, 1e10), np.random.default_rng(28), "separatrix 1e-31")
+
+
+def test_a_moment_of_1e_24_needs_both_forms_of_the_turning_rate():
+    small = (1e-24, 1.0, 1.2)  # L circles the axis of the tiny moment, then that of the largest
+    bodies = [(small, (2e-12, 0.8, -0.9)), (small, (5e-14, 0.8, 0.9))]
+    check(bodies, (1, 1e3, 1e10), np.random.default_rng(29), "moment of 1e-24")
 
 
 def test_sample_of_random_cases():

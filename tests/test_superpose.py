@@ -81,6 +81,14 @@ def test_points_on_a_line_fit_and_say_that_the_turn_is_open():
     assert not single.unique
 
 
+def test_mirrored_cross_fits_two_ways_and_says_so():
+    cross = np.array([[1.0, 0, 0], [-1, 0, 0], [0, 2, 0], [0, -2, 0], [0, 0, 1], [0, 0, -1]])
+    assert superpose(cross, cross).unique
+    fit = superpose(cross, cross * [1.0, 1.0, -1.0] + [0, 0, 0])  # the same cross: points 5 and 6 change places
+    assert not fit.unique  # x or z may be the one given up
+    assert fit.rmsd == pytest.approx(np.sqrt(8 / 6), rel=1e-14)  # two points at a distance of 2
+
+
 def test_many_clouds_at_once():
     rng = np.random.default_rng(1)
     cloud, q = rng.normal(size=(5, 3)), uniform((4, 3), rng=rng)

@@ -129,7 +129,7 @@ def products(*factors: DoubleDouble) -> list[Array]:
     return terms
 
 
-def exact_sum(terms: list[Array], passes: int = 6) -> DoubleDouble:
+def exact_sum(terms: list[Array], passes: int = 4) -> DoubleDouble:
     """Σ terms to 31 digits of the *result*, however much cancels (up to about `passes` times 16 digits).
 
     Each pass leaves the exact sum as it is and moves it towards the last term (VecSum of Ogita, Rump and Oishi).
