@@ -207,6 +207,23 @@ def test_attitude_follows_the_angular_velocity():
     assert np.max(np.abs((q[:, 2] - q[:, 0]) / (2 * h) - rate)) < h**2 * (1 + speed) ** 3  # central difference
 
 
+def test_extreme_bodies_stay_finite_and_keep_their_invariants():
+    rng = np.random.default_rng(5)
+    n = 4000
+    moments, some = 10.0 ** rng.uniform(-12, 0, (n, 3)), rng.integers(0, 4, n)
+    moments[some == 1, 1] = moments[some == 1, 0] * (1.0 + 1e-12 * rng.integers(-3, 4, np.sum(some == 1)))
+    moments[some == 2, 2] = moments[some == 2, 0]
+    momenta = rng.normal(size=(n, 3)) * 10.0 ** (rng.uniform(-110, 0, (n, 3)) * (rng.uniform(size=(n, 3)) < 0.3))
+    momenta[rng.uniform(size=(n, 3)) < 0.1] = 0.0
+    m, q = free_motion(moments, momenta).at([0.0, 1.0, 1e8])
+    size = np.linalg.norm(momenta, axis=-1)[:, None]
+    assert np.all(np.linalg.norm(rotate(q, m) - momenta[:, None], axis=-1) <= 4e-15 * size)  # some 20 roundings
+    energy0 = euler.energy(momenta, moments)[:, None]
+    assert np.all(
+        np.abs(euler.energy(m, moments[:, None]) - energy0) <= 4e-15 * energy0
+    )  # each part is exact by itself
+
+
 def test_symmetric_top_is_two_turns():
     moments, momentum = np.array([1.3, 1.3, 0.4]), np.array([0.5, -0.2, 0.7])
     times = np.linspace(0.0, 50.0, 11)

@@ -65,13 +65,21 @@ class Rows(NamedTuple):
 
 @dataclass(frozen=True)
 class Frame:
-    """Body axes in the order (first, second, third) with their signs, and moments and momentum seen in them."""
+    """Body axes in the order (first, second, third) with their signs, and moments and momentum seen in them.
+
+    d2: D2 J1 J3, the same number with axes 1 and 3 exchanged; zero on the separatrix.
+    """
 
     axes: NDArray[np.int64]
     signs: Array
     moments: tuple[Array, Array, Array]
     momentum: tuple[Array, Array, Array]
-    separatrix: NDArray[np.bool_]
+    d2: DoubleDouble
+
+    @property
+    def separatrix(self) -> NDArray[np.bool_]:
+        """Where D2 is exactly zero."""
+        return np.asarray(self.d2.hi == 0.0)
 
 
 @dataclass(frozen=True)
@@ -94,17 +102,17 @@ class Constants:
 def frame_of(moments: Array, momentum: Array) -> Frame:
     """Which axis L circles, by the exact sign of D2, and everything seen with that axis third and L3 > 0."""
     order = np.argsort(moments, axis=-1, kind="stable")
-    d2 = _d2_j1_j3(_columns(moments, order), _columns(momentum, order)).hi
-    axes = np.where((d2 < 0.0)[:, None], order[:, ::-1], order)
+    d2 = _d2_j1_j3(_columns(moments, order), _columns(momentum, order))
+    axes = np.where((d2.hi < 0.0)[:, None], order[:, ::-1], order)
     third = np.where(np.take_along_axis(momentum, axes[:, 2:], axis=-1)[:, 0] < 0.0, -1.0, 1.0)
     cyclic = (axes[:, 1] - axes[:, 0]) % 3 == 1
     first = np.where(cyclic, third, -third)
     # on the separatrix cn and dn keep one sign for ever, so L1 has to be positive too: turn by π about the third axis
-    back = (d2 == 0.0) & (np.take_along_axis(momentum, axes[:, :1], axis=-1)[:, 0] * first < 0.0)
+    back = (d2.hi == 0.0) & (np.take_along_axis(momentum, axes[:, :1], axis=-1)[:, 0] * first < 0.0)
     flip = np.where(back, -1.0, 1.0)
     signs = np.stack([first * flip, flip, third], axis=-1)
     m1, m2, m3 = (np.take_along_axis(momentum, axes, axis=-1) * signs).T
-    return Frame(axes, signs, _columns(moments, axes), (m1, m2, m3), d2 == 0.0)
+    return Frame(axes, signs, _columns(moments, axes), (m1, m2, m3), d2)
 
 
 def constants_of(frame: Frame) -> Constants:
@@ -114,7 +122,7 @@ def constants_of(frame: Frame) -> Constants:
     s1, s2, s3 = (DoubleDouble.product(m, m) for m in frame.momentum)
     d1 = s2 * j21 / j2 + s3 * j31 / j3
     d3 = -(s2 * j32 / j2 + s1 * j31 / j1)
-    mc = _d2_j1_j3(frame.moments, frame.momentum) / (j1 * j3) * j31 / (d1 * j32)
+    mc = frame.d2 / (j1 * j3) * j31 / (d1 * j32)
     kk = -(d3 * j21) / (d1 * j32)
     g, b3 = (s1 + s2 + s3).sqrt(), (j3 * d1 / j31).sqrt()
 
