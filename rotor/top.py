@@ -7,7 +7,6 @@ A molecule becomes a top here; the quantum and the classical half know tops only
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -106,7 +105,7 @@ class Top:
         cls,
         constants: Constants | str,
         *,
-        dipole_abc_debye: Sequence[float] | None = None,
+        dipole_abc_debye: ArrayLike | None = None,
         spin_weights: SpinWeights | dict[str, int] | None = None,
         **others: Any,
     ) -> Top:
@@ -197,7 +196,7 @@ class Top:
         a, b, c = self.moments_u_angstrom2
         return c - a - b
 
-    def with_dipole(self, dipole_abc_debye: Sequence[float], source: str) -> Top:
+    def with_dipole(self, dipole_abc_debye: ArrayLike, source: str) -> Top:
         """The same top with another dipole in principal axes."""
         return replace(self, dipole_abc_debye=_three(dipole_abc_debye), dipole_source=source)
 

@@ -31,7 +31,9 @@ def command(
     dipole: str | None = inputs.DIPOLE,
     dipole_abc: str | None = inputs.DIPOLE_ABC,
     spin_weights: str | None = inputs.SPIN_WEIGHTS,
-    temperature: str | None = typer.Option(None, metavar="GRID", help="Temperatures of the table: 10:300K:30 or 10,20,50 K."),
+    temperature: str | None = typer.Option(
+        None, metavar="GRID", help="Temperatures of the table: 10:300K:30 or 10,20,50 K."
+    ),
     json: str | None = inputs.JSON,
 ) -> None:
     """Frame, constants, kind of top with its margin, moments, dipole, table of Q(T)."""

@@ -112,7 +112,9 @@ def weights(name: str, text: str) -> dict[str, int]:
     for item in text.split(","):
         key, equals, number = (part.strip() for part in item.partition("="))
         if not (key and equals and number.isdecimal()) or key in table:
-            raise ValueError(f"{name}: {item.strip()!r} in {text!r}: class=number is wanted, each class once, such as ee=1")
+            raise ValueError(
+                f"{name}: {item.strip()!r} in {text!r}: class=number is wanted, each class once, such as ee=1"
+            )
         table[key] = int(number)
     return table
 
@@ -147,7 +149,9 @@ def _refuse_contradictions(given: Input) -> None:
 def _from_constants(given: Input) -> Top:
     from rotor.top import Top
 
-    return option("--constants", given.constants or "", lambda text: Top.from_constants(text, source="given (--constants)"))
+    return option(
+        "--constants", given.constants or "", lambda text: Top.from_constants(text, source="given (--constants)")
+    )
 
 
 def _from_source(given: Input) -> Top:
@@ -186,4 +190,3 @@ def with_some_dipole(top: Top) -> Top:
         raise ValueError(f"{said}: {remedy}")
     note(said)
     return replace(top.with_dipole(top.frame.axes @ dipole, CHARGES_SOURCE), notes=(*top.notes, said))
-

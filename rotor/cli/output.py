@@ -29,7 +29,9 @@ def answering() -> Iterator[None]:
     except ValueError as error:
         raise NoAnswer(str(error)) from error
     except MemoryError as error:
-        raise NoAnswer("not enough memory for so many lines; a lower J max, a range or a higher cut needs less") from error
+        raise NoAnswer(
+            "not enough memory for so many lines; a lower J max, a range or a higher cut needs less"
+        ) from error
 
 
 def note(text: str) -> None:

@@ -48,7 +48,9 @@ def command(
     temperature: str = typer.Option("300", metavar="T", help="Temperature (K)."),
     jmax: int | None = typer.Option(None, metavar="N", help="Highest J; by default what the cut needs."),
     min_lgint: str = typer.Option("-12", metavar="X", help="Leave out lines with log10(nm² MHz) below; or 'none'."),
-    range_: str | None = typer.Option(None, "--range", metavar="A:B", help="First and last frequency, such as 0:2000GHz (MHz)."),
+    range_: str | None = typer.Option(
+        None, "--range", metavar="A:B", help="First and last frequency, such as 0:2000GHz (MHz)."
+    ),
     dipole: str | None = inputs.DIPOLE,
     dipole_abc: str | None = inputs.DIPOLE_ABC,
     isotope: list[str] | None = inputs.ISOTOPE,
@@ -81,7 +83,9 @@ def command(
     ):
         files.ask(name, path, suffixes)
     if profile_csv and settings.profile == "sticks":
-        raise ValueError("--profile-csv: sticks have no profile; give --fwhm or --profile gaussian, lorentzian or voigt")
+        raise ValueError(
+            "--profile-csv: sticks have no profile; give --fwhm or --profile gaussian, lorentzian or voigt"
+        )
 
     given = Input(source, constants, isotope or [], dipole, dipole_abc, spin_weights)
     top = inputs.with_some_dipole(inputs.read_top(given))
@@ -123,7 +127,9 @@ def _settings(
         temperature_k=inputs.positive("--temperature", temperature, "K"),
         jmax=jmax,
         min_lgint=inputs.cut("--min-lgint", min_lgint),
-        range_mhz=(0.0, math.inf) if range_ is None else inputs.option("--range", range_, lambda r: parse_range(r, "MHz")),
+        range_mhz=(0.0, math.inf)
+        if range_ is None
+        else inputs.option("--range", range_, lambda r: parse_range(r, "MHz")),
         q=q,
         vibrational_factor=inputs.above_zero("--vibrational-factor", vibrational_factor),
         profile=profile,
@@ -258,7 +264,8 @@ def _lines_table(lines: Lines, rows: Any) -> Table:
     formats = ("{:.4f}", "{:.4f}", "{:.4f}", "{}", "{:.4e}", "{:.5g}")
     numbers = list(shown.columns.values())[: len(formats)]
     labels = [
-        [" ".join(f"{n:2d}" for n in quanta) for quanta in shown.quanta(states)] for states in (shown.upper, shown.lower)
+        [" ".join(f"{n:2d}" for n in quanta) for quanta in shown.quanta(states)]
+        for states in (shown.upper, shown.lower)
     ]
     cells = [[form.format(x) for x in column] for form, column in zip(formats, numbers, strict=True)]
     title = f"the {len(shown)} strongest lines" if len(shown) < len(lines) else "all lines"
