@@ -113,8 +113,9 @@ class Top:
     """A rigid or semi-rigid rotor.
 
     constants: named constants in MHz. dipole_abc_debye: (μa, μb, μc) or None where it is not known. spin_weights:
-    nuclear-spin weights. mass_u: for Doppler widths. moments_u_angstrom2, frame: of a geometry, None without one.
-    kind_of_top: how the kind was decided. molecule, symmetry: of a geometry. source: where the constants are from. notes: what a user must be told.
+    nuclear-spin weights. mass_u: for Doppler widths. frame: principal frame of a geometry, None without one.
+    kind_of_top: how the kind was decided. molecule, symmetry: of a geometry. source: where the constants are from.
+    notes: what a user must be told.
     """
 
     constants: Constants
@@ -161,9 +162,10 @@ class Top:
     ) -> Top:
         """A rigid top from a geometry: principal axes, A, B, C, kind, its dipole turned along, spin weights.
 
-        The symmetry of the nuclei decides the kind where it can (C3v is a symmetric top), the moments where it cannot;
-        nuclear-spin weights follow from it (`symmetry_within`: of the shortest distance), inversion doublets unresolved and the electronic state totally symmetric.
-        Dipole components that symmetry forbids and that are below 0.001 D are round-off or noise, and left out.
+        The symmetry of the nuclei decides the kind where it can (C3v is a symmetric top), the moments where it cannot.
+        Nuclear-spin weights follow from it, inversion doublets unresolved and the electronic state totally symmetric;
+        `symmetry_within` is its tolerance, relative to the shortest distance. Dipole components that symmetry forbids
+        and that are below 0.001 D are round-off or noise, and left out.
 
         Raises ValueError for a single atom. Neglected: everything that vibration and centrifugal distortion do, about
         0.3 to 1 % between an equilibrium geometry and measured constants.
