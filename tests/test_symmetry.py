@@ -19,9 +19,9 @@ from rotor.molecules.nuclei import masses
 from rotor.molecules.operations import best_turn
 from rotor.molecules.symmetry import Symmetry, find_symmetry, symmetry_of
 
-# Point groups of ASE's g2 collection, from the molecules' names and drawings (L. A. Curtiss et al., J. Chem. Phys. 106,
-# 1063 (1997)); states of open shells as there: CH3O, CH3S, C2H3, C2H5, CH3CO, CH3CH2O, HCO are Cs, H2COH is C1.
-# ASE's acetamide and isopropanol are C1 (gauche, pyramidal N), its t-butyl and isopropyl radicals C3v and Cs.
+# Point groups of ASE's g2 collection (geometries: L. A. Curtiss et al., J. Chem. Phys. 106, 1063 (1997)), typed from
+# chemistry. Radicals are distorted there as theory has them: CH3O and CH3S are Cs, H2COH is C1. Acetamide (pyramidal
+# N) and isopropanol (gauche) are C1; the t-butyl radical is C3v, the isopropyl radical Cs.
 G2_GROUPS = {
     "Kh": "Si S F C Cl Be Al Na P H B O N Li",
     "C∞v": "CS CO LiF CN NaCl ClF NO LiH CH OH HCl SiO N2O HCN OCS ClO HF SO NH CCH SH BeH",
@@ -32,9 +32,9 @@ G2_GROUPS = {
     "HCOOCH3 C2H6SO CH3CH2NH2",
     "C2": "N2H4 H2O2",
     "C2h": "OCHCHO trans-butane butadiene",
-    "C2v": "SH2 C4H4NH CH3SCH3 SiH2_s3B1d ClF3 isobutene bicyclobutane methylenecyclopropane PH2 cyclobutene NH2 CH2OCH2 "
-    "H2CO SiH2_s1A1d C4H4S CH3OCH3 C5H5N H2O CH2_s1A1d C4H4O O3 COF2 F2O SO2 H2CCl2 C3H8 CH2_s3B1d H2CF2 CH2SCH2 "
-    "CH3COCH3 H2CCO C3H4_C2v NO2",
+    "C2v": "SH2 C4H4NH CH3SCH3 SiH2_s3B1d ClF3 isobutene bicyclobutane methylenecyclopropane PH2 cyclobutene NH2 "
+    "CH2OCH2 H2CO SiH2_s1A1d C4H4S CH3OCH3 C5H5N H2O CH2_s1A1d C4H4O O3 COF2 F2O SO2 H2CCl2 C3H8 CH2_s3B1d H2CF2 "
+    "CH2SCH2 CH3COCH3 H2CCO C3H4_C2v NO2",
     "C3v": "PH3 C3H9C HCCl3 CH3Cl CH3SiH3 PF3 CH3CN SiH3 HCF3 isobutane CF3CN NF3 NH3 C3H9N C3H4_C3v",
     "D2d": "cyclobutane C3H4_D2d C5H8",
     "D2h": "C2H4 C2F4 C2Cl4",
@@ -107,7 +107,6 @@ PHI = (1 + 5**0.5) / 2
 C2, C3, C4, C5 = (turn_about(*a) for a in (([0, 0, 1], 2), ([1, 1, 1], 3), ([0, 0, 1], 4), ([0, 1, PHI], 5)))
 OFF_AXES = np.array([0.5, 1.1, 2.3])
 S4, S6 = turn_about([0, 0, 1], 4) * [1, 1, -1], turn_about([0, 0, 1], 6) * [1, 1, -1]
-S4[2, 2], S6[2, 2] = -1, -1
 SHAPES = {
     "Ci": (np.concatenate([orbit(p, -np.eye(3)) for p in ([1, 0, 0.2], [0.3, 1.2, 0], [0.5, 0.4, 1.4])]), "C1", 1),
     "S4": (np.concatenate([orbit(p, S4) for p in ([1, 0, 1], [1.8, 0.8, 2])]), "C2", 2),
@@ -312,10 +311,10 @@ CCCBDB_DIFFERS = {
     "BH3+_13283313": "D3h",  # the file says C2v; its three B-H are alike to 2e-5 Å
     "NO3+_12033497": "D3h",  # the file says C2v; its three N-O are alike to 3e-5 Å
     "C2H5Cl_75003": "C1",  # two of its H are 0.008 Å off the plane of symmetry; near Cs
-    "C3H6O_107186": "C1",  # the file says Cs of 2-propen-1-ol in a gauche geometry
-    "C8H6_536743": "Cs",  # the file says C2v; two ring C-H differ
+    "C3H6O_107186": "C1",  # 2-propen-1-ol in a gauche geometry, named Cs
+    "C8H6_536743": "Cs",  # phenylacetylene with a misprint: z of two like H is -0.4102 and -0.0410 Å
     "CH2N2_420042": "Cs",  # cyanamide with pyramidal NH2; C2v only on average
-    "CH3NO_75127": "Cs",  # the file says C1 of a planar formamide
+    "CH3NO_75127": "Cs",  # a planar formamide, named C1
     "CH4N2O_57136": "C2",  # urea with pyramidal NH2
     "CNZn_73963981": "C∞v",  # the file says Cs of a linear geometry
     "H2Zn_14018827": "D∞h",  # the file says C2v of a linear geometry
