@@ -21,18 +21,20 @@ from rotor.units import parse_quantity
 KINDS = ("linear", "spherical", "prolate", "oblate", "asymmetric")
 REPRESENTATIONS = ("Ir", "Il", "IIr", "IIl", "IIIr", "IIIl")
 
-# Names by order of distortion: quartic, sextic, octic. Watson, Vibrational Spectra and Structure 6 (1977) 1-89 for
-# both reductions; the octic names L_JJK, L_JK, L_KKJ are those of Watson, J. Mol. Spectrosc. 103 (1984) 350-363.
+# Names by order of distortion: quartic, sextic, octic, decic. Watson, Vibrational Spectra and Structure 6 (1977) 1-89
+# for both reductions; octic names as in Watson, J. Mol. Spectrosc. 103 (1984) 350-363. The decic P J^2(5-q) Jz^2q are
+# named as CDMS names them; without them the levels of water above J = 14 fold back.
 RIGID = ("A", "B", "C")
 LINEAR = ("D", "H", "L")
 SPHERICAL = ("D", "H")
 OCTIC = ("LJ", "LJJK", "LJK", "LKKJ", "LK")
-SYMMETRIC = ("DJ", "DJK", "DK", "HJ", "HJK", "HKJ", "HK", *OCTIC)
+DECIC = ("PJ", "PJJK", "PJK", "PKJ", "PKKJ", "PK")
+SYMMETRIC = ("DJ", "DJK", "DK", "HJ", "HJK", "HKJ", "HK", *OCTIC, *DECIC)
 S_REDUCTION = (*SYMMETRIC, "d1", "d2", "h1", "h2", "h3", "l1", "l2", "l3", "l4")
 A_REDUCTION = (
     *("DeltaJ", "DeltaJK", "DeltaK", "deltaJ", "deltaK"),
     *("PhiJ", "PhiJK", "PhiKJ", "PhiK", "phiJ", "phiJK", "phiK"),
-    *(*OCTIC, "lJ", "lJK", "lKJ", "lK"),
+    *(*OCTIC, "lJ", "lJK", "lKJ", "lK", *DECIC),
 )
 _DISTORTION = {"linear": LINEAR, "spherical": SPHERICAL, "prolate": SYMMETRIC, "oblate": SYMMETRIC}
 _REDUCED = {"A": A_REDUCTION, "S": S_REDUCTION}
@@ -384,13 +386,13 @@ def _reduction(kind: str, names: Mapping[str, float], reduction: str | None) -> 
     told = next((key for key, members in own.items() if members), None)
     if reduction and told and reduction != told:
         raise ValueError(f"reduction {reduction!r}, but {', '.join(own[told])} belong to the {told}-reduction")
-    if not reduction and not told and any(name in OCTIC for name in names):
-        raise ValueError("the octic names alone fit both reductions; say reduction='A' or reduction='S'")
+    if not reduction and not told and any(name in _shared_names() - {*RIGID} for name in names):
+        raise ValueError("octic and decic names alone fit both reductions; say reduction='A' or reduction='S'")
     return reduction or told
 
 
 def _shared_names() -> set[str]:
-    return {*RIGID, *OCTIC}
+    return {*RIGID, *OCTIC, *DECIC}
 
 
 def _representation(kind: str, values: Mapping[str, float], representation: str | None) -> str | None:

@@ -69,7 +69,9 @@ def point_masses(masses: ArrayLike, positions: ArrayLike) -> Body:
     """
     m, r = np.asarray(masses, dtype=float), np.asarray(positions, dtype=float)
     if m.ndim != 1 or r.shape != (len(m), 3) or not len(m):
-        raise ValueError(f"masses of shape {m.shape} and positions of shape {r.shape}: wanted are (n,) and (n, 3), n > 0")
+        raise ValueError(
+            f"masses of shape {m.shape} and positions of shape {r.shape}: wanted are (n,) and (n, 3), n > 0"
+        )
     if not (np.isfinite(m).all() and (m > 0).all() and np.isfinite(r).all()):
         raise ValueError("masses must be finite and above 0, positions finite")
     centre = m @ r / m.sum()
@@ -131,7 +133,11 @@ def principal_frame(
     ([4.0, 9.0, 13.0], [2.0, 1.0, 0.0])
     """
     tensor = np.asarray(body.tensor, dtype=float)
-    if tensor.shape != (3, 3) or not np.isfinite(tensor).all() or not np.allclose(tensor, tensor.T, atol=1e-9 * np.abs(tensor).max()):
+    if (
+        tensor.shape != (3, 3)
+        or not np.isfinite(tensor).all()
+        or not np.allclose(tensor, tensor.T, atol=1e-9 * np.abs(tensor).max())
+    ):
         raise ValueError("an inertia tensor is a symmetric (3, 3) array of finite numbers")
     moments, columns = np.linalg.eigh(tensor)
     if moments[0] < -1e-9 * abs(moments[2]) or moments[0] + moments[1] < moments[2] * (1 - 1e-9):
@@ -172,7 +178,9 @@ def _frames(axes: Floats, moments: Floats, masses: Floats, positions: Floats, eq
     """All frames to choose from: the signs of two axes, and inside degenerate spaces the directions of far masses."""
     ab, bc = _close(moments[0], moments[1], equal), _close(moments[1], moments[2], equal)
     if ab and bc:
-        bases = [np.array([a, b, np.cross(a, b)]) for a in _far(positions, masses) for b in _across(a, positions, masses)]
+        bases = [
+            np.array([a, b, np.cross(a, b)]) for a in _far(positions, masses) for b in _across(a, positions, masses)
+        ]
     elif ab:
         bases = [np.array([a, np.cross(axes[2], a), axes[2]]) for a in _across(axes[2], positions, masses)]
     elif bc:

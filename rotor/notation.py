@@ -65,9 +65,10 @@ def _items(text: str) -> list[re.Match[str]]:
 
     strange = next((piece.strip(" \t\r\n,;") for piece in rest if piece.strip(" \t\r\n,;")), None)
     if strange or not items:
+        what = f"cannot read {strange!r}" if strange else "no constant in it"
         raise ValueError(
-            f"{text!r}: {f'cannot read {strange!r}' if strange else 'no constant in it'}; write name=number with an uncertainty in the last "
-            "digits and a unit if wanted, such as 'A=9.2(1) B=3 C=2.5 GHz'"
+            f"{text!r}: {what}; write name=number, with the uncertainty in the last digits and a unit if wanted, "
+            "such as 'A=9.2(1) B=3 C=2.5 GHz'"
         )
     return items
 

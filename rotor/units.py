@@ -31,8 +31,8 @@ ROTATIONAL_MHZ_U_ANGSTROM2 = PLANCK_J_S / (8 * math.pi**2 * ATOMIC_MASS_KG * 1e-
 
 _FREQUENCY = {"Hz": 1e-6, "kHz": 1e-3, "MHz": 1.0, "GHz": 1e3, "THz": 1e6, "cm-1": MHZ_PER_CM, "K": MHZ_PER_K}
 _KINDS: dict[str, dict[str, float]] = {
+    "temperature": {"mK": 1e-3, "K": 1.0},  # first, so that K wanted is a temperature, K given also an energy
     "frequency": _FREQUENCY,
-    "temperature": {"mK": 1e-3, "K": 1.0},
     "length": {"pm": 0.01, "angstrom": 1.0, "Å": 1.0, "nm": 10.0, "bohr": BOHR_RADIUS_ANGSTROM, "m": 1e10},
     "dipole": {"D": 1.0, "debye": 1.0, "e*angstrom": DEBYE_PER_E_ANGSTROM, "C*m": 1.0 / DEBYE_C_M},
     "time": {"fs": 1e-3, "ps": 1.0, "ns": 1e3, "us": 1e6, "s": 1e12},
@@ -58,6 +58,10 @@ def _factor(unit: str, wanted: str, text: str) -> float:
     return table[unit] / table[wanted]
 
 
+def _factor_or_one(unit: str | None, wanted: str, text: str) -> float:
+    return _factor(unit, wanted, text) if unit else 1.0
+
+
 def _number(text: str) -> tuple[float, str | None]:
     """The number and the unit, if any, of `"9.2 GHz"`; a unicode minus is a minus."""
     match = _NUMBER.match(text.replace("−", "-"))
@@ -78,7 +82,7 @@ def parse_quantity(value: float | str, unit: str) -> float:
     """
     if isinstance(value, str):
         number, given = _number(value)
-        value = number * (_factor(given, unit, value) if given else 1.0)
+        value = number * _factor_or_one(given, unit, value)
     if not math.isfinite(value):
         raise ValueError(f"{value!r} is not a finite number of {unit}")
     return float(value)
@@ -93,8 +97,7 @@ def _bounds(text: str, unit: str) -> tuple[float, float, str | None]:
     (start, unit_1), (stop, unit_2) = _number(parts[0]), _number(parts[1])
     shared = unit_2 or unit_1
     first, last = (
-        number * (_factor(own or shared, unit, text) if (own or shared) else 1.0)
-        for number, own in ((start, unit_1), (stop, unit_2))
+        number * _factor_or_one(own or shared, unit, text) for number, own in ((start, unit_1), (stop, unit_2))
     )
     if not first < last:
         raise ValueError(f"{text!r}: the range must rise, but {first:g} {unit} is not below {last:g} {unit}")
@@ -124,7 +127,7 @@ def parse_grid(text: str, unit: str) -> NDArray[np.float64]:
     if ":" not in text:
         numbers = [_number(item) for item in text.split(",")]
         shared = numbers[-1][1]
-        return np.array([n * (_factor(u or shared, unit, text) if (u or shared) else 1.0) for n, u in numbers])
+        return np.array([n * _factor_or_one(u or shared, unit, text) for n, u in numbers])
 
     first, last, count = _bounds(text, unit)
     if count is None or not count.strip().isdecimal() or int(count) < 2:

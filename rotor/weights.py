@@ -82,7 +82,7 @@ class SpinWeights:
         """
         j, k = np.broadcast_arrays(np.asarray(j), np.asarray(k))
         if self.rule == "none":
-            return np.where(k == 0, 1, 2)
+            return np.asarray(np.where(k == 0, 1, 2))
         self._require(("K", "KaKc"), "a symmetric top")
         if self.rule == "KaKc":
             table = self._whole_numbers().reshape(2, 2)
@@ -99,7 +99,7 @@ class SpinWeights:
         """
         j = np.asarray(j)
         if self.rule == "none":
-            return 2 * j + 1
+            return np.asarray(2 * j + 1)
         self._require(("irrep", "K", "KaKc"), "a spherical top")
         if self.rule == "irrep":
             counts = irreps_in_j(j, self.classes)

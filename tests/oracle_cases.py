@@ -29,7 +29,9 @@ _WEIGHTS = {
 def top_of_case(case: dict[str, Any]) -> Top:
     """Constants by their published names (a label "-D" is minus D), dipole, spin weights."""
     given = {p["label"]: p["value"] for p in case["parameters"]}
-    values = {_PUBLISHED.get(k, k.removeprefix("-")): -v if k.startswith("-") else v for k, v in given.items() if k != "A-B"}
+    values = {
+        _PUBLISHED.get(k, k.removeprefix("-")): -v if k.startswith("-") else v for k, v in given.items() if k != "A-B"
+    }
     if "A-B" in given:
         values = {"A": given["A-B"] + given["B"]} | values
     reduction = case["reduction"][-1] if case["reduction"].startswith("Watson") else None
@@ -93,7 +95,12 @@ def disagreements(reference: Catalogue, ours: Catalogue) -> list[str]:
             near = min(index.get(label, []), key=lambda row: abs(row[0] - f), default=None)
             if near is None:
                 out.append(f"missing {label} at {f}")
-            elif abs(near[0] - f) > 1.1e-4 or abs(near[1] - strength) > 2e-4 or abs(near[2] - energy) > 2e-4 or near[3] != g:
+            elif (
+                abs(near[0] - f) > 1.1e-4
+                or abs(near[1] - strength) > 2e-4
+                or abs(near[2] - energy) > 2e-4
+                or near[3] != g
+            ):
                 out.append(f"{label}: {near} is not {[f, strength, energy, g]}")
     return out
 

@@ -40,7 +40,12 @@ def test_dominant_k_would_label_wrongly():
     b = 6000.0 + 0.25 * 4000.0  # A = 10, C = 6 GHz, κ = -0.5
     levels = solve_levels(Top(Constants(A=10000.0, B=b, C=6000.0)), 20, jmin=20)
     wrong = sum(
-        int((block.basis.k[np.argmax(np.abs(block.vectors), axis=0)] != levels.ka[block.start : block.start + block.basis.size]).sum())
+        int(
+            (
+                block.basis.k[np.argmax(np.abs(block.vectors), axis=0)]
+                != levels.ka[block.start : block.start + block.basis.size]
+            ).sum()
+        )
         for block in levels.blocks
     )
     assert wrong / len(levels) == pytest.approx(0.44, abs=0.02)  # the figure as printed, two digits
@@ -88,7 +93,9 @@ def test_symmetric_tops_join_asymmetric_ones(kind, text):
     solved = solve_levels(Top(Constants(**dict(zip("ABC", near, strict=True)), kind="asymmetric")), 30)
     for j in range(31):
         both = np.repeat(closed.energy_mhz[closed.j == j], closed.components[closed.j == j])
-        assert np.allclose(np.sort(both), np.sort(solved.energy_mhz[solved.j == j]), rtol=1e-12)  # 1e-13 times J-sized factors
+        assert np.allclose(
+            np.sort(both), np.sort(solved.energy_mhz[solved.j == j]), rtol=1e-12
+        )  # 1e-13 times J-sized factors
 
 
 def test_near_symmetric_levels_approach_without_a_jump():

@@ -7,14 +7,14 @@ import math
 import numpy as np
 import pytest
 
+from rotor import units
 from rotor.constants import Constants
+from rotor.quantum.basis import REPRESENTATIONS
 from rotor.quantum.levels import solve_levels
+from rotor.spectra import transitions
 from rotor.spectra.lines import EINSTEIN_PER_MHZ3, INTENSITY_NM2_MHZ, line_list
 from rotor.spectra.strengths import allowed_pairs, amplitudes, component
-from rotor.quantum.basis import REPRESENTATIONS
-from rotor.spectra import transitions
 from rotor.top import Top
-from rotor import units
 
 ABC = "A=8572 B=3640 C=2790 MHz"
 
@@ -145,6 +145,18 @@ def test_compiled_and_plain_loops_give_the_same_bits(monkeypatch):
     compiled = line_list(top, jmax=15, min_lgint=None, sort=False)
     for name in ("frequency_mhz", "strength_debye2", "upper", "lower"):
         assert np.array_equal(getattr(plain, name), getattr(compiled, name))
+
+
+@pytest.mark.parametrize(
+    "settings", [{"min_lgint": -7.0}, {"min_lgint": None, "range_mhz": (1e3, 9e4)}, {"range_mhz": (0, 5e5)}]
+)
+def test_compiled_and_plain_choices_are_the_same(monkeypatch, settings):
+    top = Top.from_constants(ABC, dipole_abc_debye=(1.2, 1.9, 0.4))
+    plain = line_list(top, jmax=15, **settings)
+    monkeypatch.setattr(transitions, "LONG_LIST", 0)
+    compiled = line_list(top, jmax=15, **settings)
+    assert np.array_equal(plain.frequency_mhz, compiled.frequency_mhz)
+    assert np.array_equal(plain.upper, compiled.upper)
 
 
 def test_given_q_and_vibrational_factor():

@@ -46,6 +46,10 @@ def test_whole_catalogues(case: str, shared: Path, tmp_path: Path):
     text = path.read_text().splitlines(keepends=True)
     shifted = f"{float(text[strong][:13]) + 3e-4:13.4f}" + text[strong][13:]
     stranger = text[strong][:55] + " 1 9 9      " + text[strong][67:]
-    for changed in (text[:strong] + text[strong + 1 :], [*text, stranger], [*text[:strong], shifted, *text[strong + 1 :]]):
+    for changed in (
+        text[:strong] + text[strong + 1 :],
+        [*text, stranger],
+        [*text[:strong], shifted, *text[strong + 1 :]],
+    ):
         path.write_text("".join(changed))
         assert not compare_with_tool(shared, case, path)[0], "a changed list was called equal"

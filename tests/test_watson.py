@@ -62,7 +62,10 @@ def test_levels_of_one_and_two(constants):
     if (a - b) < 1e-9 * a or (b - c) < 1e-9 * b:
         return
     levels = solve_levels(Top(Constants(A=a, B=b, C=c, representation="Ir")), 2)
-    energy = {(int(j), int(p), int(q)): e for j, p, q, e in zip(levels.j, levels.ka, levels.kc, levels.energy_mhz, strict=True)}
+    energy = {
+        (int(j), int(p), int(q)): e
+        for j, p, q, e in zip(levels.j, levels.ka, levels.kc, levels.energy_mhz, strict=True)
+    }
     root = 2 * np.sqrt((b - c) ** 2 + (a - c) * (a - b))
     closed = {
         (1, 0, 1): b + c, (1, 1, 1): a + c, (1, 1, 0): a + b,
@@ -70,7 +73,9 @@ def test_levels_of_one_and_two(constants):
         (2, 0, 2): 2 * (a + b + c) - root, (2, 2, 0): 2 * (a + b + c) + root,
     }  # fmt: skip
     for label, value in closed.items():
-        assert energy[label] == pytest.approx(value, abs=1e-13 * a)  # a handful of operations on numbers of the size of A
+        assert energy[label] == pytest.approx(
+            value, abs=1e-13 * a
+        )  # a handful of operations on numbers of the size of A
 
 
 def test_all_representations_give_the_same_rigid_levels():

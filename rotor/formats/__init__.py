@@ -1,1 +1,5 @@
 """File formats of the field, one file a format; a folder where a format has several files."""
+
+from rotor.formats.doors import read, write
+
+__all__ = ["read", "write"]

@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
+import gzip
 import json
 import math
 import os
-from collections.abc import Mapping
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from rotor.formats.atomic import atomic_path, open_atomic
-from rotor.formats.spcat.cat import write_cat
+from rotor.formats.spcat.cat import format_lines, write_cat
 from rotor.formats.spcat.catalogue import Catalogue
 from rotor.formats.spcat.fields import BLANK
 from rotor.spectra.lines import Lines
 
 _QNFMT = {("j",): 101, ("j", "k"): 202, ("j", "ka", "kc"): 303}
 MAX_TAG = 999_999
+PIECE = 1 << 16  # lines of a long list that are made into text at once
 
 
 def catalogue(lines: Lines, tag: int = 0) -> Catalogue:
@@ -33,20 +37,21 @@ def catalogue(lines: Lines, tag: int = 0) -> Catalogue:
     if not np.isfinite(lgint).all():
         lines, lgint = lines.where(np.isfinite(lgint)), lgint[np.isfinite(lgint)]
 
-    n, width = len(lines), len(lines.quanta_names)
-    quanta = [np.full((n, 6), BLANK, dtype=np.int16) for _ in range(2)]
-    quanta[0][:, :width], quanta[1][:, :width] = lines.quanta(lines.upper), lines.quanta(lines.lower)
+    n, levels = len(lines), lines.levels
+    quanta = np.full((len(levels), 6), BLANK, dtype=np.int16)
+    for i, name in enumerate(lines.quanta_names):
+        quanta[:, i] = levels.ka if name == "k" else getattr(levels, name)
     return Catalogue(
         frequency_mhz=lines.frequency_mhz,
         error_mhz=np.zeros(n),
         lgint=lgint,
-        dr=np.full(n, 2 if lines.levels.kind == "linear" else 3, dtype=np.int16),
+        dr=np.full(n, 2 if levels.kind == "linear" else 3, dtype=np.int16),
         energy_lower_cm=lines.energy_lower_cm,
         g_upper=lines.g_upper.astype(np.int32),
         tag=np.full(n, tag, dtype=np.int32),
         qnfmt=np.full(n, _QNFMT[lines.quanta_names], dtype=np.int32),
-        quanta_upper=quanta[0],
-        quanta_lower=quanta[1],
+        quanta_upper=quanta[lines.upper],
+        quanta_lower=quanta[lines.lower],
     )
 
 
@@ -92,7 +97,7 @@ def write_lines(lines: Lines, path: str | os.PathLike[str], settings: Mapping[st
     name = Path(path).name.lower()
     story = provenance(lines) | {k: v for k, v in (settings or {}).items() if k != "tag"}
     if name.endswith((".cat", ".cat.gz")):
-        write_cat(catalogue(lines, int((settings or {}).get("tag", 0))), path)
+        _write_catalogue(lines, path, int((settings or {}).get("tag", 0)))
         _write_beside(path, story)
     elif name.endswith(".csv"):
         with open_atomic(path) as handle:
@@ -105,14 +110,50 @@ def write_lines(lines: Lines, path: str | os.PathLike[str], settings: Mapping[st
         with open_atomic(path, "w", encoding="utf-8") as handle:
             json.dump({"provenance": story, "lines": records(lines)}, handle, indent=1, allow_nan=False)
     else:
-        raise ValueError(f"{path}: lines can be written as .cat, .cat.gz, .csv, .parquet or .json; the suffix names the format")
+        raise ValueError(
+            f"{path}: lines can be written as .cat, .cat.gz, .csv, .parquet or .json; the suffix names the format"
+        )
+
+
+def _write_catalogue(lines: Lines, path: str | os.PathLike[str], tag: int) -> None:
+    """The 80-column file; a long list in pieces, made side by side on all cores and written in order."""
+    if len(lines) <= PIECE:
+        return write_cat(catalogue(lines, tag), path)
+
+    _ = lines.partition  # summed once, before the pieces ask for it
+
+    def text(start: int) -> bytes:
+        return format_lines(catalogue(lines.where(slice(start, start + PIECE)), tag))
+
+    opened = gzip.open if os.fspath(path).endswith(".gz") else open
+    with (
+        atomic_path(path) as unfinished,
+        opened(unfinished, "wb") as handle,
+        ThreadPoolExecutor(os.cpu_count()) as pool,
+    ):
+        handle.writelines(_in_order(pool, text, range(0, len(lines), PIECE)))
+    return None
+
+
+def _in_order(pool: ThreadPoolExecutor, make: Callable[[int], bytes], starts: Iterable[int]) -> Iterator[bytes]:
+    """make(start) of every start, in order; only so many are under way that memory stays bounded."""
+    under_way: deque[Future[bytes]] = deque()
+    for start in starts:
+        under_way.append(pool.submit(make, start))
+        if len(under_way) > 2 * (os.cpu_count() or 1):
+            yield under_way.popleft().result()
+    while under_way:
+        yield under_way.popleft().result()
 
 
 def records(lines: Lines) -> list[dict[str, float | int | None]]:
     """The lines as a list of plain records, numbers that are not finite as None."""
     columns = {name: column.tolist() for name, column in lines.columns.items()}
     rows = zip(*columns.values(), strict=True)
-    return [{k: None if v != v or v in (math.inf, -math.inf) else v for k, v in zip(columns, row, strict=True)} for row in rows]
+    return [
+        {k: None if v != v or v in (math.inf, -math.inf) else v for k, v in zip(columns, row, strict=True)}
+        for row in rows
+    ]
 
 
 def _write_beside(path: str | os.PathLike[str], story: Mapping[str, Any]) -> None:

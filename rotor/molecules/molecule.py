@@ -70,13 +70,14 @@ class Molecule:
             if getattr(self, key) is not None:
                 object.__setattr__(self, key, _checked(getattr(self, key), shape, key))
         _refuse_lopsided(self.polarizability_angstrom3)
-        if int(self.charge) != self.charge:
-            raise ValueError(f"charge {self.charge}: a whole number of elementary charges is wanted")
+        charge = float(_checked(self.charge, (), "charge"))
+        if not charge.is_integer():
+            raise ValueError(f"charge {charge:g}: a whole number of elementary charges is wanted")
 
         object.__setattr__(self, "symbols", tuple(one.symbol for one in nuclei))
         object.__setattr__(self, "mass_numbers", tuple(one.mass_number for one in nuclei))
         object.__setattr__(self, "positions_angstrom", positions)
-        object.__setattr__(self, "charge", int(self.charge))
+        object.__setattr__(self, "charge", int(charge))
         object.__setattr__(self, "notes", tuple(self.notes))
 
     @property
@@ -193,13 +194,13 @@ def _checked(values: ArrayLike, shape: tuple[int, ...], what: str) -> Floats:
     try:
         array = np.array(values, dtype=np.float64)
     except (TypeError, ValueError):
-        raise ValueError(f"{what}: numbers in an array of shape {shape} are wanted, not {values!r:.80}") from None
+        kind = f"numbers in an array of shape {shape} are" if shape else "a number is"
+        raise ValueError(f"{what}: {kind} wanted, not {values!r:.80}") from None
     if array.shape != shape:
         raise ValueError(f"{what} has shape {array.shape}; {shape} is wanted")
     if not np.isfinite(array).all():
-        row = int(np.argwhere(~np.isfinite(array))[0][0]) + 1
-        where = f"atom {row}" if what == "positions_angstrom" else f"row {row}"
-        raise ValueError(f"{what}, {where}: {array[row - 1]} is not finite; every number must be")
+        where = f", atom {np.argwhere(~np.isfinite(array))[0][0] + 1}" if what == "positions_angstrom" else ""
+        raise ValueError(f"{what}{where}: a number that is not finite; every one must be")
     array.setflags(write=False)
     return array
 

@@ -290,9 +290,7 @@ def _orbits(group: list[Operation]) -> tuple[tuple[int, ...], ...]:
     return tuple(tuple(atoms) for atoms in sets.values())
 
 
-def _principal_axes(
-    masses: Floats, points: Floats, ideal: Floats, rotations: list[Operation]
-) -> tuple[Floats, Floats]:
+def _principal_axes(masses: Floats, points: Floats, ideal: Floats, rotations: list[Operation]) -> tuple[Floats, Floats]:
     """Principal axes as rows (3, 3), right-handed, of the exact geometry, and the moments of the given one about them.
 
     Axes of rotation at right angles are principal axes; a twofold one settles the choice where moments coincide.

@@ -17,7 +17,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-REPRESENTATIONS = {"Ir": "bca", "Il": "cba", "IIr": "cab", "IIl": "acb", "IIIr": "abc", "IIIl": "bac"}  # axes at x, y, z
+REPRESENTATIONS = {
+    "Ir": "bca",
+    "Il": "cba",
+    "IIr": "cab",
+    "IIl": "acb",
+    "IIIr": "abc",
+    "IIIl": "bac",
+}  # axes at x, y, z
 
 _WANG = ((0, 1), (2, -1), (1, 1), (1, -1))  # E+, E-, O+, O-: lowest K and s
 

@@ -44,7 +44,7 @@ class SolvedBlock:
     def jz_squared(self) -> Floats:
         """⟨Jz²⟩ of every state, (n,): how prolate (or oblate) it is along the z of the representation."""
         k = self.basis.k
-        return (self.vectors**2).T @ (k * k).astype(float)
+        return np.asarray((self.vectors**2).T @ (k * k).astype(float))
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,8 @@ class Levels:
     energy_mhz: E/h in MHz from the Hamiltonian's zero. j, ka, kc: quantum numbers; a symmetric top has K in `ka` (one
     row for both signs of K, `components` = 2) and -1 in `kc`, linear and spherical tops -1 in both. components: levels
     that coincide in the row (2J+1 for a spherical top). weight: nuclear-spin weight summed over the components.
-    degeneracy: (2J+1) times that. representation: of the Wang blocks, None for closed forms. blocks: the solved Wang blocks of an asymmetric top, empty for closed forms.
+    degeneracy: (2J+1) times that. representation: of the Wang blocks, None for closed forms. blocks: the solved Wang
+    blocks of an asymmetric top, empty for closed forms.
     """
 
     kind: str
@@ -252,7 +253,7 @@ def _dense(bands: list[Floats], vectors: bool) -> tuple[Floats, Floats]:
     matrix = np.diag(bands[0])
     for n, band in enumerate(bands[1:], 1):
         matrix += np.diag(band, -n)  # eigh reads the lower triangle
-    if vectors:
-        energies, states = np.linalg.eigh(matrix)
-        return energies, states
-    return np.linalg.eigvalsh(matrix), np.zeros((0, 0))
+    if not vectors:
+        return np.asarray(np.linalg.eigvalsh(matrix), dtype=np.float64), np.zeros((0, 0))
+    solved = np.linalg.eigh(matrix)
+    return np.asarray(solved.eigenvalues, dtype=np.float64), np.asarray(solved.eigenvectors, dtype=np.float64)

@@ -28,15 +28,16 @@ Operators = dict[tuple[int, int, int], float]
 
 _LINEAR = {"B": (1, 0, 0, 1), "D": (2, 0, 0, -1), "H": (3, 0, 0, 1), "L": (4, 0, 0, 1)}
 _DIAGONAL_OCTIC = {"LJ": (4, 0), "LJJK": (3, 1), "LJK": (2, 2), "LKKJ": (1, 3), "LK": (0, 4)}
+_DIAGONAL_DECIC = {"PJ": (5, 0), "PJJK": (4, 1), "PJK": (3, 2), "PKJ": (2, 3), "PKKJ": (1, 4), "PK": (0, 5)}
 _DIAGONAL = {"J": (2, 0), "JK": (1, 1), "K": (0, 2)}
 _DIAGONAL_SEXTIC = {"J": (3, 0), "JK": (2, 1), "KJ": (1, 2), "K": (0, 3)}
 
 
 def _diagonal_names(quartic: str, sextic: str) -> dict[str, tuple[int, int, int, int]]:
-    """(p, q, n, sign) of the terms diagonal in K, named DJ ... or DeltaJ ..., HJ ... or PhiJ ..., LJ ..."""
+    """(p, q, n, sign) of the terms diagonal in K, named DJ ... or DeltaJ ..., HJ ... or PhiJ ..., LJ ..., PJ ..."""
     table = {quartic + name: (*powers, 0, -1) for name, powers in _DIAGONAL.items()}
     table |= {sextic + name: (*powers, 0, 1) for name, powers in _DIAGONAL_SEXTIC.items()}
-    return table | {name: (*powers, 0, 1) for name, powers in _DIAGONAL_OCTIC.items()}
+    return table | {name: (*powers, 0, 1) for name, powers in (_DIAGONAL_OCTIC | _DIAGONAL_DECIC).items()}
 
 
 _SYMMETRIC = _diagonal_names("D", "H")
@@ -68,7 +69,9 @@ def rigid_operators(constants: Constants) -> Operators:
     if constants.kind in ("linear", "spherical"):
         return {(1, 0, 0): constants["B"]}
     if constants.kind in ("prolate", "oblate"):
-        along, across = (constants["A"], constants["B"]) if constants.kind == "prolate" else (constants["C"], constants["B"])
+        along, across = (
+            (constants["A"], constants["B"]) if constants.kind == "prolate" else (constants["C"], constants["B"])
+        )
         return {(1, 0, 0): across, (0, 1, 0): along - across}
 
     axes = REPRESENTATIONS[str(constants.representation)]
@@ -142,7 +145,7 @@ class Multiplet:
 
 def _ladder_steps(j: int, k: NDArray[np.int64]) -> NDArray[np.float64]:
     """√(J(J+1) - K(K+1)), what J₊ makes of |J K⟩; zero outside the multiplet."""
-    return np.sqrt(np.maximum((j - k) * (j + k + 1), 0))
+    return np.asarray(np.sqrt(np.maximum((j - k) * (j + k + 1), 0)))
 
 
 def _elements(

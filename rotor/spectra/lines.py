@@ -30,7 +30,9 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-INTENSITY_NM2_MHZ = 4.16231e-5  # 8π³/3hc for MHz and D² as catalogues use it; CODATA 2022 gives 4.16238e-5 (7e-6 in log10)
+INTENSITY_NM2_MHZ = (
+    4.16231e-5  # 8π³/3hc for MHz and D² as catalogues use it; CODATA 2022 gives 4.16238e-5 (7e-6 in log10)
+)
 EINSTEIN_PER_MHZ3 = 1.1639654e-20  # 64π⁴/3hc³ for MHz and D², CODATA 2022
 DEFAULT_MIN_LGINT = -12.0
 
@@ -115,8 +117,8 @@ class Lines:
         columns = (self.levels.j, self.levels.ka, self.levels.kc)[: len(self.quanta_names)]
         return np.stack([column[rows] for column in columns], axis=1)
 
-    def where(self, chosen: NDArray[Any]) -> Lines:
-        """The lines that a boolean mask or an array of indices chooses, in its order."""
+    def where(self, chosen: NDArray[Any] | slice) -> Lines:
+        """The lines that a slice, a boolean mask or an array of indices chooses, in its order."""
         return replace(
             self,
             frequency_mhz=self.frequency_mhz[chosen],
@@ -221,7 +223,9 @@ def line_list(
 
 def _dipole_of(top: Top) -> tuple[float, float, float]:
     if top.dipole_abc_debye is None:
-        raise ValueError(f"the dipole of {top.name or 'this top'} is not known; give one, in principal axes or in the input's frame")
+        raise ValueError(
+            f"the dipole of {top.name or 'this top'} is not known; give one, in principal axes or in the input's frame"
+        )
     return top.dipole_abc_debye
 
 

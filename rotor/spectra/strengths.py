@@ -62,8 +62,8 @@ def _along(j: int, rise: int) -> Floats:
     """Reduced amplitude of Φz from J to J + rise, K → K, for K = 0 ... J."""
     k = np.arange(j + 1.0)
     if rise:
-        return np.sqrt((j + 1 - k) * (j + 1 + k) / (j + 1))
-    return k * np.sqrt((2 * j + 1) / (j * (j + 1)))
+        return np.asarray(np.sqrt((j + 1 - k) * (j + 1 + k) / (j + 1)))
+    return np.asarray(k * np.sqrt((2 * j + 1) / (j * (j + 1))))
 
 
 @lru_cache(maxsize=16)  # the pairs of blocks come J by J

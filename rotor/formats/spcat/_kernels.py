@@ -3,34 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import numba
 import numpy as np
+from numpy.typing import NDArray
 
 from rotor.formats.spcat.fields import BLANK, QUANTUM_RANGE
 from rotor.formats.spcat.rows import QUANTA, Columns, Mask, Text, degeneracy_table, quantum_table
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
-_QUANTA_TEXT = quantum_table()
-_DEGENERACY_TEXT = degeneracy_table()
 _PAIRS = np.frombuffer("".join(f"{i:02d}" for i in range(100)).encode(), dtype=np.uint8).reshape(100, 2)
-_LOWEST, _NO_QUANTUM = QUANTUM_RANGE[0], BLANK
 _SPACE, _MINUS, _POINT, _ZERO = np.uint8(32), np.uint8(45), np.uint8(46), np.uint8(48)
 
 
 def compiled(function: _Function) -> _Function:
     """The function compiled, the machine code kept on disk; compiled anew each time where no folder can be written."""
+    kept: Any
     try:
-        kept: _Function = numba.njit(cache=True)(function)
+        kept = numba.njit(cache=True, nogil=True)(function)
     except RuntimeError:  # numba found neither its own cache folder nor the user's writable
-        kept = numba.njit(function)
-    return kept
+        kept = numba.njit(nogil=True)(function)
+    return cast("_Function", kept)
 
 
 @compiled
-def _put_digits(row, start, stop, left, negative):  # type: ignore[no-untyped-def]
+def _put_digits(row: Text, start: int, stop: int, left: Any, negative: Any) -> Any:
     """A whole number with its sign, right-justified in row[start:stop]; false where it needs more room."""
     at = stop
     while left >= 100 and at - 2 >= start:
@@ -55,7 +54,7 @@ def _put_digits(row, start, stop, left, negative):  # type: ignore[no-untyped-de
 
 
 @compiled
-def _put_decimal(row, start, stop, value, decimals, scale):  # type: ignore[no-untyped-def]
+def _put_decimal(row: Text, start: int, stop: int, value: float, decimals: int, scale: float) -> Any:
     """A number rounded as printf rounds it; see `rows.round_decimal` for why the sign of `above_half` decides."""
     a = abs(value)
     if not a * scale < 4503599627370496.0:  # 2^52; also false for nan
@@ -87,25 +86,36 @@ def _put_decimal(row, start, stop, value, decimals, scale):  # type: ignore[no-u
 
 
 @compiled
-def _put_quanta(row, start, quanta):  # type: ignore[no-untyped-def]
+def _put_quanta(row: Text, start: int, quanta: NDArray[np.int16], table: Text, lowest: int, blank: int) -> bool:
     for i in range(quanta.shape[0]):
         value = np.int64(quanta[i])
-        index = 0 if value == _NO_QUANTUM else value - _LOWEST + 1
-        if index < 0 or index >= _QUANTA_TEXT.shape[0] or (index == 0 and value != _NO_QUANTUM):
+        index = 0 if value == blank else value - lowest + 1
+        if index < 0 or index >= table.shape[0] or (index == 0 and value != blank):
             return False
-        row[start + 2 * i] = _QUANTA_TEXT[index, 0]
-        row[start + 2 * i + 1] = _QUANTA_TEXT[index, 1]
+        row[start + 2 * i] = table[index, 0]
+        row[start + 2 * i + 1] = table[index, 1]
     return True
 
 
 @compiled
-def _put_whole(row, start, stop, value):  # type: ignore[no-untyped-def]
+def _put_whole(row: Text, start: int, stop: int, value: Any) -> Any:
     wide = np.int64(value)
     return _put_digits(row, start, stop, np.uint32(abs(wide)), wide < 0)
 
 
 @compiled
-def _fill(out, plain, frequency, error, lgint, dr, energy, g_upper, tag, qnfmt, upper, lower, decimals, scales):  # type: ignore[no-untyped-def]
+def _fill(
+    out: Text,
+    plain: Mask,
+    columns: Any,
+    decimals: tuple[int, int, int, int],
+    scales: tuple[float, ...],
+    degeneracies: Text,
+    quanta: Text,
+    lowest: int,
+    blank: int,
+) -> None:
+    frequency, error, lgint, dr, energy, g_upper, tag, qnfmt, upper, lower = columns
     width = 2 * upper.shape[1]
     for i in range(out.shape[0]):
         row = out[i]
@@ -114,13 +124,13 @@ def _fill(out, plain, frequency, error, lgint, dr, energy, g_upper, tag, qnfmt, 
         fits &= _put_decimal(row, 21, 29, lgint[i], decimals[2], scales[2])
         fits &= _put_whole(row, 29, 31, dr[i])
         fits &= _put_decimal(row, 31, 41, energy[i], decimals[3], scales[3])
-        known = 0 <= g_upper[i] < _DEGENERACY_TEXT.shape[0]
+        known = 0 <= g_upper[i] < degeneracies.shape[0]
         for column in range(3):
-            row[41 + column] = _DEGENERACY_TEXT[g_upper[i] if known else 0, column]
+            row[41 + column] = degeneracies[g_upper[i] if known else 0, column]
         fits &= _put_whole(row, 44, 51, tag[i])
         fits &= _put_whole(row, 51, 55, qnfmt[i])
-        fits &= _put_quanta(row, 55, upper[i])
-        fits &= _put_quanta(row, 55 + width, lower[i])
+        fits &= _put_quanta(row, 55, upper[i], quanta, lowest, blank)
+        fits &= _put_quanta(row, 55 + width, lower[i], quanta, lowest, blank)
         for column in range(55 + 2 * width, out.shape[1]):
             row[column] = _SPACE
         plain[i] = fits and known
@@ -129,8 +139,10 @@ def _fill(out, plain, frequency, error, lgint, dr, energy, g_upper, tag, qnfmt, 
 def put_rows(out: Text, columns: Columns, decimals: tuple[int, int, int, int]) -> Mask:
     """Fill `out` with the lines of `columns` and tell which fit, as `rows.put_rows` does."""
     if out.shape[1] < QUANTA + 4 * columns.quanta_upper.shape[1]:
-        raise ValueError(f"rows of {out.shape[1]} characters have no room for {columns.quanta_upper.shape[1]} quantum numbers")
+        raise ValueError(f"rows of {out.shape[1]} characters have no room for {columns.quanta_upper.shape[1]} quanta")
     plain = np.zeros(len(out), dtype=np.bool_)
     scales = tuple(10.0**d for d in decimals)
-    _fill(out, plain, *columns, decimals, scales)
+    contiguous = tuple(np.ascontiguousarray(column) for column in columns)
+    # the tables are handed over: a table compiled in would outlive a change of rows.py in numba's cache
+    _fill(out, plain, contiguous, decimals, scales, degeneracy_table(), quantum_table(), QUANTUM_RANGE[0], BLANK)
     return plain

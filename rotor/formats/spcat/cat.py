@@ -16,7 +16,19 @@ from rotor.formats.atomic import open_atomic
 from rotor.formats.spcat.catalogue import DTYPES, Catalogue, Layout
 from rotor.formats.spcat.fields import BLANK
 from rotor.formats.spcat.line import Record, error_cap, read_record, spell_record, width_of
-from rotor.formats.spcat.rows import ENERGY, ERROR, FREQUENCY, LGINT, QNFMT, QUANTA, Columns, Mask, Text, put_rows, take_rows
+from rotor.formats.spcat.rows import (
+    ENERGY,
+    ERROR,
+    FREQUENCY,
+    LGINT,
+    QNFMT,
+    QUANTA,
+    Columns,
+    Mask,
+    Text,
+    put_rows,
+    take_rows,
+)
 
 COMPILED_FROM = 20_000  # lines; below, compiled kernels cost more to load than they save
 _CHUNK = 1 << 14  # lines handled at once: about 1 MB of text, which a processor's cache holds
@@ -127,7 +139,7 @@ def format_lines(catalogue: Catalogue) -> bytes:
 
 
 def write_cat(catalogue: Catalogue, path: str | os.PathLike[str]) -> None:
-    """Write a catalogue; packed when `path` ends in .gz. An existing file is replaced at the end, whole or not at all."""
+    """Write a catalogue, packed when `path` ends in .gz; an existing file is replaced at the end or not at all."""
     with open_atomic(path) as handle:
         if os.fspath(path).endswith(".gz"):
             with gzip.GzipFile(filename="", fileobj=handle, mode="wb", mtime=0) as packed:
@@ -252,12 +264,14 @@ def _quanta_present(columns: Columns) -> Mask:
 def _joined(parts: list[Columns], width: int) -> Columns:
     if not parts:
         return _empty(0, width)
-    return Columns(*(np.concatenate([part[i] for part in parts]) for i in range(len(parts[0]))))
+    return Columns._make(np.concatenate([part[i] for part in parts]) for i in range(len(parts[0])))
 
 
 def _empty(lines: int, width: int) -> Columns:
     shapes = [(lines, width) if name.startswith("quanta") else (lines,) for name in DTYPES]
-    return Columns(*(np.full(s, BLANK if len(s) > 1 else 0, d) for s, d in zip(shapes, DTYPES.values(), strict=True)))
+    return Columns._make(
+        np.full(s, BLANK if len(s) > 1 else 0, d) for s, d in zip(shapes, DTYPES.values(), strict=True)
+    )
 
 
 def _assembled(text: bytes, name: str, lines: _Lines, layout: Layout, columns: Columns, known: Mask) -> Catalogue:
@@ -276,7 +290,7 @@ def _assembled(text: bytes, name: str, lines: _Lines, layout: Layout, columns: C
     odd = ~known[kept] | (begins < lines.starts[kept])
     spelling = {i: text[begins[i] : stops[i]] for i in np.flatnonzero(odd).tolist()}
     ending = text[stops[-1] if len(stops) else len(layout.beginning) :]
-    whole = columns if len(numbers) == len(known) else Columns(*(column[numbers] for column in columns))
+    whole = columns if len(numbers) == len(known) else Columns._make(column[numbers] for column in columns)
     return Catalogue(*whole, layout=replace(layout, spelling=spelling, ending=ending))
 
 
@@ -284,7 +298,7 @@ def _careful_record(line: bytes, where: str) -> Record:
     body = line.removesuffix(b"\n").removesuffix(b"\r")
     strange = next((i for i, c in enumerate(body) if not 32 <= c < 127), None)
     if strange is not None:
-        raise ValueError(f"{where}, column {strange + 1}: byte {body[strange]:#04x}; catalogues are plain ASCII without tabs")
+        raise ValueError(f"{where}, column {strange + 1}: byte {body[strange]:#04x}; plain ASCII, no tab, is wanted")
     try:
         return read_record(body.decode("ascii"))
     except ValueError as error:
@@ -299,6 +313,6 @@ def _with_records(columns: Columns, records: dict[int, Record]) -> Columns:
     wider.quanta_lower[:, : columns.quanta_lower.shape[1]] = columns.quanta_lower
     columns = columns._replace(quanta_upper=wider.quanta_upper, quanta_lower=wider.quanta_lower)
     for number, record in records.items():
-        for column, value in zip(columns, record, strict=True):
-            column[number] = (*value, *(BLANK,) * width)[:width] if isinstance(value, tuple) else value
+        for name, value in record._asdict().items():
+            getattr(columns, name)[number] = (*value, *(BLANK,) * width)[:width] if isinstance(value, tuple) else value
     return columns

@@ -13,6 +13,7 @@ from rotor.formats.spcat.fields import BLANK
 from rotor.formats.spcat.line import Record
 from rotor.formats.spcat.rows import Columns
 
+
 @dataclass(frozen=True)
 class Layout:
     """What a catalogue's text holds beyond its numbers, so that it is written as it was read.
@@ -34,7 +35,7 @@ class Layout:
     ending: bytes = b""
 
 
-DTYPES = {
+DTYPES: dict[str, type[np.generic]] = {
     "frequency_mhz": np.float64,
     "error_mhz": np.float64,
     "lgint": np.float64,
@@ -52,11 +53,12 @@ DTYPES = {
 class Catalogue:
     """Lines of a catalogue as columns of equal length n.
 
-    frequency_mhz, error_mhz (n,): MHz; a negative error says that both are in cm⁻¹. Errors beyond 999.9999 are
-    written so. lgint (n,): log10 of the intensity in nm² MHz. dr (n,): degrees of freedom of rotation in Q, 0, 2
-    or 3. energy_lower_cm (n,): cm⁻¹. g_upper (n,): degeneracy of the upper state. tag (n,): the species; negative
-    for a line measured in a laboratory, whose frequency and error are then the laboratory's. qnfmt (n,): what the
-    quantum numbers are, its last digit how many. quanta_upper, quanta_lower (n, 6) or wider; -32768 is blank.
+    frequency_mhz, error_mhz (n,): FREQ and ERR as the file has them: MHz, but cm⁻¹ both where the error is negative
+    and in infrared catalogues (six decimals in `layout`); errors beyond 999.9999 are written so. lgint (n,): log10 of
+    the intensity in nm² MHz. dr (n,): degrees of freedom of rotation in Q, 0, 2 or 3. energy_lower_cm (n,): cm⁻¹.
+    g_upper (n,): degeneracy of the upper state. tag (n,): the species; negative for a line measured in a laboratory,
+    whose frequency and error are then the laboratory's. qnfmt (n,): what the quantum numbers are, its last digit how
+    many. quanta_upper, quanta_lower (n, 6) or wider; -32768 is blank.
 
     Source: Pickett, Poynter, Cohen, Delitsky, Pearson, Müller, J. Quant. Spectrosc. Radiat. Transf. 60, 883 (1998).
     """
@@ -98,11 +100,12 @@ class Catalogue:
 
     def columns(self, start: int, stop: int) -> Columns:
         """The numbers of lines `start` to `stop`."""
-        return Columns(*(getattr(self, name)[start:stop] for name in DTYPES))
+        return Columns._make(getattr(self, name)[start:stop] for name in DTYPES)
 
     def record(self, index: int) -> Record:
         """The numbers of one line."""
-        return Record(*(tuple(v.tolist()) if v.ndim else v.item() for v in (getattr(self, n)[index] for n in DTYPES)))
+        values = [getattr(self, name)[index] for name in DTYPES]
+        return Record._make(tuple(value.tolist()) if value.ndim else value.item() for value in values)
 
 
 def _column(name: str, values: Any, dtype: type[np.generic]) -> NDArray[Any]:
@@ -110,7 +113,7 @@ def _column(name: str, values: Any, dtype: type[np.generic]) -> NDArray[Any]:
     given = np.asarray(values)
     axes = 2 if name.startswith("quanta") else 1
     if given.ndim != axes:
-        raise ValueError(f"{name} has shape {given.shape}; an array of {axes} ax{'is' if axes == 1 else 'es'} is wanted")
+        raise ValueError(f"{name} has shape {given.shape}; shape {'(n, 6)' if axes == 2 else '(n,)'} is wanted")
     if given.dtype == dtype:
         return given
     with np.errstate(invalid="ignore"):

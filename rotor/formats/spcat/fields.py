@@ -24,7 +24,8 @@ def spell_quantum(value: int) -> str:
     if value == BLANK:
         return "  "
     if not QUANTUM_RANGE[0] <= value <= QUANTUM_RANGE[1]:
-        raise ValueError(f"quantum number {value} does not fit two characters; {QUANTUM_RANGE[0]} to {QUANTUM_RANGE[1]} do")
+        lowest, highest = QUANTUM_RANGE
+        raise ValueError(f"quantum number {value} does not fit two characters; {lowest} to {highest} do")
     tens, unit = divmod(abs(value), 10)
     if value < 0:
         return ("-" if tens == 0 else chr(ord("a") + tens - 1)) + str(unit)
@@ -35,8 +36,8 @@ def read_quantum(text: str) -> int:
     """The quantum number of two characters, `BLANK` for two blanks; the inverse of `spell_quantum`."""
     if text == "  ":
         return BLANK
-    lead, unit = text if len(text) == 2 else ("?", "?")
-    if unit in "0123456789":
+    lead, unit = text[:1], text[1:]
+    if len(unit) == 1 and unit in "0123456789":
         if lead in "0123456789 ":
             return int(text)
         if lead == "-":

@@ -51,8 +51,8 @@ def width_of(qnfmt: int) -> int:
 
 
 def error_cap(decimals: int) -> float:
-    """The largest error that is written, 999.9999 MHz for four decimals: larger ones, undetermined ones too, read so."""
-    return (10**7 - 1) / 10**decimals
+    """The largest error that is written, 999.9999 for four decimals: larger ones, undetermined ones too, read so."""
+    return (10**7 - 1) / 10.0**decimals
 
 
 def read_record(text: str) -> Record:
@@ -66,11 +66,11 @@ def read_record(text: str) -> Record:
         )
     numbers = [_read_field(text, field) for field in _FIELDS]
     qnfmt = numbers[-1]
-    if not 0 <= qnfmt:
+    if qnfmt < 0:
         raise ValueError(f"columns 52-55: QNFMT is {qnfmt}; it counts quantum numbers and is not negative")
     upper = _read_state(text, QUANTA, qnfmt)
     lower = _read_state(text, QUANTA + 2 * width_of(qnfmt), qnfmt)
-    return Record(*numbers, quanta_upper=upper, quanta_lower=lower)
+    return Record._make([*numbers, upper, lower])
 
 
 def _read_field(text: str, field: _Field) -> Any:
@@ -94,7 +94,8 @@ def _read_state(text: str, start: int, qnfmt: int) -> tuple[int, ...]:
             raise ValueError(f"columns {column + 1}-{column + 2}: quantum number reads {part!r}; {error}") from None
         if quanta[-1] == fields.BLANK and index < qnfmt % 10:
             raise ValueError(
-                f"columns {column + 1}-{column + 2}: blank, but QNFMT {qnfmt} says that {qnfmt % 10} quantum numbers follow"
+                f"columns {column + 1}-{column + 2}: blank, but QNFMT {qnfmt} says that {qnfmt % 10} quantum numbers "
+                "follow for each state"
             )
     return tuple(quanta)
 
@@ -117,9 +118,9 @@ def spell_record(record: Record, decimals: tuple[int, int, int, int]) -> str:
         _spell("GUP", lambda: fields.spell_degeneracy(record.g_upper)),
         _spell("TAG", lambda: _spell_whole(record.tag, 7)),
         _spell("QNFMT", lambda: _spell_whole(record.qnfmt, 4)),
+        _spell("upper state", lambda: "".join(map(fields.spell_quantum, record.quanta_upper))),
+        _spell("lower state", lambda: "".join(map(fields.spell_quantum, record.quanta_lower))),
     ]
-    for name, quanta in (("upper", record.quanta_upper), ("lower", record.quanta_lower)):
-        parts.append(_spell(f"{name} state", lambda q=quanta: "".join(map(fields.spell_quantum, q))))
     return "".join(parts)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -34,19 +35,17 @@ class Columns(NamedTuple):
     quanta_lower: NDArray[np.int16]
 
 
+@cache
 def quantum_table() -> Text:
     """Two characters for each quantum number, (630, 2): row 0 is blank, row i spells QUANTUM_RANGE[0] + i - 1."""
     values = [BLANK, *range(QUANTUM_RANGE[0], QUANTUM_RANGE[1] + 1)]
     return np.frombuffer("".join(map(spell_quantum, values)).encode(), dtype=np.uint8).reshape(-1, 2)
 
 
+@cache
 def degeneracy_table() -> Text:
     """Three characters for each degeneracy from 0 to 3599, (3600, 3)."""
     return np.frombuffer("".join(map(spell_degeneracy, range(3600))).encode(), dtype=np.uint8).reshape(-1, 3)
-
-
-_QUANTA = quantum_table()
-_DEGENERACIES = degeneracy_table()
 
 
 def round_decimal(values: NDArray[np.float64], decimals: int) -> tuple[NDArray[np.int64], Mask]:
@@ -80,7 +79,7 @@ def _put_digits(out: Text, magnitude: NDArray[np.int64], negative: Mask) -> Mask
             beyond = (left == 0) & (digit == 0)
             out[beyond, column] = np.where(sign[beyond], _MINUS, _BLANK)
             sign = sign & ~beyond
-    return (left == 0) & ~sign
+    return np.asarray((left == 0) & ~sign)
 
 
 def _put_decimal(out: Text, values: NDArray[np.float64], decimals: int) -> Mask:
@@ -102,8 +101,8 @@ def _put_whole(out: Text, values: NDArray[np.integer]) -> Mask:
 def _put_quanta(out: Text, quanta: NDArray[np.int16]) -> Mask:
     row = quanta.astype(np.int64) - QUANTUM_RANGE[0] + 1
     row[quanta == BLANK] = 0
-    legal = (row >= 0) & (row < len(_QUANTA)) & ((row > 0) | (quanta == BLANK))
-    out[:] = _QUANTA[np.where(legal, row, 0)].reshape(out.shape)
+    legal = (row >= 0) & (row < len(quantum_table())) & ((row > 0) | (quanta == BLANK))
+    out[:] = quantum_table()[np.where(legal, row, 0)].reshape(out.shape)
     return np.asarray(legal.all(axis=1))
 
 
@@ -115,8 +114,8 @@ def put_rows(out: Text, columns: Columns, decimals: tuple[int, int, int, int]) -
     width = 2 * columns.quanta_upper.shape[1]
     out[:] = _BLANK
     g_upper = columns.g_upper
-    known = (g_upper >= 0) & (g_upper < len(_DEGENERACIES))
-    out[:, DEGENERACY] = _DEGENERACIES[np.where(known, g_upper, 0)]
+    known = (g_upper >= 0) & (g_upper < len(degeneracy_table()))
+    out[:, DEGENERACY] = degeneracy_table()[np.where(known, g_upper, 0)]
     plain = known & _put_decimal(out[:, FREQUENCY], columns.frequency_mhz, decimals[0])
     plain &= _put_decimal(out[:, ERROR], columns.error_mhz, decimals[1])
     plain &= _put_decimal(out[:, LGINT], columns.lgint, decimals[2])
@@ -129,28 +128,25 @@ def put_rows(out: Text, columns: Columns, decimals: tuple[int, int, int, int]) -
     return plain
 
 
+@cache
 def _code_table() -> NDArray[np.int16]:
     """The quantum number of every pair of characters, by 256 first + second; 0 where the pair says none."""
     table = np.zeros(65536, dtype=np.int16)
-    codes = _QUANTA.astype(np.int64) @ [256, 1]
+    codes = quantum_table().astype(np.int64) @ [256, 1]
     table[codes] = [BLANK, *range(QUANTUM_RANGE[0], QUANTUM_RANGE[1] + 1)]
     return table
 
 
-_CODES = _code_table()
-
-
-def _field_weights(decimals: tuple[int, int, int, int]) -> NDArray[np.float64]:
-    """(8, 55) powers of ten: weights @ digits are the eight numbers of a line in units of their last digit."""
-    fields = ((FREQUENCY, decimals[0]), (ERROR, decimals[1]), (LGINT, decimals[2]), (ENERGY, decimals[3]))
-    weights = np.zeros((8, QUANTA))
-    for row, (field, places) in enumerate(fields):
-        point = field.stop - 1 - places
-        weights[row, field.start : point] = 10.0 ** np.arange(point + places - field.start - 1, places - 1, -1)
-        weights[row, point + 1 : field.stop] = 10.0 ** np.arange(places - 1, -1, -1)
-    for row, field in enumerate((DR, DEGENERACY, TAG, QNFMT), start=4):
-        weights[row, field] = 10.0 ** np.arange(field.stop - field.start - 1, -1, -1)
-    return weights
+def _take_number(digits: Text, characters: Text, field: slice, decimals: int | None = None) -> NDArray[np.int64]:
+    """The whole number in rows `field` of the turned text, its point (before `decimals` digits) left out."""
+    point = -1 if decimals is None else field.stop - 1 - decimals
+    number = np.zeros(digits.shape[1], dtype=np.int64)
+    for row in range(field.start, field.stop):
+        if row != point:
+            number *= 10
+            number += digits[row]
+    np.negative(number, out=number, where=(characters[field] == _MINUS).any(axis=0))
+    return number
 
 
 def take_rows(text: Text, width: int, decimals: tuple[int, int, int, int]) -> Columns:
@@ -163,14 +159,22 @@ def take_rows(text: Text, width: int, decimals: tuple[int, int, int, int]) -> Co
     digits[digits > 9] = 0
     letters = head[DEGENERACY.start] - ord("A")
     digits[DEGENERACY.start][letters < 26] = letters[letters < 26] + 10
-    numbers = _field_weights(decimals) @ digits.astype(np.float64)  # exact: whole numbers below 2^53
-    for row, field in enumerate((FREQUENCY, ERROR, LGINT, ENERGY, DR, DEGENERACY, TAG, QNFMT)):
-        np.negative(numbers[row], out=numbers[row], where=(head[field] == _MINUS).any(axis=0))
-    scaled = [numbers[i] / 10.0 ** decimals[i] for i in range(4)]
     pairs = text[:, QUANTA : QUANTA + 4 * width].astype(np.int64)
-    quanta = _CODES[256 * pairs[:, ::2] + pairs[:, 1::2]]
-    dr, g_upper, tag, qnfmt = (numbers[i].astype(np.int32) for i in range(4, 8))
+    quanta = _code_table()[256 * pairs[:, ::2] + pairs[:, 1::2]]
+    frequency, error, lgint, energy = (
+        _take_number(digits, head, field, places) / 10.0**places
+        for field, places in zip((FREQUENCY, ERROR, LGINT, ENERGY), decimals, strict=True)
+    )
+    dr, g_upper, tag, qnfmt = (_take_number(digits, head, field) for field in (DR, DEGENERACY, TAG, QNFMT))
     return Columns(
-        scaled[0], scaled[1], scaled[2], dr.astype(np.int16), scaled[3], g_upper, tag, qnfmt,
-        quanta[:, :width], quanta[:, width:],
-    )  # fmt: skip
+        frequency_mhz=frequency,
+        error_mhz=error,
+        lgint=lgint,
+        dr=dr.astype(np.int16),
+        energy_lower_cm=energy,
+        g_upper=g_upper.astype(np.int32),
+        tag=tag.astype(np.int32),
+        qnfmt=qnfmt.astype(np.int32),
+        quanta_upper=quanta[:, :width],
+        quanta_lower=quanta[:, width:],
+    )

@@ -1,0 +1,330 @@
+"""A molecule as a TOML file: geometry, constants, dipole, spin weights, each with where it came from.
+
+    name = "water"
+    names = ["H2O"]
+
+    [geometry]                          # Å, any frame; isotopes as "18O" or "D"
+    kind = "r0"                         # r0, rs or re
+    source = "..."
+    vibrational_difference = 0.02       # how far A, B, C of this geometry may be from the constants, relative
+    atoms = [["O", 0.0, 0.0, 0.1], ...]
+
+    [constants]                         # named as in rotor.constants
+    unit = "MHz"
+    reduction = "S"
+    source = "..."
+    A = 835852.4
+    DJ = { value = 34.8, uncertainty = 0.1, source = "..." }
+
+    [dipole]                            # along the principal axes a, b, c
+    unit = "D"
+    source = "..."
+    b = 1.8546
+
+    [spin_weights]                      # classes of rotor.weights
+    source = "..."
+    ee = 1
+    eo = 3
+    oe = 3
+    oo = 1
+
+    [catalogue]                         # the measured lines that the constants were held against
+    tag = "c018003"
+    lines = 144
+    rms_mhz = 0.8
+    j_max = 10
+    k_max = 5
+
+Every table may be left out, except that constants or a geometry must be there: a file of constants alone is one, too.
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+import os
+import tomllib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor.constants import Constants
+from rotor.inertia import point_masses, principal_frame
+from rotor.molecules.molecule import Molecule
+from rotor.units import parse_quantity
+from rotor.weights import SpinWeights
+
+GEOMETRY_KINDS = ("r0", "rs", "re")
+_TABLES = ("geometry", "constants", "dipole", "spin_weights", "catalogue")
+_RULES = {"linear": "J", "spherical": "irrep", "prolate": "K", "oblate": "K", "asymmetric": "KaKc"}
+
+Table = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class MeasuredLines:
+    """How constants meet the measured lines of a catalogue: rms in MHz of `lines` lines up to `j_max` and `k_max`.
+
+    k_max bounds Ka of an asymmetric and K of a symmetric top; None where there is no K or no bound.
+    """
+
+    tag: str
+    lines: int | None = None
+    rms_mhz: float | None = None
+    j_max: int | None = None
+    k_max: int | None = None
+
+
+@dataclass(frozen=True)
+class MoleculeFile:
+    """What a molecule file says.
+
+    name, names : what the molecule is called, other names
+    molecule : its geometry, with the dipole turned into the same frame; None in a file without one
+    geometry_kind : "r0", "rs" or "re"
+    vibrational_difference : bound of the relative difference between A, B, C of the geometry and the constants
+    constants : in MHz; None in a file without them
+    dipole_abc_debye : (μa, μb, μc) in D. The sign of a single component has no bearing on a spectrum
+    spin_weights : nuclear-spin weights; rule "none" where the file has none
+    sources : by table, where its numbers are from; single constants may have their own in `constants.sources`
+    catalogue : the measured lines that the constants were held against
+    """
+
+    name: str
+    names: tuple[str, ...] = ()
+    molecule: Molecule | None = None
+    geometry_kind: str | None = None
+    vibrational_difference: float | None = None
+    constants: Constants | None = None
+    dipole_abc_debye: tuple[float, float, float] | None = None
+    spin_weights: SpinWeights = field(default_factory=SpinWeights)
+    sources: Mapping[str, str] = field(default_factory=dict)
+    catalogue: MeasuredLines | None = None
+
+
+def read_molecule_file(path: str | os.PathLike[str]) -> MoleculeFile:
+    """What a molecule file says, checked.
+
+    Raises ValueError, with file, table and key, for text that is no TOML, unknown tables and keys, numbers that
+    cannot be, and a file with neither constants nor a geometry.
+    """
+    try:
+        text = Path(path).read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise ValueError(f"{path}: a molecule file is UTF-8 text: {error}") from None
+    return parse_molecule_file(text, str(path), default_name=Path(path).stem)
+
+
+def parse_molecule_file(text: str, where: str = "molecule file", default_name: str = "") -> MoleculeFile:
+    """What the text of a molecule file says; `where` names it in errors, `default_name` serves if it gives no name.
+
+    >>> parse_molecule_file("constants = { B = 57635.96804, D = 0.1835, source = 'memory' }").constants.text()
+    'B=57635.96804 D=0.1835 MHz'
+    """
+    try:
+        content = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise ValueError(f"{where}: not a TOML file: {error}") from None
+
+    _refuse_unknown(content, ("name", "names", *_TABLES), where)
+    tables = {name: _Reader(where, name, content[name]) for name in _TABLES if name in content}
+    if not {"geometry", "constants"} & tables.keys():
+        raise ValueError(f"{where}: neither [constants] nor [geometry]: one of them, or both, make a molecule file")
+
+    top = _Reader(where, "", content)
+    constants = _constants(tables.get("constants"))
+    dipole = _dipole(tables.get("dipole"))
+    molecule = _molecule(tables.get("geometry"), top.text("name", default_name), dipole, tables.get("dipole"))
+    return MoleculeFile(
+        name=top.text("name", default_name),
+        names=top.texts("names"),
+        molecule=molecule,
+        geometry_kind=tables["geometry"].choice("kind", GEOMETRY_KINDS) if molecule else None,
+        vibrational_difference=tables["geometry"].number("vibrational_difference", 0.0) if molecule else None,
+        constants=constants,
+        dipole_abc_debye=dipole,
+        spin_weights=_spin_weights(tables.get("spin_weights"), constants),
+        sources={name: table.text("source") for name, table in tables.items() if "source" in table.content},
+        catalogue=_catalogue(tables.get("catalogue")),
+    )
+
+
+class _Reader:
+    """One table of a file, whose errors say file, table and key."""
+
+    def __init__(self, where: str, name: str, content: Any) -> None:
+        self.place = f"{where}, [{name}]" if name else where
+        if not isinstance(content, dict):
+            raise ValueError(f"{self.place}: a table of key = value is wanted, not {content!r}")
+        self.content: Table = content
+
+    def refuse_unknown(self, known: Iterable[str]) -> None:
+        _refuse_unknown(self.content, known, self.place)
+
+    def error(self, key: str, reason: object) -> ValueError:
+        return ValueError(f"{self.place}, {key} = {self.content.get(key)!r}: {reason}")
+
+    def text(self, key: str, default: str = "") -> str:
+        value = self.content.get(key, default)
+        if not isinstance(value, str):
+            raise self.error(key, "text in quotes is wanted")
+        return value
+
+    def texts(self, key: str) -> tuple[str, ...]:
+        value = self.content.get(key, [])
+        if not isinstance(value, list) or not all(isinstance(item, str) and item for item in value):
+            raise self.error(key, 'a list of names such as ["H2O"] is wanted')
+        return tuple(value)
+
+    def choice(self, key: str, choices: tuple[str, ...]) -> str | None:
+        if key not in self.content:
+            return None
+        if self.content[key] not in choices:
+            raise self.error(key, f"one of {', '.join(choices)} is wanted")
+        return str(self.content[key])
+
+    def number(self, key: str, minimum: float | None = None) -> float | None:
+        if key not in self.content:
+            return None
+        value = self.content[key]
+        if not _is_number(value) or (minimum is not None and value < minimum):
+            raise self.error(key, "a finite number" + (f" of at least {minimum:g}" if minimum is not None else ""))
+        return float(value)
+
+    def whole(self, key: str) -> int | None:
+        value = self.number(key, 0)
+        if value is not None and not value.is_integer():
+            raise self.error(key, "a whole number is wanted")
+        return None if value is None else int(value)
+
+    def quantity(self, key: str, value: Any, unit: str, wanted: str) -> float:
+        """A number in the table's unit, or text with its own, in the unit wanted."""
+        if not _is_number(value) and not isinstance(value, str):
+            raise self.error(key, f"a finite number of {unit} is wanted, or text with a unit")
+        try:
+            return parse_quantity(value if isinstance(value, str) else f"{float(value)!r} {unit}", wanted)
+        except ValueError as reason:
+            raise self.error(key, reason) from None
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def _refuse_unknown(given: Iterable[str], known: Iterable[str], place: str) -> None:
+    known = tuple(known)
+    for key in given:
+        if key not in known:
+            near = difflib.get_close_matches(key, known, n=1)
+            hint = f"did you mean {near[0]}? " if near else ""
+            raise ValueError(f"{place}: unknown key {key!r}; {hint}Known are {', '.join(known)}")
+
+
+# One function a table
+
+
+def _molecule(
+    table: _Reader | None, name: str, dipole: tuple[float, float, float] | None, dipole_table: _Reader | None
+) -> Molecule | None:
+    if table is None:
+        return None
+    table.refuse_unknown(("kind", "source", "vibrational_difference", "atoms", "charge"))
+    symbols, positions = _atoms(table)
+    try:
+        molecule = Molecule(
+            symbols,
+            positions,
+            name=name,
+            source=table.text("source"),
+            uncertainty=table.number("vibrational_difference", 0.0),
+            charge=table.content.get("charge", 0),
+        )
+    except ValueError as reason:
+        raise ValueError(f"{table.place}, atoms: {reason}") from None
+    if dipole is None or dipole_table is None:
+        return molecule
+
+    body = point_masses(molecule.masses_u, molecule.positions_angstrom)
+    axes = principal_frame(body, molecule.masses_u, molecule.positions_angstrom).axes
+    return replace(molecule, dipole_debye=np.array(dipole) @ axes, dipole_source=dipole_table.text("source"))
+
+
+def _atoms(table: _Reader) -> tuple[tuple[str, ...], NDArray[np.float64]]:
+    rows = table.content.get("atoms")
+    if not isinstance(rows, list) or not rows:
+        raise table.error("atoms", 'a list of ["symbol", x, y, z] in Å is wanted')
+    for i, row in enumerate(rows, start=1):
+        if not (isinstance(row, list) and len(row) == 4 and isinstance(row[0], str) and all(map(_is_number, row[1:]))):
+            raise ValueError(f'{table.place}, atoms, atom {i} = {row!r}: ["symbol", x, y, z] in Å is wanted')
+    return tuple(row[0] for row in rows), np.array([row[1:] for row in rows], dtype=np.float64)
+
+
+def _constants(table: _Reader | None) -> Constants | None:
+    if table is None:
+        return None
+    settings = {key: table.text(key) for key in ("reduction", "representation", "kind") if key in table.content}
+    unit = table.text("unit", "MHz")
+    values: dict[str, float] = {}
+    uncertainties: dict[str, float] = {}
+    sources: dict[str, str] = {}
+    for name, item in table.content.items():
+        if name in ("unit", "source", "reduction", "representation", "kind"):
+            continue
+        one = _Reader(table.place, name, item if isinstance(item, dict) else {"value": item})
+        one.refuse_unknown(("value", "uncertainty", "source"))
+        values[name] = one.quantity("value", one.content.get("value"), unit, "MHz")
+        if "uncertainty" in one.content:
+            uncertainties[name] = one.quantity("uncertainty", one.content["uncertainty"], unit, "MHz")
+        if "source" in one.content:
+            sources[name] = one.text("source")
+    try:
+        return Constants(**settings, uncertainties=uncertainties, sources=sources, **values)  # type: ignore[arg-type]
+    except ValueError as reason:
+        raise ValueError(f"{table.place}: {reason}") from None
+
+
+def _dipole(table: _Reader | None) -> tuple[float, float, float] | None:
+    if table is None:
+        return None
+    table.refuse_unknown(("unit", "source", "a", "b", "c"))
+    unit = table.text("unit", "D")
+    a, b, c = (table.quantity(axis, table.content.get(axis, 0.0), unit, "D") for axis in "abc")
+    return a, b, c
+
+
+def _spin_weights(table: _Reader | None, constants: Constants | None) -> SpinWeights:
+    if table is None:
+        return SpinWeights()
+    classes = {key: value for key, value in table.content.items() if key != "source"}
+    for key, value in classes.items():
+        if not _is_number(value):
+            raise table.error(key, "a whole number is wanted")
+    try:
+        weights = SpinWeights.from_mapping(classes)
+    except ValueError as reason:
+        raise ValueError(f"{table.place}: {reason}") from None
+    if constants is not None and weights.rule != _RULES[constants.kind]:
+        raise ValueError(
+            f"{table.place}: classes {', '.join(weights.classes)} go by {weights.rule}, but the constants are of kind "
+            f"{constants.kind!r}, whose weights go by {_RULES[constants.kind]}"
+        )
+    return weights
+
+
+def _catalogue(table: _Reader | None) -> MeasuredLines | None:
+    if table is None:
+        return None
+    table.refuse_unknown(("tag", "source", "lines", "rms_mhz", "j_max", "k_max"))
+    if not table.text("tag"):
+        raise ValueError(f'{table.place}: tag is missing; it names the catalogue, such as "c018003"')
+    return MeasuredLines(
+        table.text("tag"),
+        table.whole("lines"),
+        table.number("rms_mhz", 0.0),
+        table.whole("j_max"),
+        table.whole("k_max"),
+    )

@@ -1,0 +1,114 @@
+"""Writes a molecule file as text that reads back as the same molecule."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from typing import Any
+
+from rotor.formats.atomic import open_atomic
+from rotor.formats.molecule_file import MoleculeFile
+
+
+def write_molecule_file(molecule: MoleculeFile, path: str | os.PathLike[str]) -> None:
+    """Writes a molecule file, beside and renamed: the path holds the whole file or what it held before."""
+    with open_atomic(path, "w", encoding="utf-8", newline="\n") as handle:
+        handle.write(molecule_file_text(molecule))
+
+
+def molecule_file_text(molecule: MoleculeFile) -> str:
+    """The TOML text of a molecule; constants in MHz, dipole in D, positions in Å.
+
+    >>> from rotor.constants import Constants
+    >>> print(molecule_file_text(MoleculeFile("hydrogen chloride", constants=Constants(B=312989.0))))
+    name = "hydrogen chloride"
+    <BLANKLINE>
+    [constants]
+    unit = "MHz"
+    kind = "linear"
+    B = 312989.0
+    <BLANKLINE>
+    """
+    head = {"name": molecule.name, "names": list(molecule.names)}
+    tables = {
+        "geometry": _geometry(molecule),
+        "constants": _constants(molecule),
+        "dipole": _dipole(molecule),
+        "spin_weights": molecule.spin_weights.to_mapping(),
+        "catalogue": _catalogue(molecule),
+    }
+    parts = ["\n".join(_lines(head))]
+    for name, table in tables.items():
+        if table:
+            source = molecule.sources.get(name)
+            parts.append("\n".join([f"[{name}]", *_lines({"source": source, **table})]))
+    return "\n\n".join(parts) + "\n"
+
+
+def _geometry(molecule: MoleculeFile) -> dict[str, Any]:
+    if molecule.molecule is None:
+        return {}
+    body = molecule.molecule
+    labels = [one.label for one in body.nuclei]
+    return {
+        "kind": molecule.geometry_kind,
+        "vibrational_difference": molecule.vibrational_difference,
+        "charge": body.charge or None,
+        "atoms": [[label, *position] for label, position in zip(labels, body.positions_angstrom.tolist(), strict=True)],
+    }
+
+
+def _constants(molecule: MoleculeFile) -> dict[str, Any]:
+    constants = molecule.constants
+    if constants is None:
+        return {}
+    numbers: dict[str, Any] = {}
+    for name, value in constants.values.items():
+        extra = {"uncertainty": constants.uncertainties.get(name), "source": constants.sources.get(name)}
+        extra = {key: thing for key, thing in extra.items() if thing is not None}
+        numbers[name] = {"value": value, **extra} if extra else value
+    return {
+        "unit": "MHz",
+        "kind": constants.kind,
+        "reduction": constants.reduction,
+        "representation": constants.representation,
+        **numbers,
+    }
+
+
+def _dipole(molecule: MoleculeFile) -> dict[str, Any]:
+    if molecule.dipole_abc_debye is None:
+        return {}
+    return {"unit": "D", **dict(zip("abc", molecule.dipole_abc_debye, strict=True))}
+
+
+def _catalogue(molecule: MoleculeFile) -> dict[str, Any]:
+    return vars(molecule.catalogue) if molecule.catalogue else {}
+
+
+def _lines(table: Mapping[str, Any]) -> list[str]:
+    return [f"{_key(key)} = {_value(value)}" for key, value in table.items() if value is not None and value != []]
+
+
+def _key(key: str) -> str:
+    bare = key.isascii() and key.replace("_", "").replace("-", "").isalnum()
+    return key if bare else _quoted(key)
+
+
+def _value(value: Any) -> str:
+    """A TOML value; a list of lists has a line for each."""
+    if isinstance(value, str):
+        return _quoted(value)
+    if isinstance(value, Mapping):
+        return "{ " + ", ".join(f"{_key(key)} = {_value(item)}" for key, item in value.items()) + " }"
+    if isinstance(value, list):
+        if value and isinstance(value[0], list):
+            return "[\n" + "".join(f"    {_value(row)},\n" for row in value) + "]"
+        return "[" + ", ".join(map(_value, value)) + "]"
+    return repr(value)
+
+
+def _quoted(text: str) -> str:
+    """A basic TOML string: quotes, backslashes and control characters escaped."""
+    escaped = text.replace("\\", "\\\\").replace('"', '\\"')
+    return '"' + "".join(c if c.isprintable() or c == " " else f"\\U{ord(c):08X}" for c in escaped) + '"'

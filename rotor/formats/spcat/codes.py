@@ -1,0 +1,316 @@
+"""The codes of SPFIT's parameters, both ways: digits to operators, and named constants to codes and signs.
+
+A code is read in decimal digits, EX FF I2 I1 NS TYP KSQ NSQ V2 V1 (H. M. Pickett, documentation of SPFIT and SPCAT;
+J. Mol. Spectrosc. 148, 371 (1991)). The parameter c of a code without spins and series multiplies
+
+    TYP = 0         N^2p Nz^2q                      p = NSQ, q = KSQ
+    TYP = 1, 2, 3   Na², Nb², Nc²
+    TYP = 3 + n     ½{Nz^2q, N₊^2n + N₋^2n} N^2p
+
+so that the codes of Watson's constants are 10000 (n > 0: 3 + n) + 1000 q + 100 p, and their signs those of his
+Hamiltonian: -ΔJ, -DJ, -δJ, -δK, all others plus. The basis is Iʳ (z, x, y = a, b, c), or IIIˡ (z, x, y = c, b, a)
+where NVIB is negative; a constant keeps its sign as published in that representation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any, NamedTuple
+
+from rotor.constants import Constants
+from rotor.formats.spcat.par import Options, Parameter, ParameterFile
+
+NOT_YET = "is read but not computed yet"
+
+AXES = {"Ir": "bca", "IIIl": "bac"}  # x, y, z of the two bases
+
+
+class Digits(NamedTuple):
+    """The fields of a code."""
+
+    ex: int
+    ff: int
+    i2: int
+    i1: int
+    ns: int
+    typ: int
+    ksq: int
+    nsq: int
+    v2: int
+    v1: int
+
+
+class Named(NamedTuple):
+    """A constant's name in one vocabulary, its code, and the sign with which it enters the file."""
+
+    name: str
+    code: int
+    sign: int
+
+
+def _named(codes: Mapping[str, int], minus: Iterable[str]) -> tuple[Named, ...]:
+    negative = set(minus)
+    return tuple(Named(name, code, -1 if name in negative else 1) for name, code in codes.items())
+
+
+_OCTIC = {"LJ": 400, "LJJK": 1300, "LJK": 2200, "LKKJ": 3100, "LK": 4000}
+_DECIC = {"PJ": 500, "PJJK": 1400, "PJK": 2300, "PKJ": 3200, "PKKJ": 4100, "PK": 5000}
+_SYMMETRIC_CODES = {
+    "DJ": 200, "DJK": 1100, "DK": 2000,
+    "HJ": 300, "HJK": 1200, "HKJ": 2100, "HK": 3000,
+    **_OCTIC,
+    **_DECIC,
+}  # fmt: skip
+LINEAR = _named({"D": 200, "H": 300, "L": 400}, ["D"])
+SYMMETRIC = _named(_SYMMETRIC_CODES, ["DJ", "DJK", "DK"])
+S_REDUCTION = _named(
+    {
+        **_SYMMETRIC_CODES,
+        "d1": 40100, "d2": 50000,
+        "h1": 40200, "h2": 50100, "h3": 60000,
+        "l1": 40300, "l2": 50200, "l3": 60100, "l4": 70000,
+    },
+    ["DJ", "DJK", "DK"],
+)  # fmt: skip
+A_REDUCTION = _named(
+    {
+        "DeltaJ": 200, "DeltaJK": 1100, "DeltaK": 2000, "deltaJ": 40100, "deltaK": 41000,
+        "PhiJ": 300, "PhiJK": 1200, "PhiKJ": 2100, "PhiK": 3000, "phiJ": 40200, "phiJK": 41100, "phiK": 42000,
+        **_OCTIC, "lJ": 40300, "lJK": 41200, "lKJ": 42100, "lK": 43000,
+        **_DECIC,
+    },
+    ["DeltaJ", "DeltaJK", "DeltaK", "deltaJ", "deltaK"],
+)  # fmt: skip
+
+
+def state_digits(states: int) -> int:
+    """Digits of V1 and of V2 in a code: one up to 9 states, two up to 99, else three."""
+    return 1 if states <= 9 else 2 if states <= 99 else 3
+
+
+def split_code(code: int, states: int = 1) -> Digits:
+    """The fields of a code in a file with so many vibrational states.
+
+    >>> split_code(110010099)
+    Digits(ex=0, ff=0, i2=1, i1=1, ns=0, typ=1, ksq=0, nsq=0, v2=9, v1=9)
+    """
+    left, fields = code, []
+    for width in (state_digits(states), state_digits(states), 1, 1, 2, 1, 1, 1, 2, 1):
+        left, digits = divmod(left, 10**width)
+        fields.append(digits)
+    if left or code < 0:
+        raise ValueError(
+            f"parameter code {code}: a code has at most {10 + 2 * state_digits(states)} digits and no sign"
+        )
+    return Digits._make(reversed(fields))
+
+
+def join_code(digits: Digits, states: int = 1) -> int:
+    """The code that `split_code` takes apart."""
+    widths = (1, 2, 1, 1, 1, 2, 1, 1, state_digits(states), state_digits(states))
+    code = 0
+    for value, width, name in zip(digits, widths, Digits._fields, strict=True):
+        if not 0 <= value < 10**width:
+            raise ValueError(f"{name.upper()} = {value} does not fit {width} digit{'s' if width > 1 else ''} of a code")
+        code = code * 10**width + value
+    return code
+
+
+def code_of_term(p: int, q: int, n: int) -> int:
+    """The code of ½{Jz^2q, J₊^2n + J₋^2n} J^2p (n = 0: Jz^2q J^2p) in the lowest state.
+
+    >>> [code_of_term(*term) for term in ((1, 0, 0), (0, 1, 0), (1, 0, 1), (0, 0, 4))]
+    [100, 1000, 40100, 70000]
+    """
+    return join_code(Digits(0, 0, 0, 0, 0, typ=3 + n if n else 0, ksq=q, nsq=p, v2=0, v1=0))
+
+
+def _whole_code(parameter: Parameter) -> int:
+    """The code for the lowest state, after everything that is not computed yet is refused."""
+    d = split_code(parameter.code)
+    label = f" /{parameter.label}" if parameter.label else ""
+    reasons = {
+        "a Fourier or Euler series": d.ex or d.ff or d.typ >= 90,
+        "a spin": d.i1 or d.i2 or d.ns,
+        "a level of its own": 80 <= d.typ < 90,
+        "a Coriolis term, or one that turns the axes,": 11 < d.typ < 80,
+        "another vibrational state": (d.v1, d.v2) not in ((0, 0), (9, 9)),
+        "a vibrational energy": not any(d[:8]),
+    }
+    for what, found in reasons.items():
+        if found:
+            raise ValueError(f"parameter {parameter.code}{label}: {what} {NOT_YET}")
+    return join_code(d._replace(v1=0, v2=0))
+
+
+def _single_state(options: tuple[Options, ...]) -> Options:
+    first = options[0]
+    if abs(first.nvib) != 1 or len(options) > 1:
+        raise ValueError(f"NVIB = {first.nvib}, {len(options)} option lines: more than one vibrational state {NOT_YET}")
+    if abs(first.spind) != 1:
+        raise ValueError(f"SPIND = {first.spind}: a spin {NOT_YET}")
+    if first.knmin != 0:
+        raise ValueError(f"KNMIN = {first.knmin}: a range of K that does not begin with 0 {NOT_YET}")
+    return first
+
+
+def constants_of(file: ParameterFile, *, errors: bool = False) -> Constants:
+    """The named constants of a .par or .var file with one vibrational state and no spin.
+
+    Values of one code are added, as the field's program does. The reduction is told by the operators; where they
+    fit both, by the letter of the option line. With `errors` the errors of a .var file become uncertainties, of
+    those constants that are one parameter.
+
+    Raises ValueError, naming the parameter, for operators that have no name here or that are not computed yet.
+    """
+    options = _single_state(file.options)
+    values, spreads = _summed(file.parameters)
+    rigid = {code: values.pop(code) for code in _RIGID if code in values}
+    kind = _kind(options, rigid, values)
+    reduction = _reduction(options, values) if kind == "asymmetric" else None
+
+    names = {item.code: item for item in _vocabulary(kind, reduction)}
+    _refuse_unnamed(values, names, kind, reduction)
+    named: dict[str, Any] = _rigid_constants(options, rigid, kind)
+    named |= {names[code].name: names[code].sign * value for code, value in values.items()}
+
+    codes = {item.name: item.code for item in names.values()} | {name: c for c, name in _RIGID_NAMES[kind].items()}
+    known = {name: spreads.get(codes[name]) for name in named if name in codes} if errors else {}
+    return Constants(
+        kind=kind,
+        reduction=reduction,
+        representation=_representation(options) if kind == "asymmetric" else None,
+        uncertainties={name: spread for name, spread in known.items() if spread is not None},
+        **named,
+    )
+
+
+def _summed(parameters: Iterable[Parameter]) -> tuple[dict[int, float], dict[int, float | None]]:
+    """Values by code, those of one code added, and errors of those that are one parameter."""
+    values: dict[int, float] = {}
+    spreads: dict[int, float | None] = {}
+    for parameter in parameters:
+        code = _whole_code(parameter)
+        spreads[code] = None if code in values else parameter.error
+        values[code] = values.get(code, 0.0) + parameter.value
+    return values, spreads
+
+
+def _refuse_unnamed(values: Iterable[int], names: Iterable[int], kind: str, reduction: str | None) -> None:
+    unnamed = [code for code in values if code not in set(names)]
+    if unnamed:
+        whose = f"the {reduction}-reduction" if reduction else f"a top of kind {kind}"
+        raise ValueError(f"parameter {unnamed[0]}: no constant of {whose} has this operator; it {NOT_YET}")
+
+
+_RIGID = (10000, 20000, 30000, 100, 1000, 40000)
+_RIGID_NAMES: dict[str, dict[int, str]] = {
+    "asymmetric": {10000: "A", 20000: "B", 30000: "C"},
+    "prolate": {100: "B"},
+    "oblate": {100: "B"},
+    "spherical": {100: "B"},
+    "linear": {100: "B"},
+}
+
+
+def _representation(options: Options) -> str:
+    return "Ir" if options.nvib > 0 else "IIIl"
+
+
+def is_linear(options: Options) -> bool:
+    """Whether an option line asks for a linear molecule."""
+    return options.knmin == options.knmax == 0
+
+
+def _kind(options: Options, rigid: Mapping[int, float], distortion: Mapping[int, float]) -> str:
+    """Kind of top; where all terms are diagonal in K, the constants decide, whichever basis the file names."""
+    if is_linear(options):
+        return "linear"
+    if any(code >= 10000 for code in (*rigid, *distortion)):
+        return "asymmetric"
+    if not any(code >= 1000 for code in (*rigid, *distortion)):
+        return "spherical"
+    return "prolate" if rigid.get(1000, 0.0) >= 0 else "oblate"
+
+
+def _rigid_constants(options: Options, rigid: Mapping[int, float], kind: str) -> dict[str, float]:
+    """A, B, C from Na², Nb², Nc² and from N², Nz², N₊² + N₋² = 2 (Nx² - Ny²)."""
+    mean, along, across = (rigid.get(code, 0.0) for code in (100, 1000, 40000))
+    if kind in ("linear", "spherical"):
+        useless = next((code for code in rigid if code != 100), None)
+        if useless is not None:
+            raise ValueError(f"parameter {useless} does nothing in a {kind} top, whose constant is 100; leave it out")
+        return {"B": mean}
+    if kind in ("prolate", "oblate"):
+        return {"A": mean + along, "B": mean} if kind == "prolate" else {"B": mean, "C": mean + along}
+    x, y, z = (axis.upper() for axis in AXES[_representation(options)])
+    constants = {name: rigid.get(code, 0.0) + mean for code, name in _RIGID_NAMES["asymmetric"].items()}
+    constants[z] += along
+    constants[x] += 2 * across
+    constants[y] -= 2 * across
+    return constants
+
+
+def _reduction(options: Options, distortion: Mapping[int, float]) -> str | None:
+    """A where K² stands with an off-diagonal term, S where K changes by more than two, else the file's letter."""
+    in_a = [code for code in distortion if 40000 <= code < 50000 and code % 10000 >= 1000]
+    in_s = [code for code in distortion if code >= 50000]
+    if in_a and in_s:
+        raise ValueError(
+            f"parameters {in_a} belong to Watson's A-reduction, {in_s} to his S-reduction; such a mixture {NOT_YET}"
+        )
+    if not distortion:
+        return None
+    return "A" if in_a else "S" if in_s or options.chr.lower() == "s" else "A"
+
+
+def _vocabulary(kind: str, reduction: str | None) -> tuple[Named, ...]:
+    if kind == "asymmetric":
+        return {"A": A_REDUCTION, "S": S_REDUCTION, None: ()}[reduction]
+    return SYMMETRIC if kind in ("prolate", "oblate") else LINEAR
+
+
+def parameters_of(constants: Constants) -> tuple[Parameter, ...]:
+    """The parameter lines of named constants; errors are their uncertainties, 1e-37 (fixed) where there are none.
+
+    Raises ValueError for a representation that the files do not have: Iʳ and IIIˡ are the two.
+
+    >>> [(p.code, p.value, p.label) for p in parameters_of(Constants(B=6081.5, D=0.0013))]
+    [(100, 6081.5, 'B'), (200, -0.0013, '-D')]
+    """
+    representation = constants.representation
+    if constants.kind == "asymmetric" and representation not in AXES:
+        raise ValueError(
+            f"constants in representation {representation}: SPFIT's files have Ir and IIIl alone; convert them first"
+        )
+    return (*_rigid_parameters(constants), *_distortion_parameters(constants))
+
+
+def _rigid_parameters(constants: Constants) -> tuple[Parameter, ...]:
+    spread = constants.uncertainties
+    if constants.kind == "asymmetric":
+        names = _RIGID_NAMES["asymmetric"].items()
+        return tuple(Parameter(code, constants[name], spread.get(name, _FIXED), name) for code, name in names)
+    b = constants["B"]
+    lines = [Parameter(100, b, spread.get("B", _FIXED), "B")]
+    axis = {"prolate": "A", "oblate": "C"}.get(constants.kind)
+    if axis:
+        lines.insert(0, Parameter(1000, constants[axis] - b, spread.get(axis, _FIXED), f"{axis}-B"))
+    return tuple(lines)
+
+
+def _distortion_parameters(constants: Constants) -> tuple[Parameter, ...]:
+    spread = constants.uncertainties
+    return tuple(
+        Parameter(
+            item.code,
+            item.sign * constants[item.name],
+            spread.get(item.name, _FIXED),
+            f"{'-' if item.sign < 0 else ''}{item.name}",
+        )
+        for item in _vocabulary(constants.kind, constants.reduction)
+        if item.name in constants
+    )
+
+
+_FIXED = 1e-37

@@ -1,0 +1,138 @@
+"""Lines of the input files: cut without loss, numbers in free form, errors that say file, line and column."""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from rotor.formats.spcat.cat import load
+
+_NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?", re.ASCII)
+_WHOLE = re.compile(r"[+-]?\d+(?:\.0*)?\Z", re.ASCII)
+_GAP = " \t\r\n"
+
+
+class Line(NamedTuple):
+    """A line with its end, and where it stands."""
+
+    text: str
+    number: int
+    file: str
+
+    @property
+    def body(self) -> str:
+        """The text without its end."""
+        return self.text.rstrip("\r\n")
+
+    @property
+    def blank(self) -> bool:
+        """Whether there is nothing on it."""
+        return not self.text.strip(_GAP + "\x1a")
+
+    def error(self, column: int, message: str) -> ValueError:
+        """The error to raise for what stands from `column` on, which counts from 0 here and from 1 in the message."""
+        return ValueError(f"{self.file}, line {self.number}, column {column + 1}: {message}")
+
+
+def read_lines(source: str | os.PathLike[str] | bytes) -> list[Line]:
+    """The lines of a file or of its bytes, ends included; bytes that are no UTF-8 survive a round trip.
+
+    Lines end with a line feed, a carriage return before it or not; one anywhere else is an error.
+    """
+    data, name = load(source)
+    text = data.decode("utf-8", "surrogateescape")
+    pieces = text.split("\n")
+    ended = [piece + "\n" for piece in pieces[:-1]] + ([pieces[-1]] if pieces[-1] else [])
+    lines = [Line(piece, number, name) for number, piece in enumerate(ended, 1)]
+    for line in lines:
+        if "\r" in line.body:
+            raise line.error(line.body.index("\r"), "a carriage return inside a line; end lines with line feeds")
+    return lines
+
+
+def encode(texts: Sequence[str]) -> bytes:
+    """The bytes of a file, as `read_lines` took them; a piece that is followed by another ends with its line."""
+    pieces = [text for text in texts if text]
+    ended = [text if text.endswith("\n") else text + "\n" for text in pieces[:-1]]
+    return "".join(ended + pieces[-1:]).encode("utf-8", "surrogateescape")
+
+
+class Word(NamedTuple):
+    """One number as it is written, None where a comma stands for a default, and where it begins."""
+
+    text: str | None
+    column: int
+
+
+def read_words(line: Line, start: int, count: int) -> tuple[list[Word], int]:
+    """At most `count` numbers from column `start` on, and where what follows them begins.
+
+    Numbers are separated by blanks or a comma; two commas in a row leave a default; a slash ends the list. Anything
+    else where a number may stand is an error: the field's programs skip it in silence and take the next digits,
+    those of a comment for instance.
+    """
+    text, at, words = line.body, start, list[Word]()
+    pending_comma = True  # a comma first of all leaves a default
+    while len(words) < count:
+        while at < len(text) and text[at] in _GAP:
+            at += 1
+        if at >= len(text) or text[at] == "/":
+            break
+        if text[at] == ",":
+            if pending_comma:
+                words.append(Word(None, at))
+            pending_comma = True
+            at += 1
+            continue
+        match = _NUMBER.match(text, at)
+        if not match or not _ends(text, match.end()):
+            wrong = re.split(r"[\s,/]", text[at:], maxsplit=1)[0]
+            raise line.error(
+                at, f"{wrong!r} is no number; numbers are parted by blanks or commas, a comment begins with /"
+            )
+        words.append(Word(match[0], at))
+        pending_comma = False
+        at = match.end()
+    return words, at
+
+
+def _ends(text: str, at: int) -> bool:
+    return at == len(text) or text[at] in _GAP + ",/"
+
+
+def number(line: Line, words: Sequence[Word], index: int, name: str, default: float | None = None) -> float:
+    """The number that is called `name`; its default where it is left out, an error where it has none."""
+    word = words[index] if index < len(words) else Word(None, len(line.body))
+    if word.text is None:
+        if default is None:
+            raise line.error(word.column, f"{name} is missing")
+        return default
+    value = float(word.text.replace("D", "E").replace("d", "e"))
+    if not math.isfinite(value):
+        raise line.error(word.column, f"{name} = {word.text} is too large for a number")
+    return value
+
+
+def whole(line: Line, words: Sequence[Word], index: int, name: str, default: int | None = None) -> int:
+    """The whole number that is called `name`, of at most 30 digits."""
+    word = words[index] if index < len(words) else Word(None, len(line.body))
+    if word.text is None:
+        if default is None:
+            raise line.error(word.column, f"{name} is missing")
+        return default
+    if not _WHOLE.match(word.text) or len(word.text) > 30:
+        raise line.error(word.column, f"{name} = {word.text}: a whole number is wanted")
+    return int(word.text.split(".")[0])
+
+
+def spell(value: float) -> str:
+    """A number with 16 digits, or 17 where it takes as many to say it exactly.
+
+    >>> spell(9192.631770), spell(0.1 + 0.2)
+    ('9.192631770000000E+03', '3.0000000000000004E-01')
+    """
+    text = f"{value:.15E}"
+    return text if float(text) == value else f"{value:.16E}"

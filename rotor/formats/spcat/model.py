@@ -1,0 +1,155 @@
+"""A top from a .var and an .int file, and back: constants, spin weights, dipole, in one vibrational state."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import reduce
+from math import gcd
+
+from rotor.constants import Constants
+from rotor.formats.spcat.codes import NOT_YET, constants_of, is_linear, parameters_of
+from rotor.formats.spcat.int_file import Dipole, IntensityFile, Request
+from rotor.formats.spcat.par import Header, Options, ParameterFile
+from rotor.top import Top
+from rotor.weights import SpinWeights
+
+# the classes of (Ka, Kc) that are even under a half turn about the axis: Ka, Ka + Kc and Kc tell a, b and c
+_EVEN = {1: ("ee", "eo"), 2: ("ee", "oo"), 3: ("ee", "oe")}
+_FOLD = {6: 3, 9: 5}  # IAX of tops with one kind of E levels
+
+
+def weights_of(options: Options) -> SpinWeights:
+    """The spin weights of an option line, reduced by their common divisor; Q in the .int file may carry it still.
+
+    IAX 1, 2, 3: WTPL and WTMN for rotational states even and odd under a half turn about a, b, c. IAX 6, 9: WTPL
+    where K is a multiple of 3 or 5, EWT elsewhere. An odd last digit of VSYM exchanges WTPL and WTMN.
+    """
+    plus, minus = (options.wtpl, options.wtmn) if options.vsym % 2 == 0 else (options.wtmn, options.wtpl)
+    if options.iax in _FOLD:
+        return _fold_weights(options, plus, minus)
+    if options.iax not in _EVEN:
+        raise ValueError(f"IAX = {options.iax}: spin weights other than by IAX 1, 2, 3, 6 or 9 {NOT_YET}")
+    if plus == minus:
+        return SpinWeights()
+    if is_linear(options):
+        if options.iax == 1:  # a turn about the axis leaves every level even
+            return SpinWeights()
+        return SpinWeights.from_mapping({"even": plus, "odd": minus})
+    if options.spind < 0:
+        along = 1 if options.nvib > 0 else 3
+        if options.iax != along:
+            raise ValueError(
+                f"IAX = {options.iax} in a symmetric top: weights that tell the two states of one K {NOT_YET}"
+            )
+        return SpinWeights.from_mapping({"0": plus, "1": minus})
+    even = _EVEN[options.iax]
+    return SpinWeights.from_mapping({name: plus if name in even else minus for name in ("ee", "eo", "oe", "oo")})
+
+
+def _fold_weights(options: Options, plus: int, minus: int) -> SpinWeights:
+    fold = _FOLD[options.iax]
+    if plus != minus:
+        raise ValueError(f"IAX = {options.iax}, WTPL = {plus}, WTMN = {minus}: weights by J at K = 0 {NOT_YET}")
+    factor = 100 if options.ewt >= 0 else 1000
+    if abs(options.ewt) >= factor - 1:
+        raise ValueError(f"EWT = {options.ewt}: l-doubled states, and E levels without a weight, {_plural(NOT_YET)}")
+    return SpinWeights.from_mapping({str(k): abs(options.ewt) if k else plus for k in range(fold)})
+
+
+def _plural(text: str) -> str:
+    return text.replace("is read", "are read")
+
+
+def options_of(constants: Constants, weights: SpinWeights, kmax: int) -> Options:
+    """The option line for one vibrational state, K up to `kmax`.
+
+    Levels of asymmetric tops are ordered by DIAG = 3: with 0 the field's program gives first-order energies for
+    eigenvalues where the diagonal no longer rises with K. Raises ValueError for weights that an option line cannot say.
+    """
+    kind = constants.kind
+    oblate = kind == "oblate" or constants.representation == "IIIl"
+    letter = "l" if kind == "linear" else (constants.reduction or "A").lower() if kind == "asymmetric" else "s"
+    iax, plus, minus, ewt = _coded_weights(weights, oblate)
+    return Options(
+        chr=letter,
+        spind=1 if kind == "asymmetric" else -1,
+        nvib=-1 if oblate else 1,
+        knmax=0 if kind == "linear" else kmax,
+        iax=iax,
+        wtpl=plus,
+        wtmn=minus,
+        ewt=ewt,
+        diag=3 if kind == "asymmetric" else 0,
+    )
+
+
+def _coded_weights(weights: SpinWeights, oblate: bool) -> tuple[int, int, int, int]:
+    """IAX, WTPL, WTMN, EWT of spin weights."""
+    by_class: Mapping[str, int] = weights.to_mapping()
+    if weights.rule == "none":
+        return 1, 1, 1, 0
+    if weights.rule == "J":
+        return 2, by_class["even"], by_class["odd"], 0
+    if weights.rule == "K":
+        others = set(weights.values[1:])
+        iax = {2: 3 if oblate else 1, 3: 6, 5: 9}.get(len(weights.values), 0)
+        if iax and len(others) == 1:
+            ewt = others.pop()
+            return (iax, weights.values[0], ewt, 0) if iax < 6 else (iax, weights.values[0], weights.values[0], ewt)
+    for iax, even in _EVEN.items():
+        if weights.rule == "KaKc":
+            sides = [{w for name, w in by_class.items() if (name in even) == side} for side in (True, False)]
+            if all(len(side) == 1 for side in sides):
+                return iax, sides[0].pop(), sides[1].pop(), 0
+    raise ValueError(f"spin weights {dict(by_class)}: one option line of SPFIT cannot say these")
+
+
+def dipole_of(file: IntensityFile) -> tuple[float, float, float]:
+    """(μa, μb, μc) in D from the dipole lines of the lowest state; lines of one code are added."""
+    components = [0.0, 0.0, 0.0]
+    for dipole in file.dipoles:
+        if dipole.code not in (1, 2, 3):
+            raise ValueError(
+                f"dipole {dipole.code}: a component other than 1, 2, 3 (a, b, c of the lowest state) {NOT_YET}"
+            )
+        components[dipole.code - 1] += dipole.value
+    return components[0], components[1], components[2]
+
+
+def top_of(parameters: ParameterFile, intensities: IntensityFile | None = None) -> Top:
+    """The top of a .par or .var file, with the dipole of an .int file where one is given.
+
+    The symmetry axis of a symmetric top is a in a prolate and c in an oblate one, whichever basis the file has.
+    Raises ValueError for what is read but not computed yet: spins, more than one vibrational state, internal rotation.
+    """
+    constants = constants_of(parameters)
+    if intensities is not None and intensities.request.flags >= 1000:
+        raise ValueError(f"FLAGS = {intensities.request.flags}: constants in cm⁻¹ {_plural(NOT_YET)}")
+    dipole = dipole_of(intensities) if intensities else None
+    oblate_basis = parameters.options[0].nvib < 0
+    if dipole and (constants.kind, oblate_basis) in (("prolate", True), ("oblate", False)):
+        dipole = dipole[::-1]
+    weights = weights_of(parameters.options[0])
+    return Top.from_constants(constants, dipole_abc_debye=dipole, spin_weights=weights, name=parameters.title)
+
+
+def parameter_file(top: Top, kmax: int) -> ParameterFile:
+    """The .var or .par file of a top, for levels with K up to `kmax`."""
+    parameters = parameters_of(top.constants)
+    header = Header(npar=len(parameters), nline=1, nitr=1, errtst=1e6)
+    return ParameterFile(top.name, header, (options_of(top.constants, top.spin_weights, kmax),), parameters)
+
+
+def intensity_file(top: Top, request: Request) -> IntensityFile:
+    """The .int file of a top; a component of exactly zero has no line."""
+    if top.dipole_abc_debye is None:
+        raise ValueError(f"{top.name or 'the top'} has no dipole; an .int file wants one, (μa, μb, μc) in D")
+    components = enumerate(top.dipole_abc_debye, 1)
+    dipoles = tuple(Dipole(code, value) for code, value in components if value)
+    return IntensityFile(top.name, request, dipoles)
+
+
+def common_weight(options: Options) -> int:
+    """The common divisor that `weights_of` takes out of WTPL, WTMN and EWT, and that Q in the .int file carries."""
+    used = [options.wtpl, options.wtmn] + ([abs(options.ewt)] if options.iax in _FOLD else [])
+    return reduce(gcd, used)

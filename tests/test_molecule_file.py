@@ -1,0 +1,143 @@
+"""Molecule files: what is read, what is refused and where, and that writing and reading back lose nothing."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rotor.constants import Constants
+from rotor.formats.library import library_file, library_molecule, names
+from rotor.formats.molecule_file import MoleculeFile, parse_molecule_file, read_molecule_file
+from rotor.formats.molecule_writer import molecule_file_text, write_molecule_file
+from rotor.molecules.molecule import Molecule
+from rotor.weights import SpinWeights
+
+LIBRARY = sorted(set(names().values()))
+
+HDO = """
+name = "semiheavy water"
+names = ["HDO"]
+
+[geometry]
+kind = "re"
+source = "r = 1 Å, 90°, invented"
+atoms = [["O", 0, 0, 0], ["H", 0, 1, 0], ["D", 0, 0, 1]]
+
+[constants]
+unit = "GHz"
+source = "invented"
+A = 700.0
+B = { value = 300.0, uncertainty = 0.5, source = "elsewhere" }
+C = "7 cm-1"
+
+[dipole]
+a = 0.6
+b = 1.7
+source = "invented"
+"""
+
+
+def test_units_uncertainties_and_sources_arrive():
+    read = parse_molecule_file(HDO)
+    assert dict(read.constants.values) == {"A": 700_000.0, "B": 300_000.0, "C": pytest.approx(7 * 29979.2458)}
+    assert dict(read.constants.uncertainties) == {"B": 500.0}
+    assert dict(read.constants.sources) == {"B": "elsewhere"}
+    assert read.sources == {"geometry": "r = 1 Å, 90°, invented", "constants": "invented", "dipole": "invented"}
+    assert read.molecule.mass_numbers == (16, 1, 2)
+    assert (read.dipole_abc_debye, read.geometry_kind, read.names) == ((0.6, 1.7, 0.0), "re", ("HDO",))
+
+
+def test_dipole_is_turned_into_the_frame_of_the_atoms():
+    molecule = parse_molecule_file(HDO).molecule
+    m, r = molecule.masses_u, molecule.positions_angstrom
+    r = r - m @ r / m.sum()
+    axes = np.linalg.eigh(np.eye(3) * (m @ (r**2).sum(axis=1)) - (m[:, None] * r).T @ r)[1]
+    assert np.abs(axes.T @ molecule.dipole_debye).tolist() == pytest.approx([0.6, 1.7, 0.0], abs=1e-12)  # round-off
+
+
+def test_constants_alone_are_a_molecule_file():
+    read = parse_molecule_file("[constants]\nB = 5\n", default_name="rod")
+    assert (read.name, read.molecule, read.dipole_abc_debye, read.spin_weights.rule) == ("rod", None, None, "none")
+    assert read.constants == Constants(B=5)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("name = 'x'", "neither .constants. nor .geometry."),
+        ("name = 3\n[constants]\nB = 5", "x.toml, name = 3: text in quotes"),
+        ("constants = 5", r"x.toml, \[constants\]: a table"),
+        ("[constants\nB = 5", "x.toml: not a TOML file.*line 1"),
+        ("[constant]\nB = 5", "x.toml: unknown key 'constant'; did you mean constants"),
+        ("[constants]\nb = 5", r"x.toml, \[constants\]: 'b' is not .*did you mean B"),
+        ("[constants]\nB = nan", "value = nan: a finite number of MHz"),
+        ("[constants]\nB = true", "a finite number"),
+        ("[constants]\nB = '5 D'", "does not measure the same"),
+        ("[constants]\nunit = 'parsec'\nB = 5", "not a known unit"),
+        ("[constants]\nB = { value = 5, error = 1 }", "unknown key 'error'"),
+        ("[constants]\nB = { uncertainty = 1 }", "value = None: a finite number"),
+        ("[constants]\nB = 5\n[dipole]\nx = 1", r"\[dipole\]: unknown key 'x'"),
+        ("[constants]\nB = 5\n[spin_weights]\nee = 1", r"\[spin_weights\]: .*no rule"),
+        ("[constants]\nB = 5\n[spin_weights]\nA = 5\nE = 2\nF = 3", "kind 'linear', whose weights go by J"),
+        ("[constants]\nB = 5\n[catalogue]\nlines = 3", "tag is missing"),
+        ("[constants]\nB = 5\n[catalogue]\ntag = 'c1'\nlines = 3.5", "lines = 3.5: a whole number"),
+        ("[geometry]\nsource = 'x'", "atoms = None: a list"),
+        ("[geometry]\natoms = [['O', 0, 0]]", "atom 1 = .*in Å is wanted"),
+        ("[geometry]\natoms = [['O', 0, 0, 0], ['Xx', 0, 0, 1]]", r"\[geometry\], atoms: atom 2"),
+        ("[geometry]\nkind = 'r9'\natoms = [['O', 0, 0, 0], ['C', 0, 0, 1]]", "kind = 'r9': one of r0, rs, re"),
+        ("[geometry]\nvibrational_difference = -1\natoms = [['O', 0, 0, 0], ['C', 0, 0, 1]]", "of at least 0"),
+    ],
+)
+def test_mistakes_are_told_with_file_table_and_key(text, message):
+    with pytest.raises(ValueError, match=message):
+        parse_molecule_file(text, "x.toml")
+
+
+def test_a_byte_order_mark_is_skipped_and_other_encodings_are_told(tmp_path):
+    (tmp_path / "bom.toml").write_bytes("\ufeff[constants]\r\nB = 5\r\n".encode())
+    assert read_molecule_file(tmp_path / "bom.toml").constants["B"] == 5
+    (tmp_path / "latin.toml").write_bytes("name = 'é'".encode("latin-1"))
+    with pytest.raises(ValueError, match=r"latin.toml: a molecule file is UTF-8"):
+        read_molecule_file(tmp_path / "latin.toml")
+
+
+def same(one: MoleculeFile, other: MoleculeFile) -> None:
+    for key in ("name", "names", "constants", "dipole_abc_debye", "spin_weights", "sources", "catalogue"):
+        assert getattr(one, key) == getattr(other, key), key
+    assert (one.geometry_kind, one.vibrational_difference) == (other.geometry_kind, other.vibrational_difference)
+    assert (one.molecule is None) == (other.molecule is None)
+    if one.molecule:
+        assert one.molecule.nuclei == other.molecule.nuclei
+        assert one.molecule.charge == other.molecule.charge
+        assert np.array_equal(one.molecule.positions_angstrom, other.molecule.positions_angstrom)
+
+
+@pytest.mark.parametrize("path", LIBRARY, ids=lambda path: path.stem)
+def test_library_survives_writing_and_reading(path: Path, tmp_path: Path):
+    molecule = read_molecule_file(path)
+    write_molecule_file(molecule, tmp_path / "copy.toml")
+    same(read_molecule_file(tmp_path / "copy.toml"), molecule)
+
+
+def test_hard_text_survives_writing_and_reading():
+    molecule = MoleculeFile(
+        name='quote " backslash \\ newline \n tab \t Å',
+        names=("x",),
+        molecule=Molecule(("N", "H"), [[0, 0, 0], [0, 0, 1e-3 + 1]], charge=1),
+        geometry_kind="r0",
+        constants=Constants(A=5, B=4, C=3, d1=-1e-300, uncertainties={"A": 1e-17}, sources={"d1": "memory"}),
+        spin_weights=SpinWeights.from_mapping({"ee": 1, "eo": 0, "oe": 0, "oo": 1}),
+        sources={"geometry": "x"},
+    )
+    same(parse_molecule_file(molecule_file_text(molecule)), molecule)
+
+
+def test_names_find_formulas_as_written_and_words_in_any_case():
+    assert library_file("CO").name == "CO.toml"
+    assert library_file("Co") is library_file("co") is None
+    assert library_file("WATER") == library_file("water") == library_file("H2O")
+    assert library_molecule("Methyl Cyanide").constants.kind == "prolate"
+    with pytest.raises(ValueError, match=r"no molecule 'wat' in the library; it has .*water"):
+        library_molecule("wat")

@@ -1,0 +1,188 @@
+"""Geometries become tops: constants, kinds with margins, frames that do not depend on how the molecule came."""
+
+from __future__ import annotations
+
+import gzip
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from rotor import units
+from rotor.constants import Constants
+from rotor.molecules.molecule import Molecule
+from rotor.top import Top, kind_from_moments
+
+WATER = Molecule(
+    ("O", "H", "H"), [[0, 0, 0.1173], [0, 0.7572, -0.4692], [0, -0.7572, -0.4692]], dipole_debye=[0, 0, -1.85]
+)
+FORMIC = Molecule(  # Cs, no other symmetry
+    ("C", "O", "O", "H", "H"),
+    [[-0.1317, 0.4010, 0], [-1.1319, -0.2652, 0], [1.1210, -0.1055, 0], [-0.1066, 1.4973, 0], [1.0416, -1.0740, 0]],
+    dipole_debye=[1.3, 0.3, 0.0],
+)
+CHIRAL = Molecule(
+    ("C", "H", "F", "Cl", "Br"),
+    [[0, 0, 0], [0.6, 0.6, 0.7], [0.8, -0.8, -0.75], [-1.0, 1.05, -1.0], [-1.1, -1.1, 1.15]],
+    dipole_debye=[0.3, -0.7, 0.4],
+)
+AMMONIA = Molecule(
+    ("N", "H", "H", "H"),
+    [[0, 0, 0.1173], *([0.9377 * np.cos(t), 0.9377 * np.sin(t), -0.2738] for t in (0, 2 * np.pi / 3, 4 * np.pi / 3))],
+)
+METHANE = Molecule(
+    ("C", "H", "H", "H", "H"), 0.629 * np.array([[0, 0, 0], [1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]])
+)
+
+
+def shaken(molecule: Molecule, seed: int) -> Molecule:
+    """The same molecule turned, shifted, its atoms in another order."""
+    rng = np.random.default_rng(seed)
+    turn, order = Rotation.random(rng=rng).as_matrix(), rng.permutation(len(molecule.symbols))
+    dipole = None if molecule.dipole_debye is None else turn @ molecule.dipole_debye
+    return Molecule(
+        tuple(molecule.symbols[i] for i in order),
+        (molecule.positions_angstrom @ turn.T + rng.normal(size=3))[order],
+        dipole_debye=dipole,
+    )
+
+
+@given(st.sampled_from([WATER, FORMIC, CHIRAL, AMMONIA, METHANE]), st.integers(0, 2**32 - 1))
+@settings(max_examples=60, deadline=None)
+def test_orientation_place_and_order_change_nothing(molecule, seed):
+    one, other = Top.from_molecule(molecule), Top.from_molecule(shaken(molecule, seed))
+    assert other.kind == one.kind
+    assert other.rotational_constants_mhz == pytest.approx(one.rotational_constants_mhz, rel=1e-12)  # round-off
+    if one.dipole_abc_debye is not None:
+        assert other.dipole_abc_debye == pytest.approx(one.dipole_abc_debye, abs=1e-9)
+    assert same_cloud(in_frame(one), in_frame(other))
+
+
+def in_frame(top: Top) -> np.ndarray:
+    """Masses and positions in a, b, c."""
+    positions = (top.molecule.positions_angstrom - top.frame.centre) @ top.frame.axes.T
+    return np.column_stack([top.molecule.masses_u, positions])
+
+
+def same_cloud(one: np.ndarray, other: np.ndarray) -> bool:
+    """Whether every atom of one has its own partner in the other, within what candidates of a frame may tie by."""
+    distances = np.abs(one[:, None, :] - other[None, :, :]).max(axis=2)
+    return bool((distances.min(axis=1) < 1e-4).all() and len(set(distances.argmin(axis=1))) == len(one))
+
+
+def test_water():
+    """r0 geometry of CCCBDB against its constants, to the 1 % that vibration makes; planar; dipole along b."""
+    top = Top.from_molecule(WATER)
+    assert top.kind == "asymmetric"
+    assert top.rotational_constants_mhz == pytest.approx((835840.3, 435351.7, 278138.7), rel=0.03)
+    assert top.inertial_defect_u_angstrom2 == pytest.approx(0, abs=1e-12)
+    assert top.planar_moments_u_angstrom2[2] == pytest.approx(0, abs=1e-12)
+    assert np.abs(top.dipole_abc_debye) == pytest.approx([0, 1.85, 0], abs=1e-12)
+    assert top.kappa == pytest.approx(-0.44, abs=0.02)
+    assert top.mass_u == pytest.approx(18.0105647, abs=1e-6)
+
+
+def test_constants_of_unit_inertia():
+    """505379.00844 MHz u Å² / I (CODATA 2022)."""
+    assert Top.from_constants("B=505379.00844 MHz").moments_u_angstrom2[2] == pytest.approx(1.0, rel=1e-10)
+
+
+def test_isotopic_masses():
+    """HDO: C of water from 278 to about 192 GHz, and a dipole along a appears: 0.67 D (hard case 13)."""
+    hdo = Top.from_molecule(WATER.with_isotopes({2: "2H"}))
+    assert hdo.rotational_constants_mhz == pytest.approx((701931.5, 272912.6, 192055.25), rel=0.03)
+    assert abs(hdo.dipole_abc_debye[0]) == pytest.approx(0.67, abs=0.02)
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_linear_in_any_orientation(seed):
+    """Hard case 8: I_a of HCl is round-off, also negative; A is never computed."""
+    top = Top.from_molecule(shaken(Molecule(("H", "Cl"), [[0, 0, 0], [0, 0, 1.27455]]), seed))
+    assert top.kind == "linear"
+    assert set(top.constants.values) == {"B"}
+    assert top.frame.moments[0] == 0
+    assert top.kappa is None
+
+
+@pytest.mark.parametrize(
+    ("bend_degrees", "kind"), [(0.0, "linear"), (0.01, "linear"), (0.5, "asymmetric"), (5.0, "asymmetric")]
+)
+def test_near_linear_says_by_which_number(bend_degrees, kind):
+    """Hard case 9: OCS bent a little; I_a/I_c against 1e-6 decides and is told with its margin."""
+    t = np.radians(bend_degrees)
+    top = Top.from_molecule(
+        Molecule(("O", "C", "S"), [[0, 0, 1.156], [0, 0, 0], [1.561 * np.sin(t), 0, -1.561 * np.cos(t)]])
+    )
+    assert top.kind == kind
+    assert top.kind_of_top.margin > 1
+    assert (top.kind_of_top.linearity < top.kind_of_top.linear_below) == (kind == "linear")
+
+
+def test_margins_tell_doubtful_choices():
+    near = kind_from_moments([1.0, 2.0, 2.0 * (1 + 2e-6)])
+    assert near.kind == "asymmetric"
+    assert near.margin == pytest.approx(2, rel=1e-3)
+    assert kind_from_moments([1.0, 2.0, 2.0 * (1 + 2e-6)], equal_within=1e-5).kind == "prolate"
+    assert kind_from_moments([1.0, 2.0, 3.0]).margin > 1e5
+
+
+@pytest.mark.parametrize(
+    ("text", "kind", "kappa"),
+    [
+        ("B=1 GHz", "linear", None),
+        ("A=2 B=1 GHz", "prolate", -1.0),
+        ("B=2 C=1 GHz", "oblate", 1.0),
+        ("A=2 B=2 C=2 GHz", "spherical", None),
+        ("A=3 B=2 C=1 GHz", "asymmetric", 0.0),
+    ],
+)
+def test_kinds_of_constants(text, kind, kappa):
+    top = Top.from_constants(text)
+    assert (top.kind, top.kappa) == (kind, kappa)
+
+
+def test_an_almost_equal_pair_of_constants_is_taken_as_given():
+    assert Top(Constants(A=10.0, B=5.0 * (1 + 1e-6), C=5.0)).kind == "asymmetric"
+
+
+def test_single_atom_and_bad_dipole():
+    with pytest.raises(ValueError, match="single atom"):
+        Top.from_molecule(Molecule(("Ar",), [[0, 0, 0]]))
+    with pytest.raises(ValueError, match="three finite numbers"):
+        Top.from_constants("B=1 GHz", dipole_abc_debye=(1, 2))
+
+
+@pytest.mark.oracle
+def test_339_geometries(shared: Path):
+    """CCCBDB: constants from each geometry deviate from the measured ones by what the file says, within 5e-5."""
+    with gzip.open(shared / "reference" / "structures" / "geometry_and_constants.json.gz", "rt") as handle:
+        species = json.load(handle)
+    assert len(species) == 339
+    assert all(abs(deviation(entry) - entry["max_rel_dev"]) < 5e-5 for entry in species.values())
+
+
+@pytest.mark.oracle
+def test_averaged_masses_would_be_seen(shared: Path):
+    """Negative control: with averaged masses of Cl and Br the comparison fails for BrCl."""
+    with gzip.open(shared / "reference" / "structures" / "geometry_and_constants.json.gz", "rt") as handle:
+        entry = json.load(handle)["BrCl_13863417"]
+    measured = entry["rot_cm1"][0] * units.MHZ_PER_CM
+    reduced_mass = 79.904 * 35.453 / (79.904 + 35.453)
+    averaged = units.ROTATIONAL_MHZ_U_ANGSTROM2 / (reduced_mass * 2.136**2)
+    assert abs(abs(averaged / measured - 1) - entry["max_rel_dev"]) > 5e-5
+
+
+def deviation(entry: dict) -> float:
+    """Largest relative difference between constants of the geometry and those measured."""
+    rows = [line.split() for line in entry["xyz"].splitlines() if line.strip()]
+    top = Top.from_molecule(
+        Molecule(tuple(r[0] for r in rows), [[float(x) for x in r[1:4]] for r in rows], charge=entry["charge"])
+    )
+    measured = np.array(sorted((x for x in entry["rot_cm1"] if x), reverse=True)) * units.MHZ_PER_CM
+    a, b, c = top.rotational_constants_mhz
+    ours = {1: [c], 2: [b, c] if top.kind == "linear" else [a, c], 3: [a, b, c]}[len(measured)]
+    return float(np.abs(np.array(ours) / measured - 1).max())
