@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 SPECIES = ("ee", "eo", "oe", "oo")  # parities of Ka and Kc
+CUBIC_IRREPS = ("A1", "A2", "E", "F1", "F2")  # of the rotation group O
 
 
 @dataclass(frozen=True)
@@ -87,13 +88,26 @@ class SpinWeights:
             total += weight * count
         return total
 
+    def of_irrep(self, irrep: str) -> int:
+        """Weight of one level of a spherical top, over its 1, 2 or 3 components, by its irrep A1, A2, E, F1 or F2.
+
+        >>> SpinWeights.from_mapping({"A": 5, "E": 2, "F": 3}).of_irrep("F2")
+        3
+        """
+        if irrep not in CUBIC_IRREPS:
+            raise ValueError(f"irrep {irrep!r}: known are {', '.join(CUBIC_IRREPS)}")
+        if self.rule == "none":
+            return {"A": 1, "E": 2, "F": 3}[irrep[0]]
+        self._require("irrep", "a spherical top")
+        return self.values[self.classes.index(irrep if irrep in self.classes else irrep[0])]
+
     def of_j(self, j: ArrayLike) -> NDArray[np.int64]:
         """Weights of linear-molecule levels, by parity of J."""
         j = np.asarray(j)
         if self.rule == "none":
             return np.ones(j.shape, dtype=np.int64)
         self._require("J", "a linear molecule")
-        return np.array(self.values, dtype=np.int64)[j % 2]
+        return np.asarray(np.array(self.values, dtype=np.int64)[j % 2])
 
     def _require(self, rule: str, what: str) -> None:
         if self.rule != rule:
@@ -136,7 +150,7 @@ def _rule_of(names: set[str]) -> tuple[str, tuple[str, ...]]:
         return "KaKc", SPECIES
     if names == {"even", "odd"}:
         return "J", ("even", "odd")
-    for irreps in (("A", "E", "F"), ("A1", "A2", "E", "F1", "F2")):
+    for irreps in (("A", "E", "F"), CUBIC_IRREPS):
         if names == set(irreps):
             return "irrep", irreps
     by_k = tuple(str(i) for i in range(len(names)))
