@@ -10,6 +10,7 @@ import os
 import shlex
 import sys
 from collections.abc import Sequence
+from typing import cast
 
 import typer
 
@@ -17,7 +18,8 @@ from rotor.cli import info, spectrum
 from rotor.cli.output import NoAnswer
 
 NO_ANSWER, WRONG_INPUT, INTERRUPTED = 1, 2, 130
-_ERROR_OF_USE = typer.BadParameter.__mro__[2]  # click's ClickException, whether click is a package or part of typer
+# click's ClickException, whether click is a package of its own or, in a newer typer, a part of it
+_ERROR_OF_USE = cast(type[Exception], typer.BadParameter.__mro__[2])
 
 EXAMPLES = """\b
 Examples:

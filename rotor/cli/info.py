@@ -136,7 +136,11 @@ def _kind_text(kind: str, decision: dict[str, Any]) -> str:
         f"(equal within {decision['equal_within']:g})"
     )
     differs = "" if kind == decision["kind"] else f"; the constants given are those of another kind, {kind}"
-    return f"the geometry is {decision['kind']} by {numbers}; margin: a factor of {decision['margin']:.3g}{differs}"
+    return f"the geometry is {decision['kind']} by {numbers}; margin: a factor of {_margin_text(decision['margin'])}{differs}"
+
+
+def _margin_text(margin: float) -> str:
+    return f"{margin:.3g}" if margin < 1e9 else "more than 1e9"
 
 
 def _constants_table(top: Top) -> Table:
@@ -170,7 +174,7 @@ def _q_table(content: dict[str, Any]) -> Table:
         summed = [f"{row['q']:.6g}", f"{row['jmax']}", f"{row['relative_error']:.0e}"] if known else ["-", "-", "-"]
         remark = "" if known else row["source"].partition(": ")[2].partition(";")[0]
         rows.append([f"{row['temperature_k']:g}", summed[0], f"{row['classical']:.6g}", *summed[1:], remark])
-    columns = ("T (K)", "Q", "Q classical", "J max", "error", "remark")
+    columns = ["T (K)", "Q", "Q classical", "J max", "error", "remark"]
     if not any(row[-1] for row in rows):
         columns, rows = columns[:-1], [row[:-1] for row in rows]
     return Table("", columns, rows, frozenset({"remark"}))
