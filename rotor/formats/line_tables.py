@@ -126,7 +126,11 @@ def _write_catalogue(lines: Lines, path: str | os.PathLike[str], tag: int) -> No
         return format_lines(catalogue(lines.where(slice(start, start + PIECE)), tag))
 
     opened = gzip.open if os.fspath(path).endswith(".gz") else open
-    with atomic_path(path) as unfinished, opened(unfinished, "wb") as handle, ThreadPoolExecutor(os.cpu_count()) as pool:
+    with (
+        atomic_path(path) as unfinished,
+        opened(unfinished, "wb") as handle,
+        ThreadPoolExecutor(os.cpu_count()) as pool,
+    ):
         handle.writelines(_in_order(pool, text, range(0, len(lines), PIECE)))
     return None
 
