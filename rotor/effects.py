@@ -10,8 +10,9 @@ from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING, ClassVar
 
 if TYPE_CHECKING:
-    from rotor.rotations import Array
     from rotor.top import Top
+
+    from rotor.rotations import Array
 
 
 class QuantumEffect(ABC):
@@ -31,20 +32,20 @@ class QuantumEffect(ABC):
         """How large the effect is for levels of angular momentum `j`, in MHz; rough, never an underestimate by 10."""
 
 
-class ClassicalEffect(ABC):
+class ClassicalEffect:
     """A change of Euler's equations, which with all effects present read, in the body's principal axes,
 
         dL/dt = L x ω + Σ torques,   ω_i = (L_i - h_i) / I_i(t),   h = Σ inner momenta.
 
-    An effect is one of the three kinds below. Each says what it leaves conserved: `conserves_energy` means
-    ½ Σ (L_i - h_i)²/I_i + potential energy, `conserves_momentum` means L seen from space.
+    An effect is one of the three kinds below; this base only names what each says of itself: `conserves_energy`
+    means ½ Σ (L_i - h_i)²/I_i + potential energy, `conserves_momentum` means L seen from space.
     """
 
     conserves_energy: ClassVar[bool] = False
     conserves_momentum: ClassVar[bool] = False
 
 
-class Torque(ClassicalEffect):
+class Torque(ClassicalEffect, ABC):
     """A torque. `needs_velocity` says that it depends on ω: then no splitting into drifts and kicks serves."""
 
     needs_velocity: ClassVar[bool] = False
@@ -62,7 +63,7 @@ class Torque(ClassicalEffect):
         return 0.0
 
 
-class InnerMomentum(ClassicalEffect):
+class InnerMomentum(ClassicalEffect, ABC):
     """Angular momentum that parts carry relative to the body."""
 
     @abstractmethod
@@ -70,7 +71,7 @@ class InnerMomentum(ClassicalEffect):
         """h in body axes (3,) at `time`."""
 
 
-class InertiaChange(ClassicalEffect):
+class InertiaChange(ClassicalEffect, ABC):
     """Moments that change in time while the principal axes stay."""
 
     @abstractmethod

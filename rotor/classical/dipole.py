@@ -33,7 +33,7 @@ class PermanentDipole(Torque):
 
     def torque(self, time: float, attitude: Array, omega: Array) -> Array:
         """μ x E in body axes."""
-        return np.asarray(np.cross(self.dipole, rotate(conjugate(attitude), self.field)))
+        return np.asarray(np.cross(np.asarray(self.dipole), rotate(conjugate(attitude), self.field)))
 
     def potential_energy(self, time: float, attitude: Array) -> Array:
         """-μ·E."""

@@ -64,4 +64,5 @@ class QuadraticDrag(Torque):
 
     def torque(self, time: float, attitude: Array, omega: Array) -> Array:
         """-c |ω| ω."""
-        return -np.asarray(self.coefficients) * np.linalg.norm(omega, axis=-1, keepdims=True) * omega
+        speed = np.linalg.norm(omega, axis=-1, keepdims=True)
+        return np.asarray(-np.asarray(self.coefficients) * speed * omega)

@@ -3,8 +3,9 @@
 Order: free motion is exact at any time, without steps; with torques 2, or 4, 6, 8 by composition. Keeps: |L| and L in
 space between kicks, the free energy, the symplectic form, time reversal. Cost: with torques each drift prepares the
 closed form anew for the momentum that the kick left, about 20 ms for up to some hundred bodies; it pays only where
-torques are so weak that steps are many periods long. Sources: R. van Zon and J. Schofield, J. Comput. Phys. 225, 145 (2007);
-E. Celledoni, F. Fassò, N. Säfström, A. Zanna, SIAM J. Sci. Comput. 30, 2084 (2008).
+torques are so weak that steps are many periods long.
+Sources: R. van Zon and J. Schofield, J. Comput. Phys. 225, 145 (2007); E. Celledoni, F. Fassò, N. Säfström, A. Zanna,
+SIAM J. Sci. Comput. 30, 2084 (2008).
 """
 
 from __future__ import annotations

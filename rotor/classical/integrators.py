@@ -2,11 +2,11 @@
 
 | method | order | keeps | for |
 |---|---|---|---|
-| `ExactDrift` | free: exact; with torques 2, 4, 6, 8 | momentum in space, symplectic | free motion at any time; weak torques |
-| `MoserVeselov` | free: 2 to 8, or exact; with torques 2 to 8 | momentum in space, free energy | free motion by steps; torques |
-| `SymmetricTopSplitting` | 2, 4, 6, 8 | symplectic, momentum in space | torques, above all on near-symmetric tops |
-| `RotationSplitting` | 2, 4, 6, 8 | symplectic, momentum in space | torques, any body that is not linear |
-| `LieRungeKutta` | 8, adaptive step | unit quaternion, free momentum in space | drag, feedback, driven chaos, closest to an answer |
+| `ExactDrift` | free: exact; with torques 2 to 8 | symplectic, L in space | free motion at any time; weak torques |
+| `MoserVeselov` | free: 2 to 8, or exact; with torques 2 to 8 | L in space, free energy | free motion by steps |
+| `SymmetricTopSplitting` | 2, 4, 6, 8 | symplectic, L in space | torques, above all on near-symmetric tops |
+| `RotationSplitting` | 2, 4, 6, 8 | symplectic, L in space | torques, any body that is not linear |
+| `LieRungeKutta` | 8, adaptive step | unit quaternion, free L in space | drag, feedback, driven chaos; references |
 
 Each has its page (module) with cost and source. What accuracy costs with each of them is drawn by
 `benchmarks/bench_work_precision.py`.
@@ -17,11 +17,11 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rotor.classical.compositions import fractions
 from rotor.classical.euler import checked_moments, checked_momentum
 from rotor.classical.system import System, acting_inverse, system_of
 from rotor.effects import ClassicalEffect
@@ -87,8 +87,8 @@ def integrate(
     omega = np.stack([system.omega(float(t), m) for t, m in zip(times, momentum, strict=True)])
     triples = zip(times, momentum, attitude, strict=True)
     energy = np.stack([system.energy(float(t), m, q) for t, m, q in triples])
-    per_body = [_bodies_first(array, shape) for array in (momentum, attitude, omega, energy)]
-    return Motion(times, *per_body, steps)
+    momentum, attitude, omega, energy = (_bodies_first(a, shape) for a in (momentum, attitude, omega, energy))
+    return Motion(times, momentum, attitude, omega, energy, steps)
 
 
 @dataclass(frozen=True)
@@ -125,7 +125,7 @@ class KickDrift(Method):
             )
         state = rows(momentum, attitude)
         carry, out, taken = np.zeros_like(state), [state.copy()], 0
-        for start, stop in zip(times[:-1], times[1:], strict=True):
+        for start, stop in pairwise(times):
             steps = max(1, int(np.ceil(abs(stop - start) / self.step - 1e-9)))
             self._advance(system, state, carry, float(start), float(stop - start) / steps, steps)
             out.append(state.copy())

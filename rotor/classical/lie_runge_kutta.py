@@ -1,8 +1,8 @@
 """An adaptive Runge-Kutta method on the rotation group, for drag, feedback and anything else that is not Hamiltonian.
 
 Order: 8, with the step chosen from embedded results of order 5 and 3 (the tableau of DOP853). Keeps: the unit
-quaternion, and L in space exactly where there is no torque (it is L in space that is integrated); the energy only to the
-tolerance, with a linear drift. Cost: 12 evaluations a step in numpy, about 1 ms a step for one body and little more
+quaternion, and L in space exactly where there is no torque (it is L in space that is integrated); the energy only to
+the tolerance, with a linear drift. Cost: 12 evaluations a step in numpy, about 1 ms a step for one body and little more
 for a hundred; all bodies of one call share the step. Sources: H. Munthe-Kaas, BIT 38, 92 (1998); the tableau,
 E. Hairer, S. P. Nørsett, G. Wanner, Solving Ordinary Differential Equations I, section II.5.
 """
@@ -10,6 +10,7 @@ E. Hairer, S. P. Nørsett, G. Wanner, Solving Ordinary Differential Equations I,
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -32,8 +33,8 @@ class LieRungeKutta(Method):
     >>> from rotor.classical.drag import LinearDrag
     >>> from rotor.classical.integrators import integrate
     >>> motion = integrate(LieRungeKutta(), [1, 1, 1], [0, 0, 1], [0.0, 1.0], effects=[LinearDrag([1, 1, 1])])
-    >>> float(motion.momentum[-1, 2].round(12))  # exp(-1)
-    0.367879441171
+    >>> float(motion.momentum[-1, 2].round(10))  # exp(-1)
+    0.3678794412
     """
 
     tolerance: float = 1e-11
@@ -50,7 +51,7 @@ class LieRungeKutta(Method):
         space, q = rotate(attitude, momentum), attitude
         out, attitudes, taken = [momentum], [attitude], 0
         step = self.fixed_step or abs(self._first_step(system, float(times[0]), momentum))
-        for start, stop in zip(times[:-1], times[1:], strict=True):
+        for start, stop in pairwise(times):
             space, q, step, steps = self._to(system, (float(start), float(stop)), space, q, step)
             taken += steps
             out.append(rotate(conjugate(q), space))

@@ -1,8 +1,8 @@
 """The discrete Moser-Veselov map with preprocessed moments: a polynomial step that keeps energy and momentum.
 
-Order: 2, 4, 6, 8 by series in the step, or exact: see `exact_modified_moments`. Keeps, for free motion: |L|, L in space,
-the energy, time reversal and the Poisson structure of L, all to round-off (the map of (L, q) is not symplectic). Cost:
-3 or 4 Newton sweeps of a 3x3 system without trigonometry, about 0.15 µs a step of one body on one core. Between kicks
+Order: 2, 4, 6, 8 by series in the step, or exact: see `exact_modified_moments`. Keeps, for free motion: |L|, L in
+space, the energy, time reversal and the Poisson structure of L, all to round-off (the map of (L, q) is not symplectic).
+Cost: 3 or 4 Newton sweeps of a 3x3 system without trigonometry, about 0.15 µs a step of one body on one core. Between kicks
 of torques the moments are prepared anew in each drift. It needs step x |ω| below about 1, and does not serve bodies
 that are nearly linear; both are refused when Newton fails.
 
@@ -81,8 +81,8 @@ class MoserVeselov(KickDrift):
 def modified_moments(moments: Array, momentum: Array, step: float, order: int) -> Array:
     """Moments J (n, 3) for which the map has `order` 2, 4, 6 or 8 at the invariants of L (n, 3).
 
-    1/J_i = S/I_i + D with S = 1 + Σ S_ab N^a H^b, D = Σ D_ab N^a H^b, N = (h|L|)²/2, H = h² energy, summed to the degree
-    a + b = order/2 - 1 in S, one less than that power of h² in D (Hairer and Vilmart 2006).
+    1/J_i = S/I_i + D with S = 1 + Σ S_ab N^a H^b, D = Σ D_ab N^a H^b, N = (h|L|)²/2, H = h² energy, summed to
+    a + b = order/2 - 1 (Hairer and Vilmart 2006).
     """
     energy = 0.5 * np.sum(momentum**2 / moments, axis=-1)
     n, h = 0.5 * step**2 * np.sum(momentum**2, axis=-1), step**2 * energy

@@ -39,7 +39,7 @@ class GravityAboutPivot(Torque):
 
     def torque(self, time: float, attitude: Array, omega: Array) -> Array:
         """r x m g in body axes."""
-        return np.asarray(self.mass * np.cross(self.centre, rotate(conjugate(attitude), self.gravity)))
+        return np.asarray(self.mass * np.cross(np.asarray(self.centre), rotate(conjugate(attitude), self.gravity)))
 
     def potential_energy(self, time: float, attitude: Array) -> Array:
         """-m g·r."""
