@@ -4,15 +4,12 @@ from __future__ import annotations
 
 from json import dumps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import typer
 
 from rotor.cli import inputs
 from rotor.cli.output import Files, Table, plain, show_facts, show_table, write_text
-
-if TYPE_CHECKING:
-    from rotor.formats.molecule_file import MoleculeFile
 
 WIDEST_NAME = 24
 
@@ -92,7 +89,9 @@ def _row(one: dict[str, Any]) -> list[str]:
     """One molecule: measured lines met, and the first words of where its constants are from."""
     dipole = one["dipole_abc_debye"] or [None] * 3
     seen = one["catalogue"] or {"lines": None, "rms_mhz": None}
-    source = ("own: " if one["own"] else "") + one["sources"].get("constants", one["sources"].get("geometry", "not said"))
+    source = ("own: " if one["own"] else "") + one["sources"].get(
+        "constants", one["sources"].get("geometry", "not said")
+    )
     return [
         one["names"][0] if one["names"] else one["formula"] or "",
         _cut(one["name"], WIDEST_NAME),
@@ -115,7 +114,10 @@ def _facts(one: dict[str, Any]) -> list[tuple[str, str]]:
     facts = [
         ("name", ", ".join([one["name"], *one["names"]])),
         ("kind", one["kind"] + (f", κ = {one['kappa']:.4f}" if one["kappa"] is not None else "")),
-        ("point group", f"{one['point_group'] or 'not known'}, symmetry number {one['symmetry_number'] or 'not known'}"),
+        (
+            "point group",
+            f"{one['point_group'] or 'not known'}, symmetry number {one['symmetry_number'] or 'not known'}",
+        ),
         ("file", one["file"]),
     ]
     return facts + [(f"{table.replace('_', ' ')} from", source) for table, source in one["sources"].items()]
