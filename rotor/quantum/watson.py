@@ -53,7 +53,8 @@ _S_REDUCTION = _SYMMETRIC | {
 }  # fmt: skip
 
 
-def _names(constants: Constants) -> dict[str, tuple[int, int, int, int]]:
+def operators_by_name(constants: Constants) -> dict[str, tuple[int, int, int, int]]:
+    """(p, q, n, sign) of the operator of every name that constants of that kind and reduction can have."""
     if constants.kind in ("linear", "spherical"):
         return _LINEAR
     if constants.kind in ("prolate", "oblate"):
@@ -81,7 +82,7 @@ def rigid_operators(constants: Constants) -> Operators:
 
 def centrifugal_operators(constants: Constants) -> Operators:
     """The distortion terms of the constants' own reduction and representation."""
-    table = _names(constants)
+    table = operators_by_name(constants)
     out: Operators = {}
     for name, value in constants.values.items():
         if name not in ("A", "B", "C"):
