@@ -397,8 +397,9 @@ def _with_distortion(parent: Top, constants: Constants, axes: str, angle: float)
     if constants.kind == "asymmetric":
         constants = constants.replace(representation=old.representation)
     across, along = (new / before for new, before in zip(_of_z(constants), _of_z(old), strict=True))
-    powers = operators_by_name(old)
-    scaled = {n: old[n] * across ** (powers[n][0] + powers[n][2]) * along ** powers[n][1] for n in names}
+    operators = operators_by_name(old)
+    powers = {name: next(iter(operators[name])) for name in names}  # (p, q, n) of the one operator of each
+    scaled = {name: old[name] * across ** (p + n) * along**q for name, (p, q, n) in powers.items()}
     changes = {**scaled, "reduction": old.reduction} if old.reduction else scaled
     note = "distortion constants of the parent scaled as powers of the rotational constants (D as B², H as B³): a guess"
     return constants.replace(**changes), (note,)

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 SPECIES = ("ee", "eo", "oe", "oo")  # parities of Ka and Kc
 MOST_WEIGHT = 2**53  # weights up to here add up exactly
+CUBIC_IRREPS = ("A1", "A2", "E", "F1", "F2")  # of the rotation group O
 
 
 @dataclass(frozen=True)
@@ -106,6 +107,19 @@ class SpinWeights:
             return np.asarray(np.tensordot(self._whole_numbers(), counts, axes=1))
         sums = [self.of_symmetric(value, np.arange(value + 1)).sum() for value in j.ravel().tolist()]
         return np.array(sums, dtype=np.int64).reshape(j.shape)
+
+    def of_irrep(self, irrep: str) -> int:
+        """Weight of one level of a spherical top, over its 1, 2 or 3 components, by its irrep A1, A2, E, F1 or F2.
+
+        >>> SpinWeights.from_mapping({"A": 5, "E": 2, "F": 3}).of_irrep("F2")
+        3
+        """
+        if irrep not in CUBIC_IRREPS:
+            raise ValueError(f"irrep {irrep!r}: known are {', '.join(CUBIC_IRREPS)}")
+        if self.rule == "none":
+            return {"A": 1, "E": 2, "F": 3}[irrep[0]]
+        self._require(("irrep",), "a spherical top")
+        return self.values[self.classes.index(irrep if irrep in self.classes else irrep[0])]
 
     def of_j(self, j: ArrayLike) -> NDArray[np.int64]:
         """Weights of linear-molecule levels, by parity of J."""

@@ -91,8 +91,8 @@ def spin_weights(symmetry: Symmetry, spins: Sequence[float], electronic: str | S
     Raises
     ------
     ValueError
-        Spins that do not fit the nuclei or are not multiples of 1/2, characters that are no representation, or a
-        symmetry and state in which no level exists.
+        Spins that do not fit the nuclei, differ between like nuclei or are not multiples of 1/2; characters that are no
+        representation.
 
     >>> found = find_symmetry("OO", [15.995, 15.995], [[0, 0, -0.604], [0, 0, 0.604]])
     >>> spin_weights(found, [0, 0], electronic="odd").to_mapping()

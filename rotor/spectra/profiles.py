@@ -49,7 +49,9 @@ def voigt(offset: ArrayLike, fwhm_gaussian: ArrayLike, fwhm_lorentzian: ArrayLik
     from scipy.special import voigt_profile
 
     sigma = np.asarray(fwhm_gaussian, dtype=float) * _SIGMA_PER_FWHM
-    return np.asarray(voigt_profile(np.asarray(offset, dtype=float), sigma, np.asarray(fwhm_lorentzian, dtype=float) / 2))
+    return np.asarray(
+        voigt_profile(np.asarray(offset, dtype=float), sigma, np.asarray(fwhm_lorentzian, dtype=float) / 2)
+    )
 
 
 def doppler_fwhm(frequency: ArrayLike, temperature_k: float, mass_u: float) -> Floats:

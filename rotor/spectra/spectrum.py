@@ -207,6 +207,11 @@ class _Shape:
         return np.asarray(0.5346 * self.lorentzian + np.sqrt(0.2166 * self.lorentzian**2 + self.gaussian**2))
 
 
+def line_widths(lines: Lines, profile: str, fwhm_mhz: float | None) -> Floats:
+    """Full width at half maximum in MHz of every line, (lines,), of a profile as `Spectrum.from_lines` takes it."""
+    return _shape(lines, profile, fwhm_mhz).fwhm()
+
+
 def _shape(lines: Lines, profile: str, fwhm_mhz: float | None) -> _Shape:
     if profile not in SHAPES:
         raise ValueError(f"profile {profile!r} is none of {', '.join(SHAPES)}")
