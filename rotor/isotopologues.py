@@ -20,7 +20,7 @@ from rotor.inertia import PrincipalFrame
 from rotor.molecules.molecule import Molecule
 from rotor.molecules.nuclei import isotope, natural_isotopes
 from rotor.molecules.symmetry import symmetry_of
-from rotor.quantum.watson import operators_by_name
+from rotor.terms import distortion_terms, powers_of_spelled
 from rotor.top import Top
 
 Floats = NDArray[np.float64]
@@ -89,9 +89,9 @@ def isotopologues(parent: Top, *, min_abundance: float = 1e-4) -> tuple[Isotopol
     >>> water = Molecule(("O", "H", "H"), [[0, 0, 0.1173], [0, 0.7572, -0.4692], [0, -0.7572, -0.4692]])
     >>> for one in isotopologues(Top.from_molecule(water)):
     ...     print(one.formula, round(one.abundance, 6), one.arrangements)
-    H2O 0.997332 1
-    H2[18O] 0.001999 1
-    H2[17O] 0.00038 1
+    H2O 0.997281 1
+    H2[18O] 0.002044 1
+    H2[17O] 0.000383 1
     H[2H]O 0.000289 2
     """
     if not 0 < min_abundance <= 1:
@@ -262,17 +262,18 @@ def _alike(kind: str) -> tuple[tuple[int, ...], ...]:
 
 
 def _matched(parent: Top, turned: Top) -> tuple[str, float]:
-    """The parent's axes nearest to a, b, c, and the smallest cos² of the matches, averaged over free directions."""
+    """The parent's axes nearest to a, b, c, and the smallest cos² of the matches; free directions are taken together."""
     assert parent.frame is not None  # both are tops of a geometry
     assert turned.frame is not None
     squares = (turned.frame.axes @ parent.frame.axes.T) ** 2
-    for group in map(list, _alike(turned.kind)):
-        squares[group, :] = squares[group, :].mean(axis=0)
-    for group in map(list, _alike(parent.kind)):
-        squares[:, group] = squares[:, group].mean(axis=1, keepdims=True)
+    inside = np.zeros((3, 3))  # of each axis in the space that the other may turn in
+    for own, other in itertools.product(map(list, _alike(turned.kind)), map(list, _alike(parent.kind))):
+        block = np.ix_(own, other)
+        inside[block] = squares[block].sum() / min(len(own), len(other))
+        squares[block] = squares[block].mean()
     ways = itertools.permutations(range(3))  # the first, which changes nothing, wins where overlaps are alike
     best = max(ways, key=lambda way: round(sum(squares[i, j] for i, j in enumerate(way)), 9))
-    return "".join("abc"[j] for j in best), min(float(squares[i, j]) for i, j in enumerate(best))
+    return "".join("abc"[j] for j in best), min(float(inside[i, j]) for i, j in enumerate(best))
 
 
 def _turned_degrees(parent: Top, turned: Top, axes: str) -> float:
@@ -321,10 +322,11 @@ def _carried_over(parent: Top, rigid: Top, turned: Top, axes: str, angle: float)
     constants = _of_kind(values, turned.kind)
     name = parent.name or "the parent"
     note = (
-        f"constants of {name} times the ratio of those calculated from its geometry, {_ratio_text(ratios, axes)}; such "
-        "constants were 0.02 % off where heavy atoms were replaced, and up to 0.8 % where hydrogen was"
+        f"constants are those of {name} times the ratio of those calculated from its geometry; such constants were 0.02 % "
+        "off where heavy atoms were replaced, and up to 0.8 % where hydrogen was"
     )
-    source = f"scaled from {name} ({parent.source})" if parent.source else f"scaled from {name}"
+    origin = f" ({parent.source})" if parent.source else ""
+    source = f"scaled from {name}{origin} by {_ratio_text(ratios, axes)}"
     constants, told = _with_distortion(parent, constants, axes, angle)
     return replace(turned, constants=constants, source=source, notes=(*turned.notes, note, *told))
 
@@ -397,12 +399,17 @@ def _with_distortion(parent: Top, constants: Constants, axes: str, angle: float)
     if constants.kind == "asymmetric":
         constants = constants.replace(representation=old.representation)
     across, along = (new / before for new, before in zip(_of_z(constants), _of_z(old), strict=True))
-    operators = operators_by_name(old)
-    powers = {name: next(iter(operators[name])) for name in names}  # (p, q, n) of the one operator of each
-    scaled = {name: old[name] * across ** (p + n) * along**q for name, (p, q, n) in powers.items()}
+    scaled = {name: old[name] * across ** (p + n) * along**q for name, (p, q, n) in _powers(old, names).items()}
     changes = {**scaled, "reduction": old.reduction} if old.reduction else scaled
     note = "distortion constants of the parent scaled as powers of the rotational constants (D as B², H as B³): a guess"
     return constants.replace(**changes), (note,)
+
+
+def _powers(constants: Constants, names: list[str]) -> dict[str, tuple[int, int, int]]:
+    """(p, q, n) of the one operator that each distortion constant stands for."""
+    table = distortion_terms(constants.kind, constants.reduction)
+    spelled = {name: powers_of_spelled(name) for name in names}
+    return {name: own if (own := spelled[name]) else next(iter(table[name])) for name in names}
 
 
 def _why_rigid(old: Constants, constants: Constants, axes: str, angle: float) -> str:
