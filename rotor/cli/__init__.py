@@ -65,15 +65,14 @@ def run(arguments: Sequence[str] | None = None) -> int:
     """Carry out a command and return its exit code; a mistake of the user is one line on standard error."""
     arguments = sys.argv[1:] if arguments is None else list(arguments)
     command = typer.main.get_command(_application())
+    provenance = shlex.join(["rotor", *arguments])
     try:
-        code = command.main(
-            args=arguments or ["--help"],
-            prog_name="rotor",
-            standalone_mode=False,
-            obj=shlex.join(["rotor", *arguments]),  # the command, for provenance
-        )
+        with command.make_context("rotor", arguments or ["--help"], obj=provenance) as context:
+            command.invoke(context)
         sys.stdout.flush()
-        return int(code or 0)
+        return 0
+    except typer.Exit as end:
+        return end.exit_code
     except _ERROR_OF_USE as error:
         return _fail(WRONG_INPUT, error.format_message())  # type: ignore[attr-defined]
     except NoAnswer as error:
@@ -81,7 +80,7 @@ def run(arguments: Sequence[str] | None = None) -> int:
     except BrokenPipeError:  # the reader has seen enough: nothing more can be said to it, at exit neither
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
-    except (KeyboardInterrupt, typer.Abort):
+    except KeyboardInterrupt:
         return INTERRUPTED
     except (ValueError, OSError) as error:
         return _fail(WRONG_INPUT, _told(error))

@@ -162,7 +162,12 @@ def write(thing: Any, path: str | os.PathLike[str], *, settings: Mapping[str, An
     """
     from rotor.formats.spcat.catalogue import Catalogue
     from rotor.spectra.lines import Lines
+    from rotor.spectra.spectrum import Spectrum
 
+    if isinstance(thing, Spectrum):
+        from rotor.formats.spectrum_table import write_spectrum
+
+        return write_spectrum(thing, path, settings)
     if isinstance(thing, Lines):
         from rotor.formats.line_tables import write_lines
 
