@@ -6,6 +6,7 @@
 
 # %%
 import sys
+from itertools import pairwise
 from pathlib import Path
 
 import matplotlib
@@ -105,7 +106,7 @@ for order, names in orders.items():
     print(f"{order:8} median {np.median(off[order]):12.3f} MHz, worst {off[order].max():14.3f} MHz")
 
 figure, axis = plt.subplots(figsize=(6, 4))
-for i, (order, values) in enumerate(off.items()):
+for i, values in enumerate(off.values()):
     axis.semilogy(np.full(len(values), i) + np.linspace(-0.2, 0.2, len(values)), values, "o", ms=4, color="#0072B2")
     axis.semilogy([i - 0.3, i + 0.3], [np.median(values)] * 2, color="#D55E00", lw=2)
 axis.set_xticks(range(len(off)), list(off))
@@ -115,7 +116,7 @@ keep(figure, "water_orders.png")
 
 medians = [np.median(values) for values in off.values()]
 assert medians[0] > 1e3
-assert all(later < earlier for earlier, later in zip(medians[:4], medians[1:], strict=False))
+assert all(later < earlier for earlier, later in pairwise(medians))
 assert medians[-1] < 1.0
 
 # %% [markdown]

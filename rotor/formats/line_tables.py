@@ -1,4 +1,4 @@
-"""A line list as a file: .cat, .csv, .parquet, .json, each with its provenance inside or in a file beside it."""
+"""A line list as a file: .cat, .csv, .parquet, .json, .hitran, each with its provenance inside or in a file beside it."""
 
 from __future__ import annotations
 
@@ -89,9 +89,10 @@ def _finite(value: float) -> float | None:
 
 
 def write_lines(lines: Lines, path: str | os.PathLike[str], settings: Mapping[str, Any] | None = None) -> None:
-    """Write lines in the format that the suffix of `path` names: .cat, .cat.gz, .csv, .parquet or .json.
+    """Write lines in the format that the suffix of `path` names: .cat, .cat.gz, .csv, .parquet, .json or .hitran.
 
-    settings: what else the provenance shall say (the command line, for instance); its key "tag" is the tag of a .cat.
+    settings: what else the provenance shall say (the command line, for instance); its key "tag" is the tag of a .cat,
+    "molecule" (always), "isotopologue" and "abundance" are those of a .hitran.
     Parquet and JSON carry the provenance inside, the others in a file beside, `path` + ".provenance.json".
     """
     name = Path(path).name.lower()
@@ -109,9 +110,12 @@ def write_lines(lines: Lines, path: str | os.PathLike[str], settings: Mapping[st
     elif name.endswith(".json"):
         with open_atomic(path, "w", encoding="utf-8") as handle:
             json.dump({"provenance": story, "lines": records(lines)}, handle, indent=1, allow_nan=False)
+    elif name.endswith(".hitran"):
+        _write_hitran(lines, path, settings or {})
+        _write_beside(path, story)
     else:
         raise ValueError(
-            f"{path}: lines can be written as .cat, .cat.gz, .csv, .parquet or .json; the suffix names the format"
+            f"{path}: lines can be written as .cat, .cat.gz, .csv, .parquet, .json or .hitran; the suffix names the format"
         )
 
 
@@ -133,6 +137,17 @@ def _write_catalogue(lines: Lines, path: str | os.PathLike[str], tag: int) -> No
     ):
         handle.writelines(_in_order(pool, text, range(0, len(lines), PIECE)))
     return None
+
+
+def _write_hitran(lines: Lines, path: str | os.PathLike[str], settings: Mapping[str, Any]) -> None:
+    from rotor.formats.hitran import hitran_lines, write_hitran
+
+    if "molecule" not in settings:
+        raise ValueError(
+            f'{path}: HITRAN\'s records begin with its number of the molecule; give settings={{"molecule": 5}} (5 is CO)'
+        )
+    known = {key: settings[key] for key in ("molecule", "isotopologue", "abundance") if key in settings}
+    write_hitran(hitran_lines(lines, **known), path)
 
 
 def _in_order(pool: ThreadPoolExecutor, make: Callable[[int], bytes], starts: Iterable[int]) -> Iterator[bytes]:
