@@ -82,6 +82,7 @@ def provenance(lines: Lines) -> dict[str, Any]:
         "q_source": lines.partition.source,
         "lines": len(lines),
         "notes": list(top.notes),
+        "warnings": list(lines.warnings),
     }
 
 

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from rotor import units
 from rotor.quantum.levels import Levels, solve_levels
+from rotor.quantum.reliability import warnings_of
 from rotor.quantum.uncertainty import Covariance, level_spread, line_errors
 from rotor.spectra.reach import jmax_for_cut
 from rotor.spectra.transitions import IntensityCut, all_transitions
@@ -77,6 +78,14 @@ class Lines:
     def q(self) -> float:
         """The value of Q(T)."""
         return self.partition.q
+
+    @cached_property
+    def warnings(self) -> tuple[str, ...]:
+        """What a user must be told about the levels behind the lines and about their errors."""
+        known = {*self.covariance.names} if self.covariance else {*self.top.constants.uncertainties}
+        exact = [name for name in self.top.constants.values if name not in known]
+        partly = f"errors of frequencies take {', '.join(exact)} as exact: their uncertainty is not known"
+        return warnings_of(self.top, self.levels) + ((partly,) if known and exact else ())
 
     @cached_property
     def spread(self) -> Floats | None:
