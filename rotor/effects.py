@@ -38,11 +38,13 @@ class ClassicalEffect:
         dL/dt = L x ω + Σ torques,   ω_i = (L_i - h_i) / I_i(t),   h = Σ inner momenta.
 
     An effect is one of the three kinds below; this base only names what each says of itself: `conserves_energy`
-    means ½ Σ (L_i - h_i)²/I_i + potential energy, `conserves_momentum` means L seen from space.
+    means ½ Σ (L_i - h_i)²/I_i + potential energy, `conserves_momentum` means L seen from space;
+    `depends_on_time` says whether the time itself enters, as in a drive.
     """
 
     conserves_energy: ClassVar[bool] = False
     conserves_momentum: ClassVar[bool] = False
+    depends_on_time: ClassVar[bool] = False
 
 
 class Torque(ClassicalEffect, ABC):
