@@ -92,7 +92,8 @@ def lammps(side: int, steps: int) -> dict[str, float]:
     triples = (
         head.replace("atom_modify", "atom_style molecular\natom_modify") + box + "create_box 1 box\nmass 1 1.0\n"
         f"molecule bent {molecule}\ncreate_atoms 0 box mol bent 31\nvelocity all create 1.0 5\n"
-        + quiet + "fix 1 all rigid/nve/small molecule\n"
+        + quiet
+        + "fix 1 all rigid/nve/small molecule\n"
     )
     try:
         return {
@@ -113,7 +114,8 @@ def mujoco(n: int, steps: int) -> dict[str, float]:
         xml = (
             f'<mujoco><option gravity="0 0 0" timestep="0.01" integrator="{method}">'
             '<flag contact="disable" constraint="disable"/></option><size memory="1G"/><worldbody>'
-            + "".join(body.format(10 * k) for k in range(n)) + "</worldbody></mujoco>"
+            + "".join(body.format(10 * k) for k in range(n))
+            + "</worldbody></mujoco>"
         )
         model = engine.MjModel.from_xml_string(xml)
         data = engine.MjData(model)

@@ -51,7 +51,9 @@ for k in range(J + 1):
     axis.text(-1.03, left, f"$K_a={k}$", ha="right", va="center", fontsize=9)
     axis.text(1.03, right, f"$K_c={k}$", va="center", fontsize=9)
 axis.set(xlabel="Ray's asymmetry parameter κ", xlim=(-1, 1), yticks=[])
-axis.set_title("Levels of J = 4 between the prolate and the oblate top\n(A = 10, C = 4; Ka even blue, odd red)", fontsize=10)
+axis.set_title(
+    "Levels of J = 4 between the prolate and the oblate top\n(A = 10, C = 4; Ka even blue, odd red)", fontsize=10
+)
 axis.spines[["top"]].set_visible(False)
 keep(figure, "kappa.png")
 

@@ -10,9 +10,8 @@ from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING, ClassVar
 
 if TYPE_CHECKING:
-    from rotor.top import Top
-
     from rotor.rotations import Array
+    from rotor.top import Top
 
 
 class QuantumEffect(ABC):

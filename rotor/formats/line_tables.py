@@ -122,7 +122,7 @@ def write_lines(lines: Lines, path: str | os.PathLike[str], settings: Mapping[st
             json.dump({"provenance": story, "lines": records(lines)}, handle, indent=1, allow_nan=False)
     elif name.endswith(".hitran"):
         _write_hitran(lines, path, settings or {})
-        _write_beside(path, story)
+        write_beside(path, story)
     else:
         raise ValueError(
             f"{path}: lines can be written as .cat, .cat.gz, .csv, .parquet, .json or .hitran; the suffix names the format"
