@@ -14,7 +14,7 @@ from typing import cast
 
 import typer
 
-from rotor.cli import info, spectrum
+from rotor.cli import info, molecules, spectrum
 from rotor.cli.output import NoAnswer
 
 NO_ANSWER, WRONG_INPUT, INTERRUPTED = 1, 2, 130
@@ -48,6 +48,7 @@ def _application() -> typer.Typer:
 
     app.command("spectrum", epilog=spectrum.EXAMPLES)(spectrum.command)
     app.command("info", epilog=info.EXAMPLES)(info.command)
+    app.command("molecules", epilog=molecules.EXAMPLES)(molecules.command)
     return app
 
 
