@@ -80,7 +80,7 @@ def test_water_has_its_lines(call):
     ):
         assert re.search(rf"^{name} +{re.escape(beginning)}", out, re.MULTILINE), name
 
-    table = out.split("in order of frequency\n")[1].splitlines()
+    table = out.split("in order of frequency (states: J Ka Kc)\n")[1].splitlines()
     frequencies = [float(row.split()[0]) for row in table[1:]]
     assert frequencies == sorted(frequencies)
     assert np.allclose(frequencies, np.sort(lines.strongest(5).frequency_mhz), rtol=0, atol=5.1e-5)  # four decimals
@@ -497,12 +497,18 @@ def test_tables_on_a_terminal_are_drawn(monkeypatch):
         def isatty(self) -> bool:
             return True
 
+    monkeypatch.setenv("COLUMNS", "80")
     table = output.Table("a title", ("name", "number [MHz]"), [("a", "1.5"), ("bc", "22.75")], frozenset({"name"}))
     screen = Terminal()
     monkeypatch.setattr(sys, "stdout", screen)
     output.show_table(table)
     drawn = screen.getvalue()
     assert all(text in drawn for text in ("a title", "number [MHz]", "22.75", "─"))
+
+    wide = output.Table("", ("x" * 60, "y" * 60), [("1", "2")])
+    screen.truncate(0)
+    output.show_table(wide)
+    assert "x" * 60 + "  " + "y" * 60 in screen.getvalue()  # whole, not cut to the terminal
     assert output.table_text(table) == "a title\nname  number [MHz]\na              1.5\nbc           22.75"
 
 
