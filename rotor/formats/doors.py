@@ -143,9 +143,7 @@ def top_of_file(file: MoleculeFile, isotopes: Isotopes | None = None) -> Top:
             raise ValueError(f"{file.name}: isotopes cannot be changed, the file has constants but no geometry")
         top = _from_molecule(file.molecule, isotopes)
         note = f"the measured constants of {file.name} belong to another isotopologue; these are of its rigid geometry"
-        return replace(
-            top, name=f"{file.name} ({top.molecule.formula if top.molecule else ''})", notes=(*top.notes, note)
-        )
+        return replace(top, name=f"{file.name} ({top.molecule.formula if top.molecule else ''})", notes=(*top.notes, note))
     if file.constants is None:
         assert geometry is not None  # the reader refuses a file with neither
         return replace(geometry, name=file.name)
