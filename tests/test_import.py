@@ -5,7 +5,19 @@ from __future__ import annotations
 import subprocess
 import sys
 
-HEAVY = ("ase", "rdkit", "qutip", "matplotlib", "numba", "polars", "pandas", "rich", "typer", "scipy.special", "scipy.stats")
+HEAVY = (
+    "ase",
+    "rdkit",
+    "qutip",
+    "matplotlib",
+    "numba",
+    "polars",
+    "pandas",
+    "rich",
+    "typer",
+    "scipy.special",
+    "scipy.stats",
+)
 
 
 def loaded_after(code: str) -> set[str]:

@@ -1,4 +1,4 @@
-"""A line list as a file: .cat, .csv, .parquet, .json, each with its provenance inside or in a file beside it."""
+"""A line list as a file: .cat, .csv, .parquet, .json, .hitran, each with its provenance inside or in a file beside it."""
 
 from __future__ import annotations
 
@@ -99,29 +99,33 @@ def _finite(value: float) -> float | None:
 
 
 def write_lines(lines: Lines, path: str | os.PathLike[str], settings: Mapping[str, Any] | None = None) -> None:
-    """Write lines in the format that the suffix of `path` names: .cat, .cat.gz, .csv, .parquet or .json.
+    """Write lines in the format that the suffix of `path` names: .cat, .cat.gz, .csv, .parquet, .json or .hitran.
 
-    settings: what else the provenance shall say (the command line, for instance); its key "tag" is the tag of a .cat.
+    settings: what else the provenance shall say (the command line, for instance); its key "tag" is the tag of a .cat,
+    "molecule" (always), "isotopologue" and "abundance" are those of a .hitran.
     Parquet and JSON carry the provenance inside, the others in a file beside, `path` + ".provenance.json".
     """
     name = Path(path).name.lower()
     story = provenance(lines) | {k: v for k, v in (settings or {}).items() if k != "tag"}
     if name.endswith((".cat", ".cat.gz")):
         _write_catalogue(lines, path, int((settings or {}).get("tag", 0)))
-        _write_beside(path, story)
+        write_beside(path, story)
     elif name.endswith(".csv"):
         with open_atomic(path) as handle:
             lines.to_polars().write_csv(handle)
-        _write_beside(path, story)
+        write_beside(path, story)
     elif name.endswith(".parquet"):
         with atomic_path(path) as unfinished:
             lines.to_polars().write_parquet(unfinished, metadata={"provenance": json.dumps(story)})
     elif name.endswith(".json"):
         with open_atomic(path, "w", encoding="utf-8") as handle:
             json.dump({"provenance": story, "lines": records(lines)}, handle, indent=1, allow_nan=False)
+    elif name.endswith(".hitran"):
+        _write_hitran(lines, path, settings or {})
+        write_beside(path, story)
     else:
         raise ValueError(
-            f"{path}: lines can be written as .cat, .cat.gz, .csv, .parquet or .json; the suffix names the format"
+            f"{path}: lines can be written as .cat, .cat.gz, .csv, .parquet, .json or .hitran; the suffix names the format"
         )
 
 
@@ -145,6 +149,17 @@ def _write_catalogue(lines: Lines, path: str | os.PathLike[str], tag: int) -> No
     return None
 
 
+def _write_hitran(lines: Lines, path: str | os.PathLike[str], settings: Mapping[str, Any]) -> None:
+    from rotor.formats.hitran import hitran_lines, write_hitran
+
+    if "molecule" not in settings:
+        raise ValueError(
+            f'{path}: HITRAN\'s records begin with its number of the molecule; give settings={{"molecule": 5}} (5 is CO)'
+        )
+    known = {key: settings[key] for key in ("molecule", "isotopologue", "abundance") if key in settings}
+    write_hitran(hitran_lines(lines, **known), path)
+
+
 def _in_order(pool: ThreadPoolExecutor, make: Callable[[int], bytes], starts: Iterable[int]) -> Iterator[bytes]:
     """make(start) of every start, in order; only so many are under way that memory stays bounded."""
     under_way: deque[Future[bytes]] = deque()
@@ -166,7 +181,8 @@ def records(lines: Lines) -> list[dict[str, float | int | None]]:
     ]
 
 
-def _write_beside(path: str | os.PathLike[str], story: Mapping[str, Any]) -> None:
+def write_beside(path: str | os.PathLike[str], story: Mapping[str, Any]) -> None:
+    """Write the provenance of a file whose format has no place for it, as `path` + ".provenance.json"."""
     with open_atomic(f"{os.fspath(path)}.provenance.json", "w", encoding="utf-8") as handle:
         json.dump(story, handle, indent=1, ensure_ascii=False)
         handle.write("\n")

@@ -209,7 +209,7 @@ def _symmetric(kind: str, operators: Operators, weights: SpinWeights, jmin: int,
         energy += c * x**p * squares**q
 
     components = np.where(k == 0, 1, 2)
-    weight = weights.of_symmetric(j, k)
+    weight = weights.of_symmetric(j, k, oblate=kind == "oblate")
     return Levels(kind, None, jmax, energy, j, k, np.full(j.shape, -1), components, weight)
 
 
