@@ -126,3 +126,15 @@ def test_noncubic_terms_are_refused():
 
     with pytest.raises(ValueError, match="tensor of D_t alone"):
         scalar_and_tensor({(1, 0, 0): 5.0, (0, 1, 0): 0.1})
+
+
+@pytest.mark.parametrize(
+    ("weights", "says"),
+    [
+        ({"A": 1, "F1": 3, "F2": 3, "G": 4, "H": 5}, "icosahedral"),
+        ({"0": 2, "1": 1, "2": 1}, "do not fit a spherical top"),
+    ],
+)
+def test_weights_that_cannot_serve_split_levels(weights, says):
+    with pytest.raises(ValueError, match=says):
+        solve_levels(Top(METHANE, spin_weights=SpinWeights.from_mapping(weights)), 3)
