@@ -115,7 +115,8 @@ class Top:
     constants: named constants in MHz. dipole_abc_debye: (μa, μb, μc) or None where it is not known. spin_weights:
     nuclear-spin weights. mass_u: for Doppler widths. frame: principal frame of a geometry, None without one.
     kind_of_top: how the kind was decided. molecule, symmetry: of a geometry. source: where the constants are from.
-    notes: what a user must be told.
+    independent_errors: whether the uncertainties of the constants may count as uncorrelated; not those of a fit whose
+    correlations are unknown. notes: what a user must be told.
     """
 
     constants: Constants
@@ -130,6 +131,7 @@ class Top:
     source: str = ""
     dipole_source: str = ""
     weights_source: str = ""
+    independent_errors: bool = True
     notes: tuple[str, ...] = ()
 
     @classmethod
