@@ -250,6 +250,13 @@ class Top:
         """The same top with another dipole in principal axes."""
         return replace(self, dipole_abc_debye=_three(dipole_abc_debye), dipole_source=source)
 
+    def with_estimated_dipole(self, dipole_debye: ArrayLike, source: str) -> Top:
+        """The same top with a dipole in the frame of its geometry, of which what symmetry forbids is left out."""
+        if self.frame is None or self.symmetry is None:
+            raise ValueError(f"{self.name or 'this top'} has no geometry whose frame a dipole could be in")
+        allowed = allowed_dipole(dipole_debye, self.symmetry)
+        return replace(self, dipole_abc_debye=_in_frame(self.frame, allowed), dipole_source=source)
+
     def with_weights(self, weights: dict[str, int], source: str) -> Top:
         """The same top with other spin weights."""
         return replace(self, spin_weights=SpinWeights.from_mapping(weights), weights_source=source)
