@@ -19,8 +19,9 @@ from rotor.formats.spcat.cat import format_lines, write_cat
 from rotor.formats.spcat.catalogue import Catalogue
 from rotor.formats.spcat.fields import BLANK
 from rotor.spectra.lines import Lines
+from rotor.top import Top
 
-_QNFMT = {("j",): 101, ("j", "k"): 202, ("j", "ka", "kc"): 303}
+QNFMT = {("j",): 101, ("j", "k"): 202, ("j", "ka", "kc"): 303}
 MAX_TAG = 999_999
 PIECE = 1 << 16  # lines of a long list that are made into text at once
 
@@ -49,17 +50,16 @@ def catalogue(lines: Lines, tag: int = 0) -> Catalogue:
         energy_lower_cm=lines.energy_lower_cm,
         g_upper=lines.g_upper.astype(np.int32),
         tag=np.full(n, tag, dtype=np.int32),
-        qnfmt=np.full(n, _QNFMT[lines.quanta_names], dtype=np.int32),
+        qnfmt=np.full(n, QNFMT[lines.quanta_names], dtype=np.int32),
         quanta_upper=quanta[lines.upper],
         quanta_lower=quanta[lines.lower],
     )
 
 
-def provenance(lines: Lines) -> dict[str, Any]:
-    """What the lines were made from: version, constants and their source, dipole, weights, settings, Q."""
+def top_provenance(top: Top) -> dict[str, Any]:
+    """What a top consists of: constants and their source, dipole, weights, notes, and the version of the package."""
     import rotor
 
-    top = lines.top
     return {
         "program": "rotor",
         "version": rotor.__version__,
@@ -73,18 +73,25 @@ def provenance(lines: Lines) -> dict[str, Any]:
         "dipole_source": top.dipole_source,
         "spin_weights": top.spin_weights.to_mapping(),
         "spin_weights_source": top.weights_source,
-        "temperature_k": lines.temperature_k,
-        "jmax": lines.jmax,
-        "min_lgint": _finite(lines.min_lgint),
-        "range_mhz": [_finite(bound) for bound in lines.range_mhz],
-        "q": lines.q,
-        "q_source": lines.partition.source,
-        "lines": len(lines),
         "notes": list(top.notes),
     }
 
 
-def _finite(value: float) -> float | None:
+def provenance(lines: Lines) -> dict[str, Any]:
+    """What the lines were made from: the top and its sources, the settings, Q."""
+    return top_provenance(lines.top) | {
+        "temperature_k": lines.temperature_k,
+        "jmax": lines.jmax,
+        "min_lgint": finite_or_none(lines.min_lgint),
+        "range_mhz": [finite_or_none(bound) for bound in lines.range_mhz],
+        "q": lines.q,
+        "q_source": lines.partition.source,
+        "lines": len(lines),
+    }
+
+
+def finite_or_none(value: float) -> float | None:
+    """The value as JSON can say it: None for an open limit."""
     return value if math.isfinite(value) else None
 
 
@@ -99,11 +106,11 @@ def write_lines(lines: Lines, path: str | os.PathLike[str], settings: Mapping[st
     story = provenance(lines) | {k: v for k, v in (settings or {}).items() if k != "tag"}
     if name.endswith((".cat", ".cat.gz")):
         _write_catalogue(lines, path, int((settings or {}).get("tag", 0)))
-        _write_beside(path, story)
+        write_beside(path, story)
     elif name.endswith(".csv"):
         with open_atomic(path) as handle:
             lines.to_polars().write_csv(handle)
-        _write_beside(path, story)
+        write_beside(path, story)
     elif name.endswith(".parquet"):
         with atomic_path(path) as unfinished:
             lines.to_polars().write_parquet(unfinished, metadata={"provenance": json.dumps(story)})
@@ -112,7 +119,7 @@ def write_lines(lines: Lines, path: str | os.PathLike[str], settings: Mapping[st
             json.dump({"provenance": story, "lines": records(lines)}, handle, indent=1, allow_nan=False)
     elif name.endswith(".hitran"):
         _write_hitran(lines, path, settings or {})
-        _write_beside(path, story)
+        write_beside(path, story)
     else:
         raise ValueError(
             f"{path}: lines can be written as .cat, .cat.gz, .csv, .parquet, .json or .hitran; the suffix names the format"
@@ -171,7 +178,8 @@ def records(lines: Lines) -> list[dict[str, float | int | None]]:
     ]
 
 
-def _write_beside(path: str | os.PathLike[str], story: Mapping[str, Any]) -> None:
+def write_beside(path: str | os.PathLike[str], story: Mapping[str, Any]) -> None:
+    """Write the provenance of `path` in a file beside it."""
     with open_atomic(f"{os.fspath(path)}.provenance.json", "w", encoding="utf-8") as handle:
         json.dump(story, handle, indent=1, ensure_ascii=False)
         handle.write("\n")
