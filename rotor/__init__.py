@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from rotor.constants import Constants as Constants
     from rotor.formats import read as read
     from rotor.formats import write as write
+    from rotor.formats.stream import stream_lines as stream_lines
     from rotor.molecules.molecule import Molecule as Molecule
     from rotor.quantum.levels import Levels as Levels
     from rotor.quantum.levels import solve_levels as solve_levels
@@ -36,6 +37,7 @@ _HOME = {
     "partition_function": "rotor.thermo",
     "read": "rotor.formats",
     "solve_levels": "rotor.quantum.levels",
+    "stream_lines": "rotor.formats.stream",
     "write": "rotor.formats",
 }
 
