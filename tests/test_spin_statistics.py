@@ -348,8 +348,10 @@ TYPED = {  # geometries that g2 lacks, Å: CCCBDB release 22
     "HC3N": ("HCCCN", [[0, 0, 0], [0, 0, 1.058], [0, 0, 2.263], [0, 0, 3.641], [0, 0, 4.800]]),
     "formamide": (
         "COHNHH",
-        [[0, 0.4165, 0], [1.1942, 0.2217, 0], [-0.4299, 1.4182, 0]]
-        + [[-0.9373, -0.5551, 0], [-0.6608, -1.5171, 0], [-1.902, -0.2881, 0]],
+        [
+            *([0, 0.4165, 0], [1.1942, 0.2217, 0], [-0.4299, 1.4182, 0]),
+            *([-0.9373, -0.5551, 0], [-0.6608, -1.5171, 0], [-1.902, -0.2881, 0]),
+        ],
     ),
 }
 
@@ -447,6 +449,19 @@ def test_characters_given_by_hand():
         assert sorted(weights.values()) == [3, 3, 3, 7]
         sevens.add(max(weights, key=weights.get))
     assert sevens == {"eo", "oe", "oo"}
+
+
+@pytest.mark.parametrize("weights", [(1, 1, 3, 3), (1, 3, 1, 3), (1, 3, 3, 1), (7, 3, 2, 1)])
+def test_pairs_of_a_symmetric_top_by_numbers_add_up_its_asymmetric_levels(weights):
+    """K is Ka in a prolate, Kc in an oblate top; the other label of the pair takes both parities."""
+    by_parity = SpinWeights("KaKc", ("ee", "eo", "oe", "oo"), weights)
+    for j in range(6):
+        labels = [((tau + 1) // 2, j - tau // 2) for tau in range(2 * j + 1)]
+        for oblate in (False, True):
+            sums = [0] * (j + 1)
+            for ka, kc in labels:
+                sums[kc if oblate else ka] += by_parity.of_ka_kc("eo"[ka % 2] + "eo"[kc % 2])
+            assert by_parity.of_symmetric(j, np.arange(j + 1), oblate).tolist() == sums
 
 
 def test_too_many_spins_to_add_up_are_told():

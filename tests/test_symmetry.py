@@ -16,7 +16,7 @@ from scipy.linalg import expm
 
 from rotor.molecules.molecule import Molecule
 from rotor.molecules.nuclei import masses
-from rotor.molecules.operations import best_turn
+from rotor.molecules.operations import best_turn, closed_group, find_operations, shortest_distance
 from rotor.molecules.symmetry import Symmetry, find_symmetry, symmetry_of
 
 # Point groups of ASE's g2 collection (geometries: L. A. Curtiss et al., J. Chem. Phys. 106, 1063 (1997)), typed from
@@ -208,8 +208,33 @@ def test_isotopes_break_symmetry_and_are_not_near():
     symbols = g2["C6H6"].get_chemical_symbols()
     found = symmetry_of(Molecule(("13C", *symbols[1:]), g2["C6H6"].positions))
     assert (found.point_group, found.symmetry_number, found.near) == ("C2v", 2, None)
-    light = find_symmetry(symbols, [13.003, *masses(symbols)[1:]], g2["C6H6"].positions)
-    assert light.point_group == "C2v"  # by the mass alone, where the kinds do not tell
+
+
+def test_masses_tell_nuclei_apart_where_kinds_do_not():
+    symbols, mass = g2["C6H6"].get_chemical_symbols(), masses(g2["C6H6"].get_chemical_symbols())
+    opposite = int(np.argmax(np.linalg.norm(g2["C6H6"].positions[:6] - g2["C6H6"].positions[0], axis=1)))
+    mass[[0, opposite]] = 13.00335  # the centre of mass stays, so that nothing else breaks the symmetry
+    assert find_symmetry(symbols, mass, g2["C6H6"].positions).point_group == "D2h"
+
+
+def test_a_limit_that_cuts_through_a_group_is_lowered():
+    """A triangle with one corner moved: of the mismatches of C3v some are within a limit set between them, some not."""
+    corners = ring(3, 1.0, 0.0) + np.array([[0.02, 0, 0], [0, 0.013, 0], [0, 0, 0]])
+    points = np.concatenate([corners, [[0, 0, 0.8], [0, 0, -1.1]]])
+    kinds, mass = "CCCNO", np.array([12.0, 12, 12, 14, 16])
+    centred = points - mass @ points / mass.sum()
+    operations, base = find_operations(np.array([0, 0, 0, 1, 2]), centred, 0.2)
+    mismatches = np.array([one.mismatch_angstrom for one in operations])
+    limits = np.sort(mismatches) + 1e-9
+    within = [int((mismatches <= limit).sum()) for limit in limits]
+    kept = [len(closed_group(operations, base, limit)) for limit in limits]
+    assert len(operations) == 6
+    assert set(kept) <= {1, 2, 3, 6}  # orders of the subgroups of C3v
+    cut = [limit for limit, n, m in zip(limits, within, kept, strict=True) if m < n]
+    assert cut  # four or five operations within the limit, which cannot be a group
+    for limit in cut:
+        found = find_symmetry(kinds, mass, points, tolerance=limit / shortest_distance(points))
+        assert found.point_group in ("C1", "Cs", "C3")
 
 
 def test_tolerance_is_relative_and_stated():

@@ -14,7 +14,7 @@ from typing import cast
 
 import typer
 
-from rotor.cli import info, molecules, spectrum
+from rotor.cli import info, isotopologues, molecules, spectrum
 from rotor.cli.output import NoAnswer
 
 NO_ANSWER, WRONG_INPUT, INTERRUPTED = 1, 2, 130
@@ -27,7 +27,8 @@ Examples:
   rotor spectrum "SMILES:C=O" --temperature 100
   rotor spectrum my.xyz --dipole 0,0,1.85 --range 0:2000GHz --cat out.cat --plot out.png
   rotor spectrum --constants "A=835840.288 B=435351.717 C=278138.7 MHz" --dipole-abc 0,1.8546,0
-  rotor info my.sdf"""
+  rotor info my.sdf
+  rotor isotopologues water"""
 
 
 def _application() -> typer.Typer:
@@ -49,6 +50,7 @@ def _application() -> typer.Typer:
     app.command("spectrum", epilog=spectrum.EXAMPLES)(spectrum.command)
     app.command("info", epilog=info.EXAMPLES)(info.command)
     app.command("molecules", epilog=molecules.EXAMPLES)(molecules.command)
+    app.command("isotopologues", epilog=isotopologues.EXAMPLES)(isotopologues.command)
     return app
 
 
@@ -64,15 +66,14 @@ def run(arguments: Sequence[str] | None = None) -> int:
     """Carry out a command and return its exit code; a mistake of the user is one line on standard error."""
     arguments = sys.argv[1:] if arguments is None else list(arguments)
     command = typer.main.get_command(_application())
+    provenance = shlex.join(["rotor", *arguments])
     try:
-        code = command.main(
-            args=arguments or ["--help"],
-            prog_name="rotor",
-            standalone_mode=False,
-            obj=shlex.join(["rotor", *arguments]),  # the command, for provenance
-        )
+        with command.make_context("rotor", arguments or ["--help"], obj=provenance) as context:
+            command.invoke(context)
         sys.stdout.flush()
-        return int(code or 0)
+        return 0
+    except typer.Exit as end:
+        return end.exit_code
     except _ERROR_OF_USE as error:
         return _fail(WRONG_INPUT, error.format_message())  # type: ignore[attr-defined]
     except NoAnswer as error:
@@ -80,7 +81,7 @@ def run(arguments: Sequence[str] | None = None) -> int:
     except BrokenPipeError:  # the reader has seen enough: nothing more can be said to it, at exit neither
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
-    except (KeyboardInterrupt, typer.Abort):
+    except KeyboardInterrupt:
         return INTERRUPTED
     except (ValueError, OSError) as error:
         return _fail(WRONG_INPUT, _told(error))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -167,12 +168,17 @@ def _axes_table(content: dict[str, Any]) -> Table:
     return Table("", columns, rows, frozenset({"axis"}))
 
 
+def _reason(source: str) -> str:
+    """Why a sum means nothing, without the temperature that stands beside it and without the remedy."""
+    return re.sub(r"^Q\([^)]*\):? *", "", source).partition(";")[0]
+
+
 def _q_table(content: dict[str, Any]) -> Table:
     rows = []
     for row in content["partition_function"]:
         known = row["q"] is not None
         summed = [f"{row['q']:.6g}", f"{row['jmax']}", f"{row['relative_error']:.0e}"] if known else ["-", "-", "-"]
-        remark = "" if known else row["source"].partition(": ")[2].partition(";")[0]
+        remark = "" if known else _reason(row["source"])
         rows.append([f"{row['temperature_k']:g}", summed[0], f"{row['classical']:.6g}", *summed[1:], remark])
     columns = ["T (K)", "Q", "Q classical", "J max", "error", "remark"]
     if not any(row[-1] for row in rows):

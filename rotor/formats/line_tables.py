@@ -98,11 +98,11 @@ def write_lines(lines: Lines, path: str | os.PathLike[str], settings: Mapping[st
     story = provenance(lines) | {k: v for k, v in (settings or {}).items() if k != "tag"}
     if name.endswith((".cat", ".cat.gz")):
         _write_catalogue(lines, path, int((settings or {}).get("tag", 0)))
-        _write_beside(path, story)
+        write_beside(path, story)
     elif name.endswith(".csv"):
         with open_atomic(path) as handle:
             lines.to_polars().write_csv(handle)
-        _write_beside(path, story)
+        write_beside(path, story)
     elif name.endswith(".parquet"):
         with atomic_path(path) as unfinished:
             lines.to_polars().write_parquet(unfinished, metadata={"provenance": json.dumps(story)})
@@ -156,7 +156,8 @@ def records(lines: Lines) -> list[dict[str, float | int | None]]:
     ]
 
 
-def _write_beside(path: str | os.PathLike[str], story: Mapping[str, Any]) -> None:
+def write_beside(path: str | os.PathLike[str], story: Mapping[str, Any]) -> None:
+    """Write the provenance of a file whose format has no place for it, as `path` + ".provenance.json"."""
     with open_atomic(f"{os.fspath(path)}.provenance.json", "w", encoding="utf-8") as handle:
         json.dump(story, handle, indent=1, ensure_ascii=False)
         handle.write("\n")

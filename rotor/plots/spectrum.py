@@ -19,7 +19,7 @@ from rotor.spectra.spectrum import Spectrum, line_widths
 Floats = NDArray[np.float64]
 
 BLUE, GREY = "#0072B2", "#555555"  # of Okabe and Ito's palette, told apart by everyone
-STYLE = {
+STYLE: dict[Any, Any] = {
     "font.size": 9.0,
     "axes.labelsize": 9.0,
     "axes.titlesize": 10.0,
@@ -36,6 +36,7 @@ STYLE = {
     "pdf.fonttype": 42,
 }
 SIZE_INCHES = (7.2, 3.8)
+DPI = 200
 VISIBLE = 4e-3  # lines below this part of the strongest do not stretch the axis of frequency
 TALL = 1e-2  # and below this they cannot be seen on a linear axis
 MOST_DECADES = 8
@@ -96,7 +97,7 @@ def plot_spectrum(
     lines = thing if isinstance(thing, Lines) else thing.lines
     heights = _heights(thing, lines)
     with mpl.rc_context(STYLE):
-        figure = Figure(figsize=SIZE_INCHES, layout="constrained")
+        figure = Figure(figsize=SIZE_INCHES, dpi=DPI, layout="constrained")
         FigureCanvasAgg(figure)
         axes = figure.add_subplot()
         x = _frequency_axis(thing, lines, heights, range_mhz)
@@ -105,7 +106,7 @@ def plot_spectrum(
         _inscribe(axes, thing, lines, x, title)
         if lines is not None:
             _name_lines(figure, axes, thing, lines, heights, x, labels)
-        figure.savefig(path, dpi=200, metadata=_metadata(suffix, thing, lines, provenance or {}))
+        figure.savefig(path, dpi=DPI, metadata=_metadata(suffix, thing, lines, provenance or {}))
 
 
 def _heights(thing: Lines | Spectrum, lines: Lines | None) -> Floats:
@@ -195,17 +196,20 @@ def _wants_logarithm(heights: Floats) -> bool:
 
 def _inscribe(axes: Any, thing: Lines | Spectrum, lines: Lines | None, x: _Axis, title: str | None) -> None:
     axes.set_xlabel(f"Frequency ({x.unit})")
-    sticks = isinstance(thing, Lines)
-    axes.set_ylabel("Integrated absorption (nm² MHz)" if sticks else _ordinate(thing))
+    axes.set_ylabel("Integrated absorption (nm² MHz)" if isinstance(thing, Lines) else _ordinate(thing))
     axes.set_title(title if title is not None else _title(thing, lines), loc="left")
-    if not sticks and thing.profile:
-        width = "Doppler width" if thing.fwhm_mhz is None else f"FWHM {thing.fwhm_mhz:g} MHz"
-        if thing.profile == "voigt":
-            width = f"Doppler and Lorentzian of {width}"
-        axes.set_title(f"{thing.profile.capitalize()} profile, {width}", loc="right", fontsize=8, color=GREY)
+    if isinstance(thing, Spectrum) and thing.profile:
+        axes.set_title(_shape_text(thing), loc="right", fontsize=8, color=GREY)
 
 
-def _ordinate(spectrum: Any) -> str:
+def _shape_text(spectrum: Spectrum) -> str:
+    width = "Doppler width" if spectrum.fwhm_mhz is None else f"FWHM {spectrum.fwhm_mhz:g} MHz"
+    if spectrum.profile == "voigt":
+        width = f"Doppler and Lorentzian of {width}"
+    return f"{spectrum.profile.capitalize()} profile, {width}"
+
+
+def _ordinate(spectrum: Spectrum) -> str:
     return "Absorption cross section (nm²)" if spectrum.unit == "nm^2" else f"Intensity ({spectrum.unit})"
 
 
@@ -252,17 +256,17 @@ def _name_lines(
     """Name the strongest lines from the strongest down, upright above them, wherever there is room."""
     figure.canvas.draw()  # places the axes, so that sizes in pixels are known
     rows = np.flatnonzero(x.inside(lines.frequency_mhz) & _stands_out(thing, lines, heights))
-    rows = rows[np.argsort(-lines.intensity_nm2_mhz[rows], kind="stable")][: 50 * most]
+    rows = rows[np.argsort(-lines.intensity_nm2_mhz[rows], kind="stable")][: 15 * most]
     drawn = _drawn_points(axes, thing, x)
     places = axes.transData.transform(np.stack([lines.frequency_mhz[rows] / x.mhz, heights[rows]], axis=1))
     taken: list[Any] = []
     for row, place in zip(rows.tolist(), places, strict=True):
         if len(taken) == most:
             break
-        if any(box.x0 - 3 < place[0] < box.x1 + 3 and box.y0 - 20 < place[1] < box.y1 for box in taken):
+        if any(box.x0 - 6 < place[0] < box.x1 + 6 and box.y0 - 40 < place[1] < box.y1 for box in taken):
             continue  # no need to measure a name that cannot fit
         text = _label(axes, lines, row, heights[row], x)
-        box = text.get_window_extent().padded(1.0)
+        box = text.get_window_extent().padded(2.0)
         if _fits(box, axes.bbox, taken, drawn):
             taken.append(box)
         else:
@@ -299,7 +303,7 @@ def _label(axes: Any, lines: Lines, row: int, height: float, x: _Axis) -> Any:
     rows = np.array([row], dtype=np.int32)
     upper, lower = (lines.quanta(states[rows])[0].tolist() for states in (lines.upper, lines.lower))
     names = lines.quanta_names
-    return axes.annotate(
+    name = axes.annotate(
         f"{state_text(names, upper)} – {state_text(names, lower)}",
         (lines.frequency_mhz[row] / x.mhz, height),
         xytext=(0, 3),
@@ -310,6 +314,8 @@ def _label(axes: Any, lines: Lines, row: int, height: float, x: _Axis) -> Any:
         fontsize=7,
         color=GREY,
     )
+    name.set_in_layout(False)  # names go where the axes leave room, and not the other way round
+    return name
 
 
 def _metadata(suffix: str, thing: Lines | Spectrum, lines: Lines | None, more: Mapping[str, Any]) -> dict[str, Any]:
