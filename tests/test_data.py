@@ -16,6 +16,7 @@ from rotor.formats.library import folders, library_molecule
 from rotor.formats.molecule_file import MoleculeFile, read_molecule_file
 from rotor.formats.spcat.cat import read_cat
 from rotor.molecules.spin_statistics import weights_of
+from rotor.molecules.symmetry import symmetry_of
 from rotor.quantum.levels import solve_levels
 from rotor.top import SYMMETRIC_WITHIN, Top
 from rotor.units import MHZ_PER_CM, ROTATIONAL_MHZ_U_ANGSTROM2
@@ -120,11 +121,12 @@ def test_dipole_lies_on_the_symmetry_axis(axis, stem):
 
 
 @every
-def test_dipole_is_zero_where_symmetry_forbids_it(molecule):
-    top = Top.from_molecule(molecule.molecule)  # leaves out what the point group forbids
-    assert np.abs(top.dipole_abc_debye) == pytest.approx(
-        np.abs(molecule.dipole_abc_debye), abs=1e-5
-    )  # six decimals of Å
+def test_every_operation_of_the_point_group_leaves_the_dipole_alike(molecule):
+    symmetry, dipole = symmetry_of(molecule.molecule, SYMMETRIC_WITHIN), molecule.molecule.dipole_debye
+    for operation in (*symmetry.rotations, *symmetry.improper):
+        assert operation.matrix @ dipole == pytest.approx(dipole, abs=1e-5)  # coordinates have six decimals
+    if symmetry.linear:
+        assert np.flatnonzero(molecule.dipole_abc_debye).tolist() in ([], [0])
 
 
 @every
