@@ -6,6 +6,7 @@
 
 # %%
 import sys
+from itertools import pairwise
 from pathlib import Path
 
 import matplotlib
@@ -50,7 +51,9 @@ for k in range(J + 1):
     axis.text(-1.03, left, f"$K_a={k}$", ha="right", va="center", fontsize=9)
     axis.text(1.03, right, f"$K_c={k}$", va="center", fontsize=9)
 axis.set(xlabel="Ray's asymmetry parameter κ", xlim=(-1, 1), yticks=[])
-axis.set_title("Levels of J = 4 between the prolate and the oblate top\n(A = 10, C = 4; Ka even blue, odd red)", fontsize=10)
+axis.set_title(
+    "Levels of J = 4 between the prolate and the oblate top\n(A = 10, C = 4; Ka even blue, odd red)", fontsize=10
+)
 axis.spines[["top"]].set_visible(False)
 keep(figure, "kappa.png")
 
@@ -105,7 +108,7 @@ for order, names in orders.items():
     print(f"{order:8} median {np.median(off[order]):12.3f} MHz, worst {off[order].max():14.3f} MHz")
 
 figure, axis = plt.subplots(figsize=(6, 4))
-for i, (order, values) in enumerate(off.items()):
+for i, values in enumerate(off.values()):
     axis.semilogy(np.full(len(values), i) + np.linspace(-0.2, 0.2, len(values)), values, "o", ms=4, color="#0072B2")
     axis.semilogy([i - 0.3, i + 0.3], [np.median(values)] * 2, color="#D55E00", lw=2)
 axis.set_xticks(range(len(off)), list(off))
@@ -115,7 +118,7 @@ keep(figure, "water_orders.png")
 
 medians = [np.median(values) for values in off.values()]
 assert medians[0] > 1e3
-assert all(later < earlier for earlier, later in zip(medians[:4], medians[1:], strict=False))
+assert all(later < earlier for earlier, later in pairwise(medians))
 assert medians[-1] < 1.0
 
 # %% [markdown]
