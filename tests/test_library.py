@@ -149,7 +149,7 @@ def test_molecules_as_json(capsys, home):
 def test_molecules_as_a_table_and_one_of_them(capsys):
     assert run(["molecules"]) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert lines[0].split() == ["formula", "name", "kind", "κ", "μa", "μb", "μc", "lines", "rms/MHz", "from"]
+    assert lines[0].split() == ["name", "also", "kind", "κ", "μa", "μb", "μc", "lines", "rms/MHz", "from"]
     assert len(lines) == len(list(OURS.glob("*.toml"))) + 1
     (row,) = [line for line in lines if line.startswith("HDO")]
     assert row.split()[1:9] == ["semiheavy", "water", "asymmetric", "-0.684", "0.6591", "1.73", "73", "0.14"]
