@@ -61,33 +61,33 @@ class Isotopologue:
 def isotopologues(parent: Top, *, min_abundance: float = 1e-4) -> tuple[Isotopologue, ...]:
     """All isotopologues of a molecule at least as abundant in nature as `min_abundance`, the most abundant first.
 
-        Placements that a symmetry of the geometry (rotation or reflection) carries into one another are one isotopologue.
-        An element that nature lacks keeps the isotope it has.
+    Placements that a symmetry of the geometry (rotation or reflection) carries into one another are one isotopologue.
+    An element that nature lacks keeps the isotope it has.
 
-        Parameters
-        ----------
-        parent : Top
-            With a geometry; its isotopes need not be the abundant ones.
-        min_abundance : float
-            Fraction of the natural molecules, above 0.
+    Parameters
+    ----------
+    parent : Top
+        With a geometry; its isotopes need not be the abundant ones.
+    min_abundance : float
+        Fraction of the natural molecules, above 0.
 
-        Returns
-        -------
-        tuple of Isotopologue
+    Returns
+    -------
+    tuple of Isotopologue
 
-        Raises
-        ------
-        ValueError
-            A top without geometry, a limit that nothing reaches or that too many placements exceed.
+    Raises
+    ------
+    ValueError
+        A top without geometry, a limit that nothing reaches or that too many placements exceed.
 
-        >>> from rotor.molecules.molecule import Molecule
-        >>> water = Molecule(("O", "H", "H"), [[0, 0, 0.1173], [0, 0.7572, -0.4692], [0, -0.7572, -0.4692]])
-        >>> for one in isotopologues(Top.from_molecule(water)):
-        ...     print(one.formula, round(one.abundance, 6), one.arrangements)
-        H2O 0.997281 1
-        H2[18O] 0.002044 1
-        H2[17O] 0.000383 1
-        H[2H]O 0.000289 2
+    >>> from rotor.molecules.molecule import Molecule
+    >>> water = Molecule(("O", "H", "H"), [[0, 0, 0.1173], [0, 0.7572, -0.4692], [0, -0.7572, -0.4692]])
+    >>> for one in isotopologues(Top.from_molecule(water)):
+    ...     print(one.formula, round(one.abundance, 6), one.arrangements)
+    H2O 0.997281 1
+    H2[18O] 0.002044 1
+    H2[17O] 0.000383 1
+    H[2H]O 0.000289 2
     """
     if not 0 < min_abundance <= 1:
         raise ValueError(f"least abundance {min_abundance:g}: a fraction above 0 and up to 1 is wanted")
@@ -109,14 +109,14 @@ def isotopologues(parent: Top, *, min_abundance: float = 1e-4) -> tuple[Isotopol
 def isotopologue(parent: Top, changes: Changes) -> Isotopologue:
     """The isotopologue of a top with a geometry that substitutions such as `"2=2H"` or `{"O": "18O"}` make.
 
-        Raises ValueError for a top without geometry, and what `Molecule.with_isotopes` refuses.
+    Raises ValueError for a top without geometry, and what `Molecule.with_isotopes` refuses.
 
-        >>> from rotor.molecules.molecule import Molecule
-        >>> water = Molecule(("O", "H", "H"), [[0, 0, 0.1173], [0, 0.7572, -0.4692], [0, -0.7572, -0.4692]],
-        ...                  dipole_debye=[0, 0, -1.8546])
-        >>> hdo = isotopologue(Top.from_molecule(water), "2=2H")
-        >>> hdo.axes, round(hdo.turned_degrees, 1), [round(abs(mu), 2) for mu in hdo.top.dipole_abc_debye]
-        ('abc', 21.1, [0.67, 1.73, 0.0])
+    >>> from rotor.molecules.molecule import Molecule
+    >>> water = Molecule(("O", "H", "H"), [[0, 0, 0.1173], [0, 0.7572, -0.4692], [0, -0.7572, -0.4692]],
+    ...                  dipole_debye=[0, 0, -1.8546])
+    >>> hdo = isotopologue(Top.from_molecule(water), "2=2H")
+    >>> hdo.axes, round(hdo.turned_degrees, 1), [round(abs(mu), 2) for mu in hdo.top.dipole_abc_debye]
+    ('abc', 21.1, [0.67, 1.73, 0.0])
     """
     return _Ancestor(parent).isotopologue(_geometry(parent).with_isotopes(changes).mass_numbers)
 
@@ -124,12 +124,12 @@ def isotopologue(parent: Top, changes: Changes) -> Isotopologue:
 def single_substitutions(parent: Top, element: str, name: str) -> tuple[Isotopologue, ...]:
     """The isotopologues with one atom of an element substituted, one for each set of equivalent atoms.
 
-        This is the set from which substitution structures are made. Raises ValueError for an element that is not there.
+    This is the set from which substitution structures are made. Raises ValueError for an element that is not there.
 
-        >>> from rotor.molecules.molecule import Molecule
-        >>> hcn = Molecule(("H", "C", "N"), [[0, 0, -1.0655], [0, 0, 0], [0, 0, 1.1532]])
-        >>> [one.label for one in single_substitutions(Top.from_molecule(hcn), "C", "13C")]
-        ['[13C]HN (2=13C)']
+    >>> from rotor.molecules.molecule import Molecule
+    >>> hcn = Molecule(("H", "C", "N"), [[0, 0, -1.0655], [0, 0, 0], [0, 0, 1.1532]])
+    >>> [one.label for one in single_substitutions(Top.from_molecule(hcn), "C", "13C")]
+    ['[13C]HN (2=13C)']
     """
     ancestor = _Ancestor(parent)
     molecule, permutations = ancestor.molecule, ancestor.permutations
