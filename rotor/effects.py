@@ -10,9 +10,8 @@ from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING, ClassVar
 
 if TYPE_CHECKING:
-    from rotor.top import Top
-
     from rotor.rotations import Array
+    from rotor.top import Top
 
 
 class QuantumEffect(ABC):
@@ -38,11 +37,13 @@ class ClassicalEffect:
         dL/dt = L x ω + Σ torques,   ω_i = (L_i - h_i) / I_i(t),   h = Σ inner momenta.
 
     An effect is one of the three kinds below; this base only names what each says of itself: `conserves_energy`
-    means ½ Σ (L_i - h_i)²/I_i + potential energy, `conserves_momentum` means L seen from space.
+    means ½ Σ (L_i - h_i)²/I_i + potential energy, `conserves_momentum` means L seen from space;
+    `depends_on_time` says whether the time itself enters, as in a drive.
     """
 
     conserves_energy: ClassVar[bool] = False
     conserves_momentum: ClassVar[bool] = False
+    depends_on_time: ClassVar[bool] = False
 
 
 class Torque(ClassicalEffect, ABC):

@@ -58,7 +58,9 @@ def test_ase_and_rdkit_objects():
 
 def test_isotopes_of_a_library_molecule_carry_its_constants_over():
     heavy = rotor.read("water", isotopes="2=2H")
-    assert heavy.rotational_constants_mhz == pytest.approx((701931.5, 272912.6, 192055.25), rel=0.006)  # HDO, ratio from r_e
+    assert heavy.rotational_constants_mhz == pytest.approx(
+        (701931.5, 272912.6, 192055.25), rel=0.006
+    )  # HDO, ratio from r_e
     assert any("the ratio of those calculated" in note for note in heavy.notes)
     assert any("no distortion constants" in note for note in heavy.notes)
     assert abs(heavy.dipole_abc_debye[0]) == pytest.approx(0.67, abs=0.005)

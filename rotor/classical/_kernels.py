@@ -46,6 +46,8 @@ def _turned(mk: Any, ma: Any, mb: Any, w: Any, qk: Any, qa: Any, qb: Any, rate: 
 @njit(cache=True, nogil=True, fastmath={"contract"}, error_model="numpy")
 def advance_blocks(data: Array, first: int, last: int, step: float, steps: int) -> None:
     """`steps` steps R1 R2 R3 R2 R1 of blocks first to last - 1; the outer halves of neighbouring steps are merged."""
+    if steps == 0:
+        return
     for block in range(first, last):
         row = data[block * RUNS * LANES : (block + 1) * RUNS * LANES]
         _first_axis(row, 0.25 * step)

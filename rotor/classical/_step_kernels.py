@@ -90,9 +90,7 @@ def _symmetric_flow(row: Any, lost: Any, axes: Any, equal: float, rest: float, h
 
 
 @njit(cache=True, nogil=True)
-def symmetric(
-    state: Array, carry: Array, inverse: Array, axes: Any, step: float, fractions: Array, steps: int
-) -> None:
+def symmetric(state: Array, carry: Array, inverse: Array, axes: Any, step: float, fractions: Array, steps: int) -> None:
     """Strang steps of a symmetric top about axes[:, 0], 1/I from axes[:, 1], and what axes[:, 2] has beyond it."""
     for body in range(state.shape[0]):
         row, lost, order = state[body], carry[body], axes[body]

@@ -27,6 +27,7 @@ class ChangingInertia(InertiaChange):
     """
 
     conserves_momentum: ClassVar[bool] = True
+    depends_on_time: ClassVar[bool] = True
 
     history: Callable[[float], ArrayLike]
 

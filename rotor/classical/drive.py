@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,6 +21,8 @@ class PeriodicDrive(Torque):
     >>> PeriodicDrive([2.0, 0, 0], frequency=np.pi).torque(1.0, np.array([1.0, 0, 0, 0]), np.zeros(3)).tolist()
     [-2.0, -0.0, -0.0]
     """
+
+    depends_on_time: ClassVar[bool] = True
 
     amplitude: ArrayLike
     frequency: float

@@ -182,8 +182,6 @@ class _Kicker:
             turn_uniformly(self.state, self.carry, -duration * rate)
 
 
-
-
 def _checked_times(times: ArrayLike) -> Array:
     array = np.asarray(times, dtype=np.float64)
     if array.ndim != 1 or array.size < 1 or not np.all(np.isfinite(array)):

@@ -8,6 +8,7 @@ energy stays bounded. Where the exact state at a few times is wanted, `free.free
 from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -42,11 +43,11 @@ def advance(
     if steps < 0:
         raise ValueError(f"the number of steps is not negative; got {steps} (to go back, give a negative step)")
     blocks = data.size // (RUNS * LANES)
-    if steps and executor is None:
+    if executor is None:
         advance_blocks(data, 0, blocks, step, steps)
-    elif steps:
+    else:
         edges = np.linspace(0, blocks, min(blocks, 64) + 1).astype(int)
-        jobs = [executor.submit(advance_blocks, data, a, b, step, steps) for a, b in zip(edges, edges[1:], strict=False)]
+        jobs = [executor.submit(advance_blocks, data, a, b, step, steps) for a, b in pairwise(edges)]
         for job in jobs:
             job.result()
     runs = data.reshape(blocks, RUNS, LANES).transpose(0, 2, 1).reshape(-1, RUNS)[:n]

@@ -2,8 +2,8 @@
 
 Order: 2, 4, 6, 8 by series in the step, or exact: see `exact_modified_moments`. Keeps, for free motion: |L|, L in
 space, the energy, time reversal and the Poisson structure of L, all to round-off (the map of (L, q) is not symplectic).
-Cost: 3 or 4 Newton sweeps of a 3x3 system without trigonometry, about 0.15 µs a step of one body on one core. Between kicks
-of torques the moments are prepared anew in each drift. It needs step x |ω| below about 1, and does not serve bodies
+Cost: 3 or 4 Newton sweeps of a 3x3 system without trigonometry, about 0.15 µs a step of one body on one core. Between
+kicks of torques the moments are prepared anew in each drift. It needs step x |ω| below about 1, and does not serve bodies
 that are nearly linear; both are refused when Newton fails.
 
 With a = h L/(2J), x solves x = (1 + |x|²) a + c (x2 x3, x3 x1, x1 x2), c1 = (J2 - J3)/J1 and cyclic; then

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -67,6 +67,8 @@ class TimedTorque(Torque):
     >>> ramp.torque(2.0, np.array([1.0, 0, 0, 0]), np.zeros(3))
     array([2., 0., 0.])
     """
+
+    depends_on_time: ClassVar[bool] = True
 
     history: Callable[[float], ArrayLike]
     frame: Frame = "body"

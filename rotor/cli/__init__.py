@@ -14,7 +14,7 @@ from typing import cast
 
 import typer
 
-from rotor.cli import info, isotopologues, spectrum
+from rotor.cli import info, isotopologues, molecules, spectrum
 from rotor.cli.output import NoAnswer
 
 NO_ANSWER, WRONG_INPUT, INTERRUPTED = 1, 2, 130
@@ -49,6 +49,7 @@ def _application() -> typer.Typer:
 
     app.command("spectrum", epilog=spectrum.EXAMPLES)(spectrum.command)
     app.command("info", epilog=info.EXAMPLES)(info.command)
+    app.command("molecules", epilog=molecules.EXAMPLES)(molecules.command)
     app.command("isotopologues", epilog=isotopologues.EXAMPLES)(isotopologues.command)
     return app
 

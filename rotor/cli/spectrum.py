@@ -310,8 +310,8 @@ def _lines_table(lines: Lines, rows: Any) -> Table:
     """The strongest lines in order of frequency."""
     shown = lines.where(rows)
     names = " ".join(name.capitalize() for name in lines.quanta_names)
-    columns = ("frequency (MHz)", "lgint", 'E" (cm-1)', "g'", "A (1/s)", "S mu2 (D2)", f"{names} upper", "lower")
-    formats = ("{:.4f}", "{:.4f}", "{:.4f}", "{}", "{:.4e}", "{:.5g}")
+    columns = ("frequency (MHz)", "lgint", 'E" (cm-1)', "g'", "A (1/s)", "Sμ² (D²)", "upper", "lower")
+    formats = ("{:.4f}", "{:.4f}", "{:.4f}", "{}", "{:.2e}", "{:.5g}")
     numbers = list(shown.columns.values())[: len(formats)]
     labels = [
         [" ".join(f"{n:2d}" for n in quanta) for quanta in shown.quanta(states)]
@@ -319,4 +319,4 @@ def _lines_table(lines: Lines, rows: Any) -> Table:
     ]
     cells = [[form.format(x) for x in column] for form, column in zip(formats, numbers, strict=True)]
     title = f"the {len(shown)} strongest lines" if len(shown) < len(lines) else "all lines"
-    return Table(f"{title}, in order of frequency", columns, list(zip(*cells, *labels, strict=True)))
+    return Table(f"{title}, in order of frequency (states: {names})", columns, list(zip(*cells, *labels, strict=True)))

@@ -19,7 +19,7 @@ Isotopes = Mapping[int | str, str] | str
 
 
 def read(source: Any, *, isotopes: Isotopes | None = None) -> Any:
-    """A top from whatever means a molecule; from a .cat file its catalogue.
+    """A top from whatever means a molecule; from a .cat or .hitran file its lines.
 
     Parameters
     ----------
@@ -28,14 +28,14 @@ def read(source: Any, *, isotopes: Isotopes | None = None) -> Any:
         a path and a molecule of one name are an error. `"SMILES:C=O"` is built with RDKit; `"-"` reads a geometry
         (xyz, sdf) or a TOML of constants from standard input. Paths: .xyz, .extxyz, .mol, .sdf, whatever
         `ase.io.read` knows; .toml: a molecule file or constants alone; .par, .var, .int: input of SPFIT and SPCAT;
-        .cat: a catalogue.
+        .cat: a catalogue; .hitran, and .par where its first line is a record of 160 characters: HITRAN's lines.
     isotopes : mapping or str, optional
         Substitutions such as `"1=2H"` (atom 1) or `"O=18O"` (every O). Measured constants of a library molecule are then
         carried over by the ratio of those calculated from its geometry, and a note says so (`rotor.isotopologues`).
 
     Returns
     -------
-    Top, or Catalogue for a .cat file
+    Top, or Catalogue for a .cat file, HitranLines for one of HITRAN
 
     Raises
     ------
@@ -90,11 +90,25 @@ def _read_path(path: Path, isotopes: Isotopes | None) -> Any:
         if isotopes:
             raise ValueError(f"{path}: isotopes cannot be changed in a catalogue; give a molecule with a geometry")
         return read_cat(path)
+    if suffixes.endswith((".hitran", ".hitran.gz")) or _is_hitran(path):
+        from rotor.formats.hitran import read_hitran
+
+        return read_hitran(path)
     if suffixes.endswith((".par", ".var", ".int")):
         return _with_isotopes(_read_spcat(path), isotopes)
     if suffixes.endswith(".toml"):
         return top_of_file(read_molecule_file(path), isotopes)
     return _with_isotopes(Top.from_molecule(read_molecule(path)), isotopes)
+
+
+def _is_hitran(path: Path) -> bool:
+    """Whether a .par file is one of HITRAN, which gives its files the suffix of SPFIT's parameters."""
+    if path.suffix.lower() != ".par":
+        return False
+    from rotor.formats.hitran import looks_like_hitran
+
+    with open(path, encoding="latin-1") as handle:
+        return looks_like_hitran(handle.readline())
 
 
 def _read_spcat(path: Path) -> Top:
@@ -156,10 +170,12 @@ def _top_as_written(file: MoleculeFile) -> Top:
 def write(thing: Any, path: str | os.PathLike[str], *, settings: Mapping[str, Any] | None = None) -> None:
     """Write lines, a catalogue or a spectrum in the format that the suffix of `path` names.
 
-    Lines: .cat, .cat.gz, .csv, .parquet, .json; catalogue: .cat, .cat.gz; spectrum: .csv. An existing file is replaced at
-    the end, whole or not at all. settings: what the provenance shall say besides; for lines, `{"tag": 18003}` is the tag
-    of a .cat. Raises ValueError for a thing or a suffix that has no format.
+    Lines: .cat, .cat.gz, .csv, .parquet, .json, .hitran; catalogue: .cat, .cat.gz; HITRAN's lines: .hitran. An existing
+    file is replaced at the end, whole or not at all. settings: what the provenance shall say besides; for lines,
+    `{"tag": 18003}` is the tag of a .cat, `{"molecule": 1, "isotopologue": 1, "abundance": 0.997}` what `hitran_lines`
+    asks for. Raises ValueError for a thing or a suffix that has no format.
     """
+    from rotor.formats.hitran import HitranLines, write_hitran
     from rotor.formats.spcat.catalogue import Catalogue
     from rotor.spectra.lines import Lines
     from rotor.spectra.spectrum import Spectrum
@@ -176,4 +192,6 @@ def write(thing: Any, path: str | os.PathLike[str], *, settings: Mapping[str, An
         from rotor.formats.spcat.cat import write_cat
 
         return write_cat(thing, path)
+    if isinstance(thing, HitranLines) and os.fspath(path).lower().endswith(".hitran"):
+        return write_hitran(thing, path)
     raise ValueError(f"{path}: there is no format of that suffix for a {type(thing).__name__}")

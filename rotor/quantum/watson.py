@@ -125,6 +125,10 @@ class Multiplet:
         with np.errstate(over="ignore", invalid="ignore"):  # said where the block is diagonalised
             self._elements = [_elements(operators, j, k, n, steps) for n in range(self.order + 1)]
 
+    def element(self, k: NDArray[np.int64], n: int) -> NDArray[np.float64]:
+        """⟨K+2n|H|K⟩ for K from -2 `order` to J; zero where K + 2n is beyond J."""
+        return self._elements[n][self._margin + k]
+
     def folded(self, low: int, n: int) -> float:
         """⟨2n - low|H|-low⟩, which connects K = low and K = 2n - low of a Wang block."""
         return float(self._elements[n][self._margin - low])
