@@ -73,7 +73,7 @@ def from_smiles(text: str) -> Molecule:
         return found[0].molecule
     others = (
         f"the lowest conformer was taken; {near} more within {NEAR_KJ_PER_MOL:g} kJ/mol of it have other constants "
-        "(rotor.molecules.smiles.conformers)"
+        "(rotor info --conformers lists them)"
     )
     return replace(found[0].molecule, notes=(*found[0].molecule.notes, others))
 
