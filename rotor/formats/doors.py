@@ -162,15 +162,20 @@ def top_of_file(file: MoleculeFile, isotopes: Isotopes | None = None) -> Top:
 
 
 def write(thing: Any, path: str | os.PathLike[str], *, settings: Mapping[str, Any] | None = None) -> None:
-    """Write lines, a catalogue or a spectrum in the format that the suffix of `path` names.
+    """Write lines, a catalogue, a spectrum or a motion in the format that the suffix of `path` names.
 
-    Lines: .cat, .cat.gz, .csv, .parquet, .json; catalogue: .cat, .cat.gz; spectrum: .csv. An existing file is replaced at
-    the end, whole or not at all. settings: what the provenance shall say besides; for lines, `{"tag": 18003}` is the tag
+    Lines: .cat, .cat.gz, .csv, .parquet, .json; catalogue: .cat, .cat.gz; spectrum, motion: .csv. An existing file is
+    replaced at the end, whole or not at all. settings: what the provenance shall say besides; for lines, `{"tag": 18003}` is the tag
     of a .cat. Raises ValueError for a thing or a suffix that has no format.
     """
+    from rotor.classical.motion import Motion
     from rotor.formats.spcat.catalogue import Catalogue
     from rotor.spectra.lines import Lines
 
+    if isinstance(thing, Motion):
+        from rotor.formats.motion_tables import write_motion
+
+        return write_motion(thing, path, settings)
     if isinstance(thing, Lines):
         from rotor.formats.line_tables import write_lines
 
