@@ -53,7 +53,7 @@ def classical_partition_function(top: Top, temperature_k: float) -> float:
 def partition_function(top: Top, temperature_k: float, relative_error: float = 1e-6) -> PartitionFunction:
     """Q(T) summed over levels until the tail is below `relative_error` of it.
 
-    The tail is estimated by the ratio of the last terms, which falls with J. Raises ValueError for a temperature not
+    The tail is estimated by the ratio of the last pairs of J, which falls with J. Raises ValueError for a temperature not
     above 0 K, and where the terms rise again before they have died away: then the distortion constants are used beyond
     their reach, and no sum would mean anything.
     """
@@ -93,33 +93,36 @@ class _Terms:
             here = exists & (levels.j == j)
             self._by_j.append((kelvin[here], levels.degeneracy[here].astype(float)))
 
-    def at(self, j: int, temperature_k: float) -> tuple[float, bool]:
-        """The sum over the levels of one J, and whether any of them exists."""
+    def at(self, j: int, temperature_k: float) -> float:
+        """The sum over the levels of one J; 0 where none of them exists, as for every second J of CO2."""
         while len(self._by_j) <= j:
             self._solve_more()
         kelvin, degeneracy = self._by_j[j]
-        return float(degeneracy @ np.exp(-kelvin / temperature_k)), len(kelvin) > 0
+        return float(degeneracy @ np.exp(-kelvin / temperature_k))
 
 
 def _summed(terms: _Terms, temperature_k: float, relative_error: float) -> PartitionFunction:
-    total, before, highest = 0.0, 0.0, 0.0
+    """The sum, J by J; its tail from pairs of neighbouring J, since spin weights may alternate with J."""
+    values: list[float] = []
+    total, highest, lowest = 0.0, 0.0, math.inf  # of the pairs, the lowest since the highest
     for j in range(JMAX_LIMIT):
-        term, exists = terms.at(j, temperature_k)
-        if not exists:  # every second J of CO2
+        values.append(terms.at(j, temperature_k))
+        total += values[-1]
+        if j < 3:
             continue
-        total += term
-        highest = max(highest, term)
+        pair, before = sum(values[-2:]), sum(values[-4:-2])
+        lowest = pair if pair >= highest else min(lowest, pair)
+        highest = max(highest, pair)
 
-        ratio = term / before if before else 1.0
-        if before and ratio > 1.0 and term < 0.5 * highest:
+        if 2 * lowest < pair < highest / 2:
             raise ValueError(
                 f"Q({temperature_k:g} K): the sum over levels grows again at J = {j}; the distortion constants are used "
-                f"beyond their reach (tail {term / total:.1e} of Q there); lower the temperature or give Q"
+                f"beyond their reach (tail {pair / total:.1e} of Q there); lower the temperature or give Q"
             )
+        ratio = pair / before if before else 1.0
         if ratio < 1.0:
-            tail = term * ratio / (1.0 - ratio)
+            tail = pair * ratio / (1.0 - ratio)
             if tail < relative_error * total:
                 source = f"summed from levels to J = {j}, relative error below {relative_error:g}"
                 return PartitionFunction(temperature_k, total, j, tail / total, source)
-        before = term
     raise ValueError(f"Q({temperature_k:g} K) needs levels beyond J = {JMAX_LIMIT - 1}; use the classical limit")

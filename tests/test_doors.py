@@ -56,13 +56,27 @@ def test_ase_and_rdkit_objects():
     assert rotor.read(mol).kind == "asymmetric"
 
 
-def test_isotopes_of_a_library_molecule_say_that_its_constants_are_lost():
+def test_isotopes_of_a_library_molecule_carry_its_constants_over():
     heavy = rotor.read("water", isotopes="2=2H")
     assert heavy.rotational_constants_mhz == pytest.approx(
-        (701931.5, 272912.6, 192055.25), rel=0.03
-    )  # HDO, geometry r_e
-    assert any("another isotopologue" in note for note in heavy.notes)
-    assert abs(heavy.dipole_abc_debye[0]) == pytest.approx(0.67, abs=0.03)
+        (701931.5, 272912.6, 192055.25), rel=0.006
+    )  # HDO, ratio from r_e
+    assert any("the ratio of those calculated" in note for note in heavy.notes)
+    assert any("no distortion constants" in note for note in heavy.notes)
+    assert abs(heavy.dipole_abc_debye[0]) == pytest.approx(0.67, abs=0.005)
+    again = rotor.read(rotor.read("water"), isotopes={2: "2H"})
+    assert again.rotational_constants_mhz == heavy.rotational_constants_mhz
+
+
+def test_isotopes_of_constants_alone_cannot_change(tmp_path):
+    (tmp_path / "co.toml").write_text(TOML)
+    with pytest.raises(ValueError, match="there is no geometry"):
+        rotor.read(tmp_path / "co.toml", isotopes="O=18O")
+    with pytest.raises(ValueError, match="there is no geometry"):
+        rotor.read(rotor.Constants(B=57635.968), isotopes="O=18O")
+    rotor.write(co_lines(), tmp_path / "co.cat")
+    with pytest.raises(ValueError, match="in a catalogue"):
+        rotor.read(tmp_path / "co.cat", isotopes="O=18O")
 
 
 @pytest.mark.parametrize(

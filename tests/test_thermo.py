@@ -96,3 +96,22 @@ def test_published_sums_of_linear_molecules(shared: Path, tag, text, column, tem
     """CDMS's sums of CO and OCS in v = 0, from 18.75 to 300 K, printed to 4 decimals of lg Q."""
     ours = partition_function(Top.from_constants(text), temperature).q
     assert math.log10(ours) == pytest.approx(math.log10(published_q(shared, tag, column)), abs=1.01e-4)
+
+
+@pytest.mark.parametrize(
+    ("constants", "weights"),
+    [
+        (
+            Constants(A=60778.5, B=10318.1, C=8799.7),
+            {"ee": 1, "eo": 0, "oe": 0, "oo": 1},
+        ),  # SO2: J + 1 and J levels in turn
+        (Constants(B=59646.0), {"even": 2, "odd": 1}),  # N2
+        (Constants(B=11698.0), {"even": 1, "odd": 0}),  # CO2
+        (Constants(B=4050.0, kind="spherical"), {"A": 1, "E": 0, "F": 0}),  # OsO4: no level at J = 1, 2, 5
+    ],
+)
+def test_weights_that_alternate_with_j_do_not_stop_the_sum(constants, weights):
+    """The sum goes on where the terms of neighbouring J rise and fall; its classical limit is near."""
+    top = Top.from_constants(constants, spin_weights=weights)
+    found = partition_function(top, 300.0)
+    assert found.q == pytest.approx(classical_partition_function(top, 300.0), rel=0.01)  # quantum correction ~ B/kT

@@ -10,14 +10,16 @@ import os
 import shlex
 import sys
 from collections.abc import Sequence
+from typing import cast
 
 import typer
 
-from rotor.cli import info, spectrum
+from rotor.cli import info, isotopologues, molecules, spectrum
 from rotor.cli.output import NoAnswer
 
 NO_ANSWER, WRONG_INPUT, INTERRUPTED = 1, 2, 130
-_ERROR_OF_USE = typer.BadParameter.__mro__[2]  # click's ClickException, whether click is a package or part of typer
+# click's ClickException, whether click is a package of its own or, in a newer typer, a part of it
+_ERROR_OF_USE = cast(type[Exception], typer.BadParameter.__mro__[2])
 
 EXAMPLES = """\b
 Examples:
@@ -25,7 +27,8 @@ Examples:
   rotor spectrum "SMILES:C=O" --temperature 100
   rotor spectrum my.xyz --dipole 0,0,1.85 --range 0:2000GHz --cat out.cat --plot out.png
   rotor spectrum --constants "A=835840.288 B=435351.717 C=278138.7 MHz" --dipole-abc 0,1.8546,0
-  rotor info my.sdf"""
+  rotor info my.sdf
+  rotor isotopologues water"""
 
 
 def _application() -> typer.Typer:
@@ -46,6 +49,8 @@ def _application() -> typer.Typer:
 
     app.command("spectrum", epilog=spectrum.EXAMPLES)(spectrum.command)
     app.command("info", epilog=info.EXAMPLES)(info.command)
+    app.command("molecules", epilog=molecules.EXAMPLES)(molecules.command)
+    app.command("isotopologues", epilog=isotopologues.EXAMPLES)(isotopologues.command)
     return app
 
 
@@ -61,15 +66,14 @@ def run(arguments: Sequence[str] | None = None) -> int:
     """Carry out a command and return its exit code; a mistake of the user is one line on standard error."""
     arguments = sys.argv[1:] if arguments is None else list(arguments)
     command = typer.main.get_command(_application())
+    provenance = shlex.join(["rotor", *arguments])
     try:
-        code = command.main(
-            args=arguments or ["--help"],
-            prog_name="rotor",
-            standalone_mode=False,
-            obj=shlex.join(["rotor", *arguments]),  # the command, for provenance
-        )
+        with command.make_context("rotor", arguments or ["--help"], obj=provenance) as context:
+            command.invoke(context)
         sys.stdout.flush()
-        return int(code or 0)
+        return 0
+    except typer.Exit as end:
+        return end.exit_code
     except _ERROR_OF_USE as error:
         return _fail(WRONG_INPUT, error.format_message())  # type: ignore[attr-defined]
     except NoAnswer as error:
@@ -77,7 +81,7 @@ def run(arguments: Sequence[str] | None = None) -> int:
     except BrokenPipeError:  # the reader has seen enough: nothing more can be said to it, at exit neither
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
-    except (KeyboardInterrupt, typer.Abort):
+    except KeyboardInterrupt:
         return INTERRUPTED
     except (ValueError, OSError) as error:
         return _fail(WRONG_INPUT, _told(error))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -136,7 +137,11 @@ def _kind_text(kind: str, decision: dict[str, Any]) -> str:
         f"(equal within {decision['equal_within']:g})"
     )
     differs = "" if kind == decision["kind"] else f"; the constants given are those of another kind, {kind}"
-    return f"the geometry is {decision['kind']} by {numbers}; margin: a factor of {decision['margin']:.3g}{differs}"
+    return f"the geometry is {decision['kind']} by {numbers}; margin: a factor of {_margin_text(decision['margin'])}{differs}"
+
+
+def _margin_text(margin: float) -> str:
+    return f"{margin:.3g}" if margin < 1e9 else "more than 1e9"
 
 
 def _constants_table(top: Top) -> Table:
@@ -163,14 +168,19 @@ def _axes_table(content: dict[str, Any]) -> Table:
     return Table("", columns, rows, frozenset({"axis"}))
 
 
+def _reason(source: str) -> str:
+    """Why a sum means nothing, without the temperature that stands beside it and without the remedy."""
+    return re.sub(r"^Q\([^)]*\):? *", "", source).partition(";")[0]
+
+
 def _q_table(content: dict[str, Any]) -> Table:
     rows = []
     for row in content["partition_function"]:
         known = row["q"] is not None
         summed = [f"{row['q']:.6g}", f"{row['jmax']}", f"{row['relative_error']:.0e}"] if known else ["-", "-", "-"]
-        remark = "" if known else row["source"].partition(": ")[2].partition(";")[0]
+        remark = "" if known else _reason(row["source"])
         rows.append([f"{row['temperature_k']:g}", summed[0], f"{row['classical']:.6g}", *summed[1:], remark])
-    columns = ("T (K)", "Q", "Q classical", "J max", "error", "remark")
+    columns = ["T (K)", "Q", "Q classical", "J max", "error", "remark"]
     if not any(row[-1] for row in rows):
         columns, rows = columns[:-1], [row[:-1] for row in rows]
     return Table("", columns, rows, frozenset({"remark"}))

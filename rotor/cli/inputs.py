@@ -166,7 +166,7 @@ def _from_source(given: Input) -> Top:
 def _with_dipole_of_input(top: Top, dipole_debye: tuple[float, float, float]) -> Top:
     if top.frame is None:
         raise ValueError("--dipole is in the frame of a geometry, and there is none here; use --dipole-abc")
-    return top.with_dipole(top.frame.axes @ dipole_debye, "given in the frame of the input (--dipole)")
+    return top.with_dipole((top.frame.axes @ dipole_debye).tolist(), "given in the frame of the input (--dipole)")
 
 
 def _refuse_weights_of_another_kind(top: Top) -> None:
@@ -189,4 +189,4 @@ def with_some_dipole(top: Top) -> Top:
     if dipole is None:
         raise ValueError(f"{said}: {remedy}")
     note(said)
-    return replace(top.with_dipole(top.frame.axes @ dipole, CHARGES_SOURCE), notes=(*top.notes, said))
+    return replace(top.with_dipole((top.frame.axes @ dipole).tolist(), CHARGES_SOURCE), notes=(*top.notes, said))

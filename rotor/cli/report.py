@@ -112,12 +112,12 @@ def vector_text(vector: Sequence[float] | None, names: Sequence[str] = ("μa", "
     """A dipole as `μa 0, μb 1.8546, μc 0 D`."""
     if vector is None:
         return "not known"
-    return ", ".join(f"{name} {x + 0.0:.5g}" for name, x in zip(names, vector, strict=True)) + " D"
+    return ", ".join(f"{name} {round(x, 6) + 0.0:.6g}" for name, x in zip(names, vector, strict=True)) + " D"
 
 
 def weights_text(mapping: Mapping[str, int]) -> str:
     """Spin weights as `ee 1, eo 3, oe 3, oo 1`."""
-    return ", ".join(f"{name} {weight}" for name, weight in mapping.items()) or "1 for every level"
+    return ", ".join(f"{name} {weight}" for name, weight in mapping.items()) or "not given: 1 for every level"
 
 
 def with_source(text: str, source: str | None) -> str:

@@ -11,10 +11,11 @@ import typer
 
 from rotor.cli import inputs
 from rotor.cli.inputs import Input
-from rotor.cli.output import Files, Table, Writer, answering, json_text, show_facts, show_table, write_text
+from rotor.cli.output import Files, NoAnswer, Table, Writer, answering, json_text, show_facts, show_table, write_text
 
 if TYPE_CHECKING:
     from rotor.spectra.lines import Lines
+    from rotor.spectra.spectrum import Spectrum
     from rotor.top import Top
 
 PROFILES = ("sticks", "gaussian", "lorentzian", "voigt")
@@ -72,32 +73,57 @@ def command(
     settings = _settings(temperature, jmax, min_lgint, range_, q, vibrational_factor, profile, fwhm)
     inputs.whole("--top", top_lines, 0)
     inputs.whole("--tag", tag, 0, 999_999)
-    files = Files()
-    for name, path, suffixes in (
-        ("--cat", cat, (".cat", ".cat.gz")),
-        ("--csv", csv, (".csv",)),
-        ("--parquet", parquet, (".parquet",)),
-        ("--profile-csv", profile_csv, (".csv",)),
-        ("--plot", plot, (".png", ".pdf", ".svg")),
-        ("--json", None if json == "-" else json, (".json",)),
-    ):
-        files.ask(name, path, suffixes)
-    if profile_csv and settings.profile == "sticks":
-        raise ValueError(
-            "--profile-csv: sticks have no profile; give --fwhm or --profile gaussian, lorentzian or voigt"
-        )
+    files = _files(
+        settings, {"--cat": cat, "--csv": csv, "--parquet": parquet, "--profile-csv": profile_csv, "--plot": plot}
+    )
+    if json != "-":
+        files.ask("--json", json, (".json",))
 
     given = Input(source, constants, isotope or [], dipole, dipole_abc, spin_weights)
     top = inputs.with_some_dipole(inputs.read_top(given))
+    _refuse_doppler_without_mass(top, settings)
     with answering():
         lines = _lines(top, settings)
-    content = _content(lines, settings, given, context.obj, top_lines)
+        content = _content(lines, settings, given, context.obj, top_lines)
+    _refuse_nothing_to_draw(lines, files)
+
     content["files"] = [str(path) for path in files.wanted.values()]
     files.write(_writers(lines, settings, content, tag))
     if json == "-":
-        print(json_text(content), end="")
+        print(_json(lines, content), end="")
     else:
         _show(lines, content)
+
+
+def _files(settings: Settings, paths: dict[str, str | None]) -> Files:
+    """The files asked for, each with a name of its format, and a use for what was said of the profile."""
+    suffixes = {"--cat": (".cat", ".cat.gz"), "--parquet": (".parquet",), "--plot": (".png", ".pdf", ".svg")}
+    files = Files()
+    for name, path in paths.items():
+        files.ask(name, path, suffixes.get(name, (".csv",)))
+    if paths["--profile-csv"] and settings.profile == "sticks":
+        raise ValueError(
+            "--profile-csv: sticks have no profile; give --fwhm or --profile gaussian, lorentzian or voigt"
+        )
+    if settings.profile != "sticks" and not (paths["--profile-csv"] or paths["--plot"]):
+        raise ValueError(
+            f"a {settings.profile} profile was asked for, but not where to put it; add --plot or --profile-csv"
+        )
+    return files
+
+
+def _refuse_doppler_without_mass(top: Top, settings: Settings) -> None:
+    doppler = settings.profile == "voigt" or (settings.profile == "gaussian" and settings.fwhm_mhz is None)
+    if doppler and top.mass_u is None:
+        raise ValueError(
+            "a Doppler width needs a mass, which constants alone do not have; give --fwhm, not --profile voigt"
+        )
+
+
+def _refuse_nothing_to_draw(lines: Lines, files: Files) -> None:
+    drawn = [name for name in ("--plot", "--profile-csv") if name in files.wanted]
+    if drawn and not len(lines):
+        raise NoAnswer(f"{drawn[0]}: no lines: {_why_none(lines)}")
 
 
 def _settings(
@@ -158,11 +184,9 @@ def _content(lines: Lines, settings: Settings, given: Input, command: str, shown
     import numpy as np
 
     from rotor.cli.report import describe, q_record
-    from rotor.formats.line_tables import records
     from rotor.thermo import classical_partition_function
 
-    with answering():
-        q = q_record(lines.partition, classical_partition_function(lines.top, lines.temperature_k))
+    q = q_record(lines.partition, classical_partition_function(lines.top, lines.temperature_k))
     strongest = np.sort(np.argsort(-lines.intensity_nm2_mhz, kind="stable")[:shown])
     return {
         **describe(lines.top, given.text, command),
@@ -176,8 +200,13 @@ def _content(lines: Lines, settings: Settings, given: Input, command: str, shown
         "profile": settings.profile,
         "fwhm_mhz": settings.fwhm_mhz,
         "strongest": strongest,
-        "lines": records(lines),
     }
+
+
+def _json(lines: Lines, content: dict[str, Any]) -> str:
+    from rotor.formats.line_tables import records
+
+    return json_text({**content, "lines": records(lines)})
 
 
 def _reach(min_lgint: float | None) -> str:
@@ -199,8 +228,29 @@ def _writers(lines: Lines, settings: Settings, content: dict[str, Any], tag: int
         "--cat": table,
         "--csv": table,
         "--parquet": table,
-        "--json": lambda path: write_text(path, json_text(content)),
+        "--profile-csv": lambda path: rotor.write(
+            _spectrum(lines, settings), path, settings={"command": story["command"]}
+        ),
+        "--plot": lambda path: _draw(lines, settings, path, story),
+        "--json": lambda path: write_text(path, _json(lines, content)),
     }
+
+
+def _spectrum(lines: Lines, settings: Settings) -> Spectrum:
+    """The lines with their shape, on a grid that follows each of them."""
+    from rotor.spectra.spectrum import Spectrum, resolving_grid
+
+    first, last = settings.range_mhz
+    shape: dict[str, Any] = {"profile": settings.profile, "fwhm_mhz": settings.fwhm_mhz}
+    grid = resolving_grid(lines, range_mhz=(first, last) if math.isfinite(last) else None, **shape)
+    return Spectrum.from_lines(lines, grid, **shape)
+
+
+def _draw(lines: Lines, settings: Settings, path: Path, story: dict[str, Any]) -> None:
+    from rotor.plots.spectrum import plot_spectrum
+
+    sticks = settings.profile == "sticks"
+    plot_spectrum(lines if sticks else _spectrum(lines, settings), path, provenance={"command": story["command"]})
 
 
 def _show(lines: Lines, content: dict[str, Any]) -> None:

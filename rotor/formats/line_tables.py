@@ -1,4 +1,4 @@
-"""A line list as a file: .cat, .csv, .parquet, .json, each with its provenance inside or in a file beside it."""
+"""A line list as a file: .cat, .csv, .parquet, .json, .hitran, each with its provenance inside or in a file beside it."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ PIECE = 1 << 16  # lines of a long list that are made into text at once
 def catalogue(lines: Lines, tag: int = 0) -> Catalogue:
     """The lines as a catalogue of the 80-column format.
 
-    Lines of zero strength have no logarithm and are left out; ERR is 0, since the constants' uncertainties are not
-    carried to the lines. Raises ValueError for a tag that has no place in its six digits.
+    Lines of zero strength have no logarithm and are left out; ERR is 0 where no uncertainty of a constant is known.
+    Raises ValueError for a tag that has no place in its six digits.
     """
     if not 0 <= tag <= MAX_TAG:
         raise ValueError(f"tag {tag}: a catalogue's tag has at most six digits")
@@ -43,7 +43,7 @@ def catalogue(lines: Lines, tag: int = 0) -> Catalogue:
         quanta[:, i] = levels.ka if name == "k" else getattr(levels, name)
     return Catalogue(
         frequency_mhz=lines.frequency_mhz,
-        error_mhz=np.zeros(n),
+        error_mhz=np.zeros(n) if (error := lines.error_mhz) is None else error,
         lgint=lgint,
         dr=np.full(n, 2 if levels.kind == "linear" else 3, dtype=np.int16),
         energy_lower_cm=lines.energy_lower_cm,
@@ -69,6 +69,7 @@ def provenance(lines: Lines) -> dict[str, Any]:
         "reduction": top.constants.reduction,
         "representation": top.constants.representation,
         "constants_source": top.source,
+        "errors_from": _errors_from(lines),
         "dipole_abc_debye": top.dipole_abc_debye,
         "dipole_source": top.dipole_source,
         "spin_weights": top.spin_weights.to_mapping(),
@@ -81,7 +82,16 @@ def provenance(lines: Lines) -> dict[str, Any]:
         "q_source": lines.partition.source,
         "lines": len(lines),
         "notes": list(top.notes),
+        "warnings": list(lines.warnings),
     }
+
+
+def _errors_from(lines: Lines) -> str | None:
+    """Which uncertainties the errors of frequencies come from, None where there are none."""
+    if lines.covariance is not None:
+        return f"covariance of {', '.join(lines.covariance.names)}"
+    known = lines.top.constants.uncertainties
+    return f"uncertainties of {', '.join(known)}, uncorrelated" if known else None
 
 
 def _finite(value: float) -> float | None:
@@ -89,29 +99,33 @@ def _finite(value: float) -> float | None:
 
 
 def write_lines(lines: Lines, path: str | os.PathLike[str], settings: Mapping[str, Any] | None = None) -> None:
-    """Write lines in the format that the suffix of `path` names: .cat, .cat.gz, .csv, .parquet or .json.
+    """Write lines in the format that the suffix of `path` names: .cat, .cat.gz, .csv, .parquet, .json or .hitran.
 
-    settings: what else the provenance shall say (the command line, for instance); its key "tag" is the tag of a .cat.
+    settings: what else the provenance shall say (the command line, for instance); its key "tag" is the tag of a .cat,
+    "molecule" (always), "isotopologue" and "abundance" are those of a .hitran.
     Parquet and JSON carry the provenance inside, the others in a file beside, `path` + ".provenance.json".
     """
     name = Path(path).name.lower()
     story = provenance(lines) | {k: v for k, v in (settings or {}).items() if k != "tag"}
     if name.endswith((".cat", ".cat.gz")):
         _write_catalogue(lines, path, int((settings or {}).get("tag", 0)))
-        _write_beside(path, story)
+        write_beside(path, story)
     elif name.endswith(".csv"):
         with open_atomic(path) as handle:
             lines.to_polars().write_csv(handle)
-        _write_beside(path, story)
+        write_beside(path, story)
     elif name.endswith(".parquet"):
         with atomic_path(path) as unfinished:
             lines.to_polars().write_parquet(unfinished, metadata={"provenance": json.dumps(story)})
     elif name.endswith(".json"):
         with open_atomic(path, "w", encoding="utf-8") as handle:
             json.dump({"provenance": story, "lines": records(lines)}, handle, indent=1, allow_nan=False)
+    elif name.endswith(".hitran"):
+        _write_hitran(lines, path, settings or {})
+        write_beside(path, story)
     else:
         raise ValueError(
-            f"{path}: lines can be written as .cat, .cat.gz, .csv, .parquet or .json; the suffix names the format"
+            f"{path}: lines can be written as .cat, .cat.gz, .csv, .parquet, .json or .hitran; the suffix names the format"
         )
 
 
@@ -120,7 +134,7 @@ def _write_catalogue(lines: Lines, path: str | os.PathLike[str], tag: int) -> No
     if len(lines) <= PIECE:
         return write_cat(catalogue(lines, tag), path)
 
-    _ = lines.partition  # summed once, before the pieces ask for it
+    _ = lines.partition, lines.spread  # made once, before the pieces ask for them
 
     def text(start: int) -> bytes:
         return format_lines(catalogue(lines.where(slice(start, start + PIECE)), tag))
@@ -133,6 +147,17 @@ def _write_catalogue(lines: Lines, path: str | os.PathLike[str], tag: int) -> No
     ):
         handle.writelines(_in_order(pool, text, range(0, len(lines), PIECE)))
     return None
+
+
+def _write_hitran(lines: Lines, path: str | os.PathLike[str], settings: Mapping[str, Any]) -> None:
+    from rotor.formats.hitran import hitran_lines, write_hitran
+
+    if "molecule" not in settings:
+        raise ValueError(
+            f'{path}: HITRAN\'s records begin with its number of the molecule; give settings={{"molecule": 5}} (5 is CO)'
+        )
+    known = {key: settings[key] for key in ("molecule", "isotopologue", "abundance") if key in settings}
+    write_hitran(hitran_lines(lines, **known), path)
 
 
 def _in_order(pool: ThreadPoolExecutor, make: Callable[[int], bytes], starts: Iterable[int]) -> Iterator[bytes]:
@@ -156,7 +181,8 @@ def records(lines: Lines) -> list[dict[str, float | int | None]]:
     ]
 
 
-def _write_beside(path: str | os.PathLike[str], story: Mapping[str, Any]) -> None:
+def write_beside(path: str | os.PathLike[str], story: Mapping[str, Any]) -> None:
+    """Write the provenance of a file whose format has no place for it, as `path` + ".provenance.json"."""
     with open_atomic(f"{os.fspath(path)}.provenance.json", "w", encoding="utf-8") as handle:
         json.dump(story, handle, indent=1, ensure_ascii=False)
         handle.write("\n")

@@ -15,7 +15,7 @@ from rotor.weights import SpinWeights
 
 # the classes of (Ka, Kc) that are even under a half turn about the axis: Ka, Ka + Kc and Kc tell a, b and c
 _EVEN = {1: ("ee", "eo"), 2: ("ee", "oo"), 3: ("ee", "oe")}
-_FOLD = {6: 3, 9: 5}  # IAX of tops with one kind of E levels
+FOLD = {6: 3, 9: 5}  # IAX of tops with one kind of E levels
 
 
 def weights_of(options: Options) -> SpinWeights:
@@ -25,7 +25,7 @@ def weights_of(options: Options) -> SpinWeights:
     where K is a multiple of 3 or 5, EWT elsewhere. An odd last digit of VSYM exchanges WTPL and WTMN.
     """
     plus, minus = (options.wtpl, options.wtmn) if options.vsym % 2 == 0 else (options.wtmn, options.wtpl)
-    if options.iax in _FOLD:
+    if options.iax in FOLD:
         return _fold_weights(options, plus, minus)
     if options.iax not in _EVEN:
         raise ValueError(f"IAX = {options.iax}: spin weights other than by IAX 1, 2, 3, 6 or 9 {NOT_YET}")
@@ -47,7 +47,7 @@ def weights_of(options: Options) -> SpinWeights:
 
 
 def _fold_weights(options: Options, plus: int, minus: int) -> SpinWeights:
-    fold = _FOLD[options.iax]
+    fold = FOLD[options.iax]
     if plus != minus:
         raise ValueError(f"IAX = {options.iax}, WTPL = {plus}, WTMN = {minus}: weights by J at K = 0 {NOT_YET}")
     factor = 100 if options.ewt >= 0 else 1000
@@ -151,5 +151,7 @@ def intensity_file(top: Top, request: Request) -> IntensityFile:
 
 def common_weight(options: Options) -> int:
     """The common divisor that `weights_of` takes out of WTPL, WTMN and EWT, and that Q in the .int file carries."""
-    used = [options.wtpl, options.wtmn] + ([abs(options.ewt)] if options.iax in _FOLD else [])
+    if is_linear(options) and options.iax == 1:  # every level has the one weight
+        return options.wtpl if options.vsym % 2 == 0 else options.wtmn
+    used = [options.wtpl, options.wtmn] + ([abs(options.ewt)] if options.iax in FOLD else [])
     return reduce(gcd, used)

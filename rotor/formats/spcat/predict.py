@@ -1,0 +1,213 @@
+"""What SPCAT does with an .int and a .var or .par file: a catalogue with the file's Q, limits, cut, weights and labels.
+
+Where that program passes over something in silence, the prediction carries a note that says so.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor import units
+from rotor.formats.line_tables import catalogue
+from rotor.formats.spcat.catalogue import Catalogue
+from rotor.formats.spcat.codes import is_linear
+from rotor.formats.spcat.int_file import IntensityFile, Request, read_int
+from rotor.formats.spcat.model import FOLD, common_weight, top_of
+from rotor.formats.spcat.par import Options, ParameterFile, read_par
+from rotor.quantum.basis import wang_blocks
+from rotor.quantum.levels import Levels, hamiltonian, solve_levels
+from rotor.quantum.watson import Multiplet, block_bands
+from rotor.spectra.lines import Lines, line_list
+from rotor.thermo import PartitionFunction, partition_function
+from rotor.top import Top
+
+LEAST_MHZ = 0.00005  # a line that would print as 0.0000 is not in the program's files
+_STR_SCALE_MHZ = 300_000.0  # STR1 counts (ν/300 GHz)²
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """A predicted catalogue and what it was made from.
+
+    catalogue: as the program would list it, E″ from the Hamiltonian's zero, degeneracies with the weights as the file
+    has them. lines: the same lines before K doublets were parted, weights reduced, E″ from the lowest level.
+    q: the partition function used, as a file counts it: unreduced weights, energies from the Hamiltonian's zero.
+    request: line 2 of the .int file. notes: what the program would have passed over in silence.
+    """
+
+    catalogue: Catalogue
+    lines: Lines
+    q: float
+    request: Request
+    notes: tuple[str, ...] = ()
+
+
+def predict_file(path: str | os.PathLike[str], *, own_q: bool = False) -> Prediction:
+    """The catalogue that belongs to an .int file, with the .var (else .par) file of the same name beside it.
+
+    own_q: see `predict`. Raises ValueError, with file and line, for what cannot be read or is not computed yet.
+    """
+    return predict(read_par(parameters_beside(path)), read_int(path), own_q=own_q)
+
+
+def parameters_beside(path: str | os.PathLike[str]) -> Path:
+    """The .var file beside an .int file, or its .par file where there is no .var."""
+    beside = [Path(path).with_suffix(suffix) for suffix in (".var", ".par")]
+    found = next((p for p in beside if p.exists()), None)
+    if found is None:
+        raise ValueError(f"{path}: an .int file has no constants; its .var or .par must stand beside it")
+    return found
+
+
+def predict(parameters: ParameterFile, intensities: IntensityFile, *, own_q: bool = False) -> Prediction:
+    """The catalogue that SPCAT makes of its two input files, from true eigenvalues.
+
+    A line is listed when both its J (F, without nuclear spins) lie from FBGN to FEND, its frequency below FQLIM, and its
+    intensity, that of one component of a K doublet, above 10^STR0 + 10^STR1 (ν/300 GHz)² nm² MHz.
+
+    own_q: the partition function is summed from the levels, whatever FEND is, instead of taken from QROT.
+
+    Raises ValueError for an empty range of F, for a Q or a temperature that is not above 0, and for what is read but not
+    computed yet: nuclear spins, several vibrational states, internal rotation.
+
+    >>> from rotor.formats.spcat.int_file import read_int
+    >>> from rotor.formats.spcat.par import read_par
+    >>> file = read_par(b"OCS\\n 1 0 0 0\\nl -1 1 0 0\\n 100 6081.492 0\\n")
+    >>> wanted = read_int(b"OCS\\n 0 60503 1028.6 0 3 -9 -9 99 300\\n 1 0.71519\\n")
+    >>> predict(file, wanted).catalogue.frequency_mhz.round(3).tolist()
+    [12162.984, 24325.968, 36488.952]
+    """
+    options, request = parameters.options[0], intensities.request
+    top = top_of(parameters, intensities)
+    if not 0 <= request.fbgn <= request.fend:
+        raise ValueError(f"FBGN = {request.fbgn}, FEND = {request.fend}: F runs from FBGN to FEND, 0 or more")
+
+    common = common_weight(options)
+    q = summed_q(top, options, request.temperature_k).q if own_q else request.qrot
+    if not (math.isfinite(q) and q > 0):
+        raise ValueError(f"QROT = {request.qrot}: a partition function is a number above 0")
+    lines = _wanted_lines(top, request, q / common)
+    return Prediction(
+        catalogue=_as_the_program_lists(lines, options, common, request.tag),
+        lines=lines,
+        q=q,
+        request=request,
+        notes=tuple(_notes(parameters, top, request)),
+    )
+
+
+def summed_q(top: Top, options: Options, temperature_k: float) -> PartitionFunction:
+    """Q summed from the levels as an .int file counts it: unreduced weights, energies from the Hamiltonian's zero."""
+    summed = partition_function(top, temperature_k)
+    ground_k = _ground_mhz(top) / units.MHZ_PER_K
+    return replace(summed, q=summed.q * common_weight(options) * math.exp(-ground_k / temperature_k))
+
+
+def _ground_mhz(top: Top) -> float:
+    """The lowest level that exists; it is among J = 0 to 3 whatever the weights are."""
+    return solve_levels(top, 3, vectors=False).ground_mhz
+
+
+def _wanted_lines(top: Top, request: Request, q_reduced: float) -> Lines:
+    """The lines within the request's limits. `Lines` counts energies from the lowest level, QROT from zero."""
+    t = request.temperature_k
+    above_zero = _ground_mhz(top) / units.MHZ_PER_K / t if math.isfinite(t) and t > 0 else 0.0
+    lines = line_list(
+        top,
+        temperature_k=t,
+        q=q_reduced * math.exp(above_zero),
+        jmax=request.fend,
+        min_lgint=request.str0,
+        range_mhz=(LEAST_MHZ, request.fqlim_ghz * 1e3),
+    )
+    j, components = lines.levels.j, lines.levels.components[lines.lower]
+    in_range = np.minimum(j[lines.upper], j[lines.lower]) >= request.fbgn
+    return lines.where(
+        in_range & (lines.intensity_nm2_mhz / components > least_intensity(request, lines.frequency_mhz))
+    )
+
+
+def least_intensity(request: Request, frequency_mhz: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The intensity in nm² MHz below which a line is left out, (n,): 10^STR0 + 10^STR1 (ν/300 GHz)²."""
+    return np.asarray(10.0**request.str0 + 10.0**request.str1 * (frequency_mhz / _STR_SCALE_MHZ) ** 2)
+
+
+def _as_the_program_lists(lines: Lines, options: Options, common: int, tag: int) -> Catalogue:
+    made = catalogue(lines, tag)
+    from_zero = (lines.levels.energy_mhz / units.MHZ_PER_CM)[lines.lower]
+    made = replace(made, energy_lower_cm=from_zero, g_upper=made.g_upper * common)
+    return _parted_doublets(made, FOLD[options.iax]) if _parts_doublets(lines.levels, options) else made
+
+
+def _parts_doublets(levels: Levels, options: Options) -> bool:
+    return levels.kind in ("prolate", "oblate") and options.spind < 0 and options.iax in FOLD
+
+
+def _parted_doublets(merged: Catalogue, fold: int) -> Catalogue:
+    """Each line of a K doublet as the two lines that the program prints.
+
+    Where K is a multiple of the fold the two states of a doublet differ in symmetry (A1, A2); the program tells them by
+    the sign of K, and a line with ΔK = 0 joins -K to K. The others (E) are printed twice with one label. Lines with
+    ΔK ≠ 0 stay as they are.
+    """
+    upper, lower = merged.quanta_upper[:, 1], merged.quanta_lower[:, 1]
+    doublet = (upper == lower) & (upper > 0)
+    twice = merged.take(np.repeat(np.arange(len(merged)), np.where(doublet, 2, 1)))
+    first = np.cumsum(np.where(doublet, 2, 1)) - np.where(doublet, 2, 1)  # where each line begins in `twice`
+
+    halved = np.repeat(doublet, np.where(doublet, 2, 1))
+    quanta_upper, quanta_lower = twice.quanta_upper.copy(), twice.quanta_lower.copy()
+    signed = first[doublet & (upper % fold == 0)]
+    quanta_upper[signed, 1] *= -1
+    quanta_lower[signed + 1, 1] *= -1
+    return replace(
+        twice,
+        lgint=twice.lgint - math.log10(2) * halved,
+        g_upper=twice.g_upper // np.where(halved, 2, 1).astype(np.int32),
+        quanta_upper=quanta_upper,
+        quanta_lower=quanta_lower,
+    )
+
+
+def _notes(parameters: ParameterFile, top: Top, request: Request) -> list[str]:
+    """What SPCAT does in silence with these files, and what is done here."""
+    options, found = parameters.options[0], len(parameters.parameters)
+    notes = []
+    if parameters.header.npar > found:
+        notes.append(f"NPAR = {parameters.header.npar}, but {found} parameters stand in the file: those are used")
+    if not is_linear(options) and options.knmax < request.fend:
+        notes.append(
+            f"KNMAX = {options.knmax} is below FEND = {request.fend}: SPCAT leaves K > {options.knmax} out of its basis "
+            f"without a word; here every K to J is in it, so levels with K near {options.knmax} and above differ"
+        )
+    if top.kind == "asymmetric" and options.diag == 0:
+        j = _diagonal_rolls_over(top, request.fend)
+        if j is not None:
+            notes.append(
+                f"from J = {j} on the diagonal of the Hamiltonian stops rising (or falling) with K: SPCAT with DIAG = 0 "
+                "may then list first-order energies instead of eigenvalues; these are eigenvalues, labelled by order"
+            )
+    if top.kind in ("prolate", "oblate") and options.spind < 0 and options.iax not in FOLD:
+        notes.append(
+            f"IAX = {options.iax} in a symmetric top: the two lines of a K doublet are listed as one, with |K|"
+        )
+    return notes
+
+
+def _diagonal_rolls_over(top: Top, jmax: int) -> int | None:
+    """The lowest J where ⟨K|H|K⟩ of a Wang block turns around as K rises."""
+    operators, representation = hamiltonian(top), str(top.constants.representation)
+    rise = 1.0 if representation[:2] == "Ir" else -1.0
+    for j in range(2, jmax + 1):
+        multiplet = Multiplet(operators, j)
+        for block in wang_blocks(j, representation):
+            steps = rise * np.diff(block_bands(multiplet, block)[0][1:])  # the folded element at the lowest K apart
+            if (steps <= 0).any():
+                return j
+    return None

@@ -1,0 +1,96 @@
+"""Catalogues side by side: what is matched, merged, missing, extra; measured lines merged in."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from oracle_cases import SAMPLES, prediction
+
+from rotor.formats.spcat.cat import read_cat
+from rotor.formats.spcat.catalogue import Layout
+from rotor.formats.spcat.compare import agreement, compare, in_mhz, with_measured_lines
+
+ONE = b"  115271.2018  0.0005 -5.0105 2    0.0000  3  28503 101 1           0           \n"
+TWO = b"  230538.0000  0.0005 -4.1197 2    3.8450  5 -28503 101 2           1           \n"
+DOUBLET = (
+    b"   73577.4513  0.0000 -3.8105 3   48.3748 18  41505 202 4-3         3 3         \n"
+    b"   73577.4513  0.0000 -3.8105 3   48.3748 18  41505 202 4 3         3-3         \n"
+)
+
+
+def test_a_list_is_equal_to_itself_and_a_change_is_seen():
+    ours = prediction(SAMPLES / "so2").catalogue
+    same = compare(ours, ours)
+    assert len(same.of_ours) == len(ours)
+    assert (len(same.missing), len(same.extra), np.abs(same.differences("lgint")).max()) == (0, 0, 0)
+
+    rng = np.random.default_rng(1)
+    shuffled = ours.take(rng.permutation(len(ours))[5:])
+    shuffled = replace(shuffled, frequency_mhz=shuffled.frequency_mhz + 0.25)
+    found = compare(ours, shuffled)
+    assert (len(found.of_ours), len(found.missing), len(found.extra)) == (len(ours) - 5, 5, 0)
+    np.testing.assert_allclose(found.differences("frequency_mhz"), 0.25, atol=1e-9)  # round-off of 1e7 MHz
+    assert len(compare(shuffled, ours).extra) == 5
+
+
+def test_components_of_a_doublet_are_one_line_whatever_the_signs():
+    merged = replace(read_cat(DOUBLET).take([0]), lgint=[np.log10(2) - 3.8105], g_upper=[36])
+    found = compare(read_cat(DOUBLET), merged)
+    assert (len(found.of_ours), len(found.missing), len(found.extra)) == (1, 0, 0)
+    assert found.differences("lgint")[0] == pytest.approx(0, abs=1e-12)  # round-off
+    assert found.differences("g_upper")[0] == 0
+    apart = replace(read_cat(DOUBLET), frequency_mhz=[73577.4513, 73577.4523])
+    assert len(compare(read_cat(DOUBLET), apart).extra) == 1  # 1 kHz apart: two lines
+
+
+def test_lines_of_other_states_are_counted_not_compared():
+    ground = b"  115271.2018  0.0005 -5.0105 2    0.0000  3  285031202 1 0         0 0         \n"
+    excited = b"  114221.7523  0.0005 -9.0105 2 2143.2711  3  285031202 1 1         0 1         \n"
+    found = compare(read_cat(ground + excited), read_cat(ONE))
+    assert (len(found.of_ours), len(found.missing), found.other_states) == (1, 0, 1)
+
+
+def test_strengths_of_many_decades_are_added_without_loss():
+    weak = replace(read_cat(DOUBLET), lgint=[-400.0, -400.0])
+    assert compare(weak, weak).ours.lgint[0] == pytest.approx(np.log10(2) - 400, abs=1e-12)  # round-off
+
+
+def test_wavenumbers_become_mhz():
+    line = read_cat(ONE.replace(b"  115271.2018  0.0005", b"       3.8450 -0.0005"))
+    assert [float(x[0]) for x in in_mhz(line)] == pytest.approx([3.845 * 29979.2458, 0.0005 * 29979.2458], rel=1e-12)
+    infrared = replace(read_cat(ONE), frequency_mhz=[2.0], error_mhz=[0.5], layout=Layout(decimals=(6, 6, 4, 4)))
+    assert [float(x[0]) for x in in_mhz(infrared)] == pytest.approx([2 * 29979.2458, 0.5 * 29979.2458], rel=1e-12)
+
+
+def test_agreement_counts_measured_lines_alone():
+    predicted = replace(read_cat(ONE + TWO), frequency_mhz=[0.0, 230538.0014], tag=[28503, 28503])
+    found = agreement(compare(read_cat(ONE + TWO), predicted))
+    assert (found.lines, found.within_3_sigma, found.no_error) == (1, 1.0, 0)  # 1.4 kHz, σ 0.5 kHz
+    assert found.median_mhz == found.rms_mhz == pytest.approx(0.0014, abs=1e-9)  # round-off of 1e5 MHz
+    further = replace(predicted, frequency_mhz=[0.0, 230538.0016])
+    assert agreement(compare(read_cat(ONE + TWO), further)).within_3_sigma == 0.0
+    exact = replace(read_cat(ONE + TWO), error_mhz=[0.0, 0.0])
+    assert agreement(compare(exact, further)).no_error == 1
+    assert agreement(compare(read_cat(ONE), predicted)).lines == 0
+
+
+def test_measured_lines_take_their_places():
+    predicted = read_cat(DOUBLET + ONE + TWO.replace(b"-28503", b" 28503"))
+    measured = read_cat(
+        TWO + DOUBLET[:81].replace(b"73577.4513  0.0000", b"240000.123  0.0300").replace(b"  41505", b" -41505")
+    )
+    merged = with_measured_lines(predicted.take(slice(2, 4)), measured.take(slice(0, 1)))
+    assert merged.frequency_mhz.tolist() == [115271.2018, 230538.0]
+    assert merged.tag.tolist() == [28503, -28503]
+    both = with_measured_lines(predicted.take(slice(0, 2)), measured.take(slice(1, 2)))
+    assert both.frequency_mhz.tolist() == [240000.123, 240000.123]
+    assert both.error_mhz.tolist() == [0.03, 0.03]
+    assert both.tag.tolist() == [-41505, -41505]
+
+
+def test_two_measured_frequencies_of_one_label_are_refused():
+    twice = read_cat(TWO + TWO.replace(b"230538.0000", b"230539.0000"))
+    with pytest.raises(ValueError, match="have one label"):
+        with_measured_lines(read_cat(ONE), twice)

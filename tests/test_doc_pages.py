@@ -1,0 +1,52 @@
+"""The generated pages of docs/ say what the programs beside them find now."""
+
+from __future__ import annotations
+
+import importlib.util
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+DOCS = Path(__file__).resolve().parents[1] / "docs"
+
+
+def script(name: str) -> ModuleType:
+    spec = importlib.util.spec_from_file_location(name, DOCS / f"{name}.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.oracle
+def test_the_page_of_measured_lines(shared: Path):
+    make = script("make_measured_lines")
+    assert make.page(shared) == make.PAGE.read_text(encoding="utf-8")
+
+
+@pytest.mark.oracle
+@pytest.mark.slow
+def test_the_page_of_reference_cases(shared: Path):
+    make = script("make_reference_cases")
+    assert make.page(shared) == make.PAGE.read_text(encoding="utf-8")
+
+
+def test_the_pages_claim_what_they_should():
+    """Every molecule and case has its row; shares and differences are what the words around the tables say."""
+    measured = (DOCS / "measured_lines.md").read_text(encoding="utf-8")
+    held = {
+        row.split("|")[1].strip(): float(row.split("|")[7]) for row in measured.splitlines() if "held against:" in row
+    }
+    assert {name for name, share in held.items() if share > 0.99} == {"CO", "OCS", "HC3N", "CH3CN", "SO2"}
+    assert {name for name, share in held.items() if share < 0.9} == {"H2O", "H2CO"}
+    assert all(f"- **{name}**" in measured for name in ("H2O", "H2CO", "SO2"))
+
+    cases = (DOCS / "reference_cases.md").read_text(encoding="utf-8").splitlines()
+    rows = [
+        [word.strip() for word in row.split("|")[1:-1]] for row in cases if row.startswith("| ") and "case" not in row
+    ]
+    equal = [row for row in rows if len(row) == 8]
+    assert len(equal) == 13
+    assert len(rows) == 26
+    assert all(float(row[3]) <= 1.1e-4 and float(row[4]) <= 2e-4 and float(row[5]) <= 2e-4 for row in equal)
+    assert all(float(row[7]) <= 1e-6 for row in equal)
