@@ -24,10 +24,10 @@ from numpy.typing import NDArray
 from rotor import units
 from rotor.quantum.levels import Levels, solve_levels
 from rotor.quantum.reliability import warnings_of
-from rotor.spectra.lines import quanta_names
+from rotor.spectra.lines import partition_of, quanta_names
 from rotor.spectra.raman_strengths import RamanTransitions, anisotropy_squared, raman_transitions
 from rotor.spectra.reach import JMAX_DEFAULT_LIMIT
-from rotor.thermo import PartitionFunction, partition_function
+from rotor.thermo import PartitionFunction, Vibrations, partition_function
 
 if TYPE_CHECKING:
     from rotor.top import Tensor, Top
@@ -162,6 +162,8 @@ def raman_lines(
     laser_nm: float = DEFAULT_LASER_NM,
     jmax: int | None = None,
     min_relative: float | None = DEFAULT_MIN_RELATIVE,
+    q: float | None = None,
+    vibrations: Vibrations | None = None,
     executor: Executor | None = None,
 ) -> RamanLines:
     """Rotational Raman lines of a top: every transition that its polarizability allows, cut only where you say.
@@ -178,6 +180,10 @@ def raman_lines(
         The highest J; by default the one beyond which no line can reach `min_relative`.
     min_relative : float, optional
         Cross section, of that of the strongest line, below which lines are left out; None for none left out.
+    q : float, optional
+        Partition function to use instead of the summed one, spin weights reduced by their common divisor.
+    vibrations : Vibrations, optional
+        States or fundamentals whose factor multiplies Q.
     executor : Executor, optional
         J are spread over it.
 
@@ -187,7 +193,7 @@ def raman_lines(
         No polarizability; a temperature or wavelength not above 0; a cut not between 0 and 1; a J max below 0.
 
     Neglected: the dependence of the polarizability on J (0.2 % per J of H2, less of all others) and on the wavelength,
-    vibrational states in Q, electron spin (the lines of O2 are triplets, resolved at 0.1 cm⁻¹ only for the lowest N).
+    lines of vibrational states, electron spin (the lines of O2 are triplets, resolved at 0.1 cm⁻¹ only for the lowest N).
 
     >>> from rotor.top import Top
     >>> rod = Top.from_constants("B=2 cm-1", polarizability_abc_angstrom3=((2.2, 0, 0), (0, 1.5, 0), (0, 0, 1.5)))
@@ -201,7 +207,7 @@ def raman_lines(
 
     levels = solve_levels(top, jmax, executor=executor)
     found = raman_transitions(levels, tensor)
-    partition = partition_function(top, temperature_k)
+    partition = partition_of(top, temperature_k, q, 1.0, vibrations) or partition_function(top, temperature_k)
     lines = _both_ways(top, levels, found, temperature_k, laser_nm, least, partition)
     lines = lines.where(lines.scattered_cm > 0)
     if len(lines) and least:

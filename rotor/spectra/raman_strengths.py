@@ -186,7 +186,8 @@ def _row(j: int, k: Ints) -> Ints:
 def _summed(levels: Levels, found: RamanTransitions) -> RamanTransitions:
     """One line for every pair of rows."""
     keys, place = np.unique(found.lower * len(levels) + found.upper, return_inverse=True)
-    strength = np.bincount(place, weights=found.strength_angstrom6, minlength=len(keys))
+    strength: Floats = np.zeros(len(keys))
+    np.add.at(strength, place, found.strength_angstrom6)
     return RamanTransitions(strength, keys // len(levels), keys % len(levels))
 
 
