@@ -271,7 +271,7 @@ def test_every_file_is_written_with_its_provenance(call, folder):
     assert (
         (folder / "a.cat")
         .read_text(encoding="ascii")
-        .startswith("  115271.2021  0.0001 -5.0104 2    0.0000  3  28503 101 1 ")
+        .startswith("  115271.2021  0.0000 -5.0104 2    0.0000  3  28503 101 1 ")
     )
     assert json.loads((folder / "a.json").read_text(encoding="utf-8"))["files"] == [
         "a.cat", "a.csv", "a.parquet", "p.csv", "a.png", "a.json",
