@@ -87,7 +87,9 @@ def test_thermal_mean_is_that_of_sampled_momenta(moments):
 
 
 def test_thermal_mean_closed_forms():
-    assert float(mean_thermal_momentum([2, 2, 2], 3.0)) == pytest.approx(math.sqrt(8 * 6 / math.pi), rel=1e-14)  # R_G = √I
+    assert float(mean_thermal_momentum([2, 2, 2], 3.0)) == pytest.approx(
+        math.sqrt(8 * 6 / math.pi), rel=1e-14
+    )  # R_G = √I
     assert float(mean_thermal_momentum([2, 0, 2], 3.0)) == pytest.approx(math.sqrt(3 * math.pi), rel=1e-14)  # √(πIkT/2)
     assert mean_thermal_momentum([[1, 2, 3], [2, 2, 2]], 1.0).shape == (2,)
     with pytest.raises(ValueError, match="not negative"):
@@ -97,7 +99,9 @@ def test_thermal_mean_closed_forms():
 def test_start_is_half_a_degree_off_the_intermediate_axis():
     momentum = off_intermediate_axis([3.0, 1.0, 2.0], 5.0, math.radians(0.5))
     assert np.linalg.norm(momentum) == pytest.approx(5.0, rel=1e-15)
-    assert math.degrees(math.acos(momentum[2] / 5.0)) == pytest.approx(0.5, rel=1e-9)  # acos near 1 loses half the digits
+    assert math.degrees(math.acos(momentum[2] / 5.0)) == pytest.approx(
+        0.5, rel=1e-9
+    )  # acos near 1 loses half the digits
     assert off_intermediate_axis([0.0, 1.0, 1.0], 5.0, 0.1)[0] == 0.0
 
 
@@ -164,7 +168,9 @@ def test_a_long_motion_is_cut_and_said_to_be():
     figure = polhode_figure(free_motion([0.6, 0.8, 1.0], [1.8, 0.4, -0.9]), [0.0, 1e4], time_factor=2.0)
     right = figure.axes[1]
     assert "first 12 periods" in right.get_xlabel()
-    assert right.get_xlim()[1] == pytest.approx(2 * 12 * 6.862616178058115, rel=1e-9)  # a period to 1e-15, shown doubled
+    assert right.get_xlim()[1] == pytest.approx(
+        2 * 12 * 6.862616178058115, rel=1e-9
+    )  # a period to 1e-15, shown doubled
 
 
 def test_the_same_picture_is_the_same_file_and_has_provenance(tmp_path):
