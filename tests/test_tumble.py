@@ -19,30 +19,11 @@ from rotor.units import CLASSICAL_TIME_PS, CM_PER_EV, EV_PER_K, HBAR_CLASSICAL
 
 COLUMNS = ["t", "m1", "m2", "m3", "qw", "qx", "qy", "qz", "energy"]
 BODY = ("tumble", "--moments", "0.6,0.8,1.0", "--angular-momentum", "1.8,0.4,-0.9")
-MOTION_KEYS = set(
-    [
-        "units",
-        "moments",
-        "axes",
-        "angular_momentum",
-        "angular_momentum_size",
-        "angular_momentum_source",
-        "temperature_k",
-        "energy",
-        "times_source",
-        "motion_kind",
-        "period",
-        "turning_rate",
-        "fixed_axes",
-        "separatrix_ratio",
-        "growth_rate",
-        "asymptotic_period",
-        "chaos",
-        "departure",
-        "motion",
-        "files",
-    ]
-)
+_KEYS = """
+    units moments axes angular_momentum angular_momentum_size angular_momentum_source temperature_k energy times_source
+    motion_kind period turning_rate fixed_axes separatrix_ratio growth_rate asymptotic_period chaos departure motion files
+"""
+MOTION_KEYS = set(_KEYS.split())
 BARE_KEYS = {"rotor_version", "command", "input", "kind", "notes"}
 
 
