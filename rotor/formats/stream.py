@@ -93,7 +93,8 @@ def stream_lines(
     has about 4.5 J². executor: pieces are spread over it, a process pool for instance, whose processes must be spawned:
     a forked copy of polars' threads never answers.
 
-    Raises ValueError for another suffix, for a pool that forks, for what `line_list` refuses, and where the folder holds pieces of another list.
+    Raises ValueError for another suffix, for a pool that forks, for what `line_list` refuses, and where the folder holds
+    pieces of another list.
     """
     target = Path(path)
     if target.suffix.lower() not in (".parquet", ".cat"):
