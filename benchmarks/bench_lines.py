@@ -71,13 +71,17 @@ def peak_mb() -> float:
 
 def main(jmaxes: list[int]) -> None:
     """Measure, compare, print a table, keep the figures."""
-    machine = f"{platform.processor() or platform.machine()}, {os.cpu_count()} cores, Python {platform.python_version()}"
+    machine = (
+        f"{platform.processor() or platform.machine()}, {os.cpu_count()} cores, Python {platform.python_version()}"
+    )
     print(machine)
     print(f"{'J max':>5} {'what':20} {'lines':>10} {'s':>8} {'M lines/s':>9} {'MB':>6} {'SPCAT M/s':>9} {'ratio':>6}")
     rows = []
     for jmax in jmaxes:
         for work in WORK:
-            done = subprocess.run([sys.executable, __file__, "--one", str(jmax), work], capture_output=True, text=True, check=True)
+            done = subprocess.run(
+                [sys.executable, __file__, "--one", str(jmax), work], capture_output=True, text=True, check=True
+            )
             row = json.loads(done.stdout)
             lines, seconds = SPCAT[jmax][work.endswith("-12")]
             rate, theirs = row["lines"] / row["seconds"], lines / seconds

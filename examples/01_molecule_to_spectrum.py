@@ -63,7 +63,9 @@ for name, ours in zip("ABC", sketch.rotational_constants_mhz, strict=True):
 for note in sketch.notes:
     print("note:", note)
 
-assert all(abs(ours / real.constants[n] - 1) < 0.04 for n, ours in zip("ABC", sketch.rotational_constants_mhz, strict=True))
+assert all(
+    abs(ours / real.constants[n] - 1) < 0.04 for n, ours in zip("ABC", sketch.rotational_constants_mhz, strict=True)
+)
 
 # %% [markdown]
 # ## Files

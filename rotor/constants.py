@@ -2,7 +2,7 @@
 
 A set of constants is a complete statement: the numbers, the reduction (A or S) and the axes (representation) in
 which they are meant, and the kind of top whose Hamiltonian they belong to. Nothing is converted silently; what the
-names mean as operators stands in `rotor.quantum.watson`.
+names mean as operators stands in `rotor.terms`.
 """
 
 from __future__ import annotations
@@ -10,35 +10,26 @@ from __future__ import annotations
 import difflib
 import math
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
 
+from rotor import terms as published
 from rotor.notation import parse_named, write_number
+from rotor.terms import Powers, powers_of_spelled, published_name, spelled_term
 from rotor.units import parse_quantity
 
 KINDS = ("linear", "spherical", "prolate", "oblate", "asymmetric")
 REPRESENTATIONS = ("Ir", "Il", "IIr", "IIl", "IIIr", "IIIl")
 
-# Names by order of distortion: quartic, sextic, octic, decic. Watson, Vibrational Spectra and Structure 6 (1977) 1-89
-# for both reductions; octic names as in Watson, J. Mol. Spectrosc. 103 (1984) 350-363. The decic P J^2(5-q) Jz^2q are
-# named as CDMS names them; without them the levels of water above J = 14 fold back.
 RIGID = ("A", "B", "C")
-LINEAR = ("D", "H", "L")
-SPHERICAL = ("D", "H")
-OCTIC = ("LJ", "LJJK", "LJK", "LKKJ", "LK")
-DECIC = ("PJ", "PJJK", "PJK", "PKJ", "PKKJ", "PK")
-SYMMETRIC = ("DJ", "DJK", "DK", "HJ", "HJK", "HKJ", "HK", *OCTIC, *DECIC)
-S_REDUCTION = (*SYMMETRIC, "d1", "d2", "h1", "h2", "h3", "l1", "l2", "l3", "l4")
-A_REDUCTION = (
-    *("DeltaJ", "DeltaJK", "DeltaK", "deltaJ", "deltaK"),
-    *("PhiJ", "PhiJK", "PhiKJ", "PhiK", "phiJ", "phiJK", "phiK"),
-    *(*OCTIC, "lJ", "lJK", "lKJ", "lK", *DECIC),
-)
+LINEAR, SPHERICAL, SYMMETRIC = tuple(published.LINEAR), tuple(published.SPHERICAL), tuple(published.SYMMETRIC)
+S_REDUCTION, A_REDUCTION = tuple(published.S_REDUCTION), tuple(published.A_REDUCTION)
 _DISTORTION = {"linear": LINEAR, "spherical": SPHERICAL, "prolate": SYMMETRIC, "oblate": SYMMETRIC}
 _REDUCED = {"A": A_REDUCTION, "S": S_REDUCTION}
-_KNOWN = tuple(dict.fromkeys((*RIGID, *LINEAR, *S_REDUCTION, *A_REDUCTION)))
+_SHARED = {*RIGID, *A_REDUCTION} & {*RIGID, *S_REDUCTION}
+_KNOWN = tuple(dict.fromkeys((*RIGID, *LINEAR, *SPHERICAL, *S_REDUCTION, *A_REDUCTION)))
 
 _GREEK = {"Δ": "Delta", "∆": "Delta", "δ": "delta", "Φ": "Phi", "φ": "phi", "ϕ": "phi"}
 _WITHOUT_K = {"DJ": "D", "HJ": "H", "LJ": "L"}  # what linear and spherical tops call them
@@ -60,6 +51,9 @@ class Constants:
         equality says. A given kind wins as long as the constants do not contradict it.
     uncertainties, sources : mapping by name
         One standard deviation in MHz; where the number was published.
+    terms : mapping {(p, q, n): value in MHz}
+        Terms J^2p ½[Jz^2q, J₊^2n + J₋^2n]₊ that no published name stands for; they are kept under names such as
+        `J4Jz2Jpm6`, which text and files may use as well.
     **values_mhz
         The constants: float in MHz or text with a unit. A, B, C with A >= B >= C > 0; distortion constants of the
         tables above, signs as published (ΔJ, DJ > 0 for a normal molecule). Greek letters and underscores are read.
@@ -94,16 +88,17 @@ class Constants:
         kind: str | None = None,
         uncertainties: Mapping[str, float] | None = None,
         sources: Mapping[str, str] | None = None,
+        terms: Mapping[Powers, float | str] | None = None,
         **values_mhz: float | str,
     ) -> None:
-        given = _renamed(values_mhz, _published_name)
+        given = _renamed([*values_mhz.items(), *_spelled(terms).items()], _published_name)
         _refuse_unknown(given)
         numbers = {name: _finite(name, value) for name, value in given.items()}
         kind = _kind(numbers, kind)
-        values = _renamed(numbers, lambda name: _name_in(kind, name))
+        values = _renamed(numbers.items(), lambda name: _name_in(kind, name))
 
-        errors = _renamed(uncertainties or {}, lambda name: _name_in(kind, _published_name(name)))
-        origins = _renamed(sources or {}, lambda name: _name_in(kind, _published_name(name)))
+        errors = _renamed((uncertainties or {}).items(), lambda name: _name_in(kind, _published_name(name)))
+        origins = _renamed((sources or {}).items(), lambda name: _name_in(kind, _published_name(name)))
         _refuse_strays("uncertainties", errors, values)
         _refuse_strays("sources", origins, values)
 
@@ -150,6 +145,15 @@ class Constants:
             return math.inf, b, b
         return self.values.get("A", b), b, self.values.get("C", b)
 
+    @property
+    def terms(self) -> dict[Powers, float]:
+        """The terms without a published name, {(p, q, n): value in MHz}.
+
+        >>> Constants(A=9.0, B=3.0, C=2.0, terms={(1, 0, 4): 1e-9}).terms
+        {(1, 0, 4): 1e-09}
+        """
+        return {powers: value for name, value in self.values.items() if (powers := powers_of_spelled(name))}
+
     def replace(self, **changes: Any) -> Constants:
         """A changed copy; a constant set to None is left out, kind, reduction or representation None is found anew.
 
@@ -158,8 +162,9 @@ class Constants:
         >>> Constants(A=9.0, B=3.0, C=2.0).replace(C=2.5).text()
         'A=9.0 B=3.0 C=2.5 MHz'
         """
+        changes |= _spelled(changes.pop("terms", None))
         moved = _renamed(
-            {name: value for name, value in changes.items() if name not in _SETTINGS},
+            [(name, value) for name, value in changes.items() if name not in _SETTINGS],
             lambda name: _name_in(self.kind, _published_name(name)),
         )
         values = {name: value for name, value in {**self.values, **moved}.items() if value is not None}
@@ -252,9 +257,13 @@ def _name_in(kind: str, name: str) -> str:
     return _WITHOUT_K.get(name, name) if kind in ("linear", "spherical") else name
 
 
-def _renamed(things: Mapping[str, Any], rename: Any) -> dict[str, Any]:
+def _spelled(values: Mapping[Powers, Any] | None) -> dict[str, Any]:
+    return {spelled_term(*powers): value for powers, value in (values or {}).items()}
+
+
+def _renamed(things: Iterable[tuple[str, Any]], rename: Callable[[str], str]) -> dict[str, Any]:
     renamed: dict[str, Any] = {}
-    for name, thing in things.items():
+    for name, thing in things:
         if rename(name) in renamed:
             raise ValueError(f"{name} is given twice (names are read as {rename(name)}); leave one out")
         renamed[rename(name)] = thing
@@ -263,11 +272,14 @@ def _renamed(things: Mapping[str, Any], rename: Any) -> dict[str, Any]:
 
 def _refuse_unknown(names: Iterable[str]) -> None:
     for name in names:
-        if name not in _KNOWN:
+        if name not in _KNOWN and not powers_of_spelled(name):
             near = [known for known in _KNOWN if known.casefold() == name.casefold()]
             near = near or difflib.get_close_matches(name, _KNOWN, n=3)
             hint = f"did you mean {' or '.join(near)}? " if near else ""
-            raise ValueError(f"{name!r} is not a rotational constant known here: {hint}Known are {', '.join(_KNOWN)}")
+            raise ValueError(
+                f"{name!r} is not a rotational constant known here: {hint}Known are {', '.join(_KNOWN)}, and terms "
+                "spelled out such as J4Jz2Jpm6"
+            )
 
 
 def _refuse_strays(what: str, names: Iterable[str], values: Mapping[str, float]) -> None:
@@ -279,13 +291,24 @@ def _refuse_strays(what: str, names: Iterable[str], values: Mapping[str, float])
 def _refuse_misplaced(kind: str, reduction: str | None, values: Mapping[str, float]) -> None:
     allowed = vocabulary(kind, reduction)
     for name in values:
-        if name not in allowed:
+        if powers := powers_of_spelled(name):
+            _refuse_named_term(kind, reduction, name, powers)
+        elif name not in allowed:
             near = _counterpart(name, allowed)
             ways = [f"use {near}"] if near else []
             if kind in ("prolate", "oblate") and {*RIGID} <= {*values}:
                 ways.append("say kind='asymmetric'")
             hint = f"{' or '.join(ways)}; " if ways else ""
             raise ValueError(f"{name} is no constant of kind {kind!r}: {hint}that has {', '.join(allowed)}")
+
+
+def _refuse_named_term(kind: str, reduction: str | None, name: str, powers: Powers) -> None:
+    """A term has one name; and it must be one that this kind of top can have."""
+    if own := published_name(powers, kind, reduction):
+        raise ValueError(f"{name} is the operator of {own}; give it by that name, with the sign of that name")
+    letters = {"linear": "J", "spherical": "J", "prolate": "J and Jz", "oblate": "J and Jz"}.get(kind)
+    if letters and (powers[2] or (powers[1] and letters == "J")):
+        raise ValueError(f"{name} is no term of kind {kind!r}, where terms have powers of {letters} alone")
 
 
 def _counterpart(name: str, allowed: tuple[str, ...]) -> str:
@@ -380,19 +403,15 @@ def _reduction(kind: str, names: Mapping[str, float], reduction: str | None) -> 
             raise ValueError(f"reduction {reduction!r} belongs to asymmetric tops; the kind here is {kind!r}")
         return None
 
-    own = {key: [n for n in names if n in table and n not in _shared_names()] for key, table in _REDUCED.items()}
+    own = {key: [n for n in names if n in table and n not in _SHARED] for key, table in _REDUCED.items()}
     if own["A"] and own["S"]:
         raise ValueError(f"both reductions in one set: {', '.join(own['A'])} (A) with {', '.join(own['S'])} (S)")
     told = next((key for key, members in own.items() if members), None)
     if reduction and told and reduction != told:
         raise ValueError(f"reduction {reduction!r}, but {', '.join(own[told])} belong to the {told}-reduction")
-    if not reduction and not told and any(name in _shared_names() - {*RIGID} for name in names):
+    if not reduction and not told and any(name in _SHARED - {*RIGID} for name in names):
         raise ValueError("octic and decic names alone fit both reductions; say reduction='A' or reduction='S'")
     return reduction or told
-
-
-def _shared_names() -> set[str]:
-    return {*RIGID, *OCTIC, *DECIC}
 
 
 def _representation(kind: str, values: Mapping[str, float], representation: str | None) -> str | None:

@@ -7,12 +7,10 @@ are given; registering one is naming it in that list.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, ClassVar
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
+    from rotor.rotations import Array
     from rotor.top import Top
 
 
@@ -33,22 +31,50 @@ class QuantumEffect(ABC):
         """How large the effect is for levels of angular momentum `j`, in MHz; rough, never an underestimate by 10."""
 
 
-class ClassicalEffect(ABC):
-    """A torque or a change of the equations of motion dm/dt = m × ω + torque, in the body's principal axes."""
+class ClassicalEffect:
+    """A change of Euler's equations, which with all effects present read, in the body's principal axes,
 
-    conserves_energy: bool = False
-    conserves_momentum: bool = False
+        dL/dt = L x ω + Σ torques,   ω_i = (L_i - h_i) / I_i(t),   h = Σ inner momenta.
+
+    An effect is one of the three kinds below; this base only names what each says of itself: `conserves_energy`
+    means ½ Σ (L_i - h_i)²/I_i + potential energy, `conserves_momentum` means L seen from space;
+    `depends_on_time` says whether the time itself enters, as in a drive.
+    """
+
+    conserves_energy: ClassVar[bool] = False
+    conserves_momentum: ClassVar[bool] = False
+    depends_on_time: ClassVar[bool] = False
+
+
+class Torque(ClassicalEffect, ABC):
+    """A torque. `needs_velocity` says that it depends on ω: then no splitting into drifts and kicks serves."""
+
+    needs_velocity: ClassVar[bool] = False
+    needs_attitude: ClassVar[bool] = True
 
     @abstractmethod
-    def torque(
-        self,
-        time: float,
-        momentum: NDArray[np.float64],
-        attitude: NDArray[np.float64],
-        moments: NDArray[np.float64],
-    ) -> NDArray[np.float64]:
-        """Torque on the body, (..., 3) in body axes, from momentum (..., 3) in body axes and attitude (..., 4)."""
+    def torque(self, time: float, attitude: Array, omega: Array) -> Array:
+        """Torque on the body in body axes (..., 3) from attitude (..., 4) and angular velocity in body axes (..., 3).
 
-    def energy(self, time: float, attitude: NDArray[np.float64]) -> Any:
-        """Potential energy (...,) that goes with the torque; zero for an effect that has none."""
+        Where `needs_velocity` is False, `omega` is not looked at.
+        """
+
+    def potential_energy(self, time: float, attitude: Array) -> Array | float:
+        """Energy (...,) whose change with attitude is the torque; zero for a torque that has none."""
         return 0.0
+
+
+class InnerMomentum(ClassicalEffect, ABC):
+    """Angular momentum that parts carry relative to the body."""
+
+    @abstractmethod
+    def inner_momentum(self, time: float) -> Array:
+        """h in body axes (3,) at `time`."""
+
+
+class InertiaChange(ClassicalEffect, ABC):
+    """Moments that change in time while the principal axes stay."""
+
+    @abstractmethod
+    def moments(self, time: float) -> Array:
+        """Principal moments (..., 3) at `time`, in place of those the motion was started with."""

@@ -7,7 +7,6 @@ A molecule becomes a top here; the quantum and the classical half know tops only
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -21,10 +20,12 @@ from rotor.weights import SpinWeights
 
 if TYPE_CHECKING:
     from rotor.molecules.molecule import Molecule
+    from rotor.molecules.symmetry import Symmetry
 
 Floats = NDArray[np.float64]
 
 LINEAR_BELOW = 1e-6  # I_a / I_c below which a geometry is linear
+SYMMETRIC_WITHIN = 1e-3  # of the shortest distance between nuclei: displacements that symmetry may overlook
 NO_WEIGHTS = SpinWeights()
 _KINDS = ("linear", "spherical", "prolate", "oblate", "asymmetric")
 
@@ -79,13 +80,43 @@ def kind_from_moments(
     return KindOfTop(kind, linearity, ab, bc, linear_below, equal_within)
 
 
+def kind_with_symmetry(by_numbers: KindOfTop, symmetry: Symmetry) -> KindOfTop:
+    """The kind that the point group settles, else the one by numbers.
+
+    A group T, O or I makes a spherical top, an axis C3 or higher, or S4, a symmetric one, C∞ a linear molecule. Lower
+    groups settle nothing: moments that agree there do so by accident.
+    """
+    group = symmetry.rotation_group
+    if symmetry.linear:
+        kind = "linear"
+    elif group in ("T", "O", "I"):
+        kind = "spherical"
+    elif symmetry.point_group in ("D2d", "S4") or (group[1:].isdigit() and int(group[1:]) > 2):
+        kind = "prolate" if by_numbers.bc < by_numbers.ab else "oblate"
+    else:
+        return replace(by_numbers, reason=f"{symmetry.point_group} settles no kind; by the moments")
+    return replace(by_numbers, kind=kind, reason=f"by symmetry: {symmetry.point_group}")
+
+
+def allowed_dipole(dipole: ArrayLike, symmetry: Symmetry) -> Floats:
+    """The part of a dipole that every operation leaves alike, where the rest is below 0.001 D; else the whole."""
+    vector = np.asarray(dipole, dtype=float)
+    operations = [operation.matrix for operation in (*symmetry.rotations, *symmetry.improper)]
+    part = np.mean([matrix @ vector for matrix in operations], axis=0)
+    if symmetry.rotation_group == "C∞":  # no operation but the identity is listed
+        part = symmetry.axes_abc[0] * (symmetry.axes_abc[0] @ vector)
+    return part if np.linalg.norm(vector - part) < 1e-3 else vector
+
+
 @dataclass(frozen=True)
 class Top:
     """A rigid or semi-rigid rotor.
 
     constants: named constants in MHz. dipole_abc_debye: (μa, μb, μc) or None where it is not known. spin_weights:
-    nuclear-spin weights. mass_u: for Doppler widths. moments_u_angstrom2, frame: of a geometry, None without one.
-    kind_of_top: how the kind was decided. source: where the constants are from. notes: what a user must be told.
+    nuclear-spin weights. mass_u: for Doppler widths. frame: principal frame of a geometry, None without one.
+    kind_of_top: how the kind was decided. molecule, symmetry: of a geometry. source: where the constants are from.
+    independent_errors: whether the uncertainties of the constants may count as uncorrelated; not those of a fit whose
+    correlations are unknown. notes: what a user must be told.
     """
 
     constants: Constants
@@ -96,9 +127,11 @@ class Top:
     frame: PrincipalFrame | None = None
     kind_of_top: KindOfTop | None = None
     molecule: Molecule | None = None
+    symmetry: Symmetry | None = None
     source: str = ""
     dipole_source: str = ""
     weights_source: str = ""
+    independent_errors: bool = True
     notes: tuple[str, ...] = ()
 
     @classmethod
@@ -106,7 +139,7 @@ class Top:
         cls,
         constants: Constants | str,
         *,
-        dipole_abc_debye: Sequence[float] | None = None,
+        dipole_abc_debye: ArrayLike | None = None,
         spin_weights: SpinWeights | dict[str, int] | None = None,
         **others: Any,
     ) -> Top:
@@ -122,9 +155,19 @@ class Top:
 
     @classmethod
     def from_molecule(
-        cls, molecule: Molecule, *, linear_below: float = LINEAR_BELOW, equal_within: float = EQUAL_MOMENTS
+        cls,
+        molecule: Molecule,
+        *,
+        linear_below: float = LINEAR_BELOW,
+        equal_within: float = EQUAL_MOMENTS,
+        symmetry_within: float = SYMMETRIC_WITHIN,
     ) -> Top:
-        """A rigid top from a geometry: principal axes, A, B, C, kind, and its dipole turned along.
+        """A rigid top from a geometry: principal axes, A, B, C, kind, its dipole turned along, spin weights.
+
+        The symmetry of the nuclei decides the kind where it can (C3v is a symmetric top), the moments where it cannot.
+        Nuclear-spin weights follow from it, inversion doublets unresolved and the electronic state totally symmetric;
+        `symmetry_within` is its tolerance, relative to the shortest distance. Dipole components that symmetry forbids
+        and that are below 0.001 D are round-off or noise, and left out.
 
         Raises ValueError for a single atom. Neglected: everything that vibration and centrifugal distortion do, about
         0.3 to 1 % between an equilibrium geometry and measured constants.
@@ -138,20 +181,28 @@ class Top:
             raise ValueError(
                 f"{molecule.name or 'the input'} is a single atom: it has no rotation; give 2 atoms or more"
             )
+        from rotor.molecules.spin_statistics import spin_weights
+        from rotor.molecules.symmetry import symmetry_of
+
         body = point_masses(molecule.masses_u, molecule.positions_angstrom)
         frame = principal_frame(body, molecule.masses_u, molecule.positions_angstrom, equal_within)
         kind = kind_from_moments(frame.moments, linear_below=linear_below, equal_within=equal_within)
+        symmetry = symmetry_of(molecule, symmetry_within)
+        kind = kind_with_symmetry(kind, symmetry)
         dipole = molecule.dipole_debye
         return cls(
             constants=constants_of_moments(frame.moments, kind.kind),
-            dipole_abc_debye=None if dipole is None else _three(frame.axes @ np.asarray(dipole)),
+            dipole_abc_debye=None if dipole is None else _in_frame(frame, allowed_dipole(dipole, symmetry)),
+            spin_weights=spin_weights(symmetry, [nucleus.spin for nucleus in molecule.nuclei]),
             name=molecule.name,
             mass_u=float(np.sum(molecule.masses_u)),
             frame=frame,
             kind_of_top=kind,
             molecule=molecule,
+            symmetry=symmetry,
             source=molecule.source,
             dipole_source=molecule.dipole_source,
+            weights_source=f"from the permutations of nuclei in {symmetry.point_group}",
             notes=tuple(molecule.notes),
         )
 
@@ -171,14 +222,7 @@ class Top:
     @property
     def rotational_constants_mhz(self) -> tuple[float, float, float]:
         """A, B, C in MHz, whatever the kind; A of a linear top is infinite."""
-        c = self.constants
-        return {
-            "linear": lambda: (math.inf, c["B"], c["B"]),
-            "spherical": lambda: (c["B"], c["B"], c["B"]),
-            "prolate": lambda: (c["A"], c["B"], c["B"]),
-            "oblate": lambda: (c["B"], c["B"], c["C"]),
-            "asymmetric": lambda: (c["A"], c["B"], c["C"]),
-        }[self.kind]()
+        return self.constants.rigid
 
     @property
     def moments_u_angstrom2(self) -> tuple[float, float, float]:
@@ -204,9 +248,16 @@ class Top:
         a, b, c = self.moments_u_angstrom2
         return c - a - b
 
-    def with_dipole(self, dipole_abc_debye: Sequence[float], source: str) -> Top:
+    def with_dipole(self, dipole_abc_debye: ArrayLike, source: str) -> Top:
         """The same top with another dipole in principal axes."""
         return replace(self, dipole_abc_debye=_three(dipole_abc_debye), dipole_source=source)
+
+    def with_estimated_dipole(self, dipole_debye: ArrayLike, source: str) -> Top:
+        """The same top with a dipole in the frame of its geometry, of which what symmetry forbids is left out."""
+        if self.frame is None or self.symmetry is None:
+            raise ValueError(f"{self.name or 'this top'} has no geometry whose frame a dipole could be in")
+        allowed = allowed_dipole(dipole_debye, self.symmetry)
+        return replace(self, dipole_abc_debye=_in_frame(self.frame, allowed), dipole_source=source)
 
     def with_weights(self, weights: dict[str, int], source: str) -> Top:
         """The same top with other spin weights."""
@@ -228,6 +279,12 @@ def constants_of_moments(moments: ArrayLike, kind: str) -> Constants:
     if kind == "oblate":
         return Constants(B=f / ((ia + ib) / 2), C=f / ic, kind=kind)
     return Constants(A=f / ia, B=f / ib, C=f / ic, kind=kind)
+
+
+def _in_frame(frame: PrincipalFrame, dipole: Floats) -> tuple[float, float, float] | None:
+    """Components along a, b, c; those below 1e-6 of the whole are round-off of the frame, and 0."""
+    components = frame.axes @ dipole
+    return _three(np.where(np.abs(components) < 1e-6 * np.linalg.norm(components), 0.0, components))
 
 
 def _three(vector: ArrayLike | None) -> tuple[float, float, float] | None:

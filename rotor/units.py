@@ -97,8 +97,7 @@ def _bounds(text: str, unit: str) -> tuple[float, float, str | None]:
     (start, unit_1), (stop, unit_2) = _number(parts[0]), _number(parts[1])
     shared = unit_2 or unit_1
     first, last = (
-        number * _factor_or_one(own or shared, unit, text)
-        for number, own in ((start, unit_1), (stop, unit_2))
+        number * _factor_or_one(own or shared, unit, text) for number, own in ((start, unit_1), (stop, unit_2))
     )
     if not first < last:
         raise ValueError(f"{text!r}: the range must rise, but {first:g} {unit} is not below {last:g} {unit}")

@@ -15,18 +15,29 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 SPECIES = ("ee", "eo", "oe", "oo")  # parities of Ka and Kc
+MOST_WEIGHT = 2**53  # weights up to here add up exactly
+CUBIC_IRREPS = ("A1", "A2", "E", "F1", "F2")  # of the rotation group O
 
 
 @dataclass(frozen=True)
 class SpinWeights:
     """Weights of the classes of one rule.
 
-    rule: "none", "KaKc" (classes ee, eo, oe, oo), "K" (classes 0 ... n-1: K modulo n), "J" (classes even, odd) or
-    "irrep" (A, E, F of the rotation group T; or A1, A2, E, F1, F2 of the group O).
-    An E level is counted once with its two components inside the weight, as in the usual 5:2:3 of CH4.
+    rule, classes:
+
+    - "none": all levels alike.
+    - "KaKc": ee, eo, oe, oo, parities of Ka and Kc.
+    - "K": 0 ... n-1, |K| modulo n, the weight of one component of a ±K pair. With twofold axes across the main one
+      K = 0 levels alternate with J: "0even" and "0odd" (parity of J) stand for class 0, and a pair with K a multiple
+      of n, which holds one level of each, weighs their sum.
+    - "J": even, odd, the parity of J.
+    - "irrep": A, E, F of the rotation group T; A1, A2, E, F1, F2 of O; A, F1, F2, G, H of I. A degenerate level is
+      counted once with its components inside the weight, as in the usual 5:2:3 of CH4.
 
     >>> SpinWeights.from_mapping({"ee": 10, "eo": 30, "oe": 30, "oo": 10})
     SpinWeights(rule='KaKc', classes=('ee', 'eo', 'oe', 'oo'), values=(1, 3, 3, 1))
+    >>> SpinWeights.from_mapping({"0even": 14, "0odd": 6, "1": 11, "2": 9, "3": 14, "4": 9, "5": 11}).of_symmetric(6, 6)
+    array(20)
     """
 
     rule: str = "none"
@@ -52,80 +63,148 @@ class SpinWeights:
     def mean(self) -> float:
         """The weight of one component averaged over many levels: what the classical limit of Q carries."""
         if self.rule == "irrep":
-            j = np.arange(12)  # the counts of irreps repeat with J modulo 12
+            j = np.arange(60)  # the counts of irreps repeat with J modulo 12 (T, O) or 30 (I)
             return float(self.of_spherical(j).sum() / (2 * j + 1).sum())
-        return sum(self.values) / len(self.values)
+        values = self._by_residue() if self.rule == "K" else self.values
+        return float(sum(values) / len(values))
 
     def of_ka_kc(self, species: str) -> int:
         """Weight of an asymmetric-top level whose parities of Ka and Kc are `species`."""
         if self.rule == "none":
             return 1
-        self._require("KaKc", "an asymmetric top")
+        self._require(("KaKc",), "an asymmetric top")
         return self.values[self.classes.index(species)]
 
-    def of_symmetric(self, j: ArrayLike, k: ArrayLike) -> NDArray[np.int64]:
+    def of_symmetric(self, j: ArrayLike, k: ArrayLike, oblate: bool = False) -> NDArray[np.int64]:
         """Weights of symmetric-top levels (J, |K|), summed over both signs of K.
 
-        Weights are by K modulo n, of one component; a K doublet counts twice.
+        By parities of (Ka, Kc), for a top that is symmetric by numbers or has twofold axes alone, K is Ka, or Kc
+        where `oblate`, and the pair holds both parities of the other; K = 0 holds that of J.
         """
-        k = np.asarray(k)
-        both: NDArray[np.int64] = np.where(k == 0, 1, 2)
+        j, k = np.broadcast_arrays(np.asarray(j), np.asarray(k))
         if self.rule == "none":
-            return both
-        self._require("K", "a symmetric top")
-        return np.asarray(both * np.array(self.values, dtype=np.int64)[k % len(self.values)])
+            return np.asarray(np.where(k == 0, 1, 2))
+        self._require(("K", "KaKc"), "a symmetric top")
+        if self.rule == "KaKc":
+            table = self._whole_numbers().reshape(2, 2)
+            table = table.T if oblate else table
+            return np.asarray(np.where(k == 0, table[0, j % 2], table[k % 2].sum(axis=-1)))
+        doubled = np.rint(2 * self._by_residue()).astype(np.int64)
+        alone = self._whole_numbers()[j % 2 if "0odd" in self.classes else np.zeros_like(j)]
+        return np.asarray(np.where(k == 0, alone, doubled[k % len(doubled)]))
 
     def of_spherical(self, j: ArrayLike) -> NDArray[np.int64]:
-        """Weights of a spherical top's levels of each J, summed over the irreps that its 2J+1 components of K hold."""
+        """Weights of a spherical top's levels of each J, summed over the irreps that its 2J+1 components of K hold.
+
+        A top that is spherical by numbers keeps the weights by K or by parities of (Ka, Kc), summed likewise.
+        """
         j = np.asarray(j)
         if self.rule == "none":
             return np.asarray(2 * j + 1)
-        self._require("irrep", "a spherical top")
-        counts = _irreps_in_j(j, self.classes)
-        total = np.zeros(j.shape, dtype=np.int64)
-        for weight, count in zip(self.values, counts, strict=True):
-            total += weight * count
-        return total
+        self._require(("irrep", "K", "KaKc"), "a spherical top")
+        if self.rule == "irrep":
+            counts = irreps_in_j(j, self.classes)
+            return np.asarray(np.tensordot(self._whole_numbers(), counts, axes=1))
+        sums = [self.of_symmetric(value, np.arange(value + 1)).sum() for value in j.ravel().tolist()]
+        return np.array(sums, dtype=np.int64).reshape(j.shape)
+
+    def of_irrep(self, irrep: str) -> int:
+        """Weight of one level of a spherical top, over its 1, 2 or 3 components, by its irrep A1, A2, E, F1 or F2.
+
+        >>> SpinWeights.from_mapping({"A": 5, "E": 2, "F": 3}).of_irrep("F2")
+        3
+        """
+        if irrep not in CUBIC_IRREPS:
+            raise ValueError(f"irrep {irrep!r}: known are {', '.join(CUBIC_IRREPS)}")
+        if self.rule == "none":
+            return {"A": 1, "E": 2, "F": 3}[irrep[0]]
+        self._require(("irrep",), "a spherical top")
+        if "G" in self.classes:
+            raise ValueError("spin weights of an icosahedral top: a tensor of fourth rank does not split its levels")
+        return int(self._whole_numbers()[self.classes.index(irrep if irrep in self.classes else irrep[0])])
 
     def of_j(self, j: ArrayLike) -> NDArray[np.int64]:
         """Weights of linear-molecule levels, by parity of J."""
         j = np.asarray(j)
         if self.rule == "none":
             return np.ones(j.shape, dtype=np.int64)
-        self._require("J", "a linear molecule")
-        return np.array(self.values, dtype=np.int64)[j % 2]
+        self._require(("J",), "a linear molecule")
+        return np.asarray(self._whole_numbers()[j % 2])
 
-    def _require(self, rule: str, what: str) -> None:
-        if self.rule != rule:
+    def _by_residue(self) -> NDArray[np.float64]:
+        """Weight of one component of a pair with |K| > 0, by |K| modulo n; half of 0even + 0odd for residue 0."""
+        values = self._whole_numbers().astype(np.float64)
+        return np.concatenate([[values[:2].mean()], values[2:]]) if "0odd" in self.classes else values
+
+    def _whole_numbers(self) -> NDArray[np.int64]:
+        if max(self.values) > MOST_WEIGHT:
+            raise ValueError(
+                f"the largest spin weight has {len(str(max(self.values)))} digits, too many to add up exactly; so many "
+                "spins leave the weights alike but for a tiny part: use none"
+            )
+        return np.array(self.values, dtype=np.int64)
+
+    def _require(self, rules: tuple[str, ...], what: str) -> None:
+        if self.rule not in rules:
             raise ValueError(
                 f"spin weights by {self.rule} ({', '.join(self.classes)}) do not fit {what}; "
-                f"give {_EXAMPLES[rule]} or none"
+                f"give {_EXAMPLES[rules[0]]} or none"
             )
 
 
-def _irreps_in_j(j: NDArray[np.int64], classes: tuple[str, ...]) -> list[NDArray[np.int64]]:
-    """How often each irrep of T or O stands in the 2J+1 components of K; E counts pairs, F triples.
+# Irreps of the rotation groups: order of the rotations of each class, how often it is turned by 2π/order, number of
+# rotations in it, and the characters by class (Bunker and Jensen, Molecular Symmetry and Spectroscopy, appendix A).
+# E of the group T stands for its two conjugate halves together. g = (1 + √5)/2.
+_G = (1 + 5**0.5) / 2
+_IRREPS: dict[tuple[str, ...], tuple[tuple[tuple[int, int, int], ...], tuple[tuple[float, ...], ...]]] = {
+    ("A", "E", "F"): (
+        ((1, 0, 1), (3, 1, 8), (2, 1, 3)),
+        ((1, 1, 1), (2, -1, 2), (3, 0, -1)),
+    ),
+    ("A1", "A2", "E", "F1", "F2"): (
+        ((1, 0, 1), (3, 1, 8), (2, 1, 3), (4, 1, 6), (2, 1, 6)),  # of the twofold ones first those along fourfold axes
+        ((1, 1, 1, 1, 1), (1, 1, 1, -1, -1), (2, -1, 2, 0, 0), (3, 0, -1, 1, -1), (3, 0, -1, -1, 1)),
+    ),
+    ("A", "F1", "F2", "G", "H"): (
+        ((1, 0, 1), (5, 1, 12), (5, 2, 12), (3, 1, 20), (2, 1, 15)),
+        ((1, 1, 1, 1, 1), (3, _G, 1 - _G, 0, -1), (3, 1 - _G, _G, 0, -1), (4, -1, -1, 1, 0), (5, 0, 0, -1, 1)),
+    ),
+}
+IRREPS = dict(zip("TOI", _IRREPS, strict=True))
 
-    By characters: χ(C3) = 1, 0, -1 for J mod 3; χ(C2) = (-1)^J; χ(C4) = 1, 1, -1, -1 for J mod 4 (Bunker and Jensen,
-    table B-2).
+
+def character_table(irreps: tuple[str, ...]) -> tuple[tuple[tuple[int, int, int], ...], tuple[tuple[float, ...], ...]]:
+    """Classes of rotations of T, O or I, as (n, k, how many) for the angle 2πk/n, and the characters of the irreps.
+
+    >>> character_table(IRREPS["T"])[0]
+    ((1, 0, 1), (3, 1, 8), (2, 1, 3))
     """
-    n = 2 * j + 1
-    c2, c3 = 1 - 2 * (j % 2), np.array([1, 0, -1])[j % 3]
-    if len(classes) == 3:
-        return [(n + 3 * c2 + 8 * c3) // 12, (n + 3 * c2 - 4 * c3) // 12, (n - c2) // 4]
-    c4 = np.array([1, 1, -1, -1])[j % 4]
-    return [
-        (n + 8 * c3 + 6 * c2 + 6 * c4 + 3 * c2) // 24,
-        (n + 8 * c3 - 6 * c2 - 6 * c4 + 3 * c2) // 24,
-        (2 * n - 8 * c3 + 6 * c2) // 24,
-        (3 * n - 6 * c2 + 6 * c4 - 3 * c2) // 24,
-        (3 * n + 6 * c2 - 6 * c4 - 3 * c2) // 24,
-    ]
+    return _IRREPS[irreps]
+
+
+def irreps_in_j(j: NDArray[np.int64], irreps: tuple[str, ...]) -> NDArray[np.int64]:
+    """How often each irrep of T, O or I (first axis) stands in the 2J+1 components of K; degenerate ones count once.
+
+    n = Σ g χ_irrep χ_J / Σ g over the classes of g rotations by the angle 2πk/n, where the character of the 2J+1
+    functions, χ_J = sin((2J+1)πk/n)/sin(πk/n), is the same for J + n.
+
+    >>> irreps_in_j(np.arange(4), IRREPS["I"]).T.tolist()
+    [[1, 0, 0, 0, 0], [0, 1, 0, 0, 0], [0, 0, 0, 0, 1], [0, 0, 1, 1, 0]]
+    """
+    classes, table = _IRREPS[irreps]
+    sizes = np.array([size for _, _, size in classes], dtype=np.float64)
+    characters = []
+    for n, k, _ in classes:
+        angle = np.pi * k / n
+        characters.append(2 * j + 1 if n == 1 else np.sin((2 * (j % n) + 1) * angle) / np.sin(angle))
+    counts = np.tensordot(np.array(table) * sizes, np.array(characters, dtype=float), axes=1) / sizes.sum()
+    halves = np.array([2 if name == "E" and len(irreps) == 3 else 1 for name in irreps])
+    return np.asarray(np.rint(counts / halves.reshape((-1,) + (1,) * np.ndim(j))), dtype=np.int64)
 
 
 _EXAMPLES = {
     "KaKc": '{"ee": 1, "eo": 3, "oe": 3, "oo": 1}',
-    "K": '{"0": 2, "1": 1, "2": 1} (by K modulo 3)',
+    "K": '{"0": 2, "1": 1, "2": 1} (by K modulo 3; "0even" and "0odd" in place of "0" where J matters)',
     "J": '{"even": 1, "odd": 3}',
     "irrep": '{"A": 5, "E": 2, "F": 3}',
 }
@@ -136,12 +215,11 @@ def _rule_of(names: set[str]) -> tuple[str, tuple[str, ...]]:
         return "KaKc", SPECIES
     if names == {"even", "odd"}:
         return "J", ("even", "odd")
-    for irreps in (("A", "E", "F"), ("A1", "A2", "E", "F1", "F2")):
+    for irreps in IRREPS.values():
         if names == set(irreps):
             return "irrep", irreps
-    by_k = tuple(str(i) for i in range(len(names)))
-    if len(names) > 1 and names == set(by_k):
-        return "K", by_k
-    raise ValueError(
-        f"spin weights by {sorted(names)}: no rule has these classes; write " + " or ".join(_EXAMPLES.values())
-    )
+    for by_k in (tuple(map(str, range(len(names)))), ("0even", "0odd", *map(str, range(1, len(names) - 1)))):
+        if len(names) > 1 and names == set(by_k):
+            return "K", by_k
+    examples = " or ".join(_EXAMPLES.values())
+    raise ValueError(f"spin weights by {sorted(names)}: no rule has these classes; write {examples}")

@@ -43,3 +43,25 @@ def watson_matrix(values: dict[str, float], reduction: str, representation: str,
     total = total + v("d1") * j2 @ pair(1) + v("d2") * pair(2)
     total = total + v("HJ") * j2 @ j2 @ j2 + v("HJK") * j2 @ j2 @ z2 + v("HKJ") * j2 @ z4 + v("HK") * z6
     return total + v("h1") * j2 @ j2 @ pair(1) + v("h2") * j2 @ pair(2) + v("h3") * pair(3)
+
+
+def term_matrix(p: int, q: int, n: int, j: int) -> np.ndarray:
+    """J^2p ½[Jz^2q, J₊^2n + J₋^2n]₊, for n = 0 J^2p Jz^2q, by multiplying operators."""
+    _, _, jz, up, down = body_operators(j)
+    power = np.linalg.matrix_power
+    ladder = power(up, 2 * n) + power(down, 2 * n) if n else np.eye(2 * j + 1)
+    return (j * (j + 1.0)) ** p * _anti(power(jz, 2 * q), ladder)
+
+
+def cubic_matrix(j: int) -> np.ndarray:
+    """6 J⁴ - 2 J² - 10 (Jx⁴ + Jy⁴ + Jz⁴), as it is printed."""
+    x = j * (j + 1.0)
+    fourth = sum(np.linalg.matrix_power(component, 4) for component in body_operators(j)[:3])
+    return (6 * x**2 - 2 * x) * np.eye(2 * j + 1) - 10 * fourth
+
+
+def threefold_turn(j: int) -> np.ndarray:
+    """The turn by 120° about (1, 1, 1)."""
+    x, y, z, _, _ = body_operators(j)
+    values, vectors = np.linalg.eigh((x + y + z) / np.sqrt(3))
+    return (vectors * np.exp(-2j * np.pi / 3 * values)) @ vectors.conj().T

@@ -3,21 +3,40 @@
 from __future__ import annotations
 
 import gzip
+import importlib.util
+import sys
+from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import pytest
 from plain_watson import levels
 
-from rotor.formats.library import library_molecule, names
+from rotor.formats.library import folders, library_molecule
 from rotor.formats.molecule_file import MoleculeFile, read_molecule_file
 from rotor.formats.spcat.cat import read_cat
-from rotor.formats.spcat.fields import BLANK
+from rotor.molecules.spin_statistics import weights_of
 from rotor.quantum.levels import solve_levels
-from rotor.top import Top
+from rotor.top import SYMMETRIC_WITHIN, Top
 from rotor.units import MHZ_PER_CM, ROTATIONAL_MHZ_U_ANGSTROM2
 
-MOLECULES = [read_molecule_file(path) for path in sorted(set(names().values()))]
-every = pytest.mark.parametrize("molecule", MOLECULES, ids=lambda molecule: molecule.name)
+DOCS = Path(__file__).resolve().parents[1] / "docs"
+MOLECULES = {path.stem: read_molecule_file(path) for path in sorted(folders()[-1].glob("*.toml"))}
+every = pytest.mark.parametrize("molecule", MOLECULES.values(), ids=MOLECULES)
+measured = pytest.mark.parametrize("stem", [stem for stem, molecule in MOLECULES.items() if molecule.catalogue])
+
+LIBRARY = """H2, N2, O2, CO, CO2, HCN, N2O, HC3N, HC5N, HCP, C2H2, OCS, CH4, CD4, SF6, CCl4, NH3, PH3, CH3F, CH3Cl, CH3I, CH3CN,
+CH3CCH, CHCl3, benzene, SO3, H2O, HDO, D2O, H2S, H2CO, H2CS, SO2, O3, HCOOH, HNCO, formamide, ketene, ethylene,
+ethylene oxide, propylene oxide, vinyl cyanide, furan, pyridine, benzonitrile, indole, glycolaldehyde, camphor"""
+WANTED = [name.strip() for name in LIBRARY.split(",")]
+
+
+@pytest.fixture(scope="module")
+def make_library() -> ModuleType:
+    spec = importlib.util.spec_from_file_location("make_library", DOCS / "make_library.py")
+    module = sys.modules["make_library"] = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
 
 
 def moments(molecule: MoleculeFile) -> tuple[np.ndarray, np.ndarray]:
@@ -27,8 +46,15 @@ def moments(molecule: MoleculeFile) -> tuple[np.ndarray, np.ndarray]:
     return np.linalg.eigh(np.eye(3) * (m @ (r**2).sum(axis=1)) - (m[:, None] * r).T @ r)
 
 
-def test_the_library_has_its_eight_molecules():
-    assert {"CO", "OCS", "HC3N", "CH4", "CH3CN", "H2O", "H2CO", "SO2"} <= names().keys()
+@pytest.mark.parametrize("name", WANTED)
+def test_the_library_has_its_molecules(name):
+    assert library_molecule(name).name in {molecule.name for molecule in MOLECULES.values()}
+
+
+def test_the_library_spans_every_kind():
+    kinds = [molecule.constants.kind for molecule in MOLECULES.values()]
+    assert len(kinds) == len(WANTED)
+    assert all(kinds.count(kind) >= 4 for kind in ("linear", "spherical", "prolate", "oblate", "asymmetric"))
 
 
 @every
@@ -45,7 +71,8 @@ def test_geometry_gives_the_constants_within_the_stated_difference(molecule):
     computed = ROTATIONAL_MHZ_U_ANGSTROM2 / inertia[3 - len(known) :]
     difference = np.abs(computed / known - 1).max()
     assert difference < molecule.vibrational_difference
-    assert difference > molecule.vibrational_difference / 4  # the bound is a statement, not a blank cheque
+    if "estimated from" not in molecule.sources["constants"]:  # CCl4's constant is that of its geometry
+        assert difference > molecule.vibrational_difference / 4  # the bound is a statement, not a blank cheque
 
 
 @every
@@ -54,33 +81,73 @@ def test_geometry_has_the_symmetry_of_its_kind(molecule):
     kind = molecule.constants.kind
     if kind == "linear":
         assert a < 1e-12 * c  # round-off
-    elif kind == "asymmetric":  # all of ours are planar: I_c = I_a + I_b
-        assert a + b == pytest.approx(c, rel=1e-12)
-        assert a < 0.99 * b < 0.99 * c
+    elif kind == "asymmetric":
+        assert a < 0.999 * b < 0.999 * c
     else:
-        assert b == pytest.approx(c, rel=1e-5)  # coordinates have six decimals
-        assert (a == pytest.approx(b, rel=1e-5)) == (kind == "spherical")
+        same = (b, c) if kind == "prolate" else (a, b)
+        assert same[0] == pytest.approx(same[1], rel=1e-5)  # coordinates have six decimals
+        assert (a == pytest.approx(c, rel=1e-5)) == (kind == "spherical")
+    assert Top.from_molecule(molecule.molecule).kind == kind
 
 
-@pytest.mark.parametrize(
-    ("name", "axis"), [("H2O", 1), ("SO2", 1), ("H2CO", 0), ("CH3CN", 0), ("OCS", 0), ("CO", 0), ("HC3N", 0)]
-)
-def test_dipole_lies_on_the_symmetry_axis(name, axis):
-    molecule = library_molecule(name)
-    assert np.flatnonzero(molecule.dipole_abc_debye).tolist() == [axis]
-    along = moments(molecule)[1][:, axis]
-    assert np.abs(along).tolist() == pytest.approx([0, 0, 1], abs=1e-9)  # our files have the symmetry axis along z
+PLANAR = "H2O HDO D2O H2S H2CO H2CS SO2 O3 HCOOH HNCO CH2CO HCONH2 C2H4 CH2CHCN C4H4O C5H5N C6H5CN C8H7N C6H6 SO3"
+
+
+@pytest.mark.parametrize("stem", PLANAR.split())
+def test_planar_molecules_are_planar(stem):
+    """I_c = I_a + I_b of the geometry; of measured constants I_c is larger, by vibration in the plane."""
+    a, b, c = moments(MOLECULES[stem])[0]
+    assert a + b == pytest.approx(c, rel=2e-5)  # coordinates have six decimals; MMFF94 bends indole by 2e-3 Å
+    a, b, c = (ROTATIONAL_MHZ_U_ANGSTROM2 / x for x in MOLECULES[stem].constants.rigid)
+    assert (
+        -1e-3 * c < c - a - b < 0.02 * c + 0.3
+    )  # u Å²: formamide's NH2 lies nearly flat; zero-point motion of benzene
+
+
+AXES = {
+    "a": "H2CO H2CS CH2CO C4H4O C5H5N C6H5CN CH3CN CH3F CH3Cl CH3I CH3CCH OCS CO HC3N HC5N HCN HCP N2O",
+    "b": "H2O D2O H2S SO2 O3 C2H4O",
+    "c": "NH3 PH3 CHCl3",
+}
+
+
+@pytest.mark.parametrize(("axis", "stem"), [(axis, stem) for axis, stems in AXES.items() for stem in stems.split()])
+def test_dipole_lies_on_the_symmetry_axis(axis, stem):
+    molecule, i = MOLECULES[stem], "abc".index(axis)
+    assert np.flatnonzero(molecule.dipole_abc_debye).tolist() == [i]
+    along = moments(molecule)[1][:, i]
+    assert np.abs(along).tolist() == pytest.approx([0, 0, 1], abs=1e-5)  # along z in our files, to six decimals of Å
+
+
+@every
+def test_dipole_is_zero_where_symmetry_forbids_it(molecule):
+    top = Top.from_molecule(molecule.molecule)  # leaves out what the point group forbids
+    assert np.abs(top.dipole_abc_debye) == pytest.approx(
+        np.abs(molecule.dipole_abc_debye), abs=1e-5
+    )  # six decimals of Å
+
+
+@every
+def test_spin_weights_are_those_of_the_geometry(molecule):
+    electronic = "odd" if molecule.name == "oxygen" else "even"  # 3Σg- changes sign under a half turn
+    assert weights_of(molecule.molecule, SYMMETRIC_WITHIN, electronic) == molecule.spin_weights
 
 
 def test_spin_weights_are_those_of_the_textbook():
-    def weights(name: str) -> dict[str, int]:
-        return library_molecule(name).spin_weights.to_mapping()
+    def weights(stem: str) -> dict[str, int]:
+        return MOLECULES[stem].spin_weights.to_mapping()
 
     assert weights("H2O") == {"ee": 1, "eo": 3, "oe": 3, "oo": 1}  # 1(01) is ortho
+    assert weights("D2O") == {"ee": 2, "eo": 1, "oe": 1, "oo": 2}
+    assert weights("HDO") == {}
     assert weights("H2CO") == {"ee": 1, "eo": 1, "oe": 3, "oo": 3}
     assert weights("SO2") == {"ee": 1, "eo": 0, "oe": 0, "oo": 1}
+    assert weights("C2H4") == {"ee": 7, "eo": 3, "oe": 3, "oo": 3}
     assert weights("CH3CN") == {"0": 2, "1": 1, "2": 1}
     assert weights("CH4") == {"A": 5, "E": 2, "F": 3}
+    assert weights("SF6") == {"A1": 1, "A2": 5, "E": 4, "F1": 3, "F2": 3}  # 2:10:8:6:6
+    assert weights("C6H6") == {"0even": 14, "0odd": 6, "1": 11, "2": 9, "3": 14, "4": 9, "5": 11}  # 7:3, 11, 9, 14
+    assert weights("N2") == {"even": 2, "odd": 1}
 
 
 def energy(molecule: MoleculeFile):
@@ -90,12 +157,13 @@ def energy(molecule: MoleculeFile):
 
     def symmetric(j: int, k: int = 0) -> float:
         x, z = j * (j + 1), k * k
-        names_of = {"linear": ("B", "D", "H", "L"), "prolate": ("B", "DJ", "HJ", "LJ")}[kind]
+        names_of = ("B", "D", "H", "L") if kind == "linear" else ("B", "DJ", "HJ", "LJ")
         total = sum((-1 if n == 2 else 1) * values.get(name, 0.0) * x**n for n, name in enumerate(names_of, start=1))
         mixed = {"DJK": (1, 1), "DK": (0, 2), "HJK": (2, 1), "HKJ": (1, 2), "HK": (0, 3), "LJJK": (3, 1)}
         mixed |= {"LJK": (2, 2), "LKKJ": (1, 3), "PJJK": (4, 1), "PJK": (3, 2)}
         total += sum((-1 if n[0] == "D" else 1) * values.get(n, 0.0) * x**p * z**q for n, (p, q) in mixed.items())
-        return total + (values["A"] - values["B"]) * z if kind == "prolate" else total
+        other = {"linear": 0.0, "prolate": values.get("A", 0.0), "oblate": values.get("C", 0.0)}[kind]
+        return total + (other - values["B"]) * z if other else total
 
     def asymmetric(j: int, ka: int, kc: int) -> float:
         if j not in done:
@@ -105,36 +173,38 @@ def energy(molecule: MoleculeFile):
     return asymmetric if kind == "asymmetric" else symmetric
 
 
-def catalogue_lines(molecule: MoleculeFile, shared):
-    """(frequency, error, upper, lower) of the ground state's lines in the stated range, and which are measured."""
-    tag = molecule.catalogue
-    found = read_cat(gzip.decompress((shared / "reference" / "catalogues" / f"{tag.tag}.cat.gz").read_bytes()))
-    width = {"linear": 1, "prolate": 2, "asymmetric": 3}[molecule.constants.kind]
-    for i in range(len(found)):
-        quanta = [q[i].tolist() for q in (found.quanta_upper, found.quanta_lower)]
-        excited = any(rest not in (0, BLANK) for q in quanta for rest in q[width:])
-        j, k = (max(q[n] for q in quanta) for n in (0, 1))
-        beyond = j > (tag.j_max or 99) or (tag.k_max is not None and k > tag.k_max)
-        if not (excited or beyond):
-            yield found.tag[i] < 0, found.frequency_mhz[i], found.error_mhz[i], *(tuple(q[:width]) for q in quanta)
-
-
 @pytest.mark.oracle
-@pytest.mark.parametrize("name", ["CO", "OCS", "HC3N", "CH3CN", "H2O", "H2CO", "SO2"])
-def test_constants_meet_the_measured_lines_as_stated(name, shared):
-    molecule = library_molecule(name)
+@measured
+def test_constants_meet_the_measured_lines_as_stated(stem, shared, make_library):
+    """Levels by full matrices and closed forms, which share nothing with the package."""
+    molecule = MOLECULES[stem]
     of = energy(molecule)
-    off = [f - (of(*up) - of(*low)) for seen, f, _, up, low in catalogue_lines(molecule, shared) if seen]
+    lines = make_library.measured_lines(molecule, shared / "reference" / "catalogues")
+    known = {level: of(*level) for line in lines for part in line.components for level in part[:2]}
+    off = [line.frequency_mhz - make_library.frequency(line, known, molecule.name) for line in lines]
     assert len(off) == molecule.catalogue.lines
     rms = float(np.sqrt(np.mean(np.square(off))))
     assert 0.85 * molecule.catalogue.rms_mhz < rms < molecule.catalogue.rms_mhz * 1.02  # stated with two digits
 
 
-@pytest.mark.parametrize(("name", "jmax"), [("H2O", 12), ("SO2", 25), ("CH3CN", 20), ("OCS", 20)])
+@pytest.mark.oracle
+def test_the_page_of_the_library_is_up_to_date(shared, make_library):
+    """Made with the package's own levels. Mend with: python docs/make_library.py CATALOGUES > docs/library.md."""
+    assert make_library.page(shared / "reference" / "catalogues") == (DOCS / "library.md").read_text(encoding="utf-8")
+
+
+@every
+def test_the_page_of_the_library_has_every_molecule(molecule):
+    assert f"| {molecule.name} | {molecule.constants.kind} |" in (DOCS / "library.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("name", "jmax"), [("H2O", 12), ("SO2", 25), ("H2S", 10), ("C2H4O", 12), ("CH3CN", 20), ("NH3", 12), ("OCS", 20)]
+)
 def test_package_and_plain_route_have_the_same_levels(name, jmax):
     molecule = library_molecule(name)
     of, found = energy(molecule), solve_levels(Top.from_constants(molecule.constants), jmax, vectors=False)
-    width = {"linear": 1, "prolate": 2, "asymmetric": 3}[found.kind]
+    width = {"linear": 1, "prolate": 2, "oblate": 2, "asymmetric": 3}[found.kind]
     quanta = np.stack([found.j, found.ka, found.kc], axis=1)[:, :width].tolist()
     plain = [of(*q) for q in quanta]
     assert len(quanta) >= jmax + 1

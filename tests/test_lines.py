@@ -147,6 +147,18 @@ def test_compiled_and_plain_loops_give_the_same_bits(monkeypatch):
         assert np.array_equal(getattr(plain, name), getattr(compiled, name))
 
 
+@pytest.mark.parametrize(
+    "settings", [{"min_lgint": -7.0}, {"min_lgint": None, "range_mhz": (1e3, 9e4)}, {"range_mhz": (0, 5e5)}]
+)
+def test_compiled_and_plain_choices_are_the_same(monkeypatch, settings):
+    top = Top.from_constants(ABC, dipole_abc_debye=(1.2, 1.9, 0.4))
+    plain = line_list(top, jmax=15, **settings)
+    monkeypatch.setattr(transitions, "LONG_LIST", 0)
+    compiled = line_list(top, jmax=15, **settings)
+    assert np.array_equal(plain.frequency_mhz, compiled.frequency_mhz)
+    assert np.array_equal(plain.upper, compiled.upper)
+
+
 def test_given_q_and_vibrational_factor():
     top = Top.from_constants("B=57635.968 MHz", dipole_abc_debye=(0.11, 0, 0))
     plain, doubled = line_list(top, jmax=3, q=100.0), line_list(top, jmax=3, q=100.0, vibrational_factor=2.0)

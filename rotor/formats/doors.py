@@ -11,7 +11,7 @@ from typing import Any
 from rotor.constants import Constants
 from rotor.formats.library import library_file
 from rotor.formats.molecule_file import MoleculeFile, parse_molecule_file, read_molecule_file
-from rotor.molecules.molecule import Molecule
+from rotor.isotopologues import isotopologue
 from rotor.molecules.readers import g2_names, read_molecule
 from rotor.top import Top
 
@@ -30,8 +30,8 @@ def read(source: Any, *, isotopes: Isotopes | None = None) -> Any:
         `ase.io.read` knows; .toml: a molecule file or constants alone; .par, .var, .int: input of SPFIT and SPCAT;
         .cat: a catalogue; .hitran, and .par where its first line is a record of 160 characters: HITRAN's lines.
     isotopes : mapping or str, optional
-        Substitutions such as `"1=2H"` (atom 1) or `"O=18O"` (every O). A molecule of the library then loses its measured
-        constants, since they belong to another isotopologue, and becomes the rigid top of its geometry.
+        Substitutions such as `"1=2H"` (atom 1) or `"O=18O"` (every O). Measured constants of a library molecule are then
+        carried over by the ratio of those calculated from its geometry, and a note says so (`rotor.isotopologues`).
 
     Returns
     -------
@@ -46,16 +46,16 @@ def read(source: Any, *, isotopes: Isotopes | None = None) -> Any:
     'linear'
     """
     if isinstance(source, Top):
-        return source if not isotopes else _from_molecule(_geometry_of(source), isotopes)
+        return _with_isotopes(source, isotopes)
     if isinstance(source, Constants):
-        return Top.from_constants(source)
+        return _with_isotopes(Top.from_constants(source), isotopes)
     if isinstance(source, str) and source != "-" and not source.startswith("SMILES:"):
         source = _meaning(source)
     if isinstance(source, Path):
         return _read_path(source, isotopes)
     if source == "-":
         return _read_standard_input(isotopes)
-    return _from_molecule(read_molecule(source), isotopes)
+    return _with_isotopes(Top.from_molecule(read_molecule(source)), isotopes)
 
 
 def _meaning(word: str) -> Path | str:
@@ -87,16 +87,18 @@ def _read_path(path: Path, isotopes: Isotopes | None) -> Any:
     if suffixes.endswith((".cat", ".cat.gz")):
         from rotor.formats.spcat.cat import read_cat
 
+        if isotopes:
+            raise ValueError(f"{path}: isotopes cannot be changed in a catalogue; give a molecule with a geometry")
         return read_cat(path)
     if suffixes.endswith((".hitran", ".hitran.gz")) or _is_hitran(path):
         from rotor.formats.hitran import read_hitran
 
         return read_hitran(path)
     if suffixes.endswith((".par", ".var", ".int")):
-        return _read_spcat(path)
+        return _with_isotopes(_read_spcat(path), isotopes)
     if suffixes.endswith(".toml"):
         return top_of_file(read_molecule_file(path), isotopes)
-    return _from_molecule(read_molecule(path), isotopes)
+    return _with_isotopes(Top.from_molecule(read_molecule(path)), isotopes)
 
 
 def _is_hitran(path: Path) -> bool:
@@ -136,30 +138,20 @@ def _read_standard_input(isotopes: Isotopes | None) -> Top:
         raise ValueError("standard input is empty; a geometry (xyz, sdf) or a TOML of constants is wanted")
     if any(line.strip().startswith("[constants]") for line in text.splitlines()):
         return top_of_file(parse_molecule_file(text, "standard input"), isotopes)
-    return _from_molecule(parse_molecule(text, "standard input"), isotopes)
+    return _with_isotopes(Top.from_molecule(parse_molecule(text, "standard input")), isotopes)
 
 
-def _geometry_of(top: Top) -> Molecule:
-    if top.molecule is None:
-        raise ValueError(f"isotopes cannot be changed in {top.name or 'constants alone'}: there is no geometry")
-    return top.molecule
-
-
-def _from_molecule(molecule: Molecule, isotopes: Isotopes | None) -> Top:
-    return Top.from_molecule(molecule.with_isotopes(isotopes) if isotopes else molecule)
+def _with_isotopes(top: Top, isotopes: Isotopes | None) -> Top:
+    return isotopologue(top, isotopes).top if isotopes else top
 
 
 def top_of_file(file: MoleculeFile, isotopes: Isotopes | None = None) -> Top:
     """The top that a molecule file describes: its constants if it has some, else those of its geometry."""
+    return _with_isotopes(_top_as_written(file), isotopes)
+
+
+def _top_as_written(file: MoleculeFile) -> Top:
     geometry = Top.from_molecule(file.molecule) if file.molecule is not None else None
-    if isotopes:
-        if file.molecule is None:
-            raise ValueError(f"{file.name}: isotopes cannot be changed, the file has constants but no geometry")
-        top = _from_molecule(file.molecule, isotopes)
-        note = f"the measured constants of {file.name} belong to another isotopologue; these are of its rigid geometry"
-        return replace(
-            top, name=f"{file.name} ({top.molecule.formula if top.molecule else ''})", notes=(*top.notes, note)
-        )
     if file.constants is None:
         assert geometry is not None  # the reader refuses a file with neither
         return replace(geometry, name=file.name)
@@ -172,6 +164,7 @@ def top_of_file(file: MoleculeFile, isotopes: Isotopes | None = None) -> Top:
         source=file.sources.get("constants", ""),
         dipole_source=file.sources.get("dipole", ""),
         weights_source=file.sources.get("spin_weights", ""),
+        independent_errors=len(file.constants.uncertainties) < 2,
     )
 
 
@@ -186,7 +179,12 @@ def write(thing: Any, path: str | os.PathLike[str], *, settings: Mapping[str, An
     from rotor.formats.hitran import HitranLines, write_hitran
     from rotor.formats.spcat.catalogue import Catalogue
     from rotor.spectra.lines import Lines
+    from rotor.spectra.spectrum import Spectrum
 
+    if isinstance(thing, Spectrum):
+        from rotor.formats.spectrum_table import write_spectrum
+
+        return write_spectrum(thing, path, settings)
     if isinstance(thing, Lines):
         from rotor.formats.line_tables import write_lines
 

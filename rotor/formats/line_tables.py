@@ -29,8 +29,8 @@ PIECE = 1 << 16  # lines of a long list that are made into text at once
 def catalogue(lines: Lines, tag: int = 0) -> Catalogue:
     """The lines as a catalogue of the 80-column format.
 
-    Lines of zero strength have no logarithm and are left out; ERR is 0, since the constants' uncertainties are not
-    carried to the lines. Raises ValueError for a tag that has no place in its six digits.
+    Lines of zero strength have no logarithm and are left out; ERR is 0 where no uncertainty of a constant is known.
+    Raises ValueError for a tag that has no place in its six digits.
     """
     if not 0 <= tag <= MAX_TAG:
         raise ValueError(f"tag {tag}: a catalogue's tag has at most six digits")
@@ -44,7 +44,7 @@ def catalogue(lines: Lines, tag: int = 0) -> Catalogue:
         quanta[:, i] = levels.ka if name == "k" else getattr(levels, name)
     return Catalogue(
         frequency_mhz=lines.frequency_mhz,
-        error_mhz=np.zeros(n),
+        error_mhz=np.zeros(n) if (error := lines.error_mhz) is None else error,
         lgint=lgint,
         dr=np.full(n, 2 if levels.kind == "linear" else 3, dtype=np.int16),
         energy_lower_cm=lines.energy_lower_cm,
@@ -80,6 +80,7 @@ def top_provenance(top: Top) -> dict[str, Any]:
 def provenance(lines: Lines) -> dict[str, Any]:
     """What the lines were made from: the top and its sources, the settings, Q."""
     return top_provenance(lines.top) | {
+        "errors_from": errors_from(lines),
         "temperature_k": lines.temperature_k,
         "jmax": lines.jmax,
         "min_lgint": finite_or_none(lines.min_lgint),
@@ -87,7 +88,18 @@ def provenance(lines: Lines) -> dict[str, Any]:
         "q": lines.q,
         "q_source": lines.partition.source,
         "lines": len(lines),
+        "warnings": list(lines.warnings),
     }
+
+
+def errors_from(lines: Lines) -> str | None:
+    """Which uncertainties the errors of frequencies come from, None where there are none."""
+    if lines.covariance is not None:
+        return f"covariance of {', '.join(lines.covariance.names)}"
+    known = lines.top.constants.uncertainties
+    if known and lines.covariance_used is None:
+        return "none: the constants are from a fit whose correlations are not known"
+    return f"uncertainties of {', '.join(known)}, uncorrelated" if known else None
 
 
 def finite_or_none(value: float) -> float | None:
@@ -131,7 +143,7 @@ def _write_catalogue(lines: Lines, path: str | os.PathLike[str], tag: int) -> No
     if len(lines) <= PIECE:
         return write_cat(catalogue(lines, tag), path)
 
-    _ = lines.partition  # summed once, before the pieces ask for it
+    _ = lines.partition, lines.spread  # made once, before the pieces ask for them
 
     def text(start: int) -> bytes:
         return format_lines(catalogue(lines.where(slice(start, start + PIECE)), tag))
@@ -179,7 +191,7 @@ def records(lines: Lines) -> list[dict[str, float | int | None]]:
 
 
 def write_beside(path: str | os.PathLike[str], story: Mapping[str, Any]) -> None:
-    """Write the provenance of `path` in a file beside it."""
+    """Write the provenance of a file whose format has no place for it, as `path` + ".provenance.json"."""
     with open_atomic(f"{os.fspath(path)}.provenance.json", "w", encoding="utf-8") as handle:
         json.dump(story, handle, indent=1, ensure_ascii=False)
         handle.write("\n")

@@ -4,7 +4,7 @@
     names = ["H2O"]
 
     [geometry]                          # Å, any frame; isotopes as "18O" or "D"
-    kind = "r0"                         # r0, rs or re
+    kind = "r0"                         # r0, rs, re, or computed (a force field, quantum chemistry)
     source = "..."
     vibrational_difference = 0.02       # how far A, B, C of this geometry may be from the constants, relative
     atoms = [["O", 0.0, 0.0, 0.1], ...]
@@ -58,7 +58,7 @@ from rotor.molecules.molecule import Molecule
 from rotor.units import parse_quantity
 from rotor.weights import SpinWeights
 
-GEOMETRY_KINDS = ("r0", "rs", "re")
+GEOMETRY_KINDS = ("r0", "rs", "re", "computed")
 _TABLES = ("geometry", "constants", "dipole", "spin_weights", "catalogue")
 _RULES = {"linear": "J", "spherical": "irrep", "prolate": "K", "oblate": "K", "asymmetric": "KaKc"}
 
@@ -85,7 +85,7 @@ class MoleculeFile:
 
     name, names : what the molecule is called, other names
     molecule : its geometry, with the dipole turned into the same frame; None in a file without one
-    geometry_kind : "r0", "rs" or "re"
+    geometry_kind : "r0", "rs", "re" or "computed"
     vibrational_difference : bound of the relative difference between A, B, C of the geometry and the constants
     constants : in MHz; None in a file without them
     dipole_abc_debye : (μa, μb, μc) in D. The sign of a single component has no bearing on a spectrum

@@ -157,6 +157,17 @@ def element_symbol(number: int) -> str:
     raise ValueError(f"{number} is not the atomic number of an element in data/isotopes.csv; hydrogen is 1, carbon 6")
 
 
+def natural_isotopes(symbol: str) -> tuple[Isotope, ...]:
+    """The isotopes that nature has of an element, the most abundant first; none of technetium.
+
+    >>> [one.label for one in natural_isotopes("O")]
+    ['16O', '18O', '17O']
+    """
+    element, _ = _split(symbol)
+    natural = [one for one in _table()[element].values() if one.abundance > 0]
+    return tuple(sorted(natural, key=lambda one: -one.abundance))
+
+
 def isotope_of_mass(symbol: str, mass_u: float, within_u: float = 0.01) -> Isotope:
     """The isotope of an element that has a given mass in u; ValueError where none is within `within_u`.
 

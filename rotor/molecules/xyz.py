@@ -126,7 +126,10 @@ def _extended(comment: str, where: str) -> tuple[dict[str, Any], _Columns]:
     from ase.io import extxyz
 
     read_pairs: Callable[[str], dict[str, Any]] = extxyz.key_val_str_to_dict
-    info = read_pairs(comment)
+    try:
+        info = read_pairs(comment)
+    except (IndexError, ValueError) as reason:
+        raise ValueError(f"{where}: {comment!r:.80} is no list of key=value; mend its quotes and brackets") from reason
     if "Properties" not in info:
         return info, _Columns()
     words = str(info["Properties"]).split(":")

@@ -16,7 +16,9 @@ from numpy.typing import NDArray
 
 from rotor.effects import QuantumEffect
 from rotor.quantum.basis import WangBlock, ka_kc, wang_blocks
-from rotor.quantum.watson import Centrifugal, Multiplet, Operators, Rigid, block_bands, rigid_operators, scalar_energy
+from rotor.quantum.clusters import DIMENSION, scalar_and_tensor, tensor_eigenvalues
+from rotor.quantum.watson import Centrifugal, Multiplet, Rigid, block_bands, rigid_operators, scalar_energy
+from rotor.terms import Operators
 from rotor.weights import SpinWeights
 
 if TYPE_CHECKING:
@@ -54,7 +56,8 @@ class Levels:
     energy_mhz: E/h in MHz from the Hamiltonian's zero. j, ka, kc: quantum numbers; a symmetric top has K in `ka` (one
     row for both signs of K, `components` = 2) and -1 in `kc`, linear and spherical tops -1 in both. components: levels
     that coincide in the row (2J+1 for a spherical top). weight: nuclear-spin weight summed over the components.
-    degeneracy: (2J+1) times that. representation: of the Wang blocks, None for closed forms. blocks: the solved Wang
+    degeneracy: (2J+1) times that. irrep: A1, A2, E, F1 or F2 of the levels into which D_t splits a spherical top, else
+    None. representation: of the Wang blocks, None for closed forms. blocks: the solved Wang
     blocks of an asymmetric top, empty for closed forms.
     """
 
@@ -67,6 +70,7 @@ class Levels:
     kc: Ints
     components: Ints
     weight: Ints
+    irrep: NDArray[np.str_] | None = None
     blocks: tuple[SolvedBlock, ...] = field(default=(), repr=False)
 
     def __len__(self) -> int:
@@ -86,7 +90,8 @@ class Levels:
         """The columns as a pandas DataFrame."""
         import pandas as pd
 
-        names = ("j", "ka", "kc", "energy_mhz", "components", "weight", "degeneracy")
+        labels = ("j", "ka", "kc") if self.irrep is None else ("j", "irrep")
+        names = (*labels, "energy_mhz", "components", "weight", "degeneracy")
         return pd.DataFrame({name: getattr(self, name) for name in names})
 
 
@@ -151,17 +156,47 @@ def solve_levels(
         return _asymmetric(top, operators, jmin, jmax, vectors, executor)
     if top.kind in ("prolate", "oblate"):
         return _symmetric(top.kind, operators, top.spin_weights, jmin, jmax)
-    return _one_per_j(top.kind, operators, top.spin_weights, jmin, jmax)
+    if top.kind == "spherical":
+        return _spherical(operators, top.spin_weights, jmin, jmax)
+    return _linear(operators, top.spin_weights, jmin, jmax)
 
 
-def _one_per_j(kind: str, operators: Operators, weights: SpinWeights, jmin: int, jmax: int) -> Levels:
-    """Linear and spherical tops: E = Σ c X^p, with 2J+1 components of K at one energy in a spherical top."""
+def _scalar_energies(operators: Operators, jmin: int, jmax: int) -> tuple[Ints, Floats]:
     j = np.arange(jmin, jmax + 1)
-    energy = np.array([scalar_energy(operators, int(value)) for value in j])
-    components = 2 * j + 1 if kind == "spherical" else np.ones_like(j)
-    weight = weights.of_spherical(j) if kind == "spherical" else weights.of_j(j)
+    return j, np.array([scalar_energy(operators, int(value)) for value in j])
+
+
+def _linear(operators: Operators, weights: SpinWeights, jmin: int, jmax: int) -> Levels:
+    """Linear tops: E = Σ c X^p."""
+    j, energy = _scalar_energies(operators, jmin, jmax)
     none = np.full(j.shape, -1)
-    return Levels(kind, None, jmax, energy, j, none, none, components, weight)
+    return Levels("linear", None, jmax, energy, j, none, none, np.ones_like(j), weights.of_j(j))
+
+
+def _spherical(operators: Operators, weights: SpinWeights, jmin: int, jmax: int) -> Levels:
+    """Spherical tops: E = Σ c X^p in one row of 2J+1 components, or, with D_t, a row for every level that it splits."""
+    scalars, dt = scalar_and_tensor(operators)
+    j, energy = _scalar_energies(scalars, jmin, jmax)
+    if not dt:
+        none = np.full(j.shape, -1)
+        return Levels("spherical", None, jmax, energy, j, none, none, 2 * j + 1, weights.of_spherical(j))
+
+    split = [tensor_eigenvalues(int(value), 1 if dt > 0 else -1) for value in j]
+    sizes = [len(irreps) for irreps, _ in split]
+    irreps = np.concatenate([irreps for irreps, _ in split])
+    none = np.full(irreps.shape, -1)
+    return Levels(
+        kind="spherical",
+        representation=None,
+        jmax=jmax,
+        energy_mhz=np.repeat(energy, sizes) + dt * np.concatenate([omega for _, omega in split]),
+        j=np.repeat(j, sizes),
+        ka=none,
+        kc=none,
+        components=np.array([DIMENSION[irrep] for irrep in irreps]),
+        weight=np.array([weights.of_irrep(irrep) for irrep in irreps]),
+        irrep=irreps,
+    )
 
 
 def _symmetric(kind: str, operators: Operators, weights: SpinWeights, jmin: int, jmax: int) -> Levels:
@@ -174,7 +209,7 @@ def _symmetric(kind: str, operators: Operators, weights: SpinWeights, jmin: int,
         energy += c * x**p * squares**q
 
     components = np.where(k == 0, 1, 2)
-    weight = weights.of_symmetric(j, k)
+    weight = weights.of_symmetric(j, k, oblate=kind == "oblate")
     return Levels(kind, None, jmax, energy, j, k, np.full(j.shape, -1), components, weight)
 
 

@@ -6,12 +6,12 @@ c · J^2p Jz^2q), so a Hamiltonian is a table {(p, q, n): c in MHz}. Its matrix 
     ⟨K|H|K⟩     = Σ c X^p K^2q                                             (n = 0)
     ⟨K+2n|H|K⟩  = Σ c X^p ½[(K+2n)^2q + K^2q] √∏_{i<2n} (J-K-i)(J+K+i+1)    (n > 0)
 
-with the phases of J∓ (body-fixed) real and positive. Names and signs: J. K. G. Watson, "Aspects of quartic and sextic
-centrifugal effects", in Vibrational Spectra and Structure 6 (1977), eq. 39 (A) and table 6 (S).
+with the phases of J∓ (body-fixed) real and positive. Which name stands for which term: `rotor.terms`.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,75 +19,67 @@ from numpy.typing import NDArray
 
 from rotor.effects import QuantumEffect
 from rotor.quantum.basis import REPRESENTATIONS, WangBlock
+from rotor.terms import Operators, Powers, distortion_terms, powers_of_spelled
 
 if TYPE_CHECKING:
     from rotor.constants import Constants
     from rotor.top import Top
 
-Operators = dict[tuple[int, int, int], float]
 
-_LINEAR = {"B": (1, 0, 0, 1), "D": (2, 0, 0, -1), "H": (3, 0, 0, 1), "L": (4, 0, 0, 1)}
-_DIAGONAL_OCTIC = {"LJ": (4, 0), "LJJK": (3, 1), "LJK": (2, 2), "LKKJ": (1, 3), "LK": (0, 4)}
-_DIAGONAL_DECIC = {"PJ": (5, 0), "PJJK": (4, 1), "PJK": (3, 2), "PKJ": (2, 3), "PKKJ": (1, 4), "PK": (0, 5)}
-_DIAGONAL = {"J": (2, 0), "JK": (1, 1), "K": (0, 2)}
-_DIAGONAL_SEXTIC = {"J": (3, 0), "JK": (2, 1), "KJ": (1, 2), "K": (0, 3)}
+def operators_by_name(constants: Constants) -> dict[str, Operators]:
+    """∂H/∂c of every constant c that the set has, by name: H is the sum of them times the constants.
 
-
-def _diagonal_names(quartic: str, sextic: str) -> dict[str, tuple[int, int, int, int]]:
-    """(p, q, n, sign) of the terms diagonal in K, named DJ ... or DeltaJ ..., HJ ... or PhiJ ..., LJ ..., PJ ..."""
-    table = {quartic + name: (*powers, 0, -1) for name, powers in _DIAGONAL.items()}
-    table |= {sextic + name: (*powers, 0, 1) for name, powers in _DIAGONAL_SEXTIC.items()}
-    return table | {name: (*powers, 0, 1) for name, powers in (_DIAGONAL_OCTIC | _DIAGONAL_DECIC).items()}
+    >>> from rotor.constants import Constants
+    >>> operators_by_name(Constants(A=9.0, B=3.0, C=2.0))["C"]
+    {(1, 0, 0): 0.5, (0, 1, 0): -0.5, (0, 0, 1): -0.25}
+    """
+    table = _rigid_terms(constants) | distortion_terms(constants.kind, constants.reduction)
+    return {name: table[name] if name in table else {_powers(name): 1.0} for name in constants.values}
 
 
-_SYMMETRIC = _diagonal_names("D", "H")
-_A_REDUCTION = _diagonal_names("Delta", "Phi") | {
-    "deltaJ": (1, 0, 1, -1), "deltaK": (0, 1, 1, -1),
-    "phiJ": (2, 0, 1, 1), "phiJK": (1, 1, 1, 1), "phiK": (0, 2, 1, 1),
-    "lJ": (3, 0, 1, 1), "lJK": (2, 1, 1, 1), "lKJ": (1, 2, 1, 1), "lK": (0, 3, 1, 1),
-}  # fmt: skip
-_S_REDUCTION = _SYMMETRIC | {
-    "d1": (1, 0, 1, 1), "d2": (0, 0, 2, 1),
-    "h1": (2, 0, 1, 1), "h2": (1, 0, 2, 1), "h3": (0, 0, 3, 1),
-    "l1": (3, 0, 1, 1), "l2": (2, 0, 2, 1), "l3": (1, 0, 3, 1), "l4": (0, 0, 4, 1),
-}  # fmt: skip
+def _powers(name: str) -> Powers:
+    powers = powers_of_spelled(name)
+    if powers is None:
+        raise ValueError(f"{name} has no operator here")
+    return powers
 
 
-def _names(constants: Constants) -> dict[str, tuple[int, int, int, int]]:
+def _rigid_terms(constants: Constants) -> dict[str, Operators]:
+    """½(Bx+By) J² + [Bz - ½(Bx+By)] Jz² + ¼(Bx-By)(J₊² + J₋²) taken apart, axes by the representation.
+
+    A linear or spherical top has the first term alone; z is a in a prolate and c in an oblate symmetric top. Where
+    equal constants are given twice, B is the one that counts.
+    """
     if constants.kind in ("linear", "spherical"):
-        return _LINEAR
+        return {"A": {}, "C": {}, "B": {(1, 0, 0): 1.0}}
     if constants.kind in ("prolate", "oblate"):
-        return _SYMMETRIC
-    return _A_REDUCTION if constants.reduction == "A" else _S_REDUCTION
+        along, equal = ("A", "C") if constants.kind == "prolate" else ("C", "A")
+        return {along: {(0, 1, 0): 1.0}, "B": {(1, 0, 0): 1.0, (0, 1, 0): -1.0}, equal: {}}
+    x, y, z = (axis.upper() for axis in REPRESENTATIONS[str(constants.representation)])
+    return {
+        z: {(0, 1, 0): 1.0},
+        x: {(1, 0, 0): 0.5, (0, 1, 0): -0.5, (0, 0, 1): 0.25},
+        y: {(1, 0, 0): 0.5, (0, 1, 0): -0.5, (0, 0, 1): -0.25},
+    }
+
+
+def _added(constants: Constants, names: Iterable[str]) -> Operators:
+    by_name = operators_by_name(constants)
+    total: Operators = {}
+    for name in names:
+        for powers, factor in by_name[name].items():
+            total[powers] = total.get(powers, 0.0) + factor * constants.values[name]
+    return total
 
 
 def rigid_operators(constants: Constants) -> Operators:
-    """½(Bx+By) J² + [Bz - ½(Bx+By)] Jz² + ¼(Bx-By)(J₊² + J₋²), axes by the representation.
-
-    A linear or spherical top has the first term alone; z is a in a prolate and c in an oblate symmetric top.
-    """
-    if constants.kind in ("linear", "spherical"):
-        return {(1, 0, 0): constants["B"]}
-    if constants.kind in ("prolate", "oblate"):
-        along, across = (
-            (constants["A"], constants["B"]) if constants.kind == "prolate" else (constants["C"], constants["B"])
-        )
-        return {(1, 0, 0): across, (0, 1, 0): along - across}
-
-    axes = REPRESENTATIONS[str(constants.representation)]
-    bx, by, bz = (constants[axis.upper()] for axis in axes)
-    return {(1, 0, 0): (bx + by) / 2, (0, 1, 0): bz - (bx + by) / 2, (0, 0, 1): (bx - by) / 4}
+    """The terms of A, B, C."""
+    return _added(constants, [name for name in constants.values if name in "ABC"])
 
 
 def centrifugal_operators(constants: Constants) -> Operators:
-    """The distortion terms of the constants' own reduction and representation."""
-    table = _names(constants)
-    out: Operators = {}
-    for name, value in constants.values.items():
-        if name not in ("A", "B", "C"):
-            p, q, n, sign = table[name]
-            out[p, q, n] = out.get((p, q, n), 0.0) + sign * value
-    return out
+    """The distortion terms of the constants' own reduction and representation, and those without a name."""
+    return _added(constants, [name for name in constants.values if name not in "ABC"])
 
 
 class Rigid(QuantumEffect):
@@ -132,6 +124,10 @@ class Multiplet:
         steps = _ladder_steps(j, np.arange(-self._margin, j + self._margin + 1))
         with np.errstate(over="ignore", invalid="ignore"):  # said where the block is diagonalised
             self._elements = [_elements(operators, j, k, n, steps) for n in range(self.order + 1)]
+
+    def element(self, k: NDArray[np.int64], n: int) -> NDArray[np.float64]:
+        """⟨K+2n|H|K⟩ for K from -2 `order` to J; zero where K + 2n is beyond J."""
+        return self._elements[n][self._margin + k]
 
     def folded(self, low: int, n: int) -> float:
         """⟨2n - low|H|-low⟩, which connects K = low and K = 2n - low of a Wang block."""

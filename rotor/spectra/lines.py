@@ -20,6 +20,8 @@ from numpy.typing import NDArray
 
 from rotor import units
 from rotor.quantum.levels import Levels, solve_levels
+from rotor.quantum.reliability import warnings_of
+from rotor.quantum.uncertainty import Covariance, level_spread, line_errors
 from rotor.spectra.reach import jmax_for_cut
 from rotor.spectra.transitions import IntensityCut, all_transitions
 from rotor.thermo import PartitionFunction, partition_function
@@ -43,6 +45,7 @@ class Lines:
 
     frequency_mhz, strength_debye2 (S μ², all components): (n,) float64. upper, lower: (n,) int32, rows of `levels`.
     All other columns are computed when asked for. min_lgint, range_mhz and jmax say where the list was cut.
+    covariance: of the constants; without one, their uncertainties count where the top says that they are independent.
     """
 
     top: Top
@@ -55,6 +58,8 @@ class Lines:
     min_lgint: float
     range_mhz: tuple[float, float]
     given_partition: PartitionFunction | None = None
+    covariance: Covariance | None = None
+    given_spread: Floats | None = None
 
     def __len__(self) -> int:
         return len(self.frequency_mhz)
@@ -73,6 +78,36 @@ class Lines:
     def q(self) -> float:
         """The value of Q(T)."""
         return self.partition.q
+
+    @cached_property
+    def warnings(self) -> tuple[str, ...]:
+        """What a user must be told about the levels behind the lines and about their errors."""
+        known = set(self.covariance_used.names) if self.covariance_used else set()
+        exact = [name for name in self.top.constants.values if name not in known]
+        partly = f"errors of frequencies take {', '.join(exact)} as exact: their uncertainty is not known"
+        return warnings_of(self.top, self.levels) + ((partly,) if known and exact else ())
+
+    @cached_property
+    def spread(self) -> Floats | None:
+        """What the covariance of the constants makes of each level, see `uncertainty.level_spread`; None without one."""
+        if self.given_spread is not None or self.covariance_used is None:
+            return self.given_spread
+        return level_spread(self.top, self.levels, self.covariance_used)
+
+    @property
+    def covariance_used(self) -> Covariance | None:
+        """The covariance given, else the uncertainties of the constants where these may count as uncorrelated."""
+        if self.covariance is None and self.top.independent_errors:
+            return Covariance.of_uncertainties(self.top.constants)
+        return self.covariance
+
+    @property
+    def error_mhz(self) -> Floats | None:
+        """One standard deviation of every frequency, from the uncertainty of the constants; None where it is unknown.
+
+        Neglected: what the Hamiltonian leaves out. Constants without an uncertainty count as exact.
+        """
+        return None if self.spread is None else line_errors(self.spread, self.upper, self.lower)
 
     @property
     def energy_lower_cm(self) -> Floats:
@@ -126,6 +161,7 @@ class Lines:
             upper=self.upper[chosen],
             lower=self.lower[chosen],
             given_partition=self.__dict__.get("partition", self.given_partition),
+            given_spread=self.__dict__.get("spread", self.given_spread),
         )
 
     def sorted(self) -> Lines:
@@ -138,9 +174,14 @@ class Lines:
 
     @cached_property
     def columns(self) -> dict[str, NDArray[Any]]:
-        """Every column by its name with unit, quantum numbers last (j_upper, ..., kc_lower)."""
+        """Every column by its name with unit, quantum numbers last (j_upper, ..., kc_lower).
+
+        `error_mhz` is among them where the uncertainty of a constant is known.
+        """
         names = ("frequency_mhz", "lgint", "energy_lower_cm", "g_upper", "einstein_a_per_s", "strength_debye2")
         out: dict[str, NDArray[Any]] = {name: getattr(self, name) for name in names}
+        if (error := self.error_mhz) is not None:
+            out = {"frequency_mhz": out["frequency_mhz"], "error_mhz": error} | out
         for suffix, rows in (("upper", self.upper), ("lower", self.lower)):
             for name, column in zip(self.quanta_names, self.quanta(rows).T, strict=True):
                 out[f"{name}_{suffix}"] = column
@@ -175,6 +216,7 @@ def line_list(
     range_mhz: tuple[float, float] = (0.0, math.inf),
     q: float | None = None,
     vibrational_factor: float = 1.0,
+    covariance: Covariance | None = None,
     sort: bool = True,
     executor: Executor | None = None,
 ) -> Lines:
@@ -183,7 +225,9 @@ def line_list(
     temperature_k: for intensities. jmax: the highest J; by default the one beyond which no line can reach
     `min_lgint`. min_lgint: log10 of nm² MHz below which lines are left out, None for none left out. range_mhz: first
     and last frequency. q: partition function to use instead of the summed one, spin weights reduced by their common
-    divisor. vibrational_factor: multiplies the summed Q. executor: J are spread over it.
+    divisor. vibrational_factor: multiplies the summed Q. covariance: of the constants, for the errors of frequencies;
+    by default the uncertainties that the constants carry, uncorrelated, but not those of a fit whose correlations are
+    unknown (the library's): they would make errors many times too large. executor: J are spread over it.
 
     Neglected: all but electric dipole, nuclear hyperfine structure, vibrational states, dependence of μ on J.
     Raises ValueError where the top has no known dipole, for a temperature not above 0, and for J max below 0.
@@ -217,6 +261,7 @@ def line_list(
         min_lgint=least,
         range_mhz=range_mhz,
         given_partition=given,
+        covariance=covariance,
     )
     return lines.sorted() if sort else lines
 

@@ -133,21 +133,55 @@ def _chosen(
     range_mhz: tuple[float, float],
     cut: IntensityCut | None,
 ) -> Iterator[Transitions]:
+    choose = _choice_of(sum(pair.up.basis.size * pair.low.basis.size for pair in pairs))
     for pair in pairs:
-        difference = np.subtract.outer(pair.up.energies_mhz, pair.low.energies_mhz)
-        frequency = np.abs(difference)
+        up, low = pair.up, pair.low
+        energies = (up.energies_mhz, low.energies_mhz)
         strength = dipole_abc["abc".index(pair.axis)] ** 2 * amplitudes(pair, axes) ** 2
-        keep = (frequency >= range_mhz[0]) & (frequency <= range_mhz[1])
-        if cut is not None:
-            of_up = cut.population[pair.up.start : pair.up.start + pair.up.basis.size, None]
-            of_low = cut.population[None, pair.low.start : pair.low.start + pair.low.basis.size]
-            keep &= cut.keeps(frequency, strength, np.where(difference < 0, of_up, of_low))
+        i, k = choose(*energies, strength, range_mhz, cut, up.start, low.start)
 
-        i, k = np.nonzero(keep)
-        first, second = (i + pair.up.start).astype(np.int32), (k + pair.low.start).astype(np.int32)
-        falling = difference[i, k] < 0
-        upper, lower = np.where(falling, second, first), np.where(falling, first, second)
-        yield Transitions(frequency[i, k], strength[i, k], upper, lower)
+        difference = energies[0][i] - energies[1][k]
+        first, second = (i + up.start).astype(np.int32), (k + low.start).astype(np.int32)
+        falls = difference < 0
+        upper, lower = np.where(falls, second, first), np.where(falls, first, second)
+        yield Transitions(np.abs(difference), strength[i, k], upper, lower)
+
+
+def _choice_of(total: int) -> Callable[..., tuple[NDArray[np.int64], NDArray[np.int64]]]:
+    """The compiled choice for lists so long that loading the compiler pays."""
+    if total < LONG_LIST:
+        return _choose
+    from rotor.spectra._kernels import choose
+
+    def compiled(
+        up: Floats,
+        low: Floats,
+        strength: Floats,
+        range_mhz: tuple[float, float],
+        cut: IntensityCut | None,
+        *starts: int,
+    ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        cut = cut or IntensityCut(np.ones(max(starts) + max(len(up), len(low))), 1.0, -np.inf)
+        rows = choose(up, low, strength, *range_mhz, cut.population, cut.kt_mhz, cut.least, *starts)
+        return rows[0], rows[1]
+
+    return compiled
+
+
+def _choose(
+    energies_up: Floats, energies_low: Floats, strength: Floats, range_mhz: tuple[float, float],
+    cut: IntensityCut | None, start_up: int, start_low: int,
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:  # fmt: skip
+    """Rows and columns of the lines between two blocks that are in the range and above the cut."""
+    difference = np.subtract.outer(energies_up, energies_low)
+    frequency = np.abs(difference)
+    keep = (frequency >= range_mhz[0]) & (frequency <= range_mhz[1])
+    if cut is not None:
+        of_up = cut.population[start_up : start_up + len(energies_up), None]
+        of_low = cut.population[None, start_low : start_low + len(energies_low)]
+        keep &= cut.keeps(frequency, strength, np.where(difference < 0, of_up, of_low))
+    i, k = np.nonzero(keep)
+    return i, k
 
 
 def _closed_form(

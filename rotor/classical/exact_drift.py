@@ -1,0 +1,56 @@
+"""The exact free motion between kicks of the torques.
+
+Order: free motion is exact at any time, without steps; with torques 2, or 4, 6, 8 by composition. Keeps: |L| and L in
+space between kicks, the free energy, the symplectic form, time reversal. Cost: with torques each drift prepares the
+closed form anew for the momentum that the kick left, about 20 ms for up to some hundred bodies; it pays only where
+torques are so weak that steps are many periods long.
+Sources: R. van Zon and J. Schofield, J. Comput. Phys. 225, 145 (2007); E. Celledoni, F. Fassò, N. Säfström, A. Zanna,
+SIAM J. Sci. Comput. 30, 2084 (2008).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rotor.classical.compositions import fractions
+from rotor.classical.free import free_motion
+from rotor.classical.integrators import KickDrift
+from rotor.classical.system import System
+from rotor.rotations import Array
+
+
+@dataclass(frozen=True)
+class ExactDrift(KickDrift):
+    """Exact drifts; free motion is evaluated at the times asked for and `step` is not used.
+
+    >>> from rotor.classical.integrators import integrate
+    >>> motion = integrate(ExactDrift(step=1.0), [0.6, 0.8, 1.0], [1.8, 0.4, -0.9], [0.0, 10.0])
+    >>> motion.momentum[-1].round(12).tolist(), motion.steps
+    ([1.765962508518, -0.695464197033, 0.779554981482], 0)
+    """
+
+    order: int = 2
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        fractions(self.order)
+
+    @property
+    def kick_fractions(self) -> Array:
+        """Fractions of the composition of kicks and drifts."""
+        return fractions(self.order)
+
+    def states(self, system: System, momentum: Array, attitude: Array, times: Array) -> tuple[Array, Array, int]:
+        """One evaluation per time for free motion, else kicks and drifts."""
+        if not system.free:
+            return super().states(system, momentum, attitude, times)
+        path, attitudes = free_motion(system.start_moments, momentum, attitude).at(times - times[0])
+        return np.moveaxis(path, 1, 0), np.moveaxis(attitudes, 1, 0), 0
+
+    def drift(self, moments: Array, state: Array, carry: Array, step: float, steps: int, whole: bool) -> None:
+        """The state after steps x step; an exact state carries nothing over."""
+        momentum, attitude = free_motion(moments, state[:, :3], state[:, 3:]).at(step * steps)
+        state[:, :3], state[:, 3:] = momentum, attitude
+        carry[:] = 0.0

@@ -1,0 +1,106 @@
+"""The command line: one file a verb; what they share is in `inputs`, `report` and `output`.
+
+docs/command_line.md is the contract: options, columns, JSON keys, error texts, exit codes. Nothing heavy is imported
+before a verb has looked at what it was given.
+"""
+
+from __future__ import annotations
+
+import os
+import shlex
+import sys
+from collections.abc import Sequence
+from typing import cast
+
+import typer
+
+from rotor.cli import info, isotopologues, molecules, spectrum
+from rotor.cli.output import NoAnswer
+
+NO_ANSWER, WRONG_INPUT, INTERRUPTED = 1, 2, 130
+# click's ClickException, whether click is a package of its own or, in a newer typer, a part of it
+_ERROR_OF_USE = cast(type[Exception], typer.BadParameter.__mro__[2])
+
+EXAMPLES = """\b
+Examples:
+  rotor spectrum water
+  rotor spectrum "SMILES:C=O" --temperature 100
+  rotor spectrum my.xyz --dipole 0,0,1.85 --range 0:2000GHz --cat out.cat --plot out.png
+  rotor spectrum --constants "A=835840.288 B=435351.717 C=278138.7 MHz" --dipole-abc 0,1.8546,0
+  rotor info my.sdf
+  rotor isotopologues water"""
+
+
+def _application() -> typer.Typer:
+    app = typer.Typer(
+        add_completion=False,
+        pretty_exceptions_enable=False,
+        rich_markup_mode=None,
+        context_settings={"help_option_names": ["-h", "--help"]},
+    )
+
+    @app.callback(help="A molecule goes in, a rotational spectrum comes out.", epilog=EXAMPLES)
+    def start(
+        version: bool = typer.Option(
+            False, "--version", is_eager=True, help="Print the version and stop.", callback=_print_version
+        ),
+    ) -> None:
+        pass
+
+    app.command("spectrum", epilog=spectrum.EXAMPLES)(spectrum.command)
+    app.command("info", epilog=info.EXAMPLES)(info.command)
+    app.command("molecules", epilog=molecules.EXAMPLES)(molecules.command)
+    app.command("isotopologues", epilog=isotopologues.EXAMPLES)(isotopologues.command)
+    return app
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        import rotor
+
+        print(f"rotor {rotor.__version__}")
+        raise typer.Exit
+
+
+def run(arguments: Sequence[str] | None = None) -> int:
+    """Carry out a command and return its exit code; a mistake of the user is one line on standard error."""
+    arguments = sys.argv[1:] if arguments is None else list(arguments)
+    command = typer.main.get_command(_application())
+    provenance = shlex.join(["rotor", *arguments])
+    try:
+        with command.make_context("rotor", arguments or ["--help"], obj=provenance) as context:
+            command.invoke(context)
+        sys.stdout.flush()
+        return 0
+    except typer.Exit as end:
+        return end.exit_code
+    except _ERROR_OF_USE as error:
+        return _fail(WRONG_INPUT, error.format_message())  # type: ignore[attr-defined]
+    except NoAnswer as error:
+        return _fail(NO_ANSWER, str(error))
+    except BrokenPipeError:  # the reader has seen enough: nothing more can be said to it, at exit neither
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except KeyboardInterrupt:
+        return INTERRUPTED
+    except (ValueError, OSError) as error:
+        return _fail(WRONG_INPUT, _told(error))
+
+
+def _told(error: ValueError | OSError) -> str:
+    if isinstance(error, OSError) and error.strerror:
+        return f"{error.filename}: {error.strerror}" if error.filename else error.strerror
+    return str(error)
+
+
+def _fail(code: int, message: str) -> int:
+    print("error:", " ".join(message.split()), file=sys.stderr)
+    return code
+
+
+def main() -> None:
+    """The console script `rotor`."""
+    for stream in (sys.stdout, sys.stderr):
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="replace")  # a terminal without Greek letters shows a question mark, no traceback
+    sys.exit(run())

@@ -1,0 +1,186 @@
+"""`rotor info`: what a molecule is as a top."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from rotor.cli import inputs
+from rotor.cli.inputs import Input
+from rotor.cli.output import Files, Table, json_text, show_facts, show_table, write_text
+
+if TYPE_CHECKING:
+    from rotor.top import Top
+
+TEMPERATURES_K = (9.375, 18.75, 37.5, 75.0, 150.0, 225.0, 300.0, 500.0, 1000.0)  # those of the catalogues, and two more
+
+EXAMPLES = """\b
+Examples:
+  rotor info water
+  rotor info my.sdf --isotope 1=2H --json info.json
+  rotor info --constants "A=8.572 B=3.64 C=2.79 GHz" --temperature 10:300K:30"""
+
+
+def command(
+    context: typer.Context,
+    source: str | None = inputs.SOURCE,
+    constants: str | None = inputs.CONSTANTS,
+    isotope: list[str] | None = inputs.ISOTOPE,
+    dipole: str | None = inputs.DIPOLE,
+    dipole_abc: str | None = inputs.DIPOLE_ABC,
+    spin_weights: str | None = inputs.SPIN_WEIGHTS,
+    temperature: str | None = typer.Option(
+        None, metavar="GRID", help="Temperatures of the table: 10:300K:30 or 10,20,50 K."
+    ),
+    json: str | None = inputs.JSON,
+) -> None:
+    """Frame, constants, kind of top with its margin, moments, dipole, table of Q(T)."""
+    temperatures = TEMPERATURES_K if temperature is None else _temperatures(temperature)
+    files = Files()
+    if json != "-":
+        files.ask("--json", json, (".json",))
+    given = Input(source, constants, isotope or [], dipole, dipole_abc, spin_weights)
+    top = inputs.read_top(given)
+
+    from rotor.cli.report import describe
+
+    content = describe(top, given.text, context.obj)
+    content["partition_function"] = partition_table(top, temperatures)
+    files.write({"--json": lambda path: write_text(path, json_text(content))})
+    if json == "-":
+        print(json_text(content), end="")
+    else:
+        _show(top, content)
+
+
+def _temperatures(text: str) -> Sequence[float]:
+    from rotor.units import parse_grid
+
+    temperatures: list[float] = inputs.option("--temperature", text, lambda value: parse_grid(value, "K").tolist())
+    if not all(0 < t < float("inf") for t in temperatures):
+        raise ValueError(f"--temperature: {text!r}: temperatures are above 0 K")
+    return temperatures
+
+
+def partition_table(top: Top, temperatures_k: Sequence[float]) -> list[dict[str, Any]]:
+    """Q summed and classical at each temperature; where the sum means nothing, `q` is None and `source` says why."""
+    from rotor.thermo import partition_functions
+
+    try:
+        found = partition_functions(top, temperatures_k)
+    except ValueError:  # one of them is out of reach: each for itself
+        return [_row(top, t) for t in temperatures_k]
+    return [_record(top, partition) for partition in found]
+
+
+def _row(top: Top, temperature_k: float) -> dict[str, Any]:
+    from rotor.thermo import classical_partition_function, partition_function
+
+    try:
+        return _record(top, partition_function(top, temperature_k))
+    except ValueError as error:
+        return {
+            "temperature_k": temperature_k,
+            "q": None,
+            "classical": classical_partition_function(top, temperature_k),
+            "jmax": None,
+            "relative_error": None,
+            "source": str(error),
+        }
+
+
+def _record(top: Top, partition: Any) -> dict[str, Any]:
+    from rotor.cli.report import q_record
+    from rotor.thermo import classical_partition_function
+
+    return q_record(partition, classical_partition_function(top, partition.temperature_k))
+
+
+def _show(top: Top, content: dict[str, Any]) -> None:
+    from rotor.cli.report import heading
+
+    print(heading(top))
+    show_facts(_facts(top, content))
+    for table in (_constants_table(top), _axes_table(content), _q_table(content)):
+        if table:
+            print()
+            show_table(table)
+
+
+def _facts(top: Top, content: dict[str, Any]) -> list[tuple[str, str]]:
+    from rotor.cli import report
+
+    facts = [("constants from", content["source"] or "not said")]
+    if top.kind_of_top:
+        facts.append(("kind", _kind_text(content["kind"], content["kind_decision"])))
+    if top.constants.representation:
+        facts.append(("meant in", report.form_text(top.constants)))
+    dipole = report.vector_text(top.dipole_abc_debye)
+    weights = report.weights_text(content["spin_weights"])
+    facts += [
+        ("dipole", report.with_source(dipole, content["dipole_source"])),
+        ("spin weights", report.with_source(weights, content["spin_weights_source"])),
+        ("mass", f"{top.mass_u:.6f} u" if top.mass_u else "not known"),
+        ("inertial defect", f"{content['inertial_defect_u_angstrom2']:.6g} u Å²"),
+    ]
+    return facts
+
+
+def _kind_text(kind: str, decision: dict[str, Any]) -> str:
+    """Which numbers decided the kind of the geometry, and how clearly."""
+    numbers = (
+        f"Ia/Ic = {decision['ia_over_ic']:.3g} (linear below {decision['linear_below']:g}), "
+        f"(Ib-Ia)/Ib = {decision['ib_minus_ia_over_ib']:.3g}, (Ic-Ib)/Ic = {decision['ic_minus_ib_over_ic']:.3g} "
+        f"(equal within {decision['equal_within']:g})"
+    )
+    differs = "" if kind == decision["kind"] else f"; the constants given are those of another kind, {kind}"
+    return f"the geometry is {decision['kind']} by {numbers}; margin: a factor of {_margin_text(decision['margin'])}{differs}"
+
+
+def _margin_text(margin: float) -> str:
+    return f"{margin:.3g}" if margin < 1e9 else "more than 1e9"
+
+
+def _constants_table(top: Top) -> Table:
+    from rotor.units import MHZ_PER_CM
+
+    spreads = top.constants.uncertainties
+    rows = [
+        (name, f"{mhz:.12g}", f"{spreads[name]:.2g}" if name in spreads else "", f"{mhz / MHZ_PER_CM:.10g}")
+        for name, mhz in top.constants.values.items()
+    ]
+    return Table("", ("constant", "MHz", "± MHz", "cm-1"), rows, frozenset({"constant"}))
+
+
+def _axes_table(content: dict[str, Any]) -> Table:
+    """Moments, planar moments, and the axes and the centre of mass in the frame of the input."""
+    moments, planar, frame = (content[k] for k in ("moments_u_angstrom2", "planar_moments_u_angstrom2", "frame"))
+    columns = ["axis", "I (u Å²)", "P (u Å²)"] + (["x", "y", "z"] if frame else [])
+    rows = []
+    for i, axis in enumerate("abc"):
+        numbers = [f"{moments[i]:.6f}", f"{planar[i] + 0.0:.6f}"]
+        rows.append([axis, *numbers, *([f"{x + 0.0:.6f}" for x in frame["axes"][i]] if frame else [])])
+    if frame:
+        rows.append(["centre of mass (Å)", "", "", *(f"{x + 0.0:.6f}" for x in frame["centre_angstrom"])])
+    return Table("", columns, rows, frozenset({"axis"}))
+
+
+def _reason(source: str) -> str:
+    """Why a sum means nothing, without the temperature that stands beside it and without the remedy."""
+    return re.sub(r"^Q\([^)]*\):? *", "", source).partition(";")[0]
+
+
+def _q_table(content: dict[str, Any]) -> Table:
+    rows = []
+    for row in content["partition_function"]:
+        known = row["q"] is not None
+        summed = [f"{row['q']:.6g}", f"{row['jmax']}", f"{row['relative_error']:.0e}"] if known else ["-", "-", "-"]
+        remark = "" if known else _reason(row["source"])
+        rows.append([f"{row['temperature_k']:g}", summed[0], f"{row['classical']:.6g}", *summed[1:], remark])
+    columns = ["T (K)", "Q", "Q classical", "J max", "error", "remark"]
+    if not any(row[-1] for row in rows):
+        columns, rows = columns[:-1], [row[:-1] for row in rows]
+    return Table("", columns, rows, frozenset({"remark"}))

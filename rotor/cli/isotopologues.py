@@ -1,0 +1,150 @@
+"""`rotor isotopologues`: the family of a molecule, by abundance or as asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from rotor.cli import inputs
+from rotor.cli.inputs import Input
+from rotor.cli.output import Files, Table, json_text, note, show_table, write_text
+
+if TYPE_CHECKING:
+    from rotor.isotopologues import Isotopologue
+    from rotor.top import Top
+
+MIN_ABUNDANCE = 1e-4
+EACH = typer.Option(None, metavar="O=18O", help="Each atom of an element substituted, one at a time; repeatable.")
+SITE = typer.Option(
+    None, metavar="2=2H", help="The isotopologue with this atom substituted; repeated, all of them together."
+)
+
+EXAMPLES = """\b
+Examples:
+  rotor isotopologues water
+  rotor isotopologues CH3Cl --min-abundance 0.01 --json family.json
+  rotor isotopologues H2CO --each C=13C --each O=18O
+  rotor isotopologues water --site 2=2H --site 3=2H"""
+
+
+def command(
+    context: typer.Context,
+    source: str | None = inputs.SOURCE,
+    min_abundance: float | None = typer.Option(
+        None,
+        metavar="X",
+        help=f"Least abundance in nature of those listed; {MIN_ABUNDANCE:g} unless others are asked for.",
+    ),
+    each: list[str] | None = EACH,
+    site: list[str] | None = SITE,
+    dipole: str | None = inputs.DIPOLE,
+    dipole_abc: str | None = inputs.DIPOLE_ABC,
+    json: str | None = inputs.JSON,
+) -> None:
+    """Isotopologues: abundance, constants, kind, axes, dipole and spin weights of each."""
+    files = Files()
+    if json != "-":
+        files.ask("--json", json, (".json",))
+    parent = inputs.read_top(Input(source, None, [], dipole, dipole_abc, None))
+    family = _family(parent, min_abundance, each or [], site or [])
+    _tell(parent, family)
+
+    content = {
+        "command": context.obj,
+        "input": source,
+        "name": parent.name or None,
+        "isotopologues": [record(one) for one in family],
+    }
+    files.write({"--json": lambda path: write_text(path, json_text(content))})
+    if json == "-":
+        print(json_text(content), end="")
+    else:
+        show_table(_table(parent, family))
+
+
+def _family(
+    parent: Top, min_abundance: float | None, each: Sequence[str], site: Sequence[str]
+) -> tuple[Isotopologue, ...]:
+    """Those above the least abundance, those of --each, that of --site; none of them twice."""
+    from rotor.isotopologues import isotopologue, isotopologues, single_substitutions
+
+    family: list[Isotopologue] = []
+    if min_abundance is not None or not (each or site):
+        least = MIN_ABUNDANCE if min_abundance is None else min_abundance
+        family += inputs.option("--min-abundance", str(least), lambda _: isotopologues(parent, min_abundance=least))
+    for text in each:
+        family += inputs.option("--each", text, lambda value: single_substitutions(parent, *_substitution(value)))
+    if site:
+        family.append(inputs.option("--site", ",".join(site), lambda text: isotopologue(parent, text)))
+    return tuple({one.label: one for one in family}.values())
+
+
+def _tell(parent: Top, family: Sequence[Isotopologue]) -> None:
+    """What has not been said of the parent, each text once with the isotopologues that it is about."""
+    about: dict[str, list[str]] = {}
+    for one in family:
+        for text in one.top.notes:
+            if text not in parent.notes:
+                about.setdefault(text, []).append(one.label)
+    for text, labels in about.items():
+        note(f"{', '.join(labels)}: {text}")
+
+
+def _substitution(text: str) -> tuple[str, str]:
+    element, equals, name = (part.strip() for part in text.partition("="))
+    if not (element.isalpha() and equals and name):
+        raise ValueError(f"{text!r}: an element and its isotope are wanted, such as O=18O")
+    return element, name
+
+
+def record(one: Isotopologue) -> dict[str, Any]:
+    """One isotopologue by the keys of docs/command_line.md."""
+    top, symmetry = one.top, one.top.symmetry
+    return {
+        "formula": one.formula,
+        "label": one.label,
+        "substituted": dict(one.substituted),
+        "arrangements": one.arrangements,
+        "abundance": one.abundance,
+        "mass_u": top.mass_u,
+        "kind": top.kind,
+        "point_group": symmetry.point_group if symmetry else None,
+        "constants_mhz": dict(top.constants.values),
+        "reduction": top.constants.reduction,
+        "representation": top.constants.representation,
+        "rotational_constants_mhz": top.rotational_constants_mhz,
+        "axes_of_parent": one.axes,
+        "turned_degrees": one.turned_degrees,
+        "dipole_abc_debye": top.dipole_abc_debye,
+        "spin_weights": top.spin_weights.to_mapping(),
+        "source": top.source or None,
+        "notes": list(top.notes),
+    }
+
+
+def _table(parent: Top, family: Sequence[Isotopologue]) -> Table:
+    columns = ("isotopologue", "abundance", "ways", "mass (u)", "kind", "group", "A (MHz)", "B (MHz)", "C (MHz)",
+               "axes", "turned (°)", "μa (D)", "μb (D)", "μc (D)", "spin weights")  # fmt: skip
+    left = frozenset({"isotopologue", "kind", "group", "axes", "spin weights"})
+    return Table(f"isotopologues of {parent.name or 'the molecule'}", columns, [_row(one) for one in family], left)
+
+
+def _row(one: Isotopologue) -> list[str]:
+    top = one.top
+    weights = ", ".join(f"{name} {weight}" for name, weight in top.spin_weights.to_mapping().items())
+    dipole = top.dipole_abc_debye
+    return [
+        one.label,
+        f"{one.abundance:.3e}",
+        str(one.arrangements),
+        f"{top.mass_u:.5f}",
+        top.kind,
+        top.symmetry.point_group if top.symmetry else "",
+        *(f"{x:.3f}" if x < float("inf") else "-" for x in top.rotational_constants_mhz),
+        one.axes,
+        f"{one.turned_degrees:.2f}",
+        *(["-"] * 3 if dipole is None else [f"{round(mu, 4) + 0.0:.4f}" for mu in dipole]),
+        weights or "all alike",
+    ]

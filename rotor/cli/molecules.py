@@ -1,0 +1,123 @@
+"""`rotor molecules`: what the library holds, the user's own molecules among it."""
+
+from __future__ import annotations
+
+from json import dumps
+from pathlib import Path
+from typing import Any
+
+import typer
+
+from rotor.cli import inputs
+from rotor.cli.output import Files, Table, plain, show_facts, show_table, write_text
+
+WIDEST_NAME = 24
+
+EXAMPLES = """\b
+Examples:
+  rotor molecules
+  rotor molecules water
+  rotor molecules --json -"""
+
+
+def command(
+    name: str | None = typer.Argument(None, help="Only this one, with all its sources.", show_default=False),
+    json: str | None = inputs.JSON,
+) -> None:
+    """Molecules known by name: kind, κ, dipole, and where the numbers are from."""
+    files = Files()
+    if json != "-":
+        files.ask("--json", json, (".json",))
+    records = [record(path) for path in _paths(name)]
+    text = "[\n" + ",\n".join(dumps(one, ensure_ascii=False, allow_nan=False) for one in records) + "\n]\n"
+    files.write({"--json": lambda path: write_text(path, text)})
+    if json == "-":
+        print(text, end="")
+    elif name is not None:
+        show_facts(_facts(records[0]))
+    else:
+        show_table(Table("", _COLUMNS, [_row(one) for one in records], frozenset({"formula", "name", "kind", "from"})))
+
+
+def _paths(name: str | None) -> list[Path]:
+    """The file of one name, or every file that a name leads to, the user's own first."""
+    from rotor.formats.library import folders, molecule_path, names
+
+    if name is not None:
+        return [molecule_path(name)]
+    order = folders()
+    return sorted(set(names().values()), key=lambda path: (order.index(path.parent), path.stem.casefold()))
+
+
+def record(path: Path) -> dict[str, Any]:
+    """What a molecule file says, by the keys of docs/command_line.md."""
+    from rotor.formats.doors import top_of_file
+    from rotor.formats.molecule_file import read_molecule_file
+
+    file = read_molecule_file(path)
+    top = top_of_file(file)
+    return {
+        "name": file.name,
+        "names": list(file.names),
+        "formula": file.molecule.formula if file.molecule else None,
+        "kind": top.kind,
+        "kappa": top.kappa,
+        "constants_mhz": dict(top.constants.values),
+        "dipole_abc_debye": plain(top.dipole_abc_debye),
+        "spin_weights": top.spin_weights.to_mapping(),
+        "point_group": top.symmetry.point_group if top.symmetry else None,
+        "symmetry_number": top.symmetry.symmetry_number if top.symmetry else None,
+        "geometry_kind": file.geometry_kind,
+        "vibrational_difference": file.vibrational_difference,
+        "catalogue": dict(vars(file.catalogue)) if file.catalogue else None,
+        "sources": dict(file.sources),
+        "file": str(path),
+        "own": _is_own(path),
+    }
+
+
+def _is_own(path: Path) -> bool:
+    from rotor.molecules.nuclei import data_folder
+
+    return path.parent != data_folder() / "molecules"
+
+
+_COLUMNS = ("formula", "name", "kind", "κ", "μa", "μb", "μc", "lines", "rms/MHz", "from")
+
+
+def _row(one: dict[str, Any]) -> list[str]:
+    """One molecule: measured lines met, and the first words of where its constants are from."""
+    dipole = one["dipole_abc_debye"] or [None] * 3
+    seen = one["catalogue"] or {"lines": None, "rms_mhz": None}
+    source = ("own: " if one["own"] else "") + one["sources"].get(
+        "constants", one["sources"].get("geometry", "not said")
+    )
+    return [
+        one["names"][0] if one["names"] else one["formula"] or "",
+        _cut(one["name"], WIDEST_NAME),
+        one["kind"],
+        *(_number(one["kappa"], ".3f"), *(_number(x or None, ".4g") for x in dipole)),
+        *(_number(seen["lines"], "d"), _number(seen["rms_mhz"], "g")),
+        _cut(source, 60),
+    ]
+
+
+def _number(value: float | None, form: str) -> str:
+    return "" if value is None else format(value, form)
+
+
+def _cut(text: str, width: int) -> str:
+    return text if len(text) <= width else text[: width - 1] + "…"
+
+
+def _facts(one: dict[str, Any]) -> list[tuple[str, str]]:
+    facts = [
+        ("name", ", ".join([one["name"], *one["names"]])),
+        ("kind", one["kind"] + (f", κ = {one['kappa']:.4f}" if one["kappa"] is not None else "")),
+        (
+            "point group",
+            f"{one['point_group'] or 'not known'}, symmetry number {one['symmetry_number'] or 'not known'}",
+        ),
+        ("file", one["file"]),
+    ]
+    return facts + [(f"{table.replace('_', ' ')} from", source) for table, source in one["sources"].items()]

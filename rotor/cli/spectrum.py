@@ -1,0 +1,322 @@
+"""`rotor spectrum`: the rotational lines of a molecule."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from rotor.cli import inputs
+from rotor.cli.inputs import Input
+from rotor.cli.output import Files, NoAnswer, Table, Writer, answering, json_text, show_facts, show_table, write_text
+
+if TYPE_CHECKING:
+    from rotor.spectra.lines import Lines
+    from rotor.spectra.spectrum import Spectrum
+    from rotor.top import Top
+
+PROFILES = ("sticks", "gaussian", "lorentzian", "voigt")
+
+EXAMPLES = """\b
+Examples:
+  rotor spectrum water
+  rotor spectrum "SMILES:C=O" --temperature 100
+  rotor spectrum my.xyz --dipole 0,0,1.85 --range 0:2000GHz --cat out.cat --csv out.csv --plot out.png
+  rotor spectrum --constants "A=835840.288 B=435351.717 C=278138.7 MHz" --dipole-abc 0,1.8546,0 --jmax 20"""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What the options ask for, in the units of the package."""
+
+    temperature_k: float
+    jmax: int | None
+    min_lgint: float | None
+    range_mhz: tuple[float, float]
+    q: float | None
+    vibrational_factor: float
+    profile: str
+    fwhm_mhz: float | None
+
+
+def command(
+    context: typer.Context,
+    source: str | None = inputs.SOURCE,
+    constants: str | None = inputs.CONSTANTS,
+    temperature: str = typer.Option("300", metavar="T", help="Temperature (K)."),
+    jmax: int | None = typer.Option(None, metavar="N", help="Highest J; by default what the cut needs."),
+    min_lgint: str = typer.Option("-12", metavar="X", help="Leave out lines with log10(nm² MHz) below; or 'none'."),
+    range_: str | None = typer.Option(
+        None, "--range", metavar="A:B", help="First and last frequency, such as 0:2000GHz (MHz)."
+    ),
+    dipole: str | None = inputs.DIPOLE,
+    dipole_abc: str | None = inputs.DIPOLE_ABC,
+    isotope: list[str] | None = inputs.ISOTOPE,
+    spin_weights: str | None = inputs.SPIN_WEIGHTS,
+    q: float | None = typer.Option(None, metavar="Q", help="Partition function to use instead of the summed one."),
+    vibrational_factor: float = typer.Option(1.0, metavar="X", help="Multiplies Q."),
+    profile: str | None = typer.Option(None, metavar="NAME", help="sticks, gaussian, lorentzian or voigt."),
+    fwhm: str | None = typer.Option(None, metavar="W", help="Full width at half maximum (MHz); by default Doppler's."),
+    cat: str | None = typer.Option(None, metavar="FILE", help="Write a catalogue of 80 columns (.cat, .cat.gz)."),
+    csv: str | None = typer.Option(None, metavar="FILE", help="Write all lines as CSV."),
+    parquet: str | None = typer.Option(None, metavar="FILE", help="Write all lines as Parquet."),
+    profile_csv: str | None = typer.Option(None, metavar="FILE", help="Write the profile on its grid as CSV."),
+    plot: str | None = typer.Option(None, metavar="FILE", help="Draw the spectrum (.png, .pdf, .svg)."),
+    json: str | None = inputs.JSON,
+    top_lines: int = typer.Option(20, "--top", metavar="N", help="How many of the strongest lines are shown."),
+    tag: int = typer.Option(0, metavar="N", help="Tag of the species in --cat."),
+) -> None:
+    """Rotational lines: frequencies, intensities, and what they were made from."""
+    settings = _settings(temperature, jmax, min_lgint, range_, q, vibrational_factor, profile, fwhm)
+    inputs.whole("--top", top_lines, 0)
+    inputs.whole("--tag", tag, 0, 999_999)
+    files = _files(
+        settings, {"--cat": cat, "--csv": csv, "--parquet": parquet, "--profile-csv": profile_csv, "--plot": plot}
+    )
+    if json != "-":
+        files.ask("--json", json, (".json",))
+
+    given = Input(source, constants, isotope or [], dipole, dipole_abc, spin_weights)
+    top = inputs.with_some_dipole(inputs.read_top(given))
+    _refuse_doppler_without_mass(top, settings)
+    with answering():
+        lines = _lines(top, settings)
+        content = _content(lines, settings, given, context.obj, top_lines)
+    _refuse_nothing_to_draw(lines, files)
+
+    content["files"] = [str(path) for path in files.wanted.values()]
+    files.write(_writers(lines, settings, content, tag))
+    if json == "-":
+        print(_json(lines, content), end="")
+    else:
+        _show(lines, content)
+
+
+def _files(settings: Settings, paths: dict[str, str | None]) -> Files:
+    """The files asked for, each with a name of its format, and a use for what was said of the profile."""
+    suffixes = {"--cat": (".cat", ".cat.gz"), "--parquet": (".parquet",), "--plot": (".png", ".pdf", ".svg")}
+    files = Files()
+    for name, path in paths.items():
+        files.ask(name, path, suffixes.get(name, (".csv",)))
+    if paths["--profile-csv"] and settings.profile == "sticks":
+        raise ValueError(
+            "--profile-csv: sticks have no profile; give --fwhm or --profile gaussian, lorentzian or voigt"
+        )
+    if settings.profile != "sticks" and not (paths["--profile-csv"] or paths["--plot"]):
+        raise ValueError(
+            f"a {settings.profile} profile was asked for, but not where to put it; add --plot or --profile-csv"
+        )
+    return files
+
+
+def _refuse_doppler_without_mass(top: Top, settings: Settings) -> None:
+    doppler = settings.profile == "voigt" or (settings.profile == "gaussian" and settings.fwhm_mhz is None)
+    if doppler and top.mass_u is None:
+        raise ValueError(
+            "a Doppler width needs a mass, which constants alone do not have; give --fwhm, not --profile voigt"
+        )
+
+
+def _refuse_nothing_to_draw(lines: Lines, files: Files) -> None:
+    drawn = [name for name in ("--plot", "--profile-csv") if name in files.wanted]
+    if drawn and not len(lines):
+        raise NoAnswer(f"{drawn[0]}: no lines: {_why_none(lines)}")
+
+
+def _settings(
+    temperature: str,
+    jmax: int | None,
+    min_lgint: str,
+    range_: str | None,
+    q: float | None,
+    vibrational_factor: float,
+    profile: str | None,
+    fwhm: str | None,
+) -> Settings:
+    """The options as numbers, each checked by itself."""
+    from rotor.units import parse_range
+
+    inputs.whole("--jmax", jmax, 0)
+    if q is not None:
+        inputs.above_zero("--q", q)
+    profile = profile or ("gaussian" if fwhm else "sticks")
+    if profile not in PROFILES:
+        raise ValueError(f"--profile: {profile!r} is none of {', '.join(PROFILES)}")
+    if profile == "sticks" and fwhm:
+        raise ValueError("--fwhm: sticks have no width; leave it out or choose another --profile")
+    if profile in ("lorentzian", "voigt") and not fwhm:
+        raise ValueError(f"--profile {profile}: the width of the Lorentzian is wanted, --fwhm")
+    return Settings(
+        temperature_k=inputs.positive("--temperature", temperature, "K"),
+        jmax=jmax,
+        min_lgint=inputs.cut("--min-lgint", min_lgint),
+        range_mhz=(0.0, math.inf)
+        if range_ is None
+        else inputs.option("--range", range_, lambda r: parse_range(r, "MHz")),
+        q=q,
+        vibrational_factor=inputs.above_zero("--vibrational-factor", vibrational_factor),
+        profile=profile,
+        fwhm_mhz=inputs.positive("--fwhm", fwhm, "MHz") if fwhm else None,
+    )
+
+
+def _lines(top: Top, settings: Settings) -> Lines:
+    from rotor.spectra.lines import line_list
+
+    if top.dipole_abc_debye is None:  # a spherical top: it has no lines, whatever the dipole
+        top = top.with_dipole((0.0, 0.0, 0.0), "none: a rigid spherical top has no rotational lines")
+    return line_list(
+        top,
+        temperature_k=settings.temperature_k,
+        jmax=settings.jmax,
+        min_lgint=settings.min_lgint,
+        range_mhz=settings.range_mhz,
+        q=settings.q,
+        vibrational_factor=settings.vibrational_factor,
+    )
+
+
+def _content(lines: Lines, settings: Settings, given: Input, command: str, shown: int) -> dict[str, Any]:
+    """What is printed and more, by the keys of docs/command_line.md."""
+    import numpy as np
+
+    from rotor.cli.report import describe, q_record
+    from rotor.thermo import classical_partition_function
+
+    q = q_record(lines.partition, classical_partition_function(lines.top, lines.temperature_k))
+    strongest = np.sort(np.argsort(-lines.intensity_nm2_mhz, kind="stable")[:shown])
+    return {
+        **describe(lines.top, given.text, command),
+        "temperature_k": lines.temperature_k,
+        "q": q,
+        "jmax": lines.jmax,
+        "jmax_source": "given" if settings.jmax is not None else _reach(settings.min_lgint),
+        "min_lgint": settings.min_lgint,
+        "range_mhz": lines.range_mhz,
+        "line_count": len(lines),
+        "profile": settings.profile,
+        "fwhm_mhz": settings.fwhm_mhz,
+        "strongest": strongest,
+    }
+
+
+def _json(lines: Lines, content: dict[str, Any]) -> str:
+    from rotor.formats.line_tables import records
+
+    return json_text({**content, "lines": records(lines)})
+
+
+def _reach(min_lgint: float | None) -> str:
+    if min_lgint is None:
+        return "beyond it no line reaches an lgint of -12"
+    return "beyond it no line reaches the cut"
+
+
+def _writers(lines: Lines, settings: Settings, content: dict[str, Any], tag: int) -> dict[str, Writer]:
+    """How each option's file is written, with the provenance that its format can hold."""
+    import rotor
+
+    story = {"command": content["command"], "input": content["input"], "tag": tag}
+
+    def table(path: Path) -> None:
+        rotor.write(lines, path, settings=story)
+
+    return {
+        "--cat": table,
+        "--csv": table,
+        "--parquet": table,
+        "--profile-csv": lambda path: rotor.write(
+            _spectrum(lines, settings), path, settings={"command": story["command"]}
+        ),
+        "--plot": lambda path: _draw(lines, settings, path, story),
+        "--json": lambda path: write_text(path, _json(lines, content)),
+    }
+
+
+def _spectrum(lines: Lines, settings: Settings) -> Spectrum:
+    """The lines with their shape, on a grid that follows each of them."""
+    from rotor.spectra.spectrum import Spectrum, resolving_grid
+
+    first, last = settings.range_mhz
+    shape: dict[str, Any] = {"profile": settings.profile, "fwhm_mhz": settings.fwhm_mhz}
+    grid = resolving_grid(lines, range_mhz=(first, last) if math.isfinite(last) else None, **shape)
+    return Spectrum.from_lines(lines, grid, **shape)
+
+
+def _draw(lines: Lines, settings: Settings, path: Path, story: dict[str, Any]) -> None:
+    from rotor.plots.spectrum import plot_spectrum
+
+    sticks = settings.profile == "sticks"
+    plot_spectrum(lines if sticks else _spectrum(lines, settings), path, provenance={"command": story["command"]})
+
+
+def _show(lines: Lines, content: dict[str, Any]) -> None:
+    from rotor.cli.report import heading
+
+    print(heading(lines.top))
+    show_facts(_facts(lines, content))
+    if len(lines) == 0:
+        print(f"\nno lines: {_why_none(lines)}")
+        return
+    if len(content["strongest"]):
+        print()
+        show_table(_lines_table(lines, content["strongest"]))
+
+
+def _facts(lines: Lines, content: dict[str, Any]) -> list[tuple[str, str]]:
+    from rotor.cli import report
+
+    top = lines.top
+    cut = "none: every allowed line" if content["min_lgint"] is None else f"lgint above {content['min_lgint']:g}"
+    weights = report.weights_text(content["spin_weights"])
+    dipole = report.vector_text(top.dipole_abc_debye)
+    return [
+        ("constants", report.with_source(report.constants_text(top), top.source)),
+        ("dipole", report.with_source(dipole, top.dipole_source)),
+        ("spin weights", report.with_source(weights, top.weights_source)),
+        ("temperature", f"{lines.temperature_k:g} K"),
+        ("Q", report.q_text(content["q"])),
+        ("J max", f"{lines.jmax}: {content['jmax_source']}"),
+        ("cut", cut + _range_text(lines.range_mhz)),
+        ("lines", _count_text(lines)),
+    ]
+
+
+def _range_text(range_mhz: tuple[float, float]) -> str:
+    first, last = range_mhz
+    if first <= 0 and math.isinf(last):
+        return ""
+    return f", from {first:g} to {last:g} MHz"
+
+
+def _count_text(lines: Lines) -> str:
+    if not len(lines):
+        return "none"
+    return f"{len(lines)}, from {lines.frequency_mhz[0]:.4f} to {lines.frequency_mhz[-1]:.4f} MHz"
+
+
+def _why_none(lines: Lines) -> str:
+    if lines.top.kind == "spherical":
+        return "a rigid spherical top has none (neither field nor distortion dipole is taken in)"
+    if not any(lines.top.dipole_abc_debye or ()):
+        return "without a permanent dipole there is no rotational absorption"
+    return "none of the allowed ones is inside the range and above the cut; widen --range or lower --min-lgint"
+
+
+def _lines_table(lines: Lines, rows: Any) -> Table:
+    """The strongest lines in order of frequency."""
+    shown = lines.where(rows)
+    names = " ".join(name.capitalize() for name in lines.quanta_names)
+    columns = ("frequency (MHz)", "lgint", 'E" (cm-1)', "g'", "A (1/s)", "Sμ² (D²)", "upper", "lower")
+    formats = ("{:.4f}", "{:.4f}", "{:.4f}", "{}", "{:.2e}", "{:.5g}")
+    numbers = list(shown.columns.values())[: len(formats)]
+    labels = [
+        [" ".join(f"{n:2d}" for n in quanta) for quanta in shown.quanta(states)]
+        for states in (shown.upper, shown.lower)
+    ]
+    cells = [[form.format(x) for x in column] for form, column in zip(formats, numbers, strict=True)]
+    title = f"the {len(shown)} strongest lines" if len(shown) < len(lines) else "all lines"
+    return Table(f"{title}, in order of frequency (states: {names})", columns, list(zip(*cells, *labels, strict=True)))

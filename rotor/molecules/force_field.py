@@ -1,0 +1,225 @@
+"""A harmonic force field: the Hessian of a molecule at its minimum, its vibrations, where it comes from.
+
+Near the minimum the potential is V = ½ xᵀ F x with the 3n displacements x. What the force field says of vibration stands
+here; what it says of rotation in `rotor.distortion`.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rotor.molecules.molecule import Molecule
+from rotor.units import ATOMIC_MASS_KG, BOHR_RADIUS_ANGSTROM, ELEMENTARY_CHARGE_C, SPEED_OF_LIGHT_M_PER_S
+
+Floats = NDArray[np.float64]
+
+HARTREE_EV = 27.211386245981  # CODATA 2022
+EV_PER_ANGSTROM2 = {  # one of each unit in eV/Å²
+    "eV/Å²": 1.0,
+    "hartree/bohr²": HARTREE_EV / BOHR_RADIUS_ANGSTROM**2,
+    "mdyn/Å": 1e-18 / ELEMENTARY_CHARGE_C,  # 1 mdyn/Å = 100 N/m = 1e-18 J/Å²
+}
+_UNIT_NAMES = {"eV/A2": "eV/Å²", "hartree/bohr2": "hartree/bohr²", "mdyn/A": "mdyn/Å"}
+_WAVENUMBER = np.sqrt(ELEMENTARY_CHARGE_C * 1e20 / ATOMIC_MASS_KG) / (200 * np.pi * SPEED_OF_LIGHT_M_PER_S)
+
+LOPSIDED = 1e-3  # of the largest element, up to which a Hessian may differ from its transpose
+LEFT_OVER_CM = 100.0  # a translation or rotation stiffer than that belongs to another geometry
+
+
+@dataclass(frozen=True, eq=False)
+class Vibrations:
+    """Harmonic vibrations.
+
+    wavenumbers_cm : (m,) rising, m = 3n - 6 or 3n - 5
+    modes : (3n, m) mass-weighted displacements, orthonormal, x_i √m_i
+    stiffness_ev : (m,) eigenvalues λ of the mass-weighted Hessian, eV/(u Å²); V = ½ λ Q²
+    left_over_cm : the stiffest translation or rotation, which a Hessian at an exact minimum leaves at 0
+    """
+
+    wavenumbers_cm: Floats
+    modes: Floats
+    stiffness_ev: Floats
+    left_over_cm: float
+
+
+@dataclass(frozen=True, eq=False)
+class ForceField:
+    """A molecule at its minimum and the Hessian there.
+
+    hessian_ev_per_angstrom2 : (3n, 3n) array in the frame of the positions, rows and columns x1 y1 z1 x2 ...
+    source : where it is from
+
+    Raises ValueError for a Hessian of another shape, with numbers that are not finite, or lopsided by more than 1e-3
+    of its largest element (up to that it is made symmetric).
+    """
+
+    molecule: Molecule
+    hessian_ev_per_angstrom2: Floats
+    source: str = ""
+
+    def __post_init__(self) -> None:
+        size = 3 * len(self.molecule.symbols)
+        hessian = np.array(self.hessian_ev_per_angstrom2, dtype=np.float64)
+        if hessian.shape != (size, size) or not np.isfinite(hessian).all():
+            raise ValueError(
+                f"Hessian of shape {hessian.shape}: {size} x {size} finite numbers are wanted for {self.molecule.formula}"
+            )
+        lopsided = float(np.abs(hessian - hessian.T).max())
+        if lopsided > LOPSIDED * float(np.abs(hessian).max()):
+            raise ValueError(
+                f"the Hessian differs from its transpose by up to {lopsided:.3g} eV/Å²: it is none, or its rows are out of order"
+            )
+        hessian = (hessian + hessian.T) / 2
+        hessian.setflags(write=False)
+        object.__setattr__(self, "hessian_ev_per_angstrom2", hessian)
+
+    def with_isotopes(self, changes: Mapping[int | str, str] | str) -> ForceField:
+        """The same force field with other isotopes: in the approximation of Born and Oppenheimer it does not change."""
+        return replace(self, molecule=self.molecule.with_isotopes(changes))
+
+    def vibrations(self) -> Vibrations:
+        """Wavenumbers and modes, translations and rotations projected out.
+
+        ω = √λ / 2πc with the eigenvalues λ of M^(-1/2) F M^(-1/2) (E. B. Wilson, J. C. Decius and P. C. Cross,
+        Molecular Vibrations (1955), § 2-2). Raises ValueError where a vibration has a negative λ (no minimum), or where
+        the projected motions are stiffer than 100 cm⁻¹ (the Hessian is that of another geometry, or there are forces).
+        """
+        roots = np.sqrt(np.repeat(self.molecule.masses_u, 3))
+        weighted = self.hessian_ev_per_angstrom2 / np.outer(roots, roots)
+        rigid = rigid_motions(self.molecule)
+        left_over = np.abs(np.linalg.eigvalsh(rigid.T @ weighted @ rigid)).max()
+        left_over_cm = float(np.sqrt(left_over) * _WAVENUMBER)
+        if left_over_cm > LEFT_OVER_CM:
+            raise ValueError(
+                f"the Hessian holds the molecule against rotation or translation by {left_over_cm:.0f} cm⁻¹ "
+                f"(at most {LEFT_OVER_CM:.0f}): it belongs to another geometry, frame or order of atoms"
+            )
+        inside = np.linalg.svd(rigid, full_matrices=True)[0][:, rigid.shape[1] :]
+        stiffness, vectors = np.linalg.eigh(inside.T @ weighted @ inside)
+        if len(stiffness) and stiffness[0] <= 0:
+            raise ValueError(
+                f"a vibration of {_wavenumber(stiffness[0]):.0f}i cm⁻¹: the geometry is no minimum; optimise it first"
+            )
+        return Vibrations(_wavenumber(stiffness), inside @ vectors, stiffness, left_over_cm)
+
+
+def _wavenumber(stiffness: Any) -> Any:
+    return np.sqrt(np.abs(stiffness)) * _WAVENUMBER
+
+
+def rigid_motions(molecule: Molecule) -> Floats:
+    """Translations and rotations as orthonormal mass-weighted displacements (3n, 6), or (3n, 5) of a linear molecule."""
+    roots = np.sqrt(molecule.masses_u)
+    positions = molecule.positions_angstrom - molecule.centre_of_mass_angstrom
+    shifts = [np.outer(roots, axis) for axis in np.eye(3)]
+    turns = [roots[:, None] * np.cross(axis, positions) for axis in np.eye(3)]
+    vectors = np.array([motion.ravel() for motion in (*shifts, *turns)]).T
+    left, sizes, _ = np.linalg.svd(vectors / np.maximum(np.linalg.norm(vectors, axis=0), 1e-12), full_matrices=False)
+    return np.asarray(left[:, sizes > 1e-4 * sizes[0]])
+
+
+def force_field_from_calculator(
+    molecule: Molecule, calculator: Any, *, step_angstrom: float = 0.005, most_force_ev_per_angstrom: float = 0.02
+) -> ForceField:
+    """The force field of a molecule at its minimum by any ASE calculator: central differences of the forces.
+
+    F_ij = -[f_j(x_i + h) - f_j(x_i - h)] / 2h, with an error of the order h² times the fourth derivative; 6n calls.
+
+    Raises ValueError where the forces at the geometry exceed `most_force_ev_per_angstrom`: refine it first
+    (`rotor.refine`).
+    """
+    from rotor.molecules.refine import ase_atoms
+
+    atoms = ase_atoms(molecule)
+    atoms.calc = calculator
+    rest = float(np.abs(atoms.get_forces()).max())
+    if not rest <= most_force_ev_per_angstrom:
+        raise ValueError(
+            f"a force of {rest:.3g} eV/Å on an atom of {molecule.formula} (at most {most_force_ev_per_angstrom:g}): "
+            "the geometry is no minimum of this calculator; refine it first (rotor.refine)"
+        )
+    start = atoms.get_positions()
+    rows = []
+    for coordinate in range(start.size):
+        ahead, behind = (_forces(atoms, start, coordinate, sign * step_angstrom) for sign in (1, -1))
+        rows.append((behind - ahead) / (2 * step_angstrom))
+    name = type(calculator).__name__
+    return ForceField(molecule, np.array(rows), f"{name}, central differences of forces, step {step_angstrom:g} Å")
+
+
+def _forces(atoms: Any, start: Floats, coordinate: int, step: float) -> Floats:
+    moved = start.copy()
+    moved.flat[coordinate] += step
+    atoms.set_positions(moved)
+    return np.asarray(atoms.get_forces(), dtype=np.float64).ravel()
+
+
+def read_hessian(path: str | os.PathLike[str], molecule: Molecule, *, unit: str = "hartree/bohr²") -> ForceField:
+    """The force field in a text file of numbers: all (3n)² of them by rows, or the lower triangle by rows.
+
+    Lines that start with # are comments. unit : "hartree/bohr²", "eV/Å²" or "mdyn/Å". The molecule is that of the
+    calculation, in its frame. Raises ValueError, with the line, for what is no number (asterisks, D exponents), and for
+    a count of numbers that fits neither form.
+    """
+    unit = _UNIT_NAMES.get(unit, unit)
+    if unit not in EV_PER_ANGSTROM2:
+        raise ValueError(f"unit {unit!r} of a Hessian: one of {', '.join(EV_PER_ANGSTROM2)} is wanted")
+    numbers: list[float] = []
+    for count, line in enumerate(Path(path).read_text(encoding="utf-8-sig").splitlines(), start=1):
+        if not line.lstrip().startswith("#"):
+            numbers += [_number(field, f"{path}, line {count}") for field in line.replace(",", " ").split()]
+    hessian = _square(np.array(numbers), 3 * len(molecule.symbols), str(path))
+    return ForceField(molecule, hessian * EV_PER_ANGSTROM2[unit], f"{path}, {unit}")
+
+
+def _number(field: str, where: str) -> float:
+    if re.fullmatch(r"[+-]?(\d+\.?\d*|\.\d+)[dD][+-]?\d+", field):
+        raise ValueError(f"{where}: {field!r} has a Fortran exponent; write {field.upper().replace('D', 'E')!r}")
+    if not re.fullmatch(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", field):
+        raise ValueError(f"{where}: {field!r} is no plain decimal number")
+    return float(field)
+
+
+def _square(numbers: Floats, size: int, where: str) -> Floats:
+    if len(numbers) == size**2:
+        return numbers.reshape(size, size)
+    if len(numbers) == size * (size + 1) // 2:
+        square = np.zeros((size, size))
+        square[np.tril_indices(size)] = numbers
+        return np.asarray(square + np.tril(square, -1).T)
+    raise ValueError(
+        f"{where}: {len(numbers)} numbers; a Hessian of {size} coordinates has {size**2}, its lower triangle "
+        f"{size * (size + 1) // 2}: the file was cut, or belongs to another molecule"
+    )
+
+
+def force_field_from_internal(
+    molecule: Molecule, coordinates: Any, constants_mdyn_angstrom: ArrayLike, *, source: str = ""
+) -> ForceField:
+    """The force field of published force constants in internal coordinates, F_x = Bᵀ F B at the minimum.
+
+    coordinates : m functions of the positions (n, 3), from `rotor.molecules.internal`. constants_mdyn_angstrom : (m, m)
+    array; between stretches mdyn/Å, between angles mdyn Å, between both mdyn. Source: Wilson, Decius and Cross (1955),
+    § 4-2; B is exact to round-off.
+
+    >>> from rotor.molecules.internal import stretch
+    >>> co = Molecule(("C", "O"), [[0, 0, 0], [0, 0, 1.1282]])
+    >>> field = force_field_from_internal(co, [stretch(0, 1)], [[19.019]])
+    >>> round(float(field.vibrations().wavenumbers_cm[0]), 1)
+    2169.8
+    """
+    from rotor.molecules.internal import wilson_b
+
+    constants = np.asarray(constants_mdyn_angstrom, dtype=np.float64)
+    if constants.shape != (len(coordinates),) * 2:
+        raise ValueError(f"force constants of shape {constants.shape} for {len(coordinates)} internal coordinates")
+    b = wilson_b(coordinates, molecule.positions_angstrom)
+    return ForceField(molecule, b.T @ constants @ b * EV_PER_ANGSTROM2["mdyn/Å"], source or "internal force constants")

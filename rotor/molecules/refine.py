@@ -1,0 +1,135 @@
+"""A geometry made better by any ASE calculator: optimised until the forces are small, never silently short of it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+
+from rotor.molecules.molecule import Molecule
+from rotor.units import DEBYE_PER_E_ANGSTROM
+
+MOST_FORCE_EV_PER_ANGSTROM = 1e-3  # on any atom, where an optimisation is done
+MOST_STEPS = 500
+_INSTALLED_SEPARATELY = {"tblite": "tblite.ase", "xtb": "xtb.ase.calculator"}
+_CLASS_NAMES = {"tblite": "TBLite", "xtb": "XTB"}
+_NOT_FOR_MOLECULES = {
+    "emt": "EMT is a potential for metals; its forces on C, N, O and H are for tests of programs, not for geometries",
+    "lj": "one Lennard-Jones parameter for all atoms holds no molecule together; build the calculator in Python",
+    "morse": "one Morse parameter for all atoms is no molecule; build the calculator in Python",
+    "tip3p": "TIP3P holds water rigid, so that there is nothing to optimise",
+    "tip4p": "TIP4P holds water rigid, so that there is nothing to optimise",
+}
+
+
+def ase_atoms(molecule: Molecule) -> Any:
+    """The molecule as `ase.Atoms`, with its isotopic masses and its charge (on the first atom)."""
+    from ase import Atoms
+
+    charges = [float(molecule.charge)] + [0.0] * (len(molecule.symbols) - 1)
+    return Atoms(
+        list(molecule.symbols), positions=molecule.positions_angstrom, masses=molecule.masses_u, charges=charges
+    )
+
+
+def refine(
+    molecule: Molecule,
+    calculator: Any,
+    *,
+    most_force_ev_per_angstrom: float = MOST_FORCE_EV_PER_ANGSTROM,
+    most_steps: int = MOST_STEPS,
+) -> Molecule:
+    """The molecule at the nearest minimum of an ASE calculator, by BFGS.
+
+    Parameters
+    ----------
+    molecule : Molecule
+        Where the search starts.
+    calculator : ASE calculator or str
+        Any with forces, or a name for `calculator_by_name`.
+    most_force_ev_per_angstrom : float
+        The search is done when no force on an atom is larger.
+    most_steps : int
+        After as many it has failed.
+
+    Returns
+    -------
+    Molecule
+        With the new positions; the dipole is the calculator's where it has one, else not known, since that of the old
+        geometry has lost its frame. A note says how many steps it took and what force is left; the uncertainty of the
+        constants is not known.
+
+    Raises
+    ------
+    ValueError
+        Where the search does not converge, with the force that is left, and where the calculator fails.
+
+    >>> from ase.calculators.lj import LennardJones
+    >>> pair = Molecule(("Ar", "Ar"), [[0, 0, 0], [0, 0, 1.3]])
+    >>> near = refine(pair, LennardJones(rc=100.0, smooth=False), most_force_ev_per_angstrom=1e-6)
+    >>> round(float(near.positions_angstrom[1, 2] - near.positions_angstrom[0, 2]), 4), round(2 ** (1 / 6), 4)
+    (1.1225, 1.1225)
+    """
+    from ase.optimize import BFGS
+
+    if isinstance(calculator, str):
+        calculator = calculator_by_name(calculator)
+    name = type(calculator).__name__
+    atoms = ase_atoms(molecule)
+    atoms.calc = calculator
+    search: Any = BFGS(atoms, logfile=None)
+    try:
+        converged = search.run(fmax=most_force_ev_per_angstrom, steps=most_steps)
+        left = float(np.linalg.norm(atoms.get_forces(), axis=1).max())
+    except Exception as reason:  # calculators fail with any class; all mean that this molecule cannot be done with it
+        raise ValueError(f"{name} fails for {molecule.formula}: {reason or type(reason).__name__}") from reason
+    if not converged:
+        raise ValueError(
+            f"{name} did not bring {molecule.formula} to a minimum in {most_steps} steps: a force of {left:.3g} eV/Å is "
+            f"left, {most_force_ev_per_angstrom:g} is wanted; start nearer, or allow more steps or a larger force"
+        )
+    note = f"geometry refined with {name} by BFGS in {search.get_number_of_steps()} steps; largest force left {left:.2g} eV/Å"
+    return _refined(molecule, atoms, name, note)
+
+
+def _refined(molecule: Molecule, atoms: Any, name: str, note: str) -> Molecule:
+    dipole = atoms.calc.results.get("dipole")
+    return replace(
+        molecule,
+        positions_angstrom=atoms.get_positions(),
+        dipole_debye=None if dipole is None else np.asarray(dipole, dtype=float) * DEBYE_PER_E_ANGSTROM,
+        dipole_source="" if dipole is None else name,
+        polarizability_angstrom3=None,
+        source=f"{name}, from {molecule.source or 'a geometry without source'}",
+        uncertainty=None,
+        notes=(note,),
+    )
+
+
+def calculator_by_name(name: str) -> Any:
+    """An ASE calculator with its own defaults, by the name that ASE knows, or `tblite`, `xtb` where installed.
+
+    Raises ValueError for a name unknown, a program not installed or not set up, and potentials that are not for
+    molecules (EMT and the like), with a word why.
+    """
+    library: Any = import_module("ase.calculators.calculator")
+    key, names = name.strip().lower(), library.names
+    if key in _NOT_FOR_MOLECULES:
+        raise ValueError(f"calculator {name!r}: {_NOT_FOR_MOLECULES[key]}")
+    if key not in (*names, *_INSTALLED_SEPARATELY):
+        known = ", ".join(sorted({*names, *_INSTALLED_SEPARATELY} - {*_NOT_FOR_MOLECULES}))
+        raise ValueError(f"calculator {name!r} is unknown to ASE; known are {known}")
+    try:
+        make = _separate(key) if key in _INSTALLED_SEPARATELY else library.get_calculator_class(key)
+        return make()
+    except Exception as reason:  # an import, a configuration or a program that is missing: all mean that it is not here
+        raise ValueError(
+            f"calculator {name!r} cannot be built here ({' '.join(str(reason).split()) or type(reason).__name__}); install "
+            "and set it up, or build it in Python and give it to rotor.refine"
+        ) from reason
+
+
+def _separate(key: str) -> Any:
+    return getattr(import_module(_INSTALLED_SEPARATELY[key]), _CLASS_NAMES[key])

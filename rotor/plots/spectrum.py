@@ -1,0 +1,348 @@
+"""A picture of a spectrum: sticks or a profile, with units, temperature, and the strongest lines named."""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor.spectra.lines import Lines
+from rotor.spectra.spectrum import Spectrum, line_widths
+
+Floats = NDArray[np.float64]
+
+BLUE, GREY = "#0072B2", "#555555"  # of Okabe and Ito's palette, told apart by everyone
+STYLE: dict[Any, Any] = {
+    "font.size": 9.0,
+    "axes.labelsize": 9.0,
+    "axes.titlesize": 10.0,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.linewidth": 0.7,
+    "xtick.direction": "out",
+    "ytick.direction": "out",
+    "xtick.major.width": 0.7,
+    "ytick.major.width": 0.7,
+    "axes.formatter.use_mathtext": True,
+    "svg.fonttype": "none",
+    "svg.hashsalt": "rotor",  # the same picture is the same file
+    "pdf.fonttype": 42,
+}
+SIZE_INCHES = (7.2, 3.8)
+DPI = 200
+VISIBLE = 4e-3  # lines below this part of the strongest do not stretch the axis of frequency
+TALL = 1e-2  # and below this they cannot be seen on a linear axis
+MOST_DECADES = 8
+MOST_VERTICES = 20_000  # of a curve; more cannot be told apart on paper
+MOST_VECTOR_STICKS = 5_000  # more are drawn as pixels inside a PDF or SVG
+
+
+@dataclass(frozen=True)
+class _Axis:
+    """Unit of the frequencies, its name and its size in MHz, and the ends shown, in MHz."""
+
+    unit: str
+    mhz: float
+    first: float
+    last: float
+
+    def inside(self, frequency_mhz: Floats) -> NDArray[np.bool_]:
+        return (frequency_mhz >= self.first) & (frequency_mhz <= self.last)
+
+
+def plot_spectrum(
+    thing: Lines | Spectrum,
+    path: str | os.PathLike[str],
+    *,
+    range_mhz: tuple[float, float] | None = None,
+    title: str | None = None,
+    labels: int = 12,
+    provenance: Mapping[str, Any] | None = None,
+) -> None:
+    """Draw lines as sticks, or a spectrum as a curve, into a .png, .pdf or .svg file.
+
+    Parameters
+    ----------
+    thing : Lines or Spectrum
+        Sticks are integrated absorption in nm² MHz, a curve is the cross section in nm².
+    path : path
+        Its suffix chooses the format.
+    range_mhz : (2,), optional
+        The frequencies shown; else the range the lines were asked for, else where lines are above 0.4 % of the strongest.
+    title : str, optional
+        Instead of name, formula and temperature.
+    labels : int
+        The most lines that are named; a name that would lie on another or on a stick is left out.
+    provenance : mapping, optional
+        What the metadata of the file shall say besides version, constants and settings.
+
+    The axis of intensity is logarithmic where fewer than ten lines would be seen on a linear one. Raises ValueError for
+    a suffix that is no picture and for a spectrum without lines or with nothing in the range.
+    """
+    suffix = Path(path).suffix.lower()
+    if suffix not in (".png", ".pdf", ".svg"):
+        raise ValueError(f"{os.fspath(path)}: a picture is .png, .pdf or .svg; the suffix names the format")
+
+    import matplotlib as mpl
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    lines = thing if isinstance(thing, Lines) else thing.lines
+    heights = _heights(thing, lines)
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=SIZE_INCHES, dpi=DPI, layout="constrained")
+        FigureCanvasAgg(figure)
+        axes = figure.add_subplot()
+        x = _frequency_axis(thing, lines, heights, range_mhz)
+        _draw(axes, thing, x)
+        _scale(axes, thing, lines, heights, x)
+        _inscribe(axes, thing, lines, x, title)
+        if lines is not None:
+            _name_lines(figure, axes, thing, lines, heights, x, labels)
+        figure.savefig(path, dpi=DPI, metadata=_metadata(suffix, thing, lines, provenance or {}))
+
+
+def _heights(thing: Lines | Spectrum, lines: Lines | None) -> Floats:
+    """How high each line stands in the picture: its intensity, or the curve at its centre."""
+    if lines is None:
+        return np.zeros(0)
+    if isinstance(thing, Lines):
+        return lines.intensity_nm2_mhz
+    return np.asarray(np.interp(lines.frequency_mhz, thing.frequency_mhz, thing.intensity, left=0.0, right=0.0))
+
+
+def _frequency_axis(
+    thing: Lines | Spectrum, lines: Lines | None, heights: Floats, range_mhz: tuple[float, float] | None
+) -> _Axis:
+    first, last = range_mhz or _range_shown(thing, lines, heights)
+    unit, mhz = next(((u, f) for u, f in (("MHz", 1.0), ("GHz", 1e3)) if last < 2e3 * f), ("THz", 1e6))
+    return _Axis(unit, mhz, first, last)
+
+
+def _range_shown(thing: Lines | Spectrum, lines: Lines | None, heights: Floats) -> tuple[float, float]:
+    """The range that was asked for; without one, up to the last visible line, and from 0 where the first is near it."""
+    if lines is None:
+        assert isinstance(thing, Spectrum)
+        return float(thing.frequency_mhz[0]), float(thing.frequency_mhz[-1])
+    if not len(lines) or not heights.max() > 0:
+        raise ValueError(
+            f"there is no line to draw for {lines.top.name or 'this top'}; widen the range or lower the cut"
+        )
+
+    if math.isfinite(lines.range_mhz[1]):
+        return lines.range_mhz
+    visible = lines.frequency_mhz[heights >= VISIBLE * heights.max()]
+    low, high = float(visible.min()), float(visible.max())
+    margin = 0.02 * (high - low) or 0.02 * high
+    return (0.0 if low - margin < 0.1 * high else low - margin), high + margin
+
+
+def _draw(axes: Any, thing: Lines | Spectrum, x: _Axis) -> None:
+    if isinstance(thing, Spectrum):
+        shown = x.inside(thing.frequency_mhz)
+        axes.plot(*_thinned(thing.frequency_mhz[shown] / x.mhz, thing.intensity[shown]), color=BLUE, linewidth=0.8)
+        return
+    shown = x.inside(thing.frequency_mhz)
+    many = int(shown.sum()) > MOST_VECTOR_STICKS
+    width = 1.0 if shown.sum() < 300 else 0.6
+    frequencies, heights = thing.frequency_mhz[shown] / x.mhz, thing.intensity_nm2_mhz[shown]
+    axes.vlines(frequencies, 0.0, heights, color=BLUE, linewidth=width, rasterized=many)
+
+
+def _thinned(x: Floats, y: Floats) -> tuple[Floats, Floats]:
+    """The lowest and highest point of every strip, where a curve has more points than can be told apart."""
+    if len(x) <= MOST_VERTICES:
+        return x, y
+    strips = np.linspace(x[0], x[-1], MOST_VERTICES // 4)
+    starts = np.unique(np.searchsorted(x, strips, side="left").clip(max=len(x) - 1))
+    low, high = np.minimum.reduceat(y, starts), np.maximum.reduceat(y, starts)
+    return np.repeat(x[starts], 2), np.stack([low, high], axis=1).ravel()
+
+
+def _scale(axes: Any, thing: Lines | Spectrum, lines: Lines | None, heights: Floats, x: _Axis) -> None:
+    """Limits of both axes, with room for names above the lines."""
+    axes.set_xlim(x.first / x.mhz, x.last / x.mhz)
+    shown = np.zeros(0) if lines is None else lines.intensity_nm2_mhz[x.inside(lines.frequency_mhz)]
+    tallest = _tallest(thing, x)
+    if _wants_logarithm(shown[shown > 0]):
+        decades = min(math.log10(shown.max() / shown[shown > 0].min()), MOST_DECADES)
+        axes.set_yscale("log")
+        axes.set_ylim(tallest * 10 ** (-1.05 * decades), tallest * 10 ** (0.28 * decades))
+    else:
+        axes.set_ylim(0.0, 1.28 * tallest)
+
+
+def _tallest(thing: Lines | Spectrum, x: _Axis) -> float:
+    height = thing.intensity_nm2_mhz if isinstance(thing, Lines) else thing.intensity
+    tallest = float(height[x.inside(thing.frequency_mhz)].max(initial=0.0))
+    if not tallest > 0:
+        raise ValueError(f"nothing between {x.first:g} and {x.last:g} MHz to draw; widen the range or lower the cut")
+    return tallest
+
+
+def _wants_logarithm(heights: Floats) -> bool:
+    """Whether fewer than ten lines (or than half, of less than twenty) reach a hundredth of the tallest."""
+    if len(heights) < 2:
+        return False
+    return int((heights >= TALL * heights.max()).sum()) < min(10, len(heights) / 2)
+
+
+def _inscribe(axes: Any, thing: Lines | Spectrum, lines: Lines | None, x: _Axis, title: str | None) -> None:
+    axes.set_xlabel(f"Frequency ({x.unit})")
+    axes.set_ylabel("Integrated absorption (nm² MHz)" if isinstance(thing, Lines) else _ordinate(thing))
+    axes.set_title(title if title is not None else _title(thing, lines), loc="left")
+    if isinstance(thing, Spectrum) and thing.profile:
+        axes.set_title(_shape_text(thing), loc="right", fontsize=8, color=GREY)
+
+
+def _shape_text(spectrum: Spectrum) -> str:
+    width = "Doppler width" if spectrum.fwhm_mhz is None else f"FWHM {spectrum.fwhm_mhz:g} MHz"
+    if spectrum.profile == "voigt":
+        width = f"Doppler and Lorentzian of {width}"
+    return f"{spectrum.profile.capitalize()} profile, {width}"
+
+
+def _ordinate(spectrum: Spectrum) -> str:
+    return "Absorption cross section (nm²)" if spectrum.unit == "nm^2" else f"Intensity ({spectrum.unit})"
+
+
+def _title(thing: Lines | Spectrum, lines: Lines | None) -> str:
+    parts = []
+    if lines is not None:
+        top = lines.top
+        formula = formula_text(top.molecule.formula) if top.molecule is not None else ""
+        name = top.name.replace("$", r"\$")
+        known = {name, top.molecule.formula if top.molecule is not None else ""}
+        parts = [name] if name and not (formula and len(known) == 1) else []
+        parts += [formula] if formula else []
+        parts = parts or [lines.top.constants.kind + " top"]
+    temperature = thing.temperature_k
+    return ", ".join([*parts, *([f"{temperature:g} K"] if temperature else [])])
+
+
+def formula_text(formula: str) -> str:
+    """A formula with subscripts and isotope numbers in matplotlib's mathtext.
+
+    >>> formula_text("C[13C]H6O"), formula_text("H3O+")
+    ('C$^{13}$CH$_{6}$O', 'H$_{3}$O$^{+}$')
+    """
+    text = re.sub(r"\[(\d+)([A-Z][a-z]?)\]", r"<\1>\2", formula)
+    text = re.sub(r"(?<=[A-Za-z)])(\d+)", r"$_{\1}$", text)
+    text = re.sub(r"\((\d+[+-])\)$|([+-])$", lambda m: f"$^{{{m[1] or m[2]}}}$", text)
+    return re.sub(r"<(\d+)>", r"$^{\1}$", text)
+
+
+def state_text(names: Sequence[str], quanta: Sequence[int]) -> str:
+    """Quantum numbers of a state as they are printed: J, or J with K or Ka,Kc as subscripts.
+
+    >>> state_text(("j", "ka", "kc"), (4, 1, 3)), state_text(("j",), (7,))
+    ('$4_{1,3}$', '7')
+    """
+    if len(names) == 1:
+        return str(quanta[0])
+    return f"${quanta[0]}_{{{','.join(map(str, quanta[1:]))}}}$"
+
+
+def _name_lines(
+    figure: Any, axes: Any, thing: Lines | Spectrum, lines: Lines, heights: Floats, x: _Axis, most: int
+) -> None:
+    """Name the strongest lines from the strongest down, upright above them, wherever there is room."""
+    figure.canvas.draw()  # places the axes, so that sizes in pixels are known
+    rows = np.flatnonzero(x.inside(lines.frequency_mhz) & _stands_out(thing, lines, heights))
+    rows = rows[np.argsort(-lines.intensity_nm2_mhz[rows], kind="stable")][: 15 * most]
+    drawn = _drawn_points(axes, thing, x)
+    places = axes.transData.transform(np.stack([lines.frequency_mhz[rows] / x.mhz, heights[rows]], axis=1))
+    taken: list[Any] = []
+    for row, place in zip(rows.tolist(), places, strict=True):
+        if len(taken) == most:
+            break
+        if any(box.x0 - 6 < place[0] < box.x1 + 6 and box.y0 - 40 < place[1] < box.y1 for box in taken):
+            continue  # no need to measure a name that cannot fit
+        text = _label(axes, lines, row, heights[row], x)
+        box = text.get_window_extent().padded(2.0)
+        if _fits(box, axes.bbox, taken, drawn):
+            taken.append(box)
+        else:
+            text.remove()
+
+
+def _stands_out(thing: Lines | Spectrum, lines: Lines, heights: Floats) -> NDArray[np.bool_]:
+    """Lines that can be seen as such: every stick; of a curve, those within a peak and not on its slope."""
+    if isinstance(thing, Lines):
+        return heights > 0
+    width = line_widths(lines, thing.profile, thing.fwhm_mhz)
+    either = [
+        np.interp(lines.frequency_mhz + side * width / 2, thing.frequency_mhz, thing.intensity) for side in (-1, 1)
+    ]
+    return (heights > 0) & (heights > np.maximum(*either))
+
+
+def _drawn_points(axes: Any, thing: Lines | Spectrum, x: _Axis) -> Floats:
+    """Pixels (n, 2) of the tops of sticks, or of the curve: what no name may lie on."""
+    shown = x.inside(thing.frequency_mhz)
+    height = thing.intensity_nm2_mhz if isinstance(thing, Lines) else thing.intensity
+    points = np.stack([thing.frequency_mhz[shown] / x.mhz, height[shown]], axis=1)
+    return np.asarray(axes.transData.transform(points[points[:, 1] > 0]))
+
+
+def _fits(box: Any, room: Any, taken: Sequence[Any], drawn: Floats) -> bool:
+    """Whether a name lies inside the axes, on no other name and on nothing that is drawn."""
+    inside = box.x0 >= room.x0 and box.x1 <= room.x1 and box.y1 <= room.y1
+    crossed = (drawn[:, 0] > box.x0) & (drawn[:, 0] < box.x1) & (drawn[:, 1] > box.y0)
+    return bool(inside and not crossed.any() and not any(box.overlaps(other) for other in taken))
+
+
+def _label(axes: Any, lines: Lines, row: int, height: float, x: _Axis) -> Any:
+    rows = np.array([row], dtype=np.int32)
+    upper, lower = (lines.quanta(states[rows])[0].tolist() for states in (lines.upper, lines.lower))
+    names = lines.quanta_names
+    name = axes.annotate(
+        f"{state_text(names, upper)} – {state_text(names, lower)}",
+        (lines.frequency_mhz[row] / x.mhz, height),
+        xytext=(0, 3),
+        textcoords="offset points",
+        rotation=90,
+        ha="center",
+        va="bottom",
+        fontsize=7,
+        color=GREY,
+    )
+    name.set_in_layout(False)  # names go where the axes leave room, and not the other way round
+    return name
+
+
+def _metadata(suffix: str, thing: Lines | Spectrum, lines: Lines | None, more: Mapping[str, Any]) -> dict[str, Any]:
+    """Provenance by the keys that each format has; no date, so that the same picture is the same file."""
+    import rotor
+
+    facts = dict(more)
+    if lines is not None:
+        top = lines.top
+        facts |= {
+            "constants": top.constants.text(),
+            "constants source": top.source,
+            "dipole": top.dipole_abc_debye,
+            "dipole source": top.dipole_source,
+            "spin weights": top.spin_weights.to_mapping(),
+            "temperature_k": lines.temperature_k,
+            "q": lines.q,
+            "jmax": lines.jmax,
+            "min_lgint": lines.min_lgint,
+        }
+    if isinstance(thing, Spectrum):
+        facts |= {"profile": thing.profile, "fwhm_mhz": thing.fwhm_mhz}
+    title = _title(thing, lines).replace("$", "")
+    story = "; ".join(f"{name}: {value}" for name, value in facts.items())
+    program = f"rotor {rotor.__version__}"
+    if suffix == ".png":
+        return {"Software": program, "Title": title, "Description": story}
+    if suffix == ".pdf":
+        return {"Creator": program, "Title": title, "Subject": story, "CreationDate": None}
+    return {"Creator": program, "Title": title, "Description": story, "Date": None}

@@ -1,0 +1,166 @@
+"""How levels depend on the constants: derivatives by Hellmann and Feynman.
+
+    ∂E_i/∂c = ⟨i|∂H/∂c|i⟩
+
+(H. Hellmann, Einführung in die Quantenchemie (1937) 285; R. P. Feynman, Phys. Rev. 56 (1939) 340), where ∂H/∂c is a sum of
+terms J^2p ½[Jz^2q, J₊^2n + J₋^2n]₊. With real coefficients a_K of a state over all K of one parity, a_{-K} = ± a_K, and
+W_K = a_K a_{K+2n} ⟨K+2n|J₊^2n|K⟩,
+
+    ⟨J^2p ½[Jz^2q, J₊^2n + J₋^2n]₊⟩ = X^p Σ_K W_K [(K+2n)^2q + K^2q]       (n > 0),      X^p Σ_K a_K² K^2q   (n = 0).
+
+The states of all blocks go through this at once, one row a state.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor.quantum.clusters import tensor_eigenvalues
+from rotor.quantum.levels import Levels
+from rotor.quantum.watson import operators_by_name
+from rotor.terms import Powers
+
+if TYPE_CHECKING:
+    from rotor.top import Top
+
+Floats = NDArray[np.float64]
+Rows = NDArray[np.integer]
+
+_AT_ONCE = 1 << 22  # coefficients that are gathered at a time: 32 MB
+
+
+def level_derivatives(top: Top, levels: Levels, names: Sequence[str] | None = None, rows: Rows | None = None) -> Floats:
+    """∂E/∂c of levels by named constants, (rows, names), MHz per MHz.
+
+    names : constants of the set, in the order of the columns; all of them, in the order of `constants.values`, if None
+    rows : indices of the levels wanted; all if None
+
+    Exact at the constants that `levels` were solved with. Raises ValueError for a name that the set does not have and
+    for levels of an asymmetric top that were solved without vectors.
+
+    >>> from rotor.quantum.levels import solve_levels
+    >>> from rotor.top import Top
+    >>> top = Top.from_constants("A=10 B=6 C=4 MHz")
+    >>> level_derivatives(top, solve_levels(top, 1)).round(12).tolist()[1:]
+    [[0.0, 1.0, 1.0], [1.0, 1.0, 0.0], [1.0, 0.0, 1.0]]
+    """
+    by_name = operators_by_name(top.constants)
+    names = tuple(by_name) if names is None else tuple(names)
+    for name in names:
+        if name not in by_name:
+            raise ValueError(f"no constant {name} here to derive by: the set has {', '.join(by_name)}")
+    rows = np.arange(len(levels)) if rows is None else np.asarray(rows)
+
+    if levels.irrep is not None:
+        return _of_spherical(top, levels, names, rows)
+    terms = sorted({powers for name in names for powers in by_name[name]})
+    if not terms:
+        return np.zeros((len(rows), len(names)))
+    expectations = term_expectations(levels, terms, rows)
+    factors = np.array([[by_name[name].get(powers, 0.0) for name in names] for powers in terms])
+    return np.asarray(expectations @ factors)
+
+
+def _of_spherical(top: Top, levels: Levels, names: Sequence[str], rows: Rows) -> Floats:
+    """X^p of the scalar constants and the eigenvalue of the tensor for D_t, of a spherical top's split levels."""
+    by_name = operators_by_name(top.constants)
+    sign = 1 if top.constants["Dt"] > 0 else -1
+    x = (levels.j * (levels.j + 1)).astype(float)
+    out = np.empty((len(levels), len(names)))
+    for i, name in enumerate(names):
+        if name == "Dt":
+            out[:, i] = np.concatenate([tensor_eigenvalues(int(j), sign)[1] for j in np.unique(levels.j)])
+        else:
+            out[:, i] = sum(factor * x**p for (p, _, _), factor in by_name[name].items())
+    return out[rows]
+
+
+def term_expectations(levels: Levels, terms: Sequence[Powers], rows: Rows) -> Floats:
+    """⟨J^2p ½[Jz^2q, J₊^2n + J₋^2n]₊⟩ of the levels `rows`, (rows, terms)."""
+    j = levels.j[rows].astype(float)
+    x = j * (j + 1)
+    if levels.kind == "asymmetric":
+        by_k = _expectations_of_blocks(levels, [(q, n) for _, q, n in terms], rows)
+    else:
+        k = np.maximum(levels.ka[rows], 0).astype(float)
+        by_k = np.stack([k ** (2 * q) for _, q, _ in terms], axis=1)
+    return np.asarray(by_k * np.stack([x**p for p, _, _ in terms], axis=1))
+
+
+def _expectations_of_blocks(levels: Levels, terms: Sequence[tuple[int, int]], rows: Rows) -> Floats:
+    """⟨½[Jz^2q, J₊^2n + J₋^2n]₊⟩, (rows, terms), so many rows at a time that memory stays bounded."""
+    if not levels.blocks:
+        raise ValueError("these levels were solved without vectors; solve them with vectors=True")
+    out = np.empty((len(rows), len(terms)))
+    for odd in (0, 1):
+        for chosen in _pieces(levels, rows, odd):
+            out[chosen] = _of_one_parity(levels, terms, rows[chosen], odd)
+    return out
+
+
+def _pieces(levels: Levels, rows: Rows, odd: int) -> Iterator[NDArray[np.intp]]:
+    """Places in `rows` of the states with K even or odd, in pieces of bounded size."""
+    parities = np.repeat([b.basis.first_k % 2 for b in levels.blocks], [b.basis.size for b in levels.blocks])
+    places = np.flatnonzero(parities[rows] == odd)
+    step = max(1, _AT_ONCE // (levels.jmax // 2 + 1))
+    for start in range(0, len(places), step):
+        yield places[start : start + step]
+
+
+def _of_one_parity(levels: Levels, terms: Sequence[tuple[int, int]], rows: Rows, odd: int) -> Floats:
+    margin = 2 * max((n for _, n in terms), default=0)  # K from -margin + odd on: pairs across K = 0 are at hand
+    states = _signed_coefficients(levels, rows, odd, margin)
+    k: Floats = odd - margin + 2 * np.arange(states.shape[1], dtype=np.float64)
+    j = levels.j[rows].astype(float)
+
+    out = np.empty((len(rows), len(terms)))
+    for n in {n for _, n in terms}:
+        weights = _pair_weights(states, j, k, n)
+        columns = [i for i, (_, order) in enumerate(terms) if order == n]
+        low, high = k[: len(k) - n] ** 2, (k[: len(k) - n] + 2 * n) ** 2
+        powers = np.stack([0.5 * (low ** terms[i][0] + high ** terms[i][0]) for i in columns], axis=1)
+        out[:, columns] = weights @ powers
+    return out
+
+
+def _pair_weights(states: Floats, j: Floats, k: Floats, n: int) -> Floats:
+    """a_K a_{K+2n} ⟨K+2n|J₊^2n|K⟩, (rows, K), each pair standing for its mirror images and both ladder operators too.
+
+    K and -K-2n are one pair, so that K > -n counts double; K = -n is its own image.
+    """
+    low = k[: len(k) - n]
+    weights = states[:, : len(low)] * states[:, n:]
+    if n:
+        step = j[:, None]
+        squared = np.ones_like(weights)
+        for i in range(2 * n):
+            squared *= np.maximum((step - low - i) * (step + low + i + 1), 0.0)
+        weights *= 2 * np.sqrt(squared)
+    return weights * np.where(low > -n, 2.0, np.where(low == -n, 1.0, 0.0))
+
+
+def _signed_coefficients(levels: Levels, rows: Rows, odd: int, margin: int) -> Floats:
+    """a_K of states over K = odd - margin, ..., zero beyond each J: (a_K = v_K/√2, a_0 = v_0, a_{-K} = s a_K)."""
+    starts = np.array([b.start for b in levels.blocks])
+    block_of = np.searchsorted(starts, rows, side="right") - 1
+    highest = int(levels.j[rows].max(initial=0))
+    zero = margin // 2  # place of K = odd
+    out = np.zeros((len(rows), zero + highest // 2 + 1))
+    signs = np.array([b.basis.sign for b in levels.blocks])[block_of]
+
+    order = np.argsort(block_of, kind="stable")
+    cuts = np.flatnonzero(np.diff(block_of[order])) + 1
+    for places in np.split(order, cuts) if len(rows) else ():
+        block = levels.blocks[block_of[places[0]]]
+        first = zero + block.basis.first_k // 2
+        out[places, first : first + block.basis.size] = block.vectors[:, rows[places] - block.start].T
+
+    out[:, zero + (1 - odd) :] *= np.sqrt(0.5)
+    mirrored = zero + np.arange(1, zero + 1) - odd  # places of K = 2 - odd, ... behind K = -2 + odd, ...
+    kept = mirrored < out.shape[1]
+    out[:, zero - 1 - np.flatnonzero(kept)] = signs[:, None] * out[:, mirrored[kept]]
+    return out

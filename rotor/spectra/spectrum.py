@@ -1,0 +1,268 @@
+"""A spectrum: lines given a shape on a grid of frequencies.
+
+    σ(ν) = Σ_i I_i s_i(ν - ν_i),     ∫ s_i dν = 1
+
+with I_i the integrated absorption in nm² MHz, so that σ is the absorption cross section of one molecule in nm².
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rotor.spectra.lines import Lines
+from rotor.spectra.profiles import doppler_fwhm, gaussian, gaussian_reach, lorentzian, lorentzian_reach, voigt
+
+Floats = NDArray[np.float64]
+
+# Fraction of the area of a line that may lie outside of the points it is computed at: 3 widths of a Gaussian, but
+# 3183 of a Lorentzian, whose wings fall as 1/x².
+OUTSIDE = {"gaussian": 1e-12, "lorentzian": 1e-4, "voigt": 1e-4}
+PIECE = 1_000_000  # points of lines that are worked on at a time, for bounded memory
+MOST_POINTS = 20_000_000  # of a grid that resolves every line
+
+_STEP = 0.1  # a resolving grid goes in steps of a fortieth of the width at a centre, of a tenth of the distance far out
+_BACKGROUND = 2001  # and has so many even points
+
+
+@dataclass(frozen=True)
+class Spectrum:
+    """Intensity on a grid of frequencies.
+
+    frequency_mhz, intensity: (n,) arrays. unit: of the intensity, "nm^2" for a cross section. temperature_k: of the gas.
+    profile, fwhm_mhz: shape of the lines and its width, None for Doppler's. outside: the fraction of the area of each
+    line that may have been left out far from its centre. lines: what it was made from, None for a spectrum that is not
+    made of lines.
+    """
+
+    frequency_mhz: Floats
+    intensity: Floats
+    unit: str = "nm^2"
+    temperature_k: float | None = None
+    profile: str = ""
+    fwhm_mhz: float | None = None
+    outside: float = 0.0
+    lines: Lines | None = None
+
+    def __post_init__(self) -> None:
+        if self.frequency_mhz.ndim != 1 or self.frequency_mhz.shape != self.intensity.shape:
+            shapes = f"{self.frequency_mhz.shape} and {self.intensity.shape}"
+            raise ValueError(f"frequencies and intensities of shapes {shapes}: both must be (n,)")
+
+    def __len__(self) -> int:
+        return len(self.frequency_mhz)
+
+    @classmethod
+    def from_lines(
+        cls,
+        lines: Lines,
+        grid_mhz: ArrayLike,
+        *,
+        fwhm_mhz: float | None = None,
+        profile: str = "gaussian",
+        outside: float | None = None,
+    ) -> Spectrum:
+        """The absorption cross section in nm² of lines on a grid, each with the area of its integrated absorption.
+
+        Parameters
+        ----------
+        lines : Lines
+            At their temperature; `lines.top.mass_u` is needed for a Doppler width.
+        grid_mhz : (n,) array
+            Rising frequencies, evenly spaced or not; `resolving_grid` makes one.
+        fwhm_mhz : float, optional
+            Full width at half maximum: of the Gaussian (Doppler's if left out) or of the Lorentzian.
+        profile : "gaussian", "lorentzian" or "voigt"
+            A Voigt profile has Doppler's Gaussian and a Lorentzian of `fwhm_mhz`.
+        outside : float, optional
+            Each line is computed out to where so much of its area is left, 1e-12 for a Gaussian and 1e-4 for the others
+            unless given. The relative error of an area is below it; that of the intensity at a point is below the sum
+            of I_i s_i(reach) over the lines i further away than their reach: at most 2.5e-8 of their peaks.
+
+        Raises
+        ------
+        ValueError
+            A grid that does not rise, a width not above 0, a shape that is not known, a Doppler width without a mass.
+
+        Neglected: Dicke narrowing, line mixing, and the change of the radiation factor across a line.
+
+        >>> from rotor.spectra.lines import line_list
+        >>> from rotor.top import Top
+        >>> lines = line_list(Top.from_constants("B=57635.968 MHz", dipole_abc_debye=(0.11, 0, 0)), jmax=1)
+        >>> grid = np.linspace(115270, 115274, 401)
+        >>> spectrum = Spectrum.from_lines(lines, grid, fwhm_mhz=0.5)
+        >>> round(float(np.trapezoid(spectrum.intensity, grid) / lines.intensity_nm2_mhz[0]), 3)
+        1.0
+        """
+        grid = _rising(grid_mhz)
+        shape, outside = _shape(lines, profile, fwhm_mhz), _fraction(profile, outside)
+        intensity = _summed(grid, lines.frequency_mhz, lines.intensity_nm2_mhz, shape, outside)
+        return cls(grid, intensity, "nm^2", lines.temperature_k, profile, fwhm_mhz, outside, lines)
+
+    @property
+    def columns(self) -> dict[str, Floats]:
+        """The two columns by their names with unit."""
+        name = "cross_section_nm2" if self.unit == "nm^2" else "intensity"
+        return {"frequency_mhz": self.frequency_mhz, name: self.intensity}
+
+    def to_pandas(self) -> Any:
+        """Both columns as a pandas DataFrame."""
+        import pandas as pd
+
+        return pd.DataFrame(self.columns)
+
+    def to_polars(self) -> Any:
+        """Both columns as a polars DataFrame."""
+        import polars as pl
+
+        return pl.DataFrame(self.columns)
+
+
+def resolving_grid(
+    lines: Lines,
+    *,
+    fwhm_mhz: float | None = None,
+    profile: str = "gaussian",
+    range_mhz: tuple[float, float] | None = None,
+    outside: float | None = None,
+) -> Floats:
+    """Frequencies (n,) in MHz that follow every line: close at its centre, wider away from it, and even in between.
+
+    Straight lines between its points enclose the area of a line within 0.2 %. `outside` as in `Spectrum.from_lines`.
+    Raises ValueError for a grid of more than 20 million points: a narrower range has fewer lines.
+    """
+    shape = _shape(lines, profile, fwhm_mhz)
+    width, reach = shape.fwhm(), shape.reach(_fraction(profile, outside))
+    first, last = _ends(lines, reach) if range_mhz is None else range_mhz
+    if not 0 <= first < last < float("inf"):
+        raise ValueError(f"range from {first} to {last} MHz: two rising, finite frequencies are wanted")
+    near = (lines.frequency_mhz > first - reach) & (lines.frequency_mhz < last + reach)
+    arm = _arm(float((reach / width).max(initial=1.0)))
+    points = near.sum() * len(arm)
+    if points > MOST_POINTS:
+        raise ValueError(
+            f"{near.sum()} lines need a grid of {points / 1e6:.0f} million points, more than {MOST_POINTS / 1e6:.0f}; "
+            "choose a narrower range, a higher cut, or sticks"
+        )
+    follow = lines.frequency_mhz[near, None] + width[near, None] * arm
+    grid = np.unique(np.concatenate([np.linspace(first, last, _BACKGROUND), follow.ravel()]))
+    return np.asarray(grid[(grid >= first) & (grid <= last)])
+
+
+def _arm(reach: float) -> Floats:
+    """Distances from a centre in widths: ever wider steps out to the reach, and one just behind it."""
+    half = 0.25 * np.sinh(np.arange(_STEP, np.arcsinh(4 * reach), _STEP))
+    half = np.append(half, [reach * (1 - 1e-9), reach * (1 + 1e-9)])
+    return np.concatenate([-half[::-1], [0.0], half])
+
+
+def _ends(lines: Lines, reach: Floats) -> tuple[float, float]:
+    """The first and last frequency where a line has anything to show."""
+    if not len(lines):
+        raise ValueError("there are no lines to make a grid for; give a range")
+    first, last = (lines.frequency_mhz - reach).min(), (lines.frequency_mhz + reach).max()
+    return max(float(first), 0.0), float(last)
+
+
+@dataclass(frozen=True)
+class _Shape:
+    """The widths of a Gaussian and a Lorentzian part for every line, (lines,) arrays; None for a part that is not there."""
+
+    gaussian: Floats | None
+    lorentzian: Floats | None
+
+    def at(self, offset: Floats, rows: NDArray[np.int64]) -> Floats:
+        """The shape of the lines `rows` at a distance from their centres."""
+        if self.lorentzian is None:
+            assert self.gaussian is not None
+            return gaussian(offset, self.gaussian[rows])
+        if self.gaussian is None:
+            return lorentzian(offset, self.lorentzian[rows])
+        return voigt(offset, self.gaussian[rows], self.lorentzian[rows])
+
+    def reach(self, outside: float) -> Floats:
+        """How far from its centre each line has all but `outside` of its area.
+
+        A Voigt profile is the density of a sum x + y: |x + y| > a + b needs |x| > a or |y| > b, half of `outside` each.
+        """
+        share = outside if self.gaussian is None or self.lorentzian is None else outside / 2
+        reach = 0.0 if self.gaussian is None else gaussian_reach(self.gaussian, share)
+        return np.asarray(reach + (0.0 if self.lorentzian is None else lorentzian_reach(self.lorentzian, share)))
+
+    def fwhm(self) -> Floats:
+        """The whole width of every line; of a Voigt profile to 0.02 %.
+
+        0.5346 w_L + √(0.2166 w_L² + w_G²): J. J. Olivero and R. L. Longbothum, J. Quant. Spectrosc. Radiat. Transf. 17,
+        233 (1977).
+        """
+        if self.gaussian is None:
+            assert self.lorentzian is not None
+            return self.lorentzian
+        if self.lorentzian is None:
+            return self.gaussian
+        return np.asarray(0.5346 * self.lorentzian + np.sqrt(0.2166 * self.lorentzian**2 + self.gaussian**2))
+
+
+def line_widths(lines: Lines, profile: str, fwhm_mhz: float | None) -> Floats:
+    """Full width at half maximum in MHz of every line, (lines,), of a profile as `Spectrum.from_lines` takes it."""
+    return _shape(lines, profile, fwhm_mhz).fwhm()
+
+
+def _shape(lines: Lines, profile: str, fwhm_mhz: float | None) -> _Shape:
+    if profile not in OUTSIDE:
+        raise ValueError(f"profile {profile!r} is none of {', '.join(OUTSIDE)}")
+    if fwhm_mhz is not None and not 0 < fwhm_mhz < float("inf"):
+        raise ValueError(f"full width at half maximum {fwhm_mhz} MHz: a finite number above 0 is wanted")
+    given = None if fwhm_mhz is None else np.full(len(lines), float(fwhm_mhz))
+    if profile == "gaussian":
+        return _Shape(_doppler(lines) if given is None else given, None)
+    if given is None:
+        raise ValueError(f"profile {profile!r}: the width of the Lorentzian is wanted, fwhm_mhz")
+    return _Shape(_doppler(lines) if profile == "voigt" else None, given)
+
+
+def _fraction(profile: str, outside: float | None) -> float:
+    fraction = OUTSIDE[profile] if outside is None else outside
+    if not 0 < fraction < 1:
+        raise ValueError(f"outside = {outside}: a fraction of the area between 0 and 1 is wanted")
+    return fraction
+
+
+def _doppler(lines: Lines) -> Floats:
+    if lines.top.mass_u is None:
+        raise ValueError("a Doppler width needs a mass, which constants alone do not have; give fwhm_mhz or a geometry")
+    return doppler_fwhm(lines.frequency_mhz, lines.temperature_k, lines.top.mass_u)
+
+
+def _rising(grid_mhz: ArrayLike) -> Floats:
+    grid = np.asarray(grid_mhz, dtype=float)
+    if grid.ndim != 1 or not len(grid) or not np.isfinite(grid).all() or not (np.diff(grid) > 0).all():
+        raise ValueError(f"a grid of shape {grid.shape}: rising, finite frequencies (n,) are wanted")
+    return grid
+
+
+def _summed(grid: Floats, centres: Floats, areas: Floats, shape: _Shape, outside: float) -> Floats:
+    """Σ area × shape on the grid, every line over the points within its reach."""
+    reach = shape.reach(outside)
+    first = np.searchsorted(grid, centres - reach, side="left")
+    count = np.searchsorted(grid, centres + reach, side="right") - first
+    total = np.zeros(len(grid))
+    for rows in _pieces(count):
+        line = np.repeat(rows, count[rows])
+        begin = np.repeat(first[rows] - np.cumsum(count[rows]) + count[rows], count[rows])
+        point = begin + np.arange(len(line))
+        value = areas[line] * shape.at(grid[point] - centres[line], line)
+        low, high = point.min(), point.max() + 1
+        total[low:high] += np.bincount(point - low, weights=value, minlength=high - low)
+    return total
+
+
+def _pieces(count: NDArray[np.int64]) -> Iterator[NDArray[np.int64]]:
+    """Rows of lines with any points, so many at a time that a piece has about `PIECE` points."""
+    rows = np.flatnonzero(count)
+    cuts = np.flatnonzero(np.diff(np.cumsum(count[rows]) // PIECE)) + 1
+    yield from (piece for piece in np.split(rows, cuts) if len(piece))

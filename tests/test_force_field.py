@@ -1,0 +1,160 @@
+"""Force fields: vibrations, finite differences, Hessian files, internal coordinates, geometries refined."""
+
+from __future__ import annotations
+
+import force_fields
+import numpy as np
+import pytest
+from ase.calculators.lj import LennardJones
+
+from rotor.distortion import distortion_constants
+from rotor.molecules.force_field import (
+    EV_PER_ANGSTROM2,
+    ForceField,
+    force_field_from_calculator,
+    force_field_from_internal,
+    read_hessian,
+    rigid_motions,
+)
+from rotor.molecules.internal import bend, out_of_plane, stretch, torsion, wilson_b
+from rotor.molecules.molecule import Molecule
+from rotor.molecules.refine import calculator_by_name, refine
+
+TRIANGLE = Molecule(("Ar",) * 3, 1.1 * np.array([[0, 0, 0], [1, 0, 0], [0.55, 0.8, 0.1]]))
+
+
+def lennard_jones():
+    return LennardJones(rc=1e3, smooth=False)
+
+
+def test_water_has_the_published_harmonic_wavenumbers():
+    found = force_fields.water().vibrations()
+    assert found.wavenumbers_cm == pytest.approx([1648.5, 3832.2, 3942.5], abs=1.0)  # force constants to three digits
+    assert found.left_over_cm < 1e-3  # B of internal coordinates knows no translation
+
+
+def test_heavy_water_follows_the_product_rule_of_teller_and_redlich():
+    """∏ω'/∏ω = √(∏ m/m' · (M'/M)³ · I_a'I_b'I_c' / I_a I_b I_c), exact for a harmonic field (Wilson et al., § 8-5)."""
+    from rotor.top import Top
+
+    light, heavy = force_fields.water(), force_fields.water().with_isotopes("H=2H")
+    ratio = np.prod(heavy.vibrations().wavenumbers_cm / light.vibrations().wavenumbers_cm)
+    masses = np.prod(light.molecule.masses_u / heavy.molecule.masses_u) ** 3
+    moments = [np.prod(Top.from_molecule(one.molecule).moments_u_angstrom2) for one in (heavy, light)]
+    expected = np.sqrt(masses * (heavy.molecule.mass_u / light.molecule.mass_u) ** 3 * moments[0] / moments[1])
+    assert ratio == pytest.approx(expected, rel=1e-9)  # round-off
+
+
+def test_vibrations_are_orthonormal_and_apart_from_rigid_motions():
+    field = force_fields.sulfur_dioxide()
+    every = np.hstack([field.vibrations().modes, rigid_motions(field.molecule)])
+    assert every.T @ every == pytest.approx(np.eye(9), abs=1e-12)  # round-off
+
+
+def test_wilson_b_agrees_with_differences():
+    rng = np.random.default_rng(2)
+    x = rng.normal(size=(4, 3))
+    coordinates = [stretch(0, 2), bend(1, 0, 3), out_of_plane(3, 0, 1, 2), torsion(0, 1, 2, 3)]
+    b = wilson_b(coordinates, x)
+    for place in range(12):
+        ahead, behind = x.copy(), x.copy()
+        ahead.flat[place] += 1e-5
+        behind.flat[place] -= 1e-5
+        slope = [(c(ahead) - c(behind)) / 2e-5 for c in coordinates]
+        assert b[:, place] == pytest.approx(slope, rel=1e-6, abs=1e-7)  # h² of the differences
+    assert np.abs(b.reshape(4, 4, 3).sum(axis=1)).max() < 1e-12  # a translation changes none
+
+
+def test_a_pair_of_lennard_jones_has_its_closed_form():
+    """V'' = 72 ε / (2^(1/3) σ²) at the minimum 2^(1/6) σ."""
+    pair = refine(Molecule(("Ar", "Ar"), [[0, 0, 0], [0, 0, 1.3]]), lennard_jones(), most_force_ev_per_angstrom=1e-8)
+    field = force_field_from_calculator(pair, lennard_jones(), step_angstrom=1e-3)
+    stretched = field.hessian_ev_per_angstrom2[2, 2]
+    assert stretched == pytest.approx(72 / 2 ** (1 / 3), rel=1e-3)  # h² V''''/6 of the differences
+    assert len(field.vibrations().wavenumbers_cm) == 1
+
+
+def test_a_triangle_becomes_an_oblate_top_and_is_refused_before():
+    with pytest.raises(ValueError, match="refine it first"):
+        force_field_from_calculator(TRIANGLE, lennard_jones())
+    molecule = refine(TRIANGLE, lennard_jones(), most_force_ev_per_angstrom=1e-9)
+    assert "largest force left" in molecule.notes[-1]
+    field = force_field_from_calculator(molecule, lennard_jones(), step_angstrom=1e-4)
+    constants = distortion_constants(field)
+    assert constants.kind == "oblate"
+    assert constants["DJK"] == pytest.approx(
+        -2 * (constants["DJ"] + 2 * constants["DK"]) / 3, rel=1e-3
+    )  # planar, Dowling 1961
+
+
+def test_an_optimisation_that_falls_short_is_an_error():
+    with pytest.raises(ValueError, match="in 2 steps: a force of"):
+        refine(TRIANGLE, lennard_jones(), most_steps=2)
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [("EMT", "metals"), ("lj", "Lennard-Jones"), ("nosuch", "unknown to ASE"), ("tblite", "cannot be built|TBLite"),
+     ("gulp", "")],
+)  # fmt: skip
+def test_calculators_by_name(name, words):
+    if name in ("tblite", "gulp"):
+        try:
+            assert hasattr(calculator_by_name(name), "get_forces")
+        except ValueError as reason:
+            assert "cannot be built here" in str(reason)  # noqa: PT017 - either is right, by what is installed
+        return
+    with pytest.raises(ValueError, match=words):
+        calculator_by_name(name)
+
+
+def test_a_calculator_that_fails_is_named():
+    from ase.calculators.emt import EMT
+
+    with pytest.raises(ValueError, match="EMT fails for Xe2"):
+        refine(Molecule(("Xe", "Xe"), [[0, 0, 0], [0, 0, 4]]), EMT())
+
+
+def write_hessian(path, field, unit, triangle):
+    values = field.hessian_ev_per_angstrom2 / EV_PER_ANGSTROM2[unit]
+    rows = [row[: i + 1] if triangle else row for i, row in enumerate(values)]
+    path.write_text(
+        "# a Hessian\r\n" + "\r\n".join(" ".join(f"{x:.14e}" for x in row) for row in rows), encoding="utf-8-sig"
+    )
+
+
+@pytest.mark.parametrize("unit", list(EV_PER_ANGSTROM2))
+@pytest.mark.parametrize("triangle", [True, False])
+def test_hessian_files(tmp_path, unit, triangle):
+    field = force_fields.water()
+    write_hessian(tmp_path / "h.txt", field, unit, triangle)
+    again = read_hessian(tmp_path / "h.txt", field.molecule, unit=unit)
+    assert again.vibrations().wavenumbers_cm == pytest.approx(field.vibrations().wavenumbers_cm, rel=1e-10)  # 14 digits
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [("1.0 2.0\n0.5D+01", "line 2: '0.5D.01' has a Fortran exponent"), ("1.0 *****", r"line 1: '\*\*\*\*\*' is no plain"),
+     ("1 2 3 4", "4 numbers; a Hessian of 9 coordinates has 81"), ("\u22121.0", "no plain"), ("", "0 numbers")],
+)  # fmt: skip
+def test_broken_hessian_files(tmp_path, text, words):
+    (tmp_path / "h.txt").write_text(text, encoding="utf-8")
+    with pytest.raises(ValueError, match=words):
+        read_hessian(tmp_path / "h.txt", force_fields.water().molecule)
+
+
+def test_hessians_that_cannot_be():
+    field = force_fields.water()
+    molecule, hessian = field.molecule, field.hessian_ev_per_angstrom2
+    with pytest.raises(ValueError, match="9 x 9"):
+        ForceField(molecule, hessian[:6, :6])
+    with pytest.raises(ValueError, match="transpose"):
+        ForceField(molecule, np.triu(hessian))
+    with pytest.raises(ValueError, match="no minimum"):
+        ForceField(molecule, -hessian).vibrations()
+    with pytest.raises(ValueError, match="another geometry"):
+        ForceField(molecule.moved([[0, 1, 0], [-1, 0, 0], [0, 0, 1]]), hessian).vibrations()
+    with pytest.raises(ValueError, match="unit 'erg'"):
+        read_hessian("none", molecule, unit="erg")
+    with pytest.raises(ValueError, match="force constants of shape"):
+        force_field_from_internal(molecule, [stretch(0, 1)], np.eye(2))

@@ -1,0 +1,126 @@
+"""Pictures: they are files of their kind, name the right lines without overlap, and say where they are from."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import rotor
+from rotor.plots import spectrum as plots
+from rotor.plots.spectrum import plot_spectrum
+from rotor.spectra.spectrum import Spectrum, resolving_grid
+
+START = {".png": b"\x89PNG", ".pdf": b"%PDF", ".svg": b"<?xml"}
+
+
+@pytest.fixture(scope="module")
+def water():
+    return rotor.line_list(rotor.read("water"), jmax=12)
+
+
+@pytest.fixture
+def figure(monkeypatch):
+    """The figures that were drawn, kept when they are written."""
+    from matplotlib.figure import Figure
+
+    kept = []
+    save = Figure.savefig
+    monkeypatch.setattr(Figure, "savefig", lambda self, *a, **k: (kept.append(self), save(self, *a, **k))[1])
+    return kept
+
+
+@pytest.mark.parametrize("suffix", START)
+def test_the_suffix_names_the_format_and_the_same_picture_is_the_same_file(water, tmp_path, suffix):
+    for name in ("a", "b"):
+        plot_spectrum(water, tmp_path / f"{name}{suffix}", provenance={"command": "by hand"})
+    content = (tmp_path / f"a{suffix}").read_bytes()
+    assert content.startswith(START[suffix])
+    assert content == (tmp_path / f"b{suffix}").read_bytes()
+    if suffix != ".pdf":  # there the metadata are compressed text
+        assert b"by hand" in content
+        assert b"Dyke" in content  # source of the dipole
+
+
+@pytest.mark.parametrize("source", ["water", "CO", "CH3CN", "H2CO"])
+@pytest.mark.parametrize("fwhm", [None, 2000.0])
+def test_names_lie_on_nothing(figure, tmp_path, source, fwhm):
+    drawn = rotor.line_list(rotor.read(source), temperature_k=100.0, jmax=25)
+    if fwhm:
+        drawn = Spectrum.from_lines(drawn, resolving_grid(drawn, fwhm_mhz=fwhm), fwhm_mhz=fwhm)
+    plot_spectrum(drawn, tmp_path / "a.png")
+    figure[0].canvas.draw()
+    axes = figure[0].axes[0]
+    boxes = [text.get_window_extent() for text in axes.texts]
+    assert len(boxes) >= 5
+    assert not any(a.overlaps(b) for i, a in enumerate(boxes) for b in boxes[:i])
+    assert all(axes.bbox.x0 <= b.x0 and b.x1 <= axes.bbox.x1 and b.y1 <= axes.bbox.y1 for b in boxes)
+
+
+def test_the_strongest_line_of_water_is_named(water, figure, tmp_path):
+    plot_spectrum(water, tmp_path / "a.png")
+    axes = figure[0].axes[0]
+    strongest = water.strongest(1)
+    upper, lower = water.quanta(strongest.upper)[0], water.quanta(strongest.lower)[0]
+    j, ka, kc = upper.tolist()
+    first = axes.texts[0]
+    assert first.get_text().startswith(f"${j}_{{{ka},{kc}}}$ – ${lower[0]}_")
+    assert first.xy[0] * 1e6 == pytest.approx(strongest.frequency_mhz[0])
+    assert axes.get_title(loc="left") == "water, H$_{2}$O, 300 K"
+    assert axes.get_xlabel() == "Frequency (THz)"
+    assert axes.get_yscale() == "linear"
+
+
+def test_an_axis_over_decades_is_logarithmic(figure, tmp_path):
+    lines = rotor.line_list(rotor.read("water"), range_mhz=(0.0, 5e5))
+    plot_spectrum(lines, tmp_path / "a.png")
+    axes = figure[0].axes[0]
+    assert axes.get_yscale() == "log"
+    assert axes.get_xlabel() == "Frequency (GHz)"
+    assert axes.get_xlim() == (0.0, 500.0)
+
+
+def test_a_profile_says_its_shape(water, figure, tmp_path):
+    doppler = Spectrum.from_lines(water, resolving_grid(water))
+    plot_spectrum(doppler, tmp_path / "a.png")
+    assert figure[0].axes[0].get_title(loc="right") == "Gaussian profile, Doppler width"
+    assert figure[0].axes[0].get_ylabel() == "Absorption cross section (nm²)"
+
+
+def test_a_spectrum_without_lines_is_drawn_without_names(figure, tmp_path):
+    x = np.linspace(10.0, 1000.0, 50_001)
+    plot_spectrum(Spectrum(x, np.exp(-(((x - 400) / 10) ** 2)), unit="D^2 ps"), tmp_path / "a.png", title="tumbling")
+    axes = figure[0].axes[0]
+    assert axes.get_ylabel() == "Intensity (D^2 ps)"
+    assert axes.get_title(loc="left") == "tumbling"
+    assert not axes.texts
+
+
+def test_thinning_keeps_every_peak():
+    x = np.linspace(0.0, 1.0, 1_000_001)
+    y = np.zeros(len(x))
+    y[[3, 500_000, 999_990]] = [1.0, 2.0, 3.0]
+    thin_x, thin_y = plots._thinned(x, y)
+    assert len(thin_x) <= plots.MOST_VERTICES
+    for peak, height in ((3e-6, 1.0), (0.5, 2.0), (0.99999, 3.0)):
+        assert thin_y[np.abs(thin_x - peak) < 4 / plots.MOST_VERTICES].max() == height
+
+
+@pytest.mark.parametrize(
+    ("formula", "text"),
+    [("CO", "CO"), ("[2H]2O", "$^{2}$H$_{2}$O"), ("C2H5OH", "C$_{2}$H$_{5}$OH"), ("Fe(2+)", "Fe$^{2+}$")],
+)
+def test_formulas_are_set_as_chemists_do(formula, text):
+    assert plots.formula_text(formula) == text
+
+
+def test_nothing_to_draw_is_an_error(water, tmp_path):
+    with pytest.raises(ValueError, match=r"\.png, \.pdf or \.svg"):
+        plot_spectrum(water, tmp_path / "a.gif")
+    with pytest.raises(ValueError, match="no line to draw"):
+        plot_spectrum(water.where([]), tmp_path / "a.png")
+    with pytest.raises(ValueError, match="nothing between"):
+        plot_spectrum(water, tmp_path / "a.png", range_mhz=(1.0, 2.0))
+    assert not list(tmp_path.iterdir())
+    assert math.isinf(water.range_mhz[1])
