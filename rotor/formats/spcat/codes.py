@@ -160,7 +160,7 @@ def constants_of(file: ParameterFile, *, errors: bool = False) -> Constants:
 
     Values of one code are added, as the field's program does. The reduction is told by the operators; where they
     fit both, by the letter of the option line. With `errors` the errors of a .var file become uncertainties, of
-    those constants that are one parameter.
+    those constants that are one parameter and were not held (an error below 1e-30 holds one).
 
     Raises ValueError, naming the parameter, for operators that have no name here or that are not computed yet.
     """
@@ -181,7 +181,7 @@ def constants_of(file: ParameterFile, *, errors: bool = False) -> Constants:
         kind=kind,
         reduction=reduction,
         representation=_representation(options) if kind == "asymmetric" else None,
-        uncertainties={name: spread for name, spread in known.items() if spread is not None},
+        uncertainties={name: spread for name, spread in known.items() if spread and spread > HELD_BELOW},
         **named,
     )
 
@@ -328,3 +328,4 @@ def _code_of_spelled(name: str) -> int:
 
 
 _FIXED = 1e-37
+HELD_BELOW = 1e-30  # an error so small says that a parameter was not fitted
