@@ -197,7 +197,7 @@ def with_some_dipole(top: Top) -> Top:
     if top.dipole_abc_debye is not None or top.kind == "spherical":
         return top
     remedy = "give --dipole x,y,z (frame of the input) or --dipole-abc a,b,c (principal axes)"
-    if top.molecule is None or top.frame is None:
+    if top.molecule is None:
         raise ValueError(f"the dipole is not known: {remedy.replace('--dipole x,y,z (frame of the input) or ', '')}")
 
     from rotor.molecules.dipoles import CHARGES_SOURCE, estimate_dipole
@@ -206,4 +206,4 @@ def with_some_dipole(top: Top) -> Top:
     if dipole is None:
         raise ValueError(f"{said}: {remedy}")
     note(said)
-    return replace(top.with_dipole((top.frame.axes @ dipole).tolist(), CHARGES_SOURCE), notes=(*top.notes, said))
+    return replace(top.with_estimated_dipole(dipole, CHARGES_SOURCE), notes=(*top.notes, said))

@@ -91,6 +91,8 @@ def _errors_from(lines: Lines) -> str | None:
     if lines.covariance is not None:
         return f"covariance of {', '.join(lines.covariance.names)}"
     known = lines.top.constants.uncertainties
+    if known and lines.covariance_used is None:
+        return "none: the constants are from a fit whose correlations are not known"
     return f"uncertainties of {', '.join(known)}, uncorrelated" if known else None
 
 
