@@ -196,3 +196,25 @@ def test_conformers_on_the_command_line(capsys):
     assert all(len(one["rotational_constants_mhz"]) == 3 for one in found)
     assert run(["info", "SMILES:CCCC", "--conformers", "20"]) == 0
     assert "E (kJ/mol)" in capsys.readouterr().out
+
+
+def test_hessian_on_the_command_line(tmp_path, capsys):
+    from rotor.cli import run
+
+    field = force_fields.water()
+    write_hessian(tmp_path / "h.txt", field, "hartree/bohr²", True)
+    rows = [f"{s} {x:.9f} {y:.9f} {z:.9f}" for s, (x, y, z) in zip("OHH", field.molecule.positions_angstrom, strict=True)]
+    (tmp_path / "w.xyz").write_text("3\n\n" + "\n".join(rows) + "\n")
+    arguments = ["info", str(tmp_path / "w.xyz"), "--hessian", str(tmp_path / "h.txt"), "--json", "-"]
+    assert run([*arguments, "--isotope", "H=2H"]) == 0
+    out, err = capsys.readouterr()
+    expected = distortion_constants(field.with_isotopes("H=2H"))
+    assert json.loads(out)["constants_mhz"] == pytest.approx(dict(expected.values), rel=1e-6)  # positions of nine digits
+    assert "quartic distortion from a harmonic force field" in err
+    assert run(["info", "water", "--hessian", "calculator"]) == 2
+    assert run(["info", "--constants", "B=1", "--hessian", "h.txt"]) == 2
+    assert run(["info", "water", "--hessian", str(tmp_path / "none.txt")]) == 2
+    told = capsys.readouterr().err
+    assert "needs --calculator NAME" in told
+    assert "--hessian: bare constants" in told
+    assert "none.txt: No such file" in told

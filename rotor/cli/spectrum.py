@@ -57,6 +57,7 @@ def command(
     isotope: list[str] | None = inputs.ISOTOPE,
     spin_weights: str | None = inputs.SPIN_WEIGHTS,
     calculator: str | None = inputs.CALCULATOR,
+    hessian: str | None = inputs.HESSIAN,
     q: float | None = typer.Option(None, metavar="Q", help="Partition function to use instead of the summed one."),
     vibrational_factor: float = typer.Option(1.0, metavar="X", help="Multiplies Q."),
     profile: str | None = typer.Option(None, metavar="NAME", help="sticks, gaussian, lorentzian or voigt."),
@@ -80,7 +81,7 @@ def command(
     if json != "-":
         files.ask("--json", json, (".json",))
 
-    given = Input(source, constants, isotope or [], dipole, dipole_abc, spin_weights, calculator)
+    given = Input(source, constants, isotope or [], dipole, dipole_abc, spin_weights, calculator, hessian)
     top = inputs.with_some_dipole(inputs.read_top(given))
     _refuse_doppler_without_mass(top, settings)
     with answering():
