@@ -28,7 +28,9 @@ family = isotopologues(water)
 for one in family:
     a, b, c = one.top.rotational_constants_mhz
     mu = ", ".join(f"{abs(x):.3f}" for x in one.top.dipole_abc_debye)
-    print(f"{one.formula:10} {one.abundance:.2e}  A {a:10.1f}  B {b:10.1f}  C {c:10.1f} MHz  |μ| {mu} D, {one.turned_degrees:.1f}°")
+    print(
+        f"{one.formula:10} {one.abundance:.2e}  A {a:10.1f}  B {b:10.1f}  C {c:10.1f} MHz  |μ| {mu} D, {one.turned_degrees:.1f}°"
+    )
 
 assert [one.formula for one in family] == ["H2O", "H2[18O]", "H2[17O]", "H[2H]O"]
 
@@ -106,7 +108,9 @@ peaks = [grid[np.argmax(part)] for part in parts]
 areas = [np.trapezoid(part, grid) for part in parts]
 print(f"J = 1 - 0: {peaks[0]:.1f} and {peaks[1]:.1f} MHz, areas {areas[0] / areas[1]:.2f} to 1")
 assert abs(peaks[1] - 2 * 13088.17) < 1.5  # measured B of CH3(37Cl), memory
-assert abs(areas[0] / areas[1] / (chlorides[0].abundance / chlorides[1].abundance) - 1) < 0.05  # μ² ν² / Q are nearly alike
+assert (
+    abs(areas[0] / areas[1] / (chlorides[0].abundance / chlorides[1].abundance) - 1) < 0.05
+)  # μ² ν² / Q are nearly alike
 
 figure = Figure(figsize=(8, 4), layout="constrained")
 axes = figure.subplots()

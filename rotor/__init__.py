@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from rotor.constants import Constants as Constants
     from rotor.formats import read as read
     from rotor.formats import write as write
+    from rotor.formats.stream import stream_lines as stream_lines
     from rotor.molecules.molecule import Molecule as Molecule
     from rotor.molecules.refine import refine as refine
     from rotor.quantum.levels import Levels as Levels
@@ -38,6 +39,7 @@ _HOME = {
     "read": "rotor.formats",
     "refine": "rotor.molecules.refine",
     "solve_levels": "rotor.quantum.levels",
+    "stream_lines": "rotor.formats.stream",
     "write": "rotor.formats",
 }
 

@@ -27,6 +27,12 @@ MHZ_PER_K = BOLTZMANN_J_PER_K / PLANCK_J_S * 1e-6  # 1 K in MHz, exact ratio: 20
 DEBYE_C_M = 1e-21 / SPEED_OF_LIGHT_M_PER_S  # 1 D = 1e-18 esu cm, exact by definition
 DEBYE_PER_E_ANGSTROM = ELEMENTARY_CHARGE_C * 1e-10 / DEBYE_C_M  # 4.80320...
 
+# the set of ASE, in which molecules move classically: eV, Å, u, and what follows from them
+CLASSICAL_TIME_PS = 1e2 * math.sqrt(ATOMIC_MASS_KG / ELEMENTARY_CHARGE_C)  # 1 Å √(u/eV) in ps: 0.01018...
+HBAR_CLASSICAL = PLANCK_J_S / (2 * math.pi * 1e-10 * math.sqrt(ATOMIC_MASS_KG * ELEMENTARY_CHARGE_C))  # in Å √(u eV)
+EV_PER_K = BOLTZMANN_J_PER_K / ELEMENTARY_CHARGE_C  # exact ratio
+CM_PER_EV = ELEMENTARY_CHARGE_C / PLANCK_J_S * 1e-6 / MHZ_PER_CM  # 1 eV in cm^-1, exact ratio: 8065.54...
+
 # A = hbar / (4 pi I): MHz times u angstrom^2
 ROTATIONAL_MHZ_U_ANGSTROM2 = PLANCK_J_S / (8 * math.pi**2 * ATOMIC_MASS_KG * 1e-20) * 1e-6
 

@@ -148,6 +148,9 @@ def _facts(top: Top, content: dict[str, Any]) -> list[tuple[str, str]]:
     facts = [("constants from", content["source"] or "not said")]
     if top.kind_of_top:
         facts.append(("kind", _kind_text(content["kind"], content["kind_decision"])))
+    if top.symmetry is not None:
+        number = content["symmetry_number"]
+        facts.append(("point group", f"{content['point_group']}, rotational symmetry number {number}"))
     if top.constants.representation:
         facts.append(("meant in", report.form_text(top.constants)))
     dipole = report.vector_text(top.dipole_abc_debye)
