@@ -176,13 +176,16 @@ def write(thing: Any, path: str | os.PathLike[str], *, settings: Mapping[str, An
     besides; for lines, `{"tag": 18003}` is the tag of a .cat, `{"molecule": 1, "isotopologue": 1, "abundance": 0.997}`
     what `hitran_lines` asks for. Raises ValueError for a thing or a suffix that has no format.
     """
-    from rotor.classical.motion import Motion
+    from rotor.classical.integrators import Motion
+    from rotor.classical.motion import MotionTable
     from rotor.formats.hitran import HitranLines, write_hitran
     from rotor.formats.spcat.catalogue import Catalogue
     from rotor.spectra.lines import Lines
     from rotor.spectra.spectrum import Spectrum
 
     if isinstance(thing, Motion):
+        thing = MotionTable.of(thing)
+    if isinstance(thing, MotionTable):
         from rotor.formats.motion_tables import write_motion
 
         return write_motion(thing, path, settings)
