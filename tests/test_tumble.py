@@ -3,8 +3,10 @@
 import csv
 import json
 import math
+import re
 import shutil
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -252,3 +254,10 @@ def test_moments_of_no_real_body_are_noted(call):
     code, _, err = call("tumble", "--moments", "0.345,0.653,1.0", "--angular-momentum", "1.8,0.4,-0.9")
     assert code == 0
     assert "note: no real body" in err
+
+
+def test_code_in_the_documentation_runs():
+    text = (Path(__file__).resolve().parents[1] / "docs" / "classical.md").read_text(encoding="utf-8")
+    blocks = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    assert len(blocks) == 2
+    exec(compile("\n".join(blocks), "docs/classical.md", "exec"), {})

@@ -45,8 +45,8 @@ def polhode_figure(
     from matplotlib.figure import Figure
 
     with _style():
-        figure = Figure(figsize=(7.2, 3.45), layout="constrained")
-        left, right = figure.subplots(1, 2, width_ratios=(1.0, 1.12))
+        figure = Figure(figsize=(7.2, 3.6), layout="constrained")
+        left, right = figure.subplots(1, 2, width_ratios=(1.2, 1.0))
         span, cut = _shown(motion, times)
         drawn = np.linspace(*span, POINTS)
         path = motion.at(drawn)[0] / size
@@ -131,7 +131,7 @@ def _draw_left(axes: Any, motion: FreeMotion, path: Array, names: tuple[str, str
     draw_curve(axes, view, path, color=MOTION, linewidth=2.2, label="this motion")
     _draw_direction(axes, view, path)
     draw_axes(axes, view, motion.moments, names)
-    axes.legend(loc="lower center", bbox_to_anchor=(0.5, -0.045), ncols=2, frameon=False, handlelength=1.6)
+    axes.legend(loc="lower center", bbox_to_anchor=(0.5, -0.09), ncols=2, frameon=False, handlelength=1.6)
 
 
 def _draw_direction(axes: Any, view: Any, path: Array) -> None:
