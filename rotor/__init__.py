@@ -13,11 +13,14 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from rotor.classical.free import FreeMotion as FreeMotion
+    from rotor.classical.free import free_motion as free_motion
     from rotor.constants import Constants as Constants
     from rotor.formats import read as read
     from rotor.formats import write as write
     from rotor.formats.stream import stream_lines as stream_lines
     from rotor.molecules.molecule import Molecule as Molecule
+    from rotor.molecules.refine import refine as refine
     from rotor.quantum.levels import Levels as Levels
     from rotor.quantum.levels import solve_levels as solve_levels
     from rotor.spectra.lines import Lines as Lines
@@ -28,14 +31,17 @@ if TYPE_CHECKING:
 
 _HOME = {
     "Constants": "rotor.constants",
+    "FreeMotion": "rotor.classical.free",
     "Levels": "rotor.quantum.levels",
     "Lines": "rotor.spectra.lines",
     "Molecule": "rotor.molecules.molecule",
     "Spectrum": "rotor.spectra.spectrum",
     "Top": "rotor.top",
+    "free_motion": "rotor.classical.free",
     "line_list": "rotor.spectra.lines",
     "partition_function": "rotor.thermo",
     "read": "rotor.formats",
+    "refine": "rotor.molecules.refine",
     "solve_levels": "rotor.quantum.levels",
     "stream_lines": "rotor.formats.stream",
     "write": "rotor.formats",

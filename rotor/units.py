@@ -26,6 +26,12 @@ MHZ_PER_K = BOLTZMANN_J_PER_K / PLANCK_J_S * 1e-6  # 1 K in MHz, exact ratio: 20
 DEBYE_C_M = 1e-21 / SPEED_OF_LIGHT_M_PER_S  # 1 D = 1e-18 esu cm, exact by definition
 DEBYE_PER_E_ANGSTROM = ELEMENTARY_CHARGE_C * 1e-10 / DEBYE_C_M  # 4.80320...
 
+# the set of ASE, in which molecules move classically: eV, Å, u, and what follows from them
+CLASSICAL_TIME_PS = 1e2 * math.sqrt(ATOMIC_MASS_KG / ELEMENTARY_CHARGE_C)  # 1 Å √(u/eV) in ps: 0.01018...
+HBAR_CLASSICAL = PLANCK_J_S / (2 * math.pi * 1e-10 * math.sqrt(ATOMIC_MASS_KG * ELEMENTARY_CHARGE_C))  # in Å √(u eV)
+EV_PER_K = BOLTZMANN_J_PER_K / ELEMENTARY_CHARGE_C  # exact ratio
+CM_PER_EV = ELEMENTARY_CHARGE_C / PLANCK_J_S * 1e-6 / MHZ_PER_CM  # 1 eV in cm^-1, exact ratio: 8065.54...
+
 # A = hbar / (4 pi I): MHz times u angstrom^2
 ROTATIONAL_MHZ_U_ANGSTROM2 = PLANCK_J_S / (8 * math.pi**2 * ATOMIC_MASS_KG * 1e-20) * 1e-6
 
@@ -38,6 +44,7 @@ _KINDS: dict[str, dict[str, float]] = {
     "time": {"fs": 1e-3, "ps": 1.0, "ns": 1e3, "us": 1e6, "s": 1e12},
     "field": {"V/cm": 1e-3, "kV/cm": 1.0, "V/m": 1e-5, "MV/m": 10.0},
     "mass": {"u": 1.0, "amu": 1.0, "Da": 1.0, "kg": 1.0 / ATOMIC_MASS_KG},
+    "number": {"": 1.0},
     "pressure": {"Pa": 1e-5, "mbar": 1e-3, "kPa": 1e-2, "bar": 1.0, "Torr": 1.33322368421e-3, "atm": 1.01325},
 }
 _ALIASES = {"cm^-1": "cm-1", "cm⁻¹": "cm-1", "1/cm": "cm-1", "μs": "us", "Debye": "debye", "Angstrom": "angstrom"}
@@ -51,6 +58,8 @@ def _kind_of(unit: str) -> str:
 def _factor(unit: str, wanted: str, text: str) -> float:
     unit = _ALIASES.get(unit, unit)
     table = _KINDS[_kind_of(wanted)]
+    if not wanted:
+        raise ValueError(f"{text!r}: plain numbers are wanted here, without the unit {unit!r}")
     if unit not in table:
         known = any(unit in other for other in _KINDS.values())
         what = "does not measure the same thing as" if known else "is not a known unit; the default is"
@@ -100,7 +109,8 @@ def _bounds(text: str, unit: str) -> tuple[float, float, str | None]:
         number * _factor_or_one(own or shared, unit, text) for number, own in ((start, unit_1), (stop, unit_2))
     )
     if not first < last:
-        raise ValueError(f"{text!r}: the range must rise, but {first:g} {unit} is not below {last:g} {unit}")
+        numbers = f"{first:g} is not below {last:g} {unit}".rstrip()
+        raise ValueError(f"{text!r}: the range must rise, but {numbers}")
     return first, last, parts[2] if len(parts) == 3 else None
 
 
@@ -121,6 +131,8 @@ def parse_grid(text: str, unit: str) -> NDArray[np.float64]:
 
     >>> parse_grid("0:200kV/cm:3", "kV/cm")
     array([  0., 100., 200.])
+    >>> parse_grid("0:1:3", "")  # plain numbers
+    array([0. , 0.5, 1. ])
     >>> parse_grid("1,2,5 GHz", "MHz")
     array([1000., 2000., 5000.])
     """

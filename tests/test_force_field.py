@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import force_fields
 import numpy as np
 import pytest
@@ -158,3 +160,39 @@ def test_hessians_that_cannot_be():
         read_hessian("none", molecule, unit="erg")
     with pytest.raises(ValueError, match="force constants of shape"):
         force_field_from_internal(molecule, [stretch(0, 1)], np.eye(2))
+
+
+def test_calculator_on_the_command_line(tmp_path, monkeypatch, capsys):
+    import rotor.molecules.refine as module
+    from rotor.cli import run
+
+    monkeypatch.setattr(module, "calculator_by_name", lambda name: lennard_jones())
+    (tmp_path / "pair.xyz").write_text("2\n\nAr 0 0 0\nAr 0 0 1.3\n")
+    assert run(["info", str(tmp_path / "pair.xyz"), "--calculator", "xtb", "--json", "-"]) == 0
+    out, err = capsys.readouterr()
+    b = 505379.00844 / (39.9623831 / 2 * 2 ** (1 / 3))  # at the minimum 2^(1/6) Å
+    assert json.loads(out)["constants_mhz"]["B"] == pytest.approx(b, rel=1e-3)  # a force of 1e-3 is left
+    assert "geometry refined with LennardJones" in err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [(["water", "--calculator", "EMT"], "--calculator: calculator 'EMT'"), (["--constants", "B=1", "--calculator", "x"], "no geometry"),
+     (["water", "--conformers", "5"], "made of a SMILES"), (["SMILES:CC", "--conformers", "0"], "--conformers: 0")],
+)  # fmt: skip
+def test_mistakes_with_calculators_and_conformers(capsys, arguments, words):
+    from rotor.cli import run
+
+    assert run(["info", *arguments]) == 2
+    assert words in capsys.readouterr().err
+
+
+def test_conformers_on_the_command_line(capsys):
+    from rotor.cli import run
+
+    assert run(["info", "SMILES:CCCC", "--conformers", "20", "--json", "-"]) == 0
+    found = json.loads(capsys.readouterr().out)["conformers"]
+    assert [round(one["energy_kj_per_mol"], 1) for one in found] == [0.0, 3.3]
+    assert all(len(one["rotational_constants_mhz"]) == 3 for one in found)
+    assert run(["info", "SMILES:CCCC", "--conformers", "20"]) == 0
+    assert "E (kJ/mol)" in capsys.readouterr().out

@@ -21,6 +21,9 @@ CONSTANTS = typer.Option(None, metavar="TEXT", help='Constants instead of a sour
 DIPOLE = typer.Option(None, metavar="X,Y,Z", help="Dipole in the frame of the input (D).")
 DIPOLE_ABC = typer.Option(None, metavar="A,B,C", help="Dipole in principal axes (D).")
 ISOTOPE = typer.Option(None, metavar="1=2H", help="Another isotope, by atom number or element; repeatable.")
+CALCULATOR = typer.Option(
+    None, metavar="NAME", help="Refine the geometry with an ASE calculator of that name, such as xtb, tblite or psi4."
+)
 SPIN_WEIGHTS = typer.Option(None, metavar="LIST", help='Nuclear-spin weights: "ee=1,eo=3,oe=3,oo=1", "even=1,odd=3".')
 JSON = typer.Option(None, "--json", metavar="FILE", help="Everything printed, as JSON; - is standard output.")
 
@@ -35,6 +38,7 @@ class Input:
     dipole: str | None
     dipole_abc: str | None
     spin_weights: str | None
+    calculator: str | None = None
 
     @property
     def text(self) -> str:
@@ -144,6 +148,8 @@ def _refuse_contradictions(given: Input) -> None:
         raise ValueError("--dipole and --dipole-abc: give one of them, in the frame of the input or in principal axes")
     if given.isotopes and given.constants is not None:
         raise ValueError("--isotope: bare constants have no atoms; give the constants of the isotopologue itself")
+    if given.calculator is not None and given.constants is not None:
+        raise ValueError("--calculator: bare constants have no geometry to refine; give a molecule")
 
 
 def _from_constants(given: Input) -> Top:
@@ -160,7 +166,18 @@ def _from_source(given: Input) -> Top:
     top = rotor.read(given.source, isotopes=",".join(given.isotopes) or None)
     if not isinstance(top, rotor.Top):
         raise ValueError(f"{given.source}: holds a {type(top).__name__.lower()}, not a molecule or constants")
-    return top
+    return (
+        top if given.calculator is None else option("--calculator", given.calculator, lambda name: _refined(top, name))
+    )
+
+
+def _refined(top: Top, name: str) -> Top:
+    from rotor.molecules.refine import refine
+    from rotor.top import Top
+
+    if top.molecule is None:
+        raise ValueError(f"{name!r} has no geometry to refine: there are constants alone")
+    return Top.from_molecule(refine(top.molecule, name))
 
 
 def _with_dipole_of_input(top: Top, dipole_debye: tuple[float, float, float]) -> Top:

@@ -58,6 +58,7 @@ def command(
     dipole_abc: str | None = inputs.DIPOLE_ABC,
     isotope: list[str] | None = inputs.ISOTOPE,
     spin_weights: str | None = inputs.SPIN_WEIGHTS,
+    calculator: str | None = inputs.CALCULATOR,
     q: float | None = typer.Option(None, metavar="Q", help="Partition function to use instead of the summed one."),
     vibrational_factor: float = typer.Option(1.0, metavar="X", help="Multiplies Q."),
     profile: str | None = typer.Option(None, metavar="NAME", help="sticks, gaussian, lorentzian or voigt."),
@@ -81,7 +82,7 @@ def command(
     if json != "-":
         files.ask("--json", json, (".json",))
 
-    given = Input(source, constants, isotope or [], dipole, dipole_abc, spin_weights)
+    given = Input(source, constants, isotope or [], dipole, dipole_abc, spin_weights, calculator)
     prediction = request.prediction_of(context, str(source)) if request.is_request(source) else None
     if prediction is not None:
         settings, tag = _requested(settings, prediction), prediction.request.tag

@@ -1,0 +1,206 @@
+"""A free rotation as a film: the body in space beside the momentum sphere, as .gif or .mp4."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rotor.classical.free import FreeMotion
+from rotor.plots.sphere import MOTION, View, draw_axes, draw_curve, draw_family, draw_sphere, view_of
+from rotor.rotations import Array, rotate, to_matrix
+
+Names = tuple[str, str, str]
+
+FRAMES = 150
+FRAMES_PER_SECOND = 25
+DOTS_PER_INCH = 80
+LIMIT = 1.45  # half the width of each of the two places; the body fits into a sphere of radius 1.15
+_EYE = np.array([[0.0, 1.0, 0.0], [-0.3, 0.0, 0.954], [0.954, 0.0, 0.3]])  # rows right, up, towards the eye; L is up
+_CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
+_FACES = ((0, 1, 3, 2), (4, 5, 7, 6), (0, 1, 5, 4), (2, 3, 7, 6), (0, 2, 6, 4), (1, 3, 7, 5))
+_FACE_NORMALS = np.array([[-1, 0, 0], [1, 0, 0], [0, -1, 0], [0, 1, 0], [0, 0, -1], [0, 0, 1]], dtype=float)
+_FACE_COLOURS = ("#0072B2", "#56B4E9", "#A06A92", "#CC79A7", "#009E73", "#7CCBB0")
+
+
+@dataclass(frozen=True)
+class Atoms:
+    """Atoms to draw: positions (n, 3) in the principal frame about the centre of mass, their symbols, their bonds."""
+
+    positions: Array
+    symbols: tuple[str, ...]
+
+    @property
+    def bonds(self) -> list[tuple[int, int]]:
+        """Pairs nearer than 1.25 times the sum of their covalent radii (ASE's, of Cordero et al. 2008)."""
+        from ase.data import atomic_numbers, covalent_radii
+
+        radii = covalent_radii[[atomic_numbers[s] for s in self.symbols]]
+        apart = np.linalg.norm(self.positions[:, None] - self.positions[None], axis=-1)
+        near = apart < 1.25 * (radii[:, None] + radii[None])
+        return [(int(i), int(j)) for i, j in np.argwhere(near) if i < j]
+
+
+def box_edges(moments: ArrayLike) -> Array:
+    """Half edges (3,) of the uniform box of these principal moments, the longest at 1: e_i² ~ I_j + I_k - I_i.
+
+    Moments that break the triangle inequality, which no real body has, give a plate.
+
+    >>> box_edges([2.0, 5.0, 5.0]).round(4).tolist()  # edges 1, 1, 2: moments as 2 : 5 : 5
+    [1.0, 0.5, 0.5]
+    """
+    moments = np.asarray(moments, dtype=np.float64)
+    squares = np.maximum(np.sum(moments) - 2.0 * moments, 0.0)
+    return np.asarray(np.sqrt(squares / squares.max()))
+
+
+def check_film(path: str | os.PathLike[str]) -> None:
+    """ValueError unless a film of that suffix can be made here."""
+    suffix = Path(path).suffix.lower()
+    if suffix not in (".gif", ".mp4"):
+        raise ValueError(f"{os.fspath(path)}: a film is .gif or .mp4; the suffix names the format")
+    if suffix == ".mp4":
+        from matplotlib.animation import FFMpegWriter
+
+        if not FFMpegWriter.isAvailable():
+            raise ValueError(
+                f"{os.fspath(path)}: an mp4 is made by ffmpeg, which is not installed here; install it, or ask for a .gif"
+            )
+
+
+def animate(
+    motion: FreeMotion,
+    times: ArrayLike,
+    path: str | os.PathLike[str],
+    *,
+    atoms: Atoms | None = None,
+    axis_names: Names = ("1", "2", "3"),
+    time_unit: str = "",
+    time_factor: float = 1.0,
+    frames: int = FRAMES,
+) -> None:
+    """Write a film of one free rotation from the first to the last of `times`, at even steps of the exact motion.
+
+    Left the body in space, L upright: the atoms, or without them the uniform box that has these moments. Right the
+    path of L over the momentum sphere in the body. times: in the units of the motion; shown multiplied by `time_factor`.
+    Raises ValueError for a suffix that cannot be made here and for times that are all the same.
+    """
+    check_film(path)
+    times = np.asarray(times, dtype=np.float64)
+    if not times.size or np.ptp(times) == 0.0:
+        raise ValueError("a film needs two different times, a first and a last")
+    from matplotlib.animation import FFMpegWriter, PillowWriter
+
+    when = np.linspace(times.min(), times.max(), frames)
+    momentum, attitude = motion.at(when)
+    path_of_l = momentum / np.linalg.norm(motion.momentum0)
+    turned = _EYE @ _upright(rotate(motion.attitude0, motion.momentum0)) @ to_matrix(attitude)
+
+    figure, (left, right) = _empty_stage()
+    view = view_of(motion.moments, path_of_l[0])
+    _draw_still_parts(right, view, motion.moments, path_of_l, axis_names)
+    figure, (left, right) = _with_backdrop(figure)
+    (trail,) = right.plot([], [], color=MOTION, linewidth=2.2, alpha=0.55)
+    (dot,) = right.plot([], [], "o", ms=8, mfc=MOTION, mec="white")
+    film = (FFMpegWriter if Path(path).suffix.lower() == ".mp4" else PillowWriter)(fps=FRAMES_PER_SECOND)
+    _draw_momentum(left)
+    clock = left.set_title("", fontsize=9, y=1.0)
+    body: list[Any] = []
+    with film.saving(figure, os.fspath(path), dpi=DOTS_PER_INCH):
+        for i in range(frames):
+            for part in body:
+                part.remove()
+            body = _draw_box(left, motion.moments, turned[i]) if atoms is None else _draw_atoms(left, atoms, turned[i])
+            clock.set_text(f"$t$ = {when[i] * time_factor:.4g} {time_unit}".rstrip())
+            dot.set_data(*view.flat(path_of_l[i : i + 1]).T)
+            trail.set_data(*view.flat(path_of_l[: i + 1]).T)
+            film.grab_frame()
+
+
+def _empty_stage() -> tuple[Any, Any]:
+    """A figure with a place for the body and one for the sphere, both within ±LIMIT."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(7.0, 3.7), dpi=DOTS_PER_INCH)
+    FigureCanvasAgg(figure)
+    left, right = figure.subplots(1, 2, gridspec_kw={"left": 0, "right": 1, "bottom": 0, "top": 0.92, "wspace": 0})
+    for axes in (left, right):
+        axes.set(xlim=(-LIMIT, LIMIT), ylim=(-LIMIT, LIMIT), aspect="equal")
+        axes.axis("off")
+        axes.set_title("", y=1.0)  # a fixed place, else every frame looks for one
+    return figure, (left, right)
+
+
+def _with_backdrop(figure: Any) -> tuple[Any, Any]:
+    """A stage with what was drawn so far as one image behind it: it is drawn once, not in every frame."""
+    figure.canvas.draw()
+    stage, places = _empty_stage()
+    stage.figimage(np.array(figure.canvas.buffer_rgba()), zorder=-10)
+    return stage, places
+
+
+def _upright(momentum: Array) -> Array:
+    """The rotation (3, 3) of space that brings L to the vertical, by the shortest way."""
+    unit = momentum / np.linalg.norm(momentum)
+    half_way = unit + np.array([0.0, 0.0, 1.0])
+    if np.linalg.norm(half_way) < 1e-8:  # L points straight down
+        return np.diag([1.0, -1.0, -1.0])
+    half_way /= np.linalg.norm(half_way)
+    half_turn = 2.0 * np.outer(half_way, half_way) - np.eye(3)  # takes L up and turns the rest by π about the vertical
+    return np.asarray(np.diag([-1.0, -1.0, 1.0]) @ half_turn)
+
+
+def _draw_still_parts(axes: Any, view: View, moments: Array, path_of_l: Array, names: Names) -> None:
+    draw_sphere(axes)
+    axes.set(xlim=(-LIMIT, LIMIT), ylim=(-LIMIT, LIMIT))
+    draw_family(axes, view, moments)
+    draw_curve(axes, view, path_of_l, color=MOTION, linewidth=1.0)
+    draw_axes(axes, view, moments, names)
+    axes.set_title("$L$ in the body", fontsize=9, y=1.0)
+
+
+def _draw_momentum(axes: Any) -> None:
+    """The fixed direction of L in space."""
+    up = (_EYE @ np.array([0.0, 0.0, 1.42]))[:2]
+    axes.annotate("", up, -0.92 * up, zorder=0, arrowprops={"arrowstyle": "-|>", "color": "0.45", "lw": 1.2})
+    axes.text(up[0] + 0.09, up[1] - 0.03, "$L$", color="0.35", va="center")
+
+
+def _draw_box(axes: Any, moments: Array, turned: Array) -> list[Any]:
+    """The faces that the eye sees of the box of these moments; `turned` (3, 3) takes body axes to right, up, eye."""
+    edges = np.maximum(box_edges(moments), 0.03)  # a plate or a rod stays visible
+    corners = _CORNERS * (1.15 * edges / np.linalg.norm(edges)) @ turned.T
+    return [
+        axes.fill(*corners[list(face), :2].T, facecolor=colour, edgecolor="black", linewidth=0.8, alpha=0.95)[0]
+        for face, normal, colour in zip(_FACES, _FACE_NORMALS @ turned.T, _FACE_COLOURS, strict=True)
+        if normal[2] > 0.0
+    ]
+
+
+def _draw_atoms(axes: Any, atoms: Atoms, turned: Array) -> list[Any]:
+    """Balls and sticks from the back to the front."""
+    from ase.data import atomic_numbers, covalent_radii
+    from ase.data.colors import jmol_colors
+    from matplotlib.patches import Circle
+
+    numbers = [atomic_numbers[s] for s in atoms.symbols]
+    radii = 0.55 * covalent_radii[numbers]
+    scale = 1.15 / float(np.max(np.linalg.norm(atoms.positions, axis=1) + radii))
+    seen = scale * atoms.positions @ turned.T
+    parts = []
+    for i, j in atoms.bonds:
+        along = (seen[j] - seen[i]) / np.linalg.norm(seen[j] - seen[i])
+        ends = np.array([seen[i] + scale * radii[i] * along, seen[j] - scale * radii[j] * along])
+        parts += axes.plot(
+            *ends[:, :2].T, color="0.35", linewidth=5, solid_capstyle="round", zorder=2 + ends[:, 2].mean()
+        )
+    for place, radius, number in zip(seen, radii, numbers, strict=True):
+        ball = Circle(place[:2], scale * radius, facecolor=jmol_colors[number], edgecolor="black", linewidth=0.9)
+        ball.set_zorder(2 + place[2])
+        parts.append(axes.add_patch(ball))
+    return parts

@@ -1,0 +1,174 @@
+"""The polhode picture: the momentum sphere with polhodes, separatrix and the motion, and L in the body over time."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rotor.classical.free import FreeMotion
+from rotor.plots.sphere import LARGE, MIDDLE, MOTION, SMALL, draw_axes, draw_curve, draw_family, draw_sphere, view_of
+from rotor.rotations import Array
+
+POINTS = 1500  # of a curve
+MOST_PERIODS = 12  # in the diagram over time; more would be a solid band
+
+
+def polhode_figure(
+    motion: FreeMotion,
+    times: ArrayLike,
+    *,
+    axis_names: tuple[str, str, str] = ("1", "2", "3"),
+    time_label: str = "$t$",
+    time_factor: float = 1.0,
+    title: str = "",
+) -> Any:
+    """A matplotlib figure of one free motion: where L goes in the body, and when.
+
+    Left the sphere of directions of L in principal axes, with polhodes about the axes of smallest (blue) and largest
+    moment (green), the separatrix (black) and the path of L from the first to the last time (orange; the dot is the
+    start). Filled axis ends are stable, open ones unstable. Right the components of L/|L| over time.
+
+    motion: of one body, in any units. times: (n,), in the units of the motion, of which only the range counts; they are
+    shown multiplied by `time_factor`. Raises ValueError for a body at rest and for more than one body.
+    """
+    times = np.asarray(times, dtype=np.float64)
+    size = np.linalg.norm(motion.momentum0, axis=-1)
+    if motion.moments.shape != (3,) or not size > 0.0 or not times.size:
+        raise ValueError("a polhode picture is that of one body with an angular momentum, at one time or more")
+    from matplotlib.figure import Figure
+
+    with _style():
+        figure = Figure(figsize=(7.2, 3.45), layout="constrained")
+        left, right = figure.subplots(1, 2, width_ratios=(1.0, 1.12))
+        span, cut = _shown(motion, times)
+        drawn = np.linspace(*span, POINTS)
+        path = motion.at(drawn)[0] / size
+        _draw_left(left, motion, path, axis_names)
+        _draw_right(right, motion.moments, drawn * time_factor, path, axis_names)
+        _mark_period(right, drawn[0] * time_factor, drawn[-1] * time_factor, float(motion.period) * time_factor)
+        right.set(xlabel=time_label + (f" (the first {MOST_PERIODS} periods)" if cut else ""), ylabel="$L_i/|L|$")
+        if title:
+            figure.suptitle(title, fontsize=10, x=0.01, ha="left")
+    return figure
+
+
+def plot_polhodes(
+    motion: FreeMotion,
+    times: ArrayLike,
+    path: str | os.PathLike[str],
+    *,
+    axis_names: tuple[str, str, str] = ("1", "2", "3"),
+    time_label: str = "$t$",
+    time_factor: float = 1.0,
+    title: str = "",
+    provenance: Mapping[str, Any] | None = None,
+) -> None:
+    """Draw `polhode_figure` into a .png, .pdf or .svg file, with the provenance in its metadata.
+
+    Raises ValueError for a suffix that is no picture, and as `polhode_figure` does.
+    """
+    suffix = Path(path).suffix.lower()
+    if suffix not in (".png", ".pdf", ".svg"):
+        raise ValueError(f"{os.fspath(path)}: a picture is .png, .pdf or .svg; the suffix names the format")
+    figure = polhode_figure(
+        motion, times, axis_names=axis_names, time_label=time_label, time_factor=time_factor, title=title
+    )
+    with _style():
+        figure.savefig(path, dpi=200, metadata=_metadata(suffix, title, provenance or {}))
+
+
+def _metadata(suffix: str, title: str, provenance: Mapping[str, Any]) -> dict[str, Any]:
+    """What made the picture, under the names that each format allows; no date, so that the same picture is the same file."""
+    import rotor
+
+    story = json.dumps({"program": "rotor", "version": rotor.__version__, **provenance}, ensure_ascii=False)
+    title = title or "polhodes"
+    if suffix == ".pdf":
+        return {"Title": title, "Subject": story, "CreationDate": None}
+    if suffix == ".svg":
+        return {"Title": title, "Description": story, "Date": None}
+    return {"Title": title, "Description": story}
+
+
+def _style() -> Any:
+    import matplotlib as mpl
+
+    return mpl.rc_context(
+        {
+            "font.size": 9,
+            "axes.linewidth": 0.7,
+            "axes.labelsize": 9,
+            "legend.fontsize": 8,
+            "xtick.labelsize": 8,
+            "ytick.labelsize": 8,
+            "mathtext.fontset": "dejavuserif",
+            "svg.fonttype": "none",
+            "svg.hashsalt": "rotor",
+            "pdf.fonttype": 42,
+        }
+    )
+
+
+def _shown(motion: FreeMotion, times: Array) -> tuple[tuple[float, float], bool]:
+    """First and last time of the diagrams; a long motion is shown for its first periods."""
+    first, last = float(times.min()), float(times.max())
+    rhythm = float(motion.period) if np.isfinite(motion.period) else math.inf
+    cut = last - first > MOST_PERIODS * rhythm
+    return (first, first + MOST_PERIODS * rhythm if cut else last), cut
+
+
+def _draw_left(axes: Any, motion: FreeMotion, path: Array, names: tuple[str, str, str]) -> None:
+    view = view_of(motion.moments, path[0])
+    draw_sphere(axes)
+    draw_family(axes, view, motion.moments)
+    draw_curve(axes, view, path, color=MOTION, linewidth=2.2, label="this motion")
+    _draw_direction(axes, view, path)
+    draw_axes(axes, view, motion.moments, names)
+    axes.legend(loc="lower center", bbox_to_anchor=(0.5, -0.045), ncols=2, frameon=False, handlelength=1.6)
+
+
+def _draw_direction(axes: Any, view: Any, path: Array) -> None:
+    """A dot at the start, and an arrow on the visible part of the path nearest to the eye."""
+    x, y = view.flat(path[0])
+    hidden = view.depth(path[0]) < 0.0
+    axes.plot(x, y, "o", ms=5, mfc=MOTION, mec="white", mew=0.8, alpha=0.4 if hidden else 1.0, zorder=8)
+    steps = np.linalg.norm(np.diff(path, axis=0), axis=1)
+    if steps.max() < 1e-9:
+        return
+    travelled = np.concatenate([[0.0], np.cumsum(steps)])
+    wanted = min(0.45, 0.4 * travelled[-1])
+    here = int(np.clip(np.searchsorted(travelled, wanted), 1, len(path) - 1))
+    if view.depth(path[here]) > 0.0:
+        axes.annotate(
+            "", view.flat(path[here]), view.flat(path[here - 1]), zorder=8,
+            arrowprops={"arrowstyle": "-|>,head_width=0.28,head_length=0.5", "color": MOTION, "lw": 1.2,
+                        "shrinkA": 0, "shrinkB": 0},
+        )  # fmt: skip
+
+
+def _mark_period(axes: Any, first: float, last: float, period: float) -> None:
+    if last - first > period:
+        axes.axvline(first + period, color="0.6", linewidth=0.8, linestyle="--", zorder=0)
+        axes.text(first + period, -1.0, " period", fontsize=8, color="0.4", ha="left", va="center")
+
+
+def _draw_right(axes: Any, moments: Array, times: Array, path: Array, names: tuple[str, str, str]) -> None:
+    rank = np.argsort(np.argsort(moments, kind="stable"))
+    for axis, name in enumerate(names):
+        colour = (SMALL, MIDDLE, LARGE)[rank[axis]]
+        axes.plot(times, path[:, axis], color=colour, linewidth=1.3, label=f"$L_{name}$")
+    axes.set(ylim=(-1.12, 1.12), yticks=(-1, -0.5, 0, 0.5, 1))
+    if times[-1] > times[0]:
+        axes.set_xlim(times[0], times[-1])
+    axes.grid(True, color="0.92", linewidth=0.6)
+    axes.set_axisbelow(True)
+    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, frameon=False)
+    for side in ("top", "right"):
+        axes.spines[side].set_visible(False)
