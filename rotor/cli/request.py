@@ -25,6 +25,7 @@ SAID = {
     "isotope": "the constants",
     "spin_weights": "WTPL and WTMN",
     "constants": "the constants",
+    "calculator": "the constants",
 }
 
 
