@@ -18,7 +18,9 @@ if TYPE_CHECKING:
     from rotor.constants import Constants as Constants
     from rotor.formats import read as read
     from rotor.formats import write as write
+    from rotor.formats.stream import stream_lines as stream_lines
     from rotor.molecules.molecule import Molecule as Molecule
+    from rotor.molecules.refine import refine as refine
     from rotor.quantum.levels import Levels as Levels
     from rotor.quantum.levels import solve_levels as solve_levels
     from rotor.spectra.lines import Lines as Lines
@@ -39,7 +41,9 @@ _HOME = {
     "line_list": "rotor.spectra.lines",
     "partition_function": "rotor.thermo",
     "read": "rotor.formats",
+    "refine": "rotor.molecules.refine",
     "solve_levels": "rotor.quantum.levels",
+    "stream_lines": "rotor.formats.stream",
     "write": "rotor.formats",
 }
 

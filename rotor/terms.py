@@ -46,11 +46,12 @@ A_REDUCTION = (
 )
 LINEAR: dict[str, Operators] = {"D": {(2, 0, 0): -1.0}, "H": {(3, 0, 0): 1.0}, "L": {(4, 0, 0): 1.0}}
 
-# The fourth-rank tensor 10 (Jx⁴ + Jy⁴ + Jz⁴) - 6 J⁴ + 2 J² of cubic tops (K. T. Hecht, J. Mol. Spectrosc. 5 (1960) 355;
-# in these words Kirschner and Watson, J. Mol. Spectrosc. 47 (1973) 347) is, with z along a fourfold axis,
-# ½ (35 Jz⁴ - 30 J² Jz² + 25 Jz² + 3 J⁴ - 6 J²) + (5/4)(J₊⁴ + J₋⁴)
+# The fourth-rank tensor Ω = 6 J⁴ - 2 J² - 10 (Jx⁴ + Jy⁴ + Jz⁴) of cubic tops (K. T. Hecht, J. Mol. Spectrosc. 5 (1960) 355) is,
+# with z along a fourfold axis, -½ [35 Jz⁴ - 30 J² Jz² + 25 Jz² + 3 J⁴ - 6 J² + (5/2)(J₊⁴ + J₋⁴)]; the sign is that of
+# J. T. Hougen, Methane Symmetry Operations (NIST 2001, first MTP Int. Rev. Sci., Phys. Chem. 3 (1976) 75), section 4:
+# H = ... - D_J J⁴ - ½ D_t [3 J⁴ - ...], in which D_t of methane is positive
 CUBIC_TENSOR: Operators = {
-    (0, 2, 0): 17.5, (1, 1, 0): -15.0, (0, 1, 0): 12.5, (2, 0, 0): 1.5, (1, 0, 0): -3.0, (0, 0, 2): 1.25,
+    (0, 2, 0): -17.5, (1, 1, 0): 15.0, (0, 1, 0): -12.5, (2, 0, 0): -1.5, (1, 0, 0): 3.0, (0, 0, 2): -1.25,
 }  # fmt: skip
 SPHERICAL: dict[str, Operators] = {"D": {(2, 0, 0): -1.0}, "H": {(3, 0, 0): 1.0}, "Dt": CUBIC_TENSOR}
 

@@ -115,7 +115,8 @@ class Top:
     constants: named constants in MHz. dipole_abc_debye: (μa, μb, μc) or None where it is not known. spin_weights:
     nuclear-spin weights. mass_u: for Doppler widths. frame: principal frame of a geometry, None without one.
     kind_of_top: how the kind was decided. molecule, symmetry: of a geometry. source: where the constants are from.
-    notes: what a user must be told.
+    independent_errors: whether the uncertainties of the constants may count as uncorrelated; not those of a fit whose
+    correlations are unknown. notes: what a user must be told.
     """
 
     constants: Constants
@@ -130,6 +131,7 @@ class Top:
     source: str = ""
     dipole_source: str = ""
     weights_source: str = ""
+    independent_errors: bool = True
     notes: tuple[str, ...] = ()
 
     @classmethod
@@ -249,6 +251,13 @@ class Top:
     def with_dipole(self, dipole_abc_debye: ArrayLike, source: str) -> Top:
         """The same top with another dipole in principal axes."""
         return replace(self, dipole_abc_debye=_three(dipole_abc_debye), dipole_source=source)
+
+    def with_estimated_dipole(self, dipole_debye: ArrayLike, source: str) -> Top:
+        """The same top with a dipole in the frame of its geometry, of which what symmetry forbids is left out."""
+        if self.frame is None or self.symmetry is None:
+            raise ValueError(f"{self.name or 'this top'} has no geometry whose frame a dipole could be in")
+        allowed = allowed_dipole(dipole_debye, self.symmetry)
+        return replace(self, dipole_abc_debye=_in_frame(self.frame, allowed), dipole_source=source)
 
     def with_weights(self, weights: dict[str, int], source: str) -> Top:
         """The same top with other spin weights."""

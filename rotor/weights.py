@@ -119,7 +119,9 @@ class SpinWeights:
         if self.rule == "none":
             return {"A": 1, "E": 2, "F": 3}[irrep[0]]
         self._require(("irrep",), "a spherical top")
-        return self.values[self.classes.index(irrep if irrep in self.classes else irrep[0])]
+        if "G" in self.classes:
+            raise ValueError("spin weights of an icosahedral top: a tensor of fourth rank does not split its levels")
+        return int(self._whole_numbers()[self.classes.index(irrep if irrep in self.classes else irrep[0])])
 
     def of_j(self, j: ArrayLike) -> NDArray[np.int64]:
         """Weights of linear-molecule levels, by parity of J."""

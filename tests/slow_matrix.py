@@ -54,10 +54,10 @@ def term_matrix(p: int, q: int, n: int, j: int) -> np.ndarray:
 
 
 def cubic_matrix(j: int) -> np.ndarray:
-    """10 (Jx⁴ + Jy⁴ + Jz⁴) - 6 J⁴ + 2 J², as it is printed."""
+    """6 J⁴ - 2 J² - 10 (Jx⁴ + Jy⁴ + Jz⁴), as it is printed."""
     x = j * (j + 1.0)
     fourth = sum(np.linalg.matrix_power(component, 4) for component in body_operators(j)[:3])
-    return 10 * fourth - (6 * x**2 - 2 * x) * np.eye(2 * j + 1)
+    return (6 * x**2 - 2 * x) * np.eye(2 * j + 1) - 10 * fourth
 
 
 def threefold_turn(j: int) -> np.ndarray:

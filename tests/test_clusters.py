@@ -26,13 +26,13 @@ def irreps_in(j: int) -> list[int]:
 
 
 def test_low_j_in_closed_form():
-    """Eigenvalues by hand from Ω|K⟩: the diagonal ½(35K⁴ - 30XK² + 25K² + 3X² - 6X) and 5/4 of the ladder to K ± 4."""
+    """Eigenvalues by hand from Ω|K⟩: the diagonal -½(35K⁴ - 30XK² + 25K² + 3X² - 6X) and -5/4 of the ladder to K ± 4."""
     closed = {
         0: {"A1": [0]},
         1: {"F1": [0]},
-        2: {"E": [36], "F2": [-24]},
-        3: {"A2": [-360], "F1": [180], "F2": [-60]},
-        4: {"A1": [840], "E": [120], "F1": [420], "F2": [-780]},
+        2: {"E": [-36], "F2": [24]},
+        3: {"A2": [360], "F1": [-180], "F2": [60]},
+        4: {"A1": [-840], "E": [-120], "F1": [-420], "F2": [780]},
     }
     for j, levels in closed.items():
         irreps, omega = tensor_eigenvalues(j)
@@ -66,6 +66,14 @@ def test_how_many_of_each(j):
     dimension = np.array([DIMENSION[irrep] for irrep in irreps])
     assert dimension.sum() == 2 * j + 1
     assert abs(dimension @ omega) < 1e-13 * (2 * j + 1) * 35 * (j + 1) ** 4  # traceless to round-off
+
+
+def test_methane_has_its_order():
+    """J = 3 of CH4, with its positive D_t: A2 is highest and F1 lowest, 300 and 240 D_t away from F2."""
+    levels = solve_levels(Top(METHANE), 3, jmin=3)
+    energy = dict(zip(levels.irrep.tolist(), levels.energy_mhz, strict=True))
+    assert energy["A2"] - energy["F2"] == pytest.approx(300 * 0.13294, rel=1e-6)
+    assert energy["F2"] - energy["F1"] == pytest.approx(240 * 0.13294, rel=1e-6)
 
 
 def test_levels_keep_their_barycentre():
@@ -118,3 +126,15 @@ def test_noncubic_terms_are_refused():
 
     with pytest.raises(ValueError, match="tensor of D_t alone"):
         scalar_and_tensor({(1, 0, 0): 5.0, (0, 1, 0): 0.1})
+
+
+@pytest.mark.parametrize(
+    ("weights", "says"),
+    [
+        ({"A": 1, "F1": 3, "F2": 3, "G": 4, "H": 5}, "icosahedral"),
+        ({"0": 2, "1": 1, "2": 1}, "do not fit a spherical top"),
+    ],
+)
+def test_weights_that_cannot_serve_split_levels(weights, says):
+    with pytest.raises(ValueError, match=says):
+        solve_levels(Top(METHANE, spin_weights=SpinWeights.from_mapping(weights)), 3)

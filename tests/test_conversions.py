@@ -12,6 +12,7 @@ from rotor.constants import REPRESENTATIONS, Constants
 from rotor.quantum import conversions
 from rotor.quantum.conversions import to_reduction, to_representation
 from rotor.quantum.levels import solve_levels
+from rotor.quantum.uncertainty import Covariance, level_errors
 from rotor.top import Top
 
 QUARTIC = {
@@ -133,13 +134,49 @@ def test_rigid_tops_change_their_axes_alone():
 
 
 def test_nothing_is_silent():
-    before = top_of("A", "Ir", 1.0).replace(sources={"A": "a paper"}, uncertainties={"A": 0.1})
+    before = top_of("A", "Ir", 1.0).replace(sources={"A": "a paper"})
     done = to_reduction(before, "S")
     assert "A in Ir to S in Ir" in done.note
-    assert "uncertainties are left out" in done.note
     assert done.constants.sources["A"].endswith("a paper")
     assert all("first order" in source for source in done.constants.sources.values())
     assert done.s111 == pytest.approx(0.5 / (2 * 9000.0 - 5500.0 - 3000.0))
+    assert done.covariance is None
+
+
+def test_uncertainties_go_along():
+    """σ(DJ) from DJ = ΔJ + 2d2, d2 = -δK/4σ: of ΔJ and δK in quadrature; σ(d1) is that of δJ."""
+    errors = {"DeltaJ": 1e-3, "deltaJ": 2e-4, "deltaK": 5e-3}
+    done = to_reduction(top_of("A", "Ir", 1.0).replace(uncertainties=errors), "S")
+    sigma = (2 * 9000.0 - 5500.0 - 3000.0) / (5500.0 - 3000.0)
+    assert done.constants.uncertainties["d1"] == pytest.approx(2e-4, rel=1e-6)
+    assert done.constants.uncertainties["d2"] == pytest.approx(5e-3 / (4 * sigma), rel=1e-6)
+    assert done.constants.uncertainties["DJ"] == pytest.approx(np.hypot(1e-3, 5e-3 / (2 * sigma)), rel=1e-6)
+
+
+def test_errors_of_levels_survive_a_conversion():
+    """The covariance carried over gives the same errors of levels, to the order of the distortion."""
+    rng = np.random.default_rng(3)
+    before = top_of("A", "Ir", 0.02)
+    names = tuple(before.values)
+    root = rng.normal(size=(8, 8)) + 2 * np.eye(8)
+    root /= np.linalg.norm(root, axis=1)[:, None]
+    old = Covariance.of_correlations(names, [0.02, 0.01, 0.01, *[1e-5] * 5], root @ root.T)
+    done = to_representation(before, "IIIl", old)
+    errors = []
+    for constants, covariance in ((before, old), (done.constants, done.covariance)):
+        levels = solve_levels(Top(constants), JMAX)
+        errors.append(level_errors(Top(constants), levels, covariance)[np.lexsort((levels.kc, levels.ka, levels.j))])
+    assert np.allclose(errors[0], errors[1], rtol=1e-3)  # distortion over rotational constants at J = 8
+
+
+def test_equal_constants_and_zeros_convert():
+    """B = C exactly in Ir: no turn to S takes away what is not there, and a constant of zero has an uncertainty too."""
+    before = Constants(
+        A=9000.0, B=5000.0, C=5000.0, kind="asymmetric", DJ=0.1, d1=0.0, uncertainties={"B": 0.1, "d1": 1e-3}
+    )
+    done = to_reduction(before, "S")
+    assert done.constants.get("d2") == 0.0
+    assert done.constants.uncertainties["d1"] == pytest.approx(1e-3)
 
 
 @pytest.mark.parametrize(

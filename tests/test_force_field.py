@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import force_fields
 import numpy as np
 import pytest
@@ -94,18 +96,27 @@ def test_an_optimisation_that_falls_short_is_an_error():
 
 @pytest.mark.parametrize(
     ("name", "words"),
-    [("EMT", "metals"), ("lj", "Lennard-Jones"), ("nosuch", "unknown to ASE"), ("tblite", "cannot be built|TBLite"),
-     ("gulp", "")],
-)  # fmt: skip
-def test_calculators_by_name(name, words):
-    if name in ("tblite", "gulp"):
-        try:
-            assert hasattr(calculator_by_name(name), "get_forces")
-        except ValueError as reason:
-            assert "cannot be built here" in str(reason)  # noqa: PT017 - either is right, by what is installed
-        return
+    [("EMT", "metals"), ("lj", "Lennard-Jones"), ("nosuch", "unknown to ASE"), ("tip3p", "rigid")],
+)
+def test_calculators_that_are_not_for_molecules(name, words):
     with pytest.raises(ValueError, match=words):
         calculator_by_name(name)
+
+
+def test_calculators_by_name(monkeypatch):
+    import ase.calculators.calculator as library
+
+    import rotor.molecules.refine as module
+
+    monkeypatch.setattr(library, "get_calculator_class", lambda name: lennard_jones)
+    assert isinstance(calculator_by_name(" Gaussian "), LennardJones)
+
+    def missing(name):
+        raise ImportError(f"No module named {name!r}")
+
+    monkeypatch.setattr(module, "import_module", lambda name: library if name.startswith("ase") else missing(name))
+    with pytest.raises(ValueError, match=r"'tblite' cannot be built here \(No module named 'tblite.ase'\); install"):
+        calculator_by_name("tblite")
 
 
 def test_a_calculator_that_fails_is_named():
@@ -158,3 +169,65 @@ def test_hessians_that_cannot_be():
         read_hessian("none", molecule, unit="erg")
     with pytest.raises(ValueError, match="force constants of shape"):
         force_field_from_internal(molecule, [stretch(0, 1)], np.eye(2))
+
+
+def test_calculator_on_the_command_line(tmp_path, monkeypatch, capsys):
+    import rotor.molecules.refine as module
+    from rotor.cli import run
+
+    monkeypatch.setattr(module, "calculator_by_name", lambda name: lennard_jones())
+    (tmp_path / "pair.xyz").write_text("2\n\nAr 0 0 0\nAr 0 0 1.3\n")
+    assert run(["info", str(tmp_path / "pair.xyz"), "--calculator", "xtb", "--json", "-"]) == 0
+    out, err = capsys.readouterr()
+    b = 505379.00844 / (39.9623831 / 2 * 2 ** (1 / 3))  # at the minimum 2^(1/6) Å
+    assert json.loads(out)["constants_mhz"]["B"] == pytest.approx(b, rel=1e-3)  # a force of 1e-3 is left
+    assert "geometry refined with LennardJones" in err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [(["water", "--calculator", "EMT"], "--calculator: calculator 'EMT'"), (["--constants", "B=1", "--calculator", "x"], "no geometry"),
+     (["water", "--conformers", "5"], "made of a SMILES"), (["SMILES:CC", "--conformers", "0"], "--conformers: 0")],
+)  # fmt: skip
+def test_mistakes_with_calculators_and_conformers(capsys, arguments, words):
+    from rotor.cli import run
+
+    assert run(["info", *arguments]) == 2
+    assert words in capsys.readouterr().err
+
+
+def test_conformers_on_the_command_line(capsys):
+    from rotor.cli import run
+
+    assert run(["info", "SMILES:CCCC", "--conformers", "20", "--json", "-"]) == 0
+    found = json.loads(capsys.readouterr().out)["conformers"]
+    assert [round(one["energy_kj_per_mol"], 1) for one in found] == [0.0, 3.3]
+    assert all(len(one["rotational_constants_mhz"]) == 3 for one in found)
+    assert run(["info", "SMILES:CCCC", "--conformers", "20"]) == 0
+    assert "E (kJ/mol)" in capsys.readouterr().out
+
+
+def test_hessian_on_the_command_line(tmp_path, capsys):
+    from rotor.cli import run
+
+    field = force_fields.water()
+    write_hessian(tmp_path / "h.txt", field, "hartree/bohr²", True)
+    rows = [
+        f"{s} {x:.9f} {y:.9f} {z:.9f}" for s, (x, y, z) in zip("OHH", field.molecule.positions_angstrom, strict=True)
+    ]
+    (tmp_path / "w.xyz").write_text("3\n\n" + "\n".join(rows) + "\n")
+    arguments = ["info", str(tmp_path / "w.xyz"), "--hessian", str(tmp_path / "h.txt"), "--json", "-"]
+    assert run([*arguments, "--isotope", "H=2H"]) == 0
+    out, err = capsys.readouterr()
+    expected = distortion_constants(field.with_isotopes("H=2H"))
+    assert json.loads(out)["constants_mhz"] == pytest.approx(
+        dict(expected.values), rel=1e-6
+    )  # positions of nine digits
+    assert "quartic distortion from a harmonic force field" in err
+    assert run(["info", "water", "--hessian", "calculator"]) == 2
+    assert run(["info", "--constants", "B=1", "--hessian", "h.txt"]) == 2
+    assert run(["info", "water", "--hessian", str(tmp_path / "none.txt")]) == 2
+    told = capsys.readouterr().err
+    assert "needs --calculator NAME" in told
+    assert "--hessian: bare constants" in told
+    assert "none.txt: No such file" in told

@@ -11,6 +11,7 @@ from rotor.molecules.smiles import (
     DOUBTFUL_UNCERTAINTY,
     MMFF_UNCERTAINTY,
     UFF_UNCERTAINTY,
+    conformers,
     from_rdkit,
     from_smiles,
     parse_sdf,
@@ -43,6 +44,27 @@ def test_the_geometry_keeps_the_symmetry_of_the_molecule():
     radii = np.sort(np.linalg.norm(p - p.mean(axis=0), axis=1))
     np.testing.assert_allclose(radii[:6], radii[0], atol=1e-5)  # Å; the optimiser stops at 1e-7 Å
     np.testing.assert_allclose(radii[6:], radii[6], atol=1e-5)
+
+
+def test_conformers_are_kept_with_their_energies():
+    trans, gauche = conformers("CCCC", 20)
+    assert trans.energy_kj_per_mol == 0
+    assert gauche.energy_kj_per_mol == pytest.approx(3.27, abs=0.02)  # 0.78 kcal/mol of MMFF94
+    ends = [
+        np.linalg.norm(one.molecule.positions_angstrom[0] - one.molecule.positions_angstrom[3])
+        for one in (trans, gauche)
+    ]
+    assert ends[0] > 3.8 > 3.3 > ends[1]
+    assert len(conformers("O", 20)) == 1  # twenty times the same geometry
+    assert [round(one.energy_kj_per_mol) for one in conformers("C1CCCCC1", 20)] == [0, 25]  # chair, twisted boat
+    assert len(conformers("OO", 20)) == 1  # its two forms are mirror images
+
+
+def test_other_conformers_are_told_of():
+    assert any("1 more within 10 kJ/mol" in note for note in from_smiles("CCCC").notes)
+    assert not any("kJ/mol" in note for note in from_smiles("CC").notes)
+    with pytest.raises(ValueError, match="1 or more"):
+        conformers("CC", 0)
 
 
 def test_the_lowest_of_ten_conformers_is_taken():

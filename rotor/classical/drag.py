@@ -17,7 +17,7 @@ class LinearDrag(Torque):
     """Torque -C ω with a matrix C (3, 3), or its diagonal (3,), in body axes.
 
     A rigid body in a viscous fluid at low Reynolds number has a symmetric positive C (Happel and Brenner, Low Reynolds
-    Number Hydrodynamics, section 5-4); a sphere of radius a has 8π η a³. A matrix that is neither is linear feedback,
+    Number Hydrodynamics, chapter 5); a sphere of radius a has 8π η a³. A matrix that is neither is linear feedback,
     such as that of Leipnik and Newton (Phys. Lett. A 86, 63 (1981)); it is taken as given.
 
     >>> LinearDrag([1.0, 2.0, 3.0]).torque(0.0, np.array([1.0, 0, 0, 0]), np.ones(3)).tolist()

@@ -63,7 +63,7 @@ class Exponents:
 
     @property
     def kaplan_yorke(self) -> float:
-        """Kaplan-Yorke dimension of the full spectrum; an exponent within three of its errors of zero counts as zero."""
+        """Kaplan-Yorke dimension of the full spectrum; exponents within three errors of zero count as zero."""
         return kaplan_yorke(np.where(np.abs(self.values) <= 3.0 * self.errors, 0.0, self.values))
 
 

@@ -1,17 +1,16 @@
 """The discrete Moser-Veselov map with preprocessed moments: a polynomial step that keeps energy and momentum.
 
 Order: 2, 4, 6, 8 by series in the step, or exact: see `exact_modified_moments`. Keeps, for free motion: |L|, L in
-space, the energy, time reversal and the Poisson structure of L, all to round-off (the map of (L, q) is not symplectic).
-Cost: 3 or 4 Newton sweeps of a 3x3 system without trigonometry, about 0.15 µs a step of one body on one core. Between
-kicks of torques the moments are prepared anew in each drift. It needs step x |ω| below about 1, and does not serve bodies
-that are nearly linear; both are refused when Newton fails.
+space, the energy, time reversal and the Poisson structure of L, to round-off (the map of (L, q) is not symplectic).
+Cost: 3 or 4 Newton sweeps of a 3x3 system without trigonometry, about 0.15 µs a step of one body on one core; between
+kicks of torques the moments are prepared anew in each drift. It needs step x |ω| below about 1, and does not serve
+bodies that are nearly linear; both are refused when Newton fails.
 
-With a = h L/(2J), x solves x = (1 + |x|²) a + c (x2 x3, x3 x1, x1 x2), c1 = (J2 - J3)/J1 and cyclic; then
+With x the root of J x = (1 + |x|²) (h/2) L + ((J2 - J3) x2 x3, (J3 - J1) x3 x1, (J1 - J2) x1 x2), the body turns by the
+quaternion (1, x)/√(1 + |x|²) while L stays where it is in space. With 1/J_i = S/I_i + D, S and D functions of the step
+and the invariants alone, the map moves along the same polhodes as the body.
 
-    q -> q (1, x)/√(1 + |x|²),   L -> L + (4/h) ((J2 - J3) x2 x3, ...)/(1 + |x|²),
-
-and with 1/J_i = S/I_i + D, S and D functions of the step and the invariants alone, the map moves along the same
-polhodes as the body. Sources: J. Moser and A. P. Veselov, Commun. Math. Phys. 139, 217 (1991); E. Hairer and
+Sources: J. Moser and A. P. Veselov, Commun. Math. Phys. 139, 217 (1991); E. Hairer and
 G. Vilmart, J. Phys. A 39, 13225 (2006), for S and D.
 """
 
@@ -70,7 +69,7 @@ class MoserVeselov(KickDrift):
             modified = exact_modified_moments(acting, momentum, step)
         else:
             modified = modified_moments(acting, momentum, step, self.order or 8)
-        failed = moser_veselov(state, carry, modified, step, steps)
+        failed = moser_veselov(state, carry, _on_grid(modified), step, steps)
         if failed >= 0:
             raise ValueError(
                 f"the Moser-Veselov step {step:g} has no solution near the motion for moments "
@@ -117,6 +116,12 @@ def exact_modified_moments(moments: Array, momentum: Array, step: float) -> Arra
             f"no exact Moser-Veselov step of {step:g} exists for moments {moments[worst].tolist()}: take a shorter one"
         )
     return np.asarray(1.0 / (solution[:, :1] / moments + solution[:, 1:]))
+
+
+def _on_grid(modified: Array) -> Array:
+    """Moments rounded to the last digit of the largest: their differences are then exact, and no energy drifts."""
+    grid = np.ldexp(1.0, np.frexp(np.max(modified, axis=-1, keepdims=True))[1] - 53)
+    return np.ascontiguousarray(np.rint(modified / grid) * grid)
 
 
 def _least_squares(matrix: Array, wanted: Array) -> Array:

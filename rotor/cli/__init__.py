@@ -14,7 +14,7 @@ from typing import cast
 
 import typer
 
-from rotor.cli import info, isotopologues, molecules, spectrum, tumble
+from rotor.cli import cat, convert, info, isotopologues, molecules, spectrum, tumble
 from rotor.cli.output import NoAnswer
 
 NO_ANSWER, WRONG_INPUT, INTERRUPTED = 1, 2, 130
@@ -53,6 +53,8 @@ def _application() -> typer.Typer:
     app.command("molecules", epilog=molecules.EXAMPLES)(molecules.command)
     app.command("isotopologues", epilog=isotopologues.EXAMPLES)(isotopologues.command)
     app.command("tumble", epilog=tumble.EXAMPLES)(tumble.command)
+    app.command("convert", epilog=convert.EXAMPLES)(convert.command)
+    app.command("cat", epilog=cat.EXAMPLES)(cat.command)
     return app
 
 

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 TEMPERATURES_K = (9.375, 18.75, 37.5, 75.0, 150.0, 225.0, 300.0, 500.0, 1000.0)  # those of the catalogues, and two more
 
+MOST_CONFORMERS = 1000
+
 EXAMPLES = """\b
 Examples:
   rotor info water
@@ -32,8 +34,13 @@ def command(
     dipole: str | None = inputs.DIPOLE,
     dipole_abc: str | None = inputs.DIPOLE_ABC,
     spin_weights: str | None = inputs.SPIN_WEIGHTS,
+    calculator: str | None = inputs.CALCULATOR,
+    hessian: str | None = inputs.HESSIAN,
     temperature: str | None = typer.Option(
         None, metavar="GRID", help="Temperatures of the table: 10:300K:30 or 10,20,50 K."
+    ),
+    conformers: int | None = typer.Option(
+        None, metavar="N", help="Of a SMILES: the different conformers among N that are tried, with their energies."
     ),
     json: str | None = inputs.JSON,
 ) -> None:
@@ -42,13 +49,15 @@ def command(
     files = Files()
     if json != "-":
         files.ask("--json", json, (".json",))
-    given = Input(source, constants, isotope or [], dipole, dipole_abc, spin_weights)
+    given = Input(source, constants, isotope or [], dipole, dipole_abc, spin_weights, calculator, hessian)
     top = inputs.read_top(given)
 
     from rotor.cli.report import describe
 
     content = describe(top, given.text, context.obj)
     content["partition_function"] = partition_table(top, temperatures)
+    if conformers is not None:
+        content["conformers"] = conformer_table(source, conformers)
     files.write({"--json": lambda path: write_text(path, json_text(content))})
     if json == "-":
         print(json_text(content), end="")
@@ -74,6 +83,28 @@ def partition_table(top: Top, temperatures_k: Sequence[float]) -> list[dict[str,
     except ValueError:  # one of them is out of reach: each for itself
         return [_row(top, t) for t in temperatures_k]
     return [_record(top, partition) for partition in found]
+
+
+def conformer_table(source: str | None, count: int) -> list[dict[str, Any]]:
+    """Energy and constants of each different conformer of a SMILES, the lowest first."""
+    from rotor.molecules.smiles import conformers
+    from rotor.top import Top
+
+    inputs.whole("--conformers", count, 1, MOST_CONFORMERS)
+    if not (source or "").startswith("SMILES:"):
+        raise ValueError(f"--conformers: {source or 'constants'!r} is one geometry; conformers are made of a SMILES")
+    found = []
+    for one in conformers((source or "").removeprefix("SMILES:").strip(), count):
+        top = Top.from_molecule(one.molecule)
+        found.append(
+            {
+                "energy_kj_per_mol": one.energy_kj_per_mol,
+                "rotational_constants_mhz": top.rotational_constants_mhz,
+                "dipole_abc_debye": top.dipole_abc_debye,
+                "uncertainty": one.molecule.uncertainty,
+            }
+        )
+    return found
 
 
 def _row(top: Top, temperature_k: float) -> dict[str, Any]:
@@ -104,7 +135,8 @@ def _show(top: Top, content: dict[str, Any]) -> None:
 
     print(heading(top))
     show_facts(_facts(top, content))
-    for table in (_constants_table(top), _axes_table(content), _q_table(content)):
+    others = _conformers_of(content.get("conformers", []))
+    for table in (_constants_table(top), _axes_table(content), _q_table(content), others):
         if table:
             print()
             show_table(table)
@@ -116,6 +148,9 @@ def _facts(top: Top, content: dict[str, Any]) -> list[tuple[str, str]]:
     facts = [("constants from", content["source"] or "not said")]
     if top.kind_of_top:
         facts.append(("kind", _kind_text(content["kind"], content["kind_decision"])))
+    if top.symmetry is not None:
+        number = content["symmetry_number"]
+        facts.append(("point group", f"{content['point_group']}, rotational symmetry number {number}"))
     if top.constants.representation:
         facts.append(("meant in", report.form_text(top.constants)))
     dipole = report.vector_text(top.dipole_abc_debye)
@@ -184,3 +219,16 @@ def _q_table(content: dict[str, Any]) -> Table:
     if not any(row[-1] for row in rows):
         columns, rows = columns[:-1], [row[:-1] for row in rows]
     return Table("", columns, rows, frozenset({"remark"}))
+
+
+def _conformers_of(records: Sequence[dict[str, Any]]) -> Table | None:
+    """The conformers, where they were asked for."""
+    if not records:
+        return None
+    columns = ("conformer", "E (kJ/mol)", "A (MHz)", "B (MHz)", "C (MHz)", "μa (D)", "μb (D)", "μc (D)")
+    rows = []
+    for number, one in enumerate(records, start=1):
+        constants = [f"{x:.1f}" if x < float("inf") else "-" for x in one["rotational_constants_mhz"]]
+        dipole = [f"{mu + 0.0:.2f}" for mu in one["dipole_abc_debye"] or ()] or ["-"] * 3
+        rows.append([str(number), f"{one['energy_kj_per_mol']:.2f}", *constants, *dipole])
+    return Table("", columns, rows)

@@ -36,7 +36,7 @@ def command(
     elif name is not None:
         show_facts(_facts(records[0]))
     else:
-        show_table(Table("", _COLUMNS, [_row(one) for one in records], frozenset({"formula", "name", "kind", "from"})))
+        show_table(Table("", _COLUMNS, [_row(one) for one in records], frozenset({"name", "also", "kind", "from"})))
 
 
 def _paths(name: str | None) -> list[Path]:
@@ -82,7 +82,7 @@ def _is_own(path: Path) -> bool:
     return path.parent != data_folder() / "molecules"
 
 
-_COLUMNS = ("formula", "name", "kind", "κ", "μa", "μb", "μc", "lines", "rms/MHz", "from")
+_COLUMNS = ("name", "also", "kind", "κ", "μa", "μb", "μc", "lines", "rms/MHz", "from")
 
 
 def _row(one: dict[str, Any]) -> list[str]:
@@ -92,9 +92,10 @@ def _row(one: dict[str, Any]) -> list[str]:
     source = ("own: " if one["own"] else "") + one["sources"].get(
         "constants", one["sources"].get("geometry", "not said")
     )
+    stem = Path(one["file"]).stem
     return [
-        one["names"][0] if one["names"] else one["formula"] or "",
-        _cut(one["name"], WIDEST_NAME),
+        stem,
+        _cut(one["name"], WIDEST_NAME) if one["name"] != stem else "",
         one["kind"],
         *(_number(one["kappa"], ".3f"), *(_number(x or None, ".4g") for x in dipole)),
         *(_number(seen["lines"], "d"), _number(seen["rms_mhz"], "g")),

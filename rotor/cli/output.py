@@ -73,12 +73,23 @@ def _draw(table: Table) -> None:
     from rich.table import Table as RichTable
     from rich.text import Text
 
-    drawn = RichTable(title=table.title or None, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD)
+    drawn = RichTable(
+        title=table.title or None,
+        title_justify="left",
+        title_style="bold",
+        box=box.SIMPLE_HEAD,
+        show_edge=False,
+        pad_edge=False,
+    )
     for name in table.columns:
         drawn.add_column(Text(name), justify="left" if name in table.left else "right", no_wrap=True)
     for row in table.rows:
         drawn.add_row(*map(Text, row))
-    Console().print(drawn)
+    console = Console()
+    if console.measure(drawn, options=console.options.update(width=10_000)).maximum <= console.width:
+        console.print(drawn)
+    else:  # too narrow for it: lines that break, rather than numbers cut short
+        print(table_text(table))
 
 
 def show_facts(facts: Iterable[tuple[str, str]]) -> None:

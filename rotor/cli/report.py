@@ -36,6 +36,8 @@ def describe(top: Top, text: str, command: str) -> dict[str, Any]:
         "mass_u": top.mass_u,
         "kind": top.kind,
         "kind_decision": _decision(top.kind_of_top) if top.kind_of_top else None,
+        "point_group": top.symmetry.point_group if top.symmetry else None,
+        "symmetry_number": top.symmetry.symmetry_number if top.symmetry else None,
         "constants_mhz": dict(constants.values),
         "uncertainties_mhz": dict(constants.uncertainties),
         "reduction": constants.reduction,

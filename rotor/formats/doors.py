@@ -164,6 +164,7 @@ def _top_as_written(file: MoleculeFile) -> Top:
         source=file.sources.get("constants", ""),
         dipole_source=file.sources.get("dipole", ""),
         weights_source=file.sources.get("spin_weights", ""),
+        independent_errors=len(file.constants.uncertainties) < 2,
     )
 
 

@@ -19,8 +19,9 @@ from rotor.formats.spcat.cat import format_lines, write_cat
 from rotor.formats.spcat.catalogue import Catalogue
 from rotor.formats.spcat.fields import BLANK
 from rotor.spectra.lines import Lines
+from rotor.top import Top
 
-_QNFMT = {("j",): 101, ("j", "k"): 202, ("j", "ka", "kc"): 303}
+QNFMT = {("j",): 101, ("j", "k"): 202, ("j", "ka", "kc"): 303}
 MAX_TAG = 999_999
 PIECE = 1 << 16  # lines of a long list that are made into text at once
 
@@ -49,17 +50,16 @@ def catalogue(lines: Lines, tag: int = 0) -> Catalogue:
         energy_lower_cm=lines.energy_lower_cm,
         g_upper=lines.g_upper.astype(np.int32),
         tag=np.full(n, tag, dtype=np.int32),
-        qnfmt=np.full(n, _QNFMT[lines.quanta_names], dtype=np.int32),
+        qnfmt=np.full(n, QNFMT[lines.quanta_names], dtype=np.int32),
         quanta_upper=quanta[lines.upper],
         quanta_lower=quanta[lines.lower],
     )
 
 
-def provenance(lines: Lines) -> dict[str, Any]:
-    """What the lines were made from: version, constants and their source, dipole, weights, settings, Q."""
+def top_provenance(top: Top) -> dict[str, Any]:
+    """What a top consists of: constants and their source, dipole, weights, notes, and the version of the package."""
     import rotor
 
-    top = lines.top
     return {
         "program": "rotor",
         "version": rotor.__version__,
@@ -69,32 +69,41 @@ def provenance(lines: Lines) -> dict[str, Any]:
         "reduction": top.constants.reduction,
         "representation": top.constants.representation,
         "constants_source": top.source,
-        "errors_from": _errors_from(lines),
         "dipole_abc_debye": top.dipole_abc_debye,
         "dipole_source": top.dipole_source,
         "spin_weights": top.spin_weights.to_mapping(),
         "spin_weights_source": top.weights_source,
+        "notes": list(top.notes),
+    }
+
+
+def provenance(lines: Lines) -> dict[str, Any]:
+    """What the lines were made from: the top and its sources, the settings, Q."""
+    return top_provenance(lines.top) | {
+        "errors_from": errors_from(lines),
         "temperature_k": lines.temperature_k,
         "jmax": lines.jmax,
-        "min_lgint": _finite(lines.min_lgint),
-        "range_mhz": [_finite(bound) for bound in lines.range_mhz],
+        "min_lgint": finite_or_none(lines.min_lgint),
+        "range_mhz": [finite_or_none(bound) for bound in lines.range_mhz],
         "q": lines.q,
         "q_source": lines.partition.source,
         "lines": len(lines),
-        "notes": list(top.notes),
         "warnings": list(lines.warnings),
     }
 
 
-def _errors_from(lines: Lines) -> str | None:
+def errors_from(lines: Lines) -> str | None:
     """Which uncertainties the errors of frequencies come from, None where there are none."""
     if lines.covariance is not None:
         return f"covariance of {', '.join(lines.covariance.names)}"
     known = lines.top.constants.uncertainties
+    if known and lines.covariance_used is None:
+        return "none: the constants are from a fit whose correlations are not known"
     return f"uncertainties of {', '.join(known)}, uncorrelated" if known else None
 
 
-def _finite(value: float) -> float | None:
+def finite_or_none(value: float) -> float | None:
+    """The value as JSON can say it: None for an open limit."""
     return value if math.isfinite(value) else None
 
 

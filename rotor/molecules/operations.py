@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,7 @@ Ints = NDArray[np.int64]
 
 MATCH_WITHIN = 0.45  # of the shortest distance of like points: below one half, so that no two match the same one
 MOST_CANDIDATES = 400_000  # pairs of images tried; a minute's work for ten thousand points
+FEW_POINTS = 60  # up to which all distances are as quick as a k-d tree
 MOST_OPERATIONS = 480  # a ring of 120 like atoms has as many
 
 
@@ -69,10 +71,32 @@ class Operation:
 
 def shortest_distance(points: Floats) -> float:
     """The shortest distance between two of the points (n, 3), n ≥ 2."""
+    distances, _ = _neighbours(points).query(points, k=2)
+    return float(distances[:, 1].min())
+
+
+def _neighbours(points: Floats) -> Any:
+    """What finds the nearest of the points (n, d): a k-d tree, or for few points all distances, which load no more."""
+    if len(points) <= FEW_POINTS:
+        return _AllDistances(points)
+
     from scipy.spatial import cKDTree
 
-    distances, _ = cKDTree(points).query(points, k=2)
-    return float(distances[:, 1].min())
+    return cKDTree(points)
+
+
+class _AllDistances:
+    """Nearest points by all distances, with the face of scipy's k-d tree."""
+
+    def __init__(self, points: Floats) -> None:
+        self.points = points
+
+    def query(self, places: Floats, k: int = 1) -> tuple[Floats, Ints]:
+        """Distances to the k nearest points, rising, and their indices."""
+        distances = np.linalg.norm(places[:, None, :] - self.points, axis=2)
+        nearest = np.argsort(distances, axis=1, kind="stable")[:, :k]
+        found = np.take_along_axis(distances, nearest, axis=1)
+        return (found[:, 0], nearest[:, 0]) if k == 1 else (found, nearest)
 
 
 def best_turn(points: Floats, images: Floats, proper: bool) -> Floats:
@@ -187,11 +211,9 @@ class _Matcher:
     """
 
     def __init__(self, labels: Ints, points: Floats) -> None:
-        from scipy.spatial import cKDTree
-
         self.points = points
         self.layers = labels * (4 * np.linalg.norm(points, axis=1).max())
-        self.tree = cKDTree(np.column_stack([points, self.layers]))
+        self.tree = _neighbours(np.column_stack([points, self.layers]))
         self.within = np.full(len(points), np.inf)
         for label in np.unique(labels):
             mine = labels == label

@@ -4,9 +4,11 @@ A geometry from MMFF94 (T. A. Halgren, J. Comput. Chem. 17, 490 (1996)) is a gue
 median error of rotational constants seen with it, and the atoms for which it is known to fail are named.
 """
 
+from __future__ import annotations
+
 import re
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -24,8 +26,20 @@ UFF_UNCERTAINTY = 0.10
 DOUBTFUL_UNCERTAINTY = 0.2
 
 CONFORMERS = 10
+KJ_PER_KCAL = 4.184  # exact, the thermochemical calorie
+SAME_KJ_PER_MOL = 0.1  # two conformers nearer than that in energy are one,
+SAME_MOMENTS = 1e-3  # if their planar moments differ by no more than that, relative to the largest
+NEAR_KJ_PER_MOL = 10.0  # four times kT at 300 K: conformers that have a share in a spectrum
 _SEED = 20240229  # any number; fixed, so that the same SMILES gives the same geometry
 _MOST_STEPS = 5000
+
+
+@dataclass(frozen=True)
+class Conformer:
+    """A geometry of a molecule, and its energy in kJ/mol above the lowest one found by the same force field."""
+
+    molecule: Molecule
+    energy_kj_per_mol: float
 
 
 def from_smiles(text: str) -> Molecule:
@@ -53,17 +67,73 @@ def from_smiles(text: str) -> Molecule:
     >>> from_smiles("[2H]O[2H]").formula
     '[2H]2O'
     """
-    mol = _parsed(text)
-    energies, field = _optimised(mol, text)
-    lowest = int(np.argmin(energies))
-    molecule = from_rdkit(mol, conformer=lowest, name=text)
-    typical, doubts = _trust(mol, field)
-    return replace(
-        molecule,
-        source=f"SMILES {text}: {field} geometry, the lowest of {len(energies)} conformers" if field else "one atom",
-        uncertainty=typical,
-        notes=(*doubts, *molecule.notes),
+    found = conformers(text)
+    near = sum(0 < one.energy_kj_per_mol < NEAR_KJ_PER_MOL for one in found)
+    if not near:
+        return found[0].molecule
+    others = (
+        f"the lowest conformer was taken; {near} more within {NEAR_KJ_PER_MOL:g} kJ/mol of it have other constants "
+        "(rotor info --conformers lists them)"
     )
+    return replace(found[0].molecule, notes=(*found[0].molecule.notes, others))
+
+
+def conformers(text: str, count: int = CONFORMERS) -> tuple[Conformer, ...]:
+    """The different conformers among `count` that ETKDG makes of a SMILES, each optimised, the lowest first.
+
+    Two are the same where their energies differ by less than 0.1 kJ/mol and their planar moments Σ m a², Σ m b², Σ m c² by
+    less than a part in a thousand of the largest; mirror images are the same, since they have one spectrum. Relative
+    energies of a force field are some kJ/mol off, and those of MMFF94 are of the bare molecule without zero-point energy.
+
+    Parameters
+    ----------
+    text : str
+        SMILES, as for `from_smiles`.
+    count : int
+        How many geometries are tried, 1 or more; the more there are the likelier the lowest one is among them.
+
+    Returns
+    -------
+    tuple of Conformer
+
+    Raises
+    ------
+    ValueError
+        As `from_smiles`, and for a count below 1.
+
+    >>> [round(one.energy_kj_per_mol, 1) for one in conformers("CCCC")]
+    [0.0, 3.3]
+    """
+    if count < 1:
+        raise ValueError(f"{count} conformers: 1 or more are wanted")
+    mol = _parsed(text)
+    energies, field = _optimised(mol, text, count)
+    typical, doubts = _trust(mol, field)
+    lowest = min(energies)
+    kept: list[Conformer] = []
+    for place in sorted(range(len(energies)), key=lambda i: energies[i]):
+        energy = (energies[place] - lowest) * KJ_PER_KCAL
+        if not np.isfinite(energy):  # its optimisation did not converge
+            continue
+        molecule = from_rdkit(mol, conformer=place, name=text)
+        source = f"SMILES {text}: {field} geometry, of {len(energies)} conformers" if field else "one atom"
+        one = Conformer(replace(molecule, source=source, uncertainty=typical, notes=(*doubts, *molecule.notes)), energy)
+        if not any(_same_conformer(one, other) for other in kept):
+            kept.append(one)
+    return tuple(kept)
+
+
+def _same_conformer(one: Conformer, other: Conformer) -> bool:
+    if abs(one.energy_kj_per_mol - other.energy_kj_per_mol) > SAME_KJ_PER_MOL:
+        return False
+    first, second = _planar_moments(one.molecule), _planar_moments(other.molecule)
+    return bool(np.abs(first - second).max() <= SAME_MOMENTS * first.max())
+
+
+def _planar_moments(molecule: Molecule) -> Floats:
+    """Σ m a², Σ m b², Σ m c² in u Å², falling."""
+    weighted = np.sqrt(molecule.masses_u)[:, None] * (molecule.positions_angstrom - molecule.centre_of_mass_angstrom)
+    return np.asarray(np.linalg.svd(weighted.T @ weighted, compute_uv=False))
 
 
 def from_rdkit(mol: Any, conformer: int = -1, name: str = "") -> Molecule:
@@ -174,7 +244,7 @@ def _parsed(text: str) -> Any:
     return Chem.AddHs(mol)
 
 
-def _optimised(mol: Any, text: str) -> tuple[list[float], str]:
+def _optimised(mol: Any, text: str, count: int) -> tuple[list[float], str]:
     """Embeds conformers in `mol` and optimises them: their energies in kcal/mol and the name of the force field."""
     from rdkit import rdBase
     from rdkit.Chem import rdDistGeom, rdForceFieldHelpers
@@ -182,7 +252,7 @@ def _optimised(mol: Any, text: str) -> tuple[list[float], str]:
     with rdBase.BlockLogs(), rdBase.CaptureErrorLog() as log:
         settings: Any = rdDistGeom.ETKDGv3()
         settings.randomSeed = _SEED
-        if not len(rdDistGeom.EmbedMultipleConfs(mol, CONFORMERS, settings)):
+        if not len(rdDistGeom.EmbedMultipleConfs(mol, count, settings)):
             raise ValueError(f"SMILES {text!r}: no geometry found ({_reason(log.messages)}); give an xyz file")
         if mol.GetNumAtoms() == 1:
             return [0.0], ""

@@ -1,6 +1,6 @@
 """Spherical tops: how the fourth-rank tensor splits each J into levels A1, A2, E, F1, F2, by exact symmetry.
 
-    Ω = 10 (Jx⁴ + Jy⁴ + Jz⁴) - 6 J⁴ + 2 J²,      E = B X - D X² + ... + D_t ω(J, irrep, rank),      X = J(J+1)
+    Ω = 6 J⁴ - 2 J² - 10 (Jx⁴ + Jy⁴ + Jz⁴),      E = B X - D X² + ... + D_t ω(J, irrep, rank),      X = J(J+1)
 
 (K. T. Hecht, J. Mol. Spectrosc. 5 (1960) 355, 390). ω are eigenvalues of Ω and depend on nothing else, so they are exact
 for every D_t. With z along a fourfold axis, states |J K s⟩ (see `basis`) with K of one residue modulo 4 and one s span
@@ -55,7 +55,7 @@ def tensor_eigenvalues(j: int, sign: int = 1) -> tuple[NDArray[np.str_], Floats]
 
     >>> irreps, omega = tensor_eigenvalues(2)
     >>> irreps.tolist(), omega.round(9).tolist()
-    (['E', 'F2'], [36.0, -24.0])
+    (['E', 'F2'], [-36.0, 24.0])
     """
     found = {"F1": _eigenvalues(_block(j, "A2")), "F2": _eigenvalues(_block(j, "B2"))}
     found["A1"], found["E"] = _one_and_two_dimensional(j, "A1")

@@ -32,7 +32,8 @@ from numpy.typing import NDArray
 
 from rotor.constants import REPRESENTATIONS, Constants
 from rotor.quantum.basis import REPRESENTATIONS as AXES
-from rotor.quantum.watson import centrifugal_operators, rigid_operators
+from rotor.quantum.uncertainty import Covariance
+from rotor.quantum.watson import centrifugal_operators, operators_by_name, rigid_operators
 from rotor.terms import Operators, Powers, distortion_terms
 
 Floats = NDArray[np.float64]
@@ -59,15 +60,22 @@ _CARTESIAN = np.array(
 
 @dataclass(frozen=True)
 class Conversion:
-    """Converted constants, the turn s111 that was needed, and in words what was done and how far it holds."""
+    """Converted constants, the turn s111 that was needed, in words what was done and how far it holds, and covariance.
+
+    covariance: of the new constants, None where nothing was known of the old ones. The new constants carry its
+    diagonal as uncertainties; on its own that says little, for a conversion correlates what was not.
+    """
 
     constants: Constants
     s111: float
     note: str
+    covariance: Covariance | None = None
 
 
-def to_reduction(constants: Constants, reduction: str) -> Conversion:
+def to_reduction(constants: Constants, reduction: str, covariance: Covariance | None = None) -> Conversion:
     """The same top in Watson's A- or S-reduction, axes kept.
+
+    covariance : of the constants; by default their uncertainties, uncorrelated. It is carried over to first order.
 
     Levels stay the same to first order in the quartic constants. Raises ValueError for sextic and higher constants,
     a top that is not asymmetric, an unknown reduction, and where the turn has no finite size: to A with Bx = By.
@@ -76,10 +84,10 @@ def to_reduction(constants: Constants, reduction: str) -> Conversion:
     >>> done.constants["d2"], done.constants["DJ"]
     (-0.025, 0.05)
     """
-    return _converted(constants, reduction, str(constants.representation))
+    return _converted(constants, reduction, str(constants.representation), covariance)
 
 
-def to_representation(constants: Constants, representation: str) -> Conversion:
+def to_representation(constants: Constants, representation: str, covariance: Covariance | None = None) -> Conversion:
     """The same top in the axes of another representation, reduction kept.
 
     Exact for a rigid top, whose A, B, C stay; else, and for errors, see `to_reduction`.
@@ -87,27 +95,61 @@ def to_representation(constants: Constants, representation: str) -> Conversion:
     >>> to_representation(Constants(A=9000.0, B=5000.0, C=3000.0, DJ=0.1), "IIIl").constants.representation
     'IIIl'
     """
-    return _converted(constants, constants.reduction, representation)
+    return _converted(constants, constants.reduction, representation, covariance)
 
 
-def _converted(constants: Constants, reduction: str | None, representation: str) -> Conversion:
+def _converted(
+    constants: Constants, reduction: str | None, representation: str, covariance: Covariance | None
+) -> Conversion:
     _refuse(constants, reduction, representation)
-    distortion = centrifugal_operators(constants)
-    if not any(distortion.values()):
-        values = {name: constants[name] for name in "ABC"}
+    covariance = covariance or Covariance.of_uncertainties(constants)
+    if {*constants.values} <= {*"ABC"}:
         note = f"rigid top in {constants.representation} to {representation}, where A, B, C are the same"
-        return _labelled(constants, values, reduction, representation, 0.0, note)
+        same = _labelled(constants, dict(constants.values), reduction, representation, note)
+        return Conversion(same, 0.0, note, covariance)
 
-    exchanged = _exchange_axes(
-        rigid_operators(constants) | distortion, AXES[str(constants.representation)], AXES[representation]
-    )
-    s = _turn(exchanged, str(reduction))
-    turned = _turned(exchanged, s)
+    operators = rigid_operators(constants) | centrifugal_operators(constants)
+    way = (str(constants.representation), str(reduction), representation)
+    values, s = _values(operators, *way)
     note = (
         f"{constants.reduction} in {constants.representation} to {reduction} in {representation}, to first order in the "
         f"quartic constants, s111 = {4 * s:.3g}; it holds while |s111| J³ is far below 1"
     )
-    return _labelled(constants, _named(turned, str(reduction), representation), reduction, representation, 4 * s, note)
+    if covariance is not None:
+        covariance = _carried(constants, covariance, way)
+    return Conversion(
+        _labelled(constants, values, reduction, representation, note, covariance), 4 * s, note, covariance
+    )
+
+
+def _values(operators: Operators, old: str, reduction: str, new: str) -> tuple[dict[str, float], float]:
+    """The new constants by name, and the turn s, of an operator written in the axes of `old`."""
+    exchanged = _exchange_axes(operators, AXES[old], AXES[new])
+    s = _turn(exchanged, reduction)
+    return _named(_turned(exchanged, s), reduction, new), s
+
+
+def _carried(constants: Constants, covariance: Covariance, way: tuple[str, str, str]) -> Covariance:
+    """J C Jᵀ, J the derivatives of new constants by old ones, from differences of a smooth function."""
+    by_name = operators_by_name(constants)
+    operators = rigid_operators(constants) | centrifugal_operators(constants)
+
+    def moved(name: str, step: float) -> list[float]:
+        return list(_values(_plus(operators, by_name[name], step), *way)[0].values())
+
+    steps = [1e-6 * (abs(constants[name]) or 1e3) for name in covariance.names]
+    differences = [
+        np.subtract(moved(name, step), moved(name, -step)) / (2 * step)
+        for name, step in zip(covariance.names, steps, strict=True)
+    ]
+    jacobian = np.stack(differences, axis=1)
+    matrix = jacobian @ covariance.matrix_mhz2 @ jacobian.T
+    return Covariance(tuple(_values(operators, *way)[0]), (matrix + matrix.T) / 2)
+
+
+def _plus(operators: Operators, others: Operators, factor: float) -> Operators:
+    sums = {powers: operators.get(powers, 0.0) + factor * value for powers, value in others.items()}
+    return operators | sums
 
 
 def _refuse(constants: Constants, reduction: str | None, representation: str) -> None:
@@ -178,18 +220,14 @@ def _labelled(
     values: dict[str, float],
     reduction: str | None,
     representation: str,
-    s111: float,
     note: str,
-) -> Conversion:
-    """The new set; every constant's source says that it was converted. Uncertainties are kept where nothing changed."""
-    same = all(constants.get(name, 0.0) == value for name, value in values.items())
-    kept = dict(constants.uncertainties) if same and reduction == constants.reduction else {}
-    sources = {
-        name: f"converted from {note}" + (f"; {old}" if (old := constants.sources.get(name)) else "") for name in values
-    }
-    lost = (
-        "" if len(kept) == len(constants.uncertainties) else "; uncertainties are left out, as they do not carry over"
-    )
+    covariance: Covariance | None = None,
+) -> Constants:
+    """The new set, in which every constant's source says that it was converted; without a covariance errors are kept."""
+    sources = dict.fromkeys(values, f"converted: {note}")
+    sources |= {name: f"{sources[name]}; {old}" for name, old in constants.sources.items() if name in values}
+    errors = dict(constants.uncertainties)
+    if covariance is not None:
+        errors = dict(zip(covariance.names, np.sqrt(np.diag(covariance.matrix_mhz2)).tolist(), strict=True))
     settings = {"reduction": reduction, "representation": representation, "kind": "asymmetric"}
-    new = Constants(**settings, uncertainties=kept, sources=sources, **values)  # type: ignore[arg-type]
-    return Conversion(new, s111, note + lost)
+    return Constants(**settings, uncertainties=errors, sources=sources, **values)  # type: ignore[arg-type]

@@ -45,7 +45,7 @@ class Lines:
 
     frequency_mhz, strength_debye2 (S μ², all components): (n,) float64. upper, lower: (n,) int32, rows of `levels`.
     All other columns are computed when asked for. min_lgint, range_mhz and jmax say where the list was cut.
-    covariance: of the constants; without one, the uncertainties that the constants carry count, uncorrelated.
+    covariance: of the constants; without one, their uncertainties count where the top says that they are independent.
     """
 
     top: Top
@@ -82,7 +82,7 @@ class Lines:
     @cached_property
     def warnings(self) -> tuple[str, ...]:
         """What a user must be told about the levels behind the lines and about their errors."""
-        known = {*self.covariance.names} if self.covariance else {*self.top.constants.uncertainties}
+        known = set(self.covariance_used.names) if self.covariance_used else set()
         exact = [name for name in self.top.constants.values if name not in known]
         partly = f"errors of frequencies take {', '.join(exact)} as exact: their uncertainty is not known"
         return warnings_of(self.top, self.levels) + ((partly,) if known and exact else ())
@@ -90,10 +90,16 @@ class Lines:
     @cached_property
     def spread(self) -> Floats | None:
         """What the covariance of the constants makes of each level, see `uncertainty.level_spread`; None without one."""
-        covariance = self.covariance or Covariance.of_uncertainties(self.top.constants)
-        if self.given_spread is not None or covariance is None:
+        if self.given_spread is not None or self.covariance_used is None:
             return self.given_spread
-        return level_spread(self.top, self.levels, covariance)
+        return level_spread(self.top, self.levels, self.covariance_used)
+
+    @property
+    def covariance_used(self) -> Covariance | None:
+        """The covariance given, else the uncertainties of the constants where these may count as uncorrelated."""
+        if self.covariance is None and self.top.independent_errors:
+            return Covariance.of_uncertainties(self.top.constants)
+        return self.covariance
 
     @property
     def error_mhz(self) -> Floats | None:
@@ -220,7 +226,8 @@ def line_list(
     `min_lgint`. min_lgint: log10 of nm² MHz below which lines are left out, None for none left out. range_mhz: first
     and last frequency. q: partition function to use instead of the summed one, spin weights reduced by their common
     divisor. vibrational_factor: multiplies the summed Q. covariance: of the constants, for the errors of frequencies;
-    by default the uncertainties that the constants carry, uncorrelated. executor: J are spread over it.
+    by default the uncertainties that the constants carry, uncorrelated, but not those of a fit whose correlations are
+    unknown (the library's): they would make errors many times too large. executor: J are spread over it.
 
     Neglected: all but electric dipole, nuclear hyperfine structure, vibrational states, dependence of μ on J.
     Raises ValueError where the top has no known dipole, for a temperature not above 0, and for J max below 0.
