@@ -2,8 +2,8 @@
 # # The unbalanced wheel
 # A wheel whose axis of figure is tilted by ε against the axle shakes its bearings: L is not along ω, so the axle must
 # supply the torque -L x ω, of size (I3 - I1) ω² sin ε cos ε, turning with the wheel
-# (Euler's equations with ω constant: Landau and Lifshitz, Mechanics, section 36). A car's wheel, I3 = 1.0, I1 = 0.6 kg m²,
-# tilted by one degree at 100 rad/s: 69.8 N m.
+# (Euler's equations with ω constant: Landau and Lifshitz, Mechanics, section 36). A car's wheel, I3 = 1.0 and
+# I1 = 0.6 kg m², tilted by one degree at 100 rad/s: 69.8 N m.
 
 # %%
 import numpy as np

@@ -1,4 +1,4 @@
-"""Compiled turns between body and space for rows of unit quaternions: what effects and the Lie-group method call most."""
+"""Compiled turns between body and space for rows of unit quaternions, for effects and the Lie-group method."""
 
 from __future__ import annotations
 

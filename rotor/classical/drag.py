@@ -25,7 +25,6 @@ class LinearDrag(Torque):
     """
 
     needs_velocity: ClassVar[bool] = True
-    needs_attitude: ClassVar[bool] = False
 
     coefficients: ArrayLike
 
@@ -36,6 +35,11 @@ class LinearDrag(Torque):
             raise ValueError(f"linear drag has 3 coefficients or a finite 3x3 matrix; got shape {array.shape}")
         matrix.setflags(write=False)
         object.__setattr__(self, "coefficients", matrix)
+
+    @property
+    def needs_attitude(self) -> bool:
+        """False: drag knows ω alone."""
+        return False
 
     def torque(self, time: float, attitude: Array, omega: Array) -> Array:
         """-C ω."""
@@ -51,7 +55,6 @@ class QuadraticDrag(Torque):
     """
 
     needs_velocity: ClassVar[bool] = True
-    needs_attitude: ClassVar[bool] = False
 
     coefficients: ArrayLike
 
@@ -61,6 +64,11 @@ class QuadraticDrag(Torque):
             raise ValueError(f"quadratic drag has 3 coefficients, finite and not negative; got {array.tolist()}")
         array.setflags(write=False)
         object.__setattr__(self, "coefficients", array)
+
+    @property
+    def needs_attitude(self) -> bool:
+        """False: drag knows ω alone."""
+        return False
 
     def torque(self, time: float, attitude: Array, omega: Array) -> Array:
         """-c |ω| ω."""

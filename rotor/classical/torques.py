@@ -68,6 +68,11 @@ class ConstantTorque(Torque):
         checked_frame(self.frame)
         object.__setattr__(self, "vector", checked_vector(self.vector, "a constant torque"))
 
+    @property
+    def needs_attitude(self) -> bool:
+        """Only where the torque is fixed in space."""
+        return self.frame == "space"
+
     def torque(self, time: float, attitude: Array, omega: Array) -> Array:
         """The constant vector, seen from the body."""
         return in_body(self.vector, self.frame, attitude)
@@ -91,6 +96,11 @@ class TimedTorque(Torque):
         checked_frame(self.frame)
         if not callable(self.history):
             raise ValueError("a timed torque needs a function of time that returns three components")
+
+    @property
+    def needs_attitude(self) -> bool:
+        """Only where the torque is fixed in space."""
+        return self.frame == "space"
 
     def torque(self, time: float, attitude: Array, omega: Array) -> Array:
         """The vector of this moment, seen from the body."""
