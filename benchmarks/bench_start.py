@@ -1,6 +1,6 @@
 """How long it takes until something happens: whole processes, median and best of seven, against numpy and scipy alone.
 
-    python benchmarks/bench_start.py
+python benchmarks/bench_start.py
 """
 
 from __future__ import annotations
