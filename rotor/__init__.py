@@ -13,6 +13,8 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from rotor.classical.free import FreeMotion as FreeMotion
+    from rotor.classical.free import free_motion as free_motion
     from rotor.constants import Constants as Constants
     from rotor.formats import read as read
     from rotor.formats import write as write
@@ -29,11 +31,13 @@ if TYPE_CHECKING:
 
 _HOME = {
     "Constants": "rotor.constants",
+    "FreeMotion": "rotor.classical.free",
     "Levels": "rotor.quantum.levels",
     "Lines": "rotor.spectra.lines",
     "Molecule": "rotor.molecules.molecule",
     "Spectrum": "rotor.spectra.spectrum",
     "Top": "rotor.top",
+    "free_motion": "rotor.classical.free",
     "line_list": "rotor.spectra.lines",
     "partition_function": "rotor.thermo",
     "read": "rotor.formats",

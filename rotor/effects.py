@@ -50,7 +50,11 @@ class Torque(ClassicalEffect, ABC):
     """A torque. `needs_velocity` says that it depends on ω: then no splitting into drifts and kicks serves."""
 
     needs_velocity: ClassVar[bool] = False
-    needs_attitude: ClassVar[bool] = True
+
+    @property
+    def needs_attitude(self) -> bool:
+        """Whether the torque in body axes depends on the attitude."""
+        return True
 
     @abstractmethod
     def torque(self, time: float, attitude: Array, omega: Array) -> Array:

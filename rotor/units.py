@@ -19,6 +19,7 @@ ELEMENTARY_CHARGE_C = 1.602176634e-19  # exact
 AVOGADRO_PER_MOL = 6.02214076e23  # exact
 ATOMIC_MASS_KG = 1.66053906892e-27  # CODATA 2022
 BOHR_RADIUS_ANGSTROM = 0.529177210544  # CODATA 2022
+HARTREE_EV = 27.211386245981  # CODATA 2022
 VACUUM_PERMITTIVITY_F_PER_M = 8.8541878188e-12  # CODATA 2022
 
 MHZ_PER_CM = 29979.2458  # 1 cm^-1 in MHz, exact
@@ -56,6 +57,7 @@ _KINDS: dict[str, dict[str, float]] = {
     "time": {"fs": 1e-3, "ps": 1.0, "ns": 1e3, "us": 1e6, "s": 1e12},
     "field": {"V/cm": 1e-3, "kV/cm": 1.0, "V/m": 1e-5, "MV/m": 10.0},
     "mass": {"u": 1.0, "amu": 1.0, "Da": 1.0, "kg": 1.0 / ATOMIC_MASS_KG},
+    "number": {"": 1.0},
     "pressure": {"Pa": 1e-5, "mbar": 1e-3, "kPa": 1e-2, "bar": 1.0, "Torr": 1.33322368421e-3, "atm": 1.01325},
 }
 _ALIASES = {
@@ -72,6 +74,8 @@ def _kind_of(unit: str) -> str:
 def _factor(unit: str, wanted: str, text: str) -> float:
     unit = _ALIASES.get(unit, unit)
     table = _KINDS[_kind_of(wanted)]
+    if not wanted:
+        raise ValueError(f"{text!r}: plain numbers are wanted here, without the unit {unit!r}")
     if unit not in table:
         known = any(unit in other for other in _KINDS.values())
         what = "does not measure the same thing as" if known else "is not a known unit; the default is"
@@ -121,7 +125,8 @@ def _bounds(text: str, unit: str) -> tuple[float, float, str | None]:
         number * _factor_or_one(own or shared, unit, text) for number, own in ((start, unit_1), (stop, unit_2))
     )
     if not first < last:
-        raise ValueError(f"{text!r}: the range must rise, but {first:g} {unit} is not below {last:g} {unit}")
+        numbers = f"{first:g} is not below {last:g} {unit}".rstrip()
+        raise ValueError(f"{text!r}: the range must rise, but {numbers}")
     return first, last, parts[2] if len(parts) == 3 else None
 
 
@@ -142,6 +147,8 @@ def parse_grid(text: str, unit: str) -> NDArray[np.float64]:
 
     >>> parse_grid("0:200kV/cm:3", "kV/cm")
     array([  0., 100., 200.])
+    >>> parse_grid("0:1:3", "")  # plain numbers
+    array([0. , 0.5, 1. ])
     >>> parse_grid("1,2,5 GHz", "MHz")
     array([1000., 2000., 5000.])
     """

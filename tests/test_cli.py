@@ -22,7 +22,7 @@ ROOT = Path(__file__).resolve().parents[1]
 WATER_XYZ = "3\nwater\nO 0 0 0\nH 0.75695 0 0.585882\nH -0.75695 0 0.585882\n"
 RIGID = "A=835840.288 B=435351.717 C=278138.7 MHz"
 INFO = """
-    rotor_version command input name formula mass_u kind kind_decision constants_mhz uncertainties_mhz reduction
+    rotor_version command input name formula mass_u kind kind_decision point_group symmetry_number constants_mhz uncertainties_mhz reduction
     representation rotational_constants_mhz rotational_constants_cm kappa moments_u_angstrom2 planar_moments_u_angstrom2
     inertial_defect_u_angstrom2 frame dipole_abc_debye dipole_source spin_weights spin_weights_source
     partition_function source notes
@@ -271,7 +271,7 @@ def test_every_file_is_written_with_its_provenance(call, folder):
     assert (
         (folder / "a.cat")
         .read_text(encoding="ascii")
-        .startswith("  115271.2021  0.0001 -5.0104 2    0.0000  3  28503 101 1 ")
+        .startswith("  115271.2021  0.0000 -5.0104 2    0.0000  3  28503 101 1 ")
     )
     assert json.loads((folder / "a.json").read_text(encoding="utf-8"))["files"] == [
         "a.cat", "a.csv", "a.parquet", "p.csv", "a.png", "a.json",

@@ -315,3 +315,12 @@ def test_mutated_parameter_files_make_a_top_or_a_refusal():
             assert model.parameter_file(top, 10).parameters
             made += 1
     assert min(made, refused) > 300  # both outcomes are really tried
+
+
+def test_spelled_terms_are_written_by_their_code_and_others_refused():
+    """A term beyond the published names has a code; the cubic tensor of a spherical top has none."""
+    top = Constants(A=9000.0, B=5000.0, C=3000.0, DJ=0.1, terms={(2, 1, 3): 1e-9})
+    written = {p.code: p.value for p in codes.parameters_of(top)}
+    assert written[61200] == 1e-9  # J⁴ Jz² (J₊⁶ + J₋⁶): KSQ 1, NSQ 2, type 6
+    with pytest.raises(ValueError, match="no code for it"):
+        codes.parameters_of(Constants(kind="spherical", B=157122.0, Dt=0.13))

@@ -96,18 +96,27 @@ def test_an_optimisation_that_falls_short_is_an_error():
 
 @pytest.mark.parametrize(
     ("name", "words"),
-    [("EMT", "metals"), ("lj", "Lennard-Jones"), ("nosuch", "unknown to ASE"), ("tblite", "cannot be built|TBLite"),
-     ("gulp", "")],
-)  # fmt: skip
-def test_calculators_by_name(name, words):
-    if name in ("tblite", "gulp"):
-        try:
-            assert hasattr(calculator_by_name(name), "get_forces")
-        except ValueError as reason:
-            assert "cannot be built here" in str(reason)  # noqa: PT017 - either is right, by what is installed
-        return
+    [("EMT", "metals"), ("lj", "Lennard-Jones"), ("nosuch", "unknown to ASE"), ("tip3p", "rigid")],
+)
+def test_calculators_that_are_not_for_molecules(name, words):
     with pytest.raises(ValueError, match=words):
         calculator_by_name(name)
+
+
+def test_calculators_by_name(monkeypatch):
+    import ase.calculators.calculator as library
+
+    import rotor.molecules.refine as module
+
+    monkeypatch.setattr(library, "get_calculator_class", lambda name: lennard_jones)
+    assert isinstance(calculator_by_name(" Gaussian "), LennardJones)
+
+    def missing(name):
+        raise ImportError(f"No module named {name!r}")
+
+    monkeypatch.setattr(module, "import_module", lambda name: library if name.startswith("ase") else missing(name))
+    with pytest.raises(ValueError, match=r"'tblite' cannot be built here \(No module named 'tblite.ase'\); install"):
+        calculator_by_name("tblite")
 
 
 def test_a_calculator_that_fails_is_named():
@@ -196,3 +205,29 @@ def test_conformers_on_the_command_line(capsys):
     assert all(len(one["rotational_constants_mhz"]) == 3 for one in found)
     assert run(["info", "SMILES:CCCC", "--conformers", "20"]) == 0
     assert "E (kJ/mol)" in capsys.readouterr().out
+
+
+def test_hessian_on_the_command_line(tmp_path, capsys):
+    from rotor.cli import run
+
+    field = force_fields.water()
+    write_hessian(tmp_path / "h.txt", field, "hartree/bohr²", True)
+    rows = [
+        f"{s} {x:.9f} {y:.9f} {z:.9f}" for s, (x, y, z) in zip("OHH", field.molecule.positions_angstrom, strict=True)
+    ]
+    (tmp_path / "w.xyz").write_text("3\n\n" + "\n".join(rows) + "\n")
+    arguments = ["info", str(tmp_path / "w.xyz"), "--hessian", str(tmp_path / "h.txt"), "--json", "-"]
+    assert run([*arguments, "--isotope", "H=2H"]) == 0
+    out, err = capsys.readouterr()
+    expected = distortion_constants(field.with_isotopes("H=2H"))
+    assert json.loads(out)["constants_mhz"] == pytest.approx(
+        dict(expected.values), rel=1e-6
+    )  # positions of nine digits
+    assert "quartic distortion from a harmonic force field" in err
+    assert run(["info", "water", "--hessian", "calculator"]) == 2
+    assert run(["info", "--constants", "B=1", "--hessian", "h.txt"]) == 2
+    assert run(["info", "water", "--hessian", str(tmp_path / "none.txt")]) == 2
+    told = capsys.readouterr().err
+    assert "needs --calculator NAME" in told
+    assert "--hessian: bare constants" in told
+    assert "none.txt: No such file" in told

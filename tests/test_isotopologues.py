@@ -18,7 +18,7 @@ from rotor.cli import run
 from rotor.distortion import distortion_constants, semirigid_top
 from rotor.isotopologues import isotopologue, isotopologues, single_substitutions
 from rotor.molecules.molecule import Molecule
-from rotor.molecules.nuclei import isotope, natural_isotopes
+from rotor.molecules.nuclei import data_folder, isotope, natural_isotopes
 from rotor.molecules.readers import g2_molecule
 from rotor.top import Top
 
@@ -303,3 +303,25 @@ def test_natural_isotopes_add_up():
         assert parts == sorted(parts, reverse=True)
         assert sum(parts) == pytest.approx(1, abs=2e-4)  # rounding of the tables
         assert natural_isotopes(symbol)[0] == isotope(symbol)
+
+
+def test_ten_thousand_atoms_get_a_clear_word():
+    side = np.stack(np.meshgrid(*[np.arange(22.0)] * 3), -1).reshape(-1, 3)[:10_000]
+    crowd = Molecule(("C",) * 10_000, 1.5 * side + np.random.default_rng(0).normal(scale=0.1, size=side.shape))
+    with pytest.raises(ValueError, match="no isotopologue of C10000"):
+        isotopologues(Top.from_molecule(crowd))
+
+
+@pytest.mark.parametrize("path", sorted((data_folder() / "molecules").glob("*.toml")), ids=lambda path: path.stem)
+def test_every_molecule_of_the_library_has_a_family(path):
+    family = isotopologues(rotor.read(path), min_abundance=3e-3)
+    assert sum(one.abundance for one in family) <= 1 + 1e-9
+    usual = next(one.top for one in family if not one.substituted)  # not the first for CCl4: C 35Cl3 37Cl is commoner
+    for one in family:
+        a, b, c = one.top.rotational_constants_mhz
+        assert a >= b >= c > 0
+        assert one.top.spin_weights.mean > 0
+        ratio = np.divide(one.top.rotational_constants_mhz[1:], usual.rotational_constants_mhz[1:])
+        assert (
+            (ratio > 0.9) & (ratio < 1.0 + 1e-9)
+        ).all()  # one or two heavier atoms slow it down, by less than a tenth

@@ -71,6 +71,17 @@ def test_every_kind_of_top(tmp_path, constants, dipole, weights):
     same(pl.read_parquet(tmp_path / "a.parquet"), rotor.line_list(top, jmax=15, range_mhz=(1e4, 9e5)).to_polars())
 
 
+def test_errors_of_frequencies_go_along(tmp_path):
+    top = Top.from_constants("A=8572.0(1) B=3640.0(2) C=2790.0(1) MHz", dipole_abc_debye=(1.2, 1.9, 0.4))
+    whole = rotor.line_list(top, jmax=12, q=1e5)
+    stream_lines(top, tmp_path / "a.parquet", jmax=12, q=1e5, piece_lines=500)
+    same(pl.read_parquet(tmp_path / "a.parquet"), whole.to_polars())
+    assert whole.error_mhz.max() > 1
+    stream_lines(top, tmp_path / "a.cat", jmax=12, q=1e5, piece_lines=500)
+    errors = np.sort(read_cat(tmp_path / "a.cat").error_mhz)
+    np.testing.assert_allclose(errors, np.sort(whole.error_mhz), atol=5.1e-5)  # four decimals
+
+
 def test_a_catalogue_is_that_of_the_list_in_memory(tmp_path):
     stream_lines(PROPANEDIOL, tmp_path / "a.cat", jmax=20, min_lgint=-12, tag=76001, piece_lines=4000)
     rotor.write(rotor.line_list(PROPANEDIOL, jmax=20, min_lgint=-12), tmp_path / "b.cat", settings={"tag": 76001})

@@ -8,9 +8,9 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rotor.classical.torques import checked_vector
+from rotor.classical.torques import checked_vector, from_body, lever_torque
 from rotor.effects import Torque
-from rotor.rotations import Array, conjugate, rotate
+from rotor.rotations import Array
 
 
 @dataclass(frozen=True)
@@ -33,11 +33,11 @@ class PermanentDipole(Torque):
 
     def torque(self, time: float, attitude: Array, omega: Array) -> Array:
         """μ x E in body axes."""
-        return np.asarray(np.cross(np.asarray(self.dipole), rotate(conjugate(attitude), self.field)))
+        return lever_torque(self.dipole, self.field, attitude)
 
     def potential_energy(self, time: float, attitude: Array) -> Array:
         """-μ·E."""
-        return np.asarray(-rotate(conjugate(attitude), self.field) @ np.asarray(self.dipole))
+        return np.asarray(-from_body(self.field, attitude) @ np.asarray(self.dipole))
 
 
 @dataclass(frozen=True)
@@ -71,10 +71,11 @@ class InducedDipole(Torque):
 
     def torque(self, time: float, attitude: Array, omega: Array) -> Array:
         """(αE) x E in body axes."""
-        field = rotate(conjugate(attitude), self.field)
-        return np.asarray(np.cross(field @ np.asarray(self.polarizability), field))
+        field = from_body(self.field, attitude)
+        induced = field @ np.asarray(self.polarizability)
+        return np.asarray(np.cross(induced, field))
 
     def potential_energy(self, time: float, attitude: Array) -> Array:
         """-½ E·αE."""
-        field = rotate(conjugate(attitude), self.field)
+        field = from_body(self.field, attitude)
         return np.asarray(-0.5 * np.sum(field @ np.asarray(self.polarizability) * field, axis=-1))

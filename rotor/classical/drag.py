@@ -17,7 +17,7 @@ class LinearDrag(Torque):
     """Torque -C ω with a matrix C (3, 3), or its diagonal (3,), in body axes.
 
     A rigid body in a viscous fluid at low Reynolds number has a symmetric positive C (Happel and Brenner, Low Reynolds
-    Number Hydrodynamics, section 5-4); a sphere of radius a has 8π η a³. A matrix that is neither is linear feedback,
+    Number Hydrodynamics, chapter 5); a sphere of radius a has 8π η a³. A matrix that is neither is linear feedback,
     such as that of Leipnik and Newton (Phys. Lett. A 86, 63 (1981)); it is taken as given.
 
     >>> LinearDrag([1.0, 2.0, 3.0]).torque(0.0, np.array([1.0, 0, 0, 0]), np.ones(3)).tolist()
@@ -25,7 +25,6 @@ class LinearDrag(Torque):
     """
 
     needs_velocity: ClassVar[bool] = True
-    needs_attitude: ClassVar[bool] = False
 
     coefficients: ArrayLike
 
@@ -36,6 +35,11 @@ class LinearDrag(Torque):
             raise ValueError(f"linear drag has 3 coefficients or a finite 3x3 matrix; got shape {array.shape}")
         matrix.setflags(write=False)
         object.__setattr__(self, "coefficients", matrix)
+
+    @property
+    def needs_attitude(self) -> bool:
+        """False: drag knows ω alone."""
+        return False
 
     def torque(self, time: float, attitude: Array, omega: Array) -> Array:
         """-C ω."""
@@ -51,7 +55,6 @@ class QuadraticDrag(Torque):
     """
 
     needs_velocity: ClassVar[bool] = True
-    needs_attitude: ClassVar[bool] = False
 
     coefficients: ArrayLike
 
@@ -61,6 +64,11 @@ class QuadraticDrag(Torque):
             raise ValueError(f"quadratic drag has 3 coefficients, finite and not negative; got {array.tolist()}")
         array.setflags(write=False)
         object.__setattr__(self, "coefficients", array)
+
+    @property
+    def needs_attitude(self) -> bool:
+        """False: drag knows ω alone."""
+        return False
 
     def torque(self, time: float, attitude: Array, omega: Array) -> Array:
         """-c |ω| ω."""

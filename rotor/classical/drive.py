@@ -33,6 +33,11 @@ class PeriodicDrive(Torque):
         checked_frame(self.frame)
         object.__setattr__(self, "amplitude", checked_vector(self.amplitude, "the amplitude of a drive"))
 
+    @property
+    def needs_attitude(self) -> bool:
+        """Only where the torque is fixed in space."""
+        return self.frame == "space"
+
     def torque(self, time: float, attitude: Array, omega: Array) -> Array:
         """The amplitude times the cosine of this moment, seen from the body."""
         now = np.asarray(self.amplitude) * math.cos(self.frequency * time + self.phase)

@@ -41,6 +41,15 @@ class FreeMotion:
     separatrix: NDArray[np.bool_]
     rows: Rows
 
+    @property
+    def centre_axis(self) -> NDArray[np.int64]:
+        """The axis (0, 1 or 2, in the order of the moments) that L goes round in the body; without meaning if steady.
+
+        >>> int(free_motion([0.6, 0.8, 1.0], [1.8, 0.4, -0.9]).centre_axis)
+        0
+        """
+        return np.asarray(self.rows.axes[:, 2]).reshape(self.period.shape)
+
     def at(self, times: ArrayLike, phases: Phases = "double-double") -> tuple[Array, Array]:
         """Momentum (*bodies, *times, 3) in the body and attitude (*bodies, *times, 4), body to space, at `times`.
 

@@ -18,7 +18,7 @@ class SpinningRotor(InnerMomentum):
     """Constant angular momentum h (3,) in body axes, carried by symmetric rotors relative to the body.
 
     L is that of body and rotors together and the moments are those of the whole with the rotors locked, so
-    ω_i = (L_i - h_i)/I_i (Wittenburg, Dynamics of Multibody Systems, section 4.6: Kelvin's gyrostat). A motor keeps h;
+    ω_i = (L_i - h_i)/I_i (Wittenburg, Dynamics of Multibody Systems: Kelvin's gyrostat). A motor keeps h;
     a rotor that turns freely about its axis keeps its absolute momentum instead: then give the moments without the
     rotor's axial one, and h is that momentum. Energy leaves out what the rotor has relative to the body.
 

@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rotor.classical.euler import checked_moments, checked_momentum
-from rotor.classical.system import System, acting_inverse, system_of
+from rotor.classical.system import System, system_of
 from rotor.effects import ClassicalEffect
 from rotor.rotations import IDENTITY, Array, normalised
 
@@ -137,7 +137,7 @@ class KickDrift(Method):
         if system.free:
             self.drift(system.start_moments, state, carry, step, steps, whole=True)
             return
-        kicker = _Kicker(system, state, carry)
+        kicker = _Kicker(system, state, carry, np.full((len(state), 3), np.nan))
         torque = kicker.torque(start)
         for k in range(steps):
             time = start + k * step
@@ -145,9 +145,9 @@ class KickDrift(Method):
                 h = fraction * step
                 kicker.kick(torque, 0.5 * h)
                 moments = system.moments(time + 0.5 * h)
-                kicker.turn(moments, time + 0.5 * h, 0.5 * h)
+                kicker.turn(time + 0.5 * h, 0.5 * h)
                 self.drift(moments, state, carry, h, 1, whole=False)
-                kicker.turn(moments, time + 0.5 * h, 0.5 * h)
+                kicker.turn(time + 0.5 * h, 0.5 * h)
                 time += h
                 torque = kicker.torque(time)
                 kicker.kick(torque, 0.5 * h)
@@ -160,13 +160,13 @@ class _Kicker:
     system: System
     state: Array
     carry: Array
+    no_omega: Array
 
     def torque(self, time: float) -> Array | None:
         if not self.system.torques:
             return None
-        attitude = self.state[:, 3:]
-        torque = self.system.torque(time, attitude, np.full_like(self.state[:, :3], np.nan))
-        return np.ascontiguousarray(np.broadcast_to(torque, (len(self.state), 3)))
+        torque = self.system.torque(time, self.state[:, 3:], self.no_omega)
+        return np.ascontiguousarray(np.broadcast_to(torque, self.no_omega.shape))
 
     def kick(self, torque: Array | None, time: float) -> None:
         from rotor.classical._step_kernels import kick
@@ -174,11 +174,11 @@ class _Kicker:
         if torque is not None:
             kick(self.state, self.carry, torque, time)
 
-    def turn(self, moments: Array, time: float, duration: float) -> None:
+    def turn(self, time: float, duration: float) -> None:
         from rotor.classical._step_kernels import turn_uniformly
 
         if self.system.inner:
-            rate = self.system.inner_momentum(time) * acting_inverse(moments)
+            rate = self.system.inner_momentum(time) * self.system.acting(time)
             turn_uniformly(self.state, self.carry, -duration * rate)
 
 

@@ -15,12 +15,12 @@ from itertools import pairwise
 import numpy as np
 
 from rotor.classical.integrators import Method
-from rotor.classical.system import System, acting_inverse
-from rotor.rotations import Array, conjugate, exp, multiply, rotate
+from rotor.classical.system import System
+from rotor.rotations import Array, conjugate, rotate
 
 SHRINK, GROW, SAFETY = 0.2, 5.0, 0.9
 SMALLEST_STEP = 1e-13  # of the interval between two times asked for
-SERIES_BELOW = 1e-2  # rad: below this angle (1 - (θ/2) cot(θ/2))/θ² is summed as a series
+STAGES = 12
 
 
 @dataclass(frozen=True)
@@ -48,9 +48,9 @@ class LieRungeKutta(Method):
 
     def states(self, system: System, momentum: Array, attitude: Array, times: Array) -> tuple[Array, Array, int]:
         """Steps that end at each of the times."""
-        space, q = rotate(attitude, momentum), attitude
+        space, q = rotate(attitude, momentum), np.array(attitude)
         out, attitudes, taken = [momentum], [attitude], 0
-        step = self.fixed_step or abs(self._first_step(system, float(times[0]), momentum))
+        step = self.fixed_step or self._first_step(system, float(times[0]), momentum)
         for start, stop in pairwise(times):
             space, q, step, steps = self._to(system, (float(start), float(stop)), space, q, step)
             taken += steps
@@ -87,39 +87,30 @@ class LieRungeKutta(Method):
         """L in space and attitude after one step, and the error estimate in units of the tolerance."""
         from scipy.integrate import DOP853
 
-        slopes_l, slopes_u = np.empty((12, *space.shape)), np.empty((12, *space.shape))
-        for stage in range(12):
-            row = DOP853.A[stage, :stage]
-            u = h * np.tensordot(row, slopes_u[:stage], axes=1)
-            momentum = space + h * np.tensordot(row, slopes_l[:stage], axes=1)
-            rates = _rates(system, time + DOP853.C[stage] * h, momentum, multiply(q, exp(u)), u)
-            slopes_l[stage], slopes_u[stage] = rates
-        change = h * np.tensordot(DOP853.B, slopes_l, axes=1)
-        turn = h * np.tensordot(DOP853.B, slopes_u, axes=1)
-        size = np.linalg.norm(space, axis=-1, keepdims=True) + np.linalg.norm(change, axis=-1, keepdims=True)
-        scaled = np.concatenate([slopes_l / np.where(size > 0.0, size, 1.0), slopes_u], axis=-1)
-        error = _error(scaled, h, DOP853.E3[:12], DOP853.E5[:12]) / self.tolerance
-        return space + change, multiply(q, exp(turn)), error
+        from rotor.classical._attitude_kernels import placed
+
+        slopes = np.zeros((STAGES, *space.shape[:1], 6))
+        here, momentum = np.empty_like(q), np.empty_like(space)
+        for stage in range(STAGES):
+            change = h * np.tensordot(DOP853.A[stage, :stage], slopes[:stage], axes=1)
+            placed(q, change[:, 3:], space + change[:, :3], here, momentum)
+            _rates(system, time + DOP853.C[stage] * h, momentum, here, change[:, 3:], slopes[stage])
+        change = h * np.tensordot(DOP853.B, slopes, axes=1)
+        placed(q, change[:, 3:], space, here, momentum)
+        size = np.linalg.norm(space, axis=-1) + np.linalg.norm(change[:, :3], axis=-1)
+        slopes[:, :, :3] /= np.where(size > 0.0, size, 1.0)[:, None]
+        error = _error(slopes, h, DOP853.E3[:STAGES], DOP853.E5[:STAGES]) / self.tolerance
+        return space + change[:, :3], here, error
 
 
-def _rates(system: System, time: float, space: Array, q: Array, u: Array) -> tuple[Array, Array]:
-    """dL/dt in space and du/dt for q = q_n exp(u)."""
-    momentum = rotate(conjugate(q), space)
-    omega = np.asarray((momentum - system.inner_momentum(time)) * acting_inverse(system.moments(time)))
-    torque = rotate(q, system.torque(time, q, omega)) if system.torques else np.zeros_like(space)
-    return torque, _turning(u, omega)
+def _rates(system: System, time: float, momentum: Array, q: Array, turn: Array, out: Array) -> None:
+    """dL/dt in space and du/dt for q = q_n exp(u) into out (n, 6)."""
+    from rotor.classical._attitude_kernels import to_space, turning
 
-
-def _turning(u: Array, omega: Array) -> Array:
-    """du/dt = ω + ½ u x ω + (1 - (θ/2) cot(θ/2))/θ² u x (u x ω), θ = |u|: the inverse of the derivative of exp."""
-    theta2 = np.sum(u * u, axis=-1, keepdims=True)
-    theta = np.sqrt(theta2)
-    large = theta > SERIES_BELOW
-    half = 0.5 * np.where(large, theta, 1.0)
-    closed = (1.0 - half / np.tan(half)) / np.where(large, theta2, 1.0)
-    series = 1.0 / 12.0 + theta2 / 720.0 + theta2**2 / 30240.0
-    once = np.cross(u, omega)
-    return np.asarray(omega + 0.5 * once + np.where(large, closed, series) * np.cross(u, once))
+    omega = (momentum - system.inner_momentum(time)) * system.acting(time)
+    turning(turn, omega, out[:, 3:])
+    if system.torques:
+        to_space(q, system.torque(time, q, omega), out[:, :3])
 
 
 def _error(slopes: Array, h: float, third: Array, fifth: Array) -> float:

@@ -133,8 +133,9 @@ def lyapunov_exponents(
     form = None if flow.timed else quadratic_form(flow)
     grown, divergence = _along(flow, form, count, plan) if form else _side_by_side(flow, count, plan)
     each = grown / plan.length
-    errors = np.std(each, axis=0, ddof=1) / np.sqrt(segments)
-    return Exponents(np.mean(each, axis=0), errors, float(np.mean(divergence) / plan.length), time)
+    values, errors = np.mean(each, axis=0), np.std(each, axis=0, ddof=1) / np.sqrt(segments)
+    order = np.argsort(-values, kind="stable")
+    return Exponents(values[order], errors[order], float(np.mean(divergence) / plan.length), time)
 
 
 def quadratic_form(flow: Flow) -> tuple[Array, Array, Array] | None:

@@ -8,7 +8,9 @@ bodies that are nearly linear; both are refused when Newton fails.
 
 With x the root of J x = (1 + |x|²) (h/2) L + ((J2 - J3) x2 x3, (J3 - J1) x3 x1, (J1 - J2) x1 x2), the body turns by the
 quaternion (1, x)/√(1 + |x|²) while L stays where it is in space. With 1/J_i = S/I_i + D, S and D functions of the step
-and the invariants alone, the map moves along the same polhodes as the body. Sources: J. Moser and A. P. Veselov, Commun. Math. Phys. 139, 217 (1991); E. Hairer and
+and the invariants alone, the map moves along the same polhodes as the body.
+
+Sources: J. Moser and A. P. Veselov, Commun. Math. Phys. 139, 217 (1991); E. Hairer and
 G. Vilmart, J. Phys. A 39, 13225 (2006), for S and D.
 """
 

@@ -10,15 +10,16 @@ from numpy.typing import ArrayLike
 
 from rotor.classical.euler import energy, invariants
 from rotor.classical.free import FreeMotion
+from rotor.classical.integrators import Motion
 from rotor.rotations import Array, continuous
 
 
 @dataclass(frozen=True)
-class Motion:
+class MotionTable:
     """One body at n times.
 
-    times: (n,). momentum: (n, 3), L in principal axes. attitude: (n, 4), body to space. energy: (n,). All in one
-    coherent set of units, or as `in_units` has changed them.
+    times: (n,). momentum: (n, 3), L in principal axes. attitude: (n, 4), body to space. energy: (n,). In one
+    coherent set of units, or each in its own, as `rotor tumble` prints them.
     """
 
     times: Array
@@ -29,15 +30,20 @@ class Motion:
     def __len__(self) -> int:
         return len(self.times)
 
+    @classmethod
+    def of(cls, motion: Motion) -> MotionTable:
+        """The table of a motion that an integrator made, of one body."""
+        if motion.momentum.ndim != 2:
+            raise ValueError(
+                f"a table holds one body; this motion is of bodies {motion.momentum.shape[:-2]}: choose one"
+            )
+        return cls(motion.times, motion.momentum, continuous(motion.attitude), motion.energy)
+
     @property
     def columns(self) -> dict[str, Array]:
         """The table by column: t, m1, m2, m3, qw, qx, qy, qz, energy."""
         names = ("t", "m1", "m2", "m3", "qw", "qx", "qy", "qz", "energy")
         return dict(zip(names, (self.times, *self.momentum.T, *self.attitude.T, self.energy), strict=True))
-
-    def in_units(self, time: float, momentum: float, energy: float) -> Motion:
-        """The same motion with its numbers multiplied, each kind by its factor."""
-        return Motion(self.times * time, self.momentum * momentum, self.attitude, self.energy * energy)
 
     def to_pandas(self) -> Any:
         """All columns as a pandas DataFrame."""
@@ -61,7 +67,7 @@ class Departure:
     space_momentum: float
 
 
-def sampled(motion: FreeMotion, times: ArrayLike) -> Motion:
+def sampled(motion: FreeMotion, times: ArrayLike) -> MotionTable:
     """The exact motion of one body at `times` (n,), in the order given; signs of q follow the neighbour before.
 
     >>> from rotor.classical.free import free_motion
@@ -75,10 +81,11 @@ def sampled(motion: FreeMotion, times: ArrayLike) -> Motion:
             f"a table holds one body at a list of times; got bodies {motion.moments.shape[:-1]}, times {times.shape}"
         )
     momentum, attitude = motion.at(times)
-    return Motion(times, momentum, continuous(attitude), energy(momentum, motion.moments))
+    attitude = continuous(attitude)
+    return MotionTable(times, momentum, attitude, energy(momentum, motion.moments))
 
 
-def departure(motion: Motion, start: FreeMotion) -> Departure:
+def departure(motion: MotionTable, start: FreeMotion) -> Departure:
     """How far the rows are from what the start demands; for the exact motion this is round-off, 1e-15 or so."""
     now = invariants(motion.momentum, motion.attitude, start.moments)
     then = invariants(start.momentum0, start.attitude0, start.moments)

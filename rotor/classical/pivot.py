@@ -8,9 +8,9 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rotor.classical.torques import checked_vector
+from rotor.classical.torques import checked_vector, from_body, lever_torque
 from rotor.effects import Torque
-from rotor.rotations import Array, conjugate, rotate
+from rotor.rotations import Array
 
 
 @dataclass(frozen=True)
@@ -39,8 +39,8 @@ class GravityAboutPivot(Torque):
 
     def torque(self, time: float, attitude: Array, omega: Array) -> Array:
         """r x m g in body axes."""
-        return np.asarray(self.mass * np.cross(np.asarray(self.centre), rotate(conjugate(attitude), self.gravity)))
+        return lever_torque(self.centre, self.mass * np.asarray(self.gravity), attitude)
 
     def potential_energy(self, time: float, attitude: Array) -> Array:
         """-m g·r."""
-        return np.asarray(-self.mass * (rotate(conjugate(attitude), self.gravity) @ np.asarray(self.centre)))
+        return np.asarray(-self.mass * (from_body(self.gravity, attitude) @ np.asarray(self.centre)))

@@ -21,6 +21,8 @@ class System:
     """Moments (n, 3) of n bodies and the effects that act on all of them, by kind; see `rotor.effects`."""
 
     start_moments: Array
+    start_inverse: Array
+    start_acting: Array
     torques: tuple[Torque, ...]
     inner: tuple[InnerMomentum, ...]
     inertia: InertiaChange | None
@@ -40,6 +42,14 @@ class System:
         """Whether a torque depends on the attitude; otherwise dL/dt follows from L and time alone."""
         return any(effect.needs_attitude for effect in self.torques)
 
+    def inverse(self, time: float) -> Array:
+        """1/I_i (n, 3) at `time`, 0 for the axis of a linear rotor."""
+        return self.start_inverse if self.inertia is None else np.asarray(1.0 / self.moments(time))
+
+    def acting(self, time: float) -> Array:
+        """`acting_inverse` of the moments (n, 3) at `time`."""
+        return self.start_acting if self.inertia is None else np.asarray(1.0 / self.moments(time))
+
     def moments(self, time: float) -> Array:
         """Principal moments (n, 3) at `time`."""
         if self.inertia is None:
@@ -52,8 +62,8 @@ class System:
 
     def omega(self, time: float, momentum: Array) -> Array:
         """ω = (L - h)/I(t) in body axes, (n, 3)."""
-        inverse = inverse_moments(self.moments(time))
-        return np.asarray((momentum - self.inner_momentum(time)) * inverse)
+        relative = momentum - self.inner_momentum(time) if self.inner else momentum
+        return np.asarray(relative * self.inverse(time))
 
     def torque(self, time: float, attitude: Array, omega: Array) -> Array:
         """Sum of the torques in body axes, (n, 3)."""
@@ -95,6 +105,8 @@ def system_of(moments: ArrayLike, effects: Sequence[ClassicalEffect] = ()) -> Sy
     checked = np.ascontiguousarray(checked_moments(moments).reshape(-1, 3))
     return System(
         start_moments=checked,
+        start_inverse=inverse_moments(checked),
+        start_acting=acting_inverse(checked),
         torques=tuple(effect for effect in effects if isinstance(effect, Torque)),
         inner=tuple(effect for effect in effects if isinstance(effect, InnerMomentum)),
         inertia=changes[0] if changes else None,

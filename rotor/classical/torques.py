@@ -10,15 +10,29 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rotor.effects import Torque
-from rotor.rotations import Array, conjugate, rotate
+from rotor.rotations import Array
 
 Frame = Literal["body", "space"]
+
+
+def from_body(vector: ArrayLike, attitude: Array) -> Array:
+    """A vector (3,) of space in body axes, (..., 3) for unit attitudes (..., 4)."""
+    from rotor.classical._attitude_kernels import seen_from_body
+
+    return np.asarray(seen_from_body(_rows(attitude), np.asarray(vector)).reshape(*attitude.shape[:-1], 3))
+
+
+def lever_torque(arm: ArrayLike, force: ArrayLike, attitude: Array) -> Array:
+    """arm x force in body axes, (..., 3), for an arm (3,) of the body and a force (3,) of space."""
+    from rotor.classical._attitude_kernels import lever
+
+    return np.asarray(lever(_rows(attitude), np.asarray(arm), np.asarray(force)).reshape(*attitude.shape[:-1], 3))
 
 
 def in_body(vector: ArrayLike, frame: str, attitude: Array) -> Array:
     """A vector (3,) of the body or of space in body axes, (..., 3) for attitudes (..., 4)."""
     if frame == "space":
-        return rotate(conjugate(attitude), vector)
+        return from_body(vector, attitude)
     return np.broadcast_to(np.asarray(vector, dtype=np.float64), (*attitude.shape[:-1], 3))
 
 
@@ -54,6 +68,11 @@ class ConstantTorque(Torque):
         checked_frame(self.frame)
         object.__setattr__(self, "vector", checked_vector(self.vector, "a constant torque"))
 
+    @property
+    def needs_attitude(self) -> bool:
+        """Only where the torque is fixed in space."""
+        return self.frame == "space"
+
     def torque(self, time: float, attitude: Array, omega: Array) -> Array:
         """The constant vector, seen from the body."""
         return in_body(self.vector, self.frame, attitude)
@@ -78,6 +97,15 @@ class TimedTorque(Torque):
         if not callable(self.history):
             raise ValueError("a timed torque needs a function of time that returns three components")
 
+    @property
+    def needs_attitude(self) -> bool:
+        """Only where the torque is fixed in space."""
+        return self.frame == "space"
+
     def torque(self, time: float, attitude: Array, omega: Array) -> Array:
         """The vector of this moment, seen from the body."""
         return in_body(checked_vector(self.history(time), f"the torque at time {time:g}"), self.frame, attitude)
+
+
+def _rows(attitude: Array) -> Array:
+    return np.ascontiguousarray(attitude, dtype=np.float64).reshape(-1, 4)

@@ -14,7 +14,7 @@ from typing import cast
 
 import typer
 
-from rotor.cli import info, isotopologues, molecules, spectrum
+from rotor.cli import cat, convert, info, isotopologues, molecules, spectrum, tumble
 from rotor.cli.output import NoAnswer
 
 NO_ANSWER, WRONG_INPUT, INTERRUPTED = 1, 2, 130
@@ -28,7 +28,8 @@ Examples:
   rotor spectrum my.xyz --dipole 0,0,1.85 --range 0:2000GHz --cat out.cat --plot out.png
   rotor spectrum --constants "A=835840.288 B=435351.717 C=278138.7 MHz" --dipole-abc 0,1.8546,0
   rotor info my.sdf
-  rotor isotopologues water"""
+  rotor isotopologues water
+  rotor tumble water --plot water.png"""
 
 
 def _application() -> typer.Typer:
@@ -51,6 +52,9 @@ def _application() -> typer.Typer:
     app.command("info", epilog=info.EXAMPLES)(info.command)
     app.command("molecules", epilog=molecules.EXAMPLES)(molecules.command)
     app.command("isotopologues", epilog=isotopologues.EXAMPLES)(isotopologues.command)
+    app.command("tumble", epilog=tumble.EXAMPLES)(tumble.command)
+    app.command("convert", epilog=convert.EXAMPLES)(convert.command)
+    app.command("cat", epilog=cat.EXAMPLES)(cat.command)
     return app
 
 

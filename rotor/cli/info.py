@@ -35,6 +35,7 @@ def command(
     dipole_abc: str | None = inputs.DIPOLE_ABC,
     spin_weights: str | None = inputs.SPIN_WEIGHTS,
     calculator: str | None = inputs.CALCULATOR,
+    hessian: str | None = inputs.HESSIAN,
     temperature: str | None = typer.Option(
         None, metavar="GRID", help="Temperatures of the table: 10:300K:30 or 10,20,50 K."
     ),
@@ -48,7 +49,7 @@ def command(
     files = Files()
     if json != "-":
         files.ask("--json", json, (".json",))
-    given = Input(source, constants, isotope or [], dipole, dipole_abc, spin_weights, calculator)
+    given = Input(source, constants, isotope or [], dipole, dipole_abc, spin_weights, calculator, hessian)
     top = inputs.read_top(given)
 
     from rotor.cli.report import describe

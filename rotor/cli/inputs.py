@@ -12,6 +12,7 @@ import typer
 from rotor.cli.output import note
 
 if TYPE_CHECKING:
+    from rotor.molecules.molecule import Molecule
     from rotor.top import Top
 
 T = TypeVar("T")
@@ -23,6 +24,12 @@ DIPOLE_ABC = typer.Option(None, metavar="A,B,C", help="Dipole in principal axes 
 ISOTOPE = typer.Option(None, metavar="1=2H", help="Another isotope, by atom number or element; repeatable.")
 CALCULATOR = typer.Option(
     None, metavar="NAME", help="Refine the geometry with an ASE calculator of that name, such as xtb, tblite or psi4."
+)
+HESSIAN = typer.Option(
+    None,
+    metavar="FILE",
+    help="Quartic distortion from a Hessian at the geometry (hartree/bohr², rows or lower triangle), or, with the word "
+    "'calculator', from one that --calculator makes.",
 )
 SPIN_WEIGHTS = typer.Option(None, metavar="LIST", help='Nuclear-spin weights: "ee=1,eo=3,oe=3,oo=1", "even=1,odd=3".')
 JSON = typer.Option(None, "--json", metavar="FILE", help="Everything printed, as JSON; - is standard output.")
@@ -39,6 +46,7 @@ class Input:
     dipole_abc: str | None
     spin_weights: str | None
     calculator: str | None = None
+    hessian: str | None = None
 
     @property
     def text(self) -> str:
@@ -150,6 +158,8 @@ def _refuse_contradictions(given: Input) -> None:
         raise ValueError("--isotope: bare constants have no atoms; give the constants of the isotopologue itself")
     if given.calculator is not None and given.constants is not None:
         raise ValueError("--calculator: bare constants have no geometry to refine; give a molecule")
+    if given.hessian is not None and given.constants is not None:
+        raise ValueError("--hessian: bare constants have no geometry that it belongs to; give a molecule")
 
 
 def _from_constants(given: Input) -> Top:
@@ -166,18 +176,37 @@ def _from_source(given: Input) -> Top:
     top = rotor.read(given.source, isotopes=",".join(given.isotopes) or None)
     if not isinstance(top, rotor.Top):
         raise ValueError(f"{given.source}: holds a {type(top).__name__.lower()}, not a molecule or constants")
-    return (
-        top if given.calculator is None else option("--calculator", given.calculator, lambda name: _refined(top, name))
-    )
+    if given.calculator is not None:
+        top = option("--calculator", given.calculator, lambda name: _refined(top, name))
+    if given.hessian is None:
+        return top
+    return option("--hessian", given.hessian, lambda path: _semirigid(top, path, given.calculator))
 
 
 def _refined(top: Top, name: str) -> Top:
     from rotor.molecules.refine import refine
     from rotor.top import Top
 
+    return Top.from_molecule(refine(_geometry(top), name))
+
+
+def _semirigid(top: Top, path: str, calculator: str | None) -> Top:
+    """The top of the geometry with the distortion that a Hessian gives, of a file or of the calculator."""
+    from rotor.distortion import semirigid_top
+    from rotor.molecules.force_field import force_field_from_calculator, read_hessian
+    from rotor.molecules.refine import calculator_by_name
+
+    if path != "calculator":
+        return semirigid_top(read_hessian(path, _geometry(top)))
+    if calculator is None:
+        raise ValueError("the word 'calculator' needs --calculator NAME; else give a file")
+    return semirigid_top(force_field_from_calculator(_geometry(top), calculator_by_name(calculator)))
+
+
+def _geometry(top: Top) -> Molecule:
     if top.molecule is None:
-        raise ValueError(f"{name!r} has no geometry to refine: there are constants alone")
-    return Top.from_molecule(refine(top.molecule, name))
+        raise ValueError(f"{top.name or 'the source'} has constants alone; a geometry is wanted")
+    return top.molecule
 
 
 def _with_dipole_of_input(top: Top, dipole_debye: tuple[float, float, float]) -> Top:

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
 
-from rotor.cli import inputs
+from rotor.cli import inputs, request
 from rotor.cli.inputs import Input
 from rotor.cli.output import Files, NoAnswer, Table, Writer, answering, json_text, show_facts, show_table, write_text
 
 if TYPE_CHECKING:
+    from rotor.formats.spcat.predict import Prediction
     from rotor.spectra.lines import Lines
     from rotor.spectra.spectrum import Spectrum
     from rotor.top import Top
@@ -25,7 +26,8 @@ Examples:
   rotor spectrum water
   rotor spectrum "SMILES:C=O" --temperature 100
   rotor spectrum my.xyz --dipole 0,0,1.85 --range 0:2000GHz --cat out.cat --csv out.csv --plot out.png
-  rotor spectrum --constants "A=835840.288 B=435351.717 C=278138.7 MHz" --dipole-abc 0,1.8546,0 --jmax 20"""
+  rotor spectrum --constants "A=835840.288 B=435351.717 C=278138.7 MHz" --dipole-abc 0,1.8546,0 --jmax 20
+  rotor spectrum case.int --cat case.cat"""
 
 
 @dataclass(frozen=True)
@@ -57,6 +59,7 @@ def command(
     isotope: list[str] | None = inputs.ISOTOPE,
     spin_weights: str | None = inputs.SPIN_WEIGHTS,
     calculator: str | None = inputs.CALCULATOR,
+    hessian: str | None = inputs.HESSIAN,
     q: float | None = typer.Option(None, metavar="Q", help="Partition function to use instead of the summed one."),
     vibrational_factor: float = typer.Option(1.0, metavar="X", help="Multiplies Q."),
     profile: str | None = typer.Option(None, metavar="NAME", help="sticks, gaussian, lorentzian or voigt."),
@@ -80,16 +83,22 @@ def command(
     if json != "-":
         files.ask("--json", json, (".json",))
 
-    given = Input(source, constants, isotope or [], dipole, dipole_abc, spin_weights, calculator)
-    top = inputs.with_some_dipole(inputs.read_top(given))
+    given = Input(source, constants, isotope or [], dipole, dipole_abc, spin_weights, calculator, hessian)
+    prediction = request.prediction_of(context, str(source)) if request.is_request(source) else None
+    if prediction is not None:
+        settings, tag = _requested(settings, prediction), prediction.request.tag
+    top = prediction.lines.top if prediction else inputs.with_some_dipole(inputs.read_top(given))
     _refuse_doppler_without_mass(top, settings)
     with answering():
-        lines = _lines(top, settings)
+        lines = prediction.lines if prediction else _lines(top, settings)
         content = _content(lines, settings, given, context.obj, top_lines)
     _refuse_nothing_to_draw(lines, files)
 
     content["files"] = [str(path) for path in files.wanted.values()]
-    files.write(_writers(lines, settings, content, tag))
+    writers = _writers(lines, settings, content, tag)
+    if prediction is not None:
+        writers["--cat"] = _program_catalogue(prediction, content)
+    files.write(writers)
     if json == "-":
         print(_json(lines, content), end="")
     else:
@@ -162,6 +171,32 @@ def _settings(
         profile=profile,
         fwhm_mhz=inputs.positive("--fwhm", fwhm, "MHz") if fwhm else None,
     )
+
+
+def _requested(settings: Settings, prediction: Prediction) -> Settings:
+    """The settings that an .int file makes."""
+    wanted = prediction.request
+    return replace(
+        settings,
+        temperature_k=wanted.temperature_k,
+        jmax=wanted.fend,
+        min_lgint=wanted.str0,
+        range_mhz=prediction.lines.range_mhz,
+        q=prediction.q,
+    )
+
+
+def _program_catalogue(prediction: Prediction, content: dict[str, Any]) -> Writer:
+    """The catalogue as the field's program lists it: its weights, its zero of energy, K doublets parted."""
+    from rotor.formats.line_tables import provenance, write_beside
+    from rotor.formats.spcat.cat import write_cat
+
+    def write(path: Path) -> None:
+        write_cat(prediction.catalogue, path)
+        story = provenance(prediction.lines) | {"command": content["command"], "input": content["input"]}
+        write_beside(path, story | {"q": prediction.q, "lines": len(prediction.catalogue)})
+
+    return write
 
 
 def _lines(top: Top, settings: Settings) -> Lines:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import os
 from collections.abc import Mapping
 from dataclasses import replace
@@ -9,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from rotor.constants import Constants
-from rotor.formats.library import library_file
+from rotor.formats.library import library_file, names
 from rotor.formats.molecule_file import MoleculeFile, parse_molecule_file, read_molecule_file
 from rotor.isotopologues import isotopologue
 from rotor.molecules.readers import g2_names, read_molecule
@@ -69,6 +70,13 @@ def _meaning(word: str) -> Path | str:
         )
     if path.exists() or _looks_like_a_path(word):
         return path
+    if known is None and word not in g2_names():
+        near = difflib.get_close_matches(word, [*names(), *g2_names()], n=3)
+        meant = f"did you mean {', '.join(near)}? " if near else ""
+        raise ValueError(
+            f"{word!r} is no file here, no molecule of the library ('rotor molecules' lists it) and none of ASE's g2 set; "
+            f"{meant}a SMILES is written 'SMILES:...'"
+        )
     return known or word
 
 
@@ -178,13 +186,16 @@ def write(thing: Any, path: str | os.PathLike[str], *, settings: Mapping[str, An
     besides; for lines, `{"tag": 18003}` is the tag of a .cat, `{"molecule": 1, "isotopologue": 1, "abundance": 0.997}`
     what `hitran_lines` asks for. Raises ValueError for a thing or a suffix that has no format.
     """
-    from rotor.classical.motion import Motion
+    from rotor.classical.integrators import Motion
+    from rotor.classical.motion import MotionTable
     from rotor.formats.hitran import HitranLines, write_hitran
     from rotor.formats.spcat.catalogue import Catalogue
     from rotor.spectra.lines import Lines
     from rotor.spectra.spectrum import Spectrum
 
     if isinstance(thing, Motion):
+        thing = MotionTable.of(thing)
+    if isinstance(thing, MotionTable):
         from rotor.formats.motion_tables import write_motion
 
         return write_motion(thing, path, settings)

@@ -77,19 +77,10 @@ def top_provenance(top: Top) -> dict[str, Any]:
     }
 
 
-def _errors_from(lines: Lines) -> str | None:
-    """Which uncertainties the errors of frequencies come from, None where there are none."""
-    if lines.covariance is not None:
-        return f"covariance of {', '.join(lines.covariance.names)}"
-    known = lines.top.constants.uncertainties
-    if known and lines.covariance_used is None:
-        return "none: the constants are from a fit whose correlations are not known"
-    return f"uncertainties of {', '.join(known)}, uncorrelated" if known else None
-
-
 def provenance(lines: Lines) -> dict[str, Any]:
     """What the lines were made from: the top and its sources, the settings, Q."""
     return top_provenance(lines.top) | {
+        "errors_from": errors_from(lines),
         "temperature_k": lines.temperature_k,
         "jmax": lines.jmax,
         "min_lgint": finite_or_none(lines.min_lgint),
@@ -97,9 +88,18 @@ def provenance(lines: Lines) -> dict[str, Any]:
         "q": lines.q,
         "q_source": lines.partition.source,
         "lines": len(lines),
-        "errors_from": _errors_from(lines),
         "warnings": list(lines.warnings),
     }
+
+
+def errors_from(lines: Lines) -> str | None:
+    """Which uncertainties the errors of frequencies come from, None where there are none."""
+    if lines.covariance is not None:
+        return f"covariance of {', '.join(lines.covariance.names)}"
+    known = lines.top.constants.uncertainties
+    if known and lines.covariance_used is None:
+        return "none: the constants are from a fit whose correlations are not known"
+    return f"uncertainties of {', '.join(known)}, uncorrelated" if known else None
 
 
 def finite_or_none(value: float) -> float | None:

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from rotor.classical.motion import Motion
+from rotor.classical.motion import MotionTable
 from rotor.formats.atomic import open_atomic
+from rotor.formats.line_tables import write_beside
 
 
-def write_motion(motion: Motion, path: str | os.PathLike[str], settings: Mapping[str, Any] | None = None) -> None:
+def write_motion(motion: MotionTable, path: str | os.PathLike[str], settings: Mapping[str, Any] | None = None) -> None:
     """Write a motion as .csv; every number is the shortest text that gives the same double back.
 
     settings: what the provenance (`path` + ".provenance.json") shall say besides version and number of rows, for
@@ -25,6 +25,4 @@ def write_motion(motion: Motion, path: str | os.PathLike[str], settings: Mapping
     story = {"program": "rotor", "version": rotor.__version__, **(settings or {}), "rows": len(motion)}
     with open_atomic(path) as handle:
         motion.to_polars().write_csv(handle)
-    with open_atomic(f"{os.fspath(path)}.provenance.json", "w", encoding="utf-8", newline="\n") as handle:
-        json.dump(story, handle, indent=1, ensure_ascii=False)
-        handle.write("\n")
+    write_beside(path, story)

@@ -21,7 +21,7 @@ import numpy as np
 
 from rotor import units
 from rotor.formats.atomic import atomic_path, open_atomic
-from rotor.formats.line_tables import QNFMT, finite_or_none, top_provenance, write_beside
+from rotor.formats.line_tables import QNFMT, errors_from, finite_or_none, top_provenance, write_beside
 from rotor.formats.spcat.cat import format_lines
 from rotor.formats.spcat.catalogue import Catalogue
 from rotor.formats.spcat.fields import BLANK
@@ -93,7 +93,8 @@ def stream_lines(
     has about 4.5 J². executor: pieces are spread over it, a process pool for instance, whose processes must be spawned:
     a forked copy of polars' threads never answers.
 
-    Raises ValueError for another suffix, for a pool that forks, for what `line_list` refuses, and where the folder holds pieces of another list.
+    Raises ValueError for another suffix, for a pool that forks, for what `line_list` refuses, and where the folder holds
+    pieces of another list.
     """
     target = Path(path)
     if target.suffix.lower() not in (".parquet", ".cat"):
@@ -106,7 +107,7 @@ def stream_lines(
     )
     plan = _plan(start, jmax, -math.inf if min_lgint is None else min_lgint, range_mhz, Path(f"{target}.pieces"))
     ranges = list(_ranges(plan, piece_lines))
-    story = _story(plan, ranges)
+    story = _story(plan, ranges) | {"errors_from": errors_from(start)}
     _open_folder(plan.folder, story)
 
     missing = [r for r in ranges if not plan.piece(*r).exists()]
@@ -230,8 +231,10 @@ def _columns(plan: _Plan, lines: Lines) -> dict[str, Any]:
     """The columns of `Lines`, energies and intensities from the lowest level of all J instead of that of the piece."""
     offset_mhz = lines.levels.ground_mhz - plan.ground_mhz
     offset_k = offset_mhz / units.MHZ_PER_K
+    error = lines.error_mhz
     return {
         "frequency_mhz": lines.frequency_mhz,
+        **({} if error is None else {"error_mhz": error}),
         "lgint": lines.lgint - offset_k / plan.temperature_k / math.log(10),
         "energy_lower_cm": lines.energy_lower_cm + offset_mhz / units.MHZ_PER_CM,
         "g_upper": lines.g_upper,
@@ -310,7 +313,7 @@ def _catalogue(part: Any, names: tuple[str, ...], kind: str, tag: int) -> Catalo
             columns[:, i] = part[f"{name}_{side}"].to_numpy()
     return Catalogue(
         frequency_mhz=part["frequency_mhz"].to_numpy(),
-        error_mhz=np.zeros(n),
+        error_mhz=part["error_mhz"].to_numpy() if "error_mhz" in part.columns else np.zeros(n),
         lgint=part["lgint"].to_numpy(),
         dr=np.full(n, 2 if kind == "linear" else 3, dtype=np.int16),
         energy_lower_cm=part["energy_lower_cm"].to_numpy(),

@@ -17,11 +17,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rotor.molecules.molecule import Molecule
-from rotor.units import ATOMIC_MASS_KG, BOHR_RADIUS_ANGSTROM, ELEMENTARY_CHARGE_C, SPEED_OF_LIGHT_M_PER_S
+from rotor.units import (
+    ATOMIC_MASS_KG,
+    BOHR_RADIUS_ANGSTROM,
+    ELEMENTARY_CHARGE_C,
+    HARTREE_EV,
+    SPEED_OF_LIGHT_M_PER_S,
+)
 
 Floats = NDArray[np.float64]
 
-HARTREE_EV = 27.211386245981  # CODATA 2022
 EV_PER_ANGSTROM2 = {  # one of each unit in eV/Å²
     "eV/Å²": 1.0,
     "hartree/bohr²": HARTREE_EV / BOHR_RADIUS_ANGSTROM**2,

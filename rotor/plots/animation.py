@@ -80,13 +80,13 @@ def animate(
     atoms: Atoms | None = None,
     axis_names: Names = ("1", "2", "3"),
     time_unit: str = "",
-    time_scale: float = 1.0,
+    time_factor: float = 1.0,
     frames: int = FRAMES,
 ) -> None:
     """Write a film of one free rotation from the first to the last of `times`, at even steps of the exact motion.
 
     Left the body in space, L upright: the atoms, or without them the uniform box that has these moments. Right the
-    path of L over the momentum sphere in the body. times: in the units of the motion; shown multiplied by `time_scale`.
+    path of L over the momentum sphere in the body. times: in the units of the motion; shown multiplied by `time_factor`.
     Raises ValueError for a suffix that cannot be made here and for times that are all the same.
     """
     check_film(path)
@@ -107,10 +107,15 @@ def animate(
     (trail,) = right.plot([], [], color=MOTION, linewidth=2.2, alpha=0.55)
     (dot,) = right.plot([], [], "o", ms=8, mfc=MOTION, mec="white")
     film = (FFMpegWriter if Path(path).suffix.lower() == ".mp4" else PillowWriter)(fps=FRAMES_PER_SECOND)
+    _draw_momentum(left)
+    clock = left.set_title("", fontsize=9, y=1.0)
+    body: list[Any] = []
     with film.saving(figure, os.fspath(path), dpi=DOTS_PER_INCH):
         for i in range(frames):
-            draw_body(left, motion.moments, atoms, turned[i])
-            left.set_title(f"$t$ = {when[i] * time_scale:.4g} {time_unit}".rstrip(), fontsize=9)
+            for part in body:
+                part.remove()
+            body = _draw_box(left, motion.moments, turned[i]) if atoms is None else _draw_atoms(left, atoms, turned[i])
+            clock.set_text(f"$t$ = {when[i] * time_factor:.4g} {time_unit}".rstrip())
             dot.set_data(*view.flat(path_of_l[i : i + 1]).T)
             trail.set_data(*view.flat(path_of_l[: i + 1]).T)
             film.grab_frame()
@@ -127,6 +132,7 @@ def _empty_stage() -> tuple[Any, Any]:
     for axes in (left, right):
         axes.set(xlim=(-LIMIT, LIMIT), ylim=(-LIMIT, LIMIT), aspect="equal")
         axes.axis("off")
+        axes.set_title("", y=1.0)  # a fixed place, else every frame looks for one
     return figure, (left, right)
 
 
@@ -155,33 +161,28 @@ def _draw_still_parts(axes: Any, view: View, moments: Array, path_of_l: Array, n
     draw_family(axes, view, moments)
     draw_curve(axes, view, path_of_l, color=MOTION, linewidth=1.0)
     draw_axes(axes, view, moments, names)
-    axes.set_title("$L$ in the body", fontsize=9)
+    axes.set_title("$L$ in the body", fontsize=9, y=1.0)
 
 
-def draw_body(axes: Any, moments: Array, atoms: Atoms | None, turned: Array) -> None:
-    """The body in one attitude, and the fixed direction of L; `turned` (3, 3) takes body axes to right, up, eye."""
-    axes.clear()
-    axes.set(xlim=(-LIMIT, LIMIT), ylim=(-LIMIT, LIMIT), aspect="equal")
-    axes.axis("off")
+def _draw_momentum(axes: Any) -> None:
+    """The fixed direction of L in space."""
     up = (_EYE @ np.array([0.0, 0.0, 1.42]))[:2]
     axes.annotate("", up, -0.92 * up, zorder=0, arrowprops={"arrowstyle": "-|>", "color": "0.45", "lw": 1.2})
     axes.text(up[0] + 0.09, up[1] - 0.03, "$L$", color="0.35", va="center")
-    if atoms is None:
-        _draw_box(axes, box_edges(moments), turned)
-    else:
-        _draw_atoms(axes, atoms, turned)
 
 
-def _draw_box(axes: Any, edges: Array, turned: Array) -> None:
-    """The faces of the box that the eye sees."""
-    edges = np.maximum(edges, 0.03)  # a plate or a rod stays visible
+def _draw_box(axes: Any, moments: Array, turned: Array) -> list[Any]:
+    """The faces that the eye sees of the box of these moments; `turned` (3, 3) takes body axes to right, up, eye."""
+    edges = np.maximum(box_edges(moments), 0.03)  # a plate or a rod stays visible
     corners = _CORNERS * (1.15 * edges / np.linalg.norm(edges)) @ turned.T
-    for face, normal, colour in zip(_FACES, _FACE_NORMALS @ turned.T, _FACE_COLOURS, strict=True):
-        if normal[2] > 0.0:
-            axes.fill(*corners[list(face), :2].T, facecolor=colour, edgecolor="black", linewidth=0.8, alpha=0.95)
+    return [
+        axes.fill(*corners[list(face), :2].T, facecolor=colour, edgecolor="black", linewidth=0.8, alpha=0.95)[0]
+        for face, normal, colour in zip(_FACES, _FACE_NORMALS @ turned.T, _FACE_COLOURS, strict=True)
+        if normal[2] > 0.0
+    ]
 
 
-def _draw_atoms(axes: Any, atoms: Atoms, turned: Array) -> None:
+def _draw_atoms(axes: Any, atoms: Atoms, turned: Array) -> list[Any]:
     """Balls and sticks from the back to the front."""
     from ase.data import atomic_numbers, covalent_radii
     from ase.data.colors import jmol_colors
@@ -191,10 +192,15 @@ def _draw_atoms(axes: Any, atoms: Atoms, turned: Array) -> None:
     radii = 0.55 * covalent_radii[numbers]
     scale = 1.15 / float(np.max(np.linalg.norm(atoms.positions, axis=1) + radii))
     seen = scale * atoms.positions @ turned.T
+    parts = []
     for i, j in atoms.bonds:
         along = (seen[j] - seen[i]) / np.linalg.norm(seen[j] - seen[i])
         ends = np.array([seen[i] + scale * radii[i] * along, seen[j] - scale * radii[j] * along])
-        axes.plot(*ends[:, :2].T, color="0.35", linewidth=5, solid_capstyle="round", zorder=2 + ends[:, 2].mean())
+        parts += axes.plot(
+            *ends[:, :2].T, color="0.35", linewidth=5, solid_capstyle="round", zorder=2 + ends[:, 2].mean()
+        )
     for place, radius, number in zip(seen, radii, numbers, strict=True):
         ball = Circle(place[:2], scale * radius, facecolor=jmol_colors[number], edgecolor="black", linewidth=0.9)
-        axes.add_patch(ball).set_zorder(2 + place[2])
+        ball.set_zorder(2 + place[2])
+        parts.append(axes.add_patch(ball))
+    return parts

@@ -25,7 +25,8 @@ def polhode_figure(
     times: ArrayLike,
     *,
     axis_names: tuple[str, str, str] = ("1", "2", "3"),
-    time_label: str = "t",
+    time_label: str = "$t$",
+    time_factor: float = 1.0,
     title: str = "",
 ) -> Any:
     """A matplotlib figure of one free motion: where L goes in the body, and when.
@@ -34,8 +35,8 @@ def polhode_figure(
     moment (green), the separatrix (black) and the path of L from the first to the last time (orange; the dot is the
     start). Filled axis ends are stable, open ones unstable. Right the components of L/|L| over time.
 
-    motion: of one body, in any units. times: (n,), in the unit that `time_label` names; only their range counts. Raises
-    ValueError for a body at rest and for more than one body.
+    motion: of one body, in any units. times: (n,), in the units of the motion, of which only the range counts; they are
+    shown multiplied by `time_factor`. Raises ValueError for a body at rest and for more than one body.
     """
     times = np.asarray(times, dtype=np.float64)
     size = np.linalg.norm(motion.momentum0, axis=-1)
@@ -44,12 +45,14 @@ def polhode_figure(
     from matplotlib.figure import Figure
 
     with _style():
-        figure = Figure(figsize=(7.2, 3.45), layout="constrained")
-        left, right = figure.subplots(1, 2, width_ratios=(1.0, 1.12))
+        figure = Figure(figsize=(7.2, 3.6), layout="constrained")
+        left, right = figure.subplots(1, 2, width_ratios=(1.2, 1.0))
         span, cut = _shown(motion, times)
-        path = motion.at(np.linspace(*span, POINTS))[0] / size
+        drawn = np.linspace(*span, POINTS)
+        path = motion.at(drawn)[0] / size
         _draw_left(left, motion, path, axis_names)
-        _draw_right(right, motion, np.linspace(*span, POINTS), path, axis_names)
+        _draw_right(right, motion.moments, drawn * time_factor, path, axis_names)
+        _mark_period(right, drawn[0] * time_factor, drawn[-1] * time_factor, float(motion.period) * time_factor)
         right.set(xlabel=time_label + (f" (the first {MOST_PERIODS} periods)" if cut else ""), ylabel="$L_i/|L|$")
         if title:
             figure.suptitle(title, fontsize=10, x=0.01, ha="left")
@@ -62,7 +65,8 @@ def plot_polhodes(
     path: str | os.PathLike[str],
     *,
     axis_names: tuple[str, str, str] = ("1", "2", "3"),
-    time_label: str = "t",
+    time_label: str = "$t$",
+    time_factor: float = 1.0,
     title: str = "",
     provenance: Mapping[str, Any] | None = None,
 ) -> None:
@@ -73,7 +77,9 @@ def plot_polhodes(
     suffix = Path(path).suffix.lower()
     if suffix not in (".png", ".pdf", ".svg"):
         raise ValueError(f"{os.fspath(path)}: a picture is .png, .pdf or .svg; the suffix names the format")
-    figure = polhode_figure(motion, times, axis_names=axis_names, time_label=time_label, title=title)
+    figure = polhode_figure(
+        motion, times, axis_names=axis_names, time_label=time_label, time_factor=time_factor, title=title
+    )
     with _style():
         figure.savefig(path, dpi=200, metadata=_metadata(suffix, title, provenance or {}))
 
@@ -125,7 +131,7 @@ def _draw_left(axes: Any, motion: FreeMotion, path: Array, names: tuple[str, str
     draw_curve(axes, view, path, color=MOTION, linewidth=2.2, label="this motion")
     _draw_direction(axes, view, path)
     draw_axes(axes, view, motion.moments, names)
-    axes.legend(loc="lower center", bbox_to_anchor=(0.5, -0.045), ncols=2, frameon=False, handlelength=1.6)
+    axes.legend(loc="lower center", bbox_to_anchor=(0.5, -0.09), ncols=2, frameon=False, handlelength=1.6)
 
 
 def _draw_direction(axes: Any, view: Any, path: Array) -> None:
@@ -147,15 +153,17 @@ def _draw_direction(axes: Any, view: Any, path: Array) -> None:
         )  # fmt: skip
 
 
-def _draw_right(axes: Any, motion: FreeMotion, times: Array, path: Array, names: tuple[str, str, str]) -> None:
-    rank = np.argsort(np.argsort(motion.moments, kind="stable"))
+def _mark_period(axes: Any, first: float, last: float, period: float) -> None:
+    if last - first > period:
+        axes.axvline(first + period, color="0.6", linewidth=0.8, linestyle="--", zorder=0)
+        axes.text(first + period, -1.0, " period", fontsize=8, color="0.4", ha="left", va="center")
+
+
+def _draw_right(axes: Any, moments: Array, times: Array, path: Array, names: tuple[str, str, str]) -> None:
+    rank = np.argsort(np.argsort(moments, kind="stable"))
     for axis, name in enumerate(names):
         colour = (SMALL, MIDDLE, LARGE)[rank[axis]]
         axes.plot(times, path[:, axis], color=colour, linewidth=1.3, label=f"$L_{name}$")
-    if np.isfinite(motion.period) and times[-1] - times[0] > motion.period:
-        end = times[0] + float(motion.period)
-        axes.axvline(end, color="0.6", linewidth=0.8, linestyle="--", zorder=0)
-        axes.text(end, -1.0, " period", fontsize=8, color="0.4", ha="left", va="center")
     axes.set(ylim=(-1.12, 1.12), yticks=(-1, -0.5, 0, 0.5, 1))
     if times[-1] > times[0]:
         axes.set_xlim(times[0], times[-1])

@@ -58,7 +58,7 @@ def draw_sphere(axes: Any) -> None:
 
     disc.set_clip_path(Circle((0, 0), 1.0, transform=axes.transData))
     axes.add_patch(Circle((0, 0), 1.0, fill=False, edgecolor=_RIM, linewidth=0.8))
-    axes.set(xlim=(-1.4, 1.4), ylim=(-1.3, 1.45), aspect="equal")
+    axes.set(xlim=(-1.3, 1.3), ylim=(-1.08, 1.36), aspect="equal")
     axes.axis("off")
 
 
@@ -108,14 +108,14 @@ def draw_axes(axes: Any, view: View, moments: Array, names: tuple[str, str, str]
             face = "white" if unstable else "black"
             axes.plot(x, y, "o", ms=4.2, mfc=face, mec="black", mew=0.9, alpha=_HIDDEN if hidden else 1.0, zorder=6)
         positive = np.eye(3)[axis]
-        tip, foot = view.flat(1.28 * positive), view.flat(positive)
+        tip, foot = view.flat(1.2 * positive), view.flat(positive)
         front = view.depth(positive) >= 0.0
         axes.annotate(
             "", tip, foot, zorder=5,
             arrowprops={"arrowstyle": "-|>,head_width=0.18,head_length=0.35", "color": "black", "lw": 0.9,
                         "alpha": 1.0 if front else 0.45, "shrinkA": 3, "shrinkB": 0},
         )  # fmt: skip
-        axes.text(*view.flat(1.28 * positive) + 0.075 * _outward(tip), f"${name}$", ha="center", va="center", zorder=7)
+        axes.text(*view.flat(1.2 * positive) + 0.075 * _outward(tip), f"${name}$", ha="center", va="center", zorder=7)
 
 
 def _outward(point: Array) -> Array:

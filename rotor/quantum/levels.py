@@ -17,7 +17,15 @@ from numpy.typing import NDArray
 from rotor.effects import QuantumEffect
 from rotor.quantum.basis import WangBlock, ka_kc, wang_blocks
 from rotor.quantum.clusters import DIMENSION, scalar_and_tensor, tensor_eigenvalues
-from rotor.quantum.watson import Centrifugal, Multiplet, Rigid, block_bands, rigid_operators, scalar_energy
+from rotor.quantum.watson import (
+    Centrifugal,
+    Multiplet,
+    Rigid,
+    block_bands,
+    centrifugal_operators,
+    rigid_operators,
+    scalar_energy,
+)
 from rotor.terms import Operators
 from rotor.weights import SpinWeights
 
@@ -102,7 +110,9 @@ def disordered_blocks(top: Top, levels: Levels) -> list[tuple[int, str]]:
     ⟨Jz²⟩ itself (`SolvedBlock.jz_squared`) is not the measure, since it falls by a little near the separatrix of a
     rigid top, where labels are in perfect order.
     """
-    out = []
+    out: list[tuple[int, str]] = []
+    if not centrifugal_operators(top.constants):  # a rigid top is in order
+        return out
     for block in levels.blocks:
         bands = block_bands(Multiplet(rigid_operators(top.constants), block.basis.j), block.basis)
         rigid = _expectations(bands, block.vectors)

@@ -17,8 +17,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
-from rotor.constants import Constants
+from rotor.constants import RIGID, Constants
 from rotor.formats.spcat.par import Options, Parameter, ParameterFile
+from rotor.terms import powers_of_spelled
 
 NOT_YET = "is read but not computed yet"
 
@@ -159,7 +160,7 @@ def constants_of(file: ParameterFile, *, errors: bool = False) -> Constants:
 
     Values of one code are added, as the field's program does. The reduction is told by the operators; where they
     fit both, by the letter of the option line. With `errors` the errors of a .var file become uncertainties, of
-    those constants that are one parameter.
+    those constants that are one parameter and were not held (an error below 1e-30 holds one).
 
     Raises ValueError, naming the parameter, for operators that have no name here or that are not computed yet.
     """
@@ -180,7 +181,7 @@ def constants_of(file: ParameterFile, *, errors: bool = False) -> Constants:
         kind=kind,
         reduction=reduction,
         representation=_representation(options) if kind == "asymmetric" else None,
-        uncertainties={name: spread for name, spread in known.items() if spread is not None},
+        uncertainties={name: spread for name, spread in known.items() if spread and spread > HELD_BELOW},
         **named,
     )
 
@@ -301,16 +302,30 @@ def _rigid_parameters(constants: Constants) -> tuple[Parameter, ...]:
 
 def _distortion_parameters(constants: Constants) -> tuple[Parameter, ...]:
     spread = constants.uncertainties
-    return tuple(
+    vocabulary = _vocabulary(constants.kind, constants.reduction)
+    unnamed = [name for name in constants.values if name not in (*RIGID, *(item.name for item in vocabulary))]
+    named = tuple(
         Parameter(
             item.code,
             item.sign * constants[item.name],
             spread.get(item.name, _FIXED),
             f"{'-' if item.sign < 0 else ''}{item.name}",
         )
-        for item in _vocabulary(constants.kind, constants.reduction)
+        for item in vocabulary
         if item.name in constants
+    )
+    return named + tuple(
+        Parameter(_code_of_spelled(name), constants[name], spread.get(name, _FIXED), name) for name in unnamed
     )
 
 
+def _code_of_spelled(name: str) -> int:
+    """The code of a term that is spelled out as an operator, such as `J4Jz2Jpm2`."""
+    powers = powers_of_spelled(name)
+    if powers is None:
+        raise ValueError(f"{name}: SPFIT's files have no code for it; leave it out")
+    return code_of_term(*powers)
+
+
 _FIXED = 1e-37
+HELD_BELOW = 1e-30  # an error so small says that a parameter was not fitted

@@ -17,6 +17,7 @@ from rotor import units
 from rotor.formats.line_tables import catalogue
 from rotor.formats.spcat.catalogue import Catalogue
 from rotor.formats.spcat.codes import is_linear
+from rotor.formats.spcat.fields import QUANTUM_RANGE
 from rotor.formats.spcat.int_file import IntensityFile, Request, read_int
 from rotor.formats.spcat.model import FOLD, common_weight, top_of
 from rotor.formats.spcat.par import Options, ParameterFile, read_par
@@ -85,8 +86,11 @@ def predict(parameters: ParameterFile, intensities: IntensityFile, *, own_q: boo
     """
     options, request = parameters.options[0], intensities.request
     top = top_of(parameters, intensities)
-    if not 0 <= request.fbgn <= request.fend:
-        raise ValueError(f"FBGN = {request.fbgn}, FEND = {request.fend}: F runs from FBGN to FEND, 0 or more")
+    if not 0 <= request.fbgn <= request.fend <= QUANTUM_RANGE[1]:
+        raise ValueError(
+            f"FBGN = {request.fbgn}, FEND = {request.fend}: F runs from FBGN to FEND, from 0 to {QUANTUM_RANGE[1]}, the "
+            "highest that two characters of a catalogue can say"
+        )
 
     common = common_weight(options)
     q = summed_q(top, options, request.temperature_k).q if own_q else request.qrot

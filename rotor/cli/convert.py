@@ -1,0 +1,97 @@
+"""`rotor convert`: constants from one format into another, SPFIT's files to TOML and back."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+from rotor.cli import inputs
+from rotor.cli.output import Files, Writer, json_text, note, write_text
+
+if TYPE_CHECKING:
+    from rotor.top import Top
+
+EXAMPLES = """\b
+Examples:
+  rotor convert case.var constants.toml
+  rotor convert constants.toml case.par --kmax 60
+  rotor convert water water.var"""
+
+
+def command(
+    context: typer.Context,
+    source: str = typer.Argument(..., help="File (.par, .var, .int, .toml, ...) or name.", show_default=False),
+    target: str = typer.Argument(..., help="File to write: .toml, .par or .var.", show_default=False),
+    kmax: int = typer.Option(99, metavar="N", help="Highest K of a .par or .var (KNMAX)."),
+    json: str | None = inputs.JSON,
+) -> None:
+    """Constants, dipole and spin weights into another format; nothing is converted but the format."""
+    inputs.whole("--kmax", kmax, 0, 359)
+    files = Files()
+    files.ask("TARGET", target, (".toml", ".par", ".var"))
+    if json != "-":
+        files.ask("--json", json, (".json",))
+    top = top_with_errors(source)
+
+    from rotor.cli.report import describe
+
+    content = {**describe(top, source, context.obj), "files": [str(path) for path in files.wanted.values()]}
+    writers: dict[str, Writer] = {
+        "TARGET": writer_of(top, source, target, kmax),
+        "--json": lambda path: write_text(path, json_text(content)),
+    }
+    files.write(writers)
+    if json == "-":
+        print(json_text(content), end="")
+    else:
+        print(f"{source} → {target}: {top.constants.text()}")
+
+
+def top_with_errors(source: str) -> Top:
+    """The top a source means; of a .var file the errors of its parameters are the constants' uncertainties."""
+    given = inputs.Input(source, None, [], None, None, None)
+    top = inputs.read_top(given)
+    path = Path(source)
+    if path.suffix.lower() == ".int":
+        from rotor.formats.spcat.predict import parameters_beside
+
+        path = parameters_beside(path)
+    if path.suffix.lower() != ".var" or not path.exists():
+        return top
+
+    from rotor.formats.spcat.codes import constants_of
+    from rotor.formats.spcat.par import read_par
+
+    return replace(top, constants=constants_of(read_par(path), errors=True))
+
+
+def writer_of(top: Top, source: str, target: str, kmax: int) -> Writer:
+    """What writes the top in the format that the target's suffix names; what that cannot say is refused or noted."""
+    if target.lower().endswith(".toml"):
+        from rotor.formats.molecule_file import MoleculeFile
+        from rotor.formats.molecule_writer import write_molecule_file
+
+        stories = {"constants": top.source, "dipole": top.dipole_source, "spin_weights": top.weights_source}
+        stories = {table: text or f"converted from {Path(source).name}" for table, text in stories.items()}
+        if not top.dipole_abc_debye:
+            del stories["dipole"]
+        file = MoleculeFile(
+            name=top.name or Path(target).stem,
+            constants=top.constants,
+            dipole_abc_debye=top.dipole_abc_debye,
+            spin_weights=top.spin_weights,
+            sources=stories,
+        )
+        return lambda path: write_molecule_file(file, path)
+
+    from rotor.formats.spcat.model import parameter_file
+    from rotor.formats.spcat.par import write_par
+
+    if top.dipole_abc_debye and any(top.dipole_abc_debye):
+        dipole = ", ".join(f"{mu:g}" for mu in top.dipole_abc_debye)
+        note(f"a {Path(target).suffix} file has no place for the dipole ({dipole} D); it belongs into an .int file")
+    parameters = parameter_file(top, kmax)
+    return lambda path: write_par(parameters, path)

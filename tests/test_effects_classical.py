@@ -1,0 +1,201 @@
+"""Classical effects: each against a closed form or an independent equation, and what each says that it conserves."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.special import ellipj, ellipk
+
+from rotor.classical.changing_inertia import ChangingInertia
+from rotor.classical.dipole import InducedDipole, PermanentDipole
+from rotor.classical.drag import LinearDrag, QuadraticDrag
+from rotor.classical.drive import PeriodicDrive
+from rotor.classical.exact_drift import ExactDrift
+from rotor.classical.gyrostat import SpinningRotor
+from rotor.classical.integrators import integrate
+from rotor.classical.lie_runge_kutta import LieRungeKutta
+from rotor.classical.pivot import GravityAboutPivot
+from rotor.classical.splitting import RotationSplitting, SymmetricTopSplitting
+from rotor.classical.system import system_of
+from rotor.classical.torques import ConstantTorque, TimedTorque
+from rotor.rotations import conjugate, distance, exp, multiply, rotate, to_matrix, uniform
+
+MOMENTS, MOMENTUM = np.array([1.0, 1.4, 2.0]), np.array([0.6, -0.3, 0.8])
+TIGHT = LieRungeKutta(1e-12)
+TIMES = np.linspace(0.0, 8.0, 9)
+
+EVERY = {
+    "constant, body": ConstantTorque([0.1, 0.2, -0.1]),
+    "constant, space": ConstantTorque([0.1, 0.2, -0.1], "space"),
+    "timed": TimedTorque(lambda t: [0.1 * t, 0.0, np.sin(t)]),
+    "drive": PeriodicDrive([0.2, 0.0, 0.1], 1.3, 0.4),
+    "linear drag": LinearDrag([0.1, 0.2, 0.3]),
+    "quadratic drag": QuadraticDrag([0.1, 0.2, 0.3]),
+    "rotor": SpinningRotor([0.2, 0.0, 0.5]),
+    "inertia": ChangingInertia(lambda t: MOMENTS * (1.0 + 0.3 * np.sin(t) ** 2)),
+    "dipole": PermanentDipole([0.5, 0.2, 0.1], [0.0, 0.3, 0.8]),
+    "induced": InducedDipole([[1.0, 0.2, 0.0], [0.2, 0.5, 0.0], [0.0, 0.0, 0.3]], [0.9, 0.0, 0.8]),
+    "pivot": GravityAboutPivot(1.2, [0.1, 0.0, 0.6], [0.0, 0.0, -1.0]),
+}
+
+
+@pytest.mark.parametrize("name", EVERY)
+def test_what_an_effect_says_it_conserves_is_conserved_and_nothing_else(name):
+    effect = EVERY[name]
+    motion = integrate(TIGHT, MOMENTS, MOMENTUM, TIMES, effects=[effect])
+    space = rotate(motion.attitude, motion.momentum)
+    energy_moves = np.ptp(motion.energy) > 1e-9  # tolerance 1e-12 a step, some hundred steps
+    momentum_moves = np.max(np.ptp(space, axis=0)) > 1e-9
+    assert energy_moves != effect.conserves_energy
+    assert momentum_moves != effect.conserves_momentum
+
+
+@pytest.mark.parametrize("name", ["dipole", "induced", "pivot"])
+def test_torque_is_minus_the_gradient_of_the_energy(name):
+    effect = EVERY[name]
+    attitude = uniform(20, rng=np.random.default_rng(5))
+    torque, h = effect.torque(0.0, attitude, np.zeros((20, 3))), 1e-5
+    for k in range(3):
+        turn = exp(h * np.eye(3)[k])
+        ahead = effect.potential_energy(0.0, multiply(attitude, turn))
+        behind = effect.potential_energy(0.0, multiply(attitude, conjugate(turn)))
+        assert np.allclose(torque[:, k], -(ahead - behind) / (2 * h), atol=1e-9)  # central difference: h², eps/h
+
+
+@pytest.mark.parametrize("name", EVERY)
+def test_against_plain_equations_with_a_rotation_matrix(name):
+    """An independent route: 12 equations for L in space and the matrix R, R' = R [ω], by scipy."""
+    effect = EVERY[name]
+    system = system_of(MOMENTS, [effect])
+
+    def rates(t, y):
+        matrix = y[3:].reshape(3, 3)
+        inertia = effect.moments(t) if name == "inertia" else MOMENTS
+        inner = effect.momentum if name == "rotor" else 0.0
+        omega = (matrix.T @ y[:3] - inner) / inertia
+        torque = np.zeros(3) if not system.torques else matrix @ space_torque(t, matrix, omega)
+        return np.concatenate([torque, turn(matrix, omega)])
+
+    def turn(matrix, omega):
+        x, y, z = omega
+        return (matrix @ np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])).reshape(-1)
+
+    def space_torque(t, matrix, omega):
+        down = {
+            "constant, body": lambda: np.array([0.1, 0.2, -0.1]),
+            "constant, space": lambda: matrix.T @ [0.1, 0.2, -0.1],
+            "timed": lambda: np.array([0.1 * t, 0.0, np.sin(t)]),
+            "drive": lambda: np.array([0.2, 0.0, 0.1]) * np.cos(1.3 * t + 0.4),
+            "linear drag": lambda: -np.array([0.1, 0.2, 0.3]) * omega,
+            "quadratic drag": lambda: -np.array([0.1, 0.2, 0.3]) * omega * np.sqrt(omega @ omega),
+            "dipole": lambda: np.cross([0.5, 0.2, 0.1], matrix.T @ [0.0, 0.3, 0.8]),
+            "induced": lambda: np.cross(
+                np.array([[1.0, 0.2, 0.0], [0.2, 0.5, 0.0], [0.0, 0.0, 0.3]]) @ matrix.T @ [0.9, 0.0, 0.8],
+                matrix.T @ [0.9, 0.0, 0.8],
+            ),
+            "pivot": lambda: np.cross([0.1, 0.0, 0.6], matrix.T @ [0.0, 0.0, -1.2]),
+        }
+        return down[name]()
+
+    start = np.concatenate([MOMENTUM, np.eye(3).reshape(-1)])
+    plain = solve_ivp(rates, (0.0, 8.0), start, "DOP853", rtol=1e-12, atol=1e-12).y[:, -1]
+    motion = integrate(TIGHT, MOMENTS, MOMENTUM, [0.0, 8.0], effects=[effect])
+    matrix = to_matrix(motion.attitude[-1])
+    assert np.allclose(matrix, plain[3:].reshape(3, 3), atol=1e-9)  # both tolerances 1e-12 a step
+    assert np.allclose(rotate(motion.attitude[-1], motion.momentum[-1]), plain[:3], atol=1e-9)
+
+
+def test_linear_drag_on_a_sphere_decays_exponentially():
+    motion = integrate(TIGHT, [2, 2, 2], MOMENTUM, TIMES, effects=[LinearDrag([0.3, 0.3, 0.3])])
+    assert np.allclose(motion.momentum, MOMENTUM * np.exp(-0.15 * TIMES)[:, None], atol=1e-11)
+
+
+def test_quadratic_drag_on_a_sphere():
+    spin = np.linalg.norm(MOMENTUM) / 2.0
+    motion = integrate(TIGHT, [2, 2, 2], MOMENTUM, TIMES, effects=[QuadraticDrag([0.3, 0.3, 0.3])])
+    closed = spin / (1.0 + 0.15 * spin * TIMES)  # ω' = -(c/I) ω²
+    assert np.allclose(np.linalg.norm(motion.omega, axis=-1), closed, atol=1e-11)
+
+
+def test_planar_pendulum_by_jacobi():
+    """A dipole in a field from 2 rad: sin(θ/2) = k sn(K + ω0 t), k = sin 1, ω0² = μE/I."""
+    times = np.linspace(0.0, 10.0, 11)
+    dipole = PermanentDipole([0.0, 0.0, 1.0], [0.0, 0.0, 0.7])
+    motion = integrate(SymmetricTopSplitting(0.01, 6), [1.3, 1.3, 1.0], [0, 0, 0], times, exp([2.0, 0, 0]), [dipole])
+    k = np.sin(1.0)
+    closed = k * ellipj(ellipk(k**2) + np.sqrt(0.7 / 1.3) * times, k**2)[0]
+    assert np.allclose(motion.attitude[:, 1], closed, atol=1e-11)  # order 6 at h ω0 = 0.007
+
+
+def test_heavy_top_keeps_what_lagrange_says():
+    top = GravityAboutPivot(1.0, [0.0, 0.0, 0.5], [0.0, 0.0, -9.81])
+    moments = [0.4, 0.4, 0.1]
+    start = exp([0.6, 0.0, 0.0])
+    motion = integrate(SymmetricTopSplitting(0.002, 4), moments, [0.1, 0.0, 3.0], np.linspace(0, 5, 21), start, [top])
+    assert np.ptp(motion.momentum[:, 2]) < 1e-13  # along the figure: each flow keeps it exactly
+    assert np.ptp(rotate(motion.attitude, motion.momentum)[:, 2]) < 1e-12  # along gravity
+    assert np.ptp(motion.energy) < 1e-7 * np.abs(motion.energy[0])  # order 4, oscillating
+
+
+def test_sleeping_top_wakes_below_the_critical_spin():
+    """Upright is stable iff L3² > 4 m g l I1 (Landau and Lifshitz, Mechanics, section 35, problem 2)."""
+    top = GravityAboutPivot(1.0, [0.0, 0.0, 0.5], [0.0, 0.0, -10.0])
+    critical = np.sqrt(4 * 10.0 * 0.5 * 0.4)
+    tilts = []
+    for spin in (0.98 * critical, 1.02 * critical):
+        times, start = np.linspace(0, 40, 401), exp([1e-4, 0, 0])
+        motion = integrate(SymmetricTopSplitting(0.02, 4), [0.4, 0.4, 0.1], [0, 0, spin], times, start, [top])
+        tilts.append(np.max(np.hypot(motion.attitude[:, 1], motion.attitude[:, 2])))
+    assert tilts[0] > 0.05 > 1e-3 > tilts[1]
+
+
+def test_spin_up_by_a_space_torque_keeps_its_direction():
+    motion = integrate(TIGHT, MOMENTS, MOMENTUM, [0.0, 4.0], effects=[ConstantTorque([0.3, 0.1, 0.2], "space")])
+    gained = rotate(motion.attitude[-1], motion.momentum[-1]) - MOMENTUM
+    assert np.allclose(gained, 4.0 * np.array([0.3, 0.1, 0.2]), atol=1e-11)
+
+
+def test_effects_add_up():
+    both = [EVERY["dipole"], EVERY["pivot"], SpinningRotor([0.1, 0, 0]), SpinningRotor([0, 0.2, 0])]
+    system = system_of(MOMENTS, both)
+    attitude = uniform(3, rng=np.random.default_rng(1))
+    total = system.torque(0.0, attitude, np.zeros((3, 3)))
+    parts = [effect.torque(0.0, attitude, np.zeros((3, 3))) for effect in both[:2]]
+    assert np.array_equal(total, parts[0] + parts[1])
+    assert np.array_equal(system.inner_momentum(0.0), [0.1, 0.2, 0.0])
+
+
+def test_an_empty_list_is_free_motion_to_the_last_bit():
+    method = RotationSplitting(0.05, 4)
+    free = integrate(method, MOMENTS, MOMENTUM, TIMES)
+    named = integrate(method, MOMENTS, MOMENTUM, TIMES, effects=[])
+    zero = integrate(method, MOMENTS, MOMENTUM, TIMES, effects=[ConstantTorque([0.0, 0.0, 0.0])])
+    assert np.array_equal(free.attitude, named.attitude)
+    assert np.allclose(free.attitude, zero.attitude, atol=1e-13)  # the same composition, kicked with zero
+
+
+def test_exact_drift_with_a_weak_torque_takes_long_steps():
+    weak = [PermanentDipole([0.0, 0.0, 1e-4], [0.0, 0.0, 1.0])]
+    reference = integrate(TIGHT, MOMENTS, MOMENTUM, [0.0, 5.0], effects=weak).attitude[-1]
+    exact = integrate(ExactDrift(0.5), MOMENTS, MOMENTUM, [0.0, 5.0], effects=weak).attitude[-1]
+    split = integrate(RotationSplitting(0.5), MOMENTS, MOMENTUM, [0.0, 5.0], effects=weak).attitude[-1]
+    assert distance(exact, reference) < 1e-3 * distance(split, reference)
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: ConstantTorque([1.0, 2.0]), "three finite components"),
+        (lambda: ConstantTorque([1.0, 2.0, 3.0], "lab"), "space"),
+        (lambda: TimedTorque(3.0), "function of time"),
+        (lambda: LinearDrag(np.ones((2, 2))), "3x3"),
+        (lambda: QuadraticDrag([-1.0, 1.0, 1.0]), "not negative"),
+        (lambda: InducedDipole([[1, 2, 0], [0, 1, 0], [0, 0, 1]], [0, 0, 1]), "symmetric"),
+        (lambda: GravityAboutPivot(0.0, [0, 0, 1], [0, 0, 1]), "positive"),
+        (lambda: ChangingInertia([1, 2, 3]), "function of time"),
+        (lambda: ChangingInertia(lambda t: [0.0, 1.0, 1.0]).moments(0.0), "positive"),
+        (lambda: system_of(MOMENTS, [EVERY["inertia"], EVERY["inertia"]]), "2 effects set the moments"),
+    ],
+)
+def test_refusals(make, message):
+    with pytest.raises(ValueError, match=message):
+        make()

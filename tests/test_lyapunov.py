@@ -1,0 +1,161 @@
+"""Lyapunov exponents: closed forms, published attractors, the trace identity, compiled against plain; sections."""
+
+import numpy as np
+import pytest
+
+from rotor.classical.drag import LinearDrag, QuadraticDrag
+from rotor.classical.drive import PeriodicDrive
+from rotor.classical.free import free_motion
+from rotor.classical.lyapunov import (
+    Flow,
+    body_flow,
+    kaplan_yorke,
+    lyapunov_exponents,
+    orbit,
+    poincare_section,
+    quadratic_form,
+)
+from rotor.classical.pivot import GravityAboutPivot
+from rotor.classical.stability import growth_rate
+from rotor.rotations import exp
+
+
+def leipnik_newton(t, y):
+    x, y, z = y.T
+    return np.stack([-0.4 * x + y + 10 * y * z, -x - 0.4 * y + 5 * x * z, 0.175 * z - 5 * x * y], axis=-1)
+
+
+def chen_lee(c):
+    def rate(t, y):
+        x, y, z = y.T
+        return np.stack([-y * z + 5 * x, x * z - 10 * y, x * y / 3 + c * z], axis=-1)
+
+    return rate
+
+
+# published and computed values of shared notes on both systems, natural logarithm per time, all ± 0.01
+ATTRACTORS = [
+    (leipnik_newton, (0.349, 0.0, -0.160), (0.14, 0.0, -0.765), -0.625, 2.185),
+    (leipnik_newton, (0.349, 0.0, -0.180), (0.1296, 0.0, -0.7546), -0.625, 2.172),
+    (chen_lee(-3.8), (0.2, 0.2, 0.2), (0.64, 0.0, -9.44), -8.8, 2.068),
+    (chen_lee(-3.8), (1.0, 1.0, 1.0), (0.0, -0.909, -7.89), -8.8, 1.0),
+    (chen_lee(-0.38), (0.2, 0.2, 0.2), (0.136, 0.0, -5.515), -5.38, 2.025),
+]
+
+
+@pytest.mark.parametrize(("rate", "start", "expected", "divergence", "dimension"), ATTRACTORS)
+def test_published_attractors(rate, start, expected, divergence, dimension):
+    time = 5000.0 if divergence < -1.0 else 30_000.0  # the fast attractors average sooner
+    found = lyapunov_exponents(Flow(rate, np.array(start)), time=time, transient=300.0)
+    assert np.allclose(found.values, expected, atol=0.015 if divergence == -5.38 else 0.01)  # ± 0.01, and our own error
+    assert abs(np.sum(found.values) - divergence) < 1e-6
+    assert found.divergence == pytest.approx(divergence, abs=1e-9)
+    assert found.kaplan_yorke == pytest.approx(dimension, abs=0.01)
+
+
+def test_compiled_and_plain_routes_agree():
+    start = np.array([0.349, 0.0, -0.160])
+    compiled = lyapunov_exponents(Flow(leipnik_newton, start), time=300.0, transient=20.0, segments=3)
+    plain = lyapunov_exponents(
+        Flow(lambda t, y: leipnik_newton(t, y) + 1e-9 * np.abs(y), start), time=300.0, transient=20.0, segments=3
+    )
+    assert quadratic_form(Flow(leipnik_newton, start)) is not None
+    assert np.allclose(compiled.values, plain.values, atol=0.05)  # two stretches of 300 on one attractor: 0.1/√3 spread
+    assert abs(np.sum(plain.values) - plain.divergence) < 1e-6
+    limit_cycle = np.array([1.0, 1.0, 1.0])
+    compiled = lyapunov_exponents(Flow(chen_lee(-3.8), limit_cycle), time=60.0, transient=40.0, segments=2)
+    plain = lyapunov_exponents(Flow(chen_lee(-3.8), limit_cycle, timed=True), time=60.0, transient=40.0, segments=2)
+    assert np.allclose(compiled.values, plain.values, atol=5e-3)  # a regular orbit: both see the same cycle
+
+
+def test_the_unstable_axis_grows_at_the_closed_rate():
+    moments, momentum = [1.0, 2.0, 3.0], [0.0, 2.0, 0.0]
+    found = lyapunov_exponents(body_flow(moments, momentum), time=60.0, transient=20.0, segments=2)
+    sigma = growth_rate(moments, 2.0)
+    assert np.allclose(found.values, [sigma, 0.0, -sigma], atol=1e-9)  # the fixed point's own exponents
+
+
+def test_free_tumbling_is_not_chaotic():
+    moments, momentum = [1.0, 1.875, 2.875], [0.5, 0.75, 1.0]
+    short = lyapunov_exponents(body_flow(moments, momentum), time=1000.0, segments=2).values[0]
+    long = lyapunov_exponents(body_flow(moments, momentum), time=20_000.0, segments=2).values[0]
+    assert long < 1e-3
+    assert long < 0.3 * short  # it falls as log(t)/t
+
+
+def test_damped_top_contracts_at_its_drag():
+    moments = np.array([1.0, 2.0, 4.0])
+    drag = np.array([0.1, 0.4, 0.2])
+    found = lyapunov_exponents(body_flow(moments, [0.0, 0.0, 0.0], [LinearDrag(drag)]), time=40.0, segments=2)
+    assert np.allclose(np.sort(found.values), np.sort(-drag / moments), atol=1e-9)
+
+
+def test_exponents_with_attitude_carry_the_zero_of_the_quaternion():
+    """A pendulum upside down leaves at √(m g l/I), its seven exponents pair up, and |q| adds one zero."""
+    weight = GravityAboutPivot(1.0, [0.0, 0.0, 0.5], [0.0, 0.0, -10.0])
+    upright = body_flow([2.0, 1.0, 0.5], [0, 0, 0], [weight], exp([0.0, 0, 0]))
+    found = lyapunov_exponents(upright, time=8.0, count=7, segments=2, transient=0.0)
+    assert np.allclose(found.values[:2], [np.sqrt(5.0), np.sqrt(2.5)], atol=0.02)  # alignment over 0.8 only
+    assert np.allclose(found.values, -found.values[::-1], atol=1e-6)
+    assert abs(found.values[2]) < 0.5  # the free turn about the vertical: a shear, log t / t with t = 4
+    assert abs(found.values[3]) < 1e-6
+    assert abs(np.sum(found.values)) < 1e-6
+
+
+def test_driven_body_is_followed_at_its_own_time():
+    """x' = -x + cos t through a driven, damped sphere: the exponents are the drag's, whatever the drive."""
+    effects = [PeriodicDrive([1.0, 0, 0], 1.0), LinearDrag([0.5, 0.5, 0.5])]
+    flow = body_flow([1.0, 1.0, 1.0], [0.0, 0.0, 0.0], effects)
+    assert flow.timed
+    found = lyapunov_exponents(flow, time=20.0, segments=2)
+    assert np.allclose(found.values, -0.5, atol=1e-6)  # central differences of a linear flow
+
+
+def test_quadratic_form_is_found_and_refused():
+    body = body_flow([1.0, 2.0, 3.0], [1.0, 1.0, 1.0], [LinearDrag([0.1, 0.2, 0.3])])
+    constant, linear, quadratic = quadratic_form(body)
+    assert np.allclose(constant, 0.0)
+    assert np.allclose(linear, -np.diag([0.1, 0.1, 0.1]), atol=1e-15)
+    assert quadratic[0, 1, 2] == pytest.approx((1 / 3 - 1 / 2) / 2)  # L2 L3 (1/I3 - 1/I2), shared by two entries
+    assert quadratic_form(body_flow([1.0, 2.0, 3.0], [1, 1, 1], [QuadraticDrag([0.1, 0.2, 0.3])])) is None
+
+
+@pytest.mark.parametrize(
+    ("values", "dimension"),
+    [([0.1, 0.0, -0.5], 2.2), ([-1.0, -2.0], 0.0), ([1.0, -1.0], 2.0), ([0.0, -1.0, -2.0], 1.0)],
+)
+def test_kaplan_yorke(values, dimension):
+    assert kaplan_yorke(values) == pytest.approx(dimension)
+
+
+def test_section_of_a_free_top_is_met_once_per_period():
+    moments, momentum = [1.0, 1.875, 2.875], [0.5, 0.75, 1.0]
+    times, states = poincare_section(body_flow(moments, momentum), lambda t, y: y[1], time=100.0)
+    assert np.allclose(np.diff(times), free_motion(moments, momentum).period, atol=1e-7)  # the orbit's tolerance, 1e-10
+    assert np.ptp(states, axis=0).max() < 1e-7
+
+
+def test_section_of_a_strange_attractor_has_width():
+    flow = Flow(leipnik_newton, np.array([0.349, 0.0, -0.160]))
+    _, states = poincare_section(flow, lambda t, y: y[1], time=400.0, transient=100.0)
+    assert len(states) > 30
+    assert np.allclose(states[:, 1], 0.0, atol=1e-9)
+    assert len(np.unique(states.round(3), axis=0)) > 30  # no cycle
+
+
+def test_orbit_agrees_with_the_exact_motion():
+    times = np.linspace(0.0, 40.0, 9)
+    path = orbit(body_flow([1.0, 1.875, 2.875], [0.5, 0.75, 1.0]), times, tolerance=1e-12)
+    assert np.allclose(path, free_motion([1.0, 1.875, 2.875], [0.5, 0.75, 1.0]).at(times)[0], atol=1e-9)
+
+
+def test_refusals():
+    flow = Flow(leipnik_newton, np.zeros(3))
+    with pytest.raises(ValueError, match="count=4"):
+        lyapunov_exponents(flow, 10.0, count=4)
+    with pytest.raises(ValueError, match="two segments"):
+        lyapunov_exponents(flow, 10.0, segments=1)
+    with pytest.raises(ValueError, match="one body"):
+        body_flow(np.ones((2, 3)), np.ones((2, 3)))
+    with pytest.raises(ValueError, match="without bound"):
+        lyapunov_exponents(Flow(lambda t, y: y * y, np.array([1.0])), 10.0)
