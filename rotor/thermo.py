@@ -41,7 +41,7 @@ class PartitionFunction:
 
 
 @dataclass(frozen=True)
-class Vibrations:
+class VibrationalStates:
     """Vibrational states behind a partition function, by their energies above the ground state.
 
     energies_cm: in cm⁻¹, all above 0. degeneracies: of each, 1 unless given. harmonic: the energies are fundamentals, and
@@ -69,10 +69,10 @@ class Vibrations:
         object.__setattr__(self, "degeneracies", tuple(int(g) for g in degeneracies))
 
     @classmethod
-    def parse(cls, text: str, harmonic: bool = False) -> Vibrations:
+    def parse(cls, text: str, harmonic: bool = False) -> VibrationalStates:
         """From a comma list such as "667.4x2, 1388, 2349 cm-1", with x and the degeneracy after an energy; cm⁻¹ by default.
 
-        >>> Vibrations.parse("667.4x2,1388,2349 cm-1").degeneracies
+        >>> VibrationalStates.parse("667.4x2,1388,2349 cm-1").degeneracies
         (2, 1, 1)
         """
         items = [_ENERGY.fullmatch(item) for item in text.split(",")]
@@ -119,7 +119,7 @@ def vibrational_partition_function(
     """
     if not (math.isfinite(temperature_k) and temperature_k > 0):
         raise ValueError(f"temperature {temperature_k} K: a temperature is above 0 K")
-    given = Vibrations(tuple(np.ravel(energies_cm).tolist()), tuple(np.ravel(degeneracies).tolist()))
+    given = VibrationalStates(tuple(np.ravel(energies_cm).tolist()), tuple(np.ravel(degeneracies).tolist()))
     occupied = np.exp(-np.array(given.energies_cm) * units.MHZ_PER_CM / (temperature_k * units.MHZ_PER_K))
     g = np.array(given.degeneracies)
     return float(np.prod((1 - occupied) ** -g.astype(float))) if harmonic else float(1 + g @ occupied)

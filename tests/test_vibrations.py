@@ -14,7 +14,7 @@ import rotor
 from rotor.formats.spcat.cat import read_cat
 from rotor.spectra.lines import line_list
 from rotor.spectra.raman import raman_lines
-from rotor.thermo import Vibrations, partition_function, vibrational_partition_function
+from rotor.thermo import VibrationalStates, partition_function, vibrational_partition_function
 
 HC_OVER_K = 1.438776877  # cm K
 
@@ -51,11 +51,11 @@ def test_hcn_of_cdms(shared, temperature, column, within):
     rows = (shared / "reference" / "partition" / "cdms_partfunc.cat").read_text().splitlines()
     theirs = float(next(row for row in rows if row.startswith("|  27501")).split("|")[column - 1])
     rigid = math.log10(3 * partition_function(rotor.read("HCN"), temperature).q)
-    factor = math.log10(Vibrations.parse(HCN_STATES).factor(temperature))
+    factor = math.log10(VibrationalStates.parse(HCN_STATES).factor(temperature))
     assert rigid + factor == pytest.approx(theirs, abs=within)
     if temperature == 300.0:
         assert theirs - rigid == pytest.approx(0.0288, abs=1e-4)
-        harmonic = Vibrations.parse(HCN_FUNDAMENTALS, harmonic=True)
+        harmonic = VibrationalStates.parse(HCN_FUNDAMENTALS, harmonic=True)
         assert math.log10(harmonic.factor(300.0)) == pytest.approx(theirs - rigid, abs=4e-4)  # anharmonic overtones
 
 
@@ -72,7 +72,7 @@ def test_intensities_of_a_catalogue_are_met_with_vibration_alone(shared):
     cat = read_cat(shared / "reference" / "catalogues" / "c027501.cat.gz")
     top = rotor.read("HCN")
     plain = line_list(top, jmax=40)
-    counted = line_list(top, jmax=40, vibrations=Vibrations.parse(HCN_STATES))
+    counted = line_list(top, jmax=40, vibrations=VibrationalStates.parse(HCN_STATES))
     j = cat.quanta_upper[:, 0].astype(int)
     few = (j >= 1) & (j <= 22)  # the lines that the constants were held against
     for lines, wanted in ((plain, 0.0288), (counted, 0.0)):
@@ -84,7 +84,7 @@ def test_intensities_of_a_catalogue_are_met_with_vibration_alone(shared):
 
 def test_a_factor_lowers_every_line_alike():
     top = replace(rotor.read("CO2"), dipole_abc_debye=(0.1, 0.0, 0.0))
-    given = Vibrations.parse("667.4x2,1388,2349", harmonic=True)
+    given = VibrationalStates.parse("667.4x2,1388,2349", harmonic=True)
     for plain, counted in (
         (line_list(top, jmax=10).intensity_nm2_mhz, line_list(top, jmax=10, vibrations=given).intensity_nm2_mhz),
         (
@@ -103,7 +103,7 @@ def test_a_factor_lowers_every_line_alike():
     [("667.4x2,1388,2349 cm-1", (667.4, 1388, 2349), (2, 1, 1)), ("100", (100,), (1,)), ("3×2 THz, 10 cm-1", (100.0692, 10), (2, 1))],
 )  # fmt: skip
 def test_texts(text, energies, degeneracies):
-    given = Vibrations.parse(text)
+    given = VibrationalStates.parse(text)
     assert given.energies_cm == pytest.approx(energies, rel=1e-6)
     assert given.degeneracies == degeneracies
 
@@ -115,12 +115,12 @@ def test_texts(text, energies, degeneracies):
 )  # fmt: skip
 def test_texts_that_mean_nothing(text, said):
     with pytest.raises(ValueError, match=said):
-        Vibrations.parse(text)
+        VibrationalStates.parse(text)
 
 
 def test_contradictions():
     with pytest.raises(ValueError, match="give one of them"):
-        line_list(rotor.read("CO"), jmax=2, vibrational_factor=2.0, vibrations=Vibrations((2143.0,)))
+        line_list(rotor.read("CO"), jmax=2, vibrational_factor=2.0, vibrations=VibrationalStates((2143.0,)))
     with pytest.raises(ValueError, match="above 0 K"):
         vibrational_partition_function([100.0], [1], 0.0)
     with pytest.raises(ValueError, match="for each of 2"):

@@ -24,7 +24,7 @@ from rotor.quantum.reliability import warnings_of
 from rotor.quantum.uncertainty import Covariance, level_spread, line_errors
 from rotor.spectra.reach import jmax_for_cut
 from rotor.spectra.transitions import IntensityCut, all_transitions
-from rotor.thermo import PartitionFunction, Vibrations, partition_function
+from rotor.thermo import PartitionFunction, VibrationalStates, partition_function
 
 if TYPE_CHECKING:
     from rotor.top import Top
@@ -216,7 +216,7 @@ def line_list(
     range_mhz: tuple[float, float] = (0.0, math.inf),
     q: float | None = None,
     vibrational_factor: float = 1.0,
-    vibrations: Vibrations | None = None,
+    vibrations: VibrationalStates | None = None,
     covariance: Covariance | None = None,
     sort: bool = True,
     executor: Executor | None = None,
@@ -277,7 +277,7 @@ def _dipole_of(top: Top) -> tuple[float, float, float]:
 
 
 def partition_of(
-    top: Top, temperature_k: float, q: float | None, vibrational_factor: float, vibrations: Vibrations | None
+    top: Top, temperature_k: float, q: float | None, vibrational_factor: float, vibrations: VibrationalStates | None
 ) -> PartitionFunction | None:
     """Q as the user gave it, or the summed one times a vibrational factor; None where it is to be summed as it is."""
     if vibrations is not None:

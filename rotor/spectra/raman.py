@@ -27,7 +27,7 @@ from rotor.quantum.reliability import warnings_of
 from rotor.spectra.lines import partition_of, quanta_names
 from rotor.spectra.raman_strengths import RamanTransitions, anisotropy_squared, raman_transitions
 from rotor.spectra.reach import JMAX_DEFAULT_LIMIT
-from rotor.thermo import PartitionFunction, Vibrations, partition_function
+from rotor.thermo import PartitionFunction, VibrationalStates, partition_function
 
 if TYPE_CHECKING:
     from rotor.top import Tensor, Top
@@ -163,7 +163,7 @@ def raman_lines(
     jmax: int | None = None,
     min_relative: float | None = DEFAULT_MIN_RELATIVE,
     q: float | None = None,
-    vibrations: Vibrations | None = None,
+    vibrations: VibrationalStates | None = None,
     executor: Executor | None = None,
 ) -> RamanLines:
     """Rotational Raman lines of a top: every transition that its polarizability allows, cut only where you say.
@@ -182,7 +182,7 @@ def raman_lines(
         Cross section, of that of the strongest line, below which lines are left out; None for none left out.
     q : float, optional
         Partition function to use instead of the summed one, spin weights reduced by their common divisor.
-    vibrations : Vibrations, optional
+    vibrations : VibrationalStates, optional
         States or fundamentals whose factor multiplies Q.
     executor : Executor, optional
         J are spread over it.
