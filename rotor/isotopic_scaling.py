@@ -124,19 +124,23 @@ def _ratio_text(ratios: Floats, axes: str) -> str:
 
 
 def _in_order(values: Floats, turned: Top) -> tuple[Floats, Top]:
-    """Values falling, with frame and dipole of the top put into the same order: near a symmetric top the names change."""
+    """Values falling, with frame and tensors of the top put into the same order: near a symmetric top the names change."""
     order = np.argsort(-values, kind="stable")
     if turned.kind != "asymmetric" or (order == np.arange(3)).all():
         return values, turned
     assert turned.frame is not None  # a top of a geometry has one
     axes = turned.frame.axes[order]
     axes = axes * np.array([[1.0], [1.0], [np.sign(np.linalg.det(axes))]])
-    dipole = turned.dipole_abc_debye
-    moved = None if dipole is None else axes @ turned.frame.axes.T @ np.array(dipole)
+    change = axes @ turned.frame.axes.T
     frame = PrincipalFrame(turned.frame.moments[order], axes, turned.frame.centre)
     note = "the scaled constants have another order than the calculated ones: the axes are named by the scaled ones"
     told = replace(turned, frame=frame, notes=(*turned.notes, note))
-    return values[order], told if moved is None else replace(told, dipole_abc_debye=(moved[0], moved[1], moved[2]))
+    if turned.dipole_abc_debye is not None:
+        told = told.with_dipole(change @ np.array(turned.dipole_abc_debye), turned.dipole_source)
+    if turned.polarizability_abc_angstrom3 is not None:
+        tensor = change @ np.array(turned.polarizability_abc_angstrom3) @ change.T
+        told = told.with_polarizability(tensor, turned.polarizability_source)
+    return values[order], told
 
 
 def _of_kind(values: Floats, kind: str) -> Constants:

@@ -217,6 +217,11 @@ class _Ancestor:
         if dipole is not None and parent.frame is not None:
             vector = np.array(dipole) @ parent.frame.axes
             molecule = replace(molecule, dipole_debye=vector, dipole_source=parent.dipole_source)
+        if parent.polarizability_abc_angstrom3 is not None and parent.frame is not None:
+            axes = parent.frame.axes
+            tensor = axes.T @ np.array(parent.polarizability_abc_angstrom3) @ axes
+            source = parent.polarizability_source
+            molecule = replace(molecule, polarizability_angstrom3=tensor, polarizability_source=source)
         self.parent, self.molecule, self.rigid = parent, molecule, Top.from_molecule(molecule)
 
     def isotopologue(self, numbers: tuple[int, ...]) -> Isotopologue:

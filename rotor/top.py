@@ -1,4 +1,4 @@
-"""A top: inertia, principal axes, rotational constants, kind, dipole and spin weights. The waist of the package.
+"""A top: inertia, principal axes, rotational constants, kind, dipole, polarizability, spin weights. The waist of the package.
 
 A molecule becomes a top here; the quantum and the classical half know tops only. Someone with constants alone starts at
 `Top.from_constants`.
@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from rotor.molecules.symmetry import Symmetry
 
 Floats = NDArray[np.float64]
+Vector = tuple[float, float, float]
+Tensor = tuple[Vector, Vector, Vector]
 
 LINEAR_BELOW = 1e-6  # I_a / I_c below which a geometry is linear
 SYMMETRIC_WITHIN = 1e-3  # of the shortest distance between nuclei: displacements that symmetry may overlook
@@ -108,11 +110,26 @@ def allowed_dipole(dipole: ArrayLike, symmetry: Symmetry) -> Floats:
     return part if np.linalg.norm(vector - part) < 1e-3 else vector
 
 
+def allowed_polarizability(tensor: ArrayLike, symmetry: Symmetry) -> Floats:
+    """The part of a (3, 3) tensor that every operation leaves alike, where the rest is below 0.001 of it; else the whole."""
+    whole = np.asarray(tensor, dtype=float)
+    if symmetry.linear:
+        along = symmetry.axes_abc[0]
+        parallel = along @ whole @ along
+        across = (np.trace(whole) - parallel) / 2
+        part = across * np.eye(3) + (parallel - across) * np.outer(along, along)
+    else:
+        operations = [operation.matrix for operation in (*symmetry.rotations, *symmetry.improper)]
+        part = np.mean([matrix @ whole @ matrix.T for matrix in operations], axis=0)
+    return part if np.linalg.norm(whole - part) < 1e-3 * np.linalg.norm(whole) else whole
+
+
 @dataclass(frozen=True)
 class Top:
     """A rigid or semi-rigid rotor.
 
-    constants: named constants in MHz. dipole_abc_debye: (μa, μb, μc) or None where it is not known. spin_weights:
+    constants: named constants in MHz. dipole_abc_debye: (μa, μb, μc) or None where it is not known.
+    polarizability_abc_angstrom3: the symmetric tensor (3, 3) along a, b, c as rows, in Å³, or None. spin_weights:
     nuclear-spin weights. mass_u: for Doppler widths. frame: principal frame of a geometry, None without one.
     kind_of_top: how the kind was decided. molecule, symmetry: of a geometry. source: where the constants are from.
     independent_errors: whether the uncertainties of the constants may count as uncorrelated; not those of a fit whose
@@ -133,6 +150,8 @@ class Top:
     weights_source: str = ""
     independent_errors: bool = True
     notes: tuple[str, ...] = ()
+    polarizability_abc_angstrom3: Tensor | None = None
+    polarizability_source: str = ""
 
     @classmethod
     def from_constants(
@@ -162,12 +181,13 @@ class Top:
         equal_within: float = EQUAL_MOMENTS,
         symmetry_within: float = SYMMETRIC_WITHIN,
     ) -> Top:
-        """A rigid top from a geometry: principal axes, A, B, C, kind, its dipole turned along, spin weights.
+        """A rigid top from a geometry: principal axes, A, B, C, kind, dipole and polarizability turned along, spin weights.
 
         The symmetry of the nuclei decides the kind where it can (C3v is a symmetric top), the moments where it cannot.
         Nuclear-spin weights follow from it, inversion doublets unresolved and the electronic state totally symmetric;
         `symmetry_within` is its tolerance, relative to the shortest distance. Dipole components that symmetry forbids
-        and that are below 0.001 D are round-off or noise, and left out.
+        and that are below 0.001 D are round-off or noise, and left out; so is what symmetry forbids of a polarizability
+        and is below 0.001 of it.
 
         Raises ValueError for a single atom. Neglected: everything that vibration and centrifugal distortion do, about
         0.3 to 1 % between an equilibrium geometry and measured constants.
@@ -189,7 +209,7 @@ class Top:
         kind = kind_from_moments(frame.moments, linear_below=linear_below, equal_within=equal_within)
         symmetry = symmetry_of(molecule, symmetry_within)
         kind = kind_with_symmetry(kind, symmetry)
-        dipole = molecule.dipole_debye
+        dipole, tensor = molecule.dipole_debye, molecule.polarizability_angstrom3
         return cls(
             constants=constants_of_moments(frame.moments, kind.kind),
             dipole_abc_debye=None if dipole is None else _in_frame(frame, allowed_dipole(dipole, symmetry)),
@@ -204,6 +224,10 @@ class Top:
             dipole_source=molecule.dipole_source,
             weights_source=f"from the permutations of nuclei in {symmetry.point_group}",
             notes=tuple(molecule.notes),
+            polarizability_abc_angstrom3=None
+            if tensor is None
+            else _tensor_in_frame(frame, allowed_polarizability(tensor, symmetry)),
+            polarizability_source="" if tensor is None else molecule.polarizability_source,
         )
 
     @classmethod
@@ -252,6 +276,11 @@ class Top:
         """The same top with another dipole in principal axes."""
         return replace(self, dipole_abc_debye=_three(dipole_abc_debye), dipole_source=source)
 
+    def with_polarizability(self, polarizability_abc_angstrom3: ArrayLike, source: str) -> Top:
+        """The same top with another polarizability (3, 3) in principal axes, Å³."""
+        tensor = symmetric_tensor(polarizability_abc_angstrom3)
+        return replace(self, polarizability_abc_angstrom3=tensor, polarizability_source=source)
+
     def with_estimated_dipole(self, dipole_debye: ArrayLike, source: str) -> Top:
         """The same top with a dipole in the frame of its geometry, of which what symmetry forbids is left out."""
         if self.frame is None or self.symmetry is None:
@@ -285,6 +314,27 @@ def _in_frame(frame: PrincipalFrame, dipole: Floats) -> tuple[float, float, floa
     """Components along a, b, c; those below 1e-6 of the whole are round-off of the frame, and 0."""
     components = frame.axes @ dipole
     return _three(np.where(np.abs(components) < 1e-6 * np.linalg.norm(components), 0.0, components))
+
+
+def _tensor_in_frame(frame: PrincipalFrame, tensor: Floats) -> Tensor:
+    """The tensor in a, b, c; elements below 1e-6 of the whole are round-off of the frame, and 0."""
+    turned = frame.axes @ tensor @ frame.axes.T
+    return symmetric_tensor(np.where(np.abs(turned) < 1e-6 * np.linalg.norm(turned), 0.0, (turned + turned.T) / 2))
+
+
+def symmetric_tensor(tensor: ArrayLike) -> Tensor:
+    """A polarizability as nested tuples, checked: (3, 3), finite, symmetric within 1e-9 of its size.
+
+    >>> symmetric_tensor([[2, 0, 0], [0, 1, 0], [0, 0, 1]])
+    ((2.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    """
+    values = np.asarray(tensor, dtype=float)
+    if values.shape != (3, 3) or not np.isfinite(values).all():
+        raise ValueError(f"a polarizability is a (3, 3) tensor of finite numbers in Å³, not {values.tolist()}")
+    if not np.allclose(values, values.T, rtol=0, atol=1e-9 * float(np.abs(values).max())):
+        raise ValueError(f"a polarizability is a symmetric tensor; this one is not: {values.tolist()}")
+    a, b, c = ((float(x), float(y), float(z)) for x, y, z in values)
+    return a, b, c
 
 
 def _three(vector: ArrayLike | None) -> tuple[float, float, float] | None:

@@ -40,15 +40,30 @@ _FREQUENCY = {"Hz": 1e-6, "kHz": 1e-3, "MHz": 1.0, "GHz": 1e3, "THz": 1e6, "cm-1
 _KINDS: dict[str, dict[str, float]] = {
     "temperature": {"mK": 1e-3, "K": 1.0},  # first, so that K wanted is a temperature, K given also an energy
     "frequency": _FREQUENCY,
-    "length": {"pm": 0.01, "angstrom": 1.0, "Å": 1.0, "nm": 10.0, "bohr": BOHR_RADIUS_ANGSTROM, "m": 1e10},
+    "length": {
+        "pm": 0.01,
+        "angstrom": 1.0,
+        "Å": 1.0,
+        "nm": 10.0,
+        "bohr": BOHR_RADIUS_ANGSTROM,
+        "um": 1e4,
+        "mm": 1e7,
+        "cm": 1e8,
+        "m": 1e10,
+        "km": 1e13,
+    },
     "dipole": {"D": 1.0, "debye": 1.0, "e*angstrom": DEBYE_PER_E_ANGSTROM, "C*m": 1.0 / DEBYE_C_M},
+    "polarizability": {"angstrom3": 1.0, "Å3": 1.0, "bohr3": BOHR_RADIUS_ANGSTROM**3},
     "time": {"fs": 1e-3, "ps": 1.0, "ns": 1e3, "us": 1e6, "s": 1e12},
     "field": {"V/cm": 1e-3, "kV/cm": 1.0, "V/m": 1e-5, "MV/m": 10.0},
     "mass": {"u": 1.0, "amu": 1.0, "Da": 1.0, "kg": 1.0 / ATOMIC_MASS_KG},
     "number": {"": 1.0},
     "pressure": {"Pa": 1e-5, "mbar": 1e-3, "kPa": 1e-2, "bar": 1.0, "Torr": 1.33322368421e-3, "atm": 1.01325},
 }
-_ALIASES = {"cm^-1": "cm-1", "cm⁻¹": "cm-1", "1/cm": "cm-1", "μs": "us", "Debye": "debye", "Angstrom": "angstrom"}
+_ALIASES = {
+    "cm^-1": "cm-1", "cm⁻¹": "cm-1", "1/cm": "cm-1", "μs": "us", "μm": "um", "Debye": "debye", "Angstrom": "angstrom",
+    "Å^3": "Å3", "Å³": "Å3", "angstrom^3": "angstrom3",
+}  # fmt: skip
 _NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(\S.*?)?\s*$")
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import rotor
 from rotor.constants import Constants
 from rotor.formats.library import library_file, library_molecule, names
 from rotor.formats.molecule_file import MoleculeFile, parse_molecule_file, read_molecule_file
@@ -141,3 +142,52 @@ def test_names_find_formulas_as_written_and_words_in_any_case():
     assert library_molecule("Methyl Cyanide").constants.kind == "prolate"
     with pytest.raises(ValueError, match=r"no molecule 'wat' in the library: did you mean water"):
         library_molecule("wat")
+
+
+AXIAL = "constants = { B = 2.0, kind = 'linear', unit = 'cm-1' }\n[polarizability]\nsource = 'x'\n"
+
+
+@pytest.mark.parametrize("numbers", ["mean = 2.0\nanisotropy = 0.6", "parallel = 2.4\nperpendicular = 1.8"])
+def test_axial_polarizability(numbers):
+    tensor = parse_molecule_file(AXIAL + numbers).polarizability_abc_angstrom3
+    assert np.array(tensor) == pytest.approx(np.diag([2.4, 1.8, 1.8]), abs=1e-15)  # one rounding
+
+
+def test_axial_polarizability_of_an_oblate_top_stands_along_c():
+    text = "constants = { B = 5.0, C = 3.0 }\n[polarizability]\nmean = 2.0\nanisotropy = -0.6"
+    assert np.array(parse_molecule_file(text).polarizability_abc_angstrom3) == pytest.approx(np.diag([2.2, 2.2, 1.6]))
+
+
+@pytest.mark.parametrize(
+    ("numbers", "said"),
+    [
+        ("mean = 2.0", "mean and anisotropy"), ("aa = 1.0\nbb = 2.0", "aa, bb and cc are wanted"),
+        ("aa = 1.0\nbb = 2.0\ncc = 1.0\nmean = 2.0", "aa, bb and cc are wanted"), ("mean = '2 D'\nanisotropy = 0.0", "unit 'D'"),
+        ("alpha = 1.0", "unknown key 'alpha'"),
+    ],
+)  # fmt: skip
+def test_polarizability_that_says_too_little_or_too_much(numbers, said):
+    with pytest.raises(ValueError, match=said):
+        parse_molecule_file(AXIAL + numbers)
+
+
+def test_an_asymmetric_top_has_no_figure_axis():
+    with pytest.raises(ValueError, match="no figure axis"):
+        parse_molecule_file("constants = { A = 9.0, B = 5.0, C = 3.0 }\n[polarizability]\nmean = 2.0\nanisotropy = 1.0")
+
+
+def test_polarizability_is_written_and_read_back():
+    text = AXIAL + "aa = 2.5\nbb = 1.5\ncc = 1.25\nab = 0.125"
+    first = parse_molecule_file(text)
+    again = parse_molecule_file(molecule_file_text(first))
+    assert again.polarizability_abc_angstrom3 == first.polarizability_abc_angstrom3 == (
+        (2.5, 0.125, 0.0), (0.125, 1.5, 0.0), (0.0, 0.0, 1.25)
+    )  # fmt: skip
+    assert again.sources["polarizability"] == "x"
+
+
+def test_polarizability_turns_along_with_isotopes():
+    """HDO: the tensor of water in its own axes, turned about c by the angle between the frames; invariants stay."""
+    water, hdo = (np.array(rotor.read("water", isotopes=i).polarizability_abc_angstrom3) for i in (None, "2=2H"))
+    assert np.linalg.eigvalsh(hdo) == pytest.approx(np.linalg.eigvalsh(water), rel=1e-12)  # round-off of a turn
+    assert abs(hdo[0, 1]) == pytest.approx(0.020, abs=0.001)  # ½ (1.528 - 1.468) sin 2·21°

@@ -172,6 +172,8 @@ def _top_as_written(file: MoleculeFile) -> Top:
         source=file.sources.get("constants", ""),
         dipole_source=file.sources.get("dipole", ""),
         weights_source=file.sources.get("spin_weights", ""),
+        polarizability_abc_angstrom3=file.polarizability_abc_angstrom3,
+        polarizability_source=file.sources.get("polarizability", ""),
         independent_errors=len(file.constants.uncertainties) < 2,
     )
 

@@ -21,6 +21,12 @@
     source = "..."
     b = 1.8546
 
+    [polarizability]                    # volume, along a, b, c: aa, bb, cc (ab, ac, bc where not 0); of a symmetric top or
+    unit = "Å3"                         # linear molecule also parallel and perpendicular, or mean and anisotropy, the
+    source = "..."                      # difference of the two
+    mean = 1.45
+    anisotropy = 0.1
+
     [spin_weights]                      # classes of rotor.weights
     source = "..."
     ee = 1
@@ -53,13 +59,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.constants import Constants
-from rotor.inertia import point_masses, principal_frame
+from rotor.inertia import PrincipalFrame, point_masses, principal_frame
 from rotor.molecules.molecule import Molecule
+from rotor.top import Tensor, kind_from_moments
 from rotor.units import parse_quantity
 from rotor.weights import SpinWeights
 
 GEOMETRY_KINDS = ("r0", "rs", "re", "computed")
-_TABLES = ("geometry", "constants", "dipole", "spin_weights", "catalogue")
+_TABLES = ("geometry", "constants", "dipole", "polarizability", "spin_weights", "catalogue")
 _RULES = {"linear": "J", "spherical": "irrep", "prolate": "K", "oblate": "K", "asymmetric": "KaKc"}
 
 Table = dict[str, Any]
@@ -92,6 +99,7 @@ class MoleculeFile:
     spin_weights : nuclear-spin weights; rule "none" where the file has none
     sources : by table, where its numbers are from; single constants may have their own in `constants.sources`
     catalogue : the measured lines that the constants were held against
+    polarizability_abc_angstrom3 : the tensor (3, 3) along a, b, c in Å³
     """
 
     name: str
@@ -104,6 +112,7 @@ class MoleculeFile:
     spin_weights: SpinWeights = field(default_factory=SpinWeights)
     sources: Mapping[str, str] = field(default_factory=dict)
     catalogue: MeasuredLines | None = None
+    polarizability_abc_angstrom3: Tensor | None = None
 
 
 def read_molecule_file(path: str | os.PathLike[str]) -> MoleculeFile:
@@ -139,10 +148,11 @@ def parse_molecule_file(text: str, where: str = "molecule file", default_name: s
     constants = _constants(tables.get("constants"))
     dipole = _dipole(tables.get("dipole"))
     molecule = _molecule(tables.get("geometry"), top.text("name", default_name), dipole, tables.get("dipole"))
+    polarizability = _polarizability(tables.get("polarizability"), constants, molecule)
     return MoleculeFile(
         name=top.text("name", default_name),
         names=top.texts("names"),
-        molecule=molecule,
+        molecule=_with_polarizability(molecule, polarizability, tables.get("polarizability")),
         geometry_kind=tables["geometry"].choice("kind", GEOMETRY_KINDS) if molecule else None,
         vibrational_difference=tables["geometry"].number("vibrational_difference", 0.0) if molecule else None,
         constants=constants,
@@ -150,6 +160,7 @@ def parse_molecule_file(text: str, where: str = "molecule file", default_name: s
         spin_weights=_spin_weights(tables.get("spin_weights"), constants),
         sources={name: table.text("source") for name, table in tables.items() if "source" in table.content},
         catalogue=_catalogue(tables.get("catalogue")),
+        polarizability_abc_angstrom3=polarizability,
     )
 
 
@@ -247,10 +258,21 @@ def _molecule(
         raise ValueError(f"{table.place}, atoms: {reason}") from None
     if dipole is None or dipole_table is None:
         return molecule
+    vector = np.array(dipole) @ _frame_of(molecule).axes
+    return replace(molecule, dipole_debye=vector, dipole_source=dipole_table.text("source"))
 
+
+def _frame_of(molecule: Molecule) -> PrincipalFrame:
     body = point_masses(molecule.masses_u, molecule.positions_angstrom)
-    axes = principal_frame(body, molecule.masses_u, molecule.positions_angstrom).axes
-    return replace(molecule, dipole_debye=np.array(dipole) @ axes, dipole_source=dipole_table.text("source"))
+    return principal_frame(body, molecule.masses_u, molecule.positions_angstrom)
+
+
+def _with_polarizability(molecule: Molecule | None, tensor: Tensor | None, table: _Reader | None) -> Molecule | None:
+    if molecule is None or tensor is None or table is None:
+        return molecule
+    axes = _frame_of(molecule).axes
+    turned = axes.T @ np.array(tensor) @ axes
+    return replace(molecule, polarizability_angstrom3=turned, polarizability_source=table.text("source"))
 
 
 def _atoms(table: _Reader) -> tuple[tuple[str, ...], NDArray[np.float64]]:
@@ -294,6 +316,49 @@ def _dipole(table: _Reader | None) -> tuple[float, float, float] | None:
     unit = table.text("unit", "D")
     a, b, c = (table.quantity(axis, table.content.get(axis, 0.0), unit, "D") for axis in "abc")
     return a, b, c
+
+
+_ELEMENTS = ("aa", "bb", "cc", "ab", "ac", "bc")
+_AXIAL = (("parallel", "perpendicular"), ("mean", "anisotropy"))
+
+
+def _polarizability(table: _Reader | None, constants: Constants | None, molecule: Molecule | None) -> Tensor | None:
+    """The tensor along a, b, c, from its elements or from the two numbers that an axial one has."""
+    if table is None:
+        return None
+    table.refuse_unknown(("unit", "source", *_ELEMENTS, *_AXIAL[0], *_AXIAL[1]))
+    unit = table.text("unit", "Å3")
+    given = [key for key in table.content if key not in ("unit", "source")]
+    values = {key: table.quantity(key, table.content[key], unit, "Å3") for key in given}
+    if tuple(sorted(given)) in (tuple(sorted(pair)) for pair in _AXIAL):
+        return _axial(table, values, _kind(constants, molecule))
+    if not {"aa", "bb", "cc"} <= set(given) <= set(_ELEMENTS):
+        raise ValueError(
+            f"{table.place}: {', '.join(given) or 'nothing'}: aa, bb and cc are wanted (with ab, ac, bc where not 0), "
+            "or parallel and perpendicular, or mean and anisotropy"
+        )
+    aa, bb, cc, ab, ac, bc = (values.get(key, 0.0) for key in _ELEMENTS)
+    return (aa, ab, ac), (ab, bb, bc), (ac, bc, cc)
+
+
+def _axial(table: _Reader, values: Mapping[str, float], kind: str) -> Tensor:
+    """α_parallel along a of a linear or prolate top, along c of an oblate one; mean (α∥ + 2α⊥)/3, anisotropy α∥ - α⊥."""
+    if kind == "asymmetric":
+        raise ValueError(f"{table.place}: an asymmetric top has no figure axis; give aa, bb and cc")
+    if "mean" in values:
+        across = values["mean"] - values["anisotropy"] / 3
+        along = across + values["anisotropy"]
+    else:
+        along, across = values["parallel"], values["perpendicular"]
+    aa, cc = (across, along) if kind == "oblate" else (along, across)
+    return (aa, 0.0, 0.0), (0.0, across, 0.0), (0.0, 0.0, cc)
+
+
+def _kind(constants: Constants | None, molecule: Molecule | None) -> str:
+    if constants is not None:
+        return constants.kind
+    assert molecule is not None  # the reader refuses a file with neither
+    return kind_from_moments(_frame_of(molecule).moments).kind
 
 
 def _spin_weights(table: _Reader | None, constants: Constants | None) -> SpinWeights:

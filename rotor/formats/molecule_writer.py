@@ -17,7 +17,7 @@ def write_molecule_file(molecule: MoleculeFile, path: str | os.PathLike[str]) ->
 
 
 def molecule_file_text(molecule: MoleculeFile) -> str:
-    """The TOML text of a molecule; constants in MHz, dipole in D, positions in Å.
+    """The TOML text of a molecule; constants in MHz, dipole in D, polarizability in Å³, positions in Å.
 
     >>> from rotor.constants import Constants
     >>> print(molecule_file_text(MoleculeFile("hydrogen chloride", constants=Constants(B=312989.0))))
@@ -34,6 +34,7 @@ def molecule_file_text(molecule: MoleculeFile) -> str:
         "geometry": _geometry(molecule),
         "constants": _constants(molecule),
         "dipole": _dipole(molecule),
+        "polarizability": _polarizability(molecule),
         "spin_weights": molecule.spin_weights.to_mapping(),
         "catalogue": _catalogue(molecule),
     }
@@ -80,6 +81,15 @@ def _dipole(molecule: MoleculeFile) -> dict[str, Any]:
     if molecule.dipole_abc_debye is None:
         return {}
     return {"unit": "D", **dict(zip("abc", molecule.dipole_abc_debye, strict=True))}
+
+
+def _polarizability(molecule: MoleculeFile) -> dict[str, Any]:
+    """The elements of the tensor; those off the diagonal only where they are not 0."""
+    if molecule.polarizability_abc_angstrom3 is None:
+        return {}
+    (aa, ab, ac), (_, bb, bc), (_, _, cc) = molecule.polarizability_abc_angstrom3
+    mixed = {name: value for name, value in (("ab", ab), ("ac", ac), ("bc", bc)) if value}
+    return {"unit": "Å3", "aa": aa, "bb": bb, "cc": cc, **mixed}
 
 
 def _catalogue(molecule: MoleculeFile) -> dict[str, Any]:

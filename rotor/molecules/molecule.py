@@ -36,6 +36,7 @@ class Molecule:
         refers to its centre of mass. None: not known
     dipole_source : where the dipole is from
     polarizability_angstrom3 : (3, 3) symmetric array in the same frame, polarizability volume in Å³. None: not known
+    polarizability_source : where the polarizability is from
     name, source : what it is called, where the geometry is from
     uncertainty : typical relative error of the rotational constants that follow from the geometry. None: not known
     notes : what a user must be told
@@ -57,6 +58,7 @@ class Molecule:
     dipole_debye: Floats | None = None
     dipole_source: str = ""
     polarizability_angstrom3: Floats | None = None
+    polarizability_source: str = ""
     name: str = ""
     source: str = ""
     uncertainty: float | None = None

@@ -24,7 +24,7 @@ from rotor.quantum.reliability import warnings_of
 from rotor.quantum.uncertainty import Covariance, level_spread, line_errors
 from rotor.spectra.reach import jmax_for_cut
 from rotor.spectra.transitions import IntensityCut, all_transitions
-from rotor.thermo import PartitionFunction, partition_function
+from rotor.thermo import PartitionFunction, VibrationalStates, partition_function
 
 if TYPE_CHECKING:
     from rotor.top import Top
@@ -216,6 +216,7 @@ def line_list(
     range_mhz: tuple[float, float] = (0.0, math.inf),
     q: float | None = None,
     vibrational_factor: float = 1.0,
+    vibrations: VibrationalStates | None = None,
     covariance: Covariance | None = None,
     sort: bool = True,
     executor: Executor | None = None,
@@ -225,7 +226,8 @@ def line_list(
     temperature_k: for intensities. jmax: the highest J; by default the one beyond which no line can reach
     `min_lgint`. min_lgint: log10 of nm² MHz below which lines are left out, None for none left out. range_mhz: first
     and last frequency. q: partition function to use instead of the summed one, spin weights reduced by their common
-    divisor. vibrational_factor: multiplies the summed Q. covariance: of the constants, for the errors of frequencies;
+    divisor. vibrational_factor: multiplies Q. vibrations: states or fundamentals whose factor at this temperature multiplies
+    Q instead. covariance: of the constants, for the errors of frequencies;
     by default the uncertainties that the constants carry, uncorrelated, but not those of a fit whose correlations are
     unknown (the library's): they would make errors many times too large. executor: J are spread over it.
 
@@ -241,7 +243,7 @@ def line_list(
         raise ValueError(f"temperature {temperature_k} K: a temperature is above 0 K")
     dipole = _dipole_of(top)
     least = -math.inf if min_lgint is None else min_lgint
-    given = _given_partition(top, temperature_k, q, vibrational_factor)
+    given = partition_of(top, temperature_k, q, vibrational_factor, vibrations)
     if given is None and (jmax is None or math.isfinite(least)):
         given = partition_function(top, temperature_k)
     if jmax is None:
@@ -274,19 +276,25 @@ def _dipole_of(top: Top) -> tuple[float, float, float]:
     return top.dipole_abc_debye
 
 
-def _given_partition(
-    top: Top, temperature_k: float, q: float | None, vibrational_factor: float
+def partition_of(
+    top: Top, temperature_k: float, q: float | None, vibrational_factor: float, vibrations: VibrationalStates | None
 ) -> PartitionFunction | None:
     """Q as the user gave it, or the summed one times a vibrational factor; None where it is to be summed as it is."""
+    if vibrations is not None:
+        if vibrational_factor != 1.0:
+            raise ValueError(f"vibrational factor {vibrational_factor:g} and vibrational energies: give one of them")
+        vibrational_factor = vibrations.factor(temperature_k)
+    named = f"a vibrational factor of {vibrational_factor:.6g}" + (f" ({vibrations.text})" if vibrations else "")
     for name, value in (("Q", q), ("vibrational factor", vibrational_factor)):
         if value is not None and not (math.isfinite(value) and value > 0):
             raise ValueError(f"{name} = {value}: a finite number above 0 is wanted")
     if q is not None:
-        return PartitionFunction(temperature_k, q * vibrational_factor, None, math.nan, "given")
+        source = "given" if vibrational_factor == 1.0 else f"given, times {named}"
+        return PartitionFunction(temperature_k, q * vibrational_factor, None, math.nan, source)
     if vibrational_factor == 1.0:
         return None
     summed = partition_function(top, temperature_k)
-    source = f"{summed.source}, times a vibrational factor of {vibrational_factor:g}"
+    source = f"{summed.source}, times {named}"
     return replace(summed, q=summed.q * vibrational_factor, source=source)
 
 

@@ -1,0 +1,294 @@
+"""Rotational Raman lines: Stokes and anti-Stokes shifts of every allowed transition, and their cross sections.
+
+    dσ/dΩ = (7/45) (2π ν_s)⁴ S (g_I/Q) exp(-E_i/kT),     ν_s = ν_laser - shift, in cm⁻¹
+
+is the power scattered by one line per molecule, steradian and unit of irradiance, in cm²/sr: laser polarised linearly,
+observed at right angles to its polarisation (backscattering among them), both polarisations of the scattered light
+together; 4/7 of it keeps the laser's polarisation, 3/7 is turned. It follows from the invariant γ² of randomly oriented
+molecules, (45 a² + 4 γ²)/45 and 3 γ²/45 (D. A. Long, The Raman Effect, 2002, chapter 5; C. M. Penney, R. L. St. Peters and
+M. Lapp, J. Opt. Soc. Am. 64, 712 (1974), who measured it for N2, O2 and CO2). S is that of `raman_strengths`, its sum over
+final states (2J+1) γ². A count of photons goes with ν_laser ν_s³ instead of ν_s⁴.
+"""
+
+from __future__ import annotations
+
+import math
+from concurrent.futures import Executor
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor import units
+from rotor.quantum.levels import Levels, solve_levels
+from rotor.quantum.reliability import warnings_of
+from rotor.spectra.lines import partition_of, quanta_names
+from rotor.spectra.raman_strengths import RamanTransitions, anisotropy_squared, raman_transitions
+from rotor.spectra.reach import JMAX_DEFAULT_LIMIT
+from rotor.thermo import PartitionFunction, VibrationalStates, partition_function
+
+if TYPE_CHECKING:
+    from rotor.top import Tensor, Top
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+ANGSTROM6_IN_CM6 = 1e-48
+NM_PER_CM = 1e7
+DEFAULT_LASER_NM = 532.0
+DEFAULT_MIN_RELATIVE = 1e-6
+
+
+@dataclass(frozen=True)
+class RamanLines:
+    """Raman lines as columns of equal length, rising in shift.
+
+    shift_mhz: (n,) of the laser's frequency above that of the scattered light, Stokes lines positive, anti-Stokes ones
+    negative. strength_angstrom6: (n,) S over all components, the same for both directions. initial, final: (n,) rows of
+    `levels`. laser_nm: wavelength in vacuum. min_relative: cross section, of the strongest line, below which lines were
+    left out. All other columns are computed when asked for.
+    """
+
+    top: Top
+    levels: Levels
+    shift_mhz: Floats
+    strength_angstrom6: Floats
+    initial: Ints
+    final: Ints
+    temperature_k: float
+    laser_nm: float
+    min_relative: float
+    partition: PartitionFunction
+
+    def __len__(self) -> int:
+        return len(self.shift_mhz)
+
+    @property
+    def jmax(self) -> int:
+        """The highest J of a level in the list's making."""
+        return self.levels.jmax
+
+    @property
+    def shift_cm(self) -> Floats:
+        """Raman shift in cm⁻¹, Stokes lines positive."""
+        return self.shift_mhz / units.MHZ_PER_CM
+
+    @property
+    def scattered_cm(self) -> Floats:
+        """Wavenumber of the scattered light, cm⁻¹."""
+        return NM_PER_CM / self.laser_nm - self.shift_cm
+
+    @property
+    def wavelength_nm(self) -> Floats:
+        """Wavelength of the scattered light in vacuum, nm."""
+        return NM_PER_CM / self.scattered_cm
+
+    @property
+    def energy_initial_cm(self) -> Floats:
+        """Energy of the initial state in cm⁻¹ above the lowest level that exists."""
+        return (self.levels.energy_mhz[self.initial] - self.levels.ground_mhz) / units.MHZ_PER_CM
+
+    @property
+    def g_initial(self) -> Ints:
+        """Degeneracy of the initial state with its spin weight, over all its components."""
+        return self.levels.degeneracy[self.initial]
+
+    @property
+    def cross_section_cm2_per_sr(self) -> Floats:
+        """Differential cross section dσ/dΩ of every line, cm²/sr per molecule of the gas."""
+        energy_k = (self.levels.energy_mhz[self.initial] - self.levels.ground_mhz) / units.MHZ_PER_K
+        population = self._weight * np.exp(-energy_k / self.temperature_k) / self.partition.q
+        photon = (2 * math.pi * self.scattered_cm) ** 4
+        return 7 / 45 * photon * self.strength_angstrom6 * ANGSTROM6_IN_CM6 * population
+
+    @property
+    def _weight(self) -> Floats:
+        """Spin weight of one component: that of whichever state has fewer, since a pair of ±K may hold two weights."""
+        levels, i, f = self.levels, self.initial, self.final
+        each = levels.weight / levels.components
+        return np.where(levels.components[i] <= levels.components[f], each[i], each[f])
+
+    @cached_property
+    def warnings(self) -> tuple[str, ...]:
+        """What a user must be told about the levels behind the lines."""
+        return warnings_of(self.top, self.levels)
+
+    @property
+    def quanta_names(self) -> tuple[str, ...]:
+        """Which quantum numbers label a state: J; J, K; or J, Ka, Kc."""
+        return quanta_names(self.levels)
+
+    def quanta(self, rows: Ints) -> Ints:
+        """Quantum numbers (n, 1 to 3) of the states `rows` (`lines.initial` or `lines.final`)."""
+        columns = (self.levels.j, self.levels.ka, self.levels.kc)[: len(self.quanta_names)]
+        return np.stack([column[rows] for column in columns], axis=1)
+
+    def where(self, chosen: NDArray[Any] | slice) -> RamanLines:
+        """The lines that a slice, a boolean mask or an array of indices chooses, in its order."""
+        names = ("shift_mhz", "strength_angstrom6", "initial", "final")
+        return replace(self, **{name: getattr(self, name)[chosen] for name in names})
+
+    @cached_property
+    def columns(self) -> dict[str, NDArray[Any]]:
+        """Every column by its name with unit, quantum numbers last (j_initial, ..., kc_final)."""
+        names = (
+            "shift_cm", "cross_section_cm2_per_sr", "wavelength_nm", "energy_initial_cm", "g_initial", "strength_angstrom6",
+        )  # fmt: skip
+        out: dict[str, NDArray[Any]] = {name: getattr(self, name) for name in names}
+        for suffix, rows in (("initial", self.initial), ("final", self.final)):
+            for name, column in zip(self.quanta_names, self.quanta(rows).T, strict=True):
+                out[f"{name}_{suffix}"] = column
+        return out
+
+    def to_pandas(self) -> Any:
+        """All columns as a pandas DataFrame."""
+        import pandas as pd
+
+        return pd.DataFrame(self.columns)
+
+    def to_polars(self) -> Any:
+        """All columns as a polars DataFrame."""
+        import polars as pl
+
+        return pl.DataFrame(self.columns)
+
+
+def raman_lines(
+    top: Top,
+    *,
+    temperature_k: float = 300.0,
+    laser_nm: float = DEFAULT_LASER_NM,
+    jmax: int | None = None,
+    min_relative: float | None = DEFAULT_MIN_RELATIVE,
+    q: float | None = None,
+    vibrations: VibrationalStates | None = None,
+    executor: Executor | None = None,
+) -> RamanLines:
+    """Rotational Raman lines of a top: every transition that its polarizability allows, cut only where you say.
+
+    Parameters
+    ----------
+    top : Top
+        With `polarizability_abc_angstrom3`, as it is at the wavelength of the laser.
+    temperature_k : float
+        Of the gas.
+    laser_nm : float
+        Wavelength in vacuum.
+    jmax : int, optional
+        The highest J; by default the one beyond which no line can reach `min_relative`.
+    min_relative : float, optional
+        Cross section, of that of the strongest line, below which lines are left out; None for none left out.
+    q : float, optional
+        Partition function to use instead of the summed one, spin weights reduced by their common divisor.
+    vibrations : VibrationalStates, optional
+        States or fundamentals whose factor multiplies Q.
+    executor : Executor, optional
+        J are spread over it.
+
+    Raises
+    ------
+    ValueError
+        No polarizability; a temperature or wavelength not above 0; a cut not between 0 and 1; a J max below 0.
+
+    Neglected: the dependence of the polarizability on J (0.2 % per J of H2, less of all others) and on the wavelength,
+    lines of vibrational states, electron spin (the lines of O2 are triplets, resolved at 0.1 cm⁻¹ only for the lowest N).
+
+    >>> from rotor.top import Top
+    >>> rod = Top.from_constants("B=2 cm-1", polarizability_abc_angstrom3=((2.2, 0, 0), (0, 1.5, 0), (0, 0, 1.5)))
+    >>> raman_lines(rod, jmax=3).shift_cm.round(6).tolist()  # 4B(J + 3/2) = 12, 20
+    [-20.0, -12.0, 12.0, 20.0]
+    """
+    _refuse_nonsense(temperature_k, laser_nm, min_relative)
+    tensor, least = _tensor_of(top), min_relative or 0.0
+    if jmax is None:
+        jmax = jmax_for_raman(top, temperature_k, min_relative or DEFAULT_MIN_RELATIVE)
+
+    levels = solve_levels(top, jmax, executor=executor)
+    found = raman_transitions(levels, tensor)
+    partition = partition_of(top, temperature_k, q, 1.0, vibrations) or partition_function(top, temperature_k)
+    lines = _both_ways(top, levels, found, temperature_k, laser_nm, least, partition)
+    lines = lines.where(lines.scattered_cm > 0)
+    if len(lines) and least:
+        section = lines.cross_section_cm2_per_sr
+        lines = lines.where(section >= least * section.max())
+    return lines.where(np.argsort(lines.shift_mhz, kind="stable"))
+
+
+def _tensor_of(top: Top) -> Tensor:
+    """The polarizability; of a spherical top, whose is isotropic, no more has to be known."""
+    if top.polarizability_abc_angstrom3 is not None:
+        return top.polarizability_abc_angstrom3
+    if top.kind == "spherical":
+        none = (0.0, 0.0, 0.0)
+        return none, none, none
+    raise ValueError(f"the polarizability of {top.name or 'this top'} is not known; give one, in principal axes")
+
+
+def _refuse_nonsense(temperature_k: float, laser_nm: float, min_relative: float | None) -> None:
+    if not (math.isfinite(temperature_k) and temperature_k > 0):
+        raise ValueError(f"temperature {temperature_k} K: a temperature is above 0 K")
+    if not (math.isfinite(laser_nm) and laser_nm > 0):
+        raise ValueError(f"laser wavelength {laser_nm} nm: a finite number above 0 is wanted")
+    if min_relative is not None and not 0 < min_relative < 1:
+        raise ValueError(f"cut {min_relative} of the strongest line: a number between 0 and 1 is wanted, or None")
+
+
+def _both_ways(
+    top: Top,
+    levels: Levels,
+    found: RamanTransitions,
+    temperature_k: float,
+    laser_nm: float,
+    least: float,
+    partition: PartitionFunction,
+) -> RamanLines:
+    """A Stokes line from the lower state of each pair and an anti-Stokes line from the upper one."""
+    shift = levels.energy_mhz[found.upper] - levels.energy_mhz[found.lower]
+    return RamanLines(
+        top=top,
+        levels=levels,
+        shift_mhz=np.concatenate([shift, -shift]),
+        strength_angstrom6=np.tile(found.strength_angstrom6, 2),
+        initial=np.concatenate([found.lower, found.upper]),
+        final=np.concatenate([found.upper, found.lower]),
+        temperature_k=temperature_k,
+        laser_nm=laser_nm,
+        min_relative=least,
+        partition=partition,
+    )
+
+
+def band_cross_section(lines: RamanLines) -> float:
+    """dσ/dΩ summed over all lines, Stokes and anti-Stokes, cm²/sr.
+
+    For many levels it tends to (3/4) (7/45) (2π ν)⁴ γ² for a linear molecule, the other quarter being Rayleigh's.
+    """
+    return float(lines.cross_section_cm2_per_sr.sum())
+
+
+def jmax_for_raman(top: Top, temperature_k: float, min_relative: float) -> int:
+    """The J beyond which every line of a rigid top is weaker than `min_relative` of the strongest.
+
+    A line from J has S ≤ (2J+1) γ² and an energy above C J(J+1); the strongest has at least 0.05 (2J+1) γ² of the most
+    populated level of energy below A J(J+1). Raises ValueError where more than J = 600 would be needed.
+    """
+    a, _, c = top.rotational_constants_mhz
+    kt_mhz, heaviest = temperature_k * units.MHZ_PER_K, max(top.spin_weights.values)
+    a = top.rotational_constants_mhz[1] if math.isinf(a) else a
+    populated = max(1.0, math.sqrt(kt_mhz / (2 * a)) * math.exp(-0.5))
+    j = 2
+    while heaviest * (2 * j + 1) * math.exp(-c * j * (j - 3) / kt_mhz) > 0.05 * min_relative * populated:
+        j += 1
+        if j > JMAX_DEFAULT_LIMIT:
+            raise ValueError(
+                f"Raman lines above {min_relative:g} of the strongest at {temperature_k:g} K reach beyond J = "
+                f"{JMAX_DEFAULT_LIMIT}; give J max yourself, a lower temperature or a higher cut"
+            )
+    return j
+
+
+def anisotropy_angstrom3(top: Top) -> float:
+    """γ of a top's polarizability in Å³, |α∥ - α⊥| of an axial one, 0 of a spherical top; ValueError if it is not known."""
+    return math.sqrt(anisotropy_squared(_tensor_of(top)))
