@@ -121,7 +121,8 @@ def test_quadratic_form_is_found_and_refused():
 
 
 @pytest.mark.parametrize(
-    ("values", "dimension"), [([0.1, 0.0, -0.5], 2.2), ([-1.0, -2.0], 0.0), ([1.0, -1.0], 2.0), ([0.0, -1.0, -2.0], 1.0)]
+    ("values", "dimension"),
+    [([0.1, 0.0, -0.5], 2.2), ([-1.0, -2.0], 0.0), ([1.0, -1.0], 2.0), ([0.0, -1.0, -2.0], 1.0)],
 )
 def test_kaplan_yorke(values, dimension):
     assert kaplan_yorke(values) == pytest.approx(dimension)
