@@ -7,7 +7,7 @@ import os
 import zlib
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -82,7 +82,8 @@ def _wide_rows(rows: Text, columns: Columns, layout: Layout, fill: Callable[...,
         index = np.flatnonzero(chosen & ~plain)
         if len(index):
             text = np.empty((len(index), rows.shape[1]), dtype=np.uint8)
-            part = _capped(Columns(*(column[index] for column in columns)), layout.decimals)
+            chosen_columns: list[Any] = [column[index] for column in columns]
+            part = _capped(Columns(*chosen_columns), layout.decimals)
             plain[index] = _plain_rows(text, part, replace(layout, decimals=decimals), fill)
             rows[index] = text
 
