@@ -30,6 +30,9 @@ DEBYE_PER_E_ANGSTROM = ELEMENTARY_CHARGE_C * 1e-10 / DEBYE_C_M  # 4.80320...
 # the set of ASE, in which molecules move classically: eV, Å, u, and what follows from them
 CLASSICAL_TIME_PS = 1e2 * math.sqrt(ATOMIC_MASS_KG / ELEMENTARY_CHARGE_C)  # 1 Å √(u/eV) in ps: 0.01018...
 HBAR_CLASSICAL = PLANCK_J_S / (2 * math.pi * 1e-10 * math.sqrt(ATOMIC_MASS_KG * ELEMENTARY_CHARGE_C))  # in Å √(u eV)
+NM2_MHZ_PER_CM = (
+    SPEED_OF_LIGHT_M_PER_S * 1e10
+)  # integrated absorption of 1 cm/molecule in nm² MHz: c in cm/s times 1e8, exact
 EV_PER_K = BOLTZMANN_J_PER_K / ELEMENTARY_CHARGE_C  # exact ratio
 CM_PER_EV = ELEMENTARY_CHARGE_C / PLANCK_J_S * 1e-6 / MHZ_PER_CM  # 1 eV in cm^-1, exact ratio: 8065.54...
 

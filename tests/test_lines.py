@@ -181,7 +181,7 @@ def test_tables_have_every_column():
     lines = line_list(Top.from_constants(ABC, dipole_abc_debye=(1.2, 0, 0)), jmax=3)
     frame = lines.to_pandas()
     assert list(frame.columns) == [
-        "frequency_mhz", "lgint", "energy_lower_cm", "g_upper", "einstein_a_per_s", "strength_debye2",
+        "frequency_mhz", "lgint", "energy_lower_cm", "g_upper", "einstein_a_per_s", "strength_debye2", "intensity_cm_per_molecule",
         "j_upper", "ka_upper", "kc_upper", "j_lower", "ka_lower", "kc_lower",
     ]  # fmt: skip
     assert lines.to_polars().shape == frame.shape

@@ -27,7 +27,6 @@ from rotor.spectra.lines import Lines
 
 LENGTH = 160
 TEMPERATURE_K = 296.0
-NM2_MHZ_PER_CM = units.SPEED_OF_LIGHT_M_PER_S * 1e10  # nm² MHz in a cm/molecule
 _ISOTOPOLOGUES = "1234567890ABCDEFGHIJKLMNOPQRSTUVWXYZ"  # 0 is the tenth, A the eleventh
 
 
@@ -125,12 +124,12 @@ def cm_per_molecule(intensity_nm2_mhz: ArrayLike) -> NDArray[np.float64]:
     >>> float(cm_per_molecule(2.99792458e-2))
     1e-20
     """
-    return np.asarray(intensity_nm2_mhz, dtype=float) / NM2_MHZ_PER_CM
+    return np.asarray(intensity_nm2_mhz, dtype=float) / units.NM2_MHZ_PER_CM
 
 
 def nm2_mhz(intensity_cm_per_molecule: ArrayLike) -> NDArray[np.float64]:
     """An integrated intensity in nm² MHz, (n,), from cm/molecule, (n,); the inverse of `cm_per_molecule`."""
-    return np.asarray(intensity_cm_per_molecule, dtype=float) * NM2_MHZ_PER_CM
+    return np.asarray(intensity_cm_per_molecule, dtype=float) * units.NM2_MHZ_PER_CM
 
 
 def read_hitran(source: str | os.PathLike[str] | bytes) -> HitranLines:

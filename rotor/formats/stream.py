@@ -240,6 +240,7 @@ def _columns(plan: _Plan, lines: Lines) -> dict[str, Any]:
         "g_upper": lines.g_upper,
         "einstein_a_per_s": lines.einstein_a_per_s,
         "strength_debye2": lines.strength_debye2,
+        "intensity_cm_per_molecule": lines.intensity_cm_per_molecule * math.exp(-offset_k / plan.temperature_k),
     } | _quanta(lines)
 
 

@@ -210,7 +210,8 @@ def _shape_text(spectrum: Spectrum) -> str:
 
 
 def _ordinate(spectrum: Spectrum) -> str:
-    return "Absorption cross section (nm²)" if spectrum.unit == "nm^2" else f"Intensity ({spectrum.unit})"
+    names = {"nm^2": "Absorption cross section (nm²)", "optical depth": "Optical depth"}
+    return names.get(spectrum.unit, f"Intensity ({spectrum.unit})")
 
 
 def _title(thing: Lines | Spectrum, lines: Lines | None) -> str:

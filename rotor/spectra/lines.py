@@ -130,6 +130,11 @@ class Lines:
         return scaled * np.exp(-lower_k / self.temperature_k) * -np.expm1(-photon_k / self.temperature_k)
 
     @property
+    def intensity_cm_per_molecule(self) -> Floats:
+        """Integrated absorption I(T) in cm/molecule, the unit of infrared lists: cm² times the wavenumber in cm⁻¹."""
+        return self.intensity_nm2_mhz / units.NM2_MHZ_PER_CM
+
+    @property
     def lgint(self) -> Floats:
         """log10 of I(T) in nm² MHz."""
         with np.errstate(divide="ignore"):  # a line of zero strength is -inf, as it should be
@@ -178,7 +183,10 @@ class Lines:
 
         `error_mhz` is among them where the uncertainty of a constant is known.
         """
-        names = ("frequency_mhz", "lgint", "energy_lower_cm", "g_upper", "einstein_a_per_s", "strength_debye2")
+        names = (
+            "frequency_mhz", "lgint", "energy_lower_cm", "g_upper", "einstein_a_per_s", "strength_debye2",
+            "intensity_cm_per_molecule",
+        )  # fmt: skip
         out: dict[str, NDArray[Any]] = {name: getattr(self, name) for name in names}
         if (error := self.error_mhz) is not None:
             out = {"frequency_mhz": out["frequency_mhz"], "error_mhz": error} | out

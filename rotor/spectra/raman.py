@@ -47,8 +47,8 @@ class RamanLines:
 
     shift_mhz: (n,) of the laser's frequency above that of the scattered light, Stokes lines positive, anti-Stokes ones
     negative. strength_angstrom6: (n,) S over all components, the same for both directions. initial, final: (n,) rows of
-    `levels`. laser_nm: wavelength in vacuum. min_relative: cross section, of the strongest line, below which lines were
-    left out. All other columns are computed when asked for.
+    `levels`. weight: (n,) spin weight of one component. laser_nm: wavelength in vacuum. min_relative: cross section, of
+    the strongest line, below which lines were left out. All other columns are computed when asked for.
     """
 
     top: Top
@@ -57,6 +57,7 @@ class RamanLines:
     strength_angstrom6: Floats
     initial: Ints
     final: Ints
+    weight: Floats
     temperature_k: float
     laser_nm: float
     min_relative: float
@@ -99,16 +100,9 @@ class RamanLines:
     def cross_section_cm2_per_sr(self) -> Floats:
         """Differential cross section dσ/dΩ of every line, cm²/sr per molecule of the gas."""
         energy_k = (self.levels.energy_mhz[self.initial] - self.levels.ground_mhz) / units.MHZ_PER_K
-        population = self._weight * np.exp(-energy_k / self.temperature_k) / self.partition.q
+        population = self.weight * np.exp(-energy_k / self.temperature_k) / self.partition.q
         photon = (2 * math.pi * self.scattered_cm) ** 4
         return 7 / 45 * photon * self.strength_angstrom6 * ANGSTROM6_IN_CM6 * population
-
-    @property
-    def _weight(self) -> Floats:
-        """Spin weight of one component: that of whichever state has fewer, since a pair of ±K may hold two weights."""
-        levels, i, f = self.levels, self.initial, self.final
-        each = levels.weight / levels.components
-        return np.where(levels.components[i] <= levels.components[f], each[i], each[f])
 
     @cached_property
     def warnings(self) -> tuple[str, ...]:
@@ -127,7 +121,7 @@ class RamanLines:
 
     def where(self, chosen: NDArray[Any] | slice) -> RamanLines:
         """The lines that a slice, a boolean mask or an array of indices chooses, in its order."""
-        names = ("shift_mhz", "strength_angstrom6", "initial", "final")
+        names = ("shift_mhz", "strength_angstrom6", "initial", "final", "weight")
         return replace(self, **{name: getattr(self, name)[chosen] for name in names})
 
     @cached_property
@@ -206,7 +200,7 @@ def raman_lines(
         jmax = jmax_for_raman(top, temperature_k, min_relative or DEFAULT_MIN_RELATIVE)
 
     levels = solve_levels(top, jmax, executor=executor)
-    found = raman_transitions(levels, tensor)
+    found = raman_transitions(levels, tensor, top.spin_weights)
     partition = partition_of(top, temperature_k, q, 1.0, vibrations) or partition_function(top, temperature_k)
     lines = _both_ways(top, levels, found, temperature_k, laser_nm, least, partition)
     lines = lines.where(lines.scattered_cm > 0)
@@ -253,6 +247,7 @@ def _both_ways(
         strength_angstrom6=np.tile(found.strength_angstrom6, 2),
         initial=np.concatenate([found.lower, found.upper]),
         final=np.concatenate([found.upper, found.lower]),
+        weight=np.tile(found.weight, 2),
         temperature_k=temperature_k,
         laser_nm=laser_nm,
         min_relative=least,

@@ -14,30 +14,36 @@ The diagonal elements and each of α_xy, α_xz, α_yz connect different pairs of
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rotor.quantum.basis import REPRESENTATIONS
+from rotor.quantum.basis import REPRESENTATIONS, wang_blocks
 from rotor.quantum.levels import Levels, SolvedBlock
+from rotor.weights import SpinWeights
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Parts = dict[int, float]  # α_2q by q, up to a common phase
 
-ROUND_OFF = 1e-6  # of γ: components of a symmetric top's tensor below it are no more than the rounding of a frame
+NO_WEIGHTS = SpinWeights()
+ROUND_OFF = 1e-6  # of a tensor: what differs less from an axial or an isotropic one is the rounding of a frame
 _MIXED = {"oe": "ab", "oo": "ac", "eo": "bc"}  # parities of (ΔKa, ΔKc) -> element off the diagonal
 
 
 @dataclass(frozen=True)
 class RamanTransitions:
-    """Columns (n,): S in Å⁶ over all components, and rows of the two states in the levels, the lower in energy first."""
+    """Columns (n,): S in Å⁶ over all components, rows of the two states in the levels, the lower in energy first.
+
+    weight: spin weight of one component, its mean by strength where components of different weight make the line.
+    """
 
     strength_angstrom6: Floats
     lower: Ints
     upper: Ints
+    weight: Floats
 
 
 def anisotropy_squared(polarizability: ArrayLike) -> float:
@@ -96,42 +102,52 @@ def _level(j: int, k: Floats, q: int) -> tuple[Floats, Floats]:
     return np.ones_like(k), 3 * (j - k) * (j - k - 1) * (j + k + 1) * (j + k + 2)
 
 
-def raman_transitions(levels: Levels, polarizability_abc: ArrayLike) -> RamanTransitions:
+def raman_transitions(
+    levels: Levels, polarizability_abc: ArrayLike, spin_weights: SpinWeights = NO_WEIGHTS
+) -> RamanTransitions:
     """Every pair of different levels that a polarizability (3, 3) along a, b, c in Å³ connects, in no particular order.
 
     Selection rules: ΔJ = 2 for a linear molecule; ΔJ = 1, 2 and ΔK = 0 for a symmetric top with an axial tensor; ΔJ = 0,
     1, 2 for an asymmetric top, between species of (Ka, Kc) parity that the tensor's elements connect (the same species
-    for the diagonal ones); none for a spherical top. Levels must start at J = 0. Raises ValueError for a spherical top
-    whose tensor is anisotropic, and for one that is not axial with spin weights by K, which need an axis.
+    for the diagonal ones); none for a spherical top. Levels must start at J = 0. spin_weights: those of the levels.
+    Raises ValueError for a spherical top whose tensor is anisotropic, and for one that is not axial with spin weights by
+    K, which need an axis.
     """
     tensor = np.asarray(polarizability_abc, dtype=float)
     if levels.representation is not None:
         return _joined(list(_of_blocks(levels, tensor)))
     if levels.kind == "spherical":
-        if anisotropy_squared(tensor) > (ROUND_OFF * np.trace(tensor)) ** 2:
+        if anisotropy_squared(tensor) > (ROUND_OFF * np.linalg.norm(tensor)) ** 2:
             raise ValueError("a spherical top's polarizability is isotropic, and this one is not; check the tensor")
         return _joined([])
     if levels.kind == "linear":
         return _linear(levels, tensor)
-    return _symmetric(levels, tensor)
+    return _symmetric(levels, tensor, spin_weights)
 
 
 def _joined(pieces: list[RamanTransitions]) -> RamanTransitions:
     if not pieces:
-        return RamanTransitions(np.zeros(0), np.zeros(0, np.int64), np.zeros(0, np.int64))
+        return RamanTransitions(np.zeros(0), np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0))
     return RamanTransitions(
         np.concatenate([piece.strength_angstrom6 for piece in pieces]),
         np.concatenate([piece.lower for piece in pieces]),
         np.concatenate([piece.upper for piece in pieces]),
+        np.concatenate([piece.weight for piece in pieces]),
     )
 
 
-def _ordered(levels: Levels, strength: Floats, first: Ints, second: Ints) -> RamanTransitions:
+def _ordered(levels: Levels, strength: Floats, first: Ints, second: Ints, weight: Floats) -> RamanTransitions:
     """Transitions between levels that exist, with a strength, the one lower in energy first."""
-    exists = (strength > 0) & (levels.weight[first] > 0) & (levels.weight[second] > 0)
+    exists = (strength > 0) & (weight > 0)
     strength, first, second = strength[exists], first[exists], second[exists]
     falls = levels.energy_mhz[second] < levels.energy_mhz[first]
-    return RamanTransitions(strength, np.where(falls, second, first), np.where(falls, first, second))
+    return RamanTransitions(strength, np.where(falls, second, first), np.where(falls, first, second), weight[exists])
+
+
+def _of_both(levels: Levels, first: Ints, second: Ints) -> Floats:
+    """Weight of one component where both states have the same; 0 where one of them does not exist."""
+    each = levels.weight / levels.components
+    return np.asarray(np.where(each[second] > 0, each[first], 0.0))
 
 
 # Linear and symmetric tops
@@ -143,52 +159,66 @@ def _linear(levels: Levels, tensor: Floats) -> RamanTransitions:
     first = np.arange(max(len(levels) - 2, 0))
     j = levels.j[first]
     strength = 1.5 * (j + 1) * (j + 2) / (2 * j + 3) * anisotropy**2
-    return _ordered(levels, strength, first, first + 2)
+    return _ordered(levels, strength, first, first + 2, _of_both(levels, first, first + 2))
 
 
-def _symmetric(levels: Levels, tensor: Floats) -> RamanTransitions:
-    """Strengths by squares of single elements, summed over both signs of K on either side."""
-    x, y, z = ("abc".index(axis) for axis in REPRESENTATIONS["Ir" if levels.kind == "prolate" else "IIIr"])
-    squares = {
-        0: (2 * tensor[z, z] - tensor[x, x] - tensor[y, y]) ** 2 / 6,
-        1: tensor[x, z] ** 2 + tensor[y, z] ** 2,
-        2: (tensor[x, x] - tensor[y, y]) ** 2 / 4 + tensor[x, y] ** 2,
-    }
-    least = ROUND_OFF**2 * anisotropy_squared(tensor)
-    squares = {q: square for q, square in squares.items() if square > least}
-    pieces = [
-        _ordered(levels, *_of_step(levels, rise, step, square))
-        for q, square in squares.items()
-        for step in dict.fromkeys((q, -q))
-        for rise in (0, 1, 2)
-    ]
-    return _summed(levels, _joined(pieces))
+def _symmetric(levels: Levels, tensor: Floats, spin_weights: SpinWeights) -> RamanTransitions:
+    """ΔK = 0 where the tensor has the axis of the top; else, for a top symmetric by numbers alone, as in Wang's basis."""
+    axes = REPRESENTATIONS["Ir" if levels.kind == "prolate" else "IIIr"]
+    x, y, z = ("abc".index(axis) for axis in axes)
+    along = (2 * tensor[z, z] - tensor[x, x] - tensor[y, y]) / np.sqrt(6)
+    if anisotropy_squared(tensor) - 1.5 * along**2 > (ROUND_OFF * np.linalg.norm(tensor)) ** 2:
+        if spin_weights.rule == "K":
+            raise ValueError("spin weights by K need an axis, and the polarizability has none; check the tensor")
+        return _without_axis(levels, tensor, spin_weights, axes)
+    pieces = [_of_axial(levels, rise, float(along)) for rise in (1, 2)]
+    return _joined([piece for piece in pieces if len(piece.lower)])
 
 
-def _of_step(levels: Levels, rise: int, step: int, square: float) -> tuple[Floats, Ints, Ints]:
-    """Strengths and rows of k → k + step for k = K and k = -K, J → J + rise; each pair of rows from one side alone."""
-    strengths, firsts, seconds = [], [], []
-    for j in range(levels.jmax + 1 - rise):
-        k = np.arange(-j, j + 1)
-        k = k[np.abs(k + step) <= j + rise]
-        first, second = _row(j, np.abs(k)), _row(j + rise, np.abs(k + step))
-        once = second > first
-        strengths.append((1.5 * square * coupling(j, k, step, rise) ** 2)[once])
-        firsts.append(first[once])
-        seconds.append(second[once])
-    return np.concatenate(strengths), np.concatenate(firsts), np.concatenate(seconds)
+def _of_axial(levels: Levels, rise: int, along: float) -> RamanTransitions:
+    """K → K, J → J + rise, both signs of K together; J → J with ΔK = 0 is Rayleigh scattering."""
+    j = np.repeat(np.arange(levels.jmax + 1 - rise), np.arange(1, levels.jmax + 2 - rise))
+    if not len(j):
+        return _joined([])
+    k = np.concatenate([np.arange(value + 1) for value in range(levels.jmax + 1 - rise)])
+    factor = np.concatenate([coupling(value, np.arange(value + 1), 0, rise) for value in range(levels.jmax + 1 - rise)])
+    first, second = _row(j, k), _row(j + rise, k)
+    strength = 1.5 * (along * factor) ** 2 * np.where(k == 0, 1, 2)
+    return _ordered(levels, strength, first, second, _of_both(levels, first, second))
 
 
-def _row(j: int, k: Ints) -> Ints:
+def _row(j: Ints, k: Ints) -> Ints:
     return np.asarray(j * (j + 1) // 2 + k)
 
 
+def _without_axis(levels: Levels, tensor: Floats, spin_weights: SpinWeights, axes: str) -> RamanTransitions:
+    """Between Wang functions, which the states are whose K pairs have one weight each; one line for a pair of rows.
+
+    Of K = 1 both functions of a pair have different strengths, α_20 and α_2±2 adding up in one and not in the other.
+    """
+    representation = "Ir" if levels.kind == "prolate" else "IIIr"
+    blocks = [
+        SolvedBlock(basis, np.zeros(basis.size), np.eye(basis.size), 0)
+        for j in range(levels.jmax + 1)
+        for basis in wang_blocks(j, representation)
+    ]
+    pieces = []
+    for up, low, parts in _pairs(blocks, tensor, axes):
+        strength = 1.5 * amplitudes(up, low, parts) ** 2
+        second, first = np.meshgrid(*(_row(b.basis.j, b.basis.k) for b in (up, low)), indexing="ij")
+        other = (first != second) & _once(up, low)
+        weight = np.full(int(other.sum()), float(spin_weights.of_ka_kc(low.basis.species)))
+        pieces.append(_ordered(levels, strength[other], first[other], second[other], weight))
+    return _summed(levels, _joined(pieces))
+
+
 def _summed(levels: Levels, found: RamanTransitions) -> RamanTransitions:
-    """One line for every pair of rows."""
+    """One line for every pair of rows, its weight the mean by strength."""
     keys, place = np.unique(found.lower * len(levels) + found.upper, return_inverse=True)
-    strength: Floats = np.zeros(len(keys))
+    strength, weighted = np.zeros(len(keys)), np.zeros(len(keys))
     np.add.at(strength, place, found.strength_angstrom6)
-    return RamanTransitions(strength, keys // len(levels), keys % len(levels))
+    np.add.at(weighted, place, found.strength_angstrom6 * found.weight)
+    return RamanTransitions(strength, keys // len(levels), keys % len(levels), weighted / strength)
 
 
 # Asymmetric tops
@@ -234,21 +264,35 @@ def amplitudes(up: SolvedBlock, low: SolvedBlock, parts: Parts) -> Floats:
     return np.asarray(up.vectors.T @ between @ low.vectors)
 
 
-def _of_blocks(levels: Levels, tensor: Floats) -> Iterator[RamanTransitions]:
-    axes = REPRESENTATIONS[str(levels.representation)]
+def _pairs(
+    blocks: Iterable[SolvedBlock], tensor: Floats, axes: str
+) -> Iterator[tuple[SolvedBlock, SolvedBlock, Parts]]:
+    """Every pair of blocks (higher or equal J first, each once) that the tensor connects, with the parts that do."""
     by_j: dict[int, list[SolvedBlock]] = {}
-    for block in levels.blocks:
+    for block in blocks:
         by_j.setdefault(block.basis.j, []).append(block)
     for j, lows in by_j.items():
         for i, low in enumerate(lows):
             for up in (*lows[i:], *by_j.get(j + 1, []), *by_j.get(j + 2, [])):
                 parts = parts_of(tensor, up.basis.species, low.basis.species, axes)
                 if parts:
-                    yield _between(levels, up, low, 1.5 * amplitudes(up, low, parts) ** 2)
+                    yield up, low, parts
+
+
+def _of_blocks(levels: Levels, tensor: Floats) -> Iterator[RamanTransitions]:
+    for up, low, parts in _pairs(levels.blocks, tensor, REPRESENTATIONS[str(levels.representation)]):
+        if levels.weight[up.start] > 0 and levels.weight[low.start] > 0:
+            yield _between(levels, up, low, 1.5 * amplitudes(up, low, parts) ** 2)
+
+
+def _once(up: SolvedBlock, low: SolvedBlock) -> NDArray[np.bool_]:
+    """Which pairs of states of two blocks are counted: all, or of a block with itself one triangle."""
+    all_pairs = np.ones((up.basis.size, low.basis.size), dtype=bool)
+    return np.tril(all_pairs, -1) if up is low else all_pairs
 
 
 def _between(levels: Levels, up: SolvedBlock, low: SolvedBlock, strength: Floats) -> RamanTransitions:
-    """All transitions between two blocks; of a block with itself each pair once, and no state with itself."""
-    wanted = np.tril(np.ones_like(strength, dtype=bool), -1) if up is low else np.ones_like(strength, dtype=bool)
-    i, k = np.nonzero(wanted)
-    return _ordered(levels, strength[i, k], k + low.start, i + up.start)
+    """All transitions between two blocks; none of a state with itself."""
+    i, k = np.nonzero(_once(up, low))
+    first, second = k + low.start, i + up.start
+    return _ordered(levels, strength[i, k], first, second, _of_both(levels, first, second))

@@ -33,7 +33,8 @@ _BACKGROUND = 2001  # and has so many even points
 class Spectrum:
     """Intensity on a grid of frequencies.
 
-    frequency_mhz, intensity: (n,) arrays. unit: of the intensity, "nm^2" for a cross section. temperature_k: of the gas.
+    frequency_mhz, intensity: (n,) arrays. unit: of the intensity, "nm^2" for a cross section,
+    "optical depth" for that of a layer of gas (`opacity`). temperature_k: of the gas.
     profile, fwhm_mhz: shape of the lines and its width, None for Doppler's. outside: the fraction of the area of each
     line that may have been left out far from its centre. lines: what it was made from, None for a spectrum that is not
     made of lines.
@@ -106,7 +107,7 @@ class Spectrum:
     @property
     def columns(self) -> dict[str, Floats]:
         """The two columns by their names with unit."""
-        name = "cross_section_nm2" if self.unit == "nm^2" else "intensity"
+        name = {"nm^2": "cross_section_nm2", "optical depth": "optical_depth"}.get(self.unit, "intensity")
         return {"frequency_mhz": self.frequency_mhz, name: self.intensity}
 
     def to_pandas(self) -> Any:
@@ -210,6 +211,11 @@ class _Shape:
 def line_widths(lines: Lines, profile: str, fwhm_mhz: float | None) -> Floats:
     """Full width at half maximum in MHz of every line, (lines,), of a profile as `Spectrum.from_lines` takes it."""
     return _shape(lines, profile, fwhm_mhz).fwhm()
+
+
+def line_peaks(lines: Lines, profile: str, fwhm_mhz: float | None) -> Floats:
+    """Value of the shape of unit area at the centre of every line, (lines,), in 1/MHz."""
+    return _shape(lines, profile, fwhm_mhz).at(np.zeros(len(lines)), np.arange(len(lines)))
 
 
 def _shape(lines: Lines, profile: str, fwhm_mhz: float | None) -> _Shape:
