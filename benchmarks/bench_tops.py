@@ -135,7 +135,7 @@ def processor() -> str:
 def measured(n: int) -> dict[str, float | str]:
     """All that can be measured here."""
     table: dict[str, float | str] = {"processor": processor(), "cores": float(os.cpu_count() or 1), "bodies": float(n)}
-    table.update(ours(n, 200))
+    table.update(ours(n, 500))
     peers = (("LAMMPS", lambda: lammps(46, 100)), ("MuJoCo", lambda: mujoco(1000, 300)))
     for name, peer in peers:
         try:

@@ -2,8 +2,8 @@
 
 Order: 8, with the step chosen from embedded results of order 5 and 3 (the tableau of DOP853). Keeps: the unit
 quaternion, and L in space exactly where there is no torque (it is L in space that is integrated); the energy only to
-the tolerance, with a linear drift. Cost: 12 evaluations a step in numpy, about 1 ms a step for one body and little more
-for a hundred; all bodies of one call share the step. Sources: H. Munthe-Kaas, BIT 38, 92 (1998); the tableau,
+the tolerance, with a linear drift. Cost: 12 evaluations a step in numpy, about 0.25 ms a step for one body and little
+more for a hundred; all bodies of one call share the step. Sources: H. Munthe-Kaas, BIT 38, 92 (1998); the tableau,
 E. Hairer, S. P. Nørsett, G. Wanner, Solving Ordinary Differential Equations I, section II.5.
 """
 
