@@ -33,7 +33,7 @@ def constants_mhz(positions, masses=None):
     _, _, axes = np.linalg.svd(np.sqrt(m)[:, None] * r)
     x = r @ axes.T
     moments = [m @ (x[:, (k + 1) % 3] ** 2 + x[:, (k + 2) % 3] ** 2) for k in range(3)]
-    return np.sort(ROTATIONAL_MHZ_U_ANGSTROM2 / np.array(moments))[::-1]
+    return np.sort([ROTATIONAL_MHZ_U_ANGSTROM2 / moment for moment in moments if moment > 1e-9])[::-1]
 
 
 def table(title, positions, numbers=NUMBERS):
@@ -80,10 +80,19 @@ def orca(*, charge=0, masses=None, positions=AXES):
     com = np.array([15.999, 1.008, 1.008]) @ positions / 18.015 / BOHR_RADIUS_ANGSTROM
     cm = "  ".join(f"{c / MHZ_PER_CM:.6f}" for c in constants_mhz(WATER, masses))
     alpha = "".join("".join(f"{value:14.6f}" for value in row) + "\n" for row in TURN @ ALPHA @ TURN.T)
+    bohr = "".join(
+        f"  {i} {s}   {z:.4f}    0  {m:8.3f}  {p[0]:12.6f} {p[1]:12.6f} {p[2]:12.6f}\n"
+        for i, (s, z, m, p) in enumerate(
+            zip(SYMBOLS, NUMBERS, (15.999, 1.008, 1.008), positions / BOHR_RADIUS_ANGSTROM, strict=True)
+        )
+    )
     return (
         "                 * O   R   C   A *\n Program Version 5.0.3 -  RELEASE  -\n\n"
         f" Total Charge           Charge          ....    {charge}\n"
+        " Multiplicity           Mult            ....    1\n\n"
         f"---------------------------------\nCARTESIAN COORDINATES (ANGSTROEM)\n---------------------------------\n{rows}\n"
+        f"----------------------------\nCARTESIAN COORDINATES (A.U.)\n----------------------------\n"
+        f"  NO LB      ZA    FRAG     MASS         X           Y           Z\n{bohr}\n"
         f"The origin for moment calculation is the CENTER OF MASS  = ({com[0]:.6f}, {com[1]:.6f} {com[2]:.6f})\n"
         "-------------\nDIPOLE MOMENT\n-------------\n                                X             Y             Z\n"
         "Electronic contribution:      0.00000       0.00000      0.00000\n"
@@ -177,6 +186,32 @@ def test_dipole_of_an_ion_refers_to_the_centre_of_mass(tmp_path):
     assert np.allclose(molecule.dipole_debye, expected, atol=2e-4)  # printed to 1e-4 D
 
 
+def test_dipole_of_an_orca_ion_refers_to_the_origin_that_is_printed(tmp_path):
+    molecule = read_output(written(tmp_path, orca(charge=-1)))
+    origin = np.array([15.999, 1.008, 1.008]) @ AXES / 18.015  # with average masses, 5e-5 Å from the isotopes' centre
+    expected = TURN @ DIPOLE + DEBYE_PER_E_ANGSTROM * (molecule.centre_of_mass_angstrom - origin)
+    assert np.allclose(molecule.dipole_debye, expected, atol=1e-5)  # the origin is printed to 1e-6 bohr
+
+
+def test_tensors_of_another_geometry_than_the_last_are_left_out(tmp_path):
+    step = table("Standard orientation:", WATER * 1.01)
+    ending = " Normal termination"
+    text = gaussian(polar=False).replace(ending, step + ending)
+    molecule = read_output(written(tmp_path, text))
+    assert molecule.dipole_debye is None
+    assert "another geometry" in molecule.notes[0]
+
+
+def test_isotopes_are_those_of_the_masses_printed(tmp_path):
+    properties = (
+        " Isotopes and Nuclear Properties:\n AtmWgt=  15.9949146   1.0078250   2.0141018\n Leave Link  101 at now\n"
+    )
+    text = gaussian(polar=False).replace(" Charge =", properties + " Charge =", 1)
+    molecule = read_output(written(tmp_path, text))
+    assert molecule.mass_numbers == (16, 1, 2)
+    assert "printed constants" in molecule.notes[0]  # those in the text are of H2O
+
+
 def test_constants_that_are_not_those_of_the_geometry_are_noted(tmp_path):
     a, b, c = constants_mhz(WATER) / 1e3
     slightly = gaussian(ghz=f"{a * (1 + 5e-5):.7f} {b:.7f} {c:.7f}")
@@ -188,14 +223,16 @@ def test_constants_that_are_not_those_of_the_geometry_are_noted(tmp_path):
 
 def test_average_masses_of_the_program_show_in_the_constants(tmp_path):
     (note,) = read_output(written(tmp_path, orca(masses=(15.999, 1.008, 1.008)))).notes
-    assert "printed constants" in note
+    assert "they agree with the masses that ORCA used" in note
 
 
 def test_linear_molecule_whose_a_is_asterisks(tmp_path):
     carbonyl = np.array([[0, 0, 0.6], [0, 0, -0.528], [0, 0, 1.7]])
-    b = constants_mhz(carbonyl)[1:] / 1e3
-    text = gaussian(standard=carbonyl, inputs=None, ghz=f"************ {b[0]:.7f} {b[1]:.7f}", polar=False)
+    b = constants_mhz(carbonyl)[-1] / 1e3
+    text = gaussian(standard=carbonyl, inputs=None, ghz=f"************ {b:.7f} {b:.7f}", polar=False)
     assert read_output(written(tmp_path, text)).notes == ()
+    (note,) = read_output(written(tmp_path, text.replace(f"{b:.7f}", f"{1.001 * b:.7f}"))).notes
+    assert "1.0e-03 apart" in note
 
 
 @pytest.mark.parametrize(
@@ -237,5 +274,5 @@ def test_reader_hands_outputs_over_and_tells_what_cclib_would_add(tmp_path, monk
 
 
 def test_a_log_of_no_program_stays_with_ase(tmp_path):
-    with pytest.raises(ValueError, match="ASE cannot read it"):
+    with pytest.raises(ValueError, match="no structure in it"):
         read_molecule(written(tmp_path, "nothing to see\n"))

@@ -185,11 +185,11 @@ def _used_lines(output: _Output) -> Iterator[tuple[int, bool]]:
         yield from ((start + program.rows_after + k, False) for k in range(len(rows)))
     d_in_tensor = program.name == "Gaussian"  # as in `Polarizability= 9.1D+00`
     for openings, d_belongs in ((program.dipole, False), (program.polarizability, d_in_tensor)):
-        start = output.last(openings) if openings else None
-        if start is not None:
-            more = 3 if "SCF Polarizability" in output.lines[start] else 0  # a head and three rows, not two
-            stop = min(start + program.tensor_lines + 1 + more, len(output.lines))
-            yield from ((i, d_belongs) for i in range(start, stop))
+        first = output.last(openings) if openings else None
+        if first is not None:
+            more = 3 if "SCF Polarizability" in output.lines[first] else 0  # a head and three rows, not two
+            stop = min(first + program.tensor_lines + 1 + more, len(output.lines))
+            yield from ((i, d_belongs) for i in range(first, stop))
 
 
 def _tables(output: _Output) -> list[tuple[int, list[list[str]]]]:
@@ -217,7 +217,7 @@ def _without_constants(output: _Output) -> str:
 
 def _parse(text: str, where: str) -> Any:
     """What cclib reads."""
-    from cclib.io import ccopen
+    from cclib.io.ccio import ccopen
 
     try:
         parser = ccopen(io.StringIO(text), loglevel=logging.CRITICAL)
