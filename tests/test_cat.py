@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rotor.formats.atomic import atomic_path, open_atomic
-from rotor.formats.spcat import _kernels, rows
+from rotor.formats.spcat import _kernels, cat, rows
 from rotor.formats.spcat.cat import COMPILED_FROM, format_lines, read_cat, write_cat
 from rotor.formats.spcat.catalogue import DTYPES, Catalogue, Layout
 from rotor.formats.spcat.fields import BLANK, read_degeneracy, read_quantum, spell_degeneracy, spell_quantum
@@ -358,3 +358,17 @@ def test_without_a_writable_cache_folder_code_is_compiled_all_the_same(monkeypat
 def test_layout_of_new_lists_is_that_of_the_program():
     assert catalogue_of().layout == Layout()
     assert {len(line) for line in format_lines(catalogue_of()).splitlines()} == {80}
+
+
+def test_wide_numbers_in_a_long_list_are_spelled_as_one_by_one(monkeypatch):
+    """Long lists have many lines with wide FREQ or LGINT: written together they are the bytes of the careful form."""
+    rng, n = np.random.default_rng(1), 6000
+    frequency = np.concatenate([rng.uniform(9.99e7, 1.001e8, n // 2), 10 ** rng.uniform(3, 9.2, n // 2)])
+    lgint = np.concatenate([-99.99995 + rng.uniform(-1e-4, 1e-4, 50), rng.uniform(-140, 2, n - 50)])
+    quanta = np.full((n, 6), -32768, dtype=np.int16)
+    quanta[:, :3] = rng.integers(0, 200, (n, 3))
+    columns = (frequency, rng.uniform(0, 2e3, n), lgint, np.full(n, 3), rng.uniform(0, 9e4, n), rng.integers(1, 900, n))
+    catalogue = Catalogue(*columns, np.full(n, 1), np.full(n, 303), quanta, quanta)
+    together = format_lines(catalogue)
+    monkeypatch.setattr(cat, "_wide_rows", lambda *given: None)
+    assert together == format_lines(catalogue)

@@ -33,7 +33,7 @@ def chen_lee(c):
     return rate
 
 
-# published and computed values of shared notes on both systems, natural logarithm per time, all ± 0.01
+# Leipnik and Newton (1981) and Chen and Lee (2004); exponents by Runge-Kutta with Gram-Schmidt elsewhere, all ± 0.01
 ATTRACTORS = [
     (leipnik_newton, (0.349, 0.0, -0.160), (0.14, 0.0, -0.765), -0.625, 2.185),
     (leipnik_newton, (0.349, 0.0, -0.180), (0.1296, 0.0, -0.7546), -0.625, 2.172),

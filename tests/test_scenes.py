@@ -10,7 +10,7 @@ SCENES = sorted((Path(__file__).resolve().parents[1] / "examples" / "scenes").gl
 
 
 def test_no_scene_is_missing():
-    assert len(SCENES) == 12  # those of the list in issue 5
+    assert len(SCENES) == 12  # a file that is lost or renamed is noticed
 
 
 @pytest.mark.parametrize("scene", SCENES, ids=lambda path: path.stem)

@@ -43,11 +43,11 @@ def lever(attitude: Array, arm: Array, force: Array) -> Array:
 
 
 @njit(cache=True, nogil=True)
-def placed(attitude: Array, turn: Array, space: Array, here: Array, momentum: Array) -> None:
-    """here = attitude exp(turn), and L in body axes from L in space, for rows."""
+def placed(attitude: Array, change: Array, space: Array, here: Array, momentum: Array) -> None:
+    """here = attitude exp(u), and L in body axes, from change (n, 6) = (change of L in space, u)."""
     for i in range(attitude.shape[0]):
         w, x, y, z = attitude[i]
-        u1, u2, u3 = turn[i]
+        u1, u2, u3 = change[i, 3:]
         half = 0.5 * math.sqrt(u1 * u1 + u2 * u2 + u3 * u3)
         c, s = math.cos(half), (0.5 * math.sin(half) / half if half > 0.0 else 0.5)
         u1, u2, u3 = s * u1, s * u2, s * u3
@@ -58,14 +58,16 @@ def placed(attitude: Array, turn: Array, space: Array, here: Array, momentum: Ar
             z * c + w * u3 + x * u2 - y * u1,
         )
         here[i] = w, x, y, z
-        momentum[i] = _seen(w, -x, -y, -z, space[i, 0], space[i, 1], space[i, 2])
+        momentum[i] = _seen(
+            w, -x, -y, -z, space[i, 0] + change[i, 0], space[i, 1] + change[i, 1], space[i, 2] + change[i, 2]
+        )
 
 
 @njit(cache=True, nogil=True)
-def turning(turn: Array, omega: Array, out: Array) -> None:
-    """du/dt = ω + ½ u x ω + (1 - (θ/2) cot(θ/2))/θ² u x (u x ω), θ = |u|, for q = q_n exp(u)."""
-    for i in range(turn.shape[0]):
-        u1, u2, u3 = turn[i]
+def turning(change: Array, omega: Array, out: Array) -> None:
+    """out[:, 3:] = du/dt = ω + ½ u x ω + (1 - (θ/2) cot(θ/2))/θ² u x (u x ω), θ = |u|, for u = change[:, 3:]."""
+    for i in range(change.shape[0]):
+        u1, u2, u3 = change[i, 3:]
         w1, w2, w3 = omega[i]
         square = u1 * u1 + u2 * u2 + u3 * u3
         if square > SERIES_BELOW**2:
@@ -74,14 +76,14 @@ def turning(turn: Array, omega: Array, out: Array) -> None:
         else:
             factor = 1.0 / 12.0 + square / 720.0 + square * square / 30240.0
         a1, a2, a3 = u2 * w3 - u3 * w2, u3 * w1 - u1 * w3, u1 * w2 - u2 * w1
-        out[i, 0] = w1 + 0.5 * a1 + factor * (u2 * a3 - u3 * a2)
-        out[i, 1] = w2 + 0.5 * a2 + factor * (u3 * a1 - u1 * a3)
-        out[i, 2] = w3 + 0.5 * a3 + factor * (u1 * a2 - u2 * a1)
+        out[i, 3] = w1 + 0.5 * a1 + factor * (u2 * a3 - u3 * a2)
+        out[i, 4] = w2 + 0.5 * a2 + factor * (u3 * a1 - u1 * a3)
+        out[i, 5] = w3 + 0.5 * a3 + factor * (u1 * a2 - u2 * a1)
 
 
 @njit(cache=True, nogil=True)
 def to_space(attitude: Array, vectors: Array, out: Array) -> None:
-    """Vectors (n, 3) of the bodies in space."""
+    """out[:, :3] = vectors (n, 3) of the bodies, seen from space."""
     for i in range(attitude.shape[0]):
         w, x, y, z = attitude[i]
-        out[i] = _seen(w, x, y, z, vectors[i, 0], vectors[i, 1], vectors[i, 2])
+        out[i, 0], out[i, 1], out[i, 2] = _seen(w, x, y, z, vectors[i, 0], vectors[i, 1], vectors[i, 2])

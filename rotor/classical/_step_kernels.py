@@ -57,7 +57,8 @@ def _squared_length(x: float, y: float, z: float) -> Any:
 def _versed(square: float, square_low: float, cosine: float) -> Any:
     """v + l = 1 - cosine with (1 - v - l)² + sine² = 1, from the sine's square in two doubles and a rounded cosine."""
     v = square / (1.0 + cosine) if cosine > 0.0 else 1.0 - cosine
-    rest = ((square - 2.0 * v) + v * v) + square_low
+    v2, v2_low = _square(v)
+    rest = ((square - 2.0 * v) + v2) + (v2_low + square_low)
     return v, rest / (2.0 * cosine) if cosine > 0.1 else 0.0
 
 

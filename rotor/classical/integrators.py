@@ -163,18 +163,21 @@ class _Kicker:
     no_omega: Array
 
     def torque(self, time: float) -> Array | None:
+        """Torques (n, 3) here and now, None where there are none."""
         if not self.system.torques:
             return None
         torque = self.system.torque(time, self.state[:, 3:], self.no_omega)
         return np.ascontiguousarray(np.broadcast_to(torque, self.no_omega.shape))
 
     def kick(self, torque: Array | None, time: float) -> None:
+        """L gains torque times time."""
         from rotor.classical._step_kernels import kick
 
         if torque is not None:
             kick(self.state, self.carry, torque, time)
 
     def turn(self, time: float, duration: float) -> None:
+        """The inner momenta's share -h/I of the angular velocity, for a duration."""
         from rotor.classical._step_kernels import turn_uniformly
 
         if self.system.inner:

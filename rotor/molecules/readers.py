@@ -10,12 +10,14 @@ import numpy as np
 
 from rotor.molecules.molecule import Molecule
 from rotor.molecules.nuclei import element_symbol, isotope, isotope_of_mass
+from rotor.molecules.outputs import WITHOUT_CCLIB, has_cclib, is_output, read_output
 from rotor.molecules.smiles import from_rdkit, from_smiles, parse_sdf
 from rotor.molecules.xyz import decode, parse_xyz
 from rotor.units import DEBYE_PER_E_ANGSTROM
 
 _PREFIX = "SMILES:"
 _SDF_SUFFIXES = (".mol", ".sdf", ".sd", ".mdl")
+_OUTPUT_SUFFIXES = (".log", ".out")
 
 
 def read_molecule(source: Any, *, isotopes: dict[int | str, str] | str | None = None) -> Molecule:
@@ -83,6 +85,8 @@ def _read_file(path: Path) -> Molecule:
         molecule = parse_xyz(decode(path.read_bytes(), str(path)), str(path))
     elif suffix in _SDF_SUFFIXES:
         molecule = parse_sdf(decode(path.read_bytes(), str(path)), str(path))
+    elif suffix in _OUTPUT_SUFFIXES and is_output(path):
+        molecule = read_output(path) if has_cclib() else _output_without_cclib(path)
     else:
         molecule = _read_with_ase(path)
     return molecule if molecule.name else replace(molecule, name=path.stem)
@@ -94,6 +98,16 @@ def parse_molecule(text: str, where: str) -> Molecule:
     if "M  END" in text or (len(head) == 4 and head[3].rstrip().endswith(("V2000", "V3000"))):
         return parse_sdf(text, where)
     return parse_xyz(text, where)
+
+
+def _output_without_cclib(path: Path) -> Molecule:
+    """What ASE reads of a quantum-chemistry output, saying what cclib would have added or checked."""
+    try:
+        molecule = _read_with_ase(path)
+    except ValueError as reason:
+        raise ValueError(f"{reason}; {WITHOUT_CCLIB}") from None
+    note = f"{path}: {WITHOUT_CCLIB}; then polarizability, printed constants and a cut end are looked at too"
+    return replace(molecule, notes=(*molecule.notes, note))
 
 
 def _read_with_ase(path: Path) -> Molecule:

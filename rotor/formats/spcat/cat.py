@@ -7,7 +7,7 @@ import os
 import zlib
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,6 +70,24 @@ def _plain_rows(text: Text, columns: Columns, layout: Layout, fill: Callable[...
     return plain
 
 
+def _wide_rows(rows: Text, columns: Columns, layout: Layout, fill: Callable[..., Mask], plain: Mask) -> None:
+    """Fill the rows of numbers that need a decimal less, and mark them plain: long lists have many such lines.
+
+    The program prints FREQ, ERR and LGINT with three decimals where FREQ is wide; LGINT below -99.9999 has three.
+    """
+    if layout.decimals != (4, 4, 4, 4):
+        return
+    wide = columns.frequency_mhz >= 99999999.0
+    for chosen, decimals in ((wide, (3, 3, 3, 4)), (~wide & (columns.lgint <= -99.99995), (4, 4, 3, 4))):
+        index = np.flatnonzero(chosen & ~plain)
+        if len(index):
+            text = np.empty((len(index), rows.shape[1]), dtype=np.uint8)
+            chosen_columns: list[Any] = [column[index] for column in columns]
+            part = _capped(Columns(*chosen_columns), layout.decimals)
+            plain[index] = _plain_rows(text, part, replace(layout, decimals=decimals), fill)
+            rows[index] = text
+
+
 def _odd_line(catalogue: Catalogue, index: int) -> bytes:
     """A line that is kept as it was spelled, or whose numbers need a form of their own."""
     record, layout = _within_format(catalogue.record(index), index), catalogue.layout
@@ -113,7 +131,9 @@ def format_chunks(catalogue: Catalogue) -> Iterator[bytes]:
     for start in range(0, len(catalogue), _CHUNK):
         stop = min(start + _CHUNK, len(catalogue))
         rows = buffer[: stop - start]
-        plain = _plain_rows(rows, catalogue.columns(start, stop), layout, fill)
+        columns = catalogue.columns(start, stop)
+        plain = _plain_rows(rows, columns, layout, fill)
+        _wide_rows(rows, columns, layout, fill, plain)
         plain[spelled[(spelled >= start) & (spelled < stop)] - start] = False
         yield from _with_odd_lines(catalogue, start, rows[:, :end], plain)
     yield layout.ending

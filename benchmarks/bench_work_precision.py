@@ -1,0 +1,146 @@
+"""What accuracy costs in time: attitude error after 1000 periods against time per period, for every integrator.
+
+    python benchmarks/bench_work_precision.py [--picture docs/pictures/work_precision.png] [--json FILE]
+
+One water-like top, I = (1, 1.875, 2.875), L = (0.5, 0.75, 1), one core. The exact solution is shown for one evaluation
+per period, its preparation left out; all other times are those of whole calls.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+from rotor.classical.euler import gyroscopic_term
+from rotor.classical.free import free_motion
+from rotor.classical.integrators import Method, integrate
+from rotor.classical.lie_runge_kutta import LieRungeKutta
+from rotor.classical.moser_veselov import MoserVeselov
+from rotor.classical.splitting import RotationSplitting, SymmetricTopSplitting
+from rotor.rotations import IDENTITY, distance
+
+MOMENTS, MOMENTUM, PERIODS = np.array([1.0, 1.875, 2.875]), np.array([0.5, 0.75, 1.0]), 1000
+
+Curve = list[tuple[float, float]]
+
+
+def scipy_motion(tolerance: float, span: float) -> np.ndarray:
+    """Attitude at the end of `span` by scipy's DOP853 on L and q."""
+
+    def rates(_: float, y: np.ndarray) -> list[float]:
+        m1, m2, m3, w, x, y_, z = y.tolist()
+        w1, w2, w3 = m1 / MOMENTS[0], m2 / MOMENTS[1], m3 / MOMENTS[2]
+        first = (-x * w1 - y_ * w2 - z * w3, w * w1 + y_ * w3 - z * w2)
+        second = (w * w2 + z * w1 - x * w3, w * w3 + x * w2 - y_ * w1)
+        return [*gyroscopic_term(m1, m2, m3, w1, w2, w3), *(0.5 * part for part in first + second)]
+
+    start = [*MOMENTUM, *IDENTITY]
+    return solve_ivp(rates, (0.0, span), start, "DOP853", t_eval=[span], rtol=tolerance, atol=tolerance).y[3:, -1]
+
+
+def timed(run: Callable[[], np.ndarray], repeats: int) -> tuple[float, np.ndarray]:
+    """Microseconds per period of the fastest run, and its attitude."""
+    seconds, attitude = [], IDENTITY
+    for _ in range(repeats):
+        start = time.perf_counter()
+        attitude = run()
+        seconds.append(time.perf_counter() - start)
+    return min(seconds) / PERIODS * 1e6, attitude
+
+
+def curve(make: Callable[[float], Method], settings: list[float], repeats: int = 3) -> Curve:
+    """(µs per period, error) for each setting; a setting that a method refuses is left out and told."""
+    motion = free_motion(MOMENTS, MOMENTUM)
+    span = PERIODS * float(motion.period)
+    exact, points = motion.at(span)[1], []
+    for setting in settings:
+        try:
+            method = make(setting)
+            cost, attitude = timed(lambda m=method: integrate(m, MOMENTS, MOMENTUM, [0.0, span]).attitude[-1], repeats)
+        except ValueError as refusal:
+            print(f"left out: {refusal}")
+            continue
+        points.append((cost, float(distance(attitude, exact))))
+    return points
+
+
+def exact_point() -> Curve:
+    """One evaluation per period with phases in plain double, against phases in double-double."""
+    motion = free_motion(MOMENTS, MOMENTUM)
+    times = float(motion.period) * np.arange(1, PERIODS + 1)
+    cost, attitude = timed(lambda: motion.at(times, "double")[1][-1], 5)
+    return [(cost, float(distance(attitude, motion.at(times[-1])[1])))]
+
+
+def curves() -> dict[str, Curve]:
+    """All of them."""
+    period = float(free_motion(MOMENTS, MOMENTUM).period)
+    table: dict[str, Curve] = {}
+    steps = {2: [160, 640, 2560], 4: [80, 160, 320, 640], 6: [40, 80, 160, 320], 8: [20, 40, 80, 120]}
+    for name, kind in (("rotations", RotationSplitting), ("symmetric top", SymmetricTopSplitting)):
+        for order in (2, 4, 8):
+            counts = steps[order]
+            table[f"{name}, order {order}"] = curve(lambda n, k=kind, o=order: k(period / n, o), counts)
+    for order in (4, 8):
+        table[f"Moser-Veselov {order}"] = curve(lambda n, o=order: MoserVeselov(period / n, o), [20, 40, 80, 160, 320])
+    table["Moser-Veselov exact, 14 ms to prepare"] = curve(lambda n: MoserVeselov(period / n, 0), [14, 20, 40])
+    table["Lie-group DOP853"] = curve(lambda tolerance: LieRungeKutta(tolerance), [1e-6, 1e-9], 1)
+    span = PERIODS * period
+    exact = free_motion(MOMENTS, MOMENTUM).at(span)[1]
+    plain = []
+    for tolerance in (1e-6, 1e-9, 1e-12):
+        cost, attitude = timed(lambda t=tolerance: scipy_motion(t, span), 1)
+        plain.append((cost, float(distance(attitude, exact))))
+    table["scipy DOP853"] = plain
+    table["exact, phases in double"] = exact_point()
+    return table
+
+
+def draw(table: dict[str, Curve], picture: Path) -> None:
+    """The work-precision picture."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    figure, axes = plt.subplots(figsize=(8, 5.5), layout="constrained")
+    styles = {"rotations": ("tab:blue", "o"), "symmetric": ("tab:green", "s"), "Moser": ("tab:red", "^")}
+    styles |= {"Lie": ("tab:purple", "D"), "scipy": ("tab:gray", "v"), "exact": ("black", "*")}
+    dashes = {"2": ":", "4": "--", "8": "-"}
+    for name, points in table.items():
+        color, marker = next(style for key, style in styles.items() if name.startswith(key))
+        cost, error = np.array(points).T
+        size = 14 if marker == "*" else 5
+        axes.loglog(error, cost, color=color, marker=marker, ms=size, ls=dashes.get(name[-1], "-."), label=name)
+    axes.invert_xaxis()
+    axes.set_xlabel("attitude error after 1000 periods / rad")
+    axes.set_ylabel("time per period / µs, one core")
+    axes.set_title("Free asymmetric top: what accuracy costs")
+    axes.grid(alpha=0.3)
+    axes.legend(fontsize=8, ncols=2)
+    figure.savefig(picture, dpi=130)
+
+
+def main() -> None:
+    """Measure, print, draw."""
+    parser = argparse.ArgumentParser(description="work-precision of the integrators")
+    parser.add_argument("--picture", type=Path)
+    parser.add_argument("--json", type=Path)
+    arguments = parser.parse_args()
+    table = curves()
+    for name, points in table.items():
+        print(f"{name:38s}", "  ".join(f"{cost:9.3g} µs {error:8.1e}" for cost, error in points))
+    if arguments.json:
+        arguments.json.write_text(json.dumps(table, indent=1) + "\n", encoding="utf-8")
+    if arguments.picture:
+        draw(table, arguments.picture)
+
+
+if __name__ == "__main__":
+    main()
