@@ -25,7 +25,10 @@ if TYPE_CHECKING:
     from rotor.quantum.levels import solve_levels as solve_levels
     from rotor.spectra.lines import Lines as Lines
     from rotor.spectra.lines import line_list as line_list
+    from rotor.spectra.raman import RamanLines as RamanLines
+    from rotor.spectra.raman import raman_lines as raman_lines
     from rotor.spectra.spectrum import Spectrum as Spectrum
+    from rotor.thermo import VibrationalStates as VibrationalStates
     from rotor.thermo import partition_function as partition_function
     from rotor.top import Top as Top
 
@@ -35,11 +38,14 @@ _HOME = {
     "Levels": "rotor.quantum.levels",
     "Lines": "rotor.spectra.lines",
     "Molecule": "rotor.molecules.molecule",
+    "RamanLines": "rotor.spectra.raman",
     "Spectrum": "rotor.spectra.spectrum",
+    "VibrationalStates": "rotor.thermo",
     "Top": "rotor.top",
     "free_motion": "rotor.classical.free",
     "line_list": "rotor.spectra.lines",
     "partition_function": "rotor.thermo",
+    "raman_lines": "rotor.spectra.raman",
     "read": "rotor.formats",
     "refine": "rotor.molecules.refine",
     "solve_levels": "rotor.quantum.levels",

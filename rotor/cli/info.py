@@ -157,6 +157,7 @@ def _facts(top: Top, content: dict[str, Any]) -> list[tuple[str, str]]:
     weights = report.weights_text(content["spin_weights"])
     facts += [
         ("dipole", report.with_source(dipole, content["dipole_source"])),
+        ("polarizability", report.with_source(report.tensor_text(top), content["polarizability_source"])),
         ("spin weights", report.with_source(weights, content["spin_weights_source"])),
         ("mass", f"{top.mass_u:.6f} u" if top.mass_u else "not known"),
         ("inertial defect", f"{content['inertial_defect_u_angstrom2']:.6g} u Å²"),

@@ -220,7 +220,7 @@ def _facts(lines: RamanLines, content: dict[str, Any]) -> list[tuple[str, str]]:
     )
     return [
         ("constants", report.with_source(report.constants_text(top), top.source)),
-        ("polarizability", report.with_source(_tensor_text(top), top.polarizability_source)),
+        ("polarizability", report.with_source(report.tensor_text(top), top.polarizability_source)),
         ("anisotropy", f"{content['anisotropy_angstrom3']:.6g} Å³"),
         ("spin weights", report.with_source(weights, top.weights_source)),
         ("temperature", f"{lines.temperature_k:g} K"),
@@ -233,15 +233,6 @@ def _facts(lines: RamanLines, content: dict[str, Any]) -> list[tuple[str, str]]:
             f"{len(lines)}, together {content['band_cross_section_cm2_per_sr']:.4g} cm²/sr" if len(lines) else "none",
         ),
     ]
-
-
-def _tensor_text(top: Top) -> str:
-    tensor = top.polarizability_abc_angstrom3
-    if tensor is None:
-        return "isotropic by symmetry"
-    names = (("aa", 0, 0), ("bb", 1, 1), ("cc", 2, 2), ("ab", 0, 1), ("ac", 0, 2), ("bc", 1, 2))
-    shown = [f"{name} {tensor[i][k]:.6g}" for name, i, k in names if i == k or tensor[i][k]]
-    return ", ".join(shown) + " Å³"
 
 
 def _why_none(lines: RamanLines) -> str:

@@ -119,6 +119,16 @@ def vector_text(vector: Sequence[float] | None, names: Sequence[str] = ("μa", "
     return ", ".join(f"{name} {round(x, 6) + 0.0:.6g}" for name, x in zip(names, vector, strict=True)) + " D"
 
 
+def tensor_text(top: Top) -> str:
+    """A polarizability as `aa 1.528, bb 1.468, cc 1.415 Å³`, with the elements off the diagonal that are not 0."""
+    tensor = top.polarizability_abc_angstrom3
+    if tensor is None:
+        return "isotropic by symmetry" if top.kind == "spherical" else "not known"
+    names = (("aa", 0, 0), ("bb", 1, 1), ("cc", 2, 2), ("ab", 0, 1), ("ac", 0, 2), ("bc", 1, 2))
+    shown = [f"{name} {tensor[i][k]:.6g}" for name, i, k in names if i == k or tensor[i][k]]
+    return ", ".join(shown) + " Å³"
+
+
 def weights_text(mapping: Mapping[str, int]) -> str:
     """Spin weights as `ee 1, eo 3, oe 3, oo 1`."""
     return ", ".join(f"{name} {weight}" for name, weight in mapping.items()) or "not given: 1 for every level"
