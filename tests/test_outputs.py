@@ -139,6 +139,7 @@ def assert_tensors(molecule: Molecule, turn, polarizability=True):
     if polarizability:
         expected = turn @ ALPHA @ turn.T * BOHR_RADIUS_ANGSTROM**3
         assert np.allclose(molecule.polarizability_angstrom3, expected, atol=2e-5)  # coordinates to 1e-6 turn 1e-6
+        assert molecule.polarizability_source
 
 
 def test_gaussian_standard_orientation_holds_geometry_and_dipole(tmp_path):

@@ -348,7 +348,8 @@ def _with_polarizability(molecule: Molecule, data: Any, output: _Output) -> Mole
         return _noted(molecule, output, start, "polarizability", "has axes or a geometry that the file does not settle")
     alpha = np.asarray(data.polarizabilities[-1], dtype=np.float64) * BOHR_RADIUS_ANGSTROM**3
     turned = fit.rotation @ (0.5 * (alpha + alpha.T)) @ fit.rotation.T
-    return replace(molecule, polarizability_angstrom3=0.5 * (turned + turned.T))
+    source = f"{output.program.name}, {output.where}"
+    return replace(molecule, polarizability_angstrom3=0.5 * (turned + turned.T), polarizability_source=source)
 
 
 def _polarizability_axes(molecule: Molecule, data: Any, output: _Output, start: int) -> Superposition | None:
