@@ -136,7 +136,11 @@ def has_cclib() -> bool:
 
 
 def program_of(text: str) -> _Program | None:
-    """The program of those known here that an output names, None for another."""
+    """The program of those known here that an output names first, None for another.
+
+    >>> program_of("Copyright (c) 1988-2016, Gaussian, Inc.  All Rights Reserved.").name
+    'Gaussian'
+    """
     named = [program for program in _PROGRAMS if program.banner in text]
     return min(named, key=lambda program: text.find(program.banner)) if named else None
 
@@ -420,7 +424,11 @@ def _constants_mhz(masses_u: Floats, positions_angstrom: Floats) -> Floats:
 
 
 def _apart(printed: Floats, calculated: Floats) -> float:
-    """Largest relative difference, of as many of the smaller constants as are printed."""
+    """Largest relative difference, of as many of the smaller constants as are printed.
+
+    >>> round(_apart(np.array([10.1, 8.0]), np.array([np.inf, 10.0, 8.0])), 9)
+    0.01
+    """
     some = calculated[-len(printed) :]
     if not np.all(np.isfinite(some)):
         return float("inf")
