@@ -259,9 +259,10 @@ def test_every_cut_is_refused(tmp_path):
 
 
 def test_second_job_that_was_cut_is_refused_although_the_first_ended(tmp_path):
-    cut = gaussian() + "".join(gaussian().splitlines(keepends=True)[:20])
-    with pytest.raises(ValueError, match="ends without 'Normal termination of Gaussian'"):
-        read_output(written(tmp_path, cut))
+    lines = gaussian().splitlines(keepends=True)
+    for rest in (lines[:20], lines[:2], [" Link1:  Proceeding to internal job step number  2.\n"]):
+        with pytest.raises(ValueError, match="ends without 'Normal termination of Gaussian'"):
+            read_output(written(tmp_path, gaussian() + "".join(rest)))
 
 
 def mopac(ending: str) -> str:

@@ -161,10 +161,13 @@ def is_output(path: Path) -> bool:
 
 
 def _refuse_cut(output: _Output) -> None:
-    """The program's last words must follow the last table; without them the file is cut or the run failed."""
+    """The program's last words must follow the last table and the last start of a job; without them the file is cut or the run failed."""
     endings = [i for i, line in enumerate(output.lines) if output.program.ending in line]
-    tables = [i for i, _ in _tables(output)]
-    if not endings or (tables and tables[-1] > endings[-1]):
+    begun = (*output.program.geometries, "Link1:  Proceeding")  # the second words open Gaussian's next job
+    starts = [
+        i for i, line in enumerate(output.lines) if output.program.banner in line or line.strip().startswith(begun)
+    ]
+    if not endings or starts[-1] > endings[-1]:
         last = max((i for i, line in enumerate(output.lines) if line.strip()), default=0)
         rule = (
             f"the file ends without {output.program.ending!r}, so that it was cut or the run failed; give a whole one"
