@@ -24,10 +24,14 @@ RIGID = "A=835840.288 B=435351.717 C=278138.7 MHz"
 INFO = """
     rotor_version command input name formula mass_u kind kind_decision point_group symmetry_number constants_mhz uncertainties_mhz reduction
     representation rotational_constants_mhz rotational_constants_cm kappa moments_u_angstrom2 planar_moments_u_angstrom2
-    inertial_defect_u_angstrom2 frame dipole_abc_debye dipole_source spin_weights spin_weights_source
+    inertial_defect_u_angstrom2 frame dipole_abc_debye dipole_source
+    polarizability_abc_angstrom3 polarizability_source spin_weights spin_weights_source
     partition_function source notes
 """
-SPECTRUM = "temperature_k q jmax jmax_source min_lgint range_mhz line_count profile fwhm_mhz strongest lines files"
+SPECTRUM = """
+    temperature_k q jmax jmax_source min_lgint range_mhz line_count profile fwhm_mhz pressure_bar path_cm column_per_cm2 optical_depth
+    strongest lines files
+"""
 INFO_KEYS = set(INFO.split())
 SPECTRUM_KEYS = (INFO_KEYS - {"partition_function"}) | set(SPECTRUM.split())
 

@@ -219,11 +219,14 @@ def test_scaled_constants_follow_axes_that_change_places():
 
 
 def test_scaled_constants_out_of_order_take_their_frame_along():
-    rigid = near_oblate()
+    rigid = near_oblate().with_polarizability(np.diag([3.0, 2.0, 1.0]), "invented")
     parent = replace(rigid, constants=rigid.constants.replace(A=rigid.constants["A"] * 1.2))
     one = isotopologue(parent, "H=2H").top
     bare = Top.from_molecule(one.molecule)
     assert one.constants["A"] == pytest.approx(bare.constants["B"] * 1.2, rel=1e-12)
+    theirs = np.array(bare.polarizability_abc_angstrom3)[np.ix_((1, 0, 2), (1, 0, 2))]
+    assert np.abs(one.polarizability_abc_angstrom3) == pytest.approx(np.abs(theirs), abs=1e-12)  # round-off of a turn
+    assert np.diag(theirs)[0] != pytest.approx(np.diag(theirs)[1], rel=0.1)
     assert one.constants.rigid == tuple(sorted(one.constants.rigid, reverse=True))
     assert [abs(mu) for mu in one.dipole_abc_debye] == pytest.approx([abs(bare.dipole_abc_debye[i]) for i in (1, 0, 2)])
     assert np.linalg.det(one.frame.axes) == pytest.approx(1.0)

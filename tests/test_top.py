@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gzip
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -154,6 +155,40 @@ def test_single_atom_and_bad_dipole():
         Top.from_molecule(Molecule(("Ar",), [[0, 0, 0]]))
     with pytest.raises(ValueError, match="three finite numbers"):
         Top.from_constants("B=1 GHz", dipole_abc_debye=(1, 2))
+
+
+@given(st.integers(0, 2**32 - 1))
+@settings(max_examples=20, deadline=None)
+def test_polarizability_turns_along(seed):
+    """In principal axes nothing depends on how the molecule came, but for the signs of axes that symmetry leaves free."""
+    alpha = np.array([[1.415, 0, 0], [0, 1.528, 0], [0, 0, 1.468]])
+    turned = replace(WATER, polarizability_angstrom3=alpha).moved(
+        Rotation.random(rng=np.random.default_rng(seed)).as_matrix()
+    )
+    found = np.array(Top.from_molecule(turned).polarizability_abc_angstrom3)
+    assert found == pytest.approx(np.diag([1.528, 1.468, 1.415]), abs=1e-12)  # round-off of a turn
+    assert not found[~np.eye(3, dtype=bool)].any()
+
+
+@pytest.mark.parametrize("symbols", [("N", "N"), ("C", "O")])
+def test_noise_in_a_polarizability_that_symmetry_forbids_is_left_out(symbols):
+    """A rod: α∥ along a, the mean of the others across; a change of more than 0.001 of the whole stays."""
+    rod = Molecule(symbols, [[0, 0, 0], [0, 0, 1.1]])
+    for noise, across in ((1e-4, (1.50005, 1.50005)), (0.1, (1.5, 1.6))):
+        tensor = np.diag([1.5, 1.5 + noise, 2.2])
+        found = Top.from_molecule(replace(rod, polarizability_angstrom3=tensor)).polarizability_abc_angstrom3
+        assert np.diag(found)[0] == pytest.approx(2.2, abs=1e-12)
+        assert sorted(np.diag(found)[1:]) == pytest.approx(across, abs=1e-12)
+
+
+def test_an_axis_makes_the_polarizability_axial():
+    angle = 2 * np.pi / 3 * np.arange(3)
+    ring = np.stack([np.cos(angle), np.sin(angle), np.full(3, 0.4)], axis=1)
+    pyramid = Molecule(
+        ("N", "H", "H", "H"), np.vstack([[0, 0, 0], ring]), polarizability_angstrom3=np.diag([2.0, 2.002, 2.4])
+    )
+    a, b, c = np.diag(Top.from_molecule(pyramid).polarizability_abc_angstrom3)
+    assert (a, b, c) == pytest.approx((2.001, 2.001, 2.4), abs=1e-12)
 
 
 @pytest.mark.oracle

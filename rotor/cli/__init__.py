@@ -14,7 +14,7 @@ from typing import cast
 
 import typer
 
-from rotor.cli import cat, convert, info, isotopologues, molecules, spectrum, tumble
+from rotor.cli import cat, convert, info, isotopologues, molecules, raman, spectrum, tumble
 from rotor.cli.output import NoAnswer
 
 NO_ANSWER, WRONG_INPUT, INTERRUPTED = 1, 2, 130
@@ -29,6 +29,7 @@ Examples:
   rotor spectrum --constants "A=835840.288 B=435351.717 C=278138.7 MHz" --dipole-abc 0,1.8546,0
   rotor info my.sdf
   rotor isotopologues water
+  rotor raman N2 --laser 488
   rotor tumble water --plot water.png"""
 
 
@@ -52,6 +53,7 @@ def _application() -> typer.Typer:
     app.command("info", epilog=info.EXAMPLES)(info.command)
     app.command("molecules", epilog=molecules.EXAMPLES)(molecules.command)
     app.command("isotopologues", epilog=isotopologues.EXAMPLES)(isotopologues.command)
+    app.command("raman", epilog=raman.EXAMPLES)(raman.command)
     app.command("tumble", epilog=tumble.EXAMPLES)(tumble.command)
     app.command("convert", epilog=convert.EXAMPLES)(convert.command)
     app.command("cat", epilog=cat.EXAMPLES)(cat.command)

@@ -51,6 +51,8 @@ def describe(top: Top, text: str, command: str) -> dict[str, Any]:
         "frame": {"axes": frame.axes, "centre_angstrom": frame.centre} if frame else None,
         "dipole_abc_debye": top.dipole_abc_debye,
         "dipole_source": top.dipole_source or None,
+        "polarizability_abc_angstrom3": top.polarizability_abc_angstrom3,
+        "polarizability_source": top.polarizability_source or None,
         "spin_weights": top.spin_weights.to_mapping(),
         "spin_weights_source": top.weights_source or None,
         "source": top.source or None,

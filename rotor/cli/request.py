@@ -19,6 +19,8 @@ SAID = {
     "range_": "FQLIM",
     "q": "QROT",
     "vibrational_factor": "QROT",
+    "vibration": "QROT",
+    "vibrational_states": "QROT",
     "tag": "TAG",
     "dipole": "the dipoles",
     "dipole_abc": "the dipoles",

@@ -9,14 +9,16 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from rotor.cli import inputs, request
+from rotor.cli import inputs, layer, request
 from rotor.cli.inputs import Input
 from rotor.cli.output import Files, NoAnswer, Table, Writer, answering, json_text, show_facts, show_table, write_text
 
 if TYPE_CHECKING:
+    from rotor.cli.layer import Layer
     from rotor.formats.spcat.predict import Prediction
     from rotor.spectra.lines import Lines
     from rotor.spectra.spectrum import Spectrum
+    from rotor.thermo import VibrationalStates
     from rotor.top import Top
 
 PROFILES = ("sticks", "gaussian", "lorentzian", "voigt")
@@ -42,6 +44,8 @@ class Settings:
     vibrational_factor: float
     profile: str
     fwhm_mhz: float | None
+    vibrations: VibrationalStates | None = None
+    gas: Layer | None = None
 
 
 def command(
@@ -62,6 +66,10 @@ def command(
     hessian: str | None = inputs.HESSIAN,
     q: float | None = typer.Option(None, metavar="Q", help="Partition function to use instead of the summed one."),
     vibrational_factor: float = typer.Option(1.0, metavar="X", help="Multiplies Q."),
+    vibration: str | None = layer.VIBRATION,
+    vibrational_states: str | None = layer.VIBRATIONAL_STATES,
+    pressure: str | None = layer.PRESSURE,
+    path: str | None = layer.PATH,
     profile: str | None = typer.Option(None, metavar="NAME", help="sticks, gaussian, lorentzian or voigt."),
     fwhm: str | None = typer.Option(None, metavar="W", help="Full width at half maximum (MHz); by default Doppler's."),
     cat: str | None = typer.Option(None, metavar="FILE", help="Write a catalogue of 80 columns (.cat, .cat.gz)."),
@@ -74,7 +82,11 @@ def command(
     tag: int = typer.Option(0, metavar="N", help="Tag of the species in --cat."),
 ) -> None:
     """Rotational lines: frequencies, intensities, and what they were made from."""
+    gas = layer.layer(pressure, path)
+    profile = profile or ("gaussian" if gas else None)
     settings = _settings(temperature, jmax, min_lgint, range_, q, vibrational_factor, profile, fwhm)
+    settings = replace(settings, vibrations=layer.vibrations(vibration, vibrational_states), gas=gas)
+    _refuse_contradictions(settings)
     inputs.whole("--top", top_lines, 0)
     inputs.whole("--tag", tag, 0, 999_999)
     files = _files(
@@ -105,6 +117,13 @@ def command(
         _show(lines, content)
 
 
+def _refuse_contradictions(settings: Settings) -> None:
+    if settings.vibrations is not None and settings.vibrational_factor != 1.0:
+        raise ValueError("--vibrational-factor and vibrational energies: give one of them")
+    if settings.gas is not None and settings.profile == "sticks":
+        raise ValueError("--pressure: an optical depth needs a width, and sticks have none; choose another --profile")
+
+
 def _files(settings: Settings, paths: dict[str, str | None]) -> Files:
     """The files asked for, each with a name of its format, and a use for what was said of the profile."""
     suffixes = {"--cat": (".cat", ".cat.gz"), "--parquet": (".parquet",), "--plot": (".png", ".pdf", ".svg")}
@@ -115,7 +134,7 @@ def _files(settings: Settings, paths: dict[str, str | None]) -> Files:
         raise ValueError(
             "--profile-csv: sticks have no profile; give --fwhm or --profile gaussian, lorentzian or voigt"
         )
-    if settings.profile != "sticks" and not (paths["--profile-csv"] or paths["--plot"]):
+    if settings.profile != "sticks" and not (settings.gas or paths["--profile-csv"] or paths["--plot"]):
         raise ValueError(
             f"a {settings.profile} profile was asked for, but not where to put it; add --plot or --profile-csv"
         )
@@ -212,6 +231,7 @@ def _lines(top: Top, settings: Settings) -> Lines:
         range_mhz=settings.range_mhz,
         q=settings.q,
         vibrational_factor=settings.vibrational_factor,
+        vibrations=settings.vibrations,
     )
 
 
@@ -235,6 +255,7 @@ def _content(lines: Lines, settings: Settings, given: Input, command: str, shown
         "line_count": len(lines),
         "profile": settings.profile,
         "fwhm_mhz": settings.fwhm_mhz,
+        **layer.depths(lines, settings.gas, settings.profile, settings.fwhm_mhz),
         "strongest": strongest,
     }
 
@@ -279,7 +300,12 @@ def _spectrum(lines: Lines, settings: Settings) -> Spectrum:
     first, last = settings.range_mhz
     shape: dict[str, Any] = {"profile": settings.profile, "fwhm_mhz": settings.fwhm_mhz}
     grid = resolving_grid(lines, range_mhz=(first, last) if math.isfinite(last) else None, **shape)
-    return Spectrum.from_lines(lines, grid, **shape)
+    spectrum = Spectrum.from_lines(lines, grid, **shape)
+    if settings.gas is None:
+        return spectrum
+    from rotor.spectra.opacity import optical_depth
+
+    return optical_depth(spectrum, settings.gas.pressure_bar, settings.gas.path_cm)
 
 
 def _draw(lines: Lines, settings: Settings, path: Path, story: dict[str, Any]) -> None:
@@ -299,7 +325,7 @@ def _show(lines: Lines, content: dict[str, Any]) -> None:
         return
     if len(content["strongest"]):
         print()
-        show_table(_lines_table(lines, content["strongest"]))
+        show_table(_lines_table(lines, content["strongest"], content["optical_depth"]))
 
 
 def _facts(lines: Lines, content: dict[str, Any]) -> list[tuple[str, str]]:
@@ -318,7 +344,18 @@ def _facts(lines: Lines, content: dict[str, Any]) -> list[tuple[str, str]]:
         ("J max", f"{lines.jmax}: {content['jmax_source']}"),
         ("cut", cut + _range_text(lines.range_mhz)),
         ("lines", _count_text(lines)),
+        *_layer_facts(content),
     ]
+
+
+def _layer_facts(content: dict[str, Any]) -> list[tuple[str, str]]:
+    if content["column_per_cm2"] is None:
+        return []
+    width = "Doppler's width" if content["fwhm_mhz"] is None else f"FWHM {content['fwhm_mhz']:g} MHz"
+    layer_text = (
+        f"{content['pressure_bar']:g} bar, {content['path_cm']:g} cm: {content['column_per_cm2']:.6g} molecules/cm²"
+    )
+    return [("layer", f"{layer_text}; optical depths τ at line centres, {content['profile']} profile, {width}")]
 
 
 def _range_text(range_mhz: tuple[float, float]) -> str:
@@ -342,11 +379,11 @@ def _why_none(lines: Lines) -> str:
     return "none of the allowed ones is inside the range and above the cut; widen --range or lower --min-lgint"
 
 
-def _lines_table(lines: Lines, rows: Any) -> Table:
-    """The strongest lines in order of frequency."""
+def _lines_table(lines: Lines, rows: Any, depth: Any = None) -> Table:
+    """The strongest lines in order of frequency, with their optical depths where there is a layer of gas."""
     shown = lines.where(rows)
     names = " ".join(name.capitalize() for name in lines.quanta_names)
-    columns = ("frequency (MHz)", "lgint", 'E" (cm-1)', "g'", "A (1/s)", "Sμ² (D²)", "upper", "lower")
+    columns: tuple[str, ...] = ("frequency (MHz)", "lgint", 'E" (cm-1)', "g'", "A (1/s)", "Sμ² (D²)", "upper", "lower")
     formats = ("{:.4f}", "{:.4f}", "{:.4f}", "{}", "{:.2e}", "{:.5g}")
     numbers = list(shown.columns.values())[: len(formats)]
     labels = [
@@ -354,5 +391,8 @@ def _lines_table(lines: Lines, rows: Any) -> Table:
         for states in (shown.upper, shown.lower)
     ]
     cells = [[form.format(x) for x in column] for form, column in zip(formats, numbers, strict=True)]
+    if depth is not None:
+        columns = (*columns[: len(formats)], "τ", *columns[len(formats) :])
+        cells.append([f"{x:.3e}" for x in depth[rows]])
     title = f"the {len(shown)} strongest lines" if len(shown) < len(lines) else "all lines"
     return Table(f"{title}, in order of frequency (states: {names})", columns, list(zip(*cells, *labels, strict=True)))

@@ -191,6 +191,7 @@ def write(thing: Any, path: str | os.PathLike[str], *, settings: Mapping[str, An
     from rotor.formats.hitran import HitranLines, write_hitran
     from rotor.formats.spcat.catalogue import Catalogue
     from rotor.spectra.lines import Lines
+    from rotor.spectra.raman import RamanLines
     from rotor.spectra.spectrum import Spectrum
 
     if isinstance(thing, Motion):
@@ -203,6 +204,10 @@ def write(thing: Any, path: str | os.PathLike[str], *, settings: Mapping[str, An
         from rotor.formats.spectrum_table import write_spectrum
 
         return write_spectrum(thing, path, settings)
+    if isinstance(thing, RamanLines):
+        from rotor.formats.raman_table import write_raman
+
+        return write_raman(thing, path, settings)
     if isinstance(thing, Lines):
         from rotor.formats.line_tables import write_lines
 

@@ -187,7 +187,7 @@ def _of_axial(levels: Levels, rise: int, along: float) -> RamanTransitions:
     return _ordered(levels, strength, first, second, _of_both(levels, first, second))
 
 
-def _row(j: Ints, k: Ints) -> Ints:
+def _row(j: int | Ints, k: Ints) -> Ints:
     return np.asarray(j * (j + 1) // 2 + k)
 
 
@@ -205,10 +205,11 @@ def _without_axis(levels: Levels, tensor: Floats, spin_weights: SpinWeights, axe
     pieces = []
     for up, low, parts in _pairs(blocks, tensor, axes):
         strength = 1.5 * amplitudes(up, low, parts) ** 2
-        second, first = np.meshgrid(*(_row(b.basis.j, b.basis.k) for b in (up, low)), indexing="ij")
-        other = (first != second) & _once(up, low)
+        i, k = np.nonzero(_once(up, low))
+        first, second = _row(low.basis.j, low.basis.k[k]), _row(up.basis.j, up.basis.k[i])
+        other = first != second
         weight = np.full(int(other.sum()), float(spin_weights.of_ka_kc(low.basis.species)))
-        pieces.append(_ordered(levels, strength[other], first[other], second[other], weight))
+        pieces.append(_ordered(levels, strength[i, k][other], first[other], second[other], weight))
     return _summed(levels, _joined(pieces))
 
 
