@@ -2,10 +2,10 @@
 
     python benchmarks/bench_lines.py [60 100 200]
 
-Each figure comes from a process of its own, after one small run that loads and compiles what is needed; the best of
-five, since whatever else the machine does only adds. Q is given, as it is in SPCAT's input. SPCAT's figures (gcc -O2, the same kind of machine, quiet) are those of its
-80-column sorted file, all lines or stronger than 1e-12; it lists round-off lines and leaves out weak allowed ones, so
-rates per line are compared.
+Each figure comes from a process of its own, after one small run that loads and compiles what is needed; the best of five,
+since whatever else the machine does only adds. Q is given, as it is in SPCAT's input. SPCAT's figures (gcc -O2, the same
+kind of machine, quiet) are those of its 80-column sorted file, all lines or stronger than 1e-12; it lists round-off lines
+and leaves out weak allowed ones, so rates per line are compared.
 Results go to benchmarks/results/lines.json.
 """
 
