@@ -30,7 +30,9 @@ def test_carbon_monoxide_by_hand():
     s_m = 8 * math.pi**3 * wavenumber / (3 * si.h * si.c) * s_mu2 * population  # m per molecule
 
     lines = line_list(CO, jmax=1)
-    assert lines.intensity_cm_per_molecule[0] == pytest.approx(s_m * 100, rel=3e-5, abs=0)  # 4.16231e-5 of catalogues is 1.7e-5 low
+    assert lines.intensity_cm_per_molecule[0] == pytest.approx(
+        s_m * 100, rel=3e-5, abs=0
+    )  # 4.16231e-5 of catalogues is 1.7e-5 low
     width = wavenumber * math.sqrt(8 * math.log(2) * kt / (27.994915 * si.atomic_mass * si.c**2))
     peak = 2 * math.sqrt(math.log(2) / math.pi) / width
     tau = 100.0 / kt * 1.0 * s_m * peak  # p L/kT, Pa m
@@ -57,7 +59,9 @@ def test_one_molecule_of_hitran(shared):
 def test_conversion_is_that_of_hitran():
     lines = line_list(CO, jmax=20)
     assert lines.intensity_cm_per_molecule == pytest.approx(cm_per_molecule(lines.intensity_nm2_mhz), rel=1e-15, abs=0)
-    assert lines.columns["intensity_cm_per_molecule"] == pytest.approx(10**lines.lgint / 2.99792458e18, rel=1e-12, abs=0)
+    assert lines.columns["intensity_cm_per_molecule"] == pytest.approx(
+        10**lines.lgint / 2.99792458e18, rel=1e-12, abs=0
+    )
 
 
 def test_loschmidt():
@@ -82,7 +86,9 @@ def test_area_and_saturation():
     thin, thick = optical_depth(section, 1e-8, 1.0), optical_depth(section, 1.0, 1e7)
     column = column_density_per_cm2(1e-8, 1.0, 300.0)
     area = np.trapezoid(thin.intensity, thin.frequency_mhz)
-    assert area == pytest.approx(column * 1e-14 * lines.intensity_nm2_mhz[0], rel=2e-3, abs=0)  # straight lines between points
+    assert area == pytest.approx(
+        column * 1e-14 * lines.intensity_nm2_mhz[0], rel=2e-3, abs=0
+    )  # straight lines between points
     assert absorbed_fraction(thin) == pytest.approx(thin.intensity, rel=1e-6, abs=0)
     assert absorbed_fraction(thick).max() == 1.0
     assert thick.intensity == pytest.approx(thin.intensity * 1e15, rel=1e-12, abs=0)  # Lambert and Beer

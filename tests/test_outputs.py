@@ -259,6 +259,30 @@ def test_every_cut_is_refused(tmp_path):
             read_output(written(tmp_path, "\n".join(lines[:stop]) + "\n"))
 
 
+def test_second_job_that_was_cut_is_refused_although_the_first_ended(tmp_path):
+    lines = gaussian().splitlines(keepends=True)
+    for rest in (lines[:20], lines[:2], [" Link1:  Proceeding to internal job step number  2.\n"]):
+        with pytest.raises(ValueError, match="ends without 'Normal termination of Gaussian'"):
+            read_output(written(tmp_path, gaussian() + "".join(rest)))
+
+
+def mopac(ending: str) -> str:
+    rows = "".join(
+        f"{i + 1:6d}   {s}   {x:14.8f}  *  {y:14.8f}  *  {z:14.8f}  *\n"
+        for i, (s, (x, y, z)) in enumerate(zip(SYMBOLS, WATER, strict=True))
+    )
+    head = "  NO.       ATOM         X             Y             Z\n NUMBER   SYMBOL    (ANGSTROMS)   (ANGSTROMS)   (ANGSTROMS)\n"
+    return f" ** MOPAC2016 **\n\n{head}\n{rows}\n{ending}\n"
+
+
+def test_of_another_program_the_geometry_alone_and_no_cut_file(tmp_path):
+    molecule = read_output(written(tmp_path, mopac("== MOPAC DONE ==")))
+    assert np.allclose(molecule.positions_angstrom, WATER, atol=1e-7)  # printed to 1e-8 Å
+    assert molecule.dipole_debye is None
+    with pytest.raises(ValueError, match=r"line 8: MOPAC does not say"):
+        read_output(written(tmp_path, mopac("")))
+
+
 def test_reader_hands_outputs_over_and_tells_what_cclib_would_add(tmp_path, monkeypatch):
     path = written(tmp_path, gaussian())
     assert_tensors(read_molecule(str(path)), np.eye(3))
@@ -267,11 +291,11 @@ def test_reader_hands_outputs_over_and_tells_what_cclib_would_add(tmp_path, monk
     monkeypatch.setattr("rotor.molecules.outputs.has_cclib", lambda: False)
     with pytest.raises(ValueError, match=r"molrotor\[qc\]"):
         read_output(path)
-    try:
-        notes = " ".join(read_molecule(path).notes)
-    except ValueError as reason:
-        notes = str(reason)
-    assert "molrotor[qc]" in notes
+    molecule = read_molecule(path)  # by ASE, which has the geometry
+    assert np.allclose(molecule.positions_angstrom, WATER, atol=1e-6) or np.allclose(
+        molecule.positions_angstrom, AXES, atol=1e-6
+    )  # printed to 1e-6 Å
+    assert "molrotor[qc]" in molecule.notes[-1]
 
 
 def test_a_log_of_no_program_stays_with_ase(tmp_path):

@@ -23,7 +23,7 @@ from rotor.top import Top
 
 QNFMT = {("j",): 101, ("j", "k"): 202, ("j", "ka", "kc"): 303}
 MAX_TAG = 999_999
-PIECE = 1 << 16  # lines of a long list that are made into text at once
+PIECE = 1 << 15  # lines of a long list that are made into text at once
 
 
 def catalogue(lines: Lines, tag: int = 0) -> Catalogue:

@@ -136,7 +136,11 @@ def has_cclib() -> bool:
 
 
 def program_of(text: str) -> _Program | None:
-    """The program of those known here that an output names, None for another."""
+    """The program of those known here that an output names first, None for another.
+
+    >>> program_of("Copyright (c) 1988-2016, Gaussian, Inc.  All Rights Reserved.").name
+    'Gaussian'
+    """
     named = [program for program in _PROGRAMS if program.banner in text]
     return min(named, key=lambda program: text.find(program.banner)) if named else None
 
@@ -157,10 +161,13 @@ def is_output(path: Path) -> bool:
 
 
 def _refuse_cut(output: _Output) -> None:
-    """The program's last words must follow the last table; without them the file is cut or the run failed."""
+    """The program's last words must follow the last table and the last start of a job; without them the file is cut or the run failed."""
     endings = [i for i, line in enumerate(output.lines) if output.program.ending in line]
-    tables = [i for i, _ in _tables(output)]
-    if not endings or (tables and tables[-1] > endings[-1]):
+    begun = (*output.program.geometries, "Link1:  Proceeding")  # the second words open Gaussian's next job
+    starts = [
+        i for i, line in enumerate(output.lines) if output.program.banner in line or line.strip().startswith(begun)
+    ]
+    if not endings or starts[-1] > endings[-1]:
         last = max((i for i, line in enumerate(output.lines) if line.strip()), default=0)
         rule = (
             f"the file ends without {output.program.ending!r}, so that it was cut or the run failed; give a whole one"
@@ -421,7 +428,11 @@ def _constants_mhz(masses_u: Floats, positions_angstrom: Floats) -> Floats:
 
 
 def _apart(printed: Floats, calculated: Floats) -> float:
-    """Largest relative difference, of as many of the smaller constants as are printed."""
+    """Largest relative difference, of as many of the smaller constants as are printed.
+
+    >>> round(_apart(np.array([10.1, 8.0]), np.array([np.inf, 10.0, 8.0])), 9)
+    0.01
+    """
     some = calculated[-len(printed) :]
     if not np.all(np.isfinite(some)):
         return float("inf")
