@@ -67,7 +67,9 @@ def in_own_process(*arguments: str, **options) -> subprocess.CompletedProcess:
 
 def test_water_has_its_lines(call):
     code, out, err = call("spectrum", "water", "--top", "5")
-    assert (code, err) == (0, "")
+    assert code == 0
+    assert err.startswith("note: the distortion series does not converge at J = 29")
+    assert err.count("\n") == 1
     assert out.splitlines()[0] == "water, H2O: asymmetric top (κ = -0.4367)"
     top = rotor.read("water")
     lines = rotor.line_list(top)
@@ -446,7 +448,7 @@ def test_a_reader_that_has_seen_enough_is_no_error(folder):
     ) as running:
         assert running.stdout.readline().startswith(b"formaldehyde")
         running.stdout.close()
-        assert running.stderr.read() == b""
+        assert all(line.startswith(b"note: ") for line in running.stderr.read().splitlines())
         assert running.wait(timeout=60) == 0
 
 
@@ -454,7 +456,8 @@ def test_a_terminal_without_greek_letters(folder):
     environment = os.environ | {"PYTHONPATH": str(ROOT), "PYTHONIOENCODING": "ascii", "PYTHONUTF8": "0"}
     command = [sys.executable, "-m", "rotor", "spectrum", "water", "--top", "1"]
     ran = subprocess.run(command, env=environment, capture_output=True, cwd=folder, check=False, timeout=60)
-    assert (ran.returncode, ran.stderr) == (0, b"")
+    assert ran.returncode == 0
+    assert ran.stderr.startswith(b"note: the distortion series")
     assert ran.stdout.startswith(b"water, H2O: asymmetric top (? = -0.4367)")
 
 
@@ -468,7 +471,7 @@ def test_nothing_heavy_is_loaded_for_lines_of_water(folder):
     ran = subprocess.run(
         [sys.executable, "-c", code], env=environment, capture_output=True, cwd=folder, check=True, timeout=60
     )
-    assert ran.stderr.decode().strip() == "[]"
+    assert ran.stderr.decode().splitlines()[-1] == "[]"
 
 
 # Pieces

@@ -11,7 +11,18 @@ import typer
 
 from rotor.cli import inputs, layer, request
 from rotor.cli.inputs import Input
-from rotor.cli.output import Files, NoAnswer, Table, Writer, answering, json_text, show_facts, show_table, write_text
+from rotor.cli.output import (
+    Files,
+    NoAnswer,
+    Table,
+    Writer,
+    answering,
+    json_text,
+    note,
+    show_facts,
+    show_table,
+    write_text,
+)
 
 if TYPE_CHECKING:
     from rotor.cli.layer import Layer
@@ -105,6 +116,9 @@ def command(
         lines = prediction.lines if prediction else _lines(top, settings)
         content = _content(lines, settings, given, context.obj, top_lines)
     _refuse_nothing_to_draw(lines, files)
+    for warning in lines.warnings:
+        note(warning)
+    content["notes"] = [*content["notes"], *lines.warnings]
 
     content["files"] = [str(path) for path in files.wanted.values()]
     writers = _writers(lines, settings, content, tag)
