@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -36,6 +37,26 @@ def pytest_terminal_summary(terminalreporter) -> None:
     skipped = len(_oracle_reports(terminalreporter, ("skipped",)))
     verdict = " (a failure: ../shared is here)" if skipped and SHARED.is_dir() else ""
     terminalreporter.write_line(f"oracles: {ran} ran, {skipped} skipped{verdict}")
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty working folder."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def call(capsys: pytest.CaptureFixture[str], folder: Path) -> Callable[..., tuple[int, str, str]]:
+    """Run a command in this process, in an empty folder: exit code, standard output, standard error."""
+    from rotor import cli
+
+    def run(*arguments: str) -> tuple[int, str, str]:
+        code = cli.run(list(arguments))
+        streams = capsys.readouterr()
+        return code, streams.out, streams.err
+
+    return run
 
 
 @pytest.fixture(autouse=True)

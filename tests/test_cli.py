@@ -15,7 +15,6 @@ import numpy as np
 import pytest
 
 import rotor
-from rotor import cli
 from rotor.cli import inputs, output, report
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -34,25 +33,6 @@ SPECTRUM = """
 """
 INFO_KEYS = set(INFO.split())
 SPECTRUM_KEYS = (INFO_KEYS - {"partition_function"}) | set(SPECTRUM.split())
-
-
-@pytest.fixture
-def folder(tmp_path, monkeypatch):
-    """An empty working folder."""
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
-
-
-@pytest.fixture
-def call(capsys, folder):
-    """Run a command in this process: exit code, standard output, standard error."""
-
-    def run(*arguments: str) -> tuple[int, str, str]:
-        code = cli.run(list(arguments))
-        streams = capsys.readouterr()
-        return code, streams.out, streams.err
-
-    return run
 
 
 def in_own_process(*arguments: str, **options) -> subprocess.CompletedProcess:

@@ -12,25 +12,11 @@ import pytest
 from oracle_cases import SAMPLES, disagreements, prediction
 
 import rotor
-from rotor import cli
 from rotor.formats.spcat.cat import read_cat, write_cat
 from rotor.formats.spcat.par import read_par
 
 DOCS = (Path(__file__).resolve().parents[1] / "docs" / "command_line.md").read_text(encoding="utf-8")
 OCS = str(SAMPLES / "ocs" / "sample.cat")
-
-
-@pytest.fixture
-def call(capsys, tmp_path, monkeypatch):
-    """Run a command in an empty folder of this process: exit code, standard output, standard error."""
-    monkeypatch.chdir(tmp_path)
-
-    def run(*arguments: str) -> tuple[int, str, str]:
-        code = cli.run(list(arguments))
-        streams = capsys.readouterr()
-        return code, streams.out, streams.err
-
-    return run
 
 
 @pytest.mark.parametrize("case", ["h2co", "ch3cn", "ocs"])

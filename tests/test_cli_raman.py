@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 import rotor
-from rotor import cli
 from rotor.plots.raman import plot_raman
 from rotor.spectra.raman import raman_lines
 
@@ -19,19 +18,6 @@ KEYS = {
     "temperature_k", "laser_nm", "anisotropy_angstrom3", "band_cross_section_cm2_per_sr", "q", "jmax", "jmax_source",
     "min_relative", "line_count", "strongest", "lines", "files", "polarizability_abc_angstrom3", "polarizability_source",
 }  # fmt: skip
-
-
-@pytest.fixture
-def call(capsys, tmp_path, monkeypatch):
-    """Run a command in an empty folder: exit code, standard output, standard error."""
-    monkeypatch.chdir(tmp_path)
-
-    def run(*arguments: str) -> tuple[int, str, str]:
-        code = cli.run(list(arguments))
-        streams = capsys.readouterr()
-        return code, streams.out, streams.err
-
-    return run
 
 
 def test_raman_of_nitrogen(call):

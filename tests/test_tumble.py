@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 
 import rotor
-from rotor import cli
 from rotor.classical.free import free_motion
 from rotor.classical.thermal import mean_thermal_momentum
 from rotor.plots import animation
@@ -27,19 +26,6 @@ _KEYS = """
 """
 MOTION_KEYS = set(_KEYS.split())
 BARE_KEYS = {"rotor_version", "command", "input", "kind", "notes"}
-
-
-@pytest.fixture
-def call(capsys, tmp_path, monkeypatch):
-    """Run a command in this process, in an empty folder: exit code, standard output, standard error."""
-    monkeypatch.chdir(tmp_path)
-
-    def run(*arguments: str) -> tuple[int, str, str]:
-        code = cli.run(list(arguments))
-        streams = capsys.readouterr()
-        return code, streams.out, streams.err
-
-    return run
 
 
 def rows_of(path):
