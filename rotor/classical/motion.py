@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,10 +11,11 @@ from rotor.classical.euler import energy, invariants
 from rotor.classical.free import FreeMotion
 from rotor.classical.integrators import Motion
 from rotor.rotations import Array, continuous
+from rotor.tables import Table
 
 
 @dataclass(frozen=True)
-class MotionTable:
+class MotionTable(Table):
     """One body at n times.
 
     times: (n,). momentum: (n, 3), L in principal axes. attitude: (n, 4), body to space. energy: (n,). In one
@@ -44,18 +44,6 @@ class MotionTable:
         """The table by column: t, m1, m2, m3, qw, qx, qy, qz, energy."""
         names = ("t", "m1", "m2", "m3", "qw", "qx", "qy", "qz", "energy")
         return dict(zip(names, (self.times, *self.momentum.T, *self.attitude.T, self.energy), strict=True))
-
-    def to_pandas(self) -> Any:
-        """All columns as a pandas DataFrame."""
-        import pandas as pd
-
-        return pd.DataFrame(self.columns)
-
-    def to_polars(self) -> Any:
-        """All columns as a polars DataFrame."""
-        import polars as pl
-
-        return pl.DataFrame(self.columns)
 
 
 @dataclass(frozen=True)

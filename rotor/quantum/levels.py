@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,7 @@ from rotor.quantum.watson import (
     rigid_operators,
     scalar_energy,
 )
+from rotor.tables import Table
 from rotor.terms import Operators
 from rotor.weights import SpinWeights
 
@@ -58,7 +59,7 @@ class SolvedBlock:
 
 
 @dataclass(frozen=True)
-class Levels:
+class Levels(Table):
     """Rotational levels as columns of equal length; the key of a level is (J, block, rank in the block).
 
     energy_mhz: E/h in MHz from the Hamiltonian's zero. j, ka, kc: quantum numbers; a symmetric top has K in `ka` (one
@@ -94,13 +95,12 @@ class Levels:
         """The lowest energy of a level that exists (spin weight above zero)."""
         return float(self.energy_mhz[self.weight > 0].min())
 
-    def to_pandas(self):  # type: ignore[no-untyped-def]
-        """The columns as a pandas DataFrame."""
-        import pandas as pd
-
+    @property
+    def columns(self) -> dict[str, NDArray[Any]]:
+        """Quantum numbers or irreps, energy_mhz, components, weight and degeneracy, by name."""
         labels = ("j", "ka", "kc") if self.irrep is None else ("j", "irrep")
         names = (*labels, "energy_mhz", "components", "weight", "degeneracy")
-        return pd.DataFrame({name: getattr(self, name) for name in names})
+        return {name: getattr(self, name) for name in names}
 
 
 def disordered_blocks(top: Top, levels: Levels) -> list[tuple[int, str]]:

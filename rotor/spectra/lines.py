@@ -24,6 +24,7 @@ from rotor.quantum.reliability import warnings_of
 from rotor.quantum.uncertainty import Covariance, level_spread, line_errors
 from rotor.spectra.reach import jmax_for_cut
 from rotor.spectra.transitions import IntensityCut, all_transitions
+from rotor.tables import Table
 from rotor.thermo import PartitionFunction, VibrationalStates, partition_function
 
 if TYPE_CHECKING:
@@ -40,7 +41,7 @@ DEFAULT_MIN_LGINT = -12.0
 
 
 @dataclass(frozen=True)
-class Lines:
+class Lines(Table):
     """Lines as columns of equal length, rising in frequency unless they were asked for unsorted.
 
     frequency_mhz, strength_debye2 (S μ², all components): (n,) float64. upper, lower: (n,) int32, rows of `levels`.
@@ -194,18 +195,6 @@ class Lines:
             for name, column in zip(self.quanta_names, self.quanta(rows).T, strict=True):
                 out[f"{name}_{suffix}"] = column
         return out
-
-    def to_pandas(self) -> Any:
-        """All columns as a pandas DataFrame."""
-        import pandas as pd
-
-        return pd.DataFrame(self.columns)
-
-    def to_polars(self) -> Any:
-        """All columns as a polars DataFrame."""
-        import polars as pl
-
-        return pl.DataFrame(self.columns)
 
 
 def quanta_names(levels: Levels) -> tuple[str, ...]:

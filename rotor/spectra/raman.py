@@ -27,6 +27,7 @@ from rotor.quantum.reliability import warnings_of
 from rotor.spectra.lines import partition_of, quanta_names
 from rotor.spectra.raman_strengths import RamanTransitions, anisotropy_squared, raman_transitions
 from rotor.spectra.reach import JMAX_DEFAULT_LIMIT
+from rotor.tables import Table
 from rotor.thermo import PartitionFunction, VibrationalStates, partition_function
 
 if TYPE_CHECKING:
@@ -42,7 +43,7 @@ DEFAULT_MIN_RELATIVE = 1e-6
 
 
 @dataclass(frozen=True)
-class RamanLines:
+class RamanLines(Table):
     """Raman lines as columns of equal length, rising in shift.
 
     shift_mhz: (n,) of the laser's frequency above that of the scattered light, Stokes lines positive, anti-Stokes ones
@@ -135,18 +136,6 @@ class RamanLines:
             for name, column in zip(self.quanta_names, self.quanta(rows).T, strict=True):
                 out[f"{name}_{suffix}"] = column
         return out
-
-    def to_pandas(self) -> Any:
-        """All columns as a pandas DataFrame."""
-        import pandas as pd
-
-        return pd.DataFrame(self.columns)
-
-    def to_polars(self) -> Any:
-        """All columns as a polars DataFrame."""
-        import polars as pl
-
-        return pl.DataFrame(self.columns)
 
 
 def raman_lines(

@@ -9,13 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rotor.spectra.lines import Lines
 from rotor.spectra.profiles import doppler_fwhm, gaussian, gaussian_reach, lorentzian, lorentzian_reach, voigt
+from rotor.tables import Table
 
 Floats = NDArray[np.float64]
 
@@ -30,7 +30,7 @@ _BACKGROUND = 2001  # and has so many even points
 
 
 @dataclass(frozen=True)
-class Spectrum:
+class Spectrum(Table):
     """Intensity on a grid of frequencies.
 
     frequency_mhz, intensity: (n,) arrays. unit: of the intensity, "nm^2" for a cross section,
@@ -109,18 +109,6 @@ class Spectrum:
         """The two columns by their names with unit."""
         name = {"nm^2": "cross_section_nm2", "optical depth": "optical_depth"}.get(self.unit, "intensity")
         return {"frequency_mhz": self.frequency_mhz, name: self.intensity}
-
-    def to_pandas(self) -> Any:
-        """Both columns as a pandas DataFrame."""
-        import pandas as pd
-
-        return pd.DataFrame(self.columns)
-
-    def to_polars(self) -> Any:
-        """Both columns as a polars DataFrame."""
-        import polars as pl
-
-        return pl.DataFrame(self.columns)
 
 
 def resolving_grid(
