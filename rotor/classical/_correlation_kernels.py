@@ -12,19 +12,20 @@ import numpy as np
 from numba import njit
 
 from rotor.classical._free_kernels import evaluate
+from rotor.classical._kernels import LANES, RUNS, advance_blocks
 from rotor.classical.theta import Rows
 from rotor.rotations import Array
 
 
 @njit(cache=True, inline="always")
-def _turned_vector(w: float, x: float, y: float, z: float, e: Array) -> float:
+def _turned_vector(w: float, x: float, y: float, z: float, e: Array) -> Any:
     """e · R e = 1 - 2 |v x e|² for the rotation (w, v) and a unit vector e."""
     a, b, c = y * e[2] - z * e[1], z * e[0] - x * e[2], x * e[1] - y * e[0]
     return 1.0 - 2.0 * (a * a + b * b + c * c)
 
 
 @njit(cache=True, inline="always")
-def _turned_tensor(w: float, x: float, y: float, z: float, axes: Array, beta: Array) -> float:
+def _turned_tensor(w: float, x: float, y: float, z: float, axes: Array, beta: Array) -> Any:
     """Σ_ij β_i β_j R_ij², the rotation seen from the tensor's principal axes (rows), Σ β_i = 0, Σ β_i² = 1.
 
     With Σ_i R_ij² = Σ_j R_ij² = 1 and β3 = -β1 - β2, four of the nine squares are enough.
@@ -61,12 +62,24 @@ def add_bodies(rows: Rows, times: Array, vector: Array, axes: Array, beta: Array
             sums[3, i] += second * second
 
 
-@njit(cache=True, nogil=True)
-def add_attitudes(attitude: Array, vector: Array, axes: Array, beta: Array) -> Any:
-    """The same four sums for attitudes (n, 4) at one time, all of which were the identity at time 0."""
-    a = b = c = d = 0.0
-    for i in range(attitude.shape[0]):
-        w, x, y, z = attitude[i]
-        first, second = _turned_vector(w, x, y, z, vector), _turned_tensor(w, x, y, z, axes, beta)
-        a, b, c, d = a + first, b + first * first, c + second, d + second * second
-    return a, b, c, d
+@njit(cache=True, nogil=True, fastmath={"contract", "reassoc", "nsz"}, error_model="numpy")
+def add_stepped(
+    data: Array, bodies: int, step: float, steps: int, vector: Array, axes: Array, beta: Array, sums: Array
+) -> None:
+    """The same four sums for blocks of bodies (`_kernels.py`) that start upright, `steps` steps between two times."""
+    a, b, c, d = LANES * 3, LANES * 4, LANES * 5, LANES * 6
+    for block in range(data.size // (RUNS * LANES)):
+        row = data[block * RUNS * LANES : (block + 1) * RUNS * LANES]
+        here = min(LANES, bodies - block * LANES)  # the last block is filled with bodies at rest
+        for i in range(sums.shape[1]):
+            if i > 0:
+                advance_blocks(data, block, block + 1, step, steps)
+            s1 = s2 = s3 = s4 = 0.0
+            for k in range(here):
+                w, x, y, z = row[a + k], row[b + k], row[c + k], row[d + k]
+                first, second = _turned_vector(w, x, y, z, vector), _turned_tensor(w, x, y, z, axes, beta)
+                s1, s2, s3, s4 = s1 + first, s2 + first * first, s3 + second, s4 + second * second
+            sums[0, i] += s1
+            sums[1, i] += s2
+            sums[2, i] += s3
+            sums[3, i] += s4

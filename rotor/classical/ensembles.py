@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike
 
 from rotor.classical.euler import checked_moments
 from rotor.classical.free import free_motion
-from rotor.classical.many import advance
+from rotor.classical.many import packed
 from rotor.degrees import rotating_axes
 from rotor.equipartition import KineticDegrees, kinetic_degrees
 from rotor.rotations import IDENTITY, Array, uniform
@@ -200,7 +200,7 @@ def stepped_gas_correlations(
     executor: ThreadPoolExecutor | None = None,
     progress: Callable[[int], object] | None = None,
 ) -> Correlations:
-    """The same at times 0, interval, ... (count of them), by `steps` steps of `rotor.classical.many.advance` each.
+    """The same at times 0, interval, ... (count of them), by `steps` steps of the splitting of `many.py` each.
 
     The error of an attitude grows as step² times the time; with the same `rng` the molecules are the same as in
     `free_gas_correlations`, so that the difference of both is the error of stepping alone. Linear molecules are refused.
@@ -211,14 +211,11 @@ def stepped_gas_correlations(
     grid = _checked_times(interval * np.arange(count))
 
     def piece(size: int, source: np.random.Generator) -> Array:
-        from rotor.classical._correlation_kernels import add_attitudes
+        from rotor.classical._correlation_kernels import add_stepped
 
-        momentum, attitude = thermal_momenta(inertia, kt, size, rng=source), np.tile(IDENTITY, (size, 1))
-        sums = np.empty((4, count))
-        for i in range(count):
-            if i:
-                momentum, attitude = advance(inertia, momentum, attitude, interval / steps, steps)
-            sums[:, i] = add_attitudes(attitude, probe.vector, probe.axes, probe.beta)
+        data, n = packed(inertia, thermal_momenta(inertia, kt, size, rng=source), IDENTITY, interval / steps)
+        sums = np.zeros((4, count))
+        add_stepped(data, n, interval / steps, steps, probe.vector, probe.axes, probe.beta, sums)
         return sums
 
     return _averaged(piece, grid, probe, molecules, rng, executor, progress)
