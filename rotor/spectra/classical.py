@@ -159,18 +159,13 @@ def band_from_correlation(
             f"C1 up to {times[-1]:g} ps is too short for a width of {fwhm_mhz:g} MHz; {wanted:.3g} ps would do"
         )
 
-    half_beta_hbar_ps = 1.0 / (4.0 * math.pi * temperature_k * units.MHZ_PER_K * HZ_PER_MHZ_PS)
+    kt_mhz = temperature_k * units.MHZ_PER_K
     if correction == "egelstaff":
-        c1 = _at_later_times(times, c1, half_beta_hbar_ps)
-    fine = np.arange(0.0, 0.5 / (times[1] * HZ_PER_MHZ_PS), fwhm_mhz / POINTS_PER_WIDTH)
-    x = fine / (temperature_k * units.MHZ_PER_K)
-    sigma = (
-        INTENSITY_NM2_MHZ
-        * dipole2_debye2
-        * fine
-        * _balance(x, correction)
-        * _cosine_transform(times, c1 * window, fine)
-    )
+        c1 = _at_later_times(times, c1, 1.0 / (4.0 * math.pi * kt_mhz * HZ_PER_MHZ_PS))
+    fine, nu2_density = _second_moment_density(times, c1, WINDOW_SHARE * fwhm_mhz, fwhm_mhz / POINTS_PER_WIDTH)
+    shown = fine <= grid.max(initial=0.0) + 4.0 * fwhm_mhz
+    fine, nu2_density = fine[shown], nu2_density[shown]
+    sigma = INTENSITY_NM2_MHZ * dipole2_debye2 / kt_mhz * _balance(fine / kt_mhz, correction) * nu2_density
     smooth = _smoothed(fine, sigma, math.sqrt(1.0 - WINDOW_SHARE**2) * fwhm_mhz)
 
     from scipy.interpolate import CubicSpline
@@ -220,26 +215,43 @@ def _even(times: Floats) -> bool:
 
 
 def _window(times_ps: Floats, fwhm_mhz: float) -> Floats:
-    """The Fourier transform of a Gaussian of unit area: exp(-(π w t)²/(4 ln 2))."""
-    turned = math.pi * fwhm_mhz * HZ_PER_MHZ_PS * times_ps
-    return np.asarray(np.exp(-(turned**2) / (4.0 * math.log(2.0))))
+    """The Fourier transform of a Gaussian of unit area: exp(-a t²), a = (π w)²/(4 ln 2)."""
+    return np.asarray(np.exp(-_closing(fwhm_mhz) * times_ps**2))
+
+
+def _closing(fwhm_mhz: float) -> float:
+    """a of `_window` in 1/ps²."""
+    return (math.pi * fwhm_mhz * HZ_PER_MHZ_PS) ** 2 / (4.0 * math.log(2.0))
 
 
 def _balance(x: Floats, correction: Correction) -> Floats:
-    """(1 - e^-x) F(x)."""
+    """(1 - e^-x) F(x)/x."""
+    half = np.maximum(0.5 * x, 1e-9)
     if correction == "harmonic":
-        return x
-    if correction == "standard":
-        return np.asarray(2.0 * np.tanh(0.5 * x))
-    return np.asarray(2.0 * np.sinh(0.5 * x))
+        return np.ones_like(x)
+    return np.asarray((np.tanh(half) if correction == "standard" else np.sinh(half)) / half)
 
 
-def _cosine_transform(times_ps: Floats, c1: Floats, frequency_mhz: Floats) -> Floats:
-    """S(ν) in 1/MHz, ∫ over all times of C1 cos(2πνt), by the trapezoidal rule."""
-    weights = np.full(len(times_ps), 2.0 * times_ps[1] * HZ_PER_MHZ_PS)
+def _second_moment_density(times_ps: Floats, c1: Floats, fwhm_mhz: float, step_mhz: float) -> tuple[Floats, Floats]:
+    """Frequencies in steps of at most `step_mhz`, and ν² S(ν) there in MHz, convolved with a Gaussian.
+
+    That is the transform of -C″ w/(2π)², w the window; with -C″ w = -(C w)″ + 2 (C w′)′ - C w″ no number is differentiated,
+    and the second moment of S, which is the area of the band, is not widened by the window.
+    """
+    from scipy.fft import next_fast_len, rfft
+
+    a, dt = _closing(fwhm_mhz), times_ps[1]
+    window = np.exp(-a * times_ps**2)
+    size = next_fast_len(max(math.ceil(1.0 / (step_mhz * HZ_PER_MHZ_PS * dt)), 2 * len(times_ps)), real=True)
+    weights = np.full(len(times_ps), 2.0 * dt)
     weights[[0, -1]] *= 0.5
-    phases = 2.0 * math.pi * HZ_PER_MHZ_PS * frequency_mhz[:, None] * times_ps
-    return np.asarray(np.cos(phases) @ (weights * c1))
+    even, odd, curved = (
+        rfft(weights * c1 * shape, size)
+        for shape in (window, -2.0 * a * times_ps * window, (4.0 * a * a * times_ps**2 - 2.0 * a) * window)
+    )
+    nu = np.arange(len(even)) / (size * dt)  # 1/ps
+    total = nu**2 * even.real + (-2.0 * (2.0 * math.pi * nu) * odd.imag - curved.real) / (4.0 * math.pi**2)
+    return nu / HZ_PER_MHZ_PS, total / HZ_PER_MHZ_PS
 
 
 def _at_later_times(times: Floats, c1: Floats, shift: float) -> Floats:
