@@ -5,8 +5,8 @@ II, eqs. V,18 and V,27; ⟨g_I⟩ is the number of nuclear-spin functions over t
 
     Q = ⟨g_I⟩ kT/hB  (linear),      Q = ⟨g_I⟩ √(π (kT/h)³ / ABC)  (all others),
 
-multiplied by f = 1 + a/T + b/T² + d T. The quantum corrections a and b are the first two terms of the expansion in ħ²: of a
-linear molecule (H. P. Mulholland, Proc. Camb. Phil. Soc. 24 (1928) 280)
+multiplied by 1 + a/T + b/T² + d T + ... The quantum corrections a and b are the first two terms of the expansion in ħ²: of
+a linear molecule (H. P. Mulholland, Proc. Camb. Phil. Soc. 24 (1928) 280)
 
     a = Θ/3,    b = Θ²/15;
 
@@ -17,6 +17,9 @@ the different terms that exchanging A, B, C makes,
 
 which for a spherical top are B/4 and (B/4)²/2. d T is the quartic centrifugal distortion to first order, -⟨H_d⟩/kT, with
 H_d a polynomial of classical angular momenta whose components have variances kT/2A, kT/2B, kT/2C (linear: 2D k/B² T).
+
+The logarithm is what is cut off: the corrected Q is the classical one times exp[a/T + (b - a²/2)/T² + d T]. To the order
+that is known that is the same, no spurious terms get into the heat capacity, and a spherical top's e^(B/4kT) is all of it.
 """
 
 from __future__ import annotations
@@ -41,14 +44,14 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
-SERIES_LIMIT = 0.5  # of a/T + b/T² and of dT, above which the corrected limit is not given
+SERIES_LIMIT = 0.5  # of the quantum corrections and of dT, above which the corrected limit is not given
 # exact for polynomials of fifth order in a normal deviate: nodes and weights of Gauss and Hermite
 _NODES = ((-math.sqrt(3.0), 1 / 6), (0.0, 2 / 3), (math.sqrt(3.0), 1 / 6))
 
 
 @dataclass(frozen=True)
 class ClassicalLimit:
-    """The classical limit of a top: q = mean_weight · scale · T^(n/2) times 1 + a/T + b/T² + d T.
+    """The classical limit of a top: q = mean_weight · scale · T^(n/2), to be multiplied by 1 + a/T + b/T² + d T.
 
     degrees: n, 2 for a linear molecule, else 3. scale: in K^(-n/2). a, b, d: in K, K², 1/K; see the module.
     """
@@ -66,18 +69,16 @@ class ClassicalLimit:
         return np.asarray(self.mean_weight * self.scale * t ** (self.degrees / 2))
 
     def corrected(self, temperatures_k: ArrayLike) -> tuple[Floats, Floats, Floats]:
-        """Q, U/RT and C_v/R with the corrections, (n,) each; NaN where these are more than half of 1.
+        """Q, U/RT and C_v/R with the corrections, (n,) each; NaN where one of these is more than half of 1.
 
-        From ln f: U/RT = n/2 + T f'/f and C_v/R = n/2 + 2T f'/f + T² [f''/f - (f'/f)²].
+        With c = b - a²/2: ln(Q/Q_cl) = a/T + c/T² + dT, U/RT = n/2 - a/T - 2c/T² + dT, C_v/R = n/2 + 2c/T² + 2dT.
         """
         t = np.asarray(temperatures_k, dtype=np.float64)
-        quantum, distortion = self.a / t + self.b / t**2, self.d * t
-        valid = (np.abs(quantum) < SERIES_LIMIT) & (np.abs(distortion) < SERIES_LIMIT)
-        f = np.where(valid, 1 + quantum + distortion, np.nan)
-        first = (-self.a / t - 2 * self.b / t**2 + distortion) / f
-        second = (2 * self.a / t + 6 * self.b / t**2) / f
-        half = self.degrees / 2
-        return self.q(t) * f, half + first, half + 2 * first + second - first**2
+        first, second, distortion = self.a / t, (self.b - self.a**2 / 2) / t**2, self.d * t
+        valid = np.max(np.abs([first + second, distortion]), axis=0) < SERIES_LIMIT
+        half = np.where(valid, self.degrees / 2, np.nan)
+        ln_f = np.where(valid, first + second + distortion, np.nan)
+        return self.q(t) * np.exp(ln_f), half - first - 2 * second + distortion, half + 2 * second + 2 * distortion
 
 
 def classical_limit(top: Top, weights: SpinWeights | None = None) -> ClassicalLimit:
@@ -166,8 +167,8 @@ def parting_temperature_k(top: Top, tolerance: float = 0.01) -> float:
     """The highest temperature at which C_v of the rigid quantum top differs from its classical value by `tolerance` of it.
 
     Above it the classical n R/2 is good to that; distortion, which both could have, is left out of both. The spin weights
-    count, all species in equilibrium. Found on 40 temperatures a decade from 300 down to 0.01 of the largest finite Θ, and
-    then bisected to 1e-6. A linear molecule of Θ, its C_v/R being 1 + (Θ/T)²/45 + ..., parts at 1.93 Θ.
+    count, all species in equilibrium. Looked for at 40 temperatures a decade from 0.01 to 10 times the largest finite Θ,
+    higher where it differs there, and then bisected to 1e-6. A linear molecule of Θ, its C_v/R being 1 + (Θ/T)²/45 + ..., parts at 1.93 Θ.
 
     >>> from rotor.top import Top
     >>> round(parting_temperature_k(Top.from_constants("B=20836.619 MHz")), 2)  # Θ = 1 K
@@ -182,11 +183,13 @@ def parting_temperature_k(top: Top, tolerance: float = 0.01) -> float:
         sums = level_sums(rigid, [rigid.spin_weights], temperatures, tolerance * 1e-4)[0]
         return np.asarray(np.abs(sums.cv_over_r / classical - 1) > tolerance)
 
-    grid = theta * np.logspace(math.log10(300), -2, 181)
-    apart = np.flatnonzero(beyond(grid))
-    if not len(apart) or apart[0] == 0:
-        raise ValueError(f"C_v differs from its classical value by {tolerance:g} nowhere between 0.01 and 300 Θ")
-    high, low = float(grid[apart[0] - 1]), float(grid[apart[0]])
+    grid = theta * np.logspace(-2, 1, 121)
+    apart = beyond(grid)
+    while apart[-20:].any():  # half a decade without a difference is the end
+        higher = grid[-1] * np.logspace(0.025, 0.5, 20)
+        grid, apart = np.append(grid, higher), np.append(apart, beyond(higher))
+    last = np.flatnonzero(apart)[-1]
+    low, high = float(grid[last]), float(grid[last + 1])
     while high - low > 1e-6 * low:
         middle = (high + low) / 2
         low, high = (middle, high) if beyond(np.array([middle]))[0] else (low, middle)

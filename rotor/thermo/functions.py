@@ -38,6 +38,7 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
+AT_WORST = 1e-4  # truncation error up to which sums that end where the distortion constants do are taken
 GAS_CONSTANT = units.BOLTZMANN_J_PER_K * units.AVOGADRO_PER_MOL  # J/(mol K), exact
 
 
@@ -139,7 +140,8 @@ def thermodynamic_functions(
         "ortho", or a class of the spin weights such as "E"; see `species_names`.
     vibrations : vibrational states; none: vibration is left out.
     pressure_bar : of an ideal gas, whose functions are then given too; the top must have a mass.
-    relative_error : of Q, U and C_v from truncating the sums.
+    relative_error : of Q, U and C_v from truncating the sums; up to 1e-4 where the distortion constants allow no better,
+        as `ThermoFunctions.relative_error` tells.
 
     Returns
     -------
@@ -185,7 +187,7 @@ def _rotation(
 ) -> ThermoFunctions:
     """The functions of rotation alone."""
     ground_k = lowest_level_k(top, [top.spin_weights])[0]
-    sums = level_sums(top, list(parts.values()), temperatures, relative_error)
+    sums = level_sums(top, list(parts.values()), temperatures, relative_error, at_worst=AT_WORST)
     shares = np.array(list(fractions.values()) or [1.0])
     ln_q, mean, cv = _mixed(sums, ground_k, shares)
 

@@ -104,11 +104,14 @@ def level_sums(
     relative_error: float = 1e-8,
     *,
     energies: bool = True,
+    at_worst: float = 0.0,
 ) -> list[LevelSums]:
     """Q, U/RT and C_v/R of a top's levels for each of several sets of spin weights, from levels solved once.
 
     The sum at each temperature goes on until the estimated truncation error of Q, and with `energies` those of U and C_v
-    too, are below `relative_error`.
+    too, are below `relative_error`. Where the terms grow again before that, since the distortion constants are used beyond
+    their reach, it ends where the error was least, as an asymptotic series does; ValueError where that is above
+    `at_worst`. The errors say what was reached.
 
     >>> from rotor.top import Top
     >>> top = Top.from_constants("B=60 GHz")
@@ -118,7 +121,7 @@ def level_sums(
     """
     temperatures = checked_temperatures(temperatures_k)
     ladder = _Ladder(top, tuple(weights))
-    return [_summed(ladder, s, temperatures, relative_error, energies) for s in range(len(weights))]
+    return [_summed(ladder, s, temperatures, relative_error, energies, at_worst) for s in range(len(weights))]
 
 
 def lowest_level_k(top: Top, weights: Sequence[SpinWeights]) -> list[float]:
@@ -184,31 +187,31 @@ def heaviest_component(weights: SpinWeights) -> float:
     return float(max(weights.values))
 
 
-def _summed(ladder: _Ladder, s: int, temperatures: Floats, relative_error: float, energies: bool) -> LevelSums:
+def _summed(
+    ladder: _Ladder, s: int, temperatures: Floats, relative_error: float, energies: bool, at_worst: float
+) -> LevelSums:
     """The sums for one set of weights; each temperature leaves the loop at the J where its tail is small enough."""
-    n, (ground, ground_j) = len(temperatures), ladder.ground[s]
-    moments, errors, jmax = np.zeros((3, n)), np.zeros((3, n)), np.zeros(n, dtype=np.int64)
-    tails, going = _Tails(temperatures), np.arange(n)
+    (ground, ground_j), kinds = ladder.ground[s], 3 if energies else 1
+    sums, tails, best = np.zeros((3, len(temperatures))), _Tails(temperatures), _Best(len(temperatures))
+    going = np.arange(len(temperatures))
     for j in range(JMAX_LIMIT):
         kelvin, plain, spin = ladder.at(j)
         x = np.clip((kelvin - ground) / temperatures[going, None], LOWEST_X, HIGHEST_X)
         terms = np.exp(-x) * np.array([np.ones_like(x), x, x * x])
-        moments[:, going] += terms @ spin[s]
+        sums[:, going] += terms @ spin[s]
         tail = tails.after(going, ladder.heaviest[s] * (np.abs(terms) @ plain))
         if j < max(3, ground_j + 2):
             continue
-        errors[:, going] = relative_errors(moments[:, going], tail)
-        small = (errors[: 3 if energies else 1, going] < relative_error).all(axis=0)
-        jmax[going[small]] = j
-        going = going[~small]
+        errors = relative_errors(sums[:, going], tail)
+        best.take(going, j, sums[:, going], errors, errors[:kinds].max(axis=0))
+        going = going[best.worst[going] >= relative_error]
+        grown = tails.grows[going]
+        tails.refuse(going[grown & (best.worst[going] > at_worst)], j, sums[0])
+        going = going[~grown]
         if not len(going):
-            break
-        tails.refuse_growth(going, j, moments[0])
-    else:
-        hottest = temperatures[going].max()
-        raise ValueError(f"Q({hottest:g} K) needs levels beyond J = {JMAX_LIMIT - 1}; use the classical limit")
-    mean = moments[1] / moments[0]
-    return LevelSums(temperatures, ground, moments[0], mean, moments[2] / moments[0] - mean**2, jmax, *errors)
+            return best.as_sums(temperatures, ground)
+    hottest = temperatures[going].max()
+    raise ValueError(f"Q({hottest:g} K) needs levels beyond J = {JMAX_LIMIT - 1}; use the classical limit")
 
 
 def relative_errors(moments: Floats, tails: Floats) -> Floats:
@@ -235,12 +238,12 @@ class _Tails:
         self._temperatures = temperatures
         self._last = np.zeros((3, n))
         self._highest, self._lowest = np.zeros(n), np.full(n, np.inf)  # of the terms of Q, and since the highest
-        self._grows = np.zeros(n, dtype=bool)
+        self.grows = np.zeros(n, dtype=bool)
 
     def after(self, going: Ints, terms: Floats) -> Floats:
         """The tails (3, n) once the terms (3, n) of one more J are added; endless while they grow."""
         before, highest, lowest = self._last[:, going], self._highest[going], self._lowest[going]
-        self._grows[going] = (terms[0] > 2 * lowest) & (lowest < highest / 2)  # has fallen, and grows again
+        self.grows[going] = (terms[0] > 2 * lowest) & (lowest < highest / 2)  # has fallen, and grows again
         self._lowest[going] = np.where(terms[0] >= highest, terms[0], np.minimum(lowest, terms[0]))
         self._highest[going] = np.maximum(highest, terms[0])
         self._last[:, going] = terms
@@ -248,12 +251,31 @@ class _Tails:
         tail = terms * (terms / np.where(falls, before - terms, 1.0))
         return np.where(terms == 0, 0.0, np.where(falls, tail, ENDLESS))
 
-    def refuse_growth(self, going: Ints, j: int, totals: Floats) -> None:
-        """ValueError where the terms of Q have fallen and grow again."""
-        if self._grows[going].any():
-            at = going[np.argmax(self._grows[going])]
-            share = self._last[0, at] / totals[at]
+    def refuse(self, grown: Ints, j: int, totals: Floats) -> None:
+        """ValueError for the first of the temperatures where the terms of Q have fallen and grow again, if there is one."""
+        if len(grown):
+            share = self._last[0, grown[0]] / totals[grown[0]]
             raise ValueError(
-                f"Q({self._temperatures[at]:g} K): the sum over levels grows again at J = {j}; the distortion constants "
-                f"are used beyond their reach (tail {share:.1e} of Q there); lower the temperature or give Q"
+                f"Q({self._temperatures[grown[0]]:g} K): the sum over levels grows again at J = {j}; the distortion "
+                f"constants are used beyond their reach (tail {share:.1e} of Q there); lower the temperature or give Q"
             )
+
+
+class _Best:
+    """Of the sums up to each J those with the least error, for every temperature."""
+
+    def __init__(self, n: int) -> None:
+        self.worst = np.full(n, np.inf)
+        self._moments, self._errors, self._jmax = np.zeros((3, n)), np.zeros((3, n)), np.zeros(n, dtype=np.int64)
+
+    def take(self, going: Ints, j: int, moments: Floats, errors: Floats, worst: Floats) -> None:
+        """Keep what is better than before: moments and errors (3, m), and the largest error that counts (m,)."""
+        better = worst <= self.worst[going]
+        these = going[better]
+        self.worst[these], self._jmax[these] = worst[better], j
+        self._moments[:, these], self._errors[:, these] = moments[:, better], errors[:, better]
+
+    def as_sums(self, temperatures: Floats, ground_k: float) -> LevelSums:
+        q, first, second = self._moments
+        mean = first / q
+        return LevelSums(temperatures, ground_k, q, mean, second / q - mean**2, self._jmax, *self._errors)
