@@ -78,9 +78,9 @@ def test_q_is_that_of_info(call):
     assert code == 0
     for row in json.loads(out)["functions"]:
         q = partition_function(rotor.read("NH3"), row["temperature_k"], 1e-10).q
-        assert row["q_rot"] == pytest.approx(q, rel=1e-8)  # truncation
+        assert row["q_rot"] == pytest.approx(q, rel=1e-6)  # truncation
         assert row["entropy_j_per_mol_k"] == pytest.approx(
-            GAS_CONSTANT * math.log(q) + row["energy_j_per_mol"] / row["temperature_k"], rel=1e-8
+            GAS_CONSTANT * math.log(q) + row["energy_j_per_mol"] / row["temperature_k"], rel=1e-6
         )
 
 

@@ -128,7 +128,7 @@ def thermodynamic_functions(
     species: str = "equilibrium",
     vibrations: VibrationalStates | None = None,
     pressure_bar: float | None = None,
-    relative_error: float = 1e-8,
+    relative_error: float = 1e-6,
 ) -> ThermoFunctions:
     """Partition function, energy, entropy and heat capacity of a top at many temperatures, quantum and classical.
 

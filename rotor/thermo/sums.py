@@ -146,7 +146,7 @@ class _Ladder:
 
     def _solve_more(self) -> None:
         first = len(self._by_j)
-        last = first + max(STRIDE, first // 4) - 1
+        last = first + max(STRIDE, first // 8) - 1
         levels = solve_levels(self._top, last, jmin=first, vectors=False)
         kelvin = levels.energy_mhz / units.MHZ_PER_K
         plain = ((2 * levels.j + 1) * levels.components).astype(np.float64)
