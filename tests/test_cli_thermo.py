@@ -128,6 +128,13 @@ def test_parquet_and_csv_have_the_same_numbers(call, folder):
     assert float(rows[0]["temperature_k"]) == 5.0
 
 
+def test_no_other_format(folder):
+    functions = thermodynamic_functions(rotor.read("CO"), [10.0])
+    with pytest.raises(ValueError, match=r"can be written as \.csv or \.parquet"):
+        rotor.write(functions, "co.cat")
+    assert list(folder.iterdir()) == []
+
+
 def test_constants_alone(call):
     code, out, _ = call("thermo", "--constants", "B=60.853 cm-1", "--spin-weights", "even=1,odd=3", "--species", "para")
     assert code == 0

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rotor.plots.heat_capacity import heat_capacity_figure
+from rotor.plots.heat_capacity import heat_capacity_figure, plot_heat_capacity
 from rotor.thermo import GAS_CONSTANT, thermodynamic_functions
 
 HERE = Path(__file__).resolve().parent
@@ -100,6 +100,23 @@ def test_remembered_tables_meet_the_equation_of_the_webbook(molecule, within):
     assert np.nanmax(np.abs(theirs - entry["cp"])) < within
 
 
+@pytest.mark.parametrize("entry", KNOWN["partition"], ids=lambda entry: entry["molecule"])
+def test_cold_partition_functions_of_jpl(entry):
+    """From 9.4 K: four decimals of log10 Q are printed, and rounded."""
+    found = MAKE.computed(entry["molecule"], entry["temperature_k"])
+    ours = np.log10(entry["spin_states"] * found.q_rot * found.q_vib)
+    assert np.abs(ours - entry["log10_q"]).max() < 1.5e-4
+
+
+@pytest.mark.oracle
+@pytest.mark.parametrize(("tag", "molecule"), [("36001", "HCl"), ("18003", "H2O")])
+def test_they_are_those_of_the_file(shared: Path, tag, molecule):
+    lines = (shared / "reference" / "partition" / "jpl_catdir.cat").read_text(encoding="latin-1").splitlines()
+    line = next(one for one in lines if one.split()[0] == tag)
+    entry = next(one for one in KNOWN["partition"] if one["molecule"] == molecule)
+    assert [float(word) for word in line.split()[3:10]] == entry["log10_q"][::-1]
+
+
 def test_cold_methane_of_nasa():
     """At 200 K vibration hardly counts: NASA's 33.506 has distortion in it, as ours, and JANAF's 33.473 has not."""
     nasa = float(MAKE.published_cp(KNOWN["nasa9"][0], "nasa9", [200.0])[0])
@@ -119,5 +136,9 @@ def test_the_picture_has_every_curve_and_point():
     labels = [{text.get_text() for text in axes.get_legend().get_texts()} for axes in figure.axes]
     assert labels[0] == {"classical", "corrected", "para", "ortho", "normal", "equilibrium"}
     assert all(found == {"classical", "corrected", "quantum", "with vibration", "published"} for found in labels[1:])
+    with pytest.raises(ValueError, match="needs a panel"):
+        heat_capacity_figure([])
+    with pytest.raises(ValueError, match=r"\.png, \.pdf or \.svg"):
+        plot_heat_capacity(MAKE.panels()[:1], "heat.gif")
     points = [sum(line.get_marker() == "o" for line in axes.get_lines()) for axes in figure.axes]
     assert points == [4, 1, 1, 1]
