@@ -60,8 +60,8 @@ WORDS = """
 What is left over:
 
 - Below 100 K no published heat capacity of HCl, H2O and CH4 was at hand, nor the tables of H. W. Woolley, R. B. Scott and F. G.
-  Brickwedde (J. Res. NBS 41 (1948) 379) for H2. Of HCl and H2O the sums of a catalogue stand in, met to their last
-  digit but one unit; of CH4 nothing.
+  Brickwedde (J. Res. NBS 41 (1948) 379) for H2. Of HCl and H2O the sums of a catalogue stand in, met within
+  one unit of their last digit; of CH4 nothing.
 - Below about 500 K the tables of H2 and HCl are met within 0.003 J/(mol K), entropies of H2 within 0.001.
 - **H2, HCl, hotter**: too low, since real vibrational levels close up (anharmonicity) and stretch the molecule.
 - **H2O**: too high by at most 0.14. Its bending state has an A larger by a tenth, so that its rotational Q is 5 % smaller
