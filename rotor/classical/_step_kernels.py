@@ -121,28 +121,21 @@ def rotations(state: Array, carry: Array, inverse: Array, step: float, fractions
                 _turn(row, lost, 0, 1, 2, 0.5 * h * i0 * row[0])
 
 
-@njit(cache=True, inline="always")
-def _symmetric_flow(row: Any, lost: Any, axes: Any, equal: float, rest: float, h: float) -> None:
-    """Exact flow of L²/(2 I) + rest L_k²/2, a symmetric top about axes[0] with 1/I = equal."""
-    k, a, b = axes[0], axes[1], axes[2]
-    _turn_about(row, lost, h * equal * row[0], h * equal * row[1], h * equal * row[2])
-    _turn(row, lost, k, a, b, h * rest * row[k])
-
-
 @njit(cache=True, nogil=True)
 def symmetric(state: Array, carry: Array, inverse: Array, axes: Any, step: float, fractions: Array, steps: int) -> None:
-    """Strang steps of a symmetric top about axes[:, 0], 1/I from axes[:, 1], and what axes[:, 2] has beyond it."""
+    """Strang steps: half an outer turn, the sphere, an inner turn, half an outer turn; axes of (outer, inner, sphere)."""
     for body in range(state.shape[0]):
-        row, lost, order = state[body], carry[body], axes[body]
-        k, a, b = order[0], order[1], order[2]
-        equal = inverse[body, a]
-        rest, remainder = inverse[body, k] - equal, inverse[body, b] - equal
+        row, lost = state[body], carry[body]
+        a, b, equal = axes[body, 0], axes[body, 1], inverse[body, axes[body, 2]]
+        outer, inner = inverse[body, a] - equal, inverse[body, b] - equal
+        a1, a2, b1, b2 = (a + 1) % 3, (a + 2) % 3, (b + 1) % 3, (b + 2) % 3
         for _ in range(steps):
             for fraction in fractions:
                 h = fraction * step
-                _turn(row, lost, b, k, a, 0.5 * h * remainder * row[b])
-                _symmetric_flow(row, lost, order, equal, rest, h)
-                _turn(row, lost, b, k, a, 0.5 * h * remainder * row[b])
+                _turn(row, lost, a, a1, a2, 0.5 * h * outer * row[a])
+                _turn_about(row, lost, h * equal * row[0], h * equal * row[1], h * equal * row[2])
+                _turn(row, lost, b, b1, b2, h * inner * row[b])
+                _turn(row, lost, a, a1, a2, 0.5 * h * outer * row[a])
 
 
 @njit(cache=True, inline="always")
