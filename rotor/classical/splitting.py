@@ -17,7 +17,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor.classical.compositions import fractions
 from rotor.classical.integrators import Composed
 from rotor.classical.system import acting_inverse
 from rotor.rotations import Array
@@ -60,7 +59,7 @@ class SymmetricTopSplitting(Composed):
     """
 
     def drift(self, moments: Array, state: Array, carry: Array, step: float, steps: int, whole: bool) -> None:
-        """Half the larger remainder, the sphere, the smaller remainder, half the larger remainder."""
+        """Half the larger remainder, the smaller one, half the larger one; the sphere for all steps at once."""
         from rotor.classical._step_kernels import symmetric
 
         inverse = acting_inverse(moments)
