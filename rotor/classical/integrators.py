@@ -4,8 +4,8 @@
 |---|---|---|---|
 | `ExactDrift` | free: exact; with torques 2 to 8 | symplectic, L in space | free motion at any time; weak torques |
 | `MoserVeselov` | free: 2 to 8, or exact; with torques 2 to 8 | L in space, free energy | free motion by steps |
-| `SymmetricTopSplitting` | 2, 4, 6, 8 | symplectic, L in space | torques, above all on near-symmetric tops |
-| `RotationSplitting` | 2, 4, 6, 8 | symplectic, L in space | torques, any body that is not linear |
+| `SymmetricTopSplitting` | 2, 4, 6, 8 | symplectic, L in space | torques, on any body |
+| `RotationSplitting` | 2, 4, 6, 8 | symplectic, L in space | the usual splitting, to compare with; not linear rotors |
 | `LieRungeKutta` | 8, adaptive step | unit quaternion, free L in space | drag, feedback, driven chaos; references |
 
 Each has its page (module) with cost and source. What accuracy costs with each of them is drawn by
