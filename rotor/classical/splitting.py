@@ -50,7 +50,7 @@ class SymmetricTopSplitting(Composed):
 
     H = L²/2I_m + ½ (1/I_a - 1/I_m) L_a² + ½ (1/I_b - 1/I_m) L_b²; the sphere's flow commutes with the others (see
     `many.py`), so that with the larger remainder it is a symmetric top, solved exactly, and the smaller is alone in the
-    error. Exact for spheres, linear rotors and symmetric tops; of all splittings by axes that with the smallest error.
+    error. Exact for spheres, linear rotors and symmetric tops.
 
     >>> from rotor.classical.integrators import integrate
     >>> motion = integrate(SymmetricTopSplitting(step=1.0), [2.0, 2.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0])
@@ -70,8 +70,8 @@ class SymmetricTopSplitting(Composed):
 def turned_axes(inverse: Array) -> NDArray[np.int64]:
     """Axes (n, 3) of each body with inverse moments (n, 3): of the outer turn, the inner turn and the sphere.
 
-    The sphere has the intermediate moment, the outer turn the larger remainder: the error of the step, of size
-    h² (outer² inner/24 + outer inner²/12), is then the smallest of the six choices.
+    The sphere has the intermediate moment, the outer turn the larger remainder: of the six choices that with the smallest
+    error for most motions, of size h² (outer² inner/24 + outer inner²/12).
 
     >>> turned_axes(np.array([[1.0, 0.8, 0.3]])).tolist()
     [[2, 0, 1]]
