@@ -14,7 +14,7 @@ from typing import cast
 
 import typer
 
-from rotor.cli import cat, convert, info, isotopologues, molecules, raman, spectrum, thermo, tumble
+from rotor.cli import cat, convert, gas, info, isotopologues, molecules, raman, spectrum, thermo, tumble
 from rotor.cli.output import NoAnswer
 
 NO_ANSWER, WRONG_INPUT, INTERRUPTED = 1, 2, 130
@@ -31,7 +31,8 @@ Examples:
   rotor isotopologues water
   rotor raman N2 --laser 488
   rotor thermo water --temperature 10:1000K:100 --plot heat.png
-  rotor tumble water --plot water.png"""
+  rotor tumble water --plot water.png
+  rotor gas water --molecules 20000 --seed 7"""
 
 
 def _application() -> typer.Typer:
@@ -57,6 +58,7 @@ def _application() -> typer.Typer:
     app.command("raman", epilog=raman.EXAMPLES)(raman.command)
     app.command("thermo", epilog=thermo.EXAMPLES)(thermo.command)
     app.command("tumble", epilog=tumble.EXAMPLES)(tumble.command)
+    app.command("gas", epilog=gas.EXAMPLES)(gas.command)
     app.command("convert", epilog=convert.EXAMPLES)(convert.command)
     app.command("cat", epilog=cat.EXAMPLES)(cat.command)
     return app

@@ -186,8 +186,10 @@ def write(thing: Any, path: str | os.PathLike[str], *, settings: Mapping[str, An
     settings: what the provenance shall say besides; for lines, `{"tag": 18003}` is the tag of a .cat, `{"molecule": 1,
     "isotopologue": 1, "abundance": 0.997}` what `hitran_lines` asks for. Raises ValueError for a thing or a suffix that has no format.
     """
+    from rotor.classical.ensembles import Correlations
     from rotor.classical.integrators import Motion
     from rotor.classical.motion import MotionTable
+    from rotor.equipartition import Equipartition
     from rotor.formats.hitran import HitranLines, write_hitran
     from rotor.formats.spcat.catalogue import Catalogue
     from rotor.spectra.lines import Lines
@@ -201,6 +203,10 @@ def write(thing: Any, path: str | os.PathLike[str], *, settings: Mapping[str, An
         from rotor.formats.motion_tables import write_motion
 
         return write_motion(thing, path, settings)
+    if isinstance(thing, Correlations | Equipartition):
+        from rotor.formats.gas_tables import write_gas_table
+
+        return write_gas_table(thing, path, settings)
     if isinstance(thing, Spectrum):
         from rotor.formats.spectrum_table import write_spectrum
 
