@@ -48,7 +48,7 @@ def band_figure(pairs: Sequence[tuple[str, Mapping[str, Spectrum], Spectrum]], c
         panel.set_ylim(bottom=0.0)
         panel.ticklabel_format(axis="y", style="sci", scilimits=(0, 0))
         panel.set_title(title, loc="left")
-        panel.legend(frameon=False)
+        panel.legend(frameon=False, loc="upper right", handlelength=1.2)
     return figure
 
 
