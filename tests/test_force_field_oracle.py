@@ -1,4 +1,4 @@
-"""Centrifugal distortion of H2O and H2CO against another program's, from the same Hessians.
+"""Centrifugal distortion of H2O, H2CO and CH3OH against two other programs, from the same Hessians.
 
 The measured constants of water are no test of this theory: ΔK of the ground state is 28 % above the harmonic one, and δK
 nearly four times it, in every good force field.
@@ -14,14 +14,16 @@ import numpy as np
 import pytest
 
 import rotor
-from rotor.distortion import distortion_constants, quartic_tensor_mhz, tau_mhz
+from rotor.distortion import MHZ_PER_EV, _constants_by_modes, distortion_constants, quartic_tensor_mhz, tau_mhz
 from rotor.molecules.force_field import ForceField, Vibrations, read_hessian
 from rotor.molecules.molecule import Molecule
 from rotor.units import BOHR_RADIUS_ANGSTROM, MHZ_PER_CM, ROTATIONAL_MHZ_U_ANGSTROM2
 
 FOLDER = Path(__file__).parent / "oracles" / "spectro"
 SPECTRO = json.loads((FOLDER / "spectro.json").read_text(encoding="utf-8"))
-TOO_MUCH = 3.833384078e4 / (8 * (ROTATIONAL_MHZ_U_ANGSTROM2 / MHZ_PER_CM) ** 3)  # SPECTRO's factor of τ over the right one
+TOO_MUCH = 3.833384078e4 / (
+    8 * (ROTATIONAL_MHZ_U_ANGSTROM2 / MHZ_PER_CM) ** 3
+)  # SPECTRO's factor of τ over the right one
 PAIRS = {"aa": (0, 0), "bb": (1, 1), "cc": (2, 2), "ab": (0, 1), "ac": (0, 2), "bc": (1, 2)}
 
 
@@ -70,9 +72,13 @@ def test_the_one_that_differs_is_spectros_mixture_of_modes():
     modes, stiffness = mixed.vibrations().modes.reshape(4, 3, -1)[:, :, [1, 5]], mixed.vibrations().stiffness_ev[[1, 5]]
     weighted = np.sqrt(field.molecule.masses_u)[:, None] * field.molecule.positions_angstrom
     along, across = weighted[:, 2] @ modes[:, 1], weighted[:, 1] @ modes[:, 2]  # z is the axis of the molecule
-    assert np.abs(2 * along) == pytest.approx([2.131457796, 1.304099113], rel=1e-6)  # its ∂I_ab/∂Q, digits of the Hessian
+    assert np.abs(2 * along) == pytest.approx(
+        [2.131457796, 1.304099113], rel=1e-6
+    )  # its ∂I_ab/∂Q, digits of the Hessian
     share = ((2 * along) ** 2 / stiffness).sum() / ((along + across) ** 2 / stiffness).sum()
-    assert TOO_MUCH * (tau[0, 0, 1, 1] + 2 * share * tau[0, 1, 0, 1]) == pytest.approx(aabb, rel=3e-6)  # constants of 1973
+    assert TOO_MUCH * (tau[0, 0, 1, 1] + 2 * share * tau[0, 1, 0, 1]) == pytest.approx(
+        aabb, rel=3e-6
+    )  # constants of 1973
 
 
 @pytest.mark.parametrize("reduction", ["A", "S"])
@@ -110,3 +116,24 @@ def test_what_parts_water_from_the_measured_constants_is_not_the_force_field():
         assert fitted[name] == pytest.approx(value, rel=0.08), name  # two force fields: at most 3.6 %, δK 7.8 %
     assert 973.29 / fitted["DeltaK"] > 1.2
     assert 41.05 / fitted["deltaK"] > 3
+
+
+def test_methanol_has_the_tau_that_gaussian_prints_along_its_axes():
+    """Twelve modes, no axis fixed by symmetry but c: six τ′ along the axes of Gaussian's output, 2.6° from a and b."""
+    folder = FOLDER.parent / "gaussian"
+    case = json.loads((folder / "ch3oh.json").read_text(encoding="utf-8"))
+    field = read_hessian(folder / "ch3oh.hessian", Molecule(tuple(case["symbols"]), case["positions_angstrom"]))
+    top = rotor.Top.from_molecule(field.molecule)
+    assert field.vibrations().wavenumbers_cm == pytest.approx(case["wavenumbers_cm"], abs=0.002)  # three decimals
+    assert top.rotational_constants_mhz == pytest.approx(case["rigid_mhz"], rel=1e-5)  # coordinates to 1e-6 Å
+
+    moments = np.array(top.moments_u_angstrom2)
+    change = _constants_by_modes(field, top) * moments[:, None] * moments  # ∂I/∂Q along a, b, c, times -h/8π²
+    printed = np.diag(np.sign(np.diag(top.frame.axes))) @ top.frame.axes  # a, b, c of the top in Gaussian's axes
+    change = np.einsum("ai,kab,bj->kij", printed, change, printed) / moments[:, None] / moments
+    tau = -2 * np.einsum("kab,kcd,k->abcd", change, change, 1 / (field.vibrations().stiffness_ev * MHZ_PER_EV))
+    assert np.degrees(np.arccos(abs(printed[0, 0]))) == pytest.approx(2.6, abs=0.05)
+    for pair, value in case["tau_prime_mhz"].items():
+        i, j = PAIRS[pair]
+        found = tau[i, i, j, j] + 2 * (i != j) * tau[i, j, i, j]
+        assert found == pytest.approx(value, rel=4e-6), pair  # coordinates to 1e-6 Å, constants of 2006

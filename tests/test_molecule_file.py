@@ -88,7 +88,10 @@ def test_constants_alone_are_a_molecule_file():
         ("[geometry]\natoms = [['O', 0, 0]]", "atom 1 = .*in Å is wanted"),
         ("[geometry]\natoms = [['O', 0, 0, 0], ['Xx', 0, 0, 1]]", r"\[geometry\], atoms: atom 2"),
         ("[geometry]\nkind = 'r9'\natoms = [['O', 0, 0, 0], ['C', 0, 0, 1]]", "kind = 'r9': one of r0, rs, re"),
-        ("[geometry]\nelectronic = 'g'\natoms = [['O', 0, 0, 0], ['C', 0, 0, 1]]", "electronic = 'g': one of even, odd"),
+        (
+            "[geometry]\nelectronic = 'g'\natoms = [['O', 0, 0, 0], ['C', 0, 0, 1]]",
+            "electronic = 'g': one of even, odd",
+        ),
         ("[geometry]\nvibrational_difference = -1\natoms = [['O', 0, 0, 0], ['C', 0, 0, 1]]", "of at least 0"),
     ],
 )

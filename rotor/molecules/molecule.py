@@ -81,7 +81,9 @@ class Molecule:
             raise ValueError(f"charge {charge:g}: a whole number of elementary charges is wanted")
 
         if self.electronic not in ELECTRONIC:
-            raise ValueError(f"electronic {self.electronic!r}: 'even' (a closed shell) or 'odd' (such as Σg-) is wanted")
+            raise ValueError(
+                f"electronic {self.electronic!r}: 'even' (a closed shell) or 'odd' (such as Σg-) is wanted"
+            )
 
         object.__setattr__(self, "symbols", tuple(one.symbol for one in nuclei))
         object.__setattr__(self, "mass_numbers", tuple(one.mass_number for one in nuclei))
