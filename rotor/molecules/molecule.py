@@ -45,7 +45,8 @@ class Molecule:
     notes : what a user must be told
 
     Raises ValueError for no atoms, positions that are not n triples of finite numbers, a symbol or mass number that
-    is no isotope, two atoms nearer than 0.1 Å, an unknown electronic state, or a dipole or tensor of the wrong shape. Arrays are read-only copies.
+    is no isotope, two atoms nearer than 0.1 Å, an unknown electronic state, or a dipole or tensor of the wrong shape.
+    Arrays are read-only copies.
 
     >>> water = Molecule(("O", "H", "H"), [[0, 0, 0.1173], [0, 0.7572, -0.4692], [0, -0.7572, -0.4692]])
     >>> water.formula, water.mass_u
