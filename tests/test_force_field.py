@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
 
 import force_fields
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 from ase.calculators.lj import LennardJones
 
+import rotor
 from rotor.distortion import distortion_constants
 from rotor.molecules.force_field import (
     EV_PER_ANGSTROM2,
@@ -182,6 +184,26 @@ def test_calculator_on_the_command_line(tmp_path, monkeypatch, capsys):
     b = 505379.00844 / (39.9623831 / 2 * 2 ** (1 / 3))  # at the minimum 2^(1/6) Å
     assert json.loads(out)["constants_mhz"]["B"] == pytest.approx(b, rel=1e-3)  # a force of 1e-3 is left
     assert "geometry refined with LennardJones" in err
+
+
+@pytest.mark.skipif(importlib.util.find_spec("tblite") is None, reason="tblite is not installed (pip install tblite)")
+def test_tblite_takes_a_smiles_to_distortion_constants(capfd):
+    """GFN2-xTB for H2CO: a real calculator from geometry to quartic constants, and nothing of its own on standard output."""
+    from rotor.cli import run
+
+    arguments = ["info", "SMILES:C=O", "--calculator", "tblite", "--hessian", "calculator", "--json", "-"]
+    assert run(arguments) == 0
+    out, err = capfd.readouterr()
+    found = json.loads(out)
+    assert found["point_group"] == "C2v"
+    measured = rotor.read("H2CO").constants
+    for name in "ABC":
+        assert found["constants_mhz"][name] == pytest.approx(measured[name], rel=0.04), name  # GFN2: 3.4, 1.5 and 2.1 %
+    for name in ("DJ", "DJK", "DK", "d1", "d2"):
+        # GFN2's force field: 3, 7, 13, 6 and 9 %
+        assert found["constants_mhz"][name] == pytest.approx(measured[name], rel=0.15), name
+    assert "geometry refined with TBLite" in err
+    assert "harmonic force field (TBLite" in err
 
 
 @pytest.mark.parametrize(
