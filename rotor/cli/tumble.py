@@ -11,7 +11,7 @@ import typer
 
 from rotor.cli import inputs
 from rotor.cli.inputs import Input
-from rotor.cli.output import Files, Table, Writer, json_text, show_facts, show_table, write_text
+from rotor.cli.output import Files, Table, Writer, deliver, json_text, show_facts, show_table
 
 if TYPE_CHECKING:
     from rotor.classical.free import FreeMotion
@@ -62,11 +62,8 @@ def command(
 
     motion, table, content = _solve(thrown, asked, context.obj)
     content["files"] = [str(path) for path in files.wanted.values()]
-    files.write(_writers(thrown, motion, table, content))
-    if json == "-":
-        print(_json(table, content), end="")
-    else:
-        _show(thrown, table, content)
+    writers = _writers(thrown, motion, table, content)
+    deliver(files, writers, lambda: _json(table, content), lambda: _show(thrown, table, content))
 
 
 def _files(csv: str | None, plot: str | None, gif: str | None, json: str | None) -> Files:
@@ -76,9 +73,9 @@ def _files(csv: str | None, plot: str | None, gif: str | None, json: str | None)
         ("--csv", csv, (".csv",)),
         ("--plot", plot, (".png", ".pdf", ".svg")),
         ("--gif", gif, (".gif", ".mp4")),
-        ("--json", None if json == "-" else json, (".json",)),
     ):
         files.ask(name, path, suffixes)
+    files.ask_json(json)
     if gif:
         from rotor.plots.animation import check_film
 
@@ -216,7 +213,6 @@ def _writers(thrown: Thrown, motion: FreeMotion, table: MotionTable, content: di
         "--csv": csv,
         "--plot": plot,
         "--gif": film,
-        "--json": lambda path: write_text(path, _json(table, content)),
     }
 
 
