@@ -14,7 +14,13 @@ import numpy as np
 import pytest
 
 import rotor
-from rotor.distortion import MHZ_PER_EV, _constants_by_modes, distortion_constants, quartic_tensor_mhz, tau_mhz
+from rotor.distortion import MHZ_PER_EV, distortion_constants, quartic_tensor_mhz, tau_mhz
+from rotor.inertial_defect import (
+    coriolis_zeta,
+    harmonic_correction_u_angstrom2,
+    inertia_by_modes,
+    inertial_defect_u_angstrom2,
+)
 from rotor.molecules.force_field import ForceField, Vibrations, read_hessian
 from rotor.molecules.molecule import Molecule
 from rotor.units import BOHR_RADIUS_ANGSTROM, MHZ_PER_CM, ROTATIONAL_MHZ_U_ANGSTROM2
@@ -128,7 +134,7 @@ def test_methanol_has_the_tau_that_gaussian_prints_along_its_axes():
     assert top.rotational_constants_mhz == pytest.approx(case["rigid_mhz"], rel=1e-5)  # coordinates to 1e-6 Å
 
     moments = np.array(top.moments_u_angstrom2)
-    change = _constants_by_modes(field, top) * moments[:, None] * moments  # ∂I/∂Q along a, b, c, times -h/8π²
+    change = -ROTATIONAL_MHZ_U_ANGSTROM2 * inertia_by_modes(field, top)
     printed = np.diag(np.sign(np.diag(top.frame.axes))) @ top.frame.axes  # a, b, c of the top in Gaussian's axes
     change = np.einsum("ai,kab,bj->kij", printed, change, printed) / moments[:, None] / moments
     tau = -2 * np.einsum("kab,kcd,k->abcd", change, change, 1 / (field.vibrations().stiffness_ev * MHZ_PER_EV))
@@ -137,3 +143,61 @@ def test_methanol_has_the_tau_that_gaussian_prints_along_its_axes():
         i, j = PAIRS[pair]
         found = tau[i, i, j, j] + 2 * (i != j) * tau[i, j, i, j]
         assert found == pytest.approx(value, rel=4e-6), pair  # coordinates to 1e-6 Å, constants of 2006
+
+
+def test_coriolis_constants_and_inertial_defect_of_water_are_those_that_spectro_prints():
+    field = field_of("h2o")
+    bend, symmetric, antisymmetric = range(3)
+    zeta = coriolis_zeta(field)[2]
+    assert abs(zeta[antisymmetric, bend]) == pytest.approx(0.99995388, abs=1e-8)  # eight decimals
+    assert abs(zeta[antisymmetric, symmetric]) == pytest.approx(0.00960432, abs=1e-8)
+    assert np.abs(coriolis_zeta(field)[:2]).max() < 1e-12  # planar: about c alone
+    assert inertial_defect_u_angstrom2(field) == pytest.approx(0.0458780280, rel=2e-6)  # constants of 1973
+
+
+@pytest.mark.parametrize(
+    ("field", "name"),
+    [
+        (field_of("h2o"), "H2O"),
+        (field_of("h2co"), "H2CO"),
+        (force_fields.sulfur_dioxide(), "SO2"),
+        (force_fields.sulfur_dioxide_ab_initio(), "SO2"),
+        (force_fields.water().with_isotopes("2=2H"), "HDO"),
+        (force_fields.water().with_isotopes("H=2H"), "D2O"),
+    ],
+)
+def test_inertial_defects_are_near_those_of_the_measured_constants(field, name):
+    """0.046, 0.057, 0.138, 0.135, 0.052 and 0.063 u Å²; distortion and electrons add up to 0.005 to the measured ones."""
+    measured = rotor.read(name).inertial_defect_u_angstrom2
+    assert inertial_defect_u_angstrom2(field) == pytest.approx(measured, abs=0.005)
+
+
+def test_the_moments_follow_the_sum_with_its_poles():
+    """Σ α/2 as it is printed in books, mode by mode, whose poles cancel pairwise in the closed form."""
+    for field in (field_of("h2co"), force_fields.water().with_isotopes("2=2H")):
+        top = rotor.Top.from_molecule(field.molecule)
+        w, moments, f = field.vibrations().wavenumbers_cm, top.moments_u_angstrom2, 505379.00844 / 29979.2458
+        a, zeta = inertia_by_modes(field, top), coriolis_zeta(field)
+        found = harmonic_correction_u_angstrom2(field)
+        for g in range(3):
+            total = 0.0
+            for k in range(len(w)):
+                total += sum(3 * a[k, g, x] ** 2 / (4 * moments[x]) for x in range(3)) / w[k]
+                others = [other for other in range(len(w)) if other != k]
+                poles = [zeta[g, k, o] ** 2 * (3 * w[k] ** 2 + w[o] ** 2) / (w[k] ** 2 - w[o] ** 2) for o in others]
+                total += sum(poles) / w[k]
+            assert found[g] == pytest.approx(-f * total, rel=1e-9)  # round-off of the poles
+
+
+def test_no_inertial_defect_where_it_is_no_harmonic_quantity():
+    folder = FOLDER.parent / "gaussian"
+    case = json.loads((folder / "ch3oh.json").read_text(encoding="utf-8"))
+    field = read_hessian(folder / "ch3oh.hessian", Molecule(tuple(case["symbols"]), case["positions_angstrom"]))
+    with pytest.raises(ValueError, match="CH4O is not planar"):
+        inertial_defect_u_angstrom2(field)
+    from rotor.molecules.force_field import force_field_from_internal
+    from rotor.molecules.internal import stretch
+
+    co = force_field_from_internal(Molecule(("C", "O"), [[0, 0, 0], [0, 0, 1.13]]), [stretch(0, 1)], [[19.0]])
+    with pytest.raises(ValueError, match="CO is linear"):
+        harmonic_correction_u_angstrom2(co)
