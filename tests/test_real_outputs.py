@@ -59,6 +59,15 @@ def test_orca_6_gives_the_dipole_along_the_rotational_axes_itself():
     assert np.trace(alpha) / 3 == pytest.approx(74.12424, rel=1e-6)  # CODATA
 
 
+def test_orca_6_and_gaussian_16_say_the_same_of_tryptophan():
+    """The same job in both programs, in one frame: cclib's data/Gaussian/basicGaussian16/Trp_polar.log."""
+    molecule = read_molecule(FOLDER / "tryptophan_orca6.out")
+    assert molecule.dipole_debye == pytest.approx([-1.2075, 0.9547, -2.2316], abs=1e-4)  # four decimals
+    gaussian = [[95.1154, -2.27759, -3.77571], [-2.27759, 49.9964, 30.4190], [-3.77571, 30.4190, 77.2609]]
+    alpha = molecule.polarizability_angstrom3 / BOHR_RADIUS_ANGSTROM**3
+    assert np.abs(alpha - gaussian).max() < 2e-4  # convergence of the two programs, digits printed
+
+
 def test_cfour_2_1_takes_the_last_geometry_and_the_correlated_dipole():
     top = top_of("water_cfour.out")
     printed = (775472.0813744339, 443134.0923194804, 281992.7588724590)
