@@ -125,11 +125,11 @@ def json_text(content: Mapping[str, Any]) -> str:
     return "{\n" + ",\n".join(items) + "\n}\n"
 
 
-def json_with_lines(lines: Columns, content: Mapping[str, Any]) -> str:
-    """The content as JSON text with all lines, one record each, under the key lines."""
-    columns = {name: column.tolist() for name, column in lines.columns.items()}
+def json_with_rows(table: Columns, key: str, content: Mapping[str, Any]) -> str:
+    """The content as JSON text with all rows of a table, one record each, under the key."""
+    columns = {name: column.tolist() for name, column in table.columns.items()}
     rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
-    return json_text({**content, "lines": rows})
+    return json_text({**content, key: rows})
 
 
 def _json_value(value: Any) -> str:

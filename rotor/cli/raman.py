@@ -17,7 +17,7 @@ from rotor.cli.output import (
     Writer,
     answering,
     deliver,
-    json_with_lines,
+    json_with_rows,
     note,
     show_facts,
     show_table,
@@ -92,7 +92,9 @@ def command(
         note(warning)
 
     content["files"] = [str(path) for path in files.wanted.values()]
-    deliver(files, _writers(lines, content), lambda: json_with_lines(lines, content), lambda: _show(lines, content))
+    deliver(
+        files, _writers(lines, content), lambda: json_with_rows(lines, "lines", content), lambda: _show(lines, content)
+    )
 
 
 def _cut(text: str) -> float | None:

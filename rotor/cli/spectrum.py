@@ -18,7 +18,7 @@ from rotor.cli.output import (
     Writer,
     answering,
     deliver,
-    json_with_lines,
+    json_with_rows,
     note,
     show_facts,
     show_table,
@@ -123,7 +123,7 @@ def command(
     writers = _writers(lines, settings, content, tag)
     if prediction is not None:
         writers["--cat"] = _program_catalogue(prediction, content)
-    deliver(files, writers, lambda: json_with_lines(lines, content), lambda: _show(lines, content))
+    deliver(files, writers, lambda: json_with_rows(lines, "lines", content), lambda: _show(lines, content))
 
 
 def _refuse_contradictions(settings: Settings) -> None:

@@ -11,7 +11,7 @@ import typer
 
 from rotor.cli import inputs
 from rotor.cli.inputs import Input
-from rotor.cli.output import Files, Table, Writer, deliver, json_text, show_facts, show_table
+from rotor.cli.output import Files, Table, Writer, deliver, json_with_rows, show_facts, show_table
 
 if TYPE_CHECKING:
     from rotor.classical.free import FreeMotion
@@ -63,7 +63,7 @@ def command(
     motion, table, content = _solve(thrown, asked, context.obj)
     content["files"] = [str(path) for path in files.wanted.values()]
     writers = _writers(thrown, motion, table, content)
-    deliver(files, writers, lambda: _json(table, content), lambda: _show(thrown, table, content))
+    deliver(files, writers, lambda: json_with_rows(table, "motion", content), lambda: _show(thrown, table, content))
 
 
 def _files(csv: str | None, plot: str | None, gif: str | None, json: str | None) -> Files:
@@ -169,12 +169,6 @@ def _motion_kind(thrown: Thrown, motion: FreeMotion) -> str:
     if motion.separatrix:
         return "separatrix"
     return f"about axis {thrown.names[motion.centre_axis]}"
-
-
-def _json(table: MotionTable, content: dict[str, Any]) -> str:
-    columns = {name: column.tolist() for name, column in table.columns.items()}
-    rows = zip(*columns.values(), strict=True)
-    return json_text({**content, "motion": [dict(zip(columns, row, strict=True)) for row in rows]})
 
 
 def _writers(thrown: Thrown, motion: FreeMotion, table: MotionTable, content: dict[str, Any]) -> dict[str, Writer]:

@@ -1,0 +1,1 @@
+"""Rigid molecules that attract and repel: bodies, potentials, dynamics, thermostats, and the engines beside ours."""

@@ -1,0 +1,43 @@
+"""The table that every run of a fluid fills, whichever engine made it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from rotor.rotations import Array
+from rotor.tables import Table
+
+
+@dataclass(frozen=True)
+class FluidRecord(Table):
+    """Energies, temperatures and pressure at n times; all arrays (n,).
+
+    time_ps. potential_ev. translation_ev, rotation_ev: kinetic energies, by the thermometer that cancels the h² term
+    where the engine allows it. total_ev: conserved (with the thermostat's part where there is one). temperature_k,
+    translation_k, rotation_k: 2 E/(k degrees). pressure_bar: not a number where an engine gives none.
+    """
+
+    time_ps: Array
+    potential_ev: Array
+    translation_ev: Array
+    rotation_ev: Array
+    total_ev: Array
+    temperature_k: Array
+    translation_k: Array
+    rotation_k: Array
+    pressure_bar: Array
+
+    def __post_init__(self) -> None:
+        lengths = {field.name: len(getattr(self, field.name)) for field in fields(self)}
+        if len(set(lengths.values())) > 1:
+            raise ValueError(f"columns of a record have one length; got {lengths}")
+
+    def __len__(self) -> int:
+        return len(self.time_ps)
+
+    @property
+    def columns(self) -> dict[str, Array]:
+        """The table by column, in the order of a file."""
+        return {field.name: np.asarray(getattr(self, field.name)) for field in fields(self)}
