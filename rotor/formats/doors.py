@@ -182,7 +182,8 @@ def write(thing: Any, path: str | os.PathLike[str], *, settings: Mapping[str, An
     """Write lines, a catalogue, a spectrum, a motion or thermodynamic functions; the suffix of `path` names the format.
 
     Lines: .cat, .cat.gz, .csv, .parquet, .json, .hitran; catalogue: .cat, .cat.gz; HITRAN's lines: .hitran; spectrum and
-    motion: .csv; thermodynamic functions: .csv, .parquet. An existing file is replaced at the end, whole or not at all.
+    motion: .csv; thermodynamic functions: .csv, .parquet; correlation functions and tests of equipartition: .csv, .parquet,
+    .json. An existing file is replaced at the end, whole or not at all.
     settings: what the provenance shall say besides; for lines, `{"tag": 18003}` is the tag of a .cat, `{"molecule": 1,
     "isotopologue": 1, "abundance": 0.997}` what `hitran_lines` asks for. Raises ValueError for a thing or a suffix that has no format.
     """
