@@ -34,7 +34,7 @@ AT_REST = 1e-8  # share of the kinetic energy of translation below which the tot
 NET_FORCE = 1e-3  # share of the summed sizes of forces below which they count as adding to nothing
 
 
-class RigidDynamics(MolecularDynamics):  # type: ignore[misc]
+class RigidDynamics(MolecularDynamics):
     """Dynamics of rigid molecules, in ASE's units.
 
     Parameters
@@ -63,8 +63,8 @@ class RigidDynamics(MolecularDynamics):  # type: ignore[misc]
     >>> dynamics = RigidDynamics(pair, 1.0 * units.fs)
     >>> dynamics.run(10)
     True
-    >>> dynamics.degrees.total, round(pair.get_distance(0, 1) - molecule("N2").get_distance(0, 1), 12)
-    (7, 0.0)
+    >>> dynamics.degrees.total, bool(abs(pair.get_distance(2, 3) - pair.get_distance(0, 1)) < 1e-12)
+    (7, True)
     """
 
     def __init__(

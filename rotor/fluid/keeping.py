@@ -46,7 +46,7 @@ class TextFile:
             raise ValueError(
                 f"{path}: is shorter than when the checkpoint was written ({length} bytes); it was changed since"
             )
-        self._file = open(path, "wb" if length is None else "r+b", buffering=0)
+        self._file = open(path, "wb" if length is None else "r+b", buffering=0)  # noqa: SIM115 - open as long as the run
         if length is not None:
             self._file.truncate(length)
             self._file.seek(length)

@@ -159,14 +159,14 @@ def pressure_bar(dynamics: RigidDynamics) -> float:
     atoms = dynamics.atoms
     if "stress" not in getattr(atoms.calc, "implemented_properties", ()) or not atoms.pbc.all():
         return float("nan")
-    volume = atoms.get_volume()
+    volume = float(atoms.get_volume())
     atomic = -float(np.trace(atoms.get_stress(voigt=False, apply_constraint=False))) / 3.0
     bodies = dynamics.bodies
     centres = np.empty((len(atoms), 3))
     centres[bodies.order] = np.repeat(dynamics.state.centres, np.diff(bodies.starts), axis=0)
     inside = float(np.sum((atoms.positions - centres) * atoms.get_forces(apply_constraint=False)))
     kinetic = 2.0 * dynamics.kinetic().translation_ev
-    return (atomic + (kinetic - inside) / (3.0 * volume)) * EV_PER_ANGSTROM3_BAR
+    return EV_PER_ANGSTROM3_BAR * (atomic + (kinetic - inside) / (3.0 * volume))
 
 
 class _Run:

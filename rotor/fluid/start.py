@@ -31,7 +31,7 @@ def lattice_box(model: RigidModel, molecules: int, density_g_cm3: float, rng: np
 
     >>> from rotor.fluid.models import model_of
     >>> box = lattice_box(model_of("spce"), 216, 0.997, np.random.default_rng(1))
-    >>> len(box), round(box.cell[0, 0], 3)
+    >>> len(box), round(float(box.cell[0, 0]), 3)
     (648, 18.643)
     """
     from ase import Atoms
