@@ -68,7 +68,14 @@ def place_sites(
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def carry_to_atoms(
-    forces: Array, first_atom: Array, first_site: Array, kinds: Array, weights: Array, atoms: Array, counts: Array, out: Array
+    forces: Array,
+    first_atom: Array,
+    first_site: Array,
+    kinds: Array,
+    weights: Array,
+    atoms: Array,
+    counts: Array,
+    out: Array,
 ) -> None:
     """Forces on sites as forces on the real atoms, by the weights that place the sites: force and torque are kept."""
     out[:] = 0.0
@@ -261,7 +268,17 @@ def _add_virial(arms: Array, rows: Array, sites: int, n: int, totals: Array) -> 
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def _gather(rows: Array, sites: Array, first_site: Array, who: Array, arms: Array, centres: Array, count: int, n: int, padded: int) -> None:
+def _gather(
+    rows: Array,
+    sites: Array,
+    first_site: Array,
+    who: Array,
+    arms: Array,
+    centres: Array,
+    count: int,
+    n: int,
+    padded: int,
+) -> None:
     """Sites of the neighbours, seen from the centre of the molecule in hand; forces zero; the lanes to `padded` far away."""
     for s in range(count):
         row = rows[s * RUNS * LANES : (s + 1) * RUNS * LANES]
@@ -315,7 +332,11 @@ def pair_forces(
                 for p in range(pair_starts[pair], pair_starts[pair + 1]):
                     mine, its = first_site[m] + pair_sites[p, 0], pair_sites[p, 1]
                     row = rows[its * RUNS * LANES : (its + 1) * RUNS * LANES]
-                    x, y, z = sites[mine, 0] - centres[m, 0], sites[mine, 1] - centres[m, 1], sites[mine, 2] - centres[m, 2]
+                    x, y, z = (
+                        sites[mine, 0] - centres[m, 0],
+                        sites[mine, 1] - centres[m, 1],
+                        sites[mine, 2] - centres[m, 2],
+                    )
                     qq, c12, c6 = pair_numbers[p, 0], pair_numbers[p, 1], pair_numbers[p, 2]
                     if c12 > 0.0:
                         fx, fy, fz, energy = _lennard_jones(row, padded, x, y, z, c12, c6, cut)

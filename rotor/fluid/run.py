@@ -24,10 +24,13 @@ from rotor.fluid.record import FluidRecord
 from rotor.fluid.settings import Settings
 from rotor.fluid.start import at_rest, check_apart, heat, model_labels
 from rotor.fluid.state import State
+from rotor.rotations import Array
 
 if TYPE_CHECKING:
     from ase import Atoms
 
+    from rotor.degrees import Degrees
+    from rotor.fluid.bodies import Bodies
     from rotor.fluid.dynamics import RigidDynamics
     from rotor.fluid.thermostats import Thermostat
 
@@ -37,6 +40,10 @@ BAR_EVERY_S = 0.2
 EV_PER_ANGSTROM3_BAR = 1.602176634e6  # 1 eV/Å³ in bar, exact
 
 Told = Callable[[int, int, float], None]
+
+
+class RunStopped(ValueError):
+    """A run that began could not go on; what was written before stays."""
 
 
 @dataclass(frozen=True)
@@ -84,10 +91,9 @@ def run_fluid(
     Raises
     ------
     ValueError
-        Molecules that do not fit their model or lie on top of each other, a force that is not finite, with the step and
-        the last checkpoint; a checkpoint of another box or other settings.
-    OSError
-        A file that cannot be written any more, with its name. What was written before stays whole.
+        Molecules that do not fit their model or lie on top of each other; a checkpoint of another box or other settings.
+    RunStopped
+        A ValueError too: a force that is not finite, a full disk; with the step and the last checkpoint.
     """
     outputs = outputs or Outputs()
     if resume and outputs.checkpoint is None:
@@ -114,7 +120,7 @@ def dynamics_of(atoms: Atoms, settings: Settings, begin: bool = True) -> RigidDy
     models = [model_of(name.strip()) for name in settings.model.split(",")]
     if "molecule" not in atoms.arrays:
         atoms.arrays["molecule"] = model_labels(atoms, models)
-    shapes = {model.symbols: model.positions_angstrom[: len(model.symbols)] for model in models}
+    shapes = _shapes(settings)
     bodies, pose = bodies_of(atoms, shapes=shapes)
     if atoms.calc is None:
         atoms.calc = calculator_of(settings)
@@ -130,6 +136,21 @@ def dynamics_of(atoms: Atoms, settings: Settings, begin: bool = True) -> RigidDy
     else:
         atoms.set_momenta(np.zeros((len(atoms), 3)))
     return RigidDynamics(atoms, settings.step_fs * fs, thermostat=thermostat, shapes=shapes)
+
+
+def bodies_and_degrees(atoms: Atoms, settings: Settings) -> tuple[Bodies, Degrees, str]:
+    """Bodies of a box, the degrees of freedom that a run counts, and the thermometer that it uses."""
+    from rotor.fluid.bodies import bodies_of
+
+    bodies, _ = bodies_of(atoms, shapes=_shapes(settings))
+    removed = 0 if settings.ensemble == "langevin" else 3
+    return bodies, bodies.degrees(removed), "mixed" if settings.ensemble == "nve" else "half"
+
+
+def _shapes(settings: Settings) -> dict[tuple[str, ...], Array]:
+    """Places of the real atoms of each model, by their elements."""
+    models = [model_of(name.strip()) for name in settings.model.split(",")]
+    return {model.symbols: model.positions_angstrom[: len(model.symbols)] for model in models}
 
 
 def thermostat_of(settings: Settings, rng: np.random.Generator) -> Thermostat | None:
@@ -150,7 +171,10 @@ def calculator_of(settings: Settings, threads: int = 1) -> Any:
     from rotor.fluid.potential import RigidPotential
 
     return RigidPotential(
-        settings.model, cutoff_angstrom=settings.cutoff_angstrom, electrostatics=settings.electrostatics, threads=threads
+        settings.model,
+        cutoff_angstrom=settings.cutoff_angstrom,
+        electrostatics=settings.electrostatics,
+        threads=threads,
     )
 
 
@@ -218,12 +242,11 @@ class _Run:
                     shown = now
                     told(dynamics.nsteps, steps, _ns_per_day(self.settings, dynamics.nsteps - first, now))
         except (ValueError, FloatingPointError) as error:
-            raise ValueError(f"{error}{self._told_checkpoint()}") from error
+            raise RunStopped(f"{error}{self._told_checkpoint()}") from error
         except OSError as error:
-            raise OSError(
-                error.errno,
-                f"{error.strerror} at step {dynamics.nsteps}; what was written before is whole{self._told_checkpoint()}",
-                error.filename,
+            what = f"{error.filename}: {error.strerror}" if error.filename else error.strerror
+            raise RunStopped(
+                f"{what} at step {dynamics.nsteps}; what was written before is whole{self._told_checkpoint()}"
             ) from error
 
     def record(self) -> FluidRecord:
