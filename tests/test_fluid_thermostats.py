@@ -35,7 +35,10 @@ def judged(dynamics):
     """The verdict on the momenta of one moment, at 99.9 %."""
     bodies, state = dynamics.bodies, dynamics.state
     energies = kinetic_degrees(
-        masses=bodies.mass, velocities=state.momentum / bodies.mass[:, None], moments=bodies.moments, momenta=state.angular
+        masses=bodies.mass,
+        velocities=state.momentum / bodies.mass[:, None],
+        moments=bodies.moments,
+        momenta=state.angular,
     )
     return equipartition(energies, KT, confidence=0.999)
 
@@ -64,7 +67,9 @@ def test_free_molecules_at_rest_come_to_equipartition_about_every_axis(name):
 
 
 def test_noise_in_the_wrong_frame_is_caught():
-    dynamics = RigidDynamics(gas("H2O", 3000), 20.0 * fs, thermostat=SpaceNoise(300.0, 0.02 / fs, np.random.default_rng(5)))
+    dynamics = RigidDynamics(
+        gas("H2O", 3000), 20.0 * fs, thermostat=SpaceNoise(300.0, 0.02 / fs, np.random.default_rng(5))
+    )
     dynamics.run(25)
     verdict = judged(dynamics)
     assert not verdict.accepted
@@ -84,7 +89,11 @@ def test_langevin_in_the_middle_has_exact_half_steps_on_springs():
     seen = []
     dynamics.attach(
         lambda: seen.append(
-            [energy for name in ("full", "half") for energy in (dynamics.kinetic(name).translation_ev, dynamics.kinetic(name).rotation_ev)]
+            [
+                energy
+                for name in ("full", "half")
+                for energy in (dynamics.kinetic(name).translation_ev, dynamics.kinetic(name).rotation_ev)
+            ]
         )
     )
     dynamics.run(150)
@@ -158,7 +167,9 @@ def test_thermal_momenta_are_canonical_with_three_degrees_fewer():
     drawn = [thermal_momenta(bodies, 300.0, rng, removed=3) for _ in range(4000)]
     momentum, angular = np.array([p for p, _ in drawn]), np.array([angular for _, angular in drawn])
     assert abs(momentum.sum(axis=1)).max() < 1e-12  # round-off
-    twice = np.sum(momentum**2 / bodies.mass[:, None], axis=(1, 2)) + np.sum(angular**2 * bodies.inverse_moments, axis=(1, 2))
+    twice = np.sum(momentum**2 / bodies.mass[:, None], axis=(1, 2)) + np.sum(
+        angular**2 * bodies.inverse_moments, axis=(1, 2)
+    )
     degrees = bodies.degrees(removed=3).total
     assert twice.mean() / (degrees * KT) == pytest.approx(1.0, abs=4 * math.sqrt(2 / degrees / 4000))  # 4 σ of χ²
     assert twice.var() / (2 * degrees * KT**2) == pytest.approx(1.0, abs=0.12)  # 4 σ of the variance of 4000 χ²

@@ -12,13 +12,22 @@ import os
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, closing, contextmanager
 from dataclasses import asdict, dataclass, fields
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rotor.fluid.keeping import Checkpoint, TextFile, csv_line, read_checkpoint, read_rows, trajectory_file
+from rotor.fluid.keeping import (
+    AseTrajectory,
+    Checkpoint,
+    ExtendedXyz,
+    TextFile,
+    csv_line,
+    read_checkpoint,
+    read_rows,
+    trajectory_file,
+)
 from rotor.fluid.models import model_of
 from rotor.fluid.record import FluidRecord
 from rotor.fluid.settings import Settings
@@ -105,6 +114,7 @@ def run_fluid(
     if resume:
         assert outputs.checkpoint is not None
         run.restore(read_checkpoint(outputs.checkpoint))
+    dynamics.wrench()  # what cannot begin is told before any file is opened
     with run.files(), _bar(settings.steps, told) as shown:
         run.go(shown)
     return run.record()
@@ -205,23 +215,24 @@ class _Run:
     def __init__(self, dynamics: RigidDynamics, settings: Settings, outputs: Outputs) -> None:
         self.dynamics, self.settings, self.outputs = dynamics, settings, outputs
         self.rows: list[list[float]] = []
-        self._lengths: dict[str, int | None] = {}
+        self._csv: TextFile | None = None
+        self._frames: list[ExtendedXyz | AseTrajectory] = []
+        self._lengths: dict[str, int] = {}
         self._kept_at: int | None = None
 
     @contextmanager
     def files(self) -> Iterator[None]:
         """Open the growing files, new or where the checkpoint left them."""
         outputs, lengths = self.outputs, self._lengths
-        self._csv = TextFile(outputs.csv, lengths.get("csv")) if outputs.csv is not None else None
-        self._frames = [trajectory_file(path, lengths.get(str(path))) for path in outputs.trajectories]
-        if self._csv is not None and lengths.get("csv") is None:
-            self._csv.add(",".join(COLUMNS) + "\n")
-        try:
+        with ExitStack() as open_files:
+            for path in outputs.trajectories:
+                file = trajectory_file(path, lengths.get(str(path)))
+                self._frames.append(open_files.enter_context(closing(file)))
+            if outputs.csv is not None:
+                self._csv = open_files.enter_context(closing(TextFile(outputs.csv, lengths.get("csv"))))
+                if lengths.get("csv") is None:
+                    self._csv.add(",".join(COLUMNS) + "\n")
             yield
-        finally:
-            for file in (self._csv, *self._frames):
-                if file is not None:
-                    file.close()
 
     def go(self, told: Told) -> None:
         """All steps that are left."""
@@ -263,7 +274,7 @@ class _Run:
         for name, value in about["settings"].items():
             if name not in MAY_CHANGE and mine.get(name) != value:
                 raise ValueError(f"{path}: was written by a run with {name} = {value}, not {mine.get(name)}")
-        if about["files"].keys() != self._file_names().keys():
+        if list(about["files"]) != self._names():
             before = ", ".join(about["files"]) or "none"
             raise ValueError(f"{path}: the run that is resumed wrote these files: {before}; name the same ones")
         if about["step"] > self.settings.steps:
@@ -310,6 +321,7 @@ class _Run:
         if path is None:
             return
         state, thermostat = dynamics.state, dynamics.thermostat
+        files = [*([] if self._csv is None else [self._csv]), *self._frames]
         arrays = {"centres": state.centres, "momentum": state.momentum, "spin": state.spin, "carry": state.carry}
         if self._csv is None:
             arrays["rows"] = np.array(self.rows).reshape(-1, len(COLUMNS))
@@ -318,17 +330,15 @@ class _Run:
             "settings": asdict(self.settings),
             "step": dynamics.nsteps,
             "thermostat": None if thermostat is None else thermostat.kept(),
-            "files": {name: file.sync() for name, file in self._file_names().items()},
+            "files": {name: file.sync() for name, file in zip(self._names(), files, strict=True)},
         }
         Checkpoint(arrays, about).write(path)
         self._kept_at = dynamics.nsteps
         dynamics.refresh()
 
-    def _file_names(self) -> dict[str, Any]:
-        """The growing files that were asked for, by name."""
-        csv = {} if self.outputs.csv is None else {"csv": getattr(self, "_csv", None)}
-        frames = getattr(self, "_frames", [None] * len(self.outputs.trajectories))
-        return csv | {str(path): file for path, file in zip(self.outputs.trajectories, frames, strict=True)}
+    def _names(self) -> list[str]:
+        """Names of the growing files that were asked for."""
+        return [*(["csv"] if self.outputs.csv is not None else []), *map(str, self.outputs.trajectories)]
 
     def _box(self) -> str:
         """A fingerprint of what does not change."""
