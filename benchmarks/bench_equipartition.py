@@ -2,10 +2,10 @@
 
     python benchmarks/bench_equipartition.py [--frames 400] [--json benchmarks/results/equipartition.json]
 
-Each fluid: 216 molecules on a lattice, relaxed, brought to temperature by Langevin's thermostat, then frames 0.2 ps apart
-under it. Momenta of the half step (on the step those of librations are too small by the error of order h²) are tested degree by degree by
-`rotor.equipartition`, as correlated data, and all degrees of all fluids as one family. The same frames are then judged three times with a
-mistake planted: momenta on the step at twice the step's length, and a count that forgets the removed momentum or takes a linear molecule as bent.
+Each fluid: 216 molecules on a lattice, relaxed, brought to temperature by Langevin's thermostat, then frames 0.2 ps
+apart under it. Momenta of the half step (on the step those of librations are too small, by the error of order h²) are
+tested degree by degree by `rotor.equipartition`, as correlated data, and all degrees of all fluids as one family. Then
+mistakes are planted: linear molecules counted with three rotations, and momenta on the step at twice the step's length.
 """
 
 from __future__ import annotations

@@ -157,7 +157,7 @@ def _read(source: str) -> Atoms:
         raise ValueError(f"{source}: no such file; with --molecules N a box is made of 'water' or of a model")
     try:
         atoms: Any = read(source)
-    except (UnknownFileTypeError, ValueError, KeyError, IndexError, AssertionError) as error:
+    except (UnknownFileTypeError, OSError, ValueError, KeyError, IndexError, AssertionError) as error:
         raise ValueError(
             f"{source}: cannot be read as a box of atoms ({str(error) or type(error).__name__})"
         ) from error
@@ -176,12 +176,15 @@ def _run(
     if atoms.calc is None:
         atoms.calc = calculator_of(settings, threads)
     thermal = not atoms.get_momenta().any()
-    if outputs.csv is not None and not resume:
+
+    def begun() -> None:
         from rotor.formats.line_tables import write_beside
 
-        write_beside(outputs.csv, _head(story))
+        if outputs.csv is not None and not resume:
+            write_beside(outputs.csv, _head(story))
+
     try:
-        record = run_fluid(atoms, settings, outputs, resume=resume)
+        record = run_fluid(atoms, settings, outputs, resume=resume, begun=begun)
     except RunStopped as error:
         raise NoAnswer(str(error)) from error
     speeds = f"drawn at {settings.temperature_k:g} K" if thermal else "those of the box"

@@ -83,6 +83,7 @@ def run_fluid(
     *,
     resume: bool = False,
     told: Told | None = None,
+    begun: Callable[[], None] = lambda: None,
 ) -> FluidRecord:
     """Run a box of rigid molecules and return its table; the atoms end where the run does.
 
@@ -96,6 +97,8 @@ def run_fluid(
         Continue from `outputs.checkpoint`; the files that grow are cut back to where they were then.
     told : callable, optional
         Told step, steps and ns per day from time to time; without it a bar is shown on a terminal.
+    begun : callable, optional
+        Called once everything is found to be in order and the files are open.
 
     Raises
     ------
@@ -116,6 +119,7 @@ def run_fluid(
         run.restore(read_checkpoint(outputs.checkpoint))
     dynamics.wrench()  # what cannot begin is told before any file is opened
     with run.files(), _bar(settings.steps, told) as shown:
+        begun()
         run.go(shown)
     return run.record()
 
