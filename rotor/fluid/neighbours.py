@@ -96,7 +96,7 @@ class Neighbours:
         extent = np.where(repeats, self.box_angstrom, self.centres.max(axis=0) - low + 1e-3)
         ranges = np.minimum(self.within_angstrom + self.skin_angstrom, np.linalg.norm(extent) * 3)
         most = int(math.ceil((4 * len(self.assembly)) ** (1 / 3)))
-        bins = np.clip(np.floor(extent / (0.5 * ranges.max())), 1, most).astype(np.int64)
+        bins = np.clip(np.floor(extent * 3 / ranges.max()), 1, most).astype(np.int64)
         self.starts, self.entries = _list_kernels.neighbour_list(
             self.centres, self.box_angstrom, low, extent / bins, bins, self.assembly.kinds, ranges
         )
