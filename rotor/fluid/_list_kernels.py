@@ -11,13 +11,14 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+from rotor.fluid.assembly import Integers
 from rotor.rotations import Array
 
 IMAGES = 2  # a neighbour is at most that many cells away
 
 
 @njit(cache=True)
-def _sorted_into_bins(centres: Array, low: Array, width: Array, bins: Array) -> Any:
+def _sorted_into_bins(centres: Array, low: Array, width: Array, bins: Integers) -> Any:
     """Bin of each centre (3 numbers), starts of the bins, molecules in the order of bins and the place of each in it."""
     n = len(centres)
     places, cells = np.empty((n, 3), dtype=np.int64), np.empty(n, dtype=np.int64)
@@ -51,8 +52,8 @@ def _image(raw: int, bins: int, box: float) -> int:
 
 @njit(cache=True, error_model="numpy")
 def _keep_near(
-    there: Array, order: Array, start: int, stop: int, x: float, y: float, z: float, range2: Array, kinds: Array, code: int,
-    found: int, mine: Array,
+    there: Array, order: Integers, start: int, stop: int, x: float, y: float, z: float, range2: Array, kinds: Integers, code: int,
+    found: int, mine: Integers,
 ) -> int:  # fmt: skip
     """Append the molecules from start to stop that are in range of (x, y, z); how many there are then."""
     for p in range(start, stop):
@@ -64,9 +65,9 @@ def _keep_near(
 
 @njit(cache=True, error_model="numpy")
 def _along_column(
-    m: int, raw_x: int, raw_y: int, left: float, own: bool, rank: int, places: Array, starts: Array, there: Array,
-    order: Array, here: Array, box: Array, low: Array, width: Array, bins: Array, range2: Array, kinds: Array, found: int,
-    mine: Array,
+    m: int, raw_x: int, raw_y: int, left: float, own: bool, rank: int, places: Integers, starts: Integers, there: Array,
+    order: Integers, here: Array, box: Array, low: Array, width: Array, bins: Integers, range2: Array, kinds: Integers, found: int,
+    mine: Integers,
 ) -> Any:  # fmt: skip
     """Neighbours of m in a column of bins along z, within √left of it there; own: the column of m, from m upwards."""
     image_x, image_y = raw_x // bins[0], raw_y // bins[1]
@@ -90,7 +91,9 @@ def _along_column(
 
 
 @njit(cache=True, error_model="numpy")
-def neighbour_list(centres: Array, box: Array, low: Array, width: Array, bins: Array, kinds: Array, ranges: Array) -> Any:
+def neighbour_list(
+    centres: Array, box: Array, low: Array, width: Array, bins: Integers, kinds: Integers, ranges: Array
+) -> Any:
     """Starts (n x kinds + 1) and entries (128 molecule + code of the image) of all pairs nearer than the range of their kinds.
 
     box is 0 along directions that do not repeat; low, width, bins (3) divide the cell or the space that holds the molecules.

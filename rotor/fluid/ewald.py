@@ -9,11 +9,13 @@ thousand molecules belong to an engine with particle meshes.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from rotor import units
+from rotor.fluid.assembly import Integers
 from rotor.rotations import Array
 
 COULOMB_EV_ANGSTROM = (
@@ -44,14 +46,14 @@ def fourier_error(alpha: float, k_cut: float, charges_squared: float, count: int
     """That of wave vectors beyond k_cut, eV/Å: 2 Q² α/L √(1/(π n N)) exp(-k_c²/4α²), n = k_c L/2π, L = ∛V."""
     q, edge = COULOMB_EV_ANGSTROM * charges_squared, volume ** (1 / 3)
     shells = k_cut * edge / (2 * math.pi)
-    return 2 * q * alpha / edge / math.sqrt(math.pi * shells * count) * math.exp(-(k_cut**2) / (4 * alpha**2))
+    return float(2 * q * alpha / edge / math.sqrt(math.pi * shells * count) * math.exp(-(k_cut**2) / (4 * alpha**2)))
 
 
-def _least(fails: object, low: float, high: float) -> float:
+def _least(fails: Callable[[float], bool], low: float, high: float) -> float:
     """Where a falling error meets its bound, by halving."""
     for _ in range(60):
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if fails(middle) else (low, middle)  # type: ignore[operator]
+        low, high = (middle, high) if fails(middle) else (low, middle)
     return high
 
 
@@ -86,8 +88,8 @@ class WaveVectors:
 
     vectors_per_angstrom: Array
     weights_ev: Array
-    columns: Array
-    highest: Array
+    columns: Integers
+    highest: Integers
     turn_per_angstrom: Array
 
 
