@@ -89,7 +89,10 @@ def test_the_virial_is_that_of_centres_of_mass() -> None:
     masses, m = atoms.get_masses(), sites.molecule
     starts = np.concatenate(([0], np.cumsum([len(model.symbols) for model in models])))
     centres = np.array(
-        [np.average(atoms.positions[a:b], axis=0, weights=masses[a:b]) for a, b in zip(starts[:-1], starts[1:], strict=True)]
+        [
+            np.average(atoms.positions[a:b], axis=0, weights=masses[a:b])
+            for a, b in zip(starts[:-1], starts[1:], strict=True)
+        ]
     )
     d = sites.places[None] - sites.places[:, None]
     shift = -edges * np.rint(d / edges)
@@ -177,7 +180,9 @@ def test_a_cluster_feels_no_net_force_or_torque_and_may_be_turned_and_moved() ->
     calc = RigidPotential("tip4p", cutoff_angstrom=math.inf)
     found = calc.evaluate(atoms)
     size = np.abs(found.forces_ev_per_angstrom).max()
-    assert np.abs(found.forces_ev_per_angstrom.sum(axis=0)).max() < 1e-13 * size * len(atoms)  # Newton's third law, round-off
+    assert np.abs(found.forces_ev_per_angstrom.sum(axis=0)).max() < 1e-13 * size * len(
+        atoms
+    )  # Newton's third law, round-off
     torque = np.cross(atoms.positions, found.forces_ev_per_angstrom).sum(axis=0)
     assert np.abs(torque).max() < 1e-12 * size * len(atoms)  # round-off, arms of 10 Å
     turned = atoms.copy()
@@ -199,7 +204,9 @@ def test_an_open_pair_has_coulomb_and_lennard_jones_and_nothing_else() -> None:
     qq = plain.COULOMB_EV_ANGSTROM * sites.charge[:3, None] * sites.charge[None, 3:]
     six = (model.sites[0].sigma_angstrom / d[0, 0]) ** 6
     wanted = np.sum(qq / d) + 4 * model.sites[0].epsilon_ev * (six**2 - six)
-    assert RigidPotential("spce", cutoff_angstrom=math.inf).evaluate(atoms).energy_ev == pytest.approx(wanted, rel=1e-13)
+    assert RigidPotential("spce", cutoff_angstrom=math.inf).evaluate(atoms).energy_ev == pytest.approx(
+        wanted, rel=1e-13
+    )
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -258,7 +265,9 @@ def sample(number: int, shared: Path) -> Atoms:
     path = shared / "reference" / "nist_spce" / f"spce_sample_config_periodic{number}.txt.gz"
     lines = [line.split() for line in gzip.open(path, "rt").read().splitlines() if line.strip()]
     edges, rows = [float(x) for x in lines[0]], lines[2:]
-    return Atoms([row[4] for row in rows], positions=[[float(x) for x in row[1:4]] for row in rows], cell=edges, pbc=True)
+    return Atoms(
+        [row[4] for row in rows], positions=[[float(x) for x in row[1:4]] for row in rows], cell=edges, pbc=True
+    )
 
 
 def terms_k(atoms: Atoms, factor: float = 1.0) -> list[float]:
@@ -309,7 +318,9 @@ def test_positions_that_are_no_numbers_are_named() -> None:
 @pytest.mark.parametrize("shift", [0.0, 0.2])
 def test_atoms_on_top_of_each_other_are_named(shift: float) -> None:
     atoms = plain.box_of({"spce": 8}, 20.0)
-    atoms.positions[12:15] += atoms.positions[4] - atoms.positions[12] + (shift, 0, 0)  # O of molecule 4 on H of molecule 1
+    atoms.positions[12:15] += (
+        atoms.positions[4] - atoms.positions[12] + (shift, 0, 0)
+    )  # O of molecule 4 on H of molecule 1
     with pytest.raises(ValueError, match=r"atoms (4 and 12|12 and 4) of different molecules are (0|0.2) Å apart"):
         RigidPotential("spce").evaluate(atoms)
 

@@ -67,7 +67,7 @@ def parameters_for(
     >>> box = np.array([31.0, 31.0, 31.0])
     >>> found = parameters_for(1e-5, 9.0, np.tile([-0.8476, 0.4238, 0.4238], 1000), box)
     >>> round(found.alpha_per_angstrom, 3), round(found.k_cut_per_angstrom, 2)
-    (0.335, 2.14)
+    (0.332, 1.99)
     """
     if not 1e-14 < tolerance < 1:
         raise ValueError(f"tolerance = {tolerance}: a relative error of forces between 1e-14 and 1 is wanted")

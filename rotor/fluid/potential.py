@@ -72,10 +72,8 @@ class RigidPotential(Calculator):
 
     Molecules may be broken by the cell's edges. Cells have right angles; directions without pbc are open.
 
-    >>> from ase.build import molecule
-    >>> pair = molecule("Ar")
-    >>> pair += molecule("Ar")
-    >>> pair.positions[1, 0] = 3.405 * 2 ** (1 / 6)
+    >>> from ase import Atoms
+    >>> pair = Atoms("Ar2", positions=[(0, 0, 0), (3.405 * 2 ** (1 / 6), 0, 0)])
     >>> pair.calc = RigidPotential("argon", cutoff_angstrom=float("inf"))
     >>> round(pair.get_potential_energy() / 8.617333262e-5, 3)  # minus the depth, in K
     -119.8
