@@ -34,7 +34,7 @@ def test_madelung_constant_of_rock_salt() -> None:
     salt = RigidModel("NaCl", (Site("Na", (0.0, 0.0, 0.0), 1.0), Site("Cl", (r0, 0.0, 0.0), -1.0)), "test")
     grid = np.stack(np.meshgrid(*[np.arange(8)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
     sodium = grid[grid.sum(axis=1) % 2 == 0] * r0
-    places = np.stack((sodium, sodium + (r0, 0, 0)), axis=1).reshape(-1, 3)
+    places = np.stack((sodium, sodium + np.array([r0, 0, 0])), axis=1).reshape(-1, 3)
     crystal = Atoms(["Na", "Cl"] * len(sodium), positions=places, cell=[8 * r0] * 3, pbc=True)
     calc = RigidPotential(salt, cutoff_angstrom=9.0, electrostatics="ewald", tolerance=1e-12)
     energy = calc.evaluate(crystal).energy_ev / len(sodium) * r0 / COULOMB_EV_ANGSTROM

@@ -38,7 +38,7 @@ def test_every_pair_stands_once(pbc: tuple, edges: tuple, cutoff: float, skin: f
     places = rng.uniform(-5, 45, size=(60, 3))
     atoms = Atoms("Ar20", positions=places[:20])
     for place in places[20:]:
-        atoms += Atoms("N2", positions=[place, place + (0, 0, 1.1)])
+        atoms += Atoms("N2", positions=[place, place + np.array([0, 0, 1.1])])
     box = np.where(pbc, edges, 0.0)
     lists = Neighbours(assemble(atoms, models), box, cutoff, skin)
     lists._refuse_overlaps = lambda: None  # places are drawn at random
