@@ -12,7 +12,7 @@ import math
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from ase.calculators.calculator import Calculator, all_changes
@@ -60,7 +60,7 @@ class Evaluation:
         return math.fsum(self.terms_ev.values())
 
 
-class RigidPotential(Calculator):  # type: ignore[misc]
+class RigidPotential(Calculator):
     """Lennard-Jones and charges between rigid molecules.
 
     models: names of `rotor.fluid.models.MODELS` (several joined by commas for a mixture), or models of one's own.
@@ -72,16 +72,14 @@ class RigidPotential(Calculator):  # type: ignore[misc]
 
     Molecules may be broken by the cell's edges. Cells have right angles; directions without pbc are open.
 
-    >>> from ase.build import molecule
-    >>> pair = molecule("Ar")
-    >>> pair += molecule("Ar")
-    >>> pair.positions[1, 0] = 3.405 * 2 ** (1 / 6)
+    >>> from ase import Atoms
+    >>> pair = Atoms("Ar2", positions=[(0, 0, 0), (3.405 * 2 ** (1 / 6), 0, 0)])
     >>> pair.calc = RigidPotential("argon", cutoff_angstrom=float("inf"))
     >>> round(pair.get_potential_energy() / 8.617333262e-5, 3)  # minus the depth, in K
     -119.8
     """
 
-    implemented_properties: ClassVar[list[str]] = ["energy", "forces", "stress"]
+    implemented_properties = ["energy", "forces", "stress"]  # noqa: RUF012
 
     def __init__(
         self, models: str | RigidModel | Sequence[str | RigidModel] = "spce", *, cutoff_angstrom: float = 9.0,
@@ -127,11 +125,12 @@ class RigidPotential(Calculator):  # type: ignore[misc]
     ) -> None:
         """Fill `results` (ASE calls this)."""
         super().calculate(atoms, list(properties), list(system_changes))
-        found = self.evaluate(self.atoms)
+        box: Any = self.atoms
+        found = self.evaluate(box)
         self.last = found
         self.results = {"energy": found.energy_ev, "forces": found.forces_ev_per_angstrom}
-        if self.atoms.pbc.all():
-            stress = -found.virial_ev / self.atoms.get_volume() - found.tail_pressure_ev_per_angstrom3 * np.eye(3)
+        if box.pbc.all():
+            stress = -found.virial_ev / box.get_volume() - found.tail_pressure_ev_per_angstrom3 * np.eye(3)
             self.results["stress"] = np.array([stress[a, b] for a, b in VOIGT])
 
     @property
@@ -152,7 +151,7 @@ class RigidPotential(Calculator):  # type: ignore[misc]
         volume = float(np.prod(neighbours.box_angstrom))
         terms = {"dispersion": float(totals[0])}
         if volume and self.long_range_correction:
-            terms["long_range_correction"] = self._tail[0] / volume
+            terms["long_range_correction"] = float(self._tail[0] / volume)
         name = {"reaction-field": "reaction_field", "ewald": "real_space", "shifted": "shifted"}[self.electrostatics]
         terms[name] = float(totals[1])
         if self.electrostatics == "ewald":
@@ -219,9 +218,9 @@ class RigidPotential(Calculator):  # type: ignore[misc]
         def share(i: int) -> None:
             _pair_kernels.pair_forces(
                 bounds[i], bounds[i + 1], neighbours.starts, neighbours.entries, neighbours.images, reach2,
-                neighbours.sites, neighbours.centres, a.first_site, a.kinds, a.counts,
+                neighbours.local.ravel(), neighbours.centres, a.first_site, a.kinds, a.counts,
                 t.starts, t.sites, t.numbers, cut, field, self.electrostatics != "reaction-field",
-                forces[i], totals[i],
+                forces[i].ravel(), totals[i],
             )  # fmt: skip
 
         self._run([lambda i=i: share(i) for i in range(self.threads)])
