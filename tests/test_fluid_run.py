@@ -296,3 +296,21 @@ def test_the_table_has_its_rows_where_asked():
     kinetic = (record.translation_ev, record.rotation_ev)
     assert record.translation_k == pytest.approx(2 * kinetic[0] / (21 * 8.617333262145e-5), rel=1e-9)  # 3·8 - 3 degrees
     assert record.rotation_k == pytest.approx(2 * kinetic[1] / (24 * 8.617333262145e-5), rel=1e-9)  # 3·8
+
+
+def test_the_table_can_be_written_and_read_back(folder):
+    import json
+
+    import polars as pl
+
+    import rotor
+
+    record = run_fluid(box(8), replace(SETTINGS, steps=10, every=5))
+    for name, reader in (("a.csv", pl.read_csv), ("a.parquet", pl.read_parquet)):
+        rotor.write(record, name, settings={"seed": 1})
+        assert reader(name)["total_ev"].to_list() == record.total_ev.tolist()  # to the last bit
+    rotor.write(record, "a.json")
+    assert [row["rotation_k"] for row in json.loads(Path("a.json").read_text())] == record.rotation_k.tolist()
+    assert json.loads(Path("a.csv.provenance.json").read_text())["seed"] == 1
+    with pytest.raises(ValueError, match=r"\.csv, \.parquet or \.json"):
+        rotor.write(record, "a.txt")
