@@ -45,7 +45,7 @@ def command(
     json: str | None = inputs.JSON,
 ) -> None:
     """Frame, constants, kind of top with its margin, moments, dipole, table of Q(T)."""
-    temperatures = TEMPERATURES_K if temperature is None else _temperatures(temperature)
+    temperatures = TEMPERATURES_K if temperature is None else inputs.temperatures("--temperature", temperature)
     files = Files()
     if json != "-":
         files.ask("--json", json, (".json",))
@@ -63,15 +63,6 @@ def command(
         print(json_text(content), end="")
     else:
         _show(top, content)
-
-
-def _temperatures(text: str) -> Sequence[float]:
-    from rotor.units import parse_grid
-
-    temperatures: list[float] = inputs.option("--temperature", text, lambda value: parse_grid(value, "K").tolist())
-    if not all(0 < t < float("inf") for t in temperatures):
-        raise ValueError(f"--temperature: {text!r}: temperatures are above 0 K")
-    return temperatures
 
 
 def partition_table(top: Top, temperatures_k: Sequence[float]) -> list[dict[str, Any]]:

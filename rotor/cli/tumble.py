@@ -209,7 +209,7 @@ def _writers(thrown: Thrown, motion: FreeMotion, table: MotionTable, content: di
         inner = table.times / units.time_factor
         animate(
             motion, inner, path, atoms=thrown.atoms, axis_names=thrown.names, time_unit=units.time,
-            time_factor=units.time_factor,
+            time_factor=units.time_factor, provenance=story,
         )  # fmt: skip
 
     return {

@@ -69,9 +69,9 @@ class Flows:
 
     @cached_property
     def _axes(self) -> NDArray[np.int64]:
-        from rotor.classical.splitting import symmetric_axes
+        from rotor.classical.splitting import turned_axes
 
-        return symmetric_axes(self._inverse)
+        return turned_axes(self._inverse)
 
     def drift(self, state: State, time: float) -> None:
         """Free motion for a time."""
