@@ -45,18 +45,19 @@ def best(run: Callable[[], None], work: float, repeats: int = 3) -> float:
 
 
 def ours(n: int, steps: int) -> dict[str, float]:
-    """One core and two threads; and what a thousand steps do to the invariants."""
+    """One core and, where there are two, two threads; and what a thousand steps do to the invariants."""
     momentum, attitude = bodies(n)
     advance(MOMENTS, momentum[:1], attitude[:1], STEP, 1)  # compile
     step = STEP / np.max(np.linalg.norm(momentum, axis=-1))  # the fastest body turns by at most STEP / smallest moment
     one = best(lambda: advance(MOMENTS, momentum, attitude, step, steps), n * steps)
-    with ThreadPoolExecutor(2) as pool:
-        two = best(lambda: advance(MOMENTS, momentum, attitude, step, steps, executor=pool), n * steps)
+    rates = {"rotor, 1 core": one}
+    if cores() > 1:
+        with ThreadPoolExecutor(2) as pool:
+            two = best(lambda: advance(MOMENTS, momentum, attitude, step, steps, executor=pool), n * steps)
+        rates["rotor, 2 threads"] = two
     end, turned = advance(MOMENTS, momentum, attitude, step, 1000)
     drift = np.abs(energy(end, np.array(MOMENTS)) / energy(momentum, np.array(MOMENTS)) - 1)
-    return {
-        "rotor, 1 core": one,
-        "rotor, 2 threads": two,
+    return rates | {
         "energy error after 1000 steps": float(np.max(drift)),
         "|L| error after 1000 steps": float(
             np.max(np.abs(np.linalg.norm(end, axis=-1) / np.linalg.norm(momentum, axis=-1) - 1))
@@ -124,6 +125,11 @@ def mujoco(n: int, steps: int) -> dict[str, float]:
     return rates
 
 
+def cores() -> int:
+    """Cores that this process may use (`taskset` may have bound it to one)."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
 def processor() -> str:
     """The processor's name where the system tells it."""
     info = Path("/proc/cpuinfo")
@@ -136,7 +142,7 @@ def processor() -> str:
 
 def measured(n: int) -> dict[str, float | str]:
     """One round of all that can be measured here."""
-    table: dict[str, float | str] = {"processor": processor(), "cores": float(os.cpu_count() or 1), "bodies": float(n)}
+    table: dict[str, float | str] = {"processor": processor(), "cores": float(cores()), "bodies": float(n)}
     table.update(ours(n, 1000))
     peers = (("LAMMPS", lambda: lammps(46, 100)), ("MuJoCo", lambda: mujoco(1000, 300)))
     for name, peer in peers:

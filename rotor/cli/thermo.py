@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from rotor.cli import inputs, layer
 from rotor.cli.inputs import Input
-from rotor.cli.output import Files, Table, Writer, answering, json_text, show_facts, show_table, write_text
+from rotor.cli.output import Files, Table, Writer, answering, deliver, json_with_rows, show_facts, show_table
 
 if TYPE_CHECKING:
     from rotor.thermo import ThermoFunctions, VibrationalStates
@@ -83,11 +83,8 @@ def command(
         functions = _functions(top, temperatures, species, states, pressure_bar)
         content = _content(functions, given, context.obj)
     content["files"] = [str(path) for path in files.wanted.values()]
-    files.write(_writers(functions, content))
-    if json == "-":
-        print(_json(functions, content), end="")
-    else:
-        _show(functions, content)
+    text = lambda: json_with_rows(functions, "functions", content)  # noqa: E731
+    deliver(files, _writers(functions, content), text, lambda: _show(functions, content))
 
 
 def _files(csv: str | None, parquet: str | None, plot: str | None, json: str | None) -> Files:
@@ -95,7 +92,7 @@ def _files(csv: str | None, parquet: str | None, plot: str | None, json: str | N
     files.ask("--csv", csv, (".csv",))
     files.ask("--parquet", parquet, (".parquet",))
     files.ask("--plot", plot, (".png", ".pdf", ".svg"))
-    files.ask("--json", None if json == "-" else json, (".json",))
+    files.ask_json(json)
     return files
 
 
@@ -148,12 +145,6 @@ def _content(functions: ThermoFunctions, given: Input, command: str) -> dict[str
     }
 
 
-def _json(functions: ThermoFunctions, content: dict[str, Any]) -> str:
-    columns = {name: column.tolist() for name, column in functions.columns.items()}
-    rows = zip(*columns.values(), strict=True)
-    return json_text({**content, "functions": [dict(zip(columns, row, strict=True)) for row in rows]})
-
-
 def _writers(functions: ThermoFunctions, content: dict[str, Any]) -> dict[str, Writer]:
     story = {"command": content["command"], "input": content["input"]}
 
@@ -175,7 +166,6 @@ def _writers(functions: ThermoFunctions, content: dict[str, Any]) -> dict[str, W
         "--csv": table,
         "--parquet": table,
         "--plot": draw,
-        "--json": lambda path: write_text(path, _json(functions, content)),
     }
 
 

@@ -58,7 +58,7 @@ class Flows:
 
     The drift is the free motion: of the centre exact; of the attitude `SymmetricTopSplitting` of the core, exact for linear
     molecules, symmetric tops and spheres, and for asymmetric ones in error by less than the kicks are
-    (benchmarks/bench_fluid.py compares it with `RotationSplitting`).
+    (benchmarks/bench_thermometers.py compares it with `RotationSplitting`).
     """
 
     bodies: Bodies

@@ -1,9 +1,9 @@
 """SPC/E water at constant energy: which thermometer is right at which step, what the energy does, what a step costs.
 
-    python benchmarks/bench_fluid.py [--span-ps 100] [--json benchmarks/results/fluid.json] [--plot docs/pictures/fluid_thermometers.png]
+    python benchmarks/bench_thermometers.py [--span-ps 100] [--json benchmarks/results/thermometers.json] [--plot docs/pictures/fluid_thermometers.png]
 
 216 molecules, 298 K, reaction field at 9 Å: brought to temperature by Langevin's thermostat, then run at constant energy with steps of
-0.5 to 4 fs from the same start. T_rot/T_trans by momenta on the step, at half steps, and by the mixture of both, each with
+1 to 4 fs from the same start. T_rot/T_trans by momenta on the step, at half steps, and by the mixture of both, each with
 the standard error of 20 blocks; rms and drift of the energy; and the cost of the two splittings that can drift a body.
 """
 
@@ -32,7 +32,7 @@ from rotor.fluid.state import Flows, State
 from rotor.fluid.temperature import THERMOMETERS, kinetic_energy, step_correction
 
 MOLECULES = 216
-STEPS_FS = (0.5, 1.0, 2.0, 3.0, 4.0)
+STEPS_FS = (1.0, 2.0, 3.0, 4.0)
 MODEL = model_of("spce")
 SHAPES = {MODEL.symbols: MODEL.positions_angstrom}
 LIBRATION_PER_PS = 112.0  # of water, from one fit to 4 fs in another program
