@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -44,7 +45,7 @@ class Neighbours:
         self.images = np.ascontiguousarray(grid * self.box_angstrom)
         self._refuse_small_boxes()
 
-    @property
+    @cached_property
     def within_angstrom(self) -> Array:
         """(kinds, kinds) distance of centres beyond which no two sites are within the cutoff."""
         reach = self.assembly.reach_angstrom
@@ -114,6 +115,7 @@ class Neighbours:
     def _refuse_overlaps(self) -> None:
         found = self.closest(2 * self.assembly.reach_angstrom.max() + CLOSEST_ANGSTROM)
         if found is not None and found[0] < CLOSEST_ANGSTROM:
+            self.starts = self.starts[:0]  # so that asking again fails again
             raise ValueError(
                 f"atoms {found[1]} and {found[2]} of different molecules are {found[0]:.3g} Å apart; molecules that lie "
                 f"on top of each other (nearer than {CLOSEST_ANGSTROM} Å) have no sensible energy: move one of them"
