@@ -17,8 +17,8 @@ from rotor.fluid.potential import RigidPotential, models_of
 
 def brute(lists: Neighbours) -> set[tuple[int, ...]]:
     """All pairs (i, j, shift) in range, each named by the larger of its two names."""
-    kinds, centres, edges = lists.assembly.kinds, lists.centres, lists.box_angstrom
-    within = (lists.within_angstrom + lists.skin_angstrom)[kinds[:, None], kinds[None]]
+    centres, edges = lists.centres, lists.box_angstrom
+    within = lists.within_angstrom.max() + lists.skin_angstrom
     found = set()
     for shift in itertools.product(*[range(-2, 3) if edge else range(1) for edge in edges]):
         apart = centres[None] + np.array(shift) * edges - centres[:, None]

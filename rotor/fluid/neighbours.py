@@ -96,11 +96,18 @@ class Neighbours:
         repeats = self.box_angstrom > 0
         low = np.where(repeats, 0.0, self.centres.min(axis=0))
         extent = np.where(repeats, self.box_angstrom, self.centres.max(axis=0) - low + 1e-3)
-        ranges = np.minimum(self.within_angstrom + self.skin_angstrom, np.linalg.norm(extent) * 3)
+        farthest = min(self.within_angstrom.max() + self.skin_angstrom, 3 * float(np.linalg.norm(extent)))
         most = math.ceil((4 * len(self.assembly)) ** (1 / 3))
-        bins = np.clip(np.floor(extent * 3 / ranges.max()), 1, most).astype(np.int64)
+        bins = np.clip(np.floor(extent * 2 / farthest), 1, most).astype(np.int64)
         self.starts, self.entries = _list_kernels.neighbour_list(
-            self.centres, self.box_angstrom, low, extent / bins, bins, self.assembly.kinds, ranges
+            self.centres,
+            self.box_angstrom,
+            low,
+            extent / bins,
+            bins,
+            self.assembly.kinds,
+            len(self.assembly.models),
+            farthest,
         )
         self.rebuilds += 1
 
