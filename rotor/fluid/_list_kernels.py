@@ -82,9 +82,7 @@ def _along_column(
             continue
         start, stop = starts[column + first - image_z * bins[2]], starts[column + last - image_z * bins[2] + 1]
         start = rank + 1 if own and image_z == 0 else start
-        if found + stop - start >= len(
-            mine
-        ):  # one place more than is kept: the next candidate is written before it is judged
+        if found + stop - start > len(mine):
             mine = np.concatenate((mine, np.empty(len(mine) + stop - start, dtype=np.int64)))
         x, y, z = here[0] - image_x * box[0], here[1] - image_y * box[1], here[2] - image_z * box[2]
         code = ((image_x + IMAGES) * 5 + image_y + IMAGES) * 5 + image_z + IMAGES
