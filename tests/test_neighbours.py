@@ -83,9 +83,9 @@ def test_lists_live_while_centres_stay_within_half_the_skin() -> None:
 
 
 def test_more_neighbours_than_one_block_holds() -> None:
-    """1000 argon atoms in open space, each with all others: blocks of 128 lanes."""
+    """1331 argon atoms in open space, each with all others: blocks of 128 lanes, lists that outgrow their first room."""
     rng = np.random.default_rng(2)
-    grid = np.stack(np.meshgrid(*[np.arange(8)] * 3, indexing="ij"), axis=-1).reshape(-1, 3) * 4.0
+    grid = np.stack(np.meshgrid(*[np.arange(11)] * 3, indexing="ij"), axis=-1).reshape(-1, 3) * 4.0
     places = grid + rng.uniform(-0.3, 0.3, size=grid.shape)
     found = RigidPotential("argon", cutoff_angstrom=math.inf).evaluate(Atoms(["Ar"] * len(grid), positions=places))
     r2 = np.sum((places[:, None] - places[None]) ** 2, axis=-1)[np.triu_indices(len(grid), 1)]
