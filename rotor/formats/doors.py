@@ -182,10 +182,10 @@ def write(thing: Any, path: str | os.PathLike[str], *, settings: Mapping[str, An
     """Write lines, a catalogue, a spectrum, a motion or thermodynamic functions; the suffix of `path` names the format.
 
     Lines: .cat, .cat.gz, .csv, .parquet, .json, .hitran; catalogue: .cat, .cat.gz; HITRAN's lines: .hitran; spectrum and
-    motion: .csv; thermodynamic functions: .csv, .parquet; the table of a fluid's run: .csv, .parquet, .json. An existing
-    file is replaced at the end, whole or not at all. settings: what the provenance shall say besides; for lines,
-    `{"tag": 18003}` is the tag of a .cat, `{"molecule": 1, "isotopologue": 1, "abundance": 0.997}` what `hitran_lines` asks
-    for. Raises ValueError for a thing or a suffix that has no format.
+    motion: .csv; thermodynamic functions: .csv, .parquet; correlation functions, tests of equipartition and the table of a
+    fluid's run: .csv, .parquet, .json. An existing file is replaced at the end, whole or not at all. settings: what the
+    provenance shall say besides; for lines, `{"tag": 18003}` is the tag of a .cat, `{"molecule": 1, "isotopologue": 1,
+    "abundance": 0.997}` what `hitran_lines` asks for. Raises ValueError for a thing or a suffix that has no format.
     """
     from rotor.classical.ensembles import Correlations
     from rotor.classical.integrators import Motion
