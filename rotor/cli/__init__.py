@@ -14,7 +14,7 @@ from typing import cast
 
 import typer
 
-from rotor.cli import cat, convert, gas, info, isotopologues, molecules, raman, spectrum, thermo, tumble
+from rotor.cli import cat, convert, fluid, gas, info, isotopologues, molecules, raman, spectrum, thermo, tumble
 from rotor.cli.output import NoAnswer
 
 NO_ANSWER, WRONG_INPUT, INTERRUPTED = 1, 2, 130
@@ -32,7 +32,8 @@ Examples:
   rotor raman N2 --laser 488
   rotor thermo water --temperature 10:1000K:100 --plot heat.png
   rotor tumble water --plot water.png
-  rotor gas water --molecules 20000 --seed 7"""
+  rotor gas water --molecules 20000 --seed 7
+  rotor fluid water --molecules 216 --csv run.csv"""
 
 
 def _application() -> typer.Typer:
@@ -59,6 +60,7 @@ def _application() -> typer.Typer:
     app.command("thermo", epilog=thermo.EXAMPLES)(thermo.command)
     app.command("tumble", epilog=tumble.EXAMPLES)(tumble.command)
     app.command("gas", epilog=gas.EXAMPLES)(gas.command)
+    app.command("fluid", epilog=fluid.EXAMPLES)(fluid.command)
     app.command("convert", epilog=convert.EXAMPLES)(convert.command)
     app.command("cat", epilog=cat.EXAMPLES)(cat.command)
     return app

@@ -182,15 +182,16 @@ def write(thing: Any, path: str | os.PathLike[str], *, settings: Mapping[str, An
     """Write lines, a catalogue, a spectrum, a motion or thermodynamic functions; the suffix of `path` names the format.
 
     Lines: .cat, .cat.gz, .csv, .parquet, .json, .hitran; catalogue: .cat, .cat.gz; HITRAN's lines: .hitran; spectrum and
-    motion: .csv; thermodynamic functions: .csv, .parquet; correlation functions and tests of equipartition: .csv, .parquet,
-    .json. An existing file is replaced at the end, whole or not at all.
-    settings: what the provenance shall say besides; for lines, `{"tag": 18003}` is the tag of a .cat, `{"molecule": 1,
-    "isotopologue": 1, "abundance": 0.997}` what `hitran_lines` asks for. Raises ValueError for a thing or a suffix that has no format.
+    motion: .csv; thermodynamic functions: .csv, .parquet; correlation functions, tests of equipartition and the table of a
+    fluid's run: .csv, .parquet, .json. An existing file is replaced at the end, whole or not at all. settings: what the
+    provenance shall say besides; for lines, `{"tag": 18003}` is the tag of a .cat, `{"molecule": 1, "isotopologue": 1,
+    "abundance": 0.997}` what `hitran_lines` asks for. Raises ValueError for a thing or a suffix that has no format.
     """
     from rotor.classical.ensembles import Correlations
     from rotor.classical.integrators import Motion
     from rotor.classical.motion import MotionTable
     from rotor.equipartition import Equipartition
+    from rotor.fluid.record import FluidRecord
     from rotor.formats.hitran import HitranLines, write_hitran
     from rotor.formats.spcat.catalogue import Catalogue
     from rotor.spectra.lines import Lines
@@ -204,6 +205,10 @@ def write(thing: Any, path: str | os.PathLike[str], *, settings: Mapping[str, An
         from rotor.formats.motion_tables import write_motion
 
         return write_motion(thing, path, settings)
+    if isinstance(thing, FluidRecord):
+        from rotor.formats.fluid_table import write_fluid
+
+        return write_fluid(thing, path, settings)
     if isinstance(thing, Correlations | Equipartition):
         from rotor.formats.gas_tables import write_gas_table
 
