@@ -126,7 +126,7 @@ def test_csv_gives_every_bit_back(tmp_path):
     assert json.loads((tmp_path / "m.csv.provenance.json").read_text())["rows"] == 101
     assert len(table.to_pandas()) == 101
     with pytest.raises(ValueError, match=r"\.csv"):
-        rotor.write(table, tmp_path / "m.parquet")
+        rotor.write(table, tmp_path / "m.gif")
 
 
 def test_motion_of_an_integrator_is_written_too(tmp_path):
