@@ -87,10 +87,10 @@ class SymmetricTopSplitting(KickDrift):
 
         inverse = acting_inverse(moments)
         gammas = self.kick_fractions if whole else _BASE
-        symmetric(state, carry, inverse, _symmetric_axes(inverse), step, gammas, steps)
+        symmetric(state, carry, inverse, symmetric_axes(inverse), step, gammas, steps)
 
 
-def _symmetric_axes(inverse: Array) -> NDArray[np.int64]:
-    """Cyclic axes (k, a, b) per body with 1/I_a and 1/I_b the nearest pair."""
+def symmetric_axes(inverse: Array) -> NDArray[np.int64]:
+    """Cyclic axes (k, a, b) per body (n, 3) with 1/I_a and 1/I_b (n, 3) the nearest pair."""
     gaps = np.stack([np.abs(inverse[:, a] - inverse[:, b]) for _, a, b in _CYCLES], axis=-1)
     return np.ascontiguousarray(_CYCLES[np.argmin(gaps, axis=-1)])
