@@ -34,10 +34,10 @@ class SiteTypes:
 
 def site_types(scene: Scene) -> SiteTypes:
     """One type for each site of each model."""
-    sites = [site for model in scene.models for site in model.sites]
-    mass = [m for model, masses in zip(scene.models, scene.masses, strict=True)
-            for m in [*masses, *[MASSLESS_U] * (len(model.sites) - len(masses))]]  # fmt: skip
-    lengths = np.array([len(model.sites) for model in scene.models])
+    sites = [site for one in scene.species for site in one.model.sites]
+    light = [[MASSLESS_U] * (len(one.model.sites) - len(one.masses)) for one in scene.species]
+    mass = [m for one, rest in zip(scene.species, light, strict=True) for m in [*one.masses, *rest]]
+    lengths = scene.sites_of_kinds
     return SiteTypes(
         np.array(mass),
         np.array([site.charge_e for site in sites]),
@@ -50,7 +50,7 @@ def site_types(scene: Scene) -> SiteTypes:
 def data_file(scene: Scene) -> str:
     """Atoms, velocities and bonds of a scene (`read_data`, atom_style full)."""
     types = site_types(scene)
-    lengths = np.array([len(model.sites) for model in scene.models])[scene.kinds]
+    lengths = scene.sites_of_kinds[scene.kinds]
     within = np.arange(len(scene.site_masses)) - scene.first_sites[scene.molecule_of_site]
     type_of = types.first[scene.kinds][scene.molecule_of_site] + within
     second = np.flatnonzero(within)
@@ -106,7 +106,9 @@ def table_file(scene: Scene, settings: Settings, dielectric: float) -> str:
                 r, types.charge[i] * types.charge[j], sigma[i, j], epsilon[i, j], settings.cutoff_angstrom, dielectric
             )
             ends = f"N {TABLE_POINTS} RSQ {r[0]:.17g} {r[-1]:.17g}"
-            rows = (f"{k} {x:.17g} {u:.17g} {f:.17g}" for k, (x, u, f) in enumerate(zip(r, energy, force, strict=True), 1))
+            rows = (
+                f"{k} {x:.17g} {u:.17g} {f:.17g}" for k, (x, u, f) in enumerate(zip(r, energy, force, strict=True), 1)
+            )
             parts.append("\n".join([f"PAIR_{i + 1}_{j + 1}", ends, "", *rows, ""]))
     return "\n".join(parts)
 
@@ -130,17 +132,20 @@ def pair_commands(scene: Scene, settings: Settings, accuracy: float, kspace: str
 
 def ensemble_commands(scene: Scene, settings: Settings) -> list[str]:
     """Fixes that move the bodies, and the single atoms where there are some."""
-    temperature, seed = f"{settings.temperature_k:.17g} {settings.temperature_k:.17g}", settings.seed
+    seed, target = settings.seed, settings.temperature_k
+    if settings.ensemble == "nose-hoover":  # its chain counts the total momentum too, which stays at 0
+        target *= scene.degrees.total / (scene.degrees.total + scene.degrees.removed)
+    temperature = f"{target:.17g} {target:.17g}"
     damping, relaxation = 1 / settings.friction_per_ps, settings.relaxation_fs / 1000
-    sizes = np.array([len(model.sites) for model in scene.models])[scene.kinds]
+    sizes = scene.sites_of_kinds[scene.kinds]
     single, bodies = bool(np.any(sizes == 1)), bool(np.any(sizes > 1))
     commands = []
     if single and bodies and settings.ensemble == "nose-hoover":
         raise ValueError("LAMMPS has no one Nosé-Hoover chain for molecules and single atoms together; take langevin")
     if bodies:
         first = site_types(scene).first
-        kinds = [k for k in np.unique(scene.kinds) if len(scene.models[k].sites) > 1]
-        ranges = " ".join(f"{first[k]}:{first[k] + len(scene.models[k].sites) - 1}" for k in kinds)
+        kinds = np.flatnonzero(scene.sites_of_kinds > 1)
+        ranges = " ".join(f"{first[k]}:{first[k] + scene.sites_of_kinds[k] - 1}" for k in kinds)
         commands.append(f"group bodies type {ranges}")
         style = {
             "nve": "rigid/nve/small molecule",
@@ -164,7 +169,7 @@ def ensemble_commands(scene: Scene, settings: Settings) -> list[str]:
 
 def input_file(scene: Scene, settings: Settings, *, accuracy: float = 1e-5, kspace: str = "pppm") -> str:
     """The commands before the run; files data.box and pairs.table stand beside."""
-    bonded = any(len(model.sites) > 1 for model in scene.models)
+    bonded = bool(np.any(scene.sites_of_kinds > 1))
     lines = ["units metal", "atom_style full", "boundary p p p"]
     lines += ["bond_style zero nocoeff", "special_bonds lj/coul 0 0 0"] if bonded else []
     lines += ["read_data data.box", *(["bond_coeff *"] if bonded else [])]

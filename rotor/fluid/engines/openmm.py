@@ -58,10 +58,10 @@ def handed(scene: Scene, settings: Settings, dielectric: float, accuracy: float)
     a, b, c = scene.edges / 10
     system.setDefaultPeriodicBoxVectors(mm.Vec3(a, 0, 0), mm.Vec3(0, b, 0), mm.Vec3(0, 0, c))
     force = nonbonded(mm, settings, dielectric, accuracy)
-    plans = [carriers_of(model, masses) for model, masses in zip(scene.models, scene.masses, strict=True)]
+    plans = [carriers_of(one.model, one.masses) for one in scene.species]
     carriers, owners, atoms, positions = [], [], [], []
     for molecule, kind in enumerate(scene.kinds):
-        plan, model, first = plans[kind], scene.models[kind], system.getNumParticles()
+        plan, model, first = plans[kind], scene.species[kind].model, system.getNumParticles()
         here = scene.site_positions[scene.first_sites[molecule] :][: len(model.sites)]
         site_at = _add_molecule(mm, system, force, plan, model)
         carriers += range(first, first + len(plan.masses))
@@ -71,9 +71,16 @@ def handed(scene: Scene, settings: Settings, dielectric: float, accuracy: float)
             positions.append(_laid(plan, model.positions_angstrom, here))
         positions.append(here)
     system.addForce(force)
+    if settings.ensemble == "nose-hoover":
+        system.addForce(mm.CMMotionRemover())  # its chain then counts three degrees fewer, as we do
     masses = np.concatenate([plans[k].masses for k in scene.kinds])
     return Handed(
-        system, np.array(carriers), np.array(owners), masses, np.array(atoms), np.ascontiguousarray(np.concatenate(positions))
+        system,
+        np.array(carriers),
+        np.array(owners),
+        masses,
+        np.array(atoms),
+        np.ascontiguousarray(np.concatenate(positions)),
     )
 
 
@@ -218,9 +225,7 @@ def session(
     context.applyConstraints(1e-7)
     context.computeVirtualSites()
     ready = Session(context, mine, settings)
-    zero = np.zeros_like(scene.site_positions)
-    whole = rigid_motion(scene.molecule_of_site, scene.site_masses, scene.site_positions, scene.site_velocities, zero)
-    ready.start(point_velocities(whole, mine.owners, mine.masses, mine.positions[mine.carriers]))
+    ready.start(point_velocities(scene.motion(), mine.owners, mine.masses, mine.positions[mine.carriers]))
     return ready
 
 

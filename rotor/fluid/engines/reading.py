@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,6 +12,7 @@ from rotor import units
 from rotor.fluid.engines.scene import Frame, Scene, scene_of
 from rotor.fluid.record import FluidRecord
 from rotor.fluid.settings import Settings
+from rotor.fluid.temperature import THERMOMETERS, temperatures
 from rotor.rotations import Array
 
 ENGINES = ("openmm", "lammps")
@@ -58,42 +59,29 @@ def engine_frames(name: str, scene: Scene, settings: Settings, **options: Any) -
     raise ValueError(f"{name!r} is no engine; there are {', '.join(ENGINES)}")
 
 
-def record_of(frames: Iterable[Frame], scene: Scene, settings: Settings) -> FluidRecord:
+def record_of(frames: Sequence[Frame], scene: Scene, settings: Settings) -> FluidRecord:
     """The table of frames.
 
-    Energies of motion are those of the thermometer without the error of order h²: on the step K + h²/12 Σ F²/M, which is
-    (2 K_half + K_full)/3; between steps, where a thermostat acts there, K itself.
+    Energies of motion are those of the thermometer without an error of order h² (`rotor.fluid.temperature`): mixed from
+    momenta on the step, as they are from momenta between steps, where a thermostat acts. The total has the energy on the
+    step.
     """
-    h2 = (settings.step_fs / 1000 / units.CLASSICAL_TIME_PS) ** 2
-    rows = [_row(frame, h2, settings) for frame in frames]
-    time, potential, translation, rotation, total, pressure = np.array(rows, dtype=np.float64).reshape(-1, 6).T
-    f_t, f_r = scene.translational_degrees(settings), scene.rotational_degrees
-
-    def kelvin(energy: Array, degrees: int) -> Array:
-        return 2 * energy / (degrees * units.EV_PER_K) if degrees else np.full_like(energy, np.nan)
-
+    h = settings.step_fs / 1000 / units.CLASSICAL_TIME_PS
+    energies = [frame.motion.kinetic() for frame in frames]
+    measured = [
+        kinetic if frame.half else kinetic + frame.motion.correction(h).times(THERMOMETERS["mixed"])
+        for frame, kinetic in zip(frames, energies, strict=True)
+    ]
+    heat = [temperatures(kinetic, scene.degrees) for kinetic in measured]
+    total = [f.potential_ev + k.total_ev + f.thermostat_ev for f, k in zip(frames, energies, strict=True)]
     return FluidRecord(
-        time_ps=time,
-        potential_ev=potential,
-        translation_ev=translation,
-        rotation_ev=rotation,
-        total_ev=total,
-        temperature_k=kelvin(translation + rotation, f_t + f_r),
-        translation_k=kelvin(translation, f_t),
-        rotation_k=kelvin(rotation, f_r),
-        pressure_bar=pressure,
-    )
-
-
-def _row(frame: Frame, h2: float, settings: Settings) -> tuple[float, ...]:
-    """Time, potential energy, energies of translation and rotation, total, pressure."""
-    full_t, full_r = frame.motion.kinetic()
-    kick_t, kick_r = (0.0, 0.0) if frame.half else frame.motion.kicks()
-    return (
-        frame.step * settings.step_fs / 1000,
-        frame.potential_ev,
-        full_t + h2 / 6 * kick_t,
-        full_r + h2 / 6 * kick_r,
-        frame.potential_ev + full_t + full_r + frame.thermostat_ev,
-        frame.pressure_bar,
+        time_ps=np.array([frame.step for frame in frames]) * settings.step_fs / 1000,
+        potential_ev=np.array([frame.potential_ev for frame in frames]),
+        translation_ev=np.array([kinetic.translation_ev for kinetic in measured]),
+        rotation_ev=np.array([kinetic.rotation_ev for kinetic in measured]),
+        total_ev=np.array(total),
+        temperature_k=np.array([one.all_k for one in heat]),
+        translation_k=np.array([one.translation_k for one in heat]),
+        rotation_k=np.array([one.rotation_k for one in heat]),
+        pressure_bar=np.array([frame.pressure_bar for frame in frames]),
     )
