@@ -148,7 +148,7 @@ def bodies_of(
     >>> from ase.build import molecule
     >>> bodies, pose = bodies_of(molecule("H2O"))
     >>> bodies.moments.round(2).tolist(), bodies.degrees().total
-    ([[0.64, 1.16, 1.8]], 6)
+    ([[0.64, 1.17, 1.81]], 6)
     """
     if atoms.constraints:
         raise ValueError(

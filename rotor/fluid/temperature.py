@@ -84,8 +84,8 @@ def temperatures(kinetic: Kinetic, degrees: Degrees) -> Temperatures:
     """Temperatures of kinetic energies by the count of degrees.
 
     >>> from rotor.degrees import Degrees
-    >>> temperatures(Kinetic(1.5 * units.EV_PER_K, units.EV_PER_K), Degrees(1, 3, 2))
-    Temperatures(all_k=1.0, translation_k=1.0, rotation_k=1.0)
+    >>> temperatures(Kinetic(3.0 * units.EV_PER_K, 2.0 * units.EV_PER_K), Degrees(2, 3, 4)).translation_k
+    2.0
     """
     counts = (degrees.total, degrees.translation, degrees.rotation)
     energies = (kinetic.total_ev, kinetic.translation_ev, kinetic.rotation_ev)

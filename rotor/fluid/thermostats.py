@@ -19,7 +19,6 @@ from rotor.degrees import Degrees
 from rotor.fluid.bodies import Bodies
 from rotor.fluid.state import State
 from rotor.fluid.temperature import kinetic_energy
-from rotor.rotations import Array
 
 # H. Yoshida, Phys. Lett. A 150, 262 (1990): weights of a step of order 4, w, 1 - 2w, w
 _W = 1.0 / (2.0 - 2.0 ** (1.0 / 3.0))
@@ -202,19 +201,3 @@ class NoseHoover(Thermostat):
         """The same links."""
         for chain, x, v in zip(self._chains, kept["x"], kept["v"], strict=True):
             chain.x, chain.v = np.array(x), np.array(v)
-
-
-def thermal_momenta(
-    bodies: Bodies, temperature_k: float, rng: np.random.Generator, removed: int = 0
-) -> tuple[Array, Array]:
-    """Momenta (n, 3) and angular momenta (n, 3) in body axes drawn from the canonical ensemble, in ASE's units.
-
-    p_i and L_i are normal with variances m kT and I_i kT. removed: 3 takes the total momentum out, each body giving the
-    share of its mass; the ensemble of what remains is then canonical with 3 degrees fewer, with no rescaling.
-    """
-    kt = temperature_k * units.EV_PER_K
-    momentum = rng.standard_normal((len(bodies), 3)) * np.sqrt(bodies.mass * kt)[:, None]
-    angular = rng.standard_normal((len(bodies), 3)) * np.sqrt(bodies.moments * kt)
-    if removed:
-        momentum -= np.outer(bodies.mass / bodies.mass.sum(), momentum.sum(axis=0))
-    return momentum, angular

@@ -1,0 +1,332 @@
+"""Long runs of a fluid: rows and frames as they come, checkpoints, and exact restarts.
+
+After each checkpoint the calculator is told to forget what it knows (lists of neighbours, the last result), as it has after a
+restart: what follows depends on the checkpoint alone, and a run that was killed and resumed ends bit for bit where the
+uninterrupted one does, on one machine with the same settings and the same interval of checkpoints.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, fields
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rotor.fluid.keeping import Checkpoint, TextFile, csv_line, read_checkpoint, read_rows, trajectory_file
+from rotor.fluid.models import RigidModel, model_of
+from rotor.fluid.record import FluidRecord
+from rotor.fluid.settings import Settings
+from rotor.fluid.start import at_rest, check_apart, heat, model_labels
+from rotor.fluid.state import State
+
+if TYPE_CHECKING:
+    from ase import Atoms
+
+    from rotor.fluid.dynamics import RigidDynamics
+    from rotor.fluid.thermostats import Thermostat
+
+COLUMNS = tuple(field.name for field in fields(FluidRecord))
+MAY_CHANGE = ("steps",)  # settings that a resumed run may have otherwise
+BAR_EVERY_S = 0.2
+EV_PER_ANGSTROM3_BAR = 1.602176634e6  # 1 eV/Å³ in bar, exact
+
+Told = Callable[[int, int, float], None]
+
+
+@dataclass(frozen=True)
+class Outputs:
+    """Files of a run; what is None or empty is not written.
+
+    csv: rows of the table as they come. trajectories: frames, .traj, .xyz or .extxyz. frames_every: steps between frames, by
+    default those between rows. checkpoint: file to resume from. checkpoint_every: steps between checkpoints.
+    """
+
+    csv: str | os.PathLike[str] | None = None
+    trajectories: Sequence[str | os.PathLike[str]] = ()
+    frames_every: int | None = None
+    checkpoint: str | os.PathLike[str] | None = None
+    checkpoint_every: int = 1000
+
+    def __post_init__(self) -> None:
+        for name in ("frames_every", "checkpoint_every"):
+            value = getattr(self, name)
+            if value is not None and value < 1:
+                raise ValueError(f"{name} = {value}: at least 1 is wanted")
+
+
+def run_fluid(
+    atoms: Atoms,
+    settings: Settings,
+    outputs: Outputs | None = None,
+    *,
+    resume: bool = False,
+    told: Told | None = None,
+) -> FluidRecord:
+    """Run a box of rigid molecules and return its table; the atoms end where the run does.
+
+    Parameters
+    ----------
+    atoms : ase.Atoms
+        Molecules one after another, atoms in the order of their models; its own calculator, if it has one, takes the place
+        of the model's potential. Momenta are used if there are any (without their total, where that is conserved), else
+        drawn at `settings.temperature_k`.
+    resume : bool
+        Continue from `outputs.checkpoint`; the files that grow are cut back to where they were then.
+    told : callable, optional
+        Told step, steps and ns per day from time to time; without it a bar is shown on a terminal.
+
+    Raises
+    ------
+    ValueError
+        Molecules that do not fit their model or lie on top of each other, a force that is not finite, with the step and
+        the last checkpoint; a checkpoint of another box or other settings.
+    OSError
+        A file that cannot be written any more, with its name. What was written before stays whole.
+    """
+    outputs = outputs or Outputs()
+    if resume and outputs.checkpoint is None:
+        raise ValueError("to resume a run, name the checkpoint that it wrote")
+    if not resume and outputs.checkpoint is not None and os.path.exists(outputs.checkpoint):
+        raise ValueError(f"{outputs.checkpoint}: exists already; resume from it, or remove it to begin anew")
+    dynamics = dynamics_of(atoms, settings, begin=not resume)
+    run = _Run(dynamics, settings, outputs)
+    if resume:
+        assert outputs.checkpoint is not None
+        run.restore(read_checkpoint(outputs.checkpoint))
+    with run.files(), _bar(settings.steps, told) as shown:
+        run.go(shown)
+    return run.record()
+
+
+def dynamics_of(atoms: Atoms, settings: Settings, begin: bool = True) -> RigidDynamics:
+    """The dynamics of settings, with model, thermostat and, if the box is to begin, thermal momenta."""
+    from ase.units import fs
+
+    from rotor.fluid.bodies import bodies_of
+    from rotor.fluid.dynamics import RigidDynamics
+
+    models = [model_of(name.strip()) for name in settings.model.split(",")]
+    if "molecule" not in atoms.arrays:
+        atoms.arrays["molecule"] = model_labels(atoms, models)
+    shapes = {model.symbols: model.positions_angstrom[: len(model.symbols)] for model in models}
+    bodies, pose = bodies_of(atoms, shapes=shapes)
+    if atoms.calc is None:
+        atoms.calc = calculator_of(atoms, settings, models)
+    velocities, noise = np.random.default_rng(settings.seed).spawn(2)
+    thermostat = thermostat_of(settings, noise)
+    if begin:
+        check_apart(atoms, bodies)
+        if not atoms.get_momenta().any():
+            heat(atoms, bodies, pose.attitude, settings.temperature_k, velocities)
+        elif thermostat is None or thermostat.keeps_momentum:
+            momentum, angular = bodies.wrench(atoms.get_momenta(), pose.attitude)
+            atoms.set_momenta(bodies.momenta(at_rest(bodies, momentum), angular, pose.attitude))
+    else:
+        atoms.set_momenta(np.zeros((len(atoms), 3)))
+    return RigidDynamics(atoms, settings.step_fs * fs, thermostat=thermostat, shapes=shapes)
+
+
+def thermostat_of(settings: Settings, rng: np.random.Generator) -> Thermostat | None:
+    """The thermostat of an ensemble; None for nve."""
+    from ase.units import fs
+
+    from rotor.fluid.thermostats import Langevin, NoseHoover
+
+    if settings.ensemble == "langevin":
+        return Langevin(settings.temperature_k, settings.friction_per_ps / (1000.0 * fs), rng)
+    if settings.ensemble == "nose-hoover":
+        return NoseHoover(settings.temperature_k, settings.relaxation_fs * fs)
+    return None
+
+
+def calculator_of(atoms: Atoms, settings: Settings, models: Sequence[RigidModel]) -> Any:
+    """The built-in potential of models, as an ASE calculator."""
+    raise NotImplementedError
+
+
+def pressure_bar(dynamics: RigidDynamics) -> float:
+    """Pressure from centres of mass: (2 K_trans + Σ r·f over atoms - Σ s·f)/3V, s from the centre; nan without a stress.
+
+    The forces that keep a molecule rigid do no virial work on its centre, so that what forces do along sites is taken off
+    the atomic virial (M. P. Allen and D. J. Tildesley, Computer Simulation of Liquids, section 2.4).
+    """
+    atoms = dynamics.atoms
+    if "stress" not in getattr(atoms.calc, "implemented_properties", ()) or not atoms.pbc.all():
+        return float("nan")
+    volume = float(atoms.get_volume())
+    atomic = -float(np.trace(atoms.get_stress(voigt=False, apply_constraint=False))) / 3.0
+    bodies = dynamics.bodies
+    centres = np.empty((len(atoms), 3))
+    centres[bodies.order] = np.repeat(dynamics.state.centres, np.diff(bodies.starts), axis=0)
+    inside = float(np.sum((atoms.positions - centres) * atoms.get_forces(apply_constraint=False)))
+    kinetic = 2.0 * dynamics.kinetic().translation_ev
+    return EV_PER_ANGSTROM3_BAR * (atomic + (kinetic - inside) / (3.0 * volume))
+
+
+class _Run:
+    """A run under way: its rows, its files, where its last checkpoint is."""
+
+    def __init__(self, dynamics: RigidDynamics, settings: Settings, outputs: Outputs) -> None:
+        self.dynamics, self.settings, self.outputs = dynamics, settings, outputs
+        self.rows: list[list[float]] = []
+        self._lengths: dict[str, int | None] = {}
+        self._kept_at: int | None = None
+
+    @contextmanager
+    def files(self) -> Iterator[None]:
+        """Open the growing files, new or where the checkpoint left them."""
+        outputs, lengths = self.outputs, self._lengths
+        self._csv = TextFile(outputs.csv, lengths.get("csv")) if outputs.csv is not None else None
+        self._frames = [trajectory_file(path, lengths.get(str(path))) for path in outputs.trajectories]
+        if self._csv is not None and lengths.get("csv") is None:
+            self._csv.add(",".join(COLUMNS) + "\n")
+        try:
+            yield
+        finally:
+            for file in (self._csv, *self._frames):
+                if file is not None:
+                    file.close()
+
+    def go(self, told: Told) -> None:
+        """All steps that are left."""
+        dynamics, steps = self.dynamics, self.settings.steps
+        first, started, shown = dynamics.nsteps, time.perf_counter(), 0.0
+        try:
+            if self._kept_at is None:
+                self._write()
+                self._keep()
+            while dynamics.nsteps < steps:
+                dynamics.step()
+                dynamics.nsteps += 1
+                self._write()
+                if dynamics.nsteps % self.outputs.checkpoint_every == 0 or dynamics.nsteps == steps:
+                    self._keep()
+                now = time.perf_counter() - started
+                if now - shown > BAR_EVERY_S or dynamics.nsteps == steps:
+                    shown = now
+                    told(dynamics.nsteps, steps, _ns_per_day(self.settings, dynamics.nsteps - first, now))
+        except (ValueError, FloatingPointError) as error:
+            raise ValueError(f"{error}{self._told_checkpoint()}") from error
+        except OSError as error:
+            raise OSError(
+                error.errno,
+                f"{error.strerror} at step {dynamics.nsteps}; what was written before is whole{self._told_checkpoint()}",
+                error.filename,
+            ) from error
+
+    def record(self) -> FluidRecord:
+        """All rows as a table."""
+        columns = np.array(self.rows, dtype=np.float64).reshape(-1, len(COLUMNS)).T
+        return FluidRecord(*columns)
+
+    def restore(self, checkpoint: Checkpoint) -> None:
+        """State, thermostat, rows and lengths of files as they were; ValueError for another box or run."""
+        about, arrays, path = checkpoint.about, checkpoint.arrays, self.outputs.checkpoint
+        if about["box"] != self._box():
+            raise ValueError(f"{path}: was written for another box (other atoms, masses, shapes or cell)")
+        mine = asdict(self.settings)
+        for name, value in about["settings"].items():
+            if name not in MAY_CHANGE and mine.get(name) != value:
+                raise ValueError(f"{path}: was written by a run with {name} = {value}, not {mine.get(name)}")
+        if about["files"].keys() != self._file_names().keys():
+            before = ", ".join(about["files"]) or "none"
+            raise ValueError(f"{path}: the run that is resumed wrote these files: {before}; name the same ones")
+        if about["step"] > self.settings.steps:
+            raise ValueError(f"{path}: is of step {about['step']}, beyond the {self.settings.steps} steps wanted")
+        state = State(*(np.array(arrays[name]) for name in ("centres", "momentum", "spin", "carry")))
+        if self.dynamics.thermostat is not None:
+            self.dynamics.thermostat.restore(about["thermostat"])
+        self.dynamics.restore(state, about["step"])
+        self._lengths = dict(about["files"])
+        self._kept_at = about["step"]
+        csv = self.outputs.csv
+        self.rows = arrays["rows"].tolist() if csv is None else read_rows(csv, about["files"]["csv"])
+
+    def _write(self) -> None:
+        """A row and frames, where it is their turn."""
+        dynamics, every = self.dynamics, self.settings.every
+        time_ps = dynamics.nsteps * self.settings.step_fs * 1e-3
+        if dynamics.nsteps % every == 0:
+            self.rows.append(self._row(time_ps))
+            if self._csv is not None:
+                self._csv.add(csv_line(self.rows[-1]))
+        if dynamics.nsteps % (self.outputs.frames_every or every) == 0:
+            for file in self._frames:
+                file.add(dynamics.atoms, time_ps)
+
+    def _row(self, time_ps: float) -> list[float]:
+        dynamics = self.dynamics
+        kinetic, heat = dynamics.kinetic(), dynamics.temperatures()
+        return [
+            time_ps,
+            float(dynamics.atoms.get_potential_energy()),
+            kinetic.translation_ev,
+            kinetic.rotation_ev,
+            dynamics.conserved_energy(),
+            heat.all_k,
+            heat.translation_k,
+            heat.rotation_k,
+            pressure_bar(dynamics),
+        ]
+
+    def _keep(self) -> None:
+        """A checkpoint, after which the calculator begins afresh."""
+        path, dynamics = self.outputs.checkpoint, self.dynamics
+        if path is None:
+            return
+        state, thermostat = dynamics.state, dynamics.thermostat
+        arrays = {"centres": state.centres, "momentum": state.momentum, "spin": state.spin, "carry": state.carry}
+        if self._csv is None:
+            arrays["rows"] = np.array(self.rows).reshape(-1, len(COLUMNS))
+        about = {
+            "box": self._box(),
+            "settings": asdict(self.settings),
+            "step": dynamics.nsteps,
+            "thermostat": None if thermostat is None else thermostat.kept(),
+            "files": {name: file.sync() for name, file in self._file_names().items()},
+        }
+        Checkpoint(arrays, about).write(path)
+        self._kept_at = dynamics.nsteps
+        dynamics.refresh()
+
+    def _file_names(self) -> dict[str, Any]:
+        """The growing files that were asked for, by name."""
+        csv = {} if self.outputs.csv is None else {"csv": getattr(self, "_csv", None)}
+        frames = getattr(self, "_frames", [None] * len(self.outputs.trajectories))
+        return csv | {str(path): file for path, file in zip(self.outputs.trajectories, frames, strict=True)}
+
+    def _box(self) -> str:
+        """A fingerprint of what does not change."""
+        bodies, atoms = self.dynamics.bodies, self.dynamics.atoms
+        parts = (atoms.numbers, bodies.order, bodies.starts, bodies.masses, bodies.sites, atoms.cell.array, atoms.pbc)
+        return hashlib.sha256(b"".join(np.ascontiguousarray(part).tobytes() for part in parts)).hexdigest()
+
+    def _told_checkpoint(self) -> str:
+        if self._kept_at is None or self.outputs.checkpoint is None:
+            return ""
+        return f"; {self.outputs.checkpoint} is of step {self._kept_at}, resume from it"
+
+
+def _ns_per_day(settings: Settings, steps: int, seconds: float) -> float:
+    return steps * settings.step_fs * 1e-6 * 86400.0 / seconds if seconds > 0.0 else 0.0
+
+
+@contextmanager
+def _bar(steps: int, told: Told | None) -> Iterator[Told]:
+    """Who is told of the progress: the caller's function, else a bar on a terminal, else nobody."""
+    if told is not None or not sys.stderr.isatty():
+        yield told or (lambda step, steps, speed: None)
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    text = TextColumn("{task.completed} of {task.total} steps, {task.fields[speed]:.3g} ns/day")
+    with Progress(BarColumn(), text, TimeRemainingColumn(), console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("", total=steps, speed=0.0)
+        yield lambda step, steps, speed: bar.update(task, completed=step, speed=speed)
