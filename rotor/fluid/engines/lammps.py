@@ -19,7 +19,9 @@ import numpy as np
 
 from rotor import units
 from rotor.fluid.engines.lammps_input import data_file, input_file, table_file
+from rotor.fluid.engines.pairs import Form, tail_of
 from rotor.fluid.engines.scene import Frame, Scene, rigid_motion
+from rotor.fluid.run import EV_PER_ANGSTROM3_BAR
 from rotor.fluid.settings import Settings
 from rotor.rotations import Array
 
@@ -56,29 +58,31 @@ def environment() -> dict[str, str]:
 
 
 def write_files(
-    folder: Path, scene: Scene, settings: Settings, *, dielectric: float, accuracy: float, kspace: str
+    folder: Path, scene: Scene, settings: Settings, form: Form, *, accuracy: float = 1e-5, kspace: str = "pppm"
 ) -> None:
     """All that LAMMPS reads."""
     (folder / "data.box").write_text(data_file(scene), encoding="ascii")
-    if settings.electrostatics == "reaction-field":
-        (folder / "pairs.table").write_text(table_file(scene, settings, dielectric), encoding="ascii")
-    (folder / "in.box").write_text(input_file(scene, settings, accuracy=accuracy, kspace=kspace), encoding="ascii")
+    if settings.electrostatics != "ewald":
+        (folder / "pairs.table").write_text(table_file(scene, settings, form), encoding="ascii")
+    text = input_file(scene, settings, form, accuracy=accuracy, kspace=kspace)
+    (folder / "in.box").write_text(text, encoding="ascii")
 
 
 def frames(
     scene: Scene,
     settings: Settings,
+    form: Form | None = None,
     *,
-    dielectric: float = 78.3,
     accuracy: float = 1e-5,
     kspace: str = "pppm",
     cores: int = 1,
 ) -> Iterator[Frame]:
     """Run, and give a frame at step 0 and after every `settings.every` steps; with cores above 1 under mpiexec."""
+    form = form or Form()
     check()
     with tempfile.TemporaryDirectory(prefix="rotor-lammps-") as name:
         folder = Path(name)
-        write_files(folder, scene, settings, dielectric=dielectric, accuracy=accuracy, kspace=kspace)
+        write_files(folder, scene, settings, form, accuracy=accuracy, kspace=kspace)
         with open(folder / "errors", "w+", encoding="utf-8") as errors:
             process = subprocess.Popen(
                 [*_launcher(cores), sys.executable, "-m", "rotor.fluid.engines._lammps_run"]
@@ -89,7 +93,7 @@ def frames(
             )
             assert process.stdout is not None
             try:
-                yield from _read(process.stdout, scene)
+                yield from _read(process.stdout, scene, tail_of(scene, settings, form))
             finally:
                 process.stdout.close()
                 if process.poll() is None and sys.exc_info()[0] is not None:
@@ -115,23 +119,23 @@ def _last_word(folder: Path, errors: IO[str]) -> str:
     return told[0].strip()
 
 
-def _read(stream: IO[bytes], scene: Scene) -> Iterator[Frame]:
-    """Frames out of the bytes that `_lammps_run` writes."""
+def _read(stream: IO[bytes], scene: Scene, tail: tuple[float, float]) -> Iterator[Frame]:
+    """Frames out of the bytes that `_lammps_run` writes, the dispersion beyond the cutoff added.
+
+    Step 0 has no pressure: LAMMPS does not know the forces that keep bodies rigid before the first step.
+    """
     head = _doubles(stream, 1)
     if head is None:
         return
     n = int(head[0])
     while (numbers := _doubles(stream, 4 + 9 * n)) is not None:
-        step, potential, pressure, bath = numbers[:4]
+        step, potential, pressure, bath = numbers[:4].tolist()
         positions, velocities, forces = numbers[4:].reshape(3, n, 3)
         motion = rigid_motion(
-            scene.molecule_of_site,
-            scene.site_masses,
-            positions,
-            velocities * units.CLASSICAL_TIME_PS,
-            forces,
+            scene.molecule_of_site, scene.site_masses, positions, velocities * units.CLASSICAL_TIME_PS, forces
         )
-        yield Frame(int(step), positions[scene.real], motion, potential, bath, pressure)
+        pressure += tail[1] * EV_PER_ANGSTROM3_BAR if step else float("nan")
+        yield Frame(int(step), positions[scene.real], motion, potential + tail[0], bath, pressure)
 
 
 def _doubles(stream: IO[bytes], count: int) -> Array | None:

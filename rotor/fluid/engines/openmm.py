@@ -15,12 +15,13 @@ import numpy as np
 
 from rotor import units
 from rotor.fluid.engines.carriers import Carriers, carriers_of
+from rotor.fluid.engines.pairs import Form
 from rotor.fluid.engines.scene import Frame, Ints, Motion, Scene, point_velocities, rigid_motion
 from rotor.fluid.settings import Settings
 from rotor.rotations import Array
 
 KJ_PER_EV = units.ELEMENTARY_CHARGE_C * units.AVOGADRO_PER_MOL * 1e-3
-BAR_PER_EV_PER_ANGSTROM3 = units.ELEMENTARY_CHARGE_C * 1e25
+CONDUCTOR = 1e12  # a dielectric constant as good as infinite
 NM_PER_PS = 0.1 / units.CLASSICAL_TIME_PS  # 1 Å √(eV/u) in nm/ps
 
 
@@ -51,13 +52,13 @@ def load() -> Any:
     return openmm
 
 
-def handed(scene: Scene, settings: Settings, dielectric: float, accuracy: float) -> Handed:
+def handed(scene: Scene, settings: Settings, form: Form, accuracy: float) -> Handed:
     """The system of a scene: masses, constraints, virtual sites, Lennard-Jones and charges."""
     mm = load()
     system = mm.System()
     a, b, c = scene.edges / 10
     system.setDefaultPeriodicBoxVectors(mm.Vec3(a, 0, 0), mm.Vec3(0, b, 0), mm.Vec3(0, 0, c))
-    force = nonbonded(mm, settings, dielectric, accuracy)
+    force = nonbonded(mm, settings, form, accuracy)
     plans = [carriers_of(one.model, one.masses) for one in scene.species]
     carriers, owners, atoms, positions = [], [], [], []
     for molecule, kind in enumerate(scene.kinds):
@@ -84,13 +85,13 @@ def handed(scene: Scene, settings: Settings, dielectric: float, accuracy: float)
     )
 
 
-def nonbonded(mm: Any, settings: Settings, dielectric: float, accuracy: float) -> Any:
+def nonbonded(mm: Any, settings: Settings, form: Form, accuracy: float) -> Any:
     """The pair force without its particles."""
     force = mm.NonbondedForce()
     force.setCutoffDistance(settings.cutoff_angstrom / 10)
     if settings.electrostatics == "reaction-field":
         force.setNonbondedMethod(mm.NonbondedForce.CutoffPeriodic)
-        force.setReactionFieldDielectric(dielectric)
+        force.setReactionFieldDielectric(min(form.dielectric, CONDUCTOR))
     elif settings.electrostatics == "ewald":
         force.setNonbondedMethod(mm.NonbondedForce.PME)
         force.setEwaldErrorTolerance(accuracy)
@@ -98,6 +99,9 @@ def nonbonded(mm: Any, settings: Settings, dielectric: float, accuracy: float) -
         raise ValueError(
             f"electrostatics {settings.electrostatics!r}: OpenMM is handed reaction-field or ewald; LAMMPS takes shifted too"
         )
+    if form.switch_angstrom:
+        force.setUseSwitchingFunction(True)
+        force.setSwitchingDistance((settings.cutoff_angstrom - form.switch_angstrom) / 10)
     force.setUseDispersionCorrection(True)
     return force
 
@@ -211,14 +215,14 @@ class Session:
 
 
 def session(
-    scene: Scene, settings: Settings, *, dielectric: float = 78.3, accuracy: float = 1e-5, platform: str | None = None
+    scene: Scene, settings: Settings, form: Form | None = None, *, accuracy: float = 1e-5, platform: str | None = None
 ) -> Session:
     """A context with the scene in it, its molecules moving as the scene says.
 
     platform: "Reference" (double precision), "CPU", "CUDA", ...; None: the fastest that this machine has.
     """
     mm = load()
-    mine = handed(scene, settings, dielectric, accuracy)
+    mine = handed(scene, settings, form or Form(), accuracy)
     made = integrator(mm, settings)
     context = mm.Context(mine.system, made, *([mm.Platform.getPlatformByName(platform)] if platform else []))
     context.setPositions(mine.positions / 10)
@@ -230,10 +234,10 @@ def session(
 
 
 def frames(
-    scene: Scene, settings: Settings, *, dielectric: float = 78.3, accuracy: float = 1e-5, platform: str | None = None
+    scene: Scene, settings: Settings, form: Form | None = None, *, accuracy: float = 1e-5, platform: str | None = None
 ) -> Iterator[Frame]:
     """Run, and give a frame at step 0 and after every `settings.every` steps."""
-    run = session(scene, settings, dielectric=dielectric, accuracy=accuracy, platform=platform)
+    run = session(scene, settings, form, accuracy=accuracy, platform=platform)
     stepper = run.context.getIntegrator()
     yield run.frame(0)
     for step in range(settings.every, settings.steps + 1, settings.every):

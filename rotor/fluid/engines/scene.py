@@ -16,11 +16,10 @@ from rotor.degrees import Degrees
 from rotor.fluid.bodies import Bodies, Pose, bodies_of
 from rotor.fluid.models import RigidModel, model_of
 from rotor.fluid.settings import Settings
+from rotor.fluid.start import at_rest, model_labels, thermal_momenta
 from rotor.fluid.temperature import Kinetic
 from rotor.rotations import Array, rotate
 from rotor.superpose import superpose
-
-FAR_ANGSTROM = 0.1  # how far an atom may stand off its model's place in a molecule that is taken for the model
 
 Ints = NDArray[np.int64]
 
@@ -188,17 +187,17 @@ def scene_of(atoms: Any, settings: Settings) -> Scene:
     """
     edges = _edges(atoms, settings.cutoff_angstrom)
     models = tuple(model_of(name.strip()) for name in settings.model.split(","))
-    which = molecules_in(atoms.get_chemical_symbols(), models)
-    lengths = np.array([len(model.symbols) for model in models])[which]
+    labels = model_labels(atoms, models)
     shapes = {model.symbols: model.positions_angstrom[: len(model.symbols)] for model in models}
-    bodies, pose = bodies_of(atoms, np.repeat(np.arange(len(which)), lengths), shapes, FAR_ANGSTROM)
+    bodies, pose = bodies_of(atoms, labels, shapes)
+    by_symbols = {model.symbols: model for model in models}
     heads = [int(np.argmax(bodies.species == number)) for number in range(len(bodies.names))]
     spans = [slice(bodies.starts[body], bodies.starts[body + 1]) for body in heads]
     species = tuple(
-        Species(models[which[body]], bodies.masses[bodies.order[span]]) for body, span in zip(heads, spans, strict=True)
+        Species(by_symbols[tuple(atoms.symbols[span])], bodies.masses[span]) for span in spans
     )
     own_axes = [
-        superpose(one.model.positions_angstrom[: len(one.masses)], bodies.sites[bodies.order[span]], one.masses).apply(
+        superpose(one.model.positions_angstrom[: len(one.masses)], bodies.sites[span], one.masses).apply(
             one.model.positions_angstrom
         )
         for one, span in zip(species, spans, strict=True)
@@ -223,33 +222,13 @@ def _edges(atoms: Any, cutoff_angstrom: float) -> Array:
     return edges
 
 
-def molecules_in(symbols: list[str], models: tuple[RigidModel, ...]) -> Ints:
-    """Which model each molecule is, read in the order of the box.
-
-    >>> molecules_in(["O", "H", "H", "O", "H", "H"], (model_of("spce"),)).tolist()
-    [0, 0]
-    """
-    kinds, at = [], 0
-    by_length = sorted(range(len(models)), key=lambda k: -len(models[k].symbols))
-    while at < len(symbols):
-        fits = [k for k in by_length if tuple(symbols[at : at + len(models[k].symbols)]) == models[k].symbols]
-        if not fits:
-            orders = " or ".join("".join(model.symbols) for model in models)
-            raise ValueError(
-                f"atom {at} of the box is {symbols[at]}: molecules are wanted as {orders}, one after another"
-            )
-        kinds.append(fits[0])
-        at += len(models[fits[0]].symbols)
-    return np.array(kinds, dtype=np.int64)
-
-
 def _starting_motion(atoms: Any, bodies: Bodies, pose: Pose, settings: Settings, removed: int) -> tuple[Array, Array]:
-    """Momenta and angular momenta (body axes) of the box, or thermal ones."""
-    if atoms.has("momenta") and np.any(atoms.get_momenta()):
-        return bodies.wrench(bodies.masses[:, None] * atoms.get_velocities(), pose.attitude)
-    from rotor.fluid.thermostats import thermal_momenta
-
-    return thermal_momenta(bodies, settings.temperature_k, np.random.default_rng(settings.seed), removed)
+    """Momenta and angular momenta (body axes) of the box, or thermal ones, as `rotor.fluid.run.dynamics_of` has them."""
+    if atoms.get_momenta().any():
+        momentum, angular = bodies.wrench(bodies.masses[:, None] * atoms.get_velocities(), pose.attitude)
+        return (at_rest(bodies, momentum) if removed else momentum), angular
+    velocities, _ = np.random.default_rng(settings.seed).spawn(2)
+    return thermal_momenta(bodies, settings.temperature_k, velocities, removed=3)
 
 
 def _sites(bodies: Bodies, pose: Pose, own_axes: list[Array], momentum: Array, angular: Array) -> tuple[Array, Array]:
