@@ -68,6 +68,9 @@ class RigidModel:
         return np.array([site.position_angstrom for site in self.sites])
 
 
+_K_PER_KCAL_PER_MOL = 4184.0 / (units.AVOGADRO_PER_MOL * units.BOLTZMANN_J_PER_K)  # 503.22 K, exact ratio
+
+
 def _bent(bond_angstrom: float, angle_degrees: float) -> tuple[Vector, Vector]:
     """Places of two equal atoms bound to one at the origin."""
     half = math.radians(angle_degrees) / 2
@@ -75,20 +78,74 @@ def _bent(bond_angstrom: float, angle_degrees: float) -> tuple[Vector, Vector]:
     return (x, 0.0, z), (-x, 0.0, z)
 
 
-def _spce() -> RigidModel:
-    first, second = _bent(1.0, math.degrees(math.acos(-1 / 3)))
+def _three_site_water(
+    name: str, hydrogens: tuple[Vector, Vector], charge_e: float, sigma_angstrom: float, epsilon_k: float, source: str
+) -> RigidModel:
+    """Charges on the atoms; charge_e is that of a hydrogen."""
+    oxygen = Site("O", (0.0, 0.0, 0.0), -2 * charge_e, sigma_angstrom, epsilon_k)
+    return RigidModel(name, (oxygen, *(Site("H", place, charge_e) for place in hydrogens)), source)
+
+
+def _four_site_water(
+    name: str, charge_e: float, om_angstrom: float, sigma_angstrom: float, epsilon_k: float, source: str
+) -> RigidModel:
+    """The negative charge sits on a massless site, om_angstrom from oxygen on the bisector; geometry of the free molecule."""
     return RigidModel(
-        "spce",
+        name,
         (
-            Site("O", (0.0, 0.0, 0.0), -0.8476, 3.16555789, 78.19743111),
-            Site("H", first, 0.4238),
-            Site("H", second, 0.4238),
+            Site("O", (0.0, 0.0, 0.0), 0.0, sigma_angstrom, epsilon_k),
+            *(Site("H", place, charge_e) for place in _bent(0.9572, 104.52)),
+            Site("", (0.0, 0.0, om_angstrom), -2 * charge_e),
         ),
-        "H. J. C. Berendsen, J. R. Grigera, T. P. Straatsma, J. Phys. Chem. 91, 6269 (1987); digits of NIST's reference",
+        source,
     )
 
 
-MODELS: dict[str, RigidModel] = {model.name: model for model in (_spce(),)}
+def _sigma_epsilon(repulsion: float, attraction: float) -> tuple[float, float]:
+    """σ in Å and ε in K from A/r¹² - C/r⁶ with A in kcal Å¹²/mol and C in kcal Å⁶/mol: σ⁶ = A/C, ε = C²/4A."""
+    return (repulsion / attraction) ** (1 / 6), attraction**2 / (4 * repulsion) * _K_PER_KCAL_PER_MOL
+
+
+def _nitrogen() -> RigidModel:
+    end = {"charge_e": -0.482, "sigma_angstrom": 3.31, "epsilon_k": 36.0}
+    return RigidModel(
+        "trappe-n2",
+        (Site("N", (0.0, 0.0, -0.55), **end), Site("N", (0.0, 0.0, 0.55), **end), Site("", (0.0, 0.0, 0.0), 0.964)),
+        _TRAPPE,
+    )
+
+
+def _carbon_dioxide() -> RigidModel:
+    end = {"charge_e": -0.35, "sigma_angstrom": 3.05, "epsilon_k": 79.0}
+    carbon = Site("C", (0.0, 0.0, 0.0), 0.70, 2.80, 27.0)
+    return RigidModel("trappe-co2", (carbon, *(Site("O", (0.0, 0.0, z), **end) for z in (-1.16, 1.16))), _TRAPPE)
+
+
+def _argon() -> RigidModel:
+    return RigidModel(
+        "argon", (Site("Ar", (0.0, 0.0, 0.0), 0.0, 3.405, 119.8),), "L. Verlet, Phys. Rev. 159, 98 (1967)"
+    )
+
+
+_TRAPPE = "J. J. Potoff, J. I. Siepmann, AIChE J. 47, 1676 (2001)"
+_JORGENSEN = "W. L. Jorgensen et al., J. Chem. Phys. 79, 926 (1983)"
+_BERENDSEN = (
+    "H. J. C. Berendsen, J. R. Grigera, T. P. Straatsma, J. Phys. Chem. 91, 6269 (1987); digits of NIST's reference"
+)
+_TIP4P_2005 = "J. L. F. Abascal, C. Vega, J. Chem. Phys. 123, 234505 (2005)"
+_TIP4P_EW = "H. W. Horn et al., J. Chem. Phys. 120, 9665 (2004)"
+
+_WATERS = (
+    _three_site_water(
+        "spce", _bent(1.0, math.degrees(math.acos(-1 / 3))), 0.4238, 3.16555789, 78.19743111, _BERENDSEN
+    ),
+    _three_site_water("tip3p", _bent(0.9572, 104.52), 0.417, *_sigma_epsilon(582.0e3, 595.0), _JORGENSEN),
+    _four_site_water("tip4p", 0.52, 0.15, *_sigma_epsilon(600.0e3, 610.0), _JORGENSEN),
+    _four_site_water("tip4p-2005", 0.5564, 0.1546, 3.1589, 93.2, _TIP4P_2005),
+    _four_site_water("tip4p-ew", 0.52422, 0.125, 3.16435, 0.16275 * _K_PER_KCAL_PER_MOL, _TIP4P_EW),
+)
+
+MODELS: dict[str, RigidModel] = {model.name: model for model in (*_WATERS, _nitrogen(), _carbon_dioxide(), _argon())}
 
 
 def model_of(name: str) -> RigidModel:

@@ -1,0 +1,315 @@
+"""Energy, forces and stress of rigid molecules as an ASE calculator: Lennard-Jones sites, charges, a cutoff by sites.
+
+Charges by reaction field, by damped shifted forces, or by Ewald's sum. The Lennard-Jones part is switched off over the last
+ångström before the cutoff, so that forces are smooth and a run at 2 fs keeps its energy; what the cutoff takes away is added
+back as an even liquid. The stress is that of molecules: Σ F_ij ⊗ R_ij with centres of mass R, to which a dynamics of rigid
+bodies adds the kinetic part of the centres.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+from ase.calculators.calculator import Calculator, all_changes
+
+from rotor.fluid.assembly import Assembly, assemble
+from rotor.fluid.ewald import EwaldParameters, WaveVectors, fourier_virial, parameters_for, self_energy, wave_vectors
+from rotor.fluid.interactions import PairTables, pair_tables, reaction_field, screened, switched, tail
+from rotor.fluid.models import RigidModel, model_of
+from rotor.fluid.neighbours import Neighbours
+from rotor.fluid.settings import ELECTROSTATICS
+from rotor.rotations import Array
+
+VOIGT = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))
+
+
+def models_of(names: str | RigidModel | Sequence[str | RigidModel]) -> tuple[RigidModel, ...]:
+    """Models from names joined by commas, models, or several of either.
+
+    >>> [model.name for model in models_of("spce,argon")]
+    ['spce', 'argon']
+    """
+    if isinstance(names, str):
+        return tuple(model_of(name.strip()) for name in names.split(","))
+    if isinstance(names, RigidModel):
+        return (names,)
+    return tuple(model for name in names for model in models_of(name))
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """What one set of positions gives.
+
+    terms_ev: energies by name. forces_ev_per_angstrom: (atoms, 3). virial_ev: (3, 3) molecular, Σ F_ij ⊗ R_ij, symmetric part,
+    without the tail. tail_pressure_ev_per_angstrom3: of the dispersion beyond the cutoff.
+    """
+
+    terms_ev: dict[str, float]
+    forces_ev_per_angstrom: Array
+    virial_ev: Array
+    tail_pressure_ev_per_angstrom3: float
+
+    @property
+    def energy_ev(self) -> float:
+        """The sum of all terms."""
+        return math.fsum(self.terms_ev.values())
+
+
+class RigidPotential(Calculator):  # type: ignore[misc]
+    """Lennard-Jones and charges between rigid molecules.
+
+    models: names of `rotor.fluid.models.MODELS` (several joined by commas for a mixture), or models of one's own.
+    cutoff_angstrom: by sites; inf where nothing repeats. electrostatics: reaction-field, ewald or shifted. dielectric: outside
+    the reaction field, inf a conductor. switch_width_angstrom: of the Lennard-Jones switch, 0 cuts hard. damping_per_angstrom:
+    of shifted forces. ewald: α and k_cut; without it they follow from `tolerance` (`rotor.fluid.ewald.parameters_for`).
+    long_range_correction: dispersion beyond the cutoff. skin_angstrom: of the lists. threads: results are the same bit for bit
+    for equal threads and equal history; `reset()` forgets the lists, so that a run can be taken up again bit for bit.
+
+    Molecules may be broken by the cell's edges. Cells have right angles; directions without pbc are open.
+
+    >>> from ase.build import molecule
+    >>> pair = molecule("Ar")
+    >>> pair += molecule("Ar")
+    >>> pair.positions[1, 0] = 3.405 * 2 ** (1 / 6)
+    >>> pair.calc = RigidPotential("argon", cutoff_angstrom=float("inf"))
+    >>> round(pair.get_potential_energy() / 8.617333262e-5, 3)  # minus the depth, in K
+    -119.8
+    """
+
+    implemented_properties: ClassVar[list[str]] = ["energy", "forces", "stress"]
+
+    def __init__(
+        self, models: str | RigidModel | Sequence[str | RigidModel] = "spce", *, cutoff_angstrom: float = 9.0,
+        electrostatics: str = "reaction-field", dielectric: float = math.inf, switch_width_angstrom: float = 1.0,
+        damping_per_angstrom: float = 0.2, ewald: EwaldParameters | None = None, tolerance: float = 1e-5,
+        long_range_correction: bool = True, skin_angstrom: float = 1.5, threads: int = 1, **kwargs: Any,
+    ) -> None:  # fmt: skip
+        self.models = models_of(models)
+        self.cutoff_angstrom, self.electrostatics, self.dielectric = cutoff_angstrom, electrostatics, dielectric
+        self.switch_width_angstrom, self.damping_per_angstrom = switch_width_angstrom, damping_per_angstrom
+        self.ewald, self.tolerance = ewald, tolerance
+        self.long_range_correction, self.skin_angstrom, self.threads = long_range_correction, skin_angstrom, threads
+        self._check()
+        self._tables: PairTables = pair_tables(self.models)
+        self._assembly: Assembly | None = None
+        self._known: tuple[Array, Array | None] | None = None
+        self._neighbours: Neighbours | None = None
+        self._waves: WaveVectors | None = None
+        self._ewald: EwaldParameters | None = None
+        self._tail = (0.0, 0.0)
+        self._pool: ThreadPoolExecutor | None = None
+        self.last: Evaluation | None = None
+        super().__init__(**kwargs)
+
+    def _check(self) -> None:
+        for name in ("cutoff_angstrom", "damping_per_angstrom", "skin_angstrom", "dielectric", "threads"):
+            if not getattr(self, name) > 0:
+                raise ValueError(f"{name} = {getattr(self, name)}: a number above 0 is wanted")
+        if self.electrostatics not in ELECTROSTATICS:
+            raise ValueError(f"{self.electrostatics!r}: charges are treated by one of {', '.join(ELECTROSTATICS)}")
+        if math.isinf(self.cutoff_angstrom) and self.electrostatics != "reaction-field":
+            raise ValueError("a cutoff of inf is for open boxes with the reaction field (which is then none)")
+        if not 0 <= self.switch_width_angstrom < self.cutoff_angstrom:
+            raise ValueError(f"switch_width_angstrom = {self.switch_width_angstrom}: 0 up to the cutoff is wanted")
+
+    def reset(self) -> None:
+        """Forget results and lists."""
+        super().reset()
+        self._neighbours = None
+
+    def calculate(
+        self, atoms: Any = None, properties: Sequence[str] = ("energy",), system_changes: Sequence[str] = all_changes
+    ) -> None:
+        """Fill `results` (ASE calls this)."""
+        super().calculate(atoms, list(properties), list(system_changes))
+        found = self.evaluate(self.atoms)
+        self.last = found
+        self.results = {"energy": found.energy_ev, "forces": found.forces_ev_per_angstrom}
+        if self.atoms.pbc.all():
+            stress = -found.virial_ev / self.atoms.get_volume() - found.tail_pressure_ev_per_angstrom3 * np.eye(3)
+            self.results["stress"] = np.array([stress[a, b] for a, b in VOIGT])
+
+    @property
+    def terms_ev(self) -> dict[str, float]:
+        """Energies by name of the last calculation: dispersion, long_range_correction, reaction_field, shifted, or
+        real_space, fourier, self, intramolecular."""
+        if self.last is None:
+            raise ValueError("no energy was asked for yet")
+        return dict(self.last.terms_ev)
+
+    def evaluate(self, atoms: Any) -> Evaluation:
+        """Energies, forces and virial of atoms."""
+        neighbours = self._prepared(atoms)
+        neighbours.update(np.ascontiguousarray(atoms.positions, dtype=float))
+        forces, totals = self._pair_sum(neighbours)
+        centres = self._mass_centres(neighbours, atoms.get_masses())
+        virial = self._virial_of_pairs(neighbours, forces, totals, centres)
+        volume = float(np.prod(neighbours.box_angstrom))
+        terms = {"dispersion": float(totals[0])}
+        if volume and self.long_range_correction:
+            terms["long_range_correction"] = self._tail[0] / volume
+        name = {"reaction-field": "reaction_field", "ewald": "real_space", "shifted": "shifted"}[self.electrostatics]
+        terms[name] = float(totals[1])
+        if self.electrostatics == "ewald":
+            virial += self._ewald_rest(neighbours, forces, centres, terms)
+        pressure = self._tail[1] / volume**2 if volume and self.long_range_correction else 0.0
+        return Evaluation(terms, self._on_atoms(neighbours, forces), 0.5 * (virial + virial.T), pressure)
+
+    def _prepared(self, atoms: Any) -> Neighbours:
+        """The lists for this box; what depends on atoms and cell is made anew where they changed."""
+        labels = atoms.arrays.get("molecule")
+        known = self._known
+        if self._assembly is None or known is None or not _same(known, (atoms.numbers, labels)):
+            self._assembly = assemble(atoms, self.models)
+            self._known = atoms.numbers.copy(), None if labels is None else labels.copy()
+            self._neighbours, self._ewald = None, self.ewald
+            if not math.isinf(self.cutoff_angstrom):
+                self._tail = tail(self.models, self._assembly.numbers, self.cutoff_angstrom, self.switch_width_angstrom)
+        box = right_angled(atoms)
+        if self._neighbours is None or not np.array_equal(box, self._neighbours.box_angstrom):
+            self._refuse_open_box(box)
+            rebuilds = self._neighbours.rebuilds if self._neighbours else 0
+            self._neighbours = Neighbours(self._assembly, box, self.cutoff_angstrom, self.skin_angstrom, rebuilds)
+            if self.electrostatics == "ewald":
+                charges = self._assembly.charges_e
+                self._ewald = self._ewald or parameters_for(
+                    self.tolerance, self.cutoff_angstrom, charges[charges != 0], box
+                )
+                self._waves = wave_vectors(self._ewald, box)
+        return self._neighbours
+
+    def _refuse_open_box(self, box: Array) -> None:
+        if math.isinf(self.cutoff_angstrom) and box.any():
+            raise ValueError("a cell that repeats needs a finite cutoff, at most half its smallest edge")
+        if self.electrostatics == "ewald" and not box.all():
+            raise ValueError("Ewald's sum needs a cell that repeats in all three directions (pbc)")
+
+    def _field(self) -> Array:
+        if self.electrostatics == "reaction-field":
+            return reaction_field(self.cutoff_angstrom, self.dielectric)
+        if self.electrostatics == "shifted":
+            return screened(self.cutoff_angstrom, self.damping_per_angstrom, shifted=True)
+        assert self._ewald is not None
+        return screened(self.cutoff_angstrom, self._ewald.alpha_per_angstrom, shifted=False)
+
+    def _run(self, jobs: Sequence[Any]) -> list[Any]:
+        """Results of the jobs, in their order."""
+        if self.threads == 1:
+            return [job() for job in jobs]
+        if self._pool is None:
+            self._pool = ThreadPoolExecutor(self.threads)
+        return [future.result() for future in [self._pool.submit(job) for job in jobs]]
+
+    def _pair_sum(self, neighbours: Neighbours) -> tuple[Array, Array]:
+        """Forces on all sites, and energies and virial of the pairs."""
+        from rotor.fluid import _pair_kernels
+
+        a, t = neighbours.assembly, self._tables
+        forces = np.zeros((self.threads, *neighbours.sites.shape))
+        totals = np.zeros((self.threads, 8))
+        bounds = np.linspace(0, len(a), self.threads + 1).astype(int)
+        reach2 = (neighbours.within_angstrom**2).ravel()
+        cut, field = switched(self.cutoff_angstrom, self.switch_width_angstrom), self._field()
+
+        def share(i: int) -> None:
+            _pair_kernels.pair_forces(
+                bounds[i], bounds[i + 1], neighbours.starts, neighbours.entries, neighbours.images, reach2,
+                neighbours.sites, neighbours.centres, a.first_site, a.kinds, a.counts,
+                t.starts, t.sites, t.numbers, cut, field, self.electrostatics != "reaction-field",
+                forces[i], totals[i],
+            )  # fmt: skip
+
+        self._run([lambda i=i: share(i) for i in range(self.threads)])
+        if not np.isfinite(totals).all():
+            found = neighbours.closest(2 * a.reach_angstrom.max() + 1.0)
+            raise ValueError(f"the energy is not finite; atoms {found[1:] if found else '?'} lie on top of each other")
+        return forces.sum(axis=0), totals.sum(axis=0)
+
+    def _mass_centres(self, neighbours: Neighbours, masses: Array) -> Array:
+        """Centres of mass, near the molecules' sites."""
+        a = neighbours.assembly
+        weighted = neighbours.sites[a.atom_sites] * masses[:, None]
+        return np.asarray(
+            np.add.reduceat(weighted, a.first_atom[:-1]) / np.add.reduceat(masses, a.first_atom[:-1])[:, None]
+        )
+
+    def _virial_of_pairs(self, neighbours: Neighbours, forces: Array, totals: Array, centres: Array) -> Array:
+        """Σ F ⊗ R with centres of mass: the sum over list's centres, and Σ F (R - c) of each molecule's total force."""
+        from rotor.fluid import _pair_kernels
+
+        tensor = np.zeros((3, 3))
+        for (row, column), value in zip(VOIGT, totals[2:], strict=True):
+            tensor[row, column] = tensor[column, row] = value
+        first_site = neighbours.assembly.first_site
+        return tensor + _pair_kernels.lever_tensor(forces, centres, neighbours.centres, first_site, True)
+
+    def _ewald_rest(self, neighbours: Neighbours, forces: Array, centres: Array, terms: dict[str, float]) -> Array:
+        """Add Fourier, self and intramolecular terms to forces and terms; the molecular virial of the Fourier part."""
+        from rotor.fluid import _ewald_kernels, _pair_kernels
+        from rotor.fluid.ewald import COULOMB_EV_ANGSTROM
+
+        assert self._waves is not None
+        assert self._ewald is not None
+        a, waves, alpha = neighbours.assembly, self._waves, self._ewald.alpha_per_angstrom
+        charged = np.flatnonzero(a.charges_e)
+        bounds = np.linspace(0, len(charged), self.threads + 1).astype(int)
+        parts = [charged[bounds[i] : bounds[i + 1]] for i in range(self.threads)]
+        factors = np.zeros((self.threads, len(waves.weights_ev), 2))
+        pushed = np.zeros_like(forces)
+        turn = waves.turn_per_angstrom, waves.highest, waves.columns
+
+        def sum_up(i: int) -> None:
+            _ewald_kernels.structure_factors(neighbours.sites, parts[i], a.charges_e[parts[i]], *turn, factors[i])
+
+        def push(i: int) -> None:
+            _ewald_kernels.fourier_forces(
+                neighbours.sites, parts[i], a.charges_e[parts[i]], *turn, weighted, pushed
+            )
+
+        self._run([lambda i=i: sum_up(i) for i in range(self.threads)])
+        structure = factors.sum(axis=0)
+        energies = waves.weights_ev * np.sum(structure**2, axis=1)
+        weighted = 2 * waves.weights_ev[:, None] * structure
+        self._run([lambda i=i: push(i) for i in range(self.threads)])
+        virial = fourier_virial(waves, energies, alpha)
+        virial -= _pair_kernels.lever_tensor(pushed, neighbours.sites, centres, a.first_site, False)
+        forces += pushed
+        terms["fourier"] = float(energies.sum())
+        terms["self"] = self_energy(alpha, a.charges_e)
+        terms["intramolecular"] = _ewald_kernels.inner_correction(
+            neighbours.sites, a.first_site, a.charges_e, alpha, COULOMB_EV_ANGSTROM, forces
+        )
+        return virial
+
+    def _on_atoms(self, neighbours: Neighbours, forces: Array) -> Array:
+        from rotor.fluid import _pair_kernels
+
+        a = neighbours.assembly
+        out = np.empty((a.first_atom[-1], 3))
+        _pair_kernels.carry_to_atoms(forces, a.first_atom, a.first_site, a.kinds, a.weights, a.atoms, a.counts, out)
+        return out
+
+
+def _same(known: tuple[Array, Array | None], now: tuple[Array, Array | None]) -> bool:
+    return all(
+        (a is None and b is None) or (a is not None and b is not None and np.array_equal(a, b))
+        for a, b in zip(known, now, strict=True)
+    )
+
+
+def right_angled(atoms: Any) -> Array:
+    """Edges of the cell, Å, 0 along directions without pbc; a ValueError for other than right angles."""
+    cell = np.asarray(atoms.cell, dtype=float)
+    edges = np.diag(cell)
+    if np.abs(cell - np.diag(edges)).max() > 1e-10 * max(1.0, np.abs(edges).max()) and atoms.pbc.any():
+        raise ValueError(
+            f"angles of the cell are {np.round(atoms.cell.angles(), 4).tolist()} degrees; right angles along x, y, z are wanted"
+        )
+    if (edges[atoms.pbc] <= 0).any():
+        raise ValueError(f"edges of the cell are {edges.tolist()} Å; directions that repeat (pbc) need one above 0")
+    return np.where(atoms.pbc, edges, 0.0)
