@@ -15,8 +15,9 @@ import numpy as np
 
 from rotor import units
 from rotor.fluid.engines.carriers import Carriers, carriers_of
-from rotor.fluid.engines.pairs import Form
+from rotor.fluid.engines.pairs import Form, tail_of
 from rotor.fluid.engines.scene import Frame, Ints, Motion, Scene, point_velocities, rigid_motion
+from rotor.fluid.run import EV_PER_ANGSTROM3_BAR
 from rotor.fluid.settings import Settings
 from rotor.rotations import Array
 
@@ -29,11 +30,12 @@ NM_PER_PS = 0.1 / units.CLASSICAL_TIME_PS  # 1 Å √(eV/u) in nm/ps
 class Handed:
     """A scene as OpenMM has it.
 
-    system: openmm.System. carriers: (c,) its particles with mass. owners: (c,) their molecules. masses: (c,). atoms:
+    system: openmm.System. barostat: a part of it that changes nothing and measures the pressure. carriers: (c,) its particles with mass. owners: (c,) their molecules. masses: (c,). atoms:
     (atoms,) its particles that are the real atoms. positions: (particles, 3) Å.
     """
 
     system: Any
+    barostat: Any
     carriers: Ints
     owners: Ints
     masses: Array
@@ -72,16 +74,13 @@ def handed(scene: Scene, settings: Settings, form: Form, accuracy: float) -> Han
             positions.append(_laid(plan, model.positions_angstrom, here))
         positions.append(here)
     system.addForce(force)
+    barostat = mm.MonteCarloBarostat(1.0, settings.temperature_k, 0)  # 0: it never moves anything
+    system.addForce(barostat)
     if settings.ensemble == "nose-hoover":
         system.addForce(mm.CMMotionRemover())  # its chain then counts three degrees fewer, as we do
     masses = np.concatenate([plans[k].masses for k in scene.kinds])
     return Handed(
-        system,
-        np.array(carriers),
-        np.array(owners),
-        masses,
-        np.array(atoms),
-        np.ascontiguousarray(np.concatenate(positions)),
+        system, barostat, np.array(carriers), np.array(owners), masses, np.array(atoms), np.concatenate(positions)
     )
 
 
@@ -102,7 +101,7 @@ def nonbonded(mm: Any, settings: Settings, form: Form, accuracy: float) -> Any:
     if form.switch_angstrom:
         force.setUseSwitchingFunction(True)
         force.setSwitchingDistance((settings.cutoff_angstrom - form.switch_angstrom) / 10)
-    force.setUseDispersionCorrection(True)
+    force.setUseDispersionCorrection(False)
     return force
 
 
@@ -173,6 +172,8 @@ class Session:
     context: Any
     handed: Handed
     settings: Settings
+    tail: tuple[float, float]
+    volume: float
 
     @property
     def step_classical(self) -> float:
@@ -204,14 +205,23 @@ class Session:
 
     def frame(self, step: int) -> Frame:
         """What there is to say about now."""
-        positions, motion, potential = self.state()
+        positions, stored, potential = self.state()
         between = self.settings.ensemble != "nve"
-        if not between:
-            motion = motion.kicked(0.5 * self.step_classical)
+        motion = stored if between else stored.kicked(0.5 * self.step_classical)
         bath = 0.0
         if self.settings.ensemble == "nose-hoover":
             bath = self.context.getIntegrator().computeHeatBathEnergy() / KJ_PER_EV
-        return Frame(step, positions[self.handed.atoms], motion, potential, bath, half=between)
+        pressure = self.pressure_bar(stored, motion)
+        return Frame(step, positions[self.handed.atoms], motion, potential + self.tail[0], bath, pressure, between)
+
+    def pressure_bar(self, stored: Motion, motion: Motion) -> float:
+        """OpenMM's molecular pressure, from energies of the box scaled up and down, with the motion on the step.
+
+        It scales molecules about their geometric centres, not those of mass: another number at a moment, the same mean.
+        """
+        theirs = self.handed.barostat.computeCurrentPressure(self.context)._value
+        kinetic = motion.kinetic().translation_ev - stored.kinetic().translation_ev
+        return float(theirs + (2 / 3 * kinetic / self.volume + self.tail[1]) * EV_PER_ANGSTROM3_BAR)
 
 
 def session(
@@ -222,13 +232,14 @@ def session(
     platform: "Reference" (double precision), "CPU", "CUDA", ...; None: the fastest that this machine has.
     """
     mm = load()
-    mine = handed(scene, settings, form or Form(), accuracy)
+    form = form or Form()
+    mine = handed(scene, settings, form, accuracy)
     made = integrator(mm, settings)
     context = mm.Context(mine.system, made, *([mm.Platform.getPlatformByName(platform)] if platform else []))
     context.setPositions(mine.positions / 10)
     context.applyConstraints(1e-7)
     context.computeVirtualSites()
-    ready = Session(context, mine, settings)
+    ready = Session(context, mine, settings, tail_of(scene, settings, form), float(np.prod(scene.edges)))
     ready.start(point_velocities(scene.motion(), mine.owners, mine.masses, mine.positions[mine.carriers]))
     return ready
 
