@@ -57,7 +57,7 @@ def neighbour_list(centres: Array, box: Array, low: Array, width: Array, bins: A
     places, first, order = _bins_of(centres, low, width, bins)
     steps = np.array([int(np.ceil(farthest / width[c])) for c in range(3)])
     starts = np.zeros(n * species + 1, dtype=np.int64)
-    entries, mine = np.empty(n * 64 + 1024, dtype=np.int64), np.empty(1024, dtype=np.int64)
+    entries, mine = np.empty(n * 64 + 1024, dtype=np.uint64), np.empty(1024, dtype=np.int64)
     used = 0
     for i in range(n):
         found = 0
@@ -92,7 +92,7 @@ def neighbour_list(centres: Array, box: Array, low: Array, width: Array, bins: A
                             mine[found] = j * CODES + code
                             found += 1
         if used + found > len(entries):
-            entries = np.concatenate((entries, np.empty(len(entries) + found, dtype=np.int64)))
+            entries = np.concatenate((entries, np.empty(len(entries) + found, dtype=np.uint64)))
         for kind in range(species):
             for p in range(found):
                 if kinds[mine[p] // CODES] == kind:

@@ -18,7 +18,8 @@ from rotor.rotations import Array
 LANES = 128
 RUNS = 6  # x y z and force of a neighbour's site
 FAR = 1e6  # Å: where the lanes are that fill up the last eight
-CODES = 128  # an entry of the list is CODES * molecule + code of its image
+BITS, MASK = np.uint64(7), np.uint64(127)  # an entry of the list is 128 * molecule + code of its image
+ONE, TWO = np.uint64(1), np.uint64(2)
 ERFC = (
     1.2811636979448175, -0.055458415747475065, -0.09234223975654644, 0.11430594538064734, -0.07733392867213719,
     0.03669367051858509, -0.012636095691085234, 0.0029892246826299807, -0.00036982052040914534,
@@ -32,11 +33,11 @@ FAST = {"reassoc", "contract", "nsz", "arcp"}  # sums may be taken by eights; in
 @njit(cache=True, error_model="numpy", nogil=True)
 def place_sites(
     positions: Array, first_atom: Array, first_site: Array, kinds: Array, weights: Array, atoms: Array, counts: Array,
-    box: Array, reference: Array, fresh: bool, sites: Array, centres: Array,
+    box: Array, reference: Array, fresh: bool, sites: Array, local: Array, centres: Array,
 ) -> float:  # fmt: skip
     """Put every molecule together, near its reference centre (fresh: into the cell); largest move of a centre, squared.
 
-    weights[kind] has a row for each site and a last one for the list's centre. box is 0 along directions that do not repeat.
+    local: sites seen from their molecule's centre. weights[kind] has a row for each site and a last one for the centre. box is 0 along directions that do not repeat.
     """
     farthest, u = 0.0, np.zeros((weights.shape[2], 3))
     for m in range(len(kinds)):
@@ -44,12 +45,12 @@ def place_sites(
         rows = counts[kind]
         for c in range(3):
             inverse = 1.0 / box[c] if box[c] > 0.0 else 0.0
-            origin, centre = positions[start, c], 0.0
+            origin, middle = positions[start, c], 0.0
             for a in range(atoms[kind]):
                 u[a, c] = positions[start + a, c] - origin
                 u[a, c] -= box[c] * np.rint(u[a, c] * inverse)
-                centre += weights[kind, rows, a] * u[a, c]
-            centre += origin
+                middle += weights[kind, rows, a] * u[a, c]
+            centre = origin + middle
             turns = np.floor(centre * inverse) if fresh else np.rint((centre - reference[m, c]) * inverse)
             origin -= box[c] * turns
             centres[m, c] = centre - box[c] * turns
@@ -58,6 +59,7 @@ def place_sites(
                 for a in range(atoms[kind]):
                     place += weights[kind, s, a] * u[a, c]
                 sites[first_site[m] + s, c] = origin + place
+                local[first_site[m] + s, c] = place - middle
         if not fresh:
             move = 0.0
             for c in range(3):
@@ -219,18 +221,19 @@ def _screened(row: Array, n: int, x: float, y: float, z: float, qq: float, field
 
 @njit(cache=True, inline="always", error_model="numpy")
 def _collect(
-    entries: Array, at: int, stop: int, images: Array, centres: Array, m: int, reach2: float, who: Array, arms: Array
-) -> Any:
-    """Neighbours of m whose spheres are within reach: their numbers, and their centres seen from m's in the first runs."""
+    entries: Array, at: int, stop: int, images: Array, centres: Array, m: int, reach2: float, first: Array, base: Array,
+    arms: Array,
+) -> Any:  # fmt: skip
+    """Neighbours of m whose spheres are within reach: where their sites begin, their centres seen from m's in three runs."""
     n = 0
     x, y, z = centres[m, 0], centres[m, 1], centres[m, 2]
     while at < stop and n < LANES:
         entry = entries[at]
-        j, code = entry // CODES, entry % CODES
+        j, code = entry >> BITS, entry & MASK
         dx = centres[j, 0] + images[code, 0] - x
         dy = centres[j, 1] + images[code, 1] - y
         dz = centres[j, 2] + images[code, 2] - z
-        who[n] = j
+        base[n] = first[j]
         arms[n], arms[LANES + n], arms[2 * LANES + n] = dx, dy, dz
         n += 1 if dx * dx + dy * dy + dz * dz < reach2 else 0
         at += 1
@@ -260,77 +263,89 @@ def _add_virial(arms: Array, rows: Array, sites: int, n: int, totals: Array) -> 
         totals[7] += 0.5 * xy
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
-def _gather(rows: Array, sites: Array, first_site: Array, who: Array, arms: Array, centres: Array, count: int, n: int, padded: int) -> None:
-    """Sites of the neighbours, seen from the centre of the molecule in hand; forces zero; the lanes to `padded` far away."""
+@njit(cache=True, error_model="numpy")
+def _gather(rows: Array, local: Array, base: Array, arms: Array, count: int, n: int, padded: int) -> None:
+    """Sites of the neighbours, seen from the centre of the molecule in hand; forces 0; the lanes to `padded` far away."""
     for s in range(count):
         row = rows[s * RUNS * LANES : (s + 1) * RUNS * LANES]
+        step = np.uint64(3 * s)
         for k in range(n):
-            j = who[k]
-            site = first_site[j] + s
-            row[k] = sites[site, 0] - centres[j, 0] + arms[k]
-            row[LANES + k] = sites[site, 1] - centres[j, 1] + arms[LANES + k]
-            row[2 * LANES + k] = sites[site, 2] - centres[j, 2] + arms[2 * LANES + k]
+            at = base[k] + step
+            row[k] = local[at] + arms[k]
+            row[LANES + k] = local[at + ONE] + arms[LANES + k]
+            row[2 * LANES + k] = local[at + TWO] + arms[2 * LANES + k]
         for k in range(n, padded):
             row[k], row[LANES + k], row[2 * LANES + k] = FAR, FAR, FAR
-        for k in range(3 * LANES, RUNS * LANES):
-            row[k] = 0.0
+        for k in range(padded):
+            row[3 * LANES + k], row[4 * LANES + k], row[5 * LANES + k] = 0.0, 0.0, 0.0
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
-def _scatter(rows: Array, forces: Array, first_site: Array, who: Array, count: int, n: int) -> None:
+@njit(cache=True, error_model="numpy")
+def _scatter(rows: Array, forces: Array, base: Array, count: int, n: int) -> None:
     for s in range(count):
         row = rows[s * RUNS * LANES : (s + 1) * RUNS * LANES]
+        step = np.uint64(3 * s)
         for k in range(n):
-            site = first_site[who[k]] + s
-            forces[site, 0] += row[3 * LANES + k]
-            forces[site, 1] += row[4 * LANES + k]
-            forces[site, 2] += row[5 * LANES + k]
+            at = base[k] + step
+            forces[at] += row[3 * LANES + k]
+            forces[at + ONE] += row[4 * LANES + k]
+            forces[at + TWO] += row[5 * LANES + k]
+
+
+@njit(cache=True, error_model="numpy")
+def _site_pairs(
+    rows: Array, padded: int, local: Array, mine: Array, pairs: Array, numbers: Array, cut: Array, field: Array,
+    screened: bool, forces: Array, totals: Array,
+) -> None:  # fmt: skip
+    """All pairs of sites between one molecule, whose numbers are `mine` and upwards, and its gathered neighbours."""
+    for p in range(len(pairs)):
+        at = 3 * (mine + pairs[p, 0])
+        row = rows[pairs[p, 1] * RUNS * LANES : (pairs[p, 1] + 1) * RUNS * LANES]
+        x, y, z = local[at], local[at + 1], local[at + 2]
+        qq, c12, c6 = numbers[p, 0], numbers[p, 1], numbers[p, 2]
+        if c12 > 0.0:
+            fx, fy, fz, energy = _lennard_jones(row, padded, x, y, z, c12, c6, cut)
+            totals[0] += energy
+            forces[at] += fx
+            forces[at + 1] += fy
+            forces[at + 2] += fz
+        if qq != 0.0:
+            if screened:
+                fx, fy, fz, energy = _screened(row, padded, x, y, z, qq, field)
+            else:
+                fx, fy, fz, energy = _reaction_field(row, padded, x, y, z, qq, field)
+            totals[1] += energy
+            forces[at] += fx
+            forces[at + 1] += fy
+            forces[at + 2] += fz
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def pair_forces(
     first: int, last: int, starts: Array, entries: Array, images: Array, reach2: Array,
-    sites: Array, centres: Array, first_site: Array, kinds: Array, counts: Array,
+    local: Array, centres: Array, first_site: Array, kinds: Array, counts: Array,
     pair_starts: Array, pair_sites: Array, pair_numbers: Array, cut: Array, field: Array, screened: bool,
     forces: Array, totals: Array,
 ) -> None:  # fmt: skip
-    """Add forces on sites, energies and molecular virial of the pairs in the lists of molecules first to last - 1.
+    """Add forces on sites, energies and virial of the pairs in the lists of molecules first to last - 1.
 
-    starts has, for each molecule, the bounds of its neighbours by kind. pair_sites (pairs, 2) and pair_numbers (pairs, 3: qq,
-    c12, c6) belong to two kinds between pair_starts. totals: energies of dispersion and of charges, Σ F ⊗ d (6).
+    local and forces are flat, three numbers a site. starts has, for each molecule, the bounds of its neighbours by kind.
+    pair_sites (pairs, 2) and pair_numbers (pairs, 3: qq, c12, c6) belong to two kinds between pair_starts. totals: energies of
+    dispersion and of charges, Σ F ⊗ d (6) with d between centres of the lists.
     """
     species = len(counts)
     rows, arms = np.empty(np.max(counts) * RUNS * LANES), np.empty(3 * LANES)
-    who = np.empty(LANES, dtype=np.int64)
+    base, begins = np.empty(LANES, dtype=np.uint64), (3 * first_site).astype(np.uint64)
     for m in range(first, last):
-        kind = kinds[m]
         for other in range(species):
+            pair = kinds[m] * species + other
+            pairs = pair_sites[pair_starts[pair] : pair_starts[pair + 1]]
+            numbers = pair_numbers[pair_starts[pair] : pair_starts[pair + 1]]
             at, stop = starts[m * species + other], starts[m * species + other + 1]
-            pair = kind * species + other
             while at < stop:
-                n, at = _collect(entries, at, stop, images, centres, m, reach2[pair], who, arms)
+                n, at = _collect(entries, at, stop, images, centres, m, reach2[pair], begins, base, arms)
                 padded = (n + 7) // 8 * 8
-                _gather(rows, sites, first_site, who, arms, centres, counts[other], n, padded)
-                for p in range(pair_starts[pair], pair_starts[pair + 1]):
-                    mine, its = first_site[m] + pair_sites[p, 0], pair_sites[p, 1]
-                    row = rows[its * RUNS * LANES : (its + 1) * RUNS * LANES]
-                    x, y, z = sites[mine, 0] - centres[m, 0], sites[mine, 1] - centres[m, 1], sites[mine, 2] - centres[m, 2]
-                    qq, c12, c6 = pair_numbers[p, 0], pair_numbers[p, 1], pair_numbers[p, 2]
-                    if c12 > 0.0:
-                        fx, fy, fz, energy = _lennard_jones(row, padded, x, y, z, c12, c6, cut)
-                        totals[0] += energy
-                        forces[mine, 0] += fx
-                        forces[mine, 1] += fy
-                        forces[mine, 2] += fz
-                    if qq != 0.0:
-                        if screened:
-                            fx, fy, fz, energy = _screened(row, padded, x, y, z, qq, field)
-                        else:
-                            fx, fy, fz, energy = _reaction_field(row, padded, x, y, z, qq, field)
-                        totals[1] += energy
-                        forces[mine, 0] += fx
-                        forces[mine, 1] += fy
-                        forces[mine, 2] += fz
-                _scatter(rows, forces, first_site, who, counts[other], n)
+                _gather(rows, local, base, arms, counts[other], n, padded)
+                _site_pairs(rows, padded, local, first_site[m], pairs, numbers, cut, field, screened, forces, totals)
+                _scatter(rows, forces, base, counts[other], n)
                 _add_virial(arms, rows, counts[other], n, totals)

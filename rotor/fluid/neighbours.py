@@ -26,6 +26,7 @@ class Neighbours:
     skin_angstrom: float
     rebuilds: int = 0
     sites: Array = field(init=False)
+    local: Array = field(init=False)
     centres: Array = field(init=False)
     reference: Array = field(init=False)
     starts: Array | None = field(init=False, default=None)
@@ -35,6 +36,7 @@ class Neighbours:
     def __post_init__(self) -> None:
         n = len(self.assembly)
         self.sites = np.zeros((self.assembly.first_site[-1], 3))
+        self.local = np.zeros_like(self.sites)
         self.centres, self.reference = np.zeros((n, 3)), np.zeros((n, 3))
         steps = np.arange(-2, 3)
         grid = np.stack(np.meshgrid(steps, steps, steps, indexing="ij"), axis=-1).reshape(-1, 3)
@@ -81,7 +83,7 @@ class Neighbours:
         return float(
             _pair_kernels.place_sites(
                 positions_angstrom, a.first_atom, a.first_site, a.kinds, a.weights, a.atoms, a.counts,
-                self.box_angstrom, self.reference, fresh, self.sites, self.centres,
+                self.box_angstrom, self.reference, fresh, self.sites, self.local, self.centres,
             )
         )  # fmt: skip
 
@@ -105,7 +107,8 @@ class Neighbours:
         if self.starts is None:
             raise ValueError("the list is made by update(); it was not called yet")
         first = np.repeat(np.arange(len(self.assembly)), np.diff(self.starts[:: len(self.assembly.models)]))
-        return first, self.entries // 128, self.images[self.entries % 128]
+        entries = self.entries.astype(np.int64)
+        return first, entries // 128, self.images[entries % 128]
 
     def _refuse_overlaps(self) -> None:
         found = self.closest(2 * self.assembly.reach_angstrom.max() + CLOSEST_ANGSTROM)

@@ -152,7 +152,7 @@ class RigidPotential(Calculator):  # type: ignore[misc]
         volume = float(np.prod(neighbours.box_angstrom))
         terms = {"dispersion": float(totals[0])}
         if volume and self.long_range_correction:
-            terms["long_range_correction"] = self._tail[0] / volume
+            terms["long_range_correction"] = float(self._tail[0] / volume)
         name = {"reaction-field": "reaction_field", "ewald": "real_space", "shifted": "shifted"}[self.electrostatics]
         terms[name] = float(totals[1])
         if self.electrostatics == "ewald":
@@ -219,9 +219,9 @@ class RigidPotential(Calculator):  # type: ignore[misc]
         def share(i: int) -> None:
             _pair_kernels.pair_forces(
                 bounds[i], bounds[i + 1], neighbours.starts, neighbours.entries, neighbours.images, reach2,
-                neighbours.sites, neighbours.centres, a.first_site, a.kinds, a.counts,
+                neighbours.local.ravel(), neighbours.centres, a.first_site, a.kinds, a.counts,
                 t.starts, t.sites, t.numbers, cut, field, self.electrostatics != "reaction-field",
-                forces[i], totals[i],
+                forces[i].ravel(), totals[i],
             )  # fmt: skip
 
         self._run([lambda i=i: share(i) for i in range(self.threads)])
