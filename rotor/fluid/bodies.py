@@ -7,7 +7,7 @@ exactly so. A molecule cut by the cell's edge is put together first.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -39,7 +39,8 @@ class Bodies:
 
     order (atoms,), starts (n + 1,): atoms of body b are order[starts[b]:starts[b + 1]]. sites: (atoms, 3), places in
     principal axes of the body, Å. masses: (atoms,) u. mass: (n,) u. moments: (n, 3) u Å², 0 about the axis of a linear
-    molecule, all 0 for an atom. species: (n,) index into names.
+    molecule, all 0 for an atom. species: (n,) index into names. notes: molecules whose count of
+    degrees hangs on the rule for linear ones.
     """
 
     order: Indices
@@ -50,6 +51,7 @@ class Bodies:
     moments: Array
     species: Indices
     names: tuple[str, ...]
+    notes: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return len(self.mass)
@@ -71,7 +73,7 @@ class Bodies:
 
     def degrees(self, removed: int = 0) -> Degrees:
         """The count of degrees of freedom, `removed` of them taken out (3 where the total momentum is held at 0)."""
-        return count_degrees(self.moments, removed=removed)
+        return replace(count_degrees(self.moments, removed=removed), notes=self.notes)
 
     def name_of(self, body: int) -> str:
         """A body as an error message names it."""
@@ -161,7 +163,7 @@ def bodies_of(
     masses = atom_masses(atoms)
     n = len(starts) - 1
     groups = _species(atoms, masses, order, starts)
-    sites, moments = np.zeros((len(atoms), 3)), np.zeros((n, 3))
+    sites, moments, notes = np.zeros((len(atoms), 3)), np.zeros((n, 3)), list[str]()
     centres, attitude, species = np.zeros((n, 3)), np.zeros((n, 4)), np.zeros(n, dtype=np.int64)
     for number, (elements, members) in enumerate(groups):
         rows = np.stack([order[starts[b] : starts[b + 1]] for b in members])
@@ -169,12 +171,13 @@ def bodies_of(
         given = (shapes or {}).get(elements)
         shape = _principal(masses[rows[0]], places[0] if given is None else np.asarray(given, dtype=np.float64))
         sites[rows], moments[members], species[members] = shape.sites, shape.moments, number
+        notes += [f"{_formula(elements)}: {note}" for note in shape.notes]
         centres[members], attitude[members] = _fitted(
             shape, places, members, rows, _formula(elements), tolerance_angstrom
         )
     mass = np.add.reduceat(masses[order], starts[:-1])
     names = tuple(_formula(elements) for elements, _ in groups)
-    return Bodies(order, starts, sites, masses, mass, moments, species, names), Pose(centres, attitude)
+    return Bodies(order, starts, sites, masses, mass, moments, species, names, tuple(notes)), Pose(centres, attitude)
 
 
 def atom_masses(atoms: Atoms) -> Array:
@@ -286,11 +289,12 @@ def _species(atoms: Atoms, masses: Array, order: Indices, starts: Indices) -> li
 
 @dataclass(frozen=True)
 class _Shape:
-    """Sites (m, 3) in principal axes, moments (3,), masses (m,)."""
+    """Sites (m, 3) in principal axes, moments (3,), masses (m,), and what is to be said of the moments."""
 
     sites: Array
     moments: Array
     masses: Array
+    notes: tuple[str, ...] = ()
 
 
 def _principal(masses: Array, places: Array) -> _Shape:
@@ -306,12 +310,13 @@ def _principal(masses: Array, places: Array) -> _Shape:
         if np.abs(centred).max() > 0.0:
             raise ValueError("a molecule with one mass and sites off it has no moments of inertia: give them mass")
         return _Shape(centred, np.zeros(3), masses)
-    frame = inertia.principal_frame(body, masses[heavy], places[heavy])
+    frame = inertia.principal_frame(body)
     sites, moments = centred @ frame.axes.T, frame.moments
+    notes = count_degrees(moments[None]).notes
     if rotating_axes(moments).sum() == 2:
         sites[:, 1:] = 0.0
         moments = np.array([0.0, 1.0, 1.0]) * float(masses @ sites[:, 0] ** 2)
-    return _Shape(sites, moments, masses)
+    return _Shape(sites, moments, masses, notes)
 
 
 def _fitted(

@@ -127,7 +127,7 @@ class RigidDynamics(MolecularDynamics):
             fine = np.isfinite(force).all(axis=1) & np.isfinite(torque).all(axis=1)
             if not fine.all():
                 raise ValueError(
-                    f"the force on {self.bodies.name_of(int(np.argmin(fine)))} is not finite at step {self.nsteps}: molecules "
+                    f"the force on {self.bodies.name_of(int(np.argmin(fine)))} is not finite in step {self.nsteps + 1}: molecules "
                     "on top of each other, or a step too long"
                 )
             self._wrench = force, torque

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rotor.fluid.keeping import Checkpoint, TextFile, csv_line, read_checkpoint, read_rows, trajectory_file
-from rotor.fluid.models import RigidModel, model_of
+from rotor.fluid.models import model_of
 from rotor.fluid.record import FluidRecord
 from rotor.fluid.settings import Settings
 from rotor.fluid.start import at_rest, check_apart, heat, model_labels
@@ -117,7 +117,7 @@ def dynamics_of(atoms: Atoms, settings: Settings, begin: bool = True) -> RigidDy
     shapes = {model.symbols: model.positions_angstrom[: len(model.symbols)] for model in models}
     bodies, pose = bodies_of(atoms, shapes=shapes)
     if atoms.calc is None:
-        atoms.calc = calculator_of(atoms, settings, models)
+        atoms.calc = calculator_of(settings)
     velocities, noise = np.random.default_rng(settings.seed).spawn(2)
     thermostat = thermostat_of(settings, noise)
     if begin:
@@ -145,28 +145,34 @@ def thermostat_of(settings: Settings, rng: np.random.Generator) -> Thermostat | 
     return None
 
 
-def calculator_of(atoms: Atoms, settings: Settings, models: Sequence[RigidModel]) -> Any:
-    """The built-in potential of models, as an ASE calculator."""
-    raise NotImplementedError
+def calculator_of(settings: Settings, threads: int = 1) -> Any:
+    """The built-in potential of settings, as an ASE calculator."""
+    from rotor.fluid.potential import RigidPotential
+
+    return RigidPotential(
+        settings.model, cutoff_angstrom=settings.cutoff_angstrom, electrostatics=settings.electrostatics, threads=threads
+    )
 
 
 def pressure_bar(dynamics: RigidDynamics) -> float:
-    """Pressure from centres of mass: (2 K_trans + Σ r·f over atoms - Σ s·f)/3V, s from the centre; nan without a stress.
+    """Pressure from centres of mass, (2 K_trans + Σ R·F)/3V; not a number where the calculator gives no stress.
 
-    The forces that keep a molecule rigid do no virial work on its centre, so that what forces do along sites is taken off
-    the atomic virial (M. P. Allen and D. J. Tildesley, Computer Simulation of Liquids, section 2.4).
+    The built-in potential's stress is that of molecules already. From others' Σ r·f over atoms is taken off what forces do
+    along the sites of each molecule, Σ s·f, since the forces that hold it rigid undo that (M. P. Allen and D. J. Tildesley,
+    Computer Simulation of Liquids, section 2.4).
     """
-    atoms = dynamics.atoms
+    from rotor.fluid.potential import RigidPotential
+
+    atoms, bodies = dynamics.atoms, dynamics.bodies
     if "stress" not in getattr(atoms.calc, "implemented_properties", ()) or not atoms.pbc.all():
         return float("nan")
-    volume = float(atoms.get_volume())
-    atomic = -float(np.trace(atoms.get_stress(voigt=False, apply_constraint=False))) / 3.0
-    bodies = dynamics.bodies
-    centres = np.empty((len(atoms), 3))
-    centres[bodies.order] = np.repeat(dynamics.state.centres, np.diff(bodies.starts), axis=0)
-    inside = float(np.sum((atoms.positions - centres) * atoms.get_forces(apply_constraint=False)))
+    virial = -float(np.trace(atoms.get_stress(voigt=False, apply_constraint=False))) * float(atoms.get_volume())
+    if not isinstance(atoms.calc, RigidPotential):
+        centres = np.empty((len(atoms), 3))
+        centres[bodies.order] = np.repeat(dynamics.state.centres, np.diff(bodies.starts), axis=0)
+        virial -= float(np.sum((atoms.positions - centres) * atoms.get_forces(apply_constraint=False)))
     kinetic = 2.0 * dynamics.kinetic().translation_ev
-    return EV_PER_ANGSTROM3_BAR * (atomic + (kinetic - inside) / (3.0 * volume))
+    return EV_PER_ANGSTROM3_BAR * (virial + kinetic) / (3.0 * float(atoms.get_volume()))
 
 
 class _Run:

@@ -44,7 +44,7 @@ class State:
     @property
     def attitude(self) -> Array:
         """Attitudes (n, 4), a copy."""
-        return np.ascontiguousarray(self.spin[:, 3:])
+        return self.spin[:, 3:].copy()
 
     @property
     def pose(self) -> Pose:
