@@ -130,7 +130,11 @@ def main() -> None:
     parser.add_argument("--json", type=Path)
     given = parser.parse_args()
     settings = Settings(
-        model=given.model, electrostatics=given.electrostatics, steps=round(given.ps * 500), every=25, cutoff_angstrom=9.0
+        model=given.model,
+        electrostatics=given.electrostatics,
+        steps=round(given.ps * 500),
+        every=25,
+        cutoff_angstrom=9.0,
     )
     for engine in given.engines:
         table = measured(engine, start(settings, given.molecules, given.box), settings)
@@ -140,7 +144,9 @@ def main() -> None:
         if given.json:
             kept = json.loads(given.json.read_text(encoding="utf-8")) if given.json.exists() else {}
             kept[f"{given.model}, {given.electrostatics}, {engine}"] = table
-            given.json.write_text(json.dumps(kept, indent=None, separators=(",", ":")).replace('"},', '"},\n') + "\n", encoding="utf-8")
+            given.json.write_text(
+                json.dumps(kept, indent=None, separators=(",", ":")).replace('"},', '"},\n') + "\n", encoding="utf-8"
+            )
 
 
 if __name__ == "__main__":

@@ -136,9 +136,7 @@ _TIP4P_2005 = "J. L. F. Abascal, C. Vega, J. Chem. Phys. 123, 234505 (2005)"
 _TIP4P_EW = "H. W. Horn et al., J. Chem. Phys. 120, 9665 (2004)"
 
 _WATERS = (
-    _three_site_water(
-        "spce", _bent(1.0, math.degrees(math.acos(-1 / 3))), 0.4238, 3.16555789, 78.19743111, _BERENDSEN
-    ),
+    _three_site_water("spce", _bent(1.0, math.degrees(math.acos(-1 / 3))), 0.4238, 3.16555789, 78.19743111, _BERENDSEN),
     _three_site_water("tip3p", _bent(0.9572, 104.52), 0.417, *_sigma_epsilon(582.0e3, 595.0), _JORGENSEN),
     _four_site_water("tip4p", 0.52, 0.15, *_sigma_epsilon(600.0e3, 610.0), _JORGENSEN),
     _four_site_water("tip4p-2005", 0.5564, 0.1546, 3.1589, 93.2, _TIP4P_2005),

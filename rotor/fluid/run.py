@@ -150,7 +150,10 @@ def calculator_of(settings: Settings, threads: int = 1) -> Any:
     from rotor.fluid.potential import RigidPotential
 
     return RigidPotential(
-        settings.model, cutoff_angstrom=settings.cutoff_angstrom, electrostatics=settings.electrostatics, threads=threads
+        settings.model,
+        cutoff_angstrom=settings.cutoff_angstrom,
+        electrostatics=settings.electrostatics,
+        threads=threads,
     )
 
 

@@ -7,6 +7,8 @@ charges under a cutoff are handed over as a table, Lennard-Jones included. Units
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from rotor import units
@@ -21,28 +23,54 @@ MASSLESS_U = 1e-10
 TABLE_POINTS, TABLE_FROM_ANGSTROM = 20_000, 0.6
 
 
-def site_types(scene: Scene) -> tuple[list[Site], Array, Ints]:
-    """One type for each site of each species: the sites, their masses, and the number (from 1) of each species' first."""
-    sites = [site for one in scene.species for site in one.model.sites]
-    light = [[MASSLESS_U] * (len(one.model.sites) - len(one.masses)) for one in scene.species]
-    masses = [m for one, rest in zip(scene.species, light, strict=True) for m in [*one.masses, *rest]]
-    lengths = scene.sites_of_kinds
-    return sites, np.array(masses), np.asarray(np.cumsum(lengths) - lengths + 1)
+@dataclass(frozen=True)
+class SiteTypes:
+    """LAMMPS' atom types, each a site that differs from the others in mass, charge, Lennard-Jones or in being alone.
+
+    sites, masses: of the types. of_species: for each species the types of its sites, numbered from 1.
+    """
+
+    sites: tuple[Site, ...]
+    masses: Array
+    of_species: tuple[Ints, ...]
+
+
+def site_types(scene: Scene) -> SiteTypes:
+    """The types of a scene."""
+    known: dict[tuple[float, ...], int] = {}
+    sites, masses, of_species = [], [], []
+    for one in scene.species:
+        numbers = []
+        for k, site in enumerate(one.model.sites):
+            mass = float(one.masses[k]) if k < len(one.masses) else MASSLESS_U
+            key = (mass, site.charge_e, site.sigma_angstrom, site.epsilon_k, len(one.model.sites) == 1)
+            if key not in known:
+                known[key] = len(known) + 1
+                sites.append(site)
+                masses.append(mass)
+            numbers.append(known[key])
+        of_species.append(np.array(numbers))
+    return SiteTypes(tuple(sites), np.array(masses), tuple(of_species))
 
 
 def data_file(scene: Scene) -> str:
     """Atoms, velocities and bonds of a scene (`read_data`, atom_style full)."""
-    sites, masses, first_types = site_types(scene)
+    known = site_types(scene)
     within = np.arange(len(scene.site_masses)) - scene.first_sites[scene.molecule_of_site]
-    types = first_types[scene.kinds][scene.molecule_of_site] + within
-    charges = np.array([site.charge_e for site in sites])[types - 1]
+    types = np.concatenate([known.of_species[k] for k in scene.kinds])
+    charges = np.array([site.charge_e for site in known.sites])[types - 1]
     bonded = np.flatnonzero(within)
     most = int(scene.sites_of_kinds.max())
-    lines = ["a box of rigid molecules", "", f"{len(types)} atoms", f"{len(sites)} atom types"]
+    lines = ["a box of rigid molecules", "", f"{len(types)} atoms", f"{len(known.sites)} atom types"]
     if len(bonded):
-        lines += [f"{len(bonded)} bonds", "1 bond types", f"{most} extra bond per atom", f"{most} extra special per atom"]
+        lines += [
+            f"{len(bonded)} bonds",
+            "1 bond types",
+            f"{most} extra bond per atom",
+            f"{most} extra special per atom",
+        ]
     lines += ["", *(f"0 {edge:.17g} {axis}lo {axis}hi" for edge, axis in zip(scene.edges, "xyz", strict=True))]
-    lines += _section("Masses", [(m,) for m in masses])
+    lines += _section("Masses", [(m,) for m in known.masses])
     columns = zip(scene.molecule_of_site + 1, types, charges, *scene.site_positions.T, strict=True)
     lines += _section("Atoms # full", columns)
     lines += _section("Velocities", scene.site_velocities / units.CLASSICAL_TIME_PS)
@@ -60,7 +88,7 @@ def _section(name: str, rows: object) -> list[str]:
 
 def _pairs(scene: Scene) -> list[tuple[int, int, tuple[Site, Site]]]:
     """All pairs of types with their sites."""
-    sites, _, _ = site_types(scene)
+    sites = site_types(scene).sites
     return [(i + 1, j + 1, (sites[i], sites[j])) for i in range(len(sites)) for j in range(i, len(sites))]
 
 
@@ -103,42 +131,31 @@ def _depth(sites: tuple[Site, Site]) -> str:
 
 def ensemble_commands(scene: Scene, settings: Settings) -> list[str]:
     """Fixes that move the bodies, and the single atoms where there are some."""
-    single, bodies = scene.sites_of_kinds == 1, scene.sites_of_kinds > 1
-    if single.any() and bodies.any() and settings.ensemble == "nose-hoover":
+    if settings.ensemble == "nose-hoover":
         raise ValueError(
-            "nose-hoover: LAMMPS has no chain for molecules and single atoms together; take langevin or nve, or OpenMM"
+            "nose-hoover: LAMMPS' chains for rigid bodies hold translations and rotations apart and count the total momentum, "
+            "which stays at 0: translations would be too warm by N/(N - 1); take langevin, or OpenMM"
         )
-    target, seed = settings.temperature_k, settings.seed
-    if settings.ensemble == "nose-hoover":  # its chain counts the total momentum too, which stays at 0
-        target *= scene.degrees.total / (scene.degrees.total + scene.degrees.removed)
-    bath = f"{target:.17g} {target:.17g}"
-    damping, relaxation = f"{1 / settings.friction_per_ps:.17g}", f"{settings.relaxation_fs / 1000:.17g}"
-    commands = [f"group bodies type {_types(scene, bodies)}"] if bodies.any() else []
+    single, bodies = scene.sites_of_kinds == 1, scene.sites_of_kinds > 1
+    bath = f"{settings.temperature_k:.17g} {settings.temperature_k:.17g} {1 / settings.friction_per_ps:.17g}"
+    noise = settings.ensemble == "langevin"
+    commands = []
     if bodies.any():
-        move = {
-            "nve": "rigid/nve/small molecule",
-            "langevin": f"rigid/nve/small molecule langevin {bath} {damping} {seed}",
-            "nose-hoover": f"rigid/nvt/small molecule temp {bath} {relaxation}",
-        }[settings.ensemble]
-        commands.append(f"fix move bodies {move}")
+        commands += [f"group bodies type {_types(scene, bodies)}", "fix move bodies rigid/nve/small molecule"]
+        commands[-1] += f" langevin {bath} {settings.seed}" if noise else ""
     if single.any():
-        commands.append(f"group single type {_types(scene, single)}")
-        chain = f"nvt temp {bath} {relaxation}"
-        commands.append(f"fix move_single single {chain if settings.ensemble == 'nose-hoover' else 'nve'}")
-    if single.any() and settings.ensemble == "langevin":
-        commands.append(f"fix bath single langevin {bath} {damping} {seed + 1}")
+        commands += [f"group single type {_types(scene, single)}", "fix move_single single nve"]
+        commands += [f"fix bath single langevin {bath} {settings.seed + 1}"] if noise else []
     return commands
 
 
 def _types(scene: Scene, chosen: Ints) -> str:
-    """Types of the chosen species as LAMMPS' ranges."""
-    first = site_types(scene)[2]
-    return " ".join(f"{first[k]}:{first[k] + scene.sites_of_kinds[k] - 1}" for k in np.flatnonzero(chosen))
+    """Types of the chosen species."""
+    numbers = np.concatenate([site_types(scene).of_species[k] for k in np.flatnonzero(chosen)])
+    return " ".join(map(str, np.unique(numbers)))
 
 
-def input_file(
-    scene: Scene, settings: Settings, form: Form, *, accuracy: float = 1e-5, kspace: str = "pppm"
-) -> str:
+def input_file(scene: Scene, settings: Settings, form: Form, *, accuracy: float = 1e-5, kspace: str = "pppm") -> str:
     """The commands before the run; files data.box and pairs.table stand beside."""
     bonded = bool(np.any(scene.sites_of_kinds > 1))
     lines = ["units metal", "atom_style full", "boundary p p p"]

@@ -209,8 +209,8 @@ class Session:
         between = self.settings.ensemble != "nve"
         motion = stored if between else stored.kicked(0.5 * self.step_classical)
         bath = 0.0
-        if self.settings.ensemble == "nose-hoover":
-            bath = self.context.getIntegrator().computeHeatBathEnergy() / KJ_PER_EV
+        if self.settings.ensemble == "nose-hoover" and step:  # before its first step OpenMM has no chain to ask
+            bath = self.context.getIntegrator().computeHeatBathEnergy()._value / KJ_PER_EV
         pressure = self.pressure_bar(stored, motion)
         return Frame(step, positions[self.handed.atoms], motion, potential + self.tail[0], bath, pressure, between)
 

@@ -193,9 +193,7 @@ def scene_of(atoms: Any, settings: Settings) -> Scene:
     by_symbols = {model.symbols: model for model in models}
     heads = [int(np.argmax(bodies.species == number)) for number in range(len(bodies.names))]
     spans = [slice(bodies.starts[body], bodies.starts[body + 1]) for body in heads]
-    species = tuple(
-        Species(by_symbols[tuple(atoms.symbols[span])], bodies.masses[span]) for span in spans
-    )
+    species = tuple(Species(by_symbols[tuple(atoms.symbols[span])], bodies.masses[span]) for span in spans)
     own_axes = [
         superpose(one.model.positions_angstrom[: len(one.masses)], bodies.sites[span], one.masses).apply(
             one.model.positions_angstrom
