@@ -20,9 +20,7 @@ CHARGE, START_C, START_S, NOW_C, NOW_S, TURN_C, TURN_S, SUM, FX, FY, FZ, HEAD = 
 
 
 @njit(cache=True, error_model="numpy")
-def _fill_block(
-    block: Array, sites: Array, charged: Array, charges: Array, first: int, waves: Array, highest: Array
-) -> None:
+def _fill_block(block: Array, sites: Array, charged: Array, charges: Array, first: int, waves: Array, highest: Array) -> None:
     """Charges, the turn along z, and e^{2πi n x/L}, e^{2πi n y/L} for n = 0... of LANES charges; charge 0 beyond the last."""
     for k in range(LANES):
         here = first + k < len(charged)
@@ -124,14 +122,7 @@ def structure_factors(
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def fourier_forces(
-    sites: Array,
-    charged: Array,
-    charges: Array,
-    waves: Array,
-    highest: Array,
-    columns: Array,
-    factors: Array,
-    forces: Array,
+    sites: Array, charged: Array, charges: Array, waves: Array, highest: Array, columns: Array, factors: Array, forces: Array
 ) -> None:
     """Add the forces of all wave vectors; factors are structure factors times 2 A(k)."""
     block = np.empty((HEAD + 2 * (highest[0] + highest[1] + 2)) * LANES)
@@ -155,9 +146,7 @@ def fourier_forces(
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def inner_correction(
-    sites: Array, first_site: Array, site_charges: Array, alpha: float, coulomb: float, forces: Array
-) -> float:
+def inner_correction(sites: Array, first_site: Array, site_charges: Array, alpha: float, coulomb: float, forces: Array) -> float:
     """Take the Gaussians' interaction inside molecules out again: -Σ qq erf(αr)/r; its forces are added, its energy returned."""
     energy = 0.0
     for m in range(len(first_site) - 1):

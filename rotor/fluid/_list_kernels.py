@@ -47,9 +47,7 @@ def _first_half(i: int, j: int, code: int) -> bool:
 
 
 @njit(cache=True)
-def neighbour_list(
-    centres: Array, box: Array, low: Array, width: Array, bins: Array, kinds: Array, ranges: Array
-) -> Any:
+def neighbour_list(centres: Array, box: Array, low: Array, width: Array, bins: Array, kinds: Array, ranges: Array) -> Any:
     """Starts (n x kinds + 1) and entries (128 molecule + code of the image) of all pairs nearer than the range of their kinds.
 
     box is 0 along directions that do not repeat; low, width, bins (3) divide the cell or the space that holds the molecules.
@@ -81,11 +79,7 @@ def neighbour_list(
                     if gap_x**2 + gap_y**2 + gap_z**2 > farthest**2:
                         continue
                     code = ((image_x + IMAGES) * 5 + image_y + IMAGES) * 5 + image_z + IMAGES
-                    cell = (
-                        ((raw_x - image_x * bins[0]) * bins[1] + raw_y - image_y * bins[1]) * bins[2]
-                        + raw_z
-                        - image_z * bins[2]
-                    )
+                    cell = ((raw_x - image_x * bins[0]) * bins[1] + raw_y - image_y * bins[1]) * bins[2] + raw_z - image_z * bins[2]
                     x = centres[i, 0] - image_x * box[0]
                     y = centres[i, 1] - image_y * box[1]
                     z = centres[i, 2] - image_z * box[2]

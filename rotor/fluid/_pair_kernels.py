@@ -70,14 +70,7 @@ def place_sites(
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def carry_to_atoms(
-    forces: Array,
-    first_atom: Array,
-    first_site: Array,
-    kinds: Array,
-    weights: Array,
-    atoms: Array,
-    counts: Array,
-    out: Array,
+    forces: Array, first_atom: Array, first_site: Array, kinds: Array, weights: Array, atoms: Array, counts: Array, out: Array
 ) -> None:
     """Forces on sites as forces on the real atoms, by the weights that place the sites: force and torque are kept."""
     out[:] = 0.0

@@ -42,7 +42,9 @@ def list_centre(model: RigidModel) -> tuple[Array, float]:
     apart = np.linalg.norm(places[:, None] - places[None], axis=2)
     s, t = np.unravel_index(apart.argmax(), apart.shape)
     choices = (0.5 * (weights[s] + weights[t]), weights.mean(axis=0))
-    reach = [float(np.linalg.norm(places - w @ places[: len(model.symbols)], axis=1).max()) for w in choices]
+    reach = [
+        float(np.linalg.norm(places - w @ places[: len(model.symbols)], axis=1).max()) for w in choices
+    ]
     best = int(np.argmin(reach))
     return choices[best], reach[best]
 

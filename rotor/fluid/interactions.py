@@ -118,9 +118,7 @@ def _beyond(c12: float, c6: float, cutoff: float, width: float) -> tuple[float, 
     return energy, energy
 
 
-def tail(
-    models: tuple[RigidModel, ...], numbers: Array, cutoff_angstrom: float, width_angstrom: float
-) -> tuple[float, float]:
+def tail(models: tuple[RigidModel, ...], numbers: Array, cutoff_angstrom: float, width_angstrom: float) -> tuple[float, float]:
     """Energy times volume (eV Å³) and pressure times volume squared of the dispersion beyond the cutoff, liquid taken as even.
 
     2π Σ N_a N_b ∫ ΔU r² dr over all ordered couples of molecules and their sites; numbers: molecules of each model.

@@ -267,7 +267,9 @@ class RigidPotential(Calculator):  # type: ignore[misc]
             _ewald_kernels.structure_factors(neighbours.sites, parts[i], a.charges_e[parts[i]], *turn, factors[i])
 
         def push(i: int) -> None:
-            _ewald_kernels.fourier_forces(neighbours.sites, parts[i], a.charges_e[parts[i]], *turn, weighted, pushed)
+            _ewald_kernels.fourier_forces(
+                neighbours.sites, parts[i], a.charges_e[parts[i]], *turn, weighted, pushed
+            )
 
         self._run([lambda i=i: sum_up(i) for i in range(self.threads)])
         structure = factors.sum(axis=0)
