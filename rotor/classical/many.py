@@ -39,7 +39,7 @@ def advance(
     """
     from rotor.classical._kernels import LANES, RUNS, advance_blocks
 
-    data, n = _packed(moments, momentum, attitude, step)
+    data, n = packed(moments, momentum, attitude, step)
     if steps < 0:
         raise ValueError(f"the number of steps is not negative; got {steps} (to go back, give a negative step)")
     blocks = data.size // (RUNS * LANES)
@@ -54,7 +54,7 @@ def advance(
     return np.ascontiguousarray(runs[:, :3]), np.ascontiguousarray(runs[:, 3:7])
 
 
-def _packed(moments: ArrayLike, momentum: ArrayLike, attitude: ArrayLike, step: float) -> tuple[Array, int]:
+def packed(moments: ArrayLike, momentum: ArrayLike, attitude: ArrayLike, step: float) -> tuple[Array, int]:
     """The flat blocks of the kernel and the number of bodies; the last block is filled with bodies at rest."""
     from rotor.classical._kernels import LANES, RUNS, WIDEST_TURN
 

@@ -14,7 +14,7 @@ from typing import cast
 
 import typer
 
-from rotor.cli import cat, convert, info, isotopologues, molecules, raman, spectrum, tumble
+from rotor.cli import cat, convert, fluid, info, isotopologues, molecules, raman, spectrum, tumble
 from rotor.cli.output import NoAnswer
 
 NO_ANSWER, WRONG_INPUT, INTERRUPTED = 1, 2, 130
@@ -30,7 +30,8 @@ Examples:
   rotor info my.sdf
   rotor isotopologues water
   rotor raman N2 --laser 488
-  rotor tumble water --plot water.png"""
+  rotor tumble water --plot water.png
+  rotor fluid water --molecules 216 --csv run.csv"""
 
 
 def _application() -> typer.Typer:
@@ -55,6 +56,7 @@ def _application() -> typer.Typer:
     app.command("isotopologues", epilog=isotopologues.EXAMPLES)(isotopologues.command)
     app.command("raman", epilog=raman.EXAMPLES)(raman.command)
     app.command("tumble", epilog=tumble.EXAMPLES)(tumble.command)
+    app.command("fluid", epilog=fluid.EXAMPLES)(fluid.command)
     app.command("convert", epilog=convert.EXAMPLES)(convert.command)
     app.command("cat", epilog=cat.EXAMPLES)(cat.command)
     return app

@@ -13,6 +13,7 @@ import numpy as np
 from numba import njit
 
 from rotor.fluid._pair_kernels import FAST
+from rotor.fluid.assembly import Integers
 from rotor.rotations import Array
 
 LANES = 128
@@ -20,7 +21,9 @@ CHARGE, START_C, START_S, NOW_C, NOW_S, TURN_C, TURN_S, SUM, FX, FY, FZ, HEAD = 
 
 
 @njit(cache=True, error_model="numpy")
-def _fill_block(block: Array, sites: Array, charged: Array, charges: Array, first: int, waves: Array, highest: Array) -> None:
+def _fill_block(
+    block: Array, sites: Array, charged: Integers, charges: Array, first: int, waves: Array, highest: Integers
+) -> None:
     """Charges, the turn along z, and e^{2πi n x/L}, e^{2πi n y/L} for n = 0... of LANES charges; charge 0 beyond the last."""
     for k in range(LANES):
         here = first + k < len(charged)
@@ -40,7 +43,7 @@ def _fill_block(block: Array, sites: Array, charged: Array, charges: Array, firs
 
 
 @njit(cache=True, error_model="numpy")
-def _start_column(block: Array, nx: int, ny: int, highest: Array) -> None:
+def _start_column(block: Array, nx: int, ny: int, highest: Integers) -> None:
     """e^{i(kx x + ky y)} of the block."""
     at_x = (HEAD + 2 * nx) * LANES
     at_y = (HEAD + 2 * (highest[0] + 1) + 2 * abs(ny)) * LANES
@@ -96,7 +99,7 @@ def _end_column(block: Array, kx: float, ky: float) -> None:
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def structure_factors(
-    sites: Array, charged: Array, charges: Array, waves: Array, highest: Array, columns: Array, factors: Array
+    sites: Array, charged: Integers, charges: Array, waves: Array, highest: Integers, columns: Integers, factors: Array
 ) -> None:
     """Add Σ q e^{ik·r} to factors (wave vectors, 2).
 
@@ -122,7 +125,14 @@ def structure_factors(
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def fourier_forces(
-    sites: Array, charged: Array, charges: Array, waves: Array, highest: Array, columns: Array, factors: Array, forces: Array
+    sites: Array,
+    charged: Integers,
+    charges: Array,
+    waves: Array,
+    highest: Integers,
+    columns: Integers,
+    factors: Array,
+    forces: Array,
 ) -> None:
     """Add the forces of all wave vectors; factors are structure factors times 2 A(k)."""
     block = np.empty((HEAD + 2 * (highest[0] + highest[1] + 2)) * LANES)
@@ -146,7 +156,9 @@ def fourier_forces(
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def inner_correction(sites: Array, first_site: Array, site_charges: Array, alpha: float, coulomb: float, forces: Array) -> float:
+def inner_correction(
+    sites: Array, first_site: Integers, site_charges: Array, alpha: float, coulomb: float, forces: Array
+) -> float:
     """Take the Gaussians' interaction inside molecules out again: -Σ qq erf(αr)/r; its forces are added, its energy returned."""
     energy = 0.0
     for m in range(len(first_site) - 1):

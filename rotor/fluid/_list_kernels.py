@@ -1,4 +1,8 @@
-"""Compiled lists of neighbouring molecules: bins of half the list's range, every image met once, in time O(N)."""
+"""Compiled lists of neighbouring molecules: bins, every image met once, in time O(N).
+
+Each pair stands in one list: that of the molecule whose bin comes first (x, then y, then z, images counted as bins beyond the
+cell's edge), and inside one bin in the order of the bin. So images need no rule of their own, not even a molecule's own image.
+"""
 
 from __future__ import annotations
 
@@ -7,96 +11,120 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+from rotor.fluid.assembly import Integers
 from rotor.rotations import Array
 
 IMAGES = 2  # a neighbour is at most that many cells away
-CODES = 128  # 5 x 5 x 5 images and room
 
 
 @njit(cache=True)
-def _bins_of(centres: Array, low: Array, width: Array, bins: Array) -> Any:
-    """Bin of each centre (3 numbers), and the molecules sorted by bin with the starts of the bins."""
+def _sorted_into_bins(centres: Array, low: Array, width: Array, bins: Integers) -> Any:
+    """Bin of each centre (3 numbers), starts of the bins, molecules in the order of bins and the place of each in it."""
     n = len(centres)
-    places = np.empty((n, 3), dtype=np.int64)
+    places, cells = np.empty((n, 3), dtype=np.int64), np.empty(n, dtype=np.int64)
     starts = np.zeros(bins[0] * bins[1] * bins[2] + 1, dtype=np.int64)
     for m in range(n):
         for c in range(3):
             places[m, c] = min(max(int((centres[m, c] - low[c]) / width[c]), 0), bins[c] - 1)
-        starts[(places[m, 0] * bins[1] + places[m, 1]) * bins[2] + places[m, 2] + 1] += 1
+        cells[m] = (places[m, 0] * bins[1] + places[m, 1]) * bins[2] + places[m, 2]
+        starts[cells[m] + 1] += 1
     starts = np.cumsum(starts)
-    fill, order = starts.copy(), np.empty(n, dtype=np.int64)
+    fill, order, rank = starts.copy(), np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64)
     for m in range(n):
-        cell = (places[m, 0] * bins[1] + places[m, 1]) * bins[2] + places[m, 2]
-        order[fill[cell]] = m
-        fill[cell] += 1
-    return places, starts, order
+        order[fill[cells[m]]] = m
+        rank[m] = fill[cells[m]]
+        fill[cells[m]] += 1
+    return places, starts, order, rank
 
 
 @njit(cache=True)
-def _gap(place: float, low: float, width: float) -> float:
-    """Distance of a point from an interval."""
-    return max(low - place, place - low - width, 0.0)
+def _gap2(place: float, low: float, width: float) -> float:
+    """Squared distance of a point from an interval."""
+    return max(low - place, place - low - width, 0.0) ** 2
 
 
 @njit(cache=True)
-def _first_half(i: int, j: int, code: int) -> bool:
-    """Whether the pair stands in i's list: shared out evenly; a molecule and its own image once."""
-    if i == j:
-        return code > CODES // 2 - 2  # the code of no shift is 62
-    return (i < j) == ((i + j) % 2 == 1)
+def _image(raw: int, bins: int, box: float) -> int:
+    """How many cells away a bin lies; out of reach (IMAGES + 1) beyond the edge where nothing repeats."""
+    image = raw // bins
+    return IMAGES + 1 if box == 0.0 and image != 0 else image
 
 
-@njit(cache=True)
-def neighbour_list(centres: Array, box: Array, low: Array, width: Array, bins: Array, kinds: Array, ranges: Array) -> Any:
+@njit(cache=True, error_model="numpy")
+def _keep_near(
+    there: Array, order: Integers, start: int, stop: int, x: float, y: float, z: float, range2: Array, kinds: Integers, code: int,
+    found: int, mine: Integers,
+) -> int:  # fmt: skip
+    """Append the molecules from start to stop that are in range of (x, y, z); how many there are then."""
+    for p in range(start, stop):
+        dx, dy, dz = there[p, 0] - x, there[p, 1] - y, there[p, 2] - z
+        mine[found] = order[p] * 128 + code
+        found += 1 if dx * dx + dy * dy + dz * dz < range2[kinds[p]] else 0
+    return found
+
+
+@njit(cache=True, error_model="numpy")
+def _along_column(
+    m: int, raw_x: int, raw_y: int, left: float, own: bool, rank: int, places: Integers, starts: Integers, there: Array,
+    order: Integers, here: Array, box: Array, low: Array, width: Array, bins: Integers, range2: Array, kinds: Integers, found: int,
+    mine: Integers,
+) -> Any:  # fmt: skip
+    """Neighbours of m in a column of bins along z, within √left of it there; own: the column of m, from m upwards."""
+    image_x, image_y = raw_x // bins[0], raw_y // bins[1]
+    column = ((raw_x - image_x * bins[0]) * bins[1] + raw_y - image_y * bins[1]) * bins[2]
+    reach = np.sqrt(left)
+    bottom = int(np.floor((here[2] - reach - low[2]) / width[2]))
+    top = int(np.floor((here[2] + reach - low[2]) / width[2]))
+    bottom = max(bottom, places[m, 2]) if own else bottom
+    for image_z in range(-IMAGES, IMAGES + 1):
+        first, last = max(bottom, image_z * bins[2]), min(top, image_z * bins[2] + bins[2] - 1)
+        if first > last or (box[2] == 0.0 and image_z != 0):
+            continue
+        start, stop = starts[column + first - image_z * bins[2]], starts[column + last - image_z * bins[2] + 1]
+        start = rank + 1 if own and image_z == 0 else start
+        if found + stop - start > len(mine):
+            mine = np.concatenate((mine, np.empty(len(mine) + stop - start, dtype=np.int64)))
+        x, y, z = here[0] - image_x * box[0], here[1] - image_y * box[1], here[2] - image_z * box[2]
+        code = ((image_x + IMAGES) * 5 + image_y + IMAGES) * 5 + image_z + IMAGES
+        found = _keep_near(there, order, start, stop, x, y, z, range2, kinds, code, found, mine)
+    return found, mine
+
+
+@njit(cache=True, error_model="numpy")
+def neighbour_list(
+    centres: Array, box: Array, low: Array, width: Array, bins: Integers, kinds: Integers, ranges: Array
+) -> Any:
     """Starts (n x kinds + 1) and entries (128 molecule + code of the image) of all pairs nearer than the range of their kinds.
 
     box is 0 along directions that do not repeat; low, width, bins (3) divide the cell or the space that holds the molecules.
     """
-    n, species = len(centres), len(ranges)
-    farthest = np.max(ranges)
-    places, first, order = _bins_of(centres, low, width, bins)
-    steps = np.array([int(np.ceil(farthest / width[c])) for c in range(3)])
+    n, species, farthest2 = len(centres), len(ranges), np.max(ranges) ** 2
+    places, first, order, rank = _sorted_into_bins(centres, low, width, bins)
+    there, sorted_kinds = centres[order], kinds[order]
+    steps = np.array([int(np.ceil(np.max(ranges) / width[c])) for c in range(2)])
     starts = np.zeros(n * species + 1, dtype=np.int64)
-    entries, mine = np.empty(n * 64 + 1024, dtype=np.uint64), np.empty(1024, dtype=np.int64)
-    used = 0
-    for i in range(n):
-        found = 0
-        for raw_x in range(places[i, 0] - steps[0], places[i, 0] + steps[0] + 1):
-            gap_x = _gap(centres[i, 0], low[0] + raw_x * width[0], width[0])
-            image_x = raw_x // bins[0]
-            if (box[0] == 0.0 and image_x != 0) or abs(image_x) > IMAGES or gap_x > farthest:
+    entries, mine, used = np.empty(n * 64 + 1024, dtype=np.uint64), np.empty(1024, dtype=np.int64), 0
+    for m in range(n):
+        found, range2, here = 0, ranges[kinds[m]] ** 2, centres[m]
+        for raw_x in range(places[m, 0], places[m, 0] + steps[0] + 1):
+            gap_x = _gap2(here[0], low[0] + raw_x * width[0], width[0])
+            if abs(_image(raw_x, bins[0], box[0])) > IMAGES or gap_x > farthest2:
                 continue
-            for raw_y in range(places[i, 1] - steps[1], places[i, 1] + steps[1] + 1):
-                gap_y = _gap(centres[i, 1], low[1] + raw_y * width[1], width[1])
-                image_y = raw_y // bins[1]
-                if (box[1] == 0.0 and image_y != 0) or abs(image_y) > IMAGES or gap_x**2 + gap_y**2 > farthest**2:
+            ahead = raw_x > places[m, 0]
+            for raw_y in range(places[m, 1] - steps[1] if ahead else places[m, 1], places[m, 1] + steps[1] + 1):
+                left = farthest2 - gap_x - _gap2(here[1], low[1] + raw_y * width[1], width[1])
+                if abs(_image(raw_y, bins[1], box[1])) > IMAGES or left < 0.0:
                     continue
-                for raw_z in range(places[i, 2] - steps[2], places[i, 2] + steps[2] + 1):
-                    gap_z = _gap(centres[i, 2], low[2] + raw_z * width[2], width[2])
-                    image_z = raw_z // bins[2]
-                    if (box[2] == 0.0 and image_z != 0) or abs(image_z) > IMAGES:
-                        continue
-                    if gap_x**2 + gap_y**2 + gap_z**2 > farthest**2:
-                        continue
-                    code = ((image_x + IMAGES) * 5 + image_y + IMAGES) * 5 + image_z + IMAGES
-                    cell = ((raw_x - image_x * bins[0]) * bins[1] + raw_y - image_y * bins[1]) * bins[2] + raw_z - image_z * bins[2]
-                    x = centres[i, 0] - image_x * box[0]
-                    y = centres[i, 1] - image_y * box[1]
-                    z = centres[i, 2] - image_z * box[2]
-                    if found + first[cell + 1] - first[cell] > len(mine):
-                        mine = np.concatenate((mine, np.empty(len(mine) + n, dtype=np.int64)))
-                    for p in range(first[cell], first[cell + 1]):
-                        j = order[p]
-                        square = (centres[j, 0] - x) ** 2 + (centres[j, 1] - y) ** 2 + (centres[j, 2] - z) ** 2
-                        if square < ranges[kinds[i], kinds[j]] ** 2 and _first_half(i, j, code):
-                            mine[found] = j * CODES + code
-                            found += 1
+                found, mine = _along_column(
+                    m, raw_x, raw_y, left, not ahead and raw_y == places[m, 1], rank[m], places, first, there, order, here,
+                    box, low, width, bins, range2, sorted_kinds, found, mine,
+                )  # fmt: skip
         if used + found > len(entries):
             entries = np.concatenate((entries, np.empty(len(entries) + found, dtype=np.uint64)))
         for kind in range(species):
             for p in range(found):
-                if kinds[mine[p] // CODES] == kind:
+                if species == 1 or kinds[mine[p] // 128] == kind:
                     entries[used] = mine[p]
                     used += 1
-            starts[i * species + kind + 1] = used
+            starts[m * species + kind + 1] = used
     return starts, entries[:used]

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+from rotor.fluid.assembly import Integers
 from rotor.rotations import Array
 
 LANES = 128
@@ -32,12 +33,13 @@ FAST = {"reassoc", "contract", "nsz", "arcp"}  # sums may be taken by eights; in
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def place_sites(
-    positions: Array, first_atom: Array, first_site: Array, kinds: Array, weights: Array, atoms: Array, counts: Array,
+    positions: Array, first_atom: Integers, first_site: Integers, kinds: Integers, weights: Array, atoms: Integers, counts: Integers,
     box: Array, reference: Array, fresh: bool, sites: Array, local: Array, centres: Array,
 ) -> float:  # fmt: skip
     """Put every molecule together, near its reference centre (fresh: into the cell); largest move of a centre, squared.
 
-    local: sites seen from their molecule's centre. weights[kind] has a row for each site and a last one for the centre. box is 0 along directions that do not repeat.
+    local: sites seen from their molecule's centre. weights[kind] has a row for each site and a last one for the centre. box
+    is 0 along directions that do not repeat.
     """
     farthest, u = 0.0, np.zeros((weights.shape[2], 3))
     for m in range(len(kinds)):
@@ -70,7 +72,14 @@ def place_sites(
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def carry_to_atoms(
-    forces: Array, first_atom: Array, first_site: Array, kinds: Array, weights: Array, atoms: Array, counts: Array, out: Array
+    forces: Array,
+    first_atom: Integers,
+    first_site: Integers,
+    kinds: Integers,
+    weights: Array,
+    atoms: Integers,
+    counts: Integers,
+    out: Array,
 ) -> None:
     """Forces on sites as forces on the real atoms, by the weights that place the sites: force and torque are kept."""
     out[:] = 0.0
@@ -84,7 +93,7 @@ def carry_to_atoms(
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def lever_tensor(forces: Array, arms_to: Array, arms_from: Array, first_site: Array, by_molecule: bool) -> Array:
+def lever_tensor(forces: Array, arms_to: Array, arms_from: Array, first_site: Integers, by_molecule: bool) -> Array:
     """Σ F ⊗ (to - from) over sites or, by_molecule, over molecules with their total force: (3, 3), not symmetric."""
     tensor = np.zeros((3, 3))
     for m in range(len(first_site) - 1):
@@ -221,7 +230,7 @@ def _screened(row: Array, n: int, x: float, y: float, z: float, qq: float, field
 
 @njit(cache=True, inline="always", error_model="numpy")
 def _collect(
-    entries: Array, at: int, stop: int, images: Array, centres: Array, m: int, reach2: float, first: Array, base: Array,
+    entries: Integers, at: int, stop: int, images: Array, centres: Array, m: int, reach2: float, first: Integers, base: Integers,
     arms: Array,
 ) -> Any:  # fmt: skip
     """Neighbours of m whose spheres are within reach: where their sites begin, their centres seen from m's in three runs."""
@@ -264,7 +273,7 @@ def _add_virial(arms: Array, rows: Array, sites: int, n: int, totals: Array) -> 
 
 
 @njit(cache=True, error_model="numpy")
-def _gather(rows: Array, local: Array, base: Array, arms: Array, count: int, n: int, padded: int) -> None:
+def _gather(rows: Array, local: Array, base: Integers, arms: Array, count: int, n: int, padded: int) -> None:
     """Sites of the neighbours, seen from the centre of the molecule in hand; forces 0; the lanes to `padded` far away."""
     for s in range(count):
         row = rows[s * RUNS * LANES : (s + 1) * RUNS * LANES]
@@ -281,7 +290,7 @@ def _gather(rows: Array, local: Array, base: Array, arms: Array, count: int, n: 
 
 
 @njit(cache=True, error_model="numpy")
-def _scatter(rows: Array, forces: Array, base: Array, count: int, n: int) -> None:
+def _scatter(rows: Array, forces: Array, base: Integers, count: int, n: int) -> None:
     for s in range(count):
         row = rows[s * RUNS * LANES : (s + 1) * RUNS * LANES]
         step = np.uint64(3 * s)
@@ -294,7 +303,7 @@ def _scatter(rows: Array, forces: Array, base: Array, count: int, n: int) -> Non
 
 @njit(cache=True, error_model="numpy")
 def _site_pairs(
-    rows: Array, padded: int, local: Array, mine: Array, pairs: Array, numbers: Array, cut: Array, field: Array,
+    rows: Array, padded: int, local: Array, mine: Integers, pairs: Integers, numbers: Array, cut: Array, field: Array,
     screened: bool, forces: Array, totals: Array,
 ) -> None:  # fmt: skip
     """All pairs of sites between one molecule, whose numbers are `mine` and upwards, and its gathered neighbours."""
@@ -322,9 +331,9 @@ def _site_pairs(
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def pair_forces(
-    first: int, last: int, starts: Array, entries: Array, images: Array, reach2: Array,
-    local: Array, centres: Array, first_site: Array, kinds: Array, counts: Array,
-    pair_starts: Array, pair_sites: Array, pair_numbers: Array, cut: Array, field: Array, screened: bool,
+    first: int, last: int, starts: Integers, entries: Integers, images: Array, reach2: Array,
+    local: Array, centres: Array, first_site: Integers, kinds: Integers, counts: Integers,
+    pair_starts: Integers, pair_sites: Integers, pair_numbers: Array, cut: Array, field: Array, screened: bool,
     forces: Array, totals: Array,
 ) -> None:  # fmt: skip
     """Add forces on sites, energies and virial of the pairs in the lists of molecules first to last - 1.
@@ -334,7 +343,7 @@ def pair_forces(
     dispersion and of charges, Σ F ⊗ d (6) with d between centres of the lists.
     """
     species = len(counts)
-    rows, arms = np.empty(np.max(counts) * RUNS * LANES), np.empty(3 * LANES)
+    rows, arms = np.empty(int(np.max(counts)) * RUNS * LANES), np.empty(3 * LANES)
     base, begins = np.empty(LANES, dtype=np.uint64), (3 * first_site).astype(np.uint64)
     for m in range(first, last):
         for other in range(species):

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rotor.fluid.models import RigidModel
 from rotor.rotations import Array
 
+Integers = NDArray[Any]  # of whichever width
 GEOMETRY_ANGSTROM = 0.05  # a distance inside a molecule may differ by that from the model's
 
 
@@ -42,9 +45,7 @@ def list_centre(model: RigidModel) -> tuple[Array, float]:
     apart = np.linalg.norm(places[:, None] - places[None], axis=2)
     s, t = np.unravel_index(apart.argmax(), apart.shape)
     choices = (0.5 * (weights[s] + weights[t]), weights.mean(axis=0))
-    reach = [
-        float(np.linalg.norm(places - w @ places[: len(model.symbols)], axis=1).max()) for w in choices
-    ]
+    reach = [float(np.linalg.norm(places - w @ places[: len(model.symbols)], axis=1).max()) for w in choices]
     best = int(np.argmin(reach))
     return choices[best], reach[best]
 
@@ -57,20 +58,20 @@ class Assembly:
     """
 
     models: tuple[RigidModel, ...]
-    kinds: Array
-    first_atom: Array
-    first_site: Array
+    kinds: Integers
+    first_atom: Integers
+    first_site: Integers
 
     def __len__(self) -> int:
         return len(self.kinds)
 
     @cached_property
-    def atoms(self) -> Array:
+    def atoms(self) -> Integers:
         """Real atoms of a molecule of each kind."""
         return np.array([len(model.symbols) for model in self.models])
 
     @cached_property
-    def counts(self) -> Array:
+    def counts(self) -> Integers:
         """Sites of a molecule of each kind."""
         return np.array([len(model.sites) for model in self.models])
 
@@ -95,12 +96,12 @@ class Assembly:
         return np.concatenate([by_kind[kind] for kind in self.kinds])
 
     @cached_property
-    def numbers(self) -> Array:
+    def numbers(self) -> Integers:
         """Molecules of each kind."""
         return np.bincount(self.kinds, minlength=len(self.models))
 
     @cached_property
-    def atom_sites(self) -> Array:
+    def atom_sites(self) -> Integers:
         """Where the real atoms stand among the sites."""
         steps = np.arange(self.first_atom[-1]) - np.repeat(self.first_atom[:-1], np.diff(self.first_atom))
         return np.asarray(steps + np.repeat(self.first_site[:-1], np.diff(self.first_atom)))
@@ -126,14 +127,14 @@ class Assembly:
             )
 
 
-def _by_label(symbols: list[str], labels: Array, models: tuple[RigidModel, ...]) -> list[int]:
+def _by_label(symbols: list[str], labels: Integers, models: tuple[RigidModel, ...]) -> list[int]:
     """Kinds of the runs of equal labels."""
     bounds = np.concatenate(([0], np.flatnonzero(np.diff(labels)) + 1, [len(labels)]))
     if len(bounds) - 1 != len(np.unique(labels)):
         raise ValueError('atoms of one molecule (array "molecule") do not stand together; sort the box by molecule')
     known = {model.symbols: kind for kind, model in enumerate(models)}
     kinds = []
-    for start, end in zip(bounds[:-1], bounds[1:], strict=True):
+    for start, end in pairwise(bounds):
         found = tuple(symbols[start:end])
         if found not in known:
             raise ValueError(

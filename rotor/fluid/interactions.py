@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rotor.fluid.assembly import Integers
 from rotor.fluid.ewald import COULOMB_EV_ANGSTROM
 from rotor.fluid.models import RigidModel
 from rotor.rotations import Array
@@ -20,8 +21,8 @@ class PairTables:
     in eV Å, c12 in eV Å¹², c6 in eV Å⁶; pairs where all are 0 do not stand here.
     """
 
-    starts: Array
-    sites: Array
+    starts: Integers
+    sites: Integers
     numbers: Array
 
 
@@ -118,7 +119,9 @@ def _beyond(c12: float, c6: float, cutoff: float, width: float) -> tuple[float, 
     return energy, energy
 
 
-def tail(models: tuple[RigidModel, ...], numbers: Array, cutoff_angstrom: float, width_angstrom: float) -> tuple[float, float]:
+def tail(
+    models: tuple[RigidModel, ...], numbers: Integers, cutoff_angstrom: float, width_angstrom: float
+) -> tuple[float, float]:
     """Energy times volume (eV Å³) and pressure times volume squared of the dispersion beyond the cutoff, liquid taken as even.
 
     2π Σ N_a N_b ∫ ΔU r² dr over all ordered couples of molecules and their sites; numbers: molecules of each model.

@@ -12,7 +12,7 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -22,16 +22,6 @@ if TYPE_CHECKING:
     from ase import Atoms
 
 VERSION = 1
-
-
-class Growing(Protocol):
-    """A file that grows during a run."""
-
-    def sync(self) -> int:
-        """Force all to the disk; the length so far, in whatever the file is counted."""
-
-    def close(self) -> None:
-        """Let go of it."""
 
 
 class TextFile:
@@ -85,8 +75,9 @@ class ExtendedXyz:
 
         frame = atoms.copy()
         frame.info.update(time_ps=time_ps, potential_ev=float(atoms.get_potential_energy()))
+        columns = ["symbols", "positions", "momenta", *(["molecule"] if "molecule" in frame.arrays else [])]
         text = io.StringIO()
-        write_extxyz(text, [frame])
+        write_extxyz(text, [frame], columns=columns)
         self._file.add(text.getvalue())
 
     def sync(self) -> int:
@@ -187,7 +178,7 @@ def read_checkpoint(path: str | os.PathLike[str]) -> Checkpoint:
     if not Path(path).is_file():
         raise ValueError(f"{path}: there is no such checkpoint to resume from; leave --resume out to begin")
     try:
-        with np.load(path, allow_pickle=False) as file:
+        with open(path, "rb") as handle, np.load(handle, allow_pickle=False) as file:
             arrays = {name: file[name] for name in file.files if name != "about"}
             about = json.loads(str(file["about"]))
     except (zipfile.BadZipFile, KeyError, ValueError, EOFError) as error:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from rotor.fluid.assembly import Assembly
+from rotor.fluid.assembly import Assembly, Integers
 from rotor.rotations import Array
 
 CLOSEST_ANGSTROM = 0.5  # sites of two molecules nearer than that lie on top of each other
@@ -29,8 +29,8 @@ class Neighbours:
     local: Array = field(init=False)
     centres: Array = field(init=False)
     reference: Array = field(init=False)
-    starts: Array | None = field(init=False, default=None)
-    entries: Array = field(init=False)
+    starts: Integers = field(init=False)
+    entries: Integers = field(init=False)
     images: Array = field(init=False)
 
     def __post_init__(self) -> None:
@@ -38,6 +38,7 @@ class Neighbours:
         self.sites = np.zeros((self.assembly.first_site[-1], 3))
         self.local = np.zeros_like(self.sites)
         self.centres, self.reference = np.zeros((n, 3)), np.zeros((n, 3))
+        self.starts = np.zeros(0, dtype=np.int64)
         steps = np.arange(-2, 3)
         grid = np.stack(np.meshgrid(steps, steps, steps, indexing="ij"), axis=-1).reshape(-1, 3)
         self.images = np.ascontiguousarray(grid * self.box_angstrom)
@@ -70,7 +71,7 @@ class Neighbours:
         if not np.isfinite(positions_angstrom).all():
             atom = int(np.flatnonzero(~np.isfinite(positions_angstrom).all(axis=1))[0])
             raise ValueError(f"position of atom {atom} is {positions_angstrom[atom]}: finite numbers are wanted")
-        if self.starts is None or self._place(positions_angstrom, fresh=False) > (0.5 * self.skin_angstrom) ** 2:
+        if not len(self.starts) or self._place(positions_angstrom, fresh=False) > (0.5 * self.skin_angstrom) ** 2:
             self._place(positions_angstrom, fresh=True)
             self.assembly.check_geometry(self.sites)
             self._build()
@@ -95,16 +96,16 @@ class Neighbours:
         low = np.where(repeats, 0.0, self.centres.min(axis=0))
         extent = np.where(repeats, self.box_angstrom, self.centres.max(axis=0) - low + 1e-3)
         ranges = np.minimum(self.within_angstrom + self.skin_angstrom, np.linalg.norm(extent) * 3)
-        most = int(math.ceil((4 * len(self.assembly)) ** (1 / 3)))
-        bins = np.clip(np.floor(extent / (0.5 * ranges.max())), 1, most).astype(np.int64)
+        most = math.ceil((4 * len(self.assembly)) ** (1 / 3))
+        bins = np.clip(np.floor(extent * 3 / ranges.max()), 1, most).astype(np.int64)
         self.starts, self.entries = _list_kernels.neighbour_list(
             self.centres, self.box_angstrom, low, extent / bins, bins, self.assembly.kinds, ranges
         )
         self.rebuilds += 1
 
-    def pairs(self) -> tuple[Array, Array, Array]:
+    def pairs(self) -> tuple[Integers, Integers, Array]:
         """Every listed pair: its two molecules, and the shift that brings the second to the first, Å."""
-        if self.starts is None:
+        if not len(self.starts):
             raise ValueError("the list is made by update(); it was not called yet")
         first = np.repeat(np.arange(len(self.assembly)), np.diff(self.starts[:: len(self.assembly.models)]))
         entries = self.entries.astype(np.int64)

@@ -12,7 +12,7 @@ import math
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from ase.calculators.calculator import Calculator, all_changes
@@ -60,7 +60,7 @@ class Evaluation:
         return math.fsum(self.terms_ev.values())
 
 
-class RigidPotential(Calculator):  # type: ignore[misc]
+class RigidPotential(Calculator):
     """Lennard-Jones and charges between rigid molecules.
 
     models: names of `rotor.fluid.models.MODELS` (several joined by commas for a mixture), or models of one's own.
@@ -72,16 +72,14 @@ class RigidPotential(Calculator):  # type: ignore[misc]
 
     Molecules may be broken by the cell's edges. Cells have right angles; directions without pbc are open.
 
-    >>> from ase.build import molecule
-    >>> pair = molecule("Ar")
-    >>> pair += molecule("Ar")
-    >>> pair.positions[1, 0] = 3.405 * 2 ** (1 / 6)
+    >>> from ase import Atoms
+    >>> pair = Atoms("Ar2", positions=[(0, 0, 0), (3.405 * 2 ** (1 / 6), 0, 0)])
     >>> pair.calc = RigidPotential("argon", cutoff_angstrom=float("inf"))
     >>> round(pair.get_potential_energy() / 8.617333262e-5, 3)  # minus the depth, in K
     -119.8
     """
 
-    implemented_properties: ClassVar[list[str]] = ["energy", "forces", "stress"]
+    implemented_properties = ["energy", "forces", "stress"]  # noqa: RUF012
 
     def __init__(
         self, models: str | RigidModel | Sequence[str | RigidModel] = "spce", *, cutoff_angstrom: float = 9.0,
@@ -127,11 +125,12 @@ class RigidPotential(Calculator):  # type: ignore[misc]
     ) -> None:
         """Fill `results` (ASE calls this)."""
         super().calculate(atoms, list(properties), list(system_changes))
-        found = self.evaluate(self.atoms)
+        box: Any = self.atoms
+        found = self.evaluate(box)
         self.last = found
         self.results = {"energy": found.energy_ev, "forces": found.forces_ev_per_angstrom}
-        if self.atoms.pbc.all():
-            stress = -found.virial_ev / self.atoms.get_volume() - found.tail_pressure_ev_per_angstrom3 * np.eye(3)
+        if box.pbc.all():
+            stress = -found.virial_ev / box.get_volume() - found.tail_pressure_ev_per_angstrom3 * np.eye(3)
             self.results["stress"] = np.array([stress[a, b] for a, b in VOIGT])
 
     @property
@@ -267,9 +266,7 @@ class RigidPotential(Calculator):  # type: ignore[misc]
             _ewald_kernels.structure_factors(neighbours.sites, parts[i], a.charges_e[parts[i]], *turn, factors[i])
 
         def push(i: int) -> None:
-            _ewald_kernels.fourier_forces(
-                neighbours.sites, parts[i], a.charges_e[parts[i]], *turn, weighted, pushed
-            )
+            _ewald_kernels.fourier_forces(neighbours.sites, parts[i], a.charges_e[parts[i]], *turn, weighted, pushed)
 
         self._run([lambda i=i: sum_up(i) for i in range(self.threads)])
         structure = factors.sum(axis=0)

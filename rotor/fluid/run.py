@@ -12,22 +12,34 @@ import os
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, closing, contextmanager
 from dataclasses import asdict, dataclass, fields
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rotor.fluid.keeping import Checkpoint, TextFile, csv_line, read_checkpoint, read_rows, trajectory_file
+from rotor.fluid.keeping import (
+    AseTrajectory,
+    Checkpoint,
+    ExtendedXyz,
+    TextFile,
+    csv_line,
+    read_checkpoint,
+    read_rows,
+    trajectory_file,
+)
 from rotor.fluid.models import model_of
 from rotor.fluid.record import FluidRecord
 from rotor.fluid.settings import Settings
 from rotor.fluid.start import at_rest, check_apart, heat, model_labels
 from rotor.fluid.state import State
+from rotor.rotations import Array
 
 if TYPE_CHECKING:
     from ase import Atoms
 
+    from rotor.degrees import Degrees
+    from rotor.fluid.bodies import Bodies
     from rotor.fluid.dynamics import RigidDynamics
     from rotor.fluid.thermostats import Thermostat
 
@@ -37,6 +49,10 @@ BAR_EVERY_S = 0.2
 EV_PER_ANGSTROM3_BAR = 1.602176634e6  # 1 eV/Å³ in bar, exact
 
 Told = Callable[[int, int, float], None]
+
+
+class RunStopped(ValueError):
+    """A run that began could not go on; what was written before stays."""
 
 
 @dataclass(frozen=True)
@@ -67,6 +83,7 @@ def run_fluid(
     *,
     resume: bool = False,
     told: Told | None = None,
+    begun: Callable[[], None] = lambda: None,
 ) -> FluidRecord:
     """Run a box of rigid molecules and return its table; the atoms end where the run does.
 
@@ -80,14 +97,15 @@ def run_fluid(
         Continue from `outputs.checkpoint`; the files that grow are cut back to where they were then.
     told : callable, optional
         Told step, steps and ns per day from time to time; without it a bar is shown on a terminal.
+    begun : callable, optional
+        Called once everything is found to be in order and the files are open.
 
     Raises
     ------
     ValueError
-        Molecules that do not fit their model or lie on top of each other, a force that is not finite, with the step and
-        the last checkpoint; a checkpoint of another box or other settings.
-    OSError
-        A file that cannot be written any more, with its name. What was written before stays whole.
+        Molecules that do not fit their model or lie on top of each other; a checkpoint of another box or other settings.
+    RunStopped
+        A ValueError too: a force that is not finite, a full disk; with the step and the last checkpoint.
     """
     outputs = outputs or Outputs()
     if resume and outputs.checkpoint is None:
@@ -99,7 +117,9 @@ def run_fluid(
     if resume:
         assert outputs.checkpoint is not None
         run.restore(read_checkpoint(outputs.checkpoint))
+    dynamics.wrench()  # what cannot begin is told before any file is opened
     with run.files(), _bar(settings.steps, told) as shown:
+        begun()
         run.go(shown)
     return run.record()
 
@@ -114,7 +134,7 @@ def dynamics_of(atoms: Atoms, settings: Settings, begin: bool = True) -> RigidDy
     models = [model_of(name.strip()) for name in settings.model.split(",")]
     if "molecule" not in atoms.arrays:
         atoms.arrays["molecule"] = model_labels(atoms, models)
-    shapes = {model.symbols: model.positions_angstrom[: len(model.symbols)] for model in models}
+    shapes = _shapes(settings)
     bodies, pose = bodies_of(atoms, shapes=shapes)
     if atoms.calc is None:
         atoms.calc = calculator_of(settings)
@@ -130,6 +150,21 @@ def dynamics_of(atoms: Atoms, settings: Settings, begin: bool = True) -> RigidDy
     else:
         atoms.set_momenta(np.zeros((len(atoms), 3)))
     return RigidDynamics(atoms, settings.step_fs * fs, thermostat=thermostat, shapes=shapes)
+
+
+def bodies_and_degrees(atoms: Atoms, settings: Settings) -> tuple[Bodies, Degrees, str]:
+    """Bodies of a box, the degrees of freedom that a run counts, and the thermometer that it uses."""
+    from rotor.fluid.bodies import bodies_of
+
+    bodies, _ = bodies_of(atoms, shapes=_shapes(settings))
+    removed = 0 if settings.ensemble == "langevin" else 3
+    return bodies, bodies.degrees(removed), "mixed" if settings.ensemble == "nve" else "half"
+
+
+def _shapes(settings: Settings) -> dict[tuple[str, ...], Array]:
+    """Places of the real atoms of each model, by their elements."""
+    models = [model_of(name.strip()) for name in settings.model.split(",")]
+    return {model.symbols: model.positions_angstrom[: len(model.symbols)] for model in models}
 
 
 def thermostat_of(settings: Settings, rng: np.random.Generator) -> Thermostat | None:
@@ -184,23 +219,24 @@ class _Run:
     def __init__(self, dynamics: RigidDynamics, settings: Settings, outputs: Outputs) -> None:
         self.dynamics, self.settings, self.outputs = dynamics, settings, outputs
         self.rows: list[list[float]] = []
-        self._lengths: dict[str, int | None] = {}
+        self._csv: TextFile | None = None
+        self._frames: list[ExtendedXyz | AseTrajectory] = []
+        self._lengths: dict[str, int] = {}
         self._kept_at: int | None = None
 
     @contextmanager
     def files(self) -> Iterator[None]:
         """Open the growing files, new or where the checkpoint left them."""
         outputs, lengths = self.outputs, self._lengths
-        self._csv = TextFile(outputs.csv, lengths.get("csv")) if outputs.csv is not None else None
-        self._frames = [trajectory_file(path, lengths.get(str(path))) for path in outputs.trajectories]
-        if self._csv is not None and lengths.get("csv") is None:
-            self._csv.add(",".join(COLUMNS) + "\n")
-        try:
+        with ExitStack() as open_files:
+            for path in outputs.trajectories:
+                file = trajectory_file(path, lengths.get(str(path)))
+                self._frames.append(open_files.enter_context(closing(file)))
+            if outputs.csv is not None:
+                self._csv = open_files.enter_context(closing(TextFile(outputs.csv, lengths.get("csv"))))
+                if lengths.get("csv") is None:
+                    self._csv.add(",".join(COLUMNS) + "\n")
             yield
-        finally:
-            for file in (self._csv, *self._frames):
-                if file is not None:
-                    file.close()
 
     def go(self, told: Told) -> None:
         """All steps that are left."""
@@ -221,12 +257,11 @@ class _Run:
                     shown = now
                     told(dynamics.nsteps, steps, _ns_per_day(self.settings, dynamics.nsteps - first, now))
         except (ValueError, FloatingPointError) as error:
-            raise ValueError(f"{error}{self._told_checkpoint()}") from error
+            raise RunStopped(f"{error}{self._told_checkpoint()}") from error
         except OSError as error:
-            raise OSError(
-                error.errno,
-                f"{error.strerror} at step {dynamics.nsteps}; what was written before is whole{self._told_checkpoint()}",
-                error.filename,
+            what = f"{error.filename}: {error.strerror}" if error.filename else error.strerror
+            raise RunStopped(
+                f"{what} at step {dynamics.nsteps}; what was written before is whole{self._told_checkpoint()}"
             ) from error
 
     def record(self) -> FluidRecord:
@@ -243,7 +278,7 @@ class _Run:
         for name, value in about["settings"].items():
             if name not in MAY_CHANGE and mine.get(name) != value:
                 raise ValueError(f"{path}: was written by a run with {name} = {value}, not {mine.get(name)}")
-        if about["files"].keys() != self._file_names().keys():
+        if list(about["files"]) != self._names():
             before = ", ".join(about["files"]) or "none"
             raise ValueError(f"{path}: the run that is resumed wrote these files: {before}; name the same ones")
         if about["step"] > self.settings.steps:
@@ -290,6 +325,7 @@ class _Run:
         if path is None:
             return
         state, thermostat = dynamics.state, dynamics.thermostat
+        files = [*([] if self._csv is None else [self._csv]), *self._frames]
         arrays = {"centres": state.centres, "momentum": state.momentum, "spin": state.spin, "carry": state.carry}
         if self._csv is None:
             arrays["rows"] = np.array(self.rows).reshape(-1, len(COLUMNS))
@@ -298,17 +334,15 @@ class _Run:
             "settings": asdict(self.settings),
             "step": dynamics.nsteps,
             "thermostat": None if thermostat is None else thermostat.kept(),
-            "files": {name: file.sync() for name, file in self._file_names().items()},
+            "files": {name: file.sync() for name, file in zip(self._names(), files, strict=True)},
         }
         Checkpoint(arrays, about).write(path)
         self._kept_at = dynamics.nsteps
         dynamics.refresh()
 
-    def _file_names(self) -> dict[str, Any]:
-        """The growing files that were asked for, by name."""
-        csv = {} if self.outputs.csv is None else {"csv": getattr(self, "_csv", None)}
-        frames = getattr(self, "_frames", [None] * len(self.outputs.trajectories))
-        return csv | {str(path): file for path, file in zip(self.outputs.trajectories, frames, strict=True)}
+    def _names(self) -> list[str]:
+        """Names of the growing files that were asked for."""
+        return [*(["csv"] if self.outputs.csv is not None else []), *map(str, self.outputs.trajectories)]
 
     def _box(self) -> str:
         """A fingerprint of what does not change."""

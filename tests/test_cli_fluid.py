@@ -1,0 +1,130 @@
+"""`rotor fluid` on the command line: the contract of docs/command_line.md."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from ase.io import read
+
+from rotor.fluid.record import FluidRecord
+
+VAPOUR = ("fluid", "water", "--molecules", "27", "--density", "0.3", "--cutoff", "4", "--step", "1fs")
+
+
+def test_a_box_is_made_and_run(call, folder):
+    code, out, err = call(*VAPOUR, "--steps", "20", "--every", "5", "--csv", "a.csv", "--json", "-")
+    assert (code, err) == (0, "")
+    told = json.loads(out)
+    assert told["degrees"] == {"translation": 78, "rotation": 81, "removed": 3, "total": 159}
+    assert told["molecules"][0]["name"] == "OH2"
+    assert told["molecules"][0]["rotational_degrees"] == 3
+    assert told["density_g_cm3"] == pytest.approx(0.3, rel=1e-12)  # by its making
+    assert told["settings"]["step_fs"] == 1.0
+    assert told["thermometer"] == "mixed"
+    assert "27 molecules on a lattice at 0.3 g/cm³" in told["start"]
+    assert [row["time_ps"] for row in told["record"]] == [0.0, 0.005, 0.01, 0.015, 0.02]
+    rows = np.genfromtxt("a.csv", delimiter=",", names=True)
+    assert rows.dtype.names == tuple(FluidRecord.__dataclass_fields__)
+    assert rows["total_ev"].tolist() == [row["total_ev"] for row in told["record"]]  # to the last bit
+    assert told["files"] == ["a.csv"]
+    story = json.loads(Path("a.csv.provenance.json").read_text())
+    assert story["settings"] == told["settings"]
+    assert story["command"].startswith("rotor fluid water --molecules 27")
+
+
+def test_the_report_names_what_was_run(call, folder):
+    code, out, _ = call(*VAPOUR, "--steps", "10", "--ensemble", "nose-hoover", "--json", "a.json")
+    assert code == 0
+    assert "27 OH2: 10 steps of 1 fs, nose-hoover, by rotor" in out
+    assert "78 of translation, 81 of rotation; 3 removed" in out
+    assert "potential energy" in out
+    assert json.loads(Path("a.json").read_text())["thermometer"] == "half"
+
+
+def test_a_run_is_resumed_to_the_same_end(call, folder):
+    options = (*VAPOUR, "--ensemble", "langevin", "--every", "5", "--checkpoint-every", "10", "--trajectory")
+    assert call(*options, "whole.xyz", "--csv", "whole.csv", "--checkpoint", "w.npz", "--steps", "40")[0] == 0
+    cut = (*options, "cut.xyz", "--csv", "cut.csv", "--checkpoint", "c.npz", "--trajectory", "cut.traj")
+    assert call(*cut, "--steps", "20")[0] == 0
+    code, out, err = call(*cut, "--steps", "40", "--resume", "--json", "-")
+    assert (code, err) == (0, "")
+    assert json.loads(out)["start"] == "resumed from c.npz"
+    assert Path("cut.csv").read_bytes() == Path("whole.csv").read_bytes()
+    assert Path("cut.xyz").read_bytes() == Path("whole.xyz").read_bytes()
+    assert len(read("cut.traj", ":")) == 9
+    code, out, _ = call("fluid", "cut.traj", "--cutoff", "4", "--steps", "4", "--json", "-")
+    assert code == 0
+    assert json.loads(out)["start"] == "cut.traj; velocities those of the box"
+
+
+def test_other_models_and_a_file_without_velocities(call, folder):
+    code, out, _ = call(
+        "fluid", "trappe-n2", "--model", "trappe-n2", "--molecules", "27", "--density", "0.3", "--temperature", "90",
+        "--cutoff", "6", "--steps", "5", "--trajectory", "n2.extxyz", "--json", "-",
+    )  # fmt: skip
+    assert code == 0
+    assert json.loads(out)["degrees"]["rotation"] == 54
+    atoms = read("n2.extxyz", ":")[-1]
+    del atoms.arrays["momenta"]
+    atoms.write("bare.xyz")
+    code, out, _ = call("fluid", "bare.xyz", "--model", "trappe-n2", "--cutoff", "6", "--steps", "2", "--json", "-")
+    assert code == 0
+    assert json.loads(out)["start"] == "bare.xyz; velocities drawn at 298.15 K"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("nowhere.xyz",), "nowhere.xyz: no such file"),
+        (("water", "--model", "spcf", "--molecules", "8"), "--model: 'spcf' is no model of a rigid molecule"),
+        (("water", "--molecules", "0"), "--molecules"),
+        (("water", "--molecules", "8", "--model", "argon"), "--model argon is no model of water"),
+        (("benzene", "--molecules", "8"), "a box is made of one model"),
+        (("water", "--density", "1"), "--density: is wanted with --molecules"),
+        (("water", "--molecules", "8", "--step", "0"), "--step"),
+        (("water", "--molecules", "8", "--ensemble", "npt"), "'npt' is no ensemble"),
+        (("water", "--molecules", "8"), "cutoff 9 Å is more than half the smallest edge"),
+        (("water", "--molecules", "8", "--csv", "a.txt"), "--csv a.txt: the name must end in .csv"),
+        (("water", "--molecules", "8", "--trajectory", "a.pdb"), "a.pdb: the name must end in"),
+        (("water", "--molecules", "8", "--engine", "gromacs"), "--engine: 'gromacs' is no engine"),
+        (("water", "--molecules", "8", "--cutoff", "3", "--resume"), "name the checkpoint"),
+        (("open.xyz",), "open.xyz: has no cell that repeats"),
+        (("overlap.xyz", "--csv", "a.csv", "--cutoff", "4"), "on top of each other"),
+        (("text.xyz",), "text.xyz: cannot be read as a box of atoms"),
+    ],
+)
+def test_mistakes_are_one_line_and_nothing_is_written(call, folder, arguments, said):
+    Path("open.xyz").write_text("1\n\nAr 0 0 0\n")
+    Path("text.xyz").write_text("no box\n")
+    water = ["O 1 1 1", "H 1.816497 1 1.577350", "H 0.183503 1 1.577350"]
+    lattice = 'Lattice="9 0 0 0 9 0 0 0 9" pbc="T T T" Properties=species:S:1:pos:R:3'
+    Path("overlap.xyz").write_text("\n".join(["6", lattice, *water, *water]) + "\n")
+    code, out, err = call("fluid", *arguments)
+    assert code == 2
+    assert out == ""
+    assert err.startswith("error: ")
+    assert said in err
+    assert err.count("\n") == 1
+    assert sorted(path.name for path in Path().iterdir()) == ["open.xyz", "overlap.xyz", "text.xyz"]
+
+
+def test_a_run_that_stops_has_exit_code_one(call, folder, monkeypatch):
+    from rotor.fluid.potential import RigidPotential
+
+    calls, inner = [], RigidPotential.calculate
+
+    def breaks(self, *arguments):
+        inner(self, *arguments)
+        calls.append(1)
+        if len(calls) > 320:  # 300 steps of relaxing come first
+            self.results["forces"][:] = np.nan
+
+    monkeypatch.setattr(RigidPotential, "calculate", breaks)
+    code, out, err = call(
+        *VAPOUR, "--steps", "100", "--csv", "a.csv", "--checkpoint", "a.npz", "--checkpoint-every", "5"
+    )
+    assert (code, out) == (1, "")
+    assert "the force on molecule 0 (OH2, atoms 0 to 2) is not finite in step" in err
+    assert "a.npz is of step" in err
+    assert len(Path("a.csv").read_text().splitlines()) >= 2

@@ -1,0 +1,298 @@
+"""Long runs: kept, killed, resumed bit for bit; full disks, broken forces, files that were changed."""
+
+import os
+import resource
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from ase.io import read
+
+from rotor.fluid.keeping import AseTrajectory, TextFile, read_checkpoint
+from rotor.fluid.models import model_of
+from rotor.fluid.record import FluidRecord
+from rotor.fluid.run import Outputs, RunStopped, calculator_of, dynamics_of, pressure_bar, run_fluid
+from rotor.fluid.settings import Settings
+from rotor.fluid.start import lattice_box
+
+SETTINGS = Settings(steps=60, every=4, step_fs=1.0, cutoff_angstrom=4.5, friction_per_ps=5.0)
+FILES = Outputs(csv="run.csv", trajectories=("run.traj", "run.xyz"), checkpoint="run.npz", checkpoint_every=14)
+ENSEMBLES = ("nve", "langevin", "nose-hoover")
+
+
+def box(molecules=27, seed=3):
+    """A thin vapour of SPC/E water that needs no relaxing."""
+    return lattice_box(model_of("spce"), molecules, 0.3, np.random.default_rng(seed))
+
+
+def stop_after(step):
+    """What a run is told to, and what ends it there as a signal would."""
+
+    def told(now, steps, speed):
+        if now >= step:
+            raise KeyboardInterrupt
+
+    return told
+
+
+def same(one: FluidRecord, other: FluidRecord) -> bool:
+    return all(
+        np.array_equal(a, b, equal_nan=True) for a, b in zip(one.columns.values(), other.columns.values(), strict=True)
+    )
+
+
+def lines(path):
+    return Path(path).read_text().splitlines()
+
+
+@pytest.mark.parametrize("ensemble", ENSEMBLES)
+def test_a_run_cut_anywhere_and_resumed_is_the_uninterrupted_one(folder, monkeypatch, ensemble):
+    monkeypatch.setattr("rotor.fluid.run.BAR_EVERY_S", -1.0)
+    settings = replace(SETTINGS, ensemble=ensemble)
+    (folder / "a").mkdir()
+    os.chdir("a")
+    whole = box()
+    record = run_fluid(whole, settings, FILES)
+    (folder / "b").mkdir()
+    os.chdir("../b")
+    for step in (5, 14, 33, 34):  # in the first interval, on a checkpoint, twice between others
+        with pytest.raises(KeyboardInterrupt):
+            run_fluid(box(), settings, FILES, resume=step > 5, told=stop_after(step))
+    with open("run.csv", "a") as file:
+        file.write("0.03")  # half a row, as a kill may leave it
+    resumed = box()
+    again = run_fluid(resumed, settings, FILES, resume=True)
+    assert same(record, again)
+    assert len(again) == 16
+    assert np.array_equal(whole.positions, resumed.positions)
+    assert np.array_equal(whole.get_momenta(), resumed.get_momenta())
+    assert Path("run.csv").read_bytes() == Path("../a/run.csv").read_bytes()
+    assert Path("run.xyz").read_bytes() == Path("../a/run.xyz").read_bytes()
+    frames, others = read("run.traj", ":"), read("../a/run.traj", ":")
+    assert [len(frames), len(others)] == [16, 16]
+    assert all(np.array_equal(f.positions, o.positions) for f, o in zip(frames, others, strict=True))
+    assert np.array_equal(frames[-1].get_momenta(), whole.get_momenta())
+    assert not list(Path().glob(".*"))
+
+
+def test_a_finished_run_can_be_made_longer(folder):
+    record = run_fluid(box(), replace(SETTINGS, steps=84), replace(FILES, csv=None, checkpoint=None))
+    run_fluid(box(), replace(SETTINGS, steps=42), replace(FILES, csv=None))
+    longer = run_fluid(box(), replace(SETTINGS, steps=84), replace(FILES, csv=None), resume=True)
+    assert len(longer) == 22
+    assert (
+        abs(longer.total_ev - record.total_ev).max() < 1e-9
+    )  # eV: other checkpoints, so other lists, so other rounding
+
+
+KILLED = """
+import sys
+import numpy as np
+from test_fluid_run import FILES, SETTINGS, box
+from dataclasses import replace
+from rotor.fluid.run import run_fluid
+run_fluid(box(), replace(SETTINGS, ensemble="langevin", steps=100000), FILES, resume="--resume" in sys.argv)
+"""
+
+
+def test_a_hard_kill_loses_no_more_than_one_interval(folder):
+    root = Path(__file__).resolve().parents[1]
+    environment = os.environ | {"PYTHONPATH": f"{root}{os.pathsep}{root / 'tests'}"}
+    process = subprocess.Popen([sys.executable, "-c", KILLED], env=environment, cwd=folder)
+    until = time.monotonic() + 60.0
+    while time.monotonic() < until and not (Path("run.csv").exists() and len(lines("run.csv")) > 15):
+        assert process.poll() is None
+        time.sleep(0.01)
+    process.send_signal(signal.SIGKILL)
+    assert process.wait() == -signal.SIGKILL
+    written = len(lines("run.csv"))
+    checkpoint = read_checkpoint("run.npz").about["step"]
+    assert checkpoint % 14 == 0
+    assert 4 * (written - 2) - checkpoint <= 14 + 4  # rows beyond the checkpoint: less than an interval and a row
+    settings = replace(SETTINGS, ensemble="langevin", steps=100000)
+    steps = checkpoint + 28
+    whole, resumed = box(), box()
+    (folder / "other").mkdir()
+    record = run_fluid(
+        whole,
+        replace(settings, steps=steps),
+        replace(FILES, csv="other/run.csv", trajectories=(), checkpoint="other/run.npz"),
+    )
+    again = run_fluid(resumed, replace(settings, steps=steps), FILES, resume=True)
+    assert same(record, again)
+    assert np.array_equal(whole.positions, resumed.positions)
+    assert Path("run.csv").read_bytes() == Path("other/run.csv").read_bytes()
+
+
+def test_a_full_disk_stops_the_run_with_all_that_was_written(folder):
+    size = 12000
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))  # no file may grow beyond: the system's own refusal
+    try:
+        with pytest.raises(
+            RunStopped, match=r"run.csv: File too large at step \d+; what was written before is whole; run.npz"
+        ):
+            run_fluid(
+                box(),
+                replace(SETTINGS, steps=500, every=1, ensemble="langevin"),
+                replace(FILES, trajectories=(), checkpoint_every=7),
+            )
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    rows = lines("run.csv")
+    assert Path("run.csv").read_bytes().endswith(b"\n")
+    assert all(len(row.split(",")) == 9 for row in rows)
+    settings = replace(SETTINGS, steps=100, every=1, ensemble="langevin")
+    record = run_fluid(box(), settings, replace(FILES, trajectories=(), checkpoint_every=7), resume=True)
+    assert len(record) == 101
+    assert lines("run.csv")[: len(rows)] == rows
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="no /dev/full on this system")
+def test_no_space_left_is_told(folder):
+    os.symlink("/dev/full", "run.csv")
+    with pytest.raises((RunStopped, OSError), match="No space left on device"):
+        run_fluid(box(), SETTINGS, Outputs(csv="run.csv"))
+
+
+def test_a_checkpoint_that_cannot_be_written_leaves_the_old_one(folder, monkeypatch):
+    run_fluid(box(), replace(SETTINGS, steps=14, ensemble="langevin"), FILES)
+    kept = Path("run.npz").read_bytes()
+
+    def full(*paths):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("rotor.fluid.keeping.os.replace", full)
+    monkeypatch.setattr(AseTrajectory, "__init__", lambda self, path, length=None: setattr(self, "path", Path(path)))
+    with pytest.raises(RunStopped, match=r"run.npz: No space left on device at step 28.*run.npz is of step 14"):
+        run_fluid(box(), replace(SETTINGS, ensemble="langevin"), FILES, resume=True)
+    assert Path("run.npz").read_bytes() == kept
+    assert not list(Path().glob(".*"))
+
+
+class BrokenLater:
+    """A force that is no number, from a call on."""
+
+    def __init__(self, calls):
+        self.left, self.inner = calls, calculator_of(SETTINGS)
+
+    def __getattr__(self, name):
+        return getattr(self.inner, name)
+
+    def get_forces(self, atoms):
+        self.left -= 1
+        forces = self.inner.get_forces(atoms).copy()
+        forces[5] = np.nan if self.left < 0 else forces[5]
+        return forces
+
+
+def test_a_force_that_is_no_number_is_told_with_step_and_checkpoint(folder):
+    atoms = box()
+    atoms.calc = BrokenLater(31)
+    with pytest.raises(
+        RunStopped,
+        match=r"force on molecule 1 \(OH2, atoms 3 to 5\) is not finite in step 2\d: .*run.npz is of step 14, resume",
+    ):
+        run_fluid(atoms, SETTINGS, FILES)
+    assert len(lines("run.csv")) >= 1 + 5
+    assert len(read("run.traj", ":")) == len(lines("run.csv")) - 1
+
+
+def test_molecules_on_top_of_each_other_and_broken_shapes_are_refused_before_anything_is_written(folder):
+    atoms = box()
+    atoms.positions[3:6] = atoms.positions[:3] + 0.05
+    with pytest.raises(ValueError, match="on top of each other"):
+        run_fluid(atoms, SETTINGS, FILES)
+    atoms = box()
+    atoms.positions[4] += 0.3
+    with pytest.raises(ValueError, match=r"molecule 1 .* off its place"):
+        run_fluid(atoms, SETTINGS, FILES)
+    assert not list(Path().iterdir())
+
+
+def test_a_box_wrapped_into_its_cell_runs_as_the_whole_one(folder):
+    whole, cut = box(), box()
+    cut.wrap()
+    cut.positions[::3] += cut.cell.lengths()  # oxygens one cell further on: every molecule is cut
+    one, other = run_fluid(whole, SETTINGS), run_fluid(cut, SETTINGS)
+    assert abs(one.total_ev - other.total_ev).max() < 1e-9  # eV: round-off of other places of the same molecules
+
+
+def test_what_cannot_be_resumed_is_refused(folder):
+    settings = replace(SETTINGS, steps=14)
+    run_fluid(box(), settings, FILES)
+    with pytest.raises(ValueError, match="exists already"):
+        run_fluid(box(), settings, FILES)
+    with pytest.raises(ValueError, match=r"with step_fs = 1\.0, not 2\.0"):
+        run_fluid(box(), replace(settings, step_fs=2.0), FILES, resume=True)
+    with pytest.raises(ValueError, match="another box"):
+        run_fluid(box(8), settings, FILES, resume=True)
+    with pytest.raises(ValueError, match=r"wrote these files: csv, run\.traj, run\.xyz"):
+        run_fluid(box(), settings, replace(FILES, csv=None), resume=True)
+    with pytest.raises(ValueError, match="beyond the 5 steps"):
+        run_fluid(box(), replace(settings, steps=5), FILES, resume=True)
+    with pytest.raises(ValueError, match="name the checkpoint"):
+        run_fluid(box(), settings, resume=True)
+    with pytest.raises(ValueError, match=r"none.npz: there is no such checkpoint"):
+        run_fluid(box(), settings, replace(FILES, checkpoint="none.npz"), resume=True)
+    Path("run.csv").write_text("short")
+    with pytest.raises(ValueError, match=r"run.csv: is shorter than when the checkpoint was written"):
+        run_fluid(box(), settings, FILES, resume=True)
+    Path("run.npz").write_bytes(Path("run.npz").read_bytes()[:300])
+    with pytest.raises(ValueError, match="is no checkpoint"):
+        run_fluid(box(), settings, FILES, resume=True)
+    with pytest.raises(ValueError, match="checkpoint_every = 0"):
+        Outputs(checkpoint_every=0)
+
+
+def test_a_piece_that_does_not_fit_is_not_there_at_all(folder):
+    file = TextFile("a.csv")
+    file.add("head\n")
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (8, before[1]))
+    try:
+        with pytest.raises(OSError, match=r"a\.csv"):
+            file.add("0123456789\n")
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    file.close()
+    assert Path("a.csv").read_text() == "head\n"
+
+
+def test_the_pressure_is_that_of_centres_of_mass():
+    """P = (2 K_trans - 3V dU/dV)/3V, the derivative by moving centres and cell, molecules as they are."""
+    from fluid_boxes import SoftSites
+
+    for calculator, edge in ((calculator_of(SETTINGS), None), (SoftSites(), 9.0)):
+        atoms = box(8)
+        if edge is not None:
+            atoms.set_cell([edge] * 3)
+        atoms.calc = calculator
+        dynamics = dynamics_of(atoms, SETTINGS)
+        volume, centres = atoms.get_volume(), dynamics.state.centres.copy()
+
+        def potential(scale, atoms=atoms, dynamics=dynamics, centres=centres):
+            other = atoms.copy()
+            other.positions += np.repeat((scale - 1.0) * centres, 3, axis=0)
+            other.set_cell(atoms.cell * scale)
+            other.calc = atoms.calc
+            return other.get_potential_energy()
+
+        h = 1e-5
+        slope = (potential(1 + h) - potential(1 - h)) / (2 * h)  # dU/ds at s = 1, V = V0 s³
+        expected = (2.0 * dynamics.kinetic().translation_ev - slope) / (3.0 * volume) * 1.602176634e6
+        assert pressure_bar(dynamics) == pytest.approx(expected, rel=1e-5)  # a difference quotient of step 1e-5
+
+
+def test_the_table_has_its_rows_where_asked():
+    record = run_fluid(box(8), replace(SETTINGS, steps=10, every=5))
+    assert record.time_ps.tolist() == [0.0, 0.005, 0.01]
+    assert np.all(record.temperature_k > 0.0)
+    kinetic = (record.translation_ev, record.rotation_ev)
+    assert record.translation_k == pytest.approx(2 * kinetic[0] / (21 * 8.617333262145e-5), rel=1e-9)  # 3·8 - 3 degrees
+    assert record.rotation_k == pytest.approx(2 * kinetic[1] / (24 * 8.617333262145e-5), rel=1e-9)  # 3·8
