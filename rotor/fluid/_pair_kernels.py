@@ -93,6 +93,20 @@ def carry_to_atoms(
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
+def mass_centres(sites: Array, first_atom: Integers, first_site: Integers, masses: Array, centres: Array) -> None:
+    """Centres of mass; the real atoms of a molecule are the first of its sites."""
+    for m in range(len(centres)):
+        total, x, y, z = 0.0, 0.0, 0.0, 0.0
+        for a in range(first_atom[m + 1] - first_atom[m]):
+            mass, site = masses[first_atom[m] + a], first_site[m] + a
+            total += mass
+            x += mass * sites[site, 0]
+            y += mass * sites[site, 1]
+            z += mass * sites[site, 2]
+        centres[m, 0], centres[m, 1], centres[m, 2] = x / total, y / total, z / total
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
 def lever_tensor(forces: Array, arms_to: Array, arms_from: Array, first_site: Integers, by_molecule: bool) -> Array:
     """Σ F ⊗ (to - from) over sites or, by_molecule, over molecules with their total force: (3, 3), not symmetric."""
     tensor = np.zeros((3, 3))

@@ -21,7 +21,7 @@ from rotor.fluid.assembly import Assembly, assemble
 from rotor.fluid.ewald import EwaldParameters, WaveVectors, fourier_virial, parameters_for, self_energy, wave_vectors
 from rotor.fluid.interactions import PairTables, pair_tables, reaction_field, screened, switched, tail
 from rotor.fluid.models import RigidModel, model_of
-from rotor.fluid.neighbours import Neighbours
+from rotor.fluid.neighbours import CLOSEST_ANGSTROM, Neighbours
 from rotor.fluid.settings import ELECTROSTATICS
 from rotor.rotations import Array
 
@@ -85,7 +85,7 @@ class RigidPotential(Calculator):
         self, models: str | RigidModel | Sequence[str | RigidModel] = "spce", *, cutoff_angstrom: float = 9.0,
         electrostatics: str = "reaction-field", dielectric: float = math.inf, switch_width_angstrom: float = 1.0,
         damping_per_angstrom: float = 0.2, ewald: EwaldParameters | None = None, tolerance: float = 1e-5,
-        long_range_correction: bool = True, skin_angstrom: float = 1.5, threads: int = 1, **kwargs: Any,
+        long_range_correction: bool = True, skin_angstrom: float = 2.0, threads: int = 1, **kwargs: Any,
     ) -> None:  # fmt: skip
         self.models = models_of(models)
         self.cutoff_angstrom, self.electrostatics, self.dielectric = cutoff_angstrom, electrostatics, dielectric
@@ -120,6 +120,17 @@ class RigidPotential(Calculator):
         super().reset()
         self._neighbours = None
 
+    def check_state(self, atoms: Any, tol: float = 0.0) -> list[str]:
+        """What changed since the last calculation, to the bit (ASE calls this)."""
+        old: Any = self.atoms
+        if old is None or len(old) != len(atoms):
+            return list(all_changes)
+        now = {"positions": atoms.positions, "numbers": atoms.numbers, "cell": atoms.cell.array, "pbc": atoms.pbc}
+        was = {"positions": old.positions, "numbers": old.numbers, "cell": old.cell.array, "pbc": old.pbc}
+        changes = [name for name in now if not np.array_equal(now[name], was[name])]
+        labels = atoms.arrays.get("molecule"), old.arrays.get("molecule")
+        return changes if _same((atoms.numbers, labels[0]), (old.numbers, labels[1])) else ["numbers", *changes]
+
     def calculate(
         self, atoms: Any = None, properties: Sequence[str] = ("energy",), system_changes: Sequence[str] = all_changes
     ) -> None:
@@ -130,7 +141,9 @@ class RigidPotential(Calculator):
         self.last = found
         self.results = {"energy": found.energy_ev, "forces": found.forces_ev_per_angstrom}
         if box.pbc.all():
-            stress = -found.virial_ev / box.get_volume() - found.tail_pressure_ev_per_angstrom3 * np.eye(3)
+            stress = -found.virial_ev / float(
+                np.prod(right_angled(box))
+            ) - found.tail_pressure_ev_per_angstrom3 * np.eye(3)
             self.results["stress"] = np.array([stress[a, b] for a, b in VOIGT])
 
     @property
@@ -225,17 +238,18 @@ class RigidPotential(Calculator):
 
         self._run([lambda i=i: share(i) for i in range(self.threads)])
         if not np.isfinite(totals).all():
-            found = neighbours.closest(2 * a.reach_angstrom.max() + 1.0)
-            raise ValueError(f"the energy is not finite; atoms {found[1:] if found else '?'} lie on top of each other")
+            found = neighbours.closest(2 * a.reach_angstrom.max() + CLOSEST_ANGSTROM)
+            near = f"atoms {found[1]} and {found[2]} are {found[0]:.3g} Å apart" if found else "no atoms are near"
+            raise ValueError(f"the energy is not finite; {near}")
         return forces.sum(axis=0), totals.sum(axis=0)
 
     def _mass_centres(self, neighbours: Neighbours, masses: Array) -> Array:
         """Centres of mass, near the molecules' sites."""
-        a = neighbours.assembly
-        weighted = neighbours.sites[a.atom_sites] * masses[:, None]
-        return np.asarray(
-            np.add.reduceat(weighted, a.first_atom[:-1]) / np.add.reduceat(masses, a.first_atom[:-1])[:, None]
-        )
+        from rotor.fluid import _pair_kernels
+
+        a, centres = neighbours.assembly, np.empty((len(neighbours.assembly), 3))
+        _pair_kernels.mass_centres(neighbours.sites, a.first_atom, a.first_site, masses, centres)
+        return centres
 
     def _virial_of_pairs(self, neighbours: Neighbours, forces: Array, totals: Array, centres: Array) -> Array:
         """Σ F ⊗ R with centres of mass: the sum over list's centres, and Σ F (R - c) of each molecule's total force."""
