@@ -21,7 +21,7 @@ import numpy as np
 from ase import Atoms, units
 from ase.io import read, write
 
-from rotor.fluid.analysis import diffusion, drift_per_ns, endless_box, mean_of, pair_distribution
+from rotor.fluid.analysis import diffusion, drift_per_ns, endless_box, pair_distribution
 from rotor.fluid.engines.reading import run_engine
 from rotor.fluid.models import model_of
 from rotor.fluid.potential import RigidPotential
@@ -29,6 +29,7 @@ from rotor.fluid.record import FluidRecord
 from rotor.fluid.run import dynamics_of
 from rotor.fluid.settings import Settings
 from rotor.fluid.start import lattice_box, relax
+from rotor.fluid.summary import mean_of
 
 KJ_PER_MOL = units.mol / units.kJ  # of 1 eV
 VISCOSITY = 0.729e-3  # Pa s, SPC/E at 298 K: M. A. González and J. L. F. Abascal, J. Chem. Phys. 132, 096101 (2010)
@@ -96,11 +97,12 @@ def measured(engine: str, atoms: Atoms, settings: Settings) -> dict[str, Any]:
     for name, series in (
         ("energy_kj_per_mol", record.potential_ev * KJ_PER_MOL / molecules),
         ("temperature_k", record.temperature_k),
-        ("rotation_k_over_translation_k", record.rotation_k / record.translation_k),
+        ("rotation_k", record.rotation_k),
+        ("translation_k", record.translation_k),
         ("pressure_bar", record.pressure_bar[1:]),
     ):
-        mean = mean_of(series)
-        table[name] = [mean.value, mean.error]
+        mean = mean_of(name, "", series)
+        table[name] = [mean.mean, mean.error]
     shells = [pair_distribution(part, edges, edges.min() / 2, 180) for part in np.array_split(oxygen[::4], 5)]
     peaks = np.array([shell.first_peak() for shell in shells])
     table["first_peak_angstrom"], table["first_peak_height"] = (

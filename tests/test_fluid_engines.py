@@ -14,7 +14,7 @@ from ase import Atoms
 
 from rotor import units
 from rotor.fluid import models
-from rotor.fluid.analysis import mean_of
+
 from rotor.fluid.engines import lammps, openmm
 from rotor.fluid.engines.carriers import carriers_of
 from rotor.fluid.engines.lammps_input import data_file, ensemble_commands, input_file, table_file
@@ -26,6 +26,7 @@ from rotor.fluid.potential import RigidPotential
 from rotor.fluid.run import run_fluid
 from rotor.fluid.settings import Settings
 from rotor.fluid.start import lattice_box
+from rotor.fluid.summary import mean_of
 from rotor.inertia import point_masses
 
 HAS = {
@@ -369,8 +370,8 @@ def test_langevin_in_an_engine_heats_translations_and_rotations_alike(engine: st
     settings = settings_for(name, ensemble="langevin", friction_per_ps=20.0, step_fs=2.0, steps=4000, every=50)
     record = run_engine(engine, box(name, 64, 0.2), settings).record
     for series in (record.translation_k[10:], record.rotation_k[10:]):
-        mean = mean_of(series)
-        assert abs(mean.value - 298.15) < 4 * max(mean.error, 1.0)  # four standard errors, one in 16,000
+        mean = mean_of("temperature", "K", series)
+        assert abs(mean.mean - 298.15) < 4 * max(mean.error, 1.0)  # four standard errors, one in 16,000
         assert mean.error < 5.0  # enough to tell 5 degrees from 6
 
 

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 import typer
 
-from rotor.cli import inputs
+from rotor.cli import engines, inputs
 from rotor.cli.output import Files, NoAnswer, Table, json_text, note, show_facts, show_table, write_text
 
 if TYPE_CHECKING:
@@ -28,8 +27,6 @@ Examples:
   rotor fluid argon --molecules 500 --model argon --density 1.4 --temperature 90 --step 5fs"""
 
 TRAJECTORY = typer.Option(None, metavar="FILE", help="Write frames as they come (.traj, .xyz, .extxyz); repeatable.")
-# other engines by name, each making the table of a box and settings
-ENGINES: dict[str, Callable[[Any, Any], Any]] = {}
 
 
 def command(
@@ -48,14 +45,14 @@ def command(
     friction: str = typer.Option("1", metavar="F", help="Of langevin (1/ps)."),
     relaxation: str = typer.Option("100", metavar="T", help="Time constant of nose-hoover (fs)."),
     seed: int = typer.Option(1, metavar="N", help="Of the lattice, the velocities and the noise."),
-    threads: int = typer.Option(1, metavar="N", help="Threads of the built-in potential."),
+    threads: int = typer.Option(1, metavar="N", help="Threads of the built-in potential, or of the engine."),
     csv: str | None = typer.Option(None, metavar="FILE", help="Write rows as they come (.csv)."),
     trajectory: list[str] | None = TRAJECTORY,
     frames_every: int | None = typer.Option(None, metavar="N", help="Steps between frames; by default as --every."),
     checkpoint: str | None = typer.Option(None, metavar="FILE", help="Write what the run needs to continue (.npz)."),
     checkpoint_every: int = typer.Option(1000, metavar="N", help="Steps between checkpoints."),
     resume: bool = typer.Option(False, "--resume", help="Continue from --checkpoint."),
-    engine: str = typer.Option("rotor", metavar="NAME", help="Who runs it."),
+    engine: str = typer.Option("rotor", metavar="NAME", help="Who runs it: rotor, openmm or lammps."),
     json: str | None = inputs.JSON,
 ) -> None:
     """Rigid molecules that attract and repel: a run of a periodic box, its temperatures, energies and pressure."""
@@ -69,17 +66,14 @@ def command(
         relaxation_fs=1000.0 * inputs.positive("--relaxation", _femtoseconds(relaxation), "ps"), seed=seed,
     )  # fmt: skip
     outputs, files = _outputs(csv, trajectory or [], frames_every, checkpoint, checkpoint_every, json)
-    if engine != "rotor" and engine not in ENGINES:
-        raise ValueError(f"--engine: {engine!r} is no engine; there are {', '.join(['rotor', *ENGINES])}")
+    engines.check(engine, outputs, resume)
     inputs.whole("--threads", threads, 1)
     atoms, start = _box(source, settings, molecules, density, threads, relaxing=not resume)
     story = {"command": context.obj, "input": source, "engine": engine, "settings": asdict(settings), "start": start}
     if engine == "rotor":
         record, about = _run(atoms, settings, outputs, resume, threads, story)
     else:
-        if outputs.trajectories or outputs.checkpoint or resume:
-            raise ValueError(f"--engine {engine}: trajectories and checkpoints are kept by --engine rotor alone")
-        record, about = ENGINES[engine](atoms, settings), {}
+        record, about = engines.run(engine, atoms, settings, outputs, threads, _head(story)), {}
     _tell(record, {**_head(story), **about}, atoms, settings, outputs, files, json)
 
 

@@ -1,4 +1,4 @@
-"""What a path of molecules says: pair distribution, displacement and diffusion, means with the errors of correlated data.
+"""What a path of molecules says: pair distribution, displacement and diffusion, drift; errors as correlated data have them.
 
 Paths are arrays (frames, n, 3) in Å of n points, not folded into the cell; cells are rectangular, (3,) edges.
 """
@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rotor import units
+from rotor.fluid.summary import mean_of
 from rotor.rotations import Array
 from rotor.tables import Table
 
@@ -144,33 +145,6 @@ def endless_box(found: Diffusion, temperature_k: float, viscosity_pa_s: float, e
     return Diffusion(found.value, found.error, found.value + YEH_HUMMER_XI * drag)
 
 
-@dataclass(frozen=True)
-class Mean:
-    """A mean of correlated data, its standard error, and for how many independent ones the data count."""
-
-    value: float
-    error: float
-    effective: float
-
-    def differs_from(self, other: Mean) -> float:
-        """The difference in combined standard errors."""
-        return (self.value - other.value) / math.hypot(self.error, other.error)
-
-
-def mean_of(series: ArrayLike) -> Mean:
-    """Mean and standard error √(g var/n) of a series (n,), g = 1 + 2 Σ ρ its statistical inefficiency.
-
-    R. Friedberg and J. E. Cameron, J. Chem. Phys. 52, 6049 (1970); Sokal's window (`rotor.equipartition`).
-    """
-    from rotor.equipartition import statistical_inefficiency
-
-    values = np.asarray(series, dtype=np.float64)
-    if values.ndim != 1 or len(values) < 2:
-        raise ValueError(f"a series of shape {values.shape}: (n,) with n of 2 or more is wanted")
-    g = statistical_inefficiency(values[:, None])
-    return Mean(float(values.mean()), float(values.std(ddof=1) * math.sqrt(g / len(values))), len(values) / g)
-
-
 def block_errors(series: ArrayLike) -> Array:
     """Standard errors by pairing neighbours again and again, (levels,): they rise to a plateau where blocks are independent.
 
@@ -192,7 +166,7 @@ def drift_per_ns(time_ps: ArrayLike, energy: ArrayLike) -> tuple[float, float]:
     """Slope of an energy per ns, and its standard error from the scatter about the line (correlations counted)."""
     t, e = np.asarray(time_ps, dtype=np.float64) / 1000, np.asarray(energy, dtype=np.float64)
     slope, start = np.polyfit(t, e, 1)
-    rest = mean_of(e - start - slope * t)
+    rest = mean_of("", "", e - start - slope * t)
     return float(slope), rest.error / float(t.std())
 
 

@@ -25,6 +25,7 @@ from rotor.fluid.run import EV_PER_ANGSTROM3_BAR
 from rotor.fluid.settings import Settings
 from rotor.rotations import Array
 
+RUN = (sys.executable, "-m", "rotor.fluid.engines._lammps_run")
 INSTALL = 'python -m pip install "molrotor[lammps]"'
 
 
@@ -85,8 +86,7 @@ def frames(
         write_files(folder, scene, settings, form, accuracy=accuracy, kspace=kspace)
         with open(folder / "errors", "w+", encoding="utf-8") as errors:
             process = subprocess.Popen(
-                [*_launcher(cores), sys.executable, "-m", "rotor.fluid.engines._lammps_run"]
-                + [name, str(settings.steps), str(settings.every)],
+                [*_launcher(cores), *RUN, name, str(settings.steps), str(settings.every)],
                 env=environment(),
                 stdout=subprocess.PIPE,
                 stderr=errors,

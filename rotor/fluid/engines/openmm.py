@@ -225,17 +225,22 @@ class Session:
 
 
 def session(
-    scene: Scene, settings: Settings, form: Form | None = None, *, accuracy: float = 1e-5, platform: str | None = None
+    scene: Scene,
+    settings: Settings,
+    form: Form | None = None,
+    *,
+    accuracy: float = 1e-5,
+    platform: str | None = None,
+    threads: int = 1,
 ) -> Session:
     """A context with the scene in it, its molecules moving as the scene says.
 
-    platform: "Reference" (double precision), "CPU", "CUDA", ...; None: the fastest that this machine has.
+    accuracy: of the forces of Ewald's sum (PME), relative. platform: "Reference" (double precision), "CPU", "CUDA", ...;
+    None: the fastest that this machine has. threads: of the platform CPU.
     """
-    mm = load()
-    form = form or Form()
+    mm, form = load(), form or Form()
     mine = handed(scene, settings, form, accuracy)
-    made = integrator(mm, settings)
-    context = mm.Context(mine.system, made, *([mm.Platform.getPlatformByName(platform)] if platform else []))
+    context = _context(mm, mine.system, integrator(mm, settings), platform, threads)
     context.setPositions(mine.positions / 10)
     context.applyConstraints(1e-7)
     context.computeVirtualSites()
@@ -244,13 +249,26 @@ def session(
     return ready
 
 
-def frames(
-    scene: Scene, settings: Settings, form: Form | None = None, *, accuracy: float = 1e-5, platform: str | None = None
-) -> Iterator[Frame]:
-    """Run, and give a frame at step 0 and after every `settings.every` steps."""
-    run = session(scene, settings, form, accuracy=accuracy, platform=platform)
-    stepper = run.context.getIntegrator()
-    yield run.frame(0)
-    for step in range(settings.every, settings.steps + 1, settings.every):
-        stepper.step(settings.every)
-        yield run.frame(step)
+def _context(mm: Any, system: Any, made: Any, platform: str | None, threads: int) -> Any:
+    """A context; where the choice of the platform is left to OpenMM and it is not the CPU, it finds one that works."""
+    known = [mm.Platform.getPlatform(k) for k in range(mm.Platform.getNumPlatforms())]
+    chosen = platform or max(known, key=lambda one: float(one.getSpeed())).getName()
+    if chosen == "CPU":
+        return mm.Context(system, made, mm.Platform.getPlatformByName("CPU"), {"Threads": str(threads)})
+    if platform is None:
+        return mm.Context(system, made)
+    return mm.Context(system, made, mm.Platform.getPlatformByName(platform))
+
+
+def frames(scene: Scene, settings: Settings, form: Form | None = None, **options: Any) -> Iterator[Frame]:
+    """Run, and give a frame at step 0 and after every `settings.every` steps; options as of `session`."""
+    mm = load()
+    try:
+        run = session(scene, settings, form, **options)
+        stepper = run.context.getIntegrator()
+        yield run.frame(0)
+        for step in range(settings.every, settings.steps + 1, settings.every):
+            stepper.step(settings.every)
+            yield run.frame(step)
+    except mm.OpenMMException as error:
+        raise RuntimeError(f"OpenMM stopped: {error}") from error

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+import importlib
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -27,61 +28,61 @@ class EngineRun:
     positions_angstrom: Array
 
 
-def run_engine(
-    name: str, atoms: Any, settings: Settings, *, progress: Callable[[int], None] | None = None, **options: Any
-) -> EngineRun:
+def run_engine(name: str, atoms: Any, settings: Settings, **options: Any) -> EngineRun:
     """Hand a box to the engine of that name, run it, read it back.
 
-    atoms: an ase.Atoms box. progress: called with every step that is reached. options: of the engine, see
-    `rotor.fluid.engines.openmm.frames` and `rotor.fluid.engines.lammps.frames`.
+    atoms: an ase.Atoms box. options: of the engine, see `rotor.fluid.engines.openmm.frames` and
+    `rotor.fluid.engines.lammps.frames`.
 
-    Raises ValueError for what the engine cannot be handed, ModuleNotFoundError where it is not installed.
+    Raises ValueError for what the engine cannot be handed, ModuleNotFoundError where it is not installed, OSError where it
+    does not load, RuntimeError where it stops on its way.
     """
     scene = scene_of(atoms, settings)
-    seen: list[Frame] = []
-    for frame in engine_frames(name, scene, settings, **options):
-        seen.append(frame)
-        if progress:
-            progress(frame.step)
+    seen = list(engine_frames(name, scene, settings, **options))
     return EngineRun(scene, record_of(seen, scene, settings), np.stack([frame.positions for frame in seen]))
 
 
 def engine_frames(name: str, scene: Scene, settings: Settings, **options: Any) -> Iterator[Frame]:
-    """The frames of an engine by its name."""
-    if name == "openmm":
-        from rotor.fluid.engines import openmm
+    """The frames of an engine by its name, each checked to be finite."""
+    if name not in ENGINES:
+        raise ValueError(f"{name!r} is no engine; there are {', '.join(ENGINES)}")
+    engine = importlib.import_module(f"rotor.fluid.engines.{name}")
+    for frame in engine.frames(scene, settings, **options):
+        if not (np.isfinite(frame.potential_ev) and np.isfinite(frame.positions).all()):
+            raise RuntimeError(
+                f"{name}: energy or positions are not finite at step {frame.step}: molecules on top of each other, or a "
+                "step too long"
+            )
+        yield frame
 
-        return openmm.frames(scene, settings, **options)
-    if name == "lammps":
-        from rotor.fluid.engines import lammps
 
-        return lammps.frames(scene, settings, **options)
-    raise ValueError(f"{name!r} is no engine; there are {', '.join(ENGINES)}")
+def record_of(frames: Iterable[Frame], scene: Scene, settings: Settings) -> FluidRecord:
+    """The table of frames."""
+    rows = np.array([row_of(frame, scene, settings) for frame in frames], dtype=np.float64)
+    return FluidRecord(*rows.reshape(-1, len(fields(FluidRecord))).T)
 
 
-def record_of(frames: Sequence[Frame], scene: Scene, settings: Settings) -> FluidRecord:
-    """The table of frames.
+def row_of(frame: Frame, scene: Scene, settings: Settings) -> list[float]:
+    """A row of the table.
 
     Energies of motion are those of the thermometer without an error of order h² (`rotor.fluid.temperature`): mixed from
     momenta on the step, as they are from momenta between steps, where a thermostat acts. The total has the energy on the
     step.
     """
-    h = settings.step_fs / 1000 / units.CLASSICAL_TIME_PS
-    energies = [frame.motion.kinetic() for frame in frames]
-    measured = [
-        kinetic if frame.half else kinetic + frame.motion.correction(h).times(THERMOMETERS["mixed"])
-        for frame, kinetic in zip(frames, energies, strict=True)
+    stored = frame.motion.kinetic()
+    kinetic = stored
+    if not frame.half:
+        h = settings.step_fs / 1000 / units.CLASSICAL_TIME_PS
+        kinetic = stored + frame.motion.correction(h).times(THERMOMETERS["mixed"])
+    heat = temperatures(kinetic, scene.degrees)
+    return [
+        frame.step * settings.step_fs / 1000,
+        frame.potential_ev,
+        kinetic.translation_ev,
+        kinetic.rotation_ev,
+        frame.potential_ev + stored.total_ev + frame.thermostat_ev,
+        heat.all_k,
+        heat.translation_k,
+        heat.rotation_k,
+        frame.pressure_bar,
     ]
-    heat = [temperatures(kinetic, scene.degrees) for kinetic in measured]
-    total = [f.potential_ev + k.total_ev + f.thermostat_ev for f, k in zip(frames, energies, strict=True)]
-    return FluidRecord(
-        time_ps=np.array([frame.step for frame in frames]) * settings.step_fs / 1000,
-        potential_ev=np.array([frame.potential_ev for frame in frames]),
-        translation_ev=np.array([kinetic.translation_ev for kinetic in measured]),
-        rotation_ev=np.array([kinetic.rotation_ev for kinetic in measured]),
-        total_ev=np.array(total),
-        temperature_k=np.array([one.all_k for one in heat]),
-        translation_k=np.array([one.translation_k for one in heat]),
-        rotation_k=np.array([one.rotation_k for one in heat]),
-        pressure_bar=np.array([frame.pressure_bar for frame in frames]),
-    )
