@@ -14,11 +14,10 @@ from ase import Atoms
 
 from rotor import units
 from rotor.fluid import models
-
 from rotor.fluid.engines import lammps, openmm
 from rotor.fluid.engines.carriers import carriers_of
 from rotor.fluid.engines.lammps_input import data_file, ensemble_commands, input_file, table_file
-from rotor.fluid.engines.pairs import Form, pair_energy, tail_of
+from rotor.fluid.engines.pairs import Form, pair_energy
 from rotor.fluid.engines.reading import engine_frames, record_of, run_engine
 from rotor.fluid.engines.scene import Frame, Scene, point_velocities, rigid_motion, scene_of
 from rotor.fluid.models import RigidModel, Site, model_of
@@ -166,7 +165,7 @@ def test_files_for_lammps_hold_the_scene() -> None:
     scene = scene_of(box("tip4p", 64, 0.9), settings)
     text = data_file(scene)
     head, rest = text.split("Masses", 1)
-    assert "256 atoms" in head and "3 atom types" in head and "192 bonds" in head
+    assert all(count in head for count in ("256 atoms", "3 atom types", "192 bonds"))
     rows = [line.split() for line in rest.split("Atoms # full")[1].split("Velocities")[0].splitlines() if line.strip()]
     table = np.array(rows, dtype=float)
     assert np.array_equal(table[:, 4:], scene.site_positions)  # 17 digits give the double back
@@ -326,7 +325,8 @@ def test_openmm_is_not_handed_shifted_charges() -> None:
 
 
 def nist(reference: Path) -> Atoms:
-    lines = gzip.open(reference, "rt").read().splitlines()
+    with gzip.open(reference, "rt") as file:
+        lines = file.read().splitlines()
     rows = [line.split() for line in lines[2:] if line.strip()]
     places = [[float(x) for x in row[1:4]] for row in rows]
     return Atoms([row[4] for row in rows], places, cell=[float(x) for x in lines[0].split()], pbc=True)
@@ -351,6 +351,7 @@ def test_an_engine_moves_the_box_as_we_do(engine: str) -> None:
     assert np.isfinite(record.pressure_bar[first:]).all()
 
 
+@pytest.mark.slow
 @HAS["openmm"]
 def test_chains_of_openmm_are_told_our_count_of_degrees() -> None:
     settings = settings_for("trappe-co2", ensemble="nose-hoover", step_fs=2.0, steps=8000, every=8, relaxation_fs=200.0)
@@ -364,6 +365,7 @@ def test_chains_of_openmm_are_told_our_count_of_degrees() -> None:
     )  # the bath's energy is in the total
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", BOTH)
 @pytest.mark.parametrize("name", ["trappe-n2", "methane"])
 def test_langevin_in_an_engine_heats_translations_and_rotations_alike(engine: str, name: str) -> None:
@@ -375,6 +377,7 @@ def test_langevin_in_an_engine_heats_translations_and_rotations_alike(engine: st
         assert mean.error < 5.0  # enough to tell 5 degrees from 6
 
 
+@pytest.mark.slow
 @HAS["lammps"]
 def test_lammps_runs_on_two_cores_and_tells_its_errors(monkeypatch: pytest.MonkeyPatch) -> None:
     settings = settings_for("spce", steps=4, every=2)
@@ -388,6 +391,7 @@ def test_lammps_runs_on_two_cores_and_tells_its_errors(monkeypatch: pytest.Monke
         list(engine_frames("lammps", scene, settings))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", BOTH)
 @pytest.mark.parametrize("number", [1, 3])
 def test_reference_boxes_have_one_energy(engine: str, number: int, shared: Path) -> None:

@@ -98,7 +98,7 @@ def _placed(frame: Frame, scene: Scene, atoms: Atoms) -> Atoms:
     from rotor.fluid.engines.scene import point_velocities
 
     masses, owners = scene.site_masses[scene.real], scene.molecule_of_site[scene.real]
-    placed = atoms.copy()
+    placed: Atoms = atoms.copy()
     placed.set_masses(masses)
     placed.positions = frame.positions
     placed.set_velocities(point_velocities(frame.motion, owners, masses, frame.positions))

@@ -7,9 +7,11 @@ charges under a cutoff are handed over as a table, Lennard-Jones included. Units
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rotor import units
 from rotor.fluid.engines.pairs import Form, pair_energy
@@ -80,9 +82,9 @@ def data_file(scene: Scene) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _section(name: str, rows: object) -> list[str]:
+def _section(name: str, rows: Iterable[Iterable[float]]) -> list[str]:
     """A section of a data file, its rows numbered from 1."""
-    numbered = enumerate(rows, 1)  # type: ignore[call-overload]
+    numbered = enumerate(rows, 1)
     return ["", name, "", *(f"{k} " + " ".join(f"{value:.17g}" for value in row) for k, row in numbered)]
 
 
@@ -149,7 +151,7 @@ def ensemble_commands(scene: Scene, settings: Settings) -> list[str]:
     return commands
 
 
-def _types(scene: Scene, chosen: Ints) -> str:
+def _types(scene: Scene, chosen: NDArray[np.bool_]) -> str:
     """Types of the chosen species."""
     numbers = np.concatenate([site_types(scene).of_species[k] for k in np.flatnonzero(chosen)])
     return " ".join(map(str, np.unique(numbers)))

@@ -62,7 +62,10 @@ def handed(scene: Scene, settings: Settings, form: Form, accuracy: float) -> Han
     system.setDefaultPeriodicBoxVectors(mm.Vec3(a, 0, 0), mm.Vec3(0, b, 0), mm.Vec3(0, 0, c))
     force = nonbonded(mm, settings, form, accuracy)
     plans = [carriers_of(one.model, one.masses) for one in scene.species]
-    carriers, owners, atoms, positions = [], [], [], []
+    carriers: list[int] = []
+    owners: list[int] = []
+    atoms: list[int] = []
+    positions: list[Array] = []
     for molecule, kind in enumerate(scene.kinds):
         plan, model, first = plans[kind], scene.species[kind].model, system.getNumParticles()
         here = scene.site_positions[scene.first_sites[molecule] :][: len(model.sites)]
@@ -107,7 +110,7 @@ def nonbonded(mm: Any, settings: Settings, form: Form, accuracy: float) -> Any:
 
 def _add_molecule(mm: Any, system: Any, force: Any, plan: Carriers, model: Any) -> int:
     """Particles, constraints and exclusions of one molecule; where its sites begin."""
-    first = system.getNumParticles()
+    first = int(system.getNumParticles())
     for mass in plan.masses:
         system.addParticle(float(mass))
     for i, j in combinations(range(len(plan.masses)), 2):

@@ -99,7 +99,7 @@ class Motion:
     @cached_property
     def inverse(self) -> Array:
         """I⁺ (n, 3, 3): of a linear molecule only the part across its axis, of an atom 0."""
-        return np.linalg.pinv(self.inertia, rcond=1e-9, hermitian=True)
+        return np.asarray(np.linalg.pinv(self.inertia, rcond=1e-9, hermitian=True), dtype=np.float64)
 
     def kinetic(self) -> Kinetic:
         """Energies of translation and rotation, Σ P²/2M and Σ ½ L·I⁻¹L."""
@@ -128,7 +128,7 @@ def rigid_motion(owners: Ints, masses: Array, positions: Array, velocities: Arra
     P = Σ m v, L = Σ m (r - R) x v, I = Σ m (d² 1 - d dᵀ), F = Σ f, N = Σ (r - R) x f: what internal forces of constraint
     do drops out.
     """
-    mass = np.bincount(owners, masses)
+    mass = np.bincount(owners, masses).astype(np.float64)
     lever = positions - centres(owners, masses, positions)[owners]
     second = _sums(owners, (masses[:, None, None] * lever[:, :, None] * lever[:, None, :]).reshape(-1, 9))
     second = second.reshape(-1, 3, 3)
