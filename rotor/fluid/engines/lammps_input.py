@@ -78,7 +78,7 @@ def data_file(scene: Scene) -> str:
     lines += _section("Velocities", scene.site_velocities / units.CLASSICAL_TIME_PS)
     if len(bonded):
         first = scene.first_sites[scene.molecule_of_site[bonded]]
-        lines += _section("Bonds", [(1, i + 1, j + 1) for i, j in zip(first, bonded, strict=True)])
+        lines += _section("Bonds", [(1, int(i) + 1, int(j) + 1) for i, j in zip(first, bonded, strict=True)])
     return "\n".join(lines) + "\n"
 
 

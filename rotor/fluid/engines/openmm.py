@@ -30,7 +30,8 @@ NM_PER_PS = 0.1 / units.CLASSICAL_TIME_PS  # 1 Å √(eV/u) in nm/ps
 class Handed:
     """A scene as OpenMM has it.
 
-    system: openmm.System. barostat: a part of it that changes nothing and measures the pressure. carriers: (c,) its particles with mass. owners: (c,) their molecules. masses: (c,). atoms:
+    system: openmm.System. barostat: a part of it that changes nothing and measures the pressure.
+    carriers: (c,) its particles with mass. owners: (c,) their molecules. masses: (c,). atoms:
     (atoms,) its particles that are the real atoms. positions: (particles, 3) Å.
     """
 
