@@ -128,3 +128,30 @@ def neighbour_list(
                     used += 1
             starts[m * species + kind + 1] = used
     return starts, entries[:used]
+
+
+@njit(cache=True, error_model="numpy")
+def closest_atoms(
+    starts: Integers, entries: Integers, images: Array, centres: Array, sites: Array, first_site: Integers, first_atom: Integers,
+    within2: float,
+) -> Any:  # fmt: skip
+    """Squared distance and numbers of the nearest atoms of listed molecules with centres within √within2; -1 if there are none.
+
+    starts: where each molecule's list begins. The real atoms of a molecule are the first of its sites.
+    """
+    best, one, other = np.inf, -1, -1
+    for i in range(len(centres)):
+        for p in range(starts[i], starts[i + 1]):
+            entry = np.int64(entries[p])
+            j, image = entry >> 7, images[entry & 127]
+            x = centres[j, 0] + image[0] - centres[i, 0]
+            y = centres[j, 1] + image[1] - centres[i, 1]
+            z = centres[j, 2] + image[2] - centres[i, 2]
+            if x * x + y * y + z * z >= within2:
+                continue
+            for a in range(first_atom[i + 1] - first_atom[i]):
+                for b in range(first_atom[j + 1] - first_atom[j]):
+                    square = np.sum((sites[first_site[j] + b] + image - sites[first_site[i] + a]) ** 2)
+                    if square < best:
+                        best, one, other = square, first_atom[i] + a, first_atom[j] + b
+    return best, one, other

@@ -121,16 +121,11 @@ class Neighbours:
 
     def closest(self, within_angstrom: float) -> tuple[float, int, int] | None:
         """Distance and numbers of the two nearest atoms of different molecules with centres nearer than that, if any."""
-        first, second, shift = self.pairs()
-        apart = self.centres[second] + shift - self.centres[first]
-        near = np.flatnonzero(np.sum(apart**2, axis=1) < within_angstrom**2)
-        best: tuple[float, int, int] | None = None
-        places, start = self.sites[self.assembly.atom_sites], self.assembly.first_atom
-        for p in near:
-            i, j = first[p], second[p]
-            one, other = places[start[i] : start[i + 1]], places[start[j] : start[j + 1]] + shift[p]
-            distances = np.linalg.norm(one[:, None] - other[None], axis=2)
-            a, b = np.unravel_index(distances.argmin(), distances.shape)
-            if best is None or distances[a, b] < best[0]:
-                best = float(distances[a, b]), int(start[i] + a), int(start[j] + b)
-        return best
+        from rotor.fluid import _list_kernels
+
+        a = self.assembly
+        square, one, other = _list_kernels.closest_atoms(
+            np.ascontiguousarray(self.starts[:: len(a.models)]), self.entries, self.images, self.centres, self.sites,
+            a.first_site, a.first_atom, within_angstrom**2,
+        )  # fmt: skip
+        return None if one < 0 else (math.sqrt(square), int(one), int(other))

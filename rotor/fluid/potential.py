@@ -147,6 +147,11 @@ class RigidPotential(Calculator):
             self.results["stress"] = np.array([stress[a, b] for a, b in VOIGT])
 
     @property
+    def rebuilds(self) -> int:
+        """How often the lists of the present box were made."""
+        return self._neighbours.rebuilds if self._neighbours else 0
+
+    @property
     def terms_ev(self) -> dict[str, float]:
         """Energies by name of the last calculation: dispersion, long_range_correction, reaction_field, shifted, or
         real_space, fourier, self, intramolecular."""
