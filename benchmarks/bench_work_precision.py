@@ -3,7 +3,8 @@
     python benchmarks/bench_work_precision.py [--picture docs/pictures/work_precision.png] [--json FILE]
 
 One water-like top, I = (1, 1.875, 2.875), L = (0.5, 0.75, 1), one core. The exact solution is shown for one evaluation
-per period, its preparation left out; all other times are those of whole calls.
+per period, its preparation left out; all other times are those of whole calls. Time is that of the processor spent in this
+process, which other work on the machine disturbs less than the clock on the wall.
 """
 
 from __future__ import annotations
@@ -48,9 +49,9 @@ def timed(run: Callable[[], np.ndarray], repeats: int) -> tuple[float, np.ndarra
     """Microseconds per period of the fastest run, and its attitude."""
     seconds, attitude = [], IDENTITY
     for _ in range(repeats):
-        start = time.perf_counter()
+        start = time.process_time()
         attitude = run()
-        seconds.append(time.perf_counter() - start)
+        seconds.append(time.process_time() - start)
     return min(seconds) / PERIODS * 1e6, attitude
 
 
@@ -71,11 +72,12 @@ def curve(make: Callable[[float], Method], settings: list[float], repeats: int =
 
 
 def exact_point() -> Curve:
-    """One evaluation per period with phases in plain double, against phases in double-double."""
+    """One evaluation per period for 1000 periods; the error is that at t = 10⁶, 48,000 periods, against 50 digits."""
     motion = free_motion(MOMENTS, MOMENTUM)
     times = float(motion.period) * np.arange(1, PERIODS + 1)
-    cost, attitude = timed(lambda: motion.at(times, "double")[1][-1], 5)
-    return [(cost, float(distance(attitude, motion.at(times[-1])[1])))]
+    cost, _ = timed(lambda: motion.at(times)[1][-1], 5)
+    truth = (0.18396472966240838, -0.12579834796681974, 0.37906201650949952, 0.89813347645481284)
+    return [(cost, float(distance(motion.at(1e6)[1], truth)))]
 
 
 def curves() -> dict[str, Curve]:
@@ -98,7 +100,7 @@ def curves() -> dict[str, Curve]:
         cost, attitude = timed(lambda t=tolerance: scipy_motion(t, span), 1)
         plain.append((cost, float(distance(attitude, exact))))
     table["scipy DOP853"] = plain
-    table["exact, phases in double"] = exact_point()
+    table["exact motion, after 48,000 periods"] = exact_point()
     return table
 
 

@@ -1,19 +1,23 @@
 """What the exact free motion costs: per evaluation, per body set up, beside one period of an adaptive stepper.
 
-Run with `python benchmarks/free_motion.py` from the project's root; prints one line per case. Goals: an evaluation
-under 0.4 µs with phases in double-double, under 0.2 µs in plain double, on one core.
+    python benchmarks/free_motion.py [--json benchmarks/results/free_motion.json]
+
+Goal: an evaluation under 0.2 µs on one core.
 """
 
 from __future__ import annotations
 
+import argparse
+import json
 import time
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 from scipy.integrate import solve_ivp
 
 from rotor.classical.euler import gyroscopic_term
-from rotor.classical.free import Phases, free_motion
+from rotor.classical.free import free_motion
 from rotor.rotations import IDENTITY
 
 BODIES = {
@@ -37,19 +41,25 @@ def seconds(action: Callable[[], object], repeats: int = 5) -> float:
 
 
 def main() -> None:
-    rng = np.random.default_rng(1)
+    """Measure, print, and write a file if asked."""
+    parser = argparse.ArgumentParser(description="cost of the exact free motion")
+    parser.add_argument("--json", type=Path)
+    arguments = parser.parse_args()
+    rng, table = np.random.default_rng(1), {}
     times = rng.uniform(0.0, 1e6, TIMES)
     free_motion(*BODIES["linear"]).at(0.0)  # compiles, or reads what was compiled
-    modes: tuple[Phases, Phases] = ("double", "double-double")
     for name, (moments, momentum) in BODIES.items():
         motion = free_motion(moments, momentum)
-        cost = [seconds(lambda m=motion, p=phases: m.at(times, p)) / TIMES * 1e6 for phases in modes]  # type: ignore[misc]
-        print(f"{name:28s} {cost[0]:.3f} µs in double, {cost[1]:.3f} µs in double-double per evaluation")
+        table[f"one evaluation, {name}"] = seconds(lambda m=motion: m.at(times)) / TIMES * 1e6  # type: ignore[misc]
     for n in (1, 1_000, 100_000):
         moments, momenta = rng.uniform(0.3, 3.0, (n, 3)), rng.normal(size=(n, 3))
         spent = seconds(lambda i=moments, m=momenta: free_motion(i, m), 3)  # type: ignore[misc]
-        print(f"setting up {n:6d} bodies          {spent / n * 1e6:10.1f} µs per body")
-    print(f"scipy DOP853, rtol 1e-12       {seconds(stepped_period, 2) * 1e6:10.0f} µs for one period, one body")
+        table[f"setting up {n} bodies, each"] = spent / n * 1e6
+    table["scipy DOP853, rtol 1e-12, one period, one body"] = seconds(stepped_period, 2) * 1e6
+    for name, value in table.items():
+        print(f"{name:50s} {value:12.3f} µs")
+    if arguments.json:
+        arguments.json.write_text(json.dumps(table, indent=1) + "\n", encoding="utf-8")
 
 
 def stepped_period() -> None:

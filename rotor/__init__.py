@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from rotor.spectra.spectrum import Spectrum as Spectrum
     from rotor.thermo import VibrationalStates as VibrationalStates
     from rotor.thermo import partition_function as partition_function
+    from rotor.thermo import thermodynamic_functions as thermodynamic_functions
     from rotor.top import Top as Top
 
 _HOME = {
@@ -50,6 +51,7 @@ _HOME = {
     "refine": "rotor.molecules.refine",
     "solve_levels": "rotor.quantum.levels",
     "stream_lines": "rotor.formats.stream",
+    "thermodynamic_functions": "rotor.thermo",
     "write": "rotor.formats",
 }
 

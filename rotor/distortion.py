@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.constants import Constants
+from rotor.inertial_defect import inertia_by_modes, inertial_defect_u_angstrom2, is_planar
 from rotor.molecules.force_field import ForceField
 from rotor.top import Top
 from rotor.units import ELEMENTARY_CHARGE_C, PLANCK_J_S, ROTATIONAL_MHZ_U_ANGSTROM2
@@ -54,18 +55,11 @@ def tau_mhz(field: ForceField) -> Floats:
 
 
 def _constants_by_modes(field: ForceField, top: Top) -> Floats:
-    """∂b_αβ/∂Q_k (m, 3, 3) in MHz/(√u Å), principal axes."""
+    """∂b_αβ/∂Q_k (m, 3, 3) in MHz/(√u Å), principal axes; 0 along the axis of a linear molecule."""
     assert top.frame is not None  # a top of a molecule has one
-    positions = (field.molecule.positions_angstrom - top.frame.centre) @ top.frame.axes.T
-    modes = field.vibrations().modes.reshape(len(positions), 3, -1)
-    turned = np.einsum("ab,nbk->nak", top.frame.axes, modes)
-    cross = np.einsum("n,na,nbk->kab", np.sqrt(field.molecule.masses_u), positions, turned)
-    trace = np.einsum("kaa->k", cross)
-    inertia = 2 * trace[:, None, None] * np.eye(3) - cross - cross.transpose(0, 2, 1)
-
     linear = top.kind == "linear"
     inverse = np.array([0.0 if linear and i == 0 else 1 / moment for i, moment in enumerate(top.frame.moments)])
-    return np.asarray(-ROTATIONAL_MHZ_U_ANGSTROM2 * inverse[:, None] * inertia * inverse)
+    return np.asarray(-ROTATIONAL_MHZ_U_ANGSTROM2 * inverse[:, None] * inertia_by_modes(field, top) * inverse)
 
 
 def quartic_tensor_mhz(field: ForceField) -> Floats:
@@ -182,7 +176,7 @@ def _asymmetric(rigid: Constants, tensor: Floats, reduction: str, representation
 def semirigid_top(field: ForceField, *, reduction: str = "S", representation: str | None = None) -> Top:
     """The top of a force field: its geometry, and the quartic distortion that the force field gives.
 
-    Notes say where the distortion is from and what it neglects.
+    Notes say where the distortion is from and what it neglects, and the inertial defect of a planar molecule that vibrates.
     """
     top = Top.from_molecule(field.molecule)
     constants = distortion_constants(field, reduction=reduction, representation=representation)
@@ -190,4 +184,8 @@ def semirigid_top(field: ForceField, *, reduction: str = "S", representation: st
         f"quartic distortion from a harmonic force field ({field.source}): some per cent off, ten for hydrides; "
         "no sextic constants"
     )
-    return replace(top, constants=constants, notes=(*top.notes, note))
+    notes = (*top.notes, note)
+    if is_planar(top):
+        defect = inertial_defect_u_angstrom2(field)
+        notes += (f"A, B, C are those of the rigid minimum; vibration makes an inertial defect of {defect:.4f} u Å²",)
+    return replace(top, constants=constants, notes=notes)

@@ -184,7 +184,7 @@ class Top:
         """A rigid top from a geometry: principal axes, A, B, C, kind, dipole and polarizability turned along, spin weights.
 
         The symmetry of the nuclei decides the kind where it can (C3v is a symmetric top), the moments where it cannot.
-        Nuclear-spin weights follow from it, inversion doublets unresolved and the electronic state totally symmetric;
+        Nuclear-spin weights follow from it and from `molecule.electronic`, inversion doublets unresolved;
         `symmetry_within` is its tolerance, relative to the shortest distance. Dipole components that symmetry forbids
         and that are below 0.001 D are round-off or noise, and left out; so is what symmetry forbids of a polarizability
         and is below 0.001 of it.
@@ -210,10 +210,11 @@ class Top:
         symmetry = symmetry_of(molecule, symmetry_within)
         kind = kind_with_symmetry(kind, symmetry)
         dipole, tensor = molecule.dipole_debye, molecule.polarizability_angstrom3
+        weights = spin_weights(symmetry, [one.spin for one in molecule.nuclei], molecule.electronic)
         return cls(
             constants=constants_of_moments(frame.moments, kind.kind),
             dipole_abc_debye=None if dipole is None else _in_frame(frame, allowed_dipole(dipole, symmetry)),
-            spin_weights=spin_weights(symmetry, [nucleus.spin for nucleus in molecule.nuclei]),
+            spin_weights=weights,
             name=molecule.name,
             mass_u=float(np.sum(molecule.masses_u)),
             frame=frame,
@@ -222,7 +223,7 @@ class Top:
             symmetry=symmetry,
             source=molecule.source,
             dipole_source=molecule.dipole_source,
-            weights_source=f"from the permutations of nuclei in {symmetry.point_group}",
+            weights_source=f"from the permutations of nuclei in {symmetry.point_group}{_electrons(molecule, weights)}",
             notes=tuple(molecule.notes),
             polarizability_abc_angstrom3=None
             if tensor is None
@@ -291,6 +292,17 @@ class Top:
     def with_weights(self, weights: dict[str, int], source: str) -> Top:
         """The same top with other spin weights."""
         return replace(self, spin_weights=SpinWeights.from_mapping(weights), weights_source=source)
+
+
+def _electrons(molecule: Molecule, weights: SpinWeights) -> str:
+    """What spin weights take the electrons for, as words after the point group; none where levels weigh alike anyway."""
+    if weights.rule == "none":
+        return ""
+    if molecule.electronic == "odd":
+        return ", electrons in a state that half turns change in sign"
+    electrons = sum(one.element_number for one in molecule.nuclei) - molecule.charge
+    odd = "; theirs is an odd number here, so that the state may be another" if electrons % 2 else ""
+    return f", electrons taken for a closed shell{odd}"
 
 
 def constants_of_moments(moments: ArrayLike, kind: str) -> Constants:

@@ -69,22 +69,22 @@ def test_corrections_restore_detailed_balance_and_part_as_x_squared():
     x = grid / (60 * units.MHZ_PER_K)
     seen = bands["harmonic"] > 1e-3 * bands["harmonic"].max()
     assert np.allclose(
-        (bands["standard"] / bands["harmonic"])[seen], (np.tanh(x / 2) / (x / 2))[seen], rtol=2e-3
+        bands["standard"][seen] / bands["harmonic"][seen], (np.tanh(x / 2) / (x / 2))[seen], rtol=2e-3
     )  # smoothing
-    assert np.allclose((bands["schofield"] / bands["harmonic"])[seen], (np.sinh(x / 2) / (x / 2))[seen], rtol=2e-3)
+    assert np.allclose(bands["schofield"][seen] / bands["harmonic"][seen], (np.sinh(x / 2) / (x / 2))[seen], rtol=2e-3)
 
 
 def test_egelstaffs_time_is_shifted():
     """∫ e^(-x/2) S dν over all ν is C1 at the time ħ/2kT, known in closed form."""
-    cold, grid = 5.0, np.linspace(0.3, 40, 4000) * CM
-    band = linear_band(OCS, grid, 0.02 * CM, "egelstaff", cold).intensity
+    cold, grid = 5.0, np.linspace(0.05, 40, 8000) * CM
+    band = linear_band(OCS, grid, 0.01 * CM, "egelstaff", cold).intensity
     kt_mhz = cold * units.MHZ_PER_K
     density = band / (INTENSITY_NM2_MHZ * OCS.dipole_abc_debye[0] ** 2 * grid * 2 * np.sinh(0.5 * grid / kt_mhz))
     shift_ps = 1e6 / (4 * math.pi * kt_mhz)
     c1, _ = linear_curves(shift_ps / units.CLASSICAL_TIME_PS, OCS.moments_u_angstrom2[1], units.EV_PER_K * cold)
     assert 0.9 < c1 < 0.98
-    total = 2 * np.trapezoid(density, grid) + grid[0] * density[0]  # S rises straight from 0
-    assert total == pytest.approx(float(c1), abs=5e-4)  # its bend below the first point: 1e-4
+    total = 2 * np.trapezoid(density, grid) + grid[0] * density[0]  # as if S rose straight from 0
+    assert total == pytest.approx(float(c1), abs=6e-4)  # S(0) is not 0 but 1e-7 per MHz: 4e-4
 
 
 def test_ocs_at_300_k_over_its_lines():
@@ -94,9 +94,11 @@ def test_ocs_at_300_k_over_its_lines():
     beside = compare_bands(linear_band(OCS, grid, 2 * CM), quantum)
     assert beside.area == pytest.approx(1.0, abs=1e-4)  # the cut of the lines and the end of the grid
     assert beside.mean == pytest.approx(1.0, abs=2e-3)  # hB/kT = 1e-3
-    assert beside.largest < 4e-3
-    colder = Spectrum.from_lines(rotor.line_list(OCS, temperature_k=5, min_lgint=-14), grid, fwhm_mhz=2 * CM)
-    assert compare_bands(linear_band(OCS, grid, 2 * CM, temperature_k=5.0), colder).largest > 0.04
+    assert beside.largest < 2e-3
+    few = np.linspace(0, 12, 1201) * CM  # at 0.6 K, hB/kT = ½, four levels are there
+    lines = rotor.line_list(OCS, temperature_k=0.6, min_lgint=-14)
+    cold = compare_bands(linear_band(OCS, few, CM, temperature_k=0.6), Spectrum.from_lines(lines, few, fwhm_mhz=CM))
+    assert cold.largest > 0.03
 
 
 def test_water_agrees_at_300_k_and_parts_at_30_k():

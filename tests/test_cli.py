@@ -104,16 +104,18 @@ def test_info_of_water(call):
 
 
 def test_info_marks_the_temperatures_that_are_beyond_the_series(call, monkeypatch):
-    from rotor import thermo
+    from rotor.thermo import sums
 
-    real = thermo._summed
+    real = sums._summed
 
-    def breaks_above_400(terms, t, error):
-        if t > 400:
-            raise ValueError(f"Q({t:g} K): the sum over levels grows again at J = 9; too hot; lower it")
-        return real(terms, t, error)
+    def breaks_above_400(ladder, s, temperatures, *others):
+        if temperatures.max() > 400:
+            raise ValueError(
+                f"Q({temperatures.max():g} K): the sum over levels grows again at J = 9; too hot; lower it"
+            )
+        return real(ladder, s, temperatures, *others)
 
-    monkeypatch.setattr(thermo, "_summed", breaks_above_400)
+    monkeypatch.setattr(sums, "_summed", breaks_above_400)
     code, out, _ = call("info", "CO", "--json", "a.json")
     assert code == 0
     assert re.search(r"^ +500 +- +180\.761 +- +- +the sum over levels grows again at J = 9$", out, re.MULTILINE)

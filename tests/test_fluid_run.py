@@ -1,11 +1,12 @@
 """Long runs: kept, killed, resumed bit for bit; full disks, broken forces, files that were changed."""
 
+import io
 import os
-import resource
 import signal
 import subprocess
 import sys
 import time
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -64,7 +65,9 @@ def test_a_run_cut_anywhere_and_resumed_is_the_uninterrupted_one(folder, monkeyp
         with pytest.raises(KeyboardInterrupt):
             run_fluid(box(), settings, FILES, resume=step > 5, told=stop_after(step))
     with open("run.csv", "a") as file:
-        file.write("0.03")  # half a row, as a kill may leave it
+        file.write(
+            "0.03,-1.5\n" * 2000 + "0.03"
+        )  # many rows and half a row beyond the checkpoint, more than come after it
     resumed = box()
     again = run_fluid(resumed, settings, FILES, resume=True)
     assert same(record, again)
@@ -90,6 +93,18 @@ def test_a_finished_run_can_be_made_longer(folder):
     )  # eV: other checkpoints, so other lists, so other rounding
 
 
+@contextmanager
+def files_up_to(size):
+    """No file may grow beyond: the system's own refusal, as of a full disk."""
+    resource = pytest.importorskip("resource")
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+
 KILLED = """
 import sys
 import numpy as np
@@ -100,6 +115,7 @@ run_fluid(box(), replace(SETTINGS, ensemble="langevin", steps=100000), FILES, re
 """
 
 
+@pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="no SIGKILL on this system")
 def test_a_hard_kill_loses_no_more_than_one_interval(folder):
     root = Path(__file__).resolve().parents[1]
     environment = os.environ | {"PYTHONPATH": f"{root}{os.pathsep}{root / 'tests'}"}
@@ -130,25 +146,15 @@ def test_a_hard_kill_loses_no_more_than_one_interval(folder):
 
 
 def test_a_full_disk_stops_the_run_with_all_that_was_written(folder):
-    size = 12000
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))  # no file may grow beyond: the system's own refusal
-    try:
-        with pytest.raises(
-            RunStopped, match=r"run.csv: File too large at step \d+; what was written before is whole; run.npz"
-        ):
-            run_fluid(
-                box(),
-                replace(SETTINGS, steps=500, every=1, ensemble="langevin"),
-                replace(FILES, trajectories=(), checkpoint_every=7),
-            )
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    settings = replace(SETTINGS, steps=500, every=1, ensemble="langevin")
+    files = replace(FILES, trajectories=(), checkpoint_every=7)
+    said = r"run.csv: File too large at step \d+; what was written before is whole; run.npz is of step \d+"
+    with files_up_to(12000), pytest.raises(RunStopped, match=said):
+        run_fluid(box(), settings, files)
     rows = lines("run.csv")
     assert Path("run.csv").read_bytes().endswith(b"\n")
     assert all(len(row.split(",")) == 9 for row in rows)
-    settings = replace(SETTINGS, steps=100, every=1, ensemble="langevin")
-    record = run_fluid(box(), settings, replace(FILES, trajectories=(), checkpoint_every=7), resume=True)
+    record = run_fluid(box(), replace(settings, steps=100), files, resume=True)
     assert len(record) == 101
     assert lines("run.csv")[: len(rows)] == rows
 
@@ -253,13 +259,8 @@ def test_what_cannot_be_resumed_is_refused(folder):
 def test_a_piece_that_does_not_fit_is_not_there_at_all(folder):
     file = TextFile("a.csv")
     file.add("head\n")
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (8, before[1]))
-    try:
-        with pytest.raises(OSError, match=r"a\.csv"):
-            file.add("0123456789\n")
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    with files_up_to(8), pytest.raises(OSError, match=r"a\.csv"):
+        file.add("0123456789\n")
     file.close()
     assert Path("a.csv").read_text() == "head\n"
 
@@ -296,3 +297,38 @@ def test_the_table_has_its_rows_where_asked():
     kinetic = (record.translation_ev, record.rotation_ev)
     assert record.translation_k == pytest.approx(2 * kinetic[0] / (21 * 8.617333262145e-5), rel=1e-9)  # 3·8 - 3 degrees
     assert record.rotation_k == pytest.approx(2 * kinetic[1] / (24 * 8.617333262145e-5), rel=1e-9)  # 3·8
+
+
+def test_the_table_can_be_written_and_read_back(folder):
+    import json
+
+    import polars as pl
+
+    import rotor
+
+    record = run_fluid(box(8), replace(SETTINGS, steps=10, every=5))
+    for name, reader in (("a.csv", pl.read_csv), ("a.parquet", pl.read_parquet)):
+        rotor.write(record, name, settings={"seed": 1})
+        assert reader(name)["total_ev"].to_list() == record.total_ev.tolist()  # to the last bit
+    rotor.write(record, "a.json")
+    assert [row["rotation_k"] for row in json.loads(Path("a.json").read_text())] == record.rotation_k.tolist()
+    assert json.loads(Path("a.csv.provenance.json").read_text())["seed"] == 1
+    with pytest.raises(ValueError, match=r"\.csv, \.parquet or \.json"):
+        rotor.write(record, "a.txt")
+
+
+class Terminal(io.StringIO):
+    """A stream that says it is a terminal."""
+
+    def isatty(self):
+        return True
+
+
+def test_a_terminal_sees_speed_and_progress_and_a_pipe_nothing(capsys, monkeypatch):
+    run_fluid(box(8), SETTINGS)
+    assert capsys.readouterr() == ("", "")
+    terminal = Terminal()
+    monkeypatch.setattr("sys.stderr", terminal)
+    run_fluid(box(8), SETTINGS)
+    assert "ns/day" in terminal.getvalue()
+    assert "60 of 60 steps" in terminal.getvalue()

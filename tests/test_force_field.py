@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
 
 import force_fields
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 from ase.calculators.lj import LennardJones
 
+import rotor
 from rotor.distortion import distortion_constants
 from rotor.molecules.force_field import (
     EV_PER_ANGSTROM2,
@@ -184,6 +186,26 @@ def test_calculator_on_the_command_line(tmp_path, monkeypatch, capsys):
     assert "geometry refined with LennardJones" in err
 
 
+@pytest.mark.skipif(importlib.util.find_spec("tblite") is None, reason="tblite is not installed (pip install tblite)")
+def test_tblite_takes_a_smiles_to_distortion_constants(capfd):
+    """GFN2-xTB for H2CO: a real calculator from geometry to quartic constants, and nothing of its own on standard output."""
+    from rotor.cli import run
+
+    arguments = ["info", "SMILES:C=O", "--calculator", "tblite", "--hessian", "calculator", "--json", "-"]
+    assert run(arguments) == 0
+    out, err = capfd.readouterr()
+    found = json.loads(out)
+    assert found["point_group"] == "C2v"
+    measured = rotor.read("H2CO").constants
+    for name in "ABC":
+        assert found["constants_mhz"][name] == pytest.approx(measured[name], rel=0.04), name  # GFN2: 3.4, 1.5 and 2.1 %
+    for name in ("DJ", "DJK", "DK", "d1", "d2"):
+        # GFN2's force field: 3, 7, 13, 6 and 9 %
+        assert found["constants_mhz"][name] == pytest.approx(measured[name], rel=0.15), name
+    assert "geometry refined with TBLite" in err
+    assert "harmonic force field (TBLite" in err
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [(["water", "--calculator", "EMT"], "--calculator: calculator 'EMT'"), (["--constants", "B=1", "--calculator", "x"], "no geometry"),
@@ -224,6 +246,7 @@ def test_hessian_on_the_command_line(tmp_path, capsys):
         dict(expected.values), rel=1e-6
     )  # positions of nine digits
     assert "quartic distortion from a harmonic force field" in err
+    assert "vibration makes an inertial defect of 0.062" in err  # D2O; measured constants 0.067
     assert run(["info", "water", "--hessian", "calculator"]) == 2
     assert run(["info", "--constants", "B=1", "--hessian", "h.txt"]) == 2
     assert run(["info", "water", "--hessian", str(tmp_path / "none.txt")]) == 2

@@ -86,8 +86,8 @@ def test_two_methods_without_a_common_formula_agree_under_torque():
 LONG = [
     (RotationSplitting(PERIOD / 80, 8), 60_000, 3e-15),
     (SymmetricTopSplitting(PERIOD / 80, 8), 60_000, 3e-15),
-    (MoserVeselov(PERIOD / 40, 8), 1_000_000, 1e-12),
-    (MoserVeselov(PERIOD / 20, 0), 1_000_000, 1e-12),
+    (MoserVeselov(PERIOD / 40, 8), 1_000_000, 1.5e-13),  # 4e-17 √steps, and as much again to be safe
+    (MoserVeselov(PERIOD / 20, 0), 1_000_000, 1.5e-13),  # a root rounded to double precision leaves 4e-13
 ]
 
 
@@ -97,7 +97,7 @@ def test_invariants_after_a_million_turns(method, steps, bound):
     end = integrate(method, MOMENTS, MOMENTUM, [0.0, steps * method.step])
     drift = end.energy[-1] / end.energy[0] - 1.0
     truncation = 4e-13 if isinstance(method, (RotationSplitting, SymmetricTopSplitting)) else 0.0
-    assert abs(drift) < bound + truncation  # 2e-19 a step are seen; sums that are not compensated make 1e-16 x 10⁶
+    assert abs(drift) < bound + truncation  # sums that are not compensated make 1e-16 x 10⁶
     assert abs(np.linalg.norm(end.momentum[-1]) / np.linalg.norm(MOMENTUM) - 1.0) < 2e-13  # random walk
     assert abs(np.linalg.norm(end.attitude[-1]) - 1.0) < 2e-13
     in_space = rotate(end.attitude[-1], end.momentum[-1])
@@ -235,6 +235,25 @@ def test_sine_and_versed_sine_of_a_turn_belong_together_beyond_double_precision(
         square = sum(Fraction(float(x)) ** 2 for x in vector)
         excess = (1 - Fraction(v) - Fraction(low)) ** 2 + square - 1
         assert abs(float(excess)) < 1e-19  # without `low` 2e-18, in one direction for a turn that repeats
+
+
+def test_the_root_of_moser_and_veselov_is_known_beyond_double_precision():
+    from rotor.classical._step_kernels import _near_root, _refined
+
+    rng = np.random.default_rng(1)
+    for _ in range(100):
+        j = np.rint(rng.uniform(2.0, 8.0, 3) * 2**49) / 2**49
+        d = (j[1] - j[2], j[2] - j[0], j[0] - j[1])  # exact on that grid
+        m, lost = 0.4 * rng.normal(size=3), 1e-17 * rng.normal(size=3)
+        near, settled = _near_root(tuple(m), tuple(j), d, tuple(m / j))
+        assert settled
+        high, low = _refined(tuple(m), lost, tuple(j), d, near)
+        x = [Fraction(float(a)) + Fraction(float(b)) for a, b in zip(high, low, strict=True)]
+        size = 1 + sum(c * c for c in x)
+        for i, k, n in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+            momentum = Fraction(float(m[i])) + Fraction(float(lost[i]))
+            residual = size * momentum + Fraction(float(d[i])) * x[k] * x[n] - Fraction(float(j[i])) * x[i]
+            assert abs(float(residual)) < 1e-22  # x of 26 bits leaves 1e-8, known to 1e-16; rounded to double: 1e-16
 
 
 def test_compensated_sums_hold_the_lengths_thirty_times_better():

@@ -328,3 +328,32 @@ def test_every_molecule_of_the_library_has_a_family(path):
         assert (
             (ratio > 0.9) & (ratio < 1.0 + 1e-9)
         ).all()  # one or two heavier atoms slow it down, by less than a tenth
+
+
+@pytest.mark.parametrize(
+    ("changes", "weights"),
+    [
+        ("O=16O", {"even": 0, "odd": 1}),
+        ("O=18O", {"even": 0, "odd": 1}),
+        ("O=17O", {"even": 7, "odd": 5}),  # (I+1) : I with I = 5/2; fermions, and the sign of the electrons
+        ("1=18O", {}),
+        ("1=17O", {}),
+    ],
+)
+def test_isotopologues_of_oxygen_keep_its_odd_electronic_state(changes, weights):
+    """Of 16O2 and 18O2 odd N alone; of 17O2 both, the other way round than in a closed shell; of mixed ones every N."""
+    assert isotopologue(rotor.read("O2"), changes).top.spin_weights.to_mapping() == weights
+    assert rotor.read("O2", isotopes=changes).spin_weights.to_mapping() == weights
+
+
+def test_a_geometry_alone_is_taken_for_a_closed_shell_and_says_so():
+    pair = Molecule(("O", "O"), [[0, 0, 0], [0, 0, 1.2075]])
+    closed, odd = Top.from_molecule(pair), Top.from_molecule(replace(pair, electronic="odd"))
+    assert closed.spin_weights.to_mapping() == {"even": 1, "odd": 0}
+    assert "closed shell" in closed.weights_source
+    assert odd.spin_weights.to_mapping() == {"even": 0, "odd": 1}
+    assert "change in sign" in odd.weights_source
+    ion = Top.from_molecule(replace(pair, charge=1))
+    assert "odd number" in ion.weights_source
+    with pytest.raises(ValueError, match="electronic 'ungerade'"):
+        replace(pair, electronic="ungerade")

@@ -88,6 +88,10 @@ def test_constants_alone_are_a_molecule_file():
         ("[geometry]\natoms = [['O', 0, 0]]", "atom 1 = .*in Å is wanted"),
         ("[geometry]\natoms = [['O', 0, 0, 0], ['Xx', 0, 0, 1]]", r"\[geometry\], atoms: atom 2"),
         ("[geometry]\nkind = 'r9'\natoms = [['O', 0, 0, 0], ['C', 0, 0, 1]]", "kind = 'r9': one of r0, rs, re"),
+        (
+            "[geometry]\nelectronic = 'g'\natoms = [['O', 0, 0, 0], ['C', 0, 0, 1]]",
+            "electronic = 'g': one of even, odd",
+        ),
         ("[geometry]\nvibrational_difference = -1\natoms = [['O', 0, 0, 0], ['C', 0, 0, 1]]", "of at least 0"),
     ],
 )
@@ -112,6 +116,7 @@ def same(one: MoleculeFile, other: MoleculeFile) -> None:
     if one.molecule:
         assert one.molecule.nuclei == other.molecule.nuclei
         assert one.molecule.charge == other.molecule.charge
+        assert one.molecule.electronic == other.molecule.electronic
         assert np.array_equal(one.molecule.positions_angstrom, other.molecule.positions_angstrom)
 
 
@@ -126,7 +131,7 @@ def test_hard_text_survives_writing_and_reading():
     molecule = MoleculeFile(
         name='quote " backslash \\ newline \n tab \t Å',
         names=("x",),
-        molecule=Molecule(("N", "H"), [[0, 0, 0], [0, 0, 1e-3 + 1]], charge=1),
+        molecule=Molecule(("N", "H"), [[0, 0, 0], [0, 0, 1e-3 + 1]], charge=1, electronic="odd"),
         geometry_kind="r0",
         constants=Constants(A=5, B=4, C=3, d1=-1e-300, uncertainties={"A": 1e-17}, sources={"d1": "memory"}),
         spin_weights=SpinWeights.from_mapping({"ee": 1, "eo": 0, "oe": 0, "oo": 1}),

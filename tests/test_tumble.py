@@ -8,8 +8,10 @@ import shutil
 from functools import partial
 from pathlib import Path
 
+import matplotlib
 import numpy as np
 import pytest
+from PIL import Image
 
 import rotor
 from rotor.classical.free import free_motion
@@ -181,6 +183,24 @@ def test_an_animation_is_written(call, tmp_path, monkeypatch):
     code, _, err = call("tumble", "water", "--gif", "w.gif")
     assert code == 0, err
     assert (tmp_path / "w.gif").read_bytes()[:6] == b"GIF89a"
+    with Image.open(tmp_path / "w.gif") as film:
+        assert film.n_frames == 3
+        film.seek(0)
+        story = json.loads(film.info["comment"])
+    assert story["program"] == "rotor"
+    assert story["input"] == "water"
+    assert story["command"].startswith("rotor tumble water --gif")
+    assert len(story["moments"]) == 3
+
+
+@pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="no ffmpeg here to make an mp4")
+def test_an_mp4_is_written(call, tmp_path, monkeypatch):
+    monkeypatch.setattr(animation, "animate", partial(animation.animate, frames=3))
+    code, _, err = call("tumble", "water", "--gif", "w.mp4")
+    assert code == 0, err
+    content = (tmp_path / "w.mp4").read_bytes()
+    assert content[4:8] == b"ftyp"
+    assert b'"command": "rotor tumble water --gif' in content
 
 
 MISTAKES = [
@@ -228,11 +248,13 @@ def test_mistakes_are_told_in_one_line_and_nothing_is_written(call, tmp_path, ar
     assert sorted(tmp_path.iterdir()) == before
 
 
-@pytest.mark.skipif(shutil.which("ffmpeg") is not None, reason="ffmpeg is installed: an mp4 can be made")
 def test_mp4_without_ffmpeg_is_refused(call, tmp_path):
-    code, _, err = call("tumble", "water", "--gif", "a.mp4")
+    with matplotlib.rc_context({"animation.ffmpeg_path": "no-such-program"}):
+        code, out, err = call("tumble", "water", "--gif", "a.mp4", "--csv", "a.csv")
     assert code == 2
-    assert "an mp4 is made by ffmpeg, which is not installed here" in err
+    assert err.startswith("error: --gif: a.mp4: an mp4 is made by ffmpeg, which is not installed here")
+    assert err.count("\n") == 1
+    assert out == ""
     assert not list(tmp_path.iterdir())
 
 

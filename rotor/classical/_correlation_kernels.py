@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit
 
 from rotor.classical._free_kernels import evaluate
-from rotor.classical._kernels import LANES, RUNS, advance_blocks
+from rotor.classical._kernels import LANES, advance_blocks
 from rotor.classical.theta import Rows
 from rotor.rotations import Array
 
@@ -52,7 +52,7 @@ def add_bodies(rows: Rows, times: Array, vector: Array, axes: Array, beta: Array
             rows.axes[b : b + 1], rows.signs[b : b + 1], rows.left[b : b + 1], rows.right[b : b + 1],
             rows.momentum0[b : b + 1],
         )  # fmt: skip
-        evaluate(one, times, 1.0, momentum, attitude)
+        evaluate(one, times, momentum, attitude)
         for i in range(times.size):
             w, x, y, z = attitude[0, i, 0], attitude[0, i, 1], attitude[0, i, 2], attitude[0, i, 3]
             first, second = _turned_vector(w, x, y, z, vector), _turned_tensor(w, x, y, z, axes, beta)
@@ -62,24 +62,34 @@ def add_bodies(rows: Rows, times: Array, vector: Array, axes: Array, beta: Array
             sums[3, i] += second * second
 
 
-@njit(cache=True, nogil=True, fastmath={"contract", "reassoc", "nsz"}, error_model="numpy")
+@njit(cache=True, nogil=True)
 def add_stepped(
-    data: Array, bodies: int, step: float, steps: int, vector: Array, axes: Array, beta: Array, sums: Array
+    momentum: Array,
+    step: float,
+    steps: int,
+    rates: Array,
+    turns: Array,
+    vector: Array,
+    axes: Array,
+    beta: Array,
+    sums: Array,
 ) -> None:
-    """The same four sums for blocks of bodies (`_kernels.py`) that start upright, `steps` steps between two times."""
-    a, b, c, d = LANES * 3, LANES * 4, LANES * 5, LANES * 6
-    for block in range(data.size // (RUNS * LANES)):
-        row = data[block * RUNS * LANES : (block + 1) * RUNS * LANES]
-        here = min(LANES, bodies - block * LANES)  # the last block is filled with bodies at rest
+    """The same four sums for bodies (n, 3) that start upright, `steps` steps of `_kernels.py` between two times.
+
+    A block of bodies is followed through all times before the next one, so that its state stays in the nearest cache.
+    """
+    attitude = np.empty((len(momentum), 4))
+    attitude[:, 0], attitude[:, 1:] = 1.0, 0.0
+    for block in range(-(-len(momentum) // LANES)):
+        first, last = block * LANES, min((block + 1) * LANES, len(momentum))
         for i in range(sums.shape[1]):
             if i > 0:
-                advance_blocks(data, block, block + 1, step, steps)
-            s1 = s2 = s3 = s4 = 0.0
-            for k in range(here):
-                w, x, y, z = row[a + k], row[b + k], row[c + k], row[d + k]
-                first, second = _turned_vector(w, x, y, z, vector), _turned_tensor(w, x, y, z, axes, beta)
-                s1, s2, s3, s4 = s1 + first, s2 + first * first, s3 + second, s4 + second * second
-            sums[0, i] += s1
-            sums[1, i] += s2
-            sums[2, i] += s3
-            sums[3, i] += s4
+                state = (momentum, attitude)
+                advance_blocks((block, block + 1), step, steps, rates, turns, state, state)
+            for b in range(first, last):
+                w, x, y, z = attitude[b, 0], attitude[b, 1], attitude[b, 2], attitude[b, 3]
+                one, two = _turned_vector(w, x, y, z, vector), _turned_tensor(w, x, y, z, axes, beta)
+                sums[0, i] += one
+                sums[1, i] += one * one
+                sums[2, i] += two
+                sums[3, i] += two * two

@@ -122,20 +122,20 @@ def _placed(left: Any, right: Any, w: float, x: float, y: float, z: float, half_
 
 
 @njit(cache=True, nogil=True)
-def evaluate(rows: Rows, times: Array, low: float, momentum: Array, attitude: Array) -> None:
-    """Momentum (n, t, 3) and attitude (n, t, 4) of n bodies at t times; `low` is 1, or 0 to drop the low halves."""
+def evaluate(rows: Rows, times: Array, momentum: Array, attitude: Array) -> None:
+    """Momentum (n, t, 3) and attitude (n, t, 4) of n bodies at t times."""
     for b in range(rows.kind.shape[0]):
         kind, rate, c, sign, axis = rows.kind[b], rows.rates[b], rows.series[b], rows.signs[b], rows.axes[b]
         for i in range(times.shape[0]):
             t = times[i]
-            hi, lo = _phase(t, rate[4], low * rate[5], 0.0, 0.0)
+            hi, lo = _phase(t, rate[4], rate[5], 0.0, 0.0)
             _, turn = _nearest(hi, lo)
             half_turn = 2.0 * math.pi * turn
             if kind == STEADY:
                 momentum[b, i] = rows.momentum0[b]
                 _placed(rows.left[b], rows.right[b], 1.0, 0.0, 0.0, 0.0, half_turn, attitude[b, i])
                 continue
-            hi, lo = _phase(t, rate[0], low * rate[1], rate[2], low * rate[3])
+            hi, lo = _phase(t, rate[0], rate[1], rate[2], rate[3])
             if kind == SEPARATRIX:
                 parity, v = 1.0, hi + lo
                 m1, m2, m3, w, x, y, z = _near_separatrix(v, c)

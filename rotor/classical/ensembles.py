@@ -14,17 +14,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rotor.classical.euler import checked_moments
 from rotor.classical.free import free_motion
-from rotor.classical.many import packed
+from rotor.classical.many import check_turn, rates_and_axes
 from rotor.degrees import rotating_axes
 from rotor.equipartition import KineticDegrees, kinetic_degrees
-from rotor.rotations import IDENTITY, Array, uniform
+from rotor.rotations import Array, uniform
 from rotor.tables import Table
 
 PIECE = 10_000  # molecules that are drawn and moved together
@@ -61,8 +61,12 @@ class Ensemble:
         """The same molecules a time later, by the exact free motion; an atom only flies on."""
         if not rotating_axes(self.moments).any():
             return self
-        momentum, attitude = free_motion(self.moments, self.momentum, self.attitude).at([time])
-        return Ensemble(self.moments, self.kt, momentum[:, 0], attitude[:, 0], self.mass, self.velocity)
+        momentum, attitude = np.empty_like(self.momentum), np.empty_like(self.attitude)
+        for first in range(0, len(self), PIECE):
+            part = slice(first, first + PIECE)
+            later = free_motion(self.moments, self.momentum[part], self.attitude[part]).at(time)
+            momentum[part], attitude[part] = later
+        return replace(self, momentum=momentum, attitude=attitude)
 
 
 @dataclass(frozen=True)
@@ -203,7 +207,7 @@ def stepped_gas_correlations(
     """The same at times 0, interval, ... (count of them), by `steps` steps of the splitting of `many.py` each.
 
     The error of an attitude grows as step² times the time; with the same `rng` the molecules are the same as in
-    `free_gas_correlations`, so that the difference of both is the error of stepping alone. Linear molecules are refused.
+    `free_gas_correlations`, so that the difference of both is the error of stepping alone.
     """
     inertia, probe = checked_moments(moments), Probe.of(vector, tensor)
     if count < 1 or steps < 1:
@@ -213,9 +217,11 @@ def stepped_gas_correlations(
     def piece(size: int, source: np.random.Generator) -> Array:
         from rotor.classical._correlation_kernels import add_stepped
 
-        data, n = packed(inertia, thermal_momenta(inertia, kt, size, rng=source), IDENTITY, interval / steps)
+        momentum = thermal_momenta(inertia, kt, size, rng=source)
+        rates, axes = (np.repeat(a, size, axis=0) for a in rates_and_axes(inertia))
+        check_turn(rates, momentum, interval / steps)
         sums = np.zeros((4, count))
-        add_stepped(data, n, interval / steps, steps, probe.vector, probe.axes, probe.beta, sums)
+        add_stepped(momentum, interval / steps, steps, rates, axes, probe.vector, probe.axes, probe.beta, sums)
         return sums
 
     return _averaged(piece, grid, probe, molecules, rng, executor, progress)

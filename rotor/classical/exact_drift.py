@@ -14,15 +14,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rotor.classical.compositions import fractions
 from rotor.classical.free import free_motion
-from rotor.classical.integrators import KickDrift
+from rotor.classical.integrators import Composed
 from rotor.classical.system import System
 from rotor.rotations import Array
 
 
 @dataclass(frozen=True)
-class ExactDrift(KickDrift):
+class ExactDrift(Composed):
     """Exact drifts; free motion is evaluated at the times asked for and `step` is not used.
 
     >>> from rotor.classical.integrators import integrate
@@ -30,17 +29,6 @@ class ExactDrift(KickDrift):
     >>> motion.momentum[-1].round(12).tolist(), motion.steps
     ([1.765962508518, -0.695464197033, 0.779554981482], 0)
     """
-
-    order: int = 2
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        fractions(self.order)
-
-    @property
-    def kick_fractions(self) -> Array:
-        """Fractions of the composition of kicks and drifts."""
-        return fractions(self.order)
 
     def states(self, system: System, momentum: Array, attitude: Array, times: Array) -> tuple[Array, Array, int]:
         """One evaluation per time for free motion, else kicks and drifts."""

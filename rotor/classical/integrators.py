@@ -4,8 +4,8 @@
 |---|---|---|---|
 | `ExactDrift` | free: exact; with torques 2 to 8 | symplectic, L in space | free motion at any time; weak torques |
 | `MoserVeselov` | free: 2 to 8, or exact; with torques 2 to 8 | L in space, free energy | free motion by steps |
-| `SymmetricTopSplitting` | 2, 4, 6, 8 | symplectic, L in space | torques, above all on near-symmetric tops |
-| `RotationSplitting` | 2, 4, 6, 8 | symplectic, L in space | torques, any body that is not linear |
+| `SymmetricTopSplitting` | 2, 4, 6, 8 | symplectic, L in space | torques, on any body |
+| `RotationSplitting` | 2, 4, 6, 8 | symplectic, L in space | the usual splitting, to compare with; not linear rotors |
 | `LieRungeKutta` | 8, adaptive step | unit quaternion, free L in space | drag, feedback, driven chaos; references |
 
 Each has its page (module) with cost and source. What accuracy costs with each of them is drawn by
@@ -22,6 +22,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rotor.classical.compositions import fractions
 from rotor.classical.euler import checked_moments, checked_momentum
 from rotor.classical.system import System, system_of
 from rotor.effects import ClassicalEffect
@@ -151,6 +152,22 @@ class KickDrift(Method):
                 time += h
                 torque = kicker.torque(time)
                 kicker.kick(torque, 0.5 * h)
+
+
+@dataclass(frozen=True)
+class Composed(KickDrift):
+    """Kicks and drifts of order 2 composed to `order` 2, 4, 6 or 8 (`compositions.py`), free steps likewise."""
+
+    order: int = 2
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        fractions(self.order)
+
+    @property
+    def kick_fractions(self) -> Array:
+        """Fractions of the composition, the same for the free steps."""
+        return fractions(self.order)
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from typing import cast
 
 import typer
 
-from rotor.cli import cat, convert, fluid, info, isotopologues, molecules, raman, spectrum, tumble
+from rotor.cli import cat, convert, fluid, gas, info, isotopologues, molecules, raman, spectrum, thermo, tumble
 from rotor.cli.output import NoAnswer
 
 NO_ANSWER, WRONG_INPUT, INTERRUPTED = 1, 2, 130
@@ -30,7 +30,9 @@ Examples:
   rotor info my.sdf
   rotor isotopologues water
   rotor raman N2 --laser 488
+  rotor thermo water --temperature 10:1000K:100 --plot heat.png
   rotor tumble water --plot water.png
+  rotor gas water --molecules 20000 --seed 7
   rotor fluid water --molecules 216 --csv run.csv"""
 
 
@@ -55,7 +57,9 @@ def _application() -> typer.Typer:
     app.command("molecules", epilog=molecules.EXAMPLES)(molecules.command)
     app.command("isotopologues", epilog=isotopologues.EXAMPLES)(isotopologues.command)
     app.command("raman", epilog=raman.EXAMPLES)(raman.command)
+    app.command("thermo", epilog=thermo.EXAMPLES)(thermo.command)
     app.command("tumble", epilog=tumble.EXAMPLES)(tumble.command)
+    app.command("gas", epilog=gas.EXAMPLES)(gas.command)
     app.command("fluid", epilog=fluid.EXAMPLES)(fluid.command)
     app.command("convert", epilog=convert.EXAMPLES)(convert.command)
     app.command("cat", epilog=cat.EXAMPLES)(cat.command)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from rotor.cli import inputs
-from rotor.cli.output import Files, NoAnswer, Table, json_text, note, show_facts, show_table, write_text
+from rotor.cli.output import Files, NoAnswer, Table, Writer, deliver, json_text, note, show_facts, show_table
 
 if TYPE_CHECKING:
     import numpy as np
@@ -45,8 +45,7 @@ def command(
     files = Files()
     files.ask("--out", out, (".cat", ".cat.gz"))
     files.ask("--plot", plot, (".png", ".pdf", ".svg"))
-    if json != "-":
-        files.ask("--json", json, (".json",))
+    files.ask_json(json)
     lines = filtered(read_catalogue(file), range_, min_lgint)
     if measured is not None:
         from rotor.formats.spcat.compare import with_measured_lines
@@ -62,11 +61,8 @@ def command(
     content["files"] = [str(path) for path in files.wanted.values()]
     content["lines"] = [_record(lines, row) for row in range(len(lines))]
 
-    _write(files, lines, content)
-    if json == "-":
-        print(json_text(content), end="")
-    else:
-        _show(lines, content, found, top_lines)
+    show = lambda: _show(lines, content, found, top_lines)  # noqa: E731
+    deliver(files, _writers(lines, content), lambda: json_text(content), show)
 
 
 def read_catalogue(path: str) -> Catalogue:
@@ -186,16 +182,10 @@ def _record(lines: Catalogue, row: int) -> dict[str, Any]:
     return record
 
 
-def _write(files: Files, lines: Catalogue, content: dict[str, Any]) -> None:
+def _writers(lines: Catalogue, content: dict[str, Any]) -> dict[str, Writer]:
     from rotor.formats.spcat.cat import write_cat
 
-    files.write(
-        {
-            "--out": lambda path: write_cat(lines, path),
-            "--plot": lambda path: draw(lines, path, content),
-            "--json": lambda path: write_text(path, json_text(content)),
-        }
-    )
+    return {"--out": lambda path: write_cat(lines, path), "--plot": lambda path: draw(lines, path, content)}
 
 
 def draw(lines: Catalogue, path: Path, content: dict[str, Any]) -> None:

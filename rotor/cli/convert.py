@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from rotor.cli import inputs
-from rotor.cli.output import Files, Writer, json_text, note, write_text
+from rotor.cli.output import Files, Writer, deliver, json_text, note
 
 if TYPE_CHECKING:
     from rotor.top import Top
@@ -32,22 +32,15 @@ def command(
     inputs.whole("--kmax", kmax, 0, 359)
     files = Files()
     files.ask("TARGET", target, (".toml", ".par", ".var"))
-    if json != "-":
-        files.ask("--json", json, (".json",))
+    files.ask_json(json)
     top = top_with_errors(source)
 
     from rotor.cli.report import describe
 
     content = {**describe(top, source, context.obj), "files": [str(path) for path in files.wanted.values()]}
-    writers: dict[str, Writer] = {
-        "TARGET": writer_of(top, source, target, kmax),
-        "--json": lambda path: write_text(path, json_text(content)),
-    }
-    files.write(writers)
-    if json == "-":
-        print(json_text(content), end="")
-    else:
-        print(f"{source} → {target}: {top.constants.text()}")
+    said = f"{source} → {target}: {top.constants.text()}"
+    writers = {"TARGET": writer_of(top, source, target, kmax)}
+    deliver(files, writers, lambda: json_text(content), lambda: print(said))
 
 
 def top_with_errors(source: str) -> Top:

@@ -10,7 +10,7 @@ import typer
 
 from rotor.cli import inputs
 from rotor.cli.inputs import Input
-from rotor.cli.output import Files, Table, json_text, show_facts, show_table, write_text
+from rotor.cli.output import Files, Table, deliver, json_text, show_facts, show_table
 
 if TYPE_CHECKING:
     from rotor.top import Top
@@ -45,10 +45,9 @@ def command(
     json: str | None = inputs.JSON,
 ) -> None:
     """Frame, constants, kind of top with its margin, moments, dipole, table of Q(T)."""
-    temperatures = TEMPERATURES_K if temperature is None else _temperatures(temperature)
+    temperatures = TEMPERATURES_K if temperature is None else inputs.temperatures("--temperature", temperature)
     files = Files()
-    if json != "-":
-        files.ask("--json", json, (".json",))
+    files.ask_json(json)
     given = Input(source, constants, isotope or [], dipole, dipole_abc, spin_weights, calculator, hessian)
     top = inputs.read_top(given)
 
@@ -58,20 +57,7 @@ def command(
     content["partition_function"] = partition_table(top, temperatures)
     if conformers is not None:
         content["conformers"] = conformer_table(source, conformers)
-    files.write({"--json": lambda path: write_text(path, json_text(content))})
-    if json == "-":
-        print(json_text(content), end="")
-    else:
-        _show(top, content)
-
-
-def _temperatures(text: str) -> Sequence[float]:
-    from rotor.units import parse_grid
-
-    temperatures: list[float] = inputs.option("--temperature", text, lambda value: parse_grid(value, "K").tolist())
-    if not all(0 < t < float("inf") for t in temperatures):
-        raise ValueError(f"--temperature: {text!r}: temperatures are above 0 K")
-    return temperatures
+    deliver(files, {}, lambda: json_text(content), lambda: _show(top, content))
 
 
 def partition_table(top: Top, temperatures_k: Sequence[float]) -> list[dict[str, Any]]:

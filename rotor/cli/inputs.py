@@ -81,6 +81,16 @@ def above_zero(name: str, value: float, unit: str = "") -> float:
     return value
 
 
+def temperatures(name: str, text: str) -> list[float]:
+    """A grid or list of temperatures in K, refused unless all are above 0 K."""
+    from rotor.units import parse_grid
+
+    found: list[float] = option(name, text, lambda value: parse_grid(value, "K").tolist())
+    if not all(0 < t < float("inf") for t in found):
+        raise ValueError(f"{name}: {text!r}: temperatures are above 0 K")
+    return found
+
+
 def whole(name: str, value: int | None, least: int, most: int | None = None) -> None:
     """Refuse a whole number out of bounds."""
     if value is not None and (value < least or (most is not None and value > most)):

@@ -9,7 +9,7 @@ import typer
 
 from rotor.cli import inputs
 from rotor.cli.inputs import Input
-from rotor.cli.output import Files, Table, json_text, note, show_table, write_text
+from rotor.cli.output import Files, Table, deliver, json_text, note, show_table
 
 if TYPE_CHECKING:
     from rotor.isotopologues import Isotopologue
@@ -45,8 +45,7 @@ def command(
 ) -> None:
     """Isotopologues: abundance, constants, kind, axes, dipole and spin weights of each."""
     files = Files()
-    if json != "-":
-        files.ask("--json", json, (".json",))
+    files.ask_json(json)
     parent = inputs.read_top(Input(source, None, [], dipole, dipole_abc, None))
     family = _family(parent, min_abundance, each or [], site or [])
     _tell(parent, family)
@@ -57,11 +56,7 @@ def command(
         "name": parent.name or None,
         "isotopologues": [record(one) for one in family],
     }
-    files.write({"--json": lambda path: write_text(path, json_text(content))})
-    if json == "-":
-        print(json_text(content), end="")
-    else:
-        show_table(_table(parent, family))
+    deliver(files, {}, lambda: json_text(content), lambda: show_table(_table(parent, family)))
 
 
 def _family(

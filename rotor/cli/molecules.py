@@ -9,7 +9,7 @@ from typing import Any
 import typer
 
 from rotor.cli import inputs
-from rotor.cli.output import Files, Table, plain, show_facts, show_table, write_text
+from rotor.cli.output import Files, Table, deliver, plain, show_facts, show_table
 
 WIDEST_NAME = 24
 
@@ -26,14 +26,14 @@ def command(
 ) -> None:
     """Molecules known by name: kind, κ, dipole, and where the numbers are from."""
     files = Files()
-    if json != "-":
-        files.ask("--json", json, (".json",))
+    files.ask_json(json)
     records = [record(path) for path in _paths(name)]
     text = "[\n" + ",\n".join(dumps(one, ensure_ascii=False, allow_nan=False) for one in records) + "\n]\n"
-    files.write({"--json": lambda path: write_text(path, text)})
-    if json == "-":
-        print(text, end="")
-    elif name is not None:
+    deliver(files, {}, lambda: text, lambda: _show(records, alone=name is not None))
+
+
+def _show(records: list[dict[str, Any]], alone: bool) -> None:
+    if alone:
         show_facts(_facts(records[0]))
     else:
         show_table(Table("", _COLUMNS, [_row(one) for one in records], frozenset({"name", "also", "kind", "from"})))

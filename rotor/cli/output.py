@@ -12,7 +12,10 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rotor.tables import Table as Columns
 
 Writer = Callable[[Path], None]
 
@@ -122,6 +125,13 @@ def json_text(content: Mapping[str, Any]) -> str:
     return "{\n" + ",\n".join(items) + "\n}\n"
 
 
+def json_with_rows(table: Columns, key: str, content: Mapping[str, Any]) -> str:
+    """The content as JSON text with all rows of a table, one record each, under the key."""
+    columns = {name: column.tolist() for name, column in table.columns.items()}
+    rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+    return json_text({**content, key: rows})
+
+
 def _json_value(value: Any) -> str:
     value = plain(value)
     if isinstance(value, list) and value and isinstance(value[0], dict):
@@ -134,6 +144,14 @@ class Files:
     """Files asked for, by option: checked before any work is done, written together after all of it."""
 
     wanted: dict[str, Path] = field(default_factory=dict)
+    screen: set[str] = field(default_factory=set)  # options whose text goes to standard output: --json -
+
+    def ask_json(self, path: str | None) -> None:
+        """Remember where the JSON goes: to a file, to standard output (`-`), or nowhere."""
+        if path == "-":
+            self.screen.add("--json")
+        else:
+            self.ask("--json", path, (".json",))
 
     def ask(self, option: str, path: str | None, suffixes: Sequence[str]) -> None:
         """Remember a file to write; ValueError for a suffix that the option does not write, or no folder to write in."""
@@ -160,6 +178,15 @@ class Files:
                 moves += [(made, target.parent / made.name) for made in sorted(folder.iterdir())]
             for made, place in moves:
                 os.replace(made, place.resolve())
+
+
+def deliver(files: Files, writers: Mapping[str, Writer], json: Callable[[], str], show: Callable[[], None]) -> None:
+    """Write all files, the JSON among them, then print the JSON where it was asked for, else what `show` prints."""
+    files.write({**writers, "--json": lambda path: write_text(path, json())})
+    if "--json" in files.screen:
+        print(json(), end="")
+    else:
+        show()
 
 
 def write_text(path: Path, text: str) -> None:

@@ -16,11 +16,11 @@ from rotor.cli.output import (
     Table,
     Writer,
     answering,
-    json_text,
+    deliver,
+    json_with_rows,
     note,
     show_facts,
     show_table,
-    write_text,
 )
 
 if TYPE_CHECKING:
@@ -79,8 +79,7 @@ def command(
     files = Files()
     files.ask("--csv", csv, (".csv",))
     files.ask("--plot", plot, (".png", ".pdf", ".svg"))
-    if json != "-":
-        files.ask("--json", json, (".json",))
+    files.ask_json(json)
 
     given = Input(source, constants, isotope or [], None, None, spin_weights)
     top = _with_polarizability(inputs.read_top(given), polarizability)
@@ -93,11 +92,9 @@ def command(
         note(warning)
 
     content["files"] = [str(path) for path in files.wanted.values()]
-    files.write(_writers(lines, content))
-    if json == "-":
-        print(_json(lines, content), end="")
-    else:
-        _show(lines, content)
+    deliver(
+        files, _writers(lines, content), lambda: json_with_rows(lines, "lines", content), lambda: _show(lines, content)
+    )
 
 
 def _cut(text: str) -> float | None:
@@ -174,12 +171,6 @@ def _content(lines: RamanLines, settings: Settings, given: Input, command: str, 
     }
 
 
-def _json(lines: RamanLines, content: dict[str, Any]) -> str:
-    columns = {name: column.tolist() for name, column in lines.columns.items()}
-    rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
-    return json_text({**content, "lines": rows})
-
-
 def _writers(lines: RamanLines, content: dict[str, Any]) -> dict[str, Writer]:
     story = {"command": content["command"], "input": content["input"]}
 
@@ -193,7 +184,7 @@ def _writers(lines: RamanLines, content: dict[str, Any]) -> dict[str, Writer]:
 
         plot_raman(lines, path, provenance={"command": story["command"]})
 
-    return {"--csv": table, "--plot": draw, "--json": lambda path: write_text(path, _json(lines, content))}
+    return {"--csv": table, "--plot": draw}
 
 
 def _show(lines: RamanLines, content: dict[str, Any]) -> None:

@@ -17,11 +17,11 @@ from rotor.cli.output import (
     Table,
     Writer,
     answering,
-    json_text,
+    deliver,
+    json_with_rows,
     note,
     show_facts,
     show_table,
-    write_text,
 )
 
 if TYPE_CHECKING:
@@ -103,8 +103,7 @@ def command(
     files = _files(
         settings, {"--cat": cat, "--csv": csv, "--parquet": parquet, "--profile-csv": profile_csv, "--plot": plot}
     )
-    if json != "-":
-        files.ask("--json", json, (".json",))
+    files.ask_json(json)
 
     given = Input(source, constants, isotope or [], dipole, dipole_abc, spin_weights, calculator, hessian)
     prediction = request.prediction_of(context, str(source)) if request.is_request(source) else None
@@ -124,11 +123,7 @@ def command(
     writers = _writers(lines, settings, content, tag)
     if prediction is not None:
         writers["--cat"] = _program_catalogue(prediction, content)
-    files.write(writers)
-    if json == "-":
-        print(_json(lines, content), end="")
-    else:
-        _show(lines, content)
+    deliver(files, writers, lambda: json_with_rows(lines, "lines", content), lambda: _show(lines, content))
 
 
 def _refuse_contradictions(settings: Settings) -> None:
@@ -274,12 +269,6 @@ def _content(lines: Lines, settings: Settings, given: Input, command: str, shown
     }
 
 
-def _json(lines: Lines, content: dict[str, Any]) -> str:
-    from rotor.formats.line_tables import records
-
-    return json_text({**content, "lines": records(lines)})
-
-
 def _reach(min_lgint: float | None) -> str:
     if min_lgint is None:
         return "beyond it no line reaches an lgint of -12"
@@ -303,7 +292,6 @@ def _writers(lines: Lines, settings: Settings, content: dict[str, Any], tag: int
             _spectrum(lines, settings), path, settings={"command": story["command"]}
         ),
         "--plot": lambda path: _draw(lines, settings, path, story),
-        "--json": lambda path: write_text(path, _json(lines, content)),
     }
 
 

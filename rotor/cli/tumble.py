@@ -11,7 +11,7 @@ import typer
 
 from rotor.cli import inputs
 from rotor.cli.inputs import Input
-from rotor.cli.output import Files, Table, Writer, json_text, show_facts, show_table, write_text
+from rotor.cli.output import Files, Table, Writer, deliver, json_with_rows, show_facts, show_table
 
 if TYPE_CHECKING:
     from rotor.classical.free import FreeMotion
@@ -62,11 +62,8 @@ def command(
 
     motion, table, content = _solve(thrown, asked, context.obj)
     content["files"] = [str(path) for path in files.wanted.values()]
-    files.write(_writers(thrown, motion, table, content))
-    if json == "-":
-        print(_json(table, content), end="")
-    else:
-        _show(thrown, table, content)
+    writers = _writers(thrown, motion, table, content)
+    deliver(files, writers, lambda: json_with_rows(table, "motion", content), lambda: _show(thrown, table, content))
 
 
 def _files(csv: str | None, plot: str | None, gif: str | None, json: str | None) -> Files:
@@ -76,9 +73,9 @@ def _files(csv: str | None, plot: str | None, gif: str | None, json: str | None)
         ("--csv", csv, (".csv",)),
         ("--plot", plot, (".png", ".pdf", ".svg")),
         ("--gif", gif, (".gif", ".mp4")),
-        ("--json", None if json == "-" else json, (".json",)),
     ):
         files.ask(name, path, suffixes)
+    files.ask_json(json)
     if gif:
         from rotor.plots.animation import check_film
 
@@ -174,12 +171,6 @@ def _motion_kind(thrown: Thrown, motion: FreeMotion) -> str:
     return f"about axis {thrown.names[motion.centre_axis]}"
 
 
-def _json(table: MotionTable, content: dict[str, Any]) -> str:
-    columns = {name: column.tolist() for name, column in table.columns.items()}
-    rows = zip(*columns.values(), strict=True)
-    return json_text({**content, "motion": [dict(zip(columns, row, strict=True)) for row in rows]})
-
-
 def _writers(thrown: Thrown, motion: FreeMotion, table: MotionTable, content: dict[str, Any]) -> dict[str, Writer]:
     """How each option's file is written, with the provenance that its format can hold."""
     from rotor.cli.output import plain
@@ -209,14 +200,13 @@ def _writers(thrown: Thrown, motion: FreeMotion, table: MotionTable, content: di
         inner = table.times / units.time_factor
         animate(
             motion, inner, path, atoms=thrown.atoms, axis_names=thrown.names, time_unit=units.time,
-            time_factor=units.time_factor,
+            time_factor=units.time_factor, provenance=story,
         )  # fmt: skip
 
     return {
         "--csv": csv,
         "--plot": plot,
         "--gif": film,
-        "--json": lambda path: write_text(path, _json(table, content)),
     }
 
 

@@ -133,12 +133,17 @@ def thermal_momenta(
 ) -> tuple[Array, Array]:
     """Momenta (n, 3) and angular momenta (n, 3) in body axes drawn from the canonical ensemble, in ASE's units.
 
-    p_i and L_i are normal with variances m kT and I_i kT (`rotor.classical.thermal`). removed: 3 takes the total momentum
+    p_i and L_i are normal with variances m kT and I_i kT (`rotor.classical.ensembles`). removed: 3 takes the total momentum
     out, each body giving the share of its mass; what remains is the canonical ensemble of 3 degrees fewer, not rescaled.
     """
+    from rotor.classical import ensembles
+
     kt = temperature_k * units.EV_PER_K
     momentum = rng.standard_normal((len(bodies), 3)) * np.sqrt(bodies.mass * kt)[:, None]
-    angular = rng.standard_normal((len(bodies), 3)) * np.sqrt(bodies.moments * kt)
+    angular = np.zeros((len(bodies), 3))
+    for species in range(len(bodies.names)):
+        members = np.flatnonzero(bodies.species == species)
+        angular[members] = ensembles.thermal_momenta(bodies.moments[members[0]], kt, len(members), rng=rng)
     return (at_rest(bodies, momentum) if removed else momentum), angular
 
 

@@ -58,7 +58,7 @@ class Flows:
 
     The drift is the free motion: of the centre exact; of the attitude `SymmetricTopSplitting` of the core, exact for linear
     molecules, symmetric tops and spheres, and for asymmetric ones in error by less than the kicks are
-    (benchmarks/bench_fluid.py compares it with `RotationSplitting`).
+    (benchmarks/bench_thermometers.py compares it with `RotationSplitting`).
     """
 
     bodies: Bodies
@@ -69,9 +69,9 @@ class Flows:
 
     @cached_property
     def _axes(self) -> NDArray[np.int64]:
-        from rotor.classical.splitting import symmetric_axes
+        from rotor.classical.splitting import turned_axes
 
-        return symmetric_axes(self._inverse)
+        return turned_axes(self._inverse)
 
     def drift(self, state: State, time: float) -> None:
         """Free motion for a time."""

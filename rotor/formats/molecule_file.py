@@ -9,6 +9,10 @@
     vibrational_difference = 0.02       # how far A, B, C of this geometry may be from the constants, relative
     atoms = [["O", 0.0, 0.0, 0.1], ...]
 
+    charge = 0                          # may be left out, as may the next
+    electronic = "even"                 # or "odd": half turns that change places of like nuclei turn the sign of the
+                                        # electronic state, as in the 3Σg- of O2 (spin weights of isotopologues need it)
+
     [constants]                         # named as in rotor.constants
     unit = "MHz"
     reduction = "S"
@@ -60,7 +64,7 @@ from numpy.typing import NDArray
 
 from rotor.constants import Constants
 from rotor.inertia import PrincipalFrame, point_masses, principal_frame
-from rotor.molecules.molecule import Molecule
+from rotor.molecules.molecule import ELECTRONIC, Molecule
 from rotor.top import Tensor, kind_from_moments
 from rotor.units import parse_quantity
 from rotor.weights import SpinWeights
@@ -243,7 +247,7 @@ def _molecule(
 ) -> Molecule | None:
     if table is None:
         return None
-    table.refuse_unknown(("kind", "source", "vibrational_difference", "atoms", "charge"))
+    table.refuse_unknown(("kind", "source", "vibrational_difference", "atoms", "charge", "electronic"))
     symbols, positions = _atoms(table)
     try:
         molecule = Molecule(
@@ -253,6 +257,7 @@ def _molecule(
             source=table.text("source"),
             uncertainty=table.number("vibrational_difference", 0.0),
             charge=table.content.get("charge", 0),
+            electronic=table.choice("electronic", ELECTRONIC) or "even",
         )
     except ValueError as reason:
         raise ValueError(f"{table.place}, atoms: {reason}") from None

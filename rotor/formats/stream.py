@@ -26,7 +26,7 @@ from rotor.formats.spcat.cat import format_lines
 from rotor.formats.spcat.catalogue import Catalogue
 from rotor.formats.spcat.fields import BLANK
 from rotor.quantum.levels import Levels, solve_levels
-from rotor.spectra.lines import DEFAULT_MIN_LGINT, INTENSITY_NM2_MHZ, Lines, line_list, quanta_names
+from rotor.spectra.lines import DEFAULT_MIN_LGINT, INTENSITY_NM2_MHZ, Lines, line_list
 from rotor.spectra.reach import jmax_for_cut
 from rotor.spectra.transitions import IntensityCut, all_transitions
 from rotor.thermo import PartitionFunction
@@ -245,12 +245,8 @@ def _columns(plan: _Plan, lines: Lines) -> dict[str, Any]:
 
 
 def _quanta(lines: Lines) -> dict[str, Any]:
-    names = quanta_names(lines.levels)
-    return {
-        f"{name}_{side}": column.astype(np.int16)
-        for side, rows in (("upper", lines.upper), ("lower", lines.lower))
-        for name, column in zip(names, lines.quanta(rows).T, strict=True)
-    }
+    columns = lines.levels.quanta_columns(lines.upper, "upper") | lines.levels.quanta_columns(lines.lower, "lower")
+    return {name: column.astype(np.int16) for name, column in columns.items()}
 
 
 def _merge(plan: _Plan, pieces: list[Path], target: Path, story: Mapping[str, Any], tag: int, memory_mb: int) -> int:

@@ -19,6 +19,7 @@ from rotor.units import DEBYE_PER_E_ANGSTROM
 
 _UNTURNED = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
+ELECTRONIC = ("even", "odd")  # what half turns do to the electronic state
 CLOSEST_ANGSTROM = 0.1  # no two nuclei of a molecule come nearer; H2 has 0.74 Å
 
 Floats = NDArray[np.float64]
@@ -32,6 +33,8 @@ class Molecule:
     positions_angstrom : (n, 3) array, Å
     mass_numbers : n mass numbers; left out, they are those of `symbols` or of the most abundant isotopes
     charge : in elementary charges
+    electronic : "even" where half turns leave the electronic state alike, as in every closed shell; "odd" where those that
+        change places of like nuclei turn its sign, as in the Σg- of O2. Nuclear-spin weights need it
     dipole_debye : (3,) array in the frame of the positions, D, pointing from negative to positive; that of an ion
         refers to its centre of mass. None: not known
     dipole_source : where the dipole is from
@@ -42,7 +45,8 @@ class Molecule:
     notes : what a user must be told
 
     Raises ValueError for no atoms, positions that are not n triples of finite numbers, a symbol or mass number that
-    is no isotope, two atoms nearer than 0.1 Å, or a dipole or tensor of the wrong shape. Arrays are read-only copies.
+    is no isotope, two atoms nearer than 0.1 Å, an unknown electronic state, or a dipole or tensor of the wrong shape.
+    Arrays are read-only copies.
 
     >>> water = Molecule(("O", "H", "H"), [[0, 0, 0.1173], [0, 0.7572, -0.4692], [0, -0.7572, -0.4692]])
     >>> water.formula, water.mass_u
@@ -55,6 +59,7 @@ class Molecule:
     positions_angstrom: Floats
     mass_numbers: tuple[int, ...] = ()
     charge: int = 0
+    electronic: str = "even"
     dipole_debye: Floats | None = None
     dipole_source: str = ""
     polarizability_angstrom3: Floats | None = None
@@ -75,6 +80,11 @@ class Molecule:
         charge = float(_checked(self.charge, (), "charge"))
         if not charge.is_integer():
             raise ValueError(f"charge {charge:g}: a whole number of elementary charges is wanted")
+
+        if self.electronic not in ELECTRONIC:
+            raise ValueError(
+                f"electronic {self.electronic!r}: 'even' (a closed shell) or 'odd' (such as Σg-) is wanted"
+            )
 
         object.__setattr__(self, "symbols", tuple(one.symbol for one in nuclei))
         object.__setattr__(self, "mass_numbers", tuple(one.mass_number for one in nuclei))

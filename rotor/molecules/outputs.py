@@ -1,6 +1,6 @@
-"""A molecule from the output of a quantum-chemistry program, through cclib: geometry, dipole, polarizability.
+"""A molecule from the output of a quantum-chemistry program: geometry, dipole, polarizability.
 
-cclib reads the numbers; here the text is looked through first (asterisks, `D` exponents, a cut end), each tensor is
+cclib reads the numbers, or `plain_outputs` where it cannot; the text is looked through first (`programs`), each tensor is
 turned from the axes it was printed in to those of the geometry, and the printed rotational constants are a check.
 """
 
@@ -10,8 +10,7 @@ import importlib.util
 import io
 import logging
 import re
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,8 +19,18 @@ from numpy.typing import NDArray
 
 from rotor.molecules.molecule import Molecule
 from rotor.molecules.nuclei import isotope, isotope_of_mass
+from rotor.molecules.plain_outputs import read_plain, reads_itself, unread
+from rotor.molecules.programs import (
+    Output,
+    coordinates_angstrom,
+    program_of,
+    refuse_cut,
+    refuse_unreadable,
+    tables,
+    without_constants,
+)
 from rotor.superpose import Superposition, superpose
-from rotor.units import BOHR_RADIUS_ANGSTROM, DEBYE_PER_E_ANGSTROM, MHZ_PER_CM, ROTATIONAL_MHZ_U_ANGSTROM2
+from rotor.units import BOHR_RADIUS_ANGSTROM, DEBYE_PER_E_ANGSTROM, ROTATIONAL_MHZ_U_ANGSTROM2
 
 CONSTANTS_AGREE = 1e-4  # relative; printed constants have 6 to 8 digits, coordinates 6 decimals
 SAME_GEOMETRY_ANGSTROM = 1e-3  # rmsd: a tensor printed for a geometry further from the last one is not its tensor
@@ -31,71 +40,13 @@ WITHOUT_CCLIB = "cclib is not installed; install the extra with it: pip install 
 Floats = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class _Program:
-    """How one program's output reads: its name's line, its last line, and what opens its tables and tensors."""
-
-    name: str
-    banner: str
-    ending: str
-    geometries: tuple[str, ...]  # what opens a table of coordinates; of several before a tensor the first one counts
-    rows_after: int  # lines between the opening one and the first atom
-    columns: slice  # of the coordinates in a row
-    dipole: tuple[str, ...]
-    polarizability: tuple[str, ...]
-    tensor_lines: int  # lines after the opening one that may hold the tensor's numbers
-    constants: str  # pattern of a line of rotational constants
-    constants_mhz: float  # unit of these
-
-
-# The orientation of Gaussian's population analysis is the standard one where printed, else that of the input.
-_PROGRAMS = (
-    _Program(
-        "Gaussian", "Gaussian, Inc.", "Normal termination of Gaussian",
-        ("Standard orientation:", "Input orientation:", "Z-Matrix orientation:"), 5, slice(-3, None),
-        ("Dipole moment (field-independent basis",),
-        ("SCF Polarizability for W=", "Polarizability=", "Exact polarizability:"), 1,
-        r"Rotational constants \(GHZ\):(.*)", 1e3,
-    ),
-    _Program(
-        "ORCA", "O   R   C   A", "ORCA TERMINATED NORMALLY",
-        ("CARTESIAN COORDINATES (ANGSTROEM)",), 2, slice(1, 4),
-        ("DIPOLE MOMENT",), ("THE POLARIZABILITY TENSOR",), 6,
-        r"Rotational constants in cm-1:(.*)", MHZ_PER_CM,
-    ),
-    _Program(
-        "Psi4", "Psi4: An Open-Source Ab Initio", "Psi4 exiting successfully",
-        ("Geometry (in ",), 4, slice(1, 4),
-        ("Dipole Moment: (a.u.)", "Multipole Moments:"), (), 1,
-        r"Rotational constants: (A =.*)\[cm\^-1\]", MHZ_PER_CM,
-    ),
-)  # fmt: skip
-
-
-@dataclass(frozen=True)
-class _Output:
-    """The lines of an output, of which program, and where it is from."""
-
-    where: str
-    lines: tuple[str, ...]
-    program: _Program
-
-    def last(self, openings: tuple[str, ...]) -> int | None:
-        """Index of the last line that begins with one of the openings."""
-        found = [i for i, line in enumerate(self.lines) if line.strip().startswith(openings)]
-        return found[-1] if found else None
-
-    def refuse(self, i: int, rule: str) -> ValueError:
-        return ValueError(f"{self.where}: line {i + 1}: {rule}: {self.lines[i].strip()[:80]!r}")
-
-
 def read_output(path: Path | str) -> Molecule:
     """The last geometry of a quantum-chemistry output, with dipole and polarizability in its axes.
 
     Parameters
     ----------
     path : Path or str
-        Output of Gaussian, ORCA or Psi4; of the other programs that cclib tells apart, the geometry alone.
+        Output of Gaussian, ORCA, Psi4 or CFOUR; of the other programs that cclib tells apart, the geometry alone.
 
     Returns
     -------
@@ -108,26 +59,38 @@ def read_output(path: Path | str) -> Molecule:
     Raises
     ------
     ValueError
-        No cclib; an output of no program that it knows; asterisks, a `D` exponent where the program prints none, or a
-        file that was cut, with the line.
+        No cclib, which CFOUR and ORCA 6 do without; an output of no program that it knows; asterisks, a `D` exponent
+        where the program prints none, or a file that was cut, with the line.
 
     The dipole of an ion is moved from the program's origin to the centre of mass. Vibrational corrections are
     neglected. Reader: N. M. O'Boyle, A. L. Tenderholt, K. M. Langner, J. Comput. Chem. 29, 839 (2008).
     """
-    if not has_cclib():
-        raise ValueError(f"{path}: {WITHOUT_CCLIB}")
-    text = Path(path).read_bytes().decode("utf-8-sig", errors="replace")
+    text = _text(Path(path))
     program = program_of(text)
+    if not has_cclib() and not needs_no_cclib(Path(path)):
+        raise ValueError(f"{path}: {WITHOUT_CCLIB}")
     if program is None:
         return _read_other(text, str(path))
-    output = _Output(str(path), tuple(text.splitlines()), program)
-    _refuse_cut(output)
-    _refuse_unreadable(output)
-    data = _parse(_without_constants(output), str(path))
-    molecule = _geometry(data, str(path), program.name)
+    output = Output(str(path), tuple(text.splitlines()), program)
+    refuse_cut(output)
+    refuse_unreadable(output)
+    plain = reads_itself(output)
+    data = read_plain(output) if plain else _parse(without_constants(output), str(path))
+    molecule = _geometry(data, str(path), program.name if plain else f"{program.name}, read with cclib")
     molecule = _with_dipole(molecule, data, output)
     molecule = _with_polarizability(molecule, data, output)
-    return replace(molecule, notes=(*molecule.notes, *_disagreement(molecule, data, output)))
+    return replace(molecule, notes=(*molecule.notes, *unread(output), *_disagreement(molecule, data, output)))
+
+
+def _text(path: Path) -> str:
+    return path.read_bytes().decode("utf-8-sig", errors="replace")
+
+
+def needs_no_cclib(path: Path) -> bool:
+    """Whether an output is of a program that is read here without cclib: CFOUR, ORCA from version 6."""
+    text = _text(path)
+    program = program_of(text)
+    return program is not None and reads_itself(Output(str(path), tuple(text.splitlines()), program))
 
 
 def has_cclib() -> bool:
@@ -135,19 +98,9 @@ def has_cclib() -> bool:
     return importlib.util.find_spec("cclib") is not None
 
 
-def program_of(text: str) -> _Program | None:
-    """The program of those known here that an output names first, None for another.
-
-    >>> program_of("Copyright (c) 1988-2016, Gaussian, Inc.  All Rights Reserved.").name
-    'Gaussian'
-    """
-    named = [program for program in _PROGRAMS if program.banner in text]
-    return min(named, key=lambda program: text.find(program.banner)) if named else None
-
-
 def is_output(path: Path) -> bool:
     """Whether a file is an output that `read_output` knows: by its banner, or, with cclib, by what cclib finds."""
-    text = path.read_bytes().decode("utf-8-sig", errors="replace")
+    text = _text(path)
     if program_of(text) is not None:
         return True
     if not has_cclib():
@@ -155,68 +108,6 @@ def is_output(path: Path) -> bool:
     from cclib.io.ccio import guess_filetype
 
     return guess_filetype(text.splitlines()) is not None
-
-
-# --- the text, before cclib sees it
-
-
-def _refuse_cut(output: _Output) -> None:
-    """The program's last words must follow the last table and the last start of a job; without them the file is cut or the run failed."""
-    endings = [i for i, line in enumerate(output.lines) if output.program.ending in line]
-    begun = (*output.program.geometries, "Link1:  Proceeding")  # the second words open Gaussian's next job
-    starts = [
-        i for i, line in enumerate(output.lines) if output.program.banner in line or line.strip().startswith(begun)
-    ]
-    if not endings or starts[-1] > endings[-1]:
-        last = max((i for i, line in enumerate(output.lines) if line.strip()), default=0)
-        rule = (
-            f"the file ends without {output.program.ending!r}, so that it was cut or the run failed; give a whole one"
-        )
-        raise output.refuse(last, rule)
-
-
-def _refuse_unreadable(output: _Output) -> None:
-    """Asterisks and `D` exponents in the numbers that are going to be used."""
-    for i, may_have_d in _used_lines(output):
-        line = output.lines[i]
-        if "**" in line:
-            raise output.refuse(i, "asterisks stand where a number did not fit; print it with more room")
-        if not may_have_d and re.search(r"\d[dD][+-]?\d", line):
-            raise output.refuse(i, f"a D exponent where {output.program.name} prints none; write E, or run it again")
-
-
-def _used_lines(output: _Output) -> Iterator[tuple[int, bool]]:
-    """Indices of the lines with coordinates, dipole, polarizability, and whether D exponents belong there."""
-    program = output.program
-    for start, rows in _tables(output):
-        yield from ((start + program.rows_after + k, False) for k in range(len(rows)))
-    d_in_tensor = program.name == "Gaussian"  # as in `Polarizability= 9.1D+00`
-    for openings, d_belongs in ((program.dipole, False), (program.polarizability, d_in_tensor)):
-        first = output.last(openings) if openings else None
-        if first is not None:
-            more = 3 if "SCF Polarizability" in output.lines[first] else 0  # a head and three rows, not two
-            stop = min(first + program.tensor_lines + 1 + more, len(output.lines))
-            yield from ((i, d_belongs) for i in range(first, stop))
-
-
-def _tables(output: _Output) -> list[tuple[int, list[list[str]]]]:
-    """Index of the opening line of each table of coordinates, and its rows as words."""
-    program = output.program
-    starts = [i for i, line in enumerate(output.lines) if line.strip().startswith(program.geometries)]
-    return [(i, list(_rows(output.lines[i + program.rows_after :]))) for i in starts]
-
-
-def _rows(lines: tuple[str, ...]) -> Iterator[list[str]]:
-    for line in lines:
-        if not line.strip() or line.strip().startswith("---"):
-            return
-        yield line.split()
-
-
-def _without_constants(output: _Output) -> str:
-    """The text without rotational constants: those of a linear molecule begin with asterisks, which stops cclib."""
-    pattern = re.compile(output.program.constants)
-    return "\n".join(line for line in output.lines if not pattern.search(line)) + "\n"
 
 
 # --- cclib
@@ -247,7 +138,7 @@ def _geometry(data: Any, where: str, program: str) -> Molecule:
             mass_numbers=mass_numbers,
             positions_angstrom=np.asarray(data.atomcoords[-1], dtype=np.float64),
             charge=getattr(data, "charge", 0),
-            source=f"{where}, output of {program}, read with cclib",
+            source=f"{where}, output of {program}",
         )
     except ValueError as reason:
         raise ValueError(f"{where}: {reason}") from None
@@ -289,7 +180,7 @@ def _read_other(text: str, where: str) -> Molecule:
     note = (
         f"{where}: dipole and polarizability were not taken, since the axes of {program}'s tensors are not known here"
     )
-    molecule = _geometry(data, where, program)
+    molecule = _geometry(data, where, f"{program}, read with cclib")
     return (
         replace(molecule, notes=(note,)) if hasattr(data, "moments") or hasattr(data, "polarizabilities") else molecule
     )
@@ -299,16 +190,15 @@ def _read_other(text: str, where: str) -> Molecule:
 
 
 def _axes_at(
-    output: _Output, tensor: int, target: Floats, openings: tuple[str, ...] | None = None
+    output: Output, tensor: int, target: Floats, openings: tuple[str, ...] | None = None
 ) -> Superposition | None:
     """What lays the geometry printed before line `tensor` on `target`; None where none is the same geometry."""
-    before = [(i, rows) for i, rows in _tables(output) if i < tensor]
+    before = [(i, rows) for i, rows in tables(output) if i < tensor]
     for opening in openings or output.program.geometries:
-        tables = [(i, rows) for i, rows in before if output.lines[i].strip().startswith(opening)]
-        if tables:
-            start, rows = tables[-1]
-            scale = BOHR_RADIUS_ANGSTROM if "bohr" in output.lines[start].lower() else 1.0
-            points = scale * np.array([[float(word) for word in row[output.program.columns]] for row in rows])
+        opened = [(i, rows) for i, rows in before if output.lines[i].strip().startswith(opening)]
+        if opened:
+            start, rows = opened[-1]
+            points = coordinates_angstrom(output, start, rows)
             if points.shape != target.shape:
                 return None
             fit = superpose(points, target)
@@ -316,7 +206,7 @@ def _axes_at(
     return None
 
 
-def _with_dipole(molecule: Molecule, data: Any, output: _Output) -> Molecule:
+def _with_dipole(molecule: Molecule, data: Any, output: Output) -> Molecule:
     """The dipole, D: turned to the axes of the geometry, and of an ion moved to the centre of mass."""
     start = output.last(output.program.dipole)
     if start is None or len(getattr(data, "moments", ())) < 2:
@@ -334,18 +224,22 @@ def _with_dipole(molecule: Molecule, data: Any, output: _Output) -> Molecule:
     return replace(molecule, dipole_debye=dipole, dipole_source=f"{output.program.name}, {output.where}")
 
 
-def _moment_origin(data: Any, output: _Output) -> Floats | None:
-    """The point that the dipole refers to, Å in the axes it is printed in; Gaussian's is the origin of these."""
-    if output.program.name == "Gaussian":
+def _moment_origin(data: Any, output: Output) -> Floats | None:
+    """The point that the dipole refers to, Å in the axes it is printed in; that of Gaussian and CFOUR is their origin."""
+    if output.program.name in ("Gaussian", "CFOUR"):
         return np.zeros(3)
     for line in reversed(output.lines):
-        found = re.search(r"origin for moment calculation is .*= *\(([^)]*)\)", line)
+        found = re.search(
+            r"origin for moment calculation is .*= *\(([^)]*)\)|Position of electric origin *\.\.\.(.*)", line
+        )
         if found:
-            return BOHR_RADIUS_ANGSTROM * np.array([float(word) for word in found[1].replace(",", " ").split()])
+            return BOHR_RADIUS_ANGSTROM * np.array(
+                [float(word) for word in (found[1] or found[2]).replace(",", " ").split()]
+            )
     return None
 
 
-def _with_polarizability(molecule: Molecule, data: Any, output: _Output) -> Molecule:
+def _with_polarizability(molecule: Molecule, data: Any, output: Output) -> Molecule:
     """The static polarizability, a.u. to Å³, turned to the axes of the geometry."""
     start = output.last(output.program.polarizability) if output.program.polarizability else None
     if start is None or not len(getattr(data, "polarizabilities", ())):
@@ -359,7 +253,7 @@ def _with_polarizability(molecule: Molecule, data: Any, output: _Output) -> Mole
     return replace(molecule, polarizability_angstrom3=0.5 * (turned + turned.T), polarizability_source=source)
 
 
-def _polarizability_axes(molecule: Molecule, data: Any, output: _Output, start: int) -> Superposition | None:
+def _polarizability_axes(molecule: Molecule, data: Any, output: Output, start: int) -> Superposition | None:
     """Axes of the polarizability; Gaussian's `Polarizability=` has those of the `Dipole =` printed above it.
 
     Whether these are the standard or the input axes is settled by that dipole and the one of the population
@@ -382,7 +276,7 @@ def _close(one: Floats, other: Floats) -> bool:
     return bool(np.max(np.abs(one - other)) < SAME_DIPOLE_DEBYE)
 
 
-def _noted(molecule: Molecule, output: _Output, start: int, tensor: str, why: str) -> Molecule:
+def _noted(molecule: Molecule, output: Output, start: int, tensor: str, why: str) -> Molecule:
     note = f"{output.where}: the {tensor} of line {start + 1} {why}: left out"
     return replace(molecule, notes=(*molecule.notes, note))
 
@@ -390,7 +284,7 @@ def _noted(molecule: Molecule, output: _Output, start: int, tensor: str, why: st
 # --- the printed constants
 
 
-def _disagreement(molecule: Molecule, data: Any, output: _Output) -> tuple[str, ...]:
+def _disagreement(molecule: Molecule, data: Any, output: Output) -> tuple[str, ...]:
     """A note where the printed rotational constants are not those of the geometry."""
     printed = _printed_constants(output)
     if not len(printed):
@@ -409,12 +303,13 @@ def _disagreement(molecule: Molecule, data: Any, output: _Output) -> tuple[str, 
     )
 
 
-def _printed_constants(output: _Output) -> Floats:
+def _printed_constants(output: Output) -> Floats:
     """The last rotational constants printed, MHz, large to small; without the infinite or zero A of a linear molecule."""
-    found = [match for line in output.lines if (match := re.search(output.program.constants, line))]
+    pairs = zip(output.lines, (*output.lines[1:], ""), strict=True)
+    found = [match[1].strip() or below for line, below in pairs if (match := re.search(output.program.constants, line))]
     if not found:
         return np.zeros(0)
-    values = [float(word) for word in re.findall(r"\d+\.\d+", found[-1][1])]
+    values = [float(word) for word in re.findall(r"\d+\.\d+", found[-1])]
     return np.sort([value * output.program.constants_mhz for value in values if value > 0])[::-1]
 
 

@@ -10,14 +10,14 @@ import numpy as np
 
 from rotor.molecules.molecule import Molecule
 from rotor.molecules.nuclei import element_symbol, isotope, isotope_of_mass
-from rotor.molecules.outputs import WITHOUT_CCLIB, has_cclib, is_output, read_output
+from rotor.molecules.outputs import WITHOUT_CCLIB, has_cclib, is_output, needs_no_cclib, read_output
 from rotor.molecules.smiles import from_rdkit, from_smiles, parse_sdf
 from rotor.molecules.xyz import decode, parse_xyz
 from rotor.units import DEBYE_PER_E_ANGSTROM
 
 _PREFIX = "SMILES:"
 _SDF_SUFFIXES = (".mol", ".sdf", ".sd", ".mdl")
-_OUTPUT_SUFFIXES = (".log", ".out")
+_OUTPUT_SUFFIXES = (".log", ".out", ".dat", ".c4", ".g09", ".g16")
 
 
 def read_molecule(source: Any, *, isotopes: dict[int | str, str] | str | None = None) -> Molecule:
@@ -86,7 +86,8 @@ def _read_file(path: Path) -> Molecule:
     elif suffix in _SDF_SUFFIXES:
         molecule = parse_sdf(decode(path.read_bytes(), str(path)), str(path))
     elif suffix in _OUTPUT_SUFFIXES and is_output(path):
-        molecule = read_output(path) if has_cclib() else _output_without_cclib(path)
+        whole = has_cclib() or needs_no_cclib(path)
+        molecule = read_output(path) if whole else _output_without_cclib(path)
     else:
         molecule = _read_with_ase(path)
     return molecule if molecule.name else replace(molecule, name=path.stem)

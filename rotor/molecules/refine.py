@@ -15,6 +15,7 @@ MOST_FORCE_EV_PER_ANGSTROM = 1e-3  # on any atom, where an optimisation is done
 MOST_STEPS = 500
 _INSTALLED_SEPARATELY = {"tblite": "tblite.ase", "xtb": "xtb.ase.calculator"}
 _CLASS_NAMES = {"tblite": "TBLite", "xtb": "XTB"}
+_SETTINGS = {"tblite": {"verbosity": 0}, "xtb": {}}  # tblite writes each cycle to standard output otherwise
 _NOT_FOR_MOLECULES = {
     "emt": "EMT is a potential for metals; its forces on C, N, O and H are for tests of programs, not for geometries",
     "lj": "one Lennard-Jones parameter for all atoms holds no molecule together; build the calculator in Python",
@@ -122,8 +123,7 @@ def calculator_by_name(name: str) -> Any:
         known = ", ".join(sorted({*names, *_INSTALLED_SEPARATELY} - {*_NOT_FOR_MOLECULES}))
         raise ValueError(f"calculator {name!r} is unknown to ASE; known are {known}")
     try:
-        make = _separate(key) if key in _INSTALLED_SEPARATELY else library.get_calculator_class(key)
-        return make()
+        return _separate(key) if key in _INSTALLED_SEPARATELY else library.get_calculator_class(key)()
     except Exception as reason:  # an import, a configuration or a program that is missing: all mean that it is not here
         raise ValueError(
             f"calculator {name!r} cannot be built here ({' '.join(str(reason).split()) or type(reason).__name__}); install "
@@ -132,4 +132,4 @@ def calculator_by_name(name: str) -> Any:
 
 
 def _separate(key: str) -> Any:
-    return getattr(import_module(_INSTALLED_SEPARATELY[key]), _CLASS_NAMES[key])
+    return getattr(import_module(_INSTALLED_SEPARATELY[key]), _CLASS_NAMES[key])(**_SETTINGS[key])

@@ -43,7 +43,7 @@ class CharacterRow:
 def weights_of(
     molecule: Molecule,
     tolerance: float = TOLERANCE,
-    electronic: str | Sequence[int] = "even",
+    electronic: str | Sequence[int] | None = None,
     inversion: str | None = None,
 ) -> SpinWeights:
     """Spin weights of a molecule's rotational levels, reduced by their common divisor.
@@ -52,7 +52,8 @@ def weights_of(
     ----------
     molecule : Molecule
     tolerance : as for `symmetry_of`.
-    electronic : how the electronic and vibrational state behaves under the rotations, as for `spin_weights`.
+    electronic : how the electronic and vibrational state behaves under the rotations, as for `spin_weights`; None for
+        what the molecule says of itself.
     inversion : None leaves inversion doublets unresolved; `"symmetric"` or `"antisymmetric"` gives the weights of the
         one state of a molecule that inverts through the plane of its a and b axes, such as NH3.
 
@@ -63,6 +64,7 @@ def weights_of(
     {}
     """
     spins = [one.spin for one in molecule.nuclei]
+    electronic = molecule.electronic if electronic is None else electronic
     if inversion is None:
         return spin_weights(symmetry_of(molecule, tolerance), spins, electronic)
     if inversion not in STATES:
@@ -84,9 +86,9 @@ def spin_weights(symmetry: Symmetry, spins: Sequence[float], electronic: str | S
     ----------
     symmetry : as `find_symmetry` gives it.
     spins : n nuclear spins in units of h/2π, in the order of the nuclei.
-    electronic : "even" for a state that every rotation leaves alike; "odd", where there are just two classes of
-        rotations, for one that the other changes in sign (Σg- of O2: half turns across the axis); or the characters +1
-        and -1, one for each of `symmetry.rotations`.
+    electronic : "even" for a state that every rotation leaves alike; "odd", where there are at most two classes of
+        rotations, for one that the other changes in sign (Σg- of O2: half turns across the axis; 16O18O has none); or
+        the characters +1 and -1, one for each of `symmetry.rotations`.
 
     Raises
     ------
@@ -130,12 +132,13 @@ def spin_characters(
 def character_rows(
     symmetry: Symmetry, spins: Sequence[float], electronic: str | Sequence[int] = "even"
 ) -> list[CharacterRow]:
-    """The characters f(R) behind the weights, rotations of one kind together."""
+    """The characters f(R) behind the weights, rotations of one kind together, E first and the others by name."""
     counts: dict[tuple[str, tuple[tuple[float, int, int], ...], int], int] = {}
     for one, character in zip(symmetry.rotations, spin_characters(symmetry, spins, electronic), strict=True):
         key = _name_of(symmetry, one), cycles(one.permutation, spins), character
         counts[key] = counts.get(key, 0) + 1
-    return [CharacterRow(name, count, turns, character) for (name, turns, character), count in counts.items()]
+    ordered = sorted(counts.items(), key=lambda item: (item[0][0] != "E", item[0]))  # round-off orders rotations
+    return [CharacterRow(name, count, turns, character) for (name, turns, character), count in ordered]
 
 
 def cycles(permutation: Ints, spins: Sequence[float]) -> tuple[tuple[float, int, int], ...]:
@@ -197,8 +200,8 @@ def _electronic_characters(symmetry: Symmetry, electronic: str | Sequence[int]) 
     rotations = symmetry.rotations
     if electronic == "even":
         return (1,) * len(rotations)
-    if electronic == "odd" and len(rotations) == 2:
-        return (1, -1)
+    if electronic == "odd" and len(rotations) <= 2:
+        return (1, -1)[: len(rotations)]
     if isinstance(electronic, str):
         raise ValueError(
             f"electronic {electronic!r} with the rotations {symmetry.rotation_group}: 'even', 'odd' for C2 and D∞, or "

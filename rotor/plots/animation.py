@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import os
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -82,19 +85,19 @@ def animate(
     time_unit: str = "",
     time_factor: float = 1.0,
     frames: int = FRAMES,
+    provenance: Mapping[str, Any] | None = None,
 ) -> None:
     """Write a film of one free rotation from the first to the last of `times`, at even steps of the exact motion.
 
     Left the body in space, L upright: the atoms, or without them the uniform box that has these moments. Right the
     path of L over the momentum sphere in the body. times: in the units of the motion; shown multiplied by `time_factor`.
+    provenance: what the comment of the file (of the gif format, or the tag of an mp4) shall say besides version.
     Raises ValueError for a suffix that cannot be made here and for times that are all the same.
     """
     check_film(path)
     times = np.asarray(times, dtype=np.float64)
     if not times.size or np.ptp(times) == 0.0:
         raise ValueError("a film needs two different times, a first and a last")
-    from matplotlib.animation import FFMpegWriter, PillowWriter
-
     when = np.linspace(times.min(), times.max(), frames)
     momentum, attitude = motion.at(when)
     path_of_l = momentum / np.linalg.norm(motion.momentum0)
@@ -106,11 +109,10 @@ def animate(
     figure, (left, right) = _with_backdrop(figure)
     (trail,) = right.plot([], [], color=MOTION, linewidth=2.2, alpha=0.55)
     (dot,) = right.plot([], [], "o", ms=8, mfc=MOTION, mec="white")
-    film = (FFMpegWriter if Path(path).suffix.lower() == ".mp4" else PillowWriter)(fps=FRAMES_PER_SECOND)
     _draw_momentum(left)
     clock = left.set_title("", fontsize=9, y=1.0)
     body: list[Any] = []
-    with film.saving(figure, os.fspath(path), dpi=DOTS_PER_INCH):
+    with _filmed(figure, Path(path), provenance or {}) as add_frame:
         for i in range(frames):
             for part in body:
                 part.remove()
@@ -118,7 +120,34 @@ def animate(
             clock.set_text(f"$t$ = {when[i] * time_factor:.4g} {time_unit}".rstrip())
             dot.set_data(*view.flat(path_of_l[i : i + 1]).T)
             trail.set_data(*view.flat(path_of_l[: i + 1]).T)
-            film.grab_frame()
+            add_frame()
+
+
+@contextmanager
+def _filmed(figure: Any, path: Path, provenance: Mapping[str, Any]) -> Iterator[Callable[[], None]]:
+    """A function that adds the figure, as it is then, to a film; at the end the film is written, with what made it."""
+    import rotor
+
+    story = json.dumps({"program": "rotor", "version": rotor.__version__, **provenance})  # ASCII, as a gif demands
+    if path.suffix.lower() == ".mp4":
+        from matplotlib.animation import FFMpegWriter
+
+        film = FFMpegWriter(fps=FRAMES_PER_SECOND, metadata={"comment": story})
+        with film.saving(figure, os.fspath(path), dpi=DOTS_PER_INCH):
+            yield film.grab_frame
+        return
+    from PIL import Image
+
+    frames: list[Any] = []
+
+    def add_frame() -> None:
+        figure.canvas.draw()
+        frames.append(Image.fromarray(np.array(figure.canvas.buffer_rgba())[..., :3]))
+
+    yield add_frame
+    frames[0].save(
+        path, "GIF", save_all=True, append_images=frames[1:], duration=1000 // FRAMES_PER_SECOND, loop=0, comment=story
+    )
 
 
 def _empty_stage() -> tuple[Any, Any]:

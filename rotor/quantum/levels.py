@@ -96,11 +96,42 @@ class Levels(Table):
         return float(self.energy_mhz[self.weight > 0].min())
 
     @property
+    def quanta_names(self) -> tuple[str, ...]:
+        """Which quantum numbers label a level: j; j, k; or j, ka, kc."""
+        if self.kind in ("linear", "spherical"):
+            return ("j",)
+        return ("j", "ka", "kc") if (self.kc >= 0).any() else ("j", "k")
+
+    def quanta(self, rows: NDArray[Any]) -> Ints:
+        """Quantum numbers (n, 1 to 3) of the levels `rows`, in the order of `quanta_names`."""
+        columns = (self.j, self.ka, self.kc)[: len(self.quanta_names)]
+        return np.stack([column[rows] for column in columns], axis=1)
+
+    def quanta_columns(self, rows: NDArray[Any], suffix: str) -> dict[str, Ints]:
+        """The same as columns by name: j_upper, ka_upper, kc_upper for the suffix upper."""
+        return {f"{name}_{suffix}": column for name, column in zip(self.quanta_names, self.quanta(rows).T, strict=True)}
+
+    @property
     def columns(self) -> dict[str, NDArray[Any]]:
         """Quantum numbers or irreps, energy_mhz, components, weight and degeneracy, by name."""
         labels = ("j", "ka", "kc") if self.irrep is None else ("j", "irrep")
         names = (*labels, "energy_mhz", "components", "weight", "degeneracy")
         return {name: getattr(self, name) for name in names}
+
+
+class PairsOfLevels(Table):
+    """What every list of transitions has: the levels that it leads between, and their quantum numbers."""
+
+    levels: Levels
+
+    @property
+    def quanta_names(self) -> tuple[str, ...]:
+        """Which quantum numbers label a state: j; j, k; or j, ka, kc."""
+        return self.levels.quanta_names
+
+    def quanta(self, rows: NDArray[Any]) -> Ints:
+        """Quantum numbers (n, 1 to 3) of the states `rows`, such as those above or below each transition."""
+        return self.levels.quanta(rows)
 
 
 def disordered_blocks(top: Top, levels: Levels) -> list[tuple[int, str]]:

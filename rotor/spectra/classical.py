@@ -46,8 +46,8 @@ Floats = NDArray[np.float64]
 Correction = Literal["harmonic", "standard", "schofield", "egelstaff"]
 
 HZ_PER_MHZ_PS = 1e-6  # MHz times ps is a pure number after this factor
-REACH = 8.0  # the band is followed to so many times its root mean square frequency
-WINDOW_SHARE = 0.5  # of the width asked for is given to the window in time, the rest to the convolution
+REACH = 6.0  # the band is followed to so many times its root mean square frequency
+WINDOW_SHARE = 0.25  # of the width asked for is given to the window in time, the rest to the convolution
 WINDOW_END = 1e-4  # what is left of the window at the last time
 POINTS_PER_WIDTH = 16
 
@@ -127,7 +127,7 @@ def band_times(top: Top, temperature_k: float, fwhm_mhz: float) -> Floats:
     start = short_time(top.moments_u_angstrom2, units.EV_PER_K * temperature_k, _dipole(top))
     edge_mhz = REACH * math.sqrt(start.m2) / (2.0 * math.pi) / (units.CLASSICAL_TIME_PS * HZ_PER_MHZ_PS)
     end = 2.0 * math.sqrt(-math.log(WINDOW_END) * math.log(2.0)) / (math.pi * WINDOW_SHARE * fwhm_mhz) / HZ_PER_MHZ_PS
-    step = 1.0 / (4.0 * edge_mhz * HZ_PER_MHZ_PS)
+    step = 1.0 / (3.0 * edge_mhz * HZ_PER_MHZ_PS)
     return np.linspace(0.0, end, math.ceil(end / step) + 1)
 
 
@@ -259,13 +259,13 @@ def _at_later_times(times: Floats, c1: Floats, shift: float) -> Floats:
     from scipy.interpolate import CubicSpline
 
     later = np.minimum(np.hypot(times, shift), times[-1])
-    return np.asarray(CubicSpline(times, c1)(later))
+    return np.asarray(CubicSpline(times, c1, bc_type=((1, 0.0), "not-a-knot"))(later))
 
 
 def _smoothed(grid: Floats, values: Floats, fwhm: float) -> Floats:
-    """Convolution with a Gaussian on an even grid from 0, the values being even about 0."""
+    """Convolution with a Gaussian on an even grid from 0; as for lines, there is nothing below 0."""
     step = grid[1]
     reach = math.ceil(3.0 * fwhm / step)
     kernel = gaussian(step * np.arange(-reach, reach + 1), fwhm)
-    padded = np.concatenate([values[reach:0:-1], values, np.zeros(reach)])
+    padded = np.concatenate([np.zeros(reach), values, np.zeros(reach)])
     return np.asarray(np.convolve(padded, kernel / kernel.sum(), mode="valid"))

@@ -19,12 +19,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor import units
-from rotor.quantum.levels import Levels, solve_levels
+from rotor.quantum.levels import Levels, PairsOfLevels, solve_levels
 from rotor.quantum.reliability import warnings_of
 from rotor.quantum.uncertainty import Covariance, level_spread, line_errors
 from rotor.spectra.reach import jmax_for_cut
 from rotor.spectra.transitions import IntensityCut, all_transitions
-from rotor.tables import Table
 from rotor.thermo import PartitionFunction, VibrationalStates, partition_function
 
 if TYPE_CHECKING:
@@ -41,7 +40,7 @@ DEFAULT_MIN_LGINT = -12.0
 
 
 @dataclass(frozen=True)
-class Lines(Table):
+class Lines(PairsOfLevels):
     """Lines as columns of equal length, rising in frequency unless they were asked for unsorted.
 
     frequency_mhz, strength_debye2 (S μ², all components): (n,) float64. upper, lower: (n,) int32, rows of `levels`.
@@ -148,16 +147,6 @@ class Lines(Table):
         states = (2 * self.levels.j + 1) * self.levels.components
         return EINSTEIN_PER_MHZ3 * self.frequency_mhz**3 * self.strength_debye2 / states[upper]
 
-    @property
-    def quanta_names(self) -> tuple[str, ...]:
-        """Which quantum numbers label a state: J; J, K; or J, Ka, Kc."""
-        return quanta_names(self.levels)
-
-    def quanta(self, rows: NDArray[np.int32]) -> Ints:
-        """Quantum numbers (n, 1 to 3) of the states `rows` (`lines.upper` or `lines.lower`)."""
-        columns = (self.levels.j, self.levels.ka, self.levels.kc)[: len(self.quanta_names)]
-        return np.stack([column[rows] for column in columns], axis=1)
-
     def where(self, chosen: NDArray[Any] | slice) -> Lines:
         """The lines that a slice, a boolean mask or an array of indices chooses, in its order."""
         return replace(
@@ -191,17 +180,7 @@ class Lines(Table):
         out: dict[str, NDArray[Any]] = {name: getattr(self, name) for name in names}
         if (error := self.error_mhz) is not None:
             out = {"frequency_mhz": out["frequency_mhz"], "error_mhz": error} | out
-        for suffix, rows in (("upper", self.upper), ("lower", self.lower)):
-            for name, column in zip(self.quanta_names, self.quanta(rows).T, strict=True):
-                out[f"{name}_{suffix}"] = column
-        return out
-
-
-def quanta_names(levels: Levels) -> tuple[str, ...]:
-    """Names of the quantum numbers that label the levels."""
-    if levels.kind in ("linear", "spherical"):
-        return ("j",)
-    return ("j", "ka", "kc") if (levels.kc >= 0).any() else ("j", "k")
+        return out | self.levels.quanta_columns(self.upper, "upper") | self.levels.quanta_columns(self.lower, "lower")
 
 
 def line_list(

@@ -22,12 +22,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor import units
-from rotor.quantum.levels import Levels, solve_levels
+from rotor.quantum.levels import Levels, PairsOfLevels, solve_levels
 from rotor.quantum.reliability import warnings_of
-from rotor.spectra.lines import partition_of, quanta_names
+from rotor.spectra.lines import partition_of
 from rotor.spectra.raman_strengths import RamanTransitions, anisotropy_squared, raman_transitions
 from rotor.spectra.reach import JMAX_DEFAULT_LIMIT
-from rotor.tables import Table
 from rotor.thermo import PartitionFunction, VibrationalStates, partition_function
 
 if TYPE_CHECKING:
@@ -43,7 +42,7 @@ DEFAULT_MIN_RELATIVE = 1e-6
 
 
 @dataclass(frozen=True)
-class RamanLines(Table):
+class RamanLines(PairsOfLevels):
     """Raman lines as columns of equal length, rising in shift.
 
     shift_mhz: (n,) of the laser's frequency above that of the scattered light, Stokes lines positive, anti-Stokes ones
@@ -110,16 +109,6 @@ class RamanLines(Table):
         """What a user must be told about the levels behind the lines."""
         return warnings_of(self.top, self.levels)
 
-    @property
-    def quanta_names(self) -> tuple[str, ...]:
-        """Which quantum numbers label a state: J; J, K; or J, Ka, Kc."""
-        return quanta_names(self.levels)
-
-    def quanta(self, rows: Ints) -> Ints:
-        """Quantum numbers (n, 1 to 3) of the states `rows` (`lines.initial` or `lines.final`)."""
-        columns = (self.levels.j, self.levels.ka, self.levels.kc)[: len(self.quanta_names)]
-        return np.stack([column[rows] for column in columns], axis=1)
-
     def where(self, chosen: NDArray[Any] | slice) -> RamanLines:
         """The lines that a slice, a boolean mask or an array of indices chooses, in its order."""
         names = ("shift_mhz", "strength_angstrom6", "initial", "final", "weight")
@@ -132,10 +121,9 @@ class RamanLines(Table):
             "shift_cm", "cross_section_cm2_per_sr", "wavelength_nm", "energy_initial_cm", "g_initial", "strength_angstrom6",
         )  # fmt: skip
         out: dict[str, NDArray[Any]] = {name: getattr(self, name) for name in names}
-        for suffix, rows in (("initial", self.initial), ("final", self.final)):
-            for name, column in zip(self.quanta_names, self.quanta(rows).T, strict=True):
-                out[f"{name}_{suffix}"] = column
-        return out
+        return (
+            out | self.levels.quanta_columns(self.initial, "initial") | self.levels.quanta_columns(self.final, "final")
+        )
 
 
 def raman_lines(

@@ -1,0 +1,142 @@
+"""Pictures of a classical gas: equipartition degree by degree, correlation functions, and a band over its quantum lines."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rotor.classical.ensembles import Correlations
+from rotor.equipartition import Equipartition
+from rotor.plots.spectrum import BLUE, DPI, GREY, SIZE_INCHES, STYLE
+from rotor.spectra.spectrum import Spectrum
+from rotor.units import MHZ_PER_CM
+
+ORANGE, GREEN = "#D55E00", "#009E73"  # of Okabe and Ito's palette
+
+
+def equipartition_figure(tests: Mapping[str, Equipartition], columns: int = 3) -> Any:
+    """A matplotlib figure: for each gas the mean of 2E/kT by degree with the spread that chance allows, ±1 and ±3 of it."""
+    figure, axes = _panels(len(tests), columns, 2.6)
+    for panel, (name, test) in zip(axes, tests.items(), strict=False):
+        _draw_test(panel, test, name)
+    return figure
+
+
+def correlation_figure(curves: Mapping[str, Correlations], columns: int = 2) -> Any:
+    """A matplotlib figure of C1 and C2 against time in ps, one diagram for each gas, with three standard errors."""
+    figure, axes = _panels(len(curves), columns, 3.0)
+    for panel, (name, curve) in zip(axes, curves.items(), strict=False):
+        _draw_curves(panel, curve, name, None)
+    return figure
+
+
+def band_figure(pairs: Sequence[tuple[str, Mapping[str, Spectrum], Spectrum]], columns: int = 2) -> Any:
+    """A matplotlib figure of classical bands over quantum ones: (title, classical ones by name, the quantum one) each."""
+    figure, axes = _panels(len(pairs), columns, 3.0)
+    for panel, (title, classical, quantum) in zip(axes, pairs, strict=False):
+        cm = quantum.frequency_mhz / MHZ_PER_CM
+        panel.fill_between(cm, quantum.intensity, color=BLUE, alpha=0.25, linewidth=0.0)
+        panel.plot(cm, quantum.intensity, color=BLUE, linewidth=1.2, label="quantum lines")
+        for (name, spectrum), colour in zip(classical.items(), (ORANGE, GREEN, "black", GREY), strict=False):
+            panel.plot(cm, spectrum.intensity, color=colour, linewidth=1.2, label=f"classical, {name}")
+        panel.set(xlabel="wavenumber (cm⁻¹)", ylabel="cross section (nm²)", xlim=(0, cm[-1]))
+        panel.set_ylim(bottom=0.0)
+        panel.set_title(title, loc="left")
+        panel.legend(frameon=False)
+    return figure
+
+
+def plot_gas(
+    test: Equipartition,
+    curves: Correlations | None,
+    path: str | os.PathLike[str],
+    *,
+    title: str = "",
+    plateau: float | None = None,
+    provenance: Mapping[str, Any] | None = None,
+) -> None:
+    """Draw the test, and the correlation functions beside it where there are some, into a .png, .pdf or .svg file.
+
+    plateau: where C1 ends, drawn as a line. provenance: kept in the metadata. ValueError for a suffix that is no picture.
+    """
+    suffix = Path(path).suffix.lower()
+    if suffix not in (".png", ".pdf", ".svg"):
+        raise ValueError(f"{os.fspath(path)}: a picture is .png, .pdf or .svg; the suffix names the format")
+    import matplotlib as mpl
+
+    figure, axes = _panels(1 if curves is None else 2, 2, SIZE_INCHES[1])
+    with mpl.rc_context(STYLE):
+        verdict = "accepted" if test.accepted else "rejected"
+        _draw_test(axes[0], test, f"equipartition {verdict}, p = {test.p_value:.2g}")
+        if curves is not None:
+            _draw_curves(axes[1], curves, "correlation functions", plateau)
+        figure.suptitle(title.replace("$", r"\$"), fontsize=10, x=0.01, ha="left")
+        figure.savefig(path, dpi=DPI, metadata=_metadata(suffix, title, provenance or {}))
+
+
+def _panels(count: int, columns: int, height: float) -> tuple[Any, list[Any]]:
+    """A figure and its diagrams, in rows."""
+    if not count:
+        raise ValueError("there is nothing to draw")
+    import matplotlib as mpl
+    from matplotlib.figure import Figure
+
+    across = min(columns, count)
+    rows = -(-count // across)
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(max(SIZE_INCHES[0], 3.3 * across), height * rows), layout="constrained")
+        axes = list(figure.subplots(rows, across, squeeze=False).flat)
+    for empty in axes[count:]:
+        empty.set_visible(False)
+    return figure, axes[:count]
+
+
+def _draw_test(axes: Any, test: Equipartition, title: str) -> None:
+    names = [degree.name.replace("translation", "trans.").replace("rotation", "rot.") for degree in test.degrees]
+    places = np.arange(len(names))
+    spread = np.array([degree.mean_spread for degree in test.degrees])
+    for factor, shade in ((3.0, 0.12), (1.0, 0.25)):
+        axes.bar(
+            places, 2 * factor * spread, bottom=1.0 - factor * spread, width=0.8, color=GREY, alpha=shade, linewidth=0
+        )
+    axes.axhline(1.0, color=GREY, linewidth=0.7)
+    colours = [ORANGE if degree.name in test.failing else BLUE for degree in test.degrees]
+    axes.scatter(places, [degree.mean for degree in test.degrees], c=colours, s=18, zorder=3)
+    axes.set_xticks(places, names, rotation=40, ha="right")
+    axes.set_ylabel("mean of 2E/kT")
+    axes.set_title(title, loc="left")
+
+
+def _draw_curves(axes: Any, curves: Correlations, title: str, plateau: float | None) -> None:
+    for name, values, error, colour in (
+        ("$C_1$", curves.c1, curves.c1_error, BLUE),
+        ("$C_2$", curves.c2, curves.c2_error, ORANGE),
+    ):
+        if values is not None and error is not None:
+            order = np.argsort(curves.times)
+            t, mean, band = curves.times[order], values[order], 3.0 * error[order]
+            axes.fill_between(t, mean - band, mean + band, color=colour, alpha=0.2, linewidth=0.0)
+            axes.plot(t, mean, color=colour, linewidth=1.2, label=name)
+    if plateau is not None:
+        axes.axhline(plateau, color=BLUE, linewidth=0.7, linestyle=":", label="$C_1$ for ever")
+    axes.axhline(0.0, color=GREY, linewidth=0.7)
+    axes.set_xlabel("$t$ (ps)")
+    axes.set_title(title, loc="left")
+    axes.legend(frameon=False)
+
+
+def _metadata(suffix: str, title: str, facts: Mapping[str, Any]) -> dict[str, Any]:
+    """Provenance by the keys that each format has; no date, so that the same picture is the same file."""
+    import rotor
+
+    story, program = json.dumps(dict(facts), ensure_ascii=False), f"rotor {rotor.__version__}"
+    if suffix == ".png":
+        return {"Software": program, "Title": title, "Description": story}
+    if suffix == ".pdf":
+        return {"Creator": program, "Title": title, "Subject": story, "CreationDate": None}
+    return {"Creator": program, "Title": title, "Description": story, "Date": None}

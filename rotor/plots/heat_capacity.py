@@ -1,0 +1,162 @@
+"""Pictures of heat capacities: the quantum sum beside the classical limit, and published values as points."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor.plots.spectrum import DPI, SIZE_INCHES, STYLE, formula_text
+from rotor.thermo import ThermoFunctions
+from rotor.top import Top
+
+# of Okabe and Ito's palette, told apart by everyone
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+GREY = "#777777"
+LOG_FROM = 30.0  # of the last to the first temperature: beyond it the axis is logarithmic
+CURVE_POINTS = 300
+
+
+@dataclass(frozen=True)
+class Points:
+    """Published values: what they are of, temperatures in K, and C_v/R without translation."""
+
+    label: str
+    temperature_k: NDArray[np.float64]
+    cv_over_r: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One diagram: functions by the name of their curve, and published points; a point takes the colour of its name."""
+
+    title: str
+    curves: Mapping[str, ThermoFunctions]
+    points: Sequence[Points] = field(default=())
+
+
+def heat_capacity_figure(panels: Sequence[Panel], columns: int = 2) -> Any:
+    """A matplotlib figure of C_v/R of rotation, and of vibration where it is given, against temperature.
+
+    Full lines: the quantum sum; thick grey: the classical limit; dotted: that with its first corrections, of the first curve.
+    Where there are vibrational states a dashed line of the same colour adds them.
+    """
+    if not panels or not all(panel.curves for panel in panels):
+        raise ValueError("a picture of heat capacities needs a panel, and a curve in each")
+    import matplotlib as mpl
+    from matplotlib.figure import Figure
+
+    rows = -(-len(panels) // columns)
+    across = min(columns, len(panels))
+    size = SIZE_INCHES if len(panels) == 1 else (4.6 * across, 3.4 * rows)
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=size, layout="constrained")
+        for panel, axes in zip(panels, figure.subplots(rows, across, squeeze=False).flat, strict=False):
+            _draw(axes, panel)
+    return figure
+
+
+def plot_heat_capacity(
+    panels: Sequence[Panel], path: str | os.PathLike[str], *, provenance: Mapping[str, Any] | None = None
+) -> None:
+    """Draw `heat_capacity_figure` into a .png, .pdf or .svg file, with the provenance in its metadata.
+
+    Raises ValueError for a suffix that is no picture, and for nothing to draw.
+    """
+    suffix = Path(path).suffix.lower()
+    if suffix not in (".png", ".pdf", ".svg"):
+        raise ValueError(f"{os.fspath(path)}: a picture is .png, .pdf or .svg; the suffix names the format")
+    import matplotlib as mpl
+
+    figure = heat_capacity_figure(panels)
+    with mpl.rc_context(STYLE):
+        figure.savefig(path, dpi=DPI, metadata=_metadata(suffix, panels, provenance or {}))
+
+
+def curve_temperatures(temperatures_k: Sequence[float] | NDArray[np.float64]) -> NDArray[np.float64]:
+    """Temperatures from the lowest to the highest of those given, close enough for a smooth curve; (300,) or (1,)."""
+    low, high = float(np.min(temperatures_k)), float(np.max(temperatures_k))
+    if low == high:
+        return np.array([low])
+    return np.geomspace(low, high, CURVE_POINTS) if high > LOG_FROM * low else np.linspace(low, high, CURVE_POINTS)
+
+
+def name_of(top: Top) -> str:
+    """Name and formula of a top for the head of a diagram."""
+    formula = formula_text(top.molecule.formula) if top.molecule is not None else ""
+    return ", ".join(part for part in (top.name.replace("$", r"\$"), formula) if part) or f"{top.kind} top"
+
+
+def _draw(axes: Any, panel: Panel) -> None:
+    first = next(iter(panel.curves.values()))
+    t = np.sort(first.temperature_k)
+    classical = float(first.cv_over_r_classical[0])
+    axes.axhline(classical, color=GREY, linewidth=2.5, alpha=0.5, label="classical")
+    if np.isfinite(first.cv_over_r_corrected).any():
+        _line(axes, first, first.cv_over_r_corrected, color="black", linestyle=":", linewidth=1.1, label="corrected")
+    colour = dict(zip(panel.curves, COLOURS * len(panel.curves), strict=False))
+    for label, functions in panel.curves.items():
+        _line(axes, functions, functions.cv_over_r, color=colour[label], linewidth=1.5, label=label)
+        if functions.cv_vib_over_r is not None:
+            total = functions.cv_over_r + functions.cv_vib_over_r
+            _line(axes, functions, total, color=colour[label], linewidth=1.1, linestyle="--", label="with vibration")
+    for points in panel.points:
+        edge = colour.get(points.label, "black")
+        name = None if points.label in colour else points.label
+        axes.plot(
+            points.temperature_k, points.cv_over_r, "o", markersize=4, markerfacecolor="white", markeredgecolor=edge,
+            markeredgewidth=0.9, label=name, zorder=5,
+        )  # fmt: skip
+    if t[-1] > LOG_FROM * t[0]:
+        _make_logarithmic(axes)
+    axes.set_ylim(bottom=0.0, top=_highest(panel, classical))
+    axes.set_xlabel("$T$ (K)")
+    axes.set_ylabel("$C_v/R$ without translation")
+    axes.set_title(panel.title, loc="left")
+    axes.legend(frameon=False, fontsize=7.5, loc="best")
+
+
+def _make_logarithmic(axes: Any) -> None:
+    """Logarithmic temperatures, written as 10, 20, 50, 100."""
+    from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
+
+    axes.set_xscale("log")
+    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axes.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+    axes.xaxis.set_minor_formatter(NullFormatter())
+
+
+def _line(axes: Any, functions: ThermoFunctions, values: NDArray[np.float64], **style: Any) -> None:
+    order = np.argsort(functions.temperature_k)
+    marker = "." if len(order) < 3 else None  # one temperature makes no line
+    axes.plot(functions.temperature_k[order], values[order], marker=marker, **style)
+
+
+def _highest(panel: Panel, classical: float) -> float:
+    """Upper end of the axis: above every curve and point, not above a correction that runs away."""
+    values = [classical]
+    for functions in panel.curves.values():
+        vibration = 0.0 if functions.cv_vib_over_r is None else functions.cv_vib_over_r
+        values.append(float(np.max(functions.cv_over_r + vibration)))
+    values += [float(points.cv_over_r.max()) for points in panel.points if len(points.cv_over_r)]
+    return 1.12 * max(values)
+
+
+def _metadata(suffix: str, panels: Sequence[Panel], provenance: Mapping[str, Any]) -> dict[str, Any]:
+    """What made the picture, under the names that each format allows; no date, so that the same picture is the same file."""
+    import rotor
+
+    curves = {panel.title: list(panel.curves) for panel in panels}
+    story = {"program": "rotor", "version": rotor.__version__, "curves": curves, **provenance}
+    text = json.dumps(story, ensure_ascii=False)
+    if suffix == ".pdf":
+        return {"Title": "heat capacity", "Subject": text, "CreationDate": None}
+    if suffix == ".svg":
+        return {"Title": "heat capacity", "Description": text, "Date": None}
+    return {"Title": "heat capacity", "Description": text}

@@ -1,0 +1,47 @@
+"""Thermodynamics of rotation: sums over levels, their classical limit, nuclear-spin species, and the ideal gas.
+
+A module for each: `sums`, `classical`, `species`, `vibration` and `functions`, which brings them together.
+"""
+
+from rotor.thermo.classical import (
+    ClassicalLimit,
+    classical_limit,
+    classical_partition_function,
+    parting_temperature_k,
+    rotational_temperatures_k,
+)
+from rotor.thermo.functions import (
+    GAS_CONSTANT,
+    IdealGas,
+    ThermoFunctions,
+    species_names,
+    thermodynamic_functions,
+    translational_entropy,
+)
+from rotor.thermo.species import implied_symmetry_number, spin_species
+from rotor.thermo.sums import LevelSums, PartitionFunction, level_sums, partition_function, partition_functions
+from rotor.thermo.vibration import VibrationalStates, vibrational_functions, vibrational_partition_function
+
+__all__ = [
+    "GAS_CONSTANT",
+    "ClassicalLimit",
+    "IdealGas",
+    "LevelSums",
+    "PartitionFunction",
+    "ThermoFunctions",
+    "VibrationalStates",
+    "classical_limit",
+    "classical_partition_function",
+    "implied_symmetry_number",
+    "level_sums",
+    "parting_temperature_k",
+    "partition_function",
+    "partition_functions",
+    "rotational_temperatures_k",
+    "species_names",
+    "spin_species",
+    "thermodynamic_functions",
+    "translational_entropy",
+    "vibrational_functions",
+    "vibrational_partition_function",
+]

@@ -1,0 +1,80 @@
+"""Nuclear-spin species: levels of one species turn into those of another so slowly that each is a gas of its own.
+
+The species are the classes of the spin weights that radiation and collisions do not mix: even and odd J of H2, the two
+sums of Ka and Kc of H2O, K a multiple of 3 or not of NH3, the irreps A, E and F of CH4. Where there are two, the one that
+weighs more is called ortho (G. Herzberg, Molecular Spectra and Molecular Structure I, section III,2f).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from rotor.weights import SpinWeights
+
+_PAIRS = ((("ee", "oo"), ("eo", "oe")), (("ee", "eo"), ("oe", "oo")), (("ee", "oe"), ("eo", "oo")))
+
+
+def spin_species(weights: SpinWeights) -> dict[str, SpinWeights]:
+    """The weights of each nuclear-spin species by its name, all other classes weighing 0; the weights add up to those given.
+
+    Two species are para and ortho, more have the names of their classes. One entry, "all", where all levels are of one
+    species. Weights are not divided again by a common divisor.
+
+    >>> {name: one.values for name, one in spin_species(SpinWeights.from_mapping({"even": 1, "odd": 3})).items()}
+    {'para': (1, 0), 'ortho': (0, 3)}
+    >>> list(spin_species(SpinWeights.from_mapping({"A": 5, "E": 2, "F": 3})))
+    ['A', 'E', 'F']
+    """
+    groups = [group for group in _groups(weights) if any(_value(weights, name) for name in group)]
+    if len(groups) < 2:
+        return {"all": weights}
+    heaviest = [max(_value(weights, name) for name in group) for group in groups]
+    if len(groups) == 2 and heaviest[0] != heaviest[1]:
+        para, ortho = (groups[i] for i in ((0, 1) if heaviest[0] < heaviest[1] else (1, 0)))
+        return {"para": _only(weights, para), "ortho": _only(weights, ortho)}
+    return {group[0]: _only(weights, group) for group in groups}
+
+
+def _groups(weights: SpinWeights) -> list[tuple[str, ...]]:
+    """Classes that one species holds: K and n - K, the two parities that a half turn tells apart, else each by itself."""
+    if weights.rule == "K":
+        return _by_k(weights)
+    if weights.rule == "KaKc":
+        for pair in _PAIRS:
+            if all(len({_value(weights, name) for name in group}) == 1 for group in pair):
+                return list(pair) if len(set(weights.values)) > 1 else [weights.classes]
+    return [(name,) for name in weights.classes]
+
+
+def _by_k(weights: SpinWeights) -> list[tuple[str, ...]]:
+    zero = [name for name in weights.classes if name.startswith("0")]
+    n = len(weights.classes) - len(zero) + 1
+    pairs = [tuple(dict.fromkeys((str(k), str(n - k)))) for k in range(1, n // 2 + 1)]
+    return [(name,) for name in zero] + pairs
+
+
+def _value(weights: SpinWeights, name: str) -> int:
+    return weights.values[weights.classes.index(name)]
+
+
+def _only(weights: SpinWeights, names: tuple[str, ...]) -> SpinWeights:
+    kept = (value if name in names else 0 for name, value in zip(weights.classes, weights.values, strict=True))
+    return replace(weights, values=tuple(kept))
+
+
+def implied_symmetry_number(weights: SpinWeights) -> int:
+    """How many rotations of a molecule the rule and the classes of its spin weights tell of; 1 where there is no rule.
+
+    >>> implied_symmetry_number(SpinWeights.from_mapping({"A": 5, "E": 2, "F": 3}))
+    12
+    """
+    if weights.rule == "none" or len(set(weights.values)) == len(weights.classes) == 1:
+        return 1
+    if weights.rule == "J":
+        return 2
+    if weights.rule == "irrep":
+        return {3: 12, 5: 60 if "G" in weights.classes else 24}[len(weights.classes)]
+    if weights.rule == "KaKc":
+        return {1: 1, 2: 2, 4: 4}[len(_groups(weights))]
+    dihedral = "0odd" in weights.classes
+    return 2 * (len(weights.classes) - 1) if dihedral else len(weights.classes)

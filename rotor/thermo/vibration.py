@@ -1,0 +1,125 @@
+"""Vibrational states of a gas: their part of the partition function, of the energy and of the heat capacity.
+
+Either states that are listed one by one, or fundamentals of harmonic oscillators, all overtones among them. Every state
+is given the same rotational levels. Energies count from the ground state of vibration.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rotor import units
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class VibrationalStates:
+    """Vibrational states behind a partition function, by their energies above the ground state.
+
+    energies_cm: in cm⁻¹, all above 0. degeneracies: of each, 1 unless given. harmonic: the energies are fundamentals, and
+    all their overtones and combinations are added as those of harmonic oscillators; else they are states, each listed.
+
+    Neglected either way: that each state has rotational constants of its own, some per cent of the factor less 1.
+    """
+
+    energies_cm: tuple[float, ...]
+    degeneracies: tuple[int, ...] = ()
+    harmonic: bool = False
+
+    def __post_init__(self) -> None:
+        energies = tuple(float(energy) for energy in self.energies_cm)
+        degeneracies = tuple(self.degeneracies) or (1,) * len(energies)
+        if not energies or not all(math.isfinite(e) and e > 0 for e in energies):
+            raise ValueError(
+                f"vibrational energies {list(energies)}: finite ones above 0 cm-1 are wanted (not the ground state)"
+            )
+        if len(degeneracies) != len(energies) or not all(int(g) == g and g > 0 for g in degeneracies):
+            raise ValueError(
+                f"degeneracies {list(degeneracies)}: a whole number above 0 for each of {len(energies)} energies"
+            )
+        object.__setattr__(self, "energies_cm", energies)
+        object.__setattr__(self, "degeneracies", tuple(int(g) for g in degeneracies))
+
+    @classmethod
+    def parse(cls, text: str, harmonic: bool = False) -> VibrationalStates:
+        """From a comma list such as "667.4x2, 1388, 2349 cm-1", with x and the degeneracy after an energy; cm⁻¹ by default.
+
+        >>> VibrationalStates.parse("667.4x2,1388,2349 cm-1").degeneracies
+        (2, 1, 1)
+        """
+        items = [_ENERGY.fullmatch(item) for item in text.split(",")]
+        if not all(items):
+            raise ValueError(
+                f"{text!r}: energies such as '667.4x2, 1388, 2349 cm-1' are wanted, x and a degeneracy after each"
+            )
+        unit = next((item["unit"] for item in reversed(items) if item and item["unit"]), "cm-1")
+        mhz = [units.parse_quantity(f"{item['energy']} {item['unit'] or unit}", "MHz") for item in items if item]
+        degeneracies = tuple(int(item["times"] or 1) for item in items if item)
+        return cls(tuple(x / units.MHZ_PER_CM for x in mhz), degeneracies, harmonic)
+
+    @property
+    def text(self) -> str:
+        """The energies as they are given, and what they are."""
+        energies = (
+            f"{e:g}" + (f"x{g}" if g > 1 else "") for e, g in zip(self.energies_cm, self.degeneracies, strict=True)
+        )
+        return f"{'fundamentals, harmonic,' if self.harmonic else 'states'} {', '.join(energies)} cm-1"
+
+    def factor(self, temperature_k: float) -> float:
+        """The factor of Q at a temperature; see `vibrational_partition_function`."""
+        return vibrational_partition_function(
+            self.energies_cm, self.degeneracies, temperature_k, harmonic=self.harmonic
+        )
+
+
+_ENERGY = re.compile(
+    r"\s*(?P<energy>[\d.]+(?:[eE][+-]?\d+)?)\s*(?:[x×]\s*(?P<times>\d+))?\s*(?P<unit>[^\d\s.,x×][^\s,]*)?\s*"
+)
+
+
+def vibrational_partition_function(
+    energies_cm: ArrayLike, degeneracies: ArrayLike, temperature_k: float, *, harmonic: bool = False
+) -> float:
+    """Q of vibration, the ground state counted as 1: Σ g exp(-E/kT) over the states listed, or of harmonic oscillators.
+
+    With `harmonic` the energies are fundamentals and Q = Π (1 - exp(-E/kT))^-g, all overtones among it (G. Herzberg,
+    Molecular Spectra and Molecular Structure II, eqs. V,20 and V,21; anharmonicity and what splits overtones neglected).
+    energies_cm, degeneracies: (n,). Raises ValueError for a temperature not above 0 K or energies not above 0.
+
+    >>> round(vibrational_partition_function([667.4, 1388.2, 2349.1], [2, 1, 1], 300.0, harmonic=True), 4)  # CO2
+    1.0881
+    """
+    if not (math.isfinite(temperature_k) and temperature_k > 0):
+        raise ValueError(f"temperature {temperature_k} K: a temperature is above 0 K")
+    given = VibrationalStates(tuple(np.ravel(energies_cm).tolist()), tuple(np.ravel(degeneracies).tolist()))
+    occupied = np.exp(-np.array(given.energies_cm) * units.MHZ_PER_CM / (temperature_k * units.MHZ_PER_K))
+    g = np.array(given.degeneracies)
+    return float(np.prod((1 - occupied) ** -g.astype(float))) if harmonic else float(1 + g @ occupied)
+
+
+def vibrational_functions(states: VibrationalStates, temperatures_k: ArrayLike) -> tuple[Floats, Floats, Floats]:
+    """ln Q, U/RT and C_v/R of vibration at many temperatures, (n,) each.
+
+    With x = E/kT and p the thermal weight of a state: U/RT = ⟨x⟩, C_v/R = ⟨x²⟩ - ⟨x⟩². An oscillator has, in closed form,
+    ln Q = -ln(1 - e⁻ˣ), U/RT = x/(eˣ - 1), C_v/R = x² eˣ/(eˣ - 1)² (A. Einstein, Ann. Phys. 327 (1907) 180, eq. 8). Where
+    eˣ would overflow they are 0.
+
+    >>> one = VibrationalStates((100.0,), harmonic=True)
+    >>> [round(float(v[0]), 4) for v in vibrational_functions(one, [1000.0])]  # C_v/R near 1 - x²/12
+    [2.0099, 0.9298, 0.9983]
+    """
+    t = np.asarray(temperatures_k, dtype=np.float64)
+    x = np.array(states.energies_cm) * units.MHZ_PER_CM / (t[:, None] * units.MHZ_PER_K)
+    g, occupied = np.array(states.degeneracies, dtype=np.float64), np.exp(-x)
+    if states.harmonic:
+        quanta = occupied / -np.expm1(-x)
+        return -np.log1p(-occupied) @ g, (x * quanta) @ g, (x * x * quanta * (1 + quanta)) @ g
+    more = occupied @ g
+    first, second = (x * occupied) @ g / (1 + more), (x * x * occupied) @ g / (1 + more)
+    return np.log1p(more), first, second - first**2
