@@ -24,6 +24,7 @@ Examples:
   rotor fluid water --molecules 216 --ensemble langevin --steps 20000 --trajectory liquid.traj --checkpoint run.npz
   rotor fluid water --molecules 216 --ensemble langevin --steps 40000 --trajectory liquid.traj --checkpoint run.npz --resume
   rotor fluid liquid.traj --ensemble nve --steps 50000 --every 10 --csv nve.csv --json -
+  rotor fluid liquid.traj --steps 50000 --engine openmm --threads 2 --csv openmm.csv
   rotor fluid argon --molecules 500 --model argon --density 1.4 --temperature 90 --step 5fs"""
 
 TRAJECTORY = typer.Option(None, metavar="FILE", help="Write frames as they come (.traj, .xyz, .extxyz); repeatable.")
