@@ -52,21 +52,21 @@ def _image(raw: int, bins: int, box: float) -> int:
 
 @njit(cache=True, error_model="numpy")
 def _keep_near(
-    there: Array, order: Integers, start: int, stop: int, x: float, y: float, z: float, range2: Array, kinds: Integers, code: int,
-    found: int, mine: Integers,
+    there: Array, order: Integers, start: int, stop: int, x: float, y: float, z: float, range2: float, code: int, found: int,
+    mine: Integers,
 ) -> int:  # fmt: skip
     """Append the molecules from start to stop that are in range of (x, y, z); how many there are then."""
     for p in range(start, stop):
         dx, dy, dz = there[p, 0] - x, there[p, 1] - y, there[p, 2] - z
         mine[found] = order[p] * 128 + code
-        found += 1 if dx * dx + dy * dy + dz * dz < range2[kinds[p]] else 0
+        found += 1 if dx * dx + dy * dy + dz * dz < range2 else 0
     return found
 
 
 @njit(cache=True, error_model="numpy")
 def _along_column(
     m: int, raw_x: int, raw_y: int, left: float, own: bool, rank: int, places: Integers, starts: Integers, there: Array,
-    order: Integers, here: Array, box: Array, low: Array, width: Array, bins: Integers, range2: Array, kinds: Integers, found: int,
+    order: Integers, here: Array, box: Array, low: Array, width: Array, bins: Integers, range2: float, found: int,
     mine: Integers,
 ) -> Any:  # fmt: skip
     """Neighbours of m in a column of bins along z, within √left of it there; own: the column of m, from m upwards."""
@@ -86,47 +86,56 @@ def _along_column(
             mine = np.concatenate((mine, np.empty(len(mine) + stop - start, dtype=np.int64)))
         x, y, z = here[0] - image_x * box[0], here[1] - image_y * box[1], here[2] - image_z * box[2]
         code = ((image_x + IMAGES) * 5 + image_y + IMAGES) * 5 + image_z + IMAGES
-        found = _keep_near(there, order, start, stop, x, y, z, range2, kinds, code, found, mine)
+        found = _keep_near(there, order, start, stop, x, y, z, range2, code, found, mine)
     return found, mine
+
+
+@njit(cache=True)
+def _by_kind(
+    mine: Integers, found: int, kinds: Integers, species: int, entries: Integers, used: int, starts: Integers
+) -> int:
+    """Copy one molecule's list behind the others, one kind after the other, and note where each ends."""
+    for kind in range(species):
+        for p in range(found):
+            if species == 1 or kinds[mine[p] // 128] == kind:
+                entries[used] = mine[p]
+                used += 1
+        starts[kind] = used
+    return used
 
 
 @njit(cache=True, error_model="numpy")
 def neighbour_list(
-    centres: Array, box: Array, low: Array, width: Array, bins: Integers, kinds: Integers, ranges: Array
+    centres: Array, box: Array, low: Array, width: Array, bins: Integers, kinds: Integers, species: int, farthest: float
 ) -> Any:
-    """Starts (n x kinds + 1) and entries (128 molecule + code of the image) of all pairs nearer than the range of their kinds.
+    """Starts (n x kinds + 1) and entries (128 molecule + code of the image) of all pairs nearer than `farthest`.
 
     box is 0 along directions that do not repeat; low, width, bins (3) divide the cell or the space that holds the molecules.
     """
-    n, species, farthest2 = len(centres), len(ranges), np.max(ranges) ** 2
+    n, range2 = len(centres), farthest**2
     places, first, order, rank = _sorted_into_bins(centres, low, width, bins)
-    there, sorted_kinds = centres[order], kinds[order]
-    steps = np.array([int(np.ceil(np.max(ranges) / width[c])) for c in range(2)])
+    there = centres[order]
+    steps = np.array([int(np.ceil(farthest / width[c])) for c in range(2)])
     starts = np.zeros(n * species + 1, dtype=np.int64)
     entries, mine, used = np.empty(n * 64 + 1024, dtype=np.uint64), np.empty(1024, dtype=np.int64), 0
     for m in range(n):
-        found, range2, here = 0, ranges[kinds[m]] ** 2, centres[m]
+        found, here = 0, centres[m]
         for raw_x in range(places[m, 0], places[m, 0] + steps[0] + 1):
             gap_x = _gap2(here[0], low[0] + raw_x * width[0], width[0])
-            if abs(_image(raw_x, bins[0], box[0])) > IMAGES or gap_x > farthest2:
+            if abs(_image(raw_x, bins[0], box[0])) > IMAGES or gap_x > range2:
                 continue
             ahead = raw_x > places[m, 0]
             for raw_y in range(places[m, 1] - steps[1] if ahead else places[m, 1], places[m, 1] + steps[1] + 1):
-                left = farthest2 - gap_x - _gap2(here[1], low[1] + raw_y * width[1], width[1])
+                left = range2 - gap_x - _gap2(here[1], low[1] + raw_y * width[1], width[1])
                 if abs(_image(raw_y, bins[1], box[1])) > IMAGES or left < 0.0:
                     continue
                 found, mine = _along_column(
                     m, raw_x, raw_y, left, not ahead and raw_y == places[m, 1], rank[m], places, first, there, order, here,
-                    box, low, width, bins, range2, sorted_kinds, found, mine,
+                    box, low, width, bins, range2, found, mine,
                 )  # fmt: skip
         if used + found > len(entries):
             entries = np.concatenate((entries, np.empty(len(entries) + found, dtype=np.uint64)))
-        for kind in range(species):
-            for p in range(found):
-                if species == 1 or kinds[mine[p] // 128] == kind:
-                    entries[used] = mine[p]
-                    used += 1
-            starts[m * species + kind + 1] = used
+        used = _by_kind(mine, found, kinds, species, entries, used, starts[m * species + 1 : (m + 1) * species + 1])
     return starts, entries[:used]
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -44,7 +45,7 @@ class Neighbours:
         self.images = np.ascontiguousarray(grid * self.box_angstrom)
         self._refuse_small_boxes()
 
-    @property
+    @cached_property
     def within_angstrom(self) -> Array:
         """(kinds, kinds) distance of centres beyond which no two sites are within the cutoff."""
         reach = self.assembly.reach_angstrom
@@ -95,11 +96,18 @@ class Neighbours:
         repeats = self.box_angstrom > 0
         low = np.where(repeats, 0.0, self.centres.min(axis=0))
         extent = np.where(repeats, self.box_angstrom, self.centres.max(axis=0) - low + 1e-3)
-        ranges = np.minimum(self.within_angstrom + self.skin_angstrom, np.linalg.norm(extent) * 3)
+        farthest = min(self.within_angstrom.max() + self.skin_angstrom, 3 * float(np.linalg.norm(extent)))
         most = math.ceil((4 * len(self.assembly)) ** (1 / 3))
-        bins = np.clip(np.floor(extent * 3 / ranges.max()), 1, most).astype(np.int64)
+        bins = np.clip(np.floor(extent * 2 / farthest), 1, most).astype(np.int64)
         self.starts, self.entries = _list_kernels.neighbour_list(
-            self.centres, self.box_angstrom, low, extent / bins, bins, self.assembly.kinds, ranges
+            self.centres,
+            self.box_angstrom,
+            low,
+            extent / bins,
+            bins,
+            self.assembly.kinds,
+            len(self.assembly.models),
+            farthest,
         )
         self.rebuilds += 1
 
@@ -114,6 +122,7 @@ class Neighbours:
     def _refuse_overlaps(self) -> None:
         found = self.closest(2 * self.assembly.reach_angstrom.max() + CLOSEST_ANGSTROM)
         if found is not None and found[0] < CLOSEST_ANGSTROM:
+            self.starts = self.starts[:0]  # so that asking again fails again
             raise ValueError(
                 f"atoms {found[1]} and {found[2]} of different molecules are {found[0]:.3g} Å apart; molecules that lie "
                 f"on top of each other (nearer than {CLOSEST_ANGSTROM} Å) have no sensible energy: move one of them"

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from ase.calculators.calculator import Calculator, all_changes
+from ase.calculators.calculator import Calculator, PropertyNotImplementedError, all_changes
 
 from rotor.fluid.assembly import Assembly, assemble
 from rotor.fluid.ewald import EwaldParameters, WaveVectors, fourier_virial, parameters_for, self_energy, wave_vectors
@@ -25,7 +25,7 @@ from rotor.fluid.neighbours import CLOSEST_ANGSTROM, Neighbours
 from rotor.fluid.settings import ELECTROSTATICS
 from rotor.rotations import Array
 
-VOIGT = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))
+VOIGT = [0, 1, 2, 1, 0, 0], [0, 1, 2, 2, 2, 1]
 
 
 def models_of(names: str | RigidModel | Sequence[str | RigidModel]) -> tuple[RigidModel, ...]:
@@ -95,11 +95,12 @@ class RigidPotential(Calculator):
         self._check()
         self._tables: PairTables = pair_tables(self.models)
         self._assembly: Assembly | None = None
-        self._known: tuple[Array, Array | None] | None = None
+        self._known: Any = None
         self._neighbours: Neighbours | None = None
         self._waves: WaveVectors | None = None
         self._ewald: EwaldParameters | None = None
         self._tail = (0.0, 0.0)
+        self._cut, self._field = switched(cutoff_angstrom, switch_width_angstrom), np.zeros(6)
         self._pool: ThreadPoolExecutor | None = None
         self.last: Evaluation | None = None
         super().__init__(**kwargs)
@@ -116,35 +117,58 @@ class RigidPotential(Calculator):
             raise ValueError(f"switch_width_angstrom = {self.switch_width_angstrom}: 0 up to the cutoff is wanted")
 
     def reset(self) -> None:
-        """Forget results and lists."""
+        """Forget results, lists and what was made for this box: the next forces are those of a new calculator, bit for bit."""
         super().reset()
-        self._neighbours = None
+        self._assembly = self._neighbours = self._ewald = None
 
     def check_state(self, atoms: Any, tol: float = 0.0) -> list[str]:
         """What changed since the last calculation, to the bit (ASE calls this)."""
         old: Any = self.atoms
-        if old is None or len(old) != len(atoms):
+        if old is None or not _same_atoms(old, atoms):
             return list(all_changes)
-        now = {"positions": atoms.positions, "numbers": atoms.numbers, "cell": atoms.cell.array, "pbc": atoms.pbc}
-        was = {"positions": old.positions, "numbers": old.numbers, "cell": old.cell.array, "pbc": old.pbc}
-        changes = [name for name in now if not np.array_equal(now[name], was[name])]
-        labels = atoms.arrays.get("molecule"), old.arrays.get("molecule")
-        return changes if _same((atoms.numbers, labels[0]), (old.numbers, labels[1])) else ["numbers", *changes]
+        now = {"positions": atoms.positions, "cell": atoms.cell.array, "pbc": atoms.pbc}
+        was = {"positions": old.positions, "cell": old.cell.array, "pbc": old.pbc}
+        return [name for name in now if not np.array_equal(now[name], was[name])]
+
+    def get_property(self, name: str, atoms: Any = None, allow_calculation: bool = True) -> Any:
+        """A property of atoms, from the last calculation where nothing changed (ASE calls this); lists outlive changes."""
+        if name not in self.implemented_properties:
+            raise PropertyNotImplementedError(f"{name}: there are {', '.join(self.implemented_properties)}")
+        if atoms is not None and self.check_state(atoms):
+            self.results = {}
+        if name not in self.results:
+            if not allow_calculation:
+                return None
+            self.calculate(atoms)
+        if name not in self.results:
+            raise PropertyNotImplementedError(f"{name} is there for a box that repeats in all directions (pbc)")
+        return np.copy(self.results[name]) if name != "energy" else self.results[name]
 
     def calculate(
         self, atoms: Any = None, properties: Sequence[str] = ("energy",), system_changes: Sequence[str] = all_changes
     ) -> None:
-        """Fill `results` (ASE calls this)."""
-        super().calculate(atoms, list(properties), list(system_changes))
-        box: Any = self.atoms
-        found = self.evaluate(box)
-        self.last = found
+        """Fill `results` with all properties."""
+        box: Any = self.atoms if atoms is None else atoms
+        if box is None:
+            raise ValueError("no atoms were given to this calculator yet")
+        found = self.last = self.evaluate(box)
         self.results = {"energy": found.energy_ev, "forces": found.forces_ev_per_angstrom}
         if box.pbc.all():
-            stress = -found.virial_ev / float(
-                np.prod(right_angled(box))
-            ) - found.tail_pressure_ev_per_angstrom3 * np.eye(3)
-            self.results["stress"] = np.array([stress[a, b] for a, b in VOIGT])
+            volume = float(box.cell.array.diagonal().prod())
+            stress = -(found.virial_ev / volume)[VOIGT]
+            stress[:3] -= found.tail_pressure_ev_per_angstrom3
+            self.results["stress"] = stress
+        self._remember(box)
+
+    def _remember(self, atoms: Any) -> None:
+        """Keep a copy for `check_state`; most often only positions changed."""
+        own: Any = self.atoms
+        if own is None or not _same_atoms(own, atoms):
+            self.atoms = atoms.copy()
+            return
+        own.positions[:] = atoms.positions
+        own.cell[:] = atoms.cell.array
+        own.pbc[:] = atoms.pbc
 
     @property
     def rebuilds(self) -> int:
@@ -166,7 +190,7 @@ class RigidPotential(Calculator):
         forces, totals = self._pair_sum(neighbours)
         centres = self._mass_centres(neighbours, atoms.get_masses())
         virial = self._virial_of_pairs(neighbours, forces, totals, centres)
-        volume = float(np.prod(neighbours.box_angstrom))
+        volume = math.prod(neighbours.box_angstrom.tolist())
         terms = {"dispersion": float(totals[0])}
         if volume and self.long_range_correction:
             terms["long_range_correction"] = float(self._tail[0] / volume)
@@ -179,11 +203,8 @@ class RigidPotential(Calculator):
 
     def _prepared(self, atoms: Any) -> Neighbours:
         """The lists for this box; what depends on atoms and cell is made anew where they changed."""
-        labels = atoms.arrays.get("molecule")
-        known = self._known
-        if self._assembly is None or known is None or not _same(known, (atoms.numbers, labels)):
-            self._assembly = assemble(atoms, self.models)
-            self._known = atoms.numbers.copy(), None if labels is None else labels.copy()
+        if self._assembly is None or not _same_atoms(self._known, atoms):
+            self._assembly, self._known = assemble(atoms, self.models), atoms.copy()
             self._neighbours, self._ewald = None, self.ewald
             if not math.isinf(self.cutoff_angstrom):
                 self._tail = tail(self.models, self._assembly.numbers, self.cutoff_angstrom, self.switch_width_angstrom)
@@ -198,6 +219,7 @@ class RigidPotential(Calculator):
                     self.tolerance, self.cutoff_angstrom, charges[charges != 0], box
                 )
                 self._waves = wave_vectors(self._ewald, box)
+            self._field = self._field_of()
         return self._neighbours
 
     def _refuse_open_box(self, box: Array) -> None:
@@ -206,7 +228,8 @@ class RigidPotential(Calculator):
         if self.electrostatics == "ewald" and not box.all():
             raise ValueError("Ewald's sum needs a cell that repeats in all three directions (pbc)")
 
-    def _field(self) -> Array:
+    def _field_of(self) -> Array:
+        """Numbers that the kernel of charges wants."""
         if self.electrostatics == "reaction-field":
             return reaction_field(self.cutoff_angstrom, self.dielectric)
         if self.electrostatics == "shifted":
@@ -229,15 +252,14 @@ class RigidPotential(Calculator):
         a, t = neighbours.assembly, self._tables
         forces = np.zeros((self.threads, *neighbours.sites.shape))
         totals = np.zeros((self.threads, 8))
-        bounds = np.linspace(0, len(a), self.threads + 1).astype(int)
+        bounds = [len(a) * i // self.threads for i in range(self.threads + 1)]
         reach2 = (neighbours.within_angstrom**2).ravel()
-        cut, field = switched(self.cutoff_angstrom, self.switch_width_angstrom), self._field()
 
         def share(i: int) -> None:
             _pair_kernels.pair_forces(
                 bounds[i], bounds[i + 1], neighbours.starts, neighbours.entries, neighbours.images, reach2,
                 neighbours.local.ravel(), neighbours.centres, a.first_site, a.kinds, a.counts,
-                t.starts, t.sites, t.numbers, cut, field, self.electrostatics != "reaction-field",
+                t.starts, t.sites, t.numbers, self._cut, self._field, self.electrostatics != "reaction-field",
                 forces[i].ravel(), totals[i],
             )  # fmt: skip
 
@@ -246,7 +268,7 @@ class RigidPotential(Calculator):
             found = neighbours.closest(2 * a.reach_angstrom.max() + CLOSEST_ANGSTROM)
             near = f"atoms {found[1]} and {found[2]} are {found[0]:.3g} Å apart" if found else "no atoms are near"
             raise ValueError(f"the energy is not finite; {near}")
-        return forces.sum(axis=0), totals.sum(axis=0)
+        return (forces[0], totals[0]) if self.threads == 1 else (forces.sum(axis=0), totals.sum(axis=0))
 
     def _mass_centres(self, neighbours: Neighbours, masses: Array) -> Array:
         """Centres of mass, near the molecules' sites."""
@@ -260,9 +282,8 @@ class RigidPotential(Calculator):
         """Σ F ⊗ R with centres of mass: the sum over list's centres, and Σ F (R - c) of each molecule's total force."""
         from rotor.fluid import _pair_kernels
 
-        tensor = np.zeros((3, 3))
-        for (row, column), value in zip(VOIGT, totals[2:], strict=True):
-            tensor[row, column] = tensor[column, row] = value
+        xx, yy, zz, yz, xz, xy = totals[2:].tolist()
+        tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
         first_site = neighbours.assembly.first_site
         return tensor + _pair_kernels.lever_tensor(forces, centres, neighbours.centres, first_site, True)
 
@@ -311,21 +332,22 @@ class RigidPotential(Calculator):
         return out
 
 
-def _same(known: tuple[Array, Array | None], now: tuple[Array, Array | None]) -> bool:
-    return all(
-        (a is None and b is None) or (a is not None and b is not None and np.array_equal(a, b))
-        for a, b in zip(known, now, strict=True)
-    )
+def _same_atoms(old: Any, new: Any) -> bool:
+    """Whether elements and labels of molecules are the same."""
+    was, now = old.arrays.get("molecule"), new.arrays.get("molecule")
+    same_labels = was is now or (was is not None and now is not None and np.array_equal(was, now))
+    return same_labels and np.array_equal(old.numbers, new.numbers)
 
 
 def right_angled(atoms: Any) -> Array:
     """Edges of the cell, Å, 0 along directions without pbc; a ValueError for other than right angles."""
-    cell = np.asarray(atoms.cell, dtype=float)
-    edges = np.diag(cell)
-    if np.abs(cell - np.diag(edges)).max() > 1e-10 * max(1.0, np.abs(edges).max()) and atoms.pbc.any():
+    cell, repeats = atoms.cell.array.tolist(), atoms.pbc.tolist()
+    edges = [cell[c][c] for c in range(3)]
+    askew = max(abs(cell[c][d]) for c in range(3) for d in range(3) if c != d)
+    if any(repeats) and not askew <= 1e-10 * max(1.0, *edges):
         raise ValueError(
             f"angles of the cell are {np.round(atoms.cell.angles(), 4).tolist()} degrees; right angles along x, y, z are wanted"
         )
-    if (edges[atoms.pbc] <= 0).any():
-        raise ValueError(f"edges of the cell are {edges.tolist()} Å; directions that repeat (pbc) need one above 0")
-    return np.where(atoms.pbc, edges, 0.0)
+    if any(repeat and not edge > 0 for repeat, edge in zip(repeats, edges, strict=True)):
+        raise ValueError(f"edges of the cell are {edges} Å; directions that repeat (pbc) need one above 0")
+    return np.array([edge if repeat else 0.0 for repeat, edge in zip(repeats, edges, strict=True)])
