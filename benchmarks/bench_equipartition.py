@@ -30,6 +30,9 @@ from rotor.fluid.thermostats import Langevin
 
 CONFIDENCE = 0.99
 APART_PS = 0.2
+FRICTION_PER_PS = (
+    20.0  # the box as a whole forgets its energy between frames, or degrees would rise and fall together
+)
 
 
 @dataclass(frozen=True)
@@ -50,18 +53,20 @@ FLUIDS = (
 )
 
 
-def frames_of(fluid: Fluid, molecules: int, frames: int, stretch: float = 1.0, on_step: bool = False) -> KineticDegrees:
+def frames_of(
+    fluid: Fluid, molecules: int, frames: int, seed: int, stretch: float = 1.0, on_step: bool = False
+) -> KineticDegrees:
     """Kinetic energies over kT by degree of freedom, (frames, molecules)."""
     model = model_of(fluid.model)
     settings = Settings(model=fluid.model, temperature_k=fluid.temperature_k)
-    atoms = lattice_box(model, molecules, fluid.density_g_cm3, np.random.default_rng(1))
+    atoms = lattice_box(model, molecules, fluid.density_g_cm3, np.random.default_rng([seed, 1]))
     atoms.calc = calculator_of(settings)
     shapes = {model.symbols: model.positions_angstrom[: len(model.symbols)]}
     relax(atoms, shapes=shapes)
     bodies, pose = bodies_of(atoms, shapes=shapes)
-    heat(atoms, bodies, pose.attitude, fluid.temperature_k, np.random.default_rng(2))
+    heat(atoms, bodies, pose.attitude, fluid.temperature_k, np.random.default_rng([seed, 2]))
     step = stretch * fluid.step_fs
-    thermostat = Langevin(fluid.temperature_k, 2.0 / (1000.0 * fs), np.random.default_rng(3))
+    thermostat = Langevin(fluid.temperature_k, FRICTION_PER_PS / (1000.0 * fs), np.random.default_rng([seed, 3]))
     dynamics = RigidDynamics(atoms, step * fs, thermostat=thermostat, shapes=shapes)
     seen = []
     for k in range(-50, frames):
@@ -110,14 +115,14 @@ def main() -> None:
     parser.add_argument("--json", type=Path)
     options = parser.parse_args()
     parts, results = {}, []
-    for fluid in FLUIDS:
-        parts[fluid.model] = frames_of(fluid, options.molecules, options.frames)
+    for seed, fluid in enumerate(FLUIDS):
+        parts[fluid.model] = frames_of(fluid, options.molecules, options.frames, seed)
         results.append(told(fluid.model, equipartition(parts[fluid.model], 1.0, confidence=CONFIDENCE)))
     results.append(told("all fluids as one family", equipartition(family(parts), 1.0, confidence=CONFIDENCE)))
     for name in ("trappe-n2", "trappe-co2"):
         bent = equipartition(miscounted(parts[name], 1.5), 1.0, confidence=CONFIDENCE)
         results.append(told(f"planted: {name} counted with three rotations", bent))
-    long = frames_of(FLUIDS[0], options.molecules, options.frames, stretch=2.0, on_step=True)
+    long = frames_of(FLUIDS[0], options.molecules, options.frames, 9, stretch=2.0, on_step=True)
     results.append(told("planted: spce at 4 fs, momenta on the step", equipartition(long, 1.0, confidence=CONFIDENCE)))
     results.append(told("the same without a temperature given", equipartition(long, None, confidence=CONFIDENCE)))
     if options.json:

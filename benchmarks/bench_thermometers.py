@@ -1,9 +1,10 @@
 """SPC/E water at constant energy: which thermometer is right at which step, what the energy does, what a step costs.
 
-    python benchmarks/bench_thermometers.py [--span-ps 100] [--json benchmarks/results/thermometers.json] [--plot docs/pictures/fluid_thermometers.png]
+    python benchmarks/bench_thermometers.py [--span-ps 100] [--json benchmarks/results/thermometers.json]
+        [--plot docs/pictures/fluid_thermometers.png]
 
-216 molecules, 298 K, reaction field at 9 Å: brought to temperature by Langevin's thermostat, then run at constant energy with steps of
-1 to 4 fs from the same start. T_rot/T_trans by momenta on the step, at half steps, and by the mixture of both, each with
+216 molecules, 298 K, reaction field at 9 Å: brought to temperature by Langevin's thermostat, then run at constant energy
+with steps of 1 to 4 fs from the same start. T_rot/T_trans by momenta on the step, at half steps, and by the mixture of both, each with
 the standard error of 20 blocks; rms and drift of the energy; and the cost of the two splittings that can drift a body.
 """
 
@@ -139,26 +140,29 @@ def timed(job: Callable[[], None]) -> float:
 
 
 def plot(rows: list[dict[str, float]], path: Path) -> None:
-    """T_rot/T_trans over the step, and the closed forms."""
+    """T_rot/T_trans over the step: by momenta on and between steps over that of the mixture, and the mixture itself."""
     import matplotlib.pyplot as plt
 
     figure, axes = plt.subplots(figsize=(6.4, 4.0), layout="constrained")
-    colours = {"full": "tab:blue", "half": "tab:orange", "mixed": "black"}
-    labels = {"full": "momenta on the step", "half": "momenta at half steps", "mixed": "mixture, the default"}
+    steps = np.array([row["step_fs"] for row in rows])
     h = np.linspace(0, 4.2, 200)
     s = np.maximum(0.5e-3 * LIBRATION_PER_PS * h, 1e-9)
-    forms = {
-        "full": s * np.sqrt(1 - s**2) / np.arcsin(s),
-        "half": s / (np.sqrt(1 - s**2) * np.arcsin(s)),
-        "mixed": np.ones_like(s),
-    }
-    for name, form in forms.items():
-        axes.plot(h, form, color=colours[name], lw=1, alpha=0.6)
-        axes.errorbar(
-            [r["step_fs"] for r in rows], [r[f"{name}_ratio"] for r in rows], [r[f"{name}_error"] for r in rows],
-            fmt="o", ms=4, capsize=2, color=colours[name], label=labels[name],
-        )  # fmt: skip
-    axes.set(xlabel="step (fs)", ylabel="$T_\\mathrm{rot}/T_\\mathrm{trans}$", title="SPC/E water at constant energy")
+    forms = {"full": s * np.sqrt(1 - s**2) / np.arcsin(s), "half": s / (np.sqrt(1 - s**2) * np.arcsin(s))}
+    labels = {"full": "momenta on the step", "half": "momenta at half steps"}
+    for (name, form), colour in zip(forms.items(), ("tab:blue", "tab:orange"), strict=True):
+        axes.plot(h, form, color=colour, lw=1, alpha=0.6)
+        over = [row[f"{name}_ratio"] / row["mixed_ratio"] for row in rows]
+        axes.plot(steps, over, "o", ms=5, color=colour, label=f"{labels[name]}, over the mixture")
+    axes.axhline(1.0, color="black", lw=1, alpha=0.6)
+    mixed, errors = ([row[f"mixed_{what}"] for row in rows] for what in ("ratio", "error"))
+    axes.errorbar(
+        steps, mixed, errors, fmt="s", ms=4, capsize=2, color="black", label="the mixture itself, with its error"
+    )
+    axes.set(
+        xlabel="step (fs)",
+        ylabel="$T_\\mathrm{rot}/T_\\mathrm{trans}$",
+        title="SPC/E water at constant energy; lines: one libration of 112 rad/ps",
+    )
     axes.legend(frameon=False, loc="lower left")
     figure.savefig(path, dpi=120)
 
