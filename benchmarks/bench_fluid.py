@@ -103,7 +103,11 @@ def by_lammps(
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         lammps.write_files(folder, scene, settings, Form(), accuracy=1e-4)
-        (folder / "in.box").write_text(change((folder / "in.box").read_text()), encoding="ascii")
+        text = change((folder / "in.box").read_text(encoding="ascii"))
+        (folder / "in.box").write_text(text, encoding="ascii")
+        if "angle_style" in text:
+            data = folder / "data.box"
+            data.write_text(with_angles(data.read_text(encoding="ascii")), encoding="ascii")
         command = [sys.executable, "-c", LAMMPS_RUN, str(steps), *arguments]
         pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
         with subprocess.Popen(command, cwd=folder, env=lammps.environment(), text=True, **pipes) as process:
@@ -116,6 +120,22 @@ def by_lammps(
                     yield float(process.stdout.readline())
             finally:
                 process.stdin.close()
+
+
+def shaken(text: str) -> str:
+    """The input with `fix shake` and `fix nve` in the place of rigid bodies."""
+    text = text.replace("bond_style zero nocoeff", "bond_style harmonic\nangle_style harmonic")
+    text = text.replace("bond_coeff *", "bond_coeff 1 10 1.0\nangle_coeff 1 10 109.4712206344907")
+    moved = "fix move all nve\nfix hold all shake 1e-5 20 0 b 1 a 1"
+    return "\n".join(moved if line.startswith("fix move") else line for line in text.splitlines()) + "\n"
+
+
+def with_angles(text: str) -> str:
+    """A data file of water with its H-O-H angles."""
+    n = sum(bool(line.strip()) for line in text.split("Bonds")[1].splitlines()) // 2
+    angles = "\n".join(f"{k + 1} 1 {3 * k + 2} {3 * k + 1} {3 * k + 3}" for k in range(n))
+    head = text.replace("1 bond types", f"1 bond types\n{n} angles\n1 angle types\n3 extra angle per atom")
+    return f"{head}\nAngles\n\n{angles}\n"
 
 
 def speed(folder: Path, pieces: int = 6) -> dict[str, Any]:
@@ -131,6 +151,10 @@ def speed(folder: Path, pieces: int = 6) -> dict[str, Any]:
         "OpenMM, PME 5e-4": by_openmm(atoms, mesh, steps),
         "LAMMPS rigid, reaction field as a table": by_lammps(atoms, field, steps, str, suffix),
         "LAMMPS rigid, lj/cut/coul/dsf": by_lammps(atoms, field, steps, damped, suffix),
+        "LAMMPS shake, lj/cut/coul/dsf": by_lammps(atoms, field, steps, lambda text: shaken(damped(text)), suffix),
+        "LAMMPS shake, lj/cut/coul/long, PPPM 1e-4": by_lammps(
+            atoms, mesh, steps, lambda text: shaken(one_style(text)), suffix
+        ),
         "LAMMPS rigid, lj/cut/coul/long, PPPM 1e-4": by_lammps(atoms, mesh, steps, one_style, suffix),
     }
     length = {"rotor, Ewald 1e-5": steps // 4}
