@@ -30,9 +30,7 @@ from rotor.fluid.thermostats import Langevin
 
 CONFIDENCE = 0.99
 APART_PS = 0.2
-FRICTION_PER_PS = (
-    20.0  # the box as a whole forgets its energy between frames, or degrees would rise and fall together
-)
+FRICTION_PER_PS = 20.0  # the box forgets its energy between frames, or all degrees would rise and fall together
 
 
 @dataclass(frozen=True)

@@ -154,3 +154,33 @@ def test_a_tag_that_does_not_fit():
     with pytest.raises(ValueError, match="six digits"):
         rotor.write(co_lines(), "co.cat", settings={"tag": 12345678})
     assert not Path("co.cat").exists()
+
+
+@pytest.mark.parametrize(
+    "verb",
+    [
+        ("raman", "N2"),
+        ("tumble", "water"),
+        ("gas", "CO", "--molecules", "50", "--times", "0:1:5"),
+        ("thermo", "CO", "--temperature", "100,300K"),
+    ],
+    ids=lambda verb: verb[0],
+)
+def test_csv_and_parquet_hold_the_same_table(call, folder, verb):
+    import polars as pl
+
+    code, _, err = call(*verb, "--csv", "a.csv", "--parquet", "a.parquet")
+    assert code == 0, err
+    csv, parquet = pl.read_csv("a.csv", infer_schema_length=None), pl.read_parquet("a.parquet")
+    assert csv.columns == parquet.columns
+    assert csv.cast(dict(parquet.schema)).equals(parquet)  # to the last bit
+    beside = json.loads(Path("a.csv.provenance.json").read_text(encoding="utf-8"))
+    inside = json.loads(pl.read_parquet_metadata("a.parquet")["provenance"])
+    assert {k: v for k, v in beside.items() if k != "command"} == {k: v for k, v in inside.items() if k != "command"}
+    assert beside["program"] == "rotor"
+
+
+def test_levels_are_a_table_too(tmp_path):
+    levels = rotor.solve_levels(rotor.read("CO"), 2)
+    rotor.write(levels, tmp_path / "levels.json")
+    assert len(json.loads((tmp_path / "levels.json").read_text())["rows"]) == len(levels) == 3

@@ -311,7 +311,7 @@ def test_the_table_can_be_written_and_read_back(folder):
         rotor.write(record, name, settings={"seed": 1})
         assert reader(name)["total_ev"].to_list() == record.total_ev.tolist()  # to the last bit
     rotor.write(record, "a.json")
-    assert [row["rotation_k"] for row in json.loads(Path("a.json").read_text())] == record.rotation_k.tolist()
+    assert [row["rotation_k"] for row in json.loads(Path("a.json").read_text())["rows"]] == record.rotation_k.tolist()
     assert json.loads(Path("a.csv.provenance.json").read_text())["seed"] == 1
     with pytest.raises(ValueError, match=r"\.csv, \.parquet or \.json"):
         rotor.write(record, "a.txt")

@@ -13,7 +13,7 @@ import typer
 
 from rotor.cli import inputs
 from rotor.cli.inputs import Input
-from rotor.cli.output import Files, Table, Writer, json_text, show_facts, show_table, write_text
+from rotor.cli.output import Files, Table, Writer, deliver, json_text, show_facts, show_table
 
 if TYPE_CHECKING:
     from rotor.classical.ensembles import Correlations, Ensemble
@@ -70,6 +70,7 @@ def command(
     dipole: str | None = inputs.DIPOLE,
     dipole_abc: str | None = inputs.DIPOLE_ABC,
     csv: str | None = typer.Option(None, metavar="FILE", help="Write the correlation functions as CSV."),
+    parquet: str | None = typer.Option(None, metavar="FILE", help="Write the correlation functions as Parquet."),
     plot: str | None = typer.Option(None, metavar="FILE", help="Draw the test and the functions (.png, .pdf, .svg)."),
     json: str | None = inputs.JSON,
 ) -> None:
@@ -80,12 +81,13 @@ def command(
     asked = _times(times)
     files = Files()
     files.ask("--csv", csv, (".csv",))
+    files.ask("--parquet", parquet, (".parquet",))
     files.ask("--plot", plot, (".png", ".pdf", ".svg"))
-    files.ask("--json", None if json == "-" else json, (".json",))
+    files.ask_json(json)
     given = Input(source, constants, isotope or [], dipole, dipole_abc, None)
     top = inputs.read_top(given)
     probes = _probes(top)
-    if asked is None and (csv or plot):
+    if asked is None and (csv or parquet or plot):
         asked = _settling_times(top, kelvin, probes)
     settings = Settings(molecules, kelvin, seed, sure, asked)
 
@@ -93,11 +95,8 @@ def command(
     curves = None if asked is None else _correlations(top, settings, probes)
     content = _content(top, given, context.obj, settings, gas, test, probes, curves)
     content["files"] = [str(path) for path in files.wanted.values()]
-    files.write(_writers(top, test, curves, content))
-    if json == "-":
-        print(json_text(content), end="")
-    else:
-        _show(top, test, curves, content)
+    writers = _writers(top, test, curves, content)
+    deliver(files, writers, lambda: json_text(content), lambda: _show(top, test, curves, content))
 
 
 def _confidence(text: str) -> float:
@@ -285,7 +284,7 @@ def _writers(top: Top, test: Equipartition, curves: Correlations | None, content
         title = f"{_name(top)}, {content['temperature_k']:g} K, {content['molecules']:,} molecules"
         plot_gas(test, curves, path, title=title, plateau=content["c1_plateau"], provenance=story)
 
-    return {"--csv": table, "--plot": draw, "--json": lambda path: write_text(path, json_text(content))}
+    return {"--csv": table, "--parquet": table, "--plot": draw}
 
 
 def _name(top: Top) -> str:

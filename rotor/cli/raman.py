@@ -62,6 +62,7 @@ def command(
     vibration: str | None = layer.VIBRATION,
     vibrational_states: str | None = layer.VIBRATIONAL_STATES,
     csv: str | None = typer.Option(None, metavar="FILE", help="Write all lines as CSV."),
+    parquet: str | None = typer.Option(None, metavar="FILE", help="Write all lines as Parquet."),
     plot: str | None = typer.Option(None, metavar="FILE", help="Draw the lines (.png, .pdf, .svg)."),
     json: str | None = inputs.JSON,
     top_lines: int = typer.Option(20, "--top", metavar="N", help="How many of the strongest lines are shown."),
@@ -78,6 +79,7 @@ def command(
     )
     files = Files()
     files.ask("--csv", csv, (".csv",))
+    files.ask("--parquet", parquet, (".parquet",))
     files.ask("--plot", plot, (".png", ".pdf", ".svg"))
     files.ask_json(json)
 
@@ -184,7 +186,7 @@ def _writers(lines: RamanLines, content: dict[str, Any]) -> dict[str, Writer]:
 
         plot_raman(lines, path, provenance={"command": story["command"]})
 
-    return {"--csv": table, "--plot": draw}
+    return {"--csv": table, "--parquet": table, "--plot": draw}
 
 
 def _show(lines: RamanLines, content: dict[str, Any]) -> None:

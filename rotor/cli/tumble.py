@@ -46,6 +46,7 @@ def command(
     ),
     isotope: list[str] | None = inputs.ISOTOPE,
     csv: str | None = typer.Option(None, metavar="FILE", help="Write the motion as CSV, in full precision."),
+    parquet: str | None = typer.Option(None, metavar="FILE", help="Write the motion as Parquet."),
     plot: str | None = typer.Option(None, metavar="FILE", help="Draw the polhodes (.png, .pdf, .svg)."),
     gif: str | None = typer.Option(None, metavar="FILE", help="Animate the motion (.gif; .mp4 with ffmpeg)."),
     json: str | None = inputs.JSON,
@@ -53,7 +54,7 @@ def command(
     """Free rotation: the exact motion, what it conserves, which axes are stable."""
     from rotor.cli.thrown import read_thrown, read_times
 
-    files = _files(csv, plot, gif, json)
+    files = _files({"--csv": csv, "--parquet": parquet, "--plot": plot, "--gif": gif}, json)
     given = Input(source, constants, isotope or [], None, None, None)
     thrown = read_thrown(given, moments, angular_momentum, temperature)
     asked = read_times(times, thrown.units)
@@ -66,17 +67,14 @@ def command(
     deliver(files, writers, lambda: json_with_rows(table, "motion", content), lambda: _show(thrown, table, content))
 
 
-def _files(csv: str | None, plot: str | None, gif: str | None, json: str | None) -> Files:
+def _files(asked: dict[str, str | None], json: str | None) -> Files:
     """The files asked for, each with a suffix that can be made here."""
     files = Files()
-    for name, path, suffixes in (
-        ("--csv", csv, (".csv",)),
-        ("--plot", plot, (".png", ".pdf", ".svg")),
-        ("--gif", gif, (".gif", ".mp4")),
-    ):
-        files.ask(name, path, suffixes)
+    suffixes = {"--plot": (".png", ".pdf", ".svg"), "--gif": (".gif", ".mp4")}
+    for name, path in asked.items():
+        files.ask(name, path, suffixes.get(name, (name.replace("--", "."),)))
     files.ask_json(json)
-    if gif:
+    if gif := asked["--gif"]:
         from rotor.plots.animation import check_film
 
         inputs.option("--gif", gif, check_film)
@@ -180,7 +178,7 @@ def _writers(thrown: Thrown, motion: FreeMotion, table: MotionTable, content: di
     kept = ("command", "input", "source", "units", "moments", "angular_momentum", "angular_momentum_source")
     story = {key: plain(content[key]) for key in kept if key in content}
 
-    def csv(path: Path) -> None:
+    def rows(path: Path) -> None:
         import rotor
 
         rotor.write(table, path, settings=story)
@@ -204,7 +202,8 @@ def _writers(thrown: Thrown, motion: FreeMotion, table: MotionTable, content: di
         )  # fmt: skip
 
     return {
-        "--csv": csv,
+        "--csv": rows,
+        "--parquet": rows,
         "--plot": plot,
         "--gif": film,
     }

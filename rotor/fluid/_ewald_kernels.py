@@ -20,25 +20,33 @@ LANES = 128
 CHARGE, START_C, START_S, NOW_C, NOW_S, TURN_C, TURN_S, SUM, FX, FY, FZ, HEAD = range(12)
 
 
+@njit(cache=True, error_model="numpy", nogil=True)
+def unit_phases(sites: Array, charged: Integers, waves: Array) -> Array:
+    """cos and sin of 2πx/L, 2πy/L, 2πz/L of the charges, (n, 6)."""
+    phases = np.empty((len(charged), 6))
+    for k in range(len(charged)):
+        for axis in range(3):
+            phase = waves[axis] * sites[charged[k], axis]
+            phases[k, 2 * axis], phases[k, 2 * axis + 1] = np.cos(phase), np.sin(phase)
+    return phases
+
+
 @njit(cache=True, error_model="numpy")
-def _fill_block(
-    block: Array, sites: Array, charged: Integers, charges: Array, first: int, waves: Array, highest: Integers
-) -> None:
+def _fill_block(block: Array, phases: Array, charges: Array, first: int, highest: Integers) -> None:
     """Charges, the turn along z, and e^{2πi n x/L}, e^{2πi n y/L} for n = 0... of LANES charges; charge 0 beyond the last."""
     for k in range(LANES):
-        here = first + k < len(charged)
-        site = charged[first + k] if here else 0
-        block[CHARGE * LANES + k] = charges[first + k] if here else 0.0
+        here = first + k < len(charges)
+        at = first + k if here else 0
+        block[CHARGE * LANES + k] = charges[at] if here else 0.0
         for run in range(FX, HEAD):
             block[run * LANES + k] = 0.0
-        block[TURN_C * LANES + k] = np.cos(waves[2] * sites[site, 2])
-        block[TURN_S * LANES + k] = np.sin(waves[2] * sites[site, 2])
+        block[TURN_C * LANES + k], block[TURN_S * LANES + k] = phases[at, 4], phases[at, 5]
         run = HEAD
         for axis in range(2):
-            for n in range(highest[axis] + 1):
-                phase = n * waves[axis] * sites[site, axis]
-                block[run * LANES + k] = np.cos(phase)
-                block[(run + 1) * LANES + k] = np.sin(phase)
+            turn_c, turn_s, c, s = phases[at, 2 * axis], phases[at, 2 * axis + 1], 1.0, 0.0
+            for _ in range(highest[axis] + 1):
+                block[run * LANES + k], block[(run + 1) * LANES + k] = c, s
+                c, s = c * turn_c - s * turn_s, c * turn_s + s * turn_c
                 run += 2
 
 
@@ -63,17 +71,8 @@ def _back_to_start(block: Array) -> None:
 
 
 @njit(cache=True, error_model="numpy", fastmath=FAST)
-def _turn(block: Array, sign: float) -> None:
-    """Times e^{±i 2π z/L}."""
-    for k in range(LANES):
-        c, s = block[NOW_C * LANES + k], block[NOW_S * LANES + k]
-        tc, ts = block[TURN_C * LANES + k], sign * block[TURN_S * LANES + k]
-        block[NOW_C * LANES + k] = c * tc - s * ts
-        block[NOW_S * LANES + k] = c * ts + s * tc
-
-
-@njit(cache=True, error_model="numpy", fastmath=FAST)
 def _sum_charges(block: Array) -> Any:
+    """Σ q e^{ik·r} of the block."""
     real, imaginary = 0.0, 0.0
     for k in range(LANES):
         real += block[CHARGE * LANES + k] * block[NOW_C * LANES + k]
@@ -82,10 +81,35 @@ def _sum_charges(block: Array) -> Any:
 
 
 @njit(cache=True, error_model="numpy", fastmath=FAST)
-def _push(block: Array, real: float, imaginary: float, kz: float) -> None:
-    """One wave vector's part of the force: sin(k·r) Re S - cos(k·r) Im S, and its multiple by kz."""
+def _turn_and_sum(block: Array, sign: float) -> Any:
+    """The same one wave vector further, phases times e^{±i 2π z/L}."""
+    real, imaginary = 0.0, 0.0
     for k in range(LANES):
-        t = block[NOW_S * LANES + k] * real - block[NOW_C * LANES + k] * imaginary
+        c, s = block[NOW_C * LANES + k], block[NOW_S * LANES + k]
+        tc, ts = block[TURN_C * LANES + k], sign * block[TURN_S * LANES + k]
+        further_c, further_s = c * tc - s * ts, c * ts + s * tc
+        block[NOW_C * LANES + k], block[NOW_S * LANES + k] = further_c, further_s
+        real += block[CHARGE * LANES + k] * further_c
+        imaginary += block[CHARGE * LANES + k] * further_s
+    return real, imaginary
+
+
+@njit(cache=True, error_model="numpy", fastmath=FAST)
+def _push(block: Array, real: float, imaginary: float) -> None:
+    """One wave vector's part of the force where kz = 0: sin(k·r) Re S - cos(k·r) Im S."""
+    for k in range(LANES):
+        block[SUM * LANES + k] += block[NOW_S * LANES + k] * real - block[NOW_C * LANES + k] * imaginary
+
+
+@njit(cache=True, error_model="numpy", fastmath=FAST)
+def _turn_and_push(block: Array, sign: float, real: float, imaginary: float, kz: float) -> None:
+    """The same one wave vector further, and its multiple by kz."""
+    for k in range(LANES):
+        c, s = block[NOW_C * LANES + k], block[NOW_S * LANES + k]
+        tc, ts = block[TURN_C * LANES + k], sign * block[TURN_S * LANES + k]
+        further_c, further_s = c * tc - s * ts, c * ts + s * tc
+        block[NOW_C * LANES + k], block[NOW_S * LANES + k] = further_c, further_s
+        t = further_s * real - further_c * imaginary
         block[SUM * LANES + k] += t
         block[FZ * LANES + k] += kz * t
 
@@ -98,34 +122,34 @@ def _end_column(block: Array, kx: float, ky: float) -> None:
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def structure_factors(
-    sites: Array, charged: Integers, charges: Array, waves: Array, highest: Integers, columns: Integers, factors: Array
-) -> None:
-    """Add Σ q e^{ik·r} to factors (wave vectors, 2).
+def structure_factors(phases: Array, charges: Array, highest: Integers, columns: Integers, factors: Array) -> None:
+    """Add Σ q e^{ik·r} to factors (wave vectors, 2); phases from `unit_phases`.
 
     columns (n, 5): nx, ny, lowest nz, highest nz, place of the column's nz = 0 in the list of wave vectors (which may be one
     that is not there).
     """
     block = np.empty((HEAD + 2 * (highest[0] + highest[1] + 2)) * LANES)
-    for first in range(0, len(charged), LANES):
-        _fill_block(block, sites, charged, charges, first, waves, highest)
+    for first in range(0, len(charges), LANES):
+        _fill_block(block, phases, charges, first, highest)
         for column in range(len(columns)):
             nx, ny, low, high, place = columns[column]
             _start_column(block, nx, ny, highest)
-            for sign in (1, -1):
+            if low <= 0:
                 _back_to_start(block)
-                for n in range(0 if sign > 0 else 1, high + 1 if sign > 0 else 1 - low):
-                    if n > 0:
-                        _turn(block, sign)
-                    if low <= sign * n:
-                        real, imaginary = _sum_charges(block)
-                        factors[place + sign * n, 0] += real
-                        factors[place + sign * n, 1] += imaginary
+                real, imaginary = _sum_charges(block)
+                factors[place, 0] += real
+                factors[place, 1] += imaginary
+            for sign, most in ((1, high), (-1, -low)):
+                _back_to_start(block)
+                for n in range(1, most + 1):
+                    real, imaginary = _turn_and_sum(block, sign)
+                    factors[place + sign * n, 0] += real
+                    factors[place + sign * n, 1] += imaginary
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def fourier_forces(
-    sites: Array,
+    phases: Array,
     charged: Integers,
     charges: Array,
     waves: Array,
@@ -136,21 +160,21 @@ def fourier_forces(
 ) -> None:
     """Add the forces of all wave vectors; factors are structure factors times 2 A(k)."""
     block = np.empty((HEAD + 2 * (highest[0] + highest[1] + 2)) * LANES)
-    for first in range(0, len(charged), LANES):
-        _fill_block(block, sites, charged, charges, first, waves, highest)
+    for first in range(0, len(charges), LANES):
+        _fill_block(block, phases, charges, first, highest)
         for column in range(len(columns)):
             nx, ny, low, high, place = columns[column]
             _start_column(block, nx, ny, highest)
-            for sign in (1, -1):
+            if low <= 0:
                 _back_to_start(block)
-                for n in range(0 if sign > 0 else 1, high + 1 if sign > 0 else 1 - low):
-                    if n > 0:
-                        _turn(block, sign)
-                    if low <= sign * n:
-                        at = place + sign * n
-                        _push(block, factors[at, 0], factors[at, 1], sign * n * waves[2])
+                _push(block, factors[place, 0], factors[place, 1])
+            for sign, most in ((1, high), (-1, -low)):
+                _back_to_start(block)
+                for n in range(1, most + 1):
+                    at = place + sign * n
+                    _turn_and_push(block, sign, factors[at, 0], factors[at, 1], sign * n * waves[2])
             _end_column(block, nx * waves[0], ny * waves[1])
-        for k in range(min(LANES, len(charged) - first)):
+        for k in range(min(LANES, len(charges) - first)):
             for axis in range(3):
                 forces[charged[first + k], axis] += charges[first + k] * block[(FX + axis) * LANES + k]
 

@@ -300,13 +300,15 @@ class RigidPotential(Calculator):
         parts = [charged[bounds[i] : bounds[i + 1]] for i in range(self.threads)]
         factors = np.zeros((self.threads, len(waves.weights_ev), 2))
         pushed = np.zeros_like(forces)
-        turn = waves.turn_per_angstrom, waves.highest, waves.columns
+        turn, columns, highest = waves.turn_per_angstrom, waves.columns, waves.highest
+        phases = [_ewald_kernels.unit_phases(neighbours.sites, part, turn) for part in parts]
+        charges = [a.charges_e[part] for part in parts]
 
         def sum_up(i: int) -> None:
-            _ewald_kernels.structure_factors(neighbours.sites, parts[i], a.charges_e[parts[i]], *turn, factors[i])
+            _ewald_kernels.structure_factors(phases[i], charges[i], highest, columns, factors[i])
 
         def push(i: int) -> None:
-            _ewald_kernels.fourier_forces(neighbours.sites, parts[i], a.charges_e[parts[i]], *turn, weighted, pushed)
+            _ewald_kernels.fourier_forces(phases[i], parts[i], charges[i], turn, highest, columns, weighted, pushed)
 
         self._run([lambda i=i: sum_up(i) for i in range(self.threads)])
         structure = factors.sum(axis=0)

@@ -1,8 +1,9 @@
 """Three thermometers of a stepped motion, and which of them is free of the error of order h².
 
 A step of length h moves a libration of angular frequency Ω under a shadow Hamiltonian. With s = Ωh/2 and the kick-drift-kick
-step (velocity Verlet) an ensemble at kT of that Hamiltonian has (J. Gans and D. Shalloway, Phys. Rev. E 61, 4587 (2000), for
-the shadow; the closed forms follow from frequency (2/h) asin s and the invariant p²/2m + ½ m Ω² (1 - s²) x²)
+step (velocity Verlet) an ensemble at kT of that Hamiltonian has (E. Hairer, C. Lubich, G. Wanner, Geometric Numerical
+Integration, chapter IX, for shadow Hamiltonians; for a harmonic motion the frequency (2/h) asin s and the invariant
+p²/2m + ½ m Ω² (1 - s²) x² fix it)
 
     ⟨p²/m⟩ = kT s √(1 - s²)/asin s   = kT (1 - (Ωh)²/6 + ...)    momenta at full steps,
     ⟨p²/m⟩ = kT s/(√(1 - s²) asin s) = kT (1 + (Ωh)²/12 + ...)   momenta at half steps.

@@ -179,56 +179,32 @@ def _top_as_written(file: MoleculeFile) -> Top:
 
 
 def write(thing: Any, path: str | os.PathLike[str], *, settings: Mapping[str, Any] | None = None) -> None:
-    """Write lines, a catalogue, a spectrum, a motion or thermodynamic functions; the suffix of `path` names the format.
+    """Write lines, a catalogue, or any table of the package; the suffix of `path` names the format.
 
-    Lines: .cat, .cat.gz, .csv, .parquet, .json, .hitran; catalogue: .cat, .cat.gz; HITRAN's lines: .hitran; spectrum and
-    motion: .csv; thermodynamic functions: .csv, .parquet; the table of a fluid's run: .csv, .parquet, .json. An existing
-    file is replaced at the end, whole or not at all. settings: what the provenance shall say besides; for lines,
-    `{"tag": 18003}` is the tag of a .cat, `{"molecule": 1, "isotopologue": 1, "abundance": 0.997}` what `hitran_lines` asks
-    for. Raises ValueError for a thing or a suffix that has no format.
+    Lines: .cat, .cat.gz, .csv, .parquet, .json, .hitran; catalogue: .cat, .cat.gz; HITRAN's lines: .hitran; every other table
+    (levels, Raman lines, spectra, motions, thermodynamic functions, correlation functions, tests of equipartition, runs of a
+    fluid): .csv, .parquet, .json. An existing file is replaced at the end, whole or not at all. settings: what the
+    provenance shall say besides; for lines, `{"tag": 18003}` is the tag of a .cat, `{"molecule": 1, "isotopologue": 1,
+    "abundance": 0.997}` what `hitran_lines` asks for. Raises ValueError for a thing or a suffix that has no format.
     """
-    from rotor.classical.ensembles import Correlations
     from rotor.classical.integrators import Motion
-    from rotor.classical.motion import MotionTable
-    from rotor.equipartition import Equipartition
-    from rotor.fluid.record import FluidRecord
     from rotor.formats.hitran import HitranLines, write_hitran
     from rotor.formats.spcat.catalogue import Catalogue
     from rotor.spectra.lines import Lines
-    from rotor.spectra.raman import RamanLines
-    from rotor.spectra.spectrum import Spectrum
-    from rotor.thermo import ThermoFunctions
+    from rotor.tables import Table
 
     if isinstance(thing, Motion):
+        from rotor.classical.motion import MotionTable
+
         thing = MotionTable.of(thing)
-    if isinstance(thing, MotionTable):
-        from rotor.formats.motion_tables import write_motion
-
-        return write_motion(thing, path, settings)
-    if isinstance(thing, FluidRecord):
-        from rotor.formats.fluid_table import write_fluid
-
-        return write_fluid(thing, path, settings)
-    if isinstance(thing, Correlations | Equipartition):
-        from rotor.formats.gas_tables import write_gas_table
-
-        return write_gas_table(thing, path, settings)
-    if isinstance(thing, Spectrum):
-        from rotor.formats.spectrum_table import write_spectrum
-
-        return write_spectrum(thing, path, settings)
-    if isinstance(thing, ThermoFunctions):
-        from rotor.formats.thermo_table import write_thermo
-
-        return write_thermo(thing, path, settings)
-    if isinstance(thing, RamanLines):
-        from rotor.formats.raman_table import write_raman
-
-        return write_raman(thing, path, settings)
     if isinstance(thing, Lines):
         from rotor.formats.line_tables import write_lines
 
         return write_lines(thing, path, settings)
+    if isinstance(thing, Table):
+        from rotor.formats.tables import write_table
+
+        return write_table(thing, path, settings)
     if isinstance(thing, Catalogue) and os.fspath(path).lower().endswith((".cat", ".cat.gz")):
         from rotor.formats.spcat.cat import write_cat
 

@@ -46,8 +46,9 @@ def band_figure(pairs: Sequence[tuple[str, Mapping[str, Spectrum], Spectrum]], c
             panel.plot(cm, spectrum.intensity, color=colour, linewidth=1.2, label=f"classical, {name}")
         panel.set(xlabel="wavenumber (cm⁻¹)", ylabel="cross section (nm²)", xlim=(0, cm[-1]))
         panel.set_ylim(bottom=0.0)
+        panel.ticklabel_format(axis="y", style="sci", scilimits=(0, 0))
         panel.set_title(title, loc="left")
-        panel.legend(frameon=False)
+        panel.legend(frameon=False, loc="upper right", handlelength=1.2)
     return figure
 
 
@@ -108,7 +109,7 @@ def _draw_test(axes: Any, test: Equipartition, title: str) -> None:
     colours = [ORANGE if degree.name in test.failing else BLUE for degree in test.degrees]
     axes.scatter(places, [degree.mean for degree in test.degrees], c=colours, s=18, zorder=3)
     axes.set_xticks(places, names, rotation=40, ha="right")
-    axes.set_ylabel("mean of 2E/kT")
+    axes.set_ylabel("mean of 2E/kT (grey: 1, 3 σ)")
     axes.set_title(title, loc="left")
 
 
