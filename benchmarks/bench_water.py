@@ -26,7 +26,7 @@ from rotor.fluid.engines.reading import run_engine
 from rotor.fluid.models import model_of
 from rotor.fluid.potential import RigidPotential
 from rotor.fluid.record import FluidRecord
-from rotor.fluid.run import dynamics_of
+from rotor.fluid.run import dynamics_of, pressure_bar
 from rotor.fluid.settings import Settings
 from rotor.fluid.start import lattice_box, relax
 from rotor.fluid.summary import mean_of
@@ -46,15 +46,12 @@ def ours(atoms: Atoms, settings: Settings) -> tuple[FluidRecord, np.ndarray]:
     """Run with our dynamics: the table with the molecular pressure, and the path of the atoms."""
     atoms.calc = potential(settings)
     dynamics, rows, path = dynamics_of(atoms, settings), [], []
-    volume = atoms.get_volume()
     for step in range(settings.steps + 1):
         if step % settings.every == 0:
             kinetic, heat = dynamics.kinetic(), dynamics.temperatures()
-            virial = -np.mean(atoms.get_stress()[:3])
-            pressure = (2 * kinetic.translation_ev / (3 * volume) + virial) / units.bar
             row = [step * settings.step_fs / 1000, atoms.get_potential_energy(), kinetic.translation_ev]
             row += [kinetic.rotation_ev, dynamics.conserved_energy(), heat.all_k, heat.translation_k, heat.rotation_k]
-            rows.append([*row, pressure])
+            rows.append([*row, pressure_bar(dynamics)])
             path.append(atoms.positions.copy())
         if step < settings.steps:
             dynamics.step()

@@ -31,7 +31,7 @@ def test_an_engine_fills_the_same_table(call, folder, engine: str) -> None:
 
     code, out, _ = call(*VAPOUR, "--steps", "20", "--json", "-")
     ours = json.loads(out)
-    for key in ("settings", "molecules", "box_angstrom", "degrees"):
+    for key in ("settings", "start", "molecules", "box_angstrom", "degrees"):
         assert ours[key] == theirs[key]
     for key in ("potential_ev", "translation_ev", "rotation_ev", "total_ev"):
         mine, its = ([row[key] for row in told["record"]] for told in (ours, theirs))

@@ -74,7 +74,8 @@ def command(
     if engine == "rotor":
         record, about = _run(atoms, settings, outputs, resume, threads, story)
     else:
-        record, about = engines.run(engine, atoms, settings, outputs, threads, _head(story)), {}
+        about = {"start": f"{start}; velocities {_speeds(atoms, settings)}"}
+        record = engines.run(engine, atoms, settings, outputs, threads, _head(story))
     _tell(record, {**_head(story), **about}, atoms, settings, outputs, files, json)
 
 
@@ -170,7 +171,7 @@ def _run(
 
     if atoms.calc is None:
         atoms.calc = calculator_of(settings, threads)
-    thermal = not atoms.get_momenta().any()
+    speeds = _speeds(atoms, settings)
 
     def begun() -> None:
         from rotor.formats.line_tables import write_beside
@@ -182,9 +183,13 @@ def _run(
         record = run_fluid(atoms, settings, outputs, resume=resume, begun=begun)
     except RunStopped as error:
         raise NoAnswer(str(error)) from error
-    speeds = f"drawn at {settings.temperature_k:g} K" if thermal else "those of the box"
     start = f"resumed from {outputs.checkpoint}" if resume else f"{story['start']}; velocities {speeds}"
     return record, {"start": start}
+
+
+def _speeds(atoms: Atoms, settings: Settings) -> str:
+    """Where the velocities of the start come from."""
+    return "those of the box" if atoms.get_momenta().any() else f"drawn at {settings.temperature_k:g} K"
 
 
 def _head(story: dict[str, Any]) -> dict[str, Any]:

@@ -192,7 +192,7 @@ def calculator_of(settings: Settings, threads: int = 1) -> Any:
     )
 
 
-def pressureprogress(dynamics: RigidDynamics) -> float:
+def pressure_bar(dynamics: RigidDynamics) -> float:
     """Pressure from centres of mass, (2 K_trans + Σ R·F)/3V; not a number where the calculator gives no stress.
 
     The built-in potential's stress is that of molecules already. From others' Σ r·f over atoms is taken off what forces do
@@ -316,7 +316,7 @@ class _Run:
             heat.all_k,
             heat.translation_k,
             heat.rotation_k,
-            pressureprogress(dynamics),
+            pressure_bar(dynamics),
         ]
 
     def _keep(self) -> None:
