@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 import typer
 
-from rotor.cli import inputs
+from rotor.cli import engines, inputs
 from rotor.cli.output import Files, NoAnswer, Table, json_text, note, show_facts, show_table, write_text
 
 if TYPE_CHECKING:
@@ -25,11 +24,10 @@ Examples:
   rotor fluid water --molecules 216 --ensemble langevin --steps 20000 --trajectory liquid.traj --checkpoint run.npz
   rotor fluid water --molecules 216 --ensemble langevin --steps 40000 --trajectory liquid.traj --checkpoint run.npz --resume
   rotor fluid liquid.traj --ensemble nve --steps 50000 --every 10 --csv nve.csv --json -
+  rotor fluid liquid.traj --steps 50000 --engine openmm --threads 2 --csv openmm.csv
   rotor fluid argon --molecules 500 --model argon --density 1.4 --temperature 90 --step 5fs"""
 
 TRAJECTORY = typer.Option(None, metavar="FILE", help="Write frames as they come (.traj, .xyz, .extxyz); repeatable.")
-# other engines by name, each making the table of a box and settings
-ENGINES: dict[str, Callable[[Any, Any], Any]] = {}
 
 
 def command(
@@ -48,14 +46,14 @@ def command(
     friction: str = typer.Option("1", metavar="F", help="Of langevin (1/ps)."),
     relaxation: str = typer.Option("100", metavar="T", help="Time constant of nose-hoover (fs)."),
     seed: int = typer.Option(1, metavar="N", help="Of the lattice, the velocities and the noise."),
-    threads: int = typer.Option(1, metavar="N", help="Threads of the built-in potential."),
+    threads: int = typer.Option(1, metavar="N", help="Threads of the built-in potential, or of the engine."),
     csv: str | None = typer.Option(None, metavar="FILE", help="Write rows as they come (.csv)."),
     trajectory: list[str] | None = TRAJECTORY,
     frames_every: int | None = typer.Option(None, metavar="N", help="Steps between frames; by default as --every."),
     checkpoint: str | None = typer.Option(None, metavar="FILE", help="Write what the run needs to continue (.npz)."),
     checkpoint_every: int = typer.Option(1000, metavar="N", help="Steps between checkpoints."),
     resume: bool = typer.Option(False, "--resume", help="Continue from --checkpoint."),
-    engine: str = typer.Option("rotor", metavar="NAME", help="Who runs it."),
+    engine: str = typer.Option("rotor", metavar="NAME", help="Who runs it: rotor, openmm or lammps."),
     json: str | None = inputs.JSON,
 ) -> None:
     """Rigid molecules that attract and repel: a run of a periodic box, its temperatures, energies and pressure."""
@@ -69,17 +67,15 @@ def command(
         relaxation_fs=1000.0 * inputs.positive("--relaxation", _femtoseconds(relaxation), "ps"), seed=seed,
     )  # fmt: skip
     outputs, files = _outputs(csv, trajectory or [], frames_every, checkpoint, checkpoint_every, json)
-    if engine != "rotor" and engine not in ENGINES:
-        raise ValueError(f"--engine: {engine!r} is no engine; there are {', '.join(['rotor', *ENGINES])}")
+    engines.check(engine, outputs, resume)
     inputs.whole("--threads", threads, 1)
     atoms, start = _box(source, settings, molecules, density, threads, relaxing=not resume)
     story = {"command": context.obj, "input": source, "engine": engine, "settings": asdict(settings), "start": start}
     if engine == "rotor":
         record, about = _run(atoms, settings, outputs, resume, threads, story)
     else:
-        if outputs.trajectories or outputs.checkpoint or resume:
-            raise ValueError(f"--engine {engine}: trajectories and checkpoints are kept by --engine rotor alone")
-        record, about = ENGINES[engine](atoms, settings), {}
+        about = {"start": f"{start}; velocities {_speeds(atoms, settings)}"}
+        record = engines.run(engine, atoms, settings, outputs, threads, _head(story))
     _tell(record, {**_head(story), **about}, atoms, settings, outputs, files, json)
 
 
@@ -175,7 +171,7 @@ def _run(
 
     if atoms.calc is None:
         atoms.calc = calculator_of(settings, threads)
-    thermal = not atoms.get_momenta().any()
+    speeds = _speeds(atoms, settings)
 
     def begun() -> None:
         from rotor.formats.line_tables import write_beside
@@ -187,9 +183,13 @@ def _run(
         record = run_fluid(atoms, settings, outputs, resume=resume, begun=begun)
     except RunStopped as error:
         raise NoAnswer(str(error)) from error
-    speeds = f"drawn at {settings.temperature_k:g} K" if thermal else "those of the box"
     start = f"resumed from {outputs.checkpoint}" if resume else f"{story['start']}; velocities {speeds}"
     return record, {"start": start}
+
+
+def _speeds(atoms: Atoms, settings: Settings) -> str:
+    """Where the velocities of the start come from."""
+    return "those of the box" if atoms.get_momenta().any() else f"drawn at {settings.temperature_k:g} K"
 
 
 def _head(story: dict[str, Any]) -> dict[str, Any]:
@@ -207,6 +207,8 @@ def _tell(
     from rotor.fluid.summary import conserved, means
 
     bodies, degrees, thermometer = bodies_and_degrees(atoms, settings)
+    if content["engine"] == "lammps":
+        thermometer = "mixed"  # its momenta are those on the step under its thermostat too
     rms, drift = conserved(record)
     grown = [outputs.csv, *outputs.trajectories, outputs.checkpoint, *files.wanted.values()]
     content |= {
@@ -257,6 +259,11 @@ def _species(bodies: Bodies) -> list[dict[str, Any]]:
     return records
 
 
+def _claim(content: dict[str, Any], settings: Settings) -> str:
+    """What is known of the thermometer's error; under LAMMPS' noise nothing."""
+    return "" if content["engine"] == "lammps" and settings.ensemble != "nve" else ": no error of order h²"
+
+
 def _show(content: dict[str, Any], settings: Settings) -> None:
     kinds = ", ".join(f"{kind['count']} {kind['name']}" for kind in content["molecules"])
     degrees = content["degrees"]
@@ -268,7 +275,7 @@ def _show(content: dict[str, Any], settings: Settings) -> None:
             "degrees",
             f"{degrees['translation']} of translation, {degrees['rotation']} of rotation; {degrees['removed']} removed",
         ),
-        ("thermometer", f"{content['thermometer']}: no error of order h²"),
+        ("thermometer", content["thermometer"] + _claim(content, settings)),
         (
             "conserved",
             f"rms {content['conserved_rms_ev']:.3g} eV, drift {content['conserved_drift_ev_per_ns']:.3g} eV/ns",

@@ -118,7 +118,7 @@ def run_fluid(
         assert outputs.checkpoint is not None
         run.restore(read_checkpoint(outputs.checkpoint))
     dynamics.wrench()  # what cannot begin is told before any file is opened
-    with run.files(), _bar(settings.steps, told) as shown:
+    with run.files(), progress(settings.steps, told) as shown:
         begun()
         run.go(shown)
     return run.record()
@@ -255,7 +255,7 @@ class _Run:
                 now = time.perf_counter() - started
                 if now - shown > BAR_EVERY_S or dynamics.nsteps == steps:
                     shown = now
-                    told(dynamics.nsteps, steps, _ns_per_day(self.settings, dynamics.nsteps - first, now))
+                    told(dynamics.nsteps, steps, ns_per_day(self.settings, dynamics.nsteps - first, now))
         except (ValueError, FloatingPointError) as error:
             raise RunStopped(f"{error}{self._told_checkpoint()}") from error
         except OSError as error:
@@ -356,12 +356,13 @@ class _Run:
         return f"; {self.outputs.checkpoint} is of step {self._kept_at}, resume from it"
 
 
-def _ns_per_day(settings: Settings, steps: int, seconds: float) -> float:
+def ns_per_day(settings: Settings, steps: int, seconds: float) -> float:
+    """How fast steps went."""
     return steps * settings.step_fs * 1e-6 * 86400.0 / seconds if seconds > 0.0 else 0.0
 
 
 @contextmanager
-def _bar(steps: int, told: Told | None) -> Iterator[Told]:
+def progress(steps: int, told: Told | None) -> Iterator[Told]:
     """Who is told of the progress: the caller's function, else a bar on a terminal, else nobody."""
     if told is not None or not sys.stderr.isatty():
         yield told or (lambda step, steps, speed: None)

@@ -1,0 +1,278 @@
+"""A box handed to OpenMM: molecules as points held at their distances, sites without mass following them.
+
+OpenMM steps with velocities half a step behind the positions (leapfrog); they are put back onto the step with the forces
+there, or kept between steps under a thermostat, which acts there. Units at this door: nm, ps, kJ/mol.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+
+from rotor import units
+from rotor.fluid.engines.carriers import Carriers, carriers_of
+from rotor.fluid.engines.pairs import Form, tail_of
+from rotor.fluid.engines.scene import Frame, Ints, Motion, Scene, point_velocities, rigid_motion
+from rotor.fluid.run import EV_PER_ANGSTROM3_BAR
+from rotor.fluid.settings import Settings
+from rotor.rotations import Array
+
+KJ_PER_EV = units.ELEMENTARY_CHARGE_C * units.AVOGADRO_PER_MOL * 1e-3
+CONDUCTOR = 1e12  # a dielectric constant as good as infinite
+NM_PER_PS = 0.1 / units.CLASSICAL_TIME_PS  # 1 Å √(eV/u) in nm/ps
+
+
+@dataclass(frozen=True)
+class Handed:
+    """A scene as OpenMM has it.
+
+    system: openmm.System. barostat: a part of it that changes nothing and measures the pressure.
+    carriers: (c,) its particles with mass. owners: (c,) their molecules. masses: (c,). atoms:
+    (atoms,) its particles that are the real atoms. positions: (particles, 3) Å.
+    """
+
+    system: Any
+    barostat: Any
+    carriers: Ints
+    owners: Ints
+    masses: Array
+    atoms: Ints
+    positions: Array
+
+
+def load() -> Any:
+    """The openmm module; ModuleNotFoundError says what to install."""
+    try:
+        import openmm
+    except ModuleNotFoundError as error:
+        raise ModuleNotFoundError(
+            'OpenMM is not installed: python -m pip install "molrotor[openmm]"', name="openmm"
+        ) from error
+    return openmm
+
+
+def handed(scene: Scene, settings: Settings, form: Form, accuracy: float) -> Handed:
+    """The system of a scene: masses, constraints, virtual sites, Lennard-Jones and charges."""
+    mm = load()
+    system = mm.System()
+    a, b, c = scene.edges / 10
+    system.setDefaultPeriodicBoxVectors(mm.Vec3(a, 0, 0), mm.Vec3(0, b, 0), mm.Vec3(0, 0, c))
+    force = nonbonded(mm, settings, form, accuracy)
+    plans = [carriers_of(one.model, one.masses) for one in scene.species]
+    carriers: list[int] = []
+    owners: list[int] = []
+    atoms: list[int] = []
+    positions: list[Array] = []
+    for molecule, kind in enumerate(scene.kinds):
+        plan, model, first = plans[kind], scene.species[kind].model, system.getNumParticles()
+        here = scene.site_positions[scene.first_sites[molecule] :][: len(model.sites)]
+        site_at = _add_molecule(mm, system, force, plan, model)
+        carriers += range(first, first + len(plan.masses))
+        owners += [molecule] * len(plan.masses)
+        atoms += range(site_at, site_at + len(model.symbols))
+        if not plan.own:
+            positions.append(_laid(plan, model.positions_angstrom, here))
+        positions.append(here)
+    system.addForce(force)
+    barostat = mm.MonteCarloBarostat(1.0, settings.temperature_k, 0)  # 0: it never moves anything
+    system.addForce(barostat)
+    if settings.ensemble == "nose-hoover":
+        system.addForce(mm.CMMotionRemover())  # its chain then counts three degrees fewer, as we do
+    masses = np.concatenate([plans[k].masses for k in scene.kinds])
+    return Handed(
+        system, barostat, np.array(carriers), np.array(owners), masses, np.array(atoms), np.concatenate(positions)
+    )
+
+
+def nonbonded(mm: Any, settings: Settings, form: Form, accuracy: float) -> Any:
+    """The pair force without its particles."""
+    force = mm.NonbondedForce()
+    force.setCutoffDistance(settings.cutoff_angstrom / 10)
+    if settings.electrostatics == "reaction-field":
+        force.setNonbondedMethod(mm.NonbondedForce.CutoffPeriodic)
+        force.setReactionFieldDielectric(min(form.dielectric, CONDUCTOR))
+    elif settings.electrostatics == "ewald":
+        force.setNonbondedMethod(mm.NonbondedForce.PME)
+        force.setEwaldErrorTolerance(accuracy)
+    else:
+        raise ValueError(
+            f"electrostatics {settings.electrostatics!r}: OpenMM is handed reaction-field or ewald; LAMMPS takes shifted too"
+        )
+    if form.switch_angstrom:
+        force.setUseSwitchingFunction(True)
+        force.setSwitchingDistance((settings.cutoff_angstrom - form.switch_angstrom) / 10)
+    force.setUseDispersionCorrection(False)
+    return force
+
+
+def _add_molecule(mm: Any, system: Any, force: Any, plan: Carriers, model: Any) -> int:
+    """Particles, constraints and exclusions of one molecule; where its sites begin."""
+    first = int(system.getNumParticles())
+    for mass in plan.masses:
+        system.addParticle(float(mass))
+    for i, j in combinations(range(len(plan.masses)), 2):
+        system.addConstraint(first + i, first + j, float(np.linalg.norm(plan.places[i] - plan.places[j])) / 10)
+    site_at = first if plan.own else first + len(plan.masses)
+    for k, site in enumerate(model.sites):
+        if plan.own and k < len(plan.masses):
+            continue
+        index = system.addParticle(0.0)
+        system.setVirtualSite(index, _virtual_site(mm, plan, first, np.array(site.position_angstrom)))
+    if not plan.own:
+        for _ in plan.masses:
+            force.addParticle(0.0, 1.0, 0.0)
+    for site in model.sites:
+        force.addParticle(site.charge_e, (site.sigma_angstrom or 1.0) / 10, site.epsilon_ev * KJ_PER_EV)
+    for i, j in combinations(range(site_at, site_at + len(model.sites)), 2):
+        force.addException(i, j, 0.0, 0.1, 0.0)
+    return site_at
+
+
+def _virtual_site(mm: Any, plan: Carriers, first: int, place: Array) -> Any:
+    """A site without mass that follows the carriers."""
+    points = list(range(first, first + len(plan.places)))
+    if plan.rank == 3:
+        x, y = plan.places[1] - plan.places[0], plan.places[2] - plan.places[0]
+        x = x / np.linalg.norm(x)
+        z = np.cross(x, y)
+        z /= np.linalg.norm(z)
+        local = np.array([x, np.cross(z, x), z]) @ (place - plan.places.mean(axis=0)) / 10
+        quarter = [0.25] * 4
+        return mm.LocalCoordinatesSite(points, quarter, [-1.0, 1.0, 0.0, 0.0], [-1.0, 0.0, 1.0, 0.0], mm.Vec3(*local))
+    weights = plan.weights(place).tolist()
+    kind = {2: mm.TwoParticleAverageSite, 3: mm.ThreeParticleAverageSite}[len(points)]
+    return kind(*points, *weights)
+
+
+def _laid(plan: Carriers, sites: Array, here: Array) -> Array:
+    """Where the carriers are in the box, from where the sites (model's axes, box) are."""
+    from rotor.superpose import superpose
+
+    return superpose(sites, here).apply(plan.places)
+
+
+def integrator(mm: Any, settings: Settings) -> Any:
+    """The integrator of an ensemble."""
+    step, temperature = settings.step_fs / 1000, settings.temperature_k
+    if settings.ensemble == "nve":
+        made = mm.VerletIntegrator(step)
+    elif settings.ensemble == "langevin":
+        made = mm.LangevinMiddleIntegrator(temperature, settings.friction_per_ps, step)
+        made.setRandomNumberSeed(settings.seed)
+    else:
+        made = mm.NoseHooverIntegrator(temperature, 1000 / settings.relaxation_fs, step)
+    made.setConstraintTolerance(1e-7)
+    return made
+
+
+@dataclass(frozen=True)
+class Session:
+    """A scene on an OpenMM context, ready to step."""
+
+    context: Any
+    handed: Handed
+    settings: Settings
+    tail: tuple[float, float]
+    volume: float
+
+    @property
+    def step_classical(self) -> float:
+        """The step in Å √(u/eV)."""
+        return self.settings.step_fs / 1000 / units.CLASSICAL_TIME_PS
+
+    def state(self) -> tuple[Array, Motion, float]:
+        """Positions (particles, 3) Å, motion of the molecules as OpenMM's velocities have it, potential energy eV."""
+        got = self.context.getState(positions=True, velocities=True, forces=True, energy=True)
+        mine = self.handed
+        positions = np.asarray(got.getPositions(asNumpy=True)._value) * 10
+        velocities = np.asarray(got.getVelocities(asNumpy=True)._value) / NM_PER_PS
+        forces = np.asarray(got.getForces(asNumpy=True)._value) / (10 * KJ_PER_EV)
+        at = mine.carriers
+        motion = rigid_motion(mine.owners, mine.masses, positions[at], velocities[at], forces[at])
+        return positions, motion, got.getPotentialEnergy()._value / KJ_PER_EV
+
+    def start(self, velocities: Array) -> None:
+        """Set velocities (carriers, 3) of the first step; a leapfrog is given those half a step before."""
+        mine = self.handed
+        full = np.zeros_like(mine.positions)
+        full[mine.carriers] = velocities
+        self.context.setVelocities(full * NM_PER_PS)
+        if self.settings.ensemble == "nve":
+            positions, motion, _ = self.state()
+            before = motion.kicked(-0.5 * self.step_classical)
+            full[mine.carriers] = point_velocities(before, mine.owners, mine.masses, positions[mine.carriers])
+            self.context.setVelocities(full * NM_PER_PS)
+
+    def frame(self, step: int) -> Frame:
+        """What there is to say about now."""
+        positions, stored, potential = self.state()
+        between = self.settings.ensemble != "nve"
+        motion = stored if between else stored.kicked(0.5 * self.step_classical)
+        bath = 0.0
+        if self.settings.ensemble == "nose-hoover" and step:  # before its first step OpenMM has no chain to ask
+            bath = self.context.getIntegrator().computeHeatBathEnergy()._value / KJ_PER_EV
+        pressure = self.pressure_bar(stored, motion)
+        return Frame(step, positions[self.handed.atoms], motion, potential + self.tail[0], bath, pressure, between)
+
+    def pressure_bar(self, stored: Motion, motion: Motion) -> float:
+        """OpenMM's molecular pressure, from energies of the box scaled up and down, with the motion on the step.
+
+        It scales molecules about their geometric centres, not those of mass: another number at a moment, the same mean.
+        """
+        theirs = self.handed.barostat.computeCurrentPressure(self.context)._value
+        kinetic = motion.kinetic().translation_ev - stored.kinetic().translation_ev
+        return float(theirs + (2 / 3 * kinetic / self.volume + self.tail[1]) * EV_PER_ANGSTROM3_BAR)
+
+
+def session(
+    scene: Scene,
+    settings: Settings,
+    form: Form | None = None,
+    *,
+    accuracy: float = 1e-5,
+    platform: str | None = None,
+    threads: int = 1,
+) -> Session:
+    """A context with the scene in it, its molecules moving as the scene says.
+
+    accuracy: of the forces of Ewald's sum (PME), relative. platform: "Reference" (double precision), "CPU", "CUDA", ...;
+    None: the fastest that this machine has. threads: of the platform CPU.
+    """
+    mm, form = load(), form or Form()
+    mine = handed(scene, settings, form, accuracy)
+    context = _context(mm, mine.system, integrator(mm, settings), platform, threads)
+    context.setPositions(mine.positions / 10)
+    context.applyConstraints(1e-7)
+    context.computeVirtualSites()
+    ready = Session(context, mine, settings, tail_of(scene, settings, form), float(np.prod(scene.edges)))
+    ready.start(point_velocities(scene.motion(), mine.owners, mine.masses, mine.positions[mine.carriers]))
+    return ready
+
+
+def _context(mm: Any, system: Any, made: Any, platform: str | None, threads: int) -> Any:
+    """A context; where the choice of the platform is left to OpenMM and it is not the CPU, it finds one that works."""
+    known = [mm.Platform.getPlatform(k) for k in range(mm.Platform.getNumPlatforms())]
+    chosen = platform or max(known, key=lambda one: float(one.getSpeed())).getName()
+    if chosen == "CPU":
+        return mm.Context(system, made, mm.Platform.getPlatformByName("CPU"), {"Threads": str(threads)})
+    if platform is None:
+        return mm.Context(system, made)
+    return mm.Context(system, made, mm.Platform.getPlatformByName(platform))
+
+
+def frames(scene: Scene, settings: Settings, form: Form | None = None, **options: Any) -> Iterator[Frame]:
+    """Run, and give a frame at step 0 and after every `settings.every` steps; options as of `session`."""
+    mm = load()
+    try:
+        run = session(scene, settings, form, **options)
+        stepper = run.context.getIntegrator()
+        yield run.frame(0)
+        for step in range(settings.every, settings.steps + 1, settings.every):
+            stepper.step(settings.every)
+            yield run.frame(step)
+    except mm.OpenMMException as error:
+        raise RuntimeError(f"OpenMM stopped: {error}") from error
