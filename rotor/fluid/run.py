@@ -257,7 +257,8 @@ class _Run:
                     shown = now
                     told(dynamics.nsteps, steps, ns_per_day(self.settings, dynamics.nsteps - first, now))
         except (ValueError, FloatingPointError) as error:
-            raise RunStopped(f"{error}{self._told_checkpoint()}") from error
+            where = f"step {dynamics.nsteps + 1} of {steps}, {self.settings.step_fs:g} fs each"
+            raise RunStopped(f"{error} ({where}){self._told_checkpoint()}") from error
         except OSError as error:
             what = f"{error.filename}: {error.strerror}" if error.filename else error.strerror
             raise RunStopped(
