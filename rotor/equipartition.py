@@ -362,7 +362,8 @@ def _family(kt: float, kt_given: bool, confidence: float, degrees: tuple[DegreeT
     sigmas = np.array([degree.sigma for degree in degrees])
     chi2 = float(np.sum(sigmas**2)) if kt_given else _homogeneity(degrees)
     chi2_p = float(gammaincc(0.5 * free, 0.5 * chi2))
-    ks_p = -math.expm1(len(degrees) * math.log1p(-min(degree.ks_p_value for degree in degrees)))
+    smallest = min(degree.ks_p_value for degree in degrees)
+    ks_p = -math.expm1(len(degrees) * math.log1p(-smallest)) if smallest < 1.0 else 1.0
     p_value = min(1.0, 2.0 * min(chi2_p, ks_p))
     failing = _holm(degrees, 1.0 - confidence)
     accepted = p_value > 1.0 - confidence

@@ -253,3 +253,10 @@ def test_the_table_and_the_sentence():
     test = equipartition(gas_of("water", 1000).kinetic, KT)
     assert list(test.to_pandas()["name"]) == [degree.name for degree in test.degrees]
     assert str(test).startswith("equipartition accepted at 99 % confidence: χ² = ")
+
+
+def test_energies_that_follow_the_law_too_well_have_an_answer():
+    ranks = (np.arange(200) + 0.5) / 200
+    test = equipartition({"x": stats.chi2(1).ppf(ranks) / 2}, 1.0)
+    assert test.ks_p == 1.0  # the asymptotic law is 1 to the last bit at this distance, 0.0025
+    assert test.accepted

@@ -106,9 +106,9 @@ def _outputs(
     growing.ask("--checkpoint", checkpoint, (".npz",))
     if json != "-":
         last.ask("--json", json, (".json",))
-    for name, path in (growing.wanted | last.wanted).items():
-        if path.resolve() == Path(source).resolve():
-            raise ValueError(f"{name.strip()} {path}: is the box that is read; write to another file")
+    for name, target in (growing.wanted | last.wanted).items():
+        if target.resolve() == Path(source).resolve():
+            raise ValueError(f"{name.strip()} {target}: is the box that is read; write to another file")
     return Outputs(csv, tuple(trajectories), frames_every, checkpoint, every), last
 
 
@@ -122,7 +122,7 @@ def _box(
         return _read(source), source
     import numpy as np
 
-    from rotor.fluid.models import MODELS, model_of
+    from rotor.fluid.models import MODELS, model_of, shapes_of
     from rotor.fluid.run import calculator_of
     from rotor.fluid.start import RELAXING_STEPS, lattice_box, relax
 
@@ -140,7 +140,7 @@ def _box(
     atoms = lattice_box(model, molecules, grams, np.random.default_rng(settings.seed))
     atoms.calc = calculator_of(settings, threads)
     if relaxing:
-        relax(atoms, shapes={model.symbols: model.positions_angstrom[: len(model.symbols)]})
+        relax(atoms, shapes=shapes_of([model]))
     made = f"{molecules} molecules on a lattice at {grams:g} g/cm³, turned at random, {RELAXING_STEPS} quenched steps of 1 fs"
     return atoms, made
 
