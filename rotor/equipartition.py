@@ -140,13 +140,22 @@ def kinetic_degrees(
     found: list[tuple[str, Array, float]] = []
     if masses is not None and velocities is not None:
         mass, v = np.asarray(masses, dtype=np.float64), np.asarray(velocities, dtype=np.float64)
+        _check_shape("velocities", v, len(mass))
+        if momentum_removed and len(mass) == 1:
+            raise ValueError("one body whose momentum is removed has no translation left; leave its velocity out")
         found += _translations(mass, v, _groups(species, len(mass)), momentum_removed)
     if moments is not None and momenta is not None:
         inertia, m = np.asarray(moments, dtype=np.float64), np.asarray(momenta, dtype=np.float64)
+        _check_shape("momenta", m, len(inertia))
         found += _rotations(inertia, m, _groups(species, len(inertia)), linear_below)
     if not found:
         raise ValueError("no degree of freedom: masses with velocities are wanted, moments with momenta, or both")
     return KineticDegrees({name: values for name, values, _ in found}, {name: count for name, _, count in found})
+
+
+def _check_shape(name: str, vectors: Array, bodies: int) -> None:
+    if vectors.ndim not in (2, 3) or vectors.shape[-2:] != (bodies, 3):
+        raise ValueError(f"{name} of shape {vectors.shape} for {bodies} bodies: (N, 3) or (frames, N, 3) is wanted")
 
 
 def _translations(mass: Array, v: Array, groups: Groups, removed: bool) -> list[tuple[str, Array, float]]:
@@ -362,7 +371,8 @@ def _family(kt: float, kt_given: bool, confidence: float, degrees: tuple[DegreeT
     sigmas = np.array([degree.sigma for degree in degrees])
     chi2 = float(np.sum(sigmas**2)) if kt_given else _homogeneity(degrees)
     chi2_p = float(gammaincc(0.5 * free, 0.5 * chi2))
-    ks_p = -math.expm1(len(degrees) * math.log1p(-min(degree.ks_p_value for degree in degrees)))
+    smallest = min(degree.ks_p_value for degree in degrees)
+    ks_p = -math.expm1(len(degrees) * math.log1p(-smallest)) if smallest < 1.0 else 1.0
     p_value = min(1.0, 2.0 * min(chi2_p, ks_p))
     failing = _holm(degrees, 1.0 - confidence)
     accepted = p_value > 1.0 - confidence

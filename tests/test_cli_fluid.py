@@ -82,7 +82,12 @@ def test_other_models_and_a_file_without_velocities(call, folder):
         (("water", "--molecules", "8", "--model", "argon"), "--model argon is no model of water"),
         (("benzene", "--molecules", "8"), "a box is made of one model"),
         (("water", "--density", "1"), "--density: is wanted with --molecules"),
-        (("water", "--molecules", "8", "--step", "0"), "--step"),
+        (("tip4p", "--molecules", "8"), "write --model tip4p too"),
+        (("water", "--molecules", "8", "--step", "0"), "--step: 0: a finite number above 0 fs is wanted"),
+        (("water", "--molecules", "8", "--relaxation", "9x"), "the default is 'fs'"),
+        (("water", "--molecules", "8", "--seed", "-1"), "seed = -1: at least 0 is wanted"),
+        (("overlap.xyz", "--trajectory", "./overlap.xyz"), "--trajectory overlap.xyz: is the box that is read"),
+        (("far.xyz", "--model", "tip4p", "--cutoff", "4"), "in the shape of its model, more than 0.01 Å"),
         (("water", "--molecules", "8", "--ensemble", "npt"), "'npt' is no ensemble"),
         (("water", "--molecules", "8"), "cutoff 9 Å is more than half the smallest edge"),
         (("water", "--molecules", "8", "--csv", "a.txt"), "--csv a.txt: the name must end in .csv"),
@@ -100,13 +105,14 @@ def test_mistakes_are_one_line_and_nothing_is_written(call, folder, arguments, s
     water = ["O 1 1 1", "H 1.816497 1 1.577350", "H 0.183503 1 1.577350"]
     lattice = 'Lattice="9 0 0 0 9 0 0 0 9" pbc="T T T" Properties=species:S:1:pos:R:3'
     Path("overlap.xyz").write_text("\n".join(["6", lattice, *water, *water]) + "\n")
+    Path("far.xyz").write_text("\n".join(["3", lattice, *water]) + "\n")
     code, out, err = call("fluid", *arguments)
     assert code == 2
     assert out == ""
     assert err.startswith("error: ")
     assert said in err
     assert err.count("\n") == 1
-    assert sorted(path.name for path in Path().iterdir()) == ["open.xyz", "overlap.xyz", "text.xyz"]
+    assert sorted(path.name for path in Path().iterdir()) == ["far.xyz", "open.xyz", "overlap.xyz", "text.xyz"]
 
 
 def test_a_run_that_stops_has_exit_code_one(call, folder, monkeypatch):
@@ -128,3 +134,44 @@ def test_a_run_that_stops_has_exit_code_one(call, folder, monkeypatch):
     assert "the force on molecule 0 (OH2, atoms 0 to 2) is not finite in step" in err
     assert "a.npz is of step" in err
     assert len(Path("a.csv").read_text().splitlines()) >= 2
+
+
+def test_steps_too_long_are_told_with_their_number_and_length(call, folder):
+    code, out, err = call(*VAPOUR[:-2], "--step", "2ps", "--steps", "50", "--checkpoint", "a.npz")
+    assert (code, out) == (1, "")
+    assert "take a shorter step" in err
+    assert "of 50, 2000 fs each" in err
+    assert err.endswith("a.npz is of step 0, resume from it\n")
+
+
+def test_ctrl_c_tells_where_to_go_on(call, folder, monkeypatch):
+    from rotor.fluid.dynamics import RigidDynamics
+
+    step = RigidDynamics.step
+
+    def interrupted(self):
+        if self.nsteps == 12 and Path("a.npz").exists():  # relaxing, before, has no checkpoint
+            raise KeyboardInterrupt
+        step(self)
+
+    options = (*VAPOUR, "--ensemble", "langevin", "--steps", "20", "--every", "5", "--checkpoint-every", "5")
+    monkeypatch.setattr(RigidDynamics, "step", interrupted)
+    code, out, err = call(*options, "--checkpoint", "a.npz", "--csv", "a.csv")
+    assert (code, out) == (130, "")
+    assert err == "note: interrupted; the same command with --resume goes on from a.npz\n"
+    monkeypatch.setattr(RigidDynamics, "step", step)
+    assert call(*options, "--checkpoint", "a.npz", "--csv", "a.csv", "--resume")[0] == 0
+    assert call(*options, "--checkpoint", "b.npz", "--csv", "b.csv")[0] == 0
+    assert Path("a.csv").read_bytes() == Path("b.csv").read_bytes()
+
+
+def test_what_there_is_not_has_no_row(call, folder):
+    argon = ("fluid", "argon", "--model", "argon", "--molecules", "27", "--density", "0.5", "--cutoff", "6")
+    code, out, _ = call(*argon, "--temperature", "90", "--steps", "20")
+    assert code == 0
+    assert "of translation" in out
+    assert "of rotation  " not in out  # an atom has none
+    code, out, _ = call(*argon, "--temperature", "90", "--steps", "0")
+    assert code == 0
+    assert "nan" not in out
+    assert "one row alone" in out

@@ -253,3 +253,27 @@ def test_the_table_and_the_sentence():
     test = equipartition(gas_of("water", 1000).kinetic, KT)
     assert list(test.to_pandas()["name"]) == [degree.name for degree in test.degrees]
     assert str(test).startswith("equipartition accepted at 99 % confidence: χ² = ")
+
+
+def test_energies_that_follow_the_law_too_well_have_an_answer():
+    ranks = (np.arange(200) + 0.5) / 200
+    test = equipartition({"x": stats.chi2(1).ppf(ranks) / 2}, 1.0)
+    assert test.ks_p == 1.0  # the asymptotic law is 1 to the last bit at this distance, 0.0025
+    assert test.accepted
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"masses": [1, 2], "velocities": np.zeros((3, 3))}, r"velocities of shape \(3, 3\) for 2 bodies"),
+        ({"masses": [1, 2], "velocities": np.zeros((2, 2))}, r"velocities of shape \(2, 2\) for 2 bodies"),
+        ({"moments": [[1, 1, 1]], "momenta": np.zeros((4, 2, 3))}, r"momenta of shape \(4, 2, 3\) for 1 bodies"),
+        (
+            {"masses": [1], "velocities": np.zeros((1, 3)), "momentum_removed": True},
+            "one body whose momentum is removed",
+        ),
+    ],
+)
+def test_motions_of_other_bodies_than_there_are_are_refused(given, said):
+    with pytest.raises(ValueError, match=said):
+        kinetic_degrees(**given)

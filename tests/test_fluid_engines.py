@@ -402,3 +402,10 @@ def test_reference_boxes_have_one_energy(engine: str, number: int, shared: Path)
     options = {"accuracy": 1e-7} | ({"platform": "Reference"} if engine == "openmm" else {"kspace": "ewald"})
     frame = next(iter(list(engine_frames(engine, scene, settings, **options))))
     assert_same(energy, terms, motion, frame, 1e-6)  # as above
+
+
+def test_a_scene_of_molecules_on_top_of_each_other_is_refused() -> None:
+    atoms = box("spce", 64, 0.9)
+    atoms.positions[3:6] = atoms.positions[:3] + 0.05
+    with pytest.raises(ValueError, match=r"molecule 0 .* and molecule 1 .* on top of each other"):
+        scene_of(atoms, settings_for("spce"))

@@ -332,3 +332,23 @@ def test_a_terminal_sees_speed_and_progress_and_a_pipe_nothing(capsys, monkeypat
     run_fluid(box(8), SETTINGS)
     assert "ns/day" in terminal.getvalue()
     assert "60 of 60 steps" in terminal.getvalue()
+
+
+@pytest.mark.parametrize("harm", [Path.unlink, lambda path: path.write_bytes(path.read_bytes()[:3000])])
+def test_frames_that_are_gone_or_cut_short_are_told_by_name(folder, harm):
+    run_fluid(box(), SETTINGS, FILES)
+    harm(Path("run.traj"))
+    with pytest.raises(
+        ValueError, match=r"^run.traj: cannot be continued \(.+\); the checkpoint wants its first \d+ frames"
+    ):
+        run_fluid(box(), SETTINGS, FILES, resume=True)
+    assert sorted(path.name for path in Path().iterdir() if path.name.startswith(".")) == []
+
+
+def test_a_file_that_is_no_checkpoint_is_told_in_our_words(folder):
+    Path("run.npz").write_text("junk")
+    with pytest.raises(
+        ValueError, match=r"^run.npz: is no checkpoint of rotor fluid; name the file of --checkpoint"
+    ) as told:
+        run_fluid(box(), SETTINGS, FILES, resume=True)
+    assert "pickle" not in str(told.value)

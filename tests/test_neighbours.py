@@ -11,8 +11,9 @@ import pytest
 from ase import Atoms
 
 from rotor.fluid.assembly import assemble
+from rotor.fluid.models import models_of
 from rotor.fluid.neighbours import Neighbours
-from rotor.fluid.potential import RigidPotential, models_of
+from rotor.fluid.potential import RigidPotential
 
 
 def brute(lists: Neighbours) -> set[tuple[int, ...]]:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rotor.cli import inputs
 from rotor.cli.output import NoAnswer
 
 if TYPE_CHECKING:
@@ -23,8 +24,9 @@ if TYPE_CHECKING:
 OPTIONS = {"openmm": "threads", "lammps": "cores"}  # what --threads means to each
 
 
-def check(engine: str, outputs: Outputs, resume: bool) -> None:
+def check(engine: str, threads: int, outputs: Outputs, resume: bool) -> None:
     """ValueError for an engine that there is not, and for what only our own does."""
+    inputs.whole("--threads", threads, 1)
     if engine != "rotor" and engine not in OPTIONS:
         raise ValueError(f"--engine: {engine!r} is no engine; there are rotor, {', '.join(OPTIONS)}")
     if engine != "rotor" and (outputs.checkpoint or resume):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict
+from math import isnan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
@@ -61,14 +62,13 @@ def command(
 
     settings = Settings(
         model=_model(model), ensemble=ensemble, temperature_k=inputs.positive("--temperature", temperature, "K"),
-        step_fs=1000.0 * inputs.positive("--step", _femtoseconds(step), "ps"), steps=steps, every=every,
+        step_fs=inputs.positive("--step", step, "fs"), steps=steps, every=every,
         cutoff_angstrom=inputs.positive("--cutoff", cutoff, "angstrom"), electrostatics=electrostatics,
         friction_per_ps=inputs.positive("--friction", friction, ""),
-        relaxation_fs=1000.0 * inputs.positive("--relaxation", _femtoseconds(relaxation), "ps"), seed=seed,
+        relaxation_fs=inputs.positive("--relaxation", relaxation, "fs"), seed=seed,
     )  # fmt: skip
-    outputs, files = _outputs(csv, trajectory or [], frames_every, checkpoint, checkpoint_every, json)
-    engines.check(engine, outputs, resume)
-    inputs.whole("--threads", threads, 1)
+    outputs, files = _outputs(source, csv, trajectory or [], frames_every, checkpoint, checkpoint_every, json)
+    engines.check(engine, threads, outputs, resume)
     atoms, start = _box(source, settings, molecules, density, threads, relaxing=not resume)
     story = {"command": context.obj, "input": source, "engine": engine, "settings": asdict(settings), "start": start}
     if engine == "rotor":
@@ -77,11 +77,6 @@ def command(
         about = {"start": f"{start}; velocities {_speeds(atoms, settings)}"}
         record = engines.run(engine, atoms, settings, outputs, threads, _head(story))
     _tell(record, {**_head(story), **about}, atoms, settings, outputs, files, json)
-
-
-def _femtoseconds(text: str) -> str:
-    """A time that is in fs where it has no unit."""
-    return f"{text}fs" if text and text.strip()[-1].isdigit() else text
 
 
 def _model(names: str) -> str:
@@ -93,6 +88,7 @@ def _model(names: str) -> str:
 
 
 def _outputs(
+    source: str,
     csv: str | None,
     trajectories: list[str],
     frames_every: int | None,
@@ -110,6 +106,9 @@ def _outputs(
     growing.ask("--checkpoint", checkpoint, (".npz",))
     if json != "-":
         last.ask("--json", json, (".json",))
+    for name, target in (growing.wanted | last.wanted).items():
+        if target.resolve() == Path(source).resolve():
+            raise ValueError(f"{name.strip()} {target}: is the box that is read; write to another file")
     return Outputs(csv, tuple(trajectories), frames_every, checkpoint, every), last
 
 
@@ -123,11 +122,13 @@ def _box(
         return _read(source), source
     import numpy as np
 
-    from rotor.fluid.models import model_of
+    from rotor.fluid.models import MODELS, model_of, shapes_of
     from rotor.fluid.run import calculator_of
     from rotor.fluid.start import RELAXING_STEPS, lattice_box, relax
 
     inputs.whole("--molecules", molecules, 1)
+    if source != settings.model and source in MODELS:
+        raise ValueError(f"{source!r}: the model is {settings.model}; write --model {source} too")
     if "," in settings.model or source not in ("water", settings.model):
         raise ValueError(
             f"{source!r}: a box is made of one model: write {settings.model.split(',')[0]!r} (or 'water') with its --model"
@@ -139,7 +140,7 @@ def _box(
     atoms = lattice_box(model, molecules, grams, np.random.default_rng(settings.seed))
     atoms.calc = calculator_of(settings, threads)
     if relaxing:
-        relax(atoms, shapes={model.symbols: model.positions_angstrom[: len(model.symbols)]})
+        relax(atoms, shapes=shapes_of([model]))
     made = f"{molecules} molecules on a lattice at {grams:g} g/cm³, turned at random, {RELAXING_STEPS} quenched steps of 1 fs"
     return atoms, made
 
@@ -183,6 +184,10 @@ def _run(
         record = run_fluid(atoms, settings, outputs, resume=resume, begun=begun)
     except RunStopped as error:
         raise NoAnswer(str(error)) from error
+    except KeyboardInterrupt:
+        if outputs.checkpoint is not None and Path(outputs.checkpoint).is_file():
+            note(f"interrupted; the same command with --resume goes on from {outputs.checkpoint}")
+        raise
     start = f"resumed from {outputs.checkpoint}" if resume else f"{story['start']}; velocities {speeds}"
     return record, {"start": start}
 
@@ -268,6 +273,7 @@ def _show(content: dict[str, Any], settings: Settings) -> None:
     kinds = ", ".join(f"{kind['count']} {kind['name']}" for kind in content["molecules"])
     degrees = content["degrees"]
     print(f"{kinds}: {settings.steps} steps of {settings.step_fs:g} fs, {settings.ensemble}, by {content['engine']}")
+    rms, drift = content["conserved_rms_ev"], content["conserved_drift_ev_per_ns"]
     facts = [
         ("model", f"{settings.model}, cutoff {settings.cutoff_angstrom:g} Å, {settings.electrostatics}"),
         ("start", content["start"]),
@@ -276,10 +282,7 @@ def _show(content: dict[str, Any], settings: Settings) -> None:
             f"{degrees['translation']} of translation, {degrees['rotation']} of rotation; {degrees['removed']} removed",
         ),
         ("thermometer", content["thermometer"] + _claim(content, settings)),
-        (
-            "conserved",
-            f"rms {content['conserved_rms_ev']:.3g} eV, drift {content['conserved_drift_ev_per_ns']:.3g} eV/ns",
-        ),
+        ("conserved", "one row alone tells nothing" if isnan(rms) else f"rms {rms:.3g} eV, drift {drift:.3g} eV/ns"),
     ]
     if content["density_g_cm3"] is not None:
         edges = " x ".join(f"{edge:.6g}" for edge in content["box_angstrom"])
@@ -290,8 +293,7 @@ def _show(content: dict[str, Any], settings: Settings) -> None:
             mean["quantity"],
             mean["unit"],
             f"{mean['mean']:.6g}",
-            f"{mean['error']:.2g}",
-            f"{mean['effective_samples']:.3g}",
+            *("-" if isnan(x) else f"{x:.{n}g}" for x, n in ((mean["error"], 2), (mean["effective_samples"], 3))),
         ]
         for mean in content["means"]
     ]

@@ -173,7 +173,7 @@ def bodies_of(
         sites[rows], moments[members], species[members] = shape.sites, shape.moments, number
         notes += [f"{_formula(elements)}: {note}" for note in shape.notes]
         centres[members], attitude[members] = _fitted(
-            shape, places, members, rows, _formula(elements), tolerance_angstrom
+            shape, places, members, rows, _formula(elements), tolerance_angstrom, given is not None
         )
     mass = np.add.reduceat(masses[order], starts[:-1])
     names = tuple(_formula(elements) for elements, _ in groups)
@@ -320,7 +320,13 @@ def _principal(masses: Array, places: Array) -> _Shape:
 
 
 def _fitted(
-    shape: _Shape, places: Array, members: Indices, rows: Indices, formula: str, tolerance_angstrom: float
+    shape: _Shape,
+    places: Array,
+    members: Indices,
+    rows: Indices,
+    formula: str,
+    tolerance_angstrom: float,
+    of_model: bool = False,
 ) -> tuple[Array, Array]:
     """Centres (k, 3) and attitudes (k, 4) that lay the shape on molecules (k, m, 3); ValueError where it does not fit."""
     centres = np.einsum("m,kmi->ki", shape.masses / shape.masses.sum(), places)
@@ -332,7 +338,8 @@ def _fitted(
     if off[worst] > tolerance_angstrom:
         raise ValueError(
             f"molecule {members[worst]} ({formula}, atoms {_listed(rows[worst])}): an atom is {off[worst]:.3g} Å off its place "
-            f"in the shape of its species, more than {tolerance_angstrom:g} Å; rigid molecules of one species have one shape"
+            f"in the shape of its {'model' if of_model else 'species'}, more than {tolerance_angstrom:g} Å; rigid molecules of "
+            f"one species have one shape{', and another model another one' if of_model else ''}"
         )
     return centres, fit.quaternion
 

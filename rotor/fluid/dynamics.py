@@ -211,7 +211,7 @@ class RigidDynamics(MolecularDynamics):
         if share > AT_REST * kinetic_energy(self.bodies, self.state.momentum, 0.0 * self.state.angular).total_ev:
             raise ValueError(
                 "the total momentum is not zero, but 3 degrees of freedom are counted as removed: set it to zero "
-                "(rotor.fluid.start.at_rest), or give removed=0"
+                "(ase.md.velocitydistribution.Stationary(atoms)), or give removed=0"
             )
 
     def _check_net_force(self, force: Array) -> None:

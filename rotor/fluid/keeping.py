@@ -100,13 +100,16 @@ class AseTrajectory:
             self.path.unlink(missing_ok=True)
             return
         beside = self.path.with_name(f".{self.path.name}.part")
-        with Trajectory(self.path) as old, Trajectory(beside, "w") as new:
-            if len(old) < length:
-                raise ValueError(
-                    f"{path}: has {len(old)} frames, fewer than the {length} when the checkpoint was written"
-                )
-            for k in range(length):
-                new.write(old[k])
+        try:
+            with Trajectory(self.path) as old, Trajectory(beside, "w") as new:
+                for k in range(length):
+                    new.write(old[k])
+        except (OSError, ValueError, IndexError, TypeError) as error:
+            beside.unlink(missing_ok=True)
+            told = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+            raise ValueError(
+                f"{path}: cannot be continued ({told}); the checkpoint wants its first {length} frames"
+            ) from error
         os.replace(beside, self.path)
 
     def add(self, atoms: Atoms, time_ps: float) -> None:
@@ -182,7 +185,7 @@ def read_checkpoint(path: str | os.PathLike[str]) -> Checkpoint:
             arrays = {name: file[name] for name in file.files if name != "about"}
             about = json.loads(str(file["about"]))
     except (zipfile.BadZipFile, KeyError, ValueError, EOFError) as error:
-        raise ValueError(f"{path}: is no checkpoint of rotor fluid ({error})") from error
+        raise ValueError(f"{path}: is no checkpoint of rotor fluid; name the file of --checkpoint") from error
     if about.get("rotor_checkpoint") != VERSION:
         raise ValueError(
             f"{path}: a checkpoint of version {about.get('rotor_checkpoint')}; this program reads {VERSION}"

@@ -7,6 +7,7 @@ the centre of N2) follow from their places.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -155,3 +156,25 @@ def model_of(name: str) -> RigidModel:
     if name.lower() not in MODELS:
         raise ValueError(f"{name!r} is no model of a rigid molecule; there are {', '.join(MODELS)}")
     return MODELS[name.lower()]
+
+
+def models_of(names: str | RigidModel | Sequence[str | RigidModel]) -> tuple[RigidModel, ...]:
+    """Models from names joined by commas, models, or several of either.
+
+    >>> [model.name for model in models_of("spce,argon")]
+    ['spce', 'argon']
+    """
+    if isinstance(names, str):
+        return tuple(model_of(name.strip()) for name in names.split(","))
+    if isinstance(names, RigidModel):
+        return (names,)
+    return tuple(model for name in names for model in models_of(name))
+
+
+def shapes_of(models: Iterable[RigidModel]) -> dict[tuple[str, ...], Array]:
+    """Places (atoms, 3) of the real atoms of each model by their elements, as `rotor.fluid.bodies.bodies_of` takes them.
+
+    >>> shapes_of(models_of("trappe-n2"))[("N", "N")].tolist()
+    [[0.0, 0.0, -0.55], [0.0, 0.0, 0.55]]
+    """
+    return {model.symbols: model.positions_angstrom[: len(model.symbols)] for model in models}

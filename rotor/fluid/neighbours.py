@@ -124,8 +124,9 @@ class Neighbours:
         if found is not None and found[0] < CLOSEST_ANGSTROM:
             self.starts = self.starts[:0]  # so that asking again fails again
             raise ValueError(
-                f"atoms {found[1]} and {found[2]} of different molecules are {found[0]:.3g} Å apart; molecules that lie "
-                f"on top of each other (nearer than {CLOSEST_ANGSTROM} Å) have no sensible energy: move one of them"
+                f"atoms {found[1]} and {found[2]} of different molecules are {found[0]:.3g} Å apart; molecules "
+                f"on top of each other (nearer than {CLOSEST_ANGSTROM} Å) have no sensible energy: move one of them, or, if "
+                "they were apart before, take a shorter step"
             )
 
     def closest(self, within_angstrom: float) -> tuple[float, int, int] | None:

@@ -20,25 +20,12 @@ from ase.calculators.calculator import Calculator, PropertyNotImplementedError, 
 from rotor.fluid.assembly import Assembly, assemble
 from rotor.fluid.ewald import EwaldParameters, WaveVectors, fourier_virial, parameters_for, self_energy, wave_vectors
 from rotor.fluid.interactions import PairTables, pair_tables, reaction_field, screened, switched, tail
-from rotor.fluid.models import RigidModel, model_of
+from rotor.fluid.models import RigidModel, models_of
 from rotor.fluid.neighbours import CLOSEST_ANGSTROM, Neighbours
 from rotor.fluid.settings import ELECTROSTATICS
 from rotor.rotations import Array
 
 VOIGT = [0, 1, 2, 1, 0, 0], [0, 1, 2, 2, 2, 1]
-
-
-def models_of(names: str | RigidModel | Sequence[str | RigidModel]) -> tuple[RigidModel, ...]:
-    """Models from names joined by commas, models, or several of either.
-
-    >>> [model.name for model in models_of("spce,argon")]
-    ['spce', 'argon']
-    """
-    if isinstance(names, str):
-        return tuple(model_of(name.strip()) for name in names.split(","))
-    if isinstance(names, RigidModel):
-        return (names,)
-    return tuple(model for name in names for model in models_of(name))
 
 
 @dataclass(frozen=True)

@@ -28,12 +28,11 @@ from rotor.fluid.keeping import (
     read_rows,
     trajectory_file,
 )
-from rotor.fluid.models import model_of
+from rotor.fluid.models import models_of, shapes_of
 from rotor.fluid.record import FluidRecord
 from rotor.fluid.settings import Settings
 from rotor.fluid.start import at_rest, check_apart, heat, model_labels
 from rotor.fluid.state import State
-from rotor.rotations import Array
 
 if TYPE_CHECKING:
     from ase import Atoms
@@ -131,10 +130,10 @@ def dynamics_of(atoms: Atoms, settings: Settings, begin: bool = True) -> RigidDy
     from rotor.fluid.bodies import bodies_of
     from rotor.fluid.dynamics import RigidDynamics
 
-    models = [model_of(name.strip()) for name in settings.model.split(",")]
+    models = models_of(settings.model)
     if "molecule" not in atoms.arrays:
         atoms.arrays["molecule"] = model_labels(atoms, models)
-    shapes = _shapes(settings)
+    shapes = shapes_of(models)
     bodies, pose = bodies_of(atoms, shapes=shapes)
     if atoms.calc is None:
         atoms.calc = calculator_of(settings)
@@ -156,15 +155,9 @@ def bodies_and_degrees(atoms: Atoms, settings: Settings) -> tuple[Bodies, Degree
     """Bodies of a box, the degrees of freedom that a run counts, and the thermometer that it uses."""
     from rotor.fluid.bodies import bodies_of
 
-    bodies, _ = bodies_of(atoms, shapes=_shapes(settings))
+    bodies, _ = bodies_of(atoms, shapes=shapes_of(models_of(settings.model)))
     removed = 0 if settings.ensemble == "langevin" else 3
     return bodies, bodies.degrees(removed), "mixed" if settings.ensemble == "nve" else "half"
-
-
-def _shapes(settings: Settings) -> dict[tuple[str, ...], Array]:
-    """Places of the real atoms of each model, by their elements."""
-    models = [model_of(name.strip()) for name in settings.model.split(",")]
-    return {model.symbols: model.positions_angstrom[: len(model.symbols)] for model in models}
 
 
 def thermostat_of(settings: Settings, rng: np.random.Generator) -> Thermostat | None:
@@ -257,7 +250,8 @@ class _Run:
                     shown = now
                     told(dynamics.nsteps, steps, ns_per_day(self.settings, dynamics.nsteps - first, now))
         except (ValueError, FloatingPointError) as error:
-            raise RunStopped(f"{error}{self._told_checkpoint()}") from error
+            where = f"step {dynamics.nsteps + 1} of {steps}, {self.settings.step_fs:g} fs each"
+            raise RunStopped(f"{error} ({where}){self._told_checkpoint()}") from error
         except OSError as error:
             what = f"{error.filename}: {error.strerror}" if error.filename else error.strerror
             raise RunStopped(

@@ -37,7 +37,7 @@ class Settings:
             value = getattr(self, name)
             if not (math.isfinite(value) and value > 0):
                 raise ValueError(f"{name} = {value}: a number above 0 is wanted")
-        for name, least in (("steps", 0), ("every", 1)):
+        for name, least in (("steps", 0), ("every", 1), ("seed", 0)):
             if getattr(self, name) < least:
                 raise ValueError(f"{name} = {getattr(self, name)}: at least {least} is wanted")
         if self.ensemble not in ENSEMBLES:

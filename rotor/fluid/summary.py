@@ -39,16 +39,21 @@ def mean_of(quantity: str, unit: str, values: Array) -> Mean:
 
 
 def means(record: FluidRecord, molecules: int, share: float = 0.5) -> list[Mean]:
-    """Means over the last `share` of a record; energies per molecule, and the ratio of both temperatures."""
+    """Means over the last `share` of a record; energies per molecule, and the ratio of both temperatures.
+
+    What there is not (the temperature of rotations of atoms, a pressure without a cell) has no row.
+    """
     first = math.floor(len(record) * (1.0 - share))
     last = {name: column[first:] for name, column in record.columns.items()}
     per_mole = KJ_PER_MOL_EV / molecules
-    table = [
-        mean_of("potential energy", "kJ/mol", last["potential_ev"] * per_mole),
-        mean_of("temperature", "K", last["temperature_k"]),
-        mean_of("of translation", "K", last["translation_k"]),
-        mean_of("of rotation", "K", last["rotation_k"]),
-    ]
+    table = [mean_of("potential energy", "kJ/mol", last["potential_ev"] * per_mole)]
+    for name, column in (
+        ("temperature", "temperature_k"),
+        ("of translation", "translation_k"),
+        ("of rotation", "rotation_k"),
+    ):
+        if np.isfinite(last[column]).all():
+            table.append(mean_of(name, "K", last[column]))
     if np.isfinite(last["rotation_k"]).all() and np.all(last["translation_k"] > 0.0):
         table.append(mean_of("rotation over translation", "", last["rotation_k"] / last["translation_k"].mean()))
     if np.isfinite(last["pressure_bar"]).all():

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from rotor.degrees import Degrees
 from rotor.fluid.bodies import Bodies, Pose, bodies_of
-from rotor.fluid.models import RigidModel, model_of
+from rotor.fluid.models import RigidModel, models_of, shapes_of
 from rotor.fluid.settings import Settings
-from rotor.fluid.start import at_rest, model_labels, thermal_momenta
+from rotor.fluid.start import at_rest, check_apart, model_labels, thermal_momenta
 from rotor.fluid.temperature import Kinetic
 from rotor.rotations import Array, rotate
 from rotor.superpose import superpose
@@ -183,13 +183,14 @@ def scene_of(atoms: Any, settings: Settings) -> Scene:
 
     Velocities are the rigid part of those of the box; a box without any gets thermal ones at the temperature of the settings,
     the total momentum taken out. Raises ValueError for a cell that is not rectangular and periodic, a cutoff beyond half of
-    its shortest edge, atoms in another order than the models have, and molecules of another shape than their model.
+    its shortest edge, atoms in another order than the models have, and molecules of another shape than their model or on top of
+    each other.
     """
     edges = _edges(atoms, settings.cutoff_angstrom)
-    models = tuple(model_of(name.strip()) for name in settings.model.split(","))
+    models = models_of(settings.model)
     labels = model_labels(atoms, models)
-    shapes = {model.symbols: model.positions_angstrom[: len(model.symbols)] for model in models}
-    bodies, pose = bodies_of(atoms, labels, shapes)
+    bodies, pose = bodies_of(atoms, labels, shapes_of(models))
+    check_apart(atoms, bodies)
     by_symbols = {model.symbols: model for model in models}
     heads = [int(np.argmax(bodies.species == number)) for number in range(len(bodies.names))]
     spans = [slice(bodies.starts[body], bodies.starts[body + 1]) for body in heads]
