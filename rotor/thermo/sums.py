@@ -110,8 +110,8 @@ def level_sums(
 
     The sum at each temperature goes on until the estimated truncation error of Q, and with `energies` those of U and C_v
     too, are below `relative_error`. Where the terms grow again before that, or a level falls below the lowest, since the
-    distortion constants are used beyond their reach, it ends where the error was least, as an asymptotic series does; ValueError where that is above
-    `at_worst`. The errors say what was reached.
+    distortion constants are used beyond their reach, it ends where the error was least, as an asymptotic series does;
+    ValueError where that is above `at_worst`. The errors say what was reached.
 
     >>> from rotor.top import Top
     >>> top = Top.from_constants("B=60 GHz")
