@@ -120,6 +120,10 @@ def level_sums(
     (104.5171, 1.000002)
     """
     temperatures = checked_temperatures(temperatures_k)
+    least_k = min(top.rotational_constants_mhz) / units.MHZ_PER_K
+    enough = -0.5 * math.log(max(relative_error, at_worst))  # half of what x of the last J must be, about
+    if least_k * JMAX_LIMIT**2 < enough * temperatures.max():
+        raise _endless(temperatures.max())
     ladder = _Ladder(top, tuple(weights))
     return [_summed(ladder, s, temperatures, relative_error, energies, at_worst) for s in range(len(weights))]
 
@@ -218,8 +222,11 @@ def _summed(
         going = going[~grown]
         if not len(going):
             return best.as_sums(temperatures, ground)
-    hottest = temperatures[going].max()
-    raise ValueError(f"Q({hottest:g} K) needs levels beyond J = {JMAX_LIMIT - 1}; use the classical limit")
+    raise _endless(temperatures[going].max())
+
+
+def _endless(hottest: float) -> ValueError:
+    return ValueError(f"Q({hottest:g} K) needs levels beyond J = {JMAX_LIMIT - 1}; use the classical limit")
 
 
 def _up_to(reached: Floats) -> str:
