@@ -17,7 +17,9 @@ import rotor
 from rotor.classical.correlations import linear_curves, plateau, short_time
 from rotor.classical.ensembles import free_gas_correlations
 from rotor.plots.gas import band_figure
+from rotor.plots.heat_capacity import Panel, plot_heat_capacity
 from rotor.spectra.classical import classical_band, compare_bands, dipole_band_area, lines_area, rigid
+from rotor.thermo import thermodynamic_functions
 from rotor.units import CLASSICAL_TIME_PS, EV_PER_K, MHZ_PER_CM
 
 folder = Path(sys.argv[1]) if len(sys.argv) > 1 and Path(sys.argv[1]).is_dir() else None
@@ -113,5 +115,24 @@ assert abs(cold.area - 1) < 2 * noise  # even there the area is the same
 # Where hB/kT is small, as for OCS at 300 K (0.001), band and lines are one curve. Water has hA/kT = 0.13 at 300 K: its band lies
 # within 3 % of the peak. At 30 K a handful of lines is left, and the classical band lies where no line is. And whoever looks
 # closely enough sees lines at any temperature: those of OCS at 3 K stand 0.4 cm⁻¹ apart, the classical band runs through them.
+
+# %% [markdown]
+# ## Heat capacities part in the same way
 #
-# Heat capacities part in the same way: `rotor thermo water --plot water.png`.
+# Frozen levels store nothing. Hydrogen's are so far apart that even at 70 K it has hardly begun to rotate, and how far it has
+# depends on its nuclear spins; water is classical from 70 K upwards.
+
+# %%
+kelvin = np.geomspace(5, 1000, 150)
+hydrogen = {
+    kind: thermodynamic_functions(rotor.read("H2"), kelvin, species=kind) for kind in ("normal", "para", "ortho")
+}
+water = thermodynamic_functions(rotor.read("water"), kelvin)
+if folder is not None:
+    plot_heat_capacity([Panel("H2", hydrogen), Panel("water", {"quantum": water})], folder / "heat_capacities.png")
+
+at_70 = {kind: float(np.interp(70, kelvin, one.cv_over_r)) for kind, one in hydrogen.items()}
+print("H2 at 70 K, C_v/R of rotation: " + ", ".join(f"{kind} {value:.3f}" for kind, value in at_70.items()))
+assert at_70["normal"] < 0.15  # of 1
+assert at_70["para"] > 50 * at_70["ortho"]  # the first steps are 510 K and 845 K high, e^(335/70) = 120
+assert abs(float(np.interp(70, kelvin, water.cv_over_r)) - 1.5) < 0.03

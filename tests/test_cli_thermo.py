@@ -159,7 +159,7 @@ def test_one_temperature_is_drawn_too(call, folder):
         (("--constants", "B=1 cm-1", "--gas"), "error: --gas: the mass is not known, since bare constants have none; give a molecule\n"),
         (("water", "--csv", "w.txt"), "error: --csv w.txt: the name must end in .csv\n"),
         (("water", "--vibration", "1", "--vibrational-states", "2"), "error: --vibration and --vibrational-states: give one"),
-        ((), "error: either a source or --constants is wanted"),
+        ((), "error: either a source or --constants is wanted, and neither was given; give one of them"),
     ],
 )  # fmt: skip
 def test_wrong_input_is_one_line(call, folder, arguments, said):
@@ -174,7 +174,25 @@ def test_beyond_the_reach_of_the_constants_there_is_no_answer(call, folder):
     code, out, err = call("thermo", "water", "--temperature", "300,2000", "--csv", "w.csv")
     assert code == 1
     assert err.startswith("error: Q(2000 K): the sum over levels grows again at J = ")
+    assert err.endswith("; lower the temperature; of those asked for the sum can be had up to 300 K\n")
     assert (out, err.count("\n"), list(folder.iterdir())) == ("", 1, [])
+
+
+def test_a_temperature_far_too_high_is_refused_at_once(call, folder):
+    """There the terms never fall, but levels come to lie below the lowest: no need to go on to J = 4000."""
+    code, out, err = call("thermo", "water", "--temperature", "1e6")
+    assert code == 1
+    assert re.match(
+        r"error: Q\(1e\+06 K\): the levels of J = \d\d fall below the lowest; the distortion constants", err
+    )
+    assert (out, err.count("\n")) == ("", 1)
+
+
+@pytest.mark.skipif(not Path("/proc/self").exists(), reason="a folder where nobody can make a file: /proc of Linux")
+def test_a_folder_that_takes_no_file_is_named_with_its_option(call, folder):
+    code, out, err = call("thermo", "water", "--temperature", "100", "--csv", "/proc/w.csv")
+    assert (code, out) == (2, "")
+    assert err.startswith("error: --csv /proc/w.csv: cannot write in /proc: ")
 
 
 def test_help_has_examples(call):

@@ -367,6 +367,12 @@ def test_distortion_beyond_its_reach():
         level_sums(top, [top.spin_weights], [1200.0], 1e-8)
 
 
+def test_a_top_too_heavy_for_a_sum_is_refused_at_once():
+    """Ten thousand atoms at 300 K: J = 50,000 would be needed, which no one should wait for."""
+    with pytest.raises(ValueError, match=r"Q\(300 K\) needs levels beyond J = 3999; use the classical limit"):
+        level_sums(top := Top.from_constants("A=0.03 B=0.025 C=0.02 MHz"), [top.spin_weights], [5.0, 300.0])
+
+
 def test_corrected_limit_is_consistent_and_ends_where_it_must():
     limit = classical_limit(rotor.read("water"))
     t, h = 200.0, 1e-4

@@ -161,7 +161,9 @@ def read_top(given: Input) -> Top:
 def _refuse_contradictions(given: Input) -> None:
     if (given.source is None) == (given.constants is None):
         both = "both were given" if given.source is not None else "neither was given"
-        raise ValueError(f"either a source or --constants is wanted, and {both}; try 'rotor spectrum water'")
+        raise ValueError(
+            f"either a source or --constants is wanted, and {both}; give one of them, such as the name water"
+        )
     if given.dipole is not None and given.dipole_abc is not None:
         raise ValueError("--dipole and --dipole-abc: give one of them, in the frame of the input or in principal axes")
     if given.isotopes and given.constants is not None:

@@ -164,6 +164,8 @@ class Files:
             raise ValueError(f"{option} {path}: is a folder; give the name of a file to write")
         if not target.parent.is_dir():
             raise ValueError(f"{option} {path}: there is no folder {target.parent}; make it first")
+        if not os.access(target.parent, os.W_OK):
+            raise ValueError(f"{option} {path}: cannot write in {target.parent}: no permission")
         if any(target.resolve() == other.resolve() for other in self.wanted.values()):
             raise ValueError(f"{option} {path}: another option writes the same file")
         self.wanted[option] = target
@@ -173,7 +175,10 @@ class Files:
         with ExitStack() as stack:
             moves: list[tuple[Path, Path]] = []
             for option, target in self.wanted.items():
-                folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix=".rotor-", dir=target.parent)))
+                try:
+                    folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix=".rotor-", dir=target.parent)))
+                except OSError as error:
+                    raise ValueError(f"{option} {target}: cannot write in {target.parent}: {error.strerror}") from None
                 writers[option](folder / target.name)
                 moves += [(made, target.parent / made.name) for made in sorted(folder.iterdir())]
             for made, place in moves:

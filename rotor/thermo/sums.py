@@ -109,9 +109,9 @@ def level_sums(
     """Q, U/RT and C_v/R of a top's levels for each of several sets of spin weights, from levels solved once.
 
     The sum at each temperature goes on until the estimated truncation error of Q, and with `energies` those of U and C_v
-    too, are below `relative_error`. Where the terms grow again before that, since the distortion constants are used beyond
-    their reach, it ends where the error was least, as an asymptotic series does; ValueError where that is above
-    `at_worst`. The errors say what was reached.
+    too, are below `relative_error`. Where the terms grow again before that, or a level falls below the lowest, since the
+    distortion constants are used beyond their reach, it ends where the error was least, as an asymptotic series does;
+    ValueError where that is above `at_worst`. The errors say what was reached.
 
     >>> from rotor.top import Top
     >>> top = Top.from_constants("B=60 GHz")
@@ -120,6 +120,10 @@ def level_sums(
     (104.5171, 1.000002)
     """
     temperatures = checked_temperatures(temperatures_k)
+    least_k = min(top.rotational_constants_mhz) / units.MHZ_PER_K
+    enough = -0.5 * math.log(max(relative_error, at_worst))  # half of what x of the last J must be, about
+    if least_k * JMAX_LIMIT**2 < enough * temperatures.max():
+        raise _endless(temperatures.max())
     ladder = _Ladder(top, tuple(weights))
     return [_summed(ladder, s, temperatures, relative_error, energies, at_worst) for s in range(len(weights))]
 
@@ -202,16 +206,32 @@ def _summed(
         tail = tails.after(going, ladder.heaviest[s] * (np.abs(terms) @ plain))
         if j < max(3, ground_j + 2):
             continue
+        beyond = bool(
+            (kelvin[spin[s] > 0] < ground).any()
+        )  # below the lowest level that exists: no energy of a molecule
         errors = relative_errors(sums[:, going], tail)
         best.take(going, j, sums[:, going], errors, errors[:kinds].max(axis=0))
         going = going[best.worst[going] >= relative_error]
-        grown = tails.grows[going]
-        tails.refuse(going[grown & (best.worst[going] > at_worst)], j, sums[0])
+        grown = tails.grows[going] | beyond
+        reached = temperatures[best.worst <= max(relative_error, at_worst)]
+        way_out = "lower the temperature" + ("" if energies else " or give Q") + _up_to(reached)
+        what = (
+            f"the levels of J = {j} fall below the lowest" if beyond else f"the sum over levels grows again at J = {j}"
+        )
+        tails.refuse(going[grown & (best.worst[going] > at_worst)], what, sums[0], way_out)
         going = going[~grown]
         if not len(going):
             return best.as_sums(temperatures, ground)
-    hottest = temperatures[going].max()
-    raise ValueError(f"Q({hottest:g} K) needs levels beyond J = {JMAX_LIMIT - 1}; use the classical limit")
+    raise _endless(temperatures[going].max())
+
+
+def _endless(hottest: float) -> ValueError:
+    return ValueError(f"Q({hottest:g} K) needs levels beyond J = {JMAX_LIMIT - 1}; use the classical limit")
+
+
+def _up_to(reached: Floats) -> str:
+    """Of the temperatures asked for those that can be had, if there are any."""
+    return f"; of those asked for the sum can be had up to {reached.max():g} K" if len(reached) else ""
 
 
 def relative_errors(moments: Floats, tails: Floats) -> Floats:
@@ -251,13 +271,13 @@ class _Tails:
         tail = terms * (terms / np.where(falls, before - terms, 1.0))
         return np.where(terms == 0, 0.0, np.where(falls, tail, ENDLESS))
 
-    def refuse(self, grown: Ints, j: int, totals: Floats) -> None:
-        """ValueError for the first of the temperatures where the terms of Q have fallen and grow again, if there is one."""
+    def refuse(self, grown: Ints, what: str, totals: Floats, way_out: str) -> None:
+        """ValueError for the first of the temperatures where the sum has lost its meaning, if there is one."""
         if len(grown):
             share = self._last[0, grown[0]] / totals[grown[0]]
             raise ValueError(
-                f"Q({self._temperatures[grown[0]]:g} K): the sum over levels grows again at J = {j}; the distortion "
-                f"constants are used beyond their reach (tail {share:.1e} of Q there); lower the temperature or give Q"
+                f"Q({self._temperatures[grown[0]]:g} K): {what}; the distortion "
+                f"constants are used beyond their reach (tail {share:.1e} of Q there); {way_out}"
             )
 
 
