@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, get_args, get_type_hints
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,9 +35,14 @@ class Layout:
     ending: bytes = b""
 
 
-# the types that the columns are declared with: NDArray[np.float64] is ndarray[shape, dtype[float64]]
-DTYPES: dict[str, type[np.generic]] = {
-    name: get_args(get_args(hint)[1])[0] for name, hint in get_type_hints(Columns).items()
+# the type of each of the columns; annotations cannot be asked for it in every release of numpy
+DTYPES: dict[str, type[np.generic]] = {name: np.float64 for name in Columns._fields} | {
+    "dr": np.int16,
+    "g_upper": np.int32,
+    "tag": np.int32,
+    "qnfmt": np.int32,
+    "quanta_upper": np.int16,
+    "quanta_lower": np.int16,
 }
 
 
