@@ -36,7 +36,7 @@ class Layout:
 
 
 # the type of each of the columns; annotations cannot be asked for it in every release of numpy
-DTYPES: dict[str, type[np.generic]] = {name: np.float64 for name in Columns._fields} | {
+DTYPES: dict[str, type[np.generic]] = dict.fromkeys(Columns._fields, np.float64) | {
     "dr": np.int16,
     "g_upper": np.int32,
     "tag": np.int32,
