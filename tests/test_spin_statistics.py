@@ -434,7 +434,9 @@ def test_mistakes_are_told():
         (lambda: weights_of(ammonia, inversion="up"), "'symmetric' or 'antisymmetric'"),
         (lambda: weights_of(ammonia, inversion="symmetric", electronic="odd"), "leave `electronic`"),
         (lambda: weights_of(water, inversion="symmetric"), "flat within"),
-        (lambda: weights_of(of_g2("C2H6"), inversion="symmetric"), "nuclei meet"),
+        (lambda: weights_of(of_g2("C2H6"), inversion="symmetric"), "no plane to invert"),
+        (lambda: weights_of(of_g2("CH4"), inversion="symmetric"), "no plane to invert"),
+        (lambda: weights_of(of_g2("H2CCl2"), inversion="symmetric"), "nuclei meet"),
     ]:
         with pytest.raises(ValueError, match=message):
             call()

@@ -172,7 +172,7 @@ def inverting_symmetry(
     The molecule is flattened onto the plane of its a and b axes, halfway between its two forms. Rotations of the flat
     form that the rigid one has keep it in its form: +1. The others exchange the forms: -1.
 
-    Raises ValueError for a molecule that is flat already, or whose nuclei would meet.
+    Raises ValueError for a molecule that is flat already, that has no one such plane, or whose nuclei would meet.
     """
     rigid = find_symmetry(kinds, masses_u, positions_angstrom, tolerance)
     points = np.asarray(positions_angstrom, dtype=float)
@@ -180,6 +180,8 @@ def inverting_symmetry(
     heights = (points - points.mean(axis=0)) @ normal
     if rigid.linear or np.ptp(heights) <= rigid.tolerance_angstrom:
         raise ValueError(f"the molecule is flat within {rigid.tolerance_angstrom:.2g} Å: there is no inversion")
+    if any(order > 2 and abs(axis @ normal) < 0.9 for order, axis in rigid.axes):
+        raise ValueError("no plane to invert through: the b and c axes, or all three, are alike by symmetry")
     flat_points = points - np.outer(heights, normal)
     if len(points) < 2 or shortest_distance(flat_points) < CLOSEST_ANGSTROM:
         raise ValueError("nuclei meet in the plane of the a and b axes: the molecule does not invert through it")
