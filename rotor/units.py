@@ -34,6 +34,8 @@ NM2_MHZ_PER_CM = (
     SPEED_OF_LIGHT_M_PER_S * 1e10
 )  # integrated absorption of 1 cm/molecule in nm² MHz: c in cm/s times 1e8, exact
 EV_PER_K = BOLTZMANN_J_PER_K / ELEMENTARY_CHARGE_C  # exact ratio
+EV_PER_ANGSTROM3_BAR = ELEMENTARY_CHARGE_C * 1e25  # 1 eV/Å³ in bar, exact
+KJ_PER_MOL_EV = ELEMENTARY_CHARGE_C * AVOGADRO_PER_MOL * 1e-3  # 1 eV in kJ/mol, exact: 96.4853...
 CM_PER_EV = ELEMENTARY_CHARGE_C / PLANCK_J_S * 1e-6 / MHZ_PER_CM  # 1 eV in cm^-1, exact ratio: 8065.54...
 
 # A = hbar / (4 pi I): MHz times u angstrom^2

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, cast
 import typer
 
 from rotor.cli import engines, inputs
-from rotor.cli.output import Files, NoAnswer, Table, json_text, note, show_facts, show_table, write_text
+from rotor.cli.output import Files, NoAnswer, Table, deliver, json_with_rows, note, show_facts, show_table
 
 if TYPE_CHECKING:
     from ase import Atoms
@@ -76,7 +76,7 @@ def command(
     else:
         about = {"start": f"{start}; velocities {_speeds(atoms, settings)}"}
         record = engines.run(engine, atoms, settings, outputs, threads, _head(story))
-    _tell(record, {**_head(story), **about}, atoms, settings, outputs, files, json)
+    _tell(record, {**_head(story), **about}, atoms, settings, outputs, files)
 
 
 def _model(names: str) -> str:
@@ -104,8 +104,7 @@ def _outputs(
     for number, path in enumerate(trajectories):
         growing.ask(f"--trajectory{' ' * number}", path, (".traj", ".xyz", ".extxyz"))
     growing.ask("--checkpoint", checkpoint, (".npz",))
-    if json != "-":
-        last.ask("--json", json, (".json",))
+    last.ask_json(json)
     for name, target in (growing.wanted | last.wanted).items():
         if target.resolve() == Path(source).resolve():
             raise ValueError(f"{name.strip()} {target}: is the box that is read; write to another file")
@@ -204,9 +203,8 @@ def _head(story: dict[str, Any]) -> dict[str, Any]:
 
 
 def _tell(
-    record: FluidRecord, content: dict[str, Any], atoms: Atoms, settings: Settings, outputs: Outputs, files: Files,
-    json: str | None,
-) -> None:  # fmt: skip
+    record: FluidRecord, content: dict[str, Any], atoms: Atoms, settings: Settings, outputs: Outputs, files: Files
+) -> None:
     """Everything printed: as JSON, or as a report."""
     from rotor.fluid.run import bodies_and_degrees
     from rotor.fluid.summary import conserved, means
@@ -230,14 +228,7 @@ def _tell(
     }
     for text in degrees.notes:
         note(text)
-    columns = {name: column.tolist() for name, column in record.columns.items()}
-    rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
-    text = json_text({**content, "record": rows})
-    files.write({"--json": lambda path: write_text(path, text)})
-    if json == "-":
-        print(text, end="")
-    else:
-        _show(content, settings)
+    deliver(files, {}, lambda: json_with_rows(record, "record", content), lambda: _show(content, settings))
 
 
 def _density(atoms: Atoms, bodies: Bodies) -> float | None:

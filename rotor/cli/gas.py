@@ -13,7 +13,7 @@ import typer
 
 from rotor.cli import inputs
 from rotor.cli.inputs import Input
-from rotor.cli.output import Files, Table, Writer, deliver, json_text, show_facts, show_table
+from rotor.cli.output import Files, Table, Writer, deliver, json_text, rows_of, show_facts, show_table
 
 if TYPE_CHECKING:
     from rotor.classical.ensembles import Correlations, Ensemble
@@ -259,11 +259,9 @@ def _about_curves(top: Top, settings: Settings, probes: Probes, curves: Correlat
 
     moments = top.moments_u_angstrom2
     start = short_time(moments, _kt(settings.temperature_k), probes.vector, probes.tensor)
-    columns = {name: column.tolist() for name, column in curves.columns.items()}
-    rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
     per_ps2 = {"c1": start.m2 / CLASSICAL_TIME_PS**2, "c2": start.n2 / CLASSICAL_TIME_PS**2}
     kept = plateau(moments, probes.vector)
-    values = (probes.vector, probes.vector_source, probes.tensor_source, per_ps2, kept, rows)
+    values = (probes.vector, probes.vector_source, probes.tensor_source, per_ps2, kept, rows_of(curves))
     return dict(zip(names, values, strict=True))
 
 

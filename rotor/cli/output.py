@@ -127,9 +127,13 @@ def json_text(content: Mapping[str, Any]) -> str:
 
 def json_with_rows(table: Columns, key: str, content: Mapping[str, Any]) -> str:
     """The content as JSON text with all rows of a table, one record each, under the key."""
+    return json_text({**content, key: rows_of(table)})
+
+
+def rows_of(table: Columns) -> list[dict[str, Any]]:
+    """All rows of a table, one record each by the names of its columns."""
     columns = {name: column.tolist() for name, column in table.columns.items()}
-    rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
-    return json_text({**content, key: rows})
+    return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 
 
 def _json_value(value: Any) -> str:

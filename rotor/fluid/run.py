@@ -33,6 +33,7 @@ from rotor.fluid.record import FluidRecord
 from rotor.fluid.settings import Settings
 from rotor.fluid.start import at_rest, check_apart, heat, model_labels
 from rotor.fluid.state import State
+from rotor.units import EV_PER_ANGSTROM3_BAR
 
 if TYPE_CHECKING:
     from ase import Atoms
@@ -45,7 +46,6 @@ if TYPE_CHECKING:
 COLUMNS = tuple(field.name for field in fields(FluidRecord))
 MAY_CHANGE = ("steps",)  # settings that a resumed run may have otherwise
 BAR_EVERY_S = 0.2
-EV_PER_ANGSTROM3_BAR = 1.602176634e6  # 1 eV/Å³ in bar, exact
 
 Told = Callable[[int, int, float], None]
 

@@ -10,8 +10,7 @@ import numpy as np
 from rotor.equipartition import statistical_inefficiency
 from rotor.fluid.record import FluidRecord
 from rotor.rotations import Array
-
-KJ_PER_MOL_EV = 96.48533212331001  # 1 eV in kJ/mol, exact: the Faraday constant
+from rotor.units import KJ_PER_MOL_EV
 
 
 @dataclass(frozen=True)

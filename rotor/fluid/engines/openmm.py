@@ -17,9 +17,9 @@ from rotor import units
 from rotor.fluid.engines.carriers import Carriers, carriers_of
 from rotor.fluid.engines.pairs import Form, tail_of
 from rotor.fluid.engines.scene import Frame, Ints, Motion, Scene, point_velocities, rigid_motion
-from rotor.fluid.run import EV_PER_ANGSTROM3_BAR
 from rotor.fluid.settings import Settings
 from rotor.rotations import Array
+from rotor.units import EV_PER_ANGSTROM3_BAR
 
 KJ_PER_EV = units.ELEMENTARY_CHARGE_C * units.AVOGADRO_PER_MOL * 1e-3
 CONDUCTOR = 1e12  # a dielectric constant as good as infinite
