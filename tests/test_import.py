@@ -30,6 +30,11 @@ def test_import_loads_no_foreign_library():
     assert loaded_after("import rotor").isdisjoint((*HEAVY, "numpy", "scipy"))
 
 
+def test_the_command_line_starts_without_arrays():
+    foreign = {*HEAVY, "numpy", "scipy"} - {"typer", "rich"}
+    assert loaded_after("import rotor.cli").isdisjoint(foreign)
+
+
 def test_constants_to_lines_needs_numpy_and_lapack_only():
     code = (
         "import rotor\n"

@@ -8,8 +8,6 @@ from collections.abc import Iterator
 from contextlib import ExitStack, closing
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from rotor.cli import inputs
 from rotor.cli.output import NoAnswer
 
@@ -59,6 +57,8 @@ def _follow(
     frames: Iterator[Frame], scene: Scene, atoms: Atoms, settings: Settings, outputs: Outputs, story: dict[str, Any]
 ) -> FluidRecord:
     """Write every frame that comes, and make the table; files are opened when the engine has given its first frame."""
+    import numpy as np
+
     from rotor.fluid.engines.reading import row_of
     from rotor.fluid.keeping import csv_line
     from rotor.fluid.record import FluidRecord
