@@ -8,13 +8,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
-from numpy.typing import ArrayLike
 
 from rotor.cli import inputs, layer
 from rotor.cli.inputs import Input
 from rotor.cli.output import Files, Table, Writer, answering, deliver, json_with_rows, show_facts, show_table
 
 if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
     from rotor.thermo import ThermoFunctions, VibrationalStates
     from rotor.top import Top
 
