@@ -15,11 +15,11 @@ from pathlib import Path
 
 import numpy as np
 
-from rotor.classical.free import free_motion
-from rotor.classical.integrators import Method, integrate
-from rotor.classical.lie_runge_kutta import LieRungeKutta
-from rotor.classical.moser_veselov import MoserVeselov
-from rotor.classical.splitting import RotationSplitting, SymmetricTopSplitting
+from rotor.classical.free.free_motion import free_motion
+from rotor.classical.integrators.lie_runge_kutta import LieRungeKutta
+from rotor.classical.integrators.method import Method, integrate
+from rotor.classical.integrators.moser_veselov import MoserVeselov
+from rotor.classical.integrators.splitting import RotationSplitting, SymmetricTopSplitting
 
 MOMENTS, MOMENTUM = np.array([1.0, 1.875, 2.875]), np.array([0.5, 0.75, 1.0])
 PERIOD = float(free_motion(MOMENTS, MOMENTUM).period)

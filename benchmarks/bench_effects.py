@@ -15,16 +15,16 @@ from pathlib import Path
 
 import numpy as np
 
-from rotor.classical._step_kernels import rotations, rows
-from rotor.classical.changing_inertia import ChangingInertia
-from rotor.classical.dipole import InducedDipole, PermanentDipole
-from rotor.classical.drive import PeriodicDrive
-from rotor.classical.gyrostat import SpinningRotor
-from rotor.classical.integrators import integrate
-from rotor.classical.pivot import GravityAboutPivot
-from rotor.classical.splitting import RotationSplitting
-from rotor.classical.torques import ConstantTorque
-from rotor.rotations import IDENTITY
+from rotor.classical.effects.changing_inertia import ChangingInertia
+from rotor.classical.effects.dipole_in_field import InducedDipole, PermanentDipole
+from rotor.classical.effects.drive import PeriodicDrive
+from rotor.classical.effects.gravity import GravityAboutPivot
+from rotor.classical.effects.gyrostat import SpinningRotor
+from rotor.classical.effects.torques import ConstantTorque
+from rotor.classical.integrators._step_kernels import rotations, rows
+from rotor.classical.integrators.method import integrate
+from rotor.classical.integrators.splitting import RotationSplitting
+from rotor.geometry.rotations import IDENTITY
 
 MOMENTS, MOMENTUM, STEP = np.array([1.0, 1.875, 2.875]), np.array([0.5, 0.75, 1.0]), 0.05
 EFFECTS = {

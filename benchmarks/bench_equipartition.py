@@ -4,7 +4,7 @@
 
 Each fluid: 216 molecules on a lattice, relaxed, brought to temperature by Langevin's thermostat, then frames 0.2 ps
 apart under it. Momenta of the half step (on the step those of librations are too small, by the error of order h²) are
-tested degree by degree by `rotor.equipartition`, as correlated data, and all degrees of all fluids as one family. Then
+tested degree by degree by `rotor.statistics.equipartition`, as correlated data, and all degrees of all fluids as one family. Then
 mistakes are planted: linear molecules counted with three rotations, and momenta on the step at twice the step's length.
 """
 
@@ -19,14 +19,14 @@ import numpy as np
 from ase.units import fs
 
 from rotor import units
-from rotor.equipartition import Equipartition, KineticDegrees, equipartition, kinetic_degrees
-from rotor.fluid.bodies import bodies_of
-from rotor.fluid.dynamics import RigidDynamics
-from rotor.fluid.models import model_of
+from rotor.fluid.forces.models import model_of
+from rotor.fluid.initial_box import heat, lattice_box, relax
+from rotor.fluid.motion.bodies import bodies_of
+from rotor.fluid.motion.dynamics import RigidDynamics
+from rotor.fluid.motion.thermostats import Langevin
 from rotor.fluid.run import calculator_of
 from rotor.fluid.settings import Settings
-from rotor.fluid.start import heat, lattice_box, relax
-from rotor.fluid.thermostats import Langevin
+from rotor.statistics.equipartition import Equipartition, KineticDegrees, equipartition, kinetic_degrees
 
 CONFIDENCE = 0.99
 APART_PS = 0.2

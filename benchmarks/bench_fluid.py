@@ -33,12 +33,12 @@ from ase.io import read, write
 
 from rotor.fluid.analysis import drift_per_ns
 from rotor.fluid.engines import lammps, openmm
-from rotor.fluid.engines.pairs import Form
-from rotor.fluid.engines.scene import scene_of
-from rotor.fluid.models import model_of
+from rotor.fluid.engines.engine_input import scene_of
+from rotor.fluid.engines.pair_tables import Form
+from rotor.fluid.forces.models import model_of
+from rotor.fluid.initial_box import lattice_box, relax
 from rotor.fluid.run import calculator_of, dynamics_of
 from rotor.fluid.settings import Settings
-from rotor.fluid.start import lattice_box, relax
 
 KJ_PER_MOL = units.mol / units.kJ
 LAMMPS_RUN = """

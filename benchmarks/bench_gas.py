@@ -19,8 +19,8 @@ from pathlib import Path
 import numpy as np
 
 import rotor
-from rotor.classical.ensembles import free_gas_correlations, stepped_gas_correlations
-from rotor.classical.free import free_motion
+from rotor.classical.free.free_motion import free_motion
+from rotor.classical.gas.ensembles import free_gas_correlations, stepped_gas_correlations
 from rotor.units import CLASSICAL_TIME_PS, EV_PER_K
 
 END_PS, TEMPERATURE_K, THREADS = 2.0, 300.0, 2

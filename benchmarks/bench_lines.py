@@ -36,7 +36,7 @@ def measure(jmax: int, work: str) -> dict[str, float]:
     from rotor.formats.line_tables import write_lines
     from rotor.spectra import transitions
     from rotor.spectra.lines import line_list
-    from rotor.top import Top
+    from rotor.tops.top import Top
 
     top = Top.from_constants("A=8572 B=3640 C=2790 MHz", dipole_abc_debye=(1.201, 1.916, 0.365))
     cut = -12.0 if work.endswith("-12") else None

@@ -22,15 +22,15 @@ from ase import Atoms
 from ase.units import fs
 
 from rotor import units
-from rotor.classical.splitting import RotationSplitting
-from rotor.fluid.bodies import bodies_of
-from rotor.fluid.dynamics import RigidDynamics
-from rotor.fluid.models import model_of
+from rotor.classical.integrators.splitting import RotationSplitting
+from rotor.fluid.forces.models import model_of
+from rotor.fluid.initial_box import heat, lattice_box, relax
+from rotor.fluid.motion.bodies import bodies_of
+from rotor.fluid.motion.dynamics import RigidDynamics
+from rotor.fluid.motion.state import Flows, State
+from rotor.fluid.motion.thermometers import THERMOMETERS, kinetic_energy, step_correction
 from rotor.fluid.run import calculator_of, run_fluid
 from rotor.fluid.settings import Settings
-from rotor.fluid.start import heat, lattice_box, relax
-from rotor.fluid.state import Flows, State
-from rotor.fluid.temperature import THERMOMETERS, kinetic_energy, step_correction
 
 MOLECULES = 216
 STEPS_FS = (1.0, 2.0, 3.0, 4.0)

@@ -22,8 +22,8 @@ from pathlib import Path
 import numpy as np
 
 from rotor.classical.euler import energy
-from rotor.classical.many import advance
-from rotor.rotations import uniform
+from rotor.classical.integrators.batch import advance
+from rotor.geometry.rotations import uniform
 
 STEP, MOMENTS = 0.1, (0.6, 0.8, 1.0)
 

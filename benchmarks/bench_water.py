@@ -22,13 +22,13 @@ from ase import Atoms, units
 from ase.io import read, write
 
 from rotor.fluid.analysis import block_errors, diffusion, drift_per_ns, endless_box, pair_distribution
-from rotor.fluid.engines.reading import run_engine
-from rotor.fluid.models import model_of
-from rotor.fluid.potential import RigidPotential
+from rotor.fluid.engines.results import run_engine
+from rotor.fluid.forces.models import model_of
+from rotor.fluid.forces.potential import RigidPotential
+from rotor.fluid.initial_box import lattice_box, relax
 from rotor.fluid.record import FluidRecord
 from rotor.fluid.run import dynamics_of, pressure_bar
 from rotor.fluid.settings import Settings
-from rotor.fluid.start import lattice_box, relax
 from rotor.fluid.summary import mean_of
 
 KJ_PER_MOL = units.mol / units.kJ  # of 1 eV

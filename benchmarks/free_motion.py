@@ -17,8 +17,8 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from rotor.classical.euler import gyroscopic_term
-from rotor.classical.free import free_motion
-from rotor.rotations import IDENTITY
+from rotor.classical.free.free_motion import free_motion
+from rotor.geometry.rotations import IDENTITY
 
 BODIES = {
     "asymmetric (water-like)": ((1.0, 1.875, 2.875), (0.5, 0.75, 1.0)),

@@ -14,13 +14,13 @@ from pathlib import Path
 
 import numpy as np
 
-from rotor.formats.doors import top_of_file
 from rotor.formats.library import folders
 from rotor.formats.molecule_file import MoleculeFile, read_molecule_file
+from rotor.formats.read_write import top_of_file
 from rotor.formats.spcat.cat import read_cat
 from rotor.formats.spcat.fields import BLANK
 from rotor.quantum.levels import solve_levels
-from rotor.top import Top
+from rotor.tops.top import Top
 
 PAGE = Path(__file__).with_name("library.md")
 WIDTH = {"linear": 1, "prolate": 2, "asymmetric": 3}  # how many quantum numbers a level has

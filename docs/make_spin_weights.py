@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from rotor.molecules.molecule import Molecule
-from rotor.molecules.spin_statistics import STATES, CharacterRow, character_rows, inverting_symmetry, spin_weights
-from rotor.molecules.symmetry import Symmetry, symmetry_of
+from rotor.molecules.symmetry.point_group import Symmetry, symmetry_of
+from rotor.tops.spin_statistics import STATES, CharacterRow, character_rows, inverting_symmetry, spin_weights
 
 TARGET = Path(__file__).with_name("spin_weights.md")
 TURNS = np.arange(3) * 2 * np.pi / 3

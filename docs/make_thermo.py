@@ -23,7 +23,7 @@ from rotor.thermo import (
     rotational_temperatures_k,
     thermodynamic_functions,
 )
-from rotor.top import Top
+from rotor.tops.top import Top
 
 PAGE = Path(__file__).with_name("thermo.md")
 PICTURE = Path(__file__).parent / "pictures" / "heat_capacity.png"

@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import rotor
-from rotor.isotopologues import isotopologue, isotopologues
+from rotor.tops.isotopologues import isotopologue, isotopologues
 
 pictures = Path(tempfile.mkdtemp())
 

@@ -14,10 +14,10 @@ import numpy as np
 
 import rotor
 from rotor.classical.euler import invariants
-from rotor.classical.polhodes import level
-from rotor.classical.stability import fixed_axes, growth_rate, separatrix_ratio
-from rotor.classical.thermal import mean_thermal_momentum, off_intermediate_axis
-from rotor.inertia import rectangle
+from rotor.classical.free.polhodes import level
+from rotor.classical.free.stability import fixed_axes, growth_rate, separatrix_ratio
+from rotor.classical.gas.thermal_momentum import mean_thermal_momentum, off_intermediate_axis
+from rotor.geometry.inertia import rectangle
 from rotor.plots.polhodes import polhode_figure
 from rotor.units import CLASSICAL_TIME_PS, EV_PER_K, HBAR_CLASSICAL
 

@@ -13,10 +13,10 @@ from pathlib import Path
 import numpy as np
 
 import rotor
-from rotor.classical.ensembles import thermal_ensemble
-from rotor.degrees import count_degrees
-from rotor.equipartition import equipartition, kinetic_degrees
+from rotor.classical.gas.ensembles import thermal_ensemble
 from rotor.plots.gas import equipartition_figure
+from rotor.statistics.degrees_of_freedom import count_degrees
+from rotor.statistics.equipartition import equipartition, kinetic_degrees
 from rotor.units import CLASSICAL_TIME_PS, EV_PER_K
 
 folder = Path(sys.argv[1]) if len(sys.argv) > 1 and Path(sys.argv[1]).is_dir() else None

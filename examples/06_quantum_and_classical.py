@@ -14,11 +14,11 @@ from pathlib import Path
 import numpy as np
 
 import rotor
-from rotor.classical.correlations import linear_curves, plateau, short_time
-from rotor.classical.ensembles import free_gas_correlations
+from rotor.classical.gas.correlations import linear_curves, plateau, short_time
+from rotor.classical.gas.ensembles import free_gas_correlations
 from rotor.plots.gas import band_figure
 from rotor.plots.heat_capacity import Panel, plot_heat_capacity
-from rotor.spectra.classical import classical_band, compare_bands, dipole_band_area, lines_area, rigid
+from rotor.spectra.classical_band import classical_band, compare_bands, dipole_band_area, lines_area, rigid
 from rotor.thermo import thermodynamic_functions
 from rotor.units import CLASSICAL_TIME_PS, EV_PER_K, MHZ_PER_CM
 

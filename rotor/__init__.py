@@ -9,18 +9,18 @@ The public names stand below. They are loaded when first used, so that `import r
 """
 
 from importlib import import_module
-from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING, Any
 
+from rotor.version import version
+
 if TYPE_CHECKING:
-    from rotor.classical.free import FreeMotion as FreeMotion
-    from rotor.classical.free import free_motion as free_motion
-    from rotor.constants import Constants as Constants
+    from rotor.classical.free.free_motion import FreeMotion as FreeMotion
+    from rotor.classical.free.free_motion import free_motion as free_motion
     from rotor.formats import read as read
     from rotor.formats import write as write
-    from rotor.formats.stream import stream_lines as stream_lines
+    from rotor.formats.streamed_lines import stream_lines as stream_lines
     from rotor.molecules.molecule import Molecule as Molecule
-    from rotor.molecules.refine import refine as refine
+    from rotor.molecules.optimise import refine as refine
     from rotor.quantum.levels import Levels as Levels
     from rotor.quantum.levels import solve_levels as solve_levels
     from rotor.spectra.lines import Lines as Lines
@@ -31,26 +31,27 @@ if TYPE_CHECKING:
     from rotor.thermo import VibrationalStates as VibrationalStates
     from rotor.thermo import partition_function as partition_function
     from rotor.thermo import thermodynamic_functions as thermodynamic_functions
-    from rotor.top import Top as Top
+    from rotor.tops.constants import Constants as Constants
+    from rotor.tops.top import Top as Top
 
 _HOME = {
-    "Constants": "rotor.constants",
-    "FreeMotion": "rotor.classical.free",
+    "Constants": "rotor.tops.constants",
+    "FreeMotion": "rotor.classical.free.free_motion",
     "Levels": "rotor.quantum.levels",
     "Lines": "rotor.spectra.lines",
     "Molecule": "rotor.molecules.molecule",
     "RamanLines": "rotor.spectra.raman",
     "Spectrum": "rotor.spectra.spectrum",
     "VibrationalStates": "rotor.thermo",
-    "Top": "rotor.top",
-    "free_motion": "rotor.classical.free",
+    "Top": "rotor.tops.top",
+    "free_motion": "rotor.classical.free.free_motion",
     "line_list": "rotor.spectra.lines",
     "partition_function": "rotor.thermo",
     "raman_lines": "rotor.spectra.raman",
     "read": "rotor.formats",
-    "refine": "rotor.molecules.refine",
+    "refine": "rotor.molecules.optimise",
     "solve_levels": "rotor.quantum.levels",
-    "stream_lines": "rotor.formats.stream",
+    "stream_lines": "rotor.formats.streamed_lines",
     "thermodynamic_functions": "rotor.thermo",
     "write": "rotor.formats",
 }
@@ -60,10 +61,7 @@ __all__ = [*sorted(_HOME), "__version__"]
 
 def __getattr__(name: str) -> Any:
     if name == "__version__":
-        try:
-            return version("molrotor")
-        except PackageNotFoundError:  # run from a source tree that was never installed
-            return "0+source"
+        return version()
     if name in _HOME:
         return getattr(import_module(_HOME[name]), name)
     raise AttributeError(f"module 'rotor' has no attribute {name!r}")

@@ -5,7 +5,7 @@ from ase import Atoms
 from ase.build import molecule
 from ase.calculators.calculator import Calculator, all_changes
 
-from rotor import rotations
+from rotor.geometry import rotations
 
 
 class Springs(Calculator):

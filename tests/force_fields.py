@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from rotor.molecules.force_field import ForceField, force_field_from_internal
-from rotor.molecules.internal import bend, stretch
+from rotor.molecules.internal_coordinates import bend, stretch
 from rotor.molecules.molecule import Molecule
 
 

@@ -15,14 +15,14 @@ from typing import Any
 
 import numpy as np
 
-from rotor.constants import Constants
 from rotor.formats.spcat.catalogue import Catalogue
 from rotor.formats.spcat.egy import LevelList
 from rotor.formats.spcat.model import common_weight
 from rotor.formats.spcat.par import read_par
 from rotor.formats.spcat.predict import Prediction, predict_file
 from rotor.spectra.lines import Lines, line_list
-from rotor.top import Top
+from rotor.tops.constants import Constants
+from rotor.tops.top import Top
 from rotor.units import MHZ_PER_CM
 
 SAMPLES = Path(__file__).parent / "oracles"

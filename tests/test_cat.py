@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rotor.formats.atomic import atomic_path, open_atomic
+from rotor.formats.atomic_write import atomic_path, open_atomic
 from rotor.formats.spcat import _kernels, cat, rows
 from rotor.formats.spcat.cat import COMPILED_FROM, format_lines, read_cat, write_cat
 from rotor.formats.spcat.catalogue import DTYPES, Catalogue, Layout

@@ -9,8 +9,8 @@ import pytest
 
 import rotor
 from rotor import units
-from rotor.classical.correlations import linear_curves
-from rotor.spectra.classical import (
+from rotor.classical.gas.correlations import linear_curves
+from rotor.spectra.classical_band import (
     band_from_correlation,
     band_times,
     classical_band,
@@ -21,7 +21,7 @@ from rotor.spectra.classical import (
 )
 from rotor.spectra.lines import INTENSITY_NM2_MHZ
 from rotor.spectra.spectrum import Spectrum
-from rotor.top import Top
+from rotor.tops.top import Top
 
 CM = units.MHZ_PER_CM
 OCS = rigid(rotor.read("OCS"))

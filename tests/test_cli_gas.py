@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import rotor
-from rotor.classical.correlations import linear_curves, short_time
-from rotor.equipartition import Equipartition
+from rotor.classical.gas.correlations import linear_curves, short_time
+from rotor.statistics.equipartition import Equipartition
 from rotor.units import CLASSICAL_TIME_PS, CM_PER_EV, EV_PER_K
 
 _KEYS = """
@@ -130,8 +130,8 @@ def test_the_picture(call, folder):
 
 
 def test_tables_of_the_test_itself(folder):
-    from rotor.classical.ensembles import thermal_ensemble
-    from rotor.equipartition import equipartition
+    from rotor.classical.gas.ensembles import thermal_ensemble
+    from rotor.statistics.equipartition import equipartition
 
     gas = thermal_ensemble([0.6, 1.2, 1.8], 1.0, 100, rng=np.random.default_rng(1))
     test = equipartition(gas.kinetic, 1.0)

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from slow_matrix import cubic_matrix, threefold_turn
 
-from rotor.constants import Constants
-from rotor.quantum.clusters import DIMENSION, tensor_eigenvalues
 from rotor.quantum.levels import solve_levels
+from rotor.quantum.spherical_top import DIMENSION, tensor_eigenvalues
 from rotor.thermo import partition_function
-from rotor.top import Top
-from rotor.weights import CUBIC_IRREPS, SpinWeights
+from rotor.tops.constants import Constants
+from rotor.tops.spin_weights import CUBIC_IRREPS, SpinWeights
+from rotor.tops.top import Top
 
 METHANE = Constants(kind="spherical", B=157127.0, D=3.3236, Dt=0.13294)
 CH4_WEIGHTS = SpinWeights.from_mapping({"A": 5, "E": 2, "F": 3})
@@ -122,7 +122,7 @@ def test_table_says_the_irrep():
 
 
 def test_noncubic_terms_are_refused():
-    from rotor.quantum.clusters import scalar_and_tensor
+    from rotor.quantum.spherical_top import scalar_and_tensor
 
     with pytest.raises(ValueError, match="tensor of D_t alone"):
         scalar_and_tensor({(1, 0, 0): 5.0, (0, 1, 0): 0.1})

@@ -5,14 +5,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rotor.constants import Constants, vocabulary
 from rotor.formats.spcat import codes, model
 from rotor.formats.spcat.egy import read_egy
 from rotor.formats.spcat.int_file import Dipole, IntensityFile, Request, read_int
 from rotor.formats.spcat.par import Options, Parameter, ParameterFile, format_par, read_par
-from rotor.quantum.watson import centrifugal_operators, rigid_operators
-from rotor.top import Top
-from rotor.weights import SpinWeights
+from rotor.quantum.effects.watson import centrifugal_operators, rigid_operators
+from rotor.tops.constants import Constants, vocabulary
+from rotor.tops.spin_weights import SpinWeights
+from rotor.tops.top import Top
 
 SAMPLES = Path(__file__).parent / "oracles" / "spcat"
 MHZ_PER_CM = 29979.2458

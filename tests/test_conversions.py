@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from slow_matrix import body_operators, term_matrix
 
-from rotor.constants import REPRESENTATIONS, Constants
-from rotor.quantum import conversions
-from rotor.quantum.conversions import to_reduction, to_representation
+from rotor.quantum import reductions as conversions
 from rotor.quantum.levels import solve_levels
+from rotor.quantum.reductions import to_reduction, to_representation
 from rotor.quantum.uncertainty import Covariance, level_errors
-from rotor.top import Top
+from rotor.tops.constants import REPRESENTATIONS, Constants
+from rotor.tops.top import Top
 
 QUARTIC = {
     "A": {"DeltaJ": 0.1, "DeltaJK": -0.3, "DeltaK": 2.0, "deltaJ": 0.02, "deltaK": 0.5},

@@ -15,10 +15,10 @@ from plain_watson import levels
 from rotor.formats.library import folders, library_molecule
 from rotor.formats.molecule_file import MoleculeFile, read_molecule_file
 from rotor.formats.spcat.cat import read_cat
-from rotor.molecules.spin_statistics import weights_of
-from rotor.molecules.symmetry import symmetry_of
+from rotor.molecules.symmetry.point_group import symmetry_of
 from rotor.quantum.levels import solve_levels
-from rotor.top import SYMMETRIC_WITHIN, Top
+from rotor.tops.spin_statistics import weights_of
+from rotor.tops.top import SYMMETRIC_WITHIN, Top
 from rotor.units import MHZ_PER_CM, ROTATIONAL_MHZ_U_ANGSTROM2
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import rotor
-from rotor.degrees import atomic_degrees, count_degrees, rotating_axes, vibrational_degrees
-from rotor.inertia import point_masses, principal_frame
+from rotor.geometry.inertia import point_masses, principal_frame
+from rotor.statistics.degrees_of_freedom import atomic_degrees, count_degrees, rotating_axes, vibrational_degrees
 
 WATER, CARBON_DIOXIDE, ATOM = (0.61457, 1.15512, 1.76968), (0.0, 43.2, 43.2), (0.0, 0.0, 0.0)
 

@@ -7,11 +7,11 @@ import time
 import numpy as np
 import pytest
 
-from rotor.constants import Constants
 from rotor.quantum.derivatives import level_derivatives, term_expectations
+from rotor.quantum.effects.watson import operators_by_name
 from rotor.quantum.levels import solve_levels
-from rotor.quantum.watson import operators_by_name
-from rotor.top import Top
+from rotor.tops.constants import Constants
+from rotor.tops.top import Top
 
 A_SET = Constants(
     A=9000.0, B=5000.0, C=3000.0, reduction="A",

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from rotor.molecules.dipoles import GAS_SCALE, estimate_dipole
+from rotor.molecules.mmff_dipole import GAS_SCALE, estimate_dipole
 from rotor.molecules.molecule import Molecule
-from rotor.molecules.readers import g2_molecule
-from rotor.molecules.smiles import from_smiles
+from rotor.molecules.readers.read import g2_molecule
+from rotor.molecules.readers.smiles import from_smiles
 
 # Measured dipoles in D of molecules in the gas: CRC Handbook of Chemistry and Physics, section 9, Dipole Moments
 MEASURED_DEBYE = {

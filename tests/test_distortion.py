@@ -8,12 +8,12 @@ import pytest
 from scipy.optimize import minimize
 
 import rotor
-from rotor.constants import Constants
-from rotor.distortion import MHZ_PER_EV, distortion_constants, quartic_tensor_mhz, semirigid_top, tau_mhz
-from rotor.inertia import point_masses
+from rotor.geometry.inertia import point_masses
 from rotor.molecules.force_field import ForceField, force_field_from_internal
-from rotor.molecules.internal import linear_bend, stretch
+from rotor.molecules.internal_coordinates import linear_bend, stretch
 from rotor.molecules.molecule import Molecule
+from rotor.tops.constants import Constants
+from rotor.tops.distortion import MHZ_PER_EV, distortion_constants, quartic_tensor_mhz, semirigid_top, tau_mhz
 from rotor.units import ROTATIONAL_MHZ_U_ANGSTROM2
 
 QUARTICS = ("DeltaJ", "DeltaJK", "DeltaK", "deltaJ", "deltaK")
@@ -182,15 +182,15 @@ def test_near_symmetric_tops_refuse_the_a_reduction():
     field = force_fields.bent_field(("S", "O", "O"), 1.4308, 119.32, 10, 0, 0, 0.8, "invented")
     with pytest.raises(ValueError, match="'A' and 'S'"):
         distortion_constants(field, reduction="B")
-    from rotor.distortion import reduced
+    from rotor.tops.distortion import reduced
 
     with pytest.raises(ValueError, match="reduction='S'"):
         reduced(quartic_tensor_mhz(field), np.array([9.0, 4.0, 4.0]), (1, 2, 0), "A")
 
 
 def test_axes_of_representations_are_those_of_the_hamiltonian():
-    from rotor.distortion import _AXES
     from rotor.quantum.basis import REPRESENTATIONS
+    from rotor.tops.distortion import _AXES
 
     assert _AXES == REPRESENTATIONS
 

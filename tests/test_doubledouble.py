@@ -4,8 +4,8 @@ import mpmath as mp
 import numpy as np
 import pytest
 
-from rotor.classical.doubledouble import PI, DoubleDouble, choose, exact_sum, products
-from rotor.classical.elliptic import carlson_rf, complete
+from rotor.classical.free.double_double import PI, DoubleDouble, choose, exact_sum, products
+from rotor.classical.free.elliptic import carlson_rf, complete
 
 UNIT = 2.0**-106  # one half unit in the last place of a number held as two doubles
 

@@ -5,19 +5,19 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.special import ellipj, ellipk
 
-from rotor.classical.changing_inertia import ChangingInertia
-from rotor.classical.dipole import InducedDipole, PermanentDipole
-from rotor.classical.drag import LinearDrag, QuadraticDrag
-from rotor.classical.drive import PeriodicDrive
-from rotor.classical.exact_drift import ExactDrift
-from rotor.classical.gyrostat import SpinningRotor
-from rotor.classical.integrators import integrate
-from rotor.classical.lie_runge_kutta import LieRungeKutta
-from rotor.classical.pivot import GravityAboutPivot
-from rotor.classical.splitting import RotationSplitting, SymmetricTopSplitting
+from rotor.classical.effects.changing_inertia import ChangingInertia
+from rotor.classical.effects.dipole_in_field import InducedDipole, PermanentDipole
+from rotor.classical.effects.drag import LinearDrag, QuadraticDrag
+from rotor.classical.effects.drive import PeriodicDrive
+from rotor.classical.effects.gravity import GravityAboutPivot
+from rotor.classical.effects.gyrostat import SpinningRotor
+from rotor.classical.effects.torques import ConstantTorque, TimedTorque
+from rotor.classical.integrators.exact_drift import ExactDrift
+from rotor.classical.integrators.lie_runge_kutta import LieRungeKutta
+from rotor.classical.integrators.method import integrate
+from rotor.classical.integrators.splitting import RotationSplitting, SymmetricTopSplitting
 from rotor.classical.system import system_of
-from rotor.classical.torques import ConstantTorque, TimedTorque
-from rotor.rotations import conjugate, distance, exp, multiply, rotate, to_matrix, uniform
+from rotor.geometry.rotations import conjugate, distance, exp, multiply, rotate, to_matrix, uniform
 
 MOMENTS, MOMENTUM = np.array([1.0, 1.4, 2.0]), np.array([0.6, -0.3, 0.8])
 TIGHT = LieRungeKutta(1e-12)

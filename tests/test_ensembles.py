@@ -10,17 +10,17 @@ import pytest
 from scipy import integrate, stats
 from scipy.special import hyp1f1
 
-from rotor.classical.correlations import linear_curves, plateau, short_time, spherical_curves, symmetric_curves
-from rotor.classical.ensembles import (
+from rotor.classical.euler import momentum_rate
+from rotor.classical.free.free_motion import free_motion
+from rotor.classical.gas.correlations import linear_curves, plateau, short_time, spherical_curves, symmetric_curves
+from rotor.classical.gas.ensembles import (
     PIECE,
     free_gas_correlations,
     stepped_gas_correlations,
     thermal_ensemble,
     thermal_momenta,
 )
-from rotor.classical.euler import momentum_rate
-from rotor.classical.free import free_motion
-from rotor.rotations import rotate, to_matrix
+from rotor.geometry.rotations import rotate, to_matrix
 
 KT = 1.3
 TOPS = {

@@ -9,9 +9,9 @@ import pytest
 from scipy import stats
 
 import rotor
-from rotor.classical.ensembles import thermal_ensemble
-from rotor.degrees import count_degrees
-from rotor.equipartition import equipartition, kinetic_degrees, statistical_inefficiency
+from rotor.classical.gas.ensembles import thermal_ensemble
+from rotor.statistics.degrees_of_freedom import count_degrees
+from rotor.statistics.equipartition import equipartition, kinetic_degrees, statistical_inefficiency
 from rotor.units import EV_PER_K
 
 GASES = ("water", "HCl", "CH4", "NH3", "CO2", "C6H6")

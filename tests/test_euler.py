@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from rotor.classical import euler
-from rotor.rotations import IDENTITY, exp, rotate, uniform
+from rotor.geometry.rotations import IDENTITY, exp, rotate, uniform
 
 moments3 = arrays(np.float64, 3, elements=st.floats(0.1, 10.0))
 vectors = arrays(np.float64, 3, elements=st.floats(-5.0, 5.0, allow_subnormal=False))

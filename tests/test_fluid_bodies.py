@@ -7,10 +7,10 @@ from ase.build import molecule
 from ase.constraints import FixAtoms
 from fluid_boxes import MIXED, box_of
 
-from rotor import rotations
-from rotor.fluid.bodies import Pose, bodies_of
-from rotor.fluid.models import model_of
-from rotor.fluid.start import check_apart, lattice_box, model_labels
+from rotor.fluid.forces.models import model_of
+from rotor.fluid.initial_box import check_apart, lattice_box, model_labels
+from rotor.fluid.motion.bodies import Pose, bodies_of
+from rotor.geometry import rotations
 from rotor.molecules.nuclei import masses
 
 

@@ -13,12 +13,12 @@ from ase.md.velocitydistribution import Stationary
 from ase.units import fs
 from fluid_boxes import MIXED, Free, SoftSites, Springs, box_of
 
-from rotor.classical.free import free_motion
-from rotor.fluid.bodies import bodies_of
-from rotor.fluid.dynamics import RigidDynamics
-from rotor.fluid.start import at_rest, heat, relax
-from rotor.fluid.temperature import THERMOMETERS, kinetic_energy
-from rotor.rotations import distance
+from rotor.classical.free.free_motion import free_motion
+from rotor.fluid.initial_box import at_rest, heat, relax
+from rotor.fluid.motion.bodies import bodies_of
+from rotor.fluid.motion.dynamics import RigidDynamics
+from rotor.fluid.motion.thermometers import THERMOMETERS, kinetic_energy
+from rotor.geometry.rotations import distance
 
 
 def warm(box, calculator, temperature_k=300.0, seed=2):

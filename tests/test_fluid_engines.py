@@ -13,20 +13,20 @@ import pytest
 from ase import Atoms
 
 from rotor import units
-from rotor.fluid import models
 from rotor.fluid.engines import lammps, openmm
-from rotor.fluid.engines.carriers import carriers_of
+from rotor.fluid.engines.engine_input import Frame, Scene, point_velocities, rigid_motion, scene_of
+from rotor.fluid.engines.equimomental import carriers_of
 from rotor.fluid.engines.lammps_input import data_file, ensemble_commands, input_file, table_file
-from rotor.fluid.engines.pairs import Form, pair_energy
-from rotor.fluid.engines.reading import engine_frames, record_of, run_engine
-from rotor.fluid.engines.scene import Frame, Scene, point_velocities, rigid_motion, scene_of
-from rotor.fluid.models import RigidModel, Site, model_of
-from rotor.fluid.potential import RigidPotential
+from rotor.fluid.engines.pair_tables import Form, pair_energy
+from rotor.fluid.engines.results import engine_frames, record_of, run_engine
+from rotor.fluid.forces import models
+from rotor.fluid.forces.models import RigidModel, Site, model_of
+from rotor.fluid.forces.potential import RigidPotential
+from rotor.fluid.initial_box import lattice_box
 from rotor.fluid.run import run_fluid
 from rotor.fluid.settings import Settings
-from rotor.fluid.start import lattice_box
 from rotor.fluid.summary import mean_of
-from rotor.inertia import point_masses
+from rotor.geometry.inertia import point_masses
 
 HAS = {
     "openmm": pytest.mark.skipif(importlib.util.find_spec("openmm") is None, reason="OpenMM is not installed"),

@@ -14,12 +14,12 @@ import numpy as np
 import pytest
 from ase.io import read
 
-from rotor.fluid.keeping import AseTrajectory, TextFile, read_checkpoint
-from rotor.fluid.models import model_of
+from rotor.fluid.checkpoint import AseTrajectory, TextFile, read_checkpoint
+from rotor.fluid.forces.models import model_of
+from rotor.fluid.initial_box import lattice_box
 from rotor.fluid.record import FluidRecord
 from rotor.fluid.run import Outputs, RunStopped, calculator_of, dynamics_of, pressure_bar, run_fluid
 from rotor.fluid.settings import Settings
-from rotor.fluid.start import lattice_box
 
 SETTINGS = Settings(steps=60, every=4, step_fs=1.0, cutoff_angstrom=4.5, friction_per_ps=5.0)
 FILES = Outputs(csv="run.csv", trajectories=("run.traj", "run.xyz"), checkpoint="run.npz", checkpoint_every=14)
@@ -173,7 +173,7 @@ def test_a_checkpoint_that_cannot_be_written_leaves_the_old_one(folder, monkeypa
     def full(*paths):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("rotor.fluid.keeping.os.replace", full)
+    monkeypatch.setattr("rotor.fluid.checkpoint.os.replace", full)
     monkeypatch.setattr(AseTrajectory, "__init__", lambda self, path, length=None: setattr(self, "path", Path(path)))
     with pytest.raises(RunStopped, match=r"run.npz: No space left on device at step 28.*run.npz is of step 14"):
         run_fluid(box(), replace(SETTINGS, ensemble="langevin"), FILES, resume=True)

@@ -9,13 +9,14 @@ from ase.build import molecule
 from ase.units import fs
 from fluid_boxes import MIXED, Free, SoftSites, Springs, box_of
 
-from rotor import rotations, units
-from rotor.degrees import Degrees
-from rotor.equipartition import equipartition, kinetic_degrees, statistical_inefficiency
-from rotor.fluid.bodies import bodies_of
-from rotor.fluid.dynamics import RigidDynamics
-from rotor.fluid.start import heat, thermal_momenta
-from rotor.fluid.thermostats import Langevin, NoseHoover
+from rotor import units
+from rotor.fluid.initial_box import heat, thermal_momenta
+from rotor.fluid.motion.bodies import bodies_of
+from rotor.fluid.motion.dynamics import RigidDynamics
+from rotor.fluid.motion.thermostats import Langevin, NoseHoover
+from rotor.geometry import rotations
+from rotor.statistics.degrees_of_freedom import Degrees
+from rotor.statistics.equipartition import equipartition, kinetic_degrees, statistical_inefficiency
 
 KT = 300.0 * units.EV_PER_K
 

@@ -7,15 +7,15 @@ import pytest
 from ase.units import fs
 
 from rotor import units
-from rotor.equipartition import KineticDegrees, equipartition, kinetic_degrees
-from rotor.fluid.bodies import bodies_of
-from rotor.fluid.dynamics import RigidDynamics
-from rotor.fluid.models import model_of
+from rotor.fluid.forces.models import model_of
+from rotor.fluid.initial_box import heat, lattice_box, relax
+from rotor.fluid.motion.bodies import bodies_of
+from rotor.fluid.motion.dynamics import RigidDynamics
+from rotor.fluid.motion.thermometers import kinetic_energy, step_correction
+from rotor.fluid.motion.thermostats import Langevin
 from rotor.fluid.run import calculator_of, dynamics_of, run_fluid
 from rotor.fluid.settings import Settings
-from rotor.fluid.start import heat, lattice_box, relax
-from rotor.fluid.temperature import kinetic_energy, step_correction
-from rotor.fluid.thermostats import Langevin
+from rotor.statistics.equipartition import KineticDegrees, equipartition, kinetic_degrees
 
 
 def fluid(name, density_g_cm3, temperature_k, molecules=64, cutoff_angstrom=6.0):

@@ -11,7 +11,6 @@ import pytest
 from ase.calculators.lj import LennardJones
 
 import rotor
-from rotor.distortion import distortion_constants
 from rotor.molecules.force_field import (
     EV_PER_ANGSTROM2,
     ForceField,
@@ -20,9 +19,10 @@ from rotor.molecules.force_field import (
     read_hessian,
     rigid_motions,
 )
-from rotor.molecules.internal import bend, out_of_plane, stretch, torsion, wilson_b
+from rotor.molecules.internal_coordinates import bend, out_of_plane, stretch, torsion, wilson_b
 from rotor.molecules.molecule import Molecule
-from rotor.molecules.refine import calculator_by_name, refine
+from rotor.molecules.optimise import calculator_by_name, refine
+from rotor.tops.distortion import distortion_constants
 
 TRIANGLE = Molecule(("Ar",) * 3, 1.1 * np.array([[0, 0, 0], [1, 0, 0], [0.55, 0.8, 0.1]]))
 
@@ -39,7 +39,7 @@ def test_water_has_the_published_harmonic_wavenumbers():
 
 def test_heavy_water_follows_the_product_rule_of_teller_and_redlich():
     """∏ω'/∏ω = √(∏ m/m' · (M'/M)³ · I_a'I_b'I_c' / I_a I_b I_c), exact for a harmonic field (Wilson et al., § 8-5)."""
-    from rotor.top import Top
+    from rotor.tops.top import Top
 
     light, heavy = force_fields.water(), force_fields.water().with_isotopes("H=2H")
     ratio = np.prod(heavy.vibrations().wavenumbers_cm / light.vibrations().wavenumbers_cm)
@@ -108,7 +108,7 @@ def test_calculators_that_are_not_for_molecules(name, words):
 def test_calculators_by_name(monkeypatch):
     import ase.calculators.calculator as library
 
-    import rotor.molecules.refine as module
+    import rotor.molecules.optimise as module
 
     monkeypatch.setattr(library, "get_calculator_class", lambda name: lennard_jones)
     assert isinstance(calculator_by_name(" Gaussian "), LennardJones)
@@ -174,7 +174,7 @@ def test_hessians_that_cannot_be():
 
 
 def test_calculator_on_the_command_line(tmp_path, monkeypatch, capsys):
-    import rotor.molecules.refine as module
+    import rotor.molecules.optimise as module
     from rotor.cli import run
 
     monkeypatch.setattr(module, "calculator_by_name", lambda name: lennard_jones())

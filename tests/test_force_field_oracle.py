@@ -14,15 +14,15 @@ import numpy as np
 import pytest
 
 import rotor
-from rotor.distortion import MHZ_PER_EV, distortion_constants, quartic_tensor_mhz, tau_mhz
-from rotor.inertial_defect import (
+from rotor.molecules.force_field import ForceField, Vibrations, read_hessian
+from rotor.molecules.molecule import Molecule
+from rotor.tops.distortion import MHZ_PER_EV, distortion_constants, quartic_tensor_mhz, tau_mhz
+from rotor.tops.inertial_defect import (
     coriolis_zeta,
     harmonic_correction_u_angstrom2,
     inertia_by_modes,
     inertial_defect_u_angstrom2,
 )
-from rotor.molecules.force_field import ForceField, Vibrations, read_hessian
-from rotor.molecules.molecule import Molecule
 from rotor.units import BOHR_RADIUS_ANGSTROM, MHZ_PER_CM, ROTATIONAL_MHZ_U_ANGSTROM2
 
 FOLDER = Path(__file__).parent / "oracles" / "spectro"
@@ -196,7 +196,7 @@ def test_no_inertial_defect_where_it_is_no_harmonic_quantity():
     with pytest.raises(ValueError, match="CH4O is not planar"):
         inertial_defect_u_angstrom2(field)
     from rotor.molecules.force_field import force_field_from_internal
-    from rotor.molecules.internal import stretch
+    from rotor.molecules.internal_coordinates import stretch
 
     co = force_field_from_internal(Molecule(("C", "O"), [[0, 0, 0], [0, 0, 1.13]]), [stretch(0, 1)], [[19.0]])
     with pytest.raises(ValueError, match="CO is linear"):

@@ -12,9 +12,9 @@ from scipy.integrate import solve_ivp
 from scipy.special import ellipj, ellipkinc, ellipkm1, elliprj
 
 from rotor.classical import euler
-from rotor.classical.free import free_motion
-from rotor.classical.stability import growth_rate
-from rotor.rotations import IDENTITY, continuous, distance, exp, multiply, rotate, uniform
+from rotor.classical.free.free_motion import free_motion
+from rotor.classical.free.stability import growth_rate
+from rotor.geometry.rotations import IDENTITY, continuous, distance, exp, multiply, rotate, uniform
 
 REGRESSION = [  # moments, momentum, time, momentum there, attitude there: 50-digit values rounded to 16
     (

@@ -11,7 +11,7 @@ import mpmath as mp
 import numpy as np
 import pytest
 
-from rotor.classical.free import free_motion
+from rotor.classical.free.free_motion import free_motion
 
 DIGITS = 80  # leaves 50 after 1e12 rad of phase and a modulus within 1e-17 of one
 TARGET_RAD = 1e-14

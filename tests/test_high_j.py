@@ -8,9 +8,9 @@ import mpmath
 import numpy as np
 import pytest
 
-from rotor.constants import Constants
 from rotor.quantum.levels import Levels, SolvedBlock, solve_levels
-from rotor.top import Top
+from rotor.tops.constants import Constants
+from rotor.tops.top import Top
 
 A, B, C, J = 1000.0, 500.0, 499.9, 1000
 DIGITS = 50

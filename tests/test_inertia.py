@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from rotor.inertia import Body, cone, hemisphere, point_masses, principal_frame, rectangle, rod, triangle
-from rotor.top import Top, kind_from_moments
+from rotor.geometry.inertia import Body, cone, hemisphere, point_masses, principal_frame, rectangle, rod, triangle
+from rotor.tops.kind import kind_from_moments
+from rotor.tops.top import Top
 
 
 def test_plate_with_a_given_tensor():

@@ -8,17 +8,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rotor.classical import compositions
-from rotor.classical.dipole import PermanentDipole
+from rotor.classical.effects.dipole_in_field import PermanentDipole
+from rotor.classical.effects.gyrostat import SpinningRotor
 from rotor.classical.euler import energy
-from rotor.classical.exact_drift import ExactDrift
-from rotor.classical.free import free_motion
-from rotor.classical.gyrostat import SpinningRotor
-from rotor.classical.integrators import integrate
-from rotor.classical.lie_runge_kutta import LieRungeKutta
-from rotor.classical.moser_veselov import MoserVeselov, exact_modified_moments, modified_moments
-from rotor.classical.splitting import RotationSplitting, SymmetricTopSplitting
-from rotor.rotations import distance, rotate
+from rotor.classical.free.free_motion import free_motion
+from rotor.classical.integrators import compositions
+from rotor.classical.integrators.exact_drift import ExactDrift
+from rotor.classical.integrators.lie_runge_kutta import LieRungeKutta
+from rotor.classical.integrators.method import integrate
+from rotor.classical.integrators.moser_veselov import MoserVeselov, exact_modified_moments, modified_moments
+from rotor.classical.integrators.splitting import RotationSplitting, SymmetricTopSplitting
+from rotor.geometry.rotations import distance, rotate
 
 MOMENTS, MOMENTUM, PERIOD = np.array([1.0, 1.875, 2.875]), np.array([0.5, 0.75, 1.0]), 20.6947551192268
 EFFECTS = [PermanentDipole([0.3, 0.2, 0.5], [0.0, 0.0, 0.7]), SpinningRotor([0.1, 0.2, 0.3])]
@@ -206,7 +206,7 @@ def test_energy_column_is_that_of_euler():
 
 
 def test_refusals_say_what_would_do():
-    from rotor.classical.drag import LinearDrag
+    from rotor.classical.effects.drag import LinearDrag
 
     with pytest.raises(ValueError, match="LieRungeKutta"):
         integrate(RotationSplitting(0.1), MOMENTS, MOMENTUM, [0.0, 1.0], effects=[LinearDrag([1, 1, 1])])
@@ -225,7 +225,7 @@ def test_refusals_say_what_would_do():
 
 
 def test_sine_and_versed_sine_of_a_turn_belong_together_beyond_double_precision():
-    from rotor.classical._step_kernels import _squared_length, _versed
+    from rotor.classical.integrators._step_kernels import _squared_length, _versed
 
     rng = np.random.default_rng(0)
     for half in rng.uniform(0.01, 0.2, 200):
@@ -238,7 +238,7 @@ def test_sine_and_versed_sine_of_a_turn_belong_together_beyond_double_precision(
 
 
 def test_the_root_of_moser_and_veselov_is_known_beyond_double_precision():
-    from rotor.classical._step_kernels import _near_root, _refined
+    from rotor.classical.integrators._step_kernels import _near_root, _refined
 
     rng = np.random.default_rng(1)
     for _ in range(100):

@@ -15,12 +15,12 @@ from hypothesis import strategies as st
 
 import rotor
 from rotor.cli import run
-from rotor.distortion import distortion_constants, semirigid_top
-from rotor.isotopologues import isotopologue, isotopologues, single_substitutions
 from rotor.molecules.molecule import Molecule
 from rotor.molecules.nuclei import data_folder, isotope, natural_isotopes
-from rotor.molecules.readers import g2_molecule
-from rotor.top import Top
+from rotor.molecules.readers.read import g2_molecule
+from rotor.tops.distortion import distortion_constants, semirigid_top
+from rotor.tops.isotopologues import isotopologue, isotopologues, single_substitutions
+from rotor.tops.top import Top
 
 # Which there are
 

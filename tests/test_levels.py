@@ -7,11 +7,11 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
-from rotor.constants import Constants
 from rotor.quantum.basis import wang_blocks
 from rotor.quantum.levels import disordered_blocks, solve_levels
-from rotor.top import Top
-from rotor.weights import SpinWeights
+from rotor.tops.constants import Constants
+from rotor.tops.spin_weights import SpinWeights
+from rotor.tops.top import Top
 
 WATER_QUARTIC = Constants(
     A=835840.288, B=435351.717, C=278138.7, DeltaJ=37.59422, DeltaJK=-172.91276, DeltaK=973.29052, deltaJ=15.210402,

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from rotor import units
-from rotor.constants import Constants
 from rotor.quantum.basis import REPRESENTATIONS
 from rotor.quantum.levels import solve_levels
 from rotor.spectra import transitions
 from rotor.spectra.lines import EINSTEIN_PER_MHZ3, INTENSITY_NM2_MHZ, line_list
 from rotor.spectra.strengths import allowed_pairs, amplitudes, component
-from rotor.top import Top
+from rotor.tops.constants import Constants
+from rotor.tops.top import Top
 
 ABC = "A=8572 B=3640 C=2790 MHz"
 

@@ -3,9 +3,11 @@
 import numpy as np
 import pytest
 
-from rotor.classical.drag import LinearDrag, QuadraticDrag
-from rotor.classical.drive import PeriodicDrive
-from rotor.classical.free import free_motion
+from rotor.classical.effects.drag import LinearDrag, QuadraticDrag
+from rotor.classical.effects.drive import PeriodicDrive
+from rotor.classical.effects.gravity import GravityAboutPivot
+from rotor.classical.free.free_motion import free_motion
+from rotor.classical.free.stability import growth_rate
 from rotor.classical.lyapunov import (
     Flow,
     body_flow,
@@ -15,9 +17,7 @@ from rotor.classical.lyapunov import (
     poincare_section,
     quadratic_form,
 )
-from rotor.classical.pivot import GravityAboutPivot
-from rotor.classical.stability import growth_rate
-from rotor.rotations import exp
+from rotor.geometry.rotations import exp
 
 
 def leipnik_newton(t, y):

@@ -13,7 +13,7 @@ from rotor.formats.hitran import cm_per_molecule, read_hitran
 from rotor.spectra.lines import line_list
 from rotor.spectra.opacity import absorbed_fraction, column_density_per_cm2, line_optical_depth, optical_depth
 from rotor.spectra.spectrum import Spectrum, resolving_grid
-from rotor.top import Top
+from rotor.tops.top import Top
 
 CO = rotor.read("CO")
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from rotor.molecules.molecule import Molecule
-from rotor.molecules.outputs import read_output
-from rotor.molecules.readers import read_molecule
+from rotor.molecules.readers.quantum_chemistry import read_output
+from rotor.molecules.readers.read import read_molecule
 from rotor.units import BOHR_RADIUS_ANGSTROM, DEBYE_PER_E_ANGSTROM, MHZ_PER_CM, ROTATIONAL_MHZ_U_ANGSTROM2
 
 pytestmark = pytest.mark.skipif(
@@ -287,8 +287,8 @@ def test_reader_hands_outputs_over_and_tells_what_cclib_would_add(tmp_path, monk
     path = written(tmp_path, gaussian())
     assert_tensors(read_molecule(str(path)), np.eye(3))
     assert read_molecule(path).name == "water"
-    monkeypatch.setattr("rotor.molecules.readers.has_cclib", lambda: False)
-    monkeypatch.setattr("rotor.molecules.outputs.has_cclib", lambda: False)
+    monkeypatch.setattr("rotor.molecules.readers.read.has_cclib", lambda: False)
+    monkeypatch.setattr("rotor.molecules.readers.quantum_chemistry.has_cclib", lambda: False)
     with pytest.raises(ValueError, match=r"molrotor\[qc\]"):
         read_output(path)
     molecule = read_molecule(path)  # by ASE, which has the geometry

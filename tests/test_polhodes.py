@@ -10,17 +10,17 @@ from hypothesis import strategies as st
 
 import rotor
 from rotor.classical import euler
-from rotor.classical.free import free_motion
-from rotor.classical.integrators import integrate
+from rotor.classical.free.free_motion import free_motion
+from rotor.classical.free.polhodes import centre_axis, even_levels, level, polhode, separatrix
+from rotor.classical.free.stability import separatrix_ratio
+from rotor.classical.gas.thermal_momentum import mean_thermal_momentum, off_intermediate_axis
+from rotor.classical.integrators.method import integrate
+from rotor.classical.integrators.splitting import RotationSplitting
 from rotor.classical.motion import MotionTable, departure, sampled
-from rotor.classical.polhodes import centre_axis, even_levels, level, polhode, separatrix
-from rotor.classical.splitting import RotationSplitting
-from rotor.classical.stability import separatrix_ratio
-from rotor.classical.thermal import mean_thermal_momentum, off_intermediate_axis
+from rotor.geometry.rotations import IDENTITY
 from rotor.plots.animation import Atoms, animate, box_edges
 from rotor.plots.polhodes import plot_polhodes, polhode_figure
 from rotor.plots.sphere import view_of
-from rotor.rotations import IDENTITY
 
 moments_of_a_body = st.permutations((0, 1, 2)).flatmap(
     lambda order: st.tuples(*(st.floats(0.5, 2.0) for _ in range(3))).map(lambda m: np.array(m)[list(order)])

@@ -13,12 +13,12 @@ from hypothesis import strategies as st
 from slow_matrix import AXES, watson_matrix
 
 import rotor
-from rotor.constants import Constants
 from rotor.quantum.basis import REPRESENTATIONS
 from rotor.quantum.levels import solve_levels
 from rotor.spectra.raman import anisotropy_angstrom3, band_cross_section, jmax_for_raman, raman_lines
 from rotor.spectra.raman_strengths import amplitudes, anisotropy_squared, coupling, parts_of, raman_transitions
-from rotor.top import Top
+from rotor.tops.constants import Constants
+from rotor.tops.top import Top
 
 ROD = ((2.2, 0, 0), (0, 1.5, 0), (0, 0, 1.5))
 DISC = ((2.0, 0, 0), (0, 2.0, 0), (0, 0, 1.4))

@@ -11,7 +11,7 @@ import pytest
 from ase.calculators.singlepoint import SinglePointCalculator
 
 from rotor.molecules.molecule import Molecule
-from rotor.molecules.readers import from_ase, g2_molecule, g2_names, read_molecule
+from rotor.molecules.readers.read import from_ase, g2_molecule, g2_names, read_molecule
 from rotor.units import DEBYE_PER_E_ANGSTROM
 
 XYZ = "2\n\nC 0 0 0\nO 0 0 1.128\n"

@@ -11,8 +11,8 @@ import pytest
 
 import rotor
 from rotor.cli import run
-from rotor.molecules.outputs import read_output
-from rotor.molecules.readers import read_molecule
+from rotor.molecules.readers.quantum_chemistry import read_output
+from rotor.molecules.readers.read import read_molecule
 from rotor.units import BOHR_RADIUS_ANGSTROM, DEBYE_PER_E_ANGSTROM
 
 FOLDER = Path(__file__).parent / "oracles" / "outputs"
@@ -89,8 +89,8 @@ def changed(tmp_path: Path, name: str, *pairs: tuple[str, str]) -> Path:
 
 
 def test_neither_needs_cclib(monkeypatch):
-    for module in ("readers", "outputs"):
-        monkeypatch.setattr(f"rotor.molecules.{module}.has_cclib", lambda: False)
+    for module in ("read", "quantum_chemistry"):
+        monkeypatch.setattr(f"rotor.molecules.readers.{module}.has_cclib", lambda: False)
     assert read_molecule(FOLDER / "water_cfour.out").dipole_source.startswith("CFOUR")
     assert read_molecule(FOLDER / "tryptophan_orca6.out").polarizability_source.startswith("ORCA")
     with pytest.raises(ValueError, match=r"molrotor\[qc\]"):

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rotor.constants import Constants
 from rotor.formats.line_tables import provenance
+from rotor.quantum.convergence import RATIO_LIMIT, order_sizes_mhz, series_ratio, warnings_of
 from rotor.quantum.levels import hamiltonian, solve_levels
-from rotor.quantum.reliability import RATIO_LIMIT, order_sizes_mhz, series_ratio, warnings_of
 from rotor.spectra.lines import line_list
-from rotor.top import Top
+from rotor.tops.constants import Constants
+from rotor.tops.top import Top
 
 WATER_QUARTIC = Constants(
     A=835840.288, B=435351.717, C=278138.7, DeltaJ=37.59422, DeltaJK=-172.91276, DeltaK=973.29052, deltaJ=15.210402,

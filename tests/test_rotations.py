@@ -9,7 +9,7 @@ from hypothesis.extra.numpy import arrays
 from scipy import stats
 from scipy.spatial.transform import Rotation
 
-from rotor import rotations as rot
+from rotor.geometry import rotations as rot
 
 EPS = np.finfo(float).eps
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rotor.molecules.smiles import (
+from rotor.molecules.readers.smiles import (
     DOUBTFUL_UNCERTAINTY,
     MMFF_UNCERTAINTY,
     UFF_UNCERTAINTY,

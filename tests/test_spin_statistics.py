@@ -17,16 +17,16 @@ from scipy.linalg import expm
 import rotor
 from rotor.formats.spcat.cat import read_cat
 from rotor.molecules.molecule import Molecule
-from rotor.molecules.spin_statistics import (
+from rotor.molecules.symmetry.point_group import find_symmetry, symmetry_of
+from rotor.tops.spin_statistics import (
     character_rows,
     inverting_symmetry,
     spin_characters,
     spin_weights,
     weights_of,
 )
-from rotor.molecules.symmetry import find_symmetry, symmetry_of
-from rotor.top import Top
-from rotor.weights import IRREPS, SpinWeights, irreps_in_j
+from rotor.tops.spin_weights import IRREPS, SpinWeights, irreps_in_j
+from rotor.tops.top import Top
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 _SPEC = importlib.util.spec_from_file_location("make_spin_weights", DOCS / "make_spin_weights.py")

@@ -6,9 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import brentq
 
-from rotor.classical import stability as stab
-from rotor.classical.free import free_motion
-from rotor.rotations import rotate
+from rotor.classical.free import stability as stab
+from rotor.classical.free.free_motion import free_motion
+from rotor.geometry.rotations import rotate
 
 MEASURED = 1e-6  # to which every closed form has to be met by a motion
 

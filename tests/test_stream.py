@@ -15,10 +15,10 @@ import polars as pl
 import pytest
 
 import rotor
-from rotor.constants import Constants
 from rotor.formats.spcat.cat import read_cat
-from rotor.formats.stream import stream_lines
-from rotor.top import Top
+from rotor.formats.streamed_lines import stream_lines
+from rotor.tops.constants import Constants
+from rotor.tops.top import Top
 
 ROOT = Path(__file__).resolve().parents[1]
 PROPANEDIOL = Top.from_constants("A=8572 B=3640 C=2790 MHz", dipole_abc_debye=(1.2, 1.9, 0.4))

@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.spatial.transform import Rotation
 
-from rotor.rotations import distance, exp, from_matrix, rotate, to_matrix, to_scalar_last, uniform
-from rotor.superpose import flow_gradient, polar, superpose
+from rotor.geometry.rotations import distance, exp, from_matrix, rotate, to_matrix, to_scalar_last, uniform
+from rotor.geometry.superposition import flow_gradient, polar, superpose
 
 EPS = np.finfo(float).eps
 

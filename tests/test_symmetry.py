@@ -16,8 +16,8 @@ from scipy.linalg import expm
 
 from rotor.molecules.molecule import Molecule
 from rotor.molecules.nuclei import masses
-from rotor.molecules.operations import best_turn, closed_group, find_operations, shortest_distance
-from rotor.molecules.symmetry import Symmetry, find_symmetry, symmetry_of
+from rotor.molecules.symmetry.operations import best_turn, closed_group, find_operations, shortest_distance
+from rotor.molecules.symmetry.point_group import Symmetry, find_symmetry, symmetry_of
 
 # Point groups of ASE's g2 collection (geometries: L. A. Curtiss et al., J. Chem. Phys. 106, 1063 (1997)), typed from
 # chemistry. Radicals are distorted there as theory has them: CH3O and CH3S are Cs, H2COH is C1. Acetamide (pyramidal

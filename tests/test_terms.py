@@ -10,13 +10,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from slow_matrix import term_matrix, watson_matrix
 
-from rotor.constants import Constants
 from rotor.formats.molecule_file import MoleculeFile, parse_molecule_file
 from rotor.formats.molecule_writer import molecule_file_text
+from rotor.quantum.effects.watson import centrifugal_operators, operators_by_name, rigid_operators
 from rotor.quantum.levels import solve_levels
-from rotor.quantum.watson import centrifugal_operators, operators_by_name, rigid_operators
-from rotor.terms import powers_of_spelled, published_name, spelled_term
-from rotor.top import Top
+from rotor.tops.constants import Constants
+from rotor.tops.operators import powers_of_spelled, published_name, spelled_term
+from rotor.tops.top import Top
 
 RIGID = {"A": 9000.0, "B": 5000.0, "C": 3000.0}
 BEYOND = {(1, 0, 4): 3e-7, (0, 2, 2): -2e-4, (6, 0, 0): 1e-9, (0, 6, 0): -4e-9, (2, 1, 3): 5e-8, (0, 0, 5): 2e-8}

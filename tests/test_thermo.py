@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from rotor import units
-from rotor.constants import Constants
 from rotor.quantum.levels import solve_levels
 from rotor.thermo import classical_partition_function, partition_function, partition_functions
-from rotor.top import Top
+from rotor.tops.constants import Constants
+from rotor.tops.top import Top
 
 
 def test_linear_molecule_meets_its_series():

@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 
 import rotor
 from rotor import units
-from rotor.constants import Constants
 from rotor.quantum.levels import solve_levels
 from rotor.thermo import (
     GAS_CONSTANT,
@@ -29,8 +28,9 @@ from rotor.thermo import (
     translational_entropy,
     vibrational_functions,
 )
-from rotor.top import Top
-from rotor.weights import SpinWeights
+from rotor.tops.constants import Constants
+from rotor.tops.spin_weights import SpinWeights
+from rotor.tops.top import Top
 
 COLD_TO_HOT = [5.0, 20.0, 77.0, 150.0, 298.15, 600.0, 1000.0]
 WITH_SPECIES = ("H2", "water", "NH3", "CH4", "C2H4", "C6H6", "SF6", "CCl4")

@@ -14,9 +14,10 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from rotor import units
-from rotor.constants import Constants
 from rotor.molecules.molecule import Molecule
-from rotor.top import Top, kind_from_moments
+from rotor.tops.constants import Constants
+from rotor.tops.kind import kind_from_moments
+from rotor.tops.top import Top
 
 WATER = Molecule(
     ("O", "H", "H"), [[0, 0, 0.1173], [0, 0.7572, -0.4692], [0, -0.7572, -0.4692]], dipole_debye=[0, 0, -1.85]

@@ -14,10 +14,10 @@ import pytest
 from PIL import Image
 
 import rotor
-from rotor.classical.free import free_motion
-from rotor.classical.thermal import mean_thermal_momentum
+from rotor.classical.free.free_motion import free_motion
+from rotor.classical.gas.thermal_momentum import mean_thermal_momentum
+from rotor.geometry.rotations import distance
 from rotor.plots import animation
-from rotor.rotations import distance
 from rotor.units import CLASSICAL_TIME_PS, CM_PER_EV, EV_PER_K, HBAR_CLASSICAL
 
 COLUMNS = ["t", "m1", "m2", "m3", "qw", "qx", "qy", "qz", "energy"]

@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.linalg import expm
 
-from rotor import twists
-from rotor.rotations import conjugate, distance, exp, normalised, rotate, to_matrix
+from rotor.geometry import rigid_motions as twists
+from rotor.geometry.rotations import conjugate, distance, exp, normalised, rotate, to_matrix
 
 numbers = st.floats(-2.0, 2.0, allow_subnormal=False)
 vectors = arrays(np.float64, 3, elements=numbers)

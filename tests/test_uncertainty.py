@@ -8,7 +8,6 @@ import json
 import numpy as np
 import pytest
 
-from rotor.constants import Constants
 from rotor.formats.line_tables import catalogue, provenance, write_lines
 from rotor.formats.spcat.cat import read_cat
 from rotor.formats.spcat.codes import constants_of
@@ -16,7 +15,8 @@ from rotor.formats.spcat.par import read_par
 from rotor.quantum.levels import solve_levels
 from rotor.quantum.uncertainty import Covariance, level_errors
 from rotor.spectra.lines import line_list
-from rotor.top import Top
+from rotor.tops.constants import Constants
+from rotor.tops.top import Top
 
 OCS = Constants(B=6081.492, D=1.3e-3, uncertainties={"B": 6e-6, "D": 2e-8})
 

@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from slow_matrix import AXES, body_operators, watson_matrix
 
-from rotor.constants import Constants
 from rotor.quantum.levels import solve_levels
-from rotor.top import Top
+from rotor.tops.constants import Constants
+from rotor.tops.top import Top
 
 RIGID = {"A": 9000.0, "B": 5000.0, "C": 3000.0}
 A_SET = RIGID | {

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rotor.molecules.readers import parse_molecule
-from rotor.molecules.xyz import decode, parse_xyz
+from rotor.molecules.readers.read import parse_molecule
+from rotor.molecules.readers.xyz import decode, parse_xyz
 from rotor.units import DEBYE_PER_E_ANGSTROM
 
 LABELS = {"C": ("C", 12), "13C": ("C", 13), "D": ("H", 2), "T": ("H", 3), "17": ("Cl", 35), "37Cl": ("Cl", 37)}

@@ -14,7 +14,7 @@ from scipy.integrate import solve_ivp
 from scipy.special import elliprd
 
 from rotor.classical.euler import gyroscopic_term
-from rotor.classical.free import free_motion
+from rotor.classical.free.free_motion import free_motion
 
 
 def shape_integrals(semiaxes):

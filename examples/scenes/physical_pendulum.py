@@ -7,10 +7,10 @@
 import numpy as np
 from scipy.special import ellipk
 
-from rotor.classical.integrators import integrate
-from rotor.classical.lie_runge_kutta import LieRungeKutta
-from rotor.classical.pivot import GravityAboutPivot
-from rotor.rotations import exp
+from rotor.classical.effects.gravity import GravityAboutPivot
+from rotor.classical.integrators.lie_runge_kutta import LieRungeKutta
+from rotor.classical.integrators.method import integrate
+from rotor.geometry.rotations import exp
 
 length, mass, gravity = 1.0, 2.0, 9.80665
 moments = mass * length**2 / 3.0 * np.array([1.0, 1.0, 1e-6])

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from rotor.classical.euler import gyroscopic_term
-from rotor.rotations import exp, rotate
+from rotor.geometry.rotations import exp, rotate
 
 radius, drop, g = 100.0, 2.0, 9.80665
 spin = np.array([0.0, 0.0, np.sqrt(g / radius)])

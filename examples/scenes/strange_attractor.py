@@ -13,7 +13,7 @@ import sys
 
 import numpy as np
 
-from rotor.classical.drag import LinearDrag
+from rotor.classical.effects.drag import LinearDrag
 from rotor.classical.lyapunov import body_flow, lyapunov_exponents, orbit
 
 moments = np.array([1.0, 3.0, 2.0])

@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from rotor.rotations import Array
+from rotor.arrays import Floats
 
 STAGES = 12
 
 
 @njit(cache=True)
-def _slopes(form: Any, table: Array, out: Array) -> None:
+def _slopes(form: Any, table: Floats, out: Floats) -> None:
     """d/dt of table (d, 1 + m) = (state, tangent vectors) and of the integral of the trace, in row d."""
     constant, linear, quadratic = form
     d, columns = linear.shape[0], table.shape[1]
@@ -41,7 +41,7 @@ def _slopes(form: Any, table: Array, out: Array) -> None:
 
 
 @njit(cache=True)
-def _stepped(form: Any, tableau: Any, table: Array, h: float, k: Array, work: Array) -> float:
+def _stepped(form: Any, tableau: Any, table: Floats, h: float, k: Floats, work: Floats) -> float:
     """One step of length h in place if its error estimate, which is returned, is at most 1."""
     a, b, e3, e5, tolerance = tableau
     for stage in range(STAGES):
@@ -72,7 +72,7 @@ def _stepped(form: Any, tableau: Any, table: Array, h: float, k: Array, work: Ar
 
 
 @njit(cache=True)
-def _orthogonal(table: Array, grown: Array) -> None:
+def _orthogonal(table: Floats, grown: Floats) -> None:
     """Gram-Schmidt of the tangent vectors, in place; logarithms of their lengths are added to `grown`."""
     d = table.shape[0] - 1
     for c in range(1, table.shape[1]):
@@ -91,7 +91,9 @@ def _orthogonal(table: Array, grown: Array) -> None:
 
 
 @njit(cache=True, nogil=True)
-def follow(form: Any, tableau: Any, table: Array, interval: float, intervals: int, first: float, grown: Array) -> float:
+def follow(
+    form: Any, tableau: Any, table: Floats, interval: float, intervals: int, first: float, grown: Floats
+) -> float:
     """Advance by `intervals` intervals, orthogonalising after each; the step to go on with, or 0 where none serves."""
     k, work = np.zeros((STAGES, *table.shape)), np.empty_like(table)
     step = first

@@ -19,7 +19,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rotor.rotations import Array, multiply, rotate
+from rotor.arrays import Floats
+from rotor.geometry.rotations import multiply, rotate
 
 LINEAR_MISMATCH = 1e-12  # the two moments of a linear rotor are the same number but for round-off
 
@@ -31,9 +32,9 @@ class Invariants:
     energy: (...), ½ Σ L_i²/I_i.  momentum: (...), |L|.  space_momentum: (..., 3), L seen from space.
     """
 
-    energy: Array
-    momentum: Array
-    space_momentum: Array
+    energy: Floats
+    momentum: Floats
+    space_momentum: Floats
 
 
 def gyroscopic_term(m1: Any, m2: Any, m3: Any, w1: Any, w2: Any, w3: Any) -> tuple[Any, Any, Any]:
@@ -47,7 +48,7 @@ def gyroscopic_term(m1: Any, m2: Any, m3: Any, w1: Any, w2: Any, w3: Any) -> tup
     return m2 * w3 - m3 * w2, m3 * w1 - m1 * w3, m1 * w2 - m2 * w1
 
 
-def checked_moments(moments: ArrayLike) -> Array:
+def checked_moments(moments: ArrayLike) -> Floats:
     """Moments (..., 3) that a rigid body can have: finite, positive, at most one zero (then the others are equal).
 
     >>> checked_moments([0.0, 2.0, 2.0])
@@ -67,7 +68,7 @@ def checked_moments(moments: ArrayLike) -> Array:
     return array
 
 
-def checked_momentum(momentum: ArrayLike, moments: Array) -> Array:
+def checked_momentum(momentum: ArrayLike, moments: Floats) -> Floats:
     """Body angular momentum (..., 3), finite, with nothing along an axis whose moment is zero."""
     array = np.asarray(momentum, dtype=np.float64)
     if array.ndim == 0 or array.shape[-1] != 3:
@@ -79,7 +80,7 @@ def checked_momentum(momentum: ArrayLike, moments: Array) -> Array:
     return array
 
 
-def inverse_moments(moments: ArrayLike) -> Array:
+def inverse_moments(moments: ArrayLike) -> Floats:
     """1/I_i, and 0 for the axis of a linear rotor, which never turns about itself.
 
     >>> inverse_moments([0.0, 2.0, 2.0])
@@ -89,7 +90,7 @@ def inverse_moments(moments: ArrayLike) -> Array:
     return np.divide(1.0, array, out=np.zeros_like(array), where=array > 0.0)
 
 
-def angular_velocity(momentum: ArrayLike, moments: ArrayLike) -> Array:
+def angular_velocity(momentum: ArrayLike, moments: ArrayLike) -> Floats:
     """ω_i = L_i / I_i in body axes, (..., 3).
 
     >>> angular_velocity([1.0, 2.0, 3.0], [1.0, 2.0, 4.0])
@@ -99,7 +100,7 @@ def angular_velocity(momentum: ArrayLike, moments: ArrayLike) -> Array:
     return np.asarray(checked_momentum(momentum, moments) * inverse_moments(moments))
 
 
-def momentum_rate(momentum: ArrayLike, moments: ArrayLike, torque: ArrayLike = 0.0) -> Array:
+def momentum_rate(momentum: ArrayLike, moments: ArrayLike, torque: ArrayLike = 0.0) -> Floats:
     """dL/dt = L x ω + torque in body axes, (..., 3).
 
     >>> momentum_rate([1.0, 1.0, 0.0], [1.0, 2.0, 4.0])  # L1 L2 (1/I2 - 1/I1) about axis 3
@@ -111,7 +112,7 @@ def momentum_rate(momentum: ArrayLike, moments: ArrayLike, torque: ArrayLike = 0
     return np.asarray(np.stack(turning, axis=-1) + np.asarray(torque, dtype=np.float64))
 
 
-def attitude_rate(attitude: ArrayLike, omega: ArrayLike) -> Array:
+def attitude_rate(attitude: ArrayLike, omega: ArrayLike) -> Floats:
     """dq/dt = ½ q (0, ω), ω in body axes; (..., 4).
 
     >>> attitude_rate([1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 2.0])
@@ -121,7 +122,7 @@ def attitude_rate(attitude: ArrayLike, omega: ArrayLike) -> Array:
     return 0.5 * multiply(attitude, np.concatenate([np.zeros_like(omega[..., :1]), omega], axis=-1))
 
 
-def energy(momentum: ArrayLike, moments: ArrayLike) -> Array:
+def energy(momentum: ArrayLike, moments: ArrayLike) -> Floats:
     """Rotational energy ½ Σ L_i²/I_i, (...).
 
     >>> energy([1.0, 2.0, 2.0], [1.0, 2.0, 4.0])
@@ -142,7 +143,7 @@ def invariants(momentum: ArrayLike, attitude: ArrayLike, moments: ArrayLike) -> 
     return Invariants(energy(momentum, moments), size, rotate(attitude, momentum))
 
 
-def poinsot_semiaxes(moments: ArrayLike, energy: ArrayLike) -> Array:
+def poinsot_semiaxes(moments: ArrayLike, energy: ArrayLike) -> Floats:
     """Semi-axes √(2E/I_i) of Poinsot's ellipsoid Σ I_i ω_i² = 2E, on which ω moves; infinite where I_i = 0.
 
     The ellipsoid, fixed in the body, rolls without slipping on a plane normal to L at the distance 2E/|L| from the
@@ -154,7 +155,7 @@ def poinsot_semiaxes(moments: ArrayLike, energy: ArrayLike) -> Array:
     return _semiaxes(moments, energy, lambda e, inverse: np.sqrt(2.0 * e * inverse))
 
 
-def momentum_semiaxes(moments: ArrayLike, momentum: ArrayLike) -> Array:
+def momentum_semiaxes(moments: ArrayLike, momentum: ArrayLike) -> Floats:
     """Semi-axes |L|/I_i of the momentum ellipsoid Σ I_i² ω_i² = L²; its meeting with Poinsot's is the polhode.
 
     >>> momentum_semiaxes([1.0, 2.0, 4.0], 3.0)
@@ -163,7 +164,7 @@ def momentum_semiaxes(moments: ArrayLike, momentum: ArrayLike) -> Array:
     return _semiaxes(moments, momentum, lambda size, inverse: size * inverse)
 
 
-def binet_semiaxes(moments: ArrayLike, energy: ArrayLike) -> Array:
+def binet_semiaxes(moments: ArrayLike, energy: ArrayLike) -> Floats:
     """Semi-axes √(2E I_i) of the energy ellipsoid Σ L_i²/I_i = 2E in the space of L; it cuts the sphere |L| = const.
 
     >>> binet_semiaxes([1.0, 2.0, 4.0], 2.0)
@@ -173,7 +174,7 @@ def binet_semiaxes(moments: ArrayLike, energy: ArrayLike) -> Array:
     return np.sqrt(2.0 * np.asarray(energy, dtype=np.float64)[..., None] * moments)
 
 
-def _semiaxes(moments: ArrayLike, scale: ArrayLike, rule: Callable[[Array, Array], Array]) -> Array:
+def _semiaxes(moments: ArrayLike, scale: ArrayLike, rule: Callable[[Floats, Floats], Floats]) -> Floats:
     moments = checked_moments(moments)
     axes = rule(np.asarray(scale, dtype=np.float64)[..., None], inverse_moments(moments))
     return np.where(moments == 0.0, np.inf, axes)

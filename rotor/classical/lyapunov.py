@@ -16,10 +16,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rotor.arrays import Floats
+from rotor.classical.effect import ClassicalEffect
 from rotor.classical.euler import attitude_rate, checked_momentum
 from rotor.classical.system import system_of
-from rotor.effects import ClassicalEffect
-from rotor.rotations import IDENTITY, Array, normalised
+from rotor.geometry.rotations import IDENTITY, normalised
 
 DIFFERENCE = 6e-6  # relative step of central differences: cube root of the rounding of doubles
 
@@ -31,12 +32,12 @@ class Flow:
     `start` is one state (d,); `timed` says whether the rate depends on the time itself, as under a periodic drive.
     """
 
-    rate: Callable[[float, Array], Array]
-    start: Array
-    jacobian: Callable[[float, Array], Array] | None = None
+    rate: Callable[[float, Floats], Floats]
+    start: Floats
+    jacobian: Callable[[float, Floats], Floats] | None = None
     timed: bool = False
 
-    def slopes(self, time: float, y: Array) -> Array:
+    def slopes(self, time: float, y: Floats) -> Floats:
         """The Jacobian ∂rate_i/∂y_j at states (k, d)."""
         if self.jacobian is not None:
             return self.jacobian(time, y)
@@ -56,8 +57,8 @@ class Exponents:
     which the sum of a full spectrum equals.  time: total time averaged over.
     """
 
-    values: Array
-    errors: Array
+    values: Floats
+    errors: Floats
     divergence: float
     time: float
 
@@ -87,10 +88,10 @@ def body_flow(
     still = np.asarray(IDENTITY)
     timed = any(effect.depends_on_time for effect in effects)
 
-    def of_momentum(time: float, y: Array) -> Array:
+    def of_momentum(time: float, y: Floats) -> Floats:
         return system.momentum_rate(time, y, np.broadcast_to(still, (len(y), 4)))
 
-    def of_both(time: float, y: Array) -> Array:
+    def of_both(time: float, y: Floats) -> Floats:
         momentum, attitude = y[:, :3], y[:, 3:]
         turning = attitude_rate(attitude, system.omega(time, momentum))
         return np.concatenate([system.momentum_rate(time, momentum, attitude), turning], axis=-1)
@@ -138,7 +139,7 @@ def lyapunov_exponents(
     return Exponents(values[order], errors[order], float(np.mean(divergence) / plan.length), time)
 
 
-def quadratic_form(flow: Flow) -> tuple[Array, Array, Array] | None:
+def quadratic_form(flow: Flow) -> tuple[Floats, Floats, Floats] | None:
     """c (d,), A (d, d) and symmetric Q (d, d, d) with rate = c + A y + Q(y, y), or None where the rate is not that.
 
     Read off values at 0, ±e_i and e_i + e_j, and held against the rate at 16 random states to 1e-12 of its size.
@@ -181,7 +182,7 @@ def kaplan_yorke(exponents: ArrayLike) -> float:
     return float(j + (sums[j - 1] / abs(values[j]) if j else 0.0))
 
 
-def orbit(flow: Flow, times: ArrayLike, tolerance: float = 1e-10) -> Array:
+def orbit(flow: Flow, times: ArrayLike, tolerance: float = 1e-10) -> Floats:
     """States (t, d) of the flow at increasing `times`, from flow.start at time 0 (DOP853).
 
     >>> decay = Flow(lambda t, y: -y, np.array([1.0]))
@@ -205,8 +206,8 @@ def orbit(flow: Flow, times: ArrayLike, tolerance: float = 1e-10) -> Array:
 
 
 def poincare_section(
-    flow: Flow, surface: Callable[[float, Array], float], time: float, transient: float = 0.0, tolerance: float = 1e-10
-) -> tuple[Array, Array]:
+    flow: Flow, surface: Callable[[float, Floats], float], time: float, transient: float = 0.0, tolerance: float = 1e-10
+) -> tuple[Floats, Floats]:
     """Times (p,) and states (p, d) at which the orbit of flow.start crosses surface(t, y) = 0 upwards before `time`.
 
     Crossings before `transient` are left out. For a periodic drive take surface = sin(frequency t / 2 + phase), which
@@ -219,7 +220,7 @@ def poincare_section(
     """
     from scipy.integrate import solve_ivp
 
-    def crossing(t: float, y: Array) -> float:
+    def crossing(t: float, y: Floats) -> float:
         return surface(t, y)
 
     crossing.direction = 1.0  # type: ignore[attr-defined]
@@ -253,7 +254,7 @@ class _Plan:
         return number, part / number
 
 
-def _along(flow: Flow, form: tuple[Array, Array, Array], count: int, plan: _Plan) -> tuple[Array, Array]:
+def _along(flow: Flow, form: tuple[Floats, Floats, Floats], count: int, plan: _Plan) -> tuple[Floats, Floats]:
     """Growth (segments, m) and integrated trace (segments,) of segments one after the other, compiled."""
     from scipy.integrate import DOP853
 
@@ -276,7 +277,7 @@ def _along(flow: Flow, form: tuple[Array, Array, Array], count: int, plan: _Plan
     return grown, divergence
 
 
-def _side_by_side(flow: Flow, count: int, plan: _Plan) -> tuple[Array, Array]:
+def _side_by_side(flow: Flow, count: int, plan: _Plan) -> tuple[Floats, Floats]:
     """The same of segments side by side, each from its own point of one orbit."""
     d = flow.start.size
     starts = plan.transient + plan.length * np.arange(plan.segments)
@@ -299,12 +300,12 @@ class _Tracker:
     """States (k, d) with tangent vectors (k, d, m), each state at its own time clock + offset."""
 
     flow: Flow
-    offsets: Array
+    offsets: Floats
     tolerance: float
 
     def follow(
-        self, clock: float, y: tuple[Array, Array], intervals: int, length: float
-    ) -> tuple[float, tuple[Array, Array], Array, Array]:
+        self, clock: float, y: tuple[Floats, Floats], intervals: int, length: float
+    ) -> tuple[float, tuple[Floats, Floats], Floats, Floats]:
         """After `intervals`: the clock, states, logarithms of growth (k, m) and integrals of the trace (k,)."""
         states, tangent = y
         k, _, m = tangent.shape
@@ -317,12 +318,12 @@ class _Tracker:
             clock += length
         return clock, (states, tangent), grown, divergence
 
-    def _interval(self, clock: float, states: Array, tangent: Array, length: float) -> tuple[Array, Array, Array]:
+    def _interval(self, clock: float, states: Floats, tangent: Floats, length: float) -> tuple[Floats, Floats, Floats]:
         from scipy.integrate import solve_ivp
 
         (k, d), m = states.shape, tangent.shape[2]
 
-        def rates(time: float, flat: Array) -> Array:
+        def rates(time: float, flat: Floats) -> Floats:
             y, v = flat[: k * d].reshape(k, d), flat[k * d : k * d * (1 + m)].reshape(k, d, m)
             rate, slopes = self._rate_and_slopes(time, y)
             traces = np.trace(slopes, axis1=-2, axis2=-1)
@@ -342,7 +343,7 @@ class _Tracker:
         end = solution.y[:, -1]
         return end[: k * d].reshape(k, d), end[k * d : -k].reshape(k, d, m), end[-k:]
 
-    def _rate_and_slopes(self, time: float, y: Array) -> tuple[Array, Array]:
+    def _rate_and_slopes(self, time: float, y: Floats) -> tuple[Floats, Floats]:
         """Rates and Jacobians of all states, each taken at its own time where the flow depends on time."""
         if not self.flow.timed:
             return self.flow.rate(time, y), self.flow.slopes(time, y)

@@ -7,11 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rotor.arrays import Floats
 from rotor.classical.euler import energy, invariants
-from rotor.classical.free import FreeMotion
-from rotor.classical.integrators import Motion
-from rotor.rotations import Array, continuous
-from rotor.tables import Table
+from rotor.classical.free.free_motion import FreeMotion
+from rotor.classical.integrators.method import Motion
+from rotor.geometry.rotations import continuous
+from rotor.table import Table
 
 
 @dataclass(frozen=True)
@@ -22,10 +23,10 @@ class MotionTable(Table):
     coherent set of units, or each in its own, as `rotor tumble` prints them.
     """
 
-    times: Array
-    momentum: Array
-    attitude: Array
-    energy: Array
+    times: Floats
+    momentum: Floats
+    attitude: Floats
+    energy: Floats
 
     def __len__(self) -> int:
         return len(self.times)
@@ -40,7 +41,7 @@ class MotionTable(Table):
         return cls(motion.times, motion.momentum, continuous(motion.attitude), motion.energy)
 
     @property
-    def columns(self) -> dict[str, Array]:
+    def columns(self) -> dict[str, Floats]:
         """The table by column: t, m1, m2, m3, qw, qx, qy, qz, energy."""
         names = ("t", "m1", "m2", "m3", "qw", "qx", "qy", "qz", "energy")
         return dict(zip(names, (self.times, *self.momentum.T, *self.attitude.T, self.energy), strict=True))
@@ -58,7 +59,7 @@ class Departure:
 def sampled(motion: FreeMotion, times: ArrayLike) -> MotionTable:
     """The exact motion of one body at `times` (n,), in the order given; signs of q follow the neighbour before.
 
-    >>> from rotor.classical.free import free_motion
+    >>> from rotor.classical.free.free_motion import free_motion
     >>> table = sampled(free_motion([1.0, 1.0, 2.0], [3.0, 0.0, 4.0]), [0.0, 1.0])
     >>> table.energy.tolist()  # ½ (9/1 + 16/2)
     [8.5, 8.5]

@@ -11,18 +11,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rotor.arrays import Floats
+from rotor.classical.effect import ClassicalEffect, InertiaChange, InnerMomentum, Torque
 from rotor.classical.euler import checked_moments, gyroscopic_term, inverse_moments
-from rotor.effects import ClassicalEffect, InertiaChange, InnerMomentum, Torque
-from rotor.rotations import Array
 
 
 @dataclass(frozen=True)
 class System:
-    """Moments (n, 3) of n bodies and the effects that act on all of them, by kind; see `rotor.effects`."""
+    """Moments (n, 3) of n bodies and the effects that act on all of them, by kind; see `rotor.classical.effect`."""
 
-    start_moments: Array
-    start_inverse: Array
-    start_acting: Array
+    start_moments: Floats
+    start_inverse: Floats
+    start_acting: Floats
     torques: tuple[Torque, ...]
     inner: tuple[InnerMomentum, ...]
     inertia: InertiaChange | None
@@ -42,43 +42,43 @@ class System:
         """Whether a torque depends on the attitude; otherwise dL/dt follows from L and time alone."""
         return any(effect.needs_attitude for effect in self.torques)
 
-    def inverse(self, time: float) -> Array:
+    def inverse(self, time: float) -> Floats:
         """1/I_i (n, 3) at `time`, 0 for the axis of a linear rotor."""
         return self.start_inverse if self.inertia is None else np.asarray(1.0 / self.moments(time))
 
-    def acting(self, time: float) -> Array:
+    def acting(self, time: float) -> Floats:
         """`acting_inverse` of the moments (n, 3) at `time`."""
         return self.start_acting if self.inertia is None else np.asarray(1.0 / self.moments(time))
 
-    def moments(self, time: float) -> Array:
+    def moments(self, time: float) -> Floats:
         """Principal moments (n, 3) at `time`."""
         if self.inertia is None:
             return self.start_moments
         return np.ascontiguousarray(np.broadcast_to(self.inertia.moments(time), self.start_moments.shape))
 
-    def inner_momentum(self, time: float) -> Array | float:
+    def inner_momentum(self, time: float) -> Floats | float:
         """Sum h (3,) of the inner momenta, 0.0 where there is none."""
         return sum((effect.inner_momentum(time) for effect in self.inner), start=0.0)
 
-    def omega(self, time: float, momentum: Array) -> Array:
+    def omega(self, time: float, momentum: Floats) -> Floats:
         """ω = (L - h)/I(t) in body axes, (n, 3)."""
         relative = momentum - self.inner_momentum(time) if self.inner else momentum
         return np.asarray(relative * self.inverse(time))
 
-    def torque(self, time: float, attitude: Array, omega: Array) -> Array:
+    def torque(self, time: float, attitude: Floats, omega: Floats) -> Floats:
         """Sum of the torques in body axes, (n, 3)."""
         total = self.torques[0].torque(time, attitude, omega)
         for effect in self.torques[1:]:
             total = total + effect.torque(time, attitude, omega)
         return total
 
-    def momentum_rate(self, time: float, momentum: Array, attitude: Array) -> Array:
+    def momentum_rate(self, time: float, momentum: Floats, attitude: Floats) -> Floats:
         """dL/dt = L x ω + Σ torques in body axes, (n, 3)."""
         omega = self.omega(time, momentum)
         rate = np.stack(gyroscopic_term(*np.moveaxis(momentum, -1, 0), *np.moveaxis(omega, -1, 0)), axis=-1)
         return rate + self.torque(time, attitude, omega) if self.torques else rate
 
-    def energy(self, time: float, momentum: Array, attitude: Array) -> Array:
+    def energy(self, time: float, momentum: Floats, attitude: Floats) -> Floats:
         """½ Σ (L_i - h_i)²/I_i + potential energies, (n,)."""
         relative = momentum - self.inner_momentum(time)
         total = 0.5 * np.sum(relative * self.omega(time, momentum), axis=-1)
@@ -90,7 +90,7 @@ class System:
 def system_of(moments: ArrayLike, effects: Sequence[ClassicalEffect] = ()) -> System:
     """The system of bodies with principal moments (..., 3), flattened to (n, 3), under a list of effects.
 
-    >>> from rotor.classical.gyrostat import SpinningRotor
+    >>> from rotor.classical.effects.gyrostat import SpinningRotor
     >>> system = system_of([1.0, 2.0, 4.0], [SpinningRotor([0, 0, 1.0])])
     >>> system.omega(0.0, np.array([[1.0, 2.0, 3.0]])).tolist()
     [[1.0, 1.0, 0.5]]
@@ -113,7 +113,7 @@ def system_of(moments: ArrayLike, effects: Sequence[ClassicalEffect] = ()) -> Sy
     )
 
 
-def acting_inverse(moments: Array) -> Array:
+def acting_inverse(moments: Floats) -> Floats:
     """1/I_i for stepping; a linear rotor's zero moment is replaced by the other one.
 
     Without momentum about its own axis a linear rotor moves exactly as a sphere of that moment: L stands still in the

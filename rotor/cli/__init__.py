@@ -15,7 +15,7 @@ from typing import cast
 import typer
 
 from rotor.cli import cat, convert, fluid, gas, info, isotopologues, molecules, raman, spectrum, thermo, tumble
-from rotor.cli.output import NoAnswer
+from rotor.cli.shared.output import NoAnswer
 
 NO_ANSWER, WRONG_INPUT, INTERRUPTED = 1, 2, 130
 # click's ClickException, whether click is a package of its own or, in a newer typer, a part of it

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from rotor.cli import inputs
-from rotor.cli.output import Files, NoAnswer, Table, Writer, deliver, json_text, note, show_facts, show_table
+from rotor.cli.shared import inputs
+from rotor.cli.shared.output import Files, NoAnswer, Table, Writer, deliver, json_text, note, show_facts, show_table
 
 if TYPE_CHECKING:
     import numpy as np

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from rotor.cli import inputs
-from rotor.cli.output import Files, Writer, deliver, json_text, note
+from rotor.cli.shared import inputs
+from rotor.cli.shared.output import Files, Writer, deliver, json_text, note
 
 if TYPE_CHECKING:
-    from rotor.top import Top
+    from rotor.tops.top import Top
 
 EXAMPLES = """\b
 Examples:
@@ -35,7 +35,7 @@ def command(
     files.ask_json(json)
     top = top_with_errors(source)
 
-    from rotor.cli.report import describe
+    from rotor.cli.shared.report import describe
 
     content = {**describe(top, source, context.obj), "files": [str(path) for path in files.wanted.values()]}
     said = f"{source} → {target}: {top.constants.text()}"

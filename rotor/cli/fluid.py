@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any, cast
 
 import typer
 
-from rotor.cli import engines, inputs
-from rotor.cli.output import Files, NoAnswer, Table, deliver, json_with_rows, note, show_facts, show_table
+from rotor.cli.shared import engines, inputs
+from rotor.cli.shared.output import Files, NoAnswer, Table, deliver, json_with_rows, note, show_facts, show_table
 
 if TYPE_CHECKING:
     from ase import Atoms
 
-    from rotor.fluid.bodies import Bodies
+    from rotor.fluid.motion.bodies import Bodies
     from rotor.fluid.record import FluidRecord
     from rotor.fluid.run import Outputs
     from rotor.fluid.settings import Settings
@@ -80,7 +80,7 @@ def command(
 
 
 def _model(names: str) -> str:
-    from rotor.fluid.models import model_of
+    from rotor.fluid.forces.models import model_of
 
     for name in names.split(","):
         inputs.option("--model", name.strip(), model_of)
@@ -121,9 +121,9 @@ def _box(
         return _read(source), source
     import numpy as np
 
-    from rotor.fluid.models import MODELS, model_of, shapes_of
+    from rotor.fluid.forces.models import MODELS, model_of, shapes_of
+    from rotor.fluid.initial_box import RELAXING_STEPS, lattice_box, relax
     from rotor.fluid.run import calculator_of
-    from rotor.fluid.start import RELAXING_STEPS, lattice_box, relax
 
     inputs.whole("--molecules", molecules, 1)
     if source != settings.model and source in MODELS:

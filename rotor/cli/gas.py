@@ -11,15 +11,15 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from rotor.cli import inputs
-from rotor.cli.inputs import Input
-from rotor.cli.output import Files, Table, Writer, deliver, json_text, rows_of, show_facts, show_table
+from rotor.cli.shared import inputs
+from rotor.cli.shared.inputs import Input
+from rotor.cli.shared.output import Files, Table, Writer, deliver, json_text, rows_of, show_facts, show_table
 
 if TYPE_CHECKING:
-    from rotor.classical.ensembles import Correlations, Ensemble
-    from rotor.equipartition import Equipartition
-    from rotor.rotations import Array
-    from rotor.top import Top
+    from rotor.arrays import Floats
+    from rotor.classical.gas.ensembles import Correlations, Ensemble
+    from rotor.statistics.equipartition import Equipartition
+    from rotor.tops.top import Top
 
 MOST_MOLECULES = 10_000_000
 MOST_TIMES = 100_000
@@ -42,16 +42,16 @@ class Settings:
     temperature_k: float
     seed: int
     confidence: float
-    times_ps: Array | None
+    times_ps: Floats | None
 
 
 @dataclass(frozen=True)
 class Probes:
     """What C1 and C2 are of, and where that is from."""
 
-    vector: Array
+    vector: Floats
     vector_source: str
-    tensor: Array
+    tensor: Floats
     tensor_source: str
 
 
@@ -106,11 +106,11 @@ def _confidence(text: str) -> float:
     return value
 
 
-def _times(text: str | None) -> Array | None:
+def _times(text: str | None) -> Floats | None:
     """The times asked for in ps."""
     if text is None:
         return None
-    from rotor.cli.thrown import Units, read_times
+    from rotor.cli.shared.tumble_inputs import Units, read_times
 
     times = read_times(text, Units(time="ps"))
     if times is not None and len(times) > MOST_TIMES:
@@ -142,10 +142,10 @@ def _kt(temperature_k: float) -> float:
     return EV_PER_K * temperature_k
 
 
-def _settling_times(top: Top, temperature_k: float, probes: Probes) -> Array:
+def _settling_times(top: Top, temperature_k: float, probes: Probes) -> Floats:
     import numpy as np
 
-    from rotor.classical.correlations import short_time
+    from rotor.classical.gas.correlations import short_time
     from rotor.units import CLASSICAL_TIME_PS
 
     start = short_time(top.moments_u_angstrom2, _kt(temperature_k), probes.vector, probes.tensor)
@@ -156,8 +156,8 @@ def _tested(top: Top, settings: Settings) -> tuple[Ensemble, Equipartition]:
     """The gas, drawn and moved, and the verdict on it."""
     import numpy as np
 
-    from rotor.classical.ensembles import thermal_ensemble
-    from rotor.equipartition import equipartition
+    from rotor.classical.gas.ensembles import thermal_ensemble
+    from rotor.statistics.equipartition import equipartition
     from rotor.units import CLASSICAL_TIME_PS
 
     kt, rng = _kt(settings.temperature_k), np.random.default_rng(settings.seed)
@@ -177,7 +177,7 @@ def _correlations(top: Top, settings: Settings, probes: Probes) -> Correlations:
 
     import numpy as np
 
-    from rotor.classical.ensembles import free_gas_correlations
+    from rotor.classical.gas.ensembles import free_gas_correlations
     from rotor.units import CLASSICAL_TIME_PS
 
     times = settings.times_ps
@@ -219,8 +219,8 @@ def _content(
     curves: Correlations | None,
 ) -> dict[str, Any]:
     """What is printed and more, by the keys of docs/command_line.md."""
-    from rotor.cli.report import describe
-    from rotor.degrees import count_degrees
+    from rotor.cli.shared.report import describe
+    from rotor.statistics.degrees_of_freedom import count_degrees
     from rotor.units import CM_PER_EV
 
     one = count_degrees([top.moments_u_angstrom2])
@@ -254,7 +254,7 @@ def _about_curves(top: Top, settings: Settings, probes: Probes, curves: Correlat
     names = ("vector_abc", "vector_source", "tensor_source", "short_time_per_ps2", "c1_plateau", "correlation")
     if curves is None:
         return dict.fromkeys(names)
-    from rotor.classical.correlations import plateau, short_time
+    from rotor.classical.gas.correlations import plateau, short_time
     from rotor.units import CLASSICAL_TIME_PS
 
     moments = top.moments_u_angstrom2
@@ -286,13 +286,13 @@ def _writers(top: Top, test: Equipartition, curves: Correlations | None, content
 
 
 def _name(top: Top) -> str:
-    from rotor.cli.report import formula_of
+    from rotor.cli.shared.report import formula_of
 
     return top.name or formula_of(top) or f"{top.kind} top"
 
 
 def _show(top: Top, test: Equipartition, curves: Correlations | None, content: dict[str, Any]) -> None:
-    from rotor.cli.report import heading
+    from rotor.cli.shared.report import heading
 
     print(f"{heading(top)}, a classical gas")
     show_facts(_facts(top, test, content))
@@ -304,7 +304,7 @@ def _show(top: Top, test: Equipartition, curves: Correlations | None, content: d
 
 
 def _facts(top: Top, test: Equipartition, content: dict[str, Any]) -> list[tuple[str, str]]:
-    from rotor.cli.report import with_source
+    from rotor.cli.shared.report import with_source
 
     a, b, c = top.rotational_constants_mhz
     rigid = ", ".join(f"{n} {x:.10g}" for n, x in zip("ABC", (a, b, c), strict=True) if math.isfinite(x))

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from rotor.cli import inputs
-from rotor.cli.inputs import Input
-from rotor.cli.output import Files, Table, deliver, json_text, show_facts, show_table
+from rotor.cli.shared import inputs
+from rotor.cli.shared.inputs import Input
+from rotor.cli.shared.output import Files, Table, deliver, json_text, show_facts, show_table
 
 if TYPE_CHECKING:
-    from rotor.top import Top
+    from rotor.tops.top import Top
 
 TEMPERATURES_K = (9.375, 18.75, 37.5, 75.0, 150.0, 225.0, 300.0, 500.0, 1000.0)  # those of the catalogues, and two more
 
@@ -51,7 +51,7 @@ def command(
     given = Input(source, constants, isotope or [], dipole, dipole_abc, spin_weights, calculator, hessian)
     top = inputs.read_top(given)
 
-    from rotor.cli.report import describe
+    from rotor.cli.shared.report import describe
 
     content = describe(top, given.text, context.obj)
     content["partition_function"] = partition_table(top, temperatures)
@@ -73,8 +73,8 @@ def partition_table(top: Top, temperatures_k: Sequence[float]) -> list[dict[str,
 
 def conformer_table(source: str | None, count: int) -> list[dict[str, Any]]:
     """Energy and constants of each different conformer of a SMILES, the lowest first."""
-    from rotor.molecules.smiles import conformers
-    from rotor.top import Top
+    from rotor.molecules.readers.smiles import conformers
+    from rotor.tops.top import Top
 
     inputs.whole("--conformers", count, 1, MOST_CONFORMERS)
     if not (source or "").startswith("SMILES:"):
@@ -110,14 +110,14 @@ def _row(top: Top, temperature_k: float) -> dict[str, Any]:
 
 
 def _record(top: Top, partition: Any) -> dict[str, Any]:
-    from rotor.cli.report import q_record
+    from rotor.cli.shared.report import q_record
     from rotor.thermo import classical_partition_function
 
     return q_record(partition, classical_partition_function(top, partition.temperature_k))
 
 
 def _show(top: Top, content: dict[str, Any]) -> None:
-    from rotor.cli.report import heading
+    from rotor.cli.shared.report import heading
 
     print(heading(top))
     show_facts(_facts(top, content))
@@ -129,7 +129,7 @@ def _show(top: Top, content: dict[str, Any]) -> None:
 
 
 def _facts(top: Top, content: dict[str, Any]) -> list[tuple[str, str]]:
-    from rotor.cli import report
+    from rotor.cli.shared import report
 
     facts = [("constants from", content["source"] or "not said")]
     if top.kind_of_top:

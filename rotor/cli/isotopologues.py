@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from rotor.cli import inputs
-from rotor.cli.inputs import Input
-from rotor.cli.output import Files, Table, deliver, json_text, note, show_table
+from rotor.cli.shared import inputs
+from rotor.cli.shared.inputs import Input
+from rotor.cli.shared.output import Files, Table, deliver, json_text, note, show_table
 
 if TYPE_CHECKING:
-    from rotor.isotopologues import Isotopologue
-    from rotor.top import Top
+    from rotor.tops.isotopologues import Isotopologue
+    from rotor.tops.top import Top
 
 MIN_ABUNDANCE = 1e-4
 EACH = typer.Option(None, metavar="O=18O", help="Each atom of an element substituted, one at a time; repeatable.")
@@ -63,7 +63,7 @@ def _family(
     parent: Top, min_abundance: float | None, each: Sequence[str], site: Sequence[str]
 ) -> tuple[Isotopologue, ...]:
     """Those above the least abundance, those of --each, that of --site; none of them twice."""
-    from rotor.isotopologues import isotopologue, isotopologues, single_substitutions
+    from rotor.tops.isotopologues import isotopologue, isotopologues, single_substitutions
 
     family: list[Isotopologue] = []
     if min_abundance is not None or not (each or site):

@@ -8,8 +8,8 @@ from typing import Any
 
 import typer
 
-from rotor.cli import inputs
-from rotor.cli.output import Files, Table, deliver, plain, show_facts, show_table
+from rotor.cli.shared import inputs
+from rotor.cli.shared.output import Files, Table, deliver, plain, show_facts, show_table
 
 WIDEST_NAME = 24
 
@@ -51,8 +51,8 @@ def _paths(name: str | None) -> list[Path]:
 
 def record(path: Path) -> dict[str, Any]:
     """What a molecule file says, by the keys of docs/command_line.md."""
-    from rotor.formats.doors import top_of_file
     from rotor.formats.molecule_file import read_molecule_file
+    from rotor.formats.read_write import top_of_file
 
     file = read_molecule_file(path)
     top = top_of_file(file)

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from rotor.cli import inputs, layer
-from rotor.cli.inputs import Input
-from rotor.cli.output import (
+from rotor.cli.shared import gas_layer as layer
+from rotor.cli.shared import inputs
+from rotor.cli.shared.inputs import Input
+from rotor.cli.shared.output import (
     Files,
     NoAnswer,
     Table,
@@ -26,7 +27,7 @@ from rotor.cli.output import (
 if TYPE_CHECKING:
     from rotor.spectra.raman import RamanLines
     from rotor.thermo import VibrationalStates
-    from rotor.top import Top
+    from rotor.tops.top import Top
 
 EXAMPLES = """\b
 Examples:
@@ -151,7 +152,7 @@ def _content(lines: RamanLines, settings: Settings, given: Input, command: str, 
     """What is printed and more, by the keys of docs/command_line.md."""
     import numpy as np
 
-    from rotor.cli.report import describe, q_record
+    from rotor.cli.shared.report import describe, q_record
     from rotor.spectra.raman import anisotropy_angstrom3, band_cross_section
     from rotor.thermo import classical_partition_function
 
@@ -190,7 +191,7 @@ def _writers(lines: RamanLines, content: dict[str, Any]) -> dict[str, Writer]:
 
 
 def _show(lines: RamanLines, content: dict[str, Any]) -> None:
-    from rotor.cli.report import heading
+    from rotor.cli.shared.report import heading
 
     print(heading(lines.top))
     show_facts(_facts(lines, content))
@@ -202,7 +203,7 @@ def _show(lines: RamanLines, content: dict[str, Any]) -> None:
 
 
 def _facts(lines: RamanLines, content: dict[str, Any]) -> list[tuple[str, str]]:
-    from rotor.cli import report
+    from rotor.cli.shared import report
 
     top = lines.top
     weights = report.weights_text(content["spin_weights"])

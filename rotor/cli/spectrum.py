@@ -9,9 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from rotor.cli import inputs, layer, request
-from rotor.cli.inputs import Input
-from rotor.cli.output import (
+from rotor.cli.shared import gas_layer as layer
+from rotor.cli.shared import inputs
+from rotor.cli.shared import spcat_request as request
+from rotor.cli.shared.inputs import Input
+from rotor.cli.shared.output import (
     Files,
     NoAnswer,
     Table,
@@ -25,12 +27,12 @@ from rotor.cli.output import (
 )
 
 if TYPE_CHECKING:
-    from rotor.cli.layer import Layer
+    from rotor.cli.shared.gas_layer import Layer
     from rotor.formats.spcat.predict import Prediction
     from rotor.spectra.lines import Lines
     from rotor.spectra.spectrum import Spectrum
     from rotor.thermo import VibrationalStates
-    from rotor.top import Top
+    from rotor.tops.top import Top
 
 PROFILES = ("sticks", "gaussian", "lorentzian", "voigt")
 
@@ -248,7 +250,7 @@ def _content(lines: Lines, settings: Settings, given: Input, command: str, shown
     """What is printed and more, by the keys of docs/command_line.md."""
     import numpy as np
 
-    from rotor.cli.report import describe, q_record
+    from rotor.cli.shared.report import describe, q_record
     from rotor.thermo import classical_partition_function
 
     q = q_record(lines.partition, classical_partition_function(lines.top, lines.temperature_k))
@@ -318,7 +320,7 @@ def _draw(lines: Lines, settings: Settings, path: Path, story: dict[str, Any]) -
 
 
 def _show(lines: Lines, content: dict[str, Any]) -> None:
-    from rotor.cli.report import heading
+    from rotor.cli.shared.report import heading
 
     print(heading(lines.top))
     show_facts(_facts(lines, content))
@@ -331,7 +333,7 @@ def _show(lines: Lines, content: dict[str, Any]) -> None:
 
 
 def _facts(lines: Lines, content: dict[str, Any]) -> list[tuple[str, str]]:
-    from rotor.cli import report
+    from rotor.cli.shared import report
 
     top = lines.top
     cut = "none: every allowed line" if content["min_lgint"] is None else f"lgint above {content['min_lgint']:g}"

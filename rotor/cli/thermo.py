@@ -9,15 +9,16 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from rotor.cli import inputs, layer
-from rotor.cli.inputs import Input
-from rotor.cli.output import Files, Table, Writer, answering, deliver, json_with_rows, show_facts, show_table
+from rotor.cli.shared import gas_layer as layer
+from rotor.cli.shared import inputs
+from rotor.cli.shared.inputs import Input
+from rotor.cli.shared.output import Files, Table, Writer, answering, deliver, json_with_rows, show_facts, show_table
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from rotor.thermo import ThermoFunctions, VibrationalStates
-    from rotor.top import Top
+    from rotor.tops.top import Top
 
 TEMPERATURES_K = (
     5.0,
@@ -123,7 +124,7 @@ def _functions(
 
 def _content(functions: ThermoFunctions, given: Input, command: str) -> dict[str, Any]:
     """What is printed and more, by the keys of docs/command_line.md."""
-    from rotor.cli.report import describe
+    from rotor.cli.shared.report import describe
     from rotor.thermo import classical_limit, parting_temperature_k, rotational_temperatures_k, species_names
 
     top, limit = functions.top, classical_limit(functions.top)
@@ -171,7 +172,7 @@ def _writers(functions: ThermoFunctions, content: dict[str, Any]) -> dict[str, W
 
 
 def _show(functions: ThermoFunctions, content: dict[str, Any]) -> None:
-    from rotor.cli.report import heading
+    from rotor.cli.shared.report import heading
 
     print(heading(functions.top))
     show_facts(_facts(functions, content))
@@ -183,7 +184,7 @@ def _show(functions: ThermoFunctions, content: dict[str, Any]) -> None:
 
 
 def _facts(functions: ThermoFunctions, content: dict[str, Any]) -> list[tuple[str, str]]:
-    from rotor.cli import report
+    from rotor.cli.shared import report
 
     top = functions.top
     weights = report.weights_text(content["spin_weights"])

@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from rotor.cli import inputs
-from rotor.cli.inputs import Input
-from rotor.cli.output import Files, Table, Writer, deliver, json_with_rows, show_facts, show_table
+from rotor.cli.shared import inputs
+from rotor.cli.shared.inputs import Input
+from rotor.cli.shared.output import Files, Table, Writer, deliver, json_with_rows, show_facts, show_table
 
 if TYPE_CHECKING:
-    from rotor.classical.free import FreeMotion
+    from rotor.arrays import Floats
+    from rotor.classical.free.free_motion import FreeMotion
     from rotor.classical.motion import MotionTable
-    from rotor.cli.thrown import Thrown
-    from rotor.rotations import Array
+    from rotor.cli.shared.tumble_inputs import Thrown
 
 SHOWN = 11  # rows of the motion in the report
 
@@ -52,7 +52,7 @@ def command(
     json: str | None = inputs.JSON,
 ) -> None:
     """Free rotation: the exact motion, what it conserves, which axes are stable."""
-    from rotor.cli.thrown import read_thrown, read_times
+    from rotor.cli.shared.tumble_inputs import read_thrown, read_times
 
     files = _files({"--csv": csv, "--parquet": parquet, "--plot": plot, "--gif": gif}, json)
     given = Input(source, constants, isotope or [], None, None, None)
@@ -81,11 +81,11 @@ def _files(asked: dict[str, str | None], json: str | None) -> Files:
     return files
 
 
-def _solve(thrown: Thrown, asked: Array | None, command: str) -> tuple[FreeMotion, MotionTable, dict[str, Any]]:
+def _solve(thrown: Thrown, asked: Floats | None, command: str) -> tuple[FreeMotion, MotionTable, dict[str, Any]]:
     """The motion, its table in the units of print, and everything else that is printed."""
-    from rotor.classical.free import free_motion
+    from rotor.classical.free.free_motion import free_motion
     from rotor.classical.motion import MotionTable, departure, sampled
-    from rotor.cli.thrown import chosen_times
+    from rotor.cli.shared.tumble_inputs import chosen_times
 
     units = thrown.units
     motion = free_motion(thrown.moments, thrown.momentum)
@@ -107,7 +107,7 @@ def _about_body(thrown: Thrown, command: str) -> dict[str, Any]:
 
     units = thrown.units
     if thrown.top is not None:
-        from rotor.cli.report import describe
+        from rotor.cli.shared.report import describe
 
         story = describe(thrown.top, thrown.text, command)
     else:
@@ -129,7 +129,7 @@ def _about_body(thrown: Thrown, command: str) -> dict[str, Any]:
     }
 
 
-def _kind(moments: Array) -> str:
+def _kind(moments: Floats) -> str:
     """Kind of body by exact equality of the moments given."""
     low, middle, high = sorted(moments.tolist())
     if low == 0.0:
@@ -140,7 +140,7 @@ def _kind(moments: Array) -> str:
 
 def _about_motion(thrown: Thrown, motion: FreeMotion) -> dict[str, Any]:
     from rotor.classical.euler import energy
-    from rotor.classical.stability import stability
+    from rotor.classical.free.stability import stability
 
     units, closed = thrown.units, stability(thrown.moments, thrown.momentum)
     distinct = len(set(thrown.moments.tolist())) == 3
@@ -171,7 +171,7 @@ def _motion_kind(thrown: Thrown, motion: FreeMotion) -> str:
 
 def _writers(thrown: Thrown, motion: FreeMotion, table: MotionTable, content: dict[str, Any]) -> dict[str, Writer]:
     """How each option's file is written, with the provenance that its format can hold."""
-    from rotor.cli.output import plain
+    from rotor.cli.shared.output import plain
 
     units = thrown.units
     label = f"$t$ ({units.time})" if units.time else "$t$"
@@ -210,7 +210,7 @@ def _writers(thrown: Thrown, motion: FreeMotion, table: MotionTable, content: di
 
 
 def _heading(thrown: Thrown) -> str:
-    from rotor.cli.report import KINDS, heading
+    from rotor.cli.shared.report import KINDS, heading
 
     if thrown.top is not None:
         return heading(thrown.top)
@@ -230,7 +230,7 @@ def _show(thrown: Thrown, table: MotionTable, content: dict[str, Any]) -> None:
 def _facts(thrown: Thrown, content: dict[str, Any]) -> list[tuple[str, str]]:
     units, facts = thrown.units, []
     if thrown.top is not None:
-        from rotor.cli.report import with_source
+        from rotor.cli.shared.report import with_source
 
         a, b, c = thrown.top.rotational_constants_mhz
         rigid = ", ".join(f"{n} {x:.10g}" for n, x in zip("ABC", (a, b, c), strict=True) if math.isfinite(x))

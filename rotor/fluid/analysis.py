@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rotor import units
+from rotor.arrays import Floats
 from rotor.fluid.summary import mean_of
-from rotor.rotations import Array
-from rotor.tables import Table
+from rotor.table import Table
 
 YEH_HUMMER_XI = 2.837297  # of a cubic cell; I.-C. Yeh and G. Hummer, J. Phys. Chem. B 108, 15873 (2004), below eq. 12
 M2_PER_S = 1e-8  # 1 Å²/ps in m²/s
@@ -25,12 +25,12 @@ M2_PER_S = 1e-8  # 1 Å²/ps in m²/s
 class PairDistribution(Table):
     """r_angstrom: (bins,) middles of shells. g: (bins,). coordination: (bins,) neighbours up to the end of each shell."""
 
-    r_angstrom: Array
-    g: Array
-    coordination: Array
+    r_angstrom: Floats
+    g: Floats
+    coordination: Floats
 
     @property
-    def columns(self) -> dict[str, Array]:
+    def columns(self) -> dict[str, Floats]:
         """The table by column."""
         return {"r_angstrom": self.r_angstrom, "g": self.g, "coordination": self.coordination}
 
@@ -74,7 +74,7 @@ def pair_distribution(path: ArrayLike, edges: ArrayLike, r_max: float, bins: int
     return PairDistribution(0.5 * (borders[1:] + borders[:-1]), counts / expected, np.cumsum(counts) / n)
 
 
-def mean_square_displacement(path: ArrayLike) -> Array:
+def mean_square_displacement(path: ArrayLike) -> Floats:
     """⟨|r(t₀ + t) - r(t₀)|²⟩ (frames,) in Å², averaged over points and all starts t₀.
 
     The sums over starts are correlations, done by fast Fourier transform (V. Calandrini et al., Collection SFN 12, 201
@@ -127,7 +127,7 @@ def diffusion(
     return Diffusion(float(values.mean()), float(values.std(ddof=1) / math.sqrt(blocks)))
 
 
-def _slope(values: Array, interval: float) -> float:
+def _slope(values: Floats, interval: float) -> float:
     return float(np.polyfit(interval * np.arange(len(values)), values, 1)[0])
 
 
@@ -145,7 +145,7 @@ def endless_box(found: Diffusion, temperature_k: float, viscosity_pa_s: float, e
     return Diffusion(found.value, found.error, found.value + YEH_HUMMER_XI * drag)
 
 
-def block_errors(series: ArrayLike) -> Array:
+def block_errors(series: ArrayLike) -> Floats:
     """Standard errors by pairing neighbours again and again, (levels,): they rise to a plateau where blocks are independent.
 
     H. Flyvbjerg and H. G. Petersen, J. Chem. Phys. 91, 461 (1989), eqs. 23-27. The last level has eight blocks or more.
@@ -170,7 +170,7 @@ def drift_per_ns(time_ps: ArrayLike, energy: ArrayLike) -> tuple[float, float]:
     return float(slope), rest.error / float(t.std())
 
 
-def _path(path: Any) -> Array:
+def _path(path: Any) -> Floats:
     points = np.asarray(path, dtype=np.float64)
     if points.ndim != 3 or points.shape[-1] != 3 or not len(points):
         raise ValueError(f"a path of shape {points.shape}: (frames, n, 3) with frames > 0 is wanted")

@@ -6,8 +6,8 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from rotor.rotations import Array
-from rotor.tables import Table
+from rotor.arrays import Floats
+from rotor.table import Table
 
 
 @dataclass(frozen=True)
@@ -19,15 +19,15 @@ class FluidRecord(Table):
     translation_k, rotation_k: 2 E/(k degrees). pressure_bar: not a number where an engine gives none.
     """
 
-    time_ps: Array
-    potential_ev: Array
-    translation_ev: Array
-    rotation_ev: Array
-    total_ev: Array
-    temperature_k: Array
-    translation_k: Array
-    rotation_k: Array
-    pressure_bar: Array
+    time_ps: Floats
+    potential_ev: Floats
+    translation_ev: Floats
+    rotation_ev: Floats
+    total_ev: Floats
+    temperature_k: Floats
+    translation_k: Floats
+    rotation_k: Floats
+    pressure_bar: Floats
 
     def __post_init__(self) -> None:
         lengths = {field.name: len(getattr(self, field.name)) for field in fields(self)}
@@ -38,6 +38,6 @@ class FluidRecord(Table):
         return len(self.time_ps)
 
     @property
-    def columns(self) -> dict[str, Array]:
+    def columns(self) -> dict[str, Floats]:
         """The table by column, in the order of a file."""
         return {field.name: np.asarray(getattr(self, field.name)) for field in fields(self)}

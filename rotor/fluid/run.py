@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rotor.fluid.keeping import (
+from rotor.fluid.checkpoint import (
     AseTrajectory,
     Checkpoint,
     ExtendedXyz,
@@ -28,20 +28,20 @@ from rotor.fluid.keeping import (
     read_rows,
     trajectory_file,
 )
-from rotor.fluid.models import models_of, shapes_of
+from rotor.fluid.forces.models import models_of, shapes_of
+from rotor.fluid.initial_box import at_rest, check_apart, heat, model_labels
+from rotor.fluid.motion.state import State
 from rotor.fluid.record import FluidRecord
 from rotor.fluid.settings import Settings
-from rotor.fluid.start import at_rest, check_apart, heat, model_labels
-from rotor.fluid.state import State
 from rotor.units import EV_PER_ANGSTROM3_BAR
 
 if TYPE_CHECKING:
     from ase import Atoms
 
-    from rotor.degrees import Degrees
-    from rotor.fluid.bodies import Bodies
-    from rotor.fluid.dynamics import RigidDynamics
-    from rotor.fluid.thermostats import Thermostat
+    from rotor.fluid.motion.bodies import Bodies
+    from rotor.fluid.motion.dynamics import RigidDynamics
+    from rotor.fluid.motion.thermostats import Thermostat
+    from rotor.statistics.degrees_of_freedom import Degrees
 
 COLUMNS = tuple(field.name for field in fields(FluidRecord))
 MAY_CHANGE = ("steps",)  # settings that a resumed run may have otherwise
@@ -127,8 +127,8 @@ def dynamics_of(atoms: Atoms, settings: Settings, begin: bool = True) -> RigidDy
     """The dynamics of settings, with model, thermostat and, if the box is to begin, thermal momenta."""
     from ase.units import fs
 
-    from rotor.fluid.bodies import bodies_of
-    from rotor.fluid.dynamics import RigidDynamics
+    from rotor.fluid.motion.bodies import bodies_of
+    from rotor.fluid.motion.dynamics import RigidDynamics
 
     models = models_of(settings.model)
     if "molecule" not in atoms.arrays:
@@ -153,7 +153,7 @@ def dynamics_of(atoms: Atoms, settings: Settings, begin: bool = True) -> RigidDy
 
 def bodies_and_degrees(atoms: Atoms, settings: Settings) -> tuple[Bodies, Degrees, str]:
     """Bodies of a box, the degrees of freedom that a run counts, and the thermometer that it uses."""
-    from rotor.fluid.bodies import bodies_of
+    from rotor.fluid.motion.bodies import bodies_of
 
     bodies, _ = bodies_of(atoms, shapes=shapes_of(models_of(settings.model)))
     removed = 0 if settings.ensemble == "langevin" else 3
@@ -164,7 +164,7 @@ def thermostat_of(settings: Settings, rng: np.random.Generator) -> Thermostat | 
     """The thermostat of an ensemble; None for nve."""
     from ase.units import fs
 
-    from rotor.fluid.thermostats import Langevin, NoseHoover
+    from rotor.fluid.motion.thermostats import Langevin, NoseHoover
 
     if settings.ensemble == "langevin":
         return Langevin(settings.temperature_k, settings.friction_per_ps / (1000.0 * fs), rng)
@@ -175,7 +175,7 @@ def thermostat_of(settings: Settings, rng: np.random.Generator) -> Thermostat | 
 
 def calculator_of(settings: Settings, threads: int = 1) -> Any:
     """The built-in potential of settings, as an ASE calculator."""
-    from rotor.fluid.potential import RigidPotential
+    from rotor.fluid.forces.potential import RigidPotential
 
     return RigidPotential(
         settings.model,
@@ -192,7 +192,7 @@ def pressure_bar(dynamics: RigidDynamics) -> float:
     along the sites of each molecule, Σ s·f, since the forces that hold it rigid undo that (M. P. Allen and D. J. Tildesley,
     Computer Simulation of Liquids, section 2.4).
     """
-    from rotor.fluid.potential import RigidPotential
+    from rotor.fluid.forces.potential import RigidPotential
 
     atoms, bodies = dynamics.atoms, dynamics.bodies
     if "stress" not in getattr(atoms.calc, "implemented_properties", ()) or not atoms.pbc.all():

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rotor.equipartition import statistical_inefficiency
+from rotor.arrays import Floats
 from rotor.fluid.record import FluidRecord
-from rotor.rotations import Array
+from rotor.statistics.equipartition import statistical_inefficiency
 from rotor.units import KJ_PER_MOL_EV
 
 
@@ -24,7 +24,7 @@ class Mean:
     effective_samples: float
 
 
-def mean_of(quantity: str, unit: str, values: Array) -> Mean:
+def mean_of(quantity: str, unit: str, values: Floats) -> Mean:
     """The mean of a correlated series (n,).
 
     >>> noise = np.random.default_rng(1).normal(size=4000)

@@ -1,5 +1,5 @@
 """File formats of the field, one file a format; a folder where a format has several files."""
 
-from rotor.formats.doors import read, write
+from rotor.formats.read_write import read, write
 
 __all__ = ["read", "write"]

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rotor import units
-from rotor.formats.atomic import open_atomic
+from rotor.formats.atomic_write import open_atomic
 from rotor.formats.spcat.fields import read_decimal, read_whole
 from rotor.formats.spcat.freeform import Line, encode, read_lines
 from rotor.spectra.lines import Lines

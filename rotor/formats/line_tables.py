@@ -14,12 +14,13 @@ from typing import Any
 
 import numpy as np
 
-from rotor.formats.atomic import atomic_path, open_atomic
+from rotor.formats.atomic_write import atomic_path, open_atomic
 from rotor.formats.spcat.cat import format_lines, write_cat
 from rotor.formats.spcat.catalogue import Catalogue
 from rotor.formats.spcat.fields import BLANK
 from rotor.spectra.lines import Lines
-from rotor.top import Top
+from rotor.tops.top import Top
+from rotor.version import version
 
 QNFMT = {("j",): 101, ("j", "k"): 202, ("j", "ka", "kc"): 303}
 MAX_TAG = 999_999
@@ -58,11 +59,9 @@ def catalogue(lines: Lines, tag: int = 0) -> Catalogue:
 
 def top_provenance(top: Top) -> dict[str, Any]:
     """What a top consists of: constants and their source, dipole, weights, notes, and the version of the package."""
-    import rotor
-
     return {
         "program": "rotor",
-        "version": rotor.__version__,
+        "version": version(),
         "name": top.name,
         "kind": top.kind,
         "constants": top.constants.text(),

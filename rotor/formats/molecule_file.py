@@ -13,7 +13,7 @@
     electronic = "even"                 # or "odd": half turns that change places of like nuclei turn the sign of the
                                         # electronic state, as in the 3Σg- of O2 (spin weights of isotopologues need it)
 
-    [constants]                         # named as in rotor.constants
+    [constants]                         # named as in rotor.tops.constants
     unit = "MHz"
     reduction = "S"
     source = "..."
@@ -31,7 +31,7 @@
     mean = 1.45
     anisotropy = 0.1
 
-    [spin_weights]                      # classes of rotor.weights
+    [spin_weights]                      # classes of rotor.tops.spin_weights
     source = "..."
     ee = 1
     eo = 3
@@ -62,12 +62,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor.constants import Constants
-from rotor.inertia import PrincipalFrame, point_masses, principal_frame
+from rotor.geometry.inertia import PrincipalFrame, point_masses, principal_frame
 from rotor.molecules.molecule import ELECTRONIC, Molecule
-from rotor.top import Tensor, kind_from_moments
+from rotor.tops.constants import Constants
+from rotor.tops.kind import kind_from_moments
+from rotor.tops.spin_weights import SpinWeights
+from rotor.tops.top import Tensor
 from rotor.units import parse_quantity
-from rotor.weights import SpinWeights
 
 GEOMETRY_KINDS = ("r0", "rs", "re", "computed")
 _TABLES = ("geometry", "constants", "dipole", "polarizability", "spin_weights", "catalogue")

@@ -6,7 +6,7 @@ import os
 from collections.abc import Mapping
 from typing import Any
 
-from rotor.formats.atomic import open_atomic
+from rotor.formats.atomic_write import open_atomic
 from rotor.formats.molecule_file import MoleculeFile
 
 
@@ -19,7 +19,7 @@ def write_molecule_file(molecule: MoleculeFile, path: str | os.PathLike[str]) ->
 def molecule_file_text(molecule: MoleculeFile) -> str:
     """The TOML text of a molecule; constants in MHz, dipole in D, polarizability in Å³, positions in Å.
 
-    >>> from rotor.constants import Constants
+    >>> from rotor.tops.constants import Constants
     >>> print(molecule_file_text(MoleculeFile("hydrogen chloride", constants=Constants(B=312989.0))))
     name = "hydrogen chloride"
     <BLANKLINE>

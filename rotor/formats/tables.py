@@ -12,15 +12,16 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rotor.formats.atomic import open_atomic
+from rotor.formats.atomic_write import open_atomic
 from rotor.formats.line_tables import provenance, top_provenance, write_frame
-from rotor.tables import Table
+from rotor.table import Table
+from rotor.version import version
 
 if TYPE_CHECKING:
-    from rotor.classical.ensembles import Correlations
-    from rotor.equipartition import Equipartition
+    from rotor.classical.gas.ensembles import Correlations
     from rotor.spectra.raman import RamanLines
     from rotor.spectra.spectrum import Spectrum
+    from rotor.statistics.equipartition import Equipartition
     from rotor.thermo import ThermoFunctions
 
 SUFFIXES = (".csv", ".parquet", ".json")
@@ -47,11 +48,10 @@ def write_table(table: Table, path: str | os.PathLike[str], settings: Mapping[st
 
 def _story(table: Table) -> dict[str, Any]:
     """What the table knows of where it came from."""
-    import rotor
-    from rotor.classical.ensembles import Correlations
-    from rotor.equipartition import Equipartition
+    from rotor.classical.gas.ensembles import Correlations
     from rotor.spectra.raman import RamanLines
     from rotor.spectra.spectrum import Spectrum
+    from rotor.statistics.equipartition import Equipartition
     from rotor.thermo import ThermoFunctions
 
     if isinstance(table, RamanLines):
@@ -60,7 +60,7 @@ def _story(table: Table) -> dict[str, Any]:
         return _spectrum_provenance(table)
     if isinstance(table, ThermoFunctions):
         return thermo_provenance(table)
-    story = {"program": "rotor", "version": rotor.__version__}
+    story = {"program": "rotor", "version": version()}
     if isinstance(table, Correlations | Equipartition):
         story |= _gas_facts(table)
     return story | {"rows": len(next(iter(table.columns.values())))}
@@ -109,7 +109,7 @@ def _spectrum_provenance(spectrum: Spectrum) -> dict[str, Any]:
 
 
 def _gas_facts(table: Correlations | Equipartition) -> dict[str, Any]:
-    from rotor.equipartition import Equipartition
+    from rotor.statistics.equipartition import Equipartition
 
     if isinstance(table, Equipartition):
         return {"accepted": table.accepted, "p_value": table.p_value, "confidence": table.confidence, "kt": table.kt}

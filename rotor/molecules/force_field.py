@@ -1,7 +1,7 @@
 """A harmonic force field: the Hessian of a molecule at its minimum, its vibrations, where it comes from.
 
 Near the minimum the potential is V = ½ xᵀ F x with the 3n displacements x. What the force field says of vibration stands
-here; what it says of rotation in `rotor.distortion`.
+here; what it says of rotation in `rotor.tops.distortion`.
 """
 
 from __future__ import annotations
@@ -14,8 +14,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rotor.arrays import Floats
 from rotor.molecules.molecule import Molecule
 from rotor.units import (
     ATOMIC_MASS_KG,
@@ -24,8 +25,6 @@ from rotor.units import (
     HARTREE_EV,
     SPEED_OF_LIGHT_M_PER_S,
 )
-
-Floats = NDArray[np.float64]
 
 EV_PER_ANGSTROM2 = {  # one of each unit in eV/Å²
     "eV/Å²": 1.0,
@@ -141,7 +140,7 @@ def force_field_from_calculator(
     Raises ValueError where the forces at the geometry exceed `most_force_ev_per_angstrom`: refine it first
     (`rotor.refine`).
     """
-    from rotor.molecules.refine import ase_atoms
+    from rotor.molecules.optimise import ase_atoms
 
     atoms = ase_atoms(molecule)
     atoms.calc = calculator
@@ -211,17 +210,17 @@ def force_field_from_internal(
 ) -> ForceField:
     """The force field of published force constants in internal coordinates, F_x = Bᵀ F B at the minimum.
 
-    coordinates : m functions of the positions (n, 3), from `rotor.molecules.internal`. constants_mdyn_angstrom : (m, m)
+    coordinates : m functions of the positions (n, 3), from `rotor.molecules.internal_coordinates`. constants_mdyn_angstrom : (m, m)
     array; between stretches mdyn/Å, between angles mdyn Å, between both mdyn. Source: Wilson, Decius and Cross (1955),
     § 4-2; B is exact to round-off.
 
-    >>> from rotor.molecules.internal import stretch
+    >>> from rotor.molecules.internal_coordinates import stretch
     >>> co = Molecule(("C", "O"), [[0, 0, 0], [0, 0, 1.1282]])
     >>> field = force_field_from_internal(co, [stretch(0, 1)], [[19.019]])
     >>> round(float(field.vibrations().wavenumbers_cm[0]), 1)
     2169.8
     """
-    from rotor.molecules.internal import wilson_b
+    from rotor.molecules.internal_coordinates import wilson_b
 
     constants = np.asarray(constants_mdyn_angstrom, dtype=np.float64)
     if constants.shape != (len(coordinates),) * 2:

@@ -12,8 +12,9 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rotor.arrays import Floats
 from rotor.molecules.nuclei import Isotope, isotope
 from rotor.units import DEBYE_PER_E_ANGSTROM
 
@@ -21,8 +22,6 @@ _UNTURNED = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 ELECTRONIC = ("even", "odd")  # what half turns do to the electronic state
 CLOSEST_ANGSTROM = 0.1  # no two nuclei of a molecule come nearer; H2 has 0.74 Å
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

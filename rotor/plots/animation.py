@@ -13,9 +13,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rotor.classical.free import FreeMotion
+from rotor.arrays import Floats
+from rotor.classical.free.free_motion import FreeMotion
+from rotor.geometry.rotations import rotate, to_matrix
 from rotor.plots.sphere import MOTION, View, draw_axes, draw_curve, draw_family, draw_sphere, view_of
-from rotor.rotations import Array, rotate, to_matrix
+from rotor.version import version
 
 Names = tuple[str, str, str]
 
@@ -34,7 +36,7 @@ _FACE_COLOURS = ("#0072B2", "#56B4E9", "#A06A92", "#CC79A7", "#009E73", "#7CCBB0
 class Atoms:
     """Atoms to draw: positions (n, 3) in the principal frame about the centre of mass, their symbols, their bonds."""
 
-    positions: Array
+    positions: Floats
     symbols: tuple[str, ...]
 
     @property
@@ -48,7 +50,7 @@ class Atoms:
         return [(int(i), int(j)) for i, j in np.argwhere(near) if i < j]
 
 
-def box_edges(moments: ArrayLike) -> Array:
+def box_edges(moments: ArrayLike) -> Floats:
     """Half edges (3,) of the uniform box of these principal moments, the longest at 1: e_i² ~ I_j + I_k - I_i.
 
     Moments that break the triangle inequality, which no real body has, give a plate.
@@ -126,9 +128,7 @@ def animate(
 @contextmanager
 def _filmed(figure: Any, path: Path, provenance: Mapping[str, Any]) -> Iterator[Callable[[], None]]:
     """A function that adds the figure, as it is then, to a film; at the end the film is written, with what made it."""
-    import rotor
-
-    story = json.dumps({"program": "rotor", "version": rotor.__version__, **provenance})  # ASCII, as a gif demands
+    story = json.dumps({"program": "rotor", "version": version(), **provenance})  # ASCII, as a gif demands
     if path.suffix.lower() == ".mp4":
         from matplotlib.animation import FFMpegWriter
 
@@ -173,7 +173,7 @@ def _with_backdrop(figure: Any) -> tuple[Any, Any]:
     return stage, places
 
 
-def _upright(momentum: Array) -> Array:
+def _upright(momentum: Floats) -> Floats:
     """The rotation (3, 3) of space that brings L to the vertical, by the shortest way."""
     unit = momentum / np.linalg.norm(momentum)
     half_way = unit + np.array([0.0, 0.0, 1.0])
@@ -184,7 +184,7 @@ def _upright(momentum: Array) -> Array:
     return np.asarray(np.diag([-1.0, -1.0, 1.0]) @ half_turn)
 
 
-def _draw_still_parts(axes: Any, view: View, moments: Array, path_of_l: Array, names: Names) -> None:
+def _draw_still_parts(axes: Any, view: View, moments: Floats, path_of_l: Floats, names: Names) -> None:
     draw_sphere(axes)
     axes.set(xlim=(-LIMIT, LIMIT), ylim=(-LIMIT, LIMIT))
     draw_family(axes, view, moments)
@@ -200,7 +200,7 @@ def _draw_momentum(axes: Any) -> None:
     axes.text(up[0] + 0.09, up[1] - 0.03, "$L$", color="0.35", va="center")
 
 
-def _draw_box(axes: Any, moments: Array, turned: Array) -> list[Any]:
+def _draw_box(axes: Any, moments: Floats, turned: Floats) -> list[Any]:
     """The faces that the eye sees of the box of these moments; `turned` (3, 3) takes body axes to right, up, eye."""
     edges = np.maximum(box_edges(moments), 0.03)  # a plate or a rod stays visible
     corners = _CORNERS * (1.15 * edges / np.linalg.norm(edges)) @ turned.T
@@ -211,7 +211,7 @@ def _draw_box(axes: Any, moments: Array, turned: Array) -> list[Any]:
     ]
 
 
-def _draw_atoms(axes: Any, atoms: Atoms, turned: Array) -> list[Any]:
+def _draw_atoms(axes: Any, atoms: Atoms, turned: Floats) -> list[Any]:
     """Balls and sticks from the back to the front."""
     from ase.data import atomic_numbers, covalent_radii
     from ase.data.colors import jmol_colors

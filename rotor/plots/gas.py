@@ -10,11 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from rotor.classical.ensembles import Correlations
-from rotor.equipartition import Equipartition
+from rotor.classical.gas.ensembles import Correlations
 from rotor.plots.spectrum import BLUE, DPI, GREY, SIZE_INCHES, STYLE
 from rotor.spectra.spectrum import Spectrum
+from rotor.statistics.equipartition import Equipartition
 from rotor.units import MHZ_PER_CM
+from rotor.version import version
 
 ORANGE, GREEN = "#D55E00", "#009E73"  # of Okabe and Ito's palette
 
@@ -133,9 +134,7 @@ def _draw_curves(axes: Any, curves: Correlations, title: str, plateau: float | N
 
 def _metadata(suffix: str, title: str, facts: Mapping[str, Any]) -> dict[str, Any]:
     """Provenance by the keys that each format has; no date, so that the same picture is the same file."""
-    import rotor
-
-    story, program = json.dumps(dict(facts), ensure_ascii=False), f"rotor {rotor.__version__}"
+    story, program = json.dumps(dict(facts), ensure_ascii=False), f"rotor {version()}"
     if suffix == ".png":
         return {"Software": program, "Title": title, "Description": story}
     if suffix == ".pdf":

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from rotor.plots.spectrum import DPI, SIZE_INCHES, STYLE, formula_text
 from rotor.thermo import ThermoFunctions
-from rotor.top import Top
+from rotor.tops.top import Top
+from rotor.version import version
 
 # of Okabe and Ito's palette, told apart by everyone
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
@@ -150,10 +151,8 @@ def _highest(panel: Panel, classical: float) -> float:
 
 def _metadata(suffix: str, panels: Sequence[Panel], provenance: Mapping[str, Any]) -> dict[str, Any]:
     """What made the picture, under the names that each format allows; no date, so that the same picture is the same file."""
-    import rotor
-
     curves = {panel.title: list(panel.curves) for panel in panels}
-    story = {"program": "rotor", "version": rotor.__version__, "curves": curves, **provenance}
+    story = {"program": "rotor", "version": version(), "curves": curves, **provenance}
     text = json.dumps(story, ensure_ascii=False)
     if suffix == ".pdf":
         return {"Title": "heat capacity", "Subject": text, "CreationDate": None}

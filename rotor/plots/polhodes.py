@@ -12,9 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rotor.classical.free import FreeMotion
+from rotor.arrays import Floats
+from rotor.classical.free.free_motion import FreeMotion
 from rotor.plots.sphere import LARGE, MIDDLE, MOTION, SMALL, draw_axes, draw_curve, draw_family, draw_sphere, view_of
-from rotor.rotations import Array
+from rotor.version import version
 
 POINTS = 1500  # of a curve
 MOST_PERIODS = 12  # in the diagram over time; more would be a solid band
@@ -86,9 +87,7 @@ def plot_polhodes(
 
 def _metadata(suffix: str, title: str, provenance: Mapping[str, Any]) -> dict[str, Any]:
     """What made the picture, under the names that each format allows; no date, so that the same picture is the same file."""
-    import rotor
-
-    story = json.dumps({"program": "rotor", "version": rotor.__version__, **provenance}, ensure_ascii=False)
+    story = json.dumps({"program": "rotor", "version": version(), **provenance}, ensure_ascii=False)
     title = title or "polhodes"
     if suffix == ".pdf":
         return {"Title": title, "Subject": story, "CreationDate": None}
@@ -116,7 +115,7 @@ def _style() -> Any:
     )
 
 
-def _shown(motion: FreeMotion, times: Array) -> tuple[tuple[float, float], bool]:
+def _shown(motion: FreeMotion, times: Floats) -> tuple[tuple[float, float], bool]:
     """First and last time of the diagrams; a long motion is shown for its first periods."""
     first, last = float(times.min()), float(times.max())
     rhythm = float(motion.period) if np.isfinite(motion.period) else math.inf
@@ -124,7 +123,7 @@ def _shown(motion: FreeMotion, times: Array) -> tuple[tuple[float, float], bool]
     return (first, first + MOST_PERIODS * rhythm if cut else last), cut
 
 
-def _draw_left(axes: Any, motion: FreeMotion, path: Array, names: tuple[str, str, str]) -> None:
+def _draw_left(axes: Any, motion: FreeMotion, path: Floats, names: tuple[str, str, str]) -> None:
     view = view_of(motion.moments, path[0])
     draw_sphere(axes)
     draw_family(axes, view, motion.moments)
@@ -134,7 +133,7 @@ def _draw_left(axes: Any, motion: FreeMotion, path: Array, names: tuple[str, str
     axes.legend(loc="lower center", bbox_to_anchor=(0.5, -0.09), ncols=2, frameon=False, handlelength=1.6)
 
 
-def _draw_direction(axes: Any, view: Any, path: Array) -> None:
+def _draw_direction(axes: Any, view: Any, path: Floats) -> None:
     """A dot at the start, and an arrow on the visible part of the path nearest to the eye."""
     x, y = view.flat(path[0])
     hidden = view.depth(path[0]) < 0.0
@@ -159,7 +158,7 @@ def _mark_period(axes: Any, first: float, last: float, period: float) -> None:
         axes.text(first + period, -1.0, " period", fontsize=8, color="0.4", ha="left", va="center")
 
 
-def _draw_right(axes: Any, moments: Array, times: Array, path: Array, names: tuple[str, str, str]) -> None:
+def _draw_right(axes: Any, moments: Floats, times: Floats, path: Floats, names: tuple[str, str, str]) -> None:
     rank = np.argsort(np.argsort(moments, kind="stable"))
     for axis, name in enumerate(names):
         colour = (SMALL, MIDDLE, LARGE)[rank[axis]]

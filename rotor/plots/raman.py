@@ -11,7 +11,8 @@ import numpy as np
 
 from rotor.plots.spectrum import BLUE, DPI, GREY, MOST_VECTOR_STICKS, SIZE_INCHES, STYLE, VISIBLE, formula_text
 from rotor.spectra.raman import RamanLines
-from rotor.top import Top
+from rotor.tops.top import Top
+from rotor.version import version
 
 
 def plot_raman(
@@ -70,8 +71,6 @@ def _name(top: Top) -> str:
 
 def _metadata(suffix: str, lines: RamanLines, more: Mapping[str, Any]) -> dict[str, Any]:
     """Provenance by the keys that each format has; no date, so that the same picture is the same file."""
-    import rotor
-
     top = lines.top
     facts = {
         **more,
@@ -83,7 +82,7 @@ def _metadata(suffix: str, lines: RamanLines, more: Mapping[str, Any]) -> dict[s
         "jmax": lines.jmax,
     }
     story = "; ".join(f"{name}: {value}" for name, value in facts.items())
-    program, title = f"rotor {rotor.__version__}", _title(lines).replace("$", "")
+    program, title = f"rotor {version()}", _title(lines).replace("$", "")
     if suffix == ".png":
         return {"Software": program, "Title": title, "Description": story}
     if suffix == ".pdf":

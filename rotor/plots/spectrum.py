@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rotor.arrays import Floats
 from rotor.spectra.lines import Lines
 from rotor.spectra.spectrum import Spectrum, line_widths
-
-Floats = NDArray[np.float64]
+from rotor.version import version
 
 BLUE, GREY = "#0072B2", "#555555"  # of Okabe and Ito's palette, told apart by everyone
 STYLE: dict[Any, Any] = {
@@ -321,8 +321,6 @@ def _label(axes: Any, lines: Lines, row: int, height: float, x: _Axis) -> Any:
 
 def _metadata(suffix: str, thing: Lines | Spectrum, lines: Lines | None, more: Mapping[str, Any]) -> dict[str, Any]:
     """Provenance by the keys that each format has; no date, so that the same picture is the same file."""
-    import rotor
-
     facts = dict(more)
     if lines is not None:
         top = lines.top
@@ -341,7 +339,7 @@ def _metadata(suffix: str, thing: Lines | Spectrum, lines: Lines | None, more: M
         facts |= {"profile": thing.profile, "fwhm_mhz": thing.fwhm_mhz}
     title = _title(thing, lines).replace("$", "")
     story = "; ".join(f"{name}: {value}" for name, value in facts.items())
-    program = f"rotor {rotor.__version__}"
+    program = f"rotor {version()}"
     if suffix == ".png":
         return {"Software": program, "Title": title, "Description": story}
     if suffix == ".pdf":

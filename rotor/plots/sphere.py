@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rotor.classical.polhodes import centre_axis, even_levels, polhode, separatrix
-from rotor.rotations import Array
+from rotor.arrays import Floats
+from rotor.classical.free.polhodes import centre_axis, even_levels, polhode, separatrix
 
 # colours that the colour-blind tell apart (Okabe and Ito): about the axis of smallest moment, of largest, the motion
 SMALL, MIDDLE, LARGE, MOTION = "#0072B2", "#A06A92", "#009E73", "#D55E00"
@@ -20,18 +20,18 @@ _RIM, _HIDDEN = "#9A9A9A", 0.22
 class View:
     """A direction of sight: rows of `axes` (3, 3) are right, up and towards the eye, in body axes."""
 
-    axes: Array
+    axes: Floats
 
-    def flat(self, points: ArrayLike) -> Array:
+    def flat(self, points: ArrayLike) -> Floats:
         """Right and up, (..., 2), of points (..., 3) seen from far away."""
         return np.asarray(np.asarray(points) @ self.axes[:2].T)
 
-    def depth(self, points: ArrayLike) -> Array:
+    def depth(self, points: ArrayLike) -> Floats:
         """How far points are in front of the centre, (...)."""
         return np.asarray(np.asarray(points) @ self.axes[2])
 
 
-def view_of(moments: Array, start: Array) -> View:
+def view_of(moments: Floats, start: Floats) -> View:
     """A view that shows all three axes and has the unit vector `start` on the front, largest moment upright.
 
     The intermediate axis points at the reader more than the other two: there the separatrix crosses itself.
@@ -62,7 +62,7 @@ def draw_sphere(axes: Any) -> None:
     axes.axis("off")
 
 
-def draw_curve(axes: Any, view: View, curve: Array, **style: Any) -> None:
+def draw_curve(axes: Any, view: View, curve: Floats, **style: Any) -> None:
     """A curve (n, 3) on the sphere: its visible parts in full, its hidden ones faint and thin."""
     flat, front = view.flat(curve), view.depth(curve) >= 0.0
     width = style.pop("linewidth", 1.0)
@@ -74,7 +74,7 @@ def draw_curve(axes: Any, view: View, curve: Array, **style: Any) -> None:
         axes.plot(x, y, alpha=strength, linewidth=thick, solid_capstyle="round", label=name, **style)
 
 
-def draw_family(axes: Any, view: View, moments: Array, per_side: int = 5) -> None:
+def draw_family(axes: Any, view: View, moments: Floats, per_side: int = 5) -> None:
     """Polhodes on both sides of the separatrix, in the colour of the axis that they go round, and the separatrix.
 
     A symmetric top has circles and an equator of points at rest, drawn dotted; a spherical or linear body has no polhodes.
@@ -95,7 +95,7 @@ def draw_family(axes: Any, view: View, moments: Array, per_side: int = 5) -> Non
         _draw_equator(axes, view, int(np.argmax(moments) if values[0] == values[1] else np.argmin(moments)))
 
 
-def draw_axes(axes: Any, view: View, moments: Array, names: tuple[str, str, str]) -> None:
+def draw_axes(axes: Any, view: View, moments: Floats, names: tuple[str, str, str]) -> None:
     """The ends of the principal axes: filled where spin about them is stable, open where it is not, and their names."""
     values = np.sort(moments)
     for axis, name in enumerate(names):
@@ -118,7 +118,7 @@ def draw_axes(axes: Any, view: View, moments: Array, names: tuple[str, str, str]
         axes.text(*view.flat(1.2 * positive) + 0.075 * _outward(tip), f"${name}$", ha="center", va="center", zorder=7)
 
 
-def _outward(point: Array) -> Array:
+def _outward(point: Floats) -> Floats:
     return np.asarray(point / max(float(np.linalg.norm(point)), 1e-12))
 
 

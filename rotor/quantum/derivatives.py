@@ -19,15 +19,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor.quantum.clusters import tensor_eigenvalues
+from rotor.arrays import Floats
+from rotor.quantum.effects.watson import operators_by_name
 from rotor.quantum.levels import Levels
-from rotor.quantum.watson import operators_by_name
-from rotor.terms import Powers
+from rotor.quantum.spherical_top import tensor_eigenvalues
+from rotor.tops.operators import Powers
 
 if TYPE_CHECKING:
-    from rotor.top import Top
+    from rotor.tops.top import Top
 
-Floats = NDArray[np.float64]
 Rows = NDArray[np.integer]
 
 _AT_ONCE = 1 << 22  # coefficients that are gathered at a time: 32 MB
@@ -43,7 +43,7 @@ def level_derivatives(top: Top, levels: Levels, names: Sequence[str] | None = No
     for levels of an asymmetric top that were solved without vectors.
 
     >>> from rotor.quantum.levels import solve_levels
-    >>> from rotor.top import Top
+    >>> from rotor.tops.top import Top
     >>> top = Top.from_constants("A=10 B=6 C=4 MHz")
     >>> level_derivatives(top, solve_levels(top, 1)).round(12).tolist()[1:]
     [[0.0, 1.0, 1.0], [1.0, 1.0, 0.0], [1.0, 0.0, 1.0]]

@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor.effects import QuantumEffect
+from rotor.arrays import Floats, Ints
 from rotor.quantum.basis import WangBlock, ka_kc, wang_blocks
-from rotor.quantum.clusters import DIMENSION, scalar_and_tensor, tensor_eigenvalues
-from rotor.quantum.watson import (
+from rotor.quantum.effect import QuantumEffect
+from rotor.quantum.effects.watson import (
     Centrifugal,
     Multiplet,
     Rigid,
@@ -26,15 +26,14 @@ from rotor.quantum.watson import (
     rigid_operators,
     scalar_energy,
 )
-from rotor.tables import Table
-from rotor.terms import Operators
-from rotor.weights import SpinWeights
+from rotor.quantum.spherical_top import DIMENSION, scalar_and_tensor, tensor_eigenvalues
+from rotor.table import Table
+from rotor.tops.operators import Operators
+from rotor.tops.spin_weights import SpinWeights
 
 if TYPE_CHECKING:
-    from rotor.top import Top
+    from rotor.tops.top import Top
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 SEMI_RIGID: tuple[QuantumEffect, ...] = (Rigid(), Centrifugal())
 
@@ -184,7 +183,7 @@ def solve_levels(
     executor: any `concurrent.futures.Executor`; J are spread over it. Energies are true eigenvalues of the truncated
     effective Hamiltonian; nothing is treated to first order. Raises ValueError for a J max below zero.
 
-    >>> from rotor.top import Top
+    >>> from rotor.tops.top import Top
     >>> levels = solve_levels(Top.from_constants("A=10 B=6 C=4 MHz"), 1)
     >>> levels.energy_mhz.tolist(), levels.ka.tolist(), levels.kc.tolist()
     ([0.0, 10.0, 16.0, 14.0], [0, 0, 1, 1], [0, 1, 0, 1])

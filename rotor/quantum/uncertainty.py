@@ -16,14 +16,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rotor.arrays import Floats
 from rotor.quantum.derivatives import level_derivatives
 from rotor.quantum.levels import Levels
 
 if TYPE_CHECKING:
-    from rotor.constants import Constants
-    from rotor.top import Top
+    from rotor.tops.constants import Constants
+    from rotor.tops.top import Top
 
-Floats = NDArray[np.float64]
 
 _AT_ONCE = 1 << 16  # lines whose rows are gathered at a time
 _NEGATIVE = 1e-4  # a correlation matrix printed with few digits has eigenvalues below zero by so much
@@ -109,9 +109,9 @@ def level_spread(top: Top, levels: Levels, covariance: Covariance) -> Floats:
 def level_errors(top: Top, levels: Levels, covariance: Covariance) -> Floats:
     """One standard deviation of every level's energy, (levels,) in MHz, against the Hamiltonian's zero.
 
-    >>> from rotor.constants import Constants
+    >>> from rotor.tops.constants import Constants
     >>> from rotor.quantum.levels import solve_levels
-    >>> from rotor.top import Top
+    >>> from rotor.tops.top import Top
     >>> top = Top(Constants(B=6000.0, uncertainties={"B": 0.1}))
     >>> covariance = Covariance.of_uncertainties(top.constants)
     >>> level_errors(top, solve_levels(top, 2), covariance).round(9).tolist()

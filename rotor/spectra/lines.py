@@ -19,18 +19,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor import units
+from rotor.arrays import Floats, Ints
+from rotor.quantum.convergence import warnings_of
 from rotor.quantum.levels import Levels, PairsOfLevels, solve_levels
-from rotor.quantum.reliability import warnings_of
 from rotor.quantum.uncertainty import Covariance, level_spread, line_errors
 from rotor.spectra.reach import jmax_for_cut
 from rotor.spectra.transitions import IntensityCut, all_transitions
 from rotor.thermo import PartitionFunction, VibrationalStates, partition_function
 
 if TYPE_CHECKING:
-    from rotor.top import Top
+    from rotor.tops.top import Top
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 INTENSITY_NM2_MHZ = (
     4.16231e-5  # 8π³/3hc for MHz and D² as catalogues use it; CODATA 2022 gives 4.16238e-5 (7e-6 in log10)
@@ -210,7 +209,7 @@ def line_list(
     Neglected: all but electric dipole, nuclear hyperfine structure, vibrational states, dependence of μ on J.
     Raises ValueError where the top has no known dipole, for a temperature not above 0, and for J max below 0.
 
-    >>> from rotor.top import Top
+    >>> from rotor.tops.top import Top
     >>> lines = line_list(Top.from_constants("B=57635.968 MHz", dipole_abc_debye=(0.11, 0, 0)), jmax=2)
     >>> [round(float(f), 3) for f in lines.frequency_mhz]
     [115271.936, 230543.872]

@@ -13,13 +13,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotor import units
+from rotor.arrays import Floats
 from rotor.spectra.lines import Lines
 from rotor.spectra.spectrum import Spectrum, line_peaks
-
-Floats = NDArray[np.float64]
 
 OPTICAL_DEPTH = "optical depth"
 NM2_IN_CM2 = 1e-14
@@ -52,7 +50,7 @@ def line_optical_depth(
     given. Raises ValueError for a pressure or a path not above 0, and for a Doppler width without a mass.
 
     >>> from rotor.spectra.lines import line_list
-    >>> from rotor.top import Top
+    >>> from rotor.tops.top import Top
     >>> rod = Top.from_constants("B=57635.968 MHz", dipole_abc_debye=(0.11011, 0, 0))
     >>> depth = line_optical_depth(line_list(rod, jmax=1), 1e-3, 100.0, fwhm_mhz=10.0)
     >>> [f"{x:.2e}" for x in depth]

@@ -8,11 +8,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from rotor import units
-
-Floats = NDArray[np.float64]
+from rotor.arrays import Floats
 
 _SIGMA_PER_FWHM = 1 / (2 * math.sqrt(2 * math.log(2)))
 

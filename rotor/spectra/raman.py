@@ -22,18 +22,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor import units
+from rotor.arrays import Floats, Ints
+from rotor.quantum.convergence import warnings_of
 from rotor.quantum.levels import Levels, PairsOfLevels, solve_levels
-from rotor.quantum.reliability import warnings_of
 from rotor.spectra.lines import partition_of
 from rotor.spectra.raman_strengths import RamanTransitions, anisotropy_squared, raman_transitions
 from rotor.spectra.reach import JMAX_DEFAULT_LIMIT
 from rotor.thermo import PartitionFunction, VibrationalStates, partition_function
 
 if TYPE_CHECKING:
-    from rotor.top import Tensor, Top
+    from rotor.tops.top import Tensor, Top
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 ANGSTROM6_IN_CM6 = 1e-48
 NM_PER_CM = 1e7
@@ -166,7 +165,7 @@ def raman_lines(
     Neglected: the dependence of the polarizability on J (0.2 % per J of H2, less of all others) and on the wavelength,
     lines of vibrational states, electron spin (the lines of O2 are triplets, resolved at 0.1 cm⁻¹ only for the lowest N).
 
-    >>> from rotor.top import Top
+    >>> from rotor.tops.top import Top
     >>> rod = Top.from_constants("B=2 cm-1", polarizability_abc_angstrom3=((2.2, 0, 0), (0, 1.5, 0), (0, 0, 1.5)))
     >>> raman_lines(rod, jmax=3).shift_cm.round(6).tolist()  # 4B(J + 3/2) = 12, 20
     [-20.0, -12.0, 12.0, 20.0]

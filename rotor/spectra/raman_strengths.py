@@ -20,12 +20,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rotor.arrays import Floats, Ints
 from rotor.quantum.basis import REPRESENTATIONS, wang_blocks
 from rotor.quantum.levels import Levels, SolvedBlock
-from rotor.weights import SpinWeights
+from rotor.tops.spin_weights import SpinWeights
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 Parts = dict[int, float]  # α_2q by q, up to a common phase
 
 NO_WEIGHTS = SpinWeights()

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from rotor import units
 
 if TYPE_CHECKING:
-    from rotor.top import Top
+    from rotor.tops.top import Top
 
 JMAX_DEFAULT_LIMIT = 600
 USUAL_CUT = -12.0

@@ -13,11 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rotor.arrays import Floats
 from rotor.spectra.lines import Lines
 from rotor.spectra.profiles import doppler_fwhm, gaussian, gaussian_reach, lorentzian, lorentzian_reach, voigt
-from rotor.tables import Table
-
-Floats = NDArray[np.float64]
+from rotor.table import Table
 
 # Fraction of the area of a line that may lie outside of the points it is computed at: 3 widths of a Gaussian, but
 # 3183 of a Lorentzian, whose wings fall as 1/x².
@@ -92,7 +91,7 @@ class Spectrum(Table):
         Neglected: Dicke narrowing, line mixing, and the change of the radiation factor across a line.
 
         >>> from rotor.spectra.lines import line_list
-        >>> from rotor.top import Top
+        >>> from rotor.tops.top import Top
         >>> lines = line_list(Top.from_constants("B=57635.968 MHz", dipole_abc_debye=(0.11, 0, 0)), jmax=1)
         >>> grid = np.linspace(115270, 115274, 401)
         >>> spectrum = Spectrum.from_lines(lines, grid, fwhm_mhz=0.5)

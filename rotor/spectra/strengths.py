@@ -17,12 +17,10 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotor.arrays import Floats
 from rotor.quantum.basis import WangBlock
 from rotor.quantum.levels import Levels, SolvedBlock
-
-Floats = NDArray[np.float64]
 
 _AXIS_OF_PRODUCT = {"eo": "a", "oe": "c", "oo": "b"}  # parities of (ΔKa, ΔKc) -> component
 

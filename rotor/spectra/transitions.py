@@ -11,12 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rotor.arrays import Floats, Indices
 from rotor.quantum.basis import REPRESENTATIONS
 from rotor.quantum.levels import Levels
 from rotor.spectra.strengths import PairOfBlocks, allowed_pairs, amplitudes
 
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int32]
 EVERYTHING = (0.0, float("inf"))
 LONG_LIST = 1_000_000  # lines above which the compiled loop is loaded
 

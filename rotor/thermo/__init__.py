@@ -3,7 +3,7 @@
 A module for each: `sums`, `classical`, `species`, `vibration` and `functions`, which brings them together.
 """
 
-from rotor.thermo.classical import (
+from rotor.thermo.classical_limit import (
     ClassicalLimit,
     classical_limit,
     classical_partition_function,
@@ -18,8 +18,8 @@ from rotor.thermo.functions import (
     thermodynamic_functions,
     translational_entropy,
 )
+from rotor.thermo.level_sums import LevelSums, PartitionFunction, level_sums, partition_function, partition_functions
 from rotor.thermo.species import implied_symmetry_number, spin_species
-from rotor.thermo.sums import LevelSums, PartitionFunction, level_sums, partition_function, partition_functions
 from rotor.thermo.vibration import VibrationalStates, vibrational_functions, vibrational_partition_function
 
 __all__ = [

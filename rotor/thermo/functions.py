@@ -1,6 +1,6 @@
 """Thermodynamic functions of a gas of tops: rotation by the quantum sum and classically, vibration, and the ideal gas.
 
-Rotation, from the sums of `rotor.thermo.sums`: U = RT ⟨x⟩, S = R ln Q + U/T, C_v. Energies count from the lowest level that
+Rotation, from the sums of `rotor.thermo.level_sums`: U = RT ⟨x⟩, S = R ln Q + U/T, C_v. Energies count from the lowest level that
 exists in the molecule, whatever its species, so that ortho hydrogen has the 1.42 kJ/mol of its lowest level at 0 K.
 
 Species that are frozen in a ratio x_s are a mixture of gases: U and C_v are means, and ln q = Σ x_s ln(q_s/x_s), whose last
@@ -26,17 +26,17 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rotor import units
-from rotor.tables import Table
-from rotor.thermo.classical import classical_limit
+from rotor.arrays import Floats
+from rotor.table import Table
+from rotor.thermo.classical_limit import classical_limit
+from rotor.thermo.level_sums import LevelSums, checked_temperatures, level_sums, lowest_level_k
 from rotor.thermo.species import implied_symmetry_number, spin_species
-from rotor.thermo.sums import LevelSums, checked_temperatures, level_sums, lowest_level_k
 from rotor.thermo.vibration import VibrationalStates, vibrational_functions
-from rotor.weights import SpinWeights
+from rotor.tops.spin_weights import SpinWeights
 
 if TYPE_CHECKING:
-    from rotor.top import Top
+    from rotor.tops.top import Top
 
-Floats = NDArray[np.float64]
 
 AT_WORST = 1e-4  # truncation error up to which sums that end where the distortion constants do are taken
 GAS_CONSTANT = units.BOLTZMANN_J_PER_K * units.AVOGADRO_PER_MOL  # J/(mol K), exact
@@ -113,7 +113,7 @@ class ThermoFunctions(Table):
 def species_names(top: Top) -> list[str]:
     """What `thermodynamic_functions` takes as species of this top.
 
-    >>> from rotor.top import Top
+    >>> from rotor.tops.top import Top
     >>> species_names(Top.from_constants("B=60 cm-1", spin_weights={"even": 1, "odd": 3}))
     ['equilibrium', 'normal', 'para', 'ortho']
     """
@@ -152,7 +152,7 @@ def thermodynamic_functions(
     ValueError
         A temperature not above 0 K, a species that the molecule has not, no mass; distortion beyond its reach.
 
-    >>> from rotor.top import Top
+    >>> from rotor.tops.top import Top
     >>> found = thermodynamic_functions(Top.from_constants("B=10 cm-1"), [5.0, 300.0])
     >>> [round(float(x), 4) for x in found.cv_over_r]  # 3x² e⁻ˣ/(1 + 3e⁻ˣ)², x = 2Θ/T; 1 + (Θ/T)²/45
     [0.3088, 1.0001]

@@ -11,11 +11,10 @@ import re
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from rotor import units
-
-Floats = NDArray[np.float64]
+from rotor.arrays import Floats
 
 
 @dataclass(frozen=True)

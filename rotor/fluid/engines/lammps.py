@@ -18,11 +18,11 @@ from typing import IO
 import numpy as np
 
 from rotor import units
+from rotor.arrays import Floats
+from rotor.fluid.engines.engine_input import Frame, Scene, rigid_motion
 from rotor.fluid.engines.lammps_input import data_file, input_file, table_file
-from rotor.fluid.engines.pairs import Form, tail_of
-from rotor.fluid.engines.scene import Frame, Scene, rigid_motion
+from rotor.fluid.engines.pair_tables import Form, tail_of
 from rotor.fluid.settings import Settings
-from rotor.rotations import Array
 from rotor.units import EV_PER_ANGSTROM3_BAR
 
 RUN = (sys.executable, "-m", "rotor.fluid.engines._lammps_run")
@@ -138,7 +138,7 @@ def _read(stream: IO[bytes], scene: Scene, tail: tuple[float, float]) -> Iterato
         yield Frame(int(step), positions[scene.real], motion, potential + tail[0], bath, pressure)
 
 
-def _doubles(stream: IO[bytes], count: int) -> Array | None:
+def _doubles(stream: IO[bytes], count: int) -> Floats | None:
     """So many doubles; None at the end of the stream."""
     data = stream.read(8 * count)
     return np.frombuffer(data) if len(data) == 8 * count else None

@@ -14,12 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor import units
-from rotor.fluid.engines.pairs import Form, pair_energy
-from rotor.fluid.engines.scene import Ints, Scene
-from rotor.fluid.interactions import mixed
-from rotor.fluid.models import Site
+from rotor.arrays import Floats, Ints
+from rotor.fluid.engines.engine_input import Scene
+from rotor.fluid.engines.pair_tables import Form, pair_energy
+from rotor.fluid.forces.interactions import mixed
+from rotor.fluid.forces.models import Site
 from rotor.fluid.settings import Settings
-from rotor.rotations import Array
 
 MASSLESS_U = 1e-10
 TABLE_POINTS, TABLE_FROM_ANGSTROM = 20_000, 0.6
@@ -33,7 +33,7 @@ class SiteTypes:
     """
 
     sites: tuple[Site, ...]
-    masses: Array
+    masses: Floats
     of_species: tuple[Ints, ...]
 
 

@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 
 from rotor import units
-from rotor.fluid.engines.carriers import Carriers, carriers_of
-from rotor.fluid.engines.pairs import Form, tail_of
-from rotor.fluid.engines.scene import Frame, Ints, Motion, Scene, point_velocities, rigid_motion
+from rotor.arrays import Floats, Ints
+from rotor.fluid.engines.engine_input import Frame, Motion, Scene, point_velocities, rigid_motion
+from rotor.fluid.engines.equimomental import Carriers, carriers_of
+from rotor.fluid.engines.pair_tables import Form, tail_of
 from rotor.fluid.settings import Settings
-from rotor.rotations import Array
 from rotor.units import EV_PER_ANGSTROM3_BAR
 
 KJ_PER_EV = units.ELEMENTARY_CHARGE_C * units.AVOGADRO_PER_MOL * 1e-3
@@ -39,9 +39,9 @@ class Handed:
     barostat: Any
     carriers: Ints
     owners: Ints
-    masses: Array
+    masses: Floats
     atoms: Ints
-    positions: Array
+    positions: Floats
 
 
 def load() -> Any:
@@ -66,7 +66,7 @@ def handed(scene: Scene, settings: Settings, form: Form, accuracy: float) -> Han
     carriers: list[int] = []
     owners: list[int] = []
     atoms: list[int] = []
-    positions: list[Array] = []
+    positions: list[Floats] = []
     for molecule, kind in enumerate(scene.kinds):
         plan, model, first = plans[kind], scene.species[kind].model, system.getNumParticles()
         here = scene.site_positions[scene.first_sites[molecule] :][: len(model.sites)]
@@ -132,7 +132,7 @@ def _add_molecule(mm: Any, system: Any, force: Any, plan: Carriers, model: Any) 
     return site_at
 
 
-def _virtual_site(mm: Any, plan: Carriers, first: int, place: Array) -> Any:
+def _virtual_site(mm: Any, plan: Carriers, first: int, place: Floats) -> Any:
     """A site without mass that follows the carriers."""
     points = list(range(first, first + len(plan.places)))
     if plan.rank == 3:
@@ -148,9 +148,9 @@ def _virtual_site(mm: Any, plan: Carriers, first: int, place: Array) -> Any:
     return kind(*points, *weights)
 
 
-def _laid(plan: Carriers, sites: Array, here: Array) -> Array:
+def _laid(plan: Carriers, sites: Floats, here: Floats) -> Floats:
     """Where the carriers are in the box, from where the sites (model's axes, box) are."""
-    from rotor.superpose import superpose
+    from rotor.geometry.superposition import superpose
 
     return superpose(sites, here).apply(plan.places)
 
@@ -184,7 +184,7 @@ class Session:
         """The step in Å √(u/eV)."""
         return self.settings.step_fs / 1000 / units.CLASSICAL_TIME_PS
 
-    def state(self) -> tuple[Array, Motion, float]:
+    def state(self) -> tuple[Floats, Motion, float]:
         """Positions (particles, 3) Å, motion of the molecules as OpenMM's velocities have it, potential energy eV."""
         got = self.context.getState(positions=True, velocities=True, forces=True, energy=True)
         mine = self.handed
@@ -195,7 +195,7 @@ class Session:
         motion = rigid_motion(mine.owners, mine.masses, positions[at], velocities[at], forces[at])
         return positions, motion, got.getPotentialEnergy()._value / KJ_PER_EV
 
-    def start(self, velocities: Array) -> None:
+    def start(self, velocities: Floats) -> None:
         """Set velocities (carriers, 3) of the first step; a leapfrog is given those half a step before."""
         mine = self.handed
         full = np.zeros_like(mine.positions)

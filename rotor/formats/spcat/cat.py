@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor.formats.atomic import open_atomic
+from rotor.formats.atomic_write import open_atomic
 from rotor.formats.spcat.catalogue import DTYPES, Catalogue, Layout
 from rotor.formats.spcat.fields import BLANK
 from rotor.formats.spcat.line import Record, error_cap, read_record, spell_record, width_of

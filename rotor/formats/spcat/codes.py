@@ -17,9 +17,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
-from rotor.constants import RIGID, Constants
 from rotor.formats.spcat.par import Options, Parameter, ParameterFile
-from rotor.terms import powers_of_spelled
+from rotor.tops.constants import RIGID, Constants
+from rotor.tops.operators import powers_of_spelled
 
 NOT_YET = "is read but not computed yet"
 

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor import units
+from rotor.arrays import Floats
 from rotor.formats.spcat.catalogue import DTYPES, Catalogue
 from rotor.formats.spcat.fields import BLANK
 
-Floats = NDArray[np.float64]
 Rows = NDArray[np.int64]
 
 TWIN_MHZ = 2e-4  # lines of one label closer than this are components of one line: two digits of print

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor.formats.atomic import open_atomic
+from rotor.formats.atomic_write import open_atomic
 from rotor.formats.spcat.fields import BLANK, read_decimal, read_whole
 from rotor.formats.spcat.freeform import Line, encode, read_lines
 

@@ -6,7 +6,7 @@ import os
 from dataclasses import dataclass, field
 from typing import Any
 
-from rotor.formats.atomic import open_atomic
+from rotor.formats.atomic_write import open_atomic
 from rotor.formats.spcat.freeform import Line, encode, number, read_lines, read_words, whole
 
 

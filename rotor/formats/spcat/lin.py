@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor.formats.atomic import open_atomic
+from rotor.formats.atomic_write import open_atomic
 from rotor.formats.spcat.fields import BLANK, read_whole
 from rotor.formats.spcat.freeform import Line, encode, number, read_lines, read_words
 from rotor.units import MHZ_PER_CM

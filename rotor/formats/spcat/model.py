@@ -6,12 +6,12 @@ from collections.abc import Mapping
 from functools import reduce
 from math import gcd
 
-from rotor.constants import Constants
 from rotor.formats.spcat.codes import NOT_YET, constants_of, is_linear, parameters_of
 from rotor.formats.spcat.int_file import Dipole, IntensityFile, Request
 from rotor.formats.spcat.par import Header, Options, ParameterFile
-from rotor.top import Top
-from rotor.weights import SpinWeights
+from rotor.tops.constants import Constants
+from rotor.tops.spin_weights import SpinWeights
+from rotor.tops.top import Top
 
 # the classes of (Ka, Kc) that are even under a half turn about the axis: Ka, Ka + Kc and Kc tell a, b and c
 _EVEN = {1: ("ee", "eo"), 2: ("ee", "oo"), 3: ("ee", "oe")}

@@ -7,7 +7,7 @@ import re
 from dataclasses import dataclass, field
 from typing import Any
 
-from rotor.formats.atomic import open_atomic
+from rotor.formats.atomic_write import open_atomic
 from rotor.formats.spcat.freeform import Line, encode, number, read_lines, read_words, spell, whole
 
 _LETTER = re.compile(r"[ \t]*([A-Za-z])?")

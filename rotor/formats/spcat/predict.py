@@ -22,11 +22,11 @@ from rotor.formats.spcat.int_file import IntensityFile, Request, read_int
 from rotor.formats.spcat.model import FOLD, common_weight, top_of
 from rotor.formats.spcat.par import Options, ParameterFile, read_par
 from rotor.quantum.basis import wang_blocks
+from rotor.quantum.effects.watson import Multiplet, block_bands
 from rotor.quantum.levels import Levels, hamiltonian, solve_levels
-from rotor.quantum.watson import Multiplet, block_bands
 from rotor.spectra.lines import Lines, line_list
 from rotor.thermo import PartitionFunction, partition_function
-from rotor.top import Top
+from rotor.tops.top import Top
 
 LEAST_MHZ = 0.00005  # a line that would print as 0.0000 is not in the program's files
 _STR_SCALE_MHZ = 300_000.0  # STR1 counts (ν/300 GHz)²

@@ -1,0 +1,65 @@
+"""The face of a classical effect: a torque, an inner angular momentum, or moments that change in time.
+
+An effect is one object in one file of `rotor.classical.effects`. Integrators take a list of effects and compute only
+what is in it.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import ClassVar
+
+from rotor.arrays import Floats
+
+
+class ClassicalEffect:
+    """A change of Euler's equations, which with all effects present read, in the body's principal axes,
+
+        dL/dt = L x ω + Σ torques,   ω_i = (L_i - h_i) / I_i(t),   h = Σ inner momenta.
+
+    An effect is one of the three kinds below; this base only names what each says of itself: `conserves_energy`
+    means ½ Σ (L_i - h_i)²/I_i + potential energy, `conserves_momentum` means L seen from space;
+    `depends_on_time` says whether the time itself enters, as in a drive.
+    """
+
+    conserves_energy: ClassVar[bool] = False
+    conserves_momentum: ClassVar[bool] = False
+    depends_on_time: ClassVar[bool] = False
+
+
+class Torque(ClassicalEffect, ABC):
+    """A torque. `needs_velocity` says that it depends on ω: then no splitting into drifts and kicks serves."""
+
+    needs_velocity: ClassVar[bool] = False
+
+    @property
+    def needs_attitude(self) -> bool:
+        """Whether the torque in body axes depends on the attitude."""
+        return True
+
+    @abstractmethod
+    def torque(self, time: float, attitude: Floats, omega: Floats) -> Floats:
+        """Torque on the body in body axes (..., 3) from attitude (..., 4) and angular velocity in body axes (..., 3).
+
+        Where `needs_velocity` is False, `omega` is not looked at.
+        """
+
+    def potential_energy(self, time: float, attitude: Floats) -> Floats | float:
+        """Energy (...,) whose change with attitude is the torque; zero for a torque that has none."""
+        return 0.0
+
+
+class InnerMomentum(ClassicalEffect, ABC):
+    """Angular momentum that parts carry relative to the body."""
+
+    @abstractmethod
+    def inner_momentum(self, time: float) -> Floats:
+        """h in body axes (3,) at `time`."""
+
+
+class InertiaChange(ClassicalEffect, ABC):
+    """Moments that change in time while the principal axes stay."""
+
+    @abstractmethod
+    def moments(self, time: float) -> Floats:
+        """Principal moments (..., 3) at `time`, in place of those the motion was started with."""

@@ -1,0 +1,1 @@
+"""Effects on a classical rigid body, one a file."""

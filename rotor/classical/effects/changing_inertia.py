@@ -1,0 +1,43 @@
+"""Moments of inertia that change in time: a skater's arms, panels that unfold. Angular momentum is kept."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rotor.arrays import Floats
+from rotor.classical.effect import InertiaChange
+from rotor.classical.euler import checked_moments
+
+
+@dataclass(frozen=True)
+class ChangingInertia(InertiaChange):
+    """Principal moments (..., 3) as a function of time, about axes that stay where they are in the body.
+
+    The moving masses carry no angular momentum relative to the body (they move along radii, or in mirror pairs); where
+    they do, add it as an inner momentum. Whoever moves them does the work, so energy changes and L does not.
+
+    >>> skater = ChangingInertia(lambda time: [4.0, 4.0, 2.0 / (1.0 + time)])
+    >>> skater.moments(1.0)
+    array([4., 4., 1.])
+    """
+
+    conserves_momentum: ClassVar[bool] = True
+    depends_on_time: ClassVar[bool] = True
+
+    history: Callable[[float], ArrayLike]
+
+    def __post_init__(self) -> None:
+        if not callable(self.history):
+            raise ValueError("changing inertia needs a function of time that returns three moments")
+
+    def moments(self, time: float) -> Floats:
+        """The moments of this moment in time, checked; a moment of zero is refused, for it has no inverse."""
+        moments = checked_moments(np.asarray(self.history(time), dtype=np.float64))
+        if np.any(moments == 0.0):
+            raise ValueError(f"changing inertia at time {time:g}: moments {moments.tolist()} must all be positive")
+        return moments

@@ -1,0 +1,76 @@
+"""Drag: torques that oppose the body's rotation, in proportion to ω or to its square."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rotor.arrays import Floats
+from rotor.classical.effect import Torque
+
+
+@dataclass(frozen=True)
+class LinearDrag(Torque):
+    """Torque -C ω with a matrix C (3, 3), or its diagonal (3,), in body axes.
+
+    A rigid body in a viscous fluid at low Reynolds number has a symmetric positive C (Happel and Brenner, Low Reynolds
+    Number Hydrodynamics, chapter 5); a sphere of radius a has 8π η a³. A matrix that is neither is linear feedback,
+    such as that of Leipnik and Newton (Phys. Lett. A 86, 63 (1981)); it is taken as given.
+
+    >>> LinearDrag([1.0, 2.0, 3.0]).torque(0.0, np.array([1.0, 0, 0, 0]), np.ones(3)).tolist()
+    [-1.0, -2.0, -3.0]
+    """
+
+    needs_velocity: ClassVar[bool] = True
+
+    coefficients: ArrayLike
+
+    def __post_init__(self) -> None:
+        array = np.array(self.coefficients, dtype=np.float64)
+        matrix = np.diag(array) if array.shape == (3,) else array
+        if matrix.shape != (3, 3) or not np.all(np.isfinite(matrix)):
+            raise ValueError(f"linear drag has 3 coefficients or a finite 3x3 matrix; got shape {array.shape}")
+        matrix.setflags(write=False)
+        object.__setattr__(self, "coefficients", matrix)
+
+    @property
+    def needs_attitude(self) -> bool:
+        """False: drag knows ω alone."""
+        return False
+
+    def torque(self, time: float, attitude: Floats, omega: Floats) -> Floats:
+        """-C ω."""
+        return np.asarray(-omega @ np.asarray(self.coefficients).T)
+
+
+@dataclass(frozen=True)
+class QuadraticDrag(Torque):
+    """Torque -c_i |ω| ω_i with coefficients (3,) in body axes, the law of drag at high Reynolds number.
+
+    >>> QuadraticDrag([1.0, 1.0, 1.0]).torque(0.0, np.array([1.0, 0, 0, 0]), np.array([0.0, 3.0, 4.0])).tolist()
+    [-0.0, -15.0, -20.0]
+    """
+
+    needs_velocity: ClassVar[bool] = True
+
+    coefficients: ArrayLike
+
+    def __post_init__(self) -> None:
+        array = np.array(self.coefficients, dtype=np.float64)
+        if array.shape != (3,) or not np.all(np.isfinite(array)) or np.any(array < 0.0):
+            raise ValueError(f"quadratic drag has 3 coefficients, finite and not negative; got {array.tolist()}")
+        array.setflags(write=False)
+        object.__setattr__(self, "coefficients", array)
+
+    @property
+    def needs_attitude(self) -> bool:
+        """False: drag knows ω alone."""
+        return False
+
+    def torque(self, time: float, attitude: Floats, omega: Floats) -> Floats:
+        """-c |ω| ω."""
+        speed = np.linalg.norm(omega, axis=-1, keepdims=True)
+        return np.asarray(-np.asarray(self.coefficients) * speed * omega)

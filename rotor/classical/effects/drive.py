@@ -1,0 +1,44 @@
+"""A torque that oscillates at one frequency, fixed in the body or in space."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rotor.arrays import Floats
+from rotor.classical.effect import Torque
+from rotor.classical.effects.torques import Frame, checked_frame, checked_vector, in_body
+
+
+@dataclass(frozen=True)
+class PeriodicDrive(Torque):
+    """Torque amplitude cos(frequency time + phase), amplitude (3,), angular frequency in radians per time.
+
+    >>> PeriodicDrive([2.0, 0, 0], frequency=np.pi).torque(1.0, np.array([1.0, 0, 0, 0]), np.zeros(3)).tolist()
+    [-2.0, -0.0, -0.0]
+    """
+
+    depends_on_time: ClassVar[bool] = True
+
+    amplitude: ArrayLike
+    frequency: float
+    phase: float = 0.0
+    frame: Frame = "body"
+
+    def __post_init__(self) -> None:
+        checked_frame(self.frame)
+        object.__setattr__(self, "amplitude", checked_vector(self.amplitude, "the amplitude of a drive"))
+
+    @property
+    def needs_attitude(self) -> bool:
+        """Only where the torque is fixed in space."""
+        return self.frame == "space"
+
+    def torque(self, time: float, attitude: Floats, omega: Floats) -> Floats:
+        """The amplitude times the cosine of this moment, seen from the body."""
+        now = np.asarray(self.amplitude) * math.cos(self.frequency * time + self.phase)
+        return in_body(now, self.frame, attitude)

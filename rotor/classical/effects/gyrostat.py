@@ -1,0 +1,39 @@
+"""A spinning rotor inside the body: the gyrostat, or dual-spin satellite."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rotor.arrays import Floats
+from rotor.classical.effect import InnerMomentum
+from rotor.classical.effects.torques import checked_vector
+
+
+@dataclass(frozen=True)
+class SpinningRotor(InnerMomentum):
+    """Constant angular momentum h (3,) in body axes, carried by symmetric rotors relative to the body.
+
+    L is that of body and rotors together and the moments are those of the whole with the rotors locked, so
+    ω_i = (L_i - h_i)/I_i (Wittenburg, Dynamics of Multibody Systems: Kelvin's gyrostat). A motor keeps h;
+    a rotor that turns freely about its axis keeps its absolute momentum instead: then give the moments without the
+    rotor's axial one, and h is that momentum. Energy leaves out what the rotor has relative to the body.
+
+    >>> SpinningRotor([0.0, 0.0, 0.7]).inner_momentum(0.0)
+    array([0. , 0. , 0.7])
+    """
+
+    conserves_energy: ClassVar[bool] = True
+    conserves_momentum: ClassVar[bool] = True
+
+    momentum: ArrayLike
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "momentum", checked_vector(self.momentum, "the momentum of a rotor"))
+
+    def inner_momentum(self, time: float) -> Floats:
+        """h, the same at any time."""
+        return np.asarray(self.momentum)

@@ -1,0 +1,111 @@
+"""Torques that are given: constant ones and ones that follow a function of time, fixed in the body or in space."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import ClassVar, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rotor.arrays import Floats
+from rotor.classical.effect import Torque
+
+Frame = Literal["body", "space"]
+
+
+def from_body(vector: ArrayLike, attitude: Floats) -> Floats:
+    """A vector (3,) of space in body axes, (..., 3) for unit attitudes (..., 4)."""
+    from rotor.classical.integrators._attitude_kernels import seen_from_body
+
+    return np.asarray(seen_from_body(_rows(attitude), np.asarray(vector)).reshape(*attitude.shape[:-1], 3))
+
+
+def lever_torque(arm: ArrayLike, force: ArrayLike, attitude: Floats) -> Floats:
+    """arm x force in body axes, (..., 3), for an arm (3,) of the body and a force (3,) of space."""
+    from rotor.classical.integrators._attitude_kernels import lever
+
+    return np.asarray(lever(_rows(attitude), np.asarray(arm), np.asarray(force)).reshape(*attitude.shape[:-1], 3))
+
+
+def in_body(vector: ArrayLike, frame: str, attitude: Floats) -> Floats:
+    """A vector (3,) of the body or of space in body axes, (..., 3) for attitudes (..., 4)."""
+    if frame == "space":
+        return from_body(vector, attitude)
+    return np.broadcast_to(np.asarray(vector, dtype=np.float64), (*attitude.shape[:-1], 3))
+
+
+def checked_frame(frame: str) -> None:
+    """Refuse a frame that is neither "body" nor "space"."""
+    if frame not in ("body", "space"):
+        raise ValueError(f'a torque is fixed in the "body" or in "space"; got frame={frame!r}')
+
+
+def checked_vector(vector: ArrayLike, what: str) -> Floats:
+    """Three finite components, read-only, or a ValueError that names `what`."""
+    array = np.array(vector, dtype=np.float64)
+    if array.shape != (3,) or not np.all(np.isfinite(array)):
+        raise ValueError(f"{what} has three finite components; got {array.tolist()}")
+    array.setflags(write=False)
+    return array
+
+
+@dataclass(frozen=True)
+class ConstantTorque(Torque):
+    """A torque (3,) that is constant in body axes (a thruster) or in space.
+
+    A constant torque in space is not the gradient of a potential: turning about it by 2π gives work.
+
+    >>> ConstantTorque([0.0, 0.0, 0.5]).torque(0.0, np.array([1.0, 0, 0, 0]), np.zeros(3))
+    array([0. , 0. , 0.5])
+    """
+
+    vector: ArrayLike
+    frame: Frame = "body"
+
+    def __post_init__(self) -> None:
+        checked_frame(self.frame)
+        object.__setattr__(self, "vector", checked_vector(self.vector, "a constant torque"))
+
+    @property
+    def needs_attitude(self) -> bool:
+        """Only where the torque is fixed in space."""
+        return self.frame == "space"
+
+    def torque(self, time: float, attitude: Floats, omega: Floats) -> Floats:
+        """The constant vector, seen from the body."""
+        return in_body(self.vector, self.frame, attitude)
+
+
+@dataclass(frozen=True)
+class TimedTorque(Torque):
+    """A torque that is a given function of time, `history(time)` -> (3,), in body axes or in space.
+
+    >>> ramp = TimedTorque(lambda time: [time, 0.0, 0.0])
+    >>> ramp.torque(2.0, np.array([1.0, 0, 0, 0]), np.zeros(3))
+    array([2., 0., 0.])
+    """
+
+    depends_on_time: ClassVar[bool] = True
+
+    history: Callable[[float], ArrayLike]
+    frame: Frame = "body"
+
+    def __post_init__(self) -> None:
+        checked_frame(self.frame)
+        if not callable(self.history):
+            raise ValueError("a timed torque needs a function of time that returns three components")
+
+    @property
+    def needs_attitude(self) -> bool:
+        """Only where the torque is fixed in space."""
+        return self.frame == "space"
+
+    def torque(self, time: float, attitude: Floats, omega: Floats) -> Floats:
+        """The vector of this moment, seen from the body."""
+        return in_body(checked_vector(self.history(time), f"the torque at time {time:g}"), self.frame, attitude)
+
+
+def _rows(attitude: Floats) -> Floats:
+    return np.ascontiguousarray(attitude, dtype=np.float64).reshape(-1, 4)

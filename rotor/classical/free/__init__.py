@@ -1,0 +1,1 @@
+"""Torque-free motion: the exact solution, its stability and its polhodes."""

@@ -1,0 +1,157 @@
+"""The exact torque-free motion of any rigid body: momentum and attitude at any time, without stepping.
+
+The formulas stand at the head of `theta.py`. Here: what goes in, what comes out, and how exact it is.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rotor.arrays import Floats
+from rotor.classical.euler import checked_moments, checked_momentum
+from rotor.classical.free.theta import SEPARATRIX, STEADY, Rows, moving_rows, steady_rows
+from rotor.geometry.rotations import IDENTITY, conjugate, multiply, normalised
+
+SMALLEST_PART = 1e-120  # of |L|: a smaller component, not zero, would underflow when squared
+
+
+@dataclass(frozen=True)
+class FreeMotion:
+    """A torque-free motion of one body or of many, ready to be asked for any time.
+
+    moments, momentum0, attitude0: (..., 3), (..., 3), (..., 4), body axes in the order given; the state at t = 0.
+    period: (...), of the momentum in the body; infinite where it stands still and on the separatrix.
+    turning_rate: (...), mean rate, rad per time, at which the body turns about L in space. After one period the body
+    has turned about L by this rate times the period, up to whole turns.
+    steady, separatrix: (...), whether the momentum stands still in the body, or runs into the unstable axis.
+    rows: the constants for the compiled evaluation.
+    """
+
+    moments: Floats
+    momentum0: Floats
+    attitude0: Floats
+    period: Floats
+    turning_rate: Floats
+    steady: NDArray[np.bool_]
+    separatrix: NDArray[np.bool_]
+    rows: Rows
+
+    @property
+    def centre_axis(self) -> NDArray[np.int64]:
+        """The axis (0, 1 or 2, in the order of the moments) that L goes round in the body; without meaning if steady.
+
+        >>> int(free_motion([0.6, 0.8, 1.0], [1.8, 0.4, -0.9]).centre_axis)
+        0
+        """
+        return np.asarray(self.rows.axes[:, 2]).reshape(self.period.shape)
+
+    def at(self, times: ArrayLike) -> tuple[Floats, Floats]:
+        """Momentum (*bodies, *times, 3) in the body and attitude (*bodies, *times, 4), body to space, at `times`.
+
+        Error of the attitude: about 1e-15 rad at any time until the body has turned 1e15 times. The phases are held in
+        double-double, always: rates rounded to double, 1e-16 of the angle turned, would cost 2e-13 rad in one period near
+        the unstable axis, and would save no time.
+        Signs of q may jump between neighbouring times; `rotor.geometry.rotations.continuous` joins them.
+
+        >>> motion = free_motion([0.6, 0.8, 1.0], [1.8, 0.4, -0.9])
+        >>> momentum, attitude = motion.at(10.0)
+        >>> momentum.round(12).tolist()
+        [1.765962508518, -0.695464197033, 0.779554981482]
+        """
+        from rotor.classical.free._kernels import evaluate
+
+        times = np.asarray(times, dtype=np.float64)
+        if not np.all(np.isfinite(times)):
+            raise ValueError("a time is not finite")
+        n, flat = len(self.rows.kind), times.flatten()
+        momentum, attitude = np.empty((n, flat.size, 3)), np.empty((n, flat.size, 4))
+        evaluate(self.rows, flat, momentum, attitude)
+        shape = (*self.period.shape, *times.shape)
+        return momentum.reshape(*shape, 3), attitude.reshape(*shape, 4)
+
+
+def free_motion(moments: ArrayLike, momentum0: ArrayLike, attitude0: ArrayLike = IDENTITY) -> FreeMotion:
+    """The torque-free motion from principal moments (..., 3), body momentum (..., 3) and attitude (..., 4) at t = 0.
+
+    Moments and momentum are the exact data of the motion (not ω: forming I ω rounds, which costs 1e-16 of the angle
+    turned). Any coherent units, axes in any order; shapes broadcast. Spherical, symmetric, asymmetric and linear
+    bodies, rest, spin about an axis and the separatrix itself are all exact members of one family. The constants cost
+    some 15 ms for one body and 15 µs each for many, every later evaluation about 0.12 µs.
+
+    >>> float(free_motion([0.6, 0.8, 1.0], [1.8, 0.4, -0.9]).period)  # 4K/λ
+    6.862616178058115
+    """
+    moments, momentum0 = checked_moments(moments), np.asarray(momentum0, dtype=np.float64)
+    momentum0 = checked_momentum(momentum0, moments)
+    attitude0 = normalised(attitude0)
+    shape = np.broadcast_shapes(moments.shape[:-1], momentum0.shape[:-1], attitude0.shape[:-1])
+    moments, momentum0 = (np.ascontiguousarray(np.broadcast_to(a, (*shape, 3))) for a in (moments, momentum0))
+    attitude0 = np.ascontiguousarray(np.broadcast_to(attitude0, (*shape, 4)))
+    rows = _rows(moments.reshape(-1, 3), momentum0.reshape(-1, 3))
+    rows = _starting_at(rows, attitude0.reshape(-1, 4))
+    steady, separatrix = rows.kind == STEADY, rows.kind == SEPARATRIX
+    pace = np.abs(rows.rates[:, 0])
+    period = np.divide(2.0, pace, out=np.full_like(pace, np.inf), where=~(steady | separatrix))
+    turning = rows.rates[:, 4] * (4.0 * np.pi)
+    period, turning = period.reshape(shape), turning.reshape(shape)
+    return FreeMotion(
+        moments, momentum0, attitude0, period, turning, steady.reshape(shape), separatrix.reshape(shape), rows
+    )
+
+
+def _rows(moments: Floats, momentum: Floats) -> Rows:
+    """Rows of all bodies, in units that make the largest moment and momentum about 1 (powers of two: exact)."""
+    unit_i = _power_of_two(np.max(moments, axis=-1))
+    unit_m = _power_of_two(np.max(np.abs(momentum), axis=-1))
+    moments, momentum = moments / unit_i[:, None], momentum / unit_m[:, None]
+    steady = _stands_still(moments, momentum)
+    both = _merged(
+        steady, steady_rows(moments[steady], momentum[steady]), moving_rows(moments[~steady], momentum[~steady])
+    )
+    rates = both.rates * np.stack(
+        [u for u in (unit_m / unit_i, np.ones_like(unit_m), unit_m / unit_i) for _ in "hl"], -1
+    )
+    series = both.series.copy()
+    series[:, :3] *= unit_m[:, None]
+    return both._replace(rates=rates, series=series, momentum0=momentum * unit_m[:, None])
+
+
+def _merged(first: NDArray[np.bool_], yes: Rows, no: Rows) -> Rows:
+    """One table from the rows where `first` holds and the others."""
+    columns = []
+    for a, b in zip(yes, no, strict=True):
+        column = np.empty((len(first), *a.shape[1:]), dtype=b.dtype)
+        column[first], column[~first] = a, b
+        columns.append(column)
+    return Rows(*columns)
+
+
+def _stands_still(moments: Floats, momentum: Floats) -> NDArray[np.bool_]:
+    """Whether L x ω is exactly zero: spin about an axis, a sphere, a linear body, the equator of a symmetric top."""
+    size = np.max(np.abs(momentum), axis=-1, keepdims=True)
+    if np.any((momentum != 0.0) & (np.abs(momentum) < SMALLEST_PART * size)):
+        raise ValueError(
+            f"a component of the angular momentum is below {SMALLEST_PART:g} of |L|, beyond what double precision can "
+            "follow; set it to 0"
+        )
+    pairs = ((0, 1), (1, 2), (2, 0))
+    still = [(momentum[:, i] == 0.0) | (momentum[:, j] == 0.0) | (moments[:, i] == moments[:, j]) for i, j in pairs]
+    linear = np.any(moments == 0.0, axis=-1)
+    return np.asarray(linear | np.all(still, axis=0))
+
+
+def _starting_at(rows: Rows, attitude0: Floats) -> Rows:
+    """The rows with the constant left quaternion that makes the attitude at t = 0 the one given."""
+    from rotor.classical.free._kernels import evaluate
+
+    n = len(rows.kind)
+    momentum, attitude = np.empty((n, 1, 3)), np.empty((n, 1, 4))
+    evaluate(rows, np.zeros(1), momentum, attitude)
+    return rows._replace(left=np.ascontiguousarray(multiply(attitude0, conjugate(attitude[:, 0]))))
+
+
+def _power_of_two(size: Floats) -> Floats:
+    return np.asarray(np.where(size > 0.0, np.ldexp(1.0, np.frexp(size)[1]), 1.0))

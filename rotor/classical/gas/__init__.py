@@ -1,0 +1,1 @@
+"""Gases of free rigid molecules: thermal ensembles and correlation functions."""

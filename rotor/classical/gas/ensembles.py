@@ -1,0 +1,284 @@
+"""A gas of free rigid molecules in thermal equilibrium: drawn exactly, moved exactly, and how fast it forgets.
+
+Drawn: L_i normal with variance I_i kT (`thermal.py` says why), orientations uniform, velocities normal with variance kT/m.
+Moved: by the exact free motion at any time. Forgotten: with u a vector fixed in the molecule and β a traceless tensor,
+
+    C1(t) = <u(0)·u(t)>/<u²>,       C2(t) = <β(0):β(t)>/<β:β> ,
+
+the correlation functions behind rotational absorption and Raman scattering (R. G. Gordon, J. Chem. Phys. 43, 1307 (1965);
+Adv. Magn. Reson. 3, 1 (1968)). For a linear molecule C2 is the mean of the second Legendre polynomial. Neglected: all that
+molecules do to each other, centrifugal distortion, and quantum mechanics. Closed forms stand in `correlations.py`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rotor.arrays import Floats
+from rotor.classical.euler import checked_moments
+from rotor.classical.free.free_motion import free_motion
+from rotor.classical.integrators.batch import check_turn, rates_and_axes
+from rotor.geometry.rotations import rotate, uniform
+from rotor.statistics.degrees_of_freedom import rotating_axes
+from rotor.statistics.equipartition import KineticDegrees, kinetic_degrees
+from rotor.table import Table
+
+PIECE = 10_000  # molecules that are drawn and moved together
+
+
+@dataclass(frozen=True)
+class Ensemble:
+    """n molecules of one kind at one moment.
+
+    moments: (3,). kt: energy. momentum: (n, 3), L in principal axes. attitude: (n, 4), body to space. mass: of one molecule,
+    None where it is not known. velocity: (n, 3), of the centres of mass, None without a mass.
+    """
+
+    moments: Floats
+    kt: float
+    momentum: Floats
+    attitude: Floats
+    mass: float | None = None
+    velocity: Floats | None = None
+
+    def __len__(self) -> int:
+        return len(self.momentum)
+
+    @property
+    def kinetic(self) -> KineticDegrees:
+        """Kinetic energies by degree of freedom, for `rotor.statistics.equipartition.equipartition`."""
+        masses = None if self.mass is None else np.full(len(self), self.mass)
+        moments = np.broadcast_to(self.moments, (len(self), 3))
+        if not rotating_axes(self.moments).any():
+            return kinetic_degrees(masses=masses, velocities=self.velocity)
+        return kinetic_degrees(masses=masses, velocities=self.velocity, moments=moments, momenta=self.momentum)
+
+    def moved(self, time: float) -> Ensemble:
+        """The same molecules a time later, by the exact free motion; an atom only flies on."""
+        if not rotating_axes(self.moments).any():
+            return self
+        momentum, attitude = np.empty_like(self.momentum), np.empty_like(self.attitude)
+        for first in range(0, len(self), PIECE):
+            part = slice(first, first + PIECE)
+            later = free_motion(self.moments, self.momentum[part], self.attitude[part]).at(time)
+            momentum[part], attitude[part] = later
+        return replace(self, momentum=momentum, attitude=attitude)
+
+
+@dataclass(frozen=True)
+class Correlations(Table):
+    """C1 and C2 at n times with the standard errors of their means; c1 or c2 is None where it was not asked for.
+
+    times, c1, c1_error, c2, c2_error: (n,). molecules: how many were averaged over; the errors at different times are those
+    of the same molecules and thus not independent.
+    """
+
+    times: Floats
+    c1: Floats | None
+    c1_error: Floats | None
+    c2: Floats | None
+    c2_error: Floats | None
+    molecules: int
+
+    def __len__(self) -> int:
+        return len(self.times)
+
+    @property
+    def columns(self) -> dict[str, Floats]:
+        """t, c1, c1_error, c2, c2_error, as far as they are there."""
+        named = {"t": self.times, "c1": self.c1, "c1_error": self.c1_error, "c2": self.c2, "c2_error": self.c2_error}
+        return {name: column for name, column in named.items() if column is not None}
+
+
+@dataclass(frozen=True)
+class Probe:
+    """What is fixed in the molecule: a unit vector (3,), and principal axes (rows) and values of a tensor of unit size."""
+
+    vector: Floats
+    axes: Floats
+    beta: Floats
+    has_vector: bool
+    has_tensor: bool
+
+    @classmethod
+    def of(cls, vector: ArrayLike | None, tensor: ArrayLike | None) -> Probe:
+        """From a vector and a symmetric tensor in principal axes, of any size; of the tensor its anisotropic part counts."""
+        if vector is None and tensor is None:
+            raise ValueError("a vector or a tensor fixed in the molecule is wanted, or both")
+        unit, axes, beta = np.array([1.0, 0.0, 0.0]), np.eye(3), np.array([2.0, -1.0, -1.0]) / np.sqrt(6.0)
+        if vector is not None:
+            unit = np.asarray(vector, dtype=np.float64)
+            if unit.shape != (3,) or not np.isfinite(unit).all() or not unit.any():
+                raise ValueError(f"a vector fixed in the molecule is three finite numbers, not all 0; got {vector}")
+            unit = unit / np.linalg.norm(unit)
+        if tensor is not None:
+            beta, axes = _principal_values(tensor)
+        return cls(unit, axes, beta, vector is not None, tensor is not None)
+
+
+def thermal_momenta(moments: ArrayLike, kt: float, size: int, *, rng: np.random.Generator) -> Floats:
+    """Angular momenta (size, 3) in principal axes, of temperature kT; 0 about an axis without a degree of freedom.
+
+    moments: (3,), in any order; an atom has three of 0. Units: any coherent ones, L in √(moment x energy).
+
+    >>> thermal_momenta([0.0, 2.0, 2.0], 1.5, 1000, rng=np.random.default_rng(3)).std(axis=0).round(1)
+    array([0. , 1.7, 1.8])
+    """
+    inertia = np.asarray(moments, dtype=np.float64)
+    if inertia.shape != (3,):
+        raise ValueError(f"the three moments of one kind of molecule are wanted; got shape {inertia.shape}")
+    if not kt > 0.0 or not np.isfinite(kt):
+        raise ValueError(f"kT = {kt}: a finite energy above 0 is wanted")
+    turns = rotating_axes(inertia)
+    return np.asarray(rng.standard_normal((size, 3)) * np.sqrt(np.where(turns, inertia * kt, 0.0)))
+
+
+def thermal_ensemble(
+    moments: ArrayLike, kt: float, size: int, *, rng: np.random.Generator, mass: float | None = None
+) -> Ensemble:
+    """`size` molecules in thermal equilibrium: momenta, orientations, and velocities where there is a mass.
+
+    >>> gas = thermal_ensemble([0.6, 1.3, 1.9], 0.0258, 1000, rng=np.random.default_rng(1), mass=18.0)
+    >>> sorted(gas.kinetic.counts)
+    ['rotation a', 'rotation b', 'rotation c', 'translation x', 'translation y', 'translation z']
+    """
+    momentum = thermal_momenta(moments, kt, size, rng=rng)
+    attitude = uniform(size, rng=rng)
+    if mass is not None and not mass > 0.0:
+        raise ValueError(f"mass {mass}: a number above 0 is wanted")
+    velocity = None if mass is None else rng.standard_normal((size, 3)) * np.sqrt(kt / mass)
+    return Ensemble(np.asarray(moments, dtype=np.float64), kt, momentum, attitude, mass, velocity)
+
+
+def free_gas_correlations(
+    moments: ArrayLike,
+    kt: float,
+    times: ArrayLike,
+    *,
+    vector: ArrayLike | None = None,
+    tensor: ArrayLike | None = None,
+    molecules: int,
+    rng: np.random.Generator,
+    executor: ThreadPoolExecutor | None = None,
+    progress: Callable[[int], object] | None = None,
+) -> Correlations:
+    """C1 of a vector and C2 of a tensor in a free gas at `times` (n,), by the exact motion.
+
+    moments (3,), kt, times: any coherent units; vector (3,), tensor (3, 3): in principal axes, any size. Only the rotation
+    between time 0 and t matters, so all molecules start upright. They come in pieces of 10,000, each with random numbers
+    of its own (`rng.spawn`): memory stays bounded, and the answer does not depend on the threads of `executor`. progress: is
+    told how many molecules are done. 0.09 µs per molecule and time on one core, and 13 µs per molecule.
+
+    >>> gas = free_gas_correlations([0, 1, 1], 1.0, [0.0, 1.0], vector=[1, 0, 0], molecules=2000, rng=np.random.default_rng(5))
+    >>> [round(float(x), 2) for x in gas.c1]  # 1 - √2 D(1/√2) = 0.275
+    [1.0, 0.28]
+    """
+    inertia, grid, probe = checked_moments(moments), _checked_times(times), Probe.of(vector, tensor)
+
+    def piece(size: int, source: np.random.Generator) -> Floats:
+        from rotor.classical.gas._correlation_kernels import add_bodies
+
+        motion = free_motion(inertia, thermal_momenta(inertia, kt, size, rng=source))
+        sums = np.zeros((4, grid.size))
+        add_bodies(motion.rows, grid, probe.vector, probe.axes, probe.beta, sums)
+        return sums
+
+    return _averaged(piece, grid, probe, molecules, rng, executor, progress)
+
+
+def stepped_gas_correlations(
+    moments: ArrayLike,
+    kt: float,
+    interval: float,
+    count: int,
+    *,
+    steps: int = 1,
+    vector: ArrayLike | None = None,
+    tensor: ArrayLike | None = None,
+    molecules: int,
+    rng: np.random.Generator,
+    executor: ThreadPoolExecutor | None = None,
+    progress: Callable[[int], object] | None = None,
+) -> Correlations:
+    """The same at times 0, interval, ... (count of them), by `steps` steps of the splitting of `many.py` each.
+
+    The error of an attitude grows as step² times the time; with the same `rng` the molecules are the same as in
+    `free_gas_correlations`, so that the difference of both is the error of stepping alone.
+    """
+    inertia, probe = checked_moments(moments), Probe.of(vector, tensor)
+    if count < 1 or steps < 1:
+        raise ValueError(f"{count} times with {steps} steps between them: whole numbers of 1 or more are wanted")
+    grid = _checked_times(interval * np.arange(count))
+    rates, turn = rates_and_axes(inertia)
+    vector_there, axes_there = rotate(turn[0], probe.vector), np.ascontiguousarray(rotate(turn[0], probe.axes))
+
+    def piece(size: int, source: np.random.Generator) -> Floats:
+        from rotor.classical.gas._correlation_kernels import add_stepped
+
+        momentum = thermal_momenta(inertia, kt, size, rng=source)
+        check_turn(rates, momentum, interval / steps)
+        sums = np.zeros((4, count))
+        add_stepped(momentum, interval / steps, steps, rates[0], turn[0], vector_there, axes_there, probe.beta, sums)
+        return sums
+
+    return _averaged(piece, grid, probe, molecules, rng, executor, progress)
+
+
+def _averaged(
+    piece: Callable[[int, np.random.Generator], Floats],
+    times: Floats,
+    probe: Probe,
+    molecules: int,
+    rng: np.random.Generator,
+    executor: ThreadPoolExecutor | None,
+    progress: Callable[[int], object] | None,
+) -> Correlations:
+    """Means and standard errors over all pieces, summed in their order whoever made them."""
+    if molecules < 2:
+        raise ValueError(f"{molecules} molecules: two or more are wanted, for a mean with an error")
+    sizes = [min(PIECE, molecules - start) for start in range(0, molecules, PIECE)]
+    sources = rng.spawn(len(sizes))
+    results = map(piece, sizes, sources) if executor is None else executor.map(piece, sizes, sources)
+    total = np.zeros((4, times.size))
+    for size, sums in zip(sizes, results, strict=True):
+        total += sums
+        if progress is not None:
+            progress(size)
+    first, first_square, second, second_square = total / molecules
+    return Correlations(
+        times,
+        first if probe.has_vector else None,
+        _error(first, first_square, molecules) if probe.has_vector else None,
+        second if probe.has_tensor else None,
+        _error(second, second_square, molecules) if probe.has_tensor else None,
+        molecules,
+    )
+
+
+def _error(mean: Floats, square: Floats, n: int) -> Floats:
+    return np.asarray(np.sqrt(np.maximum(square - mean**2, 0.0) / (n - 1)))
+
+
+def _checked_times(times: ArrayLike) -> Floats:
+    grid = np.ascontiguousarray(times, dtype=np.float64)
+    if grid.ndim != 1 or not grid.size or not np.isfinite(grid).all():
+        raise ValueError(f"times of shape {grid.shape}: finite numbers (n,) are wanted")
+    return grid
+
+
+def _principal_values(tensor: ArrayLike) -> tuple[Floats, Floats]:
+    """Principal values of the anisotropic part at unit size, Σ β² = 1, and its axes as rows."""
+    whole = np.asarray(tensor, dtype=np.float64)
+    if whole.shape != (3, 3) or not np.isfinite(whole).all() or not np.allclose(whole, whole.T):
+        raise ValueError(f"a tensor fixed in the molecule is symmetric, (3, 3) and finite; got {whole.tolist()}")
+    part = whole - np.trace(whole) / 3.0 * np.eye(3)
+    size = float(np.linalg.norm(part))
+    if size <= 1e-9 * float(np.abs(whole).max()):
+        raise ValueError("the tensor is isotropic: turning the molecule does not change it, and it has no C2")
+    values, vectors = np.linalg.eigh(part / size)
+    return values, np.ascontiguousarray(vectors.T)

@@ -1,0 +1,1 @@
+"""Integrators of rigid-body motion, one method a file."""

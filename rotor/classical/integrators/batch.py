@@ -1,0 +1,101 @@
+"""Free steps of very many independent tops, 10⁵ to 10⁶ at once: throughput before everything else.
+
+With the axes numbered so that I3 is the intermediate moment, the energy is that of a sphere and two remainders,
+
+    H = L²/2I3 + ½ (1/I1 - 1/I3) L1² + ½ (1/I2 - 1/I3) L2².
+
+|L|² commutes with every function of L, so the sphere's flow, a steady turn of the body at |L|/I3 about L in space,
+commutes with those of the remainders, turns at (1/I_i - 1/I3) L_i about the body's axes: all steps of it are made at
+once, exactly. What is left of a step (Strang 1968) is half a turn about axis 1, one about axis 2, half a turn about
+axis 1, neighbouring halves merged: two turns a step. Axis 1 is that of the larger remainder: the error is then
+h²(2 r1 r2² + r1² r2)/24 in magnitude, r the rates of the remainders, thirty times less in the median than that of turns
+about three axes, and zero for spheres, symmetric tops and linear rotors. These are the steps of order 2 of
+`SymmetricTopSplitting`, without compensated sums. L is not stepped: in space it stays as it is, and the body sees it
+through the attitude, so L in space is kept by construction; |L| in the body is as good as |q|², which is never
+renormalised and wanders by rounding, about 1e-16 √steps; rates rounded to double cost up to 2e-16 of the angle turned, far
+below the error of the step. The energy stays bounded. Where the exact state at a few times
+is wanted, `free.free_motion` is cheaper still.
+
+Sources: the split into flows of rotations is that of `splitting.py`; that |L|² is a Casimir of the bracket of Euler's
+equations: J. E. Marsden and T. S. Ratiu, Introduction to Mechanics and Symmetry, chapter 15.
+"""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rotor.arrays import Floats
+from rotor.classical.euler import checked_moments, checked_momentum
+from rotor.classical.integrators.splitting import turned_axes
+from rotor.classical.system import acting_inverse
+from rotor.geometry.rotations import from_matrix, normalised
+
+
+def advance(
+    moments: ArrayLike,
+    momentum: ArrayLike,
+    attitude: ArrayLike,
+    step: float,
+    steps: int,
+    executor: ThreadPoolExecutor | None = None,
+) -> tuple[Floats, Floats]:
+    """Momentum (n, 3) and attitude (n, 4) of n free tops after `steps` steps of length `step`.
+
+    moments (n, 3) or (3,), momentum (n, 3) in body axes, attitude (n, 4) or (4,); coherent units; `step` may be
+    negative. The two turns of a step, (1/I_i - 1/I3) |L| step, may not be wider than ½ rad for any body. Threads of
+    `executor` share the bodies (the compiled loop releases the interpreter lock).
+
+    >>> momentum, attitude = advance([0.6, 0.8, 1.0], np.array([[1.8, 0.4, -0.9]]), [1, 0, 0, 0], 0.01, 1000)
+    >>> momentum[0].round(4).tolist()  # exact: 1.76596, -0.69546, 0.77955
+    [1.766, -0.6955, 0.7796]
+    """
+    from rotor.classical.integrators._kernels import LANES, advance_blocks
+
+    moments = checked_moments(moments)
+    momentum = np.ascontiguousarray(checked_momentum(momentum, moments))
+    if momentum.ndim != 2:
+        raise ValueError(f"the momenta of many tops have shape (n, 3); got {momentum.shape}")
+    if steps < 0:
+        raise ValueError(f"the number of steps is not negative; got {steps} (to go back, give a negative step)")
+    n = len(momentum)
+    attitude = np.ascontiguousarray(np.broadcast_to(normalised(attitude), (n, 4)))
+    rates, axes = (np.ascontiguousarray(np.broadcast_to(a, (n, a.shape[-1]))) for a in rates_and_axes(moments))
+    check_turn(rates, momentum, step)
+    out = momentum.copy(), attitude.copy()
+    if steps == 0:
+        return out
+    blocks, arguments = -(-n // LANES), (step, steps, rates, axes, (momentum, attitude), out)
+    if executor is None:
+        advance_blocks((0, blocks), *arguments)
+    else:
+        edges = np.linspace(0, blocks, min(blocks, 64) + 1).astype(int).tolist()
+        jobs = [executor.submit(advance_blocks, part, *arguments) for part in pairwise(edges)]
+        for job in jobs:
+            job.result()
+    return out
+
+
+def rates_and_axes(moments: Floats) -> tuple[Floats, Floats]:
+    """Rates per |L| of the inner, the outer turn and the sphere (n, 3), and the quaternions (n, 4) to their axes."""
+    inverse = np.atleast_2d(acting_inverse(moments))
+    order = turned_axes(inverse)
+    outer, inner, third = np.take_along_axis(inverse, order, axis=-1).T
+    frames = np.eye(3)[order]
+    frames[:, 2] *= np.linalg.det(frames)[:, None]  # a rotation, not a reflection; L3 enters through its square only
+    return np.stack([inner - third, outer - third, third], axis=-1), from_matrix(frames)
+
+
+def check_turn(rates: Floats, momentum: Floats, step: float) -> None:
+    from rotor.classical.integrators._kernels import WIDEST_TURN
+
+    size = np.linalg.norm(momentum, axis=-1)
+    turn = abs(step) * float(np.max(size * np.max(np.abs(rates[:, :2]), axis=-1), initial=0.0))
+    if not turn <= WIDEST_TURN:
+        raise ValueError(
+            f"a step of {step:g} could turn a body by {turn:.3g} rad about one axis, more than {WIDEST_TURN}; "
+            "take a shorter step"
+        )

@@ -1,0 +1,139 @@
+"""An adaptive Runge-Kutta method on the rotation group, for drag, feedback and anything else that is not Hamiltonian.
+
+Order: 8, with the step chosen from embedded results of order 5 and 3 (the tableau of DOP853). Keeps: the unit
+quaternion, and L in space exactly where there is no torque (it is L in space that is integrated); the energy only to
+the tolerance, with a linear drift. Cost: 12 evaluations a step in numpy, about 0.25 ms a step for one body and little
+more for a hundred; all bodies of one call share the step. Sources: H. Munthe-Kaas, BIT 38, 92 (1998); the tableau,
+E. Hairer, S. P. Nørsett, G. Wanner, Solving Ordinary Differential Equations I, section II.5.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from rotor.arrays import Floats
+from rotor.classical.integrators.method import Method
+from rotor.classical.system import System
+from rotor.geometry.rotations import conjugate, rotate
+
+SHRINK, GROW, SAFETY = 0.2, 5.0, 0.9
+SMALLEST_STEP = 1e-13  # of the interval between two times asked for
+STAGES = 12
+
+
+@dataclass(frozen=True)
+class LieRungeKutta(Method):
+    """Steps of order 8 with the local error per step held below tolerance x (|L| of the body, one radian).
+
+    `fixed_step` turns the control off and takes steps of that length (the last of an interval shorter): for measuring
+    the order.
+
+    >>> from rotor.classical.effects.drag import LinearDrag
+    >>> from rotor.classical.integrators.method import integrate
+    >>> motion = integrate(LieRungeKutta(), [1, 1, 1], [0, 0, 1], [0.0, 1.0], effects=[LinearDrag([1, 1, 1])])
+    >>> float(motion.momentum[-1, 2].round(10))  # exp(-1)
+    0.3678794412
+    """
+
+    tolerance: float = 1e-11
+    fixed_step: float | None = None
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.tolerance < 1.0:
+            raise ValueError(f"the tolerance is a number between 0 and 1; got {self.tolerance!r}")
+        if self.fixed_step is not None and not self.fixed_step > 0.0:
+            raise ValueError(f"a fixed step is a positive time; got {self.fixed_step!r}")
+
+    def states(self, system: System, momentum: Floats, attitude: Floats, times: Floats) -> tuple[Floats, Floats, int]:
+        """Steps that end at each of the times."""
+        space, q = rotate(attitude, momentum), np.array(attitude)
+        out, attitudes, taken = [momentum], [attitude], 0
+        step = self.fixed_step or self._first_step(system, float(times[0]), momentum)
+        for start, stop in pairwise(times):
+            space, q, step, steps = self._to(system, (float(start), float(stop)), space, q, step)
+            taken += steps
+            out.append(rotate(conjugate(q), space))
+            attitudes.append(q)
+        return np.stack(out), np.stack(attitudes), taken
+
+    def _first_step(self, system: System, time: float, momentum: Floats) -> float:
+        """A tenth of a radian of the fastest body, or a time unit for bodies at rest; the control corrects it."""
+        fastest = float(np.max(np.linalg.norm(system.omega(time, momentum), axis=-1)))
+        return 0.1 / fastest if fastest > 0.0 else 1.0
+
+    def _to(
+        self, system: System, span: tuple[float, float], space: Floats, q: Floats, step: float
+    ) -> tuple[Floats, Floats, float, int]:
+        """The state at the end of `span`, the next step and the count of steps."""
+        time, end = span
+        forward, smallest, steps = np.sign(end - time), SMALLEST_STEP * abs(end - time), 0
+        while (end - time) * forward > smallest:
+            last = step >= abs(end - time) * (1.0 - 1e-12)
+            h = end - time if last else forward * step
+            new_space, new_q, error = self._step(system, time, space, q, h)
+            steps += 1
+            if self.fixed_step is None:
+                if not last or error > 1.0:
+                    step = abs(h) * _factor(error)
+                if not error <= 1.0:
+                    _check_step(step, smallest, time)
+                    continue
+            time, space, q = (end if last else time + h), new_space, new_q
+        return space, q, step, steps
+
+    def _step(self, system: System, time: float, space: Floats, q: Floats, h: float) -> tuple[Floats, Floats, float]:
+        """L in space and attitude after one step, and the error estimate in units of the tolerance."""
+        from scipy.integrate import DOP853
+
+        from rotor.classical.integrators._attitude_kernels import placed
+
+        slopes = np.zeros((STAGES, len(space), 6))
+        flat = slopes.reshape(STAGES, -1)
+        here, momentum = np.empty_like(q), np.empty_like(space)
+        for stage in range(STAGES):
+            change = (h * DOP853.A[stage, :stage] @ flat[:stage]).reshape(-1, 6)
+            placed(q, change, space, here, momentum)
+            _rates(system, time + DOP853.C[stage] * h, momentum, here, change, slopes[stage])
+        change = (h * DOP853.B @ flat).reshape(-1, 6)
+        placed(q, change, space, here, momentum)
+        size = np.linalg.norm(space, axis=-1) + np.linalg.norm(change[:, :3], axis=-1)
+        slopes[:, :, :3] /= np.where(size > 0.0, size, 1.0)[:, None]
+        error = _error(slopes, h, DOP853.E3[:STAGES], DOP853.E5[:STAGES]) / self.tolerance
+        return space + change[:, :3], here, error
+
+
+def _rates(system: System, time: float, momentum: Floats, q: Floats, change: Floats, out: Floats) -> None:
+    """dL/dt in space and du/dt, q = q_n exp(u), into out (n, 6); change (n, 6) is that of L and u since the start."""
+    from rotor.classical.integrators._attitude_kernels import to_space, turning
+
+    relative = momentum - system.inner_momentum(time) if system.inner else momentum
+    omega = relative * system.acting(time)
+    turning(change, omega, out)
+    if system.torques:
+        to_space(q, system.torque(time, q, omega), out)
+
+
+def _error(slopes: Floats, h: float, third: Floats, fifth: Floats) -> float:
+    """The estimate of Hairer, Nørsett and Wanner, |e5|²/√(|e5|² + 0.01 |e3|²), of the worst body."""
+    e5 = np.sum(np.tensordot(fifth, slopes, axes=1) ** 2, axis=-1)
+    e3 = np.sum(np.tensordot(third, slopes, axes=1) ** 2, axis=-1)
+    both = np.sqrt(e5 + 0.01 * e3)
+    return float(np.max(abs(h) * np.divide(e5, both, out=np.zeros_like(both), where=both > 0.0)))
+
+
+def _factor(error: float) -> float:
+    """By how much to change the step for an error estimate, of order 8, in units of the tolerance."""
+    if error == 0.0:
+        return GROW
+    return float(np.clip(SAFETY * error ** (-1.0 / 8.0), SHRINK, GROW)) if np.isfinite(error) else SHRINK
+
+
+def _check_step(step: float, smallest: float, time: float) -> None:
+    if step < smallest:
+        raise ValueError(
+            f"no step is short enough at time {time:g}: an effect is discontinuous or grows without bound there; "
+            "end the motion before it, or loosen the tolerance"
+        )

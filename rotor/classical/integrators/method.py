@@ -1,0 +1,228 @@
+"""Motions of rigid bodies under effects, step by step: the face that every integrator shows, and how to choose one.
+
+| method | order | keeps | for |
+|---|---|---|---|
+| `ExactDrift` | free: exact; with torques 2 to 8 | symplectic, L in space | free motion at any time; weak torques |
+| `MoserVeselov` | free: 2 to 8, or exact; with torques 2 to 8 | L in space, free energy | free motion by steps |
+| `SymmetricTopSplitting` | 2, 4, 6, 8 | symplectic, L in space | torques, on any body |
+| `RotationSplitting` | 2, 4, 6, 8 | symplectic, L in space | the usual splitting, to compare with; not linear rotors |
+| `LieRungeKutta` | 8, adaptive step | unit quaternion, free L in space | drag, feedback, driven chaos; references |
+
+Each has its page (module) with cost and source. What accuracy costs with each of them is drawn by
+`benchmarks/bench_work_precision.py`.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rotor.arrays import Floats
+from rotor.classical.effect import ClassicalEffect
+from rotor.classical.euler import checked_moments, checked_momentum
+from rotor.classical.integrators.compositions import fractions
+from rotor.classical.system import System, system_of
+from rotor.geometry.rotations import IDENTITY, normalised
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A motion at the times asked for, axes in the order of the moments given.
+
+    times: (t,).  momentum: (..., t, 3), L in body axes.  attitude: (..., t, 4), body to space.
+    omega: (..., t, 3), angular velocity in body axes.  energy: (..., t), kinetic and potential.
+    steps: how many steps of the method were taken.
+    """
+
+    times: Floats
+    momentum: Floats
+    attitude: Floats
+    omega: Floats
+    energy: Floats
+    steps: int
+
+
+class Method(ABC):
+    """A way to carry a state from time to time."""
+
+    @abstractmethod
+    def states(self, system: System, momentum: Floats, attitude: Floats, times: Floats) -> tuple[Floats, Floats, int]:
+        """Momentum (t, n, 3), attitude (t, n, 4) of n bodies and the count of steps; the start is at times[0]."""
+
+
+def integrate(
+    method: Method,
+    moments: ArrayLike,
+    momentum0: ArrayLike,
+    times: ArrayLike,
+    attitude0: ArrayLike = IDENTITY,
+    effects: Sequence[ClassicalEffect] = (),
+) -> Motion:
+    """The motion of bodies with principal moments (..., 3) under a list of effects, at `times` (t,).
+
+    momentum0 (..., 3) in body axes and attitude0 (..., 4) are the state at times[0]; times may run forward or back.
+    Any coherent units. Effects act on every body. An effect is added by naming it in the list; the empty list is free
+    motion and costs what free motion costs.
+
+    Raises ValueError for a method that cannot serve an effect, with the one that can.
+
+    >>> from rotor.classical.integrators.splitting import RotationSplitting
+    >>> motion = integrate(RotationSplitting(step=0.01, order=4), [0.6, 0.8, 1.0], [1.8, 0.4, -0.9], [0.0, 10.0])
+    >>> motion.momentum[-1].round(6).tolist()  # exact: 1.765963, -0.695464, 0.77955498
+    [1.765963, -0.695464, 0.779555]
+    """
+    times = _checked_times(times)
+    moments = checked_moments(moments)
+    momentum0 = checked_momentum(momentum0, moments)
+    attitude0 = normalised(attitude0)
+    shape = np.broadcast_shapes(moments.shape[:-1], momentum0.shape[:-1], attitude0.shape[:-1])
+    system = system_of(np.broadcast_to(moments, (*shape, 3)), effects)
+    m0 = np.broadcast_to(momentum0, (*shape, 3)).reshape(-1, 3)
+    q0 = np.broadcast_to(attitude0, (*shape, 4)).reshape(-1, 4)
+    momentum, attitude, steps = method.states(system, m0, q0, times)
+    _check_finite(momentum, times, method)
+    omega = np.stack([system.omega(float(t), m) for t, m in zip(times, momentum, strict=True)])
+    triples = zip(times, momentum, attitude, strict=True)
+    energy = np.stack([system.energy(float(t), m, q) for t, m, q in triples])
+    momentum, attitude, omega, energy = (_bodies_first(a, shape) for a in (momentum, attitude, omega, energy))
+    return Motion(times, momentum, attitude, omega, energy, steps)
+
+
+@dataclass(frozen=True)
+class KickDrift(Method):
+    """Drifts of the free body between kicks of the torques: half a kick, a drift, half a kick, composed.
+
+    With moments that change, each drift takes those of its middle; inner momenta turn the body by -h/I dt before and
+    after it. All three are symmetric, so compositions raise the order. The torque is evaluated once per drift.
+    """
+
+    step: float
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.step) and self.step > 0.0):
+            raise ValueError(f"a step is a positive time; got {self.step!r} (to go back, give times that decrease)")
+
+    @property
+    @abstractmethod
+    def kick_fractions(self) -> Floats:
+        """Fractions of the composition of kicks and drifts."""
+
+    @abstractmethod
+    def drift(self, moments: Floats, state: Floats, carry: Floats, step: float, steps: int, whole: bool) -> None:
+        """`steps` steps of free motion of rows (n, 7), in place: of full order if `whole`, else one base step each."""
+
+    def states(self, system: System, momentum: Floats, attitude: Floats, times: Floats) -> tuple[Floats, Floats, int]:
+        """Steps of equal length from each time to the next, the longest that do not exceed `step`."""
+        from rotor.classical.integrators._step_kernels import rows
+
+        if system.needs_velocity:
+            raise ValueError(
+                f"{type(self).__name__} kicks with torques of attitude and time; a torque that depends on angular "
+                "velocity (drag, feedback) needs LieRungeKutta"
+            )
+        state = rows(momentum, attitude)
+        carry, out, taken = np.zeros_like(state), [state.copy()], 0
+        for start, stop in pairwise(times):
+            steps = max(1, int(np.ceil(abs(stop - start) / self.step - 1e-9)))
+            self._advance(system, state, carry, float(start), float(stop - start) / steps, steps)
+            out.append(state.copy())
+            taken += steps
+        path = np.stack(out)
+        return path[..., :3], path[..., 3:], taken
+
+    def _advance(self, system: System, state: Floats, carry: Floats, start: float, step: float, steps: int) -> None:
+        if system.free:
+            self.drift(system.start_moments, state, carry, step, steps, whole=True)
+            return
+        kicker = _Kicker(system, state, carry, np.full((len(state), 3), np.nan))
+        torque = kicker.torque(start)
+        for k in range(steps):
+            time = start + k * step
+            for fraction in self.kick_fractions:
+                h = fraction * step
+                kicker.kick(torque, 0.5 * h)
+                moments = system.moments(time + 0.5 * h)
+                kicker.turn(time + 0.5 * h, 0.5 * h)
+                self.drift(moments, state, carry, h, 1, whole=False)
+                kicker.turn(time + 0.5 * h, 0.5 * h)
+                time += h
+                torque = kicker.torque(time)
+                kicker.kick(torque, 0.5 * h)
+
+
+@dataclass(frozen=True)
+class Composed(KickDrift):
+    """Kicks and drifts of order 2 composed to `order` 2, 4, 6 or 8 (`compositions.py`), free steps likewise."""
+
+    order: int = 2
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        fractions(self.order)
+
+    @property
+    def kick_fractions(self) -> Floats:
+        """Fractions of the composition, the same for the free steps."""
+        return fractions(self.order)
+
+
+@dataclass(frozen=True)
+class _Kicker:
+    """Kicks and turns of rows (n, 7), in place; each does nothing where its effects are absent."""
+
+    system: System
+    state: Floats
+    carry: Floats
+    no_omega: Floats
+
+    def torque(self, time: float) -> Floats | None:
+        """Torques (n, 3) here and now, None where there are none."""
+        if not self.system.torques:
+            return None
+        torque = self.system.torque(time, self.state[:, 3:], self.no_omega)
+        return np.ascontiguousarray(np.broadcast_to(torque, self.no_omega.shape))
+
+    def kick(self, torque: Floats | None, time: float) -> None:
+        """L gains torque times time."""
+        from rotor.classical.integrators._step_kernels import kick
+
+        if torque is not None:
+            kick(self.state, self.carry, torque, time)
+
+    def turn(self, time: float, duration: float) -> None:
+        """The inner momenta's share -h/I of the angular velocity, for a duration."""
+        from rotor.classical.integrators._step_kernels import turn_uniformly
+
+        if self.system.inner:
+            rate = self.system.inner_momentum(time) * self.system.acting(time)
+            turn_uniformly(self.state, self.carry, -duration * rate)
+
+
+def _checked_times(times: ArrayLike) -> Floats:
+    array = np.asarray(times, dtype=np.float64)
+    if array.ndim != 1 or array.size < 1 or not np.all(np.isfinite(array)):
+        raise ValueError(f"times are a list of finite numbers, the first of them that of the start; got {times!r}")
+    steps = np.diff(array)
+    if not (np.all(steps > 0.0) or np.all(steps < 0.0)):
+        raise ValueError("times must all increase, or all decrease, without repetition")
+    return array
+
+
+def _check_finite(momentum: Floats, times: Floats, method: Method) -> None:
+    lost = ~np.all(np.isfinite(momentum), axis=(1, 2))
+    if np.any(lost):
+        raise ValueError(
+            f"the motion is no longer finite at time {times[np.argmax(lost)]:g} with {type(method).__name__}: the step "
+            "is too long, or an effect feeds energy in without bound"
+        )
+
+
+def _bodies_first(array: Floats, shape: tuple[int, ...]) -> Floats:
+    """(t, n, ...) as (*shape, t, ...)."""
+    moved = np.moveaxis(array, 0, 1)
+    return np.ascontiguousarray(moved.reshape(*shape, *moved.shape[1:]))

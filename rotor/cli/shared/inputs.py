@@ -1,0 +1,250 @@
+"""What comes in: option texts become numbers, a source and its options become a top with a dipole."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, TypeVar
+
+import typer
+
+from rotor.cli.shared.output import note
+
+if TYPE_CHECKING:
+    from rotor.molecules.molecule import Molecule
+    from rotor.tops.top import Top
+
+T = TypeVar("T")
+
+SOURCE = typer.Argument(None, help="File, name, SMILES:... or - for standard input.", show_default=False)
+CONSTANTS = typer.Option(None, metavar="TEXT", help='Constants instead of a source: "A=9.2(1) B=3 C=2.5 GHz" (MHz).')
+DIPOLE = typer.Option(None, metavar="X,Y,Z", help="Dipole in the frame of the input (D).")
+DIPOLE_ABC = typer.Option(None, metavar="A,B,C", help="Dipole in principal axes (D).")
+ISOTOPE = typer.Option(None, metavar="1=2H", help="Another isotope, by atom number or element; repeatable.")
+CALCULATOR = typer.Option(
+    None, metavar="NAME", help="Refine the geometry with an ASE calculator of that name, such as xtb, tblite or psi4."
+)
+HESSIAN = typer.Option(
+    None,
+    metavar="FILE",
+    help="Quartic distortion from a Hessian at the geometry (hartree/bohr², rows or lower triangle), or, with the word "
+    "'calculator', from one that --calculator makes.",
+)
+SPIN_WEIGHTS = typer.Option(None, metavar="LIST", help='Nuclear-spin weights: "ee=1,eo=3,oe=3,oo=1", "even=1,odd=3".')
+JSON = typer.Option(None, "--json", metavar="FILE", help="Everything printed, as JSON; - is standard output.")
+
+
+@dataclass(frozen=True)
+class Input:
+    """The texts that say which top is meant."""
+
+    source: str | None
+    constants: str | None
+    isotopes: Sequence[str]
+    dipole: str | None
+    dipole_abc: str | None
+    spin_weights: str | None
+    calculator: str | None = None
+    hessian: str | None = None
+
+    @property
+    def text(self) -> str:
+        """The source as given, or the constants."""
+        return self.source or self.constants or ""
+
+
+def option(name: str, text: str, parse: Callable[[str], T]) -> T:
+    """The value of an option; a ValueError says which option."""
+    try:
+        return parse(text)
+    except ValueError as error:
+        raise ValueError(f"{name}: {error}") from None
+
+
+def quantity(name: str, text: str, unit: str) -> float:
+    """A number with an optional unit, in `unit`."""
+    from rotor.units import parse_quantity
+
+    return option(name, text, lambda value: parse_quantity(value, unit))
+
+
+def positive(name: str, text: str, unit: str) -> float:
+    """The same, above zero."""
+    return above_zero(name, quantity(name, text, unit), unit)
+
+
+def above_zero(name: str, value: float, unit: str = "") -> float:
+    """The value, refused unless it is finite and above zero."""
+    if not (math.isfinite(value) and value > 0):
+        raise ValueError(f"{name}: {value:g}: a finite number above 0{' ' if unit else ''}{unit} is wanted")
+    return value
+
+
+def temperatures(name: str, text: str) -> list[float]:
+    """A grid or list of temperatures in K, refused unless all are above 0 K."""
+    from rotor.units import parse_grid
+
+    found: list[float] = option(name, text, lambda value: parse_grid(value, "K").tolist())
+    if not all(0 < t < float("inf") for t in found):
+        raise ValueError(f"{name}: {text!r}: temperatures are above 0 K")
+    return found
+
+
+def whole(name: str, value: int | None, least: int, most: int | None = None) -> None:
+    """Refuse a whole number out of bounds."""
+    if value is not None and (value < least or (most is not None and value > most)):
+        bounds = f"of {least} or more" if most is None else f"from {least} to {most}"
+        raise ValueError(f"{name}: {value}: a whole number {bounds} is wanted")
+
+
+def cut(name: str, text: str) -> float | None:
+    """The least log10 of an intensity; None for `none`."""
+    if text.strip().lower() == "none":
+        return None
+
+    def parse(value: str) -> float:
+        try:
+            number = float(value.replace("−", "-"))
+        except ValueError:
+            number = math.nan
+        if not math.isfinite(number):
+            raise ValueError(f"{value!r} is not a finite number or 'none'")
+        return number
+
+    return option(name, text, parse)
+
+
+def vector(name: str, text: str) -> tuple[float, float, float]:
+    """Three components of a dipole in debye, from `x,y,z` with a unit at the end if wanted."""
+    from rotor.units import parse_grid
+
+    def parse(value: str) -> tuple[float, float, float]:
+        numbers = parse_grid(value, "D").tolist() if ":" not in value else []
+        if len(numbers) != 3 or not all(map(math.isfinite, numbers)):
+            raise ValueError(f"{value!r}: three finite numbers are wanted, such as 0,0,1.85 (debye)")
+        return numbers[0], numbers[1], numbers[2]
+
+    return option(name, text, parse)
+
+
+def weights(name: str, text: str) -> dict[str, int]:
+    """Spin weights by class, from `ee=1,eo=3,oe=3,oo=1`."""
+    table: dict[str, int] = {}
+    for item in text.split(","):
+        key, equals, number = (part.strip() for part in item.partition("="))
+        if not (key and equals and number.isdecimal()) or key in table:
+            raise ValueError(
+                f"{name}: {item.strip()!r} in {text!r}: class=number is wanted, each class once, such as ee=1"
+            )
+        table[key] = int(number)
+    return table
+
+
+def read_top(given: Input) -> Top:
+    """The top that the options mean, with the dipole and weights given by hand; what it is noted for is said."""
+    _refuse_contradictions(given)
+    top = _from_constants(given) if given.constants is not None else _from_source(given)
+    if given.dipole_abc is not None:
+        top = top.with_dipole(vector("--dipole-abc", given.dipole_abc), "given in principal axes (--dipole-abc)")
+    if given.dipole is not None:
+        top = _with_dipole_of_input(top, vector("--dipole", given.dipole))
+    if given.spin_weights is not None:
+        table = weights("--spin-weights", given.spin_weights)
+        top = option("--spin-weights", given.spin_weights, lambda _: top.with_weights(table, "given (--spin-weights)"))
+    _refuse_weights_of_another_kind(top)
+    for text in top.notes:
+        note(text)
+    return top
+
+
+def _refuse_contradictions(given: Input) -> None:
+    if (given.source is None) == (given.constants is None):
+        both = "both were given" if given.source is not None else "neither was given"
+        raise ValueError(
+            f"either a source or --constants is wanted, and {both}; give one of them, such as the name water"
+        )
+    if given.dipole is not None and given.dipole_abc is not None:
+        raise ValueError("--dipole and --dipole-abc: give one of them, in the frame of the input or in principal axes")
+    if given.isotopes and given.constants is not None:
+        raise ValueError("--isotope: bare constants have no atoms; give the constants of the isotopologue itself")
+    if given.calculator is not None and given.constants is not None:
+        raise ValueError("--calculator: bare constants have no geometry to refine; give a molecule")
+    if given.hessian is not None and given.constants is not None:
+        raise ValueError("--hessian: bare constants have no geometry that it belongs to; give a molecule")
+
+
+def _from_constants(given: Input) -> Top:
+    from rotor.tops.top import Top
+
+    return option(
+        "--constants", given.constants or "", lambda text: Top.from_constants(text, source="given (--constants)")
+    )
+
+
+def _from_source(given: Input) -> Top:
+    import rotor
+
+    top = rotor.read(given.source, isotopes=",".join(given.isotopes) or None)
+    if not isinstance(top, rotor.Top):
+        raise ValueError(f"{given.source}: holds a {type(top).__name__.lower()}, not a molecule or constants")
+    if given.calculator is not None:
+        top = option("--calculator", given.calculator, lambda name: _refined(top, name))
+    if given.hessian is None:
+        return top
+    return option("--hessian", given.hessian, lambda path: _semirigid(top, path, given.calculator))
+
+
+def _refined(top: Top, name: str) -> Top:
+    from rotor.molecules.optimise import refine
+    from rotor.tops.top import Top
+
+    return Top.from_molecule(refine(_geometry(top), name))
+
+
+def _semirigid(top: Top, path: str, calculator: str | None) -> Top:
+    """The top of the geometry with the distortion that a Hessian gives, of a file or of the calculator."""
+    from rotor.molecules.force_field import force_field_from_calculator, read_hessian
+    from rotor.molecules.optimise import calculator_by_name
+    from rotor.tops.distortion import semirigid_top
+
+    if path != "calculator":
+        return semirigid_top(read_hessian(path, _geometry(top)))
+    if calculator is None:
+        raise ValueError("the word 'calculator' needs --calculator NAME; else give a file")
+    return semirigid_top(force_field_from_calculator(_geometry(top), calculator_by_name(calculator)))
+
+
+def _geometry(top: Top) -> Molecule:
+    if top.molecule is None:
+        raise ValueError(f"{top.name or 'the source'} has constants alone; a geometry is wanted")
+    return top.molecule
+
+
+def _with_dipole_of_input(top: Top, dipole_debye: tuple[float, float, float]) -> Top:
+    if top.frame is None:
+        raise ValueError("--dipole is in the frame of a geometry, and there is none here; use --dipole-abc")
+    return top.with_dipole((top.frame.axes @ dipole_debye).tolist(), "given in the frame of the input (--dipole)")
+
+
+def _refuse_weights_of_another_kind(top: Top) -> None:
+    from rotor.quantum.levels import solve_levels
+
+    solve_levels(top, 1, vectors=False)
+
+
+def with_some_dipole(top: Top) -> Top:
+    """The top with an estimated dipole where none is known; ValueError where it cannot be estimated either."""
+    if top.dipole_abc_debye is not None or top.kind == "spherical":
+        return top
+    remedy = "give --dipole x,y,z (frame of the input) or --dipole-abc a,b,c (principal axes)"
+    if top.molecule is None:
+        raise ValueError(f"the dipole is not known: {remedy.replace('--dipole x,y,z (frame of the input) or ', '')}")
+
+    from rotor.molecules.mmff_dipole import CHARGES_SOURCE, estimate_dipole
+
+    dipole, said = estimate_dipole(top.molecule)
+    if dipole is None:
+        raise ValueError(f"{said}: {remedy}")
+    note(said)
+    return replace(top.with_estimated_dipole(dipole, CHARGES_SOURCE), notes=(*top.notes, said))

@@ -1,0 +1,203 @@
+"""What goes out: tables for people, JSON for programs, notes and files written all or none."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import shutil
+import sys
+import tempfile
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rotor.table import Table as Columns
+
+Writer = Callable[[Path], None]
+
+
+class NoAnswer(Exception):
+    """The input is sound, but no answer was reached: exit code 1."""
+
+
+@contextmanager
+def answering() -> Iterator[None]:
+    """Inside, a ValueError is no longer the user's mistake: what was given has been checked before."""
+    try:
+        yield
+    except ValueError as error:
+        raise NoAnswer(str(error)) from error
+    except MemoryError as error:
+        raise NoAnswer(
+            "not enough memory for so many lines; a lower J max, a range or a higher cut needs less"
+        ) from error
+
+
+def note(text: str) -> None:
+    """A line on standard error that the user must not miss."""
+    print("note:", text, file=sys.stderr)
+
+
+@dataclass(frozen=True)
+class Table:
+    """A heading, column names, and rows of text; numbers are aligned to the right, columns named in `left` to the left."""
+
+    title: str
+    columns: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    left: frozenset[str] = frozenset()
+
+
+def show_table(table: Table) -> None:
+    """Print a table: drawn by rich on a terminal, as aligned text into a pipe or file."""
+    if sys.stdout.isatty():
+        _draw(table)
+    else:
+        print(table_text(table))
+
+
+def table_text(table: Table) -> str:
+    """The table as aligned text, two spaces between columns."""
+    widths = [max(map(len, column)) for column in zip(table.columns, *table.rows, strict=True)]
+    rows = []
+    for row in (table.columns, *table.rows):
+        cells = zip(row, widths, table.columns, strict=True)
+        rows.append("  ".join(t.ljust(w) if name in table.left else t.rjust(w) for t, w, name in cells).rstrip())
+    return "\n".join([table.title, *rows] if table.title else rows)
+
+
+def _draw(table: Table) -> None:
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table as RichTable
+    from rich.text import Text
+
+    drawn = RichTable(
+        title=table.title or None,
+        title_justify="left",
+        title_style="bold",
+        box=box.SIMPLE_HEAD,
+        show_edge=False,
+        pad_edge=False,
+    )
+    for name in table.columns:
+        drawn.add_column(Text(name), justify="left" if name in table.left else "right", no_wrap=True)
+    for row in table.rows:
+        drawn.add_row(*map(Text, row))
+    console = Console()
+    if console.measure(drawn, options=console.options.update(width=10_000)).maximum <= console.width:
+        console.print(drawn)
+    else:  # too narrow for it: lines that break, rather than numbers cut short
+        print(table_text(table))
+
+
+def show_facts(facts: Iterable[tuple[str, str]]) -> None:
+    """Print names and what there is to say about them, folded to the width of the terminal."""
+    import textwrap
+
+    facts = list(facts)
+    indent = max(len(name) for name, _ in facts) + 2
+    width = max(60, min(120, shutil.get_terminal_size((120, 24)).columns))
+    for name, text in facts:
+        print(textwrap.fill(text, width, initial_indent=name.ljust(indent), subsequent_indent=" " * indent))
+
+
+def plain(thing: Any) -> Any:
+    """The same content in JSON's types: arrays as lists, numbers that are not finite as None."""
+    if isinstance(thing, Mapping):
+        return {str(key): plain(value) for key, value in thing.items()}
+    if hasattr(thing, "tolist"):
+        return plain(thing.tolist())
+    if isinstance(thing, list | tuple):
+        return [plain(item) for item in thing]
+    if isinstance(thing, float) and not math.isfinite(thing):
+        return None
+    return thing
+
+
+def json_text(content: Mapping[str, Any]) -> str:
+    """The content as JSON text, each number once and each record of a list on one line."""
+    items = (f"{json.dumps(str(key))}: {_json_value(value)}" for key, value in content.items())
+    return "{\n" + ",\n".join(items) + "\n}\n"
+
+
+def json_with_rows(table: Columns, key: str, content: Mapping[str, Any]) -> str:
+    """The content as JSON text with all rows of a table, one record each, under the key."""
+    return json_text({**content, key: rows_of(table)})
+
+
+def rows_of(table: Columns) -> list[dict[str, Any]]:
+    """All rows of a table, one record each by the names of its columns."""
+    columns = {name: column.tolist() for name, column in table.columns.items()}
+    return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+
+
+def _json_value(value: Any) -> str:
+    value = plain(value)
+    if isinstance(value, list) and value and isinstance(value[0], dict):
+        return "[\n" + ",\n".join(json.dumps(item, ensure_ascii=False, allow_nan=False) for item in value) + "\n]"
+    return json.dumps(value, ensure_ascii=False, allow_nan=False)
+
+
+@dataclass(frozen=True)
+class Files:
+    """Files asked for, by option: checked before any work is done, written together after all of it."""
+
+    wanted: dict[str, Path] = field(default_factory=dict)
+    screen: set[str] = field(default_factory=set)  # options whose text goes to standard output: --json -
+
+    def ask_json(self, path: str | None) -> None:
+        """Remember where the JSON goes: to a file, to standard output (`-`), or nowhere."""
+        if path == "-":
+            self.screen.add("--json")
+        else:
+            self.ask("--json", path, (".json",))
+
+    def ask(self, option: str, path: str | None, suffixes: Sequence[str]) -> None:
+        """Remember a file to write; ValueError for a suffix that the option does not write, or no folder to write in."""
+        if path is None:
+            return
+        target = Path(path)
+        if not target.name.lower().endswith(tuple(suffixes)):
+            raise ValueError(f"{option} {path}: the name must end in {' or '.join(suffixes)}")
+        if target.is_dir():
+            raise ValueError(f"{option} {path}: is a folder; give the name of a file to write")
+        if not target.parent.is_dir():
+            raise ValueError(f"{option} {path}: there is no folder {target.parent}; make it first")
+        if not os.access(target.parent, os.W_OK):
+            raise ValueError(f"{option} {path}: cannot write in {target.parent}: no permission")
+        if any(target.resolve() == other.resolve() for other in self.wanted.values()):
+            raise ValueError(f"{option} {path}: another option writes the same file")
+        self.wanted[option] = target
+
+    def write(self, writers: Mapping[str, Writer]) -> None:
+        """Make every file in a folder beside its place by the writer of its option, then rename: all appear, or none."""
+        with ExitStack() as stack:
+            moves: list[tuple[Path, Path]] = []
+            for option, target in self.wanted.items():
+                try:
+                    folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix=".rotor-", dir=target.parent)))
+                except OSError as error:
+                    raise ValueError(f"{option} {target}: cannot write in {target.parent}: {error.strerror}") from None
+                writers[option](folder / target.name)
+                moves += [(made, target.parent / made.name) for made in sorted(folder.iterdir())]
+            for made, place in moves:
+                os.replace(made, place.resolve())
+
+
+def deliver(files: Files, writers: Mapping[str, Writer], json: Callable[[], str], show: Callable[[], None]) -> None:
+    """Write all files, the JSON among them, then print the JSON where it was asked for, else what `show` prints."""
+    files.write({**writers, "--json": lambda path: write_text(path, json())})
+    if "--json" in files.screen:
+        print(json(), end="")
+    else:
+        show()
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write text as UTF-8 with plain line ends."""
+    path.write_text(text, encoding="utf-8", newline="\n")

@@ -1,0 +1,216 @@
+"""What a long run leaves on disk: rows and frames that grow, and checkpoints that are whole or not there.
+
+A checkpoint is written beside, forced to the disk and renamed. It remembers how long the growing files were; a run that
+continues cuts them back to that length first, so that nothing stands in them twice and no half line stays.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rotor.arrays import Floats
+
+if TYPE_CHECKING:
+    from ase import Atoms
+
+VERSION = 1
+
+
+class TextFile:
+    """A text file that grows by whole pieces: a piece that does not fit on the disk leaves the file as it was.
+
+    length: bytes to keep of an existing file; None begins anew.
+    """
+
+    def __init__(self, path: str | os.PathLike[str], length: int | None = None) -> None:
+        self.path = Path(path)
+        if length is not None and (not self.path.is_file() or self.path.stat().st_size < length):
+            raise ValueError(
+                f"{path}: is shorter than when the checkpoint was written ({length} bytes); it was changed since"
+            )
+        self._file = open(path, "wb" if length is None else "r+b", buffering=0)  # noqa: SIM115 - open as long as the run
+        if length is not None:
+            self._file.truncate(length)
+            self._file.seek(length)
+
+    def add(self, text: str) -> None:
+        """Append a piece; OSError, with the file as before, where the disk is full."""
+        start, left = self._file.tell(), memoryview(text.encode("utf-8"))
+        try:
+            while left:
+                left = left[self._file.write(left) :]
+        except OSError as error:
+            if os.path.isfile(self.path):
+                self._file.truncate(start)
+            raise OSError(error.errno, error.strerror, str(self.path)) from error
+
+    def sync(self) -> int:
+        """Bytes, all on the disk."""
+        if os.path.isfile(self.path):
+            os.fsync(self._file.fileno())
+        return self._file.tell()
+
+    def close(self) -> None:
+        """Let go of it."""
+        self._file.close()
+
+
+class ExtendedXyz:
+    """Frames as extended xyz: elements, positions, momenta, time and potential energy."""
+
+    def __init__(self, path: str | os.PathLike[str], length: int | None = None) -> None:
+        self._file = TextFile(path, length)
+
+    def add(self, atoms: Atoms, time_ps: float) -> None:
+        """Append a frame."""
+        from ase.io.extxyz import write_extxyz
+
+        frame = atoms.copy()
+        frame.info.update(time_ps=time_ps, potential_ev=float(atoms.get_potential_energy()))
+        columns = ["symbols", "positions", "momenta", *(["molecule"] if "molecule" in frame.arrays else [])]
+        text = io.StringIO()
+        write_extxyz(text, [frame], columns=columns)
+        self._file.add(text.getvalue())
+
+    def sync(self) -> int:
+        """Bytes, all on the disk."""
+        return self._file.sync()
+
+    def close(self) -> None:
+        """Let go of it."""
+        self._file.close()
+
+
+class AseTrajectory:
+    """Frames as ASE's .traj, counted by frames; one continued is copied up to the frame of the checkpoint."""
+
+    def __init__(self, path: str | os.PathLike[str], length: int | None = None) -> None:
+        from ase.io.trajectory import Trajectory
+
+        self.path = Path(path)
+        if length is None:
+            self.path.unlink(missing_ok=True)
+            return
+        beside = self.path.with_name(f".{self.path.name}.part")
+        try:
+            with Trajectory(self.path) as old, Trajectory(beside, "w") as new:
+                for k in range(length):
+                    new.write(old[k])
+        except (OSError, ValueError, IndexError, TypeError) as error:
+            beside.unlink(missing_ok=True)
+            told = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+            raise ValueError(
+                f"{path}: cannot be continued ({told}); the checkpoint wants its first {length} frames"
+            ) from error
+        os.replace(beside, self.path)
+
+    def add(self, atoms: Atoms, time_ps: float) -> None:
+        """Append a frame."""
+        from ase.io.trajectory import Trajectory
+
+        with Trajectory(self.path, "a") as file:
+            file.write(atoms)
+
+    def sync(self) -> int:
+        """Frames, all on the disk."""
+        from ase.io.trajectory import Trajectory
+
+        if not self.path.exists():
+            return 0
+        with open(self.path, "rb") as file:
+            os.fsync(file.fileno())
+        with Trajectory(self.path) as file:
+            return len(file)
+
+    def close(self) -> None:
+        """Nothing is held between frames."""
+
+
+def trajectory_file(path: str | os.PathLike[str], length: int | None = None) -> ExtendedXyz | AseTrajectory:
+    """The file of frames that the suffix names: .traj, .xyz or .extxyz."""
+    suffix = Path(path).suffix.lower()
+    if suffix == ".traj":
+        return AseTrajectory(path, length)
+    if suffix in (".xyz", ".extxyz"):
+        return ExtendedXyz(path, length)
+    raise ValueError(f"{path}: frames are written as .traj (ASE), .xyz or .extxyz; the suffix names the format")
+
+
+@dataclass(frozen=True)
+class Checkpoint:
+    """All that a run needs to continue exactly.
+
+    arrays: of the state, and rows of the table so far where no CSV has them. about: step, settings, thermostat, lengths of
+    the growing files, what the box is made of.
+    """
+
+    arrays: Mapping[str, Floats]
+    about: Mapping[str, Any]
+
+    def write(self, path: str | os.PathLike[str]) -> None:
+        """Beside, to the disk, and renamed: at any moment there is the old checkpoint or the new one, whole."""
+        target = Path(path).resolve()
+        beside = target.with_name(f".{target.name}.part")
+        content = io.BytesIO()
+        about = json.dumps({"rotor_checkpoint": VERSION, **self.about})
+        np.savez(content, about=np.array(about), **self.arrays)  # type: ignore[arg-type]
+        try:
+            with open(beside, "wb") as file:
+                file.write(content.getbuffer())
+                file.flush()
+                os.fsync(file.fileno())
+            os.replace(beside, target)
+        except OSError as error:
+            beside.unlink(missing_ok=True)
+            raise OSError(error.errno, error.strerror, str(path)) from error
+        _sync_folder(target.parent)
+
+
+def read_checkpoint(path: str | os.PathLike[str]) -> Checkpoint:
+    """The checkpoint of a file; ValueError for a file that is none."""
+    import zipfile
+
+    if not Path(path).is_file():
+        raise ValueError(f"{path}: there is no such checkpoint to resume from; leave --resume out to begin")
+    try:
+        with open(path, "rb") as handle, np.load(handle, allow_pickle=False) as file:
+            arrays = {name: file[name] for name in file.files if name != "about"}
+            about = json.loads(str(file["about"]))
+    except (zipfile.BadZipFile, KeyError, ValueError, EOFError) as error:
+        raise ValueError(f"{path}: is no checkpoint of rotor fluid; name the file of --checkpoint") from error
+    if about.get("rotor_checkpoint") != VERSION:
+        raise ValueError(
+            f"{path}: a checkpoint of version {about.get('rotor_checkpoint')}; this program reads {VERSION}"
+        )
+    return Checkpoint(arrays, about)
+
+
+def csv_line(values: Sequence[float]) -> str:
+    """A row in full precision: the shortest text that gives each double back."""
+    return ",".join(repr(float(value)) for value in values) + "\n"
+
+
+def read_rows(path: str | os.PathLike[str], length: int) -> list[list[float]]:
+    """Rows of a CSV file within its first bytes, without the head."""
+    with open(path, "rb") as file:
+        lines = file.read(length).decode("utf-8").splitlines()[1:]
+    return [[float(value) for value in line.split(",")] for line in lines]
+
+
+def _sync_folder(folder: Path) -> None:
+    """Force a rename to the disk where the system has folders that can be opened (not Windows)."""
+    if os.name == "nt":
+        return
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)

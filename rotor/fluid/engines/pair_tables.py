@@ -1,0 +1,71 @@
+"""The pair potential as an engine is handed it: numbers for closed forms, or a table."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rotor.arrays import Floats
+from rotor.fluid.engines.engine_input import Scene
+from rotor.fluid.forces.ewald import COULOMB_EV_ANGSTROM
+from rotor.fluid.forces.interactions import mixed, reaction_field, screened, switched, tail
+from rotor.fluid.forces.models import Site
+from rotor.fluid.settings import Settings
+
+
+@dataclass(frozen=True)
+class Form:
+    """What of the potential is no part of `Settings`; the values are those of our calculator.
+
+    switch_angstrom: over how much before the cutoff Lennard-Jones is switched off, 0 for a hard cut. dielectric: around the
+    sphere of the reaction field, infinite for a conductor. alpha_per_angstrom: damping of shifted charges.
+    """
+
+    switch_angstrom: float = 1.0
+    dielectric: float = float("inf")
+    alpha_per_angstrom: float = 0.2
+
+
+def pair_energy(
+    r: Floats, sites: tuple[Site, Site], settings: Settings, form: Form, charges: bool = True
+) -> tuple[Floats, Floats]:
+    """Energy (eV) and force (eV/Å) of two sites at distances r (n,) up to the cutoff.
+
+    S 4ε [(σ/r)¹² - (σ/r)⁶] + q₁q₂/4πε₀ f(r) with the switch S and the form f of charges under a cutoff, as in
+    `rotor.fluid.forces.interactions`. charges: False leaves the second term to a sum over the lattice.
+    """
+    one, other = sites
+    sigma, epsilon = mixed((one.sigma_angstrom, other.sigma_angstrom), (one.epsilon_ev, other.epsilon_ev))
+    sixth = (sigma / r) ** 6
+    _, begin, slope = switched(settings.cutoff_angstrom, form.switch_angstrom)
+    t = np.clip((r - begin) * slope, 0.0, 1.0)
+    switch, fall = 1 - t**3 * (10 - 15 * t + 6 * t**2), 30 * t**2 * (1 - t) ** 2 * slope
+    bare = 4 * epsilon * (sixth**2 - sixth)
+    energy, force = switch * bare, switch * 24 * epsilon * (2 * sixth**2 - sixth) / r + fall * bare
+    if not charges:
+        return energy, force
+    f, g = _charges(r, settings, form)
+    qq = COULOMB_EV_ANGSTROM * one.charge_e * other.charge_e
+    return energy + qq * f, force + qq * g
+
+
+def _charges(r: Floats, settings: Settings, form: Form) -> tuple[Floats, Floats]:
+    """f(r) and -f'(r) of unit charges under a cutoff."""
+    from scipy.special import erfc
+
+    if settings.electrostatics == "reaction-field":
+        _, k, c = reaction_field(settings.cutoff_angstrom, form.dielectric)
+        return 1 / r + k * r**2 - c, 1 / r**2 - 2 * k * r
+    _, b, c, alpha, slope, cutoff = screened(settings.cutoff_angstrom, form.alpha_per_angstrom, True)
+    damped = erfc(alpha * r) / r
+    return damped - c + b * (r - cutoff), damped / r + slope * np.exp(-((alpha * r) ** 2)) / r - b
+
+
+def tail_of(scene: Scene, settings: Settings, form: Form) -> tuple[float, float]:
+    """Energy (eV) and pressure (eV/Å³) of the dispersion beyond the cutoff, the fluid taken as even there."""
+    counts = np.bincount(scene.kinds, minlength=len(scene.species))
+    models = tuple(one.model for one in scene.species)
+    energy, pressure = tail(models, counts, settings.cutoff_angstrom, form.switch_angstrom)
+    volume = float(np.prod(scene.edges))
+    return energy / volume, pressure / volume**2

@@ -1,0 +1,88 @@
+"""Frames of an engine read back: into the table that every run fills, and into a path for the analysis."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+
+from rotor import units
+from rotor.arrays import Floats
+from rotor.fluid.engines.engine_input import Frame, Scene, scene_of
+from rotor.fluid.motion.thermometers import THERMOMETERS, temperatures
+from rotor.fluid.record import FluidRecord
+from rotor.fluid.settings import Settings
+
+ENGINES = ("openmm", "lammps")
+
+
+@dataclass(frozen=True)
+class EngineRun:
+    """What an engine has made of a box: the table, and the real atoms' places (frames, atoms, 3), molecules whole."""
+
+    scene: Scene
+    record: FluidRecord
+    positions_angstrom: Floats
+
+
+def run_engine(name: str, atoms: Any, settings: Settings, **options: Any) -> EngineRun:
+    """Hand a box to the engine of that name, run it, read it back.
+
+    atoms: an ase.Atoms box. options: of the engine, see `rotor.fluid.engines.openmm.frames` and
+    `rotor.fluid.engines.lammps.frames`.
+
+    Raises ValueError for what the engine cannot be handed, ModuleNotFoundError where it is not installed, OSError where it
+    does not load, RuntimeError where it stops on its way.
+    """
+    scene = scene_of(atoms, settings)
+    seen = list(engine_frames(name, scene, settings, **options))
+    return EngineRun(scene, record_of(seen, scene, settings), np.stack([frame.positions for frame in seen]))
+
+
+def engine_frames(name: str, scene: Scene, settings: Settings, **options: Any) -> Iterator[Frame]:
+    """The frames of an engine by its name, each checked to be finite."""
+    if name not in ENGINES:
+        raise ValueError(f"{name!r} is no engine; there are {', '.join(ENGINES)}")
+    engine = importlib.import_module(f"rotor.fluid.engines.{name}")
+    for frame in engine.frames(scene, settings, **options):
+        if not (np.isfinite(frame.potential_ev) and np.isfinite(frame.positions).all()):
+            raise RuntimeError(
+                f"{name}: energy or positions are not finite at step {frame.step}: molecules on top of each other, or a "
+                "step too long"
+            )
+        yield frame
+
+
+def record_of(frames: Iterable[Frame], scene: Scene, settings: Settings) -> FluidRecord:
+    """The table of frames."""
+    rows = np.array([row_of(frame, scene, settings) for frame in frames], dtype=np.float64)
+    return FluidRecord(*rows.reshape(-1, len(fields(FluidRecord))).T)
+
+
+def row_of(frame: Frame, scene: Scene, settings: Settings) -> list[float]:
+    """A row of the table.
+
+    Energies of motion are those of the thermometer without an error of order h² (`rotor.fluid.motion.thermometers`): mixed from
+    momenta on the step, as they are from momenta between steps, where a thermostat acts. The total has the energy on the
+    step.
+    """
+    stored = frame.motion.kinetic()
+    kinetic = stored
+    if not frame.half:
+        h = settings.step_fs / 1000 / units.CLASSICAL_TIME_PS
+        kinetic = stored + frame.motion.correction(h).times(THERMOMETERS["mixed"])
+    heat = temperatures(kinetic, scene.degrees)
+    return [
+        frame.step * settings.step_fs / 1000,
+        frame.potential_ev,
+        kinetic.translation_ev,
+        kinetic.rotation_ev,
+        frame.potential_ev + stored.total_ev + frame.thermostat_ev,
+        heat.all_k,
+        heat.translation_k,
+        heat.rotation_k,
+        frame.pressure_bar,
+    ]

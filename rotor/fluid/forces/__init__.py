@@ -1,0 +1,1 @@
+"""Forces between rigid molecules: models, neighbours, Ewald sum, potential."""

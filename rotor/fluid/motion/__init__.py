@@ -1,0 +1,1 @@
+"""Motion of rigid molecules in a box: state, dynamics, thermostats, thermometers."""

@@ -1,0 +1,214 @@
+"""How things come in and go out: `read` makes a top of whatever means a molecule, `write` chooses a format by suffix."""
+
+from __future__ import annotations
+
+import difflib
+import os
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from rotor.formats.library import library_file, names
+from rotor.formats.molecule_file import MoleculeFile, parse_molecule_file, read_molecule_file
+from rotor.molecules.readers.read import g2_names, read_molecule
+from rotor.tops.constants import Constants
+from rotor.tops.isotopologues import isotopologue
+from rotor.tops.top import Top
+
+Isotopes = Mapping[int | str, str] | str
+
+
+def read(source: Any, *, isotopes: Isotopes | None = None) -> Any:
+    """A top from whatever means a molecule; from a .cat or .hitran file its lines.
+
+    Parameters
+    ----------
+    source : str, Path, Top, Constants, Molecule, ase.Atoms or rdkit.Chem.Mol
+        A word is a path that exists, else a molecule of the library (`"water"`, `"H2CO"`), else one of ASE's g2 set;
+        a path and a molecule of one name are an error. `"SMILES:C=O"` is built with RDKit; `"-"` reads a geometry
+        (xyz, sdf) or a TOML of constants from standard input. Paths: .xyz, .extxyz, .mol, .sdf, whatever
+        `ase.io.read` knows; .toml: a molecule file or constants alone; .par, .var, .int: input of SPFIT and SPCAT;
+        .cat: a catalogue; .hitran, and .par where its first line is a record of 160 characters: HITRAN's lines.
+    isotopes : mapping or str, optional
+        Substitutions such as `"1=2H"` (atom 1) or `"O=18O"` (every O). Measured constants of a library molecule are then
+        carried over by the ratio of those calculated from its geometry, and a note says so (`rotor.tops.isotopologues`).
+
+    Returns
+    -------
+    Top, or Catalogue for a .cat file, HitranLines for one of HITRAN
+
+    Raises
+    ------
+    ValueError
+        What was read, where, which rule it breaks and what would do.
+
+    >>> read("CO").kind
+    'linear'
+    """
+    if isinstance(source, Top):
+        return _with_isotopes(source, isotopes)
+    if isinstance(source, Constants):
+        return _with_isotopes(Top.from_constants(source), isotopes)
+    if isinstance(source, str) and source != "-" and not source.startswith("SMILES:"):
+        source = _meaning(source)
+    if isinstance(source, Path):
+        return _read_path(source, isotopes)
+    if source == "-":
+        return _read_standard_input(isotopes)
+    return _with_isotopes(Top.from_molecule(read_molecule(source)), isotopes)
+
+
+def _meaning(word: str) -> Path | str:
+    """The path that a bare word names: a file that exists, else a file of the library; else the word itself."""
+    known, path = library_file(word), Path(word)
+    if path.exists() and (known or word in g2_names()):
+        what = "a molecule of the library" if known else "a molecule of ASE's g2 set"
+        raise ValueError(
+            f"{word!r} is ambiguous: it is a path here and {what}; write '{os.path.join('.', word)}' for the path, "
+            "or use another folder for the molecule"
+        )
+    if path.exists() or _looks_like_a_path(word):
+        return path
+    if known is None and word not in g2_names():
+        near = difflib.get_close_matches(word, [*names(), *g2_names()], n=3)
+        meant = f"did you mean {', '.join(near)}? " if near else ""
+        raise ValueError(
+            f"{word!r} is no file here, no molecule of the library ('rotor molecules' lists it) and none of ASE's g2 set; "
+            f"{meant}a SMILES is written 'SMILES:...'"
+        )
+    return known or word
+
+
+def _looks_like_a_path(word: str) -> bool:
+    return os.sep in word or "/" in word or bool(Path(word).suffix)
+
+
+def _read_path(path: Path, isotopes: Isotopes | None) -> Any:
+    if not path.exists():
+        raise ValueError(f"{path}: no such file")
+    if path.is_dir():
+        raise ValueError(f"{path}: is a folder; give a file in it")
+    if path.stat().st_size == 0:
+        raise ValueError(f"{path}: the file is empty")
+    suffixes = "".join(path.suffixes[-2:]).lower()
+    if suffixes.endswith((".cat", ".cat.gz")):
+        from rotor.formats.spcat.cat import read_cat
+
+        if isotopes:
+            raise ValueError(f"{path}: isotopes cannot be changed in a catalogue; give a molecule with a geometry")
+        return read_cat(path)
+    if suffixes.endswith((".hitran", ".hitran.gz")) or _is_hitran(path):
+        from rotor.formats.hitran import read_hitran
+
+        return read_hitran(path)
+    if suffixes.endswith((".par", ".var", ".int")):
+        return _with_isotopes(_read_spcat(path), isotopes)
+    if suffixes.endswith(".toml"):
+        return top_of_file(read_molecule_file(path), isotopes)
+    return _with_isotopes(Top.from_molecule(read_molecule(path)), isotopes)
+
+
+def _is_hitran(path: Path) -> bool:
+    """Whether a .par file is one of HITRAN, which gives its files the suffix of SPFIT's parameters."""
+    if path.suffix.lower() != ".par":
+        return False
+    from rotor.formats.hitran import looks_like_hitran
+
+    with open(path, encoding="latin-1") as handle:
+        return looks_like_hitran(handle.readline())
+
+
+def _read_spcat(path: Path) -> Top:
+    """The top of a .par or .var file, with the dipole of the .int file beside it; or of an .int file likewise."""
+    from rotor.formats.spcat.int_file import read_int
+    from rotor.formats.spcat.model import top_of
+    from rotor.formats.spcat.par import read_par
+
+    intensities = path.with_suffix(".int")
+    parameters = path
+    if path.suffix.lower() == ".int":
+        beside = [path.with_suffix(suffix) for suffix in (".var", ".par")]
+        parameters = next((p for p in beside if p.exists()), path)
+        if parameters == path:
+            raise ValueError(f"{path}: an .int file has no constants; its .var or .par must stand beside it")
+    return top_of(read_par(parameters), read_int(intensities) if intensities.exists() else None)
+
+
+def _read_standard_input(isotopes: Isotopes | None) -> Top:
+    import sys
+
+    from rotor.molecules.readers.read import parse_molecule
+    from rotor.molecules.readers.xyz import decode
+
+    text = decode(sys.stdin.buffer.read(), "standard input")
+    if not text.strip():
+        raise ValueError("standard input is empty; a geometry (xyz, sdf) or a TOML of constants is wanted")
+    if any(line.strip().startswith("[constants]") for line in text.splitlines()):
+        return top_of_file(parse_molecule_file(text, "standard input"), isotopes)
+    return _with_isotopes(Top.from_molecule(parse_molecule(text, "standard input")), isotopes)
+
+
+def _with_isotopes(top: Top, isotopes: Isotopes | None) -> Top:
+    return isotopologue(top, isotopes).top if isotopes else top
+
+
+def top_of_file(file: MoleculeFile, isotopes: Isotopes | None = None) -> Top:
+    """The top that a molecule file describes: its constants if it has some, else those of its geometry."""
+    return _with_isotopes(_top_as_written(file), isotopes)
+
+
+def _top_as_written(file: MoleculeFile) -> Top:
+    geometry = Top.from_molecule(file.molecule) if file.molecule is not None else None
+    if file.constants is None:
+        assert geometry is not None  # the reader refuses a file with neither
+        return replace(geometry, name=file.name)
+    return replace(
+        geometry or Top.from_constants(file.constants),
+        constants=file.constants,
+        dipole_abc_debye=file.dipole_abc_debye,
+        spin_weights=file.spin_weights,
+        name=file.name,
+        source=file.sources.get("constants", ""),
+        dipole_source=file.sources.get("dipole", ""),
+        weights_source=file.sources.get("spin_weights", ""),
+        polarizability_abc_angstrom3=file.polarizability_abc_angstrom3,
+        polarizability_source=file.sources.get("polarizability", ""),
+        independent_errors=len(file.constants.uncertainties) < 2,
+    )
+
+
+def write(thing: Any, path: str | os.PathLike[str], *, settings: Mapping[str, Any] | None = None) -> None:
+    """Write lines, a catalogue, or any table of the package; the suffix of `path` names the format.
+
+    Lines: .cat, .cat.gz, .csv, .parquet, .json, .hitran; catalogue: .cat, .cat.gz; HITRAN's lines: .hitran; every other table
+    (levels, Raman lines, spectra, motions, thermodynamic functions, correlation functions, tests of equipartition, runs of a
+    fluid): .csv, .parquet, .json. An existing file is replaced at the end, whole or not at all. settings: what the
+    provenance shall say besides; for lines, `{"tag": 18003}` is the tag of a .cat, `{"molecule": 1, "isotopologue": 1,
+    "abundance": 0.997}` what `hitran_lines` asks for. Raises ValueError for a thing or a suffix that has no format.
+    """
+    from rotor.classical.integrators.method import Motion
+    from rotor.formats.hitran import HitranLines, write_hitran
+    from rotor.formats.spcat.catalogue import Catalogue
+    from rotor.spectra.lines import Lines
+    from rotor.table import Table
+
+    if isinstance(thing, Motion):
+        from rotor.classical.motion import MotionTable
+
+        thing = MotionTable.of(thing)
+    if isinstance(thing, Lines):
+        from rotor.formats.line_tables import write_lines
+
+        return write_lines(thing, path, settings)
+    if isinstance(thing, Table):
+        from rotor.formats.tables import write_table
+
+        return write_table(thing, path, settings)
+    if isinstance(thing, Catalogue) and os.fspath(path).lower().endswith((".cat", ".cat.gz")):
+        from rotor.formats.spcat.cat import write_cat
+
+        return write_cat(thing, path)
+    if isinstance(thing, HitranLines) and os.fspath(path).lower().endswith(".hitran"):
+        return write_hitran(thing, path)
+    raise ValueError(f"{path}: there is no format of that suffix for a {type(thing).__name__}")

@@ -1,0 +1,322 @@
+"""Line lists larger than memory: pieces by J on disk, sorted by DuckDB into one Parquet or .cat file; a cut-off run goes on.
+
+A piece holds the transitions whose lower J lies in its range. Each is written beside and renamed, so that what a killed
+run leaves behind is whole pieces; the next run with the same settings makes the others.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import os
+import shutil
+from collections.abc import Iterator, Mapping
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rotor import units
+from rotor.formats.atomic_write import atomic_path, open_atomic
+from rotor.formats.line_tables import QNFMT, errors_from, finite_or_none, top_provenance, write_beside
+from rotor.formats.spcat.cat import format_lines
+from rotor.formats.spcat.catalogue import Catalogue
+from rotor.formats.spcat.fields import BLANK
+from rotor.quantum.levels import Levels, solve_levels
+from rotor.spectra.lines import DEFAULT_MIN_LGINT, INTENSITY_NM2_MHZ, Lines, line_list
+from rotor.spectra.reach import jmax_for_cut
+from rotor.spectra.transitions import IntensityCut, all_transitions
+from rotor.thermo import PartitionFunction
+from rotor.tops.top import Top
+
+PIECE_LINES = 300_000  # transitions of a piece before the cut, where one J has not more of its own
+_BATCH = 1 << 18  # lines that are made into text at once
+_MANIFEST = "manifest.json"
+
+
+@dataclass(frozen=True)
+class StreamedList:
+    """What a streamed run made: the file, its lines, how many pieces were made now and how many were there already."""
+
+    path: Path
+    lines: int
+    pieces_made: int
+    pieces_found: int
+    jmax: int
+    q: float
+
+
+@dataclass(frozen=True)
+class _Plan:
+    """Everything a piece is made from; it goes to other processes as it is."""
+
+    top: Top
+    dipole_abc: tuple[float, float, float]
+    jmax: int
+    temperature_k: float
+    partition: PartitionFunction
+    min_lgint: float
+    range_mhz: tuple[float, float]
+    ground_mhz: float
+    folder: Path
+
+    def piece(self, first: int, last: int) -> Path:
+        """The file of the lines with lower J from `first` to `last`."""
+        return self.folder / f"j{first:04d}-{last:04d}.parquet"
+
+
+def stream_lines(
+    top: Top,
+    path: str | os.PathLike[str],
+    *,
+    jmax: int | None = None,
+    temperature_k: float = 300.0,
+    min_lgint: float | None = DEFAULT_MIN_LGINT,
+    range_mhz: tuple[float, float] = (0.0, math.inf),
+    q: float | None = None,
+    vibrational_factor: float = 1.0,
+    tag: int = 0,
+    memory_mb: int = 500,
+    piece_lines: int = PIECE_LINES,
+    executor: Executor | None = None,
+) -> StreamedList:
+    """The lines of `rotor.line_list`, rising in frequency, written to a .parquet or .cat file without being in memory.
+
+    Pieces are kept in the folder `path` + ".pieces" until the file is whole, then removed. A run that was cut off leaves
+    them; the same call goes on from there.
+
+    jmax ... vibrational_factor: as in `rotor.line_list`. tag: of a .cat. memory_mb: what the sort may take beside the
+    program itself. piece_lines: transitions of a piece; one J is never parted, and with all three dipole components it
+    has about 4.5 J². executor: pieces are spread over it, a process pool for instance, whose processes must be spawned:
+    a forked copy of polars' threads never answers.
+
+    Raises ValueError for another suffix, for a pool that forks, for what `line_list` refuses, and where the folder holds
+    pieces of another list.
+    """
+    target = Path(path)
+    if target.suffix.lower() not in (".parquet", ".cat"):
+        raise ValueError(f"{path}: a streamed list is written as .parquet or .cat; the suffix names the format")
+    if piece_lines < 1 or memory_mb < 100:
+        raise ValueError(f"piece_lines = {piece_lines}, memory_mb = {memory_mb}: at least 1 line and 100 MB are wanted")
+    _refuse_forks(executor)
+    start = line_list(
+        top, temperature_k=temperature_k, jmax=0, min_lgint=None, q=q, vibrational_factor=vibrational_factor
+    )
+    plan = _plan(start, jmax, -math.inf if min_lgint is None else min_lgint, range_mhz, Path(f"{target}.pieces"))
+    ranges = list(_ranges(plan, piece_lines))
+    story = _story(plan, ranges) | {"errors_from": errors_from(start)}
+    _open_folder(plan.folder, story)
+
+    missing = [r for r in ranges if not plan.piece(*r).exists()]
+    jobs = ([plan] * len(missing), *zip(*missing, strict=True)) if missing else ([], [], [])
+    for _ in (executor.map if executor else map)(_make_piece, *jobs):
+        pass
+    lines = _merge(plan, [plan.piece(*r) for r in ranges], target, story, tag, memory_mb)
+    shutil.rmtree(plan.folder)
+    return StreamedList(target, lines, len(missing), len(ranges) - len(missing), plan.jmax, plan.partition.q)
+
+
+def _refuse_forks(executor: Executor | None) -> None:
+    context = getattr(executor, "_mp_context", None)  # of a ProcessPoolExecutor; it has no public name
+    if context is not None and context.get_start_method() == "fork":
+        raise ValueError(
+            "the executor forks its processes, and a forked copy of polars never answers; give "
+            'ProcessPoolExecutor(mp_context=multiprocessing.get_context("spawn"))'
+        )
+
+
+def _plan(start: Lines, jmax: int | None, least: float, range_mhz: tuple[float, float], folder: Path) -> _Plan:
+    top, dipole, q = start.top, start.top.dipole_abc_debye, start.partition
+    assert dipole is not None  # line_list has refused a top without one
+    if jmax is None:
+        jmax = jmax_for_cut(top, dipole, start.temperature_k, q.q, least)
+    if jmax < 1:
+        raise ValueError(f"J max = {jmax}: 1 or more is wanted, J = 0 alone has no line")
+    ground = solve_levels(top, 3, vectors=False).ground_mhz  # whatever the weights are, it is among these
+    return _Plan(top, dipole, jmax, start.temperature_k, q, least, range_mhz, ground, folder)
+
+
+def _ranges(plan: _Plan, piece_lines: int) -> Iterator[tuple[int, int]]:
+    """First and last lower J of every piece: so many that a piece has about `piece_lines` transitions."""
+    if plan.top.kind != "asymmetric":  # closed forms start at J = 0; their lists, of about J² lines, are one piece
+        yield 0, plan.jmax
+        return
+    components = sum(1 for mu in plan.dipole_abc if mu)
+    first, count = 0, 0.0
+    for j in range(plan.jmax + 1):
+        count += 1.5 * components * (j + 1) ** 2
+        if (count >= piece_lines and j >= 3) or j == plan.jmax:  # from J = 2 on every species has a level
+            yield first, j
+            first, count = j + 1, 0.0
+
+
+def _story(plan: _Plan, ranges: list[tuple[int, int]]) -> dict[str, Any]:
+    """The provenance of the list, which also tells pieces of another list from its own."""
+    return top_provenance(plan.top) | {
+        "temperature_k": plan.temperature_k,
+        "jmax": plan.jmax,
+        "min_lgint": finite_or_none(plan.min_lgint),
+        "range_mhz": [finite_or_none(bound) for bound in plan.range_mhz],
+        "q": plan.partition.q,
+        "q_source": plan.partition.source,
+        "pieces": len(ranges),
+        "pieces_end_at_j": [last for _, last in ranges],
+    }
+
+
+def _open_folder(folder: Path, story: Mapping[str, Any]) -> None:
+    """Make the folder of pieces, or see that what it holds belongs to this list."""
+    text = json.dumps(story, sort_keys=True, ensure_ascii=False)
+    mark = {"sha256": hashlib.sha256(text.encode()).hexdigest(), "list": story}
+    manifest = folder / _MANIFEST
+    if not manifest.exists():
+        folder.mkdir(exist_ok=True)
+        with open_atomic(manifest, "w", encoding="utf-8") as handle:
+            json.dump(mark, handle, indent=1, ensure_ascii=False)
+        return
+    try:
+        before = json.loads(manifest.read_text(encoding="utf-8"))
+        known, differs = before["sha256"], _first_difference(before["list"], json.loads(text))
+    except (ValueError, KeyError, TypeError):
+        raise ValueError(f"{manifest}: is no manifest of pieces; remove the folder to begin anew") from None
+    if known != mark["sha256"]:
+        raise ValueError(
+            f"{folder}: holds pieces of another list ({differs}); finish that list with its own settings, or remove the "
+            "folder to begin anew"
+        )
+
+
+def _first_difference(before: Mapping[str, Any], now: Mapping[str, Any]) -> str:
+    keys = [key for key in now if before.get(key) != now[key]]
+    return f"{keys[0]} was {before.get(keys[0])}, is {now[keys[0]]}" if keys else "its settings differ"
+
+
+def _make_piece(plan: _Plan, first: int, last: int) -> None:
+    """Lines with lower J from `first` to `last`, sorted, as a Parquet file."""
+    import polars as pl
+
+    top_j = min(last + 1, plan.jmax)
+    levels = solve_levels(plan.top, top_j, jmin=first)
+    found = all_transitions(levels, plan.dipole_abc, plan.range_mhz, _cut(plan, levels))
+    own = np.minimum(levels.j[found.upper], levels.j[found.lower]) <= last
+    lines = Lines(
+        plan.top,
+        levels,
+        found.frequency_mhz[own],
+        found.strength_debye2[own],
+        found.upper[own],
+        found.lower[own],
+        plan.temperature_k,
+        plan.min_lgint,
+        plan.range_mhz,
+        plan.partition,
+    )
+    with atomic_path(plan.piece(first, last)) as unfinished:
+        pl.DataFrame(_columns(plan, lines)).sort("frequency_mhz").write_parquet(unfinished, compression="lz4")
+
+
+def _cut(plan: _Plan, levels: Levels) -> IntensityCut | None:
+    if math.isinf(plan.min_lgint):
+        return None
+    above_k = (levels.energy_mhz - plan.ground_mhz) / units.MHZ_PER_K
+    per_component = INTENSITY_NM2_MHZ / plan.partition.q * levels.weight / levels.components
+    population = per_component * np.exp(-above_k / plan.temperature_k)
+    return IntensityCut(population, plan.temperature_k * units.MHZ_PER_K, 10.0**plan.min_lgint)
+
+
+def _columns(plan: _Plan, lines: Lines) -> dict[str, Any]:
+    """The columns of `Lines`, energies and intensities from the lowest level of all J instead of that of the piece."""
+    offset_mhz = lines.levels.ground_mhz - plan.ground_mhz
+    offset_k = offset_mhz / units.MHZ_PER_K
+    error = lines.error_mhz
+    return {
+        "frequency_mhz": lines.frequency_mhz,
+        **({} if error is None else {"error_mhz": error}),
+        "lgint": lines.lgint - offset_k / plan.temperature_k / math.log(10),
+        "energy_lower_cm": lines.energy_lower_cm + offset_mhz / units.MHZ_PER_CM,
+        "g_upper": lines.g_upper,
+        "einstein_a_per_s": lines.einstein_a_per_s,
+        "strength_debye2": lines.strength_debye2,
+        "intensity_cm_per_molecule": lines.intensity_cm_per_molecule * math.exp(-offset_k / plan.temperature_k),
+    } | _quanta(lines)
+
+
+def _quanta(lines: Lines) -> dict[str, Any]:
+    columns = lines.levels.quanta_columns(lines.upper, "upper") | lines.levels.quanta_columns(lines.lower, "lower")
+    return {name: column.astype(np.int16) for name, column in columns.items()}
+
+
+def _merge(plan: _Plan, pieces: list[Path], target: Path, story: Mapping[str, Any], tag: int, memory_mb: int) -> int:
+    """All pieces sorted into the target; the number of its lines."""
+    if target.suffix.lower() == ".parquet":
+        with atomic_path(target) as unfinished:
+            return _sort(pieces, unfinished, story, plan.folder, memory_mb)
+    merged = plan.folder / "sorted.parquet"
+    _sort(pieces, merged, story, plan.folder, memory_mb)
+    with open_atomic(target) as handle:
+        count = 0
+        for part in _catalogues(plan, merged, tag):
+            handle.write(format_lines(part))
+            count += len(part)
+    write_beside(target, dict(story) | {"lines": count})
+    return count
+
+
+def _sort(pieces: list[Path], target: Path, story: Mapping[str, Any], folder: Path, memory_mb: int) -> int:
+    """DuckDB's external merge sort: what exceeds its memory goes to files in `folder`."""
+    import duckdb
+
+    with duckdb.connect() as engine:
+        engine.execute("SET memory_limit = $limit", {"limit": f"{memory_mb}MB"})
+        engine.execute("SET temp_directory = $folder", {"folder": str(folder / "sort")})
+        engine.execute("SET preserve_insertion_order = true")
+        files = ", ".join(_quoted(str(piece)) for piece in pieces)
+        text = _quoted(json.dumps(story, ensure_ascii=False))
+        engine.execute(
+            f"COPY (SELECT * FROM read_parquet([{files}]) ORDER BY frequency_mhz) TO {_quoted(str(target))} "
+            f"(FORMAT parquet, KV_METADATA {{provenance: {text}}})"
+        )
+        row = engine.execute(f"SELECT count(*) FROM read_parquet({_quoted(str(target))})").fetchone()
+        assert row is not None  # a count always has one row
+        return int(row[0])
+
+
+def _quoted(text: str) -> str:
+    """A literal of SQL."""
+    return "'" + text.replace("'", "''") + "'"
+
+
+def _catalogues(plan: _Plan, merged: Path, tag: int) -> Iterator[Catalogue]:
+    """The sorted lines as catalogues of some hundred thousand; lines of zero strength have no logarithm."""
+    import polars as pl
+
+    table = pl.scan_parquet(merged)
+    names = [name.removesuffix("_upper") for name in table.collect_schema().names() if name.endswith("_upper")]
+    names = [name for name in names if name != "g"]
+    total = int(table.select(pl.len()).collect().item())
+    for start in range(0, total, _BATCH):
+        part = table.slice(start, _BATCH).filter(pl.col("lgint").is_finite()).collect()
+        yield _catalogue(part, tuple(names), plan.top.kind, tag)
+
+
+def _catalogue(part: Any, names: tuple[str, ...], kind: str, tag: int) -> Catalogue:
+    n = len(part)
+    quanta = {side: np.full((n, 6), BLANK, dtype=np.int16) for side in ("upper", "lower")}
+    for side, columns in quanta.items():
+        for i, name in enumerate(names):
+            columns[:, i] = part[f"{name}_{side}"].to_numpy()
+    return Catalogue(
+        frequency_mhz=part["frequency_mhz"].to_numpy(),
+        error_mhz=part["error_mhz"].to_numpy() if "error_mhz" in part.columns else np.zeros(n),
+        lgint=part["lgint"].to_numpy(),
+        dr=np.full(n, 2 if kind == "linear" else 3, dtype=np.int16),
+        energy_lower_cm=part["energy_lower_cm"].to_numpy(),
+        g_upper=part["g_upper"].to_numpy().astype(np.int32),
+        tag=np.full(n, tag, dtype=np.int32),
+        qnfmt=np.full(n, QNFMT[names], dtype=np.int32),
+        quanta_upper=quanta["upper"],
+        quanta_lower=quanta["lower"],
+    )

@@ -1,0 +1,1 @@
+"""Geometry of rigid bodies: rotations, superposition, rigid motions, inertia."""

@@ -1,0 +1,90 @@
+"""A dipole estimated from the partial charges of MMFF94, for a molecule whose dipole nobody measured.
+
+μ = s Σ q_i (r_i - R), with R the centre of mass: it decides which kinds of lines a spectrum has (a, b or c type) and
+their rough strength, no more. The charges are made for liquids, where molecules polarise each other, and give dipoles
+a third too large for the gas; s = 0.74 brings 30 measured ones down to a median error of 0.2 D.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from rotor.arrays import Floats
+from rotor.molecules.molecule import Molecule
+from rotor.units import DEBYE_PER_E_ANGSTROM
+
+GAS_SCALE = 0.74  # least squares over 30 molecules (tests/test_dipoles.py): median error 0.2 D; without it 0.6 D
+CHARGES_SOURCE = "estimate from MMFF94 partial charges"
+NO_DIPOLE_DEBYE = 1e-4  # smaller ones are round-off of a geometry that symmetry leaves without a dipole
+MOST_ATOMS = 200  # beyond this, finding the bonds of a bare geometry takes too long
+
+
+def estimate_dipole(molecule: Molecule) -> tuple[Floats | None, str]:
+    """The dipole that MMFF94 charges give a geometry, and what to say about it.
+
+    μ = s Σ q_i (r_i - R), s = 0.74 (1 for an ion, whose charges must add up). The bonds are found from the distances
+    and the molecule's charge (RDKit's rdDetermineBonds), the charges q_i are those of T. A. Halgren, J. Comput. Chem.
+    17, 490 (1996).
+
+    Parameters
+    ----------
+    molecule : Molecule
+        Its positions and charge are used; its isotopes only for the centre of mass of an ion.
+
+    Returns
+    -------
+    dipole_debye : (3,) array or None
+        In the frame of the positions, D; None where bonds or charges cannot be found.
+    note : str
+        How far to trust it, or why there is none.
+
+    >>> carbon_monoxide = Molecule(("C", "O"), [[0, 0, 0], [0, 0, 1.128]])
+    >>> estimate_dipole(carbon_monoxide)[1]
+    'no dipole for CO: MMFF94 has no charges for it; give one'
+    """
+    from rdkit import Chem, Geometry, rdBase
+    from rdkit.Chem import rdDetermineBonds
+
+    if len(molecule.symbols) > MOST_ATOMS:
+        return None, f"no dipole for {molecule.formula}: bonds are found up to {MOST_ATOMS} atoms; give one"
+    bare = Chem.RWMol()
+    conformer = Chem.Conformer(len(molecule.symbols))
+    for i, (symbol, position) in enumerate(zip(molecule.symbols, molecule.positions_angstrom, strict=True)):
+        bare.AddAtom(Chem.Atom(symbol))
+        conformer.SetAtomPosition(i, Geometry.Point3D(*position.tolist()))
+    bare.AddConformer(conformer)
+    with rdBase.BlockLogs():
+        try:
+            rdDetermineBonds.DetermineBonds(bare, charge=molecule.charge)
+        except (ValueError, RuntimeError):
+            why = "no ordinary bonds fit its geometry (a radical, a metal, or far from equilibrium?)"
+            return None, f"no dipole for {molecule.formula}: {why}; give one"
+        dipole = mmff_dipole(bare, molecule)
+    if dipole is None:
+        return None, f"no dipole for {molecule.formula}: MMFF94 has no charges for it; give one"
+    return dipole, charges_note(molecule)
+
+
+def mmff_dipole(mol: Any, molecule: Molecule) -> Floats | None:
+    """Dipole (3,) in D from the bonds of an RDKit molecule and the positions of ours; None without parameters."""
+    from rdkit import Chem
+    from rdkit.Chem import rdForceFieldHelpers
+
+    typed = Chem.Mol(mol)
+    if Chem.SanitizeMol(typed, catchErrors=True):
+        return None
+    properties = rdForceFieldHelpers.MMFFGetMoleculeProperties(typed)
+    if properties is None:
+        return None
+    charges = np.array([properties.GetMMFFPartialCharge(i) for i in range(typed.GetNumAtoms())])
+    arms = molecule.positions_angstrom - molecule.centre_of_mass_angstrom
+    scale = 1.0 if molecule.charge else GAS_SCALE
+    dipole = np.asarray(scale * DEBYE_PER_E_ANGSTROM * (charges @ arms), dtype=np.float64)
+    return dipole if np.linalg.norm(dipole) > NO_DIPOLE_DEBYE else np.zeros(3)
+
+
+def charges_note(molecule: Molecule) -> str:
+    """How far to trust a dipole from MMFF94 charges."""
+    if molecule.charge:
+        return f"dipole of the ion about its centre of mass is an {CHARGES_SOURCE}: its error was not measured"
+    return f"dipole is an {CHARGES_SOURCE}: half of 30 molecules were off by more than 0.2 D, the worst by 1.2 D"

@@ -1,0 +1,1 @@
+"""Molecules from files, SMILES, ASE and RDKit objects, and quantum-chemistry output."""

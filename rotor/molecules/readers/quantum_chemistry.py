@@ -1,0 +1,332 @@
+"""A molecule from the output of a quantum-chemistry program: geometry, dipole, polarizability.
+
+cclib reads the numbers, or `plain_outputs` where it cannot; the text is looked through first (`programs`), each tensor is
+turned from the axes it was printed in to those of the geometry, and the printed rotational constants are a check.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import io
+import logging
+import re
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rotor.arrays import Floats
+from rotor.geometry.superposition import Superposition, superpose
+from rotor.molecules.molecule import Molecule
+from rotor.molecules.nuclei import isotope, isotope_of_mass
+from rotor.molecules.readers.cfour_orca import read_plain, reads_itself, unread
+from rotor.molecules.readers.programs import (
+    Output,
+    coordinates_angstrom,
+    program_of,
+    refuse_cut,
+    refuse_unreadable,
+    tables,
+    without_constants,
+)
+from rotor.units import BOHR_RADIUS_ANGSTROM, DEBYE_PER_E_ANGSTROM, ROTATIONAL_MHZ_U_ANGSTROM2
+
+CONSTANTS_AGREE = 1e-4  # relative; printed constants have 6 to 8 digits, coordinates 6 decimals
+SAME_GEOMETRY_ANGSTROM = 1e-3  # rmsd: a tensor printed for a geometry further from the last one is not its tensor
+SAME_DIPOLE_DEBYE = 2e-3  # Gaussian prints its dipole to 1e-4 D and, in a second place, in atomic units
+WITHOUT_CCLIB = "cclib is not installed; install the extra with it: pip install 'molrotor[qc]'"
+
+
+def read_output(path: Path | str) -> Molecule:
+    """The last geometry of a quantum-chemistry output, with dipole and polarizability in its axes.
+
+    Parameters
+    ----------
+    path : Path or str
+        Output of Gaussian, ORCA, Psi4 or CFOUR; of the other programs that cclib tells apart, the geometry alone.
+
+    Returns
+    -------
+    Molecule
+        Positions in Å; dipole in D and static polarizability in Å³ where printed, turned with the rotation that
+        superposes the last geometry printed before the tensor on the one returned. Isotopes are those of the masses
+        printed, else the most abundant. `notes` says where A, B, C of the geometry and those printed differ by more
+        than 1e-4, and which tensor was left out and why.
+
+    Raises
+    ------
+    ValueError
+        No cclib, which CFOUR and ORCA 6 do without; an output of no program that it knows; asterisks, a `D` exponent
+        where the program prints none, or a file that was cut, with the line.
+
+    The dipole of an ion is moved from the program's origin to the centre of mass. Vibrational corrections are
+    neglected. Reader: N. M. O'Boyle, A. L. Tenderholt, K. M. Langner, J. Comput. Chem. 29, 839 (2008).
+    """
+    text = _text(Path(path))
+    program = program_of(text)
+    if not has_cclib() and not needs_no_cclib(Path(path)):
+        raise ValueError(f"{path}: {WITHOUT_CCLIB}")
+    if program is None:
+        return _read_other(text, str(path))
+    output = Output(str(path), tuple(text.splitlines()), program)
+    refuse_cut(output)
+    refuse_unreadable(output)
+    plain = reads_itself(output)
+    data = read_plain(output) if plain else _parse(without_constants(output), str(path))
+    molecule = _geometry(data, str(path), program.name if plain else f"{program.name}, read with cclib")
+    molecule = _with_dipole(molecule, data, output)
+    molecule = _with_polarizability(molecule, data, output)
+    return replace(molecule, notes=(*molecule.notes, *unread(output), *_disagreement(molecule, data, output)))
+
+
+def _text(path: Path) -> str:
+    return path.read_bytes().decode("utf-8-sig", errors="replace")
+
+
+def needs_no_cclib(path: Path) -> bool:
+    """Whether an output is of a program that is read here without cclib: CFOUR, ORCA from version 6."""
+    text = _text(path)
+    program = program_of(text)
+    return program is not None and reads_itself(Output(str(path), tuple(text.splitlines()), program))
+
+
+def has_cclib() -> bool:
+    """Whether cclib, the optional reader, is installed."""
+    return importlib.util.find_spec("cclib") is not None
+
+
+def is_output(path: Path) -> bool:
+    """Whether a file is an output that `read_output` knows: by its banner, or, with cclib, by what cclib finds."""
+    text = _text(path)
+    if program_of(text) is not None:
+        return True
+    if not has_cclib():
+        return False
+    from cclib.io.ccio import guess_filetype
+
+    return guess_filetype(text.splitlines()) is not None
+
+
+# --- cclib
+
+
+def _parse(text: str, where: str) -> Any:
+    """What cclib reads."""
+    from cclib.io.ccio import ccopen
+
+    try:
+        parser = ccopen(io.StringIO(text), loglevel=logging.CRITICAL)
+        data = None if parser is None else parser.parse()
+    except Exception as reason:  # cclib's parsers fail with any class; all mean that the file is not what it should be
+        why = str(reason).strip().splitlines()[0] if str(reason).strip() else type(reason).__name__
+        raise ValueError(f"{where}: cclib cannot read it ({why}); give an xyz file of the geometry") from reason
+    if data is None:
+        raise ValueError(f"{where}: no output of a program that cclib knows; give an xyz file of the geometry")
+    if not hasattr(data, "atomcoords") or not hasattr(data, "atomnos"):
+        raise ValueError(f"{where}: no geometry in it; give an output with one")
+    return data
+
+
+def _geometry(data: Any, where: str, program: str) -> Molecule:
+    symbols, mass_numbers = _isotopes(data, where)
+    try:
+        return Molecule(
+            symbols=symbols,
+            mass_numbers=mass_numbers,
+            positions_angstrom=np.asarray(data.atomcoords[-1], dtype=np.float64),
+            charge=getattr(data, "charge", 0),
+            source=f"{where}, output of {program}",
+        )
+    except ValueError as reason:
+        raise ValueError(f"{where}: {reason}") from None
+
+
+def _isotopes(data: Any, where: str) -> tuple[tuple[str, ...], tuple[int, ...]]:
+    """Symbols, and the isotopes whose masses are printed; an average over isotopes means the most abundant one."""
+    from ase.data import atomic_masses, chemical_symbols
+
+    numbers = [int(number) for number in data.atomnos]
+    if not all(0 < number < len(chemical_symbols) for number in numbers):
+        raise ValueError(f"{where}: a ghost atom or dummy in the geometry; give the output of the molecule alone")
+    symbols = tuple(chemical_symbols[number] for number in numbers)
+    masses = _printed_masses(data)
+    if masses is None:
+        return symbols, ()
+    found = []
+    for number, symbol, mass in zip(numbers, symbols, masses, strict=True):
+        average = abs(mass - atomic_masses[number]) < 5e-3  # programs' averages differ in the third decimal
+        near = isotope(symbol) if average else isotope_of_mass(symbol, float(mass))
+        found.append(near.mass_number)
+    return symbols, tuple(found)
+
+
+def _printed_masses(data: Any) -> Floats | None:
+    """Masses in u as printed, None where they are not there for every atom."""
+    masses = np.asarray(getattr(data, "atommasses", ()), dtype=np.float64)
+    n = len(data.atomnos)
+    return masses[-n:] if len(masses) and len(masses) % n == 0 else None
+
+
+def _read_other(text: str, where: str) -> Molecule:
+    """The geometry alone, of a program whose axes of tensors are not known here."""
+    data = _parse(text, where)
+    program = data.metadata.get("package", "a program")
+    if not data.metadata.get("success", False):
+        last = len(text.rstrip().splitlines())
+        raise ValueError(f"{where}: line {last}: {program} does not say here that it ended well; give a whole output")
+    note = (
+        f"{where}: dipole and polarizability were not taken, since the axes of {program}'s tensors are not known here"
+    )
+    molecule = _geometry(data, where, f"{program}, read with cclib")
+    return (
+        replace(molecule, notes=(note,)) if hasattr(data, "moments") or hasattr(data, "polarizabilities") else molecule
+    )
+
+
+# --- tensors, each in the axes it was printed in
+
+
+def _axes_at(
+    output: Output, tensor: int, target: Floats, openings: tuple[str, ...] | None = None
+) -> Superposition | None:
+    """What lays the geometry printed before line `tensor` on `target`; None where none is the same geometry."""
+    before = [(i, rows) for i, rows in tables(output) if i < tensor]
+    for opening in openings or output.program.geometries:
+        opened = [(i, rows) for i, rows in before if output.lines[i].strip().startswith(opening)]
+        if opened:
+            start, rows = opened[-1]
+            points = coordinates_angstrom(output, start, rows)
+            if points.shape != target.shape:
+                return None
+            fit = superpose(points, target)
+            return fit if fit.rmsd < SAME_GEOMETRY_ANGSTROM else None
+    return None
+
+
+def _with_dipole(molecule: Molecule, data: Any, output: Output) -> Molecule:
+    """The dipole, D: turned to the axes of the geometry, and of an ion moved to the centre of mass."""
+    start = output.last(output.program.dipole)
+    if start is None or len(getattr(data, "moments", ())) < 2:
+        return molecule
+    fit = _axes_at(output, start, molecule.positions_angstrom)
+    if fit is None:
+        return _noted(molecule, output, start, "dipole", "is for another geometry than the last one")
+    dipole = fit.rotation @ np.asarray(data.moments[1], dtype=np.float64)
+    if molecule.charge:
+        origin = _moment_origin(data, output)
+        if origin is None:
+            return _noted(molecule, output, start, "dipole", "of an ion has no origin printed with it")
+        shift = molecule.centre_of_mass_angstrom - fit.apply(origin[None, :])[0]
+        dipole = dipole - molecule.charge * DEBYE_PER_E_ANGSTROM * shift
+    return replace(molecule, dipole_debye=dipole, dipole_source=f"{output.program.name}, {output.where}")
+
+
+def _moment_origin(data: Any, output: Output) -> Floats | None:
+    """The point that the dipole refers to, Å in the axes it is printed in; that of Gaussian and CFOUR is their origin."""
+    if output.program.name in ("Gaussian", "CFOUR"):
+        return np.zeros(3)
+    for line in reversed(output.lines):
+        found = re.search(
+            r"origin for moment calculation is .*= *\(([^)]*)\)|Position of electric origin *\.\.\.(.*)", line
+        )
+        if found:
+            return BOHR_RADIUS_ANGSTROM * np.array(
+                [float(word) for word in (found[1] or found[2]).replace(",", " ").split()]
+            )
+    return None
+
+
+def _with_polarizability(molecule: Molecule, data: Any, output: Output) -> Molecule:
+    """The static polarizability, a.u. to Å³, turned to the axes of the geometry."""
+    start = output.last(output.program.polarizability) if output.program.polarizability else None
+    if start is None or not len(getattr(data, "polarizabilities", ())):
+        return molecule
+    fit = _polarizability_axes(molecule, data, output, start)
+    if fit is None:
+        return _noted(molecule, output, start, "polarizability", "has axes or a geometry that the file does not settle")
+    alpha = np.asarray(data.polarizabilities[-1], dtype=np.float64) * BOHR_RADIUS_ANGSTROM**3
+    turned = fit.rotation @ (0.5 * (alpha + alpha.T)) @ fit.rotation.T
+    source = f"{output.program.name}, {output.where}"
+    return replace(molecule, polarizability_angstrom3=0.5 * (turned + turned.T), polarizability_source=source)
+
+
+def _polarizability_axes(molecule: Molecule, data: Any, output: Output, start: int) -> Superposition | None:
+    """Axes of the polarizability; Gaussian's `Polarizability=` has those of the `Dipole =` printed above it.
+
+    Whether these are the standard or the input axes is settled by that dipole and the one of the population
+    analysis (standard axes): equal as printed, or equal after the turn. One that fits neither settles nothing.
+    """
+    fit = _axes_at(output, start, molecule.positions_angstrom)
+    above = output.last(("Dipole        =",))
+    turned = _axes_at(output, start, molecule.positions_angstrom, ("Input orientation:", "Z-Matrix orientation:"))
+    if above is None or fit is None or turned is None or np.allclose(fit.rotation, turned.rotation, atol=1e-5):
+        return fit
+    if molecule.dipole_debye is None or molecule.charge:
+        return None
+    line = output.lines[above].replace("D", "E")
+    here = np.array([float(line[k : k + 15]) for k in (16, 31, 46)]) * DEBYE_PER_E_ANGSTROM * BOHR_RADIUS_ANGSTROM
+    fits = [one for one in (fit, turned) if _close(one.rotation @ here, molecule.dipole_debye)]
+    return fits[0] if len(fits) == 1 else None
+
+
+def _close(one: Floats, other: Floats) -> bool:
+    return bool(np.max(np.abs(one - other)) < SAME_DIPOLE_DEBYE)
+
+
+def _noted(molecule: Molecule, output: Output, start: int, tensor: str, why: str) -> Molecule:
+    note = f"{output.where}: the {tensor} of line {start + 1} {why}: left out"
+    return replace(molecule, notes=(*molecule.notes, note))
+
+
+# --- the printed constants
+
+
+def _disagreement(molecule: Molecule, data: Any, output: Output) -> tuple[str, ...]:
+    """A note where the printed rotational constants are not those of the geometry."""
+    printed = _printed_constants(output)
+    if not len(printed):
+        return ()
+    here = _constants_mhz(molecule.masses_u, molecule.positions_angstrom)
+    apart = _apart(printed, here)
+    if apart < CONSTANTS_AGREE:
+        return ()
+    masses = _printed_masses(data)
+    cause = "is the geometry the last one?"
+    if masses is not None and _apart(printed, _constants_mhz(masses, molecule.positions_angstrom)) < CONSTANTS_AGREE:
+        cause = f"they agree with the masses that {output.program.name} used, which are not those of the isotopes"
+    texts = ["/".join(f"{value:.3f}" for value in some) for some in (printed, here[-len(printed) :])]
+    return (
+        f"{output.where}: printed constants {texts[0]} MHz, from the geometry {texts[1]}, {apart:.1e} apart: {cause}",
+    )
+
+
+def _printed_constants(output: Output) -> Floats:
+    """The last rotational constants printed, MHz, large to small; without the infinite or zero A of a linear molecule."""
+    pairs = zip(output.lines, (*output.lines[1:], ""), strict=True)
+    found = [match[1].strip() or below for line, below in pairs if (match := re.search(output.program.constants, line))]
+    if not found:
+        return np.zeros(0)
+    values = [float(word) for word in re.findall(r"\d+\.\d+", found[-1])]
+    return np.sort([value * output.program.constants_mhz for value in values if value > 0])[::-1]
+
+
+def _constants_mhz(masses_u: Floats, positions_angstrom: Floats) -> Floats:
+    """A, B, C (3,) of point masses, MHz, from the moments h/(8π² I); inf for a moment that vanishes."""
+    r = positions_angstrom - masses_u @ positions_angstrom / masses_u.sum()
+    spread = (masses_u[:, None] * r).T @ r
+    moments = np.linalg.eigvalsh(np.trace(spread) * np.eye(3) - spread)
+    vanishes = moments < 1e-6 * moments[-1]
+    return np.where(vanishes, np.inf, ROTATIONAL_MHZ_U_ANGSTROM2 / np.where(vanishes, 1.0, moments))
+
+
+def _apart(printed: Floats, calculated: Floats) -> float:
+    """Largest relative difference, of as many of the smaller constants as are printed.
+
+    >>> round(_apart(np.array([10.1, 8.0]), np.array([np.inf, 10.0, 8.0])), 9)
+    0.01
+    """
+    some = calculated[-len(printed) :]
+    if not np.all(np.isfinite(some)):
+        return float("inf")
+    return float(np.max(np.abs(printed / some - 1)))

@@ -1,0 +1,1 @@
+"""Point groups of molecules and their operations."""

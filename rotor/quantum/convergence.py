@@ -1,0 +1,116 @@
+"""Where an effective Hamiltonian stops being one: distortion that does not converge, levels out of order.
+
+The series J², J⁴, J⁶, ... of an effective Hamiltonian is asymptotic. As long as each order is a small part of the one
+before, what is left out is small too; where the ratio nears one, energies mean nothing, however many digits they have.
+The size of an order at one J is the largest sum of a row of its matrix, which bounds its eigenvalues (S. Gershgorin,
+Izv. Akad. Nauk SSSR 7 (1931) 749).
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rotor.quantum.effects.watson import Multiplet, scalar_energy
+from rotor.quantum.levels import Levels, disordered_blocks, hamiltonian
+from rotor.tops.operators import Operators
+
+if TYPE_CHECKING:
+    from rotor.tops.top import Top
+
+RATIO_LIMIT = 0.3  # of successive orders, above which the series is said not to converge
+
+
+def order_sizes_mhz(top: Top, j: int, kmax: int | None = None) -> dict[int, float]:
+    """How large every order of the Hamiltonian is for one J and |K| up to `kmax` (J, if None), {power of J: MHz}.
+
+    >>> from rotor.tops.top import Top
+    >>> order_sizes_mhz(Top.from_constants("B=6000 D=0.01 MHz"), 10)
+    {2: 660000.0, 4: 121.0}
+    """
+    by_order: dict[int, Operators] = {}
+    for powers, value in hamiltonian(top).items():
+        by_order.setdefault(2 * sum(powers), {})[powers] = value
+    if top.kind == "spherical":  # D_t, whose expansion has terms of J² too, is all of order four
+        by_order = _without_mixture(by_order)
+    highest = 0 if top.kind == "linear" else j if kmax is None else min(kmax, j)
+    return {order: _row_bound(by_order[order], j, highest) for order in sorted(by_order)}
+
+
+def _without_mixture(by_order: dict[int, Operators]) -> dict[int, Operators]:
+    lower = {powers: value for powers, value in by_order.get(2, {}).items() if powers == (1, 0, 0)}
+    return by_order | {2: lower}
+
+
+def _row_bound(operators: Operators, j: int, kmax: int) -> float:
+    """The largest Σ_K' |⟨K'|H|K⟩| over |K| ≤ kmax."""
+    multiplet = Multiplet(operators, j)
+    k = np.arange(kmax + 1)
+    rows = np.abs(multiplet.element(k, 0) + scalar_energy(operators, j))
+    for n in range(1, multiplet.order + 1):
+        rows += np.abs(multiplet.element(k, n)) + np.abs(multiplet.element(k - 2 * n, n))
+    return float(rows.max())
+
+
+def series_ratio(top: Top, jmax: int, kmax: int | None = None) -> float:
+    """The largest ratio of one order of the Hamiltonian to the order before it, at J = `jmax` and |K| ≤ `kmax`.
+
+    Orders without a constant are passed over; 0 for a rigid top. Above 0.3 the series is not to be trusted.
+
+    >>> from rotor.tops.top import Top
+    >>> round(series_ratio(Top.from_constants("A=835840 B=435352 C=278139 DeltaK=973 MHz"), 20), 2)
+    0.45
+    """
+    return max((ratio for ratio, _ in _ratios(top, jmax, kmax)), default=0.0)
+
+
+def _ratios(top: Top, j: int, kmax: int | None) -> list[tuple[float, int]]:
+    """(ratio to the order before, order) of every order above the first."""
+    sizes = list(order_sizes_mhz(top, j, kmax).items())
+    pairs = pairwise(sizes)
+    return [(size / before if before else 0.0, order) for (_, before), (order, size) in pairs]
+
+
+def warnings_of(top: Top, levels: Levels) -> tuple[str, ...]:
+    """What somebody who uses these levels must be told, in sentences; empty where all is well.
+
+    That the distortion series does not converge at the highest J and K of the levels, and from which J on; that in
+    some blocks energies are not in the order of the rigid top any more, so that Ka and Kc only count states. Levels
+    solved without vectors are judged by the first alone.
+    """
+    return tuple(sentence for sentence in (_divergence(top, levels), _disorder(top, levels)) if sentence)
+
+
+def _divergence(top: Top, levels: Levels) -> str:
+    j = int(levels.j.max(initial=0))
+    k = int(levels.ka.max(initial=0)) if levels.kind in ("prolate", "oblate") else None
+    if not j or series_ratio(top, j, k) <= RATIO_LIMIT:
+        return ""
+    ratio, order = max(_ratios(top, j, k))
+    first = _first(top, j, k)
+    return (
+        f"the distortion series does not converge at J = {j}: the terms of order J^{order} are up to {ratio:.2g} of the "
+        f"order before (limit {RATIO_LIMIT:g}); energies above J = {first - 1} at the highest K are not to be trusted"
+    )
+
+
+def _first(top: Top, jmax: int, kmax: int | None) -> int:
+    """The lowest J with a ratio above the limit, by halving: ratios rise with J."""
+    low, high = 0, jmax
+    while high - low > 1:
+        middle = (low + high) // 2
+        low, high = (low, middle) if series_ratio(top, middle, kmax) > RATIO_LIMIT else (middle, high)
+    return high
+
+
+def _disorder(top: Top, levels: Levels) -> str:
+    found = disordered_blocks(top, levels)
+    if not found:
+        return ""
+    first = min(j for j, _ in found)
+    return (
+        f"in {len(found)} blocks from J = {first} on the order of energies is not that of the rigid top: Ka and Kc count "
+        "states there and say nothing about the motion"
+    )

@@ -1,0 +1,1 @@
+"""Effects of the rotational Hamiltonian, one a file."""

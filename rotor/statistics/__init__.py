@@ -1,0 +1,1 @@
+"""Degrees of freedom and the test of equipartition."""

@@ -1,0 +1,1 @@
+"""Tops: constants, operators, spin weights, isotopologues, distortion."""

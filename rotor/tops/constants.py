@@ -1,0 +1,431 @@
+"""Rotational constants by the names the field publishes, in MHz, with reduction, representation and uncertainty.
+
+A set of constants is a complete statement: the numbers, the reduction (A or S) and the axes (representation) in
+which they are meant, and the kind of top whose Hamiltonian they belong to. Nothing is converted silently; what the
+names mean as operators stands in `rotor.tops.operators`.
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+import re
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any
+
+from rotor.tops import operators as published
+from rotor.tops.operators import Powers, powers_of_spelled, published_name, spelled_term
+from rotor.tops.uncertain_numbers import parse_named, write_number
+from rotor.units import parse_quantity
+
+KINDS = ("linear", "spherical", "prolate", "oblate", "asymmetric")
+REPRESENTATIONS = ("Ir", "Il", "IIr", "IIl", "IIIr", "IIIl")
+
+RIGID = ("A", "B", "C")
+LINEAR, SPHERICAL, SYMMETRIC = tuple(published.LINEAR), tuple(published.SPHERICAL), tuple(published.SYMMETRIC)
+S_REDUCTION, A_REDUCTION = tuple(published.S_REDUCTION), tuple(published.A_REDUCTION)
+_DISTORTION = {"linear": LINEAR, "spherical": SPHERICAL, "prolate": SYMMETRIC, "oblate": SYMMETRIC}
+_REDUCED = {"A": A_REDUCTION, "S": S_REDUCTION}
+_SHARED = {*RIGID, *A_REDUCTION} & {*RIGID, *S_REDUCTION}
+_KNOWN = tuple(dict.fromkeys((*RIGID, *LINEAR, *SPHERICAL, *S_REDUCTION, *A_REDUCTION)))
+
+_GREEK = {"Δ": "Delta", "∆": "Delta", "δ": "delta", "Φ": "Phi", "φ": "phi", "ϕ": "phi"}
+_WITHOUT_K = {"DJ": "D", "HJ": "H", "LJ": "L"}  # what linear and spherical tops call them
+_SETTINGS = ("reduction", "representation", "kind", "uncertainties", "sources")
+
+
+@dataclass(frozen=True, init=False)
+class Constants:
+    """Named rotational constants in MHz, immutable, equal when all their content is equal.
+
+    Parameters
+    ----------
+    reduction : "A", "S" or None
+        Watson's reduction, for asymmetric tops only; taken from the names where they tell it.
+    representation : one of Ir, Il, IIr, IIl, IIIr, IIIl, or None
+        Axes of an asymmetric top; Ir for Ray's κ <= 0 and IIIl for κ > 0 unless given.
+    kind : "linear", "spherical", "prolate", "oblate", "asymmetric" or None
+        Otherwise by the rule: B alone is linear, A and B prolate, B and C oblate; A, B and C are what their exact
+        equality says. A given kind wins as long as the constants do not contradict it.
+    uncertainties, sources : mapping by name
+        One standard deviation in MHz; where the number was published.
+    terms : mapping {(p, q, n): value in MHz}
+        Terms J^2p ½[Jz^2q, J₊^2n + J₋^2n]₊ that no published name stands for; they are kept under names such as
+        `J4Jz2Jpm6`, which text and files may use as well.
+    **values_mhz
+        The constants: float in MHz or text with a unit. A, B, C with A >= B >= C > 0; distortion constants of the
+        tables above, signs as published (ΔJ, DJ > 0 for a normal molecule). Greek letters and underscores are read.
+
+    Raises
+    ------
+    ValueError
+        For a name that is unknown or of another kind of top, both reductions in one set, constants that are not
+        finite or out of order, and a kind, reduction or representation that does not fit.
+
+    Examples
+    --------
+    >>> water = Constants(A=835840.288, B=435351.717, C=278138.7)
+    >>> water.kind, water.representation, water["B"], water.get("DeltaJ")
+    ('asymmetric', 'Ir', 435351.717, 0.0)
+    >>> Constants(B=6081.492114, D=1.301427e-3).text()
+    'B=6081.492114 D=0.001301427 MHz'
+    """
+
+    values: Mapping[str, float]
+    reduction: str | None
+    representation: str | None
+    kind: str
+    uncertainties: Mapping[str, float]
+    sources: Mapping[str, str]
+
+    def __init__(
+        self,
+        *,
+        reduction: str | None = None,
+        representation: str | None = None,
+        kind: str | None = None,
+        uncertainties: Mapping[str, float] | None = None,
+        sources: Mapping[str, str] | None = None,
+        terms: Mapping[Powers, float | str] | None = None,
+        **values_mhz: float | str,
+    ) -> None:
+        given = _renamed([*values_mhz.items(), *_spelled(terms).items()], _published_name)
+        _refuse_unknown(given)
+        numbers = {name: _finite(name, value) for name, value in given.items()}
+        kind = _kind(numbers, kind)
+        values = _renamed(numbers.items(), lambda name: _name_in(kind, name))
+
+        errors = _renamed((uncertainties or {}).items(), lambda name: _name_in(kind, _published_name(name)))
+        origins = _renamed((sources or {}).items(), lambda name: _name_in(kind, _published_name(name)))
+        _refuse_strays("uncertainties", errors, values)
+        _refuse_strays("sources", origins, values)
+
+        reduction = _reduction(kind, values, reduction)
+        _refuse_misplaced(kind, reduction, values)
+        _refuse_disorder(kind, values)
+
+        content = {
+            "values": MappingProxyType(values),
+            "reduction": reduction,
+            "representation": _representation(kind, values, representation),
+            "kind": kind,
+            "uncertainties": MappingProxyType({name: _spread(name, errors[name]) for name in values if name in errors}),
+            "sources": MappingProxyType(origins),
+        }
+        for field, thing in content.items():
+            object.__setattr__(self, field, thing)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _rebuilt, (self._settings(), dict(self.values))
+
+    def __getitem__(self, name: str) -> float:
+        """The constant of that name in MHz; KeyError when the set has none."""
+        return self.values[_name_in(self.kind, _published_name(name))]
+
+    def __contains__(self, name: str) -> bool:
+        return _name_in(self.kind, _published_name(name)) in self.values
+
+    def get(self, name: str, default: float = 0.0) -> float:
+        """The constant of that name in MHz, `default` when the set has none."""
+        return self.values.get(_name_in(self.kind, _published_name(name)), default)
+
+    @property
+    def rigid(self) -> tuple[float, float, float]:
+        """A, B, C in MHz for every kind of top, the equal ones filled in.
+
+        A linear molecule has no moment about its axis: A is infinite, so that ħ/(4πA) is the moment 0 it stands for.
+
+        >>> Constants(B=5.0, kind="spherical").rigid, Constants(B=5.0).rigid
+        ((5.0, 5.0, 5.0), (inf, 5.0, 5.0))
+        """
+        b = self.values["B"]
+        if self.kind == "linear":
+            return math.inf, b, b
+        return self.values.get("A", b), b, self.values.get("C", b)
+
+    @property
+    def terms(self) -> dict[Powers, float]:
+        """The terms without a published name, {(p, q, n): value in MHz}.
+
+        >>> Constants(A=9.0, B=3.0, C=2.0, terms={(1, 0, 4): 1e-9}).terms
+        {(1, 0, 4): 1e-09}
+        """
+        return {powers: value for name, value in self.values.items() if (powers := powers_of_spelled(name))}
+
+    def replace(self, **changes: Any) -> Constants:
+        """A changed copy; a constant set to None is left out, kind, reduction or representation None is found anew.
+
+        A changed constant loses its uncertainty and source unless the change brings new ones.
+
+        >>> Constants(A=9.0, B=3.0, C=2.0).replace(C=2.5).text()
+        'A=9.0 B=3.0 C=2.5 MHz'
+        """
+        changes |= _spelled(changes.pop("terms", None))
+        moved = _renamed(
+            [(name, value) for name, value in changes.items() if name not in _SETTINGS],
+            lambda name: _name_in(self.kind, _published_name(name)),
+        )
+        values = {name: value for name, value in {**self.values, **moved}.items() if value is not None}
+        settings = self._settings()
+        for table in ("uncertainties", "sources"):
+            settings[table] = {name: thing for name, thing in settings[table].items() if name not in moved}
+        settings.update({name: value for name, value in changes.items() if name in _SETTINGS})
+        return Constants(**settings, **values)
+
+    @classmethod
+    def parse(
+        cls,
+        text: str,
+        *,
+        reduction: str | None = None,
+        representation: str | None = None,
+        kind: str | None = None,
+    ) -> Constants:
+        """Constants from text such as "A=835840.288(12) B=435351.717 C=278138.7 MHz".
+
+        The digits in brackets are the uncertainty in the last digits. Each item may carry a unit; a unit at the end,
+        after a space, serves every item that carries none; without any, numbers are MHz.
+
+        >>> Constants.parse("B=9.2GHz DJ=3.8kHz").values["D"]
+        0.0038
+        >>> Constants.parse("A=5.17 B=0.25(2) cm-1").uncertainties["B"]
+        599.584916
+        """
+        values, uncertainties = parse_named(text)
+        settings = {"reduction": reduction, "representation": representation, "kind": kind}
+        return cls(**settings, uncertainties=uncertainties, **values)  # type: ignore[arg-type]
+
+    def text(self, unit: str = "MHz") -> str:
+        """The constants in one line, uncertainty in brackets, with the fewest digits that `parse` reads back exactly.
+
+        >>> Constants.parse("B=57635.968(12) D=0.1835 MHz").text("GHz")
+        'B=57.635968(12) D=0.0001835 GHz'
+        """
+        spreads = self.uncertainties
+        items = (f"{name}={write_number(value, spreads.get(name), unit)}" for name, value in self.values.items())
+        return f"{' '.join(items)} {unit}"
+
+    def _settings(self) -> dict[str, Any]:
+        """Everything but the values, as the constructor takes it."""
+        return {
+            "reduction": self.reduction,
+            "representation": self.representation,
+            "kind": self.kind,
+            "uncertainties": dict(self.uncertainties),
+            "sources": dict(self.sources),
+        }
+
+
+def ray_kappa(a: float, b: float, c: float) -> float:
+    """Ray's asymmetry parameter κ = (2B - A - C)/(A - C): -1 prolate, +1 oblate; -1 for a linear top (A infinite).
+
+    Source: Ray, Z. Phys. 78 (1932) 74. Raises ValueError for a spherical top, where κ is 0/0.
+
+    >>> ray_kappa(3.0, 2.0, 1.0)
+    0.0
+    """
+    if math.isinf(a):
+        return -1.0
+    if not a >= b >= c or a == c:
+        raise ValueError(f"Ray's κ of A = {a!r}, B = {b!r}, C = {c!r}: it wants A >= B >= C and A > C")
+    return (2 * b - a - c) / (a - c)
+
+
+def vocabulary(kind: str, reduction: str | None = None) -> tuple[str, ...]:
+    """The names that constants of a kind of top may have; both reductions of an asymmetric top if none is given.
+
+    >>> vocabulary("linear")
+    ('B', 'D', 'H', 'L')
+    """
+    if kind == "asymmetric":
+        return RIGID + (_REDUCED[reduction] if reduction else tuple(dict.fromkeys(S_REDUCTION + A_REDUCTION)))
+    return (("B",) if kind == "linear" else RIGID) + _DISTORTION[kind]
+
+
+# Names
+
+
+def _published_name(name: str) -> str:
+    """Greek letters spelled out, underscores taken away: `Δ_JK` is `DeltaJK`."""
+    plain = name.replace("_", "")
+    return _GREEK.get(plain[:1], plain[:1]) + plain[1:]
+
+
+def _name_in(kind: str, name: str) -> str:
+    return _WITHOUT_K.get(name, name) if kind in ("linear", "spherical") else name
+
+
+def _spelled(values: Mapping[Powers, Any] | None) -> dict[str, Any]:
+    return {spelled_term(*powers): value for powers, value in (values or {}).items()}
+
+
+def _renamed(things: Iterable[tuple[str, Any]], rename: Callable[[str], str]) -> dict[str, Any]:
+    renamed: dict[str, Any] = {}
+    for name, thing in things:
+        if rename(name) in renamed:
+            raise ValueError(f"{name} is given twice (names are read as {rename(name)}); leave one out")
+        renamed[rename(name)] = thing
+    return renamed
+
+
+def _refuse_unknown(names: Iterable[str]) -> None:
+    for name in names:
+        if name not in _KNOWN and not powers_of_spelled(name):
+            near = [known for known in _KNOWN if known.casefold() == name.casefold()]
+            near = near or difflib.get_close_matches(name, _KNOWN, n=3)
+            hint = f"did you mean {' or '.join(near)}? " if near else ""
+            raise ValueError(
+                f"{name!r} is not a rotational constant known here: {hint}Known are {', '.join(_KNOWN)}, and terms "
+                "spelled out such as J4Jz2Jpm6"
+            )
+
+
+def _refuse_strays(what: str, names: Iterable[str], values: Mapping[str, float]) -> None:
+    strays = [name for name in names if name not in values]
+    if strays:
+        raise ValueError(f"{what} of {', '.join(strays)}, but there is no such constant here: {', '.join(values)}")
+
+
+def _refuse_misplaced(kind: str, reduction: str | None, values: Mapping[str, float]) -> None:
+    allowed = vocabulary(kind, reduction)
+    for name in values:
+        if powers := powers_of_spelled(name):
+            _refuse_named_term(kind, reduction, name, powers)
+        elif name not in allowed:
+            near = _counterpart(name, allowed)
+            ways = [f"use {near}"] if near else []
+            if kind in ("prolate", "oblate") and {*RIGID} <= {*values}:
+                ways.append("say kind='asymmetric'")
+            hint = f"{' or '.join(ways)}; " if ways else ""
+            raise ValueError(f"{name} is no constant of kind {kind!r}: {hint}that has {', '.join(allowed)}")
+
+
+def _refuse_named_term(kind: str, reduction: str | None, name: str, powers: Powers) -> None:
+    """A term has one name; and it must be one that this kind of top can have."""
+    if own := published_name(powers, kind, reduction):
+        raise ValueError(f"{name} is the operator of {own}; give it by that name, with the sign of that name")
+    letters = {"linear": "J", "spherical": "J", "prolate": "J and Jz", "oblate": "J and Jz"}.get(kind)
+    if letters and (powers[2] or (powers[1] and letters == "J")):
+        raise ValueError(f"{name} is no term of kind {kind!r}, where terms have powers of {letters} alone")
+
+
+def _counterpart(name: str, allowed: tuple[str, ...]) -> str:
+    """The allowed name of the same operator: DJ for DeltaJ or D, HJK for PhiJK, nothing for d1."""
+    match = re.fullmatch(r"(Delta|Phi|[DHL])(J?J?K?K?J?)", name)
+    if not match:
+        return ""
+    letter = {"Delta": "D", "Phi": "H"}.get(match[1], match[1])
+    return next((n for n in (letter + match[2], letter + "J", letter) if n in allowed), "")
+
+
+# Numbers
+
+
+def _finite(name: str, value: float | str) -> float:
+    try:
+        return parse_quantity(value, "MHz")
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"{name} = {value!r}: {error}") from None
+
+
+def _spread(name: str, value: float | str) -> float:
+    spread = _finite(f"uncertainty of {name}", value)
+    if spread < 0:
+        raise ValueError(f"uncertainty of {name} = {spread!r} MHz: a standard deviation is 0 or more")
+    return spread
+
+
+def _refuse_disorder(kind: str, values: Mapping[str, float]) -> None:
+    rigid = {name: values[name] for name in RIGID if name in values}
+    for name, value in rigid.items():
+        if value <= 0:
+            raise ValueError(f"{name} = {value!r} MHz: a rotational constant is positive")
+    if list(rigid.values()) != sorted(rigid.values(), reverse=True):
+        given = ", ".join(f"{name} = {value!r}" for name, value in rigid.items())
+        raise ValueError(f"{given} MHz: the names follow the order {' >= '.join(rigid)}; exchange them")
+
+
+# Kind, reduction, representation
+
+
+def _kind(values: Mapping[str, float], kind: str | None) -> str:
+    given = "".join(name for name in RIGID if name in values)
+    if kind is None:
+        return _kind_by_rule(given, values)
+    if kind not in KINDS:
+        raise ValueError(f"kind {kind!r}: a top is one of {', '.join(KINDS)}")
+
+    fits = {
+        "linear": given == "B",
+        "spherical": "B" in given and len({values[name] for name in given}) == 1,
+        "prolate": given == "AB" or (given == "ABC" and values["B"] == values["C"]),
+        "oblate": given == "BC" or (given == "ABC" and values["A"] == values["B"]),
+        "asymmetric": given == "ABC",
+    }
+    if not fits[kind]:
+        wants = {
+            "linear": "B alone",
+            "spherical": "B, or equal A, B, C",
+            "prolate": "A and B, or A, B, C with B = C exactly",
+            "oblate": "B and C, or A, B, C with A = B exactly",
+            "asymmetric": "A, B and C",
+        }[kind]
+        have = ", ".join(f"{name} = {values[name]!r}" for name in given) or "none of A, B, C"
+        raise ValueError(f"kind {kind!r} wants {wants}, but the constants have {have}")
+    return kind
+
+
+def _kind_by_rule(given: str, values: Mapping[str, float]) -> str:
+    if given not in ("B", "AB", "BC", "ABC"):
+        raise ValueError(
+            f"constants with {given or 'none of A, B, C'}: give B (linear molecule), A and B (prolate top), "
+            "B and C (oblate top) or A, B and C"
+        )
+    if given == "B":
+        return "linear"
+    if len({values[name] for name in given}) == 1:
+        return "spherical"
+    if given == "AB" or (given == "ABC" and values["B"] == values["C"]):
+        return "prolate"
+    if given == "BC" or values["A"] == values["B"]:
+        return "oblate"
+    return "asymmetric"
+
+
+def _reduction(kind: str, names: Mapping[str, float], reduction: str | None) -> str | None:
+    """The reduction given, or the one the names tell; None for a rigid asymmetric top and every other kind."""
+    if reduction not in (None, "A", "S"):
+        raise ValueError(f"reduction {reduction!r}: Watson's reductions are 'A' and 'S'")
+    if kind != "asymmetric":
+        if reduction:
+            raise ValueError(f"reduction {reduction!r} belongs to asymmetric tops; the kind here is {kind!r}")
+        return None
+
+    own = {key: [n for n in names if n in table and n not in _SHARED] for key, table in _REDUCED.items()}
+    if own["A"] and own["S"]:
+        raise ValueError(f"both reductions in one set: {', '.join(own['A'])} (A) with {', '.join(own['S'])} (S)")
+    told = next((key for key, members in own.items() if members), None)
+    if reduction and told and reduction != told:
+        raise ValueError(f"reduction {reduction!r}, but {', '.join(own[told])} belong to the {told}-reduction")
+    if not reduction and not told and any(name in _SHARED - {*RIGID} for name in names):
+        raise ValueError("octic and decic names alone fit both reductions; say reduction='A' or reduction='S'")
+    return reduction or told
+
+
+def _representation(kind: str, values: Mapping[str, float], representation: str | None) -> str | None:
+    if representation is not None and representation not in REPRESENTATIONS:
+        raise ValueError(f"representation {representation!r}: known are {', '.join(REPRESENTATIONS)}")
+    if kind != "asymmetric":
+        if representation:
+            raise ValueError(f"representation {representation!r} belongs to asymmetric tops; kind is {kind!r}")
+        return None
+    if representation:
+        return representation
+    a, b, c = values["A"], values["B"], values["C"]
+    return "IIIl" if a > c and ray_kappa(a, b, c) > 0 else "Ir"
+
+
+def _rebuilt(settings: dict[str, Any], values: dict[str, Any]) -> Constants:
+    return Constants(**settings, **values)

@@ -1,0 +1,290 @@
+"""A top: inertia, principal axes, rotational constants, kind, dipole, polarizability, spin weights. The waist of the package.
+
+A molecule becomes a top here; the quantum and the classical half know tops only. Someone with constants alone starts at
+`Top.from_constants`.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rotor import units
+from rotor.arrays import Floats
+from rotor.geometry.inertia import EQUAL_MOMENTS, LINEAR_BELOW, Body, PrincipalFrame, point_masses, principal_frame
+from rotor.tops.constants import Constants
+from rotor.tops.kind import KindOfTop, kind_from_moments, kind_with_symmetry
+from rotor.tops.spin_weights import SpinWeights
+
+if TYPE_CHECKING:
+    from rotor.molecules.molecule import Molecule
+    from rotor.molecules.symmetry.point_group import Symmetry
+
+Vector = tuple[float, float, float]
+Tensor = tuple[Vector, Vector, Vector]
+
+SYMMETRIC_WITHIN = 1e-3  # of the shortest distance between nuclei: displacements that symmetry may overlook
+NO_WEIGHTS = SpinWeights()
+_KINDS = ("linear", "spherical", "prolate", "oblate", "asymmetric")
+
+
+def allowed_dipole(dipole: ArrayLike, symmetry: Symmetry) -> Floats:
+    """The part of a dipole that every operation leaves alike, where the rest is below 0.001 D; else the whole."""
+    vector = np.asarray(dipole, dtype=float)
+    operations = [operation.matrix for operation in (*symmetry.rotations, *symmetry.improper)]
+    part = np.mean([matrix @ vector for matrix in operations], axis=0)
+    if symmetry.rotation_group == "C∞":  # no operation but the identity is listed
+        part = symmetry.axes_abc[0] * (symmetry.axes_abc[0] @ vector)
+    return part if np.linalg.norm(vector - part) < 1e-3 else vector
+
+
+def allowed_polarizability(tensor: ArrayLike, symmetry: Symmetry) -> Floats:
+    """The part of a (3, 3) tensor that every operation leaves alike, where the rest is below 0.001 of it; else the whole."""
+    whole = np.asarray(tensor, dtype=float)
+    if symmetry.linear:
+        along = symmetry.axes_abc[0]
+        parallel = along @ whole @ along
+        across = (np.trace(whole) - parallel) / 2
+        part = across * np.eye(3) + (parallel - across) * np.outer(along, along)
+    else:
+        operations = [operation.matrix for operation in (*symmetry.rotations, *symmetry.improper)]
+        part = np.mean([matrix @ whole @ matrix.T for matrix in operations], axis=0)
+    return part if np.linalg.norm(whole - part) < 1e-3 * np.linalg.norm(whole) else whole
+
+
+@dataclass(frozen=True)
+class Top:
+    """A rigid or semi-rigid rotor.
+
+    constants: named constants in MHz. dipole_abc_debye: (μa, μb, μc) or None where it is not known.
+    polarizability_abc_angstrom3: the symmetric tensor (3, 3) along a, b, c as rows, in Å³, or None. spin_weights:
+    nuclear-spin weights. mass_u: for Doppler widths. frame: principal frame of a geometry, None without one.
+    kind_of_top: how the kind was decided. molecule, symmetry: of a geometry. source: where the constants are from.
+    independent_errors: whether the uncertainties of the constants may count as uncorrelated; not those of a fit whose
+    correlations are unknown. notes: what a user must be told.
+    """
+
+    constants: Constants
+    dipole_abc_debye: tuple[float, float, float] | None = None
+    spin_weights: SpinWeights = NO_WEIGHTS
+    name: str = ""
+    mass_u: float | None = None
+    frame: PrincipalFrame | None = None
+    kind_of_top: KindOfTop | None = None
+    molecule: Molecule | None = None
+    symmetry: Symmetry | None = None
+    source: str = ""
+    dipole_source: str = ""
+    weights_source: str = ""
+    independent_errors: bool = True
+    notes: tuple[str, ...] = ()
+    polarizability_abc_angstrom3: Tensor | None = None
+    polarizability_source: str = ""
+
+    @classmethod
+    def from_constants(
+        cls,
+        constants: Constants | str,
+        *,
+        dipole_abc_debye: ArrayLike | None = None,
+        spin_weights: SpinWeights | dict[str, int] | None = None,
+        **others: Any,
+    ) -> Top:
+        """A top from named constants, or from their text such as "A=835840.288 B=435351.717 C=278138.7 MHz".
+
+        others: any further field of `Top`. Raises ValueError for unknown names, units or an impossible set.
+        """
+        if isinstance(constants, str):
+            constants = Constants.parse(constants)
+        if not isinstance(spin_weights, SpinWeights):
+            spin_weights = SpinWeights.from_mapping(spin_weights) if spin_weights else SpinWeights()
+        return cls(constants, _three(dipole_abc_debye), spin_weights, **others)
+
+    @classmethod
+    def from_molecule(
+        cls,
+        molecule: Molecule,
+        *,
+        linear_below: float = LINEAR_BELOW,
+        equal_within: float = EQUAL_MOMENTS,
+        symmetry_within: float = SYMMETRIC_WITHIN,
+    ) -> Top:
+        """A rigid top from a geometry: principal axes, A, B, C, kind, dipole and polarizability turned along, spin weights.
+
+        The symmetry of the nuclei decides the kind where it can (C3v is a symmetric top), the moments where it cannot.
+        Nuclear-spin weights follow from it and from `molecule.electronic`, inversion doublets unresolved;
+        `symmetry_within` is its tolerance, relative to the shortest distance. Dipole components that symmetry forbids
+        and that are below 0.001 D are round-off or noise, and left out; so is what symmetry forbids of a polarizability
+        and is below 0.001 of it.
+
+        Raises ValueError for a single atom. Neglected: everything that vibration and centrifugal distortion do, about
+        0.3 to 1 % between an equilibrium geometry and measured constants.
+
+        >>> from rotor.molecules.molecule import Molecule
+        >>> top = Top.from_molecule(Molecule(("C", "O"), [[0, 0, 0], [0, 0, 1.128323]]))
+        >>> top.kind, round(top.constants["B"], 0)
+        ('linear', 57898.0)
+        """
+        if len(molecule.symbols) < 2:
+            raise ValueError(
+                f"{molecule.name or 'the input'} is a single atom: it has no rotation; give 2 atoms or more"
+            )
+        from rotor.molecules.symmetry.point_group import symmetry_of
+        from rotor.tops.spin_statistics import spin_weights
+
+        body = point_masses(molecule.masses_u, molecule.positions_angstrom)
+        frame = principal_frame(body, molecule.masses_u, molecule.positions_angstrom, equal_within)
+        kind = kind_from_moments(frame.moments, linear_below=linear_below, equal_within=equal_within)
+        symmetry = symmetry_of(molecule, symmetry_within)
+        kind = kind_with_symmetry(kind, symmetry)
+        dipole, tensor = molecule.dipole_debye, molecule.polarizability_angstrom3
+        weights = spin_weights(symmetry, [one.spin for one in molecule.nuclei], molecule.electronic)
+        return cls(
+            constants=constants_of_moments(frame.moments, kind.kind),
+            dipole_abc_debye=None if dipole is None else _in_frame(frame, allowed_dipole(dipole, symmetry)),
+            spin_weights=weights,
+            name=molecule.name,
+            mass_u=float(np.sum(molecule.masses_u)),
+            frame=frame,
+            kind_of_top=kind,
+            molecule=molecule,
+            symmetry=symmetry,
+            source=molecule.source,
+            dipole_source=molecule.dipole_source,
+            weights_source=f"from the permutations of nuclei in {symmetry.point_group}{_electrons(molecule, weights)}",
+            notes=tuple(molecule.notes),
+            polarizability_abc_angstrom3=None
+            if tensor is None
+            else _tensor_in_frame(frame, allowed_polarizability(tensor, symmetry)),
+            polarizability_source="" if tensor is None else molecule.polarizability_source,
+        )
+
+    @classmethod
+    def from_body(cls, body: Body, **others: Any) -> Top:
+        """A top from a body of point masses, plates or solids, in u and Å."""
+        frame = principal_frame(body)
+        kind = kind_from_moments(frame.moments)
+        constants = constants_of_moments(frame.moments, kind.kind)
+        return cls(constants, frame=frame, kind_of_top=kind, mass_u=body.mass, **others)
+
+    @property
+    def kind(self) -> str:
+        """linear, spherical, prolate, oblate or asymmetric."""
+        return self.constants.kind
+
+    @property
+    def rotational_constants_mhz(self) -> tuple[float, float, float]:
+        """A, B, C in MHz, whatever the kind; A of a linear top is infinite."""
+        return self.constants.rigid
+
+    @property
+    def moments_u_angstrom2(self) -> tuple[float, float, float]:
+        """I_a, I_b, I_c in u Å², from the constants: 505379.008/A; I_a of a linear top is 0."""
+        a, b, c = (units.ROTATIONAL_MHZ_U_ANGSTROM2 / x for x in self.rotational_constants_mhz)
+        return a, b, c
+
+    @property
+    def kappa(self) -> float | None:
+        """Ray's asymmetry parameter (2B - A - C)/(A - C), -1 prolate to +1 oblate; None where A = C or linear."""
+        a, b, c = self.rotational_constants_mhz
+        return (2 * b - a - c) / (a - c) if math.isfinite(a) and a > c else None
+
+    @property
+    def planar_moments_u_angstrom2(self) -> tuple[float, float, float]:
+        """P_aa, P_bb, P_cc = Σ m a², Σ m b², Σ m c² in u Å²."""
+        a, b, c = self.moments_u_angstrom2
+        return (b + c - a) / 2, (a + c - b) / 2, (a + b - c) / 2
+
+    @property
+    def inertial_defect_u_angstrom2(self) -> float:
+        """I_c - I_a - I_b in u Å²: 0 for a rigid planar molecule, slightly positive for a real one."""
+        a, b, c = self.moments_u_angstrom2
+        return c - a - b
+
+    def with_dipole(self, dipole_abc_debye: ArrayLike, source: str) -> Top:
+        """The same top with another dipole in principal axes."""
+        return replace(self, dipole_abc_debye=_three(dipole_abc_debye), dipole_source=source)
+
+    def with_polarizability(self, polarizability_abc_angstrom3: ArrayLike, source: str) -> Top:
+        """The same top with another polarizability (3, 3) in principal axes, Å³."""
+        tensor = symmetric_tensor(polarizability_abc_angstrom3)
+        return replace(self, polarizability_abc_angstrom3=tensor, polarizability_source=source)
+
+    def with_estimated_dipole(self, dipole_debye: ArrayLike, source: str) -> Top:
+        """The same top with a dipole in the frame of its geometry, of which what symmetry forbids is left out."""
+        if self.frame is None or self.symmetry is None:
+            raise ValueError(f"{self.name or 'this top'} has no geometry whose frame a dipole could be in")
+        allowed = allowed_dipole(dipole_debye, self.symmetry)
+        return replace(self, dipole_abc_debye=_in_frame(self.frame, allowed), dipole_source=source)
+
+    def with_weights(self, weights: dict[str, int], source: str) -> Top:
+        """The same top with other spin weights."""
+        return replace(self, spin_weights=SpinWeights.from_mapping(weights), weights_source=source)
+
+
+def _electrons(molecule: Molecule, weights: SpinWeights) -> str:
+    """What spin weights take the electrons for, as words after the point group; none where levels weigh alike anyway."""
+    if weights.rule == "none":
+        return ""
+    if molecule.electronic == "odd":
+        return ", electrons in a state that half turns change in sign"
+    electrons = sum(one.element_number for one in molecule.nuclei) - molecule.charge
+    odd = "; theirs is an odd number here, so that the state may be another" if electrons % 2 else ""
+    return f", electrons taken for a closed shell{odd}"
+
+
+def constants_of_moments(moments: ArrayLike, kind: str) -> Constants:
+    """The rigid constants that a kind of top has, from moments in u Å²; degenerate ones are averaged."""
+    if kind not in _KINDS:
+        raise ValueError(f"kind {kind!r} is none of {', '.join(_KINDS)}")
+    ia, ib, ic = (float(m) for m in np.asarray(moments))
+    f = units.ROTATIONAL_MHZ_U_ANGSTROM2
+    if kind == "linear":
+        return Constants(B=f / ((ib + ic) / 2), kind=kind)
+    if kind == "spherical":
+        return Constants(B=f / ((ia + ib + ic) / 3), kind=kind)
+    if kind == "prolate":
+        return Constants(A=f / ia, B=f / ((ib + ic) / 2), kind=kind)
+    if kind == "oblate":
+        return Constants(B=f / ((ia + ib) / 2), C=f / ic, kind=kind)
+    return Constants(A=f / ia, B=f / ib, C=f / ic, kind=kind)
+
+
+def _in_frame(frame: PrincipalFrame, dipole: Floats) -> tuple[float, float, float] | None:
+    """Components along a, b, c; those below 1e-6 of the whole are round-off of the frame, and 0."""
+    components = frame.axes @ dipole
+    return _three(np.where(np.abs(components) < 1e-6 * np.linalg.norm(components), 0.0, components))
+
+
+def _tensor_in_frame(frame: PrincipalFrame, tensor: Floats) -> Tensor:
+    """The tensor in a, b, c; elements below 1e-6 of the whole are round-off of the frame, and 0."""
+    turned = frame.axes @ tensor @ frame.axes.T
+    return symmetric_tensor(np.where(np.abs(turned) < 1e-6 * np.linalg.norm(turned), 0.0, (turned + turned.T) / 2))
+
+
+def symmetric_tensor(tensor: ArrayLike) -> Tensor:
+    """A polarizability as nested tuples, checked: (3, 3), finite, symmetric within 1e-9 of its size.
+
+    >>> symmetric_tensor([[2, 0, 0], [0, 1, 0], [0, 0, 1]])
+    ((2.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    """
+    values = np.asarray(tensor, dtype=float)
+    if values.shape != (3, 3) or not np.isfinite(values).all():
+        raise ValueError(f"a polarizability is a (3, 3) tensor of finite numbers in Å³, not {values.tolist()}")
+    if not np.allclose(values, values.T, rtol=0, atol=1e-9 * float(np.abs(values).max())):
+        raise ValueError(f"a polarizability is a symmetric tensor; this one is not: {values.tolist()}")
+    a, b, c = ((float(x), float(y), float(z)) for x, y, z in values)
+    return a, b, c
+
+
+def _three(vector: ArrayLike | None) -> tuple[float, float, float] | None:
+    if vector is None:
+        return None
+    values = np.asarray(vector, dtype=float)
+    if values.shape != (3,) or not np.isfinite(values).all():
+        raise ValueError(f"a dipole is three finite numbers (μa, μb, μc) in debye, not {values.tolist()}")
+    return float(values[0]), float(values[1]), float(values[2])
