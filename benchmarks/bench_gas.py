@@ -21,7 +21,7 @@ import numpy as np
 import rotor
 from rotor.classical.free.free_motion import free_motion
 from rotor.classical.gas.ensembles import free_gas_correlations, stepped_gas_correlations
-from rotor.units import CLASSICAL_TIME_PS, EV_PER_K
+from rotor.units import ASE_TIME_PS, EV_PER_K
 
 END_PS, TEMPERATURE_K, THREADS = 2.0, 300.0, 2
 STEPS = (1, 4)  # between two times
@@ -31,7 +31,7 @@ def measured(molecules: int, count: int) -> dict[str, float | str]:
     """Seconds, rates, errors."""
     water = rotor.read("water")
     moments, kt = np.array(water.moments_u_angstrom2), EV_PER_K * TEMPERATURE_K
-    times = np.linspace(0.0, END_PS, count) / CLASSICAL_TIME_PS
+    times = np.linspace(0.0, END_PS, count) / ASE_TIME_PS
     probe = {"vector": water.dipole_abc_debye, "tensor": np.diag([1.0, 0.3, -0.5])}
     free_motion(moments, [1.0, 2.0, 3.0]).at(0.0)  # compiled before the clock starts
     free_gas_correlations(moments, kt, times[:2], molecules=2, rng=np.random.default_rng(1), **probe)

@@ -21,7 +21,7 @@ import numpy as np
 from ase import Atoms, units
 from ase.io import read, write
 
-from rotor.fluid.analysis import block_errors, diffusion, drift_per_ns, endless_box, pair_distribution
+from rotor.fluid.analysis import block_errors, diffusion, drift_per_ns, pair_distribution, yeh_hummer_correction
 from rotor.fluid.engines.results import run_engine
 from rotor.fluid.forces.models import model_of
 from rotor.fluid.forces.potential import RigidPotential
@@ -109,7 +109,7 @@ def measured(engine: str, atoms: Atoms, settings: Settings) -> dict[str, Any]:
     table["g"] = [np.round(shells[0].r_angstrom, 4).tolist(), np.round(g, 4).tolist()]
     interval = float(record.time_ps[1] - record.time_ps[0])
     found = diffusion(oxygen, interval)
-    endless = endless_box(found, float(np.mean(record.temperature_k)), VISCOSITY, float(edges[0]))
+    endless = yeh_hummer_correction(found, float(np.mean(record.temperature_k)), VISCOSITY, float(edges[0]))
     table["diffusion_1e9_m2_per_s"] = [found.value * 1e9, found.error * 1e9]
     table["diffusion_endless_box"] = endless.corrected * 1e9
     slope, error = drift_per_ns(record.time_ps, record.total_ev / (6 * molecules - 3) / (units.kB * 298.15))

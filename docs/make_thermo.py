@@ -18,8 +18,8 @@ from rotor.thermo import (
     GAS_CONSTANT,
     ThermoFunctions,
     VibrationalStates,
+    classical_above_k,
     classical_limit,
-    parting_temperature_k,
     rotational_temperatures_k,
     thermodynamic_functions,
 )
@@ -117,7 +117,7 @@ def places() -> str:
         top = top_of(molecule)
         theta = ", ".join(f"{x:.2f}" for x in dict.fromkeys(rotational_temperatures_k(top)) if np.isfinite(x))
         limit = classical_limit(top)
-        numbers = [f"{limit.a:.4g}", f"{limit.b:.4g}", f"{limit.d:.2e}", f"{parting_temperature_k(top):.1f}"]
+        numbers = [f"{limit.a:.4g}", f"{limit.b:.4g}", f"{limit.d:.2e}", f"{classical_above_k(top):.1f}"]
         rows.append([molecule, theta, *numbers])
     words = (
         "The corrected Q is the classical one times exp[a/T + (b - a²/2)/T² + d T], which is 1 + a/T + b/T² + d T + ..."

@@ -1,7 +1,7 @@
 # %% [markdown]
 # # Free rotation: a book and a molecule
 #
-# Thrown about its longest or its shortest axis a book keeps spinning; about the axis between it turns over. The same
+# InitialState about its longest or its shortest axis a book keeps spinning; about the axis between it turns over. The same
 # equations turn a water molecule, some 10¹² times faster. Everything here is the exact motion, not stepped, and every
 # claim is asserted. Pictures go to the folder given on the command line, if one is.
 
@@ -19,7 +19,7 @@ from rotor.classical.free.stability import fixed_axes, growth_rate, separatrix_r
 from rotor.classical.gas.thermal_momentum import mean_thermal_momentum, off_intermediate_axis
 from rotor.geometry.inertia import rectangle
 from rotor.plots.polhodes import polhode_figure
-from rotor.units import CLASSICAL_TIME_PS, EV_PER_K, HBAR_CLASSICAL
+from rotor.units import ASE_TIME_PS, EV_PER_K, HBAR_CLASSICAL
 
 folder = Path(sys.argv[1]) if len(sys.argv) > 1 and Path(sys.argv[1]).is_dir() else None
 
@@ -34,7 +34,7 @@ def keep(figure, name):
 # ## The book
 #
 # A closed book in A5 is nearly a uniform plate with sides as 1 to √2. Its moments m h²/12, m w²/12 and their sum are as
-# 1 : 2 : 3. Thrown at one turn per second, tipped by a hundredth of a radian.
+# 1 : 2 : 3. InitialState at one turn per second, tipped by a hundredth of a radian.
 
 # %%
 plate = rectangle(0.4, 0.21, 0.21 / math.sqrt(2))  # kg, m
@@ -134,11 +134,11 @@ water = rotor.read("water")
 moments = np.array(water.moments_u_angstrom2)
 size = float(mean_thermal_momentum(moments, EV_PER_K * 300))
 molecule = rotor.free_motion(moments, off_intermediate_axis(moments, size, math.radians(0.5)))
-period_ps = float(molecule.period) * CLASSICAL_TIME_PS
+period_ps = float(molecule.period) * ASE_TIME_PS
 keep(
     polhode_figure(
         molecule, np.linspace(0, 2 * molecule.period, 400), axis_names=("a", "b", "c"), time_label="$t$ (ps)",
-        time_factor=CLASSICAL_TIME_PS, title="Water at 300 K, half a degree off its axis b",
+        time_factor=ASE_TIME_PS, title="Water at 300 K, half a degree off its axis b",
     ),
     "water_tumbling.png",
 )  # fmt: skip
@@ -149,7 +149,7 @@ rows = {
     "ω3/ω1 on separatrix": [f"{float(separatrix_ratio(body)):.4f}" for body in (book, moments)],
     "growth per radian": [f"{float(growth_rate(body, body[1])):.4f}" for body in (book, moments)],
     "|L|": ["", f"{size / HBAR_CLASSICAL:.3f} ħ"],
-    "one turn": ["1 s", f"{2 * math.pi * moments[1] / size * CLASSICAL_TIME_PS:.3f} ps"],
+    "one turn": ["1 s", f"{2 * math.pi * moments[1] / size * ASE_TIME_PS:.3f} ps"],
     "turned over after": [f"{thrown.period / 2:.3f} s", f"{period_ps / 2:.3f} ps"],
 }
 for name, (first, second) in rows.items():

@@ -17,7 +17,7 @@ from rotor.classical.gas.ensembles import thermal_ensemble
 from rotor.plots.gas import equipartition_figure
 from rotor.statistics.degrees_of_freedom import count_degrees
 from rotor.statistics.equipartition import equipartition, kinetic_degrees
-from rotor.units import CLASSICAL_TIME_PS, EV_PER_K
+from rotor.units import ASE_TIME_PS, EV_PER_K
 
 folder = Path(sys.argv[1]) if len(sys.argv) > 1 and Path(sys.argv[1]).is_dir() else None
 kt = EV_PER_K * 300
@@ -28,7 +28,7 @@ def gas_of(name, molecules, seed):
     top = rotor.read(name)
     rng = np.random.default_rng(seed)
     gas = thermal_ensemble(top.moments_u_angstrom2, kt, molecules, rng=rng, mass=top.mass_u)
-    return gas.moved(10.0 / CLASSICAL_TIME_PS)
+    return gas.moved(10.0 / ASE_TIME_PS)
 
 
 # %% [markdown]

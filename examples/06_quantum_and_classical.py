@@ -20,7 +20,7 @@ from rotor.plots.gas import band_figure
 from rotor.plots.heat_capacity import Panel, plot_heat_capacity
 from rotor.spectra.classical_band import classical_band, compare_bands, dipole_band_area, lines_area, rigid
 from rotor.thermo import thermodynamic_functions
-from rotor.units import CLASSICAL_TIME_PS, EV_PER_K, MHZ_PER_CM
+from rotor.units import ASE_TIME_PS, EV_PER_K, MHZ_PER_CM
 
 folder = Path(sys.argv[1]) if len(sys.argv) > 1 and Path(sys.argv[1]).is_dir() else None
 tops = {name: rigid(rotor.read(name)) for name in ("water", "OCS")}  # distortion left out on both sides
@@ -38,15 +38,15 @@ for name, kept in (("OCS", 0.0), ("water", 0.0), ("NH3", None)):
     top = rotor.read(name)
     moments, dipole = top.moments_u_angstrom2, top.dipole_abc_debye
     rng = np.random.default_rng(1)
-    gas = free_gas_correlations(moments, kt, times_ps / CLASSICAL_TIME_PS, vector=dipole, molecules=10_000, rng=rng)
+    gas = free_gas_correlations(moments, kt, times_ps / ASE_TIME_PS, vector=dipole, molecules=10_000, rng=rng)
     stays = plateau(moments, dipole)
-    second = short_time(moments, kt, dipole).m2 / CLASSICAL_TIME_PS**2
+    second = short_time(moments, kt, dipole).m2 / ASE_TIME_PS**2
     print(
         f"{name:6s} C1 = 1 - {second / 2:7.3f} t² + ..., ends at {stays:.4f}; at 4 ps {gas.c1[-1]:+.4f} ± {gas.c1_error[-1]:.4f}"
     )
     assert kept is None or stays == kept
     if name == "OCS":
-        closed, _ = linear_curves(times_ps / CLASSICAL_TIME_PS, moments[1], kt)
+        closed, _ = linear_curves(times_ps / ASE_TIME_PS, moments[1], kt)
         assert np.abs((gas.c1 - closed)[1:] / gas.c1_error[1:]).max() < 4  # standard errors
     else:
         assert abs(gas.c1[-1] - stays) < 4 * gas.c1_error[-1]

@@ -32,7 +32,7 @@ def linear_band(top: Top, grid, fwhm, correction="harmonic", temperature_k=300.0
     """The band from the closed form of C1, without a gas."""
     times = band_times(top, temperature_k, fwhm)
     moment, kt = top.moments_u_angstrom2[1], units.EV_PER_K * temperature_k
-    c1, _ = linear_curves(times / units.CLASSICAL_TIME_PS, moment, kt)
+    c1, _ = linear_curves(times / units.ASE_TIME_PS, moment, kt)
     options = {"fwhm_mhz": fwhm, "temperature_k": temperature_k, "correction": correction}
     return band_from_correlation(times, c1, top.dipole_abc_debye[0] ** 2, grid, **options)
 
@@ -52,7 +52,7 @@ def test_a_linear_gas_has_the_band_of_its_speeds():
     fwhm, grid = 0.2 * CM, np.linspace(0, 100, 501) * CM
     band = linear_band(OCS, grid, fwhm)
     kt = units.EV_PER_K * 300
-    spread = math.sqrt(kt / OCS.moments_u_angstrom2[1]) / (2 * math.pi) / units.CLASSICAL_TIME_PS * 1e6  # MHz
+    spread = math.sqrt(kt / OCS.moments_u_angstrom2[1]) / (2 * math.pi) / units.ASE_TIME_PS * 1e6  # MHz
     density = 0.5 * grid / spread**2 * np.exp(-0.5 * (grid / spread) ** 2)
     x = grid / (300 * units.MHZ_PER_K)
     closed = INTENSITY_NM2_MHZ * OCS.dipole_abc_debye[0] ** 2 * grid * x * density
@@ -81,7 +81,7 @@ def test_egelstaffs_time_is_shifted():
     kt_mhz = cold * units.MHZ_PER_K
     density = band / (INTENSITY_NM2_MHZ * OCS.dipole_abc_debye[0] ** 2 * grid * 2 * np.sinh(0.5 * grid / kt_mhz))
     shift_ps = 1e6 / (4 * math.pi * kt_mhz)
-    c1, _ = linear_curves(shift_ps / units.CLASSICAL_TIME_PS, OCS.moments_u_angstrom2[1], units.EV_PER_K * cold)
+    c1, _ = linear_curves(shift_ps / units.ASE_TIME_PS, OCS.moments_u_angstrom2[1], units.EV_PER_K * cold)
     assert 0.9 < c1 < 0.98
     total = 2 * np.trapezoid(density, grid) + grid[0] * density[0]  # as if S rose straight from 0
     assert total == pytest.approx(float(c1), abs=6e-4)  # S(0) is not 0 but 1e-7 per MHz: 4e-4

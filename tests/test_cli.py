@@ -254,10 +254,10 @@ def test_every_file_is_written_with_its_provenance(call, folder):
         [*names, *(f"{name}.provenance.json" for name in names), "a.parquet", "a.json", "a.png"]
     )
     for name in names:
-        story = json.loads((folder / f"{name}.provenance.json").read_text(encoding="utf-8"))
-        assert story["command"] == f"rotor spectrum CO {options}"
-        assert story["version"] == rotor.__version__
-        assert "CDMS" in story["constants_source"]
+        provenance = json.loads((folder / f"{name}.provenance.json").read_text(encoding="utf-8"))
+        assert provenance["command"] == f"rotor spectrum CO {options}"
+        assert provenance["version"] == rotor.__version__
+        assert "CDMS" in provenance["constants_source"]
     assert (
         (folder / "a.cat")
         .read_text(encoding="ascii")

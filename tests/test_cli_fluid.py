@@ -28,9 +28,9 @@ def test_a_box_is_made_and_run(call, folder):
     assert rows.dtype.names == tuple(FluidRecord.__dataclass_fields__)
     assert rows["total_ev"].tolist() == [row["total_ev"] for row in told["record"]]  # to the last bit
     assert told["files"] == ["a.csv"]
-    story = json.loads(Path("a.csv.provenance.json").read_text())
-    assert story["settings"] == told["settings"]
-    assert story["command"].startswith("rotor fluid water --molecules 27")
+    provenance = json.loads(Path("a.csv.provenance.json").read_text())
+    assert provenance["settings"] == told["settings"]
+    assert provenance["command"].startswith("rotor fluid water --molecules 27")
 
 
 def test_the_report_names_what_was_run(call, folder):

@@ -12,7 +12,7 @@ import pytest
 import rotor
 from rotor.classical.gas.correlations import linear_curves, short_time
 from rotor.statistics.equipartition import Equipartition
-from rotor.units import CLASSICAL_TIME_PS, CM_PER_EV, EV_PER_K
+from rotor.units import ASE_TIME_PS, CM_PER_EV, EV_PER_K
 
 _KEYS = """
     temperature_k molecules seed confidence degrees_of_freedom tested_at_ps accepted p_value chi2 chi2_degrees chi2_p ks_p
@@ -67,17 +67,17 @@ def test_correlation_functions_in_the_file_and_in_json(call, folder):
     assert [row["t"] for row in rows] == np.linspace(0, 4, 9).tolist()
     ocs = rotor.read("OCS")
     kt, moment = EV_PER_K * 300, ocs.moments_u_angstrom2[1]
-    closed = linear_curves(np.linspace(0, 4, 9) / CLASSICAL_TIME_PS, moment, kt)
+    closed = linear_curves(np.linspace(0, 4, 9) / ASE_TIME_PS, moment, kt)
     for row, c1, c2 in zip(rows[1:], closed[0][1:], closed[1][1:], strict=True):
         assert abs(row["c1"] - c1) < 4 * row["c1_error"]  # σ of a fixed seed
         assert abs(row["c2"] - c2) < 4 * row["c2_error"]
     start = short_time(ocs.moments_u_angstrom2, kt)
-    assert told["short_time_per_ps2"]["c1"] == pytest.approx(start.m2 / CLASSICAL_TIME_PS**2, rel=1e-12)
+    assert told["short_time_per_ps2"]["c1"] == pytest.approx(start.m2 / ASE_TIME_PS**2, rel=1e-12)
     assert told["c1_plateau"] == 0.0
     assert told["vector_source"] == "the dipole"
-    story = json.loads((folder / "ocs.csv.provenance.json").read_text(encoding="utf-8"))
-    assert story["molecules"] == 3000
-    assert story["seed"] == 1
+    provenance = json.loads((folder / "ocs.csv.provenance.json").read_text(encoding="utf-8"))
+    assert provenance["molecules"] == 3000
+    assert provenance["seed"] == 1
 
 
 @pytest.mark.parametrize(

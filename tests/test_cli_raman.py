@@ -35,9 +35,9 @@ def test_raman_of_nitrogen(call):
         rows = list(csv.DictReader(handle))
     assert len(rows) == content["line_count"] == len(content["lines"])
     assert [float(row["shift_cm"]) for row in rows] == [line["shift_cm"] for line in content["lines"]]
-    story = json.loads(Path("a.csv.provenance.json").read_text(encoding="utf-8"))
-    assert story["laser_nm"] == 488.0
-    assert "Bridge" in story["polarizability_source"]
+    provenance = json.loads(Path("a.csv.provenance.json").read_text(encoding="utf-8"))
+    assert provenance["laser_nm"] == 488.0
+    assert "Bridge" in provenance["polarizability_source"]
     assert Path("a.png").stat().st_size > 5000
 
 

@@ -20,7 +20,7 @@ COLUMNS = [
 OF_VIBRATION = ["q_vib", "cv_vib_over_r"]
 OF_GAS = ["gas_cp_j_per_mol_k", "gas_entropy_j_per_mol_k", "gas_enthalpy_j_per_mol", "gas_gibbs_j_per_mol_k"]
 KEYS = {
-    "rotational_temperatures_k", "parting_temperature_k", "parting_tolerance", "classical_corrections", "species",
+    "rotational_temperatures_k", "classical_above_k", "classical_tolerance", "classical_corrections", "species",
     "species_known", "fractions", "symmetry_number_counted", "spin_factor", "jmax", "relative_error", "vibrations",
     "pressure_bar", "functions", "files",
 }  # fmt: skip
@@ -48,9 +48,9 @@ def test_the_grid_of_the_contract(call, folder):
     assert content["functions"][0]["q_rot_corrected"] is None
     assert content["functions"][99]["q_rot"] == found.q_rot[99]
     assert content["files"] == ["w.csv", "w.png", "w.json"]
-    story = json.loads((folder / "w.csv.provenance.json").read_text(encoding="utf-8"))
-    assert story["species"] == "equilibrium"
-    assert story["rows"] == 100
+    provenance = json.loads((folder / "w.csv.provenance.json").read_text(encoding="utf-8"))
+    assert provenance["species"] == "equilibrium"
+    assert provenance["rows"] == 100
     assert "25 of 100 temperatures" in out
     assert "Θ_rot         A 40.1146, B 20.8894, C 13.3521 K" in out
 

@@ -121,16 +121,16 @@ def test_lines_in_every_format(tmp_path, suffix):
         found = pl.read_csv(path)["frequency_mhz"].to_numpy()
     elif suffix == ".parquet":
         found = pl.read_parquet(path)["frequency_mhz"].to_numpy()
-        story = json.loads(pl.read_parquet_metadata(path)["provenance"])
+        provenance = json.loads(pl.read_parquet_metadata(path)["provenance"])
     else:
         content = json.loads(path.read_text())
-        found, story = [line["frequency_mhz"] for line in content["lines"]], content["provenance"]
+        found, provenance = [line["frequency_mhz"] for line in content["lines"]], content["provenance"]
     if suffix in (".cat", ".cat.gz", ".csv"):
-        story = json.loads(Path(f"{path}.provenance.json").read_text())
+        provenance = json.loads(Path(f"{path}.provenance.json").read_text())
     assert np.allclose(found, lines.frequency_mhz, atol=5.1e-5)  # the rounding of a .cat
-    assert story["constants"].startswith("B=57635.968")
-    assert story["command"] == "test"
-    assert story["temperature_k"] == 100
+    assert provenance["constants"].startswith("B=57635.968")
+    assert provenance["command"] == "test"
+    assert provenance["temperature_k"] == 100
 
 
 def test_long_lists_are_written_in_the_same_bytes_as_short_ones(tmp_path, monkeypatch):

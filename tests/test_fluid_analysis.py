@@ -10,9 +10,9 @@ from rotor.fluid.analysis import (
     block_errors,
     diffusion,
     drift_per_ns,
-    endless_box,
     mean_square_displacement,
     pair_distribution,
+    yeh_hummer_correction,
 )
 from rotor.fluid.summary import mean_of
 
@@ -87,7 +87,7 @@ def test_brownian_points_diffuse_as_they_were_made_to() -> None:
 
 
 def test_endless_box_adds_the_drag_of_images() -> None:
-    found = endless_box(Diffusion(2e-9, 1e-10), 300.0, 1e-3, 20.0)
+    found = yeh_hummer_correction(Diffusion(2e-9, 1e-10), 300.0, 1e-3, 20.0)
     by_hand = 2.837297 * 1.380649e-23 * 300 / (6 * math.pi * 1e-3 * 20e-10)
     assert found.corrected - found.value == pytest.approx(by_hand, rel=1e-12)  # one formula, typed twice
     assert by_hand == pytest.approx(0.3117e-9, rel=1e-3)  # by a pocket calculator

@@ -173,7 +173,7 @@ def test_files_for_lammps_hold_the_scene() -> None:
     speeds = np.array(
         [line.split()[1:] for line in rest.split("Velocities")[1].split("Bonds")[0].split("\n")[2:-2]], float
     )
-    assert np.allclose(speeds * units.CLASSICAL_TIME_PS, scene.site_velocities, rtol=1e-15, atol=0)  # one rounding
+    assert np.allclose(speeds * units.ASE_TIME_PS, scene.site_velocities, rtol=1e-15, atol=0)  # one rounding
     commands = input_file(scene, settings, Form())
     assert "rigid/nve/small molecule langevin 300 300 0.25 9" in commands
     assert "pair_coeff 2 3 pairs.table PAIR_2_3 6" in commands
@@ -206,7 +206,7 @@ def test_a_record_counts_degrees_and_mixes_thermometers() -> None:
     )
     frames = [Frame(0, zero, motion, -1.0), Frame(4, zero, motion, -1.0, half=True)]
     record = record_of(frames, scene, settings)
-    h = 4e-3 / units.CLASSICAL_TIME_PS
+    h = 4e-3 / units.ASE_TIME_PS
     full = motion.kinetic()
     extra = motion.correction(h).times(1 / 12)
     assert record.time_ps.tolist() == [0.0, 0.016]

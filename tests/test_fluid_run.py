@@ -34,11 +34,11 @@ def box(molecules=27, seed=3):
 def stop_after(step):
     """What a run is told to, and what ends it there as a signal would."""
 
-    def told(now, steps, speed):
+    def progress(now, steps, speed):
         if now >= step:
             raise KeyboardInterrupt
 
-    return told
+    return progress
 
 
 def same(one: FluidRecord, other: FluidRecord) -> bool:
@@ -63,7 +63,7 @@ def test_a_run_cut_anywhere_and_resumed_is_the_uninterrupted_one(folder, monkeyp
     os.chdir("../b")
     for step in (5, 14, 33, 34):  # in the first interval, on a checkpoint, twice between others
         with pytest.raises(KeyboardInterrupt):
-            run_fluid(box(), settings, FILES, resume=step > 5, told=stop_after(step))
+            run_fluid(box(), settings, FILES, resume=step > 5, progress=stop_after(step))
     with open("run.csv", "a") as file:
         file.write(
             "0.03,-1.5\n" * 2000 + "0.03"
@@ -349,6 +349,6 @@ def test_a_file_that_is_no_checkpoint_is_told_in_our_words(folder):
     Path("run.npz").write_text("junk")
     with pytest.raises(
         ValueError, match=r"^run.npz: is no checkpoint of rotor fluid; name the file of --checkpoint"
-    ) as told:
+    ) as progress:
         run_fluid(box(), SETTINGS, FILES, resume=True)
-    assert "pickle" not in str(told.value)
+    assert "pickle" not in str(progress.value)

@@ -16,7 +16,7 @@ from rotor.classical.free.stability import separatrix_ratio
 from rotor.classical.gas.thermal_momentum import mean_thermal_momentum, off_intermediate_axis
 from rotor.classical.integrators.method import integrate
 from rotor.classical.integrators.splitting import RotationSplitting
-from rotor.classical.motion import MotionTable, departure, sampled
+from rotor.classical.motion import MotionTable, invariant_drift, sampled
 from rotor.geometry.rotations import IDENTITY
 from rotor.plots.animation import Atoms, animate, box_edges
 from rotor.plots.polhodes import plot_polhodes, polhode_figure
@@ -108,10 +108,10 @@ def test_start_is_half_a_degree_off_the_intermediate_axis():
 def test_table_keeps_the_invariants_and_departure_sees_a_fault():
     motion = free_motion([0.6, 0.8, 1.0], [1.8, 0.4, -0.9])
     table = sampled(motion, np.linspace(0, 100, 50))
-    kept = departure(table, motion)
+    kept = invariant_drift(table, motion)
     assert max(kept.energy, kept.momentum, kept.space_momentum) < 1e-14  # round-off of some ten operations
     bent = MotionTable(table.times, table.momentum, np.broadcast_to(IDENTITY, (50, 4)), table.energy)
-    assert departure(bent, motion).space_momentum > 0.1
+    assert invariant_drift(bent, motion).space_momentum > 0.1
     with pytest.raises(ValueError, match="one body"):
         sampled(free_motion([[1.0, 2.0, 3.0]] * 2, [1.0, 0, 1.0]), [0.0])
 

@@ -133,8 +133,8 @@ def test_corrupted_matrix_is_refused_then_mended():
     with pytest.raises(ValueError, match=r"nearest_rotation\(\) mends it"):
         rot.from_matrix(truth + noise)
     mended = rot.nearest_rotation(truth + noise)
-    assert mended.departure == pytest.approx(np.linalg.norm(truth + noise - mended.rotation), rel=1e-12)
-    assert mended.departure <= np.linalg.norm(noise)  # nearest: at least as near as the one we started from
+    assert mended.distance_from_input == pytest.approx(np.linalg.norm(truth + noise - mended.rotation), rel=1e-12)
+    assert mended.distance_from_input <= np.linalg.norm(noise)  # nearest: at least as near as the one we started from
     assert bool(mended.unique)
     assert np.linalg.norm(mended.rotation - truth) < 2 * np.linalg.norm(noise)  # triangle inequality
     assert rot.distance(rot.from_matrix(mended.rotation), rot.from_matrix(truth)) < 5e-3  # noise of 1e-3 an entry
@@ -146,7 +146,7 @@ def test_reflection_is_refused_and_its_nearest_rotation_is_not_unique():
     mended = rot.nearest_rotation(-np.eye(3))
     assert np.linalg.det(mended.rotation) == pytest.approx(1.0, abs=8 * EPS)
     assert not mended.unique
-    assert mended.departure == pytest.approx(2.0, rel=1e-14)  # one axis is wrong by 2
+    assert mended.distance_from_input == pytest.approx(2.0, rel=1e-14)  # one axis is wrong by 2
 
 
 def test_uniform_sampling_has_the_angle_law_of_the_haar_measure():

@@ -135,8 +135,8 @@ def test_csv_holds_the_columns_and_where_they_are_from(lines, tmp_path):
     heading, *rows = path.read_text(encoding="utf-8").splitlines()
     assert heading == "frequency_mhz,cross_section_nm2"
     assert [float(r.split(",")[1]) for r in rows] == made.intensity.tolist()
-    story = json.loads((tmp_path / "s.csv.provenance.json").read_text(encoding="utf-8"))
-    assert (story["command"], story["profile"], story["fwhm_mhz"]) == ("by hand", "gaussian", 100.0)
+    provenance = json.loads((tmp_path / "s.csv.provenance.json").read_text(encoding="utf-8"))
+    assert (provenance["command"], provenance["profile"], provenance["fwhm_mhz"]) == ("by hand", "gaussian", 100.0)
     assert list(made.to_pandas().columns) == list(made.to_polars().columns) == ["frequency_mhz", "cross_section_nm2"]
     with pytest.raises(ValueError, match=r"as \.csv"):
         rotor.write(made, tmp_path / "s.txt")

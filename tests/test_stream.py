@@ -88,8 +88,8 @@ def test_a_catalogue_is_that_of_the_list_in_memory(tmp_path):
     ours, theirs = ((tmp_path / name).read_text().splitlines() for name in ("a.cat", "b.cat"))
     assert sorted(ours) == sorted(theirs)
     assert (np.diff(read_cat(tmp_path / "a.cat").frequency_mhz) >= 0).all()
-    story = json.loads((tmp_path / "a.cat.provenance.json").read_text())
-    assert (story["lines"], story["jmax"], story["temperature_k"]) == (len(ours), 20, 300.0)
+    provenance = json.loads((tmp_path / "a.cat.provenance.json").read_text())
+    assert (provenance["lines"], provenance["jmax"], provenance["temperature_k"]) == (len(ours), 20, 300.0)
 
 
 def test_j_max_and_q_are_found_as_in_memory(tmp_path):

@@ -16,10 +16,10 @@ from rotor.quantum.levels import solve_levels
 from rotor.thermo import (
     GAS_CONSTANT,
     VibrationalStates,
+    classical_above_k,
     classical_limit,
     implied_symmetry_number,
     level_sums,
-    parting_temperature_k,
     partition_function,
     rotational_temperatures_k,
     species_names,
@@ -387,17 +387,17 @@ def test_corrected_limit_is_consistent_and_ends_where_it_must():
 def test_where_quantum_and_classical_part():
     """At that temperature C_v is off by just the tolerance, above it nowhere by more."""
     for top in (rotor.read("water"), rotor.read("CH4"), rotor.read("H2"), Top.from_constants("B=1 cm-1")):
-        t = parting_temperature_k(top)
+        t = classical_above_k(top)
         there = level_sums(rigid(top), [top.spin_weights], t * np.array([1.0, 1.02, 1.1, 1.5, 3.0, 10.0]), 1e-9)[0]
         off = np.abs(there.cv_over_r / (1.0 if top.kind == "linear" else 1.5) - 1)
         assert off[0] == pytest.approx(0.01, rel=1e-3)  # T is known to 1e-6
         assert (off[1:] < 0.01).all()
     j = np.arange(40)
-    part = parting_temperature_k(Top.from_constants("B=1 cm-1"))
+    part = classical_above_k(Top.from_constants("B=1 cm-1"))
     _, _, cv = plain_functions((j * (j + 1) * 1.438776877).tolist(), (2 * j + 1).tolist(), part)  # hc/k in cm K
     assert cv == pytest.approx(1.01, rel=1e-6)
     with pytest.raises(ValueError, match="between 0 and 1"):
-        parting_temperature_k(rotor.read("CO"), 0.0)
+        classical_above_k(rotor.read("CO"), 0.0)
 
 
 @pytest.mark.parametrize("harmonic", [True, False])

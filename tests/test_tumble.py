@@ -18,7 +18,7 @@ from rotor.classical.free.free_motion import free_motion
 from rotor.classical.gas.thermal_momentum import mean_thermal_momentum
 from rotor.geometry.rotations import distance
 from rotor.plots import animation
-from rotor.units import CLASSICAL_TIME_PS, CM_PER_EV, EV_PER_K, HBAR_CLASSICAL
+from rotor.units import ASE_TIME_PS, CM_PER_EV, EV_PER_K, HBAR_CLASSICAL
 
 COLUMNS = ["t", "m1", "m2", "m3", "qw", "qx", "qy", "qz", "energy"]
 BODY = ("tumble", "--moments", "0.6,0.8,1.0", "--angular-momentum", "1.8,0.4,-0.9")
@@ -75,9 +75,9 @@ def test_csv_is_the_exact_motion_bit_by_bit(call, tmp_path):
     momentum, _ = free_motion([0.6, 0.8, 1.0], [1.8, 0.4, -0.9]).at([3.0, 1.0, 2.0])
     read = [[float(row[f"m{i}"]) for i in (1, 2, 3)] for row in rows_of("out.csv")]
     assert read == momentum.tolist()
-    story = json.loads((tmp_path / "out.csv.provenance.json").read_text(encoding="utf-8"))
-    assert story["moments"] == [0.6, 0.8, 1.0]
-    assert story["rows"] == 3
+    provenance = json.loads((tmp_path / "out.csv.provenance.json").read_text(encoding="utf-8"))
+    assert provenance["moments"] == [0.6, 0.8, 1.0]
+    assert provenance["rows"] == 3
 
 
 def test_axes_keep_the_order_given(call):
@@ -99,7 +99,7 @@ def test_json_has_the_keys_of_the_contract(call):
     growth = math.sqrt(0.2 * 0.2 / 0.6) / 0.8 * math.sqrt(1.8**2 + 0.4**2 + 0.9**2)
     assert content["growth_rate"] == pytest.approx(growth, rel=1e-14)
     assert content["motion"][-1]["t"] == pytest.approx(2 * content["period"], rel=1e-15)
-    assert max(content["departure"].values()) < 1e-14
+    assert max(content["invariant_drift"].values()) < 1e-14
     assert [axis["kind"] for axis in content["fixed_axes"]] == ["stable", "unstable", "stable"]
     code, out, _ = call("tumble", "water", "--json", "-")
     info = set(json.loads(call("info", "water", "--json", "-")[1])) - {"partition_function"}
@@ -130,7 +130,7 @@ def test_units_of_a_molecule_are_ps_hbar_and_wavenumbers(call):
     assert [row["t"] for row in content["motion"]] == [0.0, 0.5, 1.0]
     moments = np.array(content["moments"])
     inside = free_motion(moments, np.array([1.0, 10.0, 2.0]) * HBAR_CLASSICAL)
-    momentum, _ = inside.at(1.0 / CLASSICAL_TIME_PS)
+    momentum, _ = inside.at(1.0 / ASE_TIME_PS)
     assert np.allclose([content["motion"][2][f"m{i}"] for i in (1, 2, 3)], momentum / HBAR_CLASSICAL, rtol=1e-13)
     per_cm = 4 * math.pi * 2.99792458e-2 * math.sqrt(105)  # |L|/I in rad/ps is 4π c B |L|/ħ
     assert c * per_cm < content["turning_rate"] < a * per_cm  # a mean of angular velocities along L
@@ -140,7 +140,7 @@ def test_constants_of_units_are_those_of_ase():
     import ase.units
 
     # ASE has CODATA 2014: its electron volt and Boltzmann's constant differ by 1e-8 and 4e-7
-    assert CLASSICAL_TIME_PS * 1000 * ase.units.fs == pytest.approx(1.0, rel=1e-7)
+    assert ASE_TIME_PS * 1000 * ase.units.fs == pytest.approx(1.0, rel=1e-7)
     assert HBAR_CLASSICAL / (ase.units._hbar * ase.units.J * ase.units.s) == pytest.approx(1.0, rel=1e-7)
     assert EV_PER_K / ase.units.kB == pytest.approx(1.0, rel=1e-6)
     assert CM_PER_EV * ase.units.invcm == pytest.approx(1.0, rel=1e-7)
@@ -186,11 +186,11 @@ def test_an_animation_is_written(call, tmp_path, monkeypatch):
     with Image.open(tmp_path / "w.gif") as film:
         assert film.n_frames == 3
         film.seek(0)
-        story = json.loads(film.info["comment"])
-    assert story["program"] == "rotor"
-    assert story["input"] == "water"
-    assert story["command"].startswith("rotor tumble water --gif")
-    assert len(story["moments"]) == 3
+        provenance = json.loads(film.info["comment"])
+    assert provenance["program"] == "rotor"
+    assert provenance["input"] == "water"
+    assert provenance["command"].startswith("rotor tumble water --gif")
+    assert len(provenance["moments"]) == 3
 
 
 @pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="no ffmpeg here to make an mp4")

@@ -48,7 +48,7 @@ class MotionTable(Table):
 
 
 @dataclass(frozen=True)
-class Departure:
+class InvariantDrift:
     """Largest relative departure from the start of energy, of |L|, and of L in space (its length over |L|)."""
 
     energy: float
@@ -74,12 +74,12 @@ def sampled(motion: FreeMotion, times: ArrayLike) -> MotionTable:
     return MotionTable(times, momentum, attitude, energy(momentum, motion.moments))
 
 
-def departure(motion: MotionTable, start: FreeMotion) -> Departure:
+def invariant_drift(motion: MotionTable, start: FreeMotion) -> InvariantDrift:
     """How far the rows are from what the start demands; for the exact motion this is round-off, 1e-15 or so."""
     now = invariants(motion.momentum, motion.attitude, start.moments)
     then = invariants(start.momentum0, start.attitude0, start.moments)
     apart = np.linalg.norm(now.space_momentum - then.space_momentum, axis=-1)
-    return Departure(
+    return InvariantDrift(
         float(np.max(np.abs(now.energy / then.energy - 1.0))),
         float(np.max(np.abs(now.momentum / then.momentum - 1.0))),
         float(np.max(apart / then.momentum)),

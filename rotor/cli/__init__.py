@@ -15,7 +15,7 @@ from typing import cast
 import typer
 
 from rotor.cli import cat, convert, fluid, gas, info, isotopologues, molecules, raman, spectrum, thermo, tumble
-from rotor.cli.shared.output import NoAnswer
+from rotor.cli.shared.output import ComputationError
 
 NO_ANSWER, WRONG_INPUT, INTERRUPTED = 1, 2, 130
 # click's ClickException, whether click is a package of its own or, in a newer typer, a part of it
@@ -88,7 +88,7 @@ def run(arguments: Sequence[str] | None = None) -> int:
         return end.exit_code
     except _ERROR_OF_USE as error:
         return _fail(WRONG_INPUT, error.format_message())  # type: ignore[attr-defined]
-    except NoAnswer as error:
+    except ComputationError as error:
         return _fail(NO_ANSWER, str(error))
     except BrokenPipeError:  # the reader has seen enough: nothing more can be said to it, at exit neither
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

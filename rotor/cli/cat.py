@@ -10,7 +10,17 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from rotor.cli.shared import inputs
-from rotor.cli.shared.output import Files, NoAnswer, Table, Writer, deliver, json_text, note, show_facts, show_table
+from rotor.cli.shared.output import (
+    ComputationError,
+    Files,
+    Table,
+    Writer,
+    deliver,
+    json_text,
+    note,
+    show_facts,
+    show_table,
+)
 
 if TYPE_CHECKING:
     import numpy as np
@@ -52,7 +62,7 @@ def command(
 
         lines = with_measured_lines(lines, read_catalogue(measured))
     if plot and not len(lines):
-        raise NoAnswer("--plot: no lines are left to draw")
+        raise ComputationError("--plot: no lines are left to draw")
     content = summary(lines, file, context.obj)
     found = None
     if compare is not None:
@@ -134,7 +144,7 @@ def predicted(lines: Catalogue, source: str) -> Catalogue:
 
     top = inputs.with_some_dipole(inputs.read_top(inputs.Input(source, None, [], None, None, None)))
     if not len(lines):
-        raise NoAnswer("--compare: no lines are left to compare")
+        raise ComputationError("--compare: no lines are left to compare")
     highest = int(max(lines.quanta_upper[:, 0].max(), lines.quanta_lower[:, 0].max()))
     made = rotor.line_list(top, jmax=highest, min_lgint=float(lines.lgint.min()) - 1.0)
     note(f"{source}: predicted at {made.temperature_k:g} K with Q = {made.q:.6g}, J up to {highest}")

@@ -10,7 +10,16 @@ from typing import TYPE_CHECKING, Any, cast
 import typer
 
 from rotor.cli.shared import engines, inputs
-from rotor.cli.shared.output import Files, NoAnswer, Table, deliver, json_with_rows, note, show_facts, show_table
+from rotor.cli.shared.output import (
+    ComputationError,
+    Files,
+    Table,
+    deliver,
+    json_with_rows,
+    note,
+    show_facts,
+    show_table,
+)
 
 if TYPE_CHECKING:
     from ase import Atoms
@@ -70,13 +79,19 @@ def command(
     outputs, files = _outputs(source, csv, trajectory or [], frames_every, checkpoint, checkpoint_every, json)
     engines.check(engine, threads, outputs, resume)
     atoms, start = _box(source, settings, molecules, density, threads, relaxing=not resume)
-    story = {"command": context.obj, "input": source, "engine": engine, "settings": asdict(settings), "start": start}
+    provenance = {
+        "command": context.obj,
+        "input": source,
+        "engine": engine,
+        "settings": asdict(settings),
+        "start": start,
+    }
     if engine == "rotor":
-        record, about = _run(atoms, settings, outputs, resume, threads, story)
+        record, about = _run(atoms, settings, outputs, resume, threads, provenance)
     else:
         about = {"start": f"{start}; velocities {_speeds(atoms, settings)}"}
-        record = engines.run(engine, atoms, settings, outputs, threads, _head(story))
-    _tell(record, {**_head(story), **about}, atoms, settings, outputs, files)
+        record = engines.run(engine, atoms, settings, outputs, threads, _head(provenance))
+    _tell(record, {**_head(provenance), **about}, atoms, settings, outputs, files)
 
 
 def _model(names: str) -> str:
@@ -164,7 +179,7 @@ def _read(source: str) -> Atoms:
 
 
 def _run(
-    atoms: Atoms, settings: Settings, outputs: Outputs, resume: bool, threads: int, story: dict[str, Any]
+    atoms: Atoms, settings: Settings, outputs: Outputs, resume: bool, threads: int, provenance: dict[str, Any]
 ) -> tuple[FluidRecord, dict[str, Any]]:
     """The run of our own engine: what stops it on its way is no mistake of the user."""
     from rotor.fluid.run import RunStopped, calculator_of, run_fluid
@@ -173,21 +188,21 @@ def _run(
         atoms.calc = calculator_of(settings, threads)
     speeds = _speeds(atoms, settings)
 
-    def begun() -> None:
+    def on_start() -> None:
         from rotor.formats.line_tables import write_beside
 
         if outputs.csv is not None and not resume:
-            write_beside(outputs.csv, _head(story))
+            write_beside(outputs.csv, _head(provenance))
 
     try:
-        record = run_fluid(atoms, settings, outputs, resume=resume, begun=begun)
+        record = run_fluid(atoms, settings, outputs, resume=resume, on_start=on_start)
     except RunStopped as error:
-        raise NoAnswer(str(error)) from error
+        raise ComputationError(str(error)) from error
     except KeyboardInterrupt:
         if outputs.checkpoint is not None and Path(outputs.checkpoint).is_file():
             note(f"interrupted; the same command with --resume goes on from {outputs.checkpoint}")
         raise
-    start = f"resumed from {outputs.checkpoint}" if resume else f"{story['start']}; velocities {speeds}"
+    start = f"resumed from {outputs.checkpoint}" if resume else f"{provenance['start']}; velocities {speeds}"
     return record, {"start": start}
 
 
@@ -196,10 +211,10 @@ def _speeds(atoms: Atoms, settings: Settings) -> str:
     return "those of the box" if atoms.get_momenta().any() else f"drawn at {settings.temperature_k:g} K"
 
 
-def _head(story: dict[str, Any]) -> dict[str, Any]:
+def _head(provenance: dict[str, Any]) -> dict[str, Any]:
     import rotor
 
-    return {"rotor_version": rotor.__version__, **story}
+    return {"rotor_version": rotor.__version__, **provenance}
 
 
 def _tell(

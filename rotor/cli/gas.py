@@ -146,10 +146,10 @@ def _settling_times(top: Top, temperature_k: float, probes: Probes) -> Floats:
     import numpy as np
 
     from rotor.classical.gas.correlations import short_time
-    from rotor.units import CLASSICAL_TIME_PS
+    from rotor.units import ASE_TIME_PS
 
     start = short_time(top.moments_u_angstrom2, _kt(temperature_k), probes.vector, probes.tensor)
-    return np.linspace(0.0, SETTLED / math.sqrt(max(start.m2, start.n2 / 3)) * CLASSICAL_TIME_PS, DEFAULT_TIMES)
+    return np.linspace(0.0, SETTLED / math.sqrt(max(start.m2, start.n2 / 3)) * ASE_TIME_PS, DEFAULT_TIMES)
 
 
 def _tested(top: Top, settings: Settings) -> tuple[Ensemble, Equipartition]:
@@ -158,11 +158,11 @@ def _tested(top: Top, settings: Settings) -> tuple[Ensemble, Equipartition]:
 
     from rotor.classical.gas.ensembles import thermal_ensemble
     from rotor.statistics.equipartition import equipartition
-    from rotor.units import CLASSICAL_TIME_PS
+    from rotor.units import ASE_TIME_PS
 
     kt, rng = _kt(settings.temperature_k), np.random.default_rng(settings.seed)
     start = thermal_ensemble(top.moments_u_angstrom2, kt, settings.molecules, rng=rng, mass=top.mass_u)
-    gas = start.moved(_tested_at(settings) / CLASSICAL_TIME_PS)
+    gas = start.moved(_tested_at(settings) / ASE_TIME_PS)
     return gas, equipartition(gas.kinetic, kt, confidence=settings.confidence)
 
 
@@ -178,14 +178,14 @@ def _correlations(top: Top, settings: Settings, probes: Probes) -> Correlations:
     import numpy as np
 
     from rotor.classical.gas.ensembles import free_gas_correlations
-    from rotor.units import CLASSICAL_TIME_PS
+    from rotor.units import ASE_TIME_PS
 
     times = settings.times_ps
     assert times is not None  # asked for by the caller
     rng = np.random.default_rng([settings.seed, 1])
     with ThreadPoolExecutor(os.cpu_count()) as pool, progress(settings.molecules, "molecules") as told:
         curves = free_gas_correlations(
-            top.moments_u_angstrom2, _kt(settings.temperature_k), times / CLASSICAL_TIME_PS, vector=probes.vector,
+            top.moments_u_angstrom2, _kt(settings.temperature_k), times / ASE_TIME_PS, vector=probes.vector,
             tensor=probes.tensor, molecules=settings.molecules, rng=rng, executor=pool, progress=told,
         )  # fmt: skip
     return replace(curves, times=times)
@@ -255,11 +255,11 @@ def _about_curves(top: Top, settings: Settings, probes: Probes, curves: Correlat
     if curves is None:
         return dict.fromkeys(names)
     from rotor.classical.gas.correlations import plateau, short_time
-    from rotor.units import CLASSICAL_TIME_PS
+    from rotor.units import ASE_TIME_PS
 
     moments = top.moments_u_angstrom2
     start = short_time(moments, _kt(settings.temperature_k), probes.vector, probes.tensor)
-    per_ps2 = {"c1": start.m2 / CLASSICAL_TIME_PS**2, "c2": start.n2 / CLASSICAL_TIME_PS**2}
+    per_ps2 = {"c1": start.m2 / ASE_TIME_PS**2, "c2": start.n2 / ASE_TIME_PS**2}
     kept = plateau(moments, probes.vector)
     values = (probes.vector, probes.vector_source, probes.tensor_source, per_ps2, kept, rows_of(curves))
     return dict(zip(names, values, strict=True))
@@ -269,18 +269,18 @@ def _writers(top: Top, test: Equipartition, curves: Correlations | None, content
     kept = (
         "command", "input", "source", "temperature_k", "molecules", "seed", "vector_source", "tensor_source",
     )  # fmt: skip
-    story = {key: content[key] for key in kept}
+    provenance = {key: content[key] for key in kept}
 
     def table(path: Path) -> None:
         import rotor
 
-        rotor.write(curves, path, settings=story)
+        rotor.write(curves, path, settings=provenance)
 
     def draw(path: Path) -> None:
         from rotor.plots.gas import plot_gas
 
         title = f"{_name(top)}, {content['temperature_k']:g} K, {content['molecules']:,} molecules"
-        plot_gas(test, curves, path, title=title, plateau=content["c1_plateau"], provenance=story)
+        plot_gas(test, curves, path, title=title, plateau=content["c1_plateau"], provenance=provenance)
 
     return {"--csv": table, "--parquet": table, "--plot": draw}
 

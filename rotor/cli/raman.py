@@ -12,8 +12,8 @@ from rotor.cli.shared import gas_layer as layer
 from rotor.cli.shared import inputs
 from rotor.cli.shared.inputs import Input
 from rotor.cli.shared.output import (
+    ComputationError,
     Files,
-    NoAnswer,
     Table,
     Writer,
     answering,
@@ -90,7 +90,7 @@ def command(
         lines = _lines(top, settings)
         content = _content(lines, settings, given, context.obj, top_lines)
     if "--plot" in files.wanted and not len(lines):
-        raise NoAnswer(f"--plot: no lines: {_why_none(lines)}")
+        raise ComputationError(f"--plot: no lines: {_why_none(lines)}")
     for warning in lines.warnings:
         note(warning)
 
@@ -175,17 +175,17 @@ def _content(lines: RamanLines, settings: Settings, given: Input, command: str, 
 
 
 def _writers(lines: RamanLines, content: dict[str, Any]) -> dict[str, Writer]:
-    story = {"command": content["command"], "input": content["input"]}
+    provenance = {"command": content["command"], "input": content["input"]}
 
     def table(path: Path) -> None:
         import rotor
 
-        rotor.write(lines, path, settings=story)
+        rotor.write(lines, path, settings=provenance)
 
     def draw(path: Path) -> None:
         from rotor.plots.raman import plot_raman
 
-        plot_raman(lines, path, provenance={"command": story["command"]})
+        plot_raman(lines, path, provenance={"command": provenance["command"]})
 
     return {"--csv": table, "--parquet": table, "--plot": draw}
 

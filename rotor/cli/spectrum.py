@@ -14,8 +14,8 @@ from rotor.cli.shared import inputs
 from rotor.cli.shared import spcat_request as request
 from rotor.cli.shared.inputs import Input
 from rotor.cli.shared.output import (
+    ComputationError,
     Files,
-    NoAnswer,
     Table,
     Writer,
     answering,
@@ -163,7 +163,7 @@ def _refuse_doppler_without_mass(top: Top, settings: Settings) -> None:
 def _refuse_nothing_to_draw(lines: Lines, files: Files) -> None:
     drawn = [name for name in ("--plot", "--profile-csv") if name in files.wanted]
     if drawn and not len(lines):
-        raise NoAnswer(f"{drawn[0]}: no lines: {_why_none(lines)}")
+        raise ComputationError(f"{drawn[0]}: no lines: {_why_none(lines)}")
 
 
 def _settings(
@@ -223,8 +223,8 @@ def _program_catalogue(prediction: Prediction, content: dict[str, Any]) -> Write
 
     def write(path: Path) -> None:
         write_cat(prediction.catalogue, path)
-        story = provenance(prediction.lines) | {"command": content["command"], "input": content["input"]}
-        write_beside(path, story | {"q": prediction.q, "lines": len(prediction.catalogue)})
+        record = provenance(prediction.lines) | {"command": content["command"], "input": content["input"]}
+        write_beside(path, record | {"q": prediction.q, "lines": len(prediction.catalogue)})
 
     return write
 
@@ -281,19 +281,19 @@ def _writers(lines: Lines, settings: Settings, content: dict[str, Any], tag: int
     """How each option's file is written, with the provenance that its format can hold."""
     import rotor
 
-    story = {"command": content["command"], "input": content["input"], "tag": tag}
+    record = {"command": content["command"], "input": content["input"], "tag": tag}
 
     def table(path: Path) -> None:
-        rotor.write(lines, path, settings=story)
+        rotor.write(lines, path, settings=record)
 
     return {
         "--cat": table,
         "--csv": table,
         "--parquet": table,
         "--profile-csv": lambda path: rotor.write(
-            _spectrum(lines, settings), path, settings={"command": story["command"]}
+            _spectrum(lines, settings), path, settings={"command": record["command"]}
         ),
-        "--plot": lambda path: _draw(lines, settings, path, story),
+        "--plot": lambda path: _draw(lines, settings, path, record),
     }
 
 
@@ -312,11 +312,11 @@ def _spectrum(lines: Lines, settings: Settings) -> Spectrum:
     return optical_depth(spectrum, settings.gas.pressure_bar, settings.gas.path_cm)
 
 
-def _draw(lines: Lines, settings: Settings, path: Path, story: dict[str, Any]) -> None:
+def _draw(lines: Lines, settings: Settings, path: Path, record: dict[str, Any]) -> None:
     from rotor.plots.spectrum import plot_spectrum
 
     sticks = settings.profile == "sticks"
-    plot_spectrum(lines if sticks else _spectrum(lines, settings), path, provenance={"command": story["command"]})
+    plot_spectrum(lines if sticks else _spectrum(lines, settings), path, provenance={"command": record["command"]})
 
 
 def _show(lines: Lines, content: dict[str, Any]) -> None:

@@ -39,7 +39,7 @@ TEMPERATURES_K = (
     1000.0,
 )
 SHOWN = 25  # rows of the table in the report
-PARTED = 0.01  # of the classical heat capacity, where quantum and classical are said to part
+CLASSICAL_TOLERANCE = 0.01  # of the classical heat capacity, where quantum and classical are said to part
 
 EXAMPLES = """\b
 Examples:
@@ -125,15 +125,15 @@ def _functions(
 def _content(functions: ThermoFunctions, given: Input, command: str) -> dict[str, Any]:
     """What is printed and more, by the keys of docs/command_line.md."""
     from rotor.cli.shared.report import describe
-    from rotor.thermo import classical_limit, parting_temperature_k, rotational_temperatures_k, species_names
+    from rotor.thermo import classical_above_k, classical_limit, rotational_temperatures_k, species_names
 
     top, limit = functions.top, classical_limit(functions.top)
     gas, vibrations = functions.gas, functions.vibrations
     return {
         **describe(top, given.text, command),
         "rotational_temperatures_k": rotational_temperatures_k(top),
-        "parting_temperature_k": parting_temperature_k(top, PARTED),
-        "parting_tolerance": PARTED,
+        "classical_above_k": classical_above_k(top, CLASSICAL_TOLERANCE),
+        "classical_tolerance": CLASSICAL_TOLERANCE,
         "classical_corrections": {"a_k": limit.a, "b_k2": limit.b, "d_per_k": limit.d},
         "species": functions.species,
         "species_known": species_names(top),
@@ -148,12 +148,12 @@ def _content(functions: ThermoFunctions, given: Input, command: str) -> dict[str
 
 
 def _writers(functions: ThermoFunctions, content: dict[str, Any]) -> dict[str, Writer]:
-    story = {"command": content["command"], "input": content["input"]}
+    provenance = {"command": content["command"], "input": content["input"]}
 
     def table(path: Path) -> None:
         import rotor
 
-        rotor.write(functions, path, settings=story)
+        rotor.write(functions, path, settings=provenance)
 
     def draw(path: Path) -> None:
         from rotor.plots.heat_capacity import Panel, curve_temperatures, name_of, plot_heat_capacity
@@ -162,7 +162,7 @@ def _writers(functions: ThermoFunctions, content: dict[str, Any]) -> dict[str, W
             functions.top, curve_temperatures(functions.temperature_k), functions.species, functions.vibrations, None
         )
         label = "quantum" if functions.species == "equilibrium" else f"quantum, {functions.species}"
-        plot_heat_capacity([Panel(name_of(functions.top), {label: smooth})], path, provenance=story)
+        plot_heat_capacity([Panel(name_of(functions.top), {label: smooth})], path, provenance=provenance)
 
     return {
         "--csv": table,
@@ -201,7 +201,7 @@ def _facts(functions: ThermoFunctions, content: dict[str, Any]) -> list[tuple[st
         ("Θ_rot", _theta_text(content["rotational_temperatures_k"])),
         (
             "classical Q",
-            f"good to {PARTED:.0%} of C_v above {content['parting_temperature_k']:.4g} K (rigid top, equilibrium)",
+            f"good to {CLASSICAL_TOLERANCE:.0%} of C_v above {content['classical_above_k']:.4g} K (rigid top, equilibrium)",
         ),
         ("corrected", f"classical Q times exp of the logarithm of 1 {series}, to that order"),
         ("sums", f"to J = {content['jmax']} at most, Q, U and C_v to {content['relative_error']:.0e} of themselves"),

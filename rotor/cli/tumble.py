@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from rotor.arrays import Floats
     from rotor.classical.free.free_motion import FreeMotion
     from rotor.classical.motion import MotionTable
-    from rotor.cli.shared.tumble_inputs import Thrown
+    from rotor.cli.shared.tumble_inputs import InitialState
 
 SHOWN = 11  # rows of the motion in the report
 
@@ -52,19 +52,19 @@ def command(
     json: str | None = inputs.JSON,
 ) -> None:
     """Free rotation: the exact motion, what it conserves, which axes are stable."""
-    from rotor.cli.shared.tumble_inputs import read_thrown, read_times
+    from rotor.cli.shared.tumble_inputs import read_initial_state, read_times
 
     files = _files({"--csv": csv, "--parquet": parquet, "--plot": plot, "--gif": gif}, json)
     given = Input(source, constants, isotope or [], None, None, None)
-    thrown = read_thrown(given, moments, angular_momentum, temperature)
-    asked = read_times(times, thrown.units)
+    state = read_initial_state(given, moments, angular_momentum, temperature)
+    asked = read_times(times, state.units)
     if gif and asked is not None and asked.min() == asked.max():
         raise ValueError(f"--gif {gif}: a film needs two different times, a first and a last; give more --times")
 
-    motion, table, content = _solve(thrown, asked, context.obj)
+    motion, table, content = _solve(state, asked, context.obj)
     content["files"] = [str(path) for path in files.wanted.values()]
-    writers = _writers(thrown, motion, table, content)
-    deliver(files, writers, lambda: json_with_rows(table, "motion", content), lambda: _show(thrown, table, content))
+    writers = _writers(state, motion, table, content)
+    deliver(files, writers, lambda: json_with_rows(table, "motion", content), lambda: _show(state, table, content))
 
 
 def _files(asked: dict[str, str | None], json: str | None) -> Files:
@@ -81,51 +81,51 @@ def _files(asked: dict[str, str | None], json: str | None) -> Files:
     return files
 
 
-def _solve(thrown: Thrown, asked: Floats | None, command: str) -> tuple[FreeMotion, MotionTable, dict[str, Any]]:
+def _solve(state: InitialState, asked: Floats | None, command: str) -> tuple[FreeMotion, MotionTable, dict[str, Any]]:
     """The motion, its table in the units of print, and everything else that is printed."""
     from rotor.classical.free.free_motion import free_motion
-    from rotor.classical.motion import MotionTable, departure, sampled
+    from rotor.classical.motion import MotionTable, invariant_drift, sampled
     from rotor.cli.shared.tumble_inputs import chosen_times
 
-    units = thrown.units
-    motion = free_motion(thrown.moments, thrown.momentum)
+    units = state.units
+    motion = free_motion(state.moments, state.momentum)
     times, times_source = (asked, "given (--times)") if asked is not None else chosen_times(motion, units)
     inner = sampled(motion, times / units.time_factor)
     momentum, energy = inner.momentum * units.momentum_factor, inner.energy * units.energy_factor
     table = MotionTable(times, momentum, inner.attitude, energy)
     content = {
-        **_about_body(thrown, command),
-        **_about_motion(thrown, motion),
+        **_about_body(state, command),
+        **_about_motion(state, motion),
         "times_source": times_source,
-        "departure": asdict(departure(inner, motion)),
+        "invariant_drift": asdict(invariant_drift(inner, motion)),
     }
     return motion, table, content
 
 
-def _about_body(thrown: Thrown, command: str) -> dict[str, Any]:
+def _about_body(state: InitialState, command: str) -> dict[str, Any]:
     import rotor
 
-    units = thrown.units
-    if thrown.top is not None:
+    units = state.units
+    if state.top is not None:
         from rotor.cli.shared.report import describe
 
-        story = describe(thrown.top, thrown.text, command)
+        provenance = describe(state.top, state.text, command)
     else:
-        story = {
+        provenance = {
             "rotor_version": rotor.__version__,
             "command": command,
-            "input": thrown.text,
-            "kind": _kind(thrown.moments),
-            "notes": list(thrown.notes),
+            "input": state.text,
+            "kind": _kind(state.moments),
+            "notes": list(state.notes),
         }
-    return story | {
+    return provenance | {
         "units": {"time": units.time, "angular_momentum": units.angular_momentum, "energy": units.energy},
-        "moments": thrown.moments,
-        "axes": list(thrown.names),
-        "angular_momentum": thrown.momentum * units.momentum_factor,
-        "angular_momentum_size": float(math.hypot(*thrown.momentum)) * units.momentum_factor,
-        "angular_momentum_source": thrown.momentum_source,
-        "temperature_k": thrown.temperature_k,
+        "moments": state.moments,
+        "axes": list(state.names),
+        "angular_momentum": state.momentum * units.momentum_factor,
+        "angular_momentum_size": float(math.hypot(*state.momentum)) * units.momentum_factor,
+        "angular_momentum_source": state.momentum_source,
+        "temperature_k": state.temperature_k,
     }
 
 
@@ -138,19 +138,19 @@ def _kind(moments: Floats) -> str:
     return equal.get((low == middle, middle == high), "asymmetric")
 
 
-def _about_motion(thrown: Thrown, motion: FreeMotion) -> dict[str, Any]:
+def _about_motion(state: InitialState, motion: FreeMotion) -> dict[str, Any]:
     from rotor.classical.euler import energy
     from rotor.classical.free.stability import stability
 
-    units, closed = thrown.units, stability(thrown.moments, thrown.momentum)
-    distinct = len(set(thrown.moments.tolist())) == 3
+    units, closed = state.units, stability(state.moments, state.momentum)
+    distinct = len(set(state.moments.tolist())) == 3
     axes = [
         {"axis": name, "moment": moment, "kind": fixed.kind, "rate": fixed.rate / units.time_factor}
-        for name, moment, fixed in zip(thrown.names, thrown.moments.tolist(), closed.axes, strict=True)
+        for name, moment, fixed in zip(state.names, state.moments.tolist(), closed.axes, strict=True)
     ]
     return {
-        "energy": float(energy(thrown.momentum, thrown.moments)) * units.energy_factor,
-        "motion_kind": _motion_kind(thrown, motion),
+        "energy": float(energy(state.momentum, state.moments)) * units.energy_factor,
+        "motion_kind": _motion_kind(state, motion),
         "period": float(motion.period) * units.time_factor,
         "turning_rate": float(motion.turning_rate) / units.time_factor,
         "fixed_axes": axes,
@@ -161,35 +161,35 @@ def _about_motion(thrown: Thrown, motion: FreeMotion) -> dict[str, Any]:
     }
 
 
-def _motion_kind(thrown: Thrown, motion: FreeMotion) -> str:
+def _motion_kind(state: InitialState, motion: FreeMotion) -> str:
     if motion.steady:
         return "steady"
     if motion.separatrix:
         return "separatrix"
-    return f"about axis {thrown.names[motion.centre_axis]}"
+    return f"about axis {state.names[motion.centre_axis]}"
 
 
-def _writers(thrown: Thrown, motion: FreeMotion, table: MotionTable, content: dict[str, Any]) -> dict[str, Writer]:
+def _writers(state: InitialState, motion: FreeMotion, table: MotionTable, content: dict[str, Any]) -> dict[str, Writer]:
     """How each option's file is written, with the provenance that its format can hold."""
     from rotor.cli.shared.output import plain
 
-    units = thrown.units
+    units = state.units
     label = f"$t$ ({units.time})" if units.time else "$t$"
     kept = ("command", "input", "source", "units", "moments", "angular_momentum", "angular_momentum_source")
-    story = {key: plain(content[key]) for key in kept if key in content}
+    provenance = {key: plain(content[key]) for key in kept if key in content}
 
     def rows(path: Path) -> None:
         import rotor
 
-        rotor.write(table, path, settings=story)
+        rotor.write(table, path, settings=provenance)
 
     def plot(path: Path) -> None:
         from rotor.plots.polhodes import plot_polhodes
 
         inner = table.times / units.time_factor
         plot_polhodes(
-            motion, inner, path, axis_names=thrown.names, time_label=label, time_factor=units.time_factor,
-            title=_heading(thrown), provenance=story,
+            motion, inner, path, axis_names=state.names, time_label=label, time_factor=units.time_factor,
+            title=_heading(state), provenance=provenance,
         )  # fmt: skip
 
     def film(path: Path) -> None:
@@ -197,8 +197,8 @@ def _writers(thrown: Thrown, motion: FreeMotion, table: MotionTable, content: di
 
         inner = table.times / units.time_factor
         animate(
-            motion, inner, path, atoms=thrown.atoms, axis_names=thrown.names, time_unit=units.time,
-            time_factor=units.time_factor, provenance=story,
+            motion, inner, path, atoms=state.atoms, axis_names=state.names, time_unit=units.time,
+            time_factor=units.time_factor, provenance=provenance,
         )  # fmt: skip
 
     return {
@@ -209,75 +209,75 @@ def _writers(thrown: Thrown, motion: FreeMotion, table: MotionTable, content: di
     }
 
 
-def _heading(thrown: Thrown) -> str:
+def _heading(state: InitialState) -> str:
     from rotor.cli.shared.report import KINDS, heading
 
-    if thrown.top is not None:
-        return heading(thrown.top)
-    name = KINDS[_kind(thrown.moments)].replace("linear molecule", "linear body")
-    return f"moments {_numbers(thrown.moments)}: {name}"
+    if state.top is not None:
+        return heading(state.top)
+    name = KINDS[_kind(state.moments)].replace("linear molecule", "linear body")
+    return f"moments {_numbers(state.moments)}: {name}"
 
 
-def _show(thrown: Thrown, table: MotionTable, content: dict[str, Any]) -> None:
-    print(f"{_heading(thrown)}, turning freely")
-    show_facts(_facts(thrown, content))
+def _show(state: InitialState, table: MotionTable, content: dict[str, Any]) -> None:
+    print(f"{_heading(state)}, turning freely")
+    show_facts(_facts(state, content))
     print()
-    show_table(_axes_table(thrown, content))
+    show_table(_axes_table(state, content))
     print()
-    show_table(_motion_table(thrown, table))
+    show_table(_motion_table(state, table))
 
 
-def _facts(thrown: Thrown, content: dict[str, Any]) -> list[tuple[str, str]]:
-    units, facts = thrown.units, []
-    if thrown.top is not None:
+def _facts(state: InitialState, content: dict[str, Any]) -> list[tuple[str, str]]:
+    units, facts = state.units, []
+    if state.top is not None:
         from rotor.cli.shared.report import with_source
 
-        a, b, c = thrown.top.rotational_constants_mhz
+        a, b, c = state.top.rotational_constants_mhz
         rigid = ", ".join(f"{n} {x:.10g}" for n, x in zip("ABC", (a, b, c), strict=True) if math.isfinite(x))
-        facts.append(("rigid top", with_source(f"{rigid} MHz, distortion neglected", thrown.top.source)))
+        facts.append(("rigid top", with_source(f"{rigid} MHz, distortion neglected", state.top.source)))
     size = f"{content['angular_momentum_size']:.8g}{_unit(units.angular_momentum)}"
     vector = f"({_numbers(content['angular_momentum'])})"
     ratio, growth = content["separatrix_ratio"], content["growth_rate"]
     facts += [
-        ("|L|", f"{size}, {vector} in the body: {thrown.momentum_source}"),
+        ("|L|", f"{size}, {vector} in the body: {state.momentum_source}"),
         ("energy", f"{content['energy']:.10g}{_unit(units.energy)}"),
-        ("motion", _motion_text(thrown, content)),
+        ("motion", _motion_text(state, content)),
         ("about L", f"turns by {content['turning_rate']:.8g} rad{_per(units.time)} on average, as space sees it"),
     ]
     if ratio is not None:
-        low, _, high = sorted(zip(thrown.moments.tolist(), thrown.names, strict=True))
+        low, _, high = sorted(zip(state.moments.tolist(), state.names, strict=True))
         where = f"|ω{high[1]}/ω{low[1]}| = {ratio:.8g} where L crosses the plane of these two axes"
         facts.append(("separatrix", where))
         facts.append(("growth rate", f"{growth:.8g}{_per(units.time)} off the intermediate axis"))
     facts += [
         ("chaos", content["chaos"]),
         ("times", content["times_source"]),
-        ("kept", _kept_text(content["departure"])),
+        ("kept", _drift_text(content["invariant_drift"])),
     ]
     return facts
 
 
-def _motion_text(thrown: Thrown, content: dict[str, Any]) -> str:
-    kind, unit = content["motion_kind"], _unit(thrown.units.time)
+def _motion_text(state: InitialState, content: dict[str, Any]) -> str:
+    kind, unit = content["motion_kind"], _unit(state.units.time)
     if kind == "steady":
         return "steady: L stands still in the body"
     if kind == "separatrix":
         return "on the separatrix: L runs into the intermediate axis and does not come back"
     period = f"L goes round {kind.removeprefix('about ')} of the body in a period of {content['period']:.10g}{unit}"
-    if len(set(thrown.moments.tolist())) < 3:
+    if len(set(state.moments.tolist())) < 3:
         return period
-    middle = sorted(zip(thrown.moments.tolist(), thrown.names, strict=True))[1][1]
+    middle = sorted(zip(state.moments.tolist(), state.names, strict=True))[1][1]
     return f"{period}; its component along axis {middle} changes sign every half of it"
 
 
-def _kept_text(departure: dict[str, float]) -> str:
+def _drift_text(drift: dict[str, float]) -> str:
     return (
-        f"energy to {departure['energy']:.1e}, |L| to {departure['momentum']:.1e}, L in space to "
-        f"{departure['space_momentum']:.1e} of themselves: round-off, at every time asked for"
+        f"energy to {drift['energy']:.1e}, |L| to {drift['momentum']:.1e}, L in space to "
+        f"{drift['space_momentum']:.1e} of themselves: round-off, at every time asked for"
     )
 
 
-def _axes_table(thrown: Thrown, content: dict[str, Any]) -> Table:
+def _axes_table(state: InitialState, content: dict[str, Any]) -> Table:
     """What becomes of a spin about each axis."""
     fates = {
         "stable": "a push oscillates",
@@ -285,7 +285,7 @@ def _axes_table(thrown: Thrown, content: dict[str, Any]) -> Table:
         "neutral": "a push drifts",
         "none": "no rotation about it",
     }
-    rate, moment = f"rate (rad{_per(thrown.units.time)})", "moment" + (" (u Å²)" if thrown.top is not None else "")
+    rate, moment = f"rate (rad{_per(state.units.time)})", "moment" + (" (u Å²)" if state.top is not None else "")
     rows = [
         (a["axis"], f"{a['moment']:.8g}", a["kind"], f"{a['rate']:.8g}", fates[a["kind"]])
         for a in content["fixed_axes"]
@@ -294,11 +294,11 @@ def _axes_table(thrown: Thrown, content: dict[str, Any]) -> Table:
     return Table(title, ("axis", moment, "kind", rate, ""), rows, frozenset({"axis", "kind", ""}))
 
 
-def _motion_table(thrown: Thrown, table: MotionTable) -> Table:
+def _motion_table(state: InitialState, table: MotionTable) -> Table:
     """Some rows of the motion, evenly chosen."""
-    units, count = thrown.units, len(table)
+    units, count = state.units, len(table)
     rows = sorted({round(i * (count - 1) / (SHOWN - 1)) for i in range(SHOWN)}) if count > SHOWN else range(count)
-    columns = [f"t{_bracket(units.time)}", *(f"L{name}{_bracket(units.angular_momentum)}" for name in thrown.names)]
+    columns = [f"t{_bracket(units.time)}", *(f"L{name}{_bracket(units.angular_momentum)}" for name in state.names)]
     columns += ["qw", "qx", "qy", "qz"]
     data = list(table.columns.values())[: len(columns)]
     cells = [

@@ -131,14 +131,16 @@ def _slope(values: Floats, interval: float) -> float:
     return float(np.polyfit(interval * np.arange(len(values)), values, 1)[0])
 
 
-def endless_box(found: Diffusion, temperature_k: float, viscosity_pa_s: float, edge_angstrom: float) -> Diffusion:
+def yeh_hummer_correction(
+    found: Diffusion, temperature_k: float, viscosity_pa_s: float, edge_angstrom: float
+) -> Diffusion:
     """D with the drag of the periodic images taken out, D + ξ kT/(6π η L) of a cubic cell (Yeh and Hummer 2004, eq. 12).
 
     viscosity_pa_s: of the model itself, which hardly depends on the box; of SPC/E at 298 K 0.729e-3 (M. A. González and
     J. L. F. Abascal, J. Chem. Phys. 132, 096101 (2010)).
 
     >>> found = Diffusion(2.5e-9, 0.0)
-    >>> round(endless_box(found, 298.15, 0.729e-3, 18.64).corrected * 1e9, 3)
+    >>> round(yeh_hummer_correction(found, 298.15, 0.729e-3, 18.64).corrected * 1e9, 3)
     2.956
     """
     drag = units.BOLTZMANN_J_PER_K * temperature_k / (6 * math.pi * viscosity_pa_s * edge_angstrom * 1e-10)

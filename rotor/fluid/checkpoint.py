@@ -106,9 +106,9 @@ class AseTrajectory:
                     new.write(old[k])
         except (OSError, ValueError, IndexError, TypeError) as error:
             beside.unlink(missing_ok=True)
-            told = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+            message = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
             raise ValueError(
-                f"{path}: cannot be continued ({told}); the checkpoint wants its first {length} frames"
+                f"{path}: cannot be continued ({message}); the checkpoint wants its first {length} frames"
             ) from error
         os.replace(beside, self.path)
 

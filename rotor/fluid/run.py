@@ -47,7 +47,7 @@ COLUMNS = tuple(field.name for field in fields(FluidRecord))
 MAY_CHANGE = ("steps",)  # settings that a resumed run may have otherwise
 BAR_EVERY_S = 0.2
 
-Told = Callable[[int, int, float], None]
+Progress = Callable[[int, int, float], None]
 
 
 class RunStopped(ValueError):
@@ -81,8 +81,8 @@ def run_fluid(
     outputs: Outputs | None = None,
     *,
     resume: bool = False,
-    told: Told | None = None,
-    begun: Callable[[], None] = lambda: None,
+    progress: Progress | None = None,
+    on_start: Callable[[], None] = lambda: None,
 ) -> FluidRecord:
     """Run a box of rigid molecules and return its table; the atoms end where the run does.
 
@@ -95,7 +95,7 @@ def run_fluid(
     resume : bool
         Continue from `outputs.checkpoint`; the files that grow are cut back to where they were then.
     told : callable, optional
-        Told step, steps and ns per day from time to time; without it a bar is shown on a terminal.
+        Progress step, steps and ns per day from time to time; without it a bar is shown on a terminal.
     begun : callable, optional
         Called once everything is found to be in order and the files are open.
 
@@ -117,8 +117,8 @@ def run_fluid(
         assert outputs.checkpoint is not None
         run.restore(read_checkpoint(outputs.checkpoint))
     dynamics.wrench()  # what cannot begin is told before any file is opened
-    with run.files(), progress(settings.steps, told) as shown:
-        begun()
+    with run.files(), progress_bar(settings.steps, progress) as shown:
+        on_start()
         run.go(shown)
     return run.record()
 
@@ -231,7 +231,7 @@ class _Run:
                     self._csv.add(",".join(COLUMNS) + "\n")
             yield
 
-    def go(self, told: Told) -> None:
+    def go(self, progress: Progress) -> None:
         """All steps that are left."""
         dynamics, steps = self.dynamics, self.settings.steps
         first, started, shown = dynamics.nsteps, time.perf_counter(), 0.0
@@ -248,7 +248,7 @@ class _Run:
                 now = time.perf_counter() - started
                 if now - shown > BAR_EVERY_S or dynamics.nsteps == steps:
                     shown = now
-                    told(dynamics.nsteps, steps, ns_per_day(self.settings, dynamics.nsteps - first, now))
+                    progress(dynamics.nsteps, steps, ns_per_day(self.settings, dynamics.nsteps - first, now))
         except (ValueError, FloatingPointError) as error:
             where = f"step {dynamics.nsteps + 1} of {steps}, {self.settings.step_fs:g} fs each"
             raise RunStopped(f"{error} ({where}){self._told_checkpoint()}") from error
@@ -327,7 +327,7 @@ class _Run:
             "box": self._box(),
             "settings": asdict(self.settings),
             "step": dynamics.nsteps,
-            "thermostat": None if thermostat is None else thermostat.kept(),
+            "thermostat": None if thermostat is None else thermostat.state_dict(),
             "files": {name: file.sync() for name, file in zip(self._names(), files, strict=True)},
         }
         Checkpoint(arrays, about).write(path)
@@ -356,10 +356,10 @@ def ns_per_day(settings: Settings, steps: int, seconds: float) -> float:
 
 
 @contextmanager
-def progress(steps: int, told: Told | None) -> Iterator[Told]:
+def progress_bar(steps: int, progress: Progress | None) -> Iterator[Progress]:
     """Who is told of the progress: the caller's function, else a bar on a terminal, else nobody."""
-    if told is not None or not sys.stderr.isatty():
-        yield told or (lambda step, steps, speed: None)
+    if progress is not None or not sys.stderr.isatty():
+        yield progress or (lambda step, steps, speed: None)
         return
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn

@@ -114,18 +114,18 @@ def write_lines(lines: Lines, path: str | os.PathLike[str], settings: Mapping[st
     Parquet and JSON carry the provenance inside, the others in a file beside, `path` + ".provenance.json".
     """
     name = Path(path).name.lower()
-    story = provenance(lines) | {k: v for k, v in (settings or {}).items() if k != "tag"}
+    record = provenance(lines) | {k: v for k, v in (settings or {}).items() if k != "tag"}
     if name.endswith((".cat", ".cat.gz")):
         _write_catalogue(lines, path, int((settings or {}).get("tag", 0)))
-        write_beside(path, story)
+        write_beside(path, record)
     elif name.endswith((".csv", ".parquet")):
-        write_frame(lines.to_polars(), path, story)
+        write_frame(lines.to_polars(), path, record)
     elif name.endswith(".json"):
         with open_atomic(path, "w", encoding="utf-8") as handle:
-            json.dump({"provenance": story, "lines": records(lines)}, handle, indent=1, allow_nan=False)
+            json.dump({"provenance": record, "lines": records(lines)}, handle, indent=1, allow_nan=False)
     elif name.endswith(".hitran"):
         _write_hitran(lines, path, settings or {})
-        write_beside(path, story)
+        write_beside(path, record)
     else:
         raise ValueError(
             f"{path}: lines can be written as .cat, .cat.gz, .csv, .parquet, .json or .hitran; the suffix names the format"
@@ -184,19 +184,19 @@ def records(lines: Lines) -> list[dict[str, float | int | None]]:
     ]
 
 
-def write_frame(frame: Any, path: str | os.PathLike[str], story: Mapping[str, Any]) -> None:
+def write_frame(frame: Any, path: str | os.PathLike[str], record: Mapping[str, Any]) -> None:
     """Write a polars frame as .csv with its provenance beside it, or as .parquet with it inside."""
     if Path(path).suffix.lower() == ".csv":
         with open_atomic(path) as handle:
             frame.write_csv(handle)
-        write_beside(path, story)
+        write_beside(path, record)
     else:
         with atomic_path(path) as unfinished:
-            frame.write_parquet(unfinished, metadata={"provenance": json.dumps(story)})
+            frame.write_parquet(unfinished, metadata={"provenance": json.dumps(record)})
 
 
-def write_beside(path: str | os.PathLike[str], story: Mapping[str, Any]) -> None:
+def write_beside(path: str | os.PathLike[str], record: Mapping[str, Any]) -> None:
     """Write the provenance of a file whose format has no place for it, as `path` + ".provenance.json"."""
     with open_atomic(f"{os.fspath(path)}.provenance.json", "w", encoding="utf-8") as handle:
-        json.dump(story, handle, indent=1, ensure_ascii=False)
+        json.dump(record, handle, indent=1, ensure_ascii=False)
         handle.write("\n")

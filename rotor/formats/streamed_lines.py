@@ -107,14 +107,14 @@ def stream_lines(
     )
     plan = _plan(start, jmax, -math.inf if min_lgint is None else min_lgint, range_mhz, Path(f"{target}.pieces"))
     ranges = list(_ranges(plan, piece_lines))
-    story = _story(plan, ranges) | {"errors_from": errors_from(start)}
-    _open_folder(plan.folder, story)
+    record = _provenance(plan, ranges) | {"errors_from": errors_from(start)}
+    _open_folder(plan.folder, record)
 
     missing = [r for r in ranges if not plan.piece(*r).exists()]
     jobs = ([plan] * len(missing), *zip(*missing, strict=True)) if missing else ([], [], [])
     for _ in (executor.map if executor else map)(_make_piece, *jobs):
         pass
-    lines = _merge(plan, [plan.piece(*r) for r in ranges], target, story, tag, memory_mb)
+    lines = _merge(plan, [plan.piece(*r) for r in ranges], target, record, tag, memory_mb)
     shutil.rmtree(plan.folder)
     return StreamedList(target, lines, len(missing), len(ranges) - len(missing), plan.jmax, plan.partition.q)
 
@@ -153,7 +153,7 @@ def _ranges(plan: _Plan, piece_lines: int) -> Iterator[tuple[int, int]]:
             first, count = j + 1, 0.0
 
 
-def _story(plan: _Plan, ranges: list[tuple[int, int]]) -> dict[str, Any]:
+def _provenance(plan: _Plan, ranges: list[tuple[int, int]]) -> dict[str, Any]:
     """The provenance of the list, which also tells pieces of another list from its own."""
     return top_provenance(plan.top) | {
         "temperature_k": plan.temperature_k,
@@ -167,10 +167,10 @@ def _story(plan: _Plan, ranges: list[tuple[int, int]]) -> dict[str, Any]:
     }
 
 
-def _open_folder(folder: Path, story: Mapping[str, Any]) -> None:
+def _open_folder(folder: Path, record: Mapping[str, Any]) -> None:
     """Make the folder of pieces, or see that what it holds belongs to this list."""
-    text = json.dumps(story, sort_keys=True, ensure_ascii=False)
-    mark = {"sha256": hashlib.sha256(text.encode()).hexdigest(), "list": story}
+    text = json.dumps(record, sort_keys=True, ensure_ascii=False)
+    mark = {"sha256": hashlib.sha256(text.encode()).hexdigest(), "list": record}
     manifest = folder / _MANIFEST
     if not manifest.exists():
         folder.mkdir(exist_ok=True)
@@ -249,23 +249,23 @@ def _quanta(lines: Lines) -> dict[str, Any]:
     return {name: column.astype(np.int16) for name, column in columns.items()}
 
 
-def _merge(plan: _Plan, pieces: list[Path], target: Path, story: Mapping[str, Any], tag: int, memory_mb: int) -> int:
+def _merge(plan: _Plan, pieces: list[Path], target: Path, record: Mapping[str, Any], tag: int, memory_mb: int) -> int:
     """All pieces sorted into the target; the number of its lines."""
     if target.suffix.lower() == ".parquet":
         with atomic_path(target) as unfinished:
-            return _sort(pieces, unfinished, story, plan.folder, memory_mb)
+            return _sort(pieces, unfinished, record, plan.folder, memory_mb)
     merged = plan.folder / "sorted.parquet"
-    _sort(pieces, merged, story, plan.folder, memory_mb)
+    _sort(pieces, merged, record, plan.folder, memory_mb)
     with open_atomic(target) as handle:
         count = 0
         for part in _catalogues(plan, merged, tag):
             handle.write(format_lines(part))
             count += len(part)
-    write_beside(target, dict(story) | {"lines": count})
+    write_beside(target, dict(record) | {"lines": count})
     return count
 
 
-def _sort(pieces: list[Path], target: Path, story: Mapping[str, Any], folder: Path, memory_mb: int) -> int:
+def _sort(pieces: list[Path], target: Path, record: Mapping[str, Any], folder: Path, memory_mb: int) -> int:
     """DuckDB's external merge sort: what exceeds its memory goes to files in `folder`."""
     import duckdb
 
@@ -274,7 +274,7 @@ def _sort(pieces: list[Path], target: Path, story: Mapping[str, Any], folder: Pa
         engine.execute("SET temp_directory = $folder", {"folder": str(folder / "sort")})
         engine.execute("SET preserve_insertion_order = true")
         files = ", ".join(_quoted(str(piece)) for piece in pieces)
-        text = _quoted(json.dumps(story, ensure_ascii=False))
+        text = _quoted(json.dumps(record, ensure_ascii=False))
         engine.execute(
             f"COPY (SELECT * FROM read_parquet([{files}]) ORDER BY frequency_mhz) TO {_quoted(str(target))} "
             f"(FORMAT parquet, KV_METADATA {{provenance: {text}}})"

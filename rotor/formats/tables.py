@@ -32,21 +32,21 @@ def write_table(table: Table, path: str | os.PathLike[str], settings: Mapping[st
 
     settings: what the provenance shall say besides what the table itself knows. Raises ValueError for another suffix.
     """
-    suffix, story = Path(path).suffix.lower(), _story(table) | dict(settings or {})
+    suffix, record = Path(path).suffix.lower(), _provenance(table) | dict(settings or {})
     if suffix not in SUFFIXES:
         raise ValueError(
             f"{os.fspath(path)}: this table can be written as .csv, .parquet or .json; the suffix names the format"
         )
     frame = table.to_polars().fill_nan(None)
     if suffix != ".json":
-        write_frame(frame, path, story)
+        write_frame(frame, path, record)
     else:
         with open_atomic(path, "w", encoding="utf-8") as handle:
-            json.dump({"provenance": story, "rows": frame.to_dicts()}, handle, indent=1, allow_nan=False)
+            json.dump({"provenance": record, "rows": frame.to_dicts()}, handle, indent=1, allow_nan=False)
             handle.write("\n")
 
 
-def _story(table: Table) -> dict[str, Any]:
+def _provenance(table: Table) -> dict[str, Any]:
     """What the table knows of where it came from."""
     from rotor.classical.gas.ensembles import Correlations
     from rotor.spectra.raman import RamanLines
@@ -60,10 +60,10 @@ def _story(table: Table) -> dict[str, Any]:
         return _spectrum_provenance(table)
     if isinstance(table, ThermoFunctions):
         return thermo_provenance(table)
-    story = {"program": "rotor", "version": version()}
+    record = {"program": "rotor", "version": version()}
     if isinstance(table, Correlations | Equipartition):
-        story |= _gas_facts(table)
-    return story | {"rows": len(next(iter(table.columns.values())))}
+        record |= _gas_facts(table)
+    return record | {"rows": len(next(iter(table.columns.values())))}
 
 
 def raman_provenance(lines: RamanLines) -> dict[str, Any]:

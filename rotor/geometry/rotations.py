@@ -22,7 +22,7 @@ POLE = 1e-8  # sin(θ/2) or cos(θ/2) below which the first and last Euler angle
 
 
 @dataclass(frozen=True)
-class Mended:
+class NearestRotation:
     """The rotation nearest to a matrix, how far the matrix was from it, and whether another is as near.
 
     rotation: (..., 3, 3), proper orthogonal.
@@ -31,7 +31,7 @@ class Mended:
     """
 
     rotation: Floats
-    departure: Floats
+    distance_from_input: Floats
     unique: NDArray[np.bool_]
 
 
@@ -202,12 +202,12 @@ def from_matrix(matrix: ArrayLike) -> Floats:
     return np.where(q[..., :1] < 0.0, -q, q)
 
 
-def nearest_rotation(matrix: ArrayLike) -> Mended:
+def nearest_rotation(matrix: ArrayLike) -> NearestRotation:
     """The proper rotation nearest in the Frobenius norm to a corrupted matrix (..., 3, 3), and how far off it was.
 
     R = U diag(1, 1, det U det V) Vᵀ of the singular value decomposition (Kabsch, Acta Cryst. A32, 922 (1976)).
 
-    >>> f"{nearest_rotation(1.01 * np.eye(3)).departure:.6f}"  # 0.01 √3
+    >>> f"{nearest_rotation(1.01 * np.eye(3)).distance_from_input:.6f}"  # 0.01 √3
     '0.017321'
     """
     m = _matrices(matrix)
@@ -215,9 +215,9 @@ def nearest_rotation(matrix: ArrayLike) -> Mended:
     handed = np.sign(np.linalg.det(u) * np.linalg.det(vt))
     signs = np.stack([np.ones_like(handed), np.ones_like(handed), handed], axis=-1)
     rotation = (u * signs[..., None, :]) @ vt
-    departure = np.linalg.norm(m - rotation, axis=(-2, -1))
+    distance_from_input = np.linalg.norm(m - rotation, axis=(-2, -1))
     gap = s[..., 1] + handed * s[..., 2]
-    return Mended(rotation, departure, gap > 1e-12 * np.maximum(s[..., 0], np.finfo(float).tiny))
+    return NearestRotation(rotation, distance_from_input, gap > 1e-12 * np.maximum(s[..., 0], np.finfo(float).tiny))
 
 
 def from_euler(phi: ArrayLike, theta: ArrayLike, chi: ArrayLike) -> Floats:

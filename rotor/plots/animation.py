@@ -128,11 +128,11 @@ def animate(
 @contextmanager
 def _filmed(figure: Any, path: Path, provenance: Mapping[str, Any]) -> Iterator[Callable[[], None]]:
     """A function that adds the figure, as it is then, to a film; at the end the film is written, with what made it."""
-    story = json.dumps({"program": "rotor", "version": version(), **provenance})  # ASCII, as a gif demands
+    description = json.dumps({"program": "rotor", "version": version(), **provenance})  # ASCII, as a gif demands
     if path.suffix.lower() == ".mp4":
         from matplotlib.animation import FFMpegWriter
 
-        film = FFMpegWriter(fps=FRAMES_PER_SECOND, metadata={"comment": story})
+        film = FFMpegWriter(fps=FRAMES_PER_SECOND, metadata={"comment": description})
         with film.saving(figure, os.fspath(path), dpi=DOTS_PER_INCH):
             yield film.grab_frame
         return
@@ -146,7 +146,13 @@ def _filmed(figure: Any, path: Path, provenance: Mapping[str, Any]) -> Iterator[
 
     yield add_frame
     frames[0].save(
-        path, "GIF", save_all=True, append_images=frames[1:], duration=1000 // FRAMES_PER_SECOND, loop=0, comment=story
+        path,
+        "GIF",
+        save_all=True,
+        append_images=frames[1:],
+        duration=1000 // FRAMES_PER_SECOND,
+        loop=0,
+        comment=description,
     )
 
 

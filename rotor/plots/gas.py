@@ -134,9 +134,9 @@ def _draw_curves(axes: Any, curves: Correlations, title: str, plateau: float | N
 
 def _metadata(suffix: str, title: str, facts: Mapping[str, Any]) -> dict[str, Any]:
     """Provenance by the keys that each format has; no date, so that the same picture is the same file."""
-    story, program = json.dumps(dict(facts), ensure_ascii=False), f"rotor {version()}"
+    description, program = json.dumps(dict(facts), ensure_ascii=False), f"rotor {version()}"
     if suffix == ".png":
-        return {"Software": program, "Title": title, "Description": story}
+        return {"Software": program, "Title": title, "Description": description}
     if suffix == ".pdf":
-        return {"Creator": program, "Title": title, "Subject": story, "CreationDate": None}
-    return {"Creator": program, "Title": title, "Description": story, "Date": None}
+        return {"Creator": program, "Title": title, "Subject": description, "CreationDate": None}
+    return {"Creator": program, "Title": title, "Description": description, "Date": None}

@@ -152,8 +152,8 @@ def _highest(panel: Panel, classical: float) -> float:
 def _metadata(suffix: str, panels: Sequence[Panel], provenance: Mapping[str, Any]) -> dict[str, Any]:
     """What made the picture, under the names that each format allows; no date, so that the same picture is the same file."""
     curves = {panel.title: list(panel.curves) for panel in panels}
-    story = {"program": "rotor", "version": version(), "curves": curves, **provenance}
-    text = json.dumps(story, ensure_ascii=False)
+    record = {"program": "rotor", "version": version(), "curves": curves, **provenance}
+    text = json.dumps(record, ensure_ascii=False)
     if suffix == ".pdf":
         return {"Title": "heat capacity", "Subject": text, "CreationDate": None}
     if suffix == ".svg":

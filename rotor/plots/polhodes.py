@@ -87,13 +87,13 @@ def plot_polhodes(
 
 def _metadata(suffix: str, title: str, provenance: Mapping[str, Any]) -> dict[str, Any]:
     """What made the picture, under the names that each format allows; no date, so that the same picture is the same file."""
-    story = json.dumps({"program": "rotor", "version": version(), **provenance}, ensure_ascii=False)
+    description = json.dumps({"program": "rotor", "version": version(), **provenance}, ensure_ascii=False)
     title = title or "polhodes"
     if suffix == ".pdf":
-        return {"Title": title, "Subject": story, "CreationDate": None}
+        return {"Title": title, "Subject": description, "CreationDate": None}
     if suffix == ".svg":
-        return {"Title": title, "Description": story, "Date": None}
-    return {"Title": title, "Description": story}
+        return {"Title": title, "Description": description, "Date": None}
+    return {"Title": title, "Description": description}
 
 
 def _style() -> Any:

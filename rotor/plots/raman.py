@@ -81,10 +81,10 @@ def _metadata(suffix: str, lines: RamanLines, more: Mapping[str, Any]) -> dict[s
         "q": lines.partition.q,
         "jmax": lines.jmax,
     }
-    story = "; ".join(f"{name}: {value}" for name, value in facts.items())
+    description = "; ".join(f"{name}: {value}" for name, value in facts.items())
     program, title = f"rotor {version()}", _title(lines).replace("$", "")
     if suffix == ".png":
-        return {"Software": program, "Title": title, "Description": story}
+        return {"Software": program, "Title": title, "Description": description}
     if suffix == ".pdf":
-        return {"Creator": program, "Title": title, "Subject": story, "CreationDate": None}
-    return {"Creator": program, "Title": title, "Description": story, "Date": None}
+        return {"Creator": program, "Title": title, "Subject": description, "CreationDate": None}
+    return {"Creator": program, "Title": title, "Description": description, "Date": None}

@@ -338,10 +338,10 @@ def _metadata(suffix: str, thing: Lines | Spectrum, lines: Lines | None, more: M
     if isinstance(thing, Spectrum):
         facts |= {"profile": thing.profile, "fwhm_mhz": thing.fwhm_mhz}
     title = _title(thing, lines).replace("$", "")
-    story = "; ".join(f"{name}: {value}" for name, value in facts.items())
+    description = "; ".join(f"{name}: {value}" for name, value in facts.items())
     program = f"rotor {version()}"
     if suffix == ".png":
-        return {"Software": program, "Title": title, "Description": story}
+        return {"Software": program, "Title": title, "Description": description}
     if suffix == ".pdf":
-        return {"Creator": program, "Title": title, "Subject": story, "CreationDate": None}
-    return {"Creator": program, "Title": title, "Description": story, "Date": None}
+        return {"Creator": program, "Title": title, "Subject": description, "CreationDate": None}
+    return {"Creator": program, "Title": title, "Description": description, "Date": None}

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rotor.quantum.effects.watson import Multiplet, scalar_energy
+from rotor.quantum.effects.watson import JMatrix, scalar_energy
 from rotor.quantum.levels import Levels, disordered_blocks, hamiltonian
 from rotor.tops.operators import Operators
 
@@ -46,7 +46,7 @@ def _without_mixture(by_order: dict[int, Operators]) -> dict[int, Operators]:
 
 def _row_bound(operators: Operators, j: int, kmax: int) -> float:
     """The largest Σ_K' |⟨K'|H|K⟩| over |K| ≤ kmax."""
-    multiplet = Multiplet(operators, j)
+    multiplet = JMatrix(operators, j)
     k = np.arange(kmax + 1)
     rows = np.abs(multiplet.element(k, 0) + scalar_energy(operators, j))
     for n in range(1, multiplet.order + 1):

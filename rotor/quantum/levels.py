@@ -19,7 +19,7 @@ from rotor.quantum.basis import WangBlock, ka_kc, wang_blocks
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.watson import (
     Centrifugal,
-    Multiplet,
+    JMatrix,
     Rigid,
     block_bands,
     centrifugal_operators,
@@ -118,7 +118,7 @@ class Levels(Table):
         return {name: getattr(self, name) for name in names}
 
 
-class PairsOfLevels(Table):
+class TransitionTable(Table):
     """What every list of transitions has: the levels that it leads between, and their quantum numbers."""
 
     levels: Levels
@@ -144,7 +144,7 @@ def disordered_blocks(top: Top, levels: Levels) -> list[tuple[int, str]]:
     if not centrifugal_operators(top.constants):  # a rigid top is in order
         return out
     for block in levels.blocks:
-        bands = block_bands(Multiplet(rigid_operators(top.constants), block.basis.j), block.basis)
+        bands = block_bands(JMatrix(rigid_operators(top.constants), block.basis.j), block.basis)
         rigid = _expectations(bands, block.vectors)
         if (np.diff(rigid) < -1e-9 * np.abs(rigid).max()).any():
             out.append((block.basis.j, block.basis.species))
@@ -288,7 +288,7 @@ def solve_j(
     operators: Operators, j: int, representation: str, vectors: bool = True
 ) -> list[tuple[WangBlock, Floats, Floats]]:
     """The Wang blocks of one J solved: (block, energies in MHz, eigenvectors) in the order ee, eo, oe, oo."""
-    scalar, multiplet = scalar_energy(operators, j), Multiplet(operators, j)
+    scalar, multiplet = scalar_energy(operators, j), JMatrix(operators, j)
     out = []
     for block in wang_blocks(j, representation):
         energies, states = diagonalise(block_bands(multiplet, block), vectors)

@@ -108,7 +108,7 @@ def classical_band(
     kt = units.EV_PER_K * temperature_k
     times = band_times(top, temperature_k, fwhm_mhz)
     gas = free_gas_correlations(
-        moments, kt, times / units.CLASSICAL_TIME_PS, vector=dipole, molecules=molecules, rng=rng, executor=executor,
+        moments, kt, times / units.ASE_TIME_PS, vector=dipole, molecules=molecules, rng=rng, executor=executor,
         progress=progress,
     )  # fmt: skip
     assert gas.c1 is not None
@@ -125,7 +125,7 @@ def band_times(top: Top, temperature_k: float, fwhm_mhz: float) -> Floats:
     if not (math.isfinite(fwhm_mhz) and fwhm_mhz > 0):
         raise ValueError(f"full width at half maximum {fwhm_mhz} MHz: a finite number above 0 is wanted")
     start = short_time(top.moments_u_angstrom2, units.EV_PER_K * temperature_k, _dipole(top))
-    edge_mhz = REACH * math.sqrt(start.m2) / (2.0 * math.pi) / (units.CLASSICAL_TIME_PS * HZ_PER_MHZ_PS)
+    edge_mhz = REACH * math.sqrt(start.m2) / (2.0 * math.pi) / (units.ASE_TIME_PS * HZ_PER_MHZ_PS)
     end = 2.0 * math.sqrt(-math.log(WINDOW_END) * math.log(2.0)) / (math.pi * WINDOW_SHARE * fwhm_mhz) / HZ_PER_MHZ_PS
     step = 1.0 / (3.0 * edge_mhz * HZ_PER_MHZ_PS)
     return np.linspace(0.0, end, math.ceil(end / step) + 1)

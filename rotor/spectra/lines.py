@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from rotor import units
 from rotor.arrays import Floats, Ints
 from rotor.quantum.convergence import warnings_of
-from rotor.quantum.levels import Levels, PairsOfLevels, solve_levels
+from rotor.quantum.levels import Levels, TransitionTable, solve_levels
 from rotor.quantum.uncertainty import Covariance, level_spread, line_errors
 from rotor.spectra.reach import jmax_for_cut
 from rotor.spectra.transitions import IntensityCut, all_transitions
@@ -39,7 +39,7 @@ DEFAULT_MIN_LGINT = -12.0
 
 
 @dataclass(frozen=True)
-class Lines(PairsOfLevels):
+class Lines(TransitionTable):
     """Lines as columns of equal length, rising in frequency unless they were asked for unsorted.
 
     frequency_mhz, strength_debye2 (S μ², all components): (n,) float64. upper, lower: (n,) int32, rows of `levels`.

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from rotor import units
 from rotor.arrays import Floats, Ints
 from rotor.quantum.convergence import warnings_of
-from rotor.quantum.levels import Levels, PairsOfLevels, solve_levels
+from rotor.quantum.levels import Levels, TransitionTable, solve_levels
 from rotor.spectra.lines import partition_of
 from rotor.spectra.raman_strengths import RamanTransitions, anisotropy_squared, raman_transitions
 from rotor.spectra.reach import JMAX_DEFAULT_LIMIT
@@ -41,7 +41,7 @@ DEFAULT_MIN_RELATIVE = 1e-6
 
 
 @dataclass(frozen=True)
-class RamanLines(PairsOfLevels):
+class RamanLines(TransitionTable):
     """Raman lines as columns of equal length, rising in shift.
 
     shift_mhz: (n,) of the laser's frequency above that of the scattered light, Stokes lines positive, anti-Stokes ones

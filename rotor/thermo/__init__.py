@@ -5,9 +5,9 @@ A module for each: `sums`, `classical`, `species`, `vibration` and `functions`, 
 
 from rotor.thermo.classical_limit import (
     ClassicalLimit,
+    classical_above_k,
     classical_limit,
     classical_partition_function,
-    parting_temperature_k,
     rotational_temperatures_k,
 )
 from rotor.thermo.functions import (
@@ -30,11 +30,11 @@ __all__ = [
     "PartitionFunction",
     "ThermoFunctions",
     "VibrationalStates",
+    "classical_above_k",
     "classical_limit",
     "classical_partition_function",
     "implied_symmetry_number",
     "level_sums",
-    "parting_temperature_k",
     "partition_function",
     "partition_functions",
     "rotational_temperatures_k",

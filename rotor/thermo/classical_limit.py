@@ -163,7 +163,7 @@ def _classical_operator(powers: tuple[int, int, int], x: float, y: float, z: flo
     return float((x * x + y * y + z * z) ** p * z ** (2 * q) * raised)
 
 
-def parting_temperature_k(top: Top, tolerance: float = 0.01) -> float:
+def classical_above_k(top: Top, tolerance: float = 0.01) -> float:
     """The highest temperature at which C_v of the rigid quantum top differs from its classical value by `tolerance` of it.
 
     Above it the classical n R/2 is good to that; distortion, which both could have, is left out of both. The spin weights
@@ -171,7 +171,7 @@ def parting_temperature_k(top: Top, tolerance: float = 0.01) -> float:
     higher where it differs there, and then bisected to 1e-6. A linear molecule of Θ, its C_v/R being 1 + (Θ/T)²/45 + ..., parts at 1.93 Θ.
 
     >>> from rotor.tops.top import Top
-    >>> round(parting_temperature_k(Top.from_constants("B=20836.619 MHz")), 2)  # Θ = 1 K
+    >>> round(classical_above_k(Top.from_constants("B=20836.619 MHz")), 2)  # Θ = 1 K
     1.93
     """
     if not 0 < tolerance < 1:

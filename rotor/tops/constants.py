@@ -406,12 +406,12 @@ def _reduction(kind: str, names: Mapping[str, float], reduction: str | None) -> 
     own = {key: [n for n in names if n in table and n not in _SHARED] for key, table in _REDUCED.items()}
     if own["A"] and own["S"]:
         raise ValueError(f"both reductions in one set: {', '.join(own['A'])} (A) with {', '.join(own['S'])} (S)")
-    told = next((key for key, members in own.items() if members), None)
-    if reduction and told and reduction != told:
-        raise ValueError(f"reduction {reduction!r}, but {', '.join(own[told])} belong to the {told}-reduction")
-    if not reduction and not told and any(name in _SHARED - {*RIGID} for name in names):
+    found = next((key for key, members in own.items() if members), None)
+    if reduction and found and reduction != found:
+        raise ValueError(f"reduction {reduction!r}, but {', '.join(own[found])} belong to the {found}-reduction")
+    if not reduction and not found and any(name in _SHARED - {*RIGID} for name in names):
         raise ValueError("octic and decic names alone fit both reductions; say reduction='A' or reduction='S'")
-    return reduction or told
+    return reduction or found
 
 
 def _representation(kind: str, values: Mapping[str, float], representation: str | None) -> str | None:

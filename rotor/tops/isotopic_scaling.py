@@ -92,8 +92,8 @@ def carried_over(parent: Top, rigid: Top, turned: Top, axes: str, angle: float) 
     )
     origin = f" ({parent.source})" if parent.source else ""
     source = f"scaled from {name}{origin} by {_ratio_text(ratios, axes)}"
-    constants, told = _with_distortion(parent, constants, axes, angle)
-    return replace(turned, constants=constants, source=source, notes=(*turned.notes, note, *told))
+    constants, annotated = _with_distortion(parent, constants, axes, angle)
+    return replace(turned, constants=constants, source=source, notes=(*turned.notes, note, *annotated))
 
 
 def _masses(top: Top) -> tuple[int, ...]:
@@ -132,13 +132,13 @@ def _in_order(values: Floats, turned: Top) -> tuple[Floats, Top]:
     change = axes @ turned.frame.axes.T
     frame = PrincipalFrame(turned.frame.moments[order], axes, turned.frame.centre)
     note = "the scaled constants have another order than the calculated ones: the axes are named by the scaled ones"
-    told = replace(turned, frame=frame, notes=(*turned.notes, note))
+    annotated = replace(turned, frame=frame, notes=(*turned.notes, note))
     if turned.dipole_abc_debye is not None:
-        told = told.with_dipole(change @ np.array(turned.dipole_abc_debye), turned.dipole_source)
+        annotated = annotated.with_dipole(change @ np.array(turned.dipole_abc_debye), turned.dipole_source)
     if turned.polarizability_abc_angstrom3 is not None:
         tensor = change @ np.array(turned.polarizability_abc_angstrom3) @ change.T
-        told = told.with_polarizability(tensor, turned.polarizability_source)
-    return values[order], told
+        annotated = annotated.with_polarizability(tensor, turned.polarizability_source)
+    return values[order], annotated
 
 
 def _of_kind(values: Floats, kind: str) -> Constants:

@@ -258,10 +258,10 @@ def _abundance(symbols: tuple[str, ...], numbers: tuple[int, ...]) -> float:
 
 
 def _doubts(parent: Top, overlap: float, angle: float) -> list[str]:
-    told = []
+    notes = []
     if overlap < _DOUBTFUL_OVERLAP:
-        told.append(f"the axes turned by {angle:.0f}°: which of them is the parent's which is doubtful")
+        notes.append(f"the axes turned by {angle:.0f}°: which of them is the parent's which is doubtful")
     dipole = parent.dipole_abc_debye
     if dipole is not None and sum(abs(mu) > 1e-3 for mu in dipole) > 1 and angle > 0.1:
-        told.append("the dipole was turned with the signs that the parent's components are given with; check them")
-    return told
+        notes.append("the dipole was turned with the signs that the parent's components are given with; check them")
+    return notes

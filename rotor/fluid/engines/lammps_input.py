@@ -75,7 +75,7 @@ def data_file(scene: Scene) -> str:
     lines += _section("Masses", [(m,) for m in known.masses])
     columns = zip(scene.molecule_of_site + 1, types, charges, *scene.site_positions.T, strict=True)
     lines += _section("Atoms # full", columns)
-    lines += _section("Velocities", scene.site_velocities / units.CLASSICAL_TIME_PS)
+    lines += _section("Velocities", scene.site_velocities / units.ASE_TIME_PS)
     if len(bonded):
         first = scene.first_sites[scene.molecule_of_site[bonded]]
         lines += _section("Bonds", [(1, int(i) + 1, int(j) + 1) for i, j in zip(first, bonded, strict=True)])

@@ -23,11 +23,11 @@ from rotor.units import EV_PER_ANGSTROM3_BAR
 
 KJ_PER_EV = units.ELEMENTARY_CHARGE_C * units.AVOGADRO_PER_MOL * 1e-3
 CONDUCTOR = 1e12  # a dielectric constant as good as infinite
-NM_PER_PS = 0.1 / units.CLASSICAL_TIME_PS  # 1 Å √(eV/u) in nm/ps
+NM_PER_PS = 0.1 / units.ASE_TIME_PS  # 1 Å √(eV/u) in nm/ps
 
 
 @dataclass(frozen=True)
-class Handed:
+class OpenMMSystem:
     """A scene as OpenMM has it.
 
     system: openmm.System. barostat: a part of it that changes nothing and measures the pressure.
@@ -55,7 +55,7 @@ def load() -> Any:
     return openmm
 
 
-def handed(scene: Scene, settings: Settings, form: Form, accuracy: float) -> Handed:
+def build_system(scene: Scene, settings: Settings, form: Form, accuracy: float) -> OpenMMSystem:
     """The system of a scene: masses, constraints, virtual sites, Lennard-Jones and charges."""
     mm = load()
     system = mm.System()
@@ -83,7 +83,7 @@ def handed(scene: Scene, settings: Settings, form: Form, accuracy: float) -> Han
     if settings.ensemble == "nose-hoover":
         system.addForce(mm.CMMotionRemover())  # its chain then counts three degrees fewer, as we do
     masses = np.concatenate([plans[k].masses for k in scene.kinds])
-    return Handed(
+    return OpenMMSystem(
         system, barostat, np.array(carriers), np.array(owners), masses, np.array(atoms), np.concatenate(positions)
     )
 
@@ -174,7 +174,7 @@ class Session:
     """A scene on an OpenMM context, ready to step."""
 
     context: Any
-    handed: Handed
+    build_system: OpenMMSystem
     settings: Settings
     tail: tuple[float, float]
     volume: float
@@ -182,12 +182,12 @@ class Session:
     @property
     def step_classical(self) -> float:
         """The step in Å √(u/eV)."""
-        return self.settings.step_fs / 1000 / units.CLASSICAL_TIME_PS
+        return self.settings.step_fs / 1000 / units.ASE_TIME_PS
 
     def state(self) -> tuple[Floats, Motion, float]:
         """Positions (particles, 3) Å, motion of the molecules as OpenMM's velocities have it, potential energy eV."""
         got = self.context.getState(positions=True, velocities=True, forces=True, energy=True)
-        mine = self.handed
+        mine = self.build_system
         positions = np.asarray(got.getPositions(asNumpy=True)._value) * 10
         velocities = np.asarray(got.getVelocities(asNumpy=True)._value) / NM_PER_PS
         forces = np.asarray(got.getForces(asNumpy=True)._value) / (10 * KJ_PER_EV)
@@ -197,7 +197,7 @@ class Session:
 
     def start(self, velocities: Floats) -> None:
         """Set velocities (carriers, 3) of the first step; a leapfrog is given those half a step before."""
-        mine = self.handed
+        mine = self.build_system
         full = np.zeros_like(mine.positions)
         full[mine.carriers] = velocities
         self.context.setVelocities(full * NM_PER_PS)
@@ -216,14 +216,16 @@ class Session:
         if self.settings.ensemble == "nose-hoover" and step:  # before its first step OpenMM has no chain to ask
             bath = self.context.getIntegrator().computeHeatBathEnergy()._value / KJ_PER_EV
         pressure = self.pressure_bar(stored, motion)
-        return Frame(step, positions[self.handed.atoms], motion, potential + self.tail[0], bath, pressure, between)
+        return Frame(
+            step, positions[self.build_system.atoms], motion, potential + self.tail[0], bath, pressure, between
+        )
 
     def pressure_bar(self, stored: Motion, motion: Motion) -> float:
         """OpenMM's molecular pressure, from energies of the box scaled up and down, with the motion on the step.
 
         It scales molecules about their geometric centres, not those of mass: another number at a moment, the same mean.
         """
-        theirs = self.handed.barostat.computeCurrentPressure(self.context)._value
+        theirs = self.build_system.barostat.computeCurrentPressure(self.context)._value
         kinetic = motion.kinetic().translation_ev - stored.kinetic().translation_ev
         return float(theirs + (2 / 3 * kinetic / self.volume + self.tail[1]) * EV_PER_ANGSTROM3_BAR)
 
@@ -243,7 +245,7 @@ def session(
     None: the fastest that this machine has. threads: of the platform CPU.
     """
     mm, form = load(), form or Form()
-    mine = handed(scene, settings, form, accuracy)
+    mine = build_system(scene, settings, form, accuracy)
     context = _context(mm, mine.system, integrator(mm, settings), platform, threads)
     context.setPositions(mine.positions / 10)
     context.applyConstraints(1e-7)

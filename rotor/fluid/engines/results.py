@@ -72,7 +72,7 @@ def row_of(frame: Frame, scene: Scene, settings: Settings) -> list[float]:
     stored = frame.motion.kinetic()
     kinetic = stored
     if not frame.half:
-        h = settings.step_fs / 1000 / units.CLASSICAL_TIME_PS
+        h = settings.step_fs / 1000 / units.ASE_TIME_PS
         kinetic = stored + frame.motion.correction(h).times(THERMOMETERS["mixed"])
     heat = temperatures(kinetic, scene.degrees)
     return [

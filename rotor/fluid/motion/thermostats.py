@@ -50,12 +50,12 @@ class Thermostat(ABC):
         """The bath's part of the conserved energy, eV."""
 
     @abstractmethod
-    def kept(self) -> dict[str, Any]:
+    def state_dict(self) -> dict[str, Any]:
         """All that changes during a run, as JSON can hold it without loss."""
 
     @abstractmethod
-    def restore(self, kept: dict[str, Any]) -> None:
-        """Continue from what `kept` gave."""
+    def restore(self, state_dict: dict[str, Any]) -> None:
+        """Continue from what `state_dict` gave."""
 
 
 class Langevin(Thermostat):
@@ -97,14 +97,14 @@ class Langevin(Thermostat):
         """Heat that the bath has taken."""
         return self._heat
 
-    def kept(self) -> dict[str, Any]:
+    def state_dict(self) -> dict[str, Any]:
         """Heat and the state of the random numbers."""
         return {"heat": self._heat, "rng": self._rng.bit_generator.state}
 
-    def restore(self, kept: dict[str, Any]) -> None:
+    def restore(self, state_dict: dict[str, Any]) -> None:
         """The same heat and the same random numbers to come."""
-        self._heat = float(kept["heat"])
-        self._rng.bit_generator.state = kept["rng"]
+        self._heat = float(state_dict["heat"])
+        self._rng.bit_generator.state = state_dict["rng"]
 
 
 class _Chain:
@@ -193,11 +193,11 @@ class NoseHoover(Thermostat):
         """The energy of the chains."""
         return sum(chain.energy() for chain in self._chains)
 
-    def kept(self) -> dict[str, Any]:
+    def state_dict(self) -> dict[str, Any]:
         """Positions and velocities of the links."""
         return {"x": [c.x.tolist() for c in self._chains], "v": [c.v.tolist() for c in self._chains]}
 
-    def restore(self, kept: dict[str, Any]) -> None:
+    def restore(self, state_dict: dict[str, Any]) -> None:
         """The same links."""
-        for chain, x, v in zip(self._chains, kept["x"], kept["v"], strict=True):
+        for chain, x, v in zip(self._chains, state_dict["x"], state_dict["v"], strict=True):
             chain.x, chain.v = np.array(x), np.array(v)

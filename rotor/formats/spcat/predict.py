@@ -22,7 +22,7 @@ from rotor.formats.spcat.int_file import IntensityFile, Request, read_int
 from rotor.formats.spcat.model import FOLD, common_weight, top_of
 from rotor.formats.spcat.par import Options, ParameterFile, read_par
 from rotor.quantum.basis import wang_blocks
-from rotor.quantum.effects.watson import Multiplet, block_bands
+from rotor.quantum.effects.watson import JMatrix, block_bands
 from rotor.quantum.levels import Levels, hamiltonian, solve_levels
 from rotor.spectra.lines import Lines, line_list
 from rotor.thermo import PartitionFunction, partition_function
@@ -209,7 +209,7 @@ def _diagonal_rolls_over(top: Top, jmax: int) -> int | None:
     operators, representation = hamiltonian(top), str(top.constants.representation)
     rise = 1.0 if representation[:2] == "Ir" else -1.0
     for j in range(2, jmax + 1):
-        multiplet = Multiplet(operators, j)
+        multiplet = JMatrix(operators, j)
         for block in wang_blocks(j, representation):
             steps = rise * np.diff(block_bands(multiplet, block)[0][1:])  # the folded element at the lowest K apart
             if (steps <= 0).any():

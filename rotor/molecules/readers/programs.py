@@ -93,9 +93,9 @@ def program_of(text: str) -> Program | None:
 def refuse_cut(output: Output) -> None:
     """The program's last words must follow the last table and the last start of a job; without them the file is cut or the run failed."""
     endings = [i for i, line in enumerate(output.lines) if output.program.ending in line]
-    begun = (*output.program.geometries, "Link1:  Proceeding")  # the second words open Gaussian's next job
+    job_starts = (*output.program.geometries, "Link1:  Proceeding")  # the second words open Gaussian's next job
     starts = [
-        i for i, line in enumerate(output.lines) if output.program.banner in line or line.strip().startswith(begun)
+        i for i, line in enumerate(output.lines) if output.program.banner in line or line.strip().startswith(job_starts)
     ]
     if not endings or starts[-1] > endings[-1]:
         last = max((i for i, line in enumerate(output.lines) if line.strip()), default=0)

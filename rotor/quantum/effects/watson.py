@@ -114,7 +114,7 @@ def scalar_energy(operators: Operators, j: int) -> float:
     return float(sum(c * x**p for (p, q, n), c in operators.items() if q == n == 0))
 
 
-class Multiplet:
+class JMatrix:
     """Matrix elements of all |J K⟩ of one J, from which its four Wang blocks are cut; the scalar part left out."""
 
     def __init__(self, operators: Operators, j: int) -> None:
@@ -163,7 +163,7 @@ def _elements(
     return np.asarray(total)
 
 
-def block_bands(multiplet: Multiplet, block: WangBlock) -> list[NDArray[np.float64]]:
+def block_bands(multiplet: JMatrix, block: WangBlock) -> list[NDArray[np.float64]]:
     """Diagonals of the block's matrix, without the scalar part: the n-th has the elements (i+n, i), size - n of them.
 
     ⟨K' s|H|K s⟩ = ⟨K'|H|K⟩ + s ⟨K'|H|-K⟩, times √2 where one of them is K = 0. The second term is there where
