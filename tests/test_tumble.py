@@ -24,7 +24,7 @@ COLUMNS = ["t", "m1", "m2", "m3", "qw", "qx", "qy", "qz", "energy"]
 BODY = ("tumble", "--moments", "0.6,0.8,1.0", "--angular-momentum", "1.8,0.4,-0.9")
 _KEYS = """
     units moments axes angular_momentum angular_momentum_size angular_momentum_source temperature_k energy times_source
-    motion_kind period turning_rate fixed_axes separatrix_ratio growth_rate asymptotic_period chaos departure motion files
+    motion_kind period turning_rate fixed_axes separatrix_ratio growth_rate asymptotic_period chaos invariant_drift motion files
 """
 MOTION_KEYS = set(_KEYS.split())
 BARE_KEYS = {"rotor_version", "command", "input", "kind", "notes"}
