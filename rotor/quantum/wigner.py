@@ -25,8 +25,8 @@ from math import isfinite, prod
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from rotor.arrays import Floats, Ints
+
 Scaled = tuple[Floats, Ints]  # mantissas and exponents of 2
 
 CANCELLATION = 32.0  # Σ|term| / |Σ term| above which the sum is made in integers
