@@ -18,7 +18,7 @@ import numpy as np
 from rotor.arrays import Floats, Ints
 from rotor.quantum.basis import WangBlock, ka_kc, wang_blocks
 from rotor.quantum.effects.watson import JMatrix, block_bands, scalar_energy
-from rotor.quantum.j_operators import JOperator, between_blocks
+from rotor.quantum.j_operators import Complexes, JOperator, between_blocks
 from rotor.quantum.levels import Levels, weights_of_levels
 from rotor.quantum.states import Coupling, State
 from rotor.tops.operators import Operators
@@ -62,38 +62,40 @@ class CoupledBlock:
 
 @dataclass(frozen=True)
 class Model:
-    """What a coupled calculation consists of: operators of every state by v, couplings, and the representation."""
+    """What a coupled calculation consists of: operators of every state by v, couplings with their values in MHz, and the representation."""
 
     states: dict[int, Operators]
-    couplings: tuple[Coupling, ...]
+    couplings: tuple[tuple[float, Coupling], ...]
     representation: str
 
 
 def model_of(top: Top, effects: tuple[QuantumEffect, ...], operators: Operators, representation: str) -> Model:
     """The states and couplings that the effects bring, beside the operators of the top's own state."""
-    couplings = [coupling for effect in effects for coupling in effect.couplings(top)]
+    states, couplings = {0: operators}, []
     for effect in effects:
         values = effect.parameters(top)
-        for name in values:
-            if effect.j_operator(top, name, 1, representation) is not None:
-                couplings.append(_own_coupling(top, effect, name, values[name]))
-    states = {0: operators}
-    for state in extra_states(top, effects):
-        states[state.v] = state.operators
-    for coupling in couplings:
+        couplings += [(values[coupling.name], coupling) for coupling in effect.couplings(top)]
+        couplings += [
+            (value, _own_coupling(top, effect, name))
+            for name, value in values.items()
+            if effect.j_operator(top, name, 1, representation) is not None
+        ]
+        states |= {state.v: state.operators(values) for state in effect.states(top)}
+    extra_states(top, effects)
+    for _, coupling in couplings:
         for v in (coupling.bra, coupling.ket):
             if v not in states:
                 raise ValueError(f"coupling {coupling.name}: state {v} is not defined; known are {sorted(states)}")
     return Model(states, tuple(couplings), representation)
 
 
-def _own_coupling(top: Top, effect: QuantumEffect, name: str, value: float) -> Coupling:
+def _own_coupling(top: Top, effect: QuantumEffect, name: str) -> Coupling:
     def operator(j: int, representation: str) -> JOperator:
         found = effect.j_operator(top, name, j, representation)
         assert found is not None
         return found
 
-    return Coupling(name, 0, 0, value, operator)
+    return Coupling(name, 0, 0, operator)
 
 
 def extra_states(top: Top, effects: tuple[QuantumEffect, ...]) -> list[State]:
@@ -111,7 +113,9 @@ def coupled_levels(
     """All levels of a coupled calculation from J = `jmin` to `jmax`, by quantum numbers j, ka, kc and, of several states, v."""
     every_j = range(jmin, jmax + 1)
     pieces = [(model, j) for j in every_j]
-    solved = executor.map(solve_coupled, *zip(*pieces, strict=True)) if executor else (solve_coupled(*p) for p in pieces)
+    solved = (
+        executor.map(solve_coupled, *zip(*pieces, strict=True)) if executor else (solve_coupled(*p) for p in pieces)
+    )
     blocks = tuple(_placed(block for of_one_j in solved for block in of_one_j))
 
     labels = np.concatenate([block.labels for block in blocks])
@@ -188,8 +192,8 @@ def solve_coupled(model: Model, j: int) -> list[CoupledBlock]:
 def _edges(model: Model, vertices: list[tuple[int, WangBlock]], j: int) -> dict[tuple[int, int], Floats]:
     """What connects two vertices, both ways round, and a vertex with itself; nothing for what round-off alone leaves."""
     found: dict[tuple[int, int], Floats] = {}
-    for coupling in model.couplings:
-        operator = coupling.value * coupling.operator(j, model.representation)
+    for value, coupling in model.couplings:
+        operator = value * coupling.operator(j, model.representation)
         largest = max((float(np.abs(band).max(initial=0.0)) for band in operator.bands.values()), default=0.0)
         for i, (bra, up) in enumerate(vertices):
             for k, (ket, low) in enumerate(vertices):
@@ -209,7 +213,7 @@ def _add(found: dict[tuple[int, int], Floats], key: tuple[int, int], matrix: Flo
     found[key] = found[key] + matrix if key in found else matrix
 
 
-def _refuse_imaginary(coupling: Coupling, between: Floats, largest: float) -> None:
+def _refuse_imaginary(coupling: Coupling, between: Complexes, largest: float) -> None:
     if np.abs(between.imag).max() > _NOTHING * largest:
         raise ValueError(
             f"{coupling.name}: the operator is not invariant under time reversal; an odd power of J is Hermitian and allowed "
@@ -266,3 +270,41 @@ def one_to_one(overlaps: Floats) -> Ints:
     return out
 
 
+def parameter_matrix(
+    top: Top, effects: tuple[QuantumEffect, ...], representation: str, block: CoupledBlock, name: str
+) -> Floats:
+    """∂H/∂c of one parameter over the functions of a coupled block, (n, n).
+
+    A parameter enters through operators of the top's own state, through other operators of J, and through the couplings of
+    its name.
+    """
+    out = np.zeros((len(block.energies_mhz),) * 2)
+    for effect in effects:
+        own = [State(0, effect.operators(top)), *effect.states(top)]
+        for state in own:
+            _add_own(out, block, state.v, state.terms.get(name, {}))
+        if name in effect.parameters(top) and (operator := effect.j_operator(top, name, block.j, representation)):
+            _add_between(out, block, 0, 0, operator)
+        for coupling in effect.couplings(top):
+            if coupling.name == name:
+                _add_between(out, block, coupling.bra, coupling.ket, coupling.operator(block.j, representation))
+    return out
+
+
+def _add_own(out: Floats, block: CoupledBlock, v: int, operators: Operators) -> None:
+    if not operators:
+        return
+    of_j, scalar = JMatrix(operators, block.j), scalar_energy(operators, block.j)
+    for part in block.parts:
+        if part.v == v:
+            out[part.place, part.place] += _dense(block_bands(of_j, part.basis)) + scalar * np.eye(part.basis.size)
+
+
+def _add_between(out: Floats, block: CoupledBlock, bra: int, ket: int, operator: JOperator) -> None:
+    for up in block.parts:
+        for low in block.parts:
+            if (up.v, low.v) == (bra, ket):
+                between = between_blocks(up.basis, low.basis, operator).real
+                out[up.place, low.place] += between
+                if bra != ket:
+                    out[low.place, up.place] += between.T

@@ -115,8 +115,7 @@ def components(j: int, representation: str) -> dict[str, JOperator]:
     up, down = raising(j), lowering(j)
     handed = -1.0 if representation.endswith("l") else 1.0
     along_x, along_y = 0.5 * (up + down), handed * 0.5j * (up - down)
-    x, y, z = REPRESENTATIONS[representation]
-    return {x: along_x, y: along_y, z: j_z(j)}
+    return dict(zip(REPRESENTATIONS[representation], (along_x, along_y, j_z(j)), strict=True))
 
 
 def phase(block: WangBlock) -> complex:

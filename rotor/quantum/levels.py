@@ -146,7 +146,9 @@ class Levels(Table):
         Raises ValueError where not all the names that label a level are given, or others.
         """
         if set(quanta) != set(self.quanta):
-            raise ValueError(f"quantum numbers {', '.join(quanta)}: these levels are labelled by {', '.join(self.quanta)}")
+            raise ValueError(
+                f"quantum numbers {', '.join(quanta)}: these levels are labelled by {', '.join(self.quanta)}"
+            )
         codes, rows, scales = self._index
         wanted = np.zeros(np.shape(next(iter(quanta.values()))), dtype=np.int64)
         inside = np.ones(wanted.shape, dtype=bool)

@@ -85,27 +85,42 @@ def centrifugal_operators(constants: Constants) -> Operators:
 class Rigid(QuantumEffect):
     """The rigid rotor: A, B, C."""
 
-    def operators(self, top: Top) -> Operators:
-        """Coefficients in MHz, see `rigid_operators`."""
-        return rigid_operators(top.constants)
+    name = "rigid rotor"
 
-    def estimate_mhz(self, top: Top, j: int) -> float:
+    def parameters(self, top: Top) -> dict[str, float]:
+        """A, B, C in MHz, those that the set has."""
+        return {name: value for name, value in top.constants.values.items() if name in "ABC"}
+
+    def operators(self, top: Top) -> dict[str, Operators]:
+        """∂H/∂A, ∂H/∂B, ∂H/∂C."""
+        return {name: terms for name, terms in operators_by_name(top.constants).items() if name in "ABC"}
+
+    def size_mhz(self, top: Top, j: int) -> float:
         """A J(J+1) bounds the rigid energy."""
-        return max(top.constants.values.values()) * j * (j + 1)
+        return max(self.parameters(top).values()) * j * (j + 1)
 
 
 class Centrifugal(QuantumEffect):
     """Centrifugal distortion of every order that the constants carry."""
 
-    def operators(self, top: Top) -> Operators:
-        """Coefficients in MHz, see `centrifugal_operators`."""
-        return centrifugal_operators(top.constants)
+    name = "centrifugal distortion"
 
-    def estimate_mhz(self, top: Top, j: int) -> float:
+    def parameters(self, top: Top) -> dict[str, float]:
+        """The distortion constants in MHz."""
+        return {name: value for name, value in top.constants.values.items() if name not in "ABC"}
+
+    def operators(self, top: Top) -> dict[str, Operators]:
+        """∂H/∂c of every distortion constant."""
+        return {name: terms for name, terms in operators_by_name(top.constants).items() if name not in "ABC"}
+
+    def size_mhz(self, top: Top, j: int) -> float:
         """Every term at K = J, all added in size."""
         x = j * (j + 1.0)
-        terms = self.operators(top).items()
+        terms = centrifugal_operators(top.constants).items()
         return float(sum(abs(c) * x**p * float(j) ** (2 * q) * (2 * x**n if n else 1.0) for (p, q, n), c in terms))
+
+
+SEMI_RIGID: tuple[QuantumEffect, ...] = (Rigid(), Centrifugal())
 
 
 def scalar_energy(operators: Operators, j: int) -> float:
