@@ -19,7 +19,7 @@ from rotor.formats.molecule_file import MoleculeFile, read_molecule_file
 from rotor.formats.read_write import top_of_file
 from rotor.formats.spcat.cat import read_cat
 from rotor.formats.spcat.fields import BLANK
-from rotor.quantum.levels import solve_levels
+from rotor.quantum.solve import solve_levels
 from rotor.tops.top import Top
 
 PAGE = Path(__file__).with_name("library.md")
@@ -128,7 +128,7 @@ def energies(file: MoleculeFile, jmax: int) -> dict[tuple[int, ...], float]:
     """Level energies in MHz by J, (J, K) or (J, Ka, Kc)."""
     assert file.constants is not None
     found = solve_levels(Top.from_constants(file.constants), jmax, vectors=False)
-    quanta = np.stack([found.j, found.ka, found.kc], axis=1)[:, : WIDTH[found.kind]]
+    quanta = found.quanta_of(np.arange(len(found)))
     return {tuple(q): float(e) for q, e in zip(quanta.tolist(), found.energy_mhz, strict=True)}
 
 

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from rotor.molecules.molecule import Molecule as Molecule
     from rotor.molecules.optimise import refine as refine
     from rotor.quantum.levels import Levels as Levels
-    from rotor.quantum.levels import solve_levels as solve_levels
+    from rotor.quantum.solve import solve_levels as solve_levels
     from rotor.spectra.lines import Lines as Lines
     from rotor.spectra.lines import line_list as line_list
     from rotor.spectra.raman import RamanLines as RamanLines
@@ -50,7 +50,7 @@ _HOME = {
     "raman_lines": "rotor.spectra.raman",
     "read": "rotor.formats",
     "refine": "rotor.molecules.optimise",
-    "solve_levels": "rotor.quantum.levels",
+    "solve_levels": "rotor.quantum.solve",
     "stream_lines": "rotor.formats.streamed_lines",
     "thermodynamic_functions": "rotor.thermo",
     "write": "rotor.formats",

@@ -9,7 +9,7 @@ import pytest
 
 from rotor.quantum.derivatives import level_derivatives, term_expectations
 from rotor.quantum.effects.watson import operators_by_name
-from rotor.quantum.levels import solve_levels
+from rotor.quantum.solve import solve_levels
 from rotor.tops.constants import Constants
 from rotor.tops.top import Top
 

@@ -9,7 +9,7 @@ import pytest
 
 from rotor import units
 from rotor.quantum.basis import REPRESENTATIONS
-from rotor.quantum.levels import solve_levels
+from rotor.quantum.solve import solve_levels
 from rotor.spectra import transitions
 from rotor.spectra.lines import EINSTEIN_PER_MHZ3, INTENSITY_NM2_MHZ, line_list
 from rotor.spectra.strengths import allowed_pairs, amplitudes, component
@@ -29,7 +29,7 @@ def sum_over_final_states(top: Top, j: int) -> dict[str, np.ndarray]:
         low = slice(pair.low.start, pair.low.start + pair.low.basis.size)
         sums[pair.axis][up] += strength.sum(axis=1)
         sums[pair.axis][low] += strength.sum(axis=0)
-    return {axis: total[levels.j == j] for axis, total in sums.items()}
+    return {axis: total[levels.quanta["j"] == j] for axis, total in sums.items()}
 
 
 @pytest.mark.parametrize("representation", REPRESENTATIONS)

@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 from slow_matrix import AXES, watson_matrix
 
 from rotor.quantum.basis import REPRESENTATIONS, WangBlock, wang_blocks
-from rotor.quantum.levels import solve_levels
+from rotor.quantum.solve import solve_levels
 from rotor.quantum.tensors import (
     BodyTensor,
     acting_on,
@@ -369,7 +369,7 @@ def _rising(matrix: np.ndarray) -> np.ndarray:
 def test_dipole_strengths_are_those_of_full_matrices(representation):
     dipole = (1.2, -0.7, 0.4)
     levels = solve_levels(Top(Constants(reduction="A", representation=representation, **UNEVEN)), 6)
-    rank = np.concatenate([np.argsort(np.argsort(levels.energy_mhz[levels.j == j])) for j in range(7)])
+    rank = np.concatenate([np.argsort(np.argsort(levels.energy_mhz[levels.quanta["j"] == j])) for j in range(7)])
     slow = slow_dipole_strengths(UNEVEN, representation, dipole, 6)
     total = 0.0
     for up, low in connected_pairs(levels.blocks, body_tensor(dipole, 1, representation)):
@@ -397,7 +397,7 @@ def test_strengths_from_one_level_add_up(rank, representation):
         if up is not low:
             sums[up.start : up.start + up.basis.size] += strength.sum(axis=1)
     wanted = (2 * j + 1) * np.sum(np.abs(tensor.components) ** 2)
-    assert np.allclose(sums[levels.j == j], wanted, rtol=1e-12)  # round-off of some hundred terms
+    assert np.allclose(sums[levels.quanta["j"] == j], wanted, rtol=1e-12)  # round-off of some hundred terms
 
 
 @pytest.mark.parametrize("rank", [1, 2])
@@ -411,7 +411,7 @@ def test_every_representation_gives_the_same_strengths(rank):
         for up, low in connected_pairs(levels.blocks, tensor):
             inside = np.ix_(*(np.arange(b.start, b.start + b.basis.size) for b in (up, low)))
             table[inside] = amplitudes(up, low, tensor) ** 2
-        order = np.lexsort((levels.kc, levels.ka, levels.j))
+        order = np.lexsort((levels.quanta["kc"], levels.quanta["ka"], levels.quanta["j"]))
         table = table[np.ix_(order, order)]
         found[representation] = np.maximum(table, table.T)
     for table in found.values():

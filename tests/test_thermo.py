@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rotor import units
-from rotor.quantum.levels import solve_levels
+from rotor.quantum.solve import solve_levels
 from rotor.thermo import classical_partition_function, partition_function, partition_functions
 from rotor.tops.constants import Constants
 from rotor.tops.top import Top

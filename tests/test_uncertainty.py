@@ -12,7 +12,7 @@ from rotor.formats.line_tables import catalogue, provenance, write_lines
 from rotor.formats.spcat.cat import read_cat
 from rotor.formats.spcat.codes import constants_of
 from rotor.formats.spcat.par import read_par
-from rotor.quantum.levels import solve_levels
+from rotor.quantum.solve import solve_levels
 from rotor.quantum.uncertainty import Covariance, level_errors
 from rotor.spectra.lines import line_list
 from rotor.tops.constants import Constants

@@ -239,11 +239,13 @@ def _why_none(lines: RamanLines) -> str:
 
 def _table(lines: RamanLines, rows: Any) -> Table:
     """The strongest lines in order of shift."""
+    from rotor.quantum import quanta
+
     shown = lines.where(rows)
-    names = " ".join(name.capitalize() for name in lines.quanta_names)
+    names = quanta.headings(lines.quanta_names)
     columns = ("shift (cm-1)", "dσ/dΩ (cm²/sr)", "λ (nm)", "E (cm-1)", "g", "S (Å⁶)", "from", "to")
     formats = ("{:.4f}", "{:.4e}", "{:.4f}", "{:.4f}", "{}", "{:.5g}")
     cells = [[form.format(x) for x in column] for form, column in zip(formats, shown.columns.values(), strict=False)]
-    labels = [[" ".join(f"{n:2d}" for n in quanta) for quanta in shown.quanta(s)] for s in (shown.initial, shown.final)]
+    labels = [shown.levels.labels(states) for states in (shown.initial, shown.final)]
     title = f"the {len(shown)} strongest lines" if len(shown) < len(lines) else "all lines"
     return Table(f"{title}, in order of shift (states: {names})", columns, list(zip(*cells, *labels, strict=True)))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import typer
 
@@ -383,20 +383,39 @@ def _why_none(lines: Lines) -> str:
     return "none of the allowed ones is inside the range and above the cut; widen --range or lower --min-lgint"
 
 
+class _Column(NamedTuple):
+    """A column of the table: its name in `Lines.columns`, its heading, and how a number is printed."""
+
+    name: str
+    heading: str
+    form: str
+
+
+_COLUMNS = (
+    _Column("frequency_mhz", "frequency (MHz)", "{:.4f}"),
+    _Column("error_mhz", "error (MHz)", "{:.4f}"),
+    _Column("lgint", "lgint", "{:.4f}"),
+    _Column("energy_lower_cm", 'E" (cm-1)', "{:.4f}"),
+    _Column("g_upper", "g'", "{}"),
+    _Column("einstein_a_per_s", "A (1/s)", "{:.2e}"),
+    _Column("strength_debye2", "Sμ² (D²)", "{:.5g}"),
+)
+
+
 def _lines_table(lines: Lines, rows: Any, depth: Any = None) -> Table:
     """The strongest lines in order of frequency, with their optical depths where there is a layer of gas."""
+    from rotor.quantum import quanta
+
     shown = lines.where(rows)
-    names = " ".join(name.capitalize() for name in lines.quanta_names)
-    columns: tuple[str, ...] = ("frequency (MHz)", "lgint", 'E" (cm-1)', "g'", "A (1/s)", "Sμ² (D²)", "upper", "lower")
-    formats = ("{:.4f}", "{:.4f}", "{:.4f}", "{}", "{:.2e}", "{:.5g}")
-    numbers = list(shown.columns.values())[: len(formats)]
-    labels = [
-        [" ".join(f"{n:2d}" for n in quanta) for quanta in shown.quanta(states)]
-        for states in (shown.upper, shown.lower)
-    ]
-    cells = [[form.format(x) for x in column] for form, column in zip(formats, numbers, strict=True)]
+    names = quanta.headings(lines.quanta_names)
+    values = shown.columns
+    present = [column for column in _COLUMNS if column.name in values]
+    cells = [[column.form.format(x) for x in values[column.name]] for column in present]
+    headings = [column.heading for column in present]
     if depth is not None:
-        columns = (*columns[: len(formats)], "τ", *columns[len(formats) :])
+        headings.append("τ")
         cells.append([f"{x:.3e}" for x in depth[rows]])
+    labels = [shown.levels.labels(states) for states in (shown.upper, shown.lower)]
+    columns = (*headings, "upper", "lower")
     title = f"the {len(shown)} strongest lines" if len(shown) < len(lines) else "all lines"
     return Table(f"{title}, in order of frequency (states: {names})", columns, list(zip(*cells, *labels, strict=True)))

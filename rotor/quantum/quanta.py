@@ -27,6 +27,8 @@ from rotor.arrays import Ints
 ORDER = ("v", "n", "j", "k", "ka", "kc", "irrep", "i_tot", "f1", "f2", "f3", "f4", "f5", "f6", "f7", "f8", "f", "m")
 _HEADINGS = {"ka": "Ka", "kc": "Kc", "i_tot": "I", "irrep": "irrep", "v": "v"}
 
+_SUBSCRIPTED = {f"f{i}": f"F_{i}" for i in range(1, 9)} | {"i_tot": "I"}
+
 Quanta = Mapping[str, NDArray[Any]]
 
 
@@ -80,3 +82,22 @@ def labels(quanta: Quanta, rows: NDArray[Any], halves: Collection[str] = (), wid
         for name, column in quanta.items()
     ]
     return [" ".join(row) for row in zip(*texts, strict=True)]
+
+
+def state_text(quanta: Quanta, row: int, halves: Collection[str] = ()) -> str:
+    """One level as a plot names it: J, J with K or Ka,Kc as subscripts, F after a comma, v before it all.
+
+    >>> state_text({"j": np.array([4]), "ka": np.array([1]), "kc": np.array([3])}, 0)
+    '$4_{1,3}$'
+    >>> state_text({"v": np.array([1]), "n": np.array([2]), "f": np.array([5])}, 0, halves={"f"})
+    '$v{=}1\\;2, F{=}5/2$'
+    >>> state_text({"j": np.array([7])}, 0)
+    '7'
+    """
+    text = {name: value_text(column[row], name in halves) for name, column in quanta.items()}
+    total = text.pop("n", None) or text.pop("j")
+    below = [text.pop(name) for name in ("k", "ka", "kc", "irrep") if name in text]
+    before = f"v{{=}}{text.pop('v')}\\;" if "v" in text else ""
+    after = "".join(f", {_SUBSCRIPTED.get(name, heading(name))}{{=}}{value}" for name, value in text.items())
+    subscript = f"_{{{','.join(below)}}}" if below else ""
+    return f"${before}{total}{subscript}{after}$" if before or subscript or after else total

@@ -10,6 +10,7 @@ all components that coincide in the line, g_I is the spin weight of one componen
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -21,7 +22,10 @@ from numpy.typing import NDArray
 from rotor import units
 from rotor.arrays import Floats, Ints
 from rotor.quantum.convergence import warnings_of
-from rotor.quantum.levels import Levels, TransitionTable, solve_levels
+from rotor.quantum.effect import QuantumEffect
+from rotor.quantum.effects.watson import SEMI_RIGID
+from rotor.quantum.levels import Levels, TransitionTable
+from rotor.quantum.solve import solve_levels
 from rotor.quantum.uncertainty import Covariance, level_spread, line_errors
 from rotor.spectra.reach import jmax_for_cut
 from rotor.spectra.transitions import IntensityCut, all_transitions
@@ -71,7 +75,7 @@ class Lines(TransitionTable):
     @cached_property
     def partition(self) -> PartitionFunction:
         """Q(T) behind the intensities, summed when first asked for unless it was given."""
-        return self.given_partition or partition_function(self.top, self.temperature_k)
+        return self.given_partition or partition_function(self.top, self.temperature_k, effects=self.levels.effects)
 
     @property
     def q(self) -> float:
@@ -122,7 +126,7 @@ class Lines(TransitionTable):
     def intensity_nm2_mhz(self) -> Floats:
         """Integrated absorption I(T) in nm² MHz."""
         levels = self.levels
-        per_component = (levels.weight / levels.components)[self.lower]
+        per_component = levels.weight_per_component[self.lower]
         scaled = INTENSITY_NM2_MHZ * self.frequency_mhz * per_component * self.strength_debye2 / self.q
         lower_k = (levels.energy_mhz[self.lower] - levels.ground_mhz) / units.MHZ_PER_K
         photon_k = self.frequency_mhz / units.MHZ_PER_K
@@ -142,9 +146,8 @@ class Lines(TransitionTable):
     @property
     def einstein_a_per_s(self) -> Floats:
         """Einstein coefficient of spontaneous emission, 1/s, of one component and M averaged."""
-        upper = self.upper
-        states = (2 * self.levels.j + 1) * self.levels.components
-        return EINSTEIN_PER_MHZ3 * self.frequency_mhz**3 * self.strength_debye2 / states[upper]
+        states = self.levels.states[self.upper]
+        return EINSTEIN_PER_MHZ3 * self.frequency_mhz**3 * self.strength_debye2 / states
 
     def where(self, chosen: NDArray[Any] | slice) -> Lines:
         """The lines that a slice, a boolean mask or an array of indices chooses, in its order."""
@@ -194,6 +197,7 @@ def line_list(
     vibrations: VibrationalStates | None = None,
     covariance: Covariance | None = None,
     sort: bool = True,
+    effects: Sequence[QuantumEffect] = SEMI_RIGID,
     executor: Executor | None = None,
 ) -> Lines:
     """Electric-dipole lines of a top: every transition that the selection rules allow, cut only where you say.
@@ -218,13 +222,13 @@ def line_list(
         raise ValueError(f"temperature {temperature_k} K: a temperature is above 0 K")
     dipole = _dipole_of(top)
     least = -math.inf if min_lgint is None else min_lgint
-    given = partition_of(top, temperature_k, q, vibrational_factor, vibrations)
+    given = partition_of(top, temperature_k, q, vibrational_factor, vibrations, effects)
     if given is None and (jmax is None or math.isfinite(least)):
-        given = partition_function(top, temperature_k)
+        given = partition_function(top, temperature_k, effects=effects)
     if jmax is None:
         jmax = jmax_for_cut(top, dipole, temperature_k, given.q if given else 1.0, least)
 
-    levels = solve_levels(top, jmax, executor=executor)
+    levels = solve_levels(top, jmax, effects=effects, executor=executor)
     cut = _intensity_cut(levels, temperature_k, given.q, least) if given and math.isfinite(least) else None
     found = all_transitions(levels, dipole, range_mhz, cut)
     lines = Lines(
@@ -252,7 +256,12 @@ def _dipole_of(top: Top) -> tuple[float, float, float]:
 
 
 def partition_of(
-    top: Top, temperature_k: float, q: float | None, vibrational_factor: float, vibrations: VibrationalStates | None
+    top: Top,
+    temperature_k: float,
+    q: float | None,
+    vibrational_factor: float,
+    vibrations: VibrationalStates | None,
+    effects: Sequence[QuantumEffect] = SEMI_RIGID,
 ) -> PartitionFunction | None:
     """Q as the user gave it, or the summed one times a vibrational factor; None where it is to be summed as it is."""
     if vibrations is not None:
@@ -268,13 +277,12 @@ def partition_of(
         return PartitionFunction(temperature_k, q * vibrational_factor, None, math.nan, source)
     if vibrational_factor == 1.0:
         return None
-    summed = partition_function(top, temperature_k)
+    summed = partition_function(top, temperature_k, effects=effects)
     source = f"{summed.source}, times {named}"
     return replace(summed, q=summed.q * vibrational_factor, source=source)
 
 
 def _intensity_cut(levels: Levels, temperature_k: float, q: float, least: float) -> IntensityCut:
     above_k = (levels.energy_mhz - levels.ground_mhz) / units.MHZ_PER_K
-    per_component = levels.weight / levels.components
-    population = INTENSITY_NM2_MHZ / q * per_component * np.exp(-above_k / temperature_k)
+    population = INTENSITY_NM2_MHZ / q * levels.weight_per_component * np.exp(-above_k / temperature_k)
     return IntensityCut(population, temperature_k * units.MHZ_PER_K, 10.0**least)

@@ -21,7 +21,10 @@ from numpy.typing import ArrayLike
 
 from rotor import units
 from rotor.arrays import Floats, Ints
-from rotor.quantum.levels import Levels, solve_levels
+from rotor.quantum.effect import QuantumEffect
+from rotor.quantum.effects.watson import SEMI_RIGID
+from rotor.quantum.levels import weights_of_levels
+from rotor.quantum.solve import solve_levels
 from rotor.tops.spin_weights import SpinWeights
 
 if TYPE_CHECKING:
@@ -75,22 +78,27 @@ def checked_temperatures(temperatures_k: ArrayLike) -> Floats:
     return temperatures
 
 
-def partition_function(top: Top, temperature_k: float, relative_error: float = 1e-6) -> PartitionFunction:
+def partition_function(
+    top: Top, temperature_k: float, relative_error: float = 1e-6, effects: Sequence[QuantumEffect] = SEMI_RIGID
+) -> PartitionFunction:
     """Q(T) summed over levels until the tail is below `relative_error` of it.
 
     The tail is estimated by the ratio of the last two J, which falls with J. Raises ValueError for a temperature not
     above 0 K, and where the terms rise again before they have died away: then the distortion constants are used beyond
     their reach, and no sum would mean anything.
     """
-    return partition_functions(top, [temperature_k], relative_error)[0]
+    return partition_functions(top, [temperature_k], relative_error, effects)[0]
 
 
 def partition_functions(
-    top: Top, temperatures_k: Iterable[float], relative_error: float = 1e-6
+    top: Top,
+    temperatures_k: Iterable[float],
+    relative_error: float = 1e-6,
+    effects: Sequence[QuantumEffect] = SEMI_RIGID,
 ) -> list[PartitionFunction]:
     """Q at several temperatures from one set of levels; see `partition_function`."""
     temperatures = checked_temperatures(list(temperatures_k))
-    sums = level_sums(top, [top.spin_weights], temperatures, relative_error, energies=False)[0]
+    sums = level_sums(top, [top.spin_weights], temperatures, relative_error, energies=False, effects=effects)[0]
     rows = zip(temperatures.tolist(), sums.q.tolist(), sums.jmax.tolist(), sums.error_q.tolist(), strict=True)
     source = "summed from levels to J = {}, relative error below {:g}"
     return [PartitionFunction(t, q, j, error, source.format(j, relative_error)) for t, q, j, error in rows]
@@ -104,6 +112,7 @@ def level_sums(
     *,
     energies: bool = True,
     at_worst: float = 0.0,
+    effects: Sequence[QuantumEffect] = SEMI_RIGID,
 ) -> list[LevelSums]:
     """Q, U/RT and C_v/R of a top's levels for each of several sets of spin weights, from levels solved once.
 
@@ -123,7 +132,7 @@ def level_sums(
     enough = -0.5 * math.log(max(relative_error, at_worst))  # half of what x of the last J must be, about
     if least_k * JMAX_LIMIT**2 < enough * temperatures.max():
         raise _endless(temperatures.max())
-    ladder = _Ladder(top, tuple(weights))
+    ladder = _Ladder(top, tuple(weights), tuple(effects))
     return [_summed(ladder, s, temperatures, relative_error, energies, at_worst) for s in range(len(weights))]
 
 
@@ -135,8 +144,10 @@ def lowest_level_k(top: Top, weights: Sequence[SpinWeights]) -> list[float]:
 class _Ladder:
     """Levels J by J, solved when first asked for: energies in K, degeneracies without spin, and with each set of weights."""
 
-    def __init__(self, top: Top, weights: tuple[SpinWeights, ...]) -> None:
-        self._top, self._weights = top, weights
+    def __init__(
+        self, top: Top, weights: tuple[SpinWeights, ...], effects: tuple[QuantumEffect, ...] = SEMI_RIGID
+    ) -> None:
+        self._top, self._weights, self._effects = top, weights, effects
         self._by_j: list[tuple[Floats, Floats, Floats]] = []
         self.heaviest = [heaviest_component(one) for one in weights]
         self.ground = [self._lowest(s) for s in range(len(weights))]
@@ -150,12 +161,13 @@ class _Ladder:
     def _solve_more(self) -> None:
         first = len(self._by_j)
         last = first + max(STRIDE, first // 8) - 1
-        levels = solve_levels(self._top, last, jmin=first, vectors=False)
+        levels = solve_levels(self._top, last, jmin=first, effects=self._effects, vectors=False)
         kelvin = levels.energy_mhz / units.MHZ_PER_K
-        plain = ((2 * levels.j + 1) * levels.components).astype(np.float64)
-        spin = np.array([(2 * levels.j + 1) * weights_of_levels(levels, one) for one in self._weights], dtype=float)
+        plain = levels.states.astype(np.float64)
+        spin = np.array([levels.multiplicity * weights_of_levels(levels, one) for one in self._weights], dtype=float)
+        rotational = levels.rotational
         for j in range(first, last + 1):
-            here = levels.j == j
+            here = rotational == j
             self._by_j.append((kelvin[here], plain[here], spin[:, here]))
 
     def _lowest(self, s: int) -> tuple[float, int]:
@@ -166,21 +178,6 @@ class _Ladder:
             if found:
                 energy, j = min(found)
                 return float(energy), j
-
-
-def weights_of_levels(levels: Levels, weights: SpinWeights) -> Ints:
-    """Spin weights of levels, summed over the components of each row, by other weights than they were solved with."""
-    if levels.kind == "linear":
-        return weights.of_j(levels.j)
-    if levels.irrep is not None:
-        of = {name: weights.of_irrep(name) for name in np.unique(levels.irrep).tolist()}
-        return np.array([of[name] for name in levels.irrep.tolist()], dtype=np.int64)
-    if levels.kind == "spherical":
-        return weights.of_spherical(levels.j)
-    if levels.kind in ("prolate", "oblate"):
-        return weights.of_symmetric(levels.j, levels.ka, oblate=levels.kind == "oblate")
-    of_parity = np.array([[weights.of_ka_kc(ka + kc) for kc in "eo"] for ka in "eo"], dtype=np.int64)
-    return np.asarray(of_parity[levels.ka % 2, levels.kc % 2])
 
 
 def heaviest_component(weights: SpinWeights) -> float:

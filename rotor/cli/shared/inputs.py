@@ -228,7 +228,7 @@ def _with_dipole_of_input(top: Top, dipole_debye: tuple[float, float, float]) ->
 
 
 def _refuse_weights_of_another_kind(top: Top) -> None:
-    from rotor.quantum.levels import solve_levels
+    from rotor.quantum.solve import solve_levels
 
     solve_levels(top, 1, vectors=False)
 

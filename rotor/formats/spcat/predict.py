@@ -23,7 +23,8 @@ from rotor.formats.spcat.model import FOLD, common_weight, top_of
 from rotor.formats.spcat.par import Options, ParameterFile, read_par
 from rotor.quantum.basis import wang_blocks
 from rotor.quantum.effects.watson import JMatrix, block_bands
-from rotor.quantum.levels import Levels, hamiltonian, solve_levels
+from rotor.quantum.levels import Levels
+from rotor.quantum.solve import hamiltonian, solve_levels
 from rotor.spectra.lines import Lines, line_list
 from rotor.thermo import PartitionFunction, partition_function
 from rotor.tops.top import Top
@@ -130,7 +131,7 @@ def _wanted_lines(top: Top, request: Request, q_reduced: float) -> Lines:
         min_lgint=request.str0,
         range_mhz=(LEAST_MHZ, request.fqlim_ghz * 1e3),
     )
-    j, components = lines.levels.j, lines.levels.components[lines.lower]
+    j, components = lines.levels.rotational, lines.levels.components[lines.lower]
     in_range = np.minimum(j[lines.upper], j[lines.lower]) >= request.fbgn
     return lines.where(
         in_range & (lines.intensity_nm2_mhz / components > least_intensity(request, lines.frequency_mhz))
