@@ -29,8 +29,9 @@ from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.levels import Levels
 from rotor.quantum.solve import solve_levels
-from rotor.spectra.lines import DEFAULT_MIN_LGINT, INTENSITY_NM2_MHZ, Lines, line_list
-from rotor.spectra.reach import jmax_for_cut
+from rotor.spectra.intensity import LGINT_NM2_MHZ
+from rotor.spectra.lines import DEFAULT_MIN_LGINT, Lines, line_list
+from rotor.spectra.intensity import jmax_for_cut
 from rotor.spectra.transitions import IntensityCut, all_transitions
 from rotor.thermo import PartitionFunction
 from rotor.tops.top import Top
@@ -230,7 +231,7 @@ def _cut(plan: _Plan, levels: Levels) -> IntensityCut | None:
     if math.isinf(plan.min_lgint):
         return None
     above_k = (levels.energy_mhz - plan.ground_mhz) / units.MHZ_PER_K
-    per_component = INTENSITY_NM2_MHZ / plan.partition.q * levels.weight_per_component
+    per_component = LGINT_NM2_MHZ / plan.partition.q * levels.weight_per_component
     population = per_component * np.exp(-above_k / plan.temperature_k)
     return IntensityCut(population, plan.temperature_k * units.MHZ_PER_K, 10.0**plan.min_lgint)
 

@@ -35,7 +35,8 @@ from rotor import units
 from rotor.arrays import Floats
 from rotor.classical.gas.correlations import plateau, short_time
 from rotor.classical.gas.ensembles import free_gas_correlations
-from rotor.spectra.lines import INTENSITY_NM2_MHZ, Lines
+from rotor.spectra.intensity import INTENSITY_NM2_MHZ
+from rotor.spectra.lines import Lines
 from rotor.spectra.profiles import gaussian
 from rotor.spectra.spectrum import Spectrum
 from rotor.tops.constants import Constants

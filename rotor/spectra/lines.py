@@ -27,7 +27,7 @@ from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.levels import Levels, TransitionTable
 from rotor.quantum.solve import solve_levels
 from rotor.quantum.uncertainty import Covariance, level_spread, line_errors
-from rotor.spectra.reach import jmax_for_cut
+from rotor.spectra.intensity import EINSTEIN_PER_MHZ3, INTENSITY_NM2_MHZ, LGINT_NM2_MHZ, jmax_for_cut, population
 from rotor.spectra.transitions import IntensityCut, all_transitions
 from rotor.thermo import PartitionFunction, VibrationalStates, partition_function
 
@@ -35,10 +35,6 @@ if TYPE_CHECKING:
     from rotor.tops.top import Top
 
 
-INTENSITY_NM2_MHZ = (
-    4.16231e-5  # 8π³/3hc for MHz and D² as catalogues use it; CODATA 2022 gives 4.16238e-5 (7e-6 in log10)
-)
-EINSTEIN_PER_MHZ3 = 1.1639654e-20  # 64π⁴/3hc³ for MHz and D², CODATA 2022
 DEFAULT_MIN_LGINT = -12.0
 
 
@@ -125,12 +121,9 @@ class Lines(TransitionTable):
     @property
     def intensity_nm2_mhz(self) -> Floats:
         """Integrated absorption I(T) in nm² MHz."""
-        levels = self.levels
-        per_component = levels.weight_per_component[self.lower]
-        scaled = INTENSITY_NM2_MHZ * self.frequency_mhz * per_component * self.strength_debye2 / self.q
-        lower_k = (levels.energy_mhz[self.lower] - levels.ground_mhz) / units.MHZ_PER_K
-        photon_k = self.frequency_mhz / units.MHZ_PER_K
-        return scaled * np.exp(-lower_k / self.temperature_k) * -np.expm1(-photon_k / self.temperature_k)
+        below = population(self.levels, self.temperature_k, self.q)[self.lower]
+        photon = -np.expm1(-self.frequency_mhz / (self.temperature_k * units.MHZ_PER_K))
+        return np.asarray(INTENSITY_NM2_MHZ * self.frequency_mhz * self.strength_debye2 * below * photon)
 
     @property
     def intensity_cm_per_molecule(self) -> Floats:
@@ -139,9 +132,9 @@ class Lines(TransitionTable):
 
     @property
     def lgint(self) -> Floats:
-        """log10 of I(T) in nm² MHz."""
+        """log10 of I(T) in nm² MHz, with the value of 8π³/3hc that catalogues use."""
         with np.errstate(divide="ignore"):  # a line of zero strength is -inf, as it should be
-            return np.log10(self.intensity_nm2_mhz)
+            return np.log10(self.intensity_nm2_mhz * (LGINT_NM2_MHZ / INTENSITY_NM2_MHZ))
 
     @property
     def einstein_a_per_s(self) -> Floats:
@@ -283,6 +276,5 @@ def partition_of(
 
 
 def _intensity_cut(levels: Levels, temperature_k: float, q: float, least: float) -> IntensityCut:
-    above_k = (levels.energy_mhz - levels.ground_mhz) / units.MHZ_PER_K
-    population = INTENSITY_NM2_MHZ / q * levels.weight_per_component * np.exp(-above_k / temperature_k)
-    return IntensityCut(population, temperature_k * units.MHZ_PER_K, 10.0**least)
+    scaled = LGINT_NM2_MHZ * population(levels, temperature_k, q)
+    return IntensityCut(scaled, temperature_k * units.MHZ_PER_K, 10.0**least)

@@ -31,7 +31,7 @@ from rotor.quantum.levels import Levels, TransitionTable
 from rotor.quantum.solve import solve_levels
 from rotor.spectra.lines import partition_of
 from rotor.spectra.raman_strengths import RamanTransitions, anisotropy_squared, raman_transitions
-from rotor.spectra.reach import JMAX_DEFAULT_LIMIT
+from rotor.spectra.intensity import JMAX_DEFAULT_LIMIT
 from rotor.thermo import PartitionFunction, VibrationalStates, partition_function
 
 if TYPE_CHECKING:
