@@ -165,7 +165,11 @@ def test_errors_of_levels_survive_a_conversion():
     errors = []
     for constants, covariance in ((before, old), (done.constants, done.covariance)):
         levels = solve_levels(Top(constants), JMAX)
-        errors.append(level_errors(Top(constants), levels, covariance)[np.lexsort((levels.quanta["kc"], levels.quanta["ka"], levels.quanta["j"]))])
+        errors.append(
+            level_errors(Top(constants), levels, covariance)[
+                np.lexsort((levels.quanta["kc"], levels.quanta["ka"], levels.quanta["j"]))
+            ]
+        )
     assert np.allclose(errors[0], errors[1], rtol=1e-3)  # distortion over rotational constants at J = 8
 
 

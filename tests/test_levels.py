@@ -23,7 +23,12 @@ WATER_QUARTIC = Constants(
 def test_every_label_stands_once():
     levels = solve_levels(Top.from_constants("A=10 B=6 C=4 GHz"), 25)
     for j in range(26):
-        labels = {(int(a), int(c)) for a, c in zip(levels.quanta["ka"][levels.quanta["j"] == j], levels.quanta["kc"][levels.quanta["j"] == j], strict=True)}
+        labels = {
+            (int(a), int(c))
+            for a, c in zip(
+                levels.quanta["ka"][levels.quanta["j"] == j], levels.quanta["kc"][levels.quanta["j"] == j], strict=True
+            )
+        }
         assert labels == {(ka, kc) for ka in range(j + 1) for kc in (j - ka, j - ka + 1) if 0 <= kc <= j}
 
 

@@ -64,7 +64,9 @@ def test_levels_of_one_and_two(constants):
     levels = solve_levels(Top(Constants(A=a, B=b, C=c, representation="Ir")), 2)
     energy = {
         (int(j), int(p), int(q)): e
-        for j, p, q, e in zip(levels.quanta["j"], levels.quanta["ka"], levels.quanta["kc"], levels.energy_mhz, strict=True)
+        for j, p, q, e in zip(
+            levels.quanta["j"], levels.quanta["ka"], levels.quanta["kc"], levels.energy_mhz, strict=True
+        )
     }
     root = 2 * np.sqrt((b - c) ** 2 + (a - c) * (a - b))
     closed = {

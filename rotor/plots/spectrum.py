@@ -291,7 +291,9 @@ def _fits(box: Any, room: Any, taken: Sequence[Any], drawn: Floats) -> bool:
 
 
 def _label(axes: Any, lines: Lines, row: int, height: float, x: _Axis) -> Any:
-    upper, lower = (state_text(lines.levels.quanta, int(states[row]), lines.levels.halves) for states in (lines.upper, lines.lower))
+    upper, lower = (
+        state_text(lines.levels.quanta, int(states[row]), lines.levels.halves) for states in (lines.upper, lines.lower)
+    )
     name = axes.annotate(
         f"{upper} – {lower}",
         (lines.frequency_mhz[row] / x.mhz, height),

@@ -38,7 +38,7 @@ class QuantumEffect(ABC):
     - `operators`: J^2p ½[Jz^2q, J₊^2n + J₋^2n]₊, by their powers (p, q, n): the fast path, for any kind of top;
     - `j_operator`: any other Hermitian operator of J, as a `rotor.quantum.j_operators.JOperator`;
     - `spin_terms`: molecule-fixed tensors coupled to spins, with the `spins` they need;
-    - `states` and `couplings`: further vibrational or tunnelling states, and what connects them.
+    - `states`, `couplings` and `dipoles`: further vibrational or tunnelling states, and what connects them.
     """
 
     name: ClassVar[str] = ""
@@ -79,6 +79,10 @@ class QuantumEffect(ABC):
     def couplings(self, top: Top) -> tuple[Coupling, ...]:
         """What connects states of different v."""
         return ()
+
+    def dipoles(self, top: Top) -> dict[tuple[int, int], tuple[float, float, float]]:
+        """(μa, μb, μc) in debye by pairs of states (v', v): of the effect's states, and between states."""
+        return {}
 
 
 class EffectSize(NamedTuple):

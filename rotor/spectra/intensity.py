@@ -9,9 +9,11 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rotor import units
 from rotor.arrays import Floats
@@ -56,7 +58,37 @@ def jmax_for_cut(top: Top, dipole_abc: tuple[float, float, float], temperature_k
     return j
 
 
-def population(levels: Levels, temperature_k: float, q: float) -> Floats:
-    """The fraction of molecules in one state, one component and one M, of every level, with its spin weight, (n,)."""
-    above_k = (levels.energy_mhz - levels.ground_mhz) / units.MHZ_PER_K
+def population(levels: Levels, temperature_k: float, q: float, ground_mhz: float | None = None) -> Floats:
+    """The fraction of molecules in one state, one component and one M, of every level, with its spin weight, (n,).
+
+    ground_mhz: the energy from which Q counts; that of the lowest of these levels that exists if None.
+    """
+    above_k = (levels.energy_mhz - (levels.ground_mhz if ground_mhz is None else ground_mhz)) / units.MHZ_PER_K
     return np.asarray(levels.weight_per_component / q * np.exp(-above_k / temperature_k))
+
+
+@dataclass(frozen=True)
+class IntensityCut:
+    """What an intensity needs besides frequency and strength, and the least one that counts.
+
+    population: (levels,) intensity per MHz and D² of a line from each state, the photon factor apart. kt_mhz: kT/h.
+    """
+
+    population: Floats
+    kt_mhz: float
+    least: float
+
+    def keeps(self, frequency_mhz: Floats, strength: Floats, population: Floats) -> NDArray[np.bool_]:
+        """Which lines are strong enough."""
+        scaled = frequency_mhz * strength * population
+        return scaled * -np.expm1(-frequency_mhz / self.kt_mhz) >= self.least
+
+
+def intensity_cut(
+    levels: Levels, temperature_k: float, q: float, least_lgint: float, ground_mhz: float | None = None
+) -> IntensityCut | None:
+    """The cut at an LGINT of `least_lgint`; None for -inf, which cuts nothing. ground_mhz: as in `population`."""
+    if math.isinf(least_lgint):
+        return None
+    scaled = LGINT_NM2_MHZ * population(levels, temperature_k, q, ground_mhz)
+    return IntensityCut(scaled, temperature_k * units.MHZ_PER_K, 10.0**least_lgint)

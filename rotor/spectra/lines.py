@@ -27,8 +27,15 @@ from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.levels import Levels, TransitionTable
 from rotor.quantum.solve import solve_levels
 from rotor.quantum.uncertainty import Covariance, level_spread, line_errors
-from rotor.spectra.intensity import EINSTEIN_PER_MHZ3, INTENSITY_NM2_MHZ, LGINT_NM2_MHZ, jmax_for_cut, population
-from rotor.spectra.transitions import IntensityCut, all_transitions
+from rotor.spectra.intensity import (
+    EINSTEIN_PER_MHZ3,
+    INTENSITY_NM2_MHZ,
+    LGINT_NM2_MHZ,
+    intensity_cut,
+    jmax_for_cut,
+    population,
+)
+from rotor.spectra.transitions import all_transitions
 from rotor.thermo import PartitionFunction, VibrationalStates, partition_function
 
 if TYPE_CHECKING:
@@ -222,8 +229,8 @@ def line_list(
         jmax = jmax_for_cut(top, dipole, temperature_k, given.q if given else 1.0, least)
 
     levels = solve_levels(top, jmax, effects=effects, executor=executor)
-    cut = _intensity_cut(levels, temperature_k, given.q, least) if given and math.isfinite(least) else None
-    found = all_transitions(levels, dipole, range_mhz, cut)
+    cut = intensity_cut(levels, temperature_k, given.q, least) if given else None
+    found = all_transitions(levels, dipoles_by_state(top, dipole, levels.effects), range_mhz, cut)
     lines = Lines(
         top=top,
         levels=levels,
@@ -238,6 +245,16 @@ def line_list(
         covariance=covariance,
     )
     return lines.sorted() if sort else lines
+
+
+def dipoles_by_state(
+    top: Top, dipole_abc: tuple[float, float, float], effects: Sequence[QuantumEffect]
+) -> dict[tuple[int, int], tuple[float, float, float]]:
+    """The dipole of every state, the top's own where its effect gives none, and those between states."""
+    found = {(0, 0): dipole_abc}
+    for effect in effects:
+        found |= {(state.v, state.v): dipole_abc for state in effect.states(top)} | effect.dipoles(top)
+    return found
 
 
 def _dipole_of(top: Top) -> tuple[float, float, float]:
@@ -273,8 +290,3 @@ def partition_of(
     summed = partition_function(top, temperature_k, effects=effects)
     source = f"{summed.source}, times {named}"
     return replace(summed, q=summed.q * vibrational_factor, source=source)
-
-
-def _intensity_cut(levels: Levels, temperature_k: float, q: float, least: float) -> IntensityCut:
-    scaled = LGINT_NM2_MHZ * population(levels, temperature_k, q)
-    return IntensityCut(scaled, temperature_k * units.MHZ_PER_K, 10.0**least)

@@ -29,9 +29,9 @@ from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.levels import Levels, TransitionTable
 from rotor.quantum.solve import solve_levels
+from rotor.spectra.intensity import JMAX_DEFAULT_LIMIT
 from rotor.spectra.lines import partition_of
 from rotor.spectra.raman_strengths import RamanTransitions, anisotropy_squared, raman_transitions
-from rotor.spectra.intensity import JMAX_DEFAULT_LIMIT
 from rotor.thermo import PartitionFunction, VibrationalStates, partition_function
 
 if TYPE_CHECKING:

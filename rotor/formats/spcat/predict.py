@@ -133,9 +133,7 @@ def _wanted_lines(top: Top, request: Request, q_reduced: float) -> Lines:
     )
     j, components = lines.levels.rotational, lines.levels.components[lines.lower]
     in_range = np.minimum(j[lines.upper], j[lines.lower]) >= request.fbgn
-    return lines.where(
-        in_range & (10.0**lines.lgint / components > least_intensity(request, lines.frequency_mhz))
-    )
+    return lines.where(in_range & (10.0**lines.lgint / components > least_intensity(request, lines.frequency_mhz)))
 
 
 def least_intensity(request: Request, frequency_mhz: NDArray[np.float64]) -> NDArray[np.float64]:
