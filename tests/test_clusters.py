@@ -10,6 +10,7 @@ from rotor.quantum.solve import solve_levels
 from rotor.quantum.spherical_top import DIMENSION, tensor_eigenvalues
 from rotor.thermo import partition_function
 from rotor.tops.constants import Constants
+from rotor.tops.operators import CUBIC_TENSOR
 from rotor.tops.spin_weights import CUBIC_IRREPS, SpinWeights
 from rotor.tops.top import Top
 
@@ -121,11 +122,13 @@ def test_table_says_the_irrep():
     assert frame.degeneracy.tolist() == [5, 9, 10, 15]
 
 
-def test_noncubic_terms_are_refused():
-    from rotor.quantum.spherical_top import scalar_and_tensor
+def test_noncubic_terms_leave_the_closed_form():
+    from rotor.quantum.spherical_top import is_cubic
 
-    with pytest.raises(ValueError, match="tensor of D_t alone"):
-        scalar_and_tensor({(1, 0, 0): 5.0, (0, 1, 0): 0.1})
+    assert is_cubic({(1, 0, 0): 5.0, (2, 0, 0): -1e-4})
+    assert is_cubic({(1, 0, 0): 5.0} | {powers: 0.1 * c for powers, c in CUBIC_TENSOR.items() if powers != (1, 0, 0)})
+    assert not is_cubic({(1, 0, 0): 5.0, (0, 1, 0): 0.1})
+    assert not is_cubic({(1, 0, 0): 5.0, (0, 0, 1): 0.1})
 
 
 @pytest.mark.parametrize(

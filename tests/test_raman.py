@@ -77,8 +77,8 @@ def test_symmetric_strengths(text, tensor, gamma):
     found = raman_transitions(levels, tensor)
     seen = {}
     for s, low, up in zip(found.strength_angstrom6, found.lower, found.upper, strict=True):
-        assert levels.quanta["ka"][low] == levels.quanta["ka"][up]
-        j, k = int(levels.quanta["j"][low]), int(levels.quanta["ka"][low])
+        assert levels.quanta["k"][low] == levels.quanta["k"][up]
+        j, k = int(levels.quanta["j"][low]), int(levels.quanta["k"][low])
         seen[j, k, int(levels.quanta["j"][up]) - j] = s / ((2 * j + 1) * (2 if k else 1) * gamma**2)
     allowed = {(j, k, r) for r in (1, 2) for j in range(10 - r) for k in range(j + 1) if b_symmetric(j, k, r)}
     assert seen.keys() == allowed
@@ -97,10 +97,10 @@ def test_a_tensor_that_is_not_axial_changes_k():
     tensor = SKEW
     levels = solve_levels(top_of("A=5 B=2 cm-1", tensor), 8)
     found = raman_transitions(levels, tensor)
-    steps = set((levels.quanta["ka"][found.upper] - levels.quanta["ka"][found.lower]).tolist())
+    steps = set((levels.quanta["k"][found.upper] - levels.quanta["k"][found.lower]).tolist())
     assert steps == {-2, -1, 0, 1, 2}
     for row in np.flatnonzero(levels.quanta["j"] <= 6):
-        j, k = int(levels.quanta["j"][row]), int(levels.quanta["ka"][row])
+        j, k = int(levels.quanta["j"][row]), int(levels.quanta["k"][row])
         axial = 2 * tensor[0, 0] - tensor[1, 1] - tensor[2, 2]
         elastic = 1.5 * axial**2 / 6 * coupling(j, j, 2, 0, k) ** 2 * (2 if k else 1)
         if k == 1:  # k = 1 to -1 and back

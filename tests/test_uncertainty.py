@@ -137,5 +137,5 @@ def test_correlations_are_checked():
 def test_a_stranger_among_the_names_is_refused():
     top = Top(OCS, (0.7, 0, 0))
     lines = line_list(top, jmax=2, covariance=Covariance(("A",), np.eye(1)))
-    with pytest.raises(ValueError, match="no constant A here"):
+    with pytest.raises(ValueError, match="no parameter A here"):
         _ = lines.error_mhz

@@ -128,7 +128,7 @@ class Levels(Table):
         >>> from rotor.quantum.solve import solve_levels
         >>> from rotor.tops.top import Top
         >>> solve_levels(Top.from_constants("A=10 B=6 C=4 MHz"), 4).find(j=4, ka=1, kc=3)
-        18
+        23
         """
         row = int(self.rows_of(**{name: [value] for name, value in quanta.items()})[0])
         if row < 0:

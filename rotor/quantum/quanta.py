@@ -85,7 +85,7 @@ def labels(quanta: Quanta, rows: NDArray[Any], halves: Collection[str] = (), wid
 
 
 def state_text(quanta: Quanta, row: int, halves: Collection[str] = ()) -> str:
-    """One level as a plot names it: J, J with K or Ka,Kc as subscripts, F after a comma, v before it all.
+    r"""One level as a plot names it: J, J with K or Ka,Kc as subscripts, F after a comma, v before it all.
 
     >>> state_text({"j": np.array([4]), "ka": np.array([1]), "kc": np.array([3])}, 0)
     '$4_{1,3}$'
