@@ -231,6 +231,16 @@ def test_closed_forms_are_three_j(rank):
             )  # of numbers to 5
 
 
+@given(j=st.integers(0, 200), rise=st.integers(-2, 2), rank=st.sampled_from([1, 2]), q=st.integers(-2, 2))
+@settings(max_examples=60, deadline=None)
+def test_couplings_squared_add_up(j, rise, rank, q):
+    """Σ_k c² = (2J+1)(2J'+1)/(2K+1) wherever there is one."""
+    j_up, k = j + rise, np.arange(-j, j + 1)
+    there = abs(rise) <= rank <= j + j_up and j_up >= 0 and abs(q) <= rank
+    wanted = (2 * j + 1) * (2 * j_up + 1) / (2 * rank + 1) if there else 0.0
+    assert np.sum(coupling(j, j_up, rank, q, k) ** 2) == pytest.approx(wanted, rel=1e-12)  # round-off of 400 terms
+
+
 @pytest.mark.parametrize("rank", [1, 2, 3, 4])
 def test_couplings_of_j_1000_add_up(rank):
     """Σ_k c² = (2J+1)(2J'+1)/(2K+1), and over J' for one k, q: 2J + 1."""

@@ -184,16 +184,16 @@ def coupling(j_low: int, j_up: int, rank: int, q: int, k: ArrayLike) -> Floats:
     exists = (np.abs(k) <= j_low) & (np.abs(k + q) <= j_up)
     if not abs(j_up - j_low) <= rank <= j_up + j_low or abs(q) > rank:
         return np.zeros(k.shape)
-    if rank > 2:
-        inside = np.where(exists, k, 0.0)
-        sign = np.where((j_up - inside - q) % 2, -1.0, 1.0)
-        return np.where(exists, sign * _three_j_coupling(j_low, j_up, rank, q, inside), 0.0)
-    return np.where(exists, _closed(j_low, j_up, rank, q, np.where(exists, k, max(-j_low, -j_up - q))), 0.0)
+    values = _existing(j_low, j_up, rank, q, np.where(exists, k, max(-j_low, -j_up - q)))
+    return np.where(exists, values, 0.0)
 
 
-def _three_j_coupling(j_low: int, j_up: int, rank: int, q: int, k: Floats) -> Floats:
-    root = np.sqrt((2.0 * j_up + 1) * (2 * j_low + 1))
-    return np.asarray(root * three_j(j_up, rank, j_low, -k - q, q, k))
+def _existing(j: int, j_up: int, rank: int, q: int, k: Floats) -> Floats:
+    """`coupling` for k and k + q that exist."""
+    if rank <= 2:
+        return _closed(j, j_up, rank, q, k)
+    root = np.sqrt((2.0 * j_up + 1) * (2 * j + 1))
+    return np.asarray(np.where((j_up - k - q) % 2, -root, root) * three_j(j_up, rank, j, -k - q, q, k))
 
 
 def _closed(j: int, j_up: int, rank: int, q: int, k: Floats) -> Floats:
@@ -293,7 +293,8 @@ def bands_between(up: WangBlock, low: WangBlock, tensor: BodyTensor) -> list[Ban
     parts = tensor.between(up, low)
     if parts is None:
         return []
-    rank, exponent = tensor.rank, phase_exponent(low) - phase_exponent(up) + (not tensor.is_real_between(up, low))
+    rank = tensor.rank
+    exponent = phase_exponent(low) - phase_exponent(up) + (not tensor.is_real_between(up, low))
     sign = -1.0 if (exponent - rank % 2) % 4 else 1.0
 
     out = []
@@ -302,7 +303,8 @@ def bands_between(up: WangBlock, low: WangBlock, tensor: BodyTensor) -> list[Ban
         folded = _folded(up, low, rank, step, parts) if rank > 1 else ()
         if source.start >= source.stop or not (parts[rank + step] or folded):
             continue
-        elements = (sign * parts[rank + step]) * _wang_coupling(low.j, up.j, rank, step)[low.first_k :: 2][source]
+        factors = _wang_coupling(low.j, up.j, rank, step)[low.first_k :: 2]
+        elements = factors[source] * (sign * parts[rank + step])
         for place, value in folded:
             elements[place - source.start] += sign * value
         out.append(Band(source, target, elements))
@@ -316,12 +318,15 @@ def _overlap(up: WangBlock, low: WangBlock, step: int) -> tuple[slice, slice]:
     return slice(start, stop), slice(start - first, stop - first)
 
 
-@lru_cache(maxsize=64)  # blocks come J by J
+@lru_cache(maxsize=2048)  # some 16 MB at J = 1000; a dipole needs 6 tables for every J
 def _wang_coupling(j_low: int, j_up: int, rank: int, step: int) -> Floats:
     """`coupling` for K = 0 ... J, times √2 where one of K and K + step is 0."""
-    k = np.arange(j_low + 1)
-    twice = np.where((k == 0) != (k + step == 0), np.sqrt(2.0), 1.0)
-    return coupling(j_low, j_up, rank, step, k) * twice
+    first, last = max(0, -step), min(j_low, j_up - step)
+    out = np.zeros(j_low + 1)
+    if first <= last:
+        out[first : last + 1] = _existing(j_low, j_up, rank, step, np.arange(first, last + 1.0))
+        out[first] *= np.sqrt(2.0) if step else 1.0
+    return out
 
 
 def _folded(up: WangBlock, low: WangBlock, rank: int, step: int, parts: list[float]) -> list[tuple[int, float]]:

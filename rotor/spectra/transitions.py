@@ -12,12 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Indices
-from rotor.quantum.basis import REPRESENTATIONS
-from rotor.quantum.levels import Levels
-from rotor.spectra.strengths import PairOfBlocks, allowed_pairs, amplitudes
+from rotor.quantum.levels import Levels, SolvedBlock
+from rotor.quantum.tensors import BodyTensor, amplitudes, body_tensor, connected_pairs
 
 EVERYTHING = (0.0, float("inf"))
 LONG_LIST = 1_000_000  # lines above which the compiled loop is loaded
+
+Pair = tuple[SolvedBlock, SolvedBlock]  # two blocks with an allowed transition, the one of higher or equal J first
 
 
 @dataclass(frozen=True)
@@ -60,11 +61,11 @@ def all_transitions(
     if levels.representation is None:
         return _joined(list(_closed_form(levels, dipole_abc, range_mhz, cut)))
 
-    axes = REPRESENTATIONS[levels.representation]
-    pairs = list(allowed_pairs(levels, dipole_abc))
+    dipole = body_tensor(dipole_abc, 1, levels.representation)
+    pairs = list(connected_pairs((block for block in levels.blocks if levels.weight[block.start] > 0), dipole))
     if cut is None and range_mhz == EVERYTHING:
-        return _every_pair(pairs, axes, dipole_abc)
-    return _joined(list(_chosen(pairs, axes, dipole_abc, range_mhz, cut)))
+        return _every_pair(pairs, dipole)
+    return _joined(list(_chosen(pairs, dipole, range_mhz, cut)))
 
 
 def _joined(pieces: list[Transitions]) -> Transitions:
@@ -78,21 +79,19 @@ def _joined(pieces: list[Transitions]) -> Transitions:
     )
 
 
-def _every_pair(pairs: list[PairOfBlocks], axes: str, dipole_abc: tuple[float, float, float]) -> Transitions:
+def _every_pair(pairs: list[Pair], dipole: BodyTensor) -> Transitions:
     """All lines of all pairs, written straight into columns of their final length."""
-    sizes = [pair.up.basis.size * pair.low.basis.size for pair in pairs]
+    sizes = [up.basis.size * low.basis.size for up, low in pairs]
     total = sum(sizes)
     out = Transitions(np.empty(total), np.empty(total), np.empty(total, np.int32), np.empty(total, np.int32))
     fill = _fill_of(total)
 
     at = 0
-    for pair, size in zip(pairs, sizes, strict=True):
+    for (up, low), size in zip(pairs, sizes, strict=True):
         here = slice(at, at + size)
         at += size
-        up, low = pair.up, pair.low
         fill(
-            up.energies_mhz, low.energies_mhz, amplitudes(pair, axes), dipole_abc["abc".index(pair.axis)] ** 2,
-            up.start, low.start,
+            up.energies_mhz, low.energies_mhz, amplitudes(up, low, dipole), up.start, low.start,
             out.frequency_mhz[here], out.strength_debye2[here], out.upper[here], out.lower[here],
         )  # fmt: skip
     return out
@@ -109,14 +108,14 @@ def _fill_of(total: int) -> Callable[..., None]:
 
 
 def _fill_pair(
-    energies_up: Floats, energies_low: Floats, amplitude: Floats, dipole2: float, start_up: int, start_low: int,
+    energies_up: Floats, energies_low: Floats, amplitude: Floats, start_up: int, start_low: int,
     frequency: Floats, strength: Floats, upper: Indices, lower: Indices,
 ) -> None:  # fmt: skip
     """Frequency, strength and states of all lines between two blocks, the upper state being the one higher in energy."""
     shape = amplitude.shape
     difference = np.subtract.outer(energies_up, energies_low)
     np.abs(difference, out=frequency.reshape(shape))
-    np.multiply(amplitude * amplitude, dipole2, out=strength.reshape(shape))
+    np.multiply(amplitude, amplitude, out=strength.reshape(shape))
 
     first = np.arange(start_up, start_up + shape[0], dtype=np.int32)[:, None]
     second = np.arange(start_low, start_low + shape[1], dtype=np.int32)[None, :]
@@ -126,17 +125,12 @@ def _fill_pair(
 
 
 def _chosen(
-    pairs: list[PairOfBlocks],
-    axes: str,
-    dipole_abc: tuple[float, float, float],
-    range_mhz: tuple[float, float],
-    cut: IntensityCut | None,
+    pairs: list[Pair], dipole: BodyTensor, range_mhz: tuple[float, float], cut: IntensityCut | None
 ) -> Iterator[Transitions]:
-    choose = _choice_of(sum(pair.up.basis.size * pair.low.basis.size for pair in pairs))
-    for pair in pairs:
-        up, low = pair.up, pair.low
+    choose = _choice_of(sum(up.basis.size * low.basis.size for up, low in pairs))
+    for up, low in pairs:
         energies = (up.energies_mhz, low.energies_mhz)
-        strength = dipole_abc["abc".index(pair.axis)] ** 2 * amplitudes(pair, axes) ** 2
+        strength = amplitudes(up, low, dipole) ** 2
         i, k = choose(*energies, strength, range_mhz, cut, up.start, low.start)
 
         difference = energies[0][i] - energies[1][k]
@@ -217,7 +211,7 @@ def _hoenl_london(levels: Levels, rise: int, step: int) -> tuple[NDArray[np.int6
 
     Parallel: [(J+1)² - K²]/(J+1) for R, nothing for Q (no change of energy). Perpendicular, with the square of the
     dipole across the axis: Q: (2J+1)(J∓K)(J±K+1)/(2J(J+1)), R: (J±K+1)(J±K+2)/(2(J+1)), over both signs of K (the
-    squares of the amplitudes in `strengths`; W. Gordy and R. L. Cook, Microwave Molecular Spectra, table 2.1). Q with
+    squares of `tensors.coupling`; W. Gordy and R. L. Cook, Microwave Molecular Spectra, table 2.1). Q with
     K - 1 is Q with K + 1 from the other side. The levels must start at J = 0.
     """
     all_j, all_k = levels.j, np.maximum(levels.ka, 0)
