@@ -171,9 +171,9 @@ def body_tensor(cartesian: ArrayLike, rank: int, representation: str) -> BodyTen
 def coupling(j_low: int, j_up: int, rank: int, q: int, k: ArrayLike) -> Floats:
     """√((2J'+1)(2J+1)) (-1)^(J'-k') (J' K J; -k' q k) from k to k' = k + q, for an array of k; 0 where k or k' do not exist.
 
-    It is √(2J+1) ⟨J k K q|J' k'⟩, for K ≤ 2 in the closed forms of the Clebsch-Gordan coefficients (D. A. Varshalovich,
-    A. N. Moskalev and V. K. Khersonskii, Quantum Theory of Angular Momentum, 1988, tables 8.2 and 8.4), else from
-    `three_j`. J' < J and q < 0 follow from
+    It is √(2J+1) ⟨J k K q|J' k'⟩. For K ≤ 2 in closed forms: K = 1 as the direction cosines of P. C. Cross, R. M. Hainer and
+    G. W. King, J. Chem. Phys. 12, 210 (1944), table I; K = 2 from D. A. Varshalovich, A. N. Moskalev and V. K. Khersonskii,
+    Quantum Theory of Angular Momentum, 1988, table 8.4. Else from `three_j`. J' < J and q < 0 follow from
 
         c(J → J', q, k) = (-1)^(J'-J-q) c(J' → J, -q, k+q) = (-1)^(J'-J-K) c(J → J', -q, -k).
 
@@ -326,6 +326,7 @@ def _wang_coupling(j_low: int, j_up: int, rank: int, step: int) -> Floats:
     if first <= last:
         out[first : last + 1] = _existing(j_low, j_up, rank, step, np.arange(first, last + 1.0))
         out[first] *= np.sqrt(2.0) if step else 1.0
+    out.flags.writeable = False  # it is shared
     return out
 
 

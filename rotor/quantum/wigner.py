@@ -1,6 +1,6 @@
 """Wigner's 3j, 6j and 9j symbols for arrays of quantum numbers, integer or half-integer, to J = 1000 and beyond.
 
-3j and 6j are Racah's finite sums (DLMF, https://dlmf.nist.gov, 34.2.4 and 34.4.2):
+3j and 6j are Racah's finite sums (https://functions.wolfram.com 07.39.06.0003, https://dlmf.nist.gov/34.4 eq. 34.4.2):
 
     (j1 j2 j3; m1 m2 m3)  = (-1)^(j1-j2-m3) √[Δ²(j1 j2 j3) ∏ (ji+mi)! (ji-mi)!] Σ_t (-1)^t / ∏ (x-t)! ∏ (t-y)!
     {j1 j2 j3; l1 l2 l3}  = √[Δ² Δ² Δ² Δ²] Σ_t (-1)^t (t+1)! / ∏ (x-t)! ∏ (t-y)!
@@ -101,9 +101,10 @@ def three_j_over_m(j1: float, j2: float, j3: float, m1: float) -> tuple[Floats, 
         c(m2-1) x(m2-1) + [j2(j2+1) + j3(j3+1) - j1(j1+1) + 2 m2 m3] x(m2) + c(m2) x(m2+1) = 0,
         c(m2)² = (j2-m2)(j2+m2+1)(j3+m3)(j3-m3+1),     Σ x² = 1/(2 j1+1),     sign (-1)^(j2-j3-m1) at the last m2
 
-    (K. Schulten and R. G. Gordon, J. Math. Phys. 16, 1961 (1975), run such recursions from both ends to the middle, where
-    both are stable). Where one j is small, `three_j` is used, because the eigenvalues are close to each other then, in
-    units of the matrix. Errors are some 1e-12 of the largest symbol at J = 1000; values below 1e-308 are 0.
+    Like the recursions of K. Schulten and R. G. Gordon, J. Math. Phys. 16, 1961 (1975), it is run from both ends to the
+    middle, where both directions are stable. Where one j is small, `three_j` is used, because the eigenvalues are close to
+    each other then, in units of the matrix. Errors are some 1e-12 of the largest symbol at J = 1000; values below 1e-308
+    are 0.
 
     >>> m2, symbols = three_j_over_m(2, 1, 1, 0)
     >>> m2.tolist(), (symbols**2 * 30).round(9).tolist()
