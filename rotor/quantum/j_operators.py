@@ -144,5 +144,5 @@ def between_blocks(up: WangBlock, low: WangBlock, operator: JOperator) -> Comple
             chosen, goal = columns[inside], target[inside]
             back = np.where(goal == 0, 1.0, np.sqrt(0.5)) * np.where(goal < 0, up.sign, 1)
             values = band[side * k[chosen] + j] * amplitude[inside] * back
-            np.add.at(out, (place[inside], chosen), values)
+            out[place[inside], chosen] += values  # a column occurs once
     return np.asarray(np.conj(phase(up)) * phase(low) * out)
