@@ -150,7 +150,7 @@ def test_effects_are_found_by_name():
     assert named_effect("rigid rotor") is Rigid
     assert named_effect("centrifugal distortion") is Centrifugal
     assert named_effect("fourth power along an axis") is AxisPower
-    with pytest.raises(ValueError, match="known are .*rigid rotor"):
+    with pytest.raises(ValueError, match=r"known are .*rigid rotor"):
         named_effect("magic")
 
 
