@@ -226,6 +226,11 @@ def _of_asymmetric(levels: Levels, weights: SpinWeights) -> Ints:
     if levels.kind in ("prolate", "oblate") and weights.rule == "K":
         k = kc if levels.kind == "oblate" else ka
         both = weights.of_symmetric(levels.rotational, k, oblate=levels.kind == "oblate")
+        if "0odd" in weights.classes:
+            raise ValueError(
+                "spin weights by 0even and 0odd: the components of a split ±K pair differ in weight, and which is which is "
+                "not known here; give weights by parity of (Ka, Kc) or by K alone"
+            )
         return np.asarray(both // np.where(k == 0, 1, 2))
     of_parity = np.array([[weights.of_ka_kc(a + c) for c in "eo"] for a in "eo"], dtype=np.int64)
     return np.asarray(of_parity[ka % 2, kc % 2])

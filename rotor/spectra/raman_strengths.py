@@ -103,10 +103,11 @@ def _of_both(levels: Levels, first: Ints, second: Ints) -> Floats:
 def _linear(levels: Levels, tensor: Floats) -> RamanTransitions:
     """S = (3/2) (J+1)(J+2)/(2J+3) Δα² from J to J + 2."""
     anisotropy = tensor[0, 0] - (tensor[1, 1] + tensor[2, 2]) / 2
-    first = np.arange(max(len(levels) - 2, 0))
-    j = levels.quanta["j"][first]
+    all_j = levels.quanta["j"]
+    first = np.flatnonzero(all_j + 2 <= levels.jmax)
+    j, second = all_j[first], levels.rows_of(j=all_j[first] + 2)
     strength = 1.5 * (j + 1) * (j + 2) / (2 * j + 3) * anisotropy**2
-    return _ordered(levels, strength, first, first + 2, _of_both(levels, first, first + 2))
+    return _ordered(levels, strength, first, second, _of_both(levels, first, second))
 
 
 def _symmetric(levels: Levels, tensor: Floats, spin_weights: SpinWeights) -> RamanTransitions:
