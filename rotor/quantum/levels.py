@@ -217,7 +217,7 @@ def weights_of_levels(levels: Levels, weights: SpinWeights) -> Ints:
         return _of_asymmetric(levels, weights)
     if "k" in quanta:
         return weights.of_symmetric(levels.rotational, np.abs(quanta["k"]), oblate=levels.kind == "oblate")
-    return weights.of_spherical(quanta["j"]) if levels.kind == "spherical" else weights.of_j(quanta["j"])
+    return weights.of_spherical(levels.rotational) if levels.kind == "spherical" else weights.of_j(levels.rotational)
 
 
 def _of_asymmetric(levels: Levels, weights: SpinWeights) -> Ints:
