@@ -7,26 +7,45 @@ contracted matrices Σ_terms c ⟨r'‖X^K‖r⟩ between solved blocks are comp
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from rotor.arrays import Floats
-from rotor.quantum.coupled import CoupledBlock, Part
-from rotor.quantum.levels import Levels, SolvedBlock
-from rotor.quantum.spins import Cosines, CosinesWithN, Rotor, Scheme, SpinTerm
+from rotor.arrays import Floats, Ints
+from rotor.quantum.basis import ka_kc
+from rotor.quantum.coupled import CoupledBlock
+from rotor.quantum.levels import SolvedBlock
+from rotor.quantum.solve import hamiltonian, solve_rotation
+from rotor.quantum.spin_operators import EVERY_STATE, AxialState, Basis, Rotor, SpinTerm, is_axial, summed
+from rotor.quantum.spins import Scheme
 
 if TYPE_CHECKING:
     from rotor.quantum.effect import QuantumEffect
     from rotor.tops.top import Top
 
 
+class RotorPart(NamedTuple):
+    """Functions of one state v within a block: a Wang block, or |N K⟩ of a symmetric top; where they stand."""
+
+    v: int
+    basis: Basis
+    place: slice
+
+    @property
+    def names(self) -> Ints:
+        """Ka and Kc of the functions in order of energy, (size, 2); K and 0 of |N K⟩."""
+        if isinstance(self.basis, AxialState):
+            return np.array([[self.basis.axial_k, 0]])
+        return np.stack(ka_kc(self.basis.j, self.basis.species, self.basis.size), axis=1)
+
+
 class RotorBlock(NamedTuple):
     """States of one N solved together: energies (n,) in MHz, eigenvectors (n, n) in columns over the parts."""
 
     n: int
-    parts: tuple[Part, ...]
+    parts: tuple[RotorPart, ...]
     energies_mhz: Floats
     vectors: Floats
 
@@ -53,21 +72,46 @@ class Piece:
 
 
 Channels = dict[Channel, list[Piece]]
-Contracted = dict[Channel, Floats]
+Terms = list[tuple[float, SpinTerm]]
 
 
-def rotor_blocks(levels: Levels) -> list[RotorBlock]:
-    """The solved blocks of a rotation."""
-    return [_rotor_block(block) for block in levels.blocks]
+def solved_rotor(
+    top: Top, effects: tuple[QuantumEffect, ...], terms: Terms, nmin: int, nmax: int, executor: Executor | None
+) -> tuple[list[RotorBlock], str]:
+    """The rotation solved from N = `nmin` to `nmax`, and the representation of its functions.
+
+    A symmetric top whose terms are all axial is left in |N K⟩, one function a block.
+    """
+    if top.kind in ("prolate", "oblate") and _all_axial(top, effects, terms):
+        levels = solve_rotation(top, effects, nmin, nmax, False, executor)
+        rows = zip(levels.rotational.tolist(), levels.quanta["k"].tolist(), levels.energy_mhz.tolist(), strict=True)
+        return [_axial_block(n, k, e) for n, k, e in rows], "Ir" if top.kind == "prolate" else "IIIr"
+    levels = solve_rotation(top, effects, nmin, nmax, True, executor, in_blocks=True)
+    return [_rotor_block(block) for block in levels.blocks], str(levels.representation)
+
+
+def _all_axial(top: Top, effects: tuple[QuantumEffect, ...], terms: Terms) -> bool:
+    axis = "a" if top.kind == "prolate" else "c"
+    if any(n for _, _, n in hamiltonian(top, effects)) or not all(is_axial(term.rotor, axis) for _, term in terms):
+        return False
+    own = (effect.j_operator(top, name, 1, "Ir") for effect in effects for name in effect.parameters(top))
+    states = any(effect.states(top) or effect.couplings(top) for effect in effects)
+    return not states and all(operator is None for operator in own)
+
+
+def _axial_block(n: int, k: int, energy_mhz: float) -> RotorBlock:
+    return RotorBlock(n, (RotorPart(0, AxialState(n, k), slice(0, 1)),), np.array([energy_mhz]), np.ones((1, 1)))
 
 
 def _rotor_block(block: SolvedBlock | CoupledBlock) -> RotorBlock:
     if isinstance(block, CoupledBlock):
-        return RotorBlock(block.j, block.parts, block.energies_mhz, block.vectors)
-    return RotorBlock(block.basis.j, (Part(0, block.basis, 0),), block.energies_mhz, block.vectors)
+        parts = tuple(RotorPart(part.v, part.basis, part.place) for part in block.parts)
+        return RotorBlock(block.j, parts, block.energies_mhz, block.vectors)
+    part = RotorPart(0, block.basis, slice(0, block.basis.size))
+    return RotorBlock(block.basis.j, (part,), block.energies_mhz, block.vectors)
 
 
-def valued_terms(top: Top, effects: Iterable[QuantumEffect]) -> list[tuple[float, SpinTerm]]:
+def valued_terms(top: Top, effects: Iterable[QuantumEffect]) -> Terms:
     """Every spin term of the effects with the value of its parameter times its factor, zeros left out."""
     found = []
     for effect in effects:
@@ -76,37 +120,18 @@ def valued_terms(top: Top, effects: Iterable[QuantumEffect]) -> list[tuple[float
     return [(value, term) for value, term in found if value]
 
 
-def channels_of(terms: Iterable[tuple[float, SpinTerm]], scheme: Scheme) -> Channels:
-    """Terms by channel; tensors that differ only in their components are added to one."""
-    found: Channels = {}
+def channels_of(terms: Terms, scheme: Scheme) -> Channels:
+    """Terms by channel; operators that differ only in their components are added to one."""
+    groups: dict[tuple[Any, ...], list[tuple[float, Rotor]]] = {}
     for value, term in terms:
-        if term.ns and not scheme.spins:
-            raise ValueError(f"{term.name}: N·S needs a spin")
         acting = tuple(sorted(scheme.place(name) for name in term.spins))
         channel = Channel(acting, term.rotor.rank, term.ns, term.n2 if term.ns else 0)
-        n2 = 0 if term.ns else term.n2
-        found.setdefault(channel, []).append(Piece(value, term.rotor, term.bra, term.ket, n2, term.nz2))
-    return {channel: _added(pieces) for channel, pieces in found.items()}
-
-
-def _added(pieces: list[Piece]) -> list[Piece]:
-    groups: dict[tuple[object, ...], list[Piece]] = {}
-    for piece in pieces:
-        groups.setdefault((type(piece.rotor), piece.bra, piece.ket, piece.n2, piece.nz2), []).append(piece)
-    out: list[Piece] = []
-    for group in groups.values():
-        first = group[0]
-        if len(group) == 1 or not isinstance(first.rotor, Cosines | CosinesWithN):
-            out += group
-            continue
-        total = sum(piece.value * np.array(piece.rotor.components) for piece in group)  # type: ignore[union-attr]
-        rotor = type(first.rotor)(_nested(np.asarray(total)))
-        out.append(Piece(1.0, rotor, first.bra, first.ket, first.n2, first.nz2))
-    return out
-
-
-def _nested(array: Floats) -> tuple:  # type: ignore[type-arg]
-    return tuple(_nested(row) if row.ndim else float(row) for row in array)
+        key = (channel, term.bra, term.ket, 0 if term.ns else term.n2, term.nz2)
+        groups.setdefault(key, []).append((value, term.rotor))
+    found: Channels = {}
+    for (channel, *where), members in groups.items():
+        found.setdefault(channel, []).extend(Piece(value, rotor, *where) for value, rotor in summed(members))
+    return found
 
 
 def contracted(up: RotorBlock, low: RotorBlock, pieces: Sequence[Piece], representation: str) -> Floats | None:
@@ -119,7 +144,7 @@ def contracted(up: RotorBlock, low: RotorBlock, pieces: Sequence[Piece], represe
     for piece in pieces:
         for left in up.parts:
             for right in low.parts:
-                if (left.v, right.v) != (piece.bra, piece.ket):
+                if not _acts(piece, left.v, right.v):
                     continue
                 found = piece.rotor.elements(left.basis, right.basis, representation)
                 if found is None or not found.any():
@@ -130,7 +155,11 @@ def contracted(up: RotorBlock, low: RotorBlock, pieces: Sequence[Piece], represe
     return total
 
 
-def _powers(piece: Piece, left: Part, right: Part) -> Floats:
+def _acts(piece: Piece, left: int, right: int) -> bool:
+    return left == right if piece.bra == EVERY_STATE else (left, right) == (piece.bra, piece.ket)
+
+
+def _powers(piece: Piece, left: RotorPart, right: RotorPart) -> Floats:
     """value ½(bra + ket) of N^2p, times ½(bra + ket) of Nz^2q."""
     m, n = left.basis.j, right.basis.j
     value = piece.value * ((m * (m + 1.0)) ** piece.n2 + (n * (n + 1.0)) ** piece.n2) / 2
@@ -140,6 +169,15 @@ def _powers(piece: Piece, left: Part, right: Part) -> Floats:
     return np.asarray(value * (bra[:, None] + ket) / 2)
 
 
-def rotor_label(block: RotorBlock) -> list[tuple[int, str]]:
-    """State and species of every part."""
-    return [(part.v, part.basis.species) for part in block.parts]
+def in_both_orders(up: RotorBlock, low: RotorBlock, pieces: Sequence[Piece], representation: str) -> Floats | None:
+    """`contracted` and, for pieces between different states, their Hermitian conjugates from the other order.
+
+    Coefficients of coupling have c(p', p) = (-1)^(N'-N) c(p, p').
+    """
+    found = contracted(up, low, pieces, representation)
+    between = [piece for piece in pieces if piece.bra != piece.ket]
+    back = contracted(low, up, between, representation) if between else None
+    if back is None:
+        return found
+    turned = (-1.0) ** (up.n - low.n) * back.T
+    return turned if found is None else found + turned

@@ -33,8 +33,18 @@ def operators_by_name(constants: Constants) -> dict[str, Operators]:
     >>> operators_by_name(Constants(A=9.0, B=3.0, C=2.0))["C"]
     {(1, 0, 0): 0.5, (0, 1, 0): -0.5, (0, 0, 1): -0.25}
     """
+    return {name: operators_of_name(constants, name) for name in constants.values}
+
+
+def operators_of_name(constants: Constants, name: str) -> Operators:
+    """∂H/∂c of one name of the vocabulary that a set of constants has, whether or not it is in the set.
+
+    >>> from rotor.tops.constants import Constants
+    >>> operators_of_name(Constants(A=9.0, B=3.0, C=2.0, reduction="A"), "DeltaJ")
+    {(2, 0, 0): -1.0}
+    """
     table = _rigid_terms(constants) | distortion_terms(constants.kind, constants.reduction)
-    return {name: table[name] if name in table else {_powers(name): 1.0} for name in constants.values}
+    return table[name] if name in table else {_powers(name): 1.0}
 
 
 def _powers(name: str) -> Powers:
