@@ -10,13 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from concurrent.futures import Executor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.basis import WangBlock, ka_kc, wang_blocks
+from rotor.quantum.basis import WangBlock, limited, names_of, wang_blocks
+from rotor.quantum.effect import k_limits_of
 from rotor.quantum.effects.watson import JMatrix, block_bands, scalar_energy
 from rotor.quantum.j_operators import Complexes, JOperator, between_blocks
 from rotor.quantum.levels import Levels, weights_of_levels
@@ -67,6 +68,7 @@ class Model:
     states: dict[int, Operators]
     couplings: tuple[tuple[float, Coupling], ...]
     representation: str
+    limits: dict[int, tuple[int, int]] = field(default_factory=dict)
 
 
 def model_of(top: Top, effects: tuple[QuantumEffect, ...], operators: Operators, representation: str) -> Model:
@@ -86,7 +88,7 @@ def model_of(top: Top, effects: tuple[QuantumEffect, ...], operators: Operators,
         for v in (coupling.bra, coupling.ket):
             if v not in states:
                 raise ValueError(f"coupling {coupling.name}: state {v} is not defined; known are {sorted(states)}")
-    return Model(states, tuple(couplings), representation)
+    return Model(states, tuple(couplings), representation, k_limits_of(top, effects))
 
 
 def _own_coupling(top: Top, effect: QuantumEffect, name: str) -> Coupling:
@@ -169,7 +171,7 @@ def _placed(solved: Iterator[CoupledBlock]) -> Iterator[CoupledBlock]:
 
 def solve_coupled(model: Model, j: int) -> list[CoupledBlock]:
     """The coupled blocks of one J."""
-    vertices = [(v, basis) for v in sorted(model.states) for basis in wang_blocks(j, model.representation)]
+    vertices = [(v, basis) for v in sorted(model.states) for basis in _blocks_of_state(model, v, j)]
     edges = _edges(model, vertices, j)
     diagonal = {v: JMatrix(operators, j) for v, operators in model.states.items()}
     scalars = {v: scalar_energy(operators, j) for v, operators in model.states.items()}
@@ -185,8 +187,13 @@ def solve_coupled(model: Model, j: int) -> list[CoupledBlock]:
             for b, k in enumerate(members):
                 if (i, k) in edges:
                     matrix[parts[a].place, parts[b].place] += edges[i, k]
-        out.append(_solved(j, parts, matrix, zero))
+        out.append(_solved(j, parts, matrix, zero, model.representation))
     return out
+
+
+def _blocks_of_state(model: Model, v: int, j: int) -> list[WangBlock]:
+    whole = wang_blocks(j, model.representation)
+    return [part for b in whole if (part := limited(b, *model.limits[v]))] if v in model.limits else whole
 
 
 def _edges(model: Model, vertices: list[tuple[int, WangBlock]], j: int) -> dict[tuple[int, int], Floats]:
@@ -242,13 +249,15 @@ def _dense(bands: list[Floats]) -> Floats:
     return np.asarray(matrix)
 
 
-def _solved(j: int, parts: tuple[Part, ...], matrix: Floats, zero: float) -> CoupledBlock:
+def _solved(
+    j: int, parts: tuple[Part, ...], matrix: Floats, zero: float, representation: str
+) -> CoupledBlock:
     if not np.isfinite(matrix).all():
         raise ValueError("a block of the Hamiltonian overflows: J max is too high for these constants")
     energies, vectors = np.linalg.eigh(matrix)
     names, functions = [], []
     for part in parts:
-        ka, kc = ka_kc(j, part.basis.species, part.basis.size)
+        ka, kc = names_of(part.basis, representation)
         names.append(np.stack([np.full_like(ka, part.v), ka, kc], axis=1))
         functions.append(np.linalg.eigh(matrix[part.place, part.place]).eigenvectors.T @ vectors[part.place])
     overlaps = np.concatenate(functions) ** 2

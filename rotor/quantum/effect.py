@@ -80,6 +80,10 @@ class QuantumEffect(ABC):
         """What connects states of different v."""
         return ()
 
+    def k_limits(self, top: Top) -> dict[int, tuple[int, int]]:
+        """The least and the largest K of states v whose basis does not have all of them, such as K = 1 of a Π state."""
+        return {}
+
     def dipoles(self, top: Top) -> dict[tuple[int, int], tuple[float, float, float]]:
         """(μa, μb, μc) in debye by pairs of states (v', v): of the effect's states, and between states."""
         return {}
@@ -108,6 +112,11 @@ def effect_sizes(
     sizes = [EffectSize(effect.name or type(effect).__name__, effect.size_mhz(top, j), True) for effect in present]
     sizes += [EffectSize(effect.name or type(effect).__name__, effect.size_mhz(top, j), False) for effect in absent]
     return sorted((size for size in sizes if size.size_mhz > 0), key=lambda size: -size.size_mhz)
+
+
+def k_limits_of(top: Top, effects: Iterable[QuantumEffect]) -> dict[int, tuple[int, int]]:
+    """The limits of K that the effects set, by states."""
+    return {v: limits for effect in effects for v, limits in effect.k_limits(top).items()}
 
 
 def named_effect(name: str) -> type[QuantumEffect]:

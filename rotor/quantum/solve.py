@@ -21,9 +21,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.basis import WangBlock, ka_kc, wang_blocks
+from rotor.quantum.basis import WangBlock, limited, names_of, wang_blocks
 from rotor.quantum.coupled import coupled_levels, model_of
-from rotor.quantum.effect import QuantumEffect
+from rotor.quantum.effect import QuantumEffect, k_limits_of
 from rotor.quantum.effects.watson import SEMI_RIGID, JMatrix, block_bands, scalar_energy
 from rotor.quantum.levels import Levels, SolvedBlock, weights_of_levels
 from rotor.quantum.spherical_top import DIMENSION, is_cubic, scalar_and_tensor, tensor_eigenvalues
@@ -112,14 +112,14 @@ def solve_rotation(
 
     in_blocks: solve symmetric tops in Wang blocks too, so that the levels have eigenvectors.
     """
-    operators = hamiltonian(top, effects)
+    operators, limits = hamiltonian(top, effects), k_limits_of(top, effects)
     if top.kind != "linear":
         representation = representation_of(top)
         model = model_of(top, effects, operators, representation)
         if len(model.states) > 1 or model.couplings:
             return coupled_levels(top, effects, model, jmin, jmax, executor)
-        if top.kind == "asymmetric" or in_blocks or not _closed_form_holds(top.kind, operators):
-            return _in_wang_blocks(top, effects, operators, jmin, jmax, vectors, executor)
+        if top.kind == "asymmetric" or in_blocks or limits or not _closed_form_holds(top.kind, operators):
+            return _in_wang_blocks(top, effects, operators, jmin, jmax, vectors, executor, limits.get(0))
     if top.kind in ("prolate", "oblate"):
         return _symmetric(top, effects, operators, jmin, jmax)
     if top.kind == "spherical":
@@ -226,13 +226,14 @@ def _in_wang_blocks(
     jmax: int,
     vectors: bool,
     executor: Executor | None,
+    limits: tuple[int, int] | None = None,
 ) -> Levels:
     representation = representation_of(top)
-    pieces = [(operators, j, representation, vectors) for j in range(jmin, jmax + 1)]
+    pieces = [(operators, j, representation, vectors, limits) for j in range(jmin, jmax + 1)]
     solved = executor.map(solve_j, *zip(*pieces, strict=True)) if executor else (solve_j(*piece) for piece in pieces)
     blocks = tuple(_placed(block for of_one_j in solved for block in of_one_j))
 
-    labels = [ka_kc(b.basis.j, b.basis.species, b.basis.size) for b in blocks]
+    labels = [names_of(b.basis, representation) for b in blocks]
     sizes = [b.basis.size for b in blocks]
     j = np.repeat([b.basis.j for b in blocks], sizes)
     quanta = {"j": j, "ka": np.concatenate([ka for ka, _ in labels]), "kc": np.concatenate([kc for _, kc in labels])}
@@ -267,12 +268,13 @@ def _placed(solved: Iterator[tuple[WangBlock, Floats, Floats]]) -> Iterator[Solv
 
 
 def solve_j(
-    operators: Operators, j: int, representation: str, vectors: bool = True
+    operators: Operators, j: int, representation: str, vectors: bool = True, limits: tuple[int, int] | None = None
 ) -> list[tuple[WangBlock, Floats, Floats]]:
-    """The Wang blocks of one J solved: (block, energies in MHz, eigenvectors) in the order ee, eo, oe, oo."""
+    """The Wang blocks of one J solved: (block, energies in MHz, eigenvectors) in the order ee, eo, oe, oo; K within `limits`."""
     scalar, of_j = scalar_energy(operators, j), JMatrix(operators, j)
     out = []
-    for block in wang_blocks(j, representation):
+    whole = wang_blocks(j, representation)
+    for block in whole if limits is None else [part for b in whole if (part := limited(b, *limits))]:
         energies, states = diagonalise(block_bands(of_j, block), vectors)
         out.append((block, energies + scalar, states))
     return out

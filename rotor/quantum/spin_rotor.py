@@ -14,8 +14,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.basis import ka_kc
+from rotor.quantum.basis import names_of
 from rotor.quantum.coupled import CoupledBlock
+from rotor.quantum.effect import k_limits_of
 from rotor.quantum.levels import SolvedBlock
 from rotor.quantum.solve import hamiltonian, solve_rotation
 from rotor.quantum.spin_operators import EVERY_STATE, AxialState, Basis, Rotor, SpinTerm, is_axial, summed
@@ -32,13 +33,7 @@ class RotorPart(NamedTuple):
     v: int
     basis: Basis
     place: slice
-
-    @property
-    def names(self) -> Ints:
-        """Ka and Kc of the functions in order of energy, (size, 2); K and 0 of |N K⟩."""
-        if isinstance(self.basis, AxialState):
-            return np.array([[self.basis.axial_k, 0]])
-        return np.stack(ka_kc(self.basis.j, self.basis.species, self.basis.size), axis=1)
+    names: Ints  # Ka and Kc of the functions in order of energy, (size, 2); K and 0 of |N K⟩
 
 
 class RotorBlock(NamedTuple):
@@ -87,12 +82,15 @@ def solved_rotor(
         rows = zip(levels.rotational.tolist(), levels.quanta["k"].tolist(), levels.energy_mhz.tolist(), strict=True)
         return [_axial_block(n, k, e) for n, k, e in rows], "Ir" if top.kind == "prolate" else "IIIr"
     levels = solve_rotation(top, effects, nmin, nmax, True, executor, in_blocks=True)
-    return [_rotor_block(block) for block in levels.blocks], str(levels.representation)
+    representation = str(levels.representation)
+    return [_rotor_block(block, representation) for block in levels.blocks], representation
 
 
 def _all_axial(top: Top, effects: tuple[QuantumEffect, ...], terms: Terms) -> bool:
     axis = "a" if top.kind == "prolate" else "c"
-    if any(n for _, _, n in hamiltonian(top, effects)) or not all(is_axial(term.rotor, axis) for _, term in terms):
+    if k_limits_of(top, effects) or any(n for _, _, n in hamiltonian(top, effects)):
+        return False
+    if not all(is_axial(term.rotor, axis) for _, term in terms):
         return False
     own = (effect.j_operator(top, name, 1, "Ir") for effect in effects for name in effect.parameters(top))
     states = any(effect.states(top) or effect.couplings(top) for effect in effects)
@@ -100,15 +98,17 @@ def _all_axial(top: Top, effects: tuple[QuantumEffect, ...], terms: Terms) -> bo
 
 
 def _axial_block(n: int, k: int, energy_mhz: float) -> RotorBlock:
-    return RotorBlock(n, (RotorPart(0, AxialState(n, k), slice(0, 1)),), np.array([energy_mhz]), np.ones((1, 1)))
+    part = RotorPart(0, AxialState(n, k), slice(0, 1), np.array([[k, 0]]))
+    return RotorBlock(n, (part,), np.array([energy_mhz]), np.ones((1, 1)))
 
 
-def _rotor_block(block: SolvedBlock | CoupledBlock) -> RotorBlock:
+def _rotor_block(block: SolvedBlock | CoupledBlock, representation: str) -> RotorBlock:
     if isinstance(block, CoupledBlock):
-        parts = tuple(RotorPart(part.v, part.basis, part.place) for part in block.parts)
-        return RotorBlock(block.j, parts, block.energies_mhz, block.vectors)
-    part = RotorPart(0, block.basis, slice(0, block.basis.size))
-    return RotorBlock(block.basis.j, (part,), block.energies_mhz, block.vectors)
+        n, where = block.j, [(part.v, part.basis, part.place) for part in block.parts]
+    else:
+        n, where = block.basis.j, [(0, block.basis, slice(0, block.basis.size))]
+    parts = (RotorPart(v, basis, place, np.stack(names_of(basis, representation), axis=1)) for v, basis, place in where)
+    return RotorBlock(n, tuple(parts), block.energies_mhz, block.vectors)
 
 
 def valued_terms(top: Top, effects: Iterable[QuantumEffect]) -> Terms:
