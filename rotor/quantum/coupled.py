@@ -249,9 +249,7 @@ def _dense(bands: list[Floats]) -> Floats:
     return np.asarray(matrix)
 
 
-def _solved(
-    j: int, parts: tuple[Part, ...], matrix: Floats, zero: float, representation: str
-) -> CoupledBlock:
+def _solved(j: int, parts: tuple[Part, ...], matrix: Floats, zero: float, representation: str) -> CoupledBlock:
     if not np.isfinite(matrix).all():
         raise ValueError("a block of the Hamiltonian overflows: J max is too high for these constants")
     energies, vectors = np.linalg.eigh(matrix)

@@ -60,7 +60,7 @@ def level_derivatives(top: Top, levels: Levels, names: Sequence[str] | None = No
     if "f" in levels.quanta:
         from rotor.quantum.spins import spin_derivatives
 
-        return spin_derivatives(top, levels, names, rows)
+        return spin_derivatives(top, levels, names, np.asarray(rows, dtype=np.int64))
     if "irrep" in levels.quanta:
         return _of_spherical(top, levels, names, rows)
     if any(isinstance(block, CoupledBlock) for block in levels.blocks):

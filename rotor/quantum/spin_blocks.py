@@ -41,12 +41,20 @@ if TYPE_CHECKING:
 
 
 class SpinPart(NamedTuple):
-    """The states of the solved block number `index` with every pattern (p, 1 + spins) of its N: pattern by pattern."""
+    """The states of the solved block `number` with every pattern of its N, pattern by pattern.
 
-    index: int
+    patterns: the rows of these patterns among those of the F, which are in the order of N.
+    """
+
+    number: int
     rotor: RotorBlock
-    patterns: Ints
+    patterns: slice
     place: slice
+
+    @property
+    def repeats(self) -> int:
+        """Number of patterns."""
+        return int(self.patterns.stop - self.patterns.start)
 
 
 @dataclass(frozen=True)
@@ -62,11 +70,13 @@ class Shared:
 class SpinBlock:
     """States of one F solved together: energies (n,) in MHz, rising, and eigenvectors (functions, n) over the parts.
 
+    patterns: all coupling patterns of the F, doubled.
     labels: (n, columns) v, Ka (K of an axial top), Kc, then the doubled pattern N, J ... F of every state. mixing: (n,) the share
     of the sub-block that names it. start: row of the first state.
     """
 
     twice_f: int
+    patterns: Ints
     parts: tuple[SpinPart, ...]
     energies_mhz: Floats
     vectors: Floats
@@ -92,7 +102,7 @@ def plan_of(top: Top, effects: tuple[QuantumEffect, ...], nmin: int, nmax: int, 
     channels = channels_of(terms, scheme)
     operators = {}
     for i, k in _near(blocks):
-        if found := _operators(blocks[i], blocks[k], channels, representation):
+        if found := operators_between(blocks[i], blocks[k], channels, representation):
             operators[i, k] = found
     return Plan(Shared(scheme, representation), blocks, operators, _families(len(blocks), operators))
 
@@ -106,8 +116,13 @@ def _near(blocks: list[RotorBlock]) -> Iterator[tuple[int, int]]:
         yield from ((i, k) for n in range(block.n - 2, block.n + 1) for k in by_n.get(n, ()) if k <= i)
 
 
-def _operators(up: RotorBlock, low: RotorBlock, channels: Channels, representation: str) -> dict[Channel, Floats]:
+def operators_between(
+    up: RotorBlock, low: RotorBlock, channels: Channels, representation: str
+) -> dict[Channel, Floats]:
     """Σ c ⟨r'|X|r⟩ of every channel that acts."""
+    bases = up.parts[0].basis, low.parts[0].basis
+    if isinstance(bases[0], AxialState) and isinstance(bases[1], AxialState) and bases[0].axial_k != bases[1].axial_k:
+        return {}
     acting = [channel for channel in channels if abs(up.n - low.n) <= channel.rank <= up.n + low.n]
     found = {channel: in_both_orders(up, low, channels[channel], representation) for channel in acting}
     return {channel: operator for channel, operator in found.items() if operator is not None}
@@ -135,72 +150,77 @@ def _families(count: int, pairs: Iterable[tuple[int, int]]) -> list[list[int]]:
 def solve_f(plan: Plan, twice_f: int) -> list[SpinBlock]:
     """The blocks of one F."""
     every = patterns(plan.shared.scheme.twice, twice_f)
-    by_n = {int(n) // 2: every[every[:, 0] == n] for n in np.unique(every[:, 0])}
-    known: dict[tuple[Channel, int, int], Floats] = {}
+    found, first = np.unique(every[:, 0], return_index=True)
+    stops = [*first[1:].tolist(), len(every)]
+    by_n = {n // 2: slice(a, b) for n, a, b in zip(found.tolist(), first.tolist(), stops, strict=True)}
+    acting = {channel for operators in plan.operators.values() for channel in operators}
+    known = {channel: coefficients_of(plan.shared.scheme, channel, every) for channel in acting}
     out = []
     for family in plan.families:
         members = [i for i in family if plan.blocks[i].n in by_n]
         if members:
-            out.append(_solved(plan, twice_f, _parts(plan, members, by_n), known))
+            out.append(_solved(plan, twice_f, every, _parts(plan, members, by_n), known))
     return out
 
 
-def _parts(plan: Plan, members: list[int], by_n: dict[int, Ints]) -> tuple[SpinPart, ...]:
+def _parts(plan: Plan, members: list[int], by_n: dict[int, slice]) -> tuple[SpinPart, ...]:
     parts, start = [], 0
     for i in members:
         block = plan.blocks[i]
-        stop = start + len(by_n[block.n]) * len(block.energies_mhz)
-        parts.append(SpinPart(i, block, by_n[block.n], slice(start, stop)))
+        rows = by_n[block.n]
+        stop = start + (rows.stop - rows.start) * len(block.energies_mhz)
+        parts.append(SpinPart(i, block, rows, slice(start, stop)))
         start = stop
     return tuple(parts)
 
 
 def _solved(
-    plan: Plan, twice_f: int, parts: tuple[SpinPart, ...], known: dict[tuple[Channel, int, int], Floats]
+    plan: Plan, twice_f: int, every: Ints, parts: tuple[SpinPart, ...], known: dict[Channel, Floats]
 ) -> SpinBlock:
     zero = float(parts[0].rotor.energies_mhz[0])  # taken out of the matrix for the sake of digits
-    diagonal = [np.tile(part.rotor.energies_mhz - zero, len(part.patterns)) for part in parts]
+    diagonal = [np.tile(part.rotor.energies_mhz - zero, part.repeats) for part in parts]
     matrix = np.diag(np.concatenate(diagonal))
     for a, up in enumerate(parts):
         for low in parts[: a + 1]:
-            for channel, operator in plan.operators.get((up.index, low.index), {}).items():
-                c = _coefficients(plan.shared.scheme, channel, up, low, known)
-                matrix[up.place, low.place] += np.kron(c, operator)
+            for channel, operator in plan.operators.get((up.number, low.number), {}).items():
+                matrix[up.place, low.place] += product(known[channel][up.patterns, low.patterns], operator)
     if not np.isfinite(matrix).all():
         raise ValueError("a block of the Hamiltonian overflows: N max is too high for these constants")
     energies, vectors = np.linalg.eigh(matrix)  # reads the lower triangle
-    labels, mixing = _labels(parts, vectors)
-    return SpinBlock(twice_f, parts, energies + zero, vectors, labels, mixing, plan.shared)
+    labels, mixing = _labels(parts, every, vectors)
+    return SpinBlock(twice_f, every, parts, energies + zero, vectors, labels, mixing, plan.shared)
 
 
-def _coefficients(
-    scheme: Scheme, channel: Channel, up: SpinPart, low: SpinPart, known: dict[tuple[Channel, int, int], Floats]
-) -> Floats:
-    key = (channel, up.rotor.n, low.rotor.n)
-    if key not in known:
-        found = coefficients(scheme.twice, channel.acting, channel.rank, up.patterns, low.patterns)
-        if channel.ns:
-            of_n = [(part.rotor.n * (part.rotor.n + 1.0)) ** channel.n2 for part in (up, low)]
-            bra, ket = (
-                x * n_dot_s(part.patterns, scheme.twice[0]) ** channel.ns for x, part in zip(of_n, (up, low), strict=True)
-            )
-            found = found * (bra[:, None] + ket) / 2
-        known[key] = found
-    return known[key]
+def product(left: Floats, right: Floats) -> Floats:
+    """The Kronecker product of two matrices."""
+    rows, columns = left.shape[0] * right.shape[0], left.shape[1] * right.shape[1]
+    return (left[:, None, :, None] * right[None, :, None, :]).reshape(rows, columns)
 
 
-def _labels(parts: tuple[SpinPart, ...], vectors: Floats) -> tuple[Ints, Floats]:
+def coefficients_of(scheme: Scheme, channel: Channel, every: Ints) -> Floats:
+    """c(p', p) of a channel between all patterns of an F, with its powers of N·S."""
+    found = coefficients(scheme.twice, channel.acting, channel.rank, every, every)
+    if not channel.ns:
+        return found
+    n = every[:, 0] / 2.0
+    of_each = (n * (n + 1)) ** channel.n2 * n_dot_s(every, scheme.twice[0]) ** channel.ns
+    return np.asarray(found * (of_each[:, None] + of_each) / 2)
+
+
+def _labels(parts: tuple[SpinPart, ...], every: Ints, vectors: Floats) -> tuple[Ints, Floats]:
     """Names (n, 3 + pattern) of the states of a block, energies rising, and the shares of the sub-blocks that give them."""
     shares: list[Floats] = []
     names: list[Ints] = []
     for part in parts:
         states = len(part.rotor.energies_mhz)
-        rows = vectors[part.place].reshape(len(part.patterns), states, -1)
+        rows = vectors[part.place].reshape(part.repeats, states, -1)
         for own in part.rotor.parts:
-            inside = rows if len(part.rotor.parts) == 1 else np.einsum("kr,prn->pkn", part.rotor.vectors[own.place], rows)
+            inside = (
+                rows if len(part.rotor.parts) == 1 else np.einsum("kr,prn->pkn", part.rotor.vectors[own.place], rows)
+            )
             shares += list((inside**2).sum(axis=1))
             of_k = np.column_stack([np.full(len(own.names), own.v), own.names])
-            names += [np.column_stack([of_k, np.tile(pattern, (len(of_k), 1))]) for pattern in part.patterns]
+            names += [np.column_stack([of_k, np.tile(pattern, (len(of_k), 1))]) for pattern in every[part.patterns]]
     table = np.array(shares)
     of_state = assigned(table, np.array([len(own) for own in names]))
     labels = np.empty((vectors.shape[1], names[0].shape[1]), dtype=np.int64)

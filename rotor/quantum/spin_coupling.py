@@ -25,7 +25,7 @@ def patterns(spins: tuple[int, ...], f: int) -> Ints:
     >>> patterns((2,), 2).tolist()  # I = 1, F = 1: N = 0, 1, 2
     [[0, 2], [2, 2], [4, 2]]
     """
-    found = [(f,)]
+    found: list[tuple[int, ...]] = [(f,)]
     for spin in reversed(spins):
         found = [(j, *rest) for rest in found for j in range(abs(rest[0] - spin), rest[0] + spin + 1, 2)]
     whole = sorted(pattern for pattern in found if pattern[0] % 2 == 0)

@@ -69,7 +69,11 @@ def tensor_elements(up: Basis, low: Basis, tensor: BodyTensor | None) -> Floats 
         if abs(q) > tensor.rank or not abs(up.j - low.j) <= tensor.rank <= up.j + low.j:
             return None
         part = tensor.components[tensor.rank + q]
-        return (abs(part) if q else part.real) * coupling(low.j, up.j, tensor.rank, q, [low.axial_k])[:, None] if part else None
+        return (
+            (abs(part) if q else part.real) * coupling(low.j, up.j, tensor.rank, q, [low.axial_k])[:, None]
+            if part
+            else None
+        )
     assert isinstance(up, WangBlock)
     assert isinstance(low, WangBlock)
     return None if tensor.between(up, low) is None else block_elements(up, low, tensor)
@@ -173,7 +177,11 @@ def is_axial(rotor: Rotor, axis: str) -> bool:
         return all(n == 0 for (_, _, n), _ in rotor.operators)
     c = np.array(rotor.components, dtype=float)
     across = (1, 2) if axis == "a" else (0, 1)
-    return c.ndim == 2 and bool((c == np.diag(np.diag(c))).all()) and bool(c[across[0], across[0]] == c[across[1], across[1]])
+    return (
+        c.ndim == 2
+        and bool((c == np.diag(np.diag(c))).all())
+        and bool(c[across[0], across[0]] == c[across[1], across[1]])
+    )
 
 
 @dataclass(frozen=True)
@@ -202,7 +210,9 @@ class SpinTerm:
                 f"{self.name}: {len(self.spins)} spins {self.spins} cannot close an operator of rank {self.rotor.rank}"
             )
         if self.rotor.odd and self.bra == self.ket:
-            raise ValueError(f"{self.name}: time reversal changes its sign; such an operator connects different states only")
+            raise ValueError(
+                f"{self.name}: time reversal changes its sign; such an operator connects different states only"
+            )
 
 
 def summed(weighted: Iterable[tuple[float, Rotor]]) -> list[tuple[float, Rotor]]:

@@ -24,7 +24,16 @@ if TYPE_CHECKING:
     from rotor.quantum.spin_blocks import SpinBlock
     from rotor.tops.top import Top
 
-__all__ = ["Scheme", "Spin", "SpinTerm", "scheme_of", "spin_amplitudes", "spin_blocks_connected", "spin_derivatives", "spin_levels"]
+__all__ = [
+    "Scheme",
+    "Spin",
+    "SpinTerm",
+    "scheme_of",
+    "spin_amplitudes",
+    "spin_blocks_connected",
+    "spin_derivatives",
+    "spin_levels",
+]
 
 
 @dataclass(frozen=True)

@@ -37,26 +37,30 @@ class CodedLine(NamedTuple):
 def coded_lines(parameters: Iterable[Parameter], states: int, oblate: bool) -> list[CodedLine]:
     """The parameter lines of a file with so many states; ValueError, naming the line, for what does not compute.
 
-    A parameter of value zero does nothing and is not looked at. Lines of states that do not exist (99, 98 in a file with
-    more than nine) are left out, as SPFIT leaves them.
+    A parameter of value zero does nothing and is not looked at, nor is one of a state and 9 (99, 999), which SPFIT takes for a
+    place holder.
     """
     wild, axes = 10 ** (1 if states <= 9 else 2 if states <= 99 else 3) - 1, AXES["IIIl" if oblate else "Ir"]
     found: list[CodedLine] = []
     for place, parameter in enumerate(parameters, 1):
         digits = split_code(parameter.code, states)
         low, high = sorted((digits.v1, digits.v2))
-        if high >= states and not low == high == wild:
-            continue
-        if parameter.value == 0.0:
+        if parameter.value == 0.0 or (high == wild and low != wild):
             continue
         label = f" /{parameter.label}" if parameter.label else ""
         try:
+            if states <= high != wild:
+                raise ValueError(f"state {high} does not exist, NVIB = {states} counts from 0")
             operator = operator_of(digits, axes)
             if operator.odd and low == high:
-                raise ValueError("time reversal changes the sign of the operator, so that it can connect different states only")
+                raise ValueError(
+                    "time reversal changes the sign of the operator, so that it can connect different states only"
+                )
         except ValueError as error:
             raise ValueError(f"parameter {parameter.code}{label}: {error}") from None
-        found.append(CodedLine(f"{parameter.code}#{place}", parameter.value, operator, None if low == wild else (low, high)))
+        found.append(
+            CodedLine(f"{parameter.code}#{place}", parameter.value, operator, None if low == wild else (low, high))
+        )
     return found
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rotor import units
 from rotor.arrays import Floats, Ints
@@ -17,6 +18,7 @@ from rotor.formats.spcat.catalogue import Catalogue
 from rotor.formats.spcat.egy import LevelList
 from rotor.formats.spcat.fields import BLANK
 from rotor.formats.spcat.file_model import Group
+from rotor.formats.spcat.int_file import Request
 from rotor.formats.spcat.par import ParameterFile
 from rotor.formats.spcat.states import is_odd
 from rotor.quantum.levels import Levels
@@ -141,39 +143,63 @@ class GroupLines:
     lower: Ints
 
 
-def lines_of(group: Group, levels: Levels, form: Format, temperature_k: float, q: float) -> GroupLines:
-    """Every line of a group with its intensity in nm² MHz, that of one component."""
+_COLUMNS = ("frequency_mhz", "intensity", "energy_lower_mhz", "g_upper", "upper", "lower")
+
+
+def transitions_of(group: Group, levels: Levels) -> Transitions:
+    """The transitions between levels of a group that exist."""
     found = all_transitions(levels, dict(group.effect.moments))
     exists = (levels.weight[found.lower] > 0) & (levels.weight[found.upper] > 0)
-    found = Transitions(*(getattr(found, name)[exists] for name in ("frequency_mhz", "strength_debye2", "upper", "lower")))
-    pair = levels.components[found.upper], levels.components[found.lower]
-    count = np.maximum(*pair)
+    if exists.all():
+        return found
+    return Transitions(
+        *(getattr(found, name)[exists] for name in ("frequency_mhz", "strength_debye2", "upper", "lower"))
+    )
+
+
+LEAST_MHZ = 0.00005  # a line that would print as 0.0000 is not in the program's files
+_STR_SCALE_MHZ = 300_000.0  # STR1 counts (ν/300 GHz)²
+
+
+def within(request: Request, frequency_mhz: Floats, intensity: Floats) -> NDArray[np.bool_]:
+    """Which lines are below FQLIM and stronger than 10^STR0 + 10^STR1 (ν/300 GHz)² nm² MHz."""
+    least = 10.0**request.str0 + 10.0**request.str1 * (frequency_mhz / _STR_SCALE_MHZ) ** 2
+    limits = (frequency_mhz > LEAST_MHZ) & (frequency_mhz < request.fqlim_ghz * 1e3)
+    return np.asarray(limits & (intensity > least))
+
+
+def lines_of(group: Group, levels: Levels, found: Transitions, form: Format, request: Request, q: float) -> GroupLines:
+    """The lines of a group within the limits of an .int file, with intensities in nm² MHz, those of one component."""
+    count = np.maximum(levels.components[found.upper], levels.components[found.lower])
     weight = (levels.weight // levels.components)[found.lower]
-    energy = levels.energy_mhz[found.lower]
-    kt = temperature_k * units.MHZ_PER_K
+    energy, kt = levels.energy_mhz[found.lower], request.temperature_k * units.MHZ_PER_K
     below = np.exp(-energy / kt) * -np.expm1(-found.frequency_mhz / kt)
     intensity = LGINT_NM2_MHZ / q * found.frequency_mhz * found.strength_debye2 / count * weight * below
-    g = levels.multiplicity[found.upper] * weight
-    columns = (found.frequency_mhz, intensity, energy, g)
+    kept = np.flatnonzero(within(request, found.frequency_mhz, intensity))
+    up, low = found.upper[kept], found.lower[kept]
+    columns = (found.frequency_mhz[kept], intensity[kept], energy[kept], levels.multiplicity[up] * weight[kept])
+    pair = levels.components[up], levels.components[low]
+    count = np.maximum(*pair)
     plus, minus = (quanta_of(group, levels, form, negative) for negative in (False, True))
     twice = np.flatnonzero((pair[0] == 2) & (pair[1] == 2))
     rest = np.flatnonzero(count == 1)
     mixed = np.flatnonzero((count == 2) & (np.minimum(*pair) == 1))
     pieces = [
-        (rest, plus[found.upper[rest]], plus[found.lower[rest]]),
-        (twice, minus[found.upper[twice]], plus[found.lower[twice]]),
-        (twice, plus[found.upper[twice]], minus[found.lower[twice]]),
-        (mixed, plus[found.upper[mixed]], plus[found.lower[mixed]]),
-        (mixed, minus[found.upper[mixed]], minus[found.lower[mixed]]),
+        (rest, plus[up[rest]], plus[low[rest]]),
+        (twice, minus[up[twice]], plus[low[twice]]),
+        (twice, plus[up[twice]], minus[low[twice]]),
+        (mixed, plus[up[mixed]], plus[low[mixed]]),
+        (mixed, minus[up[mixed]], minus[low[mixed]]),
     ]
     index = np.concatenate([piece[0] for piece in pieces])
     upper, lower = (np.concatenate([piece[i] for piece in pieces]) for i in (1, 2))
-    return GroupLines(*(column[index] for column in columns), upper, lower)
+    frequency, strength, energy, g = (column[index] for column in columns)
+    return GroupLines(frequency, strength, energy, g, upper, lower)
 
 
 def as_catalogue(lines: list[tuple[GroupLines, int]], form: Format, tag: int, dr: int) -> Catalogue:
     """Lines of all groups, each with its QNFMT, in order of frequency."""
-    joined = {name: np.concatenate([getattr(each, name) for each, _ in lines]) for name in GroupLines.__dataclass_fields__}
+    joined = {name: np.concatenate([getattr(each, name) for each, _ in lines]) for name in _COLUMNS}
     qnfmt = np.concatenate([np.full(len(each.frequency_mhz), code) for each, code in lines])
     order = np.argsort(joined["frequency_mhz"], kind="stable")
     width = max(6, form.width)

@@ -50,7 +50,9 @@ class Group:
             every = range(max(twice_f[0], sum(self.spins) % 2), twice_f[1] + 1, 2)
             levels = levels_of_f(self.top, (self.effect,), every, None, executor)
         else:
-            levels = solve_levels(self.top, twice_f[1] // 2, jmin=twice_f[0] // 2, effects=(self.effect,), executor=executor)
+            levels = solve_levels(
+                self.top, twice_f[1] // 2, jmin=twice_f[0] // 2, effects=(self.effect,), executor=executor
+            )
         return replace(levels, weight=self._weights(levels))
 
     def _weights(self, levels: Levels) -> Ints:
@@ -104,9 +106,15 @@ def _refuse_missing_spins(lines: list[CodedLine], states: tuple[StateOptions, ..
     for line in lines:
         needed = max((*line.operator.spins, 1 if line.operator.ns else 0), default=0)
         concerned = states if line.states is None else [states[v] for v in line.states]
-        have = max(len(state.spins) for state in concerned) if line.states is None else min(len(s.spins) for s in concerned)
+        have = (
+            max(len(state.spins) for state in concerned)
+            if line.states is None
+            else min(len(s.spins) for s in concerned)
+        )
         if needed > have:
-            raise ValueError(f"parameter {line.name.partition('#')[0]}: spin {needed} is not among the {have} that SPIND names")
+            raise ValueError(
+                f"parameter {line.name.partition('#')[0]}: spin {needed} is not among the {have} that SPIND names"
+            )
 
 
 def _group(
@@ -125,7 +133,9 @@ def _group(
     here = {v: place for place, v in enumerate(numbers)}
     moments = {(here[b], here[a]): mu for (a, b), mu in dipoles.items() if a in here and b in here}
     own = tuple(line for line in lines if line.states is None or set(line.states) <= set(here))
-    usable = tuple(line for line in own if max((*line.operator.spins, 1 if line.operator.ns else 0), default=0) <= len(spins))
+    usable = tuple(
+        line for line in own if max((*line.operator.spins, 1 if line.operator.ns else 0), default=0) <= len(spins)
+    )
     kind = _kind(states, usable, oblate, symmetric)
     limits = {} if kind in ("linear", "prolate", "oblate") else _limits(states, as_spcat)
     coupled = tuple(Spin(f"I{place}", twice) for place, twice in enumerate(spins, 1))
@@ -134,12 +144,12 @@ def _group(
     return Group(tuple(states), top, effect, oblate)
 
 
-_RIGID = {"A": 3.0, "B": 2.0, "C": 1.0}  # never used: the file's own operators are the whole Hamiltonian
+# the symmetry alone counts: the file's own operators are the whole Hamiltonian
 _STANDS_FOR = {
     ("linear", False): Constants(B=1.0), ("linear", True): Constants(B=1.0),
     ("prolate", False): Constants(A=2.0, B=1.0), ("oblate", True): Constants(B=2.0, C=1.0),
-    ("asymmetric", False): Constants(**_RIGID, representation="Ir"),
-    ("asymmetric", True): Constants(**_RIGID, representation="IIIl"),
+    ("asymmetric", False): Constants(A=3.0, B=2.0, C=1.0, representation="Ir"),
+    ("asymmetric", True): Constants(A=3.0, B=2.0, C=1.0, representation="IIIl"),
 }  # fmt: skip
 
 
@@ -147,7 +157,12 @@ def _kind(states: list[StateOptions], lines: tuple[CodedLine, ...], oblate: bool
     """linear; the symmetric kind whose axis is that of the basis, where K is good; else asymmetric."""
     alone = len(states) == 1
     plain = [powers for line in lines if line.operator.plain for powers in line.operator.plain]
-    if alone and states[0].linear and all(q == n == 0 for _, q, n in plain) and not any(line.operator.of_j for line in lines):
+    if (
+        alone
+        and states[0].linear
+        and all(q == n == 0 for _, q, n in plain)
+        and not any(line.operator.of_j for line in lines)
+    ):
         return "linear"
     rotors = [line.operator.rotor for line in lines if line.operator.rotor is not None]
     axis = "c" if oblate else "a"

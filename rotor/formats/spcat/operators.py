@@ -16,7 +16,7 @@ own levels.) Any other code is refused with its meaning.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from rotor.formats.spcat.codes import Digits
 from rotor.quantum.effects.interactions import with_powers
@@ -130,24 +130,23 @@ def plain_of_j(operators: Operators) -> OperatorOfJ:
 
 
 def _with_spins(d: Digits, spins: tuple[int, ...], axes: str) -> CodedOperator:
-    powers = {"n2": d.nsq, "nz2": d.ksq, "ns": d.ns}
+    powered = CodedOperator(spins=spins, n2=d.nsq, nz2=d.ksq, ns=d.ns)
     if not spins:
         plain = _plain(d._replace(nsq=0, ksq=0), axes)
         if d.typ in ODD or d.typ in CROSS:
             raise ValueError(f"N·S times an operator outside orthorhombic symmetry {NOT_YET}")
-        return CodedOperator(rotor=Scalar(tuple(plain.items())), **powers)
+        return replace(powered, rotor=Scalar(tuple(plain.items())))
     if len(spins) == 2 and d.typ == 0:
         if spins[0] == spins[1]:
             raise ValueError(f"I·I of one spin is a number; it {NOT_YET}")
-        return CodedOperator(rotor=Scalar(), spins=spins, **powers)
+        return replace(powered, rotor=Scalar())
     if d.typ in ODD:
         if len(spins) == 2:
             raise ValueError(f"a vector product of two spins {NOT_YET}")
         vector: Vector = tuple(float(axis == ODD[d.typ]) for axis in "abc")  # type: ignore[assignment]
-        return CodedOperator(rotor=Cosines(vector), spins=spins, odd=True, **powers)
+        return replace(powered, rotor=Cosines(vector), odd=True)
     matrix = _matrix(d.typ, axes)
-    rotor = CosinesWithN(matrix) if len(spins) == 1 else Cosines(matrix)
-    return CodedOperator(rotor=rotor, spins=spins, **powers)
+    return replace(powered, rotor=CosinesWithN(matrix) if len(spins) == 1 else Cosines(matrix))
 
 
 NOT_YET = "is read but not computed yet"

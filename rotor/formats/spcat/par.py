@@ -130,7 +130,7 @@ def _header(line: Line) -> Header:
     return Header(**values, text=line.text)
 
 
-def _options(line: Line, defaults: Options = Options()) -> Options:  # noqa: B008  immutable
+def _options(line: Line, defaults: Options = Options()) -> Options:
     """An option line; the first one sets the defaults of those that follow, but for VSYM."""
     letter = _LETTER.match(line.body)
     start = letter.end() if letter else 0

@@ -19,10 +19,11 @@ from rotor.formats.spcat.catalogue import Catalogue
 from rotor.formats.spcat.codes import is_linear
 from rotor.formats.spcat.egy import LevelList
 from rotor.formats.spcat.fields import QUANTUM_RANGE
+from rotor.formats.spcat.file_lines import LEAST_MHZ
 from rotor.formats.spcat.int_file import IntensityFile, Request, read_int
 from rotor.formats.spcat.model import FOLD, common_weight, top_of
 from rotor.formats.spcat.par import Options, ParameterFile, read_par
-from rotor.formats.spcat.predict_states import LEAST_MHZ, is_plain, predicted
+from rotor.formats.spcat.predict_states import is_plain, predicted
 from rotor.quantum.basis import wang_blocks
 from rotor.quantum.effects.watson import JMatrix, block_bands
 from rotor.quantum.levels import Levels

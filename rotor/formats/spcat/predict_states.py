@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -15,19 +16,26 @@ from rotor.arrays import Ints
 from rotor.formats.spcat.catalogue import Catalogue
 from rotor.formats.spcat.codes import constants_of, split_code
 from rotor.formats.spcat.egy import LevelList
-from rotor.formats.spcat.file_lines import Format, GroupLines, as_catalogue, as_level_list, format_of, lines_of
+from rotor.formats.spcat.file_lines import (
+    LEAST_MHZ,
+    Format,
+    as_catalogue,
+    as_level_list,
+    format_of,
+    lines_of,
+    transitions_of,
+    within,
+)
 from rotor.formats.spcat.file_model import Group, groups_of
 from rotor.formats.spcat.int_file import IntensityFile, Request
 from rotor.formats.spcat.par import ParameterFile
 from rotor.formats.spcat.states import doubled_spins
 from rotor.quantum.levels import Levels
 from rotor.spectra.lines import Lines
-from rotor.spectra.transitions import Transitions, all_transitions
+from rotor.spectra.transitions import Transitions
 from rotor.thermo import PartitionFunction
 from rotor.tops.top import Top
 
-LEAST_MHZ = 0.00005  # a line that would print as 0.0000 is not in the program's files
-_STR_SCALE_MHZ = 300_000.0  # STR1 counts (ν/300 GHz)²
 _TAIL = 1e-7  # of Q: what may lie beyond the last F
 _STEP = 8  # F that are added to Q at a time
 _LAST = 2000
@@ -40,7 +48,9 @@ def is_plain(parameters: ParameterFile, intensities: IntensityFile | None) -> bo
     if not one or first.knmin != 0 or first.iax < 0:
         return False
     digits = [split_code(parameter.code) for parameter in parameters.parameters]
-    orthorhombic = all(not (d.i1 or d.i2 or d.ns) and (d.typ < 12 or d.typ >= 80) and (d.v1, d.v2) in ((0, 0), (9, 9)) for d in digits)
+    orthorhombic = all(
+        not (d.i1 or d.i2 or d.ns) and (d.typ < 12 or d.typ >= 80) and (d.v1, d.v2) in ((0, 0), (9, 9)) for d in digits
+    )
     energies = any(not any(d[:8]) for d in digits)
     own = intensities is None or all(dipole.code in (1, 2, 3) for dipole in intensities.dipoles)
     return orthorhombic and own and not energies
@@ -55,13 +65,14 @@ def predicted(
     form = format_of(parameters, groups)
     q = summed_q(groups, request.temperature_k).q if own_q else request.qrot
     solved = [(group, group.levels(f_range(group, request))) for group in groups]
+    transitions = [transitions_of(group, levels) for group, levels in solved]
     pieces = [
-        (_within(lines_of(group, levels, form, request.temperature_k, q), request), form.qnfmt(group.spins))
-        for group, levels in solved
+        (lines_of(group, levels, found, form, request, q), form.qnfmt(group.spins))
+        for (group, levels), found in zip(solved, transitions, strict=True)
     ]
     made = as_catalogue(pieces, form, request.tag, 2 if all(s.linear for g in groups for s in g.states) else 3)
     notes = _notes(parameters, groups, request, as_spcat)
-    lines = _lines(parameters, solved, form, request, q)
+    lines = _lines(parameters, solved, transitions, form, request, q)
     return made, lines, q, as_level_list(solved, form), notes
 
 
@@ -69,12 +80,6 @@ def f_range(group: Group, request: Request) -> tuple[int, int]:
     """The doubled F from FBGN to FEND, which are rounded up."""
     half = sum(group.spins) % 2
     return max(0, 2 * request.fbgn - half), 2 * request.fend - half
-
-
-def _within(lines: GroupLines, request: Request) -> GroupLines:
-    least = 10.0**request.str0 + 10.0**request.str1 * (lines.frequency_mhz / _STR_SCALE_MHZ) ** 2
-    kept = (lines.frequency_mhz > LEAST_MHZ) & (lines.frequency_mhz < request.fqlim_ghz * 1e3) & (lines.intensity > least)
-    return GroupLines(*(getattr(lines, name)[kept] for name in GroupLines.__dataclass_fields__))
 
 
 def summed_q(groups: list[Group], temperature_k: float) -> PartitionFunction:
@@ -95,40 +100,41 @@ def summed_q(groups: list[Group], temperature_k: float) -> PartitionFunction:
                 raise ValueError(f"Q({temperature_k:g} K) needs levels beyond F = {_LAST}; give QROT")
             before = piece
         total, last = total + own, max(last, f - 1)
-    return PartitionFunction(temperature_k, total, last, _TAIL, f"summed from levels to F = {last}, relative error below {_TAIL:g}")
+    return PartitionFunction(
+        temperature_k, total, last, _TAIL, f"summed from levels to F = {last}, relative error below {_TAIL:g}"
+    )
 
 
 def _lines(
-    parameters: ParameterFile, solved: list[tuple[Group, Levels]], form: Format, request: Request, q: float
+    parameters: ParameterFile,
+    solved: list[tuple[Group, Levels]],
+    transitions: list[Transitions],
+    form: Format,
+    request: Request,
+    q: float,
 ) -> Lines:
     """The lines as this package has them: one table of levels for all groups, one line for both components of ±K."""
-    found, tables, start = [], [], 0
-    for group, levels in solved:
-        transitions = all_transitions(levels, dict(group.effect.moments))
-        exists = (levels.weight[transitions.lower] > 0) & (levels.weight[transitions.upper] > 0)
-        columns = (getattr(transitions, name)[exists] for name in ("frequency_mhz", "strength_debye2"))
-        rows = (getattr(transitions, name)[exists] + start for name in ("upper", "lower"))
-        found.append(Transitions(*columns, *rows))
-        tables.append((group, levels))
-        start += len(levels)
-    levels = _joined(tables, form)
+    starts = np.cumsum([0, *(len(levels) for _, levels in solved)])
+    levels = _joined(solved, form)
     t = request.temperature_k
     above = math.exp(levels.ground_mhz / units.MHZ_PER_K / t)  # Q counts from zero, `Lines` from the lowest level
     lines = Lines(
         top=_shown(parameters, solved[0][0]),
         levels=levels,
-        frequency_mhz=np.concatenate([each.frequency_mhz for each in found]),
-        strength_debye2=np.concatenate([each.strength_debye2 for each in found]),
-        upper=np.concatenate([each.upper for each in found]).astype(np.int32),
-        lower=np.concatenate([each.lower for each in found]).astype(np.int32),
+        frequency_mhz=np.concatenate([each.frequency_mhz for each in transitions]),
+        strength_debye2=np.concatenate([each.strength_debye2 for each in transitions]),
+        upper=np.concatenate([each.upper + start for each, start in zip(transitions, starts, strict=False)]).astype(
+            np.int32
+        ),
+        lower=np.concatenate([each.lower + start for each, start in zip(transitions, starts, strict=False)]).astype(
+            np.int32
+        ),
         temperature_k=t,
         min_lgint=request.str0,
         range_mhz=(LEAST_MHZ, request.fqlim_ghz * 1e3),
         given_partition=PartitionFunction(t, q * above, None, math.nan, "given"),
     )
-    strong = lines.intensity_nm2_mhz / levels.components[lines.lower]
-    least = 10.0**request.str0 + 10.0**request.str1 * (lines.frequency_mhz / _STR_SCALE_MHZ) ** 2
-    kept = (lines.frequency_mhz > LEAST_MHZ) & (lines.frequency_mhz < request.fqlim_ghz * 1e3) & (strong > least)
+    kept = within(request, lines.frequency_mhz, lines.intensity_nm2_mhz / levels.components[lines.lower])
     return lines.where(kept).sorted()
 
 
@@ -141,7 +147,7 @@ def _joined(tables: list[tuple[Group, Levels]], form: Format) -> Levels:
         quanta["v"] = np.concatenate([_file_numbers(group, levels) for group, levels in tables])
     for name in names:
         quanta[name] = np.concatenate([_column(levels, name, most) for _, levels in tables])
-    joined = {
+    joined: dict[str, Any] = {
         name: np.concatenate([getattr(levels, name) for _, levels in tables])
         for name in ("energy_mhz", "multiplicity", "components", "weight")
     }
@@ -156,15 +162,15 @@ def _file_numbers(group: Group, levels: Levels) -> Ints:
 
 def _column(levels: Levels, name: str, most: Levels) -> Ints:
     if name in levels.quanta:
-        return levels.quanta[name]
+        return np.asarray(levels.quanta[name])
     if name in ("n", "j"):
         return levels.rotational
     if name in ("k", "ka"):
-        return levels.quanta.get("k", np.zeros(len(levels), dtype=np.int64))
+        return np.asarray(levels.quanta.get("k", np.zeros(len(levels), dtype=np.int64)))
     if name == "kc":
-        return levels.rotational - levels.quanta.get("k", np.zeros(len(levels), dtype=np.int64))
+        return np.asarray(levels.rotational - levels.quanta.get("k", np.zeros(len(levels), dtype=np.int64)))
     total = (levels.multiplicity - 1).astype(np.int64)
-    return total if name in most.halves else total // 2
+    return np.asarray(total if name in most.halves else total // 2)
 
 
 def _shown(parameters: ParameterFile, group: Group) -> Top:

@@ -87,14 +87,20 @@ def _state(v: int, line: Options, first: Options, swapped: bool) -> StateOptions
     code, weight = divmod(abs(line.ewt), factor)
     iax = abs(line.iax)
     if iax not in (0, 1, 2, 3, *_FOLDS):
-        raise ValueError(f"IAX = {line.iax} of state {v}: weights other than by IAX 1, 2, 3, 6 or 9 are read but not computed yet")
+        raise ValueError(
+            f"IAX = {line.iax} of state {v}: weights other than by IAX 1, 2, 3, 6 or 9 are read but not computed yet"
+        )
     if code:
         raise ValueError(f"EWT = {line.ewt} of state {v}: l-doubled states are read but not computed yet")
     if line.iax < 0:
-        raise ValueError(f"IAX = {line.iax} of state {v}: the basis of a total spin of equivalent nuclei is read but not computed yet")
+        raise ValueError(
+            f"IAX = {line.iax} of state {v}: the basis of a total spin of equivalent nuclei is read but not computed yet"
+        )
     kmax = line.knmax if 0 <= line.knmax <= 359 else 359
     plus, minus = (line.wtmn, line.wtpl) if swapped else (line.wtpl, line.wtmn)
-    return StateOptions(v, doubled_spins(line.spind), line.knmin, max(kmax, line.knmin), iax, plus, minus, weight, code, line.iax < 0)
+    return StateOptions(
+        v, doubled_spins(line.spind), line.knmin, max(kmax, line.knmin), iax, plus, minus, weight, code, line.iax < 0
+    )
 
 
 def is_odd(ka: Ints, kc: Ints) -> NDArray[np.bool_]:

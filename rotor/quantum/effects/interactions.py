@@ -48,15 +48,14 @@ class InteractingStates(QuantumEffect):
     def __post_init__(self) -> None:
         names = {}
         for name, value in self.values.items():
-            of_state = state_of_constant(name)
-            names[name if of_state else parse_name(name).text] = float(value)
+            if state_of_constant(name):
+                names[name] = float(value)
+            else:
+                names[_coupling(name, parse_name(name)).name] = float(value)
         object.__setattr__(self, "values", MappingProxyType(names))
         moments = {(max(pair), min(pair)): tuple(vector) for pair, vector in self.moments.items()}
         object.__setattr__(self, "moments", MappingProxyType(moments))
         object.__setattr__(self, "weights", MappingProxyType(dict(self.weights)))
-        for name in names:
-            if not state_of_constant(name):
-                _coupling(name, parse_name(name))
 
     def __reduce__(self) -> tuple[type[Self], tuple[object, ...]]:
         return type(self), (dict(self.values), dict(self.weights), dict(self.moments))
@@ -129,7 +128,7 @@ def _coupling(name: str, parts: ParameterName) -> Coupling:
     def operator(j: int, representation: str) -> JOperator:
         return with_powers(_plain(kind, letters, j, representation), parts)
 
-    return Coupling(name, parts.states[0], parts.states[1], operator)
+    return Coupling(parts.text, parts.states[0], parts.states[1], operator)
 
 
 def _plain(kind: str, letters: str, j: int, representation: str) -> JOperator:
