@@ -49,10 +49,24 @@ def all_transitions(
         return _joined(list(_closed_form(levels, dipoles[0, 0], range_mhz, cut)))
 
     tensors = {states: body_tensor(mu, 1, levels.representation) for states, mu in dipoles.items()}
-    pairs = list(connected_pairs((block for block in levels.blocks if levels.weight[block.start] > 0), tensors))
+    blocks, some_without = _blocks_with_weight(levels)
+    pairs = list(connected_pairs(blocks, tensors))
     if cut is None and range_mhz == EVERYTHING and not any(up is low for up, low in pairs):
-        return _every_pair(pairs, tensors)
-    return _joined(list(_chosen(pairs, tensors, range_mhz, cut)))
+        found = _every_pair(pairs, tensors)
+    else:
+        found = _joined(list(_chosen(pairs, tensors, range_mhz, cut)))
+    return _rows(found, levels.weight[found.lower] > 0) if some_without else found
+
+
+def _blocks_with_weight(levels: Levels) -> tuple[list[Block], bool]:
+    """Blocks in which a level exists by its spin weight, and whether one of them also holds levels that do not."""
+    weights = [(block, levels.weight[block.start : block.start + len(block.energies_mhz)]) for block in levels.blocks]
+    with_some = [(block, weight) for block, weight in weights if (weight > 0).any()]
+    return [block for block, _ in with_some], any((weight <= 0).any() for _, weight in with_some)
+
+
+def _rows(lines: Transitions, rows: NDArray[np.bool_]) -> Transitions:
+    return Transitions(lines.frequency_mhz[rows], lines.strength_debye2[rows], lines.upper[rows], lines.lower[rows])
 
 
 def _joined(pieces: list[Transitions]) -> Transitions:
