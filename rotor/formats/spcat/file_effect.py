@@ -14,8 +14,8 @@ from rotor.formats.spcat.codes import AXES, split_code
 from rotor.formats.spcat.operators import CodedOperator, operator_of, plain_of_j
 from rotor.formats.spcat.par import Parameter
 from rotor.quantum.effect import QuantumEffect
-from rotor.quantum.spin_operators import EVERY_STATE, SpinTerm
 from rotor.quantum.spins import Spin
+from rotor.quantum.spins.operators import EVERY_STATE, SpinTerm
 from rotor.quantum.states import Coupling, State
 from rotor.tops.operators import Operators
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 from rotor.quantum.effects.spin_effect import SpinEffect, Symbol, matrix_of
-from rotor.quantum.spin_operators import CosinesWithN
+from rotor.quantum.spins.operators import CosinesWithN
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 from rotor.quantum.effects.spin_effect import TRACELESS, ParameterName, SpinEffect, Symbol, traceless_of
-from rotor.quantum.spin_operators import Cosines, Scalar
+from rotor.quantum.spins.operators import Cosines, Scalar
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top

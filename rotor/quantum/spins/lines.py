@@ -4,7 +4,7 @@ A dipole touches no spin: its element between two functions is that of the rotat
 
     ⟨r' p'‖T^K‖r p⟩ = t(p', p) ⟨r'‖T^K‖r⟩,
 
-see `spin_coupling.tensor_coefficients`. Elements of the rotation are computed once for all F.
+see `coupling.tensor_coefficients`. Elements of the rotation are computed once for all F.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ from rotor.quantum.basis import WangBlock
 from rotor.quantum.j_operators import JOperator, between_blocks
 from rotor.quantum.levels import Levels
 from rotor.quantum.reduced import Tensors, rank_of, tensor_between
-from rotor.quantum.spin_blocks import Shared, SpinBlock, SpinPart, coefficients_of, operators_between, product
-from rotor.quantum.spin_coupling import tensor_coefficients
-from rotor.quantum.spin_operators import AxialState, Scalar, tensor_elements
-from rotor.quantum.spin_rotor import Channel, RotorBlock, channels_of
+from rotor.quantum.spins.blocks import Shared, SpinBlock, SpinPart, coefficients_of, operators_between, product
+from rotor.quantum.spins.coupling import tensor_coefficients
+from rotor.quantum.spins.operators import AxialState, Scalar, tensor_elements
+from rotor.quantum.spins.rotor import Channel, RotorBlock, channels_of
 
 if TYPE_CHECKING:
     from rotor.quantum.effect import QuantumEffect

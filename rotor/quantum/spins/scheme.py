@@ -1,39 +1,15 @@
-"""Spins coupled to the rotation, N + S1 = J, J + I1 = F1, ... = F: which there are, what their sums are called, and the levels.
-
-    H = H_rot + Σ_terms (`rotor.quantum.spin_operators`)
-
-Levels are solved F by F (`spin_blocks`) over the eigenstates of the rotation (`spin_rotor`), with coefficients of coupling
-(`spin_coupling`); `spin_lines` has elements of dipoles between them, and derivatives.
-"""
+"""Which spins there are, in which order they are coupled, N + S1 = J, J + I1 = F1, ... = F, and what their sums are called."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import Executor
 from dataclasses import dataclass, field
 from itertools import accumulate
 from typing import TYPE_CHECKING
 
-from rotor.arrays import Floats, Ints
-from rotor.quantum.spin_operators import SpinTerm
-
 if TYPE_CHECKING:
     from rotor.quantum.effect import QuantumEffect
-    from rotor.quantum.levels import Levels
-    from rotor.quantum.reduced import Tensors
-    from rotor.quantum.spin_blocks import SpinBlock
     from rotor.tops.top import Top
-
-__all__ = [
-    "Scheme",
-    "Spin",
-    "SpinTerm",
-    "scheme_of",
-    "spin_amplitudes",
-    "spin_blocks_connected",
-    "spin_derivatives",
-    "spin_levels",
-]
 
 
 @dataclass(frozen=True)
@@ -101,38 +77,3 @@ def scheme_of(top: Top, effects: Sequence[QuantumEffect]) -> Scheme:
         if found.setdefault(spin.name, spin) != spin:
             raise ValueError(f"spin {spin.name}: given as {found[spin.name].twice}/2 and as {spin.twice}/2")
     return Scheme(tuple(sorted(found.values(), key=lambda spin: not spin.electron)))
-
-
-def spin_levels(
-    top: Top, effects: tuple[QuantumEffect, ...], jmin: int, jmax: int, executor: Executor | None = None
-) -> Levels:
-    """All levels of a top with spins whose label has N from `jmin` to `jmax`, by (v), n, k or ka and kc, j, f1, ... f.
-
-    Every F that such an N reaches is solved with all its N, so that nothing is left out of a block.
-    """
-    from rotor.quantum.spin_blocks import levels_of_f
-
-    total = scheme_of(top, effects).total
-    first = max(2 * jmin - total, total % 2)
-    return levels_of_f(top, effects, range(first, 2 * jmax + total + 1, 2), (jmin, jmax), executor)
-
-
-def spin_derivatives(top: Top, levels: Levels, names: Sequence[str], rows: Ints) -> Floats:
-    """∂E/∂c of levels with spins, (rows, names)."""
-    from rotor.quantum.spin_lines import derivatives
-
-    return derivatives(top, levels, names, rows)
-
-
-def spin_amplitudes(up: SpinBlock, low: SpinBlock, tensors: Tensors) -> Floats:
-    """Real reduced elements between all states of two blocks, (n_up, n_low)."""
-    from rotor.quantum.spin_lines import amplitudes
-
-    return amplitudes(up, low, tensors)
-
-
-def spin_blocks_connected(up: SpinBlock, low: SpinBlock, tensors: Tensors) -> bool:
-    """Whether the tensors have an element between two blocks."""
-    from rotor.quantum.spin_lines import connected
-
-    return connected(up, low, tensors)

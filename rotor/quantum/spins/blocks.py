@@ -23,9 +23,9 @@ import numpy as np
 from rotor.arrays import Floats, Ints
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.levels import Levels, weights_of_levels
-from rotor.quantum.spin_coupling import coefficients, n_dot_s, patterns
-from rotor.quantum.spin_operators import AxialState
-from rotor.quantum.spin_rotor import (
+from rotor.quantum.spins.coupling import coefficients, n_dot_s, patterns
+from rotor.quantum.spins.operators import AxialState
+from rotor.quantum.spins.rotor import (
     Channel,
     Channels,
     RotorBlock,
@@ -34,7 +34,7 @@ from rotor.quantum.spin_rotor import (
     solved_rotor,
     valued_terms,
 )
-from rotor.quantum.spins import Scheme, scheme_of
+from rotor.quantum.spins.scheme import Scheme, scheme_of
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
