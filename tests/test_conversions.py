@@ -12,7 +12,8 @@ from rotor.quantum import reductions as conversions
 from rotor.quantum.reductions import to_reduction, to_representation
 from rotor.quantum.solve import solve_levels
 from rotor.quantum.uncertainty import Covariance, level_errors
-from rotor.tops.constants import REPRESENTATIONS, Constants
+from rotor.tops.constants import Constants
+from rotor.tops.operators import REPRESENTATIONS
 from rotor.tops.top import Top
 
 QUARTIC = {

@@ -188,13 +188,6 @@ def test_near_symmetric_tops_refuse_the_a_reduction():
         reduced(quartic_tensor_mhz(field), np.array([9.0, 4.0, 4.0]), (1, 2, 0), "A")
 
 
-def test_axes_of_representations_are_those_of_the_hamiltonian():
-    from rotor.quantum.basis import REPRESENTATIONS
-    from rotor.tops.distortion import _AXES
-
-    assert _AXES == REPRESENTATIONS
-
-
 def test_a_semirigid_top_says_where_its_distortion_is_from():
     top = semirigid_top(force_fields.sulfur_dioxide(), reduction="A")
     assert top.constants["DeltaJ"] > 0

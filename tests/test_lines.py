@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from rotor import units
-from rotor.quantum.basis import REPRESENTATIONS
 from rotor.quantum.solve import solve_levels
 from rotor.quantum.tensors import amplitudes, body_tensor, connected_pairs
 from rotor.spectra import transitions
 from rotor.spectra.intensity import EINSTEIN_PER_MHZ3, INTENSITY_NM2_MHZ
 from rotor.spectra.lines import line_list
 from rotor.tops.constants import Constants
+from rotor.tops.operators import REPRESENTATIONS
 from rotor.tops.top import Top
 
 ABC = "A=8572 B=3640 C=2790 MHz"

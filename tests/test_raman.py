@@ -13,12 +13,12 @@ from hypothesis import strategies as st
 from slow_matrix import AXES, watson_matrix
 
 import rotor
-from rotor.quantum.basis import REPRESENTATIONS
 from rotor.quantum.solve import solve_levels
 from rotor.quantum.tensors import amplitudes, body_tensor, coupling
 from rotor.spectra.raman import anisotropy_angstrom3, band_cross_section, jmax_for_raman, raman_lines
 from rotor.spectra.raman_strengths import anisotropy_squared, raman_transitions
 from rotor.tops.constants import Constants
+from rotor.tops.operators import REPRESENTATIONS
 from rotor.tops.top import Top
 
 ROD = ((2.2, 0, 0), (0, 1.5, 0), (0, 0, 1.5))

@@ -17,14 +17,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-REPRESENTATIONS = {
-    "Ir": "bca",
-    "Il": "cba",
-    "IIr": "cab",
-    "IIl": "acb",
-    "IIIr": "abc",
-    "IIIl": "bac",
-}  # axes at x, y, z
+from rotor.tops.operators import REPRESENTATIONS as REPRESENTATIONS
+from rotor.tops.operators import axes_of
 
 _WANG = ((0, 1), (2, -1), (1, 1), (1, -1))  # E+, E-, O+, O-: lowest K and s
 
@@ -60,7 +54,7 @@ def wang_blocks(j: int, representation: str) -> list[WangBlock]:
     >>> [(b.species, b.size) for b in wang_blocks(1, "Ir")]
     [('eo', 1), ('oe', 1), ('oo', 1)]
     """
-    axes = REPRESENTATIONS[representation]
+    axes = axes_of(representation)
     sized = [(first, sign, (j - first) // 2 + 1) for first, sign in _WANG if j >= first]
     return sorted(WangBlock(j, _species(j, first, sign, axes), first, sign, size) for first, sign, size in sized)
 

@@ -16,7 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor.quantum.basis import REPRESENTATIONS, WangBlock
+from rotor.quantum.basis import WangBlock
+from rotor.tops.operators import axes_of
 
 Complexes = NDArray[np.complex128]
 
@@ -115,7 +116,7 @@ def components(j: int, representation: str) -> dict[str, JOperator]:
     up, down = raising(j), lowering(j)
     handed = -1.0 if representation.endswith("l") else 1.0
     along_x, along_y = 0.5 * (up + down), handed * 0.5j * (up - down)
-    return dict(zip(REPRESENTATIONS[representation], (along_x, along_y, j_z(j)), strict=True))
+    return dict(zip(axes_of(representation), (along_x, along_y, j_z(j)), strict=True))
 
 
 def phase(block: WangBlock) -> complex:

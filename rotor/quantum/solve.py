@@ -27,13 +27,11 @@ from rotor.quantum.effect import QuantumEffect, k_limits_of
 from rotor.quantum.effects.watson import SEMI_RIGID, JMatrix, block_bands, scalar_energy
 from rotor.quantum.levels import Levels, SolvedBlock, weights_of_levels
 from rotor.quantum.spherical_top import DIMENSION, is_cubic, scalar_and_tensor, tensor_eigenvalues
-from rotor.tops.operators import Operators
+from rotor.tops.operators import AXIAL_REPRESENTATION, Operators
 from rotor.tops.spin_weights import SpinWeights
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
-
-_AXIAL = {"prolate": "Ir", "spherical": "Ir", "oblate": "IIIr"}  # the axis of a symmetric top is z
 
 
 def hamiltonian(top: Top, effects: Sequence[QuantumEffect] = SEMI_RIGID) -> Operators:
@@ -49,7 +47,7 @@ def hamiltonian(top: Top, effects: Sequence[QuantumEffect] = SEMI_RIGID) -> Oper
 
 def representation_of(top: Top) -> str:
     """The representation in which a top is solved where no closed form serves: its own, else that with the axis at z."""
-    return _AXIAL[top.kind] if top.kind in _AXIAL else str(top.constants.representation or "Ir")
+    return AXIAL_REPRESENTATION.get(top.kind) or str(top.constants.representation or "Ir")
 
 
 def solve_levels(

@@ -34,8 +34,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rotor.arrays import Floats
-from rotor.quantum.basis import REPRESENTATIONS, WangBlock
+from rotor.quantum.basis import WangBlock
 from rotor.quantum.wigner import three_j
+from rotor.tops.operators import axes_of as axes_of
 
 if TYPE_CHECKING:
     from rotor.quantum.levels import SolvedBlock
@@ -46,17 +47,6 @@ ROUND_OFF = 1e-9  # of the largest component: how far T_-q may be from (-1)^q T_
 
 
 # Components
-
-
-def axes_of(representation: str) -> str:
-    """The principal axes at x, y, z of a representation.
-
-    >>> axes_of("IIIl")
-    'bac'
-    """
-    if representation not in REPRESENTATIONS:
-        raise ValueError(f"representation {representation!r}: known are {', '.join(REPRESENTATIONS)}")
-    return REPRESENTATIONS[representation]
 
 
 def frame_of(representation: str) -> Floats:

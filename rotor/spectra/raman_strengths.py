@@ -18,7 +18,8 @@ from rotor.arrays import Floats, Ints
 from rotor.quantum import reduced
 from rotor.quantum.basis import wang_blocks
 from rotor.quantum.levels import Block, Levels, SolvedBlock
-from rotor.quantum.tensors import amplitudes, axes_of, body_tensor, connected_pairs, coupling
+from rotor.quantum.tensors import amplitudes, body_tensor, connected_pairs, coupling
+from rotor.tops.operators import AXIAL_REPRESENTATION, axes_of
 from rotor.tops.spin_weights import SpinWeights
 
 NO_WEIGHTS = SpinWeights()
@@ -112,7 +113,7 @@ def _linear(levels: Levels, tensor: Floats) -> RamanTransitions:
 
 def _symmetric(levels: Levels, tensor: Floats, spin_weights: SpinWeights) -> RamanTransitions:
     """ΔK = 0 where the tensor has the axis of the top; else, for a top symmetric by numbers alone, as in Wang's basis."""
-    representation = "Ir" if levels.kind == "prolate" else "IIIr"
+    representation = AXIAL_REPRESENTATION[levels.kind]
     x, y, z = ("abc".index(axis) for axis in axes_of(representation))
     along = (2 * tensor[z, z] - tensor[x, x] - tensor[y, y]) / np.sqrt(6)
     if anisotropy_squared(tensor) - 1.5 * along**2 > (ROUND_OFF * np.linalg.norm(tensor)) ** 2:

@@ -16,6 +16,7 @@ from rotor.quantum.levels import Block, Levels
 from rotor.quantum.reduced import Tensors, amplitudes, connected_pairs
 from rotor.quantum.tensors import body_tensor
 from rotor.spectra.intensity import IntensityCut
+from rotor.tops.operators import FIGURE_AXIS
 
 EVERYTHING = (0.0, float("inf"))
 LONG_LIST = 1_000_000  # lines above which the compiled loop is loaded
@@ -206,7 +207,7 @@ def _split(kind: str, dipole_abc: tuple[float, float, float]) -> tuple[float, fl
     a, b, c = dipole_abc
     if kind == "linear":
         return a, 0.0
-    return (a, b * b + c * c) if kind == "prolate" else (c, a * a + b * b)
+    return (a, b * b + c * c) if FIGURE_AXIS[kind] == "a" else (c, a * a + b * b)
 
 
 def _hoenl_london(levels: Levels, delta_j: int, delta_k: int) -> tuple[NDArray[np.int64], NDArray[np.int64], Floats]:

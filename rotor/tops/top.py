@@ -18,6 +18,7 @@ from rotor.arrays import Floats
 from rotor.geometry.inertia import EQUAL_MOMENTS, LINEAR_BELOW, Body, PrincipalFrame, point_masses, principal_frame
 from rotor.tops.constants import Constants
 from rotor.tops.kind import KindOfTop, kind_from_moments, kind_with_symmetry
+from rotor.tops.operators import KINDS
 from rotor.tops.spin_weights import SpinWeights
 
 if TYPE_CHECKING:
@@ -29,7 +30,6 @@ Tensor = tuple[Vector, Vector, Vector]
 
 SYMMETRIC_WITHIN = 1e-3  # of the shortest distance between nuclei: displacements that symmetry may overlook
 NO_WEIGHTS = SpinWeights()
-_KINDS = ("linear", "spherical", "prolate", "oblate", "asymmetric")
 
 
 def allowed_dipole(dipole: ArrayLike, symmetry: Symmetry) -> Floats:
@@ -239,8 +239,8 @@ def _electrons(molecule: Molecule, weights: SpinWeights) -> str:
 
 def constants_of_moments(moments: ArrayLike, kind: str) -> Constants:
     """The rigid constants that a kind of top has, from moments in u Å²; degenerate ones are averaged."""
-    if kind not in _KINDS:
-        raise ValueError(f"kind {kind!r} is none of {', '.join(_KINDS)}")
+    if kind not in KINDS:
+        raise ValueError(f"kind {kind!r} is none of {', '.join(KINDS)}")
     ia, ib, ic = (float(m) for m in np.asarray(moments))
     f = units.ROTATIONAL_MHZ_U_ANGSTROM2
     if kind == "linear":

@@ -17,9 +17,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor.quantum.basis import REPRESENTATIONS, WangBlock
+from rotor.quantum.basis import WangBlock
 from rotor.quantum.effect import QuantumEffect
-from rotor.tops.operators import Operators, Powers, distortion_terms, powers_of_spelled
+from rotor.tops.operators import Operators, Powers, axes_of, distortion_terms, powers_of_spelled
 
 if TYPE_CHECKING:
     from rotor.tops.constants import Constants
@@ -65,7 +65,7 @@ def _rigid_terms(constants: Constants) -> dict[str, Operators]:
     if constants.kind in ("prolate", "oblate"):
         along, equal = ("A", "C") if constants.kind == "prolate" else ("C", "A")
         return {along: {(0, 1, 0): 1.0}, "B": {(1, 0, 0): 1.0, (0, 1, 0): -1.0}, equal: {}}
-    x, y, z = (axis.upper() for axis in REPRESENTATIONS[str(constants.representation)])
+    x, y, z = (axis.upper() for axis in axes_of(str(constants.representation)))
     return {
         z: {(0, 1, 0): 1.0},
         x: {(1, 0, 0): 0.5, (0, 1, 0): -0.5, (0, 0, 1): 0.25},
