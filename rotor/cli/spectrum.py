@@ -30,6 +30,7 @@ from rotor.cli.shared.output import (
 
 if TYPE_CHECKING:
     from rotor.formats.spcat.predict import Prediction
+    from rotor.quantum.effect import QuantumEffect
     from rotor.spectra.lines import Lines
     from rotor.spectra.request import SpectrumAnswer, SpectrumRequest
     from rotor.tops.top import Top
@@ -63,6 +64,11 @@ class Options:
     vibrational_factor: float = option(1.0, metavar="X", help="Multiplies Q.")
     profile: str | None = option(None, metavar="NAME", help="sticks, gaussian, lorentzian or voigt.")
     fwhm: str | None = option(None, metavar="W", help="Full width at half maximum (MHz); by default Doppler's.")
+    hyperfine: bool | None = option(
+        None,
+        "--hyperfine/--no-hyperfine",
+        help="Split lines by the spins of nuclei; by default where --spin-constants are given.",
+    )
     top_lines: int = option(20, "--top", metavar="N", help="How many of the strongest lines are shown.")
     tag: int = option(0, metavar="N", help="Tag of the species in --cat.")
 
@@ -95,7 +101,9 @@ def command(
         if prediction is not None:
             answer, tag = spcat.answer_of(prediction, shape), prediction.request.tag
         else:
-            answer, tag = _answer(inputs.with_some_dipole(inputs.read_top(given)), settings), options.tag
+            top = inputs.with_some_dipole(inputs.read_top(given))
+            settings |= {"effects": _effects(top, given, options)}
+            answer, tag = _answer(top, settings), options.tag
     _refuse_nothing_to_draw(answer, files)
     for warning in answer.lines.warnings:
         note(warning)
@@ -132,6 +140,13 @@ def _shape(options: Options, layer: Layer) -> dict[str, Any]:
     """Profile, width and layer of gas from the texts of the options."""
     fwhm = inputs.positive("--fwhm", options.fwhm, "MHz") if options.fwhm else None
     return {"profile": options.profile, "fwhm_mhz": fwhm, "layer": gas_layer.layer_of(layer)}
+
+
+def _effects(top: Top, given: Input, options: Options) -> tuple[QuantumEffect, ...]:
+    from rotor.quantum.effects.of_top import effects_of
+
+    asked = given.spin_constants is not None if options.hyperfine is None else options.hyperfine
+    return inputs.parsed("--hyperfine", "", lambda _: effects_of(top, asked))
 
 
 def _answer(top: Top, settings: dict[str, Any]) -> SpectrumAnswer:

@@ -25,6 +25,7 @@ from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.levels import weights_of_levels
 from rotor.quantum.solve import solve_levels
+from rotor.thermo.spin_factor import without_spins
 from rotor.tops.spin_weights import SpinWeights
 
 if TYPE_CHECKING:
@@ -98,8 +99,11 @@ def partition_functions(
 ) -> list[PartitionFunction]:
     """Q at several temperatures from one set of levels; see `partition_function`."""
     temperatures = checked_temperatures(list(temperatures_k))
-    sums = level_sums(top, [top.spin_weights], temperatures, relative_error, energies=False, effects=effects)[0]
-    rows = zip(temperatures.tolist(), sums.q.tolist(), sums.jmax.tolist(), sums.error_q.tolist(), strict=True)
+    spinless, factor = without_spins(top, effects)
+    sums = level_sums(top, [top.spin_weights], temperatures, relative_error, energies=False, effects=spinless)[0]
+    rows = zip(
+        temperatures.tolist(), (factor * sums.q).tolist(), sums.jmax.tolist(), sums.error_q.tolist(), strict=True
+    )
     source = "summed from levels to J = {}, relative error below {:g}"
     return [PartitionFunction(t, q, j, error, source.format(j, relative_error)) for t, q, j, error in rows]
 

@@ -19,6 +19,7 @@ from rotor.geometry.inertia import EQUAL_MOMENTS, LINEAR_BELOW, Body, PrincipalF
 from rotor.tops.constants import Constants
 from rotor.tops.kind import KindOfTop, kind_from_moments, kind_with_symmetry
 from rotor.tops.operators import KINDS
+from rotor.tops.spin_constants import SpinConstants
 from rotor.tops.spin_weights import SpinWeights
 
 if TYPE_CHECKING:
@@ -65,7 +66,7 @@ class Top:
     nuclear-spin weights. mass_u: for Doppler widths. frame: principal frame of a geometry, None without one.
     kind_of_top: how the kind was decided. molecule, symmetry: of a geometry. source: where the constants are from.
     independent_errors: whether the uncertainties of the constants may count as uncorrelated; not those of a fit whose
-    correlations are unknown. notes: what a user must be told.
+    correlations are unknown. notes: limits of the data. spin_constants: of nuclear and electron spins, None where none are known.
     """
 
     constants: Constants
@@ -84,6 +85,7 @@ class Top:
     notes: tuple[str, ...] = ()
     polarizability_abc_angstrom3: Tensor | None = None
     polarizability_source: str = ""
+    spin_constants: SpinConstants | None = None
 
     @classmethod
     def from_constants(
