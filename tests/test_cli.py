@@ -24,7 +24,7 @@ INFO = """
     rotor_version command input name formula mass_u kind kind_decision point_group symmetry_number constants_mhz uncertainties_mhz reduction
     representation rotational_constants_mhz rotational_constants_cm kappa moments_u_angstrom2 planar_moments_u_angstrom2
     inertial_defect_u_angstrom2 frame dipole_abc_debye dipole_source
-    polarizability_abc_angstrom3 polarizability_source spin_weights spin_weights_source
+    polarizability_abc_angstrom3 polarizability_source spin_weights spin_weights_source spin_constants_mhz spins spin_constants_source
     partition_function source notes
 """
 SPECTRUM = """
