@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from rotor.formats.spcat.fields import BLANK
 from rotor.formats.spcat.line import Record
 from rotor.formats.spcat.rows import Columns
+from rotor.table import Table
 
 
 @dataclass(frozen=True)
@@ -46,8 +47,8 @@ DTYPES: dict[str, type[np.generic]] = dict.fromkeys(Columns._fields, np.float64)
 }
 
 
-@dataclass(frozen=True, eq=False)
-class Catalogue:
+@dataclass(frozen=True, eq=False, repr=False)
+class Catalogue(Table):
     """Lines of a catalogue as columns of equal length n.
 
     frequency_mhz, error_mhz (n,): FREQ and ERR as the file has them: MHz, but cm⁻¹ both where the error is negative
@@ -95,9 +96,17 @@ class Catalogue:
         columns = {name: getattr(self, name)[index] for name in DTYPES}
         return Catalogue(**columns, layout=replace(self.layout, spelling=spelling))
 
-    def columns(self, start: int, stop: int) -> Columns:
+    def rows(self, start: int, stop: int) -> Columns:
         """The numbers of lines `start` to `stop`."""
         return Columns._make(getattr(self, name)[start:stop] for name in DTYPES)
+
+    @property
+    def columns(self) -> dict[str, NDArray[Any]]:
+        """Every column by its name with unit, the quantum numbers last, one column each: q1_upper, ..., q6_lower."""
+        out = {name: getattr(self, name) for name in DTYPES if not name.startswith("quanta")}
+        for side, quanta in (("upper", self.quanta_upper), ("lower", self.quanta_lower)):
+            out |= {f"q{i}_{side}": column for i, column in enumerate(quanta.T, 1) if (column != BLANK).any()}
+        return out
 
     def record(self, index: int) -> Record:
         """The numbers of one line."""
