@@ -19,10 +19,13 @@ import pytest
 
 import rotor
 from rotor.formats import packed, tables
+from rotor.formats.line_tables import as_printed
 from rotor.formats.provenance import record_of
 from rotor.formats.registry import FORMATS, loaded, suffixes_for
 from rotor.formats.spcat.catalogue import Catalogue
 from rotor.formats.spcat.egy import LevelList
+from rotor.formats.spcat.fields import BLANK
+from rotor.formats.spcat.file_lines import Format
 from rotor.formats.spcat.lin import LineList
 from rotor.table import Table
 
@@ -199,3 +202,38 @@ def test_packed_members_one_after_another_are_one_file(tmp_path):
     (tmp_path / "cut.cat.gz").write_bytes(packed_text[:-5])
     with pytest.raises(ValueError, match="damaged or cut off"):
         rotor.read(tmp_path / "cut.cat.gz")
+
+
+@pytest.mark.parametrize(
+    ("quanta", "halves", "printed", "code"),
+    [
+        ({"j": 3}, (), [3], 101),
+        ({"j": 3, "ka": 1, "kc": 2}, (), [3, 1, 2], 303),
+        ({"v": 1, "j": 3, "ka": 1, "kc": 2}, (), [3, 1, 2, 1], 1404),  # v after the rotation, as SPCAT prints it
+        ({"n": 3, "ka": 1, "kc": 2, "f": 7}, ("f",), [3, 1, 2, 4], 314),  # F = 7/2, rounded up
+        ({"n": 3, "ka": 1, "kc": 2, "f1": 7, "f": 4}, ("f1", "f"), [3, 1, 2, 4, 2], 325),
+        ({"v": 2, "n": 3, "ka": 1, "kc": 2, "f": 6}, ("f",), [3, 1, 2, 2, 3], 1405),
+    ],
+)
+def test_quantum_numbers_as_a_catalogue_has_them(quanta, halves, printed, code):
+    columns, qnfmt = as_printed({name: np.array([value]) for name, value in quanta.items()}, halves)
+    assert columns[0].tolist() == printed + [BLANK] * (6 - len(printed))
+    assert qnfmt == code
+
+
+def test_codes_are_those_of_predictions():
+    def code(names, doubled):
+        halves = [f"f{i}" for i in range(1, len(doubled) + 1)]
+        totals = np.cumsum(doubled) % 2
+        return as_printed(
+            {name: np.array([1]) for name in names} | dict(zip(halves, totals[:, None], strict=True)), halves
+        )[1]
+
+    for names, form in ((("n",), (1, False)), (("n", "ka", "kc"), (3, False)), (("v", "n", "k"), (2, True))):
+        for doubled in ((), (1,), (2,), (3, 3), (1, 2)):
+            assert code(names, doubled) == Format(*form, len(doubled)).qnfmt(doubled)
+
+
+def test_a_number_without_a_place_in_a_catalogue():
+    with pytest.raises(ValueError, match=r"quantum numbers j, m: a catalogue has no place for m; write \.csv"):
+        as_printed({"j": np.array([1]), "m": np.array([0])}, ())

@@ -8,7 +8,7 @@ from __future__ import annotations
 import gzip
 import os
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import TYPE_CHECKING, Any
 
@@ -18,15 +18,16 @@ from numpy.typing import NDArray
 from rotor.formats.atomic_write import atomic_path
 from rotor.formats.provenance import record_of, write_beside
 from rotor.formats.spcat.cat import format_lines, write_cat
-from rotor.formats.spcat.catalogue import Catalogue
+from rotor.formats.spcat.catalogue import Catalogue, catalogue_of
 from rotor.formats.spcat.fields import BLANK
 from rotor.spectra.lines import Lines
 
 if TYPE_CHECKING:
     from rotor.formats.hitran import HitranLines
 
-QNFMT = {("j",): 101, ("j", "k"): 202, ("j", "ka", "kc"): 303}
-MAX_TAG = 999_999
+MAX_QUANTA = 9  # the last digit of QNFMT counts them
+_BEFORE_SPINS = ("n", "j", "k", "ka", "kc", "v")
+_IN_A_CATALOGUE = (*_BEFORE_SPINS, "i_tot", *(f"f{i}" for i in range(1, 9)), "f")
 PIECE = 1 << 15  # lines of a long list that are made into text at once
 
 Settings = Mapping[str, Any]
@@ -36,7 +37,7 @@ def catalogue(lines: Lines, tag: int = 0) -> Catalogue:
     """The lines as a catalogue of the 80-column format.
 
     Lines of zero strength have no logarithm and are left out; ERR is 0 where no uncertainty of a constant is known.
-    Raises ValueError for a tag that has no place in its six digits.
+    Raises ValueError for a tag that has no place in its six digits, and for quantum numbers that the format has not.
     """
     lgint = lines.lgint
     if not np.isfinite(lgint).all():
@@ -49,54 +50,34 @@ def catalogue(lines: Lines, tag: int = 0) -> Catalogue:
     }
     if (error := lines.error_mhz) is not None:
         numbers["error_mhz"] = error
-    levels = lines.levels
-    quanta = quanta_columns(levels.quanta_of(np.arange(len(levels))))
-    return catalogue_of(numbers, lines.quanta_names, quanta[lines.upper], quanta[lines.lower], tag)
+    quanta, qnfmt = as_printed(lines.levels.quanta, lines.levels.halves)
+    linear = lines.levels.kind == "linear"
+    return catalogue_of(numbers, quanta[lines.upper], quanta[lines.lower], qnfmt, tag, linear=linear)
 
 
-def quanta_columns(quanta: NDArray[Any]) -> NDArray[np.int16]:
-    """Quantum numbers (n, names) as the six columns of a catalogue, blank where there are none, (n, 6)."""
-    out = np.full((len(quanta), 6), BLANK, dtype=np.int16)
-    out[:, : quanta.shape[1]] = quanta
-    return out
+def as_printed(quanta: Mapping[str, NDArray[Any]], halves: Collection[str]) -> tuple[NDArray[np.int16], int]:
+    """Quantum numbers of levels in the order of a catalogue, (n, 6) or wider, and QNFMT.
 
-
-def catalogue_of(
-    numbers: Mapping[str, NDArray[Any]],
-    names: tuple[str, ...],
-    quanta_upper: NDArray[np.int16],
-    quanta_lower: NDArray[np.int16],
-    tag: int = 0,
-) -> Catalogue:
-    """The catalogue of lines given as columns.
-
-    Parameters
-    ----------
-    numbers : frequency_mhz, lgint, energy_lower_cm, g_upper, each (n,), and error_mhz where one is known
-    names : of the quantum numbers, which decide QNFMT and DR
-    quanta_upper, quanta_lower : (n, 6), as `quanta_columns` makes them
-    tag : of the species
-
-    Raises
-    ------
-    ValueError
-        For a tag that has no place in its six digits.
+    quanta: columns (n,) by name. halves: names of those that hold twice the number; they are printed rounded up. QNFMT is
+    100 Q + 10 H + NQN: NQN counts the numbers, Q is that of those before the spins, 10 more with a v, H has a bit for each of the
+    last three that is half-integer (H. M. Pickett et al., J. Quant. Spectrosc. Radiat. Transf. 60, 883 (1998)).
+    Raises ValueError for quantum numbers that a catalogue has no place for.
     """
-    if not 0 <= tag <= MAX_TAG:
-        raise ValueError(f"tag {tag}: a catalogue's tag has at most six digits")
-    n = len(quanta_upper)
-    return Catalogue(
-        frequency_mhz=numbers["frequency_mhz"],
-        error_mhz=numbers["error_mhz"] if "error_mhz" in numbers else np.zeros(n),
-        lgint=numbers["lgint"],
-        dr=np.full(n, 2 if names == ("j",) else 3, dtype=np.int16),
-        energy_lower_cm=numbers["energy_lower_cm"],
-        g_upper=np.asarray(numbers["g_upper"]).astype(np.int32),
-        tag=np.full(n, tag, dtype=np.int32),
-        qnfmt=np.full(n, QNFMT[names], dtype=np.int32),
-        quanta_upper=quanta_upper,
-        quanta_lower=quanta_lower,
-    )
+    foreign = [name for name in quanta if name not in _IN_A_CATALOGUE]
+    names = sorted(quanta, key=_IN_A_CATALOGUE.index) if not foreign else []
+    if foreign or len(names) > MAX_QUANTA:
+        raise ValueError(
+            f"quantum numbers {', '.join(quanta)}: a catalogue has no place for {', '.join(foreign) or 'more than 9'}; "
+            "write .csv or .parquet"
+        )
+    columns = [(quanta[name] + 1) // 2 if name in halves else quanta[name] for name in names]
+    out = np.full((len(columns[0]), max(6, len(names))), BLANK, dtype=np.int16)
+    out[:, : len(names)] = np.stack(columns, axis=1)
+
+    before = [name for name in names if name in _BEFORE_SPINS]
+    odd = [name in halves and bool((quanta[name] % 2).any()) for name in names[len(before) :]][-3:]
+    h = sum(bit << place for place, bit in enumerate(reversed(odd)))
+    return out, 1000 * ("v" in names) + 100 * len(before) + 10 * h + len(names)
 
 
 def write_catalogue(lines: Lines, path: str | os.PathLike[str], settings: Settings) -> None:

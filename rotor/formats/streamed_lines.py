@@ -22,10 +22,10 @@ import numpy as np
 
 from rotor import units
 from rotor.formats.atomic_write import atomic_path, open_atomic
-from rotor.formats.line_tables import catalogue_of, quanta_columns
+from rotor.formats.line_tables import as_printed
 from rotor.formats.provenance import write_beside
 from rotor.formats.spcat.cat import format_lines
-from rotor.formats.spcat.catalogue import Catalogue
+from rotor.formats.spcat.catalogue import Catalogue, catalogue_of
 from rotor.formats.tables import copy_columns, quoted, run
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.watson import SEMI_RIGID
@@ -71,6 +71,7 @@ class _Plan:
     ground_mhz: float
     folder: Path
     quanta_names: tuple[str, ...]
+    halves: frozenset[str]
     effects: tuple[QuantumEffect, ...] = SEMI_RIGID
 
     def piece(self, first: int, last: int) -> Path:
@@ -157,7 +158,18 @@ def _plan(start: Lines, jmax: int | None, least: float, range_mhz: tuple[float, 
         top, 3, effects=effects, vectors=False
     ).ground_mhz  # whatever the weights are, it is among these
     return _Plan(
-        top, dipole, jmax, start.temperature_k, q, least, range_mhz, ground, folder, start.quanta_names, effects
+        top,
+        dipole,
+        jmax,
+        start.temperature_k,
+        q,
+        least,
+        range_mhz,
+        ground,
+        folder,
+        start.quanta_names,
+        start.levels.halves,
+        effects,
     )
 
 
@@ -324,8 +336,7 @@ def _catalogues(plan: _Plan, merged: Path, tag: int, memory_mb: int) -> Iterator
                 f"SELECT * FROM read_parquet({quoted(str(merged))}, file_row_number = true) WHERE lgint IS NOT NULL "
                 f"AND file_row_number >= {start} AND file_row_number < {start + _BATCH}"
             ).fetchnumpy()
-            quanta = [
-                quanta_columns(np.stack([part[f"{name}_{side}"] for name in names], axis=1))
-                for side in ("upper", "lower")
-            ]
-            yield catalogue_of(part, names, quanta[0], quanta[1], tag)
+            (upper, qnfmt), (lower, _) = (
+                as_printed({name: part[f"{name}_{side}"] for name in names}, plan.halves) for side in ("upper", "lower")
+            )
+            yield catalogue_of(part, upper, lower, qnfmt, tag, linear=plan.top.kind == "linear")

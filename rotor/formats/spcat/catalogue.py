@@ -14,6 +14,8 @@ from rotor.formats.spcat.line import Record
 from rotor.formats.spcat.rows import Columns
 from rotor.table import Table
 
+MAX_TAG = 999_999
+
 
 @dataclass(frozen=True)
 class Layout:
@@ -112,6 +114,47 @@ class Catalogue(Table):
         """The numbers of one line."""
         values = [getattr(self, name)[index] for name in DTYPES]
         return Record._make(tuple(value.tolist()) if value.ndim else value.item() for value in values)
+
+
+def catalogue_of(
+    numbers: Mapping[str, NDArray[Any]],
+    quanta_upper: NDArray[np.int16],
+    quanta_lower: NDArray[np.int16],
+    qnfmt: NDArray[np.int32] | int,
+    tag: int = 0,
+    *,
+    linear: bool = False,
+) -> Catalogue:
+    """The catalogue of predicted lines.
+
+    Parameters
+    ----------
+    numbers : frequency_mhz, lgint, energy_lower_cm, g_upper, each (n,), and error_mhz where one is known, else 0
+    quanta_upper, quanta_lower : (n, 6) or wider
+    qnfmt : one for all, or of every line, (n,)
+    tag : of the species
+    linear : whether Q rises as that of a linear molecule does, DR = 2
+
+    Raises
+    ------
+    ValueError
+        For a tag that has no place in its six digits.
+    """
+    if not 0 <= tag <= MAX_TAG:
+        raise ValueError(f"tag {tag}: a catalogue's tag has at most six digits")
+    n = len(quanta_upper)
+    return Catalogue(
+        frequency_mhz=numbers["frequency_mhz"],
+        error_mhz=numbers["error_mhz"] if "error_mhz" in numbers else np.zeros(n),
+        lgint=numbers["lgint"],
+        dr=np.full(n, 2 if linear else 3, dtype=np.int16),
+        energy_lower_cm=numbers["energy_lower_cm"],
+        g_upper=np.asarray(numbers["g_upper"]).astype(np.int32),
+        tag=np.full(n, tag, dtype=np.int32),
+        qnfmt=np.broadcast_to(np.asarray(qnfmt, dtype=np.int32), n),
+        quanta_upper=quanta_upper,
+        quanta_lower=quanta_lower,
+    )
 
 
 def _column(name: str, values: Any, dtype: type[np.generic]) -> NDArray[Any]:
