@@ -19,7 +19,7 @@ import rotor
 water = rotor.read("water")
 lines = rotor.line_list(water, temperature_k=300, jmax=20)
 print(f"{water.name}: {water.kind} top, κ = {water.kappa:.3f}, {len(lines)} lines, Q(300 K) = {lines.q:.2f}")
-print(lines.strongest(5).to_pandas().to_string(index=False))
+print(lines.strongest(5))
 
 assert water.kind == "asymmetric"
 assert abs(lines.q - 178.1) < 0.5  # JPL: 178.12, rotation alone

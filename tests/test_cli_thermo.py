@@ -130,7 +130,7 @@ def test_parquet_and_csv_have_the_same_numbers(call, folder):
 
 def test_no_other_format(folder):
     functions = thermodynamic_functions(rotor.read("CO"), [10.0])
-    with pytest.raises(ValueError, match=r"can be written as \.csv, \.parquet or \.json"):
+    with pytest.raises(ValueError, match=r"ThermoFunctions can be written as \.csv, \.parquet or \.json"):
         rotor.write(functions, "co.cat")
     assert list(folder.iterdir()) == []
 

@@ -181,12 +181,12 @@ def _why_none(answer: SpectrumAnswer) -> str:
 
 def _program_catalogue(prediction: Prediction, content: dict[str, Any]) -> Writer:
     """The catalogue as SPCAT lists it: its weights, its zero of energy, K doublets as two lines."""
-    from rotor.formats.line_tables import provenance, write_beside
+    from rotor.formats.provenance import record_of, write_beside
     from rotor.formats.spcat.cat import write_cat
 
     def write(path: Path) -> None:
         write_cat(prediction.catalogue, path)
-        record = provenance(prediction.lines) | {"command": content["command"], "input": content["input"]}
+        record = record_of(prediction.lines, {"command": content["command"], "input": content["input"]})
         write_beside(path, record | {"q": prediction.q, "lines": len(prediction.catalogue)})
 
     return write

@@ -55,7 +55,7 @@ class LevelsRequest:
             raise ValueError(f"kmin and kmax: the levels of a {self.top.kind} top have no K; give J alone")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class LevelTable(Table):
     """Energy levels in order of their rows, energies in three units from the lowest level that exists.
 
@@ -68,6 +68,11 @@ class LevelTable(Table):
 
     def __len__(self) -> int:
         return len(self.rows)
+
+    @property
+    def provenance(self) -> dict[str, Any]:
+        """The Hamiltonian that the levels are of, and the energy that theirs count from."""
+        return self.levels.provenance | {"ground_mhz": self.ground_mhz, "rows": len(self)}
 
     @cached_property
     def ground_mhz(self) -> float:

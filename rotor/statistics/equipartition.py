@@ -78,7 +78,7 @@ class DegreeTest:
     ks_p_value: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Equipartition(Table):
     """The answer for all degrees.
 
@@ -97,6 +97,17 @@ class Equipartition(Table):
     p_value: float
     accepted: bool
     failing: tuple[str, ...] = ()
+
+    @property
+    def provenance(self) -> dict[str, Any]:
+        """What the test found."""
+        return {
+            "accepted": self.accepted,
+            "p_value": self.p_value,
+            "confidence": self.confidence,
+            "kt": self.kt,
+            "rows": len(self.degrees),
+        }
 
     @property
     def columns(self) -> dict[str, NDArray[Any]]:

@@ -87,6 +87,23 @@ class Top:
     polarizability_source: str = ""
     spin_constants: SpinConstants | None = None
 
+    @property
+    def provenance(self) -> dict[str, Any]:
+        """What the top consists of and where that is from: constants, dipole, weights, notes."""
+        return {
+            "name": self.name,
+            "kind": self.kind,
+            "constants": self.constants.text(),
+            "reduction": self.constants.reduction,
+            "representation": self.constants.representation,
+            "constants_source": self.source,
+            "dipole_abc_debye": self.dipole_abc_debye,
+            "dipole_source": self.dipole_source,
+            "spin_weights": self.spin_weights.to_mapping(),
+            "spin_weights_source": self.weights_source,
+            "notes": list(self.notes),
+        }
+
     @classmethod
     def from_constants(
         cls,

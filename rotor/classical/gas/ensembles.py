@@ -15,6 +15,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -70,7 +71,7 @@ class Ensemble:
         return replace(self, momentum=momentum, attitude=attitude)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Correlations(Table):
     """C1 and C2 at n times with the standard errors of their means; c1 or c2 is None where it was not asked for.
 
@@ -87,6 +88,11 @@ class Correlations(Table):
 
     def __len__(self) -> int:
         return len(self.times)
+
+    @property
+    def provenance(self) -> dict[str, Any]:
+        """How many molecules were averaged over, and the number of times."""
+        return {"molecules": self.molecules, "rows": len(self)}
 
     @property
     def columns(self) -> dict[str, Floats]:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from rotor import units
 from rotor.arrays import Floats, Ints
-from rotor.formats.spcat.catalogue import Catalogue
+from rotor.formats.spcat.catalogue import Catalogue, catalogue_of
 from rotor.formats.spcat.egy import LevelList
 from rotor.formats.spcat.fields import BLANK
 from rotor.formats.spcat.file_model import Group
@@ -213,18 +213,13 @@ def as_catalogue(lines: list[tuple[GroupLines, int]], form: Format, tag: int, dr
         quanta[name] = table
     with np.errstate(divide="ignore"):
         lgint = np.log10(joined["intensity"][order])
-    return Catalogue(
-        frequency_mhz=joined["frequency_mhz"][order],
-        error_mhz=np.zeros(len(order)),
-        lgint=lgint,
-        dr=np.full(len(order), dr, dtype=np.int16),
-        energy_lower_cm=joined["energy_lower_mhz"][order] / units.MHZ_PER_CM,
-        g_upper=joined["g_upper"][order].astype(np.int32),
-        tag=np.full(len(order), tag, dtype=np.int32),
-        qnfmt=qnfmt[order].astype(np.int32),
-        quanta_upper=quanta["upper"],
-        quanta_lower=quanta["lower"],
-    )
+    numbers = {
+        "frequency_mhz": joined["frequency_mhz"][order],
+        "lgint": lgint,
+        "energy_lower_cm": joined["energy_lower_mhz"][order] / units.MHZ_PER_CM,
+        "g_upper": joined["g_upper"][order],
+    }
+    return catalogue_of(numbers, quanta["upper"], quanta["lower"], qnfmt[order].astype(np.int32), tag, linear=dr == 2)
 
 
 def as_level_list(solved: list[tuple[Group, Levels]], form: Format) -> LevelList:
