@@ -31,6 +31,7 @@ conjugate = inlined(quaternions.conjugate)
 turned = inlined(quaternions.turned, cross=cross)
 half_third_row = inlined(quaternions.half_third_row)
 matrix = inlined(quaternions.matrix, half_third_row=half_third_row)
+to_third = inlined(quaternions.to_third)
 exponential = inlined(quaternions.exponential)
 
 

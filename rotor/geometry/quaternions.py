@@ -79,6 +79,19 @@ def matrix(q: Any) -> Any:
     )
 
 
+def to_third(direction: Any) -> Any:
+    """A rotation that takes a unit vector (three floats) to the third axis, by way of a half turn about the second if it is down.
+
+    >>> to_third((0.0, 0.0, -1.0))
+    (-0.0, 0.0, 1.0, 0.0)
+    """
+    x, y, z = direction
+    half = (0.5 * (1.0 + abs(z))) ** 0.5
+    if z >= 0.0:
+        return half, 0.5 * y / half, -0.5 * x / half, 0.0
+    return -0.5 * x / half, 0.0, half, 0.5 * y / half
+
+
 def exponential(cosine: Any, half_sinc: Any, r: Any) -> Any:
     """The quaternion (cos θ/2, (sin θ/2)/θ r) of the rotation by θ = |r| about r.
 

@@ -89,6 +89,15 @@ def rotate(q: ArrayLike, vector: ArrayLike) -> Floats:
     return _joined(quaternions.turned(_separate(normalised(q)), _separate(_vectors(vector))))
 
 
+def vector_product(a: ArrayLike, b: ArrayLike) -> Floats:
+    """a x b of vectors (..., 3).
+
+    >>> vector_product([1, 0, 0], [0, 1, 0])
+    array([0., 0., 1.])
+    """
+    return _joined(quaternions.cross(_separate(_vectors(a)), _separate(_vectors(b))))
+
+
 def exp(rotation_vector: ArrayLike) -> Floats:
     """Quaternion of the rotation by |r| radians about r, (..., 3) to (..., 4).
 
@@ -283,12 +292,15 @@ def _matrices(m: ArrayLike) -> Floats:
 
 def _separate(array: Floats) -> tuple[Floats, ...]:
     """The components (...) of an array (..., n)."""
-    return tuple(np.moveaxis(array, -1, 0))
+    return tuple(array[..., k] for k in range(array.shape[-1]))
 
 
 def _joined(components: tuple[Floats, ...]) -> Floats:
     """An array (..., n) of n components (...)."""
-    return np.stack(components, axis=-1)
+    out = np.empty((*components[0].shape, len(components)))
+    for k, component in enumerate(components):
+        out[..., k] = component
+    return out
 
 
 def _norm3(v: Floats) -> Floats:

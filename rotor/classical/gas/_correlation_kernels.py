@@ -16,7 +16,7 @@ from rotor.arrays import Floats
 from rotor.classical._kernels import symmetric_steps
 from rotor.classical.free._kernels import evaluate
 from rotor.classical.free.theta import Rows
-from rotor.classical.integrators._kernels import FINITE, LANES, ONE, _length, _to_third, block_turns
+from rotor.classical.integrators._kernels import FINITE, LANES, ONE, _length, _upright, block_turns
 from rotor.geometry._kernels import conjugate, product
 
 
@@ -88,7 +88,7 @@ def add_stepped(
         here = min(LANES, len(momentum) - block * LANES)
         for k in range(here):
             size = _length(momentum[block * LANES + k])
-            tilt = _to_third(momentum[block * LANES + k], size)
+            tilt = _upright(momentum[block * LANES + k], size)
             row[k], row[LANES + k], row[2 * LANES + k], row[3 * LANES + k] = product(tilt, conjugate(turn))
             row[4 * LANES + k], row[5 * LANES + k] = size * rates[0], size * rates[1]
             back = product(turn, conjugate(tilt))

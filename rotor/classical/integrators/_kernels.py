@@ -16,7 +16,7 @@ from numba import njit
 
 from rotor.arrays import Floats
 from rotor.classical._kernels import symmetric_steps
-from rotor.geometry._kernels import conjugate, half_third_row, matrix, product
+from rotor.geometry._kernels import conjugate, half_third_row, matrix, product, to_third
 
 ONE = (1.0,)  # fractions of a step of order 2
 LANES = 128
@@ -58,13 +58,9 @@ def _length(v: Any) -> Any:
 
 
 @njit(cache=True, inline="always")
-def _to_third(v: Any, size: float) -> Any:
-    """A rotation that takes v of length `size` to the third axis; by way of a half turn about the second if v is down."""
-    x, y, z = (v[0] / size, v[1] / size, v[2] / size) if size > 0.0 else (0.0, 0.0, 1.0)
-    half = math.sqrt(0.5 * (1.0 + abs(z)))
-    if z >= 0.0:
-        return half, 0.5 * y / half, -0.5 * x / half, 0.0
-    return -0.5 * x / half, 0.0, half, 0.5 * y / half
+def _upright(v: Any, size: float) -> Any:
+    """A rotation that takes v of length `size` to the third axis."""
+    return to_third((v[0] / size, v[1] / size, v[2] / size) if size > 0.0 else (0.0, 0.0, 1.0))
 
 
 @njit(cache=True, nogil=True, fastmath={"contract"}, error_model="numpy")
@@ -81,7 +77,7 @@ def advance_blocks(blocks: Any, step: float, steps: int, rates: Floats, axes: Fl
         for i in range(count):
             body = begin + i
             size[i] = _length(momentum[body])
-            tilt = _to_third(momentum[body], size[i])
+            tilt = _upright(momentum[body], size[i])
             row[i], row[LANES + i], row[2 * LANES + i], row[3 * LANES + i] = product(tilt, conjugate(axes[body]))
             row[4 * LANES + i], row[5 * LANES + i] = size[i] * rates[body, 0], size[i] * rates[body, 1]
             half = 0.5 * size[i] * rates[body, 2] * step * steps
