@@ -93,7 +93,7 @@ def body_flow(
 
     def of_both(time: float, y: Floats) -> Floats:
         momentum, attitude = y[:, :3], y[:, 3:]
-        turning = attitude_rate(attitude, system.omega(time, momentum))
+        turning = attitude_rate(attitude, system.omega(time, momentum, attitude))
         return np.concatenate([system.momentum_rate(time, momentum, attitude), turning], axis=-1)
 
     if system.needs_attitude:

@@ -58,6 +58,15 @@ class Body:
         return Body(self.mass, r @ self.centre, r @ self.tensor @ r.T)
 
 
+def kinetic_energy_by_axis(momentum: Floats, omega: Floats) -> Floats:
+    """½ L_i ω_i, (..., 3), of angular momenta and angular velocities along any axes; their sum is the energy of rotation.
+
+    >>> kinetic_energy_by_axis(np.array([1.0, 2.0, 3.0]), np.array([1.0, 1.0, 0.5])).tolist()
+    [0.5, 1.0, 0.75]
+    """
+    return 0.5 * momentum * omega
+
+
 def _steiner(shift: Floats) -> Floats:
     return np.asarray(shift @ shift * np.eye(3) - np.outer(shift, shift))
 

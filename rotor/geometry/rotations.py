@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rotor.arrays import Floats
+from rotor.geometry import quaternions
 
 IDENTITY: Floats = np.array([1.0, 0.0, 0.0, 0.0])
 IDENTITY.setflags(write=False)
@@ -57,18 +58,7 @@ def multiply(p: ArrayLike, q: ArrayLike) -> Floats:
     >>> multiply([0, 1, 0, 0], [0, 0, 1, 0])
     array([0., 0., 0., 1.])
     """
-    p, q = _components(p), _components(q)
-    pw, px, py, pz = np.moveaxis(p, -1, 0)
-    qw, qx, qy, qz = np.moveaxis(q, -1, 0)
-    return np.stack(
-        [
-            pw * qw - px * qx - py * qy - pz * qz,
-            pw * qx + px * qw + py * qz - pz * qy,
-            pw * qy - px * qz + py * qw + pz * qx,
-            pw * qz + px * qy - py * qx + pz * qw,
-        ],
-        axis=-1,
-    )
+    return _joined(quaternions.product(_separate(_components(p)), _separate(_components(q))))
 
 
 def conjugate(q: ArrayLike) -> Floats:
@@ -77,7 +67,7 @@ def conjugate(q: ArrayLike) -> Floats:
     >>> conjugate([0.6, 0.8, 0, 0])
     array([ 0.6, -0.8, -0. , -0. ])
     """
-    return np.asarray(_components(q) * np.array([1.0, -1.0, -1.0, -1.0]))
+    return _joined(quaternions.conjugate(_separate(_components(q))))
 
 
 def normalised(q: ArrayLike) -> Floats:
@@ -96,10 +86,16 @@ def rotate(q: ArrayLike, vector: ArrayLike) -> Floats:
     >>> rotate(exp([0, 0, np.pi / 2]), [1, 0, 0]).round(15)
     array([0., 1., 0.])
     """
-    q, vector = normalised(q), _vectors(vector)
-    axis = q[..., 1:]
-    u = np.cross(axis, vector)
-    return vector + 2.0 * (q[..., :1] * u + np.cross(axis, u))
+    return _joined(quaternions.turned(_separate(normalised(q)), _separate(_vectors(vector))))
+
+
+def vector_product(a: ArrayLike, b: ArrayLike) -> Floats:
+    """a x b of vectors (..., 3).
+
+    >>> vector_product([1, 0, 0], [0, 1, 0])
+    array([0., 0., 1.])
+    """
+    return _joined(quaternions.cross(_separate(_vectors(a)), _separate(_vectors(b))))
 
 
 def exp(rotation_vector: ArrayLike) -> Floats:
@@ -111,7 +107,7 @@ def exp(rotation_vector: ArrayLike) -> Floats:
     r = _vectors(rotation_vector)
     half = 0.5 * _norm3(r)
     sinc = np.divide(np.sin(half), half, out=np.ones_like(half), where=half > 0.0)
-    return np.concatenate([np.cos(half)[..., None], 0.5 * sinc[..., None] * r], axis=-1)
+    return _joined(quaternions.exponential(np.cos(half), 0.5 * sinc, _separate(r)))
 
 
 def log(q: ArrayLike) -> Floats:
@@ -175,13 +171,7 @@ def to_matrix(q: ArrayLike) -> Floats:
            [ 0., -1.,  0.],
            [ 0.,  0.,  1.]])
     """
-    w, x, y, z = np.moveaxis(normalised(q), -1, 0)
-    rows = [
-        [w * w + x * x - y * y - z * z, 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), w * w - x * x + y * y - z * z, 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z],
-    ]
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+    return np.stack([_joined(row) for row in quaternions.matrix(_separate(normalised(q)))], axis=-2)
 
 
 def from_matrix(matrix: ArrayLike) -> Floats:
@@ -298,6 +288,19 @@ def _matrices(m: ArrayLike) -> Floats:
     if not np.all(np.isfinite(array)):
         raise ValueError("a rotation matrix holds a number that is not finite")
     return array
+
+
+def _separate(array: Floats) -> tuple[Floats, ...]:
+    """The components (...) of an array (..., n)."""
+    return tuple(array[..., k] for k in range(array.shape[-1]))
+
+
+def _joined(components: tuple[Floats, ...]) -> Floats:
+    """An array (..., n) of n components (...)."""
+    out = np.empty((*components[0].shape, len(components)))
+    for k, component in enumerate(components):
+        out[..., k] = component
+    return out
 
 
 def _norm3(v: Floats) -> Floats:

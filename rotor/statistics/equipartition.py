@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rotor.arrays import Floats
-from rotor.geometry.inertia import LINEAR_BELOW
+from rotor.geometry.inertia import LINEAR_BELOW, kinetic_energy_by_axis
 from rotor.statistics.degrees_of_freedom import rotating_axes
 from rotor.table import Table
 
@@ -193,7 +193,8 @@ def _rotations(inertia: Floats, m: Floats, groups: Groups, linear_below: float) 
         for axis, name in enumerate("abc"):
             here = rows[turns[rows, axis]]
             if len(here):
-                energies = 0.5 * m[..., here, axis] ** 2 / inertia[here, axis]
+                along = m[..., here, axis]
+                energies = kinetic_energy_by_axis(along, along / inertia[here, axis])
                 found.append((f"{prefix}rotation {name}", energies, float(len(here))))
     return found
 

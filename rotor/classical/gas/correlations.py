@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rotor.arrays import Floats
-from rotor.classical.euler import checked_moments, inverse_moments
+from rotor.classical.euler import checked_moments, gyroscopic_rate, inverse_moments
 
 NODES = 96  # of Gauss and Legendre's quadrature
 
@@ -175,11 +175,17 @@ def _generators() -> Floats:
 def _fourth(moments: Floats, w: Floats, axis: int) -> float:
     """<|ü|²> of the unit vector along an axis, the third of (i, j, k) cyclic; w = <ω²>, normal deviates.
 
-    |ü|² = ω̇_i² + ω̇_j² + ω² (ω_i² + ω_j²) + 2 ω_k (ω̇_j ω_i - ω̇_i ω_j), with I ω̇_i = (I_j - I_k) ω_j ω_k, cyclic.
+    |ü|² = ω̇_i² + ω̇_j² + ω² (ω_i² + ω_j²) + 2 ω_k (ω̇_j ω_i - ω̇_i ω_j), where Euler's equations give ω̇_i = d_i ω_j ω_k, cyclic.
     """
     i, j, k = (axis + 1) % 3, (axis + 2) % 3, axis
-    inverse = inverse_moments(moments)
-    di, dj = (moments[j] - moments[k]) * inverse[i], (moments[k] - moments[i]) * inverse[j]
+    unit = np.eye(3)
+    di = _acceleration(moments, unit[j] + unit[k])[i]
+    dj = _acceleration(moments, unit[k] + unit[i])[j]
     turning = di**2 * w[j] * w[k] + dj**2 * w[k] * w[i]
     across = 3.0 * w[i] ** 2 + 3.0 * w[j] ** 2 + 2.0 * w[i] * w[j] + w[k] * (w[i] + w[j])
     return float(turning + across + 2.0 * w[k] * (dj * w[i] - di * w[j]))
+
+
+def _acceleration(moments: Floats, omega: Floats) -> Floats:
+    """ω̇ of a free body, 0 about the axis of a linear rotor."""
+    return gyroscopic_rate(moments * omega, omega) * inverse_moments(moments)

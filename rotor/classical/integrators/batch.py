@@ -35,7 +35,7 @@ from rotor.classical.system import acting_inverse
 from rotor.geometry.rotations import from_matrix, normalised
 
 
-def advance(
+def propagate(
     moments: ArrayLike,
     momentum: ArrayLike,
     attitude: ArrayLike,
@@ -49,7 +49,7 @@ def advance(
     negative. The two turns of a step, (1/I_i - 1/I3) |L| step, may not be wider than ½ rad for any body. Threads of
     `executor` share the bodies (the compiled loop releases the interpreter lock).
 
-    >>> momentum, attitude = advance([0.6, 0.8, 1.0], np.array([[1.8, 0.4, -0.9]]), [1, 0, 0, 0], 0.01, 1000)
+    >>> momentum, attitude = propagate([0.6, 0.8, 1.0], np.array([[1.8, 0.4, -0.9]]), [1, 0, 0, 0], 0.01, 1000)
     >>> momentum[0].round(4).tolist()  # exact: 1.76596, -0.69546, 0.77955
     [1.766, -0.6955, 0.7796]
     """

@@ -24,6 +24,7 @@ from typing import Any
 import numpy as np
 
 from rotor.arrays import Floats
+from rotor.classical.euler import kinetic_energy
 from rotor.classical.free.free_motion import free_motion
 from rotor.classical.integrators.compositions import fractions
 from rotor.classical.integrators.method import KickDrift
@@ -86,8 +87,7 @@ def modified_moments(moments: Floats, momentum: Floats, step: float, order: int)
     1/J_i = S/I_i + D with S = 1 + Σ S_ab N^a H^b, D = Σ D_ab N^a H^b, N = (h|L|)²/2, H = h² energy, summed to
     a + b = order/2 - 1 (Hairer and Vilmart 2006).
     """
-    energy = 0.5 * np.sum(momentum**2 / moments, axis=-1)
-    n, h = 0.5 * step**2 * np.sum(momentum**2, axis=-1), step**2 * energy
+    n, h = 0.5 * step**2 * np.sum(momentum**2, axis=-1), step**2 * kinetic_energy(momentum, momentum / moments)
     s, d = np.ones_like(n), np.zeros_like(n)
     for (a, b), (of_s, of_d) in _series(moments).items():
         if a + b < order / 2:
