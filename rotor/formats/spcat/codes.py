@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 
 from rotor.formats.spcat.par import Options, Parameter, ParameterFile
 from rotor.tops.constants import RIGID, Constants
-from rotor.tops.operators import axes_of, powers_of_spelled
+from rotor.tops.operators import axes_of, powers_of_spelled, spelled_term
 
 NOT_YET = "is read but not computed yet"
 
@@ -170,8 +170,7 @@ def constants_of(file: ParameterFile, *, errors: bool = False) -> Constants:
     kind = _kind(options, rigid, values)
     reduction = _reduction(options, values) if kind == "asymmetric" else None
 
-    names = {item.code: item for item in _vocabulary(kind, reduction)}
-    _refuse_unnamed(values, names, kind, reduction)
+    names = _names_of(values, kind, reduction)
     named: dict[str, Any] = _rigid_constants(options, rigid, kind)
     named |= {names[code].name: names[code].sign * value for code, value in values.items()}
 
@@ -197,11 +196,22 @@ def _summed(parameters: Iterable[Parameter]) -> tuple[dict[int, float], dict[int
     return values, spreads
 
 
-def _refuse_unnamed(values: Iterable[int], names: Iterable[int], kind: str, reduction: str | None) -> None:
-    unnamed = [code for code in values if code not in set(names)]
-    if unnamed:
+def _names_of(codes: Iterable[int], kind: str, reduction: str | None) -> dict[int, Named]:
+    """What the codes of distortion are called: by published names, else spelled out, such as J8Jpm2 for 40400."""
+    names = {item.code: item for item in _vocabulary(kind, reduction)}
+    for code in codes:
+        if code not in names:
+            names[code] = Named(_spelled_code(code, kind, reduction), code, 1)
+    return names
+
+
+def _spelled_code(code: int, kind: str, reduction: str | None) -> str:
+    d = split_code(code)
+    n = d.typ - 3 if d.typ > 3 else 0
+    if (d.typ and not n) or (n and kind != "asymmetric") or (d.ksq and kind in ("linear", "spherical")):
         whose = f"the {reduction}-reduction" if reduction else f"a top of kind {kind}"
-        raise ValueError(f"parameter {unnamed[0]}: no constant of {whose} has this operator; it {NOT_YET}")
+        raise ValueError(f"parameter {code}: no constant of {whose} has this operator; it {NOT_YET}")
+    return spelled_term(d.nsq, d.ksq, n)
 
 
 _RIGID = (10000, 20000, 30000, 100, 1000, 40000)
