@@ -17,6 +17,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from rotor.formats.spcat.par import Options, Parameter, ParameterFile
 from rotor.tops.constants import RIGID, Constants
 from rotor.tops.operators import axes_of, powers_of_spelled, spelled_term
@@ -183,6 +186,31 @@ def constants_of(file: ParameterFile, *, errors: bool = False) -> Constants:
         uncertainties={name: spread for name, spread in known.items() if spread and spread > HELD_BELOW},
         **named,
     )
+
+
+def constants_and_matrix(file: ParameterFile) -> tuple[Constants, NDArray[np.float64]]:
+    """The constants of a file, and M (constants, parameters) with constants = M @ values of the parameters.
+
+    >>> from rotor.formats.spcat.par import read_par
+    >>> file = read_par(b"x\\n 2 1 1\\ns -1 1 0 20\\n 1000 4.0 1\\n 100 5.0 1\\n")
+    >>> constants, matrix = constants_and_matrix(file)
+    >>> constants.values["A"], matrix.tolist()
+    (9.0, [[1.0, 1.0], [0.0, 1.0]])
+    """
+    constants = constants_of(file)
+    options, names = file.options[0], list(constants.values)
+    of_code: dict[int, dict[str, float]] = {}
+    for code in {_whole_code(parameter) for parameter in file.parameters}:
+        if code in _RIGID:
+            of_code[code] = _rigid_constants(options, {code: 1.0}, constants.kind)
+        else:
+            named = _names_of([code], constants.kind, constants.reduction)[code]
+            of_code[code] = {named.name: float(named.sign)}
+    matrix = np.zeros((len(names), len(file.parameters)))
+    for column, parameter in enumerate(file.parameters):
+        for name, factor in of_code[_whole_code(parameter)].items():
+            matrix[names.index(constants.own_name(name)), column] += factor
+    return constants, matrix
 
 
 def _summed(parameters: Iterable[Parameter]) -> tuple[dict[int, float], dict[int, float | None]]:
