@@ -38,7 +38,14 @@ class Assignments(Table):
 
     def __post_init__(self) -> None:
         n, k = len(self.frequency_mhz), len(self.names)
-        shapes = {"upper": (n, k), "lower": (n, k), "error_mhz": (n,), "weight": (n,), "blend": (n,), "wavenumber": (n,)}
+        shapes = {
+            "upper": (n, k),
+            "lower": (n, k),
+            "error_mhz": (n,),
+            "weight": (n,),
+            "blend": (n,),
+            "wavenumber": (n,),
+        }
         for name, shape in shapes.items():
             if np.shape(getattr(self, name)) != shape:
                 raise ValueError(f"{name} has shape {np.shape(getattr(self, name))}; {shape} is needed for {n} lines")
@@ -51,7 +58,9 @@ class Assignments(Table):
     def columns(self) -> dict[str, NDArray[Any]]:
         """Labels as j_upper, ka_upper, ..., then frequency_mhz, error_mhz, weight, blend."""
         labels = {
-            f"{name}_{side}": getattr(self, side)[:, i] for side in ("upper", "lower") for i, name in enumerate(self.names)
+            f"{name}_{side}": getattr(self, side)[:, i]
+            for side in ("upper", "lower")
+            for i, name in enumerate(self.names)
         }
         return {**labels, **{name: getattr(self, name) for name in ("frequency_mhz", "error_mhz", "weight", "blend")}}
 

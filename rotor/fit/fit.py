@@ -19,10 +19,10 @@ from rotor.arrays import Floats, Ints
 from rotor.fit.assignment import Assignments, duplicates
 from rotor.fit.parameters import Parameters
 from rotor.quantum.labelled import LevelModel, level_model
-from rotor.quantum.uncertainty import Covariance
 from rotor.statistics.least_squares import INTERRUPTED, Minimum, Progress, minimise
 from rotor.statistics.regression import Regression, regression
 from rotor.tops.constants import Constants
+from rotor.tops.covariance import Covariance
 
 LOSSES = ("squares", "huber", "cauchy")
 POOR_RMS = 10.0  # weighted rms above which the lines are not described, unless the caller says otherwise
@@ -141,7 +141,9 @@ def covariance_of(parameters: Parameters, statistics: Regression) -> Covariance:
     """The covariance (MHz²) of the constants that follow from free parameters."""
     if not np.isfinite(statistics.errors).all():
         lost = ", ".join(one.text for one in statistics.undetermined)
-        raise ValueError(f"the lines do not determine {lost}: there is no covariance; hold it or give an a-priori error")
+        raise ValueError(
+            f"the lines do not determine {lost}: there is no covariance; hold it or give an a-priori error"
+        )
     rows = np.flatnonzero(parameters.matrix.any(axis=1))
     matrix = parameters.matrix[rows] @ statistics.covariance @ parameters.matrix[rows].T
     return Covariance(tuple(parameters.constant_names[i] for i in rows), (matrix + matrix.T) / 2)
@@ -218,7 +220,9 @@ def _errors_of(lines: Assignments, options: FitOptions) -> tuple[dict[int, str],
     """Lines without an error, by position, and errors with the default put in."""
     zero = lines.error_mhz == 0
     if zero.all() and options.default_error_mhz is None:
-        raise ValueError("every line has an error of 0: give errors in the file, or one for all of them (default_error_mhz)")
+        raise ValueError(
+            "every line has an error of 0: give errors in the file, or one for all of them (default_error_mhz)"
+        )
     if options.default_error_mhz is not None:
         return {}, np.where(zero, options.default_error_mhz, lines.error_mhz)
     return {int(i): "its error is 0" for i in np.flatnonzero(zero)}, np.where(zero, 1.0, lines.error_mhz)
@@ -411,9 +415,7 @@ def _minimised(search: _Search, start: Floats, progress: Progress | None) -> Min
     )  # fmt: skip
 
 
-def _finished(
-    search: _Search, minimum: Minimum, constants: Constants, left_out: dict[int, str], labels: Ints
-) -> Fit:
+def _finished(search: _Search, minimum: Minimum, constants: Constants, left_out: dict[int, str], labels: Ints) -> Fit:
     values, parameters = minimum.parameters, search.parameters
     calculated, jacobian, slopes = search.lines_of(values)
     residuals, _ = search.weighted(values)
@@ -507,13 +509,19 @@ def _notes(fit: Fit) -> list[str]:
         notes.append(f"line {i + 1}, {lines.text(i)} at {lines.frequency_mhz[i]:.4f} MHz, does not count: {why}")
     if fit.changed_states:
         some = ", ".join(fit.changed_states[:5]) + (", ..." if len(fit.changed_states) > 5 else "")
-        notes.append(f"{len(fit.changed_states)} levels are mostly another state than at the start (by overlap): {some}")
+        notes.append(
+            f"{len(fit.changed_states)} levels are mostly another state than at the start (by overlap): {some}"
+        )
     twice = duplicates(lines)
     if twice:
         notes.append(f"{len(twice)} lines stand twice in the list, the first: {lines.text(twice[0][1])}")
-    reversed_ = np.flatnonzero(fit.used & (np.abs(lines.frequency_mhz + fit.calculated_mhz) < 1e-3 * np.abs(lines.frequency_mhz)))
+    reversed_ = np.flatnonzero(
+        fit.used & (np.abs(lines.frequency_mhz + fit.calculated_mhz) < 1e-3 * np.abs(lines.frequency_mhz))
+    )
     for i in reversed_.tolist():
-        notes.append(f"line {i + 1}, {lines.text(i)}: calculated with the opposite sign; are upper and lower exchanged?")
+        notes.append(
+            f"line {i + 1}, {lines.text(i)}: calculated with the opposite sign; are upper and lower exchanged?"
+        )
     if np.isfinite(fit.statistics.condition) and fit.statistics.condition > 1e5:
         notes.append(f"condition number {fit.statistics.condition:.1e}: some constants are nearly interchangeable")
     return notes

@@ -121,7 +121,9 @@ def with_names(constants: Constants, names: Sequence[str]) -> Constants:
 
 def _known(name: str, constants: Constants) -> str:
     if name not in constants:
-        raise ValueError(f"{name} is not in the set of constants to start from, which has {', '.join(constants.values)}")
+        raise ValueError(
+            f"{name} is not in the set of constants to start from, which has {', '.join(constants.values)}"
+        )
     return constants.own_name(name)
 
 
@@ -129,7 +131,9 @@ def _tie(text: str, constants: Constants) -> tuple[str, float, str, float]:
     """Left, ratio, right, difference in MHz of `left = ratio*right + difference`."""
     match = _TIE.match(text.replace("−", "-"))
     if not match:
-        raise ValueError(f"tie {text!r}: write 'X = 2.5*Y' (a ratio) or 'X = Y - 300' (a difference, in MHz or with a unit)")
+        raise ValueError(
+            f"tie {text!r}: write 'X = 2.5*Y' (a ratio) or 'X = Y - 300' (a difference, in MHz or with a unit)"
+        )
     left, right = _known(match[1], constants), _known(match[3], constants)
     if left == right:
         raise ValueError(f"tie {text!r}: {left} cannot follow itself")

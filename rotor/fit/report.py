@@ -20,7 +20,11 @@ def report_text(fit: Fit, title: str = "", *, notes: Sequence[str] = ()) -> str:
         [title or "fit of rotational constants", status_text(fit), ""],
         ["PARAMETERS AT THE START (MHz), A-PRIORI ERRORS", *_start(fit), ""],
         ["LINES", *_lines(fit), ""],
-        ["PARAMETERS (MHz): value(error), error from stated line errors, error from the scatter, change", *_end(fit), ""],
+        [
+            "PARAMETERS (MHz): value(error), error from stated line errors, error from the scatter, change",
+            *_end(fit),
+            "",
+        ],
         ["STATISTICS", *statistics_text(fit), ""],
         ["SEARCH: weighted rms before and after each step, damping", *_search(fit), ""],
         ["CORRELATIONS", *_correlations(fit), ""],
@@ -58,7 +62,8 @@ def far_off(fit: Fit, errors: float = FAR_OFF) -> list[str]:
     parts = np.abs(fit.residuals[: len(fit.groups)])
     order = [int(i) for i in np.argsort(-parts) if parts[i] > errors]
     return [
-        f"line {fit.groups[i] + 1}, {fit.lines.text(int(fit.groups[i]))}: {fit.residuals[i]:+.1f} errors" for i in order[:20]
+        f"line {fit.groups[i] + 1}, {fit.lines.text(int(fit.groups[i]))}: {fit.residuals[i]:+.1f} errors"
+        for i in order[:20]
     ]
 
 

@@ -75,7 +75,9 @@ def level_model(constants: Constants, labels: Ints, *, kmax: int | None = None) 
     if constants.kind == "asymmetric":
         return WangBlocks.of(constants, labels, kmax)
     if "Dt" in constants.values:
-        raise ValueError("D_t splits the levels of a spherical top, which J alone does not label; it cannot be fitted here")
+        raise ValueError(
+            "D_t splits the levels of a spherical top, which J alone does not label; it cannot be fitted here"
+        )
     return ClosedForm.of(constants, labels)
 
 

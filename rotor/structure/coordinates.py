@@ -79,7 +79,9 @@ def named(molecule: Molecule, name: str, atoms: Sequence[int]) -> Named:
     """
     chosen, count = tuple(int(atom) for atom in atoms), len(molecule.symbols)
     if len(chosen) not in UNITS or len(set(chosen)) < len(chosen):
-        raise ValueError(f"{name} = {list(atoms)}: 2 (distance), 3 (angle) or 4 (dihedral angle) different atoms are needed")
+        raise ValueError(
+            f"{name} = {list(atoms)}: 2 (distance), 3 (angle) or 4 (dihedral angle) different atoms are needed"
+        )
     if not all(1 <= atom <= count for atom in chosen):
         raise ValueError(f"{name} = {list(atoms)}: the molecule has atoms 1 to {count}")
     found = Named(name, chosen, (chosen,))

@@ -17,7 +17,6 @@ errors of the constants carried through.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -165,7 +164,9 @@ def _refuse(shape: str, pair: str, mass_u: float, change_u: float) -> None:
     if pair not in ("ab", "ac", "bc"):
         raise ValueError(f"pair {pair!r}: ab, ac or bc says which two moments of a planar molecule count")
     if not (np.isfinite([mass_u, change_u]).all() and mass_u > 0 and mass_u + change_u > 0 and change_u):
-        raise ValueError(f"mass {mass_u!r} u changed by {change_u!r} u: a mass above 0 and a change other than 0 are needed")
+        raise ValueError(
+            f"mass {mass_u!r} u changed by {change_u!r} u: a mass above 0 and a change other than 0 are needed"
+        )
 
 
 def _used_moments(both: Floats, shape: str, pair: str) -> np.ndarray:

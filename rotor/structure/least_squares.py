@@ -230,7 +230,9 @@ class _Problem:
             moments[row] = self._with_vibration(species, axis, moment, terms, jacobian[row])
         return moments, jacobian
 
-    def _with_vibration(self, species: Species, axis: str, moment: float, terms: dict[str, float], row: Floats) -> float:
+    def _with_vibration(
+        self, species: Species, axis: str, moment: float, terms: dict[str, float], row: Floats
+    ) -> float:
         """The moment with c and d, the derivatives of this row changed accordingly."""
         total, slope = moment, 1.0
         if f"c_{axis}" in terms:
@@ -329,7 +331,13 @@ def _result(problem: _Problem, minimum: Minimum) -> FittedStructure:
         spread = _spread(gradient, covariance[shape, shape])
         values.append(Value(one.name, one.atoms, one.value(x), spread * one.factor, one.unit))
     vibrational = [
-        Value(name, (), float(p[problem.shape_count + i]), float(np.sqrt(covariance.diagonal()[problem.shape_count + i])), "")
+        Value(
+            name,
+            (),
+            float(p[problem.shape_count + i]),
+            float(np.sqrt(covariance.diagonal()[problem.shape_count + i])),
+            "",
+        )
         for i, name in enumerate(problem.terms)
     ]
     moments = tuple(
@@ -383,6 +391,12 @@ def _notes(problem: _Problem, condition: float) -> tuple[str, ...]:
     if condition > 1e4:
         notes.append(f"condition {condition:.1e}: some combination of the parameters is poorly determined")
     family = problem.family
-    if problem.method in ("r0", "re") and family.planar and len({family.species[s].axes[g] for s, g in problem.rows}) == 3:
-        notes.append("a planar molecule with all three moments of each species: they depend on each other; leave one out")
+    if (
+        problem.method in ("r0", "re")
+        and family.planar
+        and len({family.species[s].axes[g] for s, g in problem.rows}) == 3
+    ):
+        notes.append(
+            "a planar molecule with all three moments of each species: they depend on each other; leave one out"
+        )
     return tuple(notes)

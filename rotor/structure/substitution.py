@@ -64,7 +64,9 @@ class SubstitutionStructure:
     notes: tuple[str, ...]
 
 
-def substitution_structure(family: Family, *, pair: str = "ab", coordinates: Iterable[Named] = ()) -> SubstitutionStructure:
+def substitution_structure(
+    family: Family, *, pair: str = "ab", coordinates: Iterable[Named] = ()
+) -> SubstitutionStructure:
     """The r_s structure of a family.
 
     pair : which two moments serve for a planar molecule. coordinates : bonds and angles to give; those of the start geometry

@@ -24,7 +24,13 @@ from rotor.formats.spcat.par import Header, Parameter, ParameterFile, read_par
 from rotor.tops.constants import Constants
 
 FREE_ABOVE = 1e30  # an a-priori error so large is none
-_QUANTA = {"linear": ("j",), "spherical": ("j",), "prolate": ("j", "k"), "oblate": ("j", "k"), "asymmetric": ("j", "ka", "kc")}
+_QUANTA = {
+    "linear": ("j",),
+    "spherical": ("j",),
+    "prolate": ("j", "k"),
+    "oblate": ("j", "k"),
+    "asymmetric": ("j", "ka", "kc"),
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +58,9 @@ def read_fit(par: str | os.PathLike[str], lin: str | os.PathLike[str] | None = N
     """
     beside = Path(lin) if lin is not None else Path(par).with_suffix(".lin")
     if not beside.exists():
-        raise ValueError(f"{beside}: there are no measured lines beside {Path(par).name}; SPFIT's lines stand in a .lin file")
+        raise ValueError(
+            f"{beside}: there are no measured lines beside {Path(par).name}; SPFIT's lines stand in a .lin file"
+        )
     return spfit_input(read_par(par), read_lin(beside), Path(beside).name)
 
 
@@ -86,7 +94,9 @@ def spfit_input(file: ParameterFile, lines: LineList, source: str = "") -> Spfit
 
 def _refuse_options(header: Header) -> None:
     if header.nxpar:
-        raise ValueError(f"NXPAR = {header.nxpar}: parameters that special lines leave out are not supported; set it to 0")
+        raise ValueError(
+            f"NXPAR = {header.nxpar}: parameters that special lines leave out are not supported; set it to 0"
+        )
     if not header.errtst > 0:
         raise ValueError(f"ERRTST = {header.errtst:g}: the largest |obs - calc|/error of a line that counts is above 0")
     if not header.cal > 0:
@@ -98,7 +108,9 @@ def _roles(parameters: Sequence[Parameter]) -> tuple[list[bool], list[bool]]:
     if parameters and parameters[0].constrained:
         raise ValueError(f"parameter -{parameters[0].code}: the first one has none before it to keep a ratio to")
     ties = [p.constrained for p in parameters]
-    held = [not tied and p.error is not None and abs(p.error) < HELD_BELOW for p, tied in zip(parameters, ties, strict=True)]
+    held = [
+        not tied and p.error is not None and abs(p.error) < HELD_BELOW for p, tied in zip(parameters, ties, strict=True)
+    ]
     return held, ties
 
 
@@ -128,7 +140,8 @@ def _prior(parameter: Parameter) -> float:
 def _distinct(names: Sequence[str]) -> tuple[str, ...]:
     """Names with a number behind those that stand twice."""
     return tuple(
-        f"{name} ({1 + list(names[:i]).count(name)})" if list(names).count(name) > 1 else name for i, name in enumerate(names)
+        f"{name} ({1 + list(names[:i]).count(name)})" if list(names).count(name) > 1 else name
+        for i, name in enumerate(names)
     )
 
 
@@ -136,9 +149,7 @@ def _kmax(file: ParameterFile, constants: Constants) -> int | None:
     return file.options[0].knmax if constants.kind == "asymmetric" else None
 
 
-def _assigned(
-    lines: LineList, constants: Constants, header: Header, source: str
-) -> tuple[Assignments, list[str]]:
+def _assigned(lines: LineList, constants: Constants, header: Header, source: str) -> tuple[Assignments, list[str]]:
     """Lines up to NLINE, wavenumbers times CAL, blends as the file marks them."""
     notes = []
     blends = lines.blends()
@@ -175,7 +186,9 @@ def _refuse_width(lines: LineList, names: Sequence[str], kept: np.ndarray) -> No
 def _notes(file: ParameterFile, options: FitOptions, constants: Constants, lines: Assignments) -> list[str]:
     notes = []
     if file.header.npar > len(file.parameters):
-        notes.append(f"NPAR = {file.header.npar}, but {len(file.parameters)} parameters stand in the file: those are used")
+        notes.append(
+            f"NPAR = {file.header.npar}, but {len(file.parameters)} parameters stand in the file: those are used"
+        )
     if file.header.thresh:
         notes.append("THRESH, the first damping, is chosen by the search itself; the result does not depend on it")
     highest = int(max(lines.upper[:, 0].max(initial=0), lines.lower[:, 0].max(initial=0)))
