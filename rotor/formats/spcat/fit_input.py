@@ -21,7 +21,9 @@ from rotor.fit.parameters import Parameters
 from rotor.formats.spcat.codes import HELD_BELOW, constants_and_matrix
 from rotor.formats.spcat.lin import LineList, line_list, read_lin
 from rotor.formats.spcat.par import Header, Parameter, ParameterFile, read_par
+from rotor.formats.spcat.model import parameter_file
 from rotor.tops.constants import Constants
+from rotor.tops.top import Top
 
 FREE_ABOVE = 1e30  # an a-priori error so large is none
 _QUANTA = {
@@ -218,6 +220,33 @@ def fitted_file(asked: SpfitInput, fit: Fit, *, variances: bool) -> ParameterFil
     return replace(asked.file, parameters=tuple(made), rest=rest)
 
 
+def named_file(fit: Fit, title: str, *, variances: bool) -> ParameterFile:
+    """The .par or .var file of a fit in named constants.
+
+    SPFIT's parameters are not always the constants (A - B of a symmetric top): their errors and correlations are carried over.
+    Raises ValueError where a fitted combination of constants has no parameter of its own there (a tie between constants).
+    """
+    top = Top.from_constants(fit.constants, name=title)
+    highest = int(max(fit.lines.upper[:, 0].max(), fit.lines.lower[:, 0].max()))
+    file = parameter_file(top, kmax=min(max(highest, 1), 359))
+    _, matrix = constants_and_matrix(file)
+    back = np.linalg.pinv(matrix) @ fit.parameters.matrix  # SPFIT's parameters by the free ones
+    back[np.abs(back) < 1e-9] = 0.0
+    covariance = back @ np.where(np.isfinite(fit.statistics.covariance), fit.statistics.covariance, 0.0) @ back.T
+    errors = np.sqrt(np.diag(covariance))
+    moved = back.any(axis=1)
+    parameters = tuple(
+        replace(p, error=(float(errors[i]) if variances else 1e36) if moved[i] else 1e-37)
+        for i, p in enumerate(file.parameters)
+    )
+    rows = np.flatnonzero(moved)
+    if len(rows) != len(fit.parameters.names):
+        raise ValueError("tied constants have no parameters of their own in SPFIT's files; write the .toml file instead")
+    rest = _packed(covariance[np.ix_(rows, rows)] / np.outer(errors[rows], errors[rows])) if variances else ""
+    header = replace(file.header, npar=len(parameters), nline=len(fit.lines), nitr=100)
+    return replace(file, header=header, parameters=parameters, rest=rest)
+
+
 def correlation_text(fit: Fit) -> str:
     """What stands at the end of a .var file: the correlations C = V Vᵀ, V upper triangular, column by column, eight in a line.
 
@@ -225,6 +254,10 @@ def correlation_text(fit: Fit) -> str:
     """
     correlations = np.nan_to_num(fit.statistics.correlations)
     np.fill_diagonal(correlations, 1.0)
+    return _packed(correlations)
+
+
+def _packed(correlations: Floats) -> str:
     factor = _lower_factor(correlations[::-1, ::-1])[::-1, ::-1]
     values = [factor[i, j] for j in range(len(factor)) for i in range(j + 1)]
     rows = [values[i : i + 8] for i in range(0, len(values), 8)]
