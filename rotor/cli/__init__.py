@@ -14,7 +14,21 @@ from typing import cast
 
 import typer
 
-from rotor.cli import cat, convert, fit, fluid, gas, info, isotopologues, molecules, raman, spectrum, structure, thermo, tumble
+from rotor.cli import (
+    cat,
+    convert,
+    fit,
+    fluid,
+    gas,
+    info,
+    isotopologues,
+    molecules,
+    raman,
+    spectrum,
+    structure,
+    thermo,
+    tumble,
+)
 from rotor.cli.shared.output import ComputationError
 
 NO_ANSWER, WRONG_INPUT, INTERRUPTED = 1, 2, 130

@@ -40,8 +40,12 @@ Examples:
   rotor fit lines.lin --start water --free A,B,C --try DeltaJ,DeltaJK,DeltaK
   rotor fit lines.csv --start constants.toml --free A,B,C --prior DeltaK=0.02 --tie "deltaK=0.5*deltaJ" --plot rest.png"""
 
-_FREE = typer.Option(None, metavar="LIST", help="Constants to fit: A,B,C,DeltaJ; those of --start that carry an error if left out.")
-_TIE = typer.Option(None, metavar="TEXT", help='A constant that follows a free one: "DeltaK=2.5*DeltaJ", "C=B-300"; repeatable.')
+_FREE = typer.Option(
+    None, metavar="LIST", help="Constants to fit: A,B,C,DeltaJ; those of --start that carry an error if left out."
+)
+_TIE = typer.Option(
+    None, metavar="TEXT", help='A constant that follows a free one: "DeltaK=2.5*DeltaJ", "C=B-300"; repeatable.'
+)
 _PRIOR = typer.Option(None, metavar="X=ERROR", help="A-priori standard error of a free constant (MHz); repeatable.")
 
 
@@ -66,26 +70,40 @@ def command(
     context: typer.Context,
     source: str = typer.Argument(..., help="case.par (with case.lin), or lines: .lin, .csv, .cat.", show_default=False),
     lin: str | None = typer.Option(None, metavar="FILE", help="Lines of case.par, where they are not case.lin."),
-    start: str | None = typer.Option(None, metavar="SOURCE", help="Constants to start from: a file (.toml, .var, ...) or a name."),
+    start: str | None = typer.Option(
+        None, metavar="SOURCE", help="Constants to start from: a file (.toml, .var, ...) or a name."
+    ),
     constants: str | None = inputs.CONSTANTS,
     free: str | None = _FREE,
     tie: list[str] | None = _TIE,
     prior: list[str] | None = _PRIOR,
-    more: str | None = typer.Option(None, "--merge", metavar="FILE", help="More lines (.lin, .csv, .cat) of the same kind."),
-    reject: float | None = typer.Option(None, metavar="X", help="Lines more than X errors off do not count; they are reported."),
+    more: str | None = typer.Option(
+        None, "--merge", metavar="FILE", help="More lines (.lin, .csv, .cat) of the same kind."
+    ),
+    reject: float | None = typer.Option(
+        None, metavar="X", help="Lines more than X errors off do not count; they are reported."
+    ),
     loss: str = typer.Option("squares", metavar="NAME", help="squares, or huber or cauchy: lines far off weigh less."),
     default_error: str | None = typer.Option(None, metavar="X", help="Error of lines whose file gives 0 (MHz)."),
     poor_rms: float = typer.Option(10.0, metavar="X", help="Weighted rms above which the fit has failed."),
     iterations: int | None = typer.Option(None, metavar="N", help="Most iterations; 100, or NITR of a .par file."),
     try_: str | None = typer.Option(None, "--try", metavar="LIST", help="Try each of these constants more, or less."),
-    choose: str | None = typer.Option(None, metavar="LIST", help="Build the model up from these constants, one at a time."),
-    suggest: str | None = typer.Option(None, metavar="NAME", help="Which unmeasured line would best fix this constant."),
-    resample: int = typer.Option(0, "--bootstrap", metavar="N", help="Errors from N samples of the lines beside the others."),
+    choose: str | None = typer.Option(
+        None, metavar="LIST", help="Build the model up from these constants, one at a time."
+    ),
+    suggest: str | None = typer.Option(
+        None, metavar="NAME", help="Which unmeasured line would best fix this constant."
+    ),
+    resample: int = typer.Option(
+        0, "--bootstrap", metavar="N", help="Errors from N samples of the lines beside the others."
+    ),
     seed: int = typer.Option(0, metavar="N", help="Of the bootstrap."),
     out: str | None = typer.Option(None, metavar="STEM", help="Write STEM.fit (report), .toml, .par and .var."),
     table: str | None = typer.Option(None, metavar="FILE", help="Table for a publication (.txt, .md, .tex)."),
     save_lines: str | None = typer.Option(None, metavar="FILE", help="The assigned lines, merged (.lin, .csv)."),
-    plot: str | None = typer.Option(None, metavar="FILE", help="Residuals against frequency, J and K (.png, .pdf, .svg)."),
+    plot: str | None = typer.Option(
+        None, metavar="FILE", help="Residuals against frequency, J and K (.png, .pdf, .svg)."
+    ),
     json: str | None = inputs.JSON,
 ) -> None:
     """Constants from measured lines, with errors, correlations and what the lines leave open; exit code 1 unless converged."""
@@ -174,7 +192,9 @@ def _of_spfit(source: str, lin: str | None) -> Request:
 
     asked = read_fit(source, lin)
     title = " ".join(asked.file.title.split()) or Path(source).stem
-    return Request(asked.lines, asked.constants, asked.parameters, asked.options, title, source, asked, list(asked.notes))
+    return Request(
+        asked.lines, asked.constants, asked.parameters, asked.options, title, source, asked, list(asked.notes)
+    )
 
 
 def _of_lines(
@@ -193,7 +213,9 @@ def _of_lines(
         raise ValueError("--free: name the constants to fit, such as A,B,C,DeltaJ; those of the start carry no errors")
     begin = with_names(top.constants, names)
     made = parameters(begin, names, ties=ties, priors_mhz=dict(_prior(text) for text in priors))
-    return Request(lines, begin, made, FitOptions(), " ".join(top.name.split()) or Path(source).name, start or "", None, notes)
+    return Request(
+        lines, begin, made, FitOptions(), " ".join(top.name.split()) or Path(source).name, start or "", None, notes
+    )
 
 
 def _prior(text: str) -> tuple[str, float]:
@@ -215,7 +237,12 @@ def _with_more(request: Request, path: str | None) -> Request:
 
 
 def _options(
-    options: FitOptions, reject: float | None, loss: str, default_error: str | None, poor_rms: float, iterations: int | None
+    options: FitOptions,
+    reject: float | None,
+    loss: str,
+    default_error: str | None,
+    poor_rms: float,
+    iterations: int | None,
 ) -> FitOptions:
     changes: dict[str, Any] = {"loss": loss, "poor_rms": poor_rms}
     if reject is not None:
@@ -243,7 +270,9 @@ def _progress() -> Any:
 
     def tell(one: Iteration) -> None:
         taken = "" if one.taken else " refused"
-        print(f"iteration {one.number}: weighted rms {one.rms_before:.6g} -> {one.rms_after:.6g}{taken}", file=sys.stderr)
+        print(
+            f"iteration {one.number}: weighted rms {one.rms_before:.6g} -> {one.rms_after:.6g}{taken}", file=sys.stderr
+        )
 
     return tell
 
@@ -488,7 +517,9 @@ def _parameter_table(fit: Fit, spread: Sequence[float]) -> Table:
     rows = []
     for i, name in enumerate(fit.parameters.names):
         error = float(fit.errors[i])
-        text = value_text(float(fit.values[i]), error) if error < float("inf") else f"{fit.values[i]!r} (not determined)"
+        text = (
+            value_text(float(fit.values[i]), error) if error < float("inf") else f"{fit.values[i]!r} (not determined)"
+        )
         numbers = [f"{error:.3g}", f"{float(fit.scaled_errors[i]):.3g}", *([f"{spread[i]:.3g}"] if spread else [])]
         rows.append([name, text, *numbers])
     return Table("", columns, rows, frozenset({"parameter"}))

@@ -53,8 +53,12 @@ def command(
     method: str = typer.Option("rs,r0", metavar="LIST", help="Of rs, r0, rm1, rm2, re."),
     weights: str = typer.Option("equal", metavar="NAME", help="Moments weighted equally, or by their errors (errors)."),
     leave_out: str | None = typer.Option(None, metavar="AXES", help="Axes whose moments are not fitted, such as c."),
-    pair: str = typer.Option("ab", metavar="AB", help="Which two moments serve for rs of a planar molecule: ab, ac, bc."),
-    xyz: str | None = typer.Option(None, metavar="FILE", help="The geometry of the last method, in principal axes (.xyz)."),
+    pair: str = typer.Option(
+        "ab", metavar="AB", help="Which two moments serve for rs of a planar molecule: ab, ac, bc."
+    ),
+    xyz: str | None = typer.Option(
+        None, metavar="FILE", help="The geometry of the last method, in principal axes (.xyz)."
+    ),
     plot: str | None = typer.Option(None, metavar="FILE", help="The molecule with its bonds (.png, .pdf, .svg)."),
     json: str | None = inputs.JSON,
 ) -> None:
@@ -68,7 +72,9 @@ def command(
     files.ask("--plot", plot, (".png", ".pdf", ".svg"))
     files.ask_json(json)
     if not source.lower().endswith(".toml"):
-        raise ValueError(f"{source}: a family of isotopologues is a .toml file; docs/structure.md says what stands in it")
+        raise ValueError(
+            f"{source}: a family of isotopologues is a .toml file; docs/structure.md says what stands in it"
+        )
 
     from rotor.formats.family_file import read_family
 
@@ -195,9 +201,13 @@ def _writers(file: FamilyFile, answer: Answer, content: dict[str, Any]) -> dict[
         molecule, _, method = _geometry(file, answer)
         rows = [
             f"{s:2s} {x:14.8f} {y:14.8f} {z:14.8f}"
-            for s, (x, y, z) in zip(molecule.symbols, (molecule.positions_angstrom.round(8) + 0.0).tolist(), strict=True)
+            for s, (x, y, z) in zip(
+                molecule.symbols, (molecule.positions_angstrom.round(8) + 0.0).tolist(), strict=True
+            )
         ]
-        write_text(path, "\n".join([str(len(rows)), f"{file.family.name}, {method}, principal axes a b c", *rows]) + "\n")
+        write_text(
+            path, "\n".join([str(len(rows)), f"{file.family.name}, {method}, principal axes a b c", *rows]) + "\n"
+        )
 
     def picture(path: Path) -> None:
         from rotor.plots.structure import plot_structure
@@ -220,7 +230,10 @@ def _show(file: FamilyFile, answer: Answer) -> None:
         worst = max(one.moments, key=lambda moment: abs(moment.difference))
         show_facts(
             [
-                ("moments", f"{len(one.moments)}, {one.degrees_of_freedom} degrees of freedom, rms {one.rms_u_angstrom2:.3g} u Å²"),
+                (
+                    "moments",
+                    f"{len(one.moments)}, {one.degrees_of_freedom} degrees of freedom, rms {one.rms_u_angstrom2:.3g} u Å²",
+                ),
                 ("worst", f"I_{worst.axis} of {worst.species}: obs - calc {worst.difference:+.3g} u Å²"),
                 ("search", one.minimum.reason),
             ]
@@ -240,7 +253,9 @@ def _coordinates_table(found: SubstitutionStructure) -> Table:
             )
         ]
         rows.append([str(one.atom), one.species, *cells, one.found.shape])
-    return Table("rs: coordinates (Å)", ["atom", "from", "a", "b", "c", "equations"], rows, frozenset({"from", "equations"}))
+    return Table(
+        "rs: coordinates (Å)", ["atom", "from", "a", "b", "c", "equations"], rows, frozenset({"from", "equations"})
+    )
 
 
 def _values_table(method: str, values: Sequence[Value]) -> Table:

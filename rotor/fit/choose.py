@@ -12,6 +12,7 @@ and the rms of the residuals that leaving each line out in turn would give, r_i/
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -158,7 +159,15 @@ def _same_priors(fit: Fit, made: Parameters) -> Parameters:
 
 def _trial(name: str, added: bool, before: Fit, found: Fit, ratio: float, chance: float) -> Trial:
     return Trial(
-        name, added, found, ratio, chance, aicc(found), cross_validated_rms(found), aicc(before), cross_validated_rms(before)
+        name,
+        added,
+        found,
+        ratio,
+        chance,
+        aicc(found),
+        cross_validated_rms(found),
+        aicc(before),
+        cross_validated_rms(before),
     )
 
 
@@ -229,7 +238,7 @@ def _patient(options: FitOptions | None) -> FitOptions:
 def _best_pair(fit: Fit, left: Sequence[str], options: FitOptions | None) -> Trial | None:
     """Two neighbours of the list together, judged as one step."""
     found = []
-    for one, other in zip(left, left[1:], strict=False):
+    for one, other in itertools.pairwise(left):
         constants = with_names(fit.constants, [one, other])
         try:
             both = fit_lines(
@@ -257,7 +266,13 @@ class Suggestion:
 
 
 def suggest_lines(
-    fit: Fit, name: str, upper: Ints, lower: Ints, *, error_mhz: float, model: Callable[[Ints], LevelModel] | None = None
+    fit: Fit,
+    name: str,
+    upper: Ints,
+    lower: Ints,
+    *,
+    error_mhz: float,
+    model: Callable[[Ints], LevelModel] | None = None,
 ) -> list[Suggestion]:
     """How much each line, if it were measured, would reduce the standard error of one parameter; the best first.
 
@@ -334,6 +349,8 @@ def bootstrap(
         if one.statistics.rank == fit.statistics.rank:
             out.append(one.values)
     if len(out) < samples:
-        raise ValueError(f"only {len(out)} of {10 * samples} samples determine all constants; too few lines for a bootstrap")
+        raise ValueError(
+            f"only {len(out)} of {10 * samples} samples determine all constants; too few lines for a bootstrap"
+        )
     found = np.array(out)
     return found, np.asarray(found.std(axis=0, ddof=1))

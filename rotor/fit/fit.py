@@ -19,7 +19,7 @@ from rotor.arrays import Floats, Ints
 from rotor.fit.assignment import Assignments, duplicates
 from rotor.fit.parameters import Parameters
 from rotor.quantum.labelled import LevelModel, level_model
-from rotor.statistics.least_squares import INTERRUPTED, Minimum, Progress, minimise
+from rotor.statistics.least_squares import EXHAUSTED, INTERRUPTED, Minimum, Progress, minimise
 from rotor.statistics.regression import Regression, regression
 from rotor.tops.constants import Constants
 from rotor.tops.covariance import Covariance
@@ -31,6 +31,9 @@ _HUBER, _CAUCHY = 1.345, 2.385  # σ at which a loss bends: 95 % efficiency for 
 _CANCELLED = 1e-12  # of the level derivatives: what is left of differences below it is round-off
 _REJECTIONS = 20
 _STAGES = (0.1, 0.2, 0.35, 0.5, 0.7, 0.85)  # shares of the lines, in order of J, of a search that begins with low J
+_ROUGH = 10.0  # standard errors within which a stage has converged
+_FIRST_ITERATIONS = 12  # of a direct search, after which it must have made way
+_WAY = 0.01  # of the weighted rms at the start, below which it has
 _AT_ZERO_MHZ = 1e-30  # how far a constant that starts at 0 may move in these stages
 
 
@@ -358,9 +361,7 @@ def _with_rejection(
     search: _Search, options: FitOptions, progress: Progress | None
 ) -> tuple[_Search, Minimum, dict[int, str]]:
     """The search, repeated without the lines that are too far off until the same ones stay out."""
-    minimum = _minimised(search, search.parameters.start, progress)
-    if _poor(search, minimum):
-        minimum = _by_stages(search, minimum, progress)
+    minimum = _searched(search, progress)
     if options.reject_above is None:
         return search, minimum, {}
     may = search.used
@@ -374,14 +375,26 @@ def _with_rejection(
             break
         _refuse_too_few(search.lines, used, search.parameters)
         search = replace(search, used=used)
-        minimum = _minimised(search, minimum.parameters, progress)
+        minimum = _continued(minimum, _minimised(search, minimum.parameters, progress, options.most_iterations))
     out = np.flatnonzero(may & ~search.used)
     return search, minimum, {int(i): f"more than {options.reject_above:g} errors off" for i in out}
 
 
-def _poor(search: _Search, minimum: Minimum) -> bool:
-    """Whether a search ended far from the lines, other than by the user's will."""
-    return minimum.status != INTERRUPTED and minimum.rms > search.options.poor_rms
+def _searched(search: _Search, progress: Progress | None) -> Minimum:
+    """A direct search; where it makes no way in its first iterations, or ends far from the lines, one by rising J."""
+    limit = search.options.most_iterations
+    first = _minimised(search, search.parameters.start, progress, min(_FIRST_ITERATIONS, limit))
+    before = first.iterations[0].rms_before if first.iterations else first.rms
+    slow = first.rms > _WAY * before and first.rms > search.options.poor_rms
+    if first.status == EXHAUSTED and limit > _FIRST_ITERATIONS and not slow:
+        first = _continued(first, _minimised(search, first.parameters, progress, limit - len(first.iterations)))
+    poor = first.rms > search.options.poor_rms and first.status != INTERRUPTED
+    return _by_stages(search, first, progress) if poor and len(first.iterations) < limit else first
+
+
+def _continued(first: Minimum, second: Minimum) -> Minimum:
+    """The second search with the iterations of both."""
+    return replace(second, iterations=(*first.iterations, *second.iterations))
 
 
 def _by_stages(search: _Search, first: Minimum, progress: Progress | None) -> Minimum:
@@ -392,27 +405,26 @@ def _by_stages(search: _Search, first: Minimum, progress: Progress | None) -> Mi
     starts at 0 stays there.
     """
     j = np.maximum(search.lines.upper[:, 0], search.lines.lower[:, 0])
-    values, tried = search.parameters.start, list(first.iterations)
+    last, limit = replace(first, parameters=search.parameters.start), search.options.most_iterations
+    rough = replace(search.options, tolerance=_ROUGH)
     try:
         for share in _STAGES:
             cut = np.quantile(j[search.used], share)
             soft = np.minimum(search.parameters.prior, np.maximum(np.abs(search.parameters.start), _AT_ZERO_MHZ))
-            stage = replace(search, used=search.used & (j <= cut), parameters=replace(search.parameters, prior=soft))
-            staged = _minimised(stage, values, progress)
-            values = staged.parameters
-            tried += staged.iterations
-        second = _minimised(search, values, progress)
+            stage = replace(
+                search, options=rough, used=search.used & (j <= cut), parameters=replace(search.parameters, prior=soft)
+            )
+            last = _continued(last, _minimised(stage, last.parameters, progress, max(limit - len(last.iterations), 0)))
+        second = _continued(last, _minimised(search, last.parameters, progress, max(limit - len(last.iterations), 0)))
     except ValueError:  # a stage left the bounds of the model
         return first
-    best = second if second.rms < first.rms else first
-    return replace(best, iterations=(*tried, *second.iterations))
+    return second if second.rms < first.rms else replace(first, iterations=second.iterations)
 
 
-def _minimised(search: _Search, start: Floats, progress: Progress | None) -> Minimum:
+def _minimised(search: _Search, start: Floats, progress: Progress | None, limit: int) -> Minimum:
     return minimise(
-        search.evaluate, start, tolerance=search.options.tolerance, most_iterations=search.options.most_iterations,
-        progress=progress,
-    )  # fmt: skip
+        search.evaluate, start, tolerance=search.options.tolerance, most_iterations=limit, progress=progress
+    )
 
 
 def _finished(search: _Search, minimum: Minimum, constants: Constants, left_out: dict[int, str], labels: Ints) -> Fit:

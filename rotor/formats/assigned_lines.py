@@ -22,7 +22,13 @@ from rotor.formats.spcat.lin import line_list, read_lin, write_lin
 from rotor.units import MHZ_PER_CM
 
 SUFFIXES = (".lin", ".csv", ".cat", ".cat.gz")
-QUANTA = {"linear": ("j",), "spherical": ("j",), "prolate": ("j", "k"), "oblate": ("j", "k"), "asymmetric": ("j", "ka", "kc")}
+QUANTA = {
+    "linear": ("j",),
+    "spherical": ("j",),
+    "prolate": ("j", "k"),
+    "oblate": ("j", "k"),
+    "asymmetric": ("j", "ka", "kc"),
+}
 _FREQUENCY = {"frequency_mhz": 1.0, "frequency_ghz": 1e3, "wavenumber_cm": MHZ_PER_CM}
 _ERROR = {"error_mhz": 1.0, "error_khz": 1e-3, "error_ghz": 1e3, "error_cm": MHZ_PER_CM}
 
@@ -105,12 +111,16 @@ def _of_csv(path: str | os.PathLike[str], names: Sequence[str]) -> Assignments:
     )  # fmt: skip
 
 
-def _refuse_columns(path: str | os.PathLike[str], columns: Sequence[str], labels: Sequence[str], known: set[str]) -> None:
+def _refuse_columns(
+    path: str | os.PathLike[str], columns: Sequence[str], labels: Sequence[str], known: set[str]
+) -> None:
     missing = [name for name in labels if name not in columns]
     strange = [name for name in columns if name not in known]
     if missing or strange:
         what = f"no column {', '.join(missing)}" if missing else f"unknown column {', '.join(map(repr, strange))}"
-        raise ValueError(f"{path}: {what}; columns are {', '.join(labels)}, a frequency, an error, weight, blend, comment")
+        raise ValueError(
+            f"{path}: {what}; columns are {', '.join(labels)}, a frequency, an error, weight, blend, comment"
+        )
     if len([name for name in _FREQUENCY if name in columns]) != 1:
         raise ValueError(f"{path}: one column of {', '.join(_FREQUENCY)} is needed")
 
@@ -184,7 +194,13 @@ def write_assigned_lines(lines: Assignments, path: str | os.PathLike[str]) -> No
     labels = [f"{name}_{side}" for side in ("upper", "lower") for name in lines.names]
     wave = bool(lines.wavenumber.all()) and len(lines) > 0
     unit = MHZ_PER_CM if wave else 1.0
-    heads = [*labels, "wavenumber_cm" if wave else "frequency_mhz", "error_cm" if wave else "error_mhz", "weight", "blend"]
+    heads = [
+        *labels,
+        "wavenumber_cm" if wave else "frequency_mhz",
+        "error_cm" if wave else "error_mhz",
+        "weight",
+        "blend",
+    ]
     with open_atomic(path, "w", encoding="utf-8", newline="") as handle:
         writer = csv.writer(handle, lineterminator="\n")
         writer.writerow([*heads, *(["comment"] if lines.comments else [])])

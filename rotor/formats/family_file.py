@@ -1,25 +1,25 @@
 """A family of isotopologues as a TOML file: a start geometry, constants of each, what is to be fitted.
 
-    name = "OCS"
+name = "OCS"
 
-    [geometry]                                    # good enough to tell axes and signs; the isotopes of the parent
-    atoms = [["O", 0, 0, 1.16], ["C", 0, 0, 0], ["S", 0, 0, -1.56]]
+[geometry]                                    # good enough to tell axes and signs; the isotopes of the parent
+atoms = [["O", 0, 0, 1.16], ["C", 0, 0, 0], ["S", 0, 0, -1.56]]
 
-    [coordinates]                                 # what is fitted, atoms from 1: a distance, an angle, a dihedral angle;
-    CO = [1, 2]                                   # left out: everything that keeps the symmetry
-    CS = [2, 3]
+[coordinates]                                 # what is fitted, atoms from 1: a distance, an angle, a dihedral angle;
+CO = [1, 2]                                   # left out: everything that keeps the symmetry
+CS = [2, 3]
 
-    [held]                                        # coordinates that stay as in the geometry
+[held]                                        # coordinates that stay as in the geometry
 
-    [[isotopologue]]                              # the parent first
-    constants = "B=6081.492114(6) MHz"            # those of A, B, C that are known
-    source = "..."
+[[isotopologue]]                              # the parent first
+constants = "B=6081.492114(6) MHz"            # those of A, B, C that are known
+source = "..."
 
-    [[isotopologue]]
-    isotopes = "C=13C"                            # or "2=13C"
-    lines = "c061502.cat.gz"                      # instead of constants: measured lines (.cat, .lin, .csv) that are fitted here,
-    start = "B=6062 D=0.0013 MHz"                 # from these constants, all of them free; a path counts from the file's folder
-    corrections = "B=13.2 MHz"                    # to be added to the constants of the ground state: B_e = B_0 + correction
+[[isotopologue]]
+isotopes = "C=13C"                            # or "2=13C"
+lines = "c061502.cat.gz"                      # instead of constants: measured lines (.cat, .lin, .csv) that are fitted here,
+start = "B=6062 D=0.0013 MHz"                 # from these constants, all of them free; a path counts from the file's folder
+corrections = "B=13.2 MHz"                    # to be added to the constants of the ground state: B_e = B_0 + correction
 """
 
 from __future__ import annotations
@@ -128,7 +128,7 @@ def _constants(
         values, errors = _parsed(one, "constants", place)
         return _rigid(values), _rigid(errors), ""
     if "start" not in one:
-        raise ValueError(f"{place}: lines need start constants, such as start = \"B=6062 D=0.0013 MHz\"")
+        raise ValueError(f'{place}: lines need start constants, such as start = "B=6062 D=0.0013 MHz"')
     try:
         fit = _fitted(folder / one["lines"], Constants.parse(one["start"]), options)
     except (ValueError, OSError) as error:

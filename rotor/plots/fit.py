@@ -14,7 +14,12 @@ from rotor.plots.spectrum import BLUE, DPI, GREY, STYLE
 from rotor.version import version
 
 RED = "#D55E00"  # of Okabe and Ito's palette
-_HEADINGS = {"j": "J of the upper state", "ka": "Ka of the upper state", "k": "K of the upper state", "n": "N of the upper state"}
+_HEADINGS = {
+    "j": "J of the upper state",
+    "ka": "Ka of the upper state",
+    "k": "K of the upper state",
+    "n": "N of the upper state",
+}
 
 
 def plot_fit(
@@ -46,7 +51,9 @@ def plot_fit(
             _draw(axes, fit, x)
             axes.set_xlabel("frequency (GHz)" if heading == "frequency" else heading)
         status = "" if fit.converged else ", NOT CONVERGED"
-        heading = f"{title or fit.lines.source}: weighted rms {fit.weighted_rms:.3g}, {len(fit.groups)} frequencies{status}"
+        heading = (
+            f"{title or fit.lines.source}: weighted rms {fit.weighted_rms:.3g}, {len(fit.groups)} frequencies{status}"
+        )
         figure.axes[0].set_title(heading.replace("$", r"\$"), loc="left")
         figure.savefig(path, dpi=DPI, metadata=_metadata(suffix, fit, provenance or {}))
 

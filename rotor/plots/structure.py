@@ -97,7 +97,6 @@ def _draw_bonds(axes: Any, molecule: Molecule, values: Sequence[Value], across: 
 def _draw_atoms(axes: Any, molecule: Molecule, across: int, up: int, depth: int, scale: float) -> None:
     from ase.data import atomic_numbers, covalent_radii
     from ase.data.colors import jmol_colors
-
     from matplotlib.patches import Circle
 
     x = molecule.positions_angstrom
@@ -105,7 +104,9 @@ def _draw_atoms(axes: Any, molecule: Molecule, across: int, up: int, depth: int,
         number = atomic_numbers[molecule.symbols[atom]]
         colour = 0.75 * np.asarray(jmol_colors[number]) + 0.25
         place = (x[atom, across], x[atom, up])
-        axes.add_patch(Circle(place, 0.42 * covalent_radii[number], facecolor=colour, edgecolor=GREY, linewidth=0.8, zorder=2))
+        axes.add_patch(
+            Circle(place, 0.42 * covalent_radii[number], facecolor=colour, edgecolor=GREY, linewidth=0.8, zorder=2)
+        )
         axes.text(*place, f"{molecule.symbols[atom]}{atom + 1}", ha="center", va="center", fontsize=7.0, zorder=3)
 
 

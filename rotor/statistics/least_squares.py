@@ -24,7 +24,7 @@ Evaluate = Callable[[Floats], tuple[Floats, Floats]]  # p (n,) -> r (m,), J (m, 
 Progress = Callable[["Iteration"], None]
 
 CONVERGED, STALLED, EXHAUSTED, INTERRUPTED = "converged", "stalled", "too many iterations", "interrupted"
-FIRST_DAMPING, MOST_DAMPING = 1e-6, 1e12  # λ where D p has columns of length 1
+FIRST_DAMPING, MOST_DAMPING = 1e-4, 1e12  # λ where D p has columns of length 1
 ROUND_OFF = 1e-13  # singular values below this part of the largest carry no information
 
 
@@ -136,10 +136,11 @@ def minimise(
             gain = (state.rms**2 - after**2) * len(state.residuals) / predicted if predicted > 0 else -1.0
             good = math.isfinite(after) and gain > 1e-4
             taken.append(Iteration(len(taken) + 1, state.rms, after, damping, predicted, good))
-            if progress:
-                progress(taken[-1])
             if good and trial:
                 state = trial
+            if progress:
+                progress(taken[-1])
+            if good:
                 damping = _relaxed(damping, gain)
                 continue
             damping = max(10.0 * damping, FIRST_DAMPING)

@@ -9,7 +9,7 @@ names leave open moves as little as it can (the pseudo-inverse).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from rotor.arrays import Floats
 from rotor.molecules.internal_coordinates import Coordinate, bend, stretch, torsion, wilson_b
 from rotor.molecules.molecule import Molecule
+from rotor.molecules.symmetry.operations import symmetrised
 from rotor.molecules.symmetry.point_group import symmetry_of
 
 Atoms = tuple[int, ...]  # counted from 1
@@ -101,6 +102,28 @@ def named(molecule: Molecule, name: str, atoms: Sequence[int]) -> Named:
 def _one_way(atoms: Atoms) -> Atoms:
     """A coordinate read forwards and backwards is one."""
     return min(atoms, atoms[::-1])
+
+
+def symmetric_geometry(molecule: Molecule) -> Molecule:
+    """The molecule with its nuclei exactly where its symmetry has them; isotopes, centre and frame stay.
+
+    >>> tilted = Molecule(("O", "C", "S"), [[0, 1e-4, 1.16], [0, 0, 0], [0, 0, -1.56]])
+    >>> float(np.abs(symmetric_geometry(tilted).positions_angstrom[:, 0]).max())
+    0.0
+    """
+    plain = _without_isotopes(molecule)
+    symmetry, centre = symmetry_of(plain), plain.centre_of_mass_angstrom
+    points = plain.positions_angstrom - centre
+    if symmetry.linear:
+        axis = symmetry.axes_abc[0]
+        permutation = symmetry.rotations[-1].permutation
+        along = points @ axis
+        if (permutation != np.arange(len(along))).any():
+            along = (along - along[permutation]) / 2
+        ideal = np.outer(along, axis)
+    else:
+        ideal, _ = symmetrised(points, [*symmetry.rotations, *symmetry.improper])
+    return replace(molecule, positions_angstrom=ideal + centre)
 
 
 def symmetric_displacements(molecule: Molecule) -> Floats:

@@ -9,6 +9,7 @@ import numpy as np
 
 from rotor.arrays import Floats
 from rotor.molecules.molecule import Molecule
+from rotor.structure.coordinates import symmetric_geometry
 from rotor.tops.isotopic_scaling import matched_axes
 from rotor.tops.top import Top
 from rotor.units import ROTATIONAL_MHZ_U_ANGSTROM2
@@ -114,7 +115,7 @@ def family(
     Parameters
     ----------
     molecule : Molecule
-        The parent with a start geometry, good enough to tell axes and signs.
+        The parent with a start geometry, good enough to tell axes and signs; it is made exactly symmetric first.
     measured : sequence of (name, isotopes, constants_mhz, errors_mhz)
         Isotopes as `Molecule.with_isotopes` takes them, "" for the parent; the parent comes first.
     corrections_mhz, sources : sequences, optional
@@ -138,6 +139,7 @@ def family(
     """
     if not measured:
         raise ValueError("a family without isotopologues: the constants of the parent at least are needed")
+    molecule = symmetric_geometry(molecule)
     top = Top.from_molecule(molecule)
     found: list[Species] = []
     for i, (label, isotopes, constants, errors) in enumerate(measured):

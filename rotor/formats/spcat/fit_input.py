@@ -20,8 +20,8 @@ from rotor.fit.fit import Fit, FitOptions
 from rotor.fit.parameters import Parameters
 from rotor.formats.spcat.codes import HELD_BELOW, constants_and_matrix
 from rotor.formats.spcat.lin import LineList, line_list, read_lin
-from rotor.formats.spcat.par import Header, Parameter, ParameterFile, read_par
 from rotor.formats.spcat.model import parameter_file
+from rotor.formats.spcat.par import Header, Parameter, ParameterFile, read_par
 from rotor.tops.constants import Constants
 from rotor.tops.top import Top
 
@@ -241,7 +241,9 @@ def named_file(fit: Fit, title: str, *, variances: bool) -> ParameterFile:
     )
     rows = np.flatnonzero(moved)
     if len(rows) != len(fit.parameters.names):
-        raise ValueError("tied constants have no parameters of their own in SPFIT's files; write the .toml file instead")
+        raise ValueError(
+            "tied constants have no parameters of their own in SPFIT's files; write the .toml file instead"
+        )
     rest = _packed(covariance[np.ix_(rows, rows)] / np.outer(errors[rows], errors[rows])) if variances else ""
     header = replace(file.header, npar=len(parameters), nline=len(fit.lines), nitr=100)
     return replace(file, header=header, parameters=parameters, rest=rest)
