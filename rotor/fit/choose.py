@@ -16,6 +16,7 @@ import itertools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -126,9 +127,10 @@ def _set_of(fit: Fit) -> Constants:
 
 def _with(fit: Fit, constants: Constants, name: str, options: FitOptions | None) -> Trial | None:
     free = [*fit.parameters.names, name]
+    values: dict[str, Any] = {k: v for k, v in constants.values.items() if k in fit.constants.values or k == name}
     own = Constants(
         kind=constants.kind, reduction=constants.reduction, representation=constants.representation,
-        **{key: value for key, value in constants.values.items() if key in fit.constants.values or key == name},
+**values,
     )  # fmt: skip
     try:
         found = fit_lines(fit.lines, own, _same_priors(fit, parameters(own, free)), options)

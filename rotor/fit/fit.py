@@ -467,7 +467,7 @@ def _constants(
 ) -> tuple[Constants, str]:
     """The fitted set with standard errors, and what is wrong with it: then it is the start, with that text."""
     new = dict(zip(parameters.constant_names, parameters.constants_of(values).tolist(), strict=True))
-    touched = parameters.matrix.any(axis=1)
+    touched = np.asarray(parameters.matrix.any(axis=1)).tolist()
     covariance = statistics.covariance
     errors = {}
     for name, row, moves in zip(parameters.constant_names, parameters.matrix, touched, strict=True):

@@ -31,6 +31,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from rotor.fit.fit import Fit, FitOptions, fit_lines
 from rotor.fit.parameters import parameters
 from rotor.formats.assigned_lines import QUANTA, read_assigned_lines
@@ -106,7 +108,11 @@ def _molecule(content: Mapping[str, Any], path: str) -> Molecule:
     if not isinstance(atoms, list) or not all(isinstance(row, list) and len(row) == 4 for row in atoms):
         raise ValueError(f'{path}: [geometry] with atoms = [["O", x, y, z], ...] in Å is needed')
     try:
-        return Molecule(tuple(row[0] for row in atoms), [row[1:] for row in atoms], name=content.get("name", ""))
+        return Molecule(
+            tuple(row[0] for row in atoms),
+            np.array([row[1:] for row in atoms], dtype=float),
+            name=content.get("name", ""),
+        )
     except (TypeError, ValueError) as error:
         raise ValueError(f"{path}, [geometry]: {error}") from None
 

@@ -333,7 +333,7 @@ def _covariance(table: _Reader | None, constants: Constants | None) -> Covarianc
     lost = [name for name in names if name not in known]
     if lost or not names:
         raise table.error("names", f"{', '.join(lost) or 'none'}: constants of the file with an uncertainty are needed")
-    rows = table.content.get("correlations")
+    rows: Any = table.content.get("correlations") or []
     fits = isinstance(rows, list) and [len(row) if isinstance(row, list) else 0 for row in rows] == [
         *range(1, len(names) + 1)
     ]

@@ -186,16 +186,23 @@ def _rms(residuals: Floats) -> float:
 
 @dataclass(frozen=True)
 class _State:
-    """A point with residuals, Jacobian and the norms of its columns."""
+    """A point with residuals and Jacobian, and the triangle R of the QR of (J, r), from which all else follows."""
 
     parameters: Floats
     residuals: Floats
     jacobian: Floats
-    norms: Floats
+    triangle: Floats
 
     @classmethod
     def at(cls, parameters: Floats, residuals: Floats, jacobian: Floats) -> _State:
-        return cls(parameters, residuals, jacobian, np.sqrt(np.einsum("ij,ij->j", jacobian, jacobian)))
+        stacked = np.empty((len(residuals), len(parameters) + 1), order="F")
+        stacked[:, :-1], stacked[:, -1] = jacobian, residuals
+        return cls(parameters, residuals, jacobian, _triangle(stacked))
+
+    @property
+    def norms(self) -> Floats:
+        """Lengths (n,) of the columns of the Jacobian."""
+        return np.asarray(np.sqrt(np.einsum("ij,ij->j", self.triangle[:, :-1], self.triangle[:, :-1])))
 
     @property
     def rms(self) -> float:
@@ -215,6 +222,13 @@ class _State:
         )  # fmt: skip
 
 
+def _triangle(stacked: Floats) -> Floats:
+    """R of the QR of (m, n), or the matrix itself where it has fewer rows than columns."""
+    if len(stacked) <= stacked.shape[1]:
+        return stacked
+    return np.asarray(np.linalg.qr(stacked, mode="r"))
+
+
 @dataclass(frozen=True)
 class _Linear:
     """The linear model at a point, D p its variables: singular values s, z = Uᵀ r, and D⁻¹ V."""
@@ -227,15 +241,14 @@ class _Linear:
     @classmethod
     def of(cls, state: _State, scale: Floats) -> _Linear:
         safe = np.where(scale > 0, scale, 1.0)
-        n = len(safe)
-        stacked = np.column_stack([state.jacobian / safe, state.residuals])
-        r = np.linalg.qr(stacked, mode="r") if len(stacked) > n + 1 else stacked
-        u, s, vt = np.linalg.svd(r[:, :n], full_matrices=False)
+        columns: Floats = state.triangle[:, :-1]
+        last: Floats = state.triangle[:, -1]
+        u, s, vt = np.linalg.svd(columns / safe, full_matrices=False)
         s = np.where(s > ROUND_OFF * s.max(initial=0.0), s, 0.0)
-        size = np.linalg.norm(state.residuals) or 1.0
+        size = float(np.linalg.norm(last)) or 1.0
         norms = np.where(state.norms > 0, state.norms, 1.0)
-        gradient = np.abs(state.jacobian.T @ state.residuals) / (norms * size)
-        return cls(s, u.T @ r[:, n], vt.T / safe[:, None], float(gradient.max(initial=0.0)))
+        gradient = np.abs(columns.T @ last) / (norms * size)
+        return cls(s, u.T @ last, vt.T / safe[:, None], float(gradient.max(initial=0.0)))
 
     @property
     def distance(self) -> float:

@@ -63,7 +63,7 @@ class Regression:
     @property
     def rank(self) -> int:
         """How many combinations are determined."""
-        return self.left.shape[1]
+        return int(self.left.shape[1])
 
     @property
     def errors(self) -> Floats:
@@ -164,5 +164,5 @@ def _by_axes(s: Floats, vt: Floats) -> Floats:
 
 
 def _combination(names: Sequence[str], row: Floats, singular: float) -> Combination:
-    part = np.flatnonzero(np.abs(row) > _PART)
+    part: list[int] = np.flatnonzero(np.abs(row) > _PART).tolist()
     return Combination(tuple(names[i] for i in part), row[part], singular)

@@ -58,8 +58,10 @@ class Named:
 
 
 def _function(atoms: Atoms) -> Coordinate:
-    i = [atom - 1 for atom in atoms]
-    return {2: stretch, 3: bend, 4: torsion}[len(atoms)](*i)
+    places = [atom - 1 for atom in atoms]
+    if len(places) == 2:
+        return stretch(*places)
+    return bend(*places) if len(places) == 3 else torsion(*places)
 
 
 def permutations(molecule: Molecule) -> list[NDArray[np.int64]]:
@@ -163,7 +165,7 @@ def _along_axis(positions: Floats, reversal: NDArray[np.int64]) -> Floats:
     along = np.kron(np.eye(len(positions)), np.outer(axis, axis))
     turned = _acting(-np.outer(axis, axis), reversal)
     same = bool((reversal == np.arange(len(reversal))).all())
-    return along if same else (along + turned) / 2
+    return np.asarray(along if same else (along + turned) / 2, dtype=np.float64)
 
 
 def _rigid_motions(positions: Floats) -> Floats:

@@ -20,7 +20,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from rotor.arrays import Floats
 
@@ -57,7 +57,7 @@ class Substituted:
     def costain_angstrom(self) -> Floats:
         """K/|r| (3,), what vibration may do to each coordinate; √K = 0.039 Å at most, where the rule has lost its sense."""
         size = np.maximum(np.sqrt(np.abs(self.squares_angstrom2)), np.sqrt(COSTAIN_ANGSTROM2))
-        return np.where(self._used, COSTAIN_ANGSTROM2 / size, 0.0)
+        return np.where(self._used > 0, COSTAIN_ANGSTROM2 / size, 0.0)
 
     @property
     def measured_angstrom(self) -> Floats:
@@ -75,7 +75,7 @@ class Substituted:
 
     @property
     def _used(self) -> Floats:
-        return np.isin(np.arange(3), SHAPES[self.shape])
+        return np.isin(np.arange(3), SHAPES[self.shape]).astype(float)
 
 
 def planar_moments(moments: ArrayLike) -> Floats:
@@ -169,14 +169,14 @@ def _refuse(shape: str, pair: str, mass_u: float, change_u: float) -> None:
         )
 
 
-def _used_moments(both: Floats, shape: str, pair: str) -> np.ndarray:
+def _used_moments(both: Floats, shape: str, pair: str) -> NDArray[np.bool_]:
     """Which moments (2, 3) count; a missing one of two equal moments does not."""
     if shape == "planar":
         return np.array([[axis in pair for axis in "abc"]] * 2)
     if shape == "linear":
-        return np.isfinite(both) & np.array([[False, True, True]] * 2)
+        return np.asarray(np.isfinite(both) & np.array([[False, True, True]] * 2))
     if shape == "symmetric":
-        return np.isfinite(both)
+        return np.asarray(np.isfinite(both))
     return np.ones((2, 3), dtype=bool)
 
 

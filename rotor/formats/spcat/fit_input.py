@@ -234,7 +234,7 @@ def named_file(fit: Fit, title: str, *, variances: bool) -> ParameterFile:
     back[np.abs(back) < 1e-9] = 0.0
     covariance = back @ np.where(np.isfinite(fit.statistics.covariance), fit.statistics.covariance, 0.0) @ back.T
     errors = np.sqrt(np.diag(covariance))
-    moved = back.any(axis=1)
+    moved = np.atleast_1d(back.any(axis=1))
     parameters = tuple(
         replace(p, error=(float(errors[i]) if variances else 1e36) if moved[i] else 1e-37)
         for i, p in enumerate(file.parameters)
