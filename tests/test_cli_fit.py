@@ -151,7 +151,7 @@ def test_trying_choosing_suggesting_and_resampling(call, folder):
     assert code == 0
     assert "tried" in out
     trials = json.loads((folder / "try.json").read_text(encoding="utf-8"))["trials"]
-    assert [(one["name"], one["better"]) for one in trials][0] == ("H", True)
+    assert (trials[0]["name"], trials[0]["better"]) == ("H", True)
     code, out, _ = call(*common, "--choose", "H,L", "--suggest", "H", "--bootstrap", "20", "--json", "choose.json")
     assert code == 0
     content = json.loads((folder / "choose.json").read_text(encoding="utf-8"))
