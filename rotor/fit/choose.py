@@ -26,6 +26,7 @@ from rotor.fit.fit import Fit, FitOptions, fit_lines
 from rotor.fit.parameters import Parameters, parameters, with_names
 from rotor.quantum.labelled import LevelModel, level_model
 from rotor.tops.constants import Constants
+from rotor.tops.operators import distortion_terms, powers_of_spelled
 
 CHANCE = 0.01  # of an F so large by accident, above which a constant is not taken
 _MOST_STEPS = 40
@@ -194,7 +195,11 @@ def choose_constants(
     *,
     progress: Callable[[Trial], None] | None = None,
 ) -> tuple[Fit, list[Trial]]:
-    """A model built up one constant at a time: the candidate with the largest F that all three signs speak for.
+    """A model built up order by order in J, then freed of what it does not need.
+
+    Of the candidates of one order that all three signs speak for, the one with the largest F is taken, until none is left; where
+    none helps alone, pairs of one order are tried, because such constants often make sense together only. Then the next order
+    follows. At the end constants that the whole model does not need are left out one by one, highest order first.
 
     Parameters
     ----------
@@ -204,8 +209,6 @@ def choose_constants(
     base : sequence of str
         Constants that are always free.
     candidates : sequence of str
-        In the order in which ties are broken. Where none helps alone, each pair of neighbours in this list is tried, because
-        constants of one order often make sense together only.
     options : FitOptions, optional
     progress : callable, optional
         Called with every step taken.
@@ -217,19 +220,46 @@ def choose_constants(
     """
     start = with_names(constants, base)
     fit = fit_lines(lines, start, parameters(start, base), _patient(options))
-    taken: list[Trial] = []
-    left = [name for name in (start.own_name(c) for c in candidates) if name not in fit.parameters.names]
-    for _ in range(_MOST_STEPS):
-        trials = [one for one in try_constants(fit, left, _patient(options)) if one.added]
-        best = next((one for one in trials if one.better), None) or _best_pair(fit, left, options)
-        if best is None:
-            break
-        fit = best.fit
-        left = [name for name in left if name not in fit.parameters.names]
-        taken.append(best)
+    fixed, taken = tuple(fit.parameters.names), list[Trial]()
+    names = dict.fromkeys(start.own_name(name) for name in candidates)
+    orders = {name: order_of(name, start) for name in names if name not in fixed}
+
+    def take(trial: Trial) -> Fit:
+        taken.append(trial)
         if progress:
-            progress(best)
-    return fit, taken
+            progress(trial)
+        return trial.fit
+
+    before = -1
+    while len(taken) > before:  # once more while something was taken: a higher order may have made room for a lower one
+        before = len(taken)
+        for order in sorted(set(orders.values())):
+            while len(taken) < _MOST_STEPS:
+                left = [name for name, own in orders.items() if own == order and name not in fit.parameters.names]
+                trials = [one for one in try_constants(fit, left, _patient(options)) if one.added]
+                best = next((one for one in trials if one.better), None) or _best_pair(fit, left, options)
+                if best is None:
+                    break
+                fit = take(best)
+    while True:
+        spare = [name for name in fit.parameters.names if name not in fixed]
+        needless = [one for one in try_constants(fit, spare, _patient(options)) if not one.added and one.better]
+        if not needless:
+            return fit, taken
+        fit = take(min(needless, key=lambda one: (-orders[one.name], one.f_ratio)))
+
+
+def order_of(name: str, constants: Constants) -> int:
+    """The highest power of J in a constant's operator: 2 for A, 4 for DeltaJ, 6 for PhiK.
+
+    >>> order_of("PhiK", Constants(A=9.0, B=3.0, C=2.0, reduction="A"))
+    6
+    """
+    if name in ("A", "B", "C"):
+        return 2
+    spelled = powers_of_spelled(name)
+    terms = {spelled: 1.0} if spelled else distortion_terms(constants.kind, constants.reduction)[name]
+    return max(2 * (p + q + n) for p, q, n in terms)
 
 
 def _patient(options: FitOptions | None) -> FitOptions:
@@ -238,9 +268,9 @@ def _patient(options: FitOptions | None) -> FitOptions:
 
 
 def _best_pair(fit: Fit, left: Sequence[str], options: FitOptions | None) -> Trial | None:
-    """Two neighbours of the list together, judged as one step."""
+    """Two constants together, judged as one step."""
     found = []
-    for one, other in itertools.pairwise(left):
+    for one, other in itertools.combinations(left, 2):
         constants = with_names(fit.constants, [one, other])
         try:
             both = fit_lines(
