@@ -162,20 +162,20 @@ class WangBlocks(LevelModel):
     def levels(self, values_mhz: Floats) -> tuple[Floats, Floats]:
         """See `LevelModel`. Raises ValueError where a block is not finite or LAPACK does not converge."""
         coefficients = self.factors @ values_mhz
-        energies, slopes = np.empty(self.count), np.empty((self.count, len(self.powers)))
+        energies, slopes = np.empty(self.count), np.empty((self.count, len(self.names)))
+        places = [place for _, place in self.powers]  # that of a scalar is -1, the column of ones
         for chunk in self.chunks:
             weights = self._weights(coefficients, chunk.x)
             bands = [np.einsum("bkt,bt->bk", unit, weights) for unit in chunk.units]
             solved, vectors = _diagonalised(bands, chunk.sizes)
             energies[chunk.rows] = solved[chunk.block, chunk.rank]
-            expected = _expectations(chunk, vectors)
-            for column, (p, place) in enumerate(self.powers):
-                power = chunk.x[chunk.block] ** p
-                slopes[chunk.rows, column] = power * expected[:, place] if place >= 0 else power
+            expected = np.column_stack([_expectations(chunk, vectors), np.ones(len(chunk.rows))])
+            powers = np.stack([chunk.x**p for p, _ in self.powers], axis=1)[chunk.block]
+            slopes[chunk.rows] = (expected[:, places] * powers) @ self.factors
         for (p, place), coefficient in zip(self.powers, coefficients.tolist(), strict=True):
             if place < 0:
                 energies += coefficient * (self.j * (self.j + 1.0)) ** p
-        return energies, slopes @ self.factors
+        return energies, slopes
 
     def overlaps(self, before_mhz: Floats, after_mhz: Floats) -> Floats:
         """See `LevelModel`."""
