@@ -14,9 +14,10 @@ from rotor.formats.spcat.cat import read_cat
 from rotor.formats.spcat.codes import constants_of
 from rotor.formats.spcat.par import read_par
 from rotor.quantum.solve import solve_levels
-from rotor.quantum.uncertainty import Covariance, level_errors
+from rotor.quantum.uncertainty import level_errors
 from rotor.spectra.lines import line_list
 from rotor.tops.constants import Constants
+from rotor.tops.covariance import Covariance
 from rotor.tops.top import Top
 
 OCS = Constants(B=6081.492, D=1.3e-3, uncertainties={"B": 6e-6, "D": 2e-8})

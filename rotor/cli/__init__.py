@@ -14,7 +14,21 @@ from typing import cast
 
 import typer
 
-from rotor.cli import cat, convert, fluid, gas, info, isotopologues, molecules, raman, spectrum, thermo, tumble
+from rotor.cli import (
+    cat,
+    convert,
+    fit,
+    fluid,
+    gas,
+    info,
+    isotopologues,
+    molecules,
+    raman,
+    spectrum,
+    structure,
+    thermo,
+    tumble,
+)
 from rotor.cli.shared.output import ComputationError
 
 NO_ANSWER, WRONG_INPUT, INTERRUPTED = 1, 2, 130
@@ -33,7 +47,9 @@ Examples:
   rotor thermo water --temperature 10:1000K:100 --plot heat.png
   rotor tumble water --plot water.png
   rotor gas water --molecules 20000 --seed 7
-  rotor fluid water --molecules 216 --csv run.csv"""
+  rotor fluid water --molecules 216 --csv run.csv
+  rotor fit case.par --out fitted
+  rotor structure family.toml --plot molecule.png"""
 
 
 def _application() -> typer.Typer:
@@ -61,6 +77,8 @@ def _application() -> typer.Typer:
     app.command("tumble", epilog=tumble.EXAMPLES)(tumble.command)
     app.command("gas", epilog=gas.EXAMPLES)(gas.command)
     app.command("fluid", epilog=fluid.EXAMPLES)(fluid.command)
+    app.command("fit", epilog=fit.EXAMPLES)(fit.command)
+    app.command("structure", epilog=structure.EXAMPLES)(structure.command)
     app.command("convert", epilog=convert.EXAMPLES)(convert.command)
     app.command("cat", epilog=cat.EXAMPLES)(cat.command)
     return app

@@ -20,6 +20,10 @@
     A = 835852.4
     DJ = { value = 34.8, uncertainty = 0.1, source = "..." }
 
+    [covariance]                        # of constants that were fitted together: their correlation coefficients, row by row as
+    names = ["A", "DJ"]                 # far as the diagonal; the standard errors are the uncertainties above
+    correlations = [[1.0], [0.3, 1.0]]
+
     [dipole]                            # along the principal axes a, b, c
     unit = "D"
     source = "..."
@@ -65,13 +69,14 @@ from numpy.typing import NDArray
 from rotor.geometry.inertia import PrincipalFrame, point_masses, principal_frame
 from rotor.molecules.molecule import ELECTRONIC, Molecule
 from rotor.tops.constants import Constants
+from rotor.tops.covariance import Covariance
 from rotor.tops.kind import kind_from_moments
 from rotor.tops.spin_weights import SpinWeights
 from rotor.tops.top import Tensor
 from rotor.units import parse_quantity
 
 GEOMETRY_KINDS = ("r0", "rs", "re", "computed")
-_TABLES = ("geometry", "constants", "dipole", "polarizability", "spin_weights", "catalogue")
+_TABLES = ("geometry", "constants", "covariance", "dipole", "polarizability", "spin_weights", "catalogue")
 _RULES = {"linear": "J", "spherical": "irrep", "prolate": "K", "oblate": "K", "asymmetric": "KaKc"}
 
 Table = dict[str, Any]
@@ -105,6 +110,7 @@ class MoleculeFile:
     sources : by table, where its numbers are from; single constants may have their own in `constants.sources`
     catalogue : the measured lines that the constants were held against
     polarizability_abc_angstrom3 : the tensor (3, 3) along a, b, c in Å³
+    covariance : of the constants, where the file has their correlations
     """
 
     name: str
@@ -118,6 +124,7 @@ class MoleculeFile:
     sources: Mapping[str, str] = field(default_factory=dict)
     catalogue: MeasuredLines | None = None
     polarizability_abc_angstrom3: Tensor | None = None
+    covariance: Covariance | None = None
 
 
 def read_molecule_file(path: str | os.PathLike[str]) -> MoleculeFile:
@@ -166,6 +173,7 @@ def parse_molecule_file(text: str, where: str = "molecule file", default_name: s
         sources={name: table.text("source") for name, table in tables.items() if "source" in table.content},
         catalogue=_catalogue(tables.get("catalogue")),
         polarizability_abc_angstrom3=polarizability,
+        covariance=_covariance(tables.get("covariance"), constants),
     )
 
 
@@ -311,6 +319,34 @@ def _constants(table: _Reader | None) -> Constants | None:
             sources[name] = one.text("source")
     try:
         return Constants(**settings, uncertainties=uncertainties, sources=sources, **values)  # type: ignore[arg-type]
+    except ValueError as reason:
+        raise ValueError(f"{table.place}: {reason}") from None
+
+
+def _covariance(table: _Reader | None, constants: Constants | None) -> Covariance | None:
+    """From the lower triangle of the correlations and the uncertainties of the constants."""
+    if table is None:
+        return None
+    table.refuse_unknown(("source", "names", "correlations"))
+    names = table.texts("names")
+    known = constants.uncertainties if constants is not None else {}
+    lost = [name for name in names if name not in known]
+    if lost or not names:
+        raise table.error("names", f"{', '.join(lost) or 'none'}: constants of the file with an uncertainty are needed")
+    rows: Any = table.content.get("correlations") or []
+    fits = isinstance(rows, list) and [len(row) if isinstance(row, list) else 0 for row in rows] == [
+        *range(1, len(names) + 1)
+    ]
+    if not fits or not all(_is_number(value) for row in rows for value in row):
+        raise table.error(
+            "correlations", f"{len(names)} rows of 1 to {len(names)} numbers are needed, the lower triangle"
+        )
+    matrix = np.zeros((len(names), len(names)))
+    for i, row in enumerate(rows):
+        matrix[i, : i + 1] = row
+    matrix += np.tril(matrix, -1).T
+    try:
+        return Covariance.of_correlations(names, [known[name] for name in names], matrix)
     except ValueError as reason:
         raise ValueError(f"{table.place}: {reason}") from None
 

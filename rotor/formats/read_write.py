@@ -165,6 +165,7 @@ def _top_as_written(file: MoleculeFile) -> Top:
         polarizability_abc_angstrom3=file.polarizability_abc_angstrom3,
         polarizability_source=file.sources.get("polarizability", ""),
         independent_errors=len(file.constants.uncertainties) < 2,
+        covariance=file.covariance,
     )
 
 

@@ -27,7 +27,7 @@ from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.levels import Levels, TransitionTable
 from rotor.quantum.quanta import heading
 from rotor.quantum.solve import solve_levels
-from rotor.quantum.uncertainty import Covariance, level_spread, line_errors
+from rotor.quantum.uncertainty import level_spread, line_errors
 from rotor.spectra.intensity import (
     EINSTEIN_PER_MHZ3,
     INTENSITY_NM2_MHZ,
@@ -38,6 +38,7 @@ from rotor.spectra.intensity import (
 )
 from rotor.spectra.transitions import all_transitions
 from rotor.thermo import PartitionFunction, VibrationalStates, partition_function
+from rotor.tops.covariance import Covariance
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
@@ -103,10 +104,11 @@ class Lines(TransitionTable):
 
     @property
     def covariance_used(self) -> Covariance | None:
-        """The covariance given, else the uncertainties of the constants where these may count as uncorrelated."""
-        if self.covariance is None and self.top.independent_errors:
+        """The covariance given, else the top's, else the uncertainties of the constants where these may count as uncorrelated."""
+        known = self.covariance or self.top.covariance
+        if known is None and self.top.independent_errors:
             return Covariance.of_uncertainties(self.top.constants)
-        return self.covariance
+        return known
 
     @property
     def error_mhz(self) -> Floats | None:

@@ -17,6 +17,7 @@ from rotor import units
 from rotor.arrays import Floats
 from rotor.geometry.inertia import EQUAL_MOMENTS, LINEAR_BELOW, Body, PrincipalFrame, point_masses, principal_frame
 from rotor.tops.constants import Constants
+from rotor.tops.covariance import Covariance
 from rotor.tops.kind import KindOfTop, kind_from_moments, kind_with_symmetry
 from rotor.tops.operators import KINDS
 from rotor.tops.spin_constants import SpinConstants
@@ -66,7 +67,8 @@ class Top:
     nuclear-spin weights. mass_u: for Doppler widths. frame: principal frame of a geometry, None without one.
     kind_of_top: how the kind was decided. molecule, symmetry: of a geometry. source: where the constants are from.
     independent_errors: whether the uncertainties of the constants may count as uncorrelated; not those of a fit whose
-    correlations are unknown. notes: limits of the data. spin_constants: of nuclear and electron spins, None where none are known.
+    correlations are unknown. covariance: of the constants, where it is known. notes: limits of the data. spin_constants: of nuclear and
+    electron spins, None where none are known.
     """
 
     constants: Constants
@@ -85,6 +87,7 @@ class Top:
     notes: tuple[str, ...] = ()
     polarizability_abc_angstrom3: Tensor | None = None
     polarizability_source: str = ""
+    covariance: Covariance | None = None
     spin_constants: SpinConstants | None = None
 
     @property
