@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from rotor.checks import require_whole
 from rotor.cli.shared import inputs
 from rotor.cli.shared.output import (
     ComputationError,
@@ -31,6 +32,9 @@ if TYPE_CHECKING:
     from rotor.formats.spcat.fit_input import SpfitInput
     from rotor.statistics.least_squares import Iteration
     from rotor.tops.constants import Constants
+
+_JSON = typer.Option(None, "--json", metavar="FILE", help="Everything printed, as JSON; - is standard output.")
+_CONSTANTS = typer.Option(None, metavar="TEXT", help='Constants instead of --start: "A=9.2(1) B=3 C=2.5 GHz" (MHz).')
 
 EXAMPLES = """\b
 Examples:
@@ -73,7 +77,7 @@ def command(
     start: str | None = typer.Option(
         None, metavar="SOURCE", help="Constants to start from: a file (.toml, .var, ...) or a name."
     ),
-    constants: str | None = inputs.CONSTANTS,
+    constants: str | None = _CONSTANTS,
     free: str | None = _FREE,
     tie: list[str] | None = _TIE,
     prior: list[str] | None = _PRIOR,
@@ -104,11 +108,11 @@ def command(
     plot: str | None = typer.Option(
         None, metavar="FILE", help="Residuals against frequency, J and K (.png, .pdf, .svg)."
     ),
-    json: str | None = inputs.JSON,
+    json: str | None = _JSON,
 ) -> None:
     """Constants from measured lines, with errors, correlations and what the lines leave open; exit code 1 unless converged."""
-    inputs.whole("--bootstrap", resample, 0)
-    inputs.whole("--iterations", iterations, 1)
+    require_whole("--bootstrap", resample, 0)
+    require_whole("--iterations", iterations, 1)
     files = _files(out, table, save_lines, plot, json)
     request = read_request(source, lin, start, constants, free, tie or [], prior or [])
     request = _with_more(request, more)
@@ -125,11 +129,11 @@ def command(
     suggestions = _suggestions(fit, suggest)
     spread = _bootstrap(fit, options, resample, seed)
     content = record(request, fit, context.obj, steps, trials, suggestions, spread)
-    content["files"] = [str(path) for path in files.wanted.values()]
+    content["files"] = [str(path) for path in files.paths.values()]
     if not fit.converged:
         for option in ("--out .toml", "--out .par", "--out .var"):
             if fit.minimum.status != "interrupted":
-                files.wanted.pop(option, None)
+                files.paths.pop(option, None)
     writers = _writers(request, fit, content, source)
     deliver(files, writers, lambda: json_text(content), lambda: _show(request, fit, steps, trials, suggestions, spread))
     if not fit.converged:
@@ -151,7 +155,7 @@ def _files(out: str | None, table: str | None, lines: str | None, plot: str | No
 def _refuse_overwriting(files: Files, read: Sequence[str | None]) -> None:
     """What was read is not written over."""
     here = {Path(path).resolve() for path in read if path and Path(path).exists()}
-    for option, path in files.wanted.items():
+    for option, path in files.paths.items():
         if path.resolve() in here:
             raise ValueError(f"{option.split()[0]}: {path} is an input; write the result under another name")
 

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from rotor.cli.shared import inputs
 from rotor.cli.shared.output import (
     ComputationError,
     Files,
@@ -29,6 +28,8 @@ if TYPE_CHECKING:
     from rotor.molecules.molecule import Molecule
     from rotor.structure.least_squares import FittedStructure
     from rotor.structure.substitution import SubstitutionStructure, Value
+
+_JSON = typer.Option(None, "--json", metavar="FILE", help="Everything printed, as JSON; - is standard output.")
 
 EXAMPLES = """\b
 Examples:
@@ -60,7 +61,7 @@ def command(
         None, metavar="FILE", help="The geometry of the last method, in principal axes (.xyz)."
     ),
     plot: str | None = typer.Option(None, metavar="FILE", help="The molecule with its bonds (.png, .pdf, .svg)."),
-    json: str | None = inputs.JSON,
+    json: str | None = _JSON,
 ) -> None:
     """Structures of a family: by substitution (rs), fitted to all moments (r0, rm1, rm2), of equilibrium (re)."""
     chosen = [name.strip() for name in method.split(",")]
@@ -83,7 +84,7 @@ def command(
     for text in _notes(answer):
         note(text)
     content = record(file, answer, source, context.obj)
-    content["files"] = [str(path) for path in files.wanted.values()]
+    content["files"] = [str(path) for path in files.paths.values()]
     deliver(files, _writers(file, answer, content), lambda: json_text(content), lambda: _show(file, answer))
     bad = [one for one in answer.fitted if not one.minimum.converged]
     if bad:

@@ -17,13 +17,13 @@ from rotor.arrays import Floats, Ints
 from rotor.checks import require_one_of, require_positive, require_whole
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.watson import SEMI_RIGID
-from rotor.quantum.uncertainty import Covariance
 from rotor.spectra.intensity import USUAL_CUT
 from rotor.spectra.lines import DEFAULT_MIN_LGINT, Lines, line_list
 from rotor.spectra.opacity import column_density_per_cm2, line_optical_depth, optical_depth
 from rotor.spectra.spectrum import Spectrum, resolving_grid
 from rotor.thermo import VibrationalStates
 from rotor.thermo.request import partition_facts
+from rotor.tops.covariance import Covariance
 from rotor.tops.facts import top_facts
 
 if TYPE_CHECKING:
