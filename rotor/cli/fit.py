@@ -51,7 +51,7 @@ class Request:
     """What is to be fitted, from either kind of input."""
 
     lines: Assignments
-    constants: Constants
+    constants: Constants | None
     parameters: Any
     options: FitOptions
     title: str
@@ -117,6 +117,8 @@ def command(context: typer.Context, given: Options) -> None:
         fit = _fitted(request, options)
     for text in request.notes:
         note(text)
+    if fit.constants is None and files.paths.pop("--out .toml", None):
+        note("spins or several states: no .toml is written, the .par and .var have everything")
     trials = _trials(fit, options, given.try_)
     suggestions = _suggestions(fit, given.suggest)
     spread = _bootstrap(fit, options, given.bootstrap, given.seed)
@@ -237,7 +239,8 @@ def _options(options: FitOptions, given: Options) -> FitOptions:
 def _fitted(request: Request, options: FitOptions) -> Fit:
     from rotor.fit.fit import fit_lines
 
-    return fit_lines(request.lines, request.constants, request.parameters, options, progress=_progress())
+    model = request.spfit.model if request.spfit else None
+    return fit_lines(request.lines, request.constants, request.parameters, options, model=model, progress=_progress())
 
 
 def _progress() -> Any:
@@ -261,8 +264,9 @@ def _chosen(request: Request, options: FitOptions, candidates: Sequence[str]) ->
 
     if request.spfit is not None:
         raise ValueError("--choose: start from a line list and constants, whose free ones are the base of the model")
+    assert request.constants is not None  # a list of lines has constants to start from
     fit, steps = choose_constants(request.lines, request.constants, request.parameters.names, candidates, options)
-    return fit_lines(request.lines, fit.constants, parameters(fit.constants, fit.parameters.names), options), steps
+    return fit_lines(request.lines, fit.named, parameters(fit.named, fit.parameters.names), options), steps
 
 
 def _trials(fit: Fit, options: FitOptions, text: str | None) -> list[Trial]:
@@ -281,7 +285,7 @@ def _suggestions(fit: Fit, name: str | None) -> list[Suggestion]:
 
     upper, lower = _unmeasured(fit)
     error = float(np.median(fit.lines.error_mhz[fit.used]))
-    return suggest_lines(fit, fit.constants.own_name(name), upper, lower, error_mhz=error)[:20]
+    return suggest_lines(fit, fit.named.own_name(name), upper, lower, error_mhz=error)[:20]
 
 
 def _unmeasured(fit: Fit) -> tuple[Any, Any]:
@@ -292,7 +296,7 @@ def _unmeasured(fit: Fit) -> tuple[Any, Any]:
     from rotor.tops.top import Top
 
     measured = fit.lines
-    top = Top.from_constants(fit.constants, dipole_abc_debye=_components(fit))
+    top = Top.from_constants(fit.named, dipole_abc_debye=_components(fit))
     jmax = int(max(measured.upper[:, 0].max(), measured.lower[:, 0].max()))
     seen_mhz = (float(measured.frequency_mhz.min()) * 0.99, float(measured.frequency_mhz.max()) * 1.01)
     lines = line_list(top, jmax=jmax, min_lgint=None, q=1.0, range_mhz=seen_mhz)
@@ -306,7 +310,7 @@ def _unmeasured(fit: Fit) -> tuple[Any, Any]:
 
 def _components(fit: Fit) -> tuple[float, float, float]:
     """1 D along each axis whose lines occur among those measured, by the parities of Ka and Kc."""
-    kind = fit.constants.kind
+    kind = fit.named.kind
     if kind != "asymmetric":
         return (0.0, 0.0, 1.0) if kind == "oblate" else (1.0, 0.0, 0.0)
     change = (fit.lines.upper[:, 1:] - fit.lines.lower[:, 1:]) % 2
@@ -358,11 +362,7 @@ def record(
         "degrees_of_freedom": fit.degrees_of_freedom,
         "condition": statistics.condition,
         "iterations": len(fit.minimum.iterations),
-        "kind": fit.constants.kind,
-        "reduction": fit.constants.reduction,
-        "representation": fit.constants.representation,
-        "constants_mhz": dict(fit.constants.values),
-        "uncertainties_mhz": dict(fit.constants.uncertainties),
+        **_constants_record(fit.constants),
         "parameters": [
             {"name": n, "value": v, "error": e, "scaled_error": s, "start": b}
             for n, v, e, s, b in zip(
@@ -379,6 +379,20 @@ def record(
         "suggestions": [vars(one) for one in suggestions],
         "lines": _line_records(fit),
     }
+
+
+def _constants_record(constants: Constants | None) -> dict[str, Any]:
+    names = ("kind", "reduction", "representation", "constants_mhz", "uncertainties_mhz")
+    if constants is None:
+        return dict.fromkeys(names)
+    values = (
+        constants.kind,
+        constants.reduction,
+        constants.representation,
+        dict(constants.values),
+        dict(constants.uncertainties),
+    )
+    return dict(zip(names, values, strict=True))
 
 
 def _trial_record(trial: Trial) -> dict[str, Any]:
@@ -449,7 +463,7 @@ def _write_toml(request: Request, fit: Fit, source: str, path: Path) -> None:
     own = request.start.lower().endswith(".toml") and Path(request.start).exists()
     file = read_molecule_file(request.start) if own else MoleculeFile(request.title or path.stem)
     covariance = None if fit.statistics.undetermined else fit.covariance
-    made = replace(file, constants=fit.constants, covariance=covariance, sources={**file.sources, "constants": origin})
+    made = replace(file, constants=fit.named, covariance=covariance, sources={**file.sources, "constants": origin})
     write_molecule_file(made, path)
 
 
