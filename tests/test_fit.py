@@ -121,8 +121,8 @@ def near_prolate_chain(free):
     lines = line_list(Top.from_constants(constants, dipole_abc_debye=(1.0, 0, 0)), jmax=11, min_lgint=None, q=1.0)
     quanta = np.stack([lines.levels.quanta[name] for name in ASYMMETRIC], axis=1)
     upper, lower = quanta[lines.upper], quanta[lines.lower]
-    kept = (upper[:, 0] == lower[:, 0] + 1) & (lower[:, 0] >= 1) & (upper[:, 1] <= 2) & (upper[:, 1] == lower[:, 1])
-    seen = assignments(ASYMMETRIC, upper[kept], lower[kept], lines.frequency_mhz[kept], 0.005)
+    chosen = (upper[:, 0] == lower[:, 0] + 1) & (lower[:, 0] >= 1) & (upper[:, 1] <= 2) & (upper[:, 1] == lower[:, 1])
+    seen = assignments(ASYMMETRIC, upper[chosen], lower[chosen], lines.frequency_mhz[chosen], 0.005)
     return fit_lines(seen, constants, parameters(constants, free))
 
 

@@ -12,6 +12,8 @@ import typer
 
 from rotor.checks import require_whole
 from rotor.cli.shared import inputs
+from rotor.cli.shared.inputs import json_option
+from rotor.cli.shared.options import argument, file_option, grouped, option
 from rotor.cli.shared.output import (
     ComputationError,
     Files,
@@ -33,9 +35,6 @@ if TYPE_CHECKING:
     from rotor.statistics.least_squares import Iteration
     from rotor.tops.constants import Constants
 
-_JSON = typer.Option(None, "--json", metavar="FILE", help="Everything printed, as JSON; - is standard output.")
-_CONSTANTS = typer.Option(None, metavar="TEXT", help='Constants instead of --start: "A=9.2(1) B=3 C=2.5 GHz" (MHz).')
-
 EXAMPLES = """\b
 Examples:
   rotor fit case.par --out fitted
@@ -43,15 +42,6 @@ Examples:
   rotor fit c060503.cat.gz --constants "B=6081 D=0.001 H=0 MHz" --free B,D,H
   rotor fit lines.lin --start water --free A,B,C --try DeltaJ,DeltaJK,DeltaK
   rotor fit lines.csv --start constants.toml --free A,B,C --prior DeltaK=0.02 --tie "deltaK=0.5*deltaJ" --plot rest.png"""
-
-_FREE = typer.Option(
-    None, metavar="LIST", help="Constants to fit: A,B,C,DeltaJ; those of --start that carry an error if left out."
-)
-_TIE = typer.Option(
-    None, metavar="TEXT", help='A constant that follows a free one: "DeltaK=2.5*DeltaJ", "C=B-300"; repeatable.'
-)
-_PRIOR = typer.Option(None, metavar="X=ERROR", help="A-priori standard error of a free constant (MHz); repeatable.")
-
 
 _WORTH_MEASURING = 1e-2  # S μ² of a line with μ = 1 D, below which it is not suggested
 
@@ -61,7 +51,7 @@ class Request:
     """What is to be fitted, from either kind of input."""
 
     lines: Assignments
-    constants: Constants
+    constants: Constants | None
     parameters: Any
     options: FitOptions
     title: str
@@ -70,94 +60,93 @@ class Request:
     notes: list[str] = field(default_factory=list)
 
 
-def command(
-    context: typer.Context,
-    source: str = typer.Argument(..., help="case.par (with case.lin), or lines: .lin, .csv, .cat.", show_default=False),
-    lin: str | None = typer.Option(None, metavar="FILE", help="Lines of case.par, where they are not case.lin."),
-    start: str | None = typer.Option(
-        None, metavar="SOURCE", help="Constants to start from: a file (.toml, .var, ...) or a name."
-    ),
-    constants: str | None = _CONSTANTS,
-    free: str | None = _FREE,
-    tie: list[str] | None = _TIE,
-    prior: list[str] | None = _PRIOR,
-    more: str | None = typer.Option(
-        None, "--merge", metavar="FILE", help="More lines (.lin, .csv, .cat) of the same kind."
-    ),
-    reject: float | None = typer.Option(
-        None, metavar="X", help="Lines more than X errors off do not count; they are reported."
-    ),
-    loss: str = typer.Option("squares", metavar="NAME", help="squares, or huber or cauchy: lines far off weigh less."),
-    default_error: str | None = typer.Option(None, metavar="X", help="Error of lines whose file gives 0 (MHz)."),
-    poor_rms: float = typer.Option(10.0, metavar="X", help="Weighted rms above which the fit has failed."),
-    iterations: int | None = typer.Option(None, metavar="N", help="Most iterations; 100, or NITR of a .par file."),
-    try_: str | None = typer.Option(None, "--try", metavar="LIST", help="Try each of these constants more, or less."),
-    choose: str | None = typer.Option(
-        None, metavar="LIST", help="Build the model up from these constants, one at a time."
-    ),
-    suggest: str | None = typer.Option(
-        None, metavar="NAME", help="Which unmeasured line would best fix this constant."
-    ),
-    resample: int = typer.Option(
-        0, "--bootstrap", metavar="N", help="Errors from N samples of the lines beside the others."
-    ),
-    seed: int = typer.Option(0, metavar="N", help="Of the bootstrap."),
-    out: str | None = typer.Option(None, metavar="STEM", help="Write STEM.fit (report), .toml, .par and .var."),
-    table: str | None = typer.Option(None, metavar="FILE", help="Table for a publication (.txt, .md, .tex)."),
-    save_lines: str | None = typer.Option(None, metavar="FILE", help="The assigned lines, merged (.lin, .csv)."),
-    plot: str | None = typer.Option(
-        None, metavar="FILE", help="Residuals against frequency, J and K (.png, .pdf, .svg)."
-    ),
-    json: str | None = _JSON,
-) -> None:
-    """Constants from measured lines, with errors, correlations and what the lines leave open; exit code 1 unless converged."""
-    require_whole("--bootstrap", resample, 0)
-    require_whole("--iterations", iterations, 1)
-    files = _files(out, table, save_lines, plot, json)
-    request = read_request(source, lin, start, constants, free, tie or [], prior or [])
-    request = _with_more(request, more)
-    options = _options(request.options, reject, loss, default_error, poor_rms, iterations)
-    _refuse_overwriting(files, [source, lin, start, more, str(Path(source).with_suffix(".lin"))])
+@dataclass(frozen=True)
+class Options:
+    """What is read, what is fitted and how, and what is written."""
 
-    if choose is not None:
-        fit, steps = _chosen(request, options, _names(choose))
+    source: str = argument(..., help="case.par (with case.lin), or lines: .lin, .csv, .cat.")
+    lin: str | None = option(None, metavar="FILE", help="Lines of case.par, where they are not case.lin.")
+    start: str | None = option(
+        None, metavar="SOURCE", help="Constants to start from: a file (.toml, .var, ...) or a name."
+    )
+    constants: str | None = option(None, metavar="TEXT", help='Constants to start from: "A=9.2 B=3 C=2.5 GHz" (MHz).')
+    free: str | None = option(
+        None, metavar="LIST", help="Constants to fit: A,B,C,DeltaJ; those of --start that have an error if left out."
+    )
+    tie: list[str] | None = option(
+        None, metavar="TEXT", help='A constant that follows a free one: "DeltaK=2.5*DeltaJ", "C=B-300"; repeatable.'
+    )
+    prior: list[str] | None = option(
+        None, metavar="X=ERROR", help="A-priori standard error of a free constant (MHz); repeatable."
+    )
+    more: str | None = option(None, "--merge", metavar="FILE", help="More lines (.lin, .csv, .cat) of the same kind.")
+    reject: float | None = option(
+        None, metavar="X", help="Lines more than X errors off do not count; they are reported."
+    )
+    loss: str = option("squares", metavar="NAME", help="squares, or huber or cauchy: lines far off weigh less.")
+    default_error: str | None = option(None, metavar="X", help="Error of lines whose file gives 0 (MHz).")
+    poor_rms: float = option(10.0, metavar="X", help="Weighted rms above which the fit has failed.")
+    iterations: int | None = option(None, metavar="N", help="Most iterations; 100, or NITR of a .par file.")
+    try_: str | None = option(None, "--try", metavar="LIST", help="Try each of these constants more, or less.")
+    choose: str | None = option(None, metavar="LIST", help="Build the model up from these constants, one at a time.")
+    suggest: str | None = option(None, metavar="NAME", help="Which unmeasured line would best fix this constant.")
+    bootstrap: int = option(0, metavar="N", help="Errors from N samples of the lines beside the others.")
+    seed: int = option(0, metavar="N", help="Of the bootstrap.")
+    out: str | None = option(None, metavar="STEM", help="Write STEM.fit (report), .toml, .par and .var.")
+    table: str | None = file_option(".txt", ".md", ".tex", help="Table for a publication.")
+    save_lines: str | None = file_option(".lin", ".csv", help="The assigned lines, merged.")
+    plot: str | None = file_option(".png", ".pdf", ".svg", help="Residuals against frequency, J and K.")
+    json: str | None = json_option()
+
+
+@grouped()
+def command(context: typer.Context, given: Options) -> None:
+    """Constants from measured lines, with errors, correlations and what the lines leave open; exit code 1 unless converged."""
+    require_whole("--bootstrap", given.bootstrap, 0)
+    require_whole("--iterations", given.iterations, 1)
+    files = _files(given)
+    request = _with_more(read_request(given), given.more)
+    options = _options(request.options, given)
+    source = given.source
+    _refuse_overwriting(files, [source, given.lin, given.start, given.more, str(Path(source).with_suffix(".lin"))])
+
+    steps: list[Trial] = []
+    if given.choose is not None:
+        fit, steps = _chosen(request, options, _names(given.choose))
     else:
-        fit, steps = _fitted(request, options), []
+        fit = _fitted(request, options)
     for text in request.notes:
         note(text)
-    trials = _trials(fit, options, try_)
-    suggestions = _suggestions(fit, suggest)
-    spread = _bootstrap(fit, options, resample, seed)
+    if fit.constants is None and files.paths.pop("--out .toml", None):
+        note("spins or several states: no .toml is written, the .par and .var have everything")
+    trials = _trials(fit, options, given.try_)
+    suggestions = _suggestions(fit, given.suggest)
+    spread = _bootstrap(fit, options, given.bootstrap, given.seed)
+    if not fit.converged and fit.minimum.status != "interrupted":
+        for name in ("--out .toml", "--out .par", "--out .var"):
+            files.paths.pop(name, None)
     content = record(request, fit, context.obj, steps, trials, suggestions, spread)
-    content["files"] = [str(path) for path in files.paths.values()]
-    if not fit.converged:
-        for option in ("--out .toml", "--out .par", "--out .var"):
-            if fit.minimum.status != "interrupted":
-                files.paths.pop(option, None)
+    content["files"] = files.names
     writers = _writers(request, fit, content, source)
     deliver(files, writers, lambda: json_text(content), lambda: _show(request, fit, steps, trials, suggestions, spread))
     if not fit.converged:
         raise ComputationError(f"not converged: {fit.reason}")
 
 
-def _files(out: str | None, table: str | None, lines: str | None, plot: str | None, json: str | None) -> Files:
-    files = Files()
-    if out is not None:
+def _files(given: Options) -> Files:
+    files = Files.of(given)
+    if given.out is not None:
         for suffix in (".fit", ".toml", ".par", ".var"):
-            files.ask(f"--out {suffix}", out + suffix, (suffix,))
-    files.ask("--table", table, (".txt", ".md", ".tex"))
-    files.ask("--save-lines", lines, (".lin", ".csv"))
-    files.ask("--plot", plot, (".png", ".pdf", ".svg"))
-    files.ask_json(json)
+            files.ask(f"--out {suffix}", given.out + suffix, (suffix,))
     return files
 
 
 def _refuse_overwriting(files: Files, read: Sequence[str | None]) -> None:
     """What was read is not written over."""
     here = {Path(path).resolve() for path in read if path and Path(path).exists()}
-    for option, path in files.paths.items():
+    for name, path in files.paths.items():
         if path.resolve() in here:
-            raise ValueError(f"{option.split()[0]}: {path} is an input; write the result under another name")
+            raise ValueError(f"{name.split()[0]}: {path} is an input; write the result under another name")
 
 
 def _names(text: str) -> list[str]:
@@ -170,25 +159,20 @@ def _names(text: str) -> list[str]:
 # What comes in
 
 
-def read_request(
-    source: str,
-    lin: str | None,
-    start: str | None,
-    constants: str | None,
-    free: str | None,
-    ties: Sequence[str],
-    priors: Sequence[str],
-) -> Request:
+def read_request(given: Options) -> Request:
     """The fit that the options mean."""
-    if source.lower().endswith(".par"):
-        others = {"--start": start, "--constants": constants, "--free": free, "--tie": ties, "--prior": priors}
-        given = [name for name, value in others.items() if value]
-        if given:
-            raise ValueError(f"{', '.join(given)}: a .par file says itself what is free and where the fit starts")
-        return _of_spfit(source, lin)
-    if lin is not None:
+    if given.source.lower().endswith(".par"):
+        others = {
+            "--start": given.start, "--constants": given.constants, "--free": given.free, "--tie": given.tie,
+            "--prior": given.prior,
+        }  # fmt: skip
+        unused = [name for name, value in others.items() if value]
+        if unused:
+            raise ValueError(f"{', '.join(unused)}: a .par file says itself what is free and where the fit starts")
+        return _of_spfit(given.source, given.lin)
+    if given.lin is not None:
         raise ValueError("--lin goes with a .par file; give the lines as the source otherwise")
-    return _of_lines(source, start, constants, free, ties, priors)
+    return _of_lines(given)
 
 
 def _of_spfit(source: str, lin: str | None) -> Request:
@@ -201,25 +185,23 @@ def _of_spfit(source: str, lin: str | None) -> Request:
     )
 
 
-def _of_lines(
-    source: str, start: str | None, constants: str | None, free: str | None, ties: Sequence[str], priors: Sequence[str]
-) -> Request:
+def _of_lines(given: Options) -> Request:
     from rotor.fit.fit import FitOptions
     from rotor.fit.parameters import parameters, with_names
     from rotor.formats.assigned_lines import QUANTA, read_assigned_lines
 
-    if (start is None) == (constants is None):
+    if (given.start is None) == (given.constants is None):
         raise ValueError("either --start or --constants says where the fit starts; give one of them")
-    top = inputs.read_top(inputs.Input(start, constants, [], None, None, None))
-    lines, notes = read_assigned_lines(source, QUANTA[top.kind])
-    names = _names(free) if free is not None else list(top.constants.uncertainties)
+    top = inputs.read_top(inputs.Input(given.start, given.constants))
+    lines, notes = read_assigned_lines(given.source, QUANTA[top.kind])
+    names = _names(given.free) if given.free is not None else list(top.constants.uncertainties)
     if not names:
-        raise ValueError("--free: name the constants to fit, such as A,B,C,DeltaJ; those of the start carry no errors")
+        raise ValueError("--free: name the constants to fit, such as A,B,C,DeltaJ; those of the start have no errors")
     begin = with_names(top.constants, names)
-    made = parameters(begin, names, ties=ties, priors_mhz=dict(_prior(text) for text in priors))
-    return Request(
-        lines, begin, made, FitOptions(), " ".join(top.name.split()) or Path(source).name, start or "", None, notes
-    )
+    priors = dict(_prior(text) for text in given.prior or [])
+    made = parameters(begin, names, ties=given.tie or [], priors_mhz=priors)
+    title = " ".join(top.name.split()) or Path(given.source).name
+    return Request(lines, begin, made, FitOptions(), title, given.start or "", None, notes)
 
 
 def _prior(text: str) -> tuple[str, float]:
@@ -240,21 +222,14 @@ def _with_more(request: Request, path: str | None) -> Request:
     return replace(request, lines=both, notes=[*request.notes, *notes, *found])
 
 
-def _options(
-    options: FitOptions,
-    reject: float | None,
-    loss: str,
-    default_error: str | None,
-    poor_rms: float,
-    iterations: int | None,
-) -> FitOptions:
-    changes: dict[str, Any] = {"loss": loss, "poor_rms": poor_rms}
-    if reject is not None:
-        changes["reject_above"] = reject
-    if iterations is not None:
-        changes["most_iterations"] = iterations
-    if default_error is not None:
-        changes["default_error_mhz"] = inputs.positive("--default-error", default_error, "MHz")
+def _options(options: FitOptions, given: Options) -> FitOptions:
+    changes: dict[str, Any] = {"loss": given.loss, "poor_rms": given.poor_rms}
+    if given.reject is not None:
+        changes["reject_above"] = given.reject
+    if given.iterations is not None:
+        changes["most_iterations"] = given.iterations
+    if given.default_error is not None:
+        changes["default_error_mhz"] = inputs.positive("--default-error", given.default_error, "MHz")
     return replace(options, **changes)
 
 
@@ -264,7 +239,8 @@ def _options(
 def _fitted(request: Request, options: FitOptions) -> Fit:
     from rotor.fit.fit import fit_lines
 
-    return fit_lines(request.lines, request.constants, request.parameters, options, progress=_progress())
+    model = request.spfit.model if request.spfit else None
+    return fit_lines(request.lines, request.constants, request.parameters, options, model=model, progress=_progress())
 
 
 def _progress() -> Any:
@@ -272,13 +248,13 @@ def _progress() -> Any:
     if not sys.stderr.isatty():
         return None
 
-    def tell(one: Iteration) -> None:
+    def show(one: Iteration) -> None:
         taken = "" if one.taken else " refused"
         print(
             f"iteration {one.number}: weighted rms {one.rms_before:.6g} -> {one.rms_after:.6g}{taken}", file=sys.stderr
         )
 
-    return tell
+    return show
 
 
 def _chosen(request: Request, options: FitOptions, candidates: Sequence[str]) -> tuple[Fit, list[Trial]]:
@@ -288,8 +264,9 @@ def _chosen(request: Request, options: FitOptions, candidates: Sequence[str]) ->
 
     if request.spfit is not None:
         raise ValueError("--choose: start from a line list and constants, whose free ones are the base of the model")
+    assert request.constants is not None  # a list of lines has constants to start from
     fit, steps = choose_constants(request.lines, request.constants, request.parameters.names, candidates, options)
-    return fit_lines(request.lines, fit.constants, parameters(fit.constants, fit.parameters.names), options), steps
+    return fit_lines(request.lines, fit.named, parameters(fit.named, fit.parameters.names), options), steps
 
 
 def _trials(fit: Fit, options: FitOptions, text: str | None) -> list[Trial]:
@@ -308,7 +285,7 @@ def _suggestions(fit: Fit, name: str | None) -> list[Suggestion]:
 
     upper, lower = _unmeasured(fit)
     error = float(np.median(fit.lines.error_mhz[fit.used]))
-    return suggest_lines(fit, fit.constants.own_name(name), upper, lower, error_mhz=error)[:20]
+    return suggest_lines(fit, fit.named.own_name(name), upper, lower, error_mhz=error)[:20]
 
 
 def _unmeasured(fit: Fit) -> tuple[Any, Any]:
@@ -319,7 +296,7 @@ def _unmeasured(fit: Fit) -> tuple[Any, Any]:
     from rotor.tops.top import Top
 
     measured = fit.lines
-    top = Top.from_constants(fit.constants, dipole_abc_debye=_components(fit))
+    top = Top.from_constants(fit.named, dipole_abc_debye=_components(fit))
     jmax = int(max(measured.upper[:, 0].max(), measured.lower[:, 0].max()))
     seen_mhz = (float(measured.frequency_mhz.min()) * 0.99, float(measured.frequency_mhz.max()) * 1.01)
     lines = line_list(top, jmax=jmax, min_lgint=None, q=1.0, range_mhz=seen_mhz)
@@ -333,7 +310,7 @@ def _unmeasured(fit: Fit) -> tuple[Any, Any]:
 
 def _components(fit: Fit) -> tuple[float, float, float]:
     """1 D along each axis whose lines occur among those measured, by the parities of Ka and Kc."""
-    kind = fit.constants.kind
+    kind = fit.named.kind
     if kind != "asymmetric":
         return (0.0, 0.0, 1.0) if kind == "oblate" else (1.0, 0.0, 0.0)
     change = (fit.lines.upper[:, 1:] - fit.lines.lower[:, 1:]) % 2
@@ -385,11 +362,7 @@ def record(
         "degrees_of_freedom": fit.degrees_of_freedom,
         "condition": statistics.condition,
         "iterations": len(fit.minimum.iterations),
-        "kind": fit.constants.kind,
-        "reduction": fit.constants.reduction,
-        "representation": fit.constants.representation,
-        "constants_mhz": dict(fit.constants.values),
-        "uncertainties_mhz": dict(fit.constants.uncertainties),
+        **_constants_record(fit.constants),
         "parameters": [
             {"name": n, "value": v, "error": e, "scaled_error": s, "start": b}
             for n, v, e, s, b in zip(
@@ -406,6 +379,20 @@ def record(
         "suggestions": [vars(one) for one in suggestions],
         "lines": _line_records(fit),
     }
+
+
+def _constants_record(constants: Constants | None) -> dict[str, Any]:
+    names = ("kind", "reduction", "representation", "constants_mhz", "uncertainties_mhz")
+    if constants is None:
+        return dict.fromkeys(names)
+    values = (
+        constants.kind,
+        constants.reduction,
+        constants.representation,
+        dict(constants.values),
+        dict(constants.uncertainties),
+    )
+    return dict(zip(names, values, strict=True))
 
 
 def _trial_record(trial: Trial) -> dict[str, Any]:
@@ -476,7 +463,7 @@ def _write_toml(request: Request, fit: Fit, source: str, path: Path) -> None:
     own = request.start.lower().endswith(".toml") and Path(request.start).exists()
     file = read_molecule_file(request.start) if own else MoleculeFile(request.title or path.stem)
     covariance = None if fit.statistics.undetermined else fit.covariance
-    made = replace(file, constants=fit.constants, covariance=covariance, sources={**file.sources, "constants": origin})
+    made = replace(file, constants=fit.named, covariance=covariance, sources={**file.sources, "constants": origin})
     write_molecule_file(made, path)
 
 

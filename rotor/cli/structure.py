@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from rotor.cli.shared.inputs import json_option
+from rotor.cli.shared.options import argument, file_option, grouped, option
 from rotor.cli.shared.output import (
     ComputationError,
     Files,
@@ -29,8 +31,6 @@ if TYPE_CHECKING:
     from rotor.structure.least_squares import FittedStructure
     from rotor.structure.substitution import SubstitutionStructure, Value
 
-_JSON = typer.Option(None, "--json", metavar="FILE", help="Everything printed, as JSON; - is standard output.")
-
 EXAMPLES = """\b
 Examples:
   rotor structure ocs.toml
@@ -48,30 +48,28 @@ class Answer:
     fitted: tuple[FittedStructure, ...]
 
 
-def command(
-    context: typer.Context,
-    source: str = typer.Argument(..., metavar="FAMILY", help="Family of isotopologues (.toml).", show_default=False),
-    method: str = typer.Option("rs,r0", metavar="LIST", help="Of rs, r0, rm1, rm2, re."),
-    weights: str = typer.Option("equal", metavar="NAME", help="Moments weighted equally, or by their errors (errors)."),
-    leave_out: str | None = typer.Option(None, metavar="AXES", help="Axes whose moments are not fitted, such as c."),
-    pair: str = typer.Option(
-        "ab", metavar="AB", help="Which two moments serve for rs of a planar molecule: ab, ac, bc."
-    ),
-    xyz: str | None = typer.Option(
-        None, metavar="FILE", help="The geometry of the last method, in principal axes (.xyz)."
-    ),
-    plot: str | None = typer.Option(None, metavar="FILE", help="The molecule with its bonds (.png, .pdf, .svg)."),
-    json: str | None = _JSON,
-) -> None:
+@dataclass(frozen=True)
+class Options:
+    """The family, the methods, and what is written."""
+
+    source: str = argument(..., metavar="FAMILY", help="Family of isotopologues (.toml).")
+    method: str = option("rs,r0", metavar="LIST", help="Of rs, r0, rm1, rm2, re.")
+    weights: str = option("equal", metavar="NAME", help="Moments weighted equally, or by their errors (errors).")
+    leave_out: str = option("", metavar="AXES", help="Axes whose moments are not fitted, such as c.")
+    pair: str = option("ab", metavar="AB", help="Which two moments serve for rs of a planar molecule: ab, ac, bc.")
+    xyz: str | None = file_option(".xyz", help="The geometry of the last method, in principal axes.")
+    plot: str | None = file_option(".png", ".pdf", ".svg", help="The molecule with its bonds.")
+    json: str | None = json_option()
+
+
+@grouped()
+def command(context: typer.Context, given: Options) -> None:
     """Structures of a family: by substitution (rs), fitted to all moments (r0, rm1, rm2), of equilibrium (re)."""
-    chosen = [name.strip() for name in method.split(",")]
+    chosen = [name.strip() for name in given.method.split(",")]
     strange = [name for name in chosen if name not in METHODS]
     if strange or len(set(chosen)) < len(chosen):
-        raise ValueError(f"--method {method}: each of {', '.join(METHODS)} once at most")
-    files = Files()
-    files.ask("--xyz", xyz, (".xyz",))
-    files.ask("--plot", plot, (".png", ".pdf", ".svg"))
-    files.ask_json(json)
+        raise ValueError(f"--method {given.method}: expected each of {', '.join(METHODS)} once at most")
+    files, source = Files.of(given), given.source
     if not source.lower().endswith(".toml"):
         raise ValueError(
             f"{source}: a family of isotopologues is a .toml file; docs/structure.md says what stands in it"
@@ -80,11 +78,11 @@ def command(
     from rotor.formats.family_file import read_family
 
     file = read_family(source)
-    answer = answered(file, chosen, weights, leave_out or "", pair)
+    answer = answered(file, chosen, given.weights, given.leave_out, given.pair)
     for text in _notes(answer):
         note(text)
     content = record(file, answer, source, context.obj)
-    content["files"] = [str(path) for path in files.paths.values()]
+    content["files"] = files.names
     deliver(files, _writers(file, answer, content), lambda: json_text(content), lambda: _show(file, answer))
     bad = [one for one in answer.fitted if not one.minimum.converged]
     if bad:

@@ -123,12 +123,12 @@ def try_constants(fit: Fit, candidates: Sequence[str], options: FitOptions | Non
 
 
 def _set_of(fit: Fit) -> Constants:
-    return fit.constants
+    return fit.named
 
 
 def _with(fit: Fit, constants: Constants, name: str, options: FitOptions | None) -> Trial | None:
     free = [*fit.parameters.names, name]
-    values: dict[str, Any] = {k: v for k, v in constants.values.items() if k in fit.constants.values or k == name}
+    values: dict[str, Any] = {k: v for k, v in constants.values.items() if k in fit.named.values or k == name}
     own = Constants(
         kind=constants.kind, reduction=constants.reduction, representation=constants.representation,
 **values,
@@ -142,7 +142,7 @@ def _with(fit: Fit, constants: Constants, name: str, options: FitOptions | None)
 
 
 def _without(fit: Fit, name: str, options: FitOptions | None) -> Trial | None:
-    own = fit.constants.replace(**{name: 0.0})
+    own = fit.named.replace(**{name: 0.0})
     free = [other for other in fit.parameters.names if other != name]
     try:
         found = fit_lines(fit.lines, own, _same_priors(fit, parameters(own, free)), options)
@@ -231,7 +231,9 @@ def choose_constants(
         return trial.fit
 
     before = -1
-    while len(taken) > before:  # once more while something was taken: a higher order may have made room for a lower one
+    while (
+        len(taken) > before
+    ):  # once more while something was taken: a higher order may have made a lower one significant
         before = len(taken)
         for order in sorted(set(orders.values())):
             while len(taken) < _MOST_STEPS:
@@ -271,7 +273,7 @@ def _best_pair(fit: Fit, left: Sequence[str], options: FitOptions | None) -> Tri
     """Two constants together, judged as one step."""
     found = []
     for one, other in itertools.combinations(left, 2):
-        constants = with_names(fit.constants, [one, other])
+        constants = with_names(fit.named, [one, other])
         try:
             both = fit_lines(
                 fit.lines, constants, _same_priors(fit, parameters(constants, [*fit.parameters.names, one, other])),
@@ -338,7 +340,7 @@ def suggest_lines(
         raise ValueError("some parameters are not determined by the lines; hold them before asking for the next line")
     labels, places = np.unique(np.concatenate([upper, lower]), axis=0, return_inverse=True)
     places = places.reshape(-1)
-    made = model(labels) if model else level_model(fit.constants, labels)
+    made = model(labels) if model else level_model(fit.named, labels)
     energies, slopes = made.levels(fit.parameters.constants_of(fit.values))
     slopes = slopes @ fit.parameters.matrix
     up, low = places[: len(upper)], places[len(upper) :]
@@ -377,7 +379,7 @@ def bootstrap(
         rows = np.concatenate([members[int(b)] for b in drawn])
         blend = np.repeat(np.arange(len(drawn)), [len(members[int(b)]) for b in drawn])
         lines = replace(fit.lines.take(rows), blend=blend, comments=())
-        one = fit_lines(lines, fit.constants, at, _patient(options))
+        one = fit_lines(lines, fit.named, at, _patient(options))
         if one.statistics.rank == fit.statistics.rank:
             out.append(one.values)
     if len(out) < samples:

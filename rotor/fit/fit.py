@@ -70,7 +70,8 @@ class FitOptions:
 class Fit:
     """A finished fit.
 
-    lines : as given. constants : the fitted set with its standard errors. parameters : what was fitted, `values` (n,) at the end
+    lines : as given. constants : the fitted set with its standard errors, None where the parameters are not named constants (SPFIT's
+    codes with spins or several states). parameters : what was fitted, `values` (n,) at the end
     calculated_mhz (lines,) : each line; blended_mhz (lines,) : the mean of its blend. calculated_errors_mhz (lines,) : of the
     prediction, from the stated errors. used (lines,) : whether a line counted; left_out : why not, by line
     residuals (u,), jacobian's statistics : of the measured frequencies that counted, blends as one, in order of `groups`
@@ -79,7 +80,7 @@ class Fit:
     """
 
     lines: Assignments
-    constants: Constants
+    constants: Constants | None
     parameters: Parameters
     values: Floats
     calculated_mhz: Floats
@@ -95,6 +96,15 @@ class Fit:
     reason: str
     changed_states: tuple[str, ...]
     notes: tuple[str, ...]
+
+    @property
+    def named(self) -> Constants:
+        """The fitted constants. ValueError where the parameters are not named constants."""
+        if self.constants is None:
+            raise ValueError(
+                "the parameters of this fit are codes of SPFIT with spins or states; it has no named constants"
+            )
+        return self.constants
 
     @property
     def difference_mhz(self) -> Floats:
@@ -134,8 +144,8 @@ class Fit:
         return covariance_of(self.parameters, self.statistics)
 
     def rms_mhz(self, wavenumber: bool = False) -> float:
-        """Unweighted rms of the lines that counted, MHz (of those measured in cm⁻¹ in cm⁻¹); nan where there are none."""
-        chosen = self.used & (self.lines.wavenumber == wavenumber)
+        """Unweighted rms of the measured frequencies, MHz (of those measured in cm⁻¹ in cm⁻¹); nan where there are none."""
+        chosen = self.groups[self.lines.wavenumber[self.groups] == wavenumber]
         d = self.difference_mhz[chosen] / (29979.2458 if wavenumber else 1.0)
         return float(np.sqrt(d @ d / len(d))) if len(d) else float("nan")
 
@@ -154,7 +164,7 @@ def covariance_of(parameters: Parameters, statistics: Regression) -> Covariance:
 
 def fit_lines(
     lines: Assignments,
-    constants: Constants,
+    constants: Constants | None,
     parameters: Parameters,
     options: FitOptions | None = None,
     *,
@@ -167,7 +177,7 @@ def fit_lines(
     ----------
     lines : Assignments
     constants : Constants
-        Where the fit starts: kind, reduction, representation and every constant that is held.
+        Where the fit starts: kind, reduction, representation and every constant that is held; None with a model of its own.
     parameters : Parameters
         What is free, for the same constants.
     options : FitOptions, optional
@@ -206,7 +216,9 @@ def fit_lines(
     labels, places = np.unique(np.concatenate([lines.upper, lines.lower]), axis=0, return_inverse=True)
     places = places.reshape(-1)
     upper, lower = places[: len(lines)], places[len(lines) :]
-    made = model(labels) if model else level_model(constants, labels, kmax=options.kmax)
+    if model is None and constants is None:
+        raise ValueError("either constants or a model of the levels is needed")
+    made = model(labels) if model else level_model(constants, labels, kmax=options.kmax)  # type: ignore[arg-type]
     if made.names != parameters.constant_names:
         raise ValueError(f"parameters for {parameters.constant_names}, but the levels depend on {made.names}")
 
@@ -427,7 +439,9 @@ def _minimised(search: _Search, start: Floats, progress: Progress | None, limit:
     )
 
 
-def _finished(search: _Search, minimum: Minimum, constants: Constants, left_out: dict[int, str], labels: Ints) -> Fit:
+def _finished(
+    search: _Search, minimum: Minimum, constants: Constants | None, left_out: dict[int, str], labels: Ints
+) -> Fit:
     values, parameters = minimum.parameters, search.parameters
     calculated, jacobian, slopes = search.lines_of(values)
     residuals, _ = search.weighted(values)
@@ -463,9 +477,11 @@ def _round_off(search: _Search, slopes: Floats) -> Floats:
 
 
 def _constants(
-    constants: Constants, parameters: Parameters, values: Floats, statistics: Regression
-) -> tuple[Constants, str]:
+    constants: Constants | None, parameters: Parameters, values: Floats, statistics: Regression
+) -> tuple[Constants | None, str]:
     """The fitted set with standard errors, and what is wrong with it: then it is the start, with that text."""
+    if constants is None:
+        return None, ""
     new = dict(zip(parameters.constant_names, parameters.constants_of(values).tolist(), strict=True))
     touched = np.asarray(parameters.matrix.any(axis=1)).tolist()
     covariance = statistics.covariance
@@ -474,9 +490,9 @@ def _constants(
         used = row != 0
         if moves and np.isfinite(covariance.diagonal()[used]).all():
             errors[name] = float(np.sqrt(row[used] @ covariance[np.ix_(used, used)] @ row[used]))
-    kept = {name: value for name, value in constants.uncertainties.items() if name not in new}
+    chosen = {name: value for name, value in constants.uncertainties.items() if name not in new}
     try:
-        return constants.replace(**new, uncertainties={**kept, **errors}), ""
+        return constants.replace(**new, uncertainties={**chosen, **errors}), ""
     except ValueError as error:
         return constants, str(error)
 

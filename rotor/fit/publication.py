@@ -95,9 +95,8 @@ def publication_table(fit: Fit, form: str = "text", *, scaled: bool = False, dig
         raise ValueError(f"form {form!r}: one of {', '.join(FORMS)} is needed")
     factor = fit.reduced_chi if scaled else 1.0
     rows = []
-    for name, value in fit.constants.values.items():
-        error = fit.constants.uncertainties.get(name)
-        free = name in fit.constants.uncertainties
+    for name, value, error in _numbers(fit):
+        free = error is not None
         unit, size = unit_of(value, error)
         text = value_text(value / size, error * factor / size if error else None, digits)
         rows.append((name_text(name, form), unit, text if free else f"{text} (held)"))
@@ -105,10 +104,19 @@ def publication_table(fit: Fit, form: str = "text", *, scaled: bool = False, dig
     return {"text": _plain, "markdown": _markdown, "latex": _latex}[form](rows, facts)
 
 
+def _numbers(fit: Fit) -> list[tuple[str, float, float | None]]:
+    """Name, value and standard error (None: held) of the constants, or of SPFIT's parameters where they have no names."""
+    if fit.constants is None:
+        rows = zip(fit.parameters.names, fit.values.tolist(), fit.errors.tolist(), strict=True)
+        return [(name, value, error) for name, value, error in rows]
+    errors = fit.constants.uncertainties
+    return [(name, value, errors.get(name)) for name, value in fit.constants.values.items()]
+
+
 def _facts(fit: Fit, scaled: bool) -> list[tuple[str, str]]:
     j = max(int(fit.lines.upper[fit.used, 0].max(initial=0)), int(fit.lines.lower[fit.used, 0].max(initial=0)))
-    form = fit.constants.kind
-    if fit.constants.reduction:
+    form = "SPFIT's parameters" if fit.constants is None else fit.constants.kind
+    if fit.constants is not None and fit.constants.reduction:
         form = f"{fit.constants.reduction}-reduction, {fit.constants.representation}"
     return [
         ("Hamiltonian", form),

@@ -68,7 +68,7 @@ def far_off(fit: Fit, errors: float = FAR_OFF) -> list[str]:
 
 
 def decisive(fit: Fit, leverage: float = 0.9) -> list[str]:
-    """Lines without which a combination of parameters would hang in the air: leverage near 1."""
+    """Lines without which a combination of parameters would not be determined: leverage near 1."""
     leverages = fit.statistics.leverages[: len(fit.groups)]
     return [
         f"line {fit.groups[i] + 1}, {fit.lines.text(int(fit.groups[i]))}: leverage {leverages[i]:.3f}; nothing checks it"

@@ -2,11 +2,11 @@
 
 name = "OCS"
 
-[geometry]                                    # good enough to tell axes and signs; the isotopes of the parent
+[geometry]                                    # good enough to decide axes and signs; the isotopes of the parent
 atoms = [["O", 0, 0, 1.16], ["C", 0, 0, 0], ["S", 0, 0, -1.56]]
 
 [coordinates]                                 # what is fitted, atoms from 1: a distance, an angle, a dihedral angle;
-CO = [1, 2]                                   # left out: everything that keeps the symmetry
+CO = [1, 2]                                   # left out: everything that preserves the symmetry
 CS = [2, 3]
 
 [held]                                        # coordinates that stay as in the geometry

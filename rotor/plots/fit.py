@@ -19,6 +19,7 @@ _HEADINGS = {
     "ka": "Ka of the upper state",
     "k": "K of the upper state",
     "n": "N of the upper state",
+    "f": "F of the upper state (rounded up)",
 }
 
 
@@ -74,7 +75,12 @@ def _draw(axes: Any, fit: Fit, x: np.ndarray[Any, Any]) -> None:
 
 def _metadata(suffix: str, fit: Fit, more: Mapping[str, Any]) -> dict[str, Any]:
     """Provenance by the keys that each format has; no date, so that the same picture is the same file."""
-    facts = {**more, "constants": fit.constants.text(), "weighted_rms": fit.weighted_rms, "converged": fit.converged}
+    facts = {
+        **more,
+        "constants": fit.constants.text() if fit.constants else fit.parameters.names,
+        "weighted_rms": fit.weighted_rms,
+        "converged": fit.converged,
+    }
     description = "; ".join(f"{name}: {value}" for name, value in facts.items())
     program = f"rotor {version()}"
     if suffix == ".png":

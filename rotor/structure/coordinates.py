@@ -1,7 +1,7 @@
 """Bonds and angles by name, and moves of the atoms that keep the symmetry of a molecule.
 
 A structure is refined along totally symmetric displacements u (an orthonormal basis S of those Cartesian displacements that
-every operation leaves alike, translations and rotations taken out), so that x = x₀ + S u keeps its point group whatever is
+every operation leaves alike, translations and rotations taken out), so that x = x₀ + S u retains its point group whatever is
 fitted. Named coordinates q(x) are set by Newton's method, S δu = S (B S)⁺ (q_wanted - q(x)), B the matrix of Wilson; what the
 names leave open moves as little as it can (the pseudo-inverse).
 """
@@ -78,7 +78,7 @@ def named(molecule: Molecule, name: str, atoms: Sequence[int]) -> Named:
     """A coordinate of a molecule with those that symmetry makes equal to it.
 
     Raises ValueError for other than 2, 3 or 4 different atoms, atoms that are not there, and a straight angle, which has no
-    derivative: leave it out, symmetry or the geometry keeps it.
+    derivative: leave it out, symmetry or the geometry fixes it.
     """
     chosen, count = tuple(int(atom) for atom in atoms), len(molecule.symbols)
     if len(chosen) not in UNITS or len(set(chosen)) < len(chosen):
@@ -177,8 +177,8 @@ def _rigid_motions(positions: Floats) -> Floats:
     return np.asarray(u[:, s > 1e-8 * s[0]])
 
 
-def moved_to(positions: Floats, space: Floats, coordinates: Sequence[Named], wanted: Floats) -> Floats:
-    """Positions (n, 3) at which the coordinates have the values wanted (Å, degrees), reached along `space` (3n, k).
+def moved_to(positions: Floats, space: Floats, coordinates: Sequence[Named], targets: Floats) -> Floats:
+    """Positions (n, 3) at which the coordinates have the target values (Å, degrees), reached along `space` (3n, k).
 
     Raises ValueError where they cannot all be had (coordinates that contradict each other, or a step that does not settle).
     """
@@ -186,7 +186,7 @@ def moved_to(positions: Floats, space: Floats, coordinates: Sequence[Named], wan
     factors = np.array([one.factor for one in coordinates])
     missing = np.inf
     for _ in range(50):
-        off = (wanted - np.array([one.value(x) for one in coordinates])) / factors
+        off = (targets - np.array([one.value(x) for one in coordinates])) / factors
         missing = float(np.abs(off).max(initial=0.0))
         if missing < 1e-12:
             return x

@@ -115,7 +115,7 @@ def family(
     Parameters
     ----------
     molecule : Molecule
-        The parent with a start geometry, good enough to tell axes and signs; it is made exactly symmetric first.
+        The parent with a start geometry, good enough to decide axes and signs; it is made exactly symmetric first.
     measured : sequence of (name, isotopes, constants_mhz, errors_mhz)
         Isotopes as `Molecule.with_isotopes` takes them, "" for the parent; the parent comes first.
     corrections_mhz, sources : sequences, optional

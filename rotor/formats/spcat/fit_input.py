@@ -8,49 +8,50 @@ by its name.
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
-from rotor.arrays import Floats
+from rotor.arrays import Floats, Ints
 from rotor.fit.assignment import Assignments, assignments
 from rotor.fit.fit import Fit, FitOptions
 from rotor.fit.parameters import Parameters
+from rotor.formats.assigned_lines import QUANTA
 from rotor.formats.spcat.codes import HELD_BELOW, constants_and_matrix
+from rotor.formats.spcat.file_lines import format_of
+from rotor.formats.spcat.fit_states import FileLevels, groups_for_fit, line_names, names_of_quanta
 from rotor.formats.spcat.lin import LineList, line_list, read_lin
 from rotor.formats.spcat.model import parameter_file
 from rotor.formats.spcat.par import Header, Parameter, ParameterFile, read_par
+from rotor.formats.spcat.predict_states import is_plain
+from rotor.quantum.labelled import LevelModel
 from rotor.tops.constants import Constants
 from rotor.tops.top import Top
 
 FREE_ABOVE = 1e30  # an a-priori error so large is none
-_QUANTA = {
-    "linear": ("j",),
-    "spherical": ("j",),
-    "prolate": ("j", "k"),
-    "oblate": ("j", "k"),
-    "asymmetric": ("j", "ka", "kc"),
-}
 
 
 @dataclass(frozen=True, eq=False)
 class SpfitInput:
     """What a pair of .par and .lin files asks for.
 
+    constants : of a file with one state and no spins, else None, and `model` has the levels
     columns : of each parameter of the file the free one that it follows, -1 for one that is held; ratios : times what
     notes : what is done otherwise than the field's program does it
     """
 
     file: ParameterFile
     lines: Assignments
-    constants: Constants
+    constants: Constants | None
     parameters: Parameters
     options: FitOptions
     columns: tuple[int, ...]
     ratios: tuple[float, ...]
     notes: tuple[str, ...]
+    model: Callable[[Ints], LevelModel] | None = None
 
 
 def read_fit(par: str | os.PathLike[str], lin: str | os.PathLike[str] | None = None) -> SpfitInput:
@@ -69,29 +70,34 @@ def read_fit(par: str | os.PathLike[str], lin: str | os.PathLike[str] | None = N
 def spfit_input(file: ParameterFile, lines: LineList, source: str = "") -> SpfitInput:
     """The same from files that have been read."""
     _refuse_options(file.header)
-    constants, matrix = constants_and_matrix(file)
     held, ties = _roles(file.parameters)
     columns, ratios, free = _columns(file.parameters, held, ties)
-    values = np.array([p.value for p in file.parameters])
-    spread = np.zeros((len(values), len(free)))
+    spread = np.zeros((len(file.parameters), len(free)))
     for row, (column, ratio) in enumerate(zip(columns, ratios, strict=True)):
         if column >= 0:
             spread[row, column] = ratio
-    base = matrix @ np.where(np.array(columns) < 0, values, 0.0)
+    model, constants, kmax = None, None, None
+    if is_plain(file, None):
+        constants, matrix = constants_and_matrix(file)
+        names, quanta, kmax = tuple(constants.values), QUANTA[constants.kind], _kmax(file, constants)
+    else:
+        matrix, names = np.eye(len(file.parameters)), line_names(file)
+        quanta = names_of_quanta(format_of(file, groups_for_fit(file)))
+        needed = [name for name, column in zip(names, columns, strict=True) if column >= 0]
+        model = partial(FileLevels.of, file, needed=needed)
+    values = np.array([p.value for p in file.parameters])
     parameters = Parameters(
         names=_distinct([file.parameters[i].label or str(file.parameters[i].code) for i in free]),
         start=values[list(free)],
         prior=np.array([_prior(file.parameters[i]) for i in free]),
-        constant_names=tuple(constants.values),
-        base=base,
+        constant_names=names,
+        base=matrix @ np.where(np.array(columns) < 0, values, 0.0),
         matrix=matrix @ spread,
     )
-    assigned, notes = _assigned(lines, constants, file.header, source)
-    options = FitOptions(
-        reject_above=file.header.errtst, most_iterations=max(abs(file.header.nitr), 1), kmax=_kmax(file, constants)
-    )
-    notes += _notes(file, options, constants, assigned)
-    return SpfitInput(file, assigned, constants, parameters, options, columns, ratios, tuple(notes))
+    assigned, notes = _assigned(lines, quanta, file.header, source)
+    options = FitOptions(reject_above=file.header.errtst, most_iterations=max(abs(file.header.nitr), 1), kmax=kmax)
+    notes += _notes(file, options, model is None, assigned)
+    return SpfitInput(file, assigned, constants, parameters, options, columns, ratios, tuple(notes), model)
 
 
 def _refuse_options(header: Header) -> None:
@@ -151,32 +157,31 @@ def _kmax(file: ParameterFile, constants: Constants) -> int | None:
     return file.options[0].knmax if constants.kind == "asymmetric" else None
 
 
-def _assigned(lines: LineList, constants: Constants, header: Header, source: str) -> tuple[Assignments, list[str]]:
+def _assigned(lines: LineList, names: Sequence[str], header: Header, source: str) -> tuple[Assignments, list[str]]:
     """Lines up to NLINE, wavenumbers times CAL, blends as the file marks them."""
     notes = []
     blends = lines.blends()
-    kept = np.arange(len(lines)) < abs(header.nline)
-    if not kept.all():
-        notes.append(f"NLINE = {abs(header.nline)}: {len(lines) - int(kept.sum())} lines behind it do not count")
-    widths = kept & (blends < 0)
+    used = np.arange(len(lines)) < abs(header.nline)
+    if not used.all():
+        notes.append(f"NLINE = {abs(header.nline)}: {len(lines) - int(used.sum())} lines behind it do not count")
+    widths = used & (blends < 0)
     if widths.any():
         notes.append(f"{int(widths.sum())} lines that give the width of a blend do not count")
-    kept &= blends >= 0
+    used &= blends >= 0
     upper, lower = lines.states()
-    names = _QUANTA[constants.kind]
-    _refuse_width(lines, names, kept)
+    _refuse_width(lines, names, used)
     wavenumber = lines.error < 0
     frequency = lines.frequency_mhz * np.where(wavenumber, header.cal, 1.0)
     k = len(names)
     return assignments(
-        names, upper[kept][:, :k], lower[kept][:, :k], frequency[kept], lines.error_mhz[kept],
-        weight=lines.weight[kept], blend=blends[kept], wavenumber=wavenumber[kept], source=source,
+        names, upper[used][:, :k], lower[used][:, :k], frequency[used], lines.error_mhz[used],
+        weight=lines.weight[used], blend=blends[used], wavenumber=wavenumber[used], source=source,
     ), notes  # fmt: skip
 
 
-def _refuse_width(lines: LineList, names: Sequence[str], kept: np.ndarray) -> None:
+def _refuse_width(lines: LineList, names: Sequence[str], used: np.ndarray) -> None:
     """ValueError for a line with fewer or more quantum numbers than the top has."""
-    for i in np.flatnonzero(kept).tolist():
+    for i in np.flatnonzero(used).tolist():
         count = len(lines.measured(i).quanta) // 2
         if count != len(names):
             raise ValueError(
@@ -185,7 +190,7 @@ def _refuse_width(lines: LineList, names: Sequence[str], kept: np.ndarray) -> No
             )
 
 
-def _notes(file: ParameterFile, options: FitOptions, constants: Constants, lines: Assignments) -> list[str]:
+def _notes(file: ParameterFile, options: FitOptions, plain: bool, lines: Assignments) -> list[str]:
     notes = []
     if file.header.npar > len(file.parameters):
         notes.append(
@@ -196,7 +201,7 @@ def _notes(file: ParameterFile, options: FitOptions, constants: Constants, lines
     highest = int(max(lines.upper[:, 0].max(initial=0), lines.lower[:, 0].max(initial=0)))
     if options.kmax is not None and options.kmax < highest:
         notes.append(f"KNMAX = {options.kmax} is below the highest J, {highest}: the basis is cut there, as SPFIT does")
-    if constants.kind == "asymmetric" and file.options[0].diag not in (0, 3):
+    if plain and options.kmax is not None and file.options[0].diag not in (0, 3):
         notes.append(f"DIAG = {file.options[0].diag}: levels are labelled by the order of energy in each Wang block")
     return notes
 
@@ -226,7 +231,7 @@ def named_file(fit: Fit, title: str, *, variances: bool) -> ParameterFile:
     SPFIT's parameters are not always the constants (A - B of a symmetric top): their errors and correlations are carried over.
     Raises ValueError where a fitted combination of constants has no parameter of its own there (a tie between constants).
     """
-    top = Top.from_constants(fit.constants, name=title)
+    top = Top.from_constants(fit.named, name=title)
     highest = int(max(fit.lines.upper[:, 0].max(), fit.lines.lower[:, 0].max()))
     file = parameter_file(top, kmax=min(max(highest, 1), 359))
     _, matrix = constants_and_matrix(file)
