@@ -43,7 +43,7 @@ def table():
     """{piece: motions that use it} and all motions, from the page."""
     text = PAGE.read_text(encoding="utf-8").split("## Which motion uses what")[1].split("\n## ")[0]
     rows = re.findall(r"^\| (.+) \|$", text, re.MULTILINE)
-    head, _, *body = ([cell.strip() for cell in row.split("|")] for row in rows)
+    head, *body = ([cell.strip() for cell in row.split("|")] for row in rows)
     used = {piece: {row[0] for row in body if row[column]} for column, piece in enumerate(head) if column}
     return used, {row[0] for row in body}
 

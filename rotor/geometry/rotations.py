@@ -27,7 +27,7 @@ class NearestRotation:
     """The rotation nearest to a matrix, how far the matrix was from it, and whether another is as near.
 
     rotation: (..., 3, 3), proper orthogonal.
-    departure: (...), Frobenius norm of matrix - rotation.
+    distance_from_input: (...), Frobenius norm of matrix - rotation.
     unique: (...), False where the nearest rotation is not unique (a rank below 2, or a reflection with equal axes).
     """
 
@@ -178,7 +178,7 @@ def from_matrix(matrix: ArrayLike) -> Floats:
     """Quaternions of rotation matrices (..., 3, 3), scalar part not negative.
 
     The entries of R give the symmetric matrix 4 q qᵀ; its row with the largest diagonal never cancels (Shepperd,
-    J. Guidance Control 1, 223 (1978)). A matrix that is no rotation to 1e-6 is refused; `nearest_rotation` mends it.
+    J. Guidance Control 1, 223 (1978)). A matrix that is no rotation to 1e-6 is refused; `nearest_rotation` finds the nearest one.
 
     >>> from_matrix(np.diag([1.0, -1.0, -1.0]))
     array([0., 1., 0., 0.])
@@ -202,11 +202,11 @@ def nearest_rotation(matrix: ArrayLike) -> NearestRotation:
     """
     m = _matrices(matrix)
     u, s, vt = np.linalg.svd(m)
-    handed = np.sign(np.linalg.det(u) * np.linalg.det(vt))
-    signs = np.stack([np.ones_like(handed), np.ones_like(handed), handed], axis=-1)
+    parity = np.sign(np.linalg.det(u) * np.linalg.det(vt))
+    signs = np.stack([np.ones_like(parity), np.ones_like(parity), parity], axis=-1)
     rotation = (u * signs[..., None, :]) @ vt
     distance_from_input = np.linalg.norm(m - rotation, axis=(-2, -1))
-    gap = s[..., 1] + handed * s[..., 2]
+    gap = s[..., 1] + parity * s[..., 2]
     return NearestRotation(rotation, distance_from_input, gap > 1e-12 * np.maximum(s[..., 0], np.finfo(float).tiny))
 
 
@@ -336,7 +336,7 @@ def _require_rotation(m: Floats) -> None:
     if worst > ORTHOGONALITY_TOLERANCE:
         raise ValueError(
             f"not a rotation matrix: RᵀR departs from 1 by {worst:.3g} (at most {ORTHOGONALITY_TOLERANCE:g} is taken "
-            "for round-off); nearest_rotation() mends it and says how far it was"
+            "for round-off); nearest_rotation() gives the nearest rotation and its distance"
         )
     if np.any(np.linalg.det(m) < 0.0):
         raise ValueError("a matrix of determinant -1 is a reflection, no rotation; nearest_rotation() finds one")

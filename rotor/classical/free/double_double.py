@@ -71,7 +71,7 @@ class DoubleDouble:
         third = (rest - other * second).hi / other.hi
         return DoubleDouble(*_fast_two_sum(first, second)) + third
 
-    __array_ufunc__ = None  # let numpy hand array - number over to __rsub__ and its kin
+    __array_ufunc__ = None  # numpy then leaves array - number to __rsub__, __radd__, ...
 
     def __radd__(self, other: Floats | float) -> DoubleDouble:
         return self + other

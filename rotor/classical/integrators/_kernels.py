@@ -1,7 +1,7 @@
 """Compiled free steps of very many tops: blocks of 128 bodies side by side, written so that they vectorise.
 
 A block is six runs of 128 numbers in one array: the quaternion w, x, y, z that takes the body to a frame whose third
-axis is L, and the rates of two turns. The offsets between the runs are constants of the program, so the compiler knows
+axis is L, and the rates of two turns. The offsets between the runs are constants of the program, so the compiler sees
 that they do not overlap and handles four or eight bodies with one instruction; sine and cosine are polynomials for the
 same reason. A step is some sixty multiplications and additions; L itself is written nowhere, it is R^T (0, 0, |L|).
 """

@@ -1,6 +1,6 @@
 """An adaptive Runge-Kutta method on the rotation group, for drag, feedback and anything else that is not Hamiltonian.
 
-Order: 8, with the step chosen from embedded results of order 5 and 3 (the tableau of DOP853). Keeps: the unit
+Order: 8, with the step chosen from embedded results of order 5 and 3 (the tableau of DOP853). Conserves: the unit
 quaternion, and L in space exactly where there is no torque (it is L in space that is integrated); the energy only to
 the tolerance, with a linear drift. Cost: 12 evaluations a step in numpy, about 0.25 ms a step for one body and little
 more for a hundred; all bodies of one call share the step. Sources: H. Munthe-Kaas, BIT 38, 92 (1998); the tableau,

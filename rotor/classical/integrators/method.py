@@ -1,6 +1,6 @@
-"""Motions of rigid bodies under effects, step by step: the face that every integrator shows, and how to choose one.
+"""Motions of rigid bodies under effects, step by step: the interface of every integrator, and how to choose one.
 
-| method | order | keeps | for |
+| method | order | conserves | for |
 |---|---|---|---|
 | `ExactDrift` | free: exact; with torques 2 to 8 | symplectic, L in space | free motion at any time; weak torques |
 | `MoserVeselov` | free: 2 to 8, or exact; with torques 2 to 8 | L in space, free energy | free motion by steps |
