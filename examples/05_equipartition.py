@@ -8,7 +8,6 @@
 # %%
 import math
 
-import matplotlib.pyplot as plt
 import numpy as np
 
 import rotor

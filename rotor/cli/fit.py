@@ -117,7 +117,8 @@ def command(context: typer.Context, given: Options) -> None:
         fit = _fitted(request, options)
     for text in request.notes:
         note(text)
-    if fit.constants is None and files.paths.pop("--out .toml", None):
+    if fit.constants is None and "--out .toml" in files.paths:
+        del files.paths["--out .toml"]
         note("spins or several states: no .toml is written, the .par and .var have everything")
     trials = _trials(fit, options, given.try_)
     suggestions = _suggestions(fit, given.suggest)

@@ -139,7 +139,7 @@ def _constants(
         fit = _fitted(folder / one["lines"], Constants.parse(one["start"]), options)
     except (ValueError, OSError) as error:
         raise ValueError(f"{place}, lines: {error}") from None
-    if not fit.converged:
+    if not fit.converged or fit.constants is None:
         raise ValueError(f"{place}, lines = {one['lines']!r}: the fit has not converged: {fit.reason}")
     fits[label] = fit
     source = f"fitted to {int(fit.used.sum())} measured lines of {Path(one['lines']).name}, weighted rms {fit.weighted_rms:.3g}"

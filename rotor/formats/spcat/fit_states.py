@@ -92,7 +92,8 @@ class FileLevels(LevelModel):
             energies[part.rows] = levels.energy_mhz[rows]
             names = [name for name in part.names if name in self.needed]
             derived = level_derivatives(part.group.top, levels, names, rows)
-            slopes[np.ix_(part.rows, [column[name] for name in names])] = derived
+            columns = np.array([column[name] for name in names], dtype=np.int64)
+            slopes[np.ix_(part.rows, columns)] = derived
         return energies, slopes
 
     def doubtful(self, values_mhz: Floats) -> Ints:
