@@ -77,7 +77,9 @@ def executed(script: Path, patience: float = 10.0) -> tuple[Any, float]:
     limit = int(patience * max(seconds_allowed(script), SECONDS))
     place = {"metadata": {"path": str(EXAMPLES)}}
     with tempfile.TemporaryDirectory() as sockets:
-        ipc = {"transport": "ipc", "ip": f"{sockets}/kernel"} if os.name == "posix" else {}  # files instead of open ports
+        ipc = (
+            {"transport": "ipc", "ip": f"{sockets}/kernel"} if os.name == "posix" else {}
+        )  # files instead of open ports
         config = Config({"KernelManager": ipc})
         NotebookClient(notebook, timeout=limit, kernel_name="python3", resources=place, config=config).execute()
     for cell in notebook.cells:
@@ -136,7 +138,10 @@ def main() -> int:
         differs = arguments.check and not agrees(script)
         size = 0 if arguments.check else write(script, notebook)
         verdict = ", too long" * late + ", differs from its notebook: run docs/make_notebooks.py" * differs
-        print(f"{script.stem}: {seconds:.1f} s, {len(pictures(notebook))} pictures, {size // 1000} kB{verdict}", flush=True)
+        print(
+            f"{script.stem}: {seconds:.1f} s, {len(pictures(notebook))} pictures, {size // 1000} kB{verdict}",
+            flush=True,
+        )
         wrong |= late or differs
         if arguments.pictures:
             arguments.pictures.mkdir(parents=True, exist_ok=True)

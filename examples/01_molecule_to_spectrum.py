@@ -21,7 +21,9 @@ from rotor.formats.spcat.compare import agreement, compare
 
 # %matplotlib inline
 
-published = next(folder / "tests/oracles/catalogues" for folder in (Path.cwd(), *Path.cwd().parents) if (folder / "tests").is_dir())
+published = next(
+    folder / "tests/oracles/catalogues" for folder in (Path.cwd(), *Path.cwd().parents) if (folder / "tests").is_dir()
+)
 
 
 def beside(lines, file):
@@ -62,7 +64,9 @@ matched = beside(lines, "c018003_part.cat")
 found = agreement(matched)
 shift, strength = matched.differences("frequency_mhz"), matched.differences("lgint")
 measured = matched.reference.take(matched.of_reference)
-print(f"{found.lines} measured lines: median |calculated - measured| {found.median_mhz:.2f} MHz, rms {found.rms_mhz:.2f} MHz")
+print(
+    f"{found.lines} measured lines: median |calculated - measured| {found.median_mhz:.2f} MHz, rms {found.rms_mhz:.2f} MHz"
+)
 print(f"intensities: median ratio {10 ** np.median(strength):.4f}, largest |Δ log10| {np.abs(strength).max():.4f}")
 
 figure, (spectrum, residuals) = plt.subplots(2, 1, figsize=(8, 6), height_ratios=(2, 1), layout="constrained")
@@ -91,7 +95,9 @@ ocs = rotor.read("OCS")
 matched = beside(rotor.line_list(ocs, temperature_k=300, jmax=80), "c060503_part.cat")
 found, error = agreement(matched), matched.reference.error_mhz[matched.of_reference]
 off = matched.differences("frequency_mhz")
-print(f"{found.lines} measured lines: rms {1e3 * found.rms_mhz:.1f} kHz, {found.within_3_sigma:.0%} within three errors")
+print(
+    f"{found.lines} measured lines: rms {1e3 * found.rms_mhz:.1f} kHz, {found.within_3_sigma:.0%} within three errors"
+)
 
 figure, axes = plt.subplots(figsize=(8, 3), layout="constrained")
 j = matched.reference.quanta_upper[matched.of_reference, 0]
@@ -121,7 +127,11 @@ for table in tables.values():
         top = rotor.read(name)
         ours = np.array([math.log10(float(rotor.partition_function(top, t).q)) for t in kelvin.tolist()])
         differences[name] = ours - np.array(table[name])
-        print(f"{name:5}", " ".join(f"{value:7.4f}" for value in ours), f"  largest difference {np.abs(differences[name]).max():.4f}")
+        print(
+            f"{name:5}",
+            " ".join(f"{value:7.4f}" for value in ours),
+            f"  largest difference {np.abs(differences[name]).max():.4f}",
+        )
 
 excess = 10.0 ** -differences["SO2"] - 1  # population of the excited state
 bending_cm = -np.log(excess[:3]) * kelvin[:3] / 1.438777  # hc/k in cm K
@@ -131,7 +141,13 @@ figure, axes = plt.subplots(figsize=(8, 3), layout="constrained")
 for name, values in differences.items():
     axes.plot(kelvin, np.abs(values) + 1e-5, "o-", label=name)
 axes.axhline(5e-5, color="black", lw=0.5, ls="--")
-axes.set(xscale="log", yscale="log", xlabel="temperature (K)", ylabel="|Δ log₁₀ Q|", title="Q against JPL and CDMS; dashed: last digit")
+axes.set(
+    xscale="log",
+    yscale="log",
+    xlabel="temperature (K)",
+    ylabel="|Δ log₁₀ Q|",
+    title="Q against JPL and CDMS; dashed: last digit",
+)
 axes.legend(frameon=False, ncols=4, fontsize=8)
 
 # %%
@@ -162,7 +178,9 @@ assert abs(rigid.constants["B"] / ground_state.constants["B"] - 1) < 0.006
 # %%
 sketch, real = rotor.read("SMILES:C=O"), rotor.read("H2CO")
 for name, ours in zip("ABC", sketch.rotational_constants_mhz, strict=True):
-    print(f"{name}: {ours:10.1f} MHz from SMILES, {real.constants[name]:10.1f} MHz measured, {ours / real.constants[name] - 1:+.1%}")
+    print(
+        f"{name}: {ours:10.1f} MHz from SMILES, {real.constants[name]:10.1f} MHz measured, {ours / real.constants[name] - 1:+.1%}"
+    )
 for note in sketch.notes:
     print("note:", note)
 
@@ -186,7 +204,13 @@ with tempfile.TemporaryDirectory() as folder:
 
 figure, axes = plt.subplots(figsize=(8, 3), layout="constrained")
 axes.plot(grid / 1e6, curve.intensity)
-axes.set(xlim=(0, 6), ylim=(0, None), xlabel="frequency (THz)", ylabel="cross section (nm²)", title="Water, lines 20 GHz wide")
+axes.set(
+    xlim=(0, 6),
+    ylim=(0, None),
+    xlabel="frequency (THz)",
+    ylabel="cross section (nm²)",
+    title="Water, lines 20 GHz wide",
+)
 
 # %%
 assert abs(area / inside - 1) < 0.02  # lines at the end of the grid are cut

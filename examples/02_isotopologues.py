@@ -17,7 +17,9 @@ from rotor.tops.isotopologues import isotopologue, isotopologues
 
 # %matplotlib inline
 
-published = next(folder / "tests/oracles/catalogues" for folder in (Path.cwd(), *Path.cwd().parents) if (folder / "tests").is_dir())
+published = next(
+    folder / "tests/oracles/catalogues" for folder in (Path.cwd(), *Path.cwd().parents) if (folder / "tests").is_dir()
+)
 
 # %% [markdown]
 # ## Water at natural abundance
@@ -31,7 +33,9 @@ family = isotopologues(water)
 for one in family:
     a, b, c = one.top.rotational_constants_mhz
     mu = ", ".join(f"{abs(x):.3f}" for x in one.top.dipole_abc_debye)
-    print(f"{one.formula:10} {one.abundance:.2e}  A {a:8.0f}  B {b:8.0f}  C {c:8.0f} MHz  |μ| {mu} D, axes {one.turned_degrees:.1f}°")
+    print(
+        f"{one.formula:10} {one.abundance:.2e}  A {a:8.0f}  B {b:8.0f}  C {c:8.0f} MHz  |μ| {mu} D, axes {one.turned_degrees:.1f}°"
+    )
 
 assert [one.formula for one in family] == ["H2O", "H2[18O]", "H2[17O]", "H[2H]O"]
 
@@ -86,7 +90,9 @@ figure, axes = plt.subplots(figsize=(5, 4.5), layout="constrained")
 for column, name in enumerate("ABC"):
     axes.plot(seen[:, column], shifts[:, column], "os^"[column], ms=6, label=name)
 axes.plot([-28, 0], [-28, 0], color="black", lw=0.5)
-axes.set(xlabel="measured change (MHz)", ylabel="predicted change (MHz)", title="Seven ¹³C isotopologues of trifluorotoluene")
+axes.set(
+    xlabel="measured change (MHz)", ylabel="predicted change (MHz)", title="Seven ¹³C isotopologues of trifluorotoluene"
+)
 axes.legend(frameon=False)
 
 # %%
@@ -116,7 +122,9 @@ for one, centre in zip(chlorides, centres, strict=True):
     lines = rotor.line_list(one.top, temperature_k=300, jmax=2)
     places.append(float(lines.frequency_mhz[lines.levels.quanta["j"][lines.upper] == 1][0]))
     parts.append(one.abundance * rotor.Spectrum.from_lines(lines, grid, fwhm_mhz=5.0).intensity)
-    print(f"{one.formula:10} abundance {one.abundance:.4f}: J = 1 - 0 at {places[-1]:.2f} MHz, centre of JPL's {centre:.2f} MHz")
+    print(
+        f"{one.formula:10} abundance {one.abundance:.4f}: J = 1 - 0 at {places[-1]:.2f} MHz, centre of JPL's {centre:.2f} MHz"
+    )
 areas = [np.trapezoid(part, grid) for part in parts]
 
 figure, axes = plt.subplots(figsize=(8, 3.5), layout="constrained")
@@ -131,7 +139,9 @@ axes.set_title("J = 1 - 0 of methyl chloride (red: centres of JPL's components)"
 # %%
 assert abs(places[0] - centres[0]) < 0.5  # MHz; the library's own constants
 assert abs(places[1] - centres[1]) < 1.5  # scaled by the geometry: 4e-5
-assert abs(areas[0] / areas[1] / (chlorides[0].abundance / chlorides[1].abundance) - 1) < 0.05  # μ² ν² / Q are nearly alike
+assert (
+    abs(areas[0] / areas[1] / (chlorides[0].abundance / chlorides[1].abundance) - 1) < 0.05
+)  # μ² ν² / Q are nearly alike
 
 # %% [markdown]
 # ## The family of water in one picture

@@ -93,7 +93,9 @@ assert all(np.abs(values).max() < 5.1e-7 for values in off.values())  # half of 
 
 # %%
 measured = rotor.read(oracles / "catalogues" / "c018003_part.cat")
-upper, lower = ({name: quanta[:, i] for i, name in enumerate(("j", "ka", "kc"))} for quanta in (measured.quanta_upper, measured.quanta_lower))
+upper, lower = (
+    dict(zip(("j", "ka", "kc"), q.T, strict=False)) for q in (measured.quanta_upper, measured.quanta_lower)
+)  # v = 0
 water = rotor.read("water")
 orders = {
     "rigid": (),

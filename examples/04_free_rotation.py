@@ -116,7 +116,7 @@ for panel, (moments, (expected, expected_period)) in zip(panels, problems.items(
     panel.plot(np.linspace(0, 10, 500), motion.at(np.linspace(0, 10, 500))[0], label=["$L_1$", "$L_2$", "$L_3$"])
     panel.plot([10] * 3, expected, "k.", ms=8)
     panel.set(title=f"I = {moments}; dots: 50 digits", ylabel="L in the body", xlim=(0, 10.2))
-panels[0].legend(frameon=False, ncols=3, loc="lower left")
+panels[0].legend(frameon=False, ncols=3, loc="lower right", bbox_to_anchor=(1, 1))
 panels[1].set_xlabel("t")
 
 racket = np.array([0.3, 0.35, 0.4])
@@ -132,7 +132,9 @@ assert abs(period - 12.3349458093386) < 1e-9
 
 # %%
 again, _ = tumbling.at(np.array([0.0, 1e6]) * tumbling.period)
-print(f"after 10⁶ periods L in the body differs by {np.abs(again[1] - again[0]).max() / np.linalg.norm(again[0]):.1e} of |L|")
+print(
+    f"after 10⁶ periods L in the body differs by {np.abs(again[1] - again[0]).max() / np.linalg.norm(again[0]):.1e} of |L|"
+)
 assert np.allclose(
     again[1], again[0], atol=1e-6 * np.linalg.norm(again[0])
 )  # the period rounds: 1e-16 times 1e6 and σT

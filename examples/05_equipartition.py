@@ -53,6 +53,31 @@ for seed, name in enumerate(("water", "HCl", "CH4", "NH3", "CO2", "C6H6")):
 equipartition_figure(tests)
 
 # %% [markdown]
+# Not only the mean is the same: a linear molecule has the distribution of rotational energies exp(-x), x = E/kT, that of two
+# degrees, and a bent one 2√(x/π) exp(-x), that of three.
+
+# %%
+figure, axes = plt.subplots(figsize=(7, 3.5), layout="constrained")
+edges = np.linspace(0, 6, 41)
+middle = (edges[1:] + edges[:-1]) / 2
+closed = {"CO2": np.exp(-middle), "water": 2 * np.sqrt(middle / math.pi) * np.exp(-middle)}
+for color, (name, expected) in zip(("tab:blue", "tab:orange"), closed.items(), strict=True):
+    gas = gas_of(name, 40_000, seed=11)
+    moments = gas.moments[np.newaxis] if gas.moments.ndim == 1 else gas.moments
+    energy = (
+        np.divide(gas.momentum**2, 2 * moments, out=np.zeros_like(gas.momentum), where=moments > 0).sum(axis=1) / kt
+    )
+    seen = np.histogram(energy, edges)[0] / len(energy) / np.diff(edges)
+    axes.stairs(seen, edges, color=color, label=f"{name}, 40,000 molecules")
+    axes.plot(middle, expected, "--", color="black", lw=0.8)
+    error = np.sqrt(expected / np.diff(edges) / len(energy))
+    assert (
+        np.abs((seen - expected) / error)[2:].max() < 4.5
+    )  # σ of a bin; 76 bins. The first two bend within their width
+axes.set(xlabel="rotational energy / kT", ylabel="probability density", title="Dashed: closed forms")
+axes.legend(frameon=False)
+
+# %% [markdown]
 # ## A wrong count is caught
 #
 # A thermostat that takes CO2 for a body of six degrees puts 6/5 of the energy into the five that there are. And a box of ten

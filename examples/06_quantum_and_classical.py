@@ -1,9 +1,9 @@
 # %% [markdown]
 # # Quantum lines and a classical gas
 #
-# A rotating dipole absorbs and emits in quantum and in classical mechanics alike. The classical gas has no lines: its dipole loses
-# the memory of its direction, and the Fourier transform of that correlation function is a band. Where many levels are occupied the band is the envelope of the
-# lines; where few are, the two part. Every claim is asserted.
+# A rotating dipole absorbs and emits in quantum and in classical mechanics alike. The classical gas has no lines: its dipole
+# loses the memory of its direction, and the Fourier transform of that correlation function is a band. Where many levels are
+# occupied the band is the envelope of the lines; where few are, the two differ. Every claim is asserted.
 
 # %%
 import math
@@ -164,7 +164,9 @@ def cp_over_r(formula, t):
 figure, (left, right) = plt.subplots(1, 2, figsize=(9, 4), layout="constrained")
 curve_k, published_k = np.linspace(15, 500, 200), np.linspace(20, 400, 20)
 worst = {}
-for color, species in zip(("tab:blue", "tab:orange", "tab:green", "tab:red"), ("para", "ortho", "normal", "equilibrium"), strict=True):
+for color, species in zip(
+    ("tab:blue", "tab:orange", "tab:green", "tab:red"), ("para", "ortho", "normal", "equilibrium"), strict=True
+):
     ours = thermodynamic_functions(rotor.read("H2"), curve_k, species=species).cv_over_r + 2.5
     left.plot(curve_k, ours, color=color, label=species)
     if species in leachman:
@@ -172,7 +174,9 @@ for color, species in zip(("tab:blue", "tab:orange", "tab:green", "tab:red"), ("
     else:
         t, values = np.array(janaf["H2"]["temperature_k"][:7], float), np.array(janaf["H2"]["cp"][:7]) / GAS_CONSTANT
     left.plot(t, values, "o", ms=3, color=color)
-    worst[species] = np.abs(thermodynamic_functions(rotor.read("H2"), t, species=species).cv_over_r + 2.5 - values).max()
+    worst[species] = np.abs(
+        thermodynamic_functions(rotor.read("H2"), t, species=species).cv_over_r + 2.5 - values
+    ).max()
 left.set(xlabel="temperature (K)", ylabel="$C_p/R$", title="Hydrogen; dots: published", ylim=(2.4, 4.8))
 left.legend(frameon=False)
 
@@ -183,7 +187,10 @@ right.plot(t, values, "o", ms=4, label="JANAF")
 right.axhline(4.0, color="black", lw=0.5, ls="--", label="classical, 4 R")
 right.set(xlabel="temperature (K)", ylabel="$C_p/R$", title="Water: vibration begins at 300 K", ylim=(3.9, 5.1))
 right.legend(frameon=False)
-print("H2, largest |difference| of C_p/R up to 400 K:", {species: round(float(value), 4) for species, value in worst.items()})
+print(
+    "H2, largest |difference| of C_p/R up to 400 K:",
+    {species: round(float(value), 4) for species, value in worst.items()},
+)
 print(f"water, C_p/R - JANAF at 100 and 200 K: {rotation[0] - values[0]:+.4f} {rotation[1] - values[1]:+.4f}")
 
 # %%
