@@ -37,6 +37,7 @@ _NYSTROM_6 = (
     (0.0414649985182624, 0.198128671918067, -0.0400061921041533, 0.0752539843015807, -0.0115113874206879),
 )
 CHEBYSHEV_BELOW = 1e-14  # terms of the series below it are left out
+CHECKS = 12  # how often, about, leakage is looked at inside a window
 SNAPSHOT_NUMBERS = 1 << 20  # complex numbers of snapshots held at once
 
 
@@ -145,26 +146,52 @@ def decompose(matrix: NDArray[Any]) -> Decomposed:
 
 
 def split_through(
-    plan: KickPlan, energies: Floats, operator: Decomposed, states: Complexes, snapshots: list[Complexes] | None = None
-) -> Complexes:
-    """States (n, m) over the free states after a window with one channel.
+    plan: KickPlan,
+    energies: Floats,
+    operator: Decomposed,
+    states: Complexes,
+    edge: NDArray[np.bool_],
+    snapshots: list[Complexes] | None = None,
+) -> tuple[Complexes, Floats]:
+    """States (n, m) over the free states after a window with one channel, and each one's largest population at the edge.
 
-    energies: (n,) in rad/ps. snapshots: where given, the states at every sampled time are appended.
+    Parameters
+    ----------
+    plan : KickPlan
+        Of the window.
+    energies : (n,) rad/ps
+        Of the free states.
+    operator : Decomposed
+        Of the channel in this block.
+    states : (n, m)
+        At the start of the window.
+    edge : (n,) of bool
+        The states whose population is leakage, looked at a dozen times.
+    snapshots : list, optional
+        The states at every sampled time are appended.
     """
     from rotor.alignment._kernels import kick_and_drift
 
     vectors = operator.vectors
     here = np.ascontiguousarray(vectors.conj().T @ states)
     matrices: dict[float, Complexes] = {}
-    sequence = np.arange(len(plan.splitting.drifts))
+    stages, piece = len(plan.splitting.drifts), max(1, plan.grid.total // CHECKS)
+    leaked = np.zeros(states.shape[1])
     for step, count, area, sampled in zip(plan.grid.steps, plan.grid.counts, plan.areas, plan.grid.sampled, strict=True):
         key = round(float(step), 12)
         if key not in matrices:
             matrices[key] = _drift_matrices(plan.splitting.drifts * step, energies, vectors)
-        kick_and_drift(here, matrices[key], np.tile(sequence, count), _phases(area, operator.values))
+        phases = _phases(area, operator.values)
+        for first in range(0, count, piece):
+            last = min(first + piece, count)
+            mine = phases[first * stages : last * stages + 1]
+            if first:
+                mine = np.concatenate([np.ones((1, len(energies))), mine[1:]])  # its first kick has been made
+            kick_and_drift(here, matrices[key], np.tile(np.arange(stages), last - first), mine)
+            leaked = np.maximum(leaked, (np.abs(vectors[edge] @ here) ** 2).sum(axis=0))
         if sampled and snapshots is not None:
             snapshots.append(vectors @ here)
-    return np.asarray(vectors @ here)
+    return np.asarray(vectors @ here), leaked
 
 
 def _phases(areas: Floats, values: Floats) -> Complexes:
@@ -197,15 +224,14 @@ def magnus_through(
     energies: Floats,
     operators: Sequence[Any],
     states: Complexes,
+    edge: NDArray[np.bool_],
     snapshots: list[Complexes] | None = None,
-) -> Complexes:
-    """States (n, m) after a window with any channels, one operator (n, n), dense or sparse, for each.
-
-    The same arguments as `split_through` has, but the operators as matrices.
-    """
+) -> tuple[Complexes, Floats]:
+    """As `split_through`, of a window with any channels, one operator (n, n), dense or sparse, for each."""
     first, second = 0.5 - math.sqrt(3) / 6, 0.5 + math.sqrt(3) / 6
     large, small = 0.25 + math.sqrt(3) / 6, 0.25 - math.sqrt(3) / 6
     reach = [_norm_bound(operator) for operator in operators]
+    leaked = np.zeros(states.shape[1])
     for start, step, count, sampled in zip(grid.starts, grid.steps, grid.counts, grid.sampled, strict=True):
         begins = start + step * np.arange(count)
         early = np.array([channel.strength(begins + first * step) for channel in window.channels])
@@ -213,9 +239,10 @@ def magnus_through(
         for u1, u2 in zip(early.T, late.T, strict=True):
             for weights in (large * u1 + small * u2, small * u1 + large * u2):
                 states = _chebyshev(0.5 * step * energies, -step * weights, operators, reach, states)
+            leaked = np.maximum(leaked, (np.abs(states[edge]) ** 2).sum(axis=0))
         if sampled and snapshots is not None:
             snapshots.append(states)
-    return states
+    return states, leaked
 
 
 def _norm_bound(operator: Any) -> float:

@@ -168,16 +168,16 @@ class AxialBlock(FieldBlock):
     def bands(self, contraction: Contraction) -> list[Floats]:
         """Diagonals of the matrix, the main one first; at most three."""
         size = _along(contraction.body, self.axis) * _along(contraction.space, 2)
-        j = self.j
-        whole = np.arange(j[0], j[-1] + 1)
+        first = max(abs(self.k), abs(self.m))
+        j, skip = np.arange(first, self.j[-1] + 1), int(self.j[0]) - first
         if contraction.rank == 1:
-            return [size * band[:: self.step] for band in cosine_bands(whole, self.k, self.m)]
-        d, one, two = cosine_squared_bands(whole, self.k, self.m)
+            return [size * band[skip:] for band in cosine_bands(j, self.k, self.m)]
+        d, one, two = (band[skip:] for band in cosine_squared_bands(j, self.k, self.m))
         main = contraction.scalar + size * (d[:: self.step] - 1 / 3)
         return [main, size * two[::2]] if self.step == 2 else [main, size * one, size * two]
 
     def matrix(self, contraction: Contraction) -> Floats:
-        """The contraction over the states (n, n), real."""
+        """The contraction over the states (n, n), real; that of a vector connects nothing where J even and odd are apart."""
         if self.step == 2 and contraction.rank == 1:
             return np.zeros((len(self), len(self)))
         out = np.zeros((len(self), len(self)))
@@ -250,13 +250,13 @@ def field_space(top: Top, jmax: int, contractions: Sequence[Contraction]) -> Fie
 
 def axial_levels(top: Top, jmax: int) -> FreeLevels:
     """Levels of a linear or symmetric top, K and -K apart, by K and then by J."""
-    from rotor.quantum.levels import solve_levels
+    from rotor.quantum.solve import solve_levels
 
     solved = solve_levels(top, jmax)
+    j, each = solved.rotational, solved.weight_per_component
     if top.kind == "linear":
-        return FreeLevels(solved.j, solved.energy_mhz, {}, solved.weight.astype(np.float64))
-    each = solved.weight / solved.components
-    k = np.concatenate([solved.ka, -solved.ka[solved.ka > 0]])
-    row = np.concatenate([np.arange(len(solved)), np.flatnonzero(solved.ka > 0)])
-    order = np.lexsort((solved.j[row], k))
-    return FreeLevels(solved.j[row][order], solved.energy_mhz[row][order], {"k": k[order]}, each[row][order])
+        return FreeLevels(j, solved.energy_mhz, {}, each)
+    k = np.concatenate([solved.quanta["k"], -solved.quanta["k"][solved.quanta["k"] > 0]])
+    row = np.concatenate([np.arange(len(solved)), np.flatnonzero(solved.quanta["k"] > 0)])
+    order = np.lexsort((j[row], k))
+    return FreeLevels(j[row][order], solved.energy_mhz[row][order], {"k": k[order]}, each[row][order])

@@ -200,12 +200,10 @@ def coloured_components(
 
 def wang_space(top: Top, jmax: int, contractions: Sequence[Contraction]) -> WangSpace:
     """The space of a top whose tensors do not have the axis of a symmetric top."""
-    from rotor.quantum.basis import ka_kc
-    from rotor.quantum.levels import solve_levels
+    from rotor.quantum.effects.watson import SEMI_RIGID
+    from rotor.quantum.solve import representation_of, solve_rotation
 
-    levels = solve_levels(top, jmax)
-    solved = levels.blocks
-    labels = [ka_kc(b.basis.j, b.basis.species, b.basis.size) for b in solved]
-    quanta = {"ka": np.concatenate([ka for ka, _ in labels]), "kc": np.concatenate([kc for _, kc in labels])}
-    free = FreeLevels(levels.j, levels.energy_mhz, quanta, levels.weight.astype(np.float64))
-    return WangSpace(free, jmax, str(levels.representation), solved, tuple(contractions))
+    levels = solve_rotation(top, SEMI_RIGID, 0, jmax, in_blocks=True)
+    quanta = {name: column for name, column in levels.quanta.items() if name != "j"}
+    free = FreeLevels(levels.rotational, levels.energy_mhz, quanta, levels.weight_per_component)
+    return WangSpace(free, jmax, representation_of(top), levels.blocks, tuple(contractions))
