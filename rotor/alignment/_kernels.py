@@ -11,17 +11,22 @@ def kick_and_drift(
     drifts: NDArray[np.complex128],
     which: NDArray[np.int64],
     phases: NDArray[np.complex128],
+    marks: NDArray[np.bool_],
+    snapshots: NDArray[np.complex128],
 ) -> None:
-    """`states` (n, m) in place: the kick phases[0] (n,), then for every later one the drift drifts[which[i]] and phases[i + 1].
+    """`states` (n, m) in place: for every stage i the phases[i] (n,) of a kick and the drift drifts[which[i]].
 
-    One column goes through plain loops, which are faster there than a call of BLAS; more go through zgemm.
+    After the stages with `marks` the states are copied into `snapshots`. One column goes through plain loops, which are faster
+    there than a call of BLAS; more go through zgemm.
     """
     size, columns = states.shape
-    for i in range(size):
-        for c in range(columns):
-            states[i, c] *= phases[0, i]
     moved = np.empty_like(states)
+    taken = 0
     for stage in range(len(which)):
+        for i in range(size):
+            phase = phases[stage, i]
+            for c in range(columns):
+                states[i, c] *= phase
         drift = drifts[which[stage]]
         if columns == 1:
             for i in range(size):
@@ -34,7 +39,7 @@ def kick_and_drift(
                 moved[i, 0] = real + 1j * imag
         else:
             np.dot(drift, states, moved)
-        for i in range(size):
-            phase = phases[stage + 1, i]
-            for c in range(columns):
-                states[i, c] = moved[i, c] * phase
+        states[:, :] = moved
+        if marks[stage]:
+            snapshots[taken] = states
+            taken += 1

@@ -28,7 +28,7 @@ from rotor.alignment.observables import Coherences, Harmonics, Observable
 from rotor.alignment.pulse import RAD_PER_PS_MHZ, Kick, Pulse
 from rotor.alignment.timeline import Channel, Window, timeline
 from rotor.arrays import Floats, Ints
-from rotor.quantum.field_blocks import Contraction, FieldBlock, FieldSpace, FreeLevels, field_space
+from rotor.quantum.field_blocks import AxialBlock, Contraction, FieldBlock, FieldSpace, FreeLevels, field_space
 from rotor.table import Table
 
 if TYPE_CHECKING:
@@ -38,10 +38,10 @@ Complexes = NDArray[np.complex128]
 
 DEFAULT_TOLERANCE = 1e-6
 HIGHEST_J = 600
-FIRST_STEPS = 16
+FIRST_STEPS = 4
 MOST_STEPS = 200_000
 EDGE = 2  # the highest values of J, whose population is the leakage
-PILOT_COLUMNS = 8
+PILOT_COLUMNS = 64
 PILOT_TIMES = 256
 
 
@@ -150,7 +150,7 @@ def align(
     windows = timeline(pulses)
     problem = _Problem(top, pulses, windows, times, ensemble, wanted, tolerance, _contractions(top, windows))
     given = jmax
-    jmax = guessed_jmax(top, pulses, ensemble.jmax) if given is None else given
+    jmax = guessed_jmax(top, pulses, ensemble.jmax, tolerance) if given is None else given
     if jmax < ensemble.jmax + EDGE:
         raise ValueError(f"J max {jmax}: the ensemble itself has J up to {ensemble.jmax}; give at least {ensemble.jmax + EDGE}")
     while True:
@@ -231,8 +231,8 @@ def _contractions(top: Top, windows: Sequence[Window]) -> tuple[tuple[Contractio
     return tuple(tuple(_contraction(top, channel) for channel in window.channels) for window in windows)
 
 
-def guessed_jmax(top: Top, pulses: Sequence[Pulse], highest: int) -> int:
-    """J that a gas reaches from J = `highest`: J + min(P, √(J² + U0/B) - J) + 12 for each pulse, P = ∫U0 dt/ħ, U0 the well."""
+def guessed_jmax(top: Top, pulses: Sequence[Pulse], highest: int, tolerance: float) -> int:
+    """J that a gas reaches from J = `highest`: J + min(P, √(J² + U0/B) - J) for each pulse, P = ∫U0 dt/ħ, U0 the well; and a tail."""
     smallest = RAD_PER_PS_MHZ * min(x for x in top.rotational_constants_mhz if math.isfinite(x))
     reached = float(highest)
     for pulse in pulses:
@@ -242,7 +242,7 @@ def guessed_jmax(top: Top, pulses: Sequence[Pulse], highest: int) -> int:
             continue
         strength, area = _peak_and_area(pulse)
         reached += min(size * area, math.sqrt(reached**2 + size * strength / smallest) - reached)
-    return int(reached) + 12
+    return int(reached + max(6.0, 6 - 1.5 * math.log10(tolerance) - highest / 5))
 
 
 def _spread(body: Floats) -> float:
@@ -312,6 +312,23 @@ class _Task:
     edge: NDArray[np.bool_]
     plan: _Plan
     before: bool
+    gradients: tuple[GradientOf | None, ...] | None = None
+
+
+@dataclass(frozen=True)
+class GradientOf:
+    """W = scale (x^rank - shift) of x = cosθ, and B in rad/ps across the figure axis: what B (dW/dθ)² follows from."""
+
+    rank: int
+    scale: float
+    across: float
+
+    def at(self, values: Floats) -> Floats:
+        """B (dW/dθ)² at eigenvalues of W (n,)."""
+        if self.rank == 1:
+            return self.across * (self.scale**2 - values**2)
+        squares = values / self.scale + 1 / 3
+        return np.asarray(4 * self.across * self.scale**2 * squares * (1 - squares))
 
 
 @dataclass(frozen=True)
@@ -363,7 +380,9 @@ def _through(
     if isinstance(passage, propagate.Grid):
         states, leaked = propagate.magnus_through(window, passage, task.energies, operators, states, task.edge, snapshots)
         return states, leaked, snapshots.cosines
-    operator = known.get(id(operators[0])) or known.setdefault(id(operators[0]), propagate.decompose(operators[0]))
+    operator = known.get(id(operators[0]))
+    if operator is None:
+        operator = known[id(operators[0])] = _decomposed(task, window, operators[0])
     if isinstance(passage, propagate.KickPlan):
         states, leaked = propagate.split_through(passage, task.energies, operator, states, task.edge, snapshots)
     else:
@@ -372,29 +391,26 @@ def _through(
     return states, leaked, snapshots.cosines
 
 
+def _decomposed(task: _Task, window: Window, matrix: NDArray[Any]) -> propagate.Decomposed:
+    found = propagate.decompose(matrix)
+    gradient = task.gradients[task.plan.windows.index(window)] if task.gradients is not None else None
+    return found if gradient is None else replace(found, gradient=gradient.at(found.values))
+
+
 class _Snapshots(list[Complexes]):
-    """Takes states at sampled times and turns them into cosines before they fill the memory."""
+    """Takes states at sampled times and turns them into cosines, so that they do not fill the memory."""
 
     def __init__(self, task: _Task) -> None:
         super().__init__()
         self._task, self._made = task, [np.zeros((len(task.cosines), 0))]
 
     def append(self, states: Complexes) -> None:
-        super().append(states)
-        if len(self) * states.size > propagate.SNAPSHOT_NUMBERS:
-            self._turn()
-
-    def _turn(self) -> None:
-        if self:
-            block = np.array(self)
-            rows = [observe.expectation(block, self._task.weights, matrix) for matrix in self._task.cosines]
-            self._made.append(np.array(rows))
-            self.clear()
+        """Of states (times, n, m) only the cosines stay."""
+        self._made.append(np.array([observe.expectation(states, self._task.weights, one) for one in self._task.cosines]))
 
     @property
     def cosines(self) -> Floats:
         """(cosines, samples)."""
-        self._turn()
         return np.concatenate(self._made, axis=1)
 
 
@@ -409,12 +425,18 @@ class _Pilot:
     steps: tuple[int, ...]
     error: float
     edge: float
+    task: _Task | None = None
+    outcome: _Outcome | None = None
+
+    def outcome_of(self, tasks: Sequence[_Task]) -> _Outcome | None:
+        """What was found already, where the pilot has carried all there is."""
+        whole = len(tasks) == 1 and self.task is not None and len(self.task.columns) == len(tasks[0].columns)
+        return self.outcome if whole else None
 
 
-def _plan(problem: _Problem, steps: Sequence[int], factor: int = 1) -> _Plan:
+def _plan(problem: _Problem, steps: Sequence[int], rule: str, factor: int = 1) -> _Plan:
     """Passages with about so many steps a window, `factor` times as many."""
     out: list[propagate.KickPlan | propagate.Grid | float] = []
-    order = 6 if problem.tolerance < 1e-8 else 4
     for window, count in zip(problem.windows, steps, strict=True):
         if window.is_kick:
             kick = window.channels[0].pulses[0]
@@ -422,53 +444,85 @@ def _plan(problem: _Problem, steps: Sequence[int], factor: int = 1) -> _Plan:
             continue
         grid = propagate.grid_of(window, (window.stop_ps - window.start_ps) / count, problem.times).refined(factor)
         splits = len(window.channels) == 1
-        out.append(propagate.kick_plan(window, grid, propagate.nystrom(order)) if splits else grid)
+        out.append(propagate.kick_plan(window, grid, propagate.splitting(rule)) if splits else grid)
     return _Plan(problem.windows, tuple(out))
 
 
 def _pilot(problem: _Problem, jmax: int) -> _Pilot:
     """Steps that are fine enough for the tolerance, found on the block M = 0 that holds most of the gas."""
     space = problem.space(jmax)
-    order = 6 if problem.tolerance < 1e-8 else 4
-    task = _pilot_task(problem, space)
+    task, whole = _pilot_task(problem, space)
     if task is None or all(window.is_kick for window in problem.windows):
-        plan = _plan(problem, [1] * len(problem.windows))
-        edge = 0.0 if task is None else _relative_edge(_run(replace(task, plan=plan)), task)
-        return _Pilot(plan, (0,) * len(problem.windows), 0.0, edge)
-    count = FIRST_STEPS
+        plan = _plan(problem, [1] * len(problem.windows), "nystrom 4")
+        outcome = None if task is None else _run(replace(task, plan=plan))
+        edge = _relative_edge(outcome, task) if outcome and task else 0.0
+        return _Pilot(plan, (0,) * len(problem.windows), 0.0, edge, task if whole else None, outcome)
+    if whole:
+        return _refined(problem, space, task, "nystrom 4" if problem.tolerance >= 1e-10 else "nystrom 6", 16)
+    rules = propagate.SPLITTINGS if task.gradients is not None else propagate.SPLITTINGS[1:]
+    best = _refined(problem, space, task, rules[0])
+    for rule in rules[1:]:
+        best = _refined(problem, space, task, rule, below=best)
+    return best
+
+
+def _refined(
+    problem: _Problem, space: FieldSpace, task: _Task, rule: str, first: int = FIRST_STEPS, below: _Pilot | None = None
+) -> _Pilot:
+    """About the fewest steps of a method whose error is below half the tolerance; `below` where that would cost more.
+
+    The number of steps is doubled; the difference between a run and the next is taken as the error of the first. Of the number that
+    is enough and its half, between which the answer lies, the place is taken where log(error) on a straight line meets the goal.
+    """
+    goal, before, count = 0.5 * problem.tolerance, 0.0, first
+    plan = _plan(problem, [count] * len(problem.windows), rule)
+    outcome = _run(replace(task, plan=plan))
     while count <= MOST_STEPS:
-        coarse, fine = (_plan(problem, [count] * len(problem.windows), factor) for factor in (1, 2))
-        first, second = _run(replace(task, plan=coarse)), _run(replace(task, plan=fine))
-        error = _difference(problem, space, task, first, second)
-        if error <= 0.5 * problem.tolerance:
-            return _Pilot(coarse, _steps_of(coarse), error, _relative_edge(second, task))
-        if error / (2**order - 1) <= 0.5 * problem.tolerance:
-            return _Pilot(fine, _steps_of(fine), error / (2**order - 1), _relative_edge(second, task))
-        growth = (error / (0.4 * problem.tolerance)) ** (1 / order) if error < 0.01 else 2.0
-        count = math.ceil(count * min(max(growth, 1.3), 8.0))
+        finer = _plan(problem, [count] * len(problem.windows), rule, 2)
+        check = _run(replace(task, plan=finer))
+        error = _difference(problem, space, task, outcome, check)
+        if error <= goal:
+            edge = _relative_edge(check, task)
+            if before > error > 0:
+                count = math.ceil(count / 2 * 2 ** (math.log(before / goal) / math.log(before / error)))
+                fewer = _plan(problem, [count] * len(problem.windows), rule)
+                if _cost(fewer) < _cost(plan):
+                    plan, error, outcome = fewer, goal, None
+            found = _Pilot(plan, _steps_of(plan), error, edge, task, outcome)
+            return found if below is None or _cost(plan) < _cost(below.plan) else below
+        before, count = error, 2 * count
+        plan, outcome = _plan(problem, [count] * len(problem.windows), rule), check
+        if below is not None and _cost(plan) > 2 * _cost(below.plan):
+            return below
     raise ValueError(f"more than {MOST_STEPS} steps would be needed for a tolerance of {problem.tolerance:g}; give a larger one")
 
 
 def _steps_of(plan: _Plan) -> tuple[int, ...]:
     totals = []
     for passage in plan.passages:
-        grid = passage.grid if isinstance(passage, propagate.KickPlan) else passage
-        totals.append(grid.total if isinstance(grid, propagate.Grid) else 0)
+        totals.append(0 if isinstance(passage, float) else passage.steps_taken)
     return tuple(totals)
 
 
-def _pilot_task(problem: _Problem, space: FieldSpace) -> _Task | None:
-    """The populated block of lowest M with the largest population, with at most a few of its columns."""
+def _cost(plan: _Plan) -> int:
+    """Drifts or exponentials in all windows."""
+    return sum(0 if isinstance(one, float) else one.stages for one in plan.passages)
+
+
+def _pilot_task(problem: _Problem, space: FieldSpace) -> tuple[_Task | None, bool]:
+    """The populated block of lowest M with the largest population, with a few of its columns; and whether that is all there is."""
     m = problem.ensemble.m or 0
-    plan = _plan(problem, [1] * len(problem.windows))
-    tasks = [task for block in space.blocks(m) if (task := _task(problem, block, plan, False)) is not None]
+    plan = _plan(problem, [1] * len(problem.windows), "nystrom 4")
+    before = bool(problem.free_times(-1).any())
+    tasks = [task for block in space.blocks(m) if (task := _task(problem, block, plan, before)) is not None]
     if not tasks:
-        return None
+        return None, False
     task = max(tasks, key=lambda one: float(one.weights.sum()))
+    whole = len(tasks) == 1 and (problem.ensemble.m is not None or problem.ensemble.jmax == 0)
     if len(task.columns) > PILOT_COLUMNS:
         chosen = np.unique(np.linspace(0, len(task.columns) - 1, PILOT_COLUMNS).astype(int))
-        task = replace(task, columns=task.columns[chosen], weights=task.weights[chosen])
-    return task
+        return replace(task, columns=task.columns[chosen], weights=task.weights[chosen]), False
+    return task, whole
 
 
 def _relative_edge(outcome: _Outcome, task: _Task) -> float:
@@ -512,7 +566,17 @@ def _task(problem: _Problem, block: FieldBlock, plan: _Plan, before: bool) -> _T
         edge=block.j > block.levels.j.max() - EDGE,
         plan=plan,
         before=before,
+        gradients=tuple(_gradient(problem.top, one[0]) for one in problem.contractions) if isinstance(block, AxialBlock) else None,
     )
+
+
+def _gradient(top: Top, contraction: Contraction) -> GradientOf:
+    """Of a contraction of an axial top; its tensors have no trace."""
+    axis = 2 if top.kind == "oblate" else 0
+    a, b, _ = top.rotational_constants_mhz
+    body, space = contraction.body, contraction.space
+    scale = body[axis] * space[2] if contraction.rank == 1 else 2.25 * body[axis, axis] * space[2, 2]
+    return GradientOf(contraction.rank, float(scale), RAD_PER_PS_MHZ * (a if top.kind == "oblate" else b))
 
 
 def _made(block: FieldBlock, contraction: Contraction, made: dict[int, NDArray[Any]]) -> NDArray[Any]:
@@ -538,6 +602,9 @@ def _carried(
     space = problem.space(jmax)
     before = bool(problem.free_times(-1).any())
     tasks = list(_tasks(problem, space, pilot.plan, before))
+    found = pilot.outcome_of(tasks)
+    if found is not None:
+        return _trace(problem, space, tasks, [found], pilot, before)
     outcomes = []
     for done, outcome in enumerate(executor.map(_run, tasks) if executor else map(_run, tasks), 1):
         outcomes.append(outcome)

@@ -2,9 +2,10 @@
 
 Where one operator W acts, V(t) = -u(t) W, H = H0 + V is split into drifts, diagonal over the free states, and kicks, diagonal
 over the eigenvectors of W in the block (a discrete variable representation of the angle). For a rigid body [V, [V, [V, H0]]] = 0,
-because H0 has two derivatives, so the Runge-Kutta-Nyström compositions of S. Blanes and P. C. Moan (J. Comput. Appl. Math. 142, 313
+because H0 is of second order in the momenta, so the Runge-Kutta-Nyström compositions of S. Blanes and P. C. Moan (J. Comput. Appl. Math. 142, 313
 (2002), table 3: SRKN6b of order 4, SRKN11b of order 6) serve, whose errors are a hundred times smaller than Yoshida's; a test
-measures both orders. Time goes on with the drifts. The states live in the eigenvectors of W, where a drift is the matrix
+measures both orders. For linear and symmetric tops [V, [H0, V]] is known at the eigenvectors too, 2B (dV/dθ)², and the splitting of S. A.
+Chin (Phys. Lett. A 226, 344 (1997), method A) with its evenly spaced kicks is the cheapest for short pulses. Time goes on with the drifts. The states live in the eigenvectors of W, where a drift is the matrix
 Q† exp(-i E a h) Q, made once for each a.
 
 Where several operators act at once (light and a THz field, crossed polarizations), each step is the product of two exponentials of
@@ -37,17 +38,22 @@ _NYSTROM_6 = (
     (0.0414649985182624, 0.198128671918067, -0.0400061921041533, 0.0752539843015807, -0.0115113874206879),
 )
 CHEBYSHEV_BELOW = 1e-14  # terms of the series below it are left out
-CHECKS = 12  # how often, about, leakage is looked at inside a window
+_INSIDE = 1e-9  # of a step
+CHECKS = 8  # how often, about, leakage is looked at inside a window
 SNAPSHOT_NUMBERS = 1 << 20  # complex numbers of snapshots held at once
 
 
 @dataclass(frozen=True)
 class Splitting:
-    """A symmetric composition: kick b[0], drift a[0], kick b[1], ..., kick b[-1] of a step, of `order`."""
+    """A symmetric composition: kick b[0], drift a[0], kick b[1], ..., kick b[-1] of a step, of `order`.
+
+    gradients: shares of h³ [V, [H0, V]]/2 in the kicks, 0 where there are none.
+    """
 
     order: int
     drifts: Floats
     kicks: Floats
+    gradients: Floats
 
     @property
     def nodes(self) -> Floats:
@@ -55,23 +61,28 @@ class Splitting:
         return np.concatenate([[0.0], np.cumsum(self.drifts)])
 
 
-def nystrom(order: int) -> Splitting:
-    """The composition of order 4 (6 drifts a step) or 6 (11 drifts).
+SPLITTINGS = ("gradient", "nystrom 4", "nystrom 6")
 
-    >>> nystrom(4).drifts.sum().round(15), nystrom(6).kicks.sum().round(15)
+
+def splitting(name: str) -> Splitting:
+    """A composition by its name in `SPLITTINGS`: order 4 with 2, order 4 with 6, order 6 with 11 drifts a step.
+
+    >>> splitting("nystrom 4").drifts.sum().round(15), splitting("nystrom 6").kicks.sum().round(15)
     (np.float64(1.0), np.float64(1.0))
     """
-    if order == 4:
+    if name == "gradient":
+        return Splitting(4, np.array([0.5, 0.5]), np.array([1.0, 4.0, 1.0]) / 6, np.array([0.0, 1 / 36, 0.0]))
+    if name == "nystrom 4":
         (a1, a2), kicks = _NYSTROM_4
         a = [a1, a2, 0.5 - a1 - a2]
         b = [*kicks, 1 - 2 * sum(kicks)]
-        return Splitting(4, np.array([*a, *a[::-1]]), np.array([*b, *b[-2::-1]]))
-    if order == 6:
+        return Splitting(4, np.array([*a, *a[::-1]]), np.array([*b, *b[-2::-1]]), np.zeros(7))
+    if name == "nystrom 6":
         half, kicks = _NYSTROM_6
         a = [*half, 1 - 2 * sum(half)]
         b = [*kicks, 0.5 - sum(kicks)]
-        return Splitting(6, np.array([*a, *a[-2::-1]]), np.array([*b, *b[::-1]]))
-    raise ValueError(f"splittings of order 4 and 6 exist; got {order!r}")
+        return Splitting(6, np.array([*a, *a[-2::-1]]), np.array([*b, *b[::-1]]), np.zeros(12))
+    raise ValueError(f"splitting {name!r}: known are {', '.join(SPLITTINGS)}")
 
 
 @dataclass(frozen=True)
@@ -84,9 +95,14 @@ class Grid:
     sampled: NDArray[np.bool_]
 
     @property
-    def total(self) -> int:
+    def steps_taken(self) -> int:
         """All steps."""
         return int(self.counts.sum())
+
+    @property
+    def stages(self) -> int:
+        """What a run costs, in exponentials."""
+        return 2 * self.steps_taken
 
     def refined(self, factor: int) -> Grid:
         """The same stretches with `factor` times as many steps."""
@@ -104,32 +120,79 @@ def grid_of(window: Window, longest_step_ps: float, times_ps: Floats) -> Grid:
 
 @dataclass(frozen=True)
 class KickPlan:
-    """For each stretch of a grid: u(t) times the duration of every kick, (kicks,), and the step. Shared by all blocks."""
+    """How a window is passed by a splitting, the same for all blocks.
 
-    splitting: Splitting
-    grid: Grid
-    areas: tuple[Floats, ...]
+    durations: (kinds,) of every different drift. which: (stages,) the drift after each kick. areas: (stages + 1,) u(t) times the
+    duration of each kick; those where a step ends and the next begins are one. gradients: u(t)² times h³ and its share. marks: (stages,) after which drift the states are
+    looked at. sampled: (looks,) whether it is for the observables.
+    steps_taken: how many.
+    """
+
+    durations: Floats
+    which: Ints
+    areas: Floats
+    gradients: Floats | None
+    marks: NDArray[np.bool_]
+    sampled: NDArray[np.bool_]
+    steps_taken: int
+
+    @property
+    def stages(self) -> int:
+        """What a run costs, in drifts."""
+        return len(self.which)
 
 
-def kick_plan(window: Window, grid: Grid, splitting: Splitting) -> KickPlan:
-    """The kicks of the one channel of a window; those at the end of a step and the start of the next are one."""
-    strength = window.channels[0].strength
-    areas = []
-    for start, step, count in zip(grid.starts, grid.steps, grid.counts, strict=True):
-        times = start + step * (np.arange(count)[:, None] + splitting.nodes)
-        table = strength(times.ravel()).reshape(times.shape) * splitting.kicks * step
-        merged = np.append(table[:, :-1].ravel(), 0.0)
-        merged[:: len(splitting.drifts)][1:] += table[:, -1]
-        areas.append(merged)
-    return KickPlan(splitting, grid, tuple(areas))
+def kick_plan(window: Window, grid: Grid, rule: Splitting) -> KickPlan:
+    """The kicks and drifts of the one channel of a window.
+
+    What is looked at are functions of the angle, which a kick does not change, so that states between drifts serve. Kicks at the
+    ends of a step are evaluated just inside it, since the pulse may jump there.
+    """
+    stages = len(rule.drifts)
+    steps = np.repeat(grid.steps, grid.counts)
+    starts = np.concatenate([s + h * np.arange(n) for s, h, n in zip(grid.starts, grid.steps, grid.counts, strict=True)])
+    times = starts[:, None] + steps[:, None] * np.clip(rule.nodes, _INSIDE, 1 - _INSIDE)
+    strength = window.channels[0].strength(times.ravel()).reshape(times.shape)
+    areas = _merged(strength * rule.kicks * steps[:, None])
+    gradients = _merged(strength**2 * rule.gradients * steps[:, None] ** 3) if rule.gradients.any() else None
+
+    durations, which = np.unique(np.round(np.multiply.outer(steps, rule.drifts), 13), return_inverse=True)
+    last = np.cumsum(grid.counts) * stages - 1
+    piece = max(1, len(steps) // CHECKS) * stages
+    looked = np.union1d(last[grid.sampled], np.arange(piece - 1, len(areas) - 1, piece))
+    marks = np.zeros(len(areas) - 1, dtype=bool)
+    marks[looked] = True
+    return KickPlan(durations, which.ravel(), areas, gradients, marks, np.isin(looked, last[grid.sampled]), len(steps))
+
+
+def _merged(table: Floats) -> Floats:
+    """Kicks of steps (steps, kicks) in a row, (stages + 1,), the last of each added to the first of the next."""
+    stages = table.shape[1] - 1
+    out = np.append(table[:, :-1].ravel(), 0.0)
+    out[stages::stages] += table[:, -1]
+    return out
 
 
 @dataclass(frozen=True)
 class Decomposed:
-    """Eigenvalues (n,) and eigenvectors (n, n) in columns of the operator W of a channel in a block."""
+    """Eigenvalues (n,) and eigenvectors (n, n) in columns of the operator W of a channel in a block.
+
+    gradient: where W is a function of one angle, B (dW/dθ)² at the eigenvalues (n,) in rad/ps times the unit of W²: ½ [W, [H0, W]].
+    """
 
     values: Floats
     vectors: NDArray[Any]
+    gradient: Floats | None = None
+
+    def phases(self, areas: Floats, gradients: Floats | None) -> Complexes:
+        """Of kicks with `areas` (kicks,), and with those of the gradient, (kicks, n)."""
+        angles = np.multiply.outer(areas, self.values)
+        if gradients is not None and self.gradient is not None:
+            angles += np.multiply.outer(gradients, self.gradient)
+        out = np.empty(angles.shape, dtype=np.complex128)
+        np.cos(angles, out=out.real)
+        np.sin(angles, out=out.imag)
+        return out
 
 
 def decompose(matrix: NDArray[Any]) -> Decomposed:
@@ -168,48 +231,40 @@ def split_through(
     edge : (n,) of bool
         The states whose population is leakage, looked at a dozen times.
     snapshots : list, optional
-        The states at every sampled time are appended.
+        The states at the sampled times, (times, n, m) in pieces, are appended.
     """
     from rotor.alignment._kernels import kick_and_drift
 
     vectors = operator.vectors
     here = np.ascontiguousarray(vectors.conj().T @ states)
-    matrices: dict[float, Complexes] = {}
-    stages, piece = len(plan.splitting.drifts), max(1, plan.grid.total // CHECKS)
-    leaked = np.zeros(states.shape[1])
-    for step, count, area, sampled in zip(plan.grid.steps, plan.grid.counts, plan.areas, plan.grid.sampled, strict=True):
-        key = round(float(step), 12)
-        if key not in matrices:
-            matrices[key] = _drift_matrices(plan.splitting.drifts * step, energies, vectors)
-        phases = _phases(area, operator.values)
-        for first in range(0, count, piece):
-            last = min(first + piece, count)
-            mine = phases[first * stages : last * stages + 1]
-            if first:
-                mine = np.concatenate([np.ones((1, len(energies))), mine[1:]])  # its first kick has been made
-            kick_and_drift(here, matrices[key], np.tile(np.arange(stages), last - first), mine)
-            leaked = np.maximum(leaked, (np.abs(vectors[edge] @ here) ** 2).sum(axis=0))
-        if sampled and snapshots is not None:
-            snapshots.append(vectors @ here)
+    drifts = _drift_matrices(plan.durations, energies, vectors)
+    phases = operator.phases(plan.areas, plan.gradients)
+    leaked, looks = np.zeros(states.shape[1]), 0
+    for piece in _pieces(plan.marks, states.size):
+        marks = plan.marks[piece]
+        seen = np.empty((int(marks.sum()), *states.shape), dtype=np.complex128)
+        kick_and_drift(here, drifts, plan.which[piece], phases[piece], marks, seen)
+        leaked = np.maximum(leaked, (np.abs(vectors[edge] @ seen) ** 2).sum(axis=1).max(axis=0, initial=0.0))
+        sampled = plan.sampled[looks : looks + len(seen)]
+        looks += len(seen)
+        if snapshots is not None and sampled.any():
+            snapshots.append(vectors @ seen[sampled])
+    here *= phases[-1][:, None]
     return np.asarray(vectors @ here), leaked
 
 
-def _phases(areas: Floats, values: Floats) -> Complexes:
-    """exp(i area value), (kicks, n)."""
-    angles = np.multiply.outer(areas, values)
-    out = np.empty(angles.shape, dtype=np.complex128)
-    np.cos(angles, out=out.real)
-    np.sin(angles, out=out.imag)
-    return out
+def _pieces(marks: NDArray[np.bool_], size: int) -> list[slice]:
+    """Stages in pieces whose snapshots of `size` numbers fit into memory."""
+    at_once = max(1, SNAPSHOT_NUMBERS // max(size, 1))
+    ends = np.flatnonzero(marks)[at_once - 1 :: at_once] + 1
+    edges = np.unique(np.concatenate([[0], ends, [len(marks)]])).tolist()
+    return [slice(first, last) for first, last in zip(edges[:-1], edges[1:], strict=True)]
 
 
 def _drift_matrices(durations: Floats, energies: Floats, vectors: NDArray[Any]) -> Complexes:
-    """Q† exp(-i E a h) Q for all a of a step, (drifts, n, n); equal ones are made once."""
-    made: dict[float, Complexes] = {}
-    for duration in durations.tolist():
-        if duration not in made:
-            made[duration] = vectors.conj().T @ (np.exp(-1j * duration * energies)[:, None] * vectors)
-    return np.ascontiguousarray([made[duration] for duration in durations.tolist()])
+    """Q† exp(-i E d) Q for all durations, (durations, n, n)."""
+    phases = np.exp(-1j * np.multiply.outer(durations, energies))
+    return np.ascontiguousarray(vectors.conj().T @ (phases[:, :, None] * vectors))
 
 
 def kick_through(area: float, operator: Decomposed, states: Complexes) -> Complexes:
@@ -241,7 +296,7 @@ def magnus_through(
                 states = _chebyshev(0.5 * step * energies, -step * weights, operators, reach, states)
             leaked = np.maximum(leaked, (np.abs(states[edge]) ** 2).sum(axis=0))
         if sampled and snapshots is not None:
-            snapshots.append(states)
+            snapshots.append(states[None])
     return states, leaked
 
 
