@@ -263,8 +263,14 @@ def _pieces(marks: NDArray[np.bool_], size: int) -> list[slice]:
 
 def _drift_matrices(durations: Floats, energies: Floats, vectors: NDArray[Any]) -> Complexes:
     """Q† exp(-i E d) Q for all durations, (durations, n, n)."""
-    phases = np.exp(-1j * np.multiply.outer(durations, energies))
-    return np.ascontiguousarray(vectors.conj().T @ (phases[:, :, None] * vectors))
+    angles = np.multiply.outer(durations, energies)
+    out = np.empty((len(durations), *vectors.shape), dtype=np.complex128)
+    if np.iscomplexobj(vectors):
+        np.matmul(vectors.conj().T, np.exp(-1j * angles)[:, :, None] * vectors, out=out)
+    else:  # two real products
+        out.real = vectors.T @ (np.cos(angles)[:, :, None] * vectors)
+        out.imag = vectors.T @ (-np.sin(angles)[:, :, None] * vectors)
+    return out
 
 
 def kick_through(area: float, operator: Decomposed, states: Complexes) -> Complexes:
