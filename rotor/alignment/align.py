@@ -39,6 +39,7 @@ Complexes = NDArray[np.complex128]
 DEFAULT_TOLERANCE = 1e-6
 HIGHEST_J = 600
 FIRST_STEPS = 4
+LARGEST_SPLIT = 700  # states of a block whose operator is still diagonalised
 MOST_STEPS = 200_000
 EDGE = 2  # the highest values of J, whose population is the leakage
 PILOT_COLUMNS = 64
@@ -109,7 +110,8 @@ def align(
     top : Top
         With `polarizability_abc_angstrom3` for light, `dipole_abc_debye` for fields that act on the dipole.
     pulses : sequence of Pulse
-        All with polarizations symmetric about Z (linear along Z, circular in the XY plane) here.
+        Any polarizations and directions; M stays good, and the work small, where all are symmetric about Z (linear along Z,
+        circular in the XY plane).
     times_ps : (t,) rising
         They may begin before the first pulse; the last pulse must have ended by the last of them.
     temperature_k : float
@@ -280,6 +282,12 @@ class _Problem:
         """The states up to J max and their blocks."""
         return field_space(self.top, jmax, [one for of_window in self.contractions for one in of_window])
 
+    def m_values(self, space: FieldSpace) -> Sequence[int]:
+        """|M| of the blocks to be carried; 0 stands for all where M is mixed."""
+        if not space.m_is_good:
+            return (0,)
+        return range(self.ensemble.jmax + 1) if self.ensemble.m is None else (self.ensemble.m,)
+
     def free_times(self, after: int) -> NDArray[np.bool_]:
         """Which times lie between window `after` (-1: before the first) and the next."""
         start = self.windows[after].stop_ps if after >= 0 else -np.inf
@@ -434,8 +442,8 @@ class _Pilot:
         return self.outcome if whole else None
 
 
-def _plan(problem: _Problem, steps: Sequence[int], rule: str, factor: int = 1) -> _Plan:
-    """Passages with about so many steps a window, `factor` times as many."""
+def _plan(problem: _Problem, steps: Sequence[int], rule: str | None, factor: int = 1) -> _Plan:
+    """Passages with about so many steps a window, `factor` times as many; a Magnus method where `rule` is None."""
     out: list[propagate.KickPlan | propagate.Grid | float] = []
     for window, count in zip(problem.windows, steps, strict=True):
         if window.is_kick:
@@ -443,8 +451,8 @@ def _plan(problem: _Problem, steps: Sequence[int], rule: str, factor: int = 1) -
             out.append(kick.area if isinstance(kick, Kick) else 0.0)
             continue
         grid = propagate.grid_of(window, (window.stop_ps - window.start_ps) / count, problem.times).refined(factor)
-        splits = len(window.channels) == 1
-        out.append(propagate.kick_plan(window, grid, propagate.splitting(rule)) if splits else grid)
+        splits = rule is not None and len(window.channels) == 1
+        out.append(propagate.kick_plan(window, grid, propagate.splitting(rule)) if splits and rule else grid)
     return _Plan(problem.windows, tuple(out))
 
 
@@ -457,6 +465,8 @@ def _pilot(problem: _Problem, jmax: int) -> _Pilot:
         outcome = None if task is None else _run(replace(task, plan=plan))
         edge = _relative_edge(outcome, task) if outcome and task else 0.0
         return _Pilot(plan, (0,) * len(problem.windows), 0.0, edge, task if whole else None, outcome)
+    if len(task.rows) > LARGEST_SPLIT or all(len(window.channels) > 1 for window in problem.windows):
+        return _refined(problem, space, task, None)
     if whole:
         return _refined(problem, space, task, "nystrom 4" if problem.tolerance >= 1e-10 else "nystrom 6", 16)
     rules = propagate.SPLITTINGS if task.gradients is not None else propagate.SPLITTINGS[1:]
@@ -467,7 +477,7 @@ def _pilot(problem: _Problem, jmax: int) -> _Pilot:
 
 
 def _refined(
-    problem: _Problem, space: FieldSpace, task: _Task, rule: str, first: int = FIRST_STEPS, below: _Pilot | None = None
+    problem: _Problem, space: FieldSpace, task: _Task, rule: str | None, first: int = FIRST_STEPS, below: _Pilot | None = None
 ) -> _Pilot:
     """About the fewest steps of a method whose error is below half the tolerance; `below` where that would cost more.
 
@@ -511,14 +521,14 @@ def _cost(plan: _Plan) -> int:
 
 def _pilot_task(problem: _Problem, space: FieldSpace) -> tuple[_Task | None, bool]:
     """The populated block of lowest M with the largest population, with a few of its columns; and whether that is all there is."""
-    m = problem.ensemble.m or 0
+    m = problem.m_values(space)[0]
     plan = _plan(problem, [1] * len(problem.windows), "nystrom 4")
     before = bool(problem.free_times(-1).any())
     tasks = [task for block in space.blocks(m) if (task := _task(problem, block, plan, before)) is not None]
     if not tasks:
         return None, False
     task = max(tasks, key=lambda one: float(one.weights.sum()))
-    whole = len(tasks) == 1 and (problem.ensemble.m is not None or problem.ensemble.jmax == 0)
+    whole = len(tasks) == 1 and (len(problem.m_values(space)) == 1)
     if len(task.columns) > PILOT_COLUMNS:
         chosen = np.unique(np.linspace(0, len(task.columns) - 1, PILOT_COLUMNS).astype(int))
         return replace(task, columns=task.columns[chosen], weights=task.weights[chosen]), False
@@ -550,7 +560,7 @@ def _task(problem: _Problem, block: FieldBlock, plan: _Plan, before: bool) -> _T
     """What has to be done for a block; None where nothing in it is populated."""
     population = problem.ensemble.populations(block.levels)[block.rows] * block.copies
     if problem.ensemble.m is not None:
-        population = population * (abs(block.m) == problem.ensemble.m) / (2 if problem.ensemble.m else 1)
+        population = population * (block.abs_m == problem.ensemble.m) / (2 if problem.ensemble.m else 1)
     columns = np.flatnonzero(population)
     if not len(columns):
         return None
@@ -588,7 +598,7 @@ def _made(block: FieldBlock, contraction: Contraction, made: dict[int, NDArray[A
 
 
 def _tasks(problem: _Problem, space: FieldSpace, plan: _Plan, before: bool) -> Iterator[_Task]:
-    for m in range(problem.ensemble.jmax + 1) if problem.ensemble.m is None else (problem.ensemble.m,):
+    for m in problem.m_values(space):
         for block in space.blocks(m):
             task = _task(problem, block, plan, before)
             if task is not None:
@@ -633,7 +643,7 @@ def _trace(
         populations=populations,
         jmax=space.jmax,
         states=sum(len(task.columns) for task in tasks),
-        method=_method(problem),
+        method=_method(pilot.plan),
         steps=pilot.steps,
         step_error=pilot.error,
         edge_population=float(sum(outcome.edge for outcome in outcomes).max(initial=0.0)),  # type: ignore[union-attr]
@@ -643,11 +653,9 @@ def _trace(
     )
 
 
-def _method(problem: _Problem) -> str:
-    names = {
-        "kick" if window.is_kick else "splitting" if len(window.channels) == 1 else "magnus" for window in problem.windows
-    }
-    return ", ".join(sorted(names))
+def _method(plan: _Plan) -> str:
+    names = {float: "kick", propagate.KickPlan: "splitting", propagate.Grid: "magnus"}
+    return ", ".join(sorted({names[type(passage)] for passage in plan.passages}))
 
 
 def _signal(

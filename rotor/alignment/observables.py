@@ -196,12 +196,20 @@ class Coherences:
     constant: float
 
 
-def coherences(states: Complexes, weights: Floats, matrix: NDArray[Any], rows: Ints) -> Coherences:
-    """Of states in columns (n, m) over the free states with weights (m,); rows (n,) of their levels."""
-    density = (states.conj() * weights) @ states.T  # Σ w c_i* c_j
-    product = density * matrix
-    i, j = np.nonzero(np.triu(matrix, 1))
-    return Coherences(rows[i], rows[j], product[i, j], float(np.trace(product).real))
+def coherences(states: Complexes, weights: Floats, matrix: Any, rows: Ints) -> Coherences:
+    """Of states in columns (n, m) over the free states with weights (m,); rows (n,) of their levels; matrix dense or sparse."""
+    weighted = states.conj() * weights
+    if isinstance(matrix, np.ndarray):
+        i, j = np.nonzero(np.triu(matrix, 1))
+        product = (weighted @ states.T) * matrix  # Σ w c_i* c_j O_ij
+        return Coherences(rows[i], rows[j], product[i, j], float(np.trace(product).real))
+    upper = matrix.tocoo()
+    (i, j), values = upper.coords, upper.data
+    above = i < j
+    i, j, values = i[above], j[above], values[above]
+    amplitudes = np.einsum("lm,lm->l", weighted[i], states[j]) * values
+    constant = float((matrix.diagonal() @ (np.abs(states) ** 2)) @ weights)
+    return Coherences(rows[i], rows[j], amplitudes, constant)
 
 
 def harmonics(pieces: Sequence[Coherences], energies: Floats, remainder: float) -> Harmonics:
@@ -217,6 +225,10 @@ def harmonics(pieces: Sequence[Coherences], energies: Floats, remainder: float) 
     return Harmonics(constant, total, energies[pairs // size] - energies[pairs % size])
 
 
-def expectation(states: Complexes, weights: Floats, matrix: NDArray[Any]) -> Floats:
-    """Σ_m w_m ⟨m|O|m⟩ of snapshots (s, n, m), (s,)."""
-    return np.asarray(np.einsum("snm,snm,m->s", states.conj(), matrix @ states, weights, optimize=True).real)
+def expectation(states: Complexes, weights: Floats, matrix: Any) -> Floats:
+    """Σ_m w_m ⟨m|O|m⟩ of snapshots (s, n, m), (s,); matrix dense or sparse."""
+    if isinstance(matrix, np.ndarray):
+        moved = matrix @ states
+    else:
+        moved = np.array([matrix @ one for one in states])
+    return np.asarray(np.einsum("snm,snm,m->s", states.conj(), moved, weights, optimize=True).real)

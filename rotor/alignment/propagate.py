@@ -195,8 +195,9 @@ class Decomposed:
         return out
 
 
-def decompose(matrix: NDArray[Any]) -> Decomposed:
-    """Of a Hermitian matrix; LAPACK's tridiagonal solver where it has one band."""
+def decompose(matrix: Any) -> Decomposed:
+    """Of a Hermitian matrix, dense or sparse; LAPACK's tridiagonal solver where it has one band."""
+    matrix = matrix if isinstance(matrix, np.ndarray) else matrix.toarray()
     size = len(matrix)
     if size > 2 and not matrix[np.triu_indices(size, 2)].any() and not np.iscomplexobj(matrix):
         from scipy.linalg.lapack import dstevd

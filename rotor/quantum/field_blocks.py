@@ -19,7 +19,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -136,6 +136,11 @@ class FieldBlock(ABC):
         """Energies of the free top (n,)."""
         return self.levels.energy_mhz[self.rows]
 
+    @property
+    def abs_m(self) -> Ints:
+        """|M| of the states (n,)."""
+        return np.full(len(self), abs(self.m))
+
     def __len__(self) -> int:
         return len(self.rows)
 
@@ -192,6 +197,7 @@ class FieldSpace(ABC):
 
     levels: FreeLevels
     jmax: int
+    m_is_good: ClassVar[bool] = True
 
     @abstractmethod
     def blocks(self, m: int) -> list[FieldBlock]:
@@ -229,12 +235,14 @@ class AxialSpace(FieldSpace):
 
 
 def field_space(top: Top, jmax: int, contractions: Sequence[Contraction]) -> FieldSpace:
-    """The states of a top up to `jmax` and the blocks that contractions along Z leave apart.
+    """The states of a top up to `jmax` and the blocks that contractions leave apart.
 
-    Raises ValueError for a contraction that is not symmetric about Z, and for a spherical top.
+    Raises ValueError for a spherical top.
     """
     if not all(one.along_z for one in contractions):
-        raise ValueError("a field that is not along Z mixes M: use a tilted space")
+        from rotor.quantum.tilted_blocks import tilted_space
+
+        return tilted_space(top, jmax, contractions)
     if top.kind == "spherical":
         raise ValueError(
             f"{top.name or 'this top'} is a spherical top: it has neither a dipole nor an anisotropy, and no field of the first "
