@@ -78,6 +78,30 @@ class AlignmentTrace(Table):
         """t_ps and every cosine."""
         return {"t_ps": self.t_ps, **self.cosines}
 
+    @property
+    def facts(self) -> dict[str, Any]:
+        """Top, pulses, ensemble and what was found about accuracy."""
+        top = self.top
+        return {
+            "constants_mhz": dict(top.constants.values),
+            "dipole_abc_debye": top.dipole_abc_debye,
+            "polarizability_abc_angstrom3": top.polarizability_abc_angstrom3,
+            "polarizability_source": top.polarizability_source or None,
+            "pulses": [repr(pulse) for pulse in self.pulses],
+            "temperature_k": self.ensemble.temperature_k or None,
+            "state": dict(self.ensemble.chosen) if self.ensemble.chosen is not None else None,
+            "m": self.ensemble.m,
+            "states": self.states,
+            "left_out": self.ensemble.left_out,
+            "jmax": self.jmax,
+            "method": self.method,
+            "steps": list(self.steps),
+            "tolerance": self.tolerance,
+            "step_error": self.step_error,
+            "edge_population": self.edge_population,
+            "norm_error": self.norm_error,
+        }
+
     @cached_property
     def permanent(self) -> dict[str, float]:
         """The mean over time of each cosine after the last pulse."""

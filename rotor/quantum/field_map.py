@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -71,7 +71,6 @@ class FieldMap(Table):
     jmax: int
     accuracy_mhz: float
     diabatic_label: NDArray[np.str_] | None = None
-    warnings: tuple[str, ...] = field(default=())
 
     def __len__(self) -> int:
         return len(self.energy_mhz)
@@ -92,6 +91,15 @@ class FieldMap(Table):
             "copies": self.copies,
         }
         return out if self.diabatic_label is None else {**out, "diabatic_label": self.diabatic_label}
+
+    @property
+    def facts(self) -> dict[str, Any]:
+        """J max and what was found about accuracy."""
+        return {
+            "jmax": self.jmax,
+            "accuracy_mhz": self.accuracy_mhz,
+            "edge_population": float(self.edge_population.max(initial=0.0)),
+        }
 
     @property
     def fields(self) -> Floats:
