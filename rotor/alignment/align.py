@@ -508,24 +508,24 @@ def _refined(
     The number of steps is doubled; the difference between a run and the next is taken as the error of the first. Of the number that
     is enough and its half, between which the answer lies, the place is taken where log(error) on a straight line meets the goal.
     """
-    goal, before, count = 0.5 * problem.tolerance, 0.0, first
-    plan = _plan(problem, [count] * len(problem.windows), rule)
+    goal, before, factor = 0.5 * problem.tolerance, 0.0, 1
+    counts = [first] * len(problem.windows)
+    plan = _plan(problem, counts, rule)
     outcome = _run(replace(task, plan=plan))
-    while count <= MOST_STEPS:
-        finer = _plan(problem, [count] * len(problem.windows), rule, 2)
+    while sum(_steps_of(plan)) <= MOST_STEPS:
+        finer = _plan(problem, counts, rule, 2 * factor)
         check = _run(replace(task, plan=finer))
         error = _difference(problem, space, task, outcome, check)
         if error <= goal:
-            edge = _relative_edge(check, task)
+            edge, mine = _relative_edge(check, task), _Pilot(plan, _steps_of(plan), error, 0.0, task, outcome)
             if before > error > 0:
-                count = math.ceil(count / 2 * 2 ** (math.log(before / goal) / math.log(before / error)))
-                fewer = _plan(problem, [count] * len(problem.windows), rule)
-                if _cost(fewer) < _cost(plan):
-                    plan, error, outcome = fewer, goal, None
-            found = _Pilot(plan, _steps_of(plan), error, edge, task, outcome)
-            return found if below is None or _cost(plan) < _cost(below.plan) else below
-        before, count = error, 2 * count
-        plan, outcome = _plan(problem, [count] * len(problem.windows), rule), check
+                steps = 0.5 * 2 ** (math.log(before / goal) / math.log(before / error)) * sum(_steps_of(plan))
+                fewer = _plan(problem, [math.ceil(steps / len(counts))] * len(counts), rule)
+                if steps <= sum(_steps_of(fewer)) and _cost(fewer) < _cost(plan):
+                    mine = _Pilot(fewer, _steps_of(fewer), goal, 0.0)
+            mine = replace(mine, edge=edge)
+            return mine if below is None or _cost(mine.plan) < _cost(below.plan) else below
+        before, factor, plan, outcome = error, 2 * factor, finer, check
         if below is not None and _cost(plan) > 2 * _cost(below.plan):
             return below
     raise ValueError(f"more than {MOST_STEPS} steps would be needed for a tolerance of {problem.tolerance:g}; give a larger one")
