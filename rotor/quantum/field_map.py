@@ -32,6 +32,7 @@ FIRST_BASIS = 64
 DENSE = 48  # blocks up to this size are solved whole, all fields at once
 HIGHEST_J = 300
 FIRST_ANCHORS = 5  # fields solved in full at first, of many
+SPANNED = 101  # fields that the basis for diabatic labels holds
 BUFFER = 4  # further states in the basis of a map
 DEPENDENT = 1e-7  # of the largest singular value: directions of a basis below it are left out
 STEP_J = 6
@@ -290,7 +291,17 @@ def _lowest(matrix: Matrix, count: int, with_vectors: bool = True) -> tuple[Floa
 def reduced_basis(
     fixed: Matrix, slope: Matrix, fields: Floats, count: int, tolerance_mhz: float
 ) -> tuple[Floats, Matrix]:
-    """The lowest states at many fields from full solutions at a few: energies (fields, count), vectors (fields, n, count).
+    """The lowest states at many fields from full solutions at a few: energies (fields, count), vectors (fields, n, count)."""
+    basis = spanning(fixed, slope, fields, count, tolerance_mhz)
+    if basis is None:
+        solved = [_lowest(fixed + x * slope, count) for x in fields.tolist()]
+        return np.array([energies for energies, _ in solved]), np.array([vectors for _, vectors in solved])
+    energies, vectors, _ = _in_basis(basis, (fixed @ basis, slope @ basis), fields, count)
+    return energies, vectors
+
+
+def spanning(fixed: Matrix, slope: Matrix, fields: Floats, count: int, tolerance_mhz: float) -> Matrix | None:
+    """A basis (n, r) for the lowest states at all fields; None where it would be as large as half of the matrix.
 
     The eigenvectors at some fields, a few more than are asked for, span a space that holds those at the fields between. In it
     the matrices are small. An energy is wrong by |residual|²/gap, the gap reaching to the highest of the further states; the field
@@ -300,18 +311,15 @@ def reduced_basis(
     found = [_lowest(fixed + fields[place] * slope, count + BUFFER)[1] for place in anchors]
     while True:
         basis = _orthonormal(np.concatenate(found, axis=1))
-        moved = fixed @ basis, slope @ basis
-        energies, vectors, error = _in_basis(basis, moved, fields, count)
+        if basis.shape[1] > len(fixed) // 2:
+            return None
+        error = _in_basis(basis, (fixed @ basis, slope @ basis), fields, count)[2]
         error[anchors] = 0.0
         worst = int(np.argmax(error))
-        if error[worst] <= 0.1 * tolerance_mhz or len(anchors) == len(fields) or basis.shape[1] > len(fixed) // 2:
-            break
+        if error[worst] <= 0.1 * tolerance_mhz:
+            return basis
         anchors.append(worst)
         found.append(_lowest(fixed + fields[worst] * slope, count + BUFFER)[1])
-    if error[worst] > 0.1 * tolerance_mhz:
-        solved = [_lowest(fixed + x * slope, count) for x in fields.tolist()]
-        return np.array([energies for energies, _ in solved]), np.array([vectors for _, vectors in solved])
-    return energies, vectors
 
 
 def _orthonormal(vectors: Matrix) -> Matrix:
@@ -334,9 +342,11 @@ def _in_basis(basis: Matrix, moved: tuple[Matrix, Matrix], fields: Floats, count
 def _tabulated(request: MapRequest, jmax: int, moved: float, executor: Executor | None) -> FieldMap:
     solved = _jobs(request, jmax, request.fields, executor, True)
     fields, rows = request.fields, []
-    for one in solved:
-        for rank in np.flatnonzero(one.block.levels.j[one.rows] <= request.j_highest).tolist():
-            rows.append((one, rank))
+    named = [None if request.diabatic_gap_mhz is None else _diabatic_ranks(request, one) for one in solved]
+    for one, names in zip(solved, named, strict=True):
+        ours = one.block.levels.j[one.rows] <= request.j_highest
+        listed = ours if names is None else ours | ours[names].any(axis=0)
+        rows += [(one, rank) for rank in np.flatnonzero(listed).tolist()]
 
     def column(pick: Callable[[_Solved, int], Any]) -> NDArray[Any]:
         return np.concatenate([np.broadcast_to(pick(one, rank), len(fields)) for one, rank in rows])
@@ -358,30 +368,48 @@ def _tabulated(request: MapRequest, jmax: int, moved: float, executor: Executor 
         free_row=column(lambda one, rank: one.rows[rank]),
         jmax=jmax,
         accuracy_mhz=moved,
-        diabatic_label=_diabatic(request, solved, rows),
+        diabatic_label=_diabatic_labels(solved, named, rows),
     )
 
 
-def _diabatic(request: MapRequest, solved: Sequence[_Solved], rows: list[tuple[_Solved, int]]) -> NDArray[np.str_] | None:
-    if request.diabatic_gap_mhz is None:
-        return None
+def _diabatic_ranks(request: MapRequest, one: _Solved) -> Ints:
+    """Whose name each state of a block has at each field, (fields, states)."""
     from rotor.quantum.diabatic import diabatic_ranks
 
-    named = {}
-    for one in solved:
-        count = one.energies.shape[1]
-        solve = partial(_energies_and_slopes, request, one.block, count)
+    count, gap = one.energies.shape[1], request.diabatic_gap_mhz or 0.0
+    return diabatic_ranks(partial(_energies_and_slopes, *_small(request, one.block, count), count), request.fields, count, gap)
+
+
+def _diabatic_labels(
+    solved: Sequence[_Solved], named: Sequence[Ints | None], rows: list[tuple[_Solved, int]]
+) -> NDArray[np.str_] | None:
+    if not rows or named[0] is None:
+        return None
+    of_block = {}
+    for one, names in zip(solved, named, strict=True):
         labels = np.array([one.block.levels.label(int(row)) for row in one.rows])
-        named[id(one)] = labels[diabatic_ranks(solve, request.fields, count, request.diabatic_gap_mhz)]
-    return np.concatenate([named[id(one)][:, rank] for one, rank in rows])
+        of_block[id(one)] = labels[names]
+    return np.concatenate([of_block[id(one)][:, rank] for one, rank in rows])
 
 
-def _energies_and_slopes(request: MapRequest, block: FieldBlock, count: int, fields: Floats) -> tuple[Floats, Floats]:
+def _small(request: MapRequest, block: FieldBlock, count: int) -> tuple[Matrix, Matrix]:
+    """Both matrices of a block in a basis for its lowest states at all fields."""
     problem = request.problem(block)
-    basis = _enough(problem, free_order(block), count, request.fields, request.tolerance_mhz)
-    fixed, slope = (matrix[np.ix_(basis, basis)] for matrix in (problem.fixed, problem.slope))
-    energies, vectors = solve_fields(fixed, slope, fields, count, True)
-    return energies, _expectation(slope, vectors)
+    states = _enough(problem, free_order(block), count, request.fields, request.tolerance_mhz)
+    fixed, slope = (matrix[np.ix_(states, states)] for matrix in (problem.fixed, problem.slope))
+    if len(fixed) <= DENSE:
+        return fixed, slope
+    fields = np.linspace(request.fields[0], request.fields[-1], SPANNED)
+    basis = spanning(fixed, slope, fields, count, request.tolerance_mhz)
+    if basis is None:
+        return fixed, slope
+    return basis.conj().T @ fixed @ basis, basis.conj().T @ slope @ basis
+
+
+def _energies_and_slopes(fixed: Matrix, slope: Matrix, count: int, fields: Floats) -> tuple[Floats, Floats]:
+    """Of the lowest states at fields (f,): energies and dE/dx (f, count)."""
+    energies, vectors = np.linalg.eigh(fixed + fields[:, None, None] * slope)
+    return energies[:, :count], _expectation(slope, vectors[:, :, :count])
 
 
 def checked_fields(fields: Any, unit: str, highest: float) -> Floats:
