@@ -221,8 +221,14 @@ def followed(block: FieldBlock, j_highest: int) -> int:
     return int(np.flatnonzero(block.j[order] <= j_highest)[-1]) + 1
 
 
+def _count(request: MapRequest, block: FieldBlock) -> int:
+    """States to be solved: those followed, and where labels are diabatic as many above as they may cross."""
+    count = followed(block, request.j_highest)
+    return count if request.diabatic_gap_mhz is None else min(len(block), count + count // 2 + 4)
+
+
 def _solve_block(request: MapRequest, block: FieldBlock, fields: Floats, with_vectors: bool) -> _Solved:
-    problem, count = request.problem(block), followed(block, request.j_highest)
+    problem, count = request.problem(block), _count(request, block)
     order = free_order(block)
     basis = _enough(problem, order, count, fields, request.tolerance_mhz)
     fixed, slope = (matrix[np.ix_(basis, basis)] for matrix in (problem.fixed, problem.slope))
