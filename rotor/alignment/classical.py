@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rotor import units
-from rotor.alignment.align import acted_on
+from rotor.alignment.acting import acted_on
 from rotor.alignment.observables import figure_axis
 from rotor.alignment.pulse import RAD_PER_PS_MHZ, Kick, Pulse
 from rotor.alignment.timeline import Channel, Window, timeline
-from rotor.arrays import Floats
+from rotor.arrays import Floats, Ints
 from rotor.classical.effect import Torque
 from rotor.classical.effects.dipole_in_field import PulsedDipole, PulsedPolarizability
 from rotor.classical.free.free_motion import free_motion
@@ -134,7 +134,7 @@ def _summed(
     return out
 
 
-def _between(times: Floats, first: float, last: float) -> Floats:
+def _between(times: Floats, first: float, last: float) -> Ints:
     return np.flatnonzero((times >= first) & (times <= last))
 
 

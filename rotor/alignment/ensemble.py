@@ -93,7 +93,9 @@ def thermal(top: Top, temperature_k: float, cut: float) -> Ensemble:
     Raises ValueError for a temperature not above 0 K and one that would populate J above 400.
     """
     if not (math.isfinite(temperature_k) and temperature_k > 0):
-        raise ValueError(f"temperature {temperature_k} K: a finite temperature above 0 K is expected (0 means one level)")
+        raise ValueError(
+            f"temperature {temperature_k} K: a finite temperature above 0 K is expected (0 means one level)"
+        )
     levels = _levels_for(top, temperature_k, cut)
     there = levels.weight > 0
     ground = float(levels.energy_mhz[there].min())
@@ -106,7 +108,12 @@ def thermal(top: Top, temperature_k: float, cut: float) -> Ensemble:
     least = float(factor[order[last]] / whole.sum()) * (1 - 1e-9)
     kept = factor / whole.sum() >= least
     return Ensemble(
-        temperature_k, ground, float(whole.sum()), least, float(whole[~kept].sum() / whole.sum()), int(levels.j[kept].max())
+        temperature_k,
+        ground,
+        float(whole.sum()),
+        least,
+        float(whole[~kept].sum() / whole.sum()),
+        int(levels.j[kept].max()),
     )
 
 
@@ -123,5 +130,4 @@ def _levels_for(top: Top, temperature_k: float, cut: float) -> FreeLevels:
             "ensemble, a lower temperature or a larger tolerance"
         )
     solved = solve_levels(top, jmax, vectors=False)
-    levels = FreeLevels(solved.rotational, solved.energy_mhz, {}, solved.weight.astype(np.float64))
-    return levels
+    return FreeLevels(solved.rotational, solved.energy_mhz, {}, solved.weight.astype(np.float64))

@@ -48,7 +48,9 @@ class Observable:
         if self.contraction is not None:
             return block.matrix(self.contraction)
         if not isinstance(block, AxialBlock):
-            raise ValueError(f"{self.name} is made for linear and symmetric tops in a field with the symmetry of Z; use cos2theta")
+            raise ValueError(
+                f"{self.name} is made for linear and symmetric tops in a field with the symmetry of Z; use cos2theta"
+            )
         return absolute_cosine(block)
 
 

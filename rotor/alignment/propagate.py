@@ -1,20 +1,24 @@
 """One block of states carried through one window of a pulse, all its columns at once.
 
 Where one operator W acts, V(t) = -u(t) W, H = H0 + V is split into drifts, diagonal over the free states, and kicks, diagonal
-over the eigenvectors of W in the block (a discrete variable representation of the angle). For a rigid body [V, [V, [V, H0]]] = 0,
-because H0 is of second order in the momenta, so the Runge-Kutta-Nyström compositions of S. Blanes and P. C. Moan (J. Comput. Appl. Math. 142, 313
-(2002), table 3: SRKN6b of order 4, SRKN11b of order 6) serve, whose errors are a hundred times smaller than Yoshida's; a test
-measures both orders. For linear and symmetric tops [V, [H0, V]] is known at the eigenvectors too, 2B (dV/dθ)², and the splitting of S. A.
-Chin (Phys. Lett. A 226, 344 (1997), method A) with its evenly spaced kicks is the cheapest for short pulses. Time goes on with the drifts. The states live in the eigenvectors of W, where a drift is the matrix
-Q† exp(-i E a h) Q, made once for each a.
+over the eigenvectors of W in the block (a discrete variable representation of the angle). Time goes on with the drifts. The
+states live in the eigenvectors of W, where a drift is the matrix Q† exp(-i E a h) Q, made once for each a. Three splittings:
 
-Where several operators act at once (light and a THz field, crossed polarizations), each step is the product of two exponentials of
-the commutator-free Magnus method of order 4 (S. Blanes and P. C. Moan, Appl. Numer. Math. 56, 1519 (2006), eq. 43), each of them a
-Chebyshev series (H. Tal-Ezer and R. Kosloff, J. Chem. Phys. 81, 3967 (1984)). A kick is a diagonal phase.
+- `nystrom 4`, `nystrom 6`: for a rigid body [V, [V, [V, H0]]] = 0, because H0 is of second order in the momenta, so that the
+  Runge-Kutta-Nyström compositions SRKN6b (order 4, 6 drifts) and SRKN11b (order 6, 11 drifts) of S. Blanes and P. C. Moan serve
+  (J. Comput. Appl. Math. 142, 313 (2002), table 3);
+- `gradient`: for linear and symmetric tops ½ [V, [H0, V]] = B (dV/dθ)² is known at the eigenvectors too, and the splitting of
+  order 4 with 2 drifts of S. A. Chin (Phys. Lett. A 226, 344 (1997)) is the cheapest for short pulses.
+
+Where several operators act at once (light and a THz field, crossed polarizations), or a block is too large to be diagonalised, each
+step is the product of two exponentials of the commutator-free Magnus method of order 4 (S. Blanes and P. C. Moan, Appl. Numer.
+Math. 56, 1519 (2006)), each of them a Chebyshev series (H. Tal-Ezer and R. Kosloff, J. Chem. Phys. 81, 3967 (1984)). A kick is
+one diagonal phase. Tests measure the orders.
 """
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -73,9 +77,9 @@ def splitting(name: str) -> Splitting:
     if name == "gradient":
         return Splitting(4, np.array([0.5, 0.5]), np.array([1.0, 4.0, 1.0]) / 6, np.array([0.0, 1 / 36, 0.0]))
     if name == "nystrom 4":
-        (a1, a2), kicks = _NYSTROM_4
+        (a1, a2), first = _NYSTROM_4
         a = [a1, a2, 0.5 - a1 - a2]
-        b = [*kicks, 1 - 2 * sum(kicks)]
+        b = [*first, 1 - 2 * sum(first)]
         return Splitting(4, np.array([*a, *a[::-1]]), np.array([*b, *b[-2::-1]]), np.zeros(7))
     if name == "nystrom 6":
         half, kicks = _NYSTROM_6
@@ -123,9 +127,9 @@ class KickPlan:
     """How a window is passed by a splitting, the same for all blocks.
 
     durations: (kinds,) of every different drift. which: (stages,) the drift after each kick. areas: (stages + 1,) u(t) times the
-    duration of each kick; those where a step ends and the next begins are one. gradients: u(t)² times h³ and its share. marks: (stages,) after which drift the states are
-    looked at. sampled: (looks,) whether it is for the observables.
-    steps_taken: how many.
+    duration of each kick; those where a step ends and the next begins are one. gradients: u(t)² times h³ and its share, None
+    where there is none. marks: (stages,) after which drift the states are looked at. sampled: (looks,) whether it is for the
+    observables. steps_taken: how many.
     """
 
     durations: Floats
@@ -150,7 +154,9 @@ def kick_plan(window: Window, grid: Grid, rule: Splitting) -> KickPlan:
     """
     stages = len(rule.drifts)
     steps = np.repeat(grid.steps, grid.counts)
-    starts = np.concatenate([s + h * np.arange(n) for s, h, n in zip(grid.starts, grid.steps, grid.counts, strict=True)])
+    starts = np.concatenate(
+        [s + h * np.arange(n) for s, h, n in zip(grid.starts, grid.steps, grid.counts, strict=True)]
+    )
     times = starts[:, None] + steps[:, None] * np.clip(rule.nodes, _INSIDE, 1 - _INSIDE)
     strength = window.channels[0].strength(times.ravel()).reshape(times.shape)
     areas = _merged(strength * rule.kicks * steps[:, None])
@@ -162,7 +168,15 @@ def kick_plan(window: Window, grid: Grid, rule: Splitting) -> KickPlan:
     looked = np.union1d(last[grid.sampled], np.arange(piece - 1, len(areas) - 1, piece))
     marks = np.zeros(len(areas) - 1, dtype=bool)
     marks[looked] = True
-    return KickPlan(durations, which.ravel(), areas, gradients, marks, np.isin(looked, last[grid.sampled]), len(steps))
+    return KickPlan(
+        np.asarray(durations, dtype=np.float64),
+        which.ravel(),
+        areas,
+        gradients,
+        marks,
+        np.isin(looked, last[grid.sampled]),
+        len(steps),
+    )
 
 
 def _merged(table: Floats) -> Floats:
@@ -259,7 +273,7 @@ def _pieces(marks: NDArray[np.bool_], size: int) -> list[slice]:
     at_once = max(1, SNAPSHOT_NUMBERS // max(size, 1))
     ends = np.flatnonzero(marks)[at_once - 1 :: at_once] + 1
     edges = np.unique(np.concatenate([[0], ends, [len(marks)]])).tolist()
-    return [slice(first, last) for first, last in zip(edges[:-1], edges[1:], strict=True)]
+    return [slice(first, last) for first, last in itertools.pairwise(edges)]
 
 
 def _drift_matrices(durations: Floats, energies: Floats, vectors: NDArray[Any]) -> Complexes:
@@ -312,14 +326,16 @@ def _norm_bound(operator: Any) -> float:
     return float(np.max(abs(operator).sum(axis=1)))
 
 
-def _chebyshev(diagonal: Floats, factors: Floats, operators: Sequence[Any], reach: list[float], states: Complexes) -> Complexes:
+def _chebyshev(
+    diagonal: Floats, factors: Floats, operators: Sequence[Any], reach: list[float], states: Complexes
+) -> Complexes:
     """exp(-i (diagonal + Σ factor operator)) states by Σ (2 - δ_n0) (-i)^n J_n(R) T_n(H/R) after H is centred."""
     from scipy.special import jv
 
     centre = (diagonal.max() + diagonal.min()) / 2
     radius = (diagonal.max() - diagonal.min()) / 2 + sum(abs(f) * r for f, r in zip(factors, reach, strict=True))
     if radius == 0:
-        return np.exp(-1j * centre) * states
+        return np.asarray(np.exp(-1j * centre) * states)
     terms = int(radius + 12 + 8 * radius ** (1 / 3)) + 8
     coefficients = jv(np.arange(terms), radius)
     last = int(np.flatnonzero(np.abs(coefficients) > CHEBYSHEV_BELOW)[-1])

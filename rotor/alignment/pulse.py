@@ -209,7 +209,9 @@ class TabulatedPulse(Pulse):
     def __post_init__(self) -> None:
         times, values = (np.array(a, dtype=np.float64) for a in (self.times_ps, self.intensities_w_per_cm2))
         if times.ndim != 1 or times.shape != values.shape or len(times) < 2:
-            raise ValueError(f"a table of a pulse has as many intensities as times, 2 or more; got {times.shape}, {values.shape}")
+            raise ValueError(
+                f"a table of a pulse has as many intensities as times, 2 or more; got {times.shape}, {values.shape}"
+            )
         if not np.isfinite(times).all() or (np.diff(times) <= 0).any():
             raise ValueError("the times of a pulse's table must be finite and rise")
         for value in (values.min(), values.max()):

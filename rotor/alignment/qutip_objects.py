@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rotor.alignment.align import acted_on, guessed_jmax
+from rotor.alignment.acting import acted_on, guessed_jmax
 from rotor.alignment.observables import observable
 from rotor.alignment.pulse import RAD_PER_PS_MHZ, Kick, Pulse
 from rotor.alignment.timeline import Channel, Window, timeline
@@ -137,7 +137,12 @@ def solve_windows(
 
 
 def _through(
-    objects: BlockObjects, window: Window, ket: Any, times: Floats, out: dict[str, Floats], options: dict[str, Any] | None
+    objects: BlockObjects,
+    window: Window,
+    ket: Any,
+    times: Floats,
+    out: dict[str, Floats],
+    options: dict[str, Any] | None,
 ) -> Any:
     import qutip
 
@@ -146,8 +151,14 @@ def _through(
         return (1j * kick.area * _operator(objects, window.channels[0])).expm() * ket
     inside = np.flatnonzero((times > window.start_ps) & (times < window.stop_ps))
     listed = np.concatenate([[window.start_ps], times[inside], [window.stop_ps]])
-    chosen = {**(options or BEST_OPTIONS), "max_step": LONGEST_STEP * (window.stop_ps - window.start_ps), "store_states": True}
-    solved = qutip.sesolve(objects.hamiltonian(window), ket, listed, e_ops=list(objects.cosines.values()), options=chosen)
+    chosen = {
+        **(options or BEST_OPTIONS),
+        "max_step": LONGEST_STEP * (window.stop_ps - window.start_ps),
+        "store_states": True,
+    }
+    solved = qutip.sesolve(
+        objects.hamiltonian(window), ket, listed, e_ops=list(objects.cosines.values()), options=chosen
+    )
     for name, values in zip(objects.cosines, solved.expect, strict=True):
         out[name][inside] = np.real(values[1:-1])
     return solved.states[-1]
@@ -244,7 +255,9 @@ def _turn(jmax: int, p: int) -> Any:
             columns.append(low * low + low + m)
             values.append(coupling(low, up, 1, p, m) * body / np.sqrt((2.0 * up + 1) * (2 * low + 1)))
     size = (jmax + 1) ** 2
-    return coo_array((np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape=(size, size)).tocsr()
+    return coo_array(
+        (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape=(size, size)
+    ).tocsr()
 
 
 def chain_of(jmax: int, k: int, m: int) -> Any:

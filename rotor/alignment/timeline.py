@@ -7,6 +7,7 @@ solver can step over a pulse that it never sees.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -95,7 +96,7 @@ def _cut(group: Sequence[Pulse], kicks: Sequence[float]) -> list[Window]:
     edges = {time for one in group for time in (*one.window_ps, *one.breaks_ps)}
     times = [start, *sorted({time for time in kicks if start < time < stop}), stop]
     out = []
-    for first, last in zip(times[:-1], times[1:], strict=True):
+    for first, last in itertools.pairwise(times):
         here = [one for one in group if one.window_ps[0] < last and one.window_ps[1] > first]
         breaks = tuple(sorted(time for time in edges if first < time < last))
         out.append(Window(first, last, channels_of(here), breaks))

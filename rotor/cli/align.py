@@ -9,25 +9,25 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from rotor.cli.raman import with_polarizability
-from rotor.cli.shared import inputs, pulse_inputs
-from rotor.cli.shared.inputs import Input
+from rotor.cli.shared import inputs
+from rotor.cli.shared.inputs import Input, json_option, parsed, quantity
+from rotor.cli.shared.options import file_option, grouped, option
 from rotor.cli.shared.output import (
     Files,
     Table,
     Writer,
-    answering,
     deliver,
     json_with_rows,
     note,
     show_facts,
     show_table,
 )
+from rotor.cli.shared.pulse_inputs import Pulses, pulses_of
 
 if TYPE_CHECKING:
     from rotor.alignment.align import AlignmentTrace
     from rotor.alignment.pulse import Pulse
-    from rotor.arrays import Floats
-    from rotor.table import Table as Columns
+    from rotor.alignment.request import AlignAnswer
     from rotor.tops.top import Top
 
 EXAMPLES = """\b
@@ -37,109 +37,87 @@ Examples:
   rotor align N2 --pulse "3e13 W/cm2, 0.1 ps" --pulse "3e13 W/cm2, 0.1 ps, 8.38 ps" --temperature 300 --classical 20000
   rotor align OCS --thz "500 kV/cm, 1 ps, 0.3 THz" --observable costheta"""
 
-SHOWN = 12
+NAMES = {
+    "temperature_k": "--temperature", "from_ps": "--from", "until_ps": "--until", "points": "--points", "jmax": "--jmax",
+    "classical_molecules": "--classical", "seed": "--seed", "tolerance": "--tolerance",
+}  # fmt: skip  # field of the request -> option
 
 
 @dataclass(frozen=True)
-class Settings:
-    """What the options ask for, in the units of the package."""
+class Options:
+    """What is computed."""
 
-    pulses: tuple[Pulse, ...]
-    temperature_k: float
-    state: dict[str, int] | None
-    m: int | None
-    times_ps: Floats
-    observables: tuple[str, ...]
-    tolerance: float
-    jmax: int | None
-    classical: int
-    seed: int
-
-
-def command(
-    context: typer.Context,
-    source: str | None = inputs.SOURCE,
-    constants: str | None = inputs.CONSTANTS,
-    pulse: list[str] | None = pulse_inputs.PULSE,
-    switched: list[str] | None = pulse_inputs.SWITCHED,
-    kick: list[str] | None = pulse_inputs.KICK,
-    pulse_table: str | None = pulse_inputs.PULSE_TABLE,
-    thz: list[str] | None = pulse_inputs.THZ,
-    polarization: str = pulse_inputs.POLARIZATION,
-    temperature: str = typer.Option("1", metavar="T", help="Temperature (K); 0 is the lowest level."),
-    state: str | None = typer.Option(
+    temperature: str = option("1", metavar="T", help="Temperature (K); 0 is the lowest level.")
+    state: str | None = option(
         None, metavar="LIST", help="One level instead of a temperature, such as j=0 or j=1,ka=0,kc=1."
-    ),
-    m: int | None = typer.Option(None, "--m", metavar="N", help="|M| of that level; by default all alike."),
-    until: str | None = typer.Option(None, metavar="T", help="Last time (ps); by default one revival, or 100 ps."),
-    start: str | None = typer.Option(None, "--from", metavar="T", help="First time (ps); by default where the pulses begin."),
-    points: int = typer.Option(2001, metavar="N", help="How many times."),
-    observable: list[str] | None = typer.Option(
+    )
+    m: int | None = option(None, "--m", metavar="N", help="|M| of that level; by default all alike.")
+    until: str | None = option(
+        None, metavar="T", help="Last time (ps); by default one revival after the pulses, or 100 ps."
+    )
+    from_: str | None = option(None, "--from", metavar="T", help="First time (ps); by default where the pulses begin.")
+    points: int = option(2001, metavar="N", help="How many times.")
+    observable: list[str] | None = option(
         None, metavar="NAME", help="cos2theta (default), costheta, cos2theta_2d, cos2_aZ, cos_bX, ...; repeatable."
-    ),
-    polarizability: str | None = typer.Option(
+    )
+    polarizability: str | None = option(
         None, metavar="LIST", help="In principal axes: aa,bb,cc[,ab,ac,bc] or parallel,perpendicular (Å³)."
-    ),
-    anisotropy: str | None = typer.Option(
+    )
+    anisotropy: str | None = option(
         None, metavar="X", help="α∥ - α⊥ of a linear or symmetric top (Å³), instead of --polarizability."
-    ),
-    dipole_abc: str | None = inputs.DIPOLE_ABC,
-    tolerance: str = typer.Option("1e-6", metavar="X", help="Of the cosines: steps, J max and populations follow from it."),
-    jmax: int | None = typer.Option(None, metavar="N", help="Highest J of the basis; by default what the tolerance needs."),
-    classical: int = typer.Option(0, metavar="N", help="Also a classical gas of so many molecules under the same pulses."),
-    seed: int = typer.Option(1, metavar="N", help="Of the classical gas."),
-    isotope: list[str] | None = inputs.ISOTOPE,
-    spin_weights: str | None = inputs.SPIN_WEIGHTS,
-    csv: str | None = typer.Option(None, metavar="FILE", help="Write the cosines as CSV."),
-    parquet: str | None = typer.Option(None, metavar="FILE", help="Write the cosines as Parquet."),
-    plot: str | None = typer.Option(None, metavar="FILE", help="Draw the cosines (.png, .pdf, .svg)."),
-    json: str | None = inputs.JSON,
-) -> None:
+    )
+    tolerance: str = option("1e-6", metavar="X", help="Of the cosines: steps, J max and populations follow from it.")
+    jmax: int | None = option(None, metavar="N", help="Highest J of the basis; by default what the tolerance needs.")
+    classical: int = option(0, metavar="N", help="Also a classical gas of so many molecules under the same pulses.")
+    seed: int = option(1, metavar="N", help="Of the classical gas.")
+
+
+@dataclass(frozen=True)
+class Outputs:
+    """Files to write."""
+
+    csv: str | None = file_option(".csv", help="Write the cosines as CSV.")
+    parquet: str | None = file_option(".parquet", help="Write the cosines as Parquet.")
+    plot: str | None = file_option(".png", ".pdf", ".svg", help="Draw the cosines (.png, .pdf, .svg).")
+    json: str | None = json_option()
+
+
+@grouped(given=("dipole", "calculator", "hessian", "spin_constants", "spins"))
+def command(context: typer.Context, given: Input, pulses: Pulses, options: Options, outputs: Outputs) -> None:
     """Molecules aligned or oriented by pulses of light: cosines against time of a rotational wave packet."""
-    inputs.whole("--points", points, 2, 1_000_000)
-    inputs.whole("--jmax", jmax, 2)
-    inputs.whole("--classical", classical, 0)
-    inputs.whole("--seed", seed, 0)
-    given_pulses = pulse_inputs.pulses(pulse or [], switched or [], kick or [], pulse_table, thz or [], polarization)
-    files = Files()
-    files.ask("--csv", csv, (".csv",))
-    files.ask("--parquet", parquet, (".parquet",))
-    files.ask("--plot", plot, (".png", ".pdf", ".svg"))
-    files.ask_json(json)
+    from rotor.alignment.request import AlignRequest, answer_align
 
-    given = Input(source, constants, isotope or [], None, dipole_abc, spin_weights)
-    top = _with_tensor(inputs.read_top(given), polarizability, anisotropy, given_pulses)
-    settings = Settings(
-        pulses=given_pulses,
-        temperature_k=_temperature(temperature),
-        state=None if state is None else inputs.option("--state", state, _state),
-        m=m,
-        times_ps=_times(top, given_pulses, start, until, points),
-        observables=tuple(observable or ["cos2theta"]),
-        tolerance=inputs.positive("--tolerance", tolerance, ""),
-        jmax=jmax,
-        classical=classical,
-        seed=seed,
-    )
-    trace = _trace(top, settings)
-    with answering():
-        gas = _classical(top, settings)
-    table = _joined(trace, gas)
-    content = _content(trace, settings, given, context.obj, gas)
-    content["files"] = [str(path) for path in files.wanted.values()]
-    deliver(
-        files,
-        _writers(table, trace, gas, content),
-        lambda: json_with_rows(table, "trace", content),
-        lambda: _show(trace, gas, content),
-    )
+    acting = pulses_of(pulses)
+    settings = _settings(options)
+    files = Files.of(outputs)
+    top = _with_tensor(inputs.read_top(given), options, acting)
+    with inputs.fields_as_options(**NAMES):
+        request = AlignRequest(top, acting, **settings)
+        answer = answer_align(request)
+    if request.state is not None and request.classical_molecules:
+        note("the classical gas is at the temperature of --temperature, not in the level of --state")
+
+    content = _content(answer, given, context.obj)
+    content["files"] = files.names
+    text = lambda: json_with_rows(answer.table, "trace", content)  # noqa: E731
+    deliver(files, _writers(answer, content), text, lambda: _show(answer, content))
 
 
-def _temperature(text: str) -> float:
-    value = inputs.quantity("--temperature", text, "K")
-    if value < 0:
-        raise ValueError(f"--temperature: {text!r}: 0 K or more is expected")
-    return value
+def _settings(options: Options) -> dict[str, Any]:
+    """Fields of the request from the texts of the options."""
+    return {
+        "temperature_k": quantity("--temperature", options.temperature, "K"),
+        "state": None if options.state is None else parsed("--state", options.state, _state),
+        "m": options.m,
+        "from_ps": None if options.from_ is None else quantity("--from", options.from_, "ps"),
+        "until_ps": None if options.until is None else quantity("--until", options.until, "ps"),
+        "points": options.points,
+        "observables": tuple(options.observable or ["cos2theta"]),
+        "tolerance": quantity("--tolerance", options.tolerance, ""),
+        "jmax": options.jmax,
+        "classical_molecules": options.classical,
+        "seed": options.seed,
+    }
 
 
 def _state(text: str) -> dict[str, int]:
@@ -147,141 +125,65 @@ def _state(text: str) -> dict[str, int]:
     for item in text.split(","):
         name, equals, number = (part.strip() for part in item.partition("="))
         if not equals or not number.isdecimal():
-            raise ValueError(f"{item.strip()!r} in {text!r}: name=number is expected, such as j=1,ka=0,kc=1")
+            raise ValueError(f"{item.strip()!r} in {text!r}: expected name=number, such as j=1,ka=0,kc=1")
         out[name.lower()] = int(number)
     return out
 
 
-def _with_tensor(top: Top, polarizability: str | None, anisotropy: str | None, pulses: tuple[Pulse, ...]) -> Top:
-    if polarizability is not None and anisotropy is not None:
+def _with_tensor(top: Top, options: Options, pulses: tuple[Pulse, ...]) -> Top:
+    """The top with what the pulses act on, from the options where they give it."""
+    if options.polarizability is not None and options.anisotropy is not None:
         raise ValueError("--polarizability and --anisotropy: give one of them")
-    if anisotropy is not None:
-        if top.kind not in ("linear", "prolate", "oblate"):
-            raise ValueError(f"--anisotropy: {top.kind} tops have more than one number; give --polarizability aa,bb,cc")
-        across = max(0.0, -inputs.quantity("--anisotropy", anisotropy, "Å3")) + 1.0  # the mean does not count
-        return with_polarizability(top, f"{across + inputs.quantity('--anisotropy', anisotropy, 'Å3')!r},{across!r}")
-    if polarizability is None and all(pulse.acts_on == "dipole" for pulse in pulses):
-        return inputs.with_some_dipole(top)
-    return with_polarizability(top, polarizability)
+    if options.anisotropy is not None:
+        return parsed("--anisotropy", options.anisotropy, lambda text: _with_anisotropy(top, text))
+    acts_on = {pulse.acts_on for pulse in pulses}
+    if "dipole" in acts_on:
+        top = inputs.with_some_dipole(top)
+    if options.polarizability is not None or "polarizability" in acts_on:
+        top = with_polarizability(top, options.polarizability)
+    return top
 
 
-def _times(top: Top, pulses: tuple[Pulse, ...], start: str | None, until: str | None, points: int) -> Floats:
+def _with_anisotropy(top: Top, text: str) -> Top:
     import numpy as np
 
-    from rotor.alignment.align import revival_period_ps
+    from rotor.units import parse_quantity
 
-    begins, ends = min(pulse.window_ps[0] for pulse in pulses), max(pulse.window_ps[1] for pulse in pulses)
-    first = begins if start is None else inputs.quantity("--from", start, "ps")
-    long = 100.0 if top.kind == "asymmetric" else revival_period_ps(top)
-    last = ends + long if until is None else inputs.quantity("--until", until, "ps")
-    if not first < last:
-        raise ValueError(f"--until: {last:g} ps is not after the first time, {first:g} ps")
-    if last < ends:
-        raise ValueError(f"--until: {last:g} ps is before the pulses have ended, at {ends:g} ps; give a later time")
-    return np.linspace(first, last, points)
-
-
-def _trace(top: Top, settings: Settings) -> AlignmentTrace:
-    from rotor.alignment.align import align
-
-    return align(
-        top,
-        settings.pulses,
-        settings.times_ps,
-        temperature_k=0.0 if settings.state is not None else settings.temperature_k,
-        state=settings.state,
-        m=settings.m,
-        observables=settings.observables,
-        tolerance=settings.tolerance,
-        jmax=settings.jmax,
+    if top.kind not in ("linear", "prolate", "oblate"):
+        raise ValueError(f"a top of the kind {top.kind} has no single anisotropy; give --polarizability aa,bb,cc")
+    tensor = np.zeros((3, 3))
+    axis = 2 if top.kind == "oblate" else 0
+    tensor[axis, axis] = parse_quantity(text, "Å3")
+    return top.with_polarizability(
+        tensor, "the anisotropy given (--anisotropy); the mean, which turns nothing, is left out"
     )
 
 
-def _classical(top: Top, settings: Settings) -> dict[str, Floats]:
-    """Cosines of the classical gas by name, none where it was not asked for."""
-    if not settings.classical:
-        return {}
-    import numpy as np
-
-    from rotor.alignment.classical import classical_trace
-
-    if settings.state is not None:
-        note("the classical gas is at the temperature of --temperature, not in the level of --state")
-    return classical_trace(
-        top,
-        settings.pulses,
-        settings.times_ps,
-        temperature_k=settings.temperature_k,
-        molecules=settings.classical,
-        observables=settings.observables,
-        rng=np.random.default_rng(settings.seed),
-    )
-
-
-def _joined(trace: AlignmentTrace, gas: dict[str, Floats]) -> Columns:
-    """The trace as a table, with columns of the classical gas where there is one."""
-    from rotor.table import Table as Columns
-
-    class Joined(Columns):
-        @property
-        def columns(self) -> dict[str, Floats]:
-            return {**trace.columns, **{f"{name}_classical": values for name, values in gas.items()}}
-
-        @property
-        def facts(self) -> dict[str, Any]:
-            return trace.facts
-
-    return Joined()
-
-
-def _content(
-    trace: AlignmentTrace, settings: Settings, given: Input, command: str, gas: dict[str, Floats]
-) -> dict[str, Any]:
+def _content(answer: AlignAnswer, given: Input, command: str) -> dict[str, Any]:
     """What is printed and more, by the keys of docs/command_line.md."""
-    from rotor.cli.shared.report import describe
+    from rotor.cli.shared.report import begin
 
-    return {
-        **describe(trace.top, given.text, command),
-        **trace.facts,
-        "windows_ps": [list(pulse.window_ps) for pulse in trace.pulses],
-        "populated_jmax": trace.ensemble.jmax,
-        "error_estimate": trace.error_estimate,
-        "permanent": trace.permanent,
-        "extremes": [_extremes(name, trace.t_ps, values) for name, values in trace.columns.items() if name != "t_ps"],
-        "classical_molecules": settings.classical,
-        "classical_extremes": [_extremes(name, trace.t_ps, values) for name, values in gas.items()],
-        "times": len(trace.t_ps),
-    }
+    return {**begin(command, given.text), **answer.facts()}
 
 
-def _extremes(name: str, times: Floats, values: Floats) -> dict[str, Any]:
-    import numpy as np
-
-    high, low = int(np.argmax(values)), int(np.argmin(values))
-    return {
-        "name": name,
-        "max": float(values[high]),
-        "max_at_ps": float(times[high]),
-        "min": float(values[low]),
-        "min_at_ps": float(times[low]),
-    }
-
-
-def _writers(table: Columns, trace: AlignmentTrace, gas: dict[str, Floats], content: dict[str, Any]) -> dict[str, Writer]:
+def _writers(answer: AlignAnswer, content: dict[str, Any]) -> dict[str, Writer]:
     provenance = {"command": content["command"], "input": content["input"]}
 
-    def write(path: Path) -> None:
+    def table(path: Path) -> None:
         import rotor
 
-        rotor.write(table, path, settings=provenance)
+        rotor.write(answer.table, path, settings=provenance)
 
     def draw(path: Path) -> None:
         from rotor.plots.alignment import plot_alignment
 
+        trace = answer.trace
         title = ", ".join(filter(None, (trace.top.name, _ensemble_text(trace))))
-        plot_alignment(trace, path, classical=gas, title=title, provenance={"command": provenance["command"]})
+        plot_alignment(
+            trace, path, classical=answer.classical, title=title, provenance={"command": provenance["command"]}
+        )
 
-    return {"--csv": write, "--parquet": write, "--plot": draw}
+    return {"--csv": table, "--parquet": table, "--plot": draw}
 
 
 def _ensemble_text(trace: AlignmentTrace) -> str:
@@ -292,18 +194,18 @@ def _ensemble_text(trace: AlignmentTrace) -> str:
     return f"level {level}, " + ("all M" if ensemble.m is None else f"|M| = {ensemble.m}")
 
 
-def _show(trace: AlignmentTrace, gas: dict[str, Floats], content: dict[str, Any]) -> None:
+def _show(answer: AlignAnswer, content: dict[str, Any]) -> None:
     from rotor.cli.shared.report import heading
 
+    trace = answer.trace
     print(heading(trace.top))
     show_facts(_facts(trace, content))
     print()
-    rows = [
-        [one["name"] + suffix, f"{one['max']:.6f}", f"{one['max_at_ps']:.3f}", f"{one['min']:.6f}", f"{one['min_at_ps']:.3f}", mean]
-        for suffix, list_of, means in (("", content["extremes"], True), (" (classical)", content["classical_extremes"], False))
-        for one in list_of
-        for mean in [f"{trace.permanent[one['name']]:.6f}" if means else ""]
-    ]
+    rows = []
+    for one in content["extremes"]:
+        mean = trace.permanent.get(one["name"])
+        numbers = f"{one['max']:.6f}", f"{one['max_at_ps']:.3f}", f"{one['min']:.6f}", f"{one['min_at_ps']:.3f}"
+        rows.append([one["name"], *numbers, "" if mean is None else f"{mean:.6f}"])
     columns = ("cosine", "max", "at (ps)", "min", "at (ps)", "mean after")
     show_table(Table("", columns, rows, frozenset({"cosine"})))
 
@@ -312,15 +214,19 @@ def _facts(trace: AlignmentTrace, content: dict[str, Any]) -> list[tuple[str, st
     from rotor.cli.shared import report
 
     top = trace.top
-    pulses = "; ".join(_pulse_text(pulse) for pulse in trace.pulses)
+    acts_on = {pulse.acts_on for pulse in trace.pulses}
+    facts = [("constants", report.with_source(report.constants_text(top), top.source))]
+    if "dipole" in acts_on:
+        facts.append(("dipole", report.with_source(report.vector_text(top.dipole_abc_debye), top.dipole_source)))
+    if "polarizability" in acts_on:
+        facts.append(("polarizability", report.with_source(report.tensor_text(top), top.polarizability_source)))
     accuracy = (
         f"{content['error_estimate']:.1e} estimated: steps {trace.step_error:.1e}, leakage {trace.edge_population:.1e}, "
         f"left out {trace.ensemble.left_out:.1e} of the population"
     )
     return [
-        ("constants", report.with_source(report.constants_text(top), top.source)),
-        ("polarizability", report.with_source(report.tensor_text(top), top.polarizability_source)),
-        ("pulses", pulses),
+        *facts,
+        ("pulses", "; ".join(_pulse_text(pulse) for pulse in trace.pulses)),
         ("gas", _ensemble_text(trace)),
         ("J max", str(trace.jmax)),
         ("method", f"{trace.method}, {sum(trace.steps)} steps"),
@@ -330,5 +236,4 @@ def _facts(trace: AlignmentTrace, content: dict[str, Any]) -> list[tuple[str, st
 
 def _pulse_text(pulse: Pulse) -> str:
     first, last = pulse.window_ps
-    what = {"dipole": "on the dipole", "polarizability": "on the polarizability"}[pulse.acts_on]
-    return f"{type(pulse).__name__} {what}, {first:g} to {last:g} ps"
+    return f"{type(pulse).__name__} on the {pulse.acts_on}, {first:g} to {last:g} ps"

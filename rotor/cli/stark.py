@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from rotor.cli.shared import inputs, pulse_inputs
-from rotor.cli.shared.inputs import Input
+from rotor.cli.raman import with_polarizability
+from rotor.cli.shared import inputs
+from rotor.cli.shared.inputs import Input, json_option, parsed, positive, quantity
+from rotor.cli.shared.options import file_option, grouped, option
 from rotor.cli.shared.output import (
     Files,
     Table,
@@ -21,170 +23,159 @@ from rotor.cli.shared.output import (
 )
 
 if TYPE_CHECKING:
-    from rotor.arrays import Floats
     from rotor.quantum.field_map import FieldMap
+    from rotor.quantum.stark_request import StarkAnswer
     from rotor.tops.top import Top
 
 EXAMPLES = """\b
 Examples:
   rotor stark OCS --field 0:200kV/cm --states "J<=2" --plot ocs.png --csv ocs.csv
+  rotor stark indole --field 0:200kV/cm --states "J<=2" --plot indole.png
   rotor stark --constants "A=5655.2654 B=1546.8759 C=1214.4040 MHz" --dipole-abc 4.5152,0,0 --field 0,100kV/cm
   rotor stark OCS --field 0:50kV/cm:101 --intensity "1e11 W/cm2" --states "J<=1\""""
 
+NAMES = {
+    "fields_kv_per_cm": "--field", "j_highest": "--states", "m_values": "--m", "intensity_w_per_cm2": "--intensity",
+    "jmax": "--jmax", "tolerance_mhz": "--tolerance", "diabatic_gap_mhz": "--diabatic-gap",
+}  # fmt: skip  # field of the request -> option
 POINTS = 201
 SHOWN = 24
 
 
 @dataclass(frozen=True)
-class Settings:
-    """What the options ask for, in the units of the package."""
+class Options:
+    """What is computed."""
 
-    fields_kv_per_cm: Floats
-    j_highest: int
-    m_values: tuple[int, ...] | None
-    intensity_w_per_cm2: float
-    jmax: int | None
-    tolerance_mhz: float
-    diabatic_gap_mhz: float | None
-
-
-def command(
-    context: typer.Context,
-    source: str | None = inputs.SOURCE,
-    constants: str | None = inputs.CONSTANTS,
-    field: str = typer.Option(
-        "0:100kV/cm", metavar="GRID", help="Fields: start:stop[:count], count 201 by default, or a comma list (kV/cm)."
-    ),
-    states: str = typer.Option("J<=2", metavar="TEXT", help="Levels up to this J of the free molecule."),
-    m: str | None = typer.Option(None, "--m", metavar="LIST", help="|M| of the states: 0,1; by default 0 to the highest J."),
-    intensity: str = typer.Option("0", metavar="I", help="Of a laser along the field, far from resonance (W/cm2)."),
-    diabatic_gap: str | None = typer.Option(
+    field: str = option(
+        "0:100kV/cm", metavar="GRID", help="Fields: start:stop[:count], of 201 by default, or a comma list (kV/cm)."
+    )
+    states: str = option("J<=2", metavar="TEXT", help="Levels up to this J of the free molecule.")
+    m: str | None = option(None, "--m", metavar="LIST", help="|M| of the states: 0,1; by default 0 to the highest J.")
+    intensity: str = option("0", metavar="I", help="Of a laser along the field, far from resonance (W/cm2).")
+    diabatic_gap: str | None = option(
         None, metavar="GAP", help="Also labels that pass near crossings with a smaller gap (MHz)."
-    ),
-    dipole: str | None = inputs.DIPOLE,
-    dipole_abc: str | None = inputs.DIPOLE_ABC,
-    polarizability: str | None = typer.Option(
+    )
+    polarizability: str | None = option(
         None, metavar="LIST", help="In principal axes: aa,bb,cc[,ab,ac,bc] or parallel,perpendicular (Å³)."
-    ),
-    jmax: int | None = typer.Option(None, metavar="N", help="Highest J of the basis; by default what the tolerance needs."),
-    tolerance: str = typer.Option("1e-4", metavar="E", help="Of the energies (MHz)."),
-    isotope: list[str] | None = inputs.ISOTOPE,
-    csv: str | None = typer.Option(None, metavar="FILE", help="Write the map as CSV."),
-    parquet: str | None = typer.Option(None, metavar="FILE", help="Write the map as Parquet."),
-    plot: str | None = typer.Option(None, metavar="FILE", help="Draw the map (.png, .pdf, .svg)."),
-    json: str | None = inputs.JSON,
-) -> None:
+    )
+    jmax: int | None = option(None, metavar="N", help="Highest J of the basis; by default what the tolerance needs.")
+    tolerance: str = option("1e-4", metavar="E", help="Of the energies (MHz).")
+
+
+@dataclass(frozen=True)
+class Outputs:
+    """Files to write."""
+
+    csv: str | None = file_option(".csv", help="Write the map as CSV.")
+    parquet: str | None = file_option(".parquet", help="Write the map as Parquet.")
+    plot: str | None = file_option(".png", ".pdf", ".svg", help="Draw the map (.png, .pdf, .svg).")
+    json: str | None = json_option()
+
+
+@grouped(given=("spin_weights", "calculator", "hessian", "spin_constants", "spins"))
+def command(context: typer.Context, given: Input, options: Options, outputs: Outputs) -> None:
     """Levels in a static electric field: energies, labels, effective dipoles and cosines of every M."""
-    inputs.whole("--jmax", jmax, 2)
-    settings = Settings(
-        fields_kv_per_cm=inputs.option("--field", field, _fields),
-        j_highest=pulse_inputs.states("--states", states),
-        m_values=None if m is None else inputs.option("--m", m, _m_values),
-        intensity_w_per_cm2=inputs.quantity("--intensity", intensity, "W/cm2"),
-        jmax=jmax,
-        tolerance_mhz=inputs.positive("--tolerance", tolerance, "MHz"),
-        diabatic_gap_mhz=None if diabatic_gap is None else inputs.positive("--diabatic-gap", diabatic_gap, "MHz"),
-    )
-    files = Files()
-    files.ask("--csv", csv, (".csv",))
-    files.ask("--parquet", parquet, (".parquet",))
-    files.ask("--plot", plot, (".png", ".pdf", ".svg"))
-    files.ask_json(json)
-    if "--plot" in files.wanted and len(settings.fields_kv_per_cm) < 2:
+    from rotor.quantum.stark_request import StarkRequest, answer_stark
+
+    settings = _settings(options)
+    files = Files.of(outputs)
+    if "--plot" in files.paths and len(settings["fields_kv_per_cm"]) < 2:
         raise ValueError("--plot: a picture of a map needs two fields or more; give --field a range")
+    top = _acted_on(inputs.read_top(given), options, settings["intensity_w_per_cm2"])
+    with inputs.fields_as_options(**NAMES):
+        answer = answer_stark(StarkRequest(top, **settings))
 
-    given = Input(source, constants, isotope or [], dipole, dipole_abc, None)
-    top = inputs.with_some_dipole(inputs.read_top(given))
-    if polarizability is not None or settings.intensity_w_per_cm2:
-        from rotor.cli.raman import with_polarizability
-
-        top = with_polarizability(top, polarizability)
-    found = _map(top, settings)
-    content = _content(top, found, settings, given, context.obj)
-    content["files"] = [str(path) for path in files.wanted.values()]
-    deliver(
-        files,
-        _writers(top, found, content),
-        lambda: json_with_rows(found, "states", content),
-        lambda: _show(top, found, content),
-    )
+    content = _content(answer, given, context.obj)
+    content["files"] = files.names
+    text = lambda: json_with_rows(answer.states, "states", content)  # noqa: E731
+    deliver(files, _writers(top, answer.states, content), text, lambda: _show(top, answer.states, content))
 
 
-def _fields(text: str) -> Floats:
+def _settings(options: Options) -> dict[str, Any]:
+    """Fields of the request from the texts of the options."""
+    gap = options.diabatic_gap
+    return {
+        "fields_kv_per_cm": parsed("--field", options.field, _fields),
+        "j_highest": parsed("--states", options.states, _highest_j),
+        "m_values": None if options.m is None else parsed("--m", options.m, _m_values),
+        "intensity_w_per_cm2": quantity("--intensity", options.intensity, "W/cm2"),
+        "jmax": options.jmax,
+        "tolerance_mhz": positive("--tolerance", options.tolerance, "MHz"),
+        "diabatic_gap_mhz": None if gap is None else positive("--diabatic-gap", gap, "MHz"),
+    }
+
+
+def _acted_on(top: Top, options: Options, intensity_w_per_cm2: float) -> Top:
+    """The top with the dipole and, where light acts, the polarizability."""
+    top = inputs.with_some_dipole(top)
+    if options.polarizability is not None or intensity_w_per_cm2:
+        top = with_polarizability(top, options.polarizability)
+    return top
+
+
+def _fields(text: str) -> tuple[float, ...]:
     from rotor.units import parse_grid
 
-    return parse_grid(f"{text}:{POINTS}" if text.count(":") == 1 else text, "kV/cm")
+    return tuple(parse_grid(f"{text}:{POINTS}" if text.count(":") == 1 else text, "kV/cm").tolist())
+
+
+def _highest_j(text: str) -> int:
+    number = text.replace(" ", "").upper().removeprefix("J<=").removeprefix("J≤")
+    if not number.isdecimal():
+        raise ValueError(f"{text!r}: expected J<=2, or the number alone")
+    return int(number)
 
 
 def _m_values(text: str) -> tuple[int, ...]:
     parts = [part.strip() for part in text.split(",")]
     if not all(part.isdecimal() for part in parts):
-        raise ValueError(f"{text!r}: whole numbers of 0 or more between commas are expected, such as 0,1")
+        raise ValueError(f"{text!r}: expected whole numbers of 0 or more between commas, such as 0,1")
     return tuple(int(part) for part in parts)
 
 
-def _map(top: Top, settings: Settings) -> FieldMap:
-    from rotor.quantum.effects.stark import stark_map
-
-    return stark_map(
-        top,
-        settings.fields_kv_per_cm,
-        j_highest=settings.j_highest,
-        m_values=settings.m_values,
-        intensity_w_per_cm2=settings.intensity_w_per_cm2,
-        jmax=settings.jmax,
-        tolerance_mhz=settings.tolerance_mhz,
-        diabatic_gap_mhz=settings.diabatic_gap_mhz,
-    )
-
-
-def _content(top: Top, found: FieldMap, settings: Settings, given: Input, command: str) -> dict[str, Any]:
+def _content(answer: StarkAnswer, given: Input, command: str) -> dict[str, Any]:
     """What is printed and more, by the keys of docs/command_line.md."""
-    from rotor.cli.shared.report import describe
+    from rotor.cli.shared.report import begin
 
-    fields = found.fields
-    return {
-        **describe(top, given.text, command),
-        "field_kv_per_cm": [float(fields[0]), float(fields[-1]), len(fields)],
-        "intensity_w_per_cm2": settings.intensity_w_per_cm2,
-        "j_highest": settings.j_highest,
-        "diabatic_gap_mhz": settings.diabatic_gap_mhz,
-        "tolerance_mhz": settings.tolerance_mhz,
-        **found.facts,
-        "curves": len(found.curves()),
-    }
+    return {**begin(command, given.text), **answer.facts()}
 
 
-def _writers(top: Top, found: FieldMap, content: dict[str, Any]) -> dict[str, Writer]:
+def _writers(top: Top, states: FieldMap, content: dict[str, Any]) -> dict[str, Writer]:
     provenance = {"command": content["command"], "input": content["input"], "dipole_abc_debye": top.dipole_abc_debye}
 
     def table(path: Path) -> None:
         import rotor
 
-        rotor.write(found, path, settings=provenance)
+        rotor.write(states, path, settings=provenance)
 
     def draw(path: Path) -> None:
         from rotor.plots.stark import plot_stark
 
-        plot_stark(found, path, title=top.name or "in a static field", provenance={"command": provenance["command"]})
+        plot_stark(states, path, title=top.name or "in a static field", provenance={"command": provenance["command"]})
 
     return {"--csv": table, "--parquet": table, "--plot": draw}
 
 
-def _show(top: Top, found: FieldMap, content: dict[str, Any]) -> None:
+def _show(top: Top, states: FieldMap, content: dict[str, Any]) -> None:
     from rotor.cli.shared.report import heading
 
     print(heading(top))
     show_facts(_facts(top, content))
     print()
-    curves = found.curves()
-    last = f"{found.fields[-1]:g} kV/cm"
+    curves, first, last = states.curves(), states.fields[0], states.fields[-1]
     rows = []
     for rows_of in curves[:SHOWN]:
         at, end = rows_of.start, rows_of.stop - 1
-        numbers = (found.energy_mhz[at], found.energy_mhz[end], found.slope[end], found.cosines["costheta"][end])
-        rows.append([str(found.label[at]), str(found.m[at]), *(f"{value:.6f}" for value in numbers)])
-    names = ("state", "|M|", f"E at {found.fields[0]:g} kV/cm (MHz)", f"E at {last} (MHz)", f"μ_eff at {last} (D)", "⟨cosθ⟩")
+        numbers = (states.energy_mhz[at], states.energy_mhz[end], states.slope[end], states.cosines["costheta"][end])
+        rows.append([str(states.label[at]), str(states.m[at]), *(f"{value:.6f}" for value in numbers)])
+    names = (
+        "state",
+        "|M|",
+        f"E at {first:g} kV/cm (MHz)",
+        f"E at {last:g} kV/cm (MHz)",
+        "μ_eff there (D)",
+        "⟨cosθ⟩ there",
+    )
     title = f"{len(rows)} of {len(curves)} states" if len(rows) < len(curves) else "all states"
     show_table(Table(f"{title}, by M and block", names, rows, frozenset({"state"})))
 

@@ -87,7 +87,9 @@ def _cosines(axes: Any, trace: AlignmentTrace, classical: Mapping[str, Floats]) 
         axes.plot(trace.t_ps, values, color=colour, linewidth=1.0, label=NAMES.get(name, name))
         if name in classical:
             label = f"{NAMES.get(name, name)}, classical"
-            axes.plot(trace.t_ps, classical[name], color=colour, linewidth=1.0, linestyle=(0, (4, 2)), alpha=0.8, label=label)
+            axes.plot(
+                trace.t_ps, classical[name], color=colour, linewidth=1.0, linestyle=(0, (4, 2)), alpha=0.8, label=label
+            )
     if len(trace.cosines) == 1 and "cos2theta" in trace.cosines:
         axes.axhline(1 / 3, color="#555555", linewidth=0.6, linestyle=":")
         axes.set_ylabel(NAMES["cos2theta"])

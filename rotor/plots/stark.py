@@ -92,14 +92,24 @@ def _labels(axes: Any, field_map: FieldMap, ends: list[tuple[float, str]]) -> No
     last = -np.inf
     for energy, label in sorted(set(ends)):
         if energy - last > (high - low) / 40:
-            axes.annotate(label, (field_map.fields[0], energy), (-4, 0), textcoords="offset points", ha="right", va="center", fontsize=7)
+            axes.annotate(
+                label,
+                (field_map.fields[0], energy),
+                (-4, 0),
+                textcoords="offset points",
+                ha="right",
+                va="center",
+                fontsize=7,
+            )
             last = energy
     axes.tick_params(axis="y", pad=38)
 
 
 def _slopes(axes: Any, field_map: FieldMap, unit: str) -> None:
     for rows in field_map.curves():
-        axes.plot(field_map.field[rows], field_map.slope[rows], color=_colour(int(field_map.m[rows.start])), linewidth=0.8)
+        axes.plot(
+            field_map.field[rows], field_map.slope[rows], color=_colour(int(field_map.m[rows.start])), linewidth=0.8
+        )
     axes.axhline(0.0, color="#555555", linewidth=0.6, linestyle=":")
     axes.set_xlabel(f"field ({unit})")
     name = "μ_eff (D)" if field_map.slope_name == "mu_eff_debye" else field_map.slope_name

@@ -49,7 +49,9 @@ class Contraction:
     def __post_init__(self) -> None:
         body, space = np.array(self.body, dtype=np.float64), np.array(self.space, dtype=np.float64)
         if body.shape != space.shape or body.shape not in ((3,), (3, 3)):
-            raise ValueError(f"a contraction is of two vectors (3,) or of two tensors (3, 3); got {body.shape}, {space.shape}")
+            raise ValueError(
+                f"a contraction is of two vectors (3,) or of two tensors (3, 3); got {body.shape}, {space.shape}"
+            )
         if not (np.isfinite(body).all() and np.isfinite(space).all()):
             raise ValueError("a contraction of fields has numbers that are not finite")
         object.__setattr__(self, "body", body)
@@ -121,10 +123,18 @@ class FieldBlock(ABC):
     """
 
     m: int
-    name: str
     copies: int
     rows: Ints
-    levels: FreeLevels
+
+    @property
+    @abstractmethod
+    def label(self) -> str:
+        """Which block of its M it is."""
+
+    @property
+    @abstractmethod
+    def levels(self) -> FreeLevels:
+        """The levels whose rows the states are of."""
 
     @property
     def j(self) -> Ints:
@@ -162,10 +172,15 @@ class AxialBlock(FieldBlock):
     step: int
     axis: int
     rows: Ints = field(repr=False)
-    levels: FreeLevels = field(repr=False)
+    space: AxialSpace = field(repr=False)
 
     @property
-    def name(self) -> str:
+    def levels(self) -> FreeLevels:
+        """The levels of the space."""
+        return self.space.levels
+
+    @property
+    def label(self) -> str:
         """k, and the parity of J where it is good."""
         parity = "" if self.step == 1 else (" J odd" if int(self.j[0]) % 2 else " J even")
         return f"k={self.k}{parity}"
@@ -225,7 +240,7 @@ class AxialSpace(FieldSpace):
             apart = not self.oriented and k * m == 0
             for half in (rows[::2], rows[1::2]) if apart else (rows,):
                 if len(half):
-                    out.append(AxialBlock(m, k, copies, 2 if apart else 1, self.axis, half, self.levels))
+                    out.append(AxialBlock(m, k, copies, 2 if apart else 1, self.axis, half, self))
         return out
 
     @cached_property

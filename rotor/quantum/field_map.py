@@ -118,7 +118,9 @@ class FieldMap(Table):
             if self.label[rows.start] == label and self.m[rows.start] == m:
                 return rows
         known = sorted({(str(self.label[rows.start]), int(self.m[rows.start])) for rows in self.curves()})
-        raise ValueError(f"no state {label!r} with M = {m}; there are {', '.join(f'{name!r} M={value}' for name, value in known)}")
+        raise ValueError(
+            f"no state {label!r} with M = {m}; there are {', '.join(f'{name!r} M={value}' for name, value in known)}"
+        )
 
 
 @dataclass(frozen=True)
@@ -163,7 +165,9 @@ def field_map(request: MapRequest, jmax: int | None = None, executor: Executor |
     given = jmax is not None
     jmax = jmax if jmax is not None else _first_jmax(request)
     if jmax < request.j_highest + EDGE:
-        raise ValueError(f"J max {jmax}: states up to J = {request.j_highest} are followed; give at least {request.j_highest + EDGE}")
+        raise ValueError(
+            f"J max {jmax}: states up to J = {request.j_highest} are followed; give at least {request.j_highest + EDGE}"
+        )
     ends = np.unique(np.abs(request.fields))[-1:]
     before = _energies_at(request, jmax, ends, executor)
     while True:
@@ -187,7 +191,9 @@ def _blocks(request: MapRequest, jmax: int) -> list[FieldBlock]:
     return [block for m in request.m_values for block in space.blocks(m) if (block.j <= request.j_highest).any()]
 
 
-def _jobs(request: MapRequest, jmax: int, fields: Floats, executor: Executor | None, with_vectors: bool) -> list[_Solved]:
+def _jobs(
+    request: MapRequest, jmax: int, fields: Floats, executor: Executor | None, with_vectors: bool
+) -> list[_Solved]:
     blocks = _blocks(request, jmax)
     run = partial(_solve_block, request, fields=fields, with_vectors=with_vectors)
     return list(executor.map(run, blocks) if executor else map(run, blocks))
@@ -207,7 +213,9 @@ def _first_jmax(request: MapRequest) -> int:
 
 def _energies_at(request: MapRequest, jmax: int, fields: Floats, executor: Executor | None) -> Floats:
     solved = _jobs(request, jmax, fields, executor, False)
-    return np.concatenate([one.energies[:, one.block.levels.j[one.rows] <= request.j_highest].ravel() for one in solved])
+    return np.concatenate(
+        [one.energies[:, one.block.levels.j[one.rows] <= request.j_highest].ravel() for one in solved]
+    )
 
 
 def free_order(block: FieldBlock) -> Ints:
@@ -255,8 +263,8 @@ def _enough(problem: BlockProblem, order: Ints, count: int, fields: Floats, tole
     before = None
     while size < len(order):
         basis = np.sort(order[:size])
-        pair = (matrix[np.ix_(basis, basis)] for matrix in (problem.fixed, problem.slope))
-        energies = solve_fields(*pair, strongest, count, False)[0]
+        fixed, slope = (matrix[np.ix_(basis, basis)] for matrix in (problem.fixed, problem.slope))
+        energies = solve_fields(fixed, slope, strongest, count, False)[0]
         if before is not None and np.abs(energies - before).max() <= 0.1 * tolerance_mhz:
             return basis
         before, size = energies, int(1.4 * size) + 1
@@ -274,11 +282,15 @@ def solve_fields(
     if len(fixed) <= DENSE:
         stack = fixed + fields[:, None, None] * slope
         if not with_vectors:
-            return np.linalg.eigvalsh(stack)[:, :count], stack[:, :, :0]
-        energies, vectors = np.linalg.eigh(stack)
-        return energies[:, :count], vectors[:, :, :count]
+            return np.asarray(np.linalg.eigvalsh(stack)[:, :count], dtype=np.float64), stack[:, :, :0]
+        solved = np.linalg.eigh(stack)
+        return np.asarray(solved.eigenvalues[:, :count], dtype=np.float64), solved.eigenvectors[:, :, :count]
     if len(fields) >= 3 * FIRST_ANCHORS and tolerance_mhz > 0 and count + BUFFER < len(fixed) // 4:
         return reduced_basis(fixed, slope, fields, count, tolerance_mhz)
+    return _each(fixed, slope, fields, count, with_vectors)
+
+
+def _each(fixed: Matrix, slope: Matrix, fields: Floats, count: int, with_vectors: bool = True) -> tuple[Floats, Matrix]:
     solved = [_lowest(fixed + x * slope, count, with_vectors) for x in fields.tolist()]
     return np.array([energies for energies, _ in solved]), np.array([vectors for _, vectors in solved])
 
@@ -300,8 +312,7 @@ def reduced_basis(
     """The lowest states at many fields from full solutions at a few: energies (fields, count), vectors (fields, n, count)."""
     basis = spanning(fixed, slope, fields, count, tolerance_mhz)
     if basis is None:
-        solved = [_lowest(fixed + x * slope, count) for x in fields.tolist()]
-        return np.array([energies for energies, _ in solved]), np.array([vectors for _, vectors in solved])
+        return _each(fixed, slope, fields, count)
     energies, vectors, _ = _in_basis(basis, (fixed @ basis, slope @ basis), fields, count)
     return energies, vectors
 
@@ -357,18 +368,18 @@ def _tabulated(request: MapRequest, jmax: int, moved: float, executor: Executor 
     def column(pick: Callable[[_Solved, int], Any]) -> NDArray[Any]:
         return np.concatenate([np.broadcast_to(pick(one, rank), len(fields)) for one, rank in rows])
 
-    names = list(solved[0].cosines) if solved else []
+    cosines = list(solved[0].cosines) if solved else []
     return FieldMap(
         field_name=request.field_name,
         slope_name=request.slope_name,
         field=np.tile(fields, len(rows)),
         m=column(lambda one, rank: one.block.m),
-        block=column(lambda one, rank: np.array(one.block.name)),
+        block=column(lambda one, rank: np.array(one.block.label)),
         rank=column(lambda one, rank: rank),
         energy_mhz=column(lambda one, rank: one.energies[:, rank]),
         label=column(lambda one, rank: np.array(one.block.levels.label(int(one.rows[rank])))),
         slope=column(lambda one, rank: one.slopes[:, rank] / request.slope_unit_mhz),
-        cosines={name: column(lambda one, rank, name=name: one.cosines[name][:, rank]) for name in names},  # type: ignore[misc]
+        cosines={name: column(partial(_cosine, name)) for name in cosines},
         edge_population=column(lambda one, rank: one.edge[:, rank]),
         copies=column(lambda one, rank: one.block.copies),
         free_row=column(lambda one, rank: one.rows[rank]),
@@ -378,12 +389,18 @@ def _tabulated(request: MapRequest, jmax: int, moved: float, executor: Executor 
     )
 
 
+def _cosine(name: str, one: _Solved, rank: int) -> Floats:
+    return one.cosines[name][:, rank]
+
+
 def _diabatic_ranks(request: MapRequest, one: _Solved) -> Ints:
     """Whose name each state of a block has at each field, (fields, states)."""
     from rotor.quantum.diabatic import diabatic_ranks
 
     count, gap = one.energies.shape[1], request.diabatic_gap_mhz or 0.0
-    return diabatic_ranks(partial(_energies_and_slopes, *_small(request, one.block, count), count), request.fields, count, gap)
+    return diabatic_ranks(
+        partial(_energies_and_slopes, *_small(request, one.block, count), count), request.fields, count, gap
+    )
 
 
 def _diabatic_labels(

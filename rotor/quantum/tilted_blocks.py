@@ -39,7 +39,7 @@ class TiltedBlock(FieldBlock):
     """States (Wang function of M) x (state of a solved Wang block of k) of the pairs `members`."""
 
     m: int
-    name: str
+    label: str
     copies: int
     members: tuple[tuple[int, int], ...]
     rows: Ints = field(repr=False)
@@ -52,7 +52,7 @@ class TiltedBlock(FieldBlock):
         return self.projections
 
     @property
-    def levels(self) -> FreeLevels:  # type: ignore[override]
+    def levels(self) -> FreeLevels:
         """The levels of the space."""
         return self.space.levels
 
@@ -117,7 +117,9 @@ class TiltedSpace(FieldSpace):
             block, of_m = self.solved[i], self._of_m[self.solved[i].basis.j][k]
             rows.append(np.tile(np.arange(block.start, block.start + block.basis.size), of_m.size))
             abs_m.append(np.repeat(of_m.k, block.basis.size))
-        return TiltedBlock(NO_M, f"block {number}", 1, tuple(members), np.concatenate(rows), np.concatenate(abs_m), self)
+        return TiltedBlock(
+            NO_M, f"block {number}", 1, tuple(members), np.concatenate(rows), np.concatenate(abs_m), self
+        )
 
     def size(self, pair: tuple[int, int]) -> int:
         """States of a pair of blocks."""
@@ -145,7 +147,9 @@ class TiltedSpace(FieldSpace):
                 for up in lows[place:] + above:
                     if body.between(self.solved[up].basis, self.solved[low].basis) is None:
                         continue
-                    out += [((up, a), (low, b)) for a, b in self._of_m_pairs(self.solved[up].basis.j, j, space, up == low)]
+                    out += [
+                        ((up, a), (low, b)) for a, b in self._of_m_pairs(self.solved[up].basis.j, j, space, up == low)
+                    ]
         return out
 
     def _of_m_pairs(self, j_up: int, j_low: int, space: BodyTensor, same: bool) -> list[tuple[int, int]]:

@@ -33,7 +33,7 @@ class WangBlockInField(FieldBlock):
     """
 
     m: int
-    name: str
+    label: str
     copies: int
     members: tuple[int, ...]
     colours: tuple[int, ...]
@@ -42,7 +42,7 @@ class WangBlockInField(FieldBlock):
     space: WangSpace = field(repr=False)
 
     @property
-    def levels(self) -> FreeLevels:  # type: ignore[override]
+    def levels(self) -> FreeLevels:
         """The levels of the space."""
         return self.space.levels
 
@@ -139,9 +139,7 @@ class WangSpace(FieldSpace):
             self._cache[key] = np.append(factor, 0.0)
         return self._cache[key]  # type: ignore[no-any-return]
 
-    def elements(
-        self, contraction: Contraction, members: Sequence[int], m: int
-    ) -> list[tuple[int, int, Floats]]:
+    def elements(self, contraction: Contraction, members: Sequence[int], m: int) -> list[tuple[int, int, Floats]]:
         """(place of up, place of low, real elements) of all pairs among `members`, for M = m."""
         place = {node: i for i, node in enumerate(members)}
         pairs, size = self._pairs(contraction), _space_size(contraction)
@@ -164,7 +162,9 @@ class WangSpace(FieldSpace):
 def _space_size(contraction: Contraction) -> float:
     """The q = 0 component of the space part, T^1_0 = Z or T^2_0 = (2ZZ - XX - YY)/√6."""
     space = contraction.space
-    return float(space[2]) if contraction.rank == 1 else float((2 * space[2, 2] - space[0, 0] - space[1, 1]) / np.sqrt(6))
+    return (
+        float(space[2]) if contraction.rank == 1 else float((2 * space[2, 2] - space[0, 0] - space[1, 1]) / np.sqrt(6))
+    )
 
 
 def coloured_components(

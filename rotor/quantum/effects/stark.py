@@ -63,7 +63,11 @@ class Stark(QuantumEffect):
 
     def size_mhz(self, top: Top, j: int) -> float:
         """Second order at J = 0, first order (K = M = J) where ±K coincide."""
-        first = units.MHZ_PER_DEBYE_KV_PER_CM * abs(self.field_kv_per_cm) * float(np.linalg.norm(top.dipole_abc_debye or (0.0,)))
+        first = (
+            units.MHZ_PER_DEBYE_KV_PER_CM
+            * abs(self.field_kv_per_cm)
+            * float(np.linalg.norm(top.dipole_abc_debye or (0.0,)))
+        )
         b = min(x for x in top.rotational_constants_mhz if math.isfinite(x))
         if top.kind in ("prolate", "oblate") and j:
             return first * j / (j + 1)
@@ -120,14 +124,14 @@ def stark_map(
     Neglected: the polarizability in the static field (0.5 Δα E², below 1e-3 of the dipole's part), hyperfine coupling.
     """
     fields = checked_fields(fields_kv_per_cm, "kV/cm", HIGHEST_KV_PER_CM)
-    dipole, light = _acting(top, intensity_w_per_cm2)
+    dipole, light = acting(top, intensity_w_per_cm2)
     names = {"costheta": _orientation(top), "cos2theta": _alignment(top)}
     request = MapRequest(
         space=partial(field_space, top, contractions=tuple(one for one in (dipole, light) if one is not None)),
         problem=partial(_problem, dipole, light, intensity_w_per_cm2, names),
         fields=fields,
         j_highest=checked_j(j_highest),
-        m_values=_checked_m(m_values, j_highest),
+        m_values=checked_m(m_values, j_highest),
         tolerance_mhz=checked_tolerance_mhz(tolerance_mhz),
         field_name="field_kv_per_cm",
         slope_name="mu_eff_debye",
@@ -144,19 +148,27 @@ def checked_j(j_highest: int) -> int:
     return int(j_highest)
 
 
-def _checked_m(m_values: Sequence[int] | None, j_highest: int) -> tuple[int, ...]:
+def checked_m(m_values: Sequence[int] | None, j_highest: int) -> tuple[int, ...]:
+    """|M| from 0 to J, each once, all of them for None; ValueError for others."""
     values = tuple(range(j_highest + 1)) if m_values is None else tuple(sorted({int(m) for m in m_values}))
     if not values or not all(0 <= m <= j_highest for m in values):
-        raise ValueError(f"M of {list(values)}: whole numbers from 0 to J = {j_highest} are expected (M and -M coincide)")
+        raise ValueError(
+            f"M of {list(values)}: whole numbers from 0 to J = {j_highest} are expected (M and -M coincide)"
+        )
     return values
 
 
-def _acting(top: Top, intensity_w_per_cm2: float) -> tuple[Contraction, Contraction | None]:
+def acting(top: Top, intensity_w_per_cm2: float) -> tuple[Contraction, Contraction | None]:
+    """Dipole and light as contractions with Z; ValueError where they are not known or nothing acts."""
     name = top.name or "this top"
     if not 0 <= intensity_w_per_cm2 <= HIGHEST_W_PER_CM2:
-        raise ValueError(f"intensity {intensity_w_per_cm2:g} W/cm²: a number from 0 to {HIGHEST_W_PER_CM2:g} is expected")
+        raise ValueError(
+            f"intensity {intensity_w_per_cm2:g} W/cm²: a number from 0 to {HIGHEST_W_PER_CM2:g} is expected"
+        )
     if top.kind == "spherical":
-        raise ValueError(f"{name} is a spherical top: it has no dipole and no anisotropy, so that a field does not split its levels")
+        raise ValueError(
+            f"{name} is a spherical top: it has no dipole and no anisotropy, so that a field does not split its levels"
+        )
     dipole = top.dipole_abc_debye
     if dipole is None and not intensity_w_per_cm2:
         raise ValueError(f"the dipole of {name} is not known: give one, in principal axes (D)")
