@@ -72,7 +72,7 @@ class AlignmentTrace(Table):
         return {"t_ps": self.t_ps, **self.cosines}
 
     @property
-    def facts(self) -> dict[str, Any]:
+    def provenance(self) -> dict[str, Any]:
         """Top, pulses, ensemble and what was found about accuracy."""
         top = self.top
         return {

@@ -95,9 +95,9 @@ class AlignmentTable(Table):
         return {**self.trace.columns, **{f"{name}_classical": values for name, values in self.classical.items()}}
 
     @property
-    def facts(self) -> Mapping[str, Any]:
-        """Those of the quantum calculation."""
-        return self.trace.facts
+    def provenance(self) -> dict[str, Any]:
+        """That of the quantum calculation."""
+        return self.trace.provenance
 
 
 @dataclass(frozen=True)
@@ -118,7 +118,7 @@ class AlignAnswer:
         trace, cosines = self.trace, {name: values for name, values in self.table.columns.items() if name != "t_ps"}
         return {
             **top_facts(trace.top),
-            **trace.facts,
+            **trace.provenance,
             "windows_ps": [list(pulse.window_ps) for pulse in trace.pulses],
             "populated_jmax": trace.ensemble.jmax,
             "error_estimate": trace.error_estimate,

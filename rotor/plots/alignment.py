@@ -101,7 +101,7 @@ def _cosines(axes: Any, trace: AlignmentTrace, classical: Mapping[str, Floats]) 
 
 def _metadata(suffix: str, trace: AlignmentTrace, title: str, more: Mapping[str, Any]) -> dict[str, Any]:
     """Provenance by the keys that each format has; no date, so that the same picture is the same file."""
-    description = "; ".join(f"{name}: {value}" for name, value in {**more, **trace.facts}.items())
+    description = "; ".join(f"{name}: {value}" for name, value in {**more, **trace.provenance}.items())
     program = f"rotor {version()}"
     if suffix == ".png":
         return {"Software": program, "Title": title, "Description": description}

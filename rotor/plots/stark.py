@@ -118,7 +118,7 @@ def _slopes(axes: Any, field_map: FieldMap, unit: str) -> None:
 
 def _metadata(suffix: str, field_map: FieldMap, title: str, more: Mapping[str, Any]) -> dict[str, Any]:
     """Provenance by the keys that each format has; no date, so that the same picture is the same file."""
-    description = "; ".join(f"{name}: {value}" for name, value in {**more, **field_map.facts}.items())
+    description = "; ".join(f"{name}: {value}" for name, value in {**more, **field_map.provenance}.items())
     program = f"rotor {version()}"
     if suffix == ".png":
         return {"Software": program, "Title": title, "Description": description}

@@ -94,7 +94,7 @@ class FieldMap(Table):
         return out if self.diabatic_label is None else {**out, "diabatic_label": self.diabatic_label}
 
     @property
-    def facts(self) -> dict[str, Any]:
+    def provenance(self) -> dict[str, Any]:
         """J max and what was found about accuracy."""
         return {
             "jmax": self.jmax,

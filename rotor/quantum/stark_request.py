@@ -61,7 +61,7 @@ class StarkAnswer:
             "j_highest": request.j_highest,
             "diabatic_gap_mhz": request.diabatic_gap_mhz,
             "tolerance_mhz": request.tolerance_mhz,
-            **self.states.facts,
+            **self.states.provenance,
             "curves": len(self.states.curves()),
         }
 

@@ -39,7 +39,7 @@ class TiltedBlock(FieldBlock):
     """States (Wang function of M) x (state of a solved Wang block of k) of the pairs `members`."""
 
     m: int
-    label: str
+    species: str
     copies: int
     members: tuple[tuple[int, int], ...]
     rows: Ints = field(repr=False)
@@ -50,6 +50,11 @@ class TiltedBlock(FieldBlock):
     def abs_m(self) -> Ints:
         """|M| of the Wang functions (n,)."""
         return self.projections
+
+    @property
+    def label(self) -> str:
+        """Which block it is."""
+        return self.species
 
     @property
     def levels(self) -> FreeLevels:

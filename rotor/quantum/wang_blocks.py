@@ -33,13 +33,18 @@ class WangBlockInField(FieldBlock):
     """
 
     m: int
-    label: str
+    species: str
     copies: int
     members: tuple[int, ...]
     colours: tuple[int, ...]
     real: bool
     rows: Ints = field(repr=False)
     space: WangSpace = field(repr=False)
+
+    @property
+    def label(self) -> str:
+        """Which block it is."""
+        return self.species
 
     @property
     def levels(self) -> FreeLevels:
