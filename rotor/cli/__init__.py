@@ -15,6 +15,7 @@ from typing import cast
 import typer
 
 from rotor.cli import (
+    align,
     cat,
     convert,
     fit,
@@ -25,6 +26,7 @@ from rotor.cli import (
     molecules,
     raman,
     spectrum,
+    stark,
     structure,
     thermo,
     tumble,
@@ -46,6 +48,8 @@ Examples:
   rotor raman N2 --laser 488
   rotor thermo water --temperature 10:1000K:100 --plot heat.png
   rotor tumble water --plot water.png
+  rotor stark OCS --field 0:200kV/cm --plot stark.png
+  rotor align OCS --pulse "1e13 W/cm2, 1 ps" --plot align.png
   rotor gas water --molecules 20000 --seed 7
   rotor fluid water --molecules 216 --csv run.csv
   rotor fit case.par --out fitted
@@ -75,6 +79,8 @@ def _application() -> typer.Typer:
     app.command("raman", epilog=raman.EXAMPLES)(raman.command)
     app.command("thermo", epilog=thermo.EXAMPLES)(thermo.command)
     app.command("tumble", epilog=tumble.EXAMPLES)(tumble.command)
+    app.command("stark", epilog=stark.EXAMPLES)(stark.command)
+    app.command("align", epilog=align.EXAMPLES)(align.command)
     app.command("gas", epilog=gas.EXAMPLES)(gas.command)
     app.command("fluid", epilog=fluid.EXAMPLES)(fluid.command)
     app.command("fit", epilog=fit.EXAMPLES)(fit.command)
