@@ -23,6 +23,7 @@ from rotor.cli import (
     gas,
     info,
     isotopologues,
+    levels,
     molecules,
     raman,
     spectrum,
@@ -44,6 +45,7 @@ Examples:
   rotor spectrum my.xyz --dipole 0,0,1.85 --range 0:2000GHz --cat out.cat --plot out.png
   rotor spectrum --constants "A=835840.288 B=435351.717 C=278138.7 MHz" --dipole-abc 0,1.8546,0
   rotor info my.sdf
+  rotor levels water --jmax 5 --plot terms.png
   rotor isotopologues water
   rotor raman N2 --laser 488
   rotor thermo water --temperature 10:1000K:100 --plot heat.png
@@ -74,6 +76,7 @@ def _application() -> typer.Typer:
 
     app.command("spectrum", epilog=spectrum.EXAMPLES)(spectrum.command)
     app.command("info", epilog=info.EXAMPLES)(info.command)
+    app.command("levels", epilog=levels.EXAMPLES)(levels.command)
     app.command("molecules", epilog=molecules.EXAMPLES)(molecules.command)
     app.command("isotopologues", epilog=isotopologues.EXAMPLES)(isotopologues.command)
     app.command("raman", epilog=raman.EXAMPLES)(raman.command)

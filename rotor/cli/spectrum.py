@@ -225,10 +225,10 @@ def _draw(answer: SpectrumAnswer, path: Path, record: dict[str, Any]) -> None:
 
 
 def _show(answer: SpectrumAnswer, content: dict[str, Any]) -> None:
-    from rotor.cli.shared.report import heading
+    from rotor.cli.shared import report
 
     lines = answer.lines
-    print(heading(lines.top))
+    print(report.heading(lines.top))
     show_facts(_facts(lines, content))
     if len(lines) == 0:
         print(f"\nno lines: {_why_none(answer)}")
@@ -236,6 +236,8 @@ def _show(answer: SpectrumAnswer, content: dict[str, Any]) -> None:
     if len(content["strongest"]):
         print()
         show_table(_lines_table(lines, content["strongest"], content["optical_depth"]))
+    print()
+    show_facts(report.model_facts(content))
 
 
 def _facts(lines: Lines, content: dict[str, Any]) -> list[tuple[str, str]]:

@@ -174,9 +174,10 @@ def write(thing: Any, path: str | os.PathLike[str], *, settings: Mapping[str, An
 
     Lines: .cat, .cat.gz, .hitran, .csv, .parquet, .json; catalogue: .cat, .cat.gz; HITRAN's lines: .hitran; these and every
     other table (levels, Raman lines, spectra, motions, thermodynamic functions, correlation functions, tests of
-    equipartition, runs of a fluid): .csv, .parquet, .json. An existing file is replaced at the end, whole or not at all.
-    settings: what the provenance shall say besides; for lines, `{"tag": 18003}` is the tag of a .cat, `{"molecule": 1,
-    "isotopologue": 1, "abundance": 0.997}` what `hitran_lines` asks for. Parquet and JSON carry the provenance inside, the
-    others in a file beside, `path` + ".provenance.json". Raises ValueError for a thing or a suffix that has no format.
+    equipartition, runs of a fluid): .csv, .parquet, .json; levels that were selected (`answer_levels`): .egy too. An existing
+    file is replaced at the end, whole or not at all. settings: what the provenance shall say besides; for lines,
+    `{"tag": 18003}` is the tag of a .cat, `{"molecule": 1, "isotopologue": 1, "abundance": 0.997}` what `hitran_lines` asks
+    for. Parquet and JSON carry the provenance inside, the others in a file beside, `path` + ".provenance.json". Raises
+    ValueError for a thing or a suffix that has no format.
     """
     writer_of(thing, path)(thing, path, settings or {})

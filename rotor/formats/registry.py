@@ -17,6 +17,7 @@ LINES = "rotor.spectra.lines:Lines"
 TABLE = "rotor.table:Table"
 MOTION = "rotor.classical.integrators.method:Motion"
 CATALOGUE = "rotor.formats.spcat.catalogue:Catalogue"
+LEVELS = "rotor.quantum.request:SelectedLevels"
 HITRAN = "rotor.formats.hitran:HitranLines"
 
 Writer = Callable[[Any, str | os.PathLike[str], Mapping[str, Any]], None]
@@ -62,7 +63,13 @@ FORMATS = (
     ),
     Format("input of SPFIT and SPCAT", (".par", ".var", ".int"), "rotor.formats.read_write:read_spcat_top"),
     Format("measured lines of SPFIT", (".lin", ".lin.gz"), "rotor.formats.spcat.lin:read_lin"),
-    Format("levels of SPCAT", (".egy", ".egy.gz"), "rotor.formats.spcat.egy:read_egy"),
+    Format("levels of SPCAT", (".egy.gz",), "rotor.formats.spcat.egy:read_egy"),
+    Format(
+        "levels of SPCAT",
+        (".egy",),
+        "rotor.formats.spcat.egy:read_egy",
+        {LEVELS: "rotor.formats.spcat.level_list:write_level_list"},
+    ),
     Format(
         "data of LAMDA",
         (".dat",),

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from rotor.fit.fit import Fit
-from rotor.plots.spectrum import BLUE, DPI, GREY, STYLE
-from rotor.version import version
+from rotor.plots.picture import BLUE, GREY, ORANGE, checked_suffix, new_figure, save, styled
 
-RED = "#D55E00"  # of Okabe and Ito's palette
 _HEADINGS = {
     "j": "J of the upper state",
     "ka": "Ka of the upper state",
@@ -30,23 +27,15 @@ def plot_fit(
 
     Raises ValueError for another suffix.
     """
-    suffix = Path(path).suffix.lower()
-    if suffix not in (".png", ".pdf", ".svg"):
-        raise ValueError(f"{os.fspath(path)}: a picture is .png, .pdf or .svg; the suffix names the format")
-
-    import matplotlib as mpl
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
+    checked_suffix(path)
     panels = [("frequency", fit.lines.frequency_mhz / 1e3)]
     panels += [
         (_HEADINGS[name], fit.lines.upper[:, i].astype(float))
         for i, name in enumerate(fit.lines.names)
         if name in _HEADINGS
     ]
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(7.2, 1.6 * len(panels) + 0.6), dpi=DPI, layout="constrained")
-        FigureCanvasAgg(figure)
+    with styled():
+        figure = new_figure((7.2, 1.6 * len(panels) + 0.6))
         for place, (heading, x) in enumerate(panels, 1):
             axes = figure.add_subplot(len(panels), 1, place)
             _draw(axes, fit, x)
@@ -56,7 +45,9 @@ def plot_fit(
             f"{title or fit.lines.source}: weighted rms {fit.weighted_rms:.3g}, {len(fit.groups)} frequencies{status}"
         )
         figure.axes[0].set_title(heading.replace("$", r"\$"), loc="left")
-        figure.savefig(path, dpi=DPI, metadata=_metadata(suffix, fit, provenance or {}))
+        names = fit.constants.text() if fit.constants else fit.parameters.names
+        facts = {"constants": names, "weighted_rms": fit.weighted_rms, "converged": fit.converged}
+        save(figure, path, heading, {**(provenance or {}), **facts})
 
 
 def _draw(axes: Any, fit: Fit, x: np.ndarray[Any, Any]) -> None:
@@ -66,25 +57,8 @@ def _draw(axes: Any, fit: Fit, x: np.ndarray[Any, Any]) -> None:
     axes.axhspan(-1, 1, color=GREY, alpha=0.12, linewidth=0)
     axes.axhline(0.0, color=GREY, linewidth=0.7)
     axes.plot(x[used], y[used], "o", markersize=2.6, color=BLUE, alpha=0.8, markeredgewidth=0)
-    axes.plot(x[~used], y[~used], "x", markersize=4.0, color=RED)
+    axes.plot(x[~used], y[~used], "x", markersize=4.0, color=ORANGE)
     seen = np.abs(y[used][np.isfinite(y[used])])
     limit = max(3.5, 1.1 * float(seen.max(initial=0.0)))
     axes.set_ylim(-limit, limit)
     axes.set_ylabel("(obs - calc)/error")
-
-
-def _metadata(suffix: str, fit: Fit, more: Mapping[str, Any]) -> dict[str, Any]:
-    """Provenance by the keys that each format has; no date, so that the same picture is the same file."""
-    facts = {
-        **more,
-        "constants": fit.constants.text() if fit.constants else fit.parameters.names,
-        "weighted_rms": fit.weighted_rms,
-        "converged": fit.converged,
-    }
-    description = "; ".join(f"{name}: {value}" for name, value in facts.items())
-    program = f"rotor {version()}"
-    if suffix == ".png":
-        return {"Software": program, "Description": description}
-    if suffix == ".pdf":
-        return {"Creator": program, "Subject": description, "CreationDate": None}
-    return {"Creator": program, "Description": description, "Date": None}

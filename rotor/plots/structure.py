@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from rotor.molecules.molecule import Molecule
-from rotor.plots.spectrum import DPI, GREY, STYLE, formula_text
+from rotor.plots.picture import GREY, checked_suffix, formula_text, new_figure, save, styled
 from rotor.structure.coordinates import bonded
 from rotor.structure.substitution import Value
-from rotor.version import version
 
 _MARGIN = 0.9  # Å around the atoms
 
@@ -44,22 +42,14 @@ def plot_structure(
     ValueError
         For a suffix that is no picture.
     """
-    suffix = Path(path).suffix.lower()
-    if suffix not in (".png", ".pdf", ".svg"):
-        raise ValueError(f"{os.fspath(path)}: a picture is .png, .pdf or .svg; the suffix names the format")
-
-    import matplotlib as mpl
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
+    checked_suffix(path)
     x = molecule.positions_angstrom
     spread = np.ptp(x, axis=0)
     across, up, depth = np.argsort(-spread, kind="stable")
     width, height = max(spread[across] + 2 * _MARGIN, 2.5), max(spread[up] + 2 * _MARGIN, 2.0)
     scale = min(7.2 / width, 6.0 / height, 1.5)
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(width * scale, height * scale + 0.5), dpi=DPI, layout="constrained")
-        FigureCanvasAgg(figure)
+    with styled():
+        figure = new_figure((width * scale, height * scale + 0.5))
         axes = figure.add_subplot()
         _draw_bonds(axes, molecule, values, int(across), int(up), scale)
         _draw_atoms(axes, molecule, int(across), int(up), int(depth), scale)
@@ -70,7 +60,9 @@ def plot_structure(
         axes.set_xlabel(f"{'abc'[across]} (Å)")
         axes.set_ylabel(f"{'abc'[up]} (Å)")
         axes.set_title(title or formula_text(molecule.formula), loc="left")
-        figure.savefig(path, dpi=DPI, metadata=_metadata(suffix, molecule, title, provenance or {}))
+        places = np.round(x, 6).tolist()
+        atoms = [[symbol, *place] for symbol, place in zip(molecule.symbols, places, strict=True)]
+        save(figure, path, title, {**(provenance or {}), "atoms": atoms})
 
 
 def _draw_bonds(axes: Any, molecule: Molecule, values: Sequence[Value], across: int, up: int, scale: float) -> None:
@@ -108,15 +100,3 @@ def _draw_atoms(axes: Any, molecule: Molecule, across: int, up: int, depth: int,
             Circle(place, 0.42 * covalent_radii[number], facecolor=colour, edgecolor=GREY, linewidth=0.8, zorder=2)
         )
         axes.text(*place, f"{molecule.symbols[atom]}{atom + 1}", ha="center", va="center", fontsize=7.0, zorder=3)
-
-
-def _metadata(suffix: str, molecule: Molecule, title: str, more: Mapping[str, Any]) -> dict[str, Any]:
-    """Provenance by the keys that each format has; no date, so that the same picture is the same file."""
-    atoms = [[s, *x] for s, x in zip(molecule.symbols, np.round(molecule.positions_angstrom, 6).tolist(), strict=True)]
-    description = "; ".join(f"{name}: {value}" for name, value in {**more, "atoms": atoms}.items())
-    program = f"rotor {version()}"
-    if suffix == ".png":
-        return {"Software": program, "Title": title, "Description": description}
-    if suffix == ".pdf":
-        return {"Creator": program, "Title": title, "Subject": description, "CreationDate": None}
-    return {"Creator": program, "Title": title, "Description": description, "Date": None}

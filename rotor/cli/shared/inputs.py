@@ -114,6 +114,17 @@ def temperatures(name: str, text: str) -> list[float]:
     return found
 
 
+def whole_range(name: str, text: str) -> tuple[int, int]:
+    """First and last of a range of whole numbers, `2:5` or `3`."""
+    parts = [part.strip() for part in text.split(":")]
+    if len(parts) > 2 or not all(part.isdecimal() for part in parts):
+        raise ValueError(f"{name}: {text!r}: expected a whole number or a range of them, such as 2:5")
+    first, last = int(parts[0]), int(parts[-1])
+    if first > last:
+        raise ValueError(f"{name}: {text!r}: expected a range that rises, but {first} is above {last}")
+    return first, last
+
+
 def times(name: str, text: str | None, unit: str) -> tuple[float, ...] | None:
     """Finite times in `unit` from a grid or a list; None: none were given."""
     if text is None:
