@@ -10,30 +10,18 @@ import os
 import shlex
 import sys
 from collections.abc import Sequence
+from importlib import import_module
 from typing import cast
 
 import typer
 
-from rotor.cli import (
-    align,
-    cat,
-    convert,
-    fit,
-    fluid,
-    gas,
-    info,
-    isotopologues,
-    levels,
-    molecules,
-    raman,
-    spectrum,
-    stark,
-    structure,
-    thermo,
-    tumble,
-)
+from rotor.cli.shared.options import PlainCommand
 from rotor.cli.shared.output import ComputationError
 
+VERBS = (
+    "spectrum", "info", "levels", "molecules", "isotopologues", "raman", "thermo", "tumble", "stark", "align", "gas", "fluid",
+    "fit", "structure", "convert", "cat",
+)  # fmt: skip
 NO_ANSWER, WRONG_INPUT, INTERRUPTED = 1, 2, 130
 # click's ClickException, whether click is a package of its own or, in a newer typer, a part of it
 _ERROR_OF_USE = cast(type[Exception], typer.BadParameter.__mro__[2])
@@ -58,7 +46,8 @@ Examples:
   rotor structure family.toml --plot molecule.png"""
 
 
-def _application() -> typer.Typer:
+def _application(verbs: Sequence[str] = VERBS) -> typer.Typer:
+    """The command with some of its verbs."""
     app = typer.Typer(
         add_completion=False,
         pretty_exceptions_enable=False,
@@ -74,22 +63,9 @@ def _application() -> typer.Typer:
     ) -> None:
         pass
 
-    app.command("spectrum", epilog=spectrum.EXAMPLES)(spectrum.command)
-    app.command("info", epilog=info.EXAMPLES)(info.command)
-    app.command("levels", epilog=levels.EXAMPLES)(levels.command)
-    app.command("molecules", epilog=molecules.EXAMPLES)(molecules.command)
-    app.command("isotopologues", epilog=isotopologues.EXAMPLES)(isotopologues.command)
-    app.command("raman", epilog=raman.EXAMPLES)(raman.command)
-    app.command("thermo", epilog=thermo.EXAMPLES)(thermo.command)
-    app.command("tumble", epilog=tumble.EXAMPLES)(tumble.command)
-    app.command("stark", epilog=stark.EXAMPLES)(stark.command)
-    app.command("align", epilog=align.EXAMPLES)(align.command)
-    app.command("gas", epilog=gas.EXAMPLES)(gas.command)
-    app.command("fluid", epilog=fluid.EXAMPLES)(fluid.command)
-    app.command("fit", epilog=fit.EXAMPLES)(fit.command)
-    app.command("structure", epilog=structure.EXAMPLES)(structure.command)
-    app.command("convert", epilog=convert.EXAMPLES)(convert.command)
-    app.command("cat", epilog=cat.EXAMPLES)(cat.command)
+    for verb in verbs:
+        module = import_module(f"rotor.cli.{verb}")
+        app.command(verb, cls=PlainCommand, epilog=module.EXAMPLES)(module.command)
     return app
 
 
@@ -104,7 +80,8 @@ def _print_version(wanted: bool) -> None:
 def run(arguments: Sequence[str] | None = None) -> int:
     """Carry out a command and return its exit code; a mistake of the user is one line on standard error."""
     arguments = sys.argv[1:] if arguments is None else list(arguments)
-    command = typer.main.get_command(_application())
+    verbs = arguments[:1] if arguments[:1] and arguments[0] in VERBS else VERBS  # what is not asked for is not loaded
+    command = typer.main.get_command(_application(verbs))
     provenance = shlex.join(["rotor", *arguments])
     try:
         with command.make_context("rotor", arguments or ["--help"], obj=provenance) as context:
