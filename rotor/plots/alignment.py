@@ -11,7 +11,7 @@ import numpy as np
 from rotor.alignment.align import AlignmentTrace
 from rotor.alignment.pulse import Kick
 from rotor.arrays import Floats
-from rotor.plots.spectrum import DPI, STYLE
+from rotor.plots.picture import DPI, STYLE
 from rotor.plots.stark import COLOURS
 from rotor.version import version
 

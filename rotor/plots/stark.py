@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from rotor.plots.spectrum import DPI, STYLE
+from rotor.plots.picture import DPI, STYLE
 from rotor.quantum.field_map import FieldMap
 from rotor.units import MHZ_PER_CM
 from rotor.version import version

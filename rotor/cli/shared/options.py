@@ -124,7 +124,7 @@ class PlainCommand(typer.core.TyperCommand):
     def __init__(self, *arguments: Any, **settings: Any) -> None:
         super().__init__(*arguments, **settings)
         for parameter in self.params:
-            parameter.process_value = _unchanged  # type: ignore[method-assign]
+            parameter.process_value = _unchanged  # type: ignore[method-assign, assignment]
 
 
 def _unchanged(context: Any, value: Any) -> Any:
