@@ -111,13 +111,13 @@ def derivatives(top: Top, levels: Levels, names: Sequence[str], rows: Ints) -> F
         raise ValueError("these levels have no vectors; solve them with their spins anew")
     shared = levels.blocks[0].shared
     for column, name in enumerate(names):
-        of_name = _Derivative(top, levels.effects, name, shared)
+        of_name = ParameterOperator(top, levels.effects, name, shared)
         for block in levels.blocks:
             out[block.start : block.start + len(block.energies_mhz), column] = of_name.expectations(block)
     return np.asarray(out[rows])
 
 
-class _Derivative:
+class ParameterOperator:
     """∂H/∂c of one parameter over the parts of spin blocks, each element of the rotation computed once."""
 
     def __init__(self, top: Top, effects: Sequence[QuantumEffect], name: str, shared: Shared) -> None:
@@ -132,7 +132,7 @@ class _Derivative:
         known: dict[Channel, Floats] = {}
         for a, up in enumerate(block.parts):
             for low in block.parts[: a + 1]:
-                for channel, element in self._elements(up, low).items():
+                for channel, element in self.elements(up, low).items():
                     if channel not in known:
                         known[channel] = coefficients_of(self._shared.scheme, channel, block.patterns)
                     matrix = product(known[channel][up.patterns, low.patterns], element)
@@ -140,7 +140,8 @@ class _Derivative:
                     total += (2.0 if low is not up else 1.0) * np.einsum("in,in->n", bra, matrix @ ket)
         return total
 
-    def _elements(self, up: SpinPart, low: SpinPart) -> dict[Channel, Floats]:
+    def elements(self, up: SpinPart, low: SpinPart) -> dict[Channel, Floats]:
+        """Elements between the states of the rotation of two parts, by channel."""
         key = (up.number, low.number)
         if key not in self._known:
             found = operators_between(up.rotor, low.rotor, self._channels, self._shared.representation)
