@@ -62,6 +62,8 @@ def plot_spectrum(
     provenance : mapping, optional
         What the metadata of the file shall say besides version, constants and settings.
 
+    Notes
+    -----
     The axis of intensity is logarithmic where fewer than ten lines would be seen on a linear one. Raises ValueError for
     a suffix that is no picture and for a spectrum without lines or with nothing in the range.
     """

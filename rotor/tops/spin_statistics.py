@@ -56,6 +56,8 @@ def weights_of(
     inversion : None leaves inversion doublets unresolved; `"symmetric"` or `"antisymmetric"` gives the weights of the
         one state of a molecule that inverts through the plane of its a and b axes, such as NH3.
 
+    Examples
+    --------
     >>> water = Molecule(("O", "H", "H"), [[0, 0, 0.1173], [0, 0.7572, -0.4692], [0, -0.7572, -0.4692]])
     >>> weights_of(water).to_mapping()
     {'ee': 1, 'eo': 3, 'oe': 3, 'oo': 1}

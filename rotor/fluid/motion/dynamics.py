@@ -54,6 +54,8 @@ class RigidDynamics(MolecularDynamics):
     trajectory, logfile, loginterval
         As of every ASE dynamics; the log's temperatures are those of rigid bodies.
 
+    Examples
+    --------
     >>> from ase import units
     >>> from ase.build import molecule
     >>> from ase.calculators.lj import LennardJones
