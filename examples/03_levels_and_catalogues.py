@@ -99,11 +99,11 @@ def misses(constants):
     return np.array([abs(table.get(key, -table.get((*key[3:], *key[:3]), np.nan)) - f) for key, f in measured.items()])
 
 
-kept: tuple[str, ...] = ("A", "B", "C")
+used: tuple[str, ...] = ("A", "B", "C")
 off = {}
 for order, names in orders.items():
-    kept += names
-    part = {name: value for name, value in water.constants.values.items() if name in kept}
+    used += names
+    part = {name: value for name, value in water.constants.values.items() if name in used}
     off[order] = misses(rotor.Constants(**part, reduction="S", representation="Ir"))
     print(f"{order:8} median {np.median(off[order]):12.3f} MHz, worst {off[order].max():14.3f} MHz")
 

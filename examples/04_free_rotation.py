@@ -55,9 +55,9 @@ for axis, fixed in enumerate(fixed_axes(book, 1.0)):
     assert (tipped < 1.2) == (fixed.kind == "stable")  # 0.57° to start with
     assert (tipped > 178) == (fixed.kind == "unstable")  # turned over
 
-    kept = invariants(momentum, attitude, book)
-    assert np.ptp(kept.energy) < 1e-14 * kept.energy[0]
-    assert np.abs(kept.space_momentum - (spin + aside)).max() < 1e-14 * kept.momentum[0]
+    conserved = invariants(momentum, attitude, book)
+    assert np.ptp(conserved.energy) < 1e-14 * conserved.energy[0]
+    assert np.abs(conserved.space_momentum - (spin + aside)).max() < 1e-14 * conserved.momentum[0]
 
 # %% [markdown]
 # ## How fast each fate comes
@@ -94,11 +94,11 @@ assert abs(sigma / turn_per_s - math.sqrt(1 / 3)) < 1e-14  # a factor of 37.6 in
 # intermediate axis, parts the curves about the first axis (blue) from those about the third (green).
 
 # %%
-thrown = rotor.free_motion(book, off_intermediate_axis(book, book[1] * turn_per_s, math.radians(0.5)))
-seconds = np.linspace(0, 2 * thrown.period, 400)
-keep(polhode_figure(thrown, seconds, time_label="$t$ (s)", title="A book, half a degree off"), "book.png")
+flight = rotor.free_motion(book, off_intermediate_axis(book, book[1] * turn_per_s, math.radians(0.5)))
+seconds = np.linspace(0, 2 * flight.period, 400)
+keep(polhode_figure(flight, seconds, time_label="$t$ (s)", title="A book, half a degree off"), "book.png")
 
-path = thrown.at(seconds)[0]
+path = flight.at(seconds)[0]
 assert np.ptp(level(book, path)) < 1e-14 * level(book, path[0])  # one polhode
 assert (np.diff(np.sign(path[:, 1])) != 0).sum() == 4  # turned over four times in two periods
 
@@ -109,17 +109,17 @@ assert (np.diff(np.sign(path[:, 1])) != 0).sum() == 4  # turned over four times 
 # later too, and two tumbles that start a little apart separate in proportion to time: no Lyapunov exponent is positive.
 
 # %%
-again, _ = thrown.at(np.array([0.0, 1e6]) * thrown.period)
+again, _ = flight.at(np.array([0.0, 1e6]) * flight.period)
 print(f"after 10⁶ periods L in the body is back to {np.abs(again[1] - again[0]).max() / np.linalg.norm(again[0]):.1e}")
 assert np.allclose(
     again[1], again[0], atol=1e-6 * np.linalg.norm(again[0])
 )  # the period rounds: 1e-16 times 1e6 and σT
 
-neighbour = rotor.free_motion(book, thrown.momentum0 * (1 + 1e-12))
+neighbour = rotor.free_motion(book, flight.momentum0 * (1 + 1e-12))
 gaps = []
 for periods in (100, 1000, 10000):
-    window = (periods + np.linspace(0, 1, 1000)) * float(thrown.period)
-    gaps.append(np.linalg.norm(neighbour.at(window)[0] - thrown.at(window)[0], axis=1).max())
+    window = (periods + np.linspace(0, 1, 1000)) * float(flight.period)
+    gaps.append(np.linalg.norm(neighbour.at(window)[0] - flight.at(window)[0], axis=1).max())
 print("gap after 100, 1000, 10000 periods:", ", ".join(f"{gap / gaps[0]:.2f}" for gap in gaps), "of the first")
 assert np.allclose(np.array(gaps) / gaps[0], np.array([101, 1001, 10001]) / 101, rtol=0.02)  # linear, not e^(σt)
 
@@ -150,7 +150,7 @@ rows = {
     "growth per radian": [f"{float(growth_rate(body, body[1])):.4f}" for body in (book, moments)],
     "|L|": ["", f"{size / HBAR_CLASSICAL:.3f} ħ"],
     "one turn": ["1 s", f"{2 * math.pi * moments[1] / size * ASE_TIME_PS:.3f} ps"],
-    "turned over after": [f"{thrown.period / 2:.3f} s", f"{period_ps / 2:.3f} ps"],
+    "turned over after": [f"{flight.period / 2:.3f} s", f"{period_ps / 2:.3f} ps"],
 }
 for name, (first, second) in rows.items():
     print(f"{name:22s}{first:>14s}{second:>14s}")

@@ -34,7 +34,7 @@ def gas_of(name, molecules, seed):
 # %% [markdown]
 # ## Six gases
 #
-# Of n molecules Σ 2E/kT follows χ² with n degrees, exactly. How far each mean is off is told in σ; the sum of their squares is
+# Of n molecules Σ 2E/kT follows χ² with n degrees, exactly. How far each mean is off is given in σ; the sum of their squares is
 # one statement for all degrees of a gas, the largest distance between distributions another.
 
 # %%

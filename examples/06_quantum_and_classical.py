@@ -34,7 +34,7 @@ tops = {name: rigid(rotor.read(name)) for name in ("water", "OCS")}  # distortio
 # %%
 kt = EV_PER_K * 300
 times_ps = np.linspace(0, 4, 41)
-for name, kept in (("OCS", 0.0), ("water", 0.0), ("NH3", None)):
+for name, remains in (("OCS", 0.0), ("water", 0.0), ("NH3", None)):
     top = rotor.read(name)
     moments, dipole = top.moments_u_angstrom2, top.dipole_abc_debye
     rng = np.random.default_rng(1)
@@ -44,7 +44,7 @@ for name, kept in (("OCS", 0.0), ("water", 0.0), ("NH3", None)):
     print(
         f"{name:6s} C1 = 1 - {second / 2:7.3f} t² + ..., ends at {stays:.4f}; at 4 ps {gas.c1[-1]:+.4f} ± {gas.c1_error[-1]:.4f}"
     )
-    assert kept is None or stays == kept
+    assert remains is None or stays == remains
     if name == "OCS":
         closed, _ = linear_curves(times_ps / ASE_TIME_PS, moments[1], kt)
         assert np.abs((gas.c1 - closed)[1:] / gas.c1_error[1:]).max() < 4  # standard errors
@@ -113,7 +113,7 @@ assert abs(cold.area - 1) < 2 * noise  # even there the area is the same
 
 # %% [markdown]
 # Where hB/kT is small, as for OCS at 300 K (0.001), band and lines are one curve. Water has hA/kT = 0.13 at 300 K: its band lies
-# within 3 % of the peak. At 30 K a handful of lines is left, and the classical band lies where no line is. And whoever looks
+# within 3 % of the peak. At 30 K a handful of lines is left, and the classical band lies where no line is. A reader who looks
 # closely enough sees lines at any temperature: those of OCS at 3 K stand 0.4 cm⁻¹ apart, the classical band runs through them.
 
 # %% [markdown]

@@ -169,9 +169,11 @@ def test_coordinates_are_set_without_loss_of_symmetry():
     molecule = symmetric_geometry(rotor.read("CH3CN").molecule)
     space, coordinates = symmetric_displacements(molecule), bonds_and_angles(molecule)[:4]
     changes = np.array([0.02, -0.01, 0.005, 1.5])
-    wanted = changes + [one.value(molecule.positions_angstrom) for one in coordinates]
-    moved = moved_to(molecule.positions_angstrom, space, coordinates, wanted)
-    assert [one.value(moved) for one in coordinates] == pytest.approx(wanted, abs=1e-10)  # Newton's method to round-off
+    expected = changes + [one.value(molecule.positions_angstrom) for one in coordinates]
+    moved = moved_to(molecule.positions_angstrom, space, coordinates, expected)
+    assert [one.value(moved) for one in coordinates] == pytest.approx(
+        expected, abs=1e-10
+    )  # Newton's method to round-off
     assert symmetry_of(Molecule(molecule.symbols, moved), 1e-8).point_group == "C3v"
 
 

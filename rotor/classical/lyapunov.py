@@ -1,6 +1,6 @@
 """Chaos of driven and damped bodies: Lyapunov exponents, Kaplan-Yorke dimension, Poincaré sections.
 
-Exponents are those of the linearised flow along an orbit: as many tangent vectors as exponents are wanted are carried
+Exponents are those of the linearised flow along an orbit: as many tangent vectors as exponents are asked for are carried
 along, made orthogonal again at short intervals, and the logarithms of what they grew by are averaged (G. Benettin,
 L. Galgani, A. Giorgilli, J.-M. Strelcyn, Meccanica 15, 9 (1980)). The full sum equals the mean divergence of the flow,
 which is integrated beside it and is the check that every result carries.
@@ -158,9 +158,9 @@ def quadratic_form(flow: Flow) -> tuple[Floats, Floats, Floats] | None:
     mixed[np.arange(d), np.arange(d)] = squares
     quadratic = np.moveaxis(mixed, -1, 0)
     y = np.random.default_rng(0).normal(size=(16, d)) * (1.0 + np.max(np.abs(flow.start)))
-    wanted = flow.rate(0.0, y)
+    expected = flow.rate(0.0, y)
     found = constant + y @ linear + np.einsum("ijk,nj,nk->ni", quadratic, y, y)
-    if np.max(np.abs(found - wanted)) > 1e-12 * np.max(np.abs(wanted)):
+    if np.max(np.abs(found - expected)) > 1e-12 * np.max(np.abs(expected)):
         return None
     return constant, np.ascontiguousarray(linear.T), np.ascontiguousarray(quadratic)
 

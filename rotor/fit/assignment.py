@@ -19,7 +19,7 @@ class Assignments(Table):
     """Assigned lines as columns of equal length n.
 
     names : quantum numbers of a state, such as ("j", "ka", "kc"). upper, lower (n, k) : labels of the two states
-    frequency_mhz, error_mhz (n,) : measured. A line of wavenumbers is kept in MHz and marked in `wavenumber` (n,)
+    frequency_mhz, error_mhz (n,) : measured. A line of wavenumbers is stored in MHz and marked in `wavenumber` (n,)
     weight (n,) : share within its blend. blend (n,) : lines of one number are one measured frequency, the mean of their
     calculated ones by weight; a line alone has a number of its own
     source : where the lines are from. comments : by line, what was written beside it
@@ -152,19 +152,19 @@ def merged(first: Assignments, second: Assignments, *, same_within_mhz: float = 
     if first.names != second.names:
         raise ValueError(f"lines by {', '.join(first.names)} and by {', '.join(second.names)} cannot be merged")
     here = {_key(first, i): i for i in range(len(first))}
-    kept, notes = [], list[str]()
+    chosen, notes = [], list[str]()
     for i in range(len(second)):
         twin = here.get(_key(second, i))
         if twin is None:
-            kept.append(i)
+            chosen.append(i)
             continue
         apart = abs(first.frequency_mhz[twin] - second.frequency_mhz[i])
         if apart <= same_within_mhz:
             notes.append(f"{second.text(i)}: in both, once in the result")
         else:
             notes.append(f"{second.text(i)}: in both, {apart:.4f} MHz apart; both stay")
-            kept.append(i)
-    more = second.take(np.array(kept, dtype=np.int64))
+            chosen.append(i)
+    more = second.take(np.array(chosen, dtype=np.int64))
     shift = int(first.blend.max(initial=-1)) + 1
     fields = ("upper", "lower", "frequency_mhz", "error_mhz", "weight", "wavenumber")
     joined: dict[str, Any] = {name: np.concatenate([getattr(first, name), getattr(more, name)]) for name in fields}

@@ -231,7 +231,7 @@ def choose_constants(
         return trial.fit
 
     before = -1
-    while len(taken) > before:  # once more while something was taken: a higher order may have made room for a lower one
+    while len(taken) > before:  # once more while something was taken: a higher order may have made a lower one count
         before = len(taken)
         for order in sorted(set(orders.values())):
             while len(taken) < _MOST_STEPS:

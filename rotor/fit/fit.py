@@ -474,9 +474,9 @@ def _constants(
         used = row != 0
         if moves and np.isfinite(covariance.diagonal()[used]).all():
             errors[name] = float(np.sqrt(row[used] @ covariance[np.ix_(used, used)] @ row[used]))
-    kept = {name: value for name, value in constants.uncertainties.items() if name not in new}
+    unchanged = {name: value for name, value in constants.uncertainties.items() if name not in new}
     try:
-        return constants.replace(**new, uncertainties={**kept, **errors}), ""
+        return constants.replace(**new, uncertainties={**unchanged, **errors}), ""
     except ValueError as error:
         return constants, str(error)
 

@@ -68,7 +68,7 @@ def parameters(
         The start; those not free stay as they are. A free constant that the set does not have must be added to it first.
     free : sequence of str
     ties : sequence of str
-        Such as "DeltaK = 2.5*DeltaJ" (a ratio kept) or "C = B - 300" (a difference kept, MHz or with a unit): the constant on
+        Such as "DeltaK = 2.5*DeltaJ" (a fixed ratio) or "C = B - 300" (a fixed difference, MHz or with a unit): the constant on
         the left follows the one on the right and is not free itself.
     priors_mhz : mapping, optional
         A-priori standard errors of free constants, which then are drawn to their start.

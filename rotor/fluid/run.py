@@ -1,6 +1,6 @@
 """Long runs of a fluid: rows and frames as they come, checkpoints, and exact restarts.
 
-After each checkpoint the calculator is told to forget what it knows (lists of neighbours, the last result), as it has after a
+After each checkpoint the calculator forgets its lists of neighbours and its last result, as it has after a
 restart: what follows depends on the checkpoint alone, and a run that was killed and resumed ends bit for bit where the
 uninterrupted one does, on one machine with the same settings and the same interval of checkpoints.
 """
@@ -72,7 +72,7 @@ class Outputs:
         for name in ("frames_every", "checkpoint_every"):
             value = getattr(self, name)
             if value is not None and value < 1:
-                raise ValueError(f"{name} = {value}: at least 1 is wanted")
+                raise ValueError(f"{name} = {value}: expected at least 1")
 
 
 def run_fluid(
@@ -94,9 +94,9 @@ def run_fluid(
         drawn at `settings.temperature_k`.
     resume : bool
         Continue from `outputs.checkpoint`; the files that grow are cut back to where they were then.
-    told : callable, optional
-        Progress step, steps and ns per day from time to time; without it a bar is shown on a terminal.
-    begun : callable, optional
+    progress : callable, optional
+        Called with step, steps and ns per day from time to time; without it a bar is shown on a terminal.
+    on_start : callable, optional
         Called once everything is found to be in order and the files are open.
 
     Raises
@@ -116,7 +116,7 @@ def run_fluid(
     if resume:
         assert outputs.checkpoint is not None
         run.restore(read_checkpoint(outputs.checkpoint))
-    dynamics.wrench()  # what cannot begin is told before any file is opened
+    dynamics.wrench()  # what cannot begin is refused before any file is opened
     with run.files(), progress_bar(settings.steps, progress) as shown:
         on_start()
         run.go(shown)
@@ -276,7 +276,7 @@ class _Run:
             before = ", ".join(about["files"]) or "none"
             raise ValueError(f"{path}: the run that is resumed wrote these files: {before}; name the same ones")
         if about["step"] > self.settings.steps:
-            raise ValueError(f"{path}: is of step {about['step']}, beyond the {self.settings.steps} steps wanted")
+            raise ValueError(f"{path}: is of step {about['step']}, beyond the {self.settings.steps} steps asked for")
         state = State(*(np.array(arrays[name]) for name in ("centres", "momentum", "spin", "carry")))
         if self.dynamics.thermostat is not None:
             self.dynamics.thermostat.restore(about["thermostat"])
@@ -357,7 +357,7 @@ def ns_per_day(settings: Settings, steps: int, seconds: float) -> float:
 
 @contextmanager
 def progress_bar(steps: int, progress: Progress | None) -> Iterator[Progress]:
-    """Who is told of the progress: the caller's function, else a bar on a terminal, else nobody."""
+    """What shows the progress: the caller's function, else a bar on a terminal, else nothing."""
     if progress is not None or not sys.stderr.isatty():
         yield progress or (lambda step, steps, speed: None)
         return

@@ -2,7 +2,7 @@
 
 A .csv has a column for each quantum number of both states (`j_upper`, `ka_upper`, `kc_upper`, `j_lower`, ...), a frequency
 (`frequency_mhz`, `frequency_ghz` or `wavenumber_cm`), its error (`error_mhz`, `error_khz`, `error_ghz` or `error_cm`), and, where
-wanted, `weight`, `blend` (one text or number for the lines of one measured frequency) and `comment`. Of a catalogue the lines
+asked for, `weight`, `blend` (one text or number for the lines of one measured frequency) and `comment`. Of a catalogue the lines
 measured in a laboratory are taken (a negative tag); those of one frequency and error are one blend by intensity.
 """
 
@@ -69,19 +69,19 @@ def read_assigned_lines(path: str | os.PathLike[str], names: Sequence[str]) -> t
 def _of_lin(path: str | os.PathLike[str], names: Sequence[str]) -> tuple[Assignments, list[str]]:
     lines = read_lin(path)
     blends = lines.blends()
-    kept = blends >= 0
-    notes = [] if kept.all() else [f"{int((~kept).sum())} lines that give the width of a blend do not count"]
-    for i in np.flatnonzero(kept).tolist():
+    counts = blends >= 0
+    notes = [] if counts.all() else [f"{int((~counts).sum())} lines that give the width of a blend do not count"]
+    for i in np.flatnonzero(counts).tolist():
         count = len(lines.measured(i).quanta) // 2
         if count != len(names):
             raise ValueError(
                 f"{path}, line {i + 1} of the list: {count} quantum numbers for each state; {len(names)} are needed "
                 f"({', '.join(names)})"
             )
-    upper, lower = (side[kept][:, : len(names)] for side in lines.states())
+    upper, lower = (side[counts][:, : len(names)] for side in lines.states())
     return assignments(
-        names, upper, lower, lines.frequency_mhz[kept], lines.error_mhz[kept], weight=lines.weight[kept],
-        blend=blends[kept], wavenumber=(lines.error < 0)[kept], source=Path(path).name,
+        names, upper, lower, lines.frequency_mhz[counts], lines.error_mhz[counts], weight=lines.weight[counts],
+        blend=blends[counts], wavenumber=(lines.error < 0)[counts], source=Path(path).name,
     ), notes  # fmt: skip
 
 

@@ -202,11 +202,11 @@ def nearest_rotation(matrix: ArrayLike) -> NearestRotation:
     """
     m = _matrices(matrix)
     u, s, vt = np.linalg.svd(m)
-    handed = np.sign(np.linalg.det(u) * np.linalg.det(vt))
-    signs = np.stack([np.ones_like(handed), np.ones_like(handed), handed], axis=-1)
+    sense = np.sign(np.linalg.det(u) * np.linalg.det(vt))
+    signs = np.stack([np.ones_like(sense), np.ones_like(sense), sense], axis=-1)
     rotation = (u * signs[..., None, :]) @ vt
     distance_from_input = np.linalg.norm(m - rotation, axis=(-2, -1))
-    gap = s[..., 1] + handed * s[..., 2]
+    gap = s[..., 1] + sense * s[..., 2]
     return NearestRotation(rotation, distance_from_input, gap > 1e-12 * np.maximum(s[..., 0], np.finfo(float).tiny))
 
 

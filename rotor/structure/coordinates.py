@@ -2,7 +2,7 @@
 
 A structure is refined along totally symmetric displacements u (an orthonormal basis S of those Cartesian displacements that
 every operation leaves alike, translations and rotations taken out), so that x = x₀ + S u keeps its point group whatever is
-fitted. Named coordinates q(x) are set by Newton's method, S δu = S (B S)⁺ (q_wanted - q(x)), B the matrix of Wilson; what the
+fitted. Named coordinates q(x) are set by Newton's method, S δu = S (B S)⁺ (q_target - q(x)), B the matrix of Wilson; what the
 names leave open moves as little as it can (the pseudo-inverse).
 """
 
@@ -177,8 +177,8 @@ def _rigid_motions(positions: Floats) -> Floats:
     return np.asarray(u[:, s > 1e-8 * s[0]])
 
 
-def moved_to(positions: Floats, space: Floats, coordinates: Sequence[Named], wanted: Floats) -> Floats:
-    """Positions (n, 3) at which the coordinates have the values wanted (Å, degrees), reached along `space` (3n, k).
+def moved_to(positions: Floats, space: Floats, coordinates: Sequence[Named], expected: Floats) -> Floats:
+    """Positions (n, 3) at which the coordinates have the values asked for (Å, degrees), reached along `space` (3n, k).
 
     Raises ValueError where they cannot all be had (coordinates that contradict each other, or a step that does not settle).
     """
@@ -186,7 +186,7 @@ def moved_to(positions: Floats, space: Floats, coordinates: Sequence[Named], wan
     factors = np.array([one.factor for one in coordinates])
     missing = np.inf
     for _ in range(50):
-        off = (wanted - np.array([one.value(x) for one in coordinates])) / factors
+        off = (expected - np.array([one.value(x) for one in coordinates])) / factors
         missing = float(np.abs(off).max(initial=0.0))
         if missing < 1e-12:
             return x

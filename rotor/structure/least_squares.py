@@ -111,7 +111,7 @@ def fit_structure(
 
     Notes
     -----
-    Symmetry is kept exactly. Coordinates that are neither fitted nor held move as little as possible.
+    Symmetry is preserved exactly. Coordinates that are neither fitted nor held move as little as possible.
     """
     _refuse_settings(method, weights, coordinates, held)
     problem = _Problem.of(family, method, coordinates, held, weights, leave_out)
@@ -200,9 +200,9 @@ class _Problem:
             x = self.start + (self.space @ change).reshape(self.start.shape)
         else:
             every = (*self.coordinates, *self.held)
-            wanted = np.array([one.value(self.start) for one in every])
-            wanted[: len(change)] += change * np.array([one.factor for one in self.coordinates])
-            x = moved_to(self.start, self.space, every, wanted)
+            expected = np.array([one.value(self.start) for one in every])
+            expected[: len(change)] += change * np.array([one.factor for one in self.coordinates])
+            x = moved_to(self.start, self.space, every, expected)
         if np.abs(x - self.start).max() > 2 * _FAR:
             raise ValueError("an atom would move by more than 1 Å from the start geometry; give a better one")
         return x

@@ -85,8 +85,8 @@ def substitution_structure(
         raise ValueError(f"{family.name}: r_s needs isotopologues with one atom replaced, and there is none")
 
     positions, errors = _with_equal_atoms(family, atoms, ours)
-    wanted = tuple(coordinates) or bonds_and_angles(_in_frame(family.molecule, ours))
-    values = tuple(_value(one, positions, errors) for one in wanted if _known(one, positions))
+    expected = tuple(coordinates) or bonds_and_angles(_in_frame(family.molecule, ours))
+    values = tuple(_value(one, positions, errors) for one in expected if _known(one, positions))
     return SubstitutionStructure(tuple(atoms), positions, errors, values, tuple(notes))
 
 

@@ -53,7 +53,7 @@ class Covariance:
         if sigma.shape != (len(names),) or matrix.shape != (len(names), len(names)):
             raise ValueError(
                 f"{len(names)} constants with uncertainties of shape {sigma.shape} and correlations of shape "
-                f"{matrix.shape}; ({len(names)},) and ({len(names)}, {len(names)}) are wanted"
+                f"{matrix.shape}; expected ({len(names)},) and ({len(names)}, {len(names)})"
             )
         if not np.allclose(np.diag(matrix), 1.0):
             raise ValueError("a correlation matrix has 1 on its diagonal; is this a covariance?")
@@ -82,11 +82,11 @@ def _refuse_impossible(names: Sequence[str], matrix: Floats) -> None:
         raise ValueError(f"covariance of {', '.join(names)}: a name stands twice")
     if matrix.shape != (len(names), len(names)):
         raise ValueError(
-            f"covariance of {len(names)} constants of shape {matrix.shape}: a square of that size is wanted"
+            f"covariance of {len(names)} constants of shape {matrix.shape}: expected a square of that size"
         )
     variances = np.diag(matrix)
     if not np.isfinite(matrix).all() or (variances < 0).any():
-        raise ValueError("covariance: finite numbers are wanted, and variances of 0 or more")
+        raise ValueError("covariance: expected finite numbers, and variances of 0 or more")
     sigma = np.sqrt(variances)
     scale = np.outer(np.where(sigma > 0, sigma, 1.0), np.where(sigma > 0, sigma, 1.0))
     if not np.allclose(matrix / scale, matrix.T / scale, rtol=0, atol=1e-9):

@@ -128,13 +128,13 @@ def plateau(moments: ArrayLike, vector: ArrayLike) -> float:
     ascending = inertia[order]
     if ascending[0] == ascending[2]:
         return 1.0 / 3.0
-    kept = np.zeros(3)
-    kept[order[2]] = _kept_along_third(ascending)
-    kept[order[0]] = _kept_along_third(ascending[::-1])
-    return float(kept @ unit**2)
+    shares = np.zeros(3)
+    shares[order[2]] = _share_along_third(ascending)
+    shares[order[0]] = _share_along_third(ascending[::-1])
+    return float(shares @ unit**2)
 
 
-def _kept_along_third(moments: Floats) -> float:
+def _share_along_third(moments: Floats) -> float:
     """<(mean of L3/|L|)²> over all L that circle axis 3, moments in rising or falling order.
 
     With L2/|L| = s and the angle φ in the plane of axes 1 and 3 they fill 0 < φ < atan √(I1 (I3-I2)/(I3 (I2-I1))); 1/K²

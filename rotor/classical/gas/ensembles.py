@@ -115,7 +115,7 @@ class Probe:
     def of(cls, vector: ArrayLike | None, tensor: ArrayLike | None) -> Probe:
         """From a vector and a symmetric tensor in principal axes, of any size; of the tensor its anisotropic part counts."""
         if vector is None and tensor is None:
-            raise ValueError("a vector or a tensor fixed in the molecule is wanted, or both")
+            raise ValueError("expected a vector or a tensor fixed in the molecule, or both")
         unit, axes, beta = np.array([1.0, 0.0, 0.0]), np.eye(3), np.array([2.0, -1.0, -1.0]) / np.sqrt(6.0)
         if vector is not None:
             unit = np.asarray(vector, dtype=np.float64)
@@ -137,9 +137,9 @@ def thermal_momenta(moments: ArrayLike, kt: float, size: int, *, rng: np.random.
     """
     inertia = np.asarray(moments, dtype=np.float64)
     if inertia.shape != (3,):
-        raise ValueError(f"the three moments of one kind of molecule are wanted; got shape {inertia.shape}")
+        raise ValueError(f"expected the three moments of one kind of molecule; got shape {inertia.shape}")
     if not kt > 0.0 or not np.isfinite(kt):
-        raise ValueError(f"kT = {kt}: a finite energy above 0 is wanted")
+        raise ValueError(f"kT = {kt}: expected a finite energy above 0")
     turns = rotating_axes(inertia)
     return np.asarray(rng.standard_normal((size, 3)) * np.sqrt(np.where(turns, inertia * kt, 0.0)))
 
@@ -156,7 +156,7 @@ def thermal_ensemble(
     momentum = thermal_momenta(moments, kt, size, rng=rng)
     attitude = uniform(size, rng=rng)
     if mass is not None and not mass > 0.0:
-        raise ValueError(f"mass {mass}: a number above 0 is wanted")
+        raise ValueError(f"mass {mass}: expected a number above 0")
     velocity = None if mass is None else rng.standard_normal((size, 3)) * np.sqrt(kt / mass)
     return Ensemble(np.asarray(moments, dtype=np.float64), kt, momentum, attitude, mass, velocity)
 
@@ -177,8 +177,8 @@ def free_gas_correlations(
 
     moments (3,), kt, times: any coherent units; vector (3,), tensor (3, 3): in principal axes, any size. Only the rotation
     between time 0 and t matters, so all molecules start upright. They come in pieces of 10,000, each with random numbers
-    of its own (`rng.spawn`): memory stays bounded, and the answer does not depend on the threads of `executor`. progress: is
-    told how many molecules are done. 0.09 µs per molecule and time on one core, and 13 µs per molecule.
+    of its own (`rng.spawn`): memory stays bounded, and the answer does not depend on the threads of `executor`. progress: called
+    with how many molecules are done. 0.09 µs per molecule and time on one core, and 13 µs per molecule.
 
     >>> gas = free_gas_correlations([0, 1, 1], 1.0, [0.0, 1.0], vector=[1, 0, 0], molecules=2000, rng=np.random.default_rng(5))
     >>> [round(float(x), 2) for x in gas.c1]  # 1 - √2 D(1/√2) = 0.275
@@ -218,7 +218,7 @@ def stepped_gas_correlations(
     """
     inertia, probe = checked_moments(moments), Probe.of(vector, tensor)
     if count < 1 or steps < 1:
-        raise ValueError(f"{count} times with {steps} steps between them: whole numbers of 1 or more are wanted")
+        raise ValueError(f"{count} times with {steps} steps between them: expected whole numbers of 1 or more")
     grid = _checked_times(interval * np.arange(count))
     rates, turn = rates_and_axes(inertia)
     vector_there, axes_there = rotate(turn[0], probe.vector), np.ascontiguousarray(rotate(turn[0], probe.axes))
@@ -244,9 +244,9 @@ def _averaged(
     executor: ThreadPoolExecutor | None,
     progress: Callable[[int], object] | None,
 ) -> Correlations:
-    """Means and standard errors over all pieces, summed in their order whoever made them."""
+    """Means and standard errors over all pieces, summed in their order, whichever thread made them."""
     if molecules < 2:
-        raise ValueError(f"{molecules} molecules: two or more are wanted, for a mean with an error")
+        raise ValueError(f"{molecules} molecules: expected two or more, for a mean with an error")
     sizes = [min(PIECE, molecules - start) for start in range(0, molecules, PIECE)]
     sources = rng.spawn(len(sizes))
     results = map(piece, sizes, sources) if executor is None else executor.map(piece, sizes, sources)
@@ -273,7 +273,7 @@ def _error(mean: Floats, square: Floats, n: int) -> Floats:
 def _checked_times(times: ArrayLike) -> Floats:
     grid = np.ascontiguousarray(times, dtype=np.float64)
     if grid.ndim != 1 or not grid.size or not np.isfinite(grid).all():
-        raise ValueError(f"times of shape {grid.shape}: finite numbers (n,) are wanted")
+        raise ValueError(f"times of shape {grid.shape}: expected finite numbers (n,)")
     return grid
 
 

@@ -110,10 +110,10 @@ def exact_modified_moments(moments: Floats, momentum: Floats, step: float) -> Fl
     x = turn[..., 1:] / turn[..., :1]
     y = 0.25 * step * (before + after) * (1.0 + np.sum(x**2, axis=-1, keepdims=True))
     matrix = np.stack([y / moments[:, None], y], axis=-1).reshape(len(moments), -1, 2)
-    wanted = x.reshape(len(moments), -1)
-    solution = _least_squares(matrix, wanted)
-    misfit = np.max(np.abs(np.einsum("nij,nj->ni", matrix, solution) - wanted), axis=-1)
-    if np.any(misfit > 1e-10 * np.max(np.abs(wanted), axis=-1)):
+    expected = x.reshape(len(moments), -1)
+    solution = _least_squares(matrix, expected)
+    misfit = np.max(np.abs(np.einsum("nij,nj->ni", matrix, solution) - expected), axis=-1)
+    if np.any(misfit > 1e-10 * np.max(np.abs(expected), axis=-1)):
         worst = int(np.argmax(misfit))
         raise ValueError(
             f"no exact Moser-Veselov step of {step:g} exists for moments {moments[worst].tolist()}: take a shorter one"
@@ -127,9 +127,9 @@ def _on_grid(scaled: Floats) -> Floats:
     return np.ascontiguousarray(np.rint(scaled / grid) * grid)
 
 
-def _least_squares(matrix: Floats, wanted: Floats) -> Floats:
+def _least_squares(matrix: Floats, expected: Floats) -> Floats:
     """Solutions (n, 2) of small systems; the pseudo-inverse serves a sphere, where S and D are not separate."""
-    return np.asarray(np.einsum("nij,nj->ni", np.linalg.pinv(matrix, rcond=1e-13), wanted))
+    return np.asarray(np.einsum("nij,nj->ni", np.linalg.pinv(matrix, rcond=1e-13), expected))
 
 
 def _check_turn(momentum: Floats, moments: Floats, step: float) -> None:

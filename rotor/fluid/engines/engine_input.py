@@ -1,4 +1,4 @@
-"""What an engine is handed: whole rigid molecules with all sites placed, their masses, motion and cell; and what it gives back.
+"""What an engine gets: whole rigid molecules with all sites placed, their masses, motion and cell; and what it gives back.
 
 Lengths are Å, masses u, energies eV, and velocities those of ASE's set, Å √(eV/u): ½ m v² is in eV.
 """

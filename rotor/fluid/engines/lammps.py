@@ -1,4 +1,4 @@
-"""A box handed to LAMMPS, which runs in a process of its own: its library finds MPI there without the user's doing.
+"""A box for LAMMPS, which runs in a process of its own: its library finds MPI there without the user's doing.
 
 The velocities of its rigid bodies are those on the step.
 """

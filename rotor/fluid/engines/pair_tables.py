@@ -1,4 +1,4 @@
-"""The pair potential as an engine is handed it: numbers for closed forms, or a table."""
+"""The pair potential as an engine gets it: numbers for closed forms, or a table."""
 
 from __future__ import annotations
 

@@ -81,7 +81,7 @@ def carry_to_atoms(
     counts: Integers,
     out: Floats,
 ) -> None:
-    """Forces on sites as forces on the real atoms, by the weights that place the sites: force and torque are kept."""
+    """Forces on sites as forces on the real atoms, by the weights that place the sites: force and torque are conserved."""
     out[:] = 0.0
     for m in range(len(kinds)):
         kind = kinds[m]

@@ -1,7 +1,7 @@
 """Rigid molecules moved by the forces of any ASE calculator: an ASE dynamics for `attach`, loggers and trajectories.
 
 A step kicks with half the force and torque, drifts freely, and kicks again (T. F. Miller et al., J. Chem. Phys. 116, 8649
-(2002), with the core's drift): order 2, symplectic, reversible; total momentum is kept to round-off. A thermostat acts in
+(2002), with the core's drift): order 2, symplectic, reversible; total momentum is conserved to round-off. A thermostat acts in
 the middle of the drift. This module imports ASE when it is imported; the rest of the package does so only on use.
 """
 
@@ -83,7 +83,7 @@ class RigidDynamics(MolecularDynamics):
         **kwargs: Any,
     ) -> None:
         if not (np.isfinite(timestep) and timestep != 0.0):
-            raise ValueError(f"timestep {timestep}: a time other than 0 is wanted, in ASE's unit (2 * ase.units.fs)")
+            raise ValueError(f"timestep {timestep}: expected a time other than 0, in ASE's unit (2 * ase.units.fs)")
         self.bodies, pose = bodies_of(atoms, molecules, shapes, tolerance_angstrom)
         self.thermostat, self._tolerance = thermostat, tolerance_angstrom
         self._flows = Flows(self.bodies)
@@ -170,7 +170,7 @@ class RigidDynamics(MolecularDynamics):
         self._wrench = None
 
     def restore(self, state: State, nsteps: int) -> None:
-        """Continue from a state kept earlier."""
+        """Continue from a state stored earlier."""
         self.state, self.nsteps = state, nsteps
         self._write_positions()
         self.write_momenta()

@@ -155,28 +155,28 @@ def _assigned(lines: LineList, constants: Constants, header: Header, source: str
     """Lines up to NLINE, wavenumbers times CAL, blends as the file marks them."""
     notes = []
     blends = lines.blends()
-    kept = np.arange(len(lines)) < abs(header.nline)
-    if not kept.all():
-        notes.append(f"NLINE = {abs(header.nline)}: {len(lines) - int(kept.sum())} lines behind it do not count")
-    widths = kept & (blends < 0)
+    counts = np.arange(len(lines)) < abs(header.nline)
+    if not counts.all():
+        notes.append(f"NLINE = {abs(header.nline)}: {len(lines) - int(counts.sum())} lines behind it do not count")
+    widths = counts & (blends < 0)
     if widths.any():
         notes.append(f"{int(widths.sum())} lines that give the width of a blend do not count")
-    kept &= blends >= 0
+    counts &= blends >= 0
     upper, lower = lines.states()
     names = _QUANTA[constants.kind]
-    _refuse_width(lines, names, kept)
+    _refuse_width(lines, names, counts)
     wavenumber = lines.error < 0
     frequency = lines.frequency_mhz * np.where(wavenumber, header.cal, 1.0)
     k = len(names)
     return assignments(
-        names, upper[kept][:, :k], lower[kept][:, :k], frequency[kept], lines.error_mhz[kept],
-        weight=lines.weight[kept], blend=blends[kept], wavenumber=wavenumber[kept], source=source,
+        names, upper[counts][:, :k], lower[counts][:, :k], frequency[counts], lines.error_mhz[counts],
+        weight=lines.weight[counts], blend=blends[counts], wavenumber=wavenumber[counts], source=source,
     ), notes  # fmt: skip
 
 
-def _refuse_width(lines: LineList, names: Sequence[str], kept: np.ndarray) -> None:
+def _refuse_width(lines: LineList, names: Sequence[str], counts: np.ndarray) -> None:
     """ValueError for a line with fewer or more quantum numbers than the top has."""
-    for i in np.flatnonzero(kept).tolist():
+    for i in np.flatnonzero(counts).tolist():
         count = len(lines.measured(i).quanta) // 2
         if count != len(names):
             raise ValueError(
