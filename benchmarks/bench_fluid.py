@@ -6,8 +6,8 @@
 speed: 1000 SPC/E molecules, cutoff 9 Å, 2 fs. drift: 216 molecules, steps from 0.25 to 6 fs, the same time each: rms of the
 total energy about its line, and the line's slope. ase: TIP3P with FixBondLengths as ASE has it (27 molecules in its own test
 of it; here 216), 1 fs. Rates are per second of processor time of the one thread, so that other work beside counts less;
-the best of a few pieces, which take turns. Engines that are not installed are left out and told. Figures that the file has
-from other parts are kept.
+the best of a few pieces, which take turns. Engines that are not installed are left out and listed. Figures that the file has
+from other parts stay.
 """
 
 from __future__ import annotations
@@ -342,18 +342,18 @@ def main() -> None:
     parser.add_argument("--json", type=Path)
     parser.add_argument("--picture", type=Path)
     given = parser.parse_args()
-    kept = json.loads(given.json.read_text(encoding="utf-8")) if given.json and given.json.exists() else {}
+    stored = json.loads(given.json.read_text(encoding="utf-8")) if given.json and given.json.exists() else {}
     parts = {
         "speed": lambda: speed(given.boxes),
         "drift": lambda: drift(given.boxes, given.ps),
         "ase": lambda: by_ase(given.boxes, given.ase_steps),
     }
     for part in given.parts:
-        kept[part] = parts[part]()
+        stored[part] = parts[part]()
     if given.json:
-        given.json.write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
-    if given.picture and "drift" in kept:
-        draw(kept["drift"], given.picture)
+        given.json.write_text(json.dumps(stored, indent=1) + "\n", encoding="utf-8")
+    if given.picture and "drift" in stored:
+        draw(stored["drift"], given.picture)
 
 
 if __name__ == "__main__":

@@ -108,8 +108,8 @@ def filtered(lines: Catalogue, range_: str | None, min_lgint: str | None) -> Cat
         first, last = inputs.parsed("--range", range_, lambda text: parse_range(text, "MHz"))
     least = inputs.cut("--min-lgint", min_lgint) if min_lgint is not None else None
     frequency, _ = in_mhz(lines)
-    kept = (frequency >= first) & (frequency <= last) & (lines.lgint >= (-np.inf if least is None else least))
-    return lines.take(kept)
+    chosen = (frequency >= first) & (frequency <= last) & (lines.lgint >= (-np.inf if least is None else least))
+    return lines.take(chosen)
 
 
 def summary(lines: Catalogue, file: str, command: str) -> dict[str, Any]:

@@ -254,7 +254,7 @@ def _with_gas(found: ThermoFunctions, pressure_bar: float | None) -> ThermoFunct
     if pressure_bar is None:
         return found
     if not (math.isfinite(pressure_bar) and pressure_bar > 0):
-        raise ValueError(f"pressure {pressure_bar} bar: a finite pressure above 0 is wanted")
+        raise ValueError(f"pressure {pressure_bar} bar: expected a finite pressure above 0")
     if found.top.mass_u is None:
         raise ValueError("the ideal gas needs the mass of the molecule, and bare constants have none; give a molecule")
     t, rt = found.temperature_k, GAS_CONSTANT * found.temperature_k

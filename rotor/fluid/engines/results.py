@@ -29,7 +29,7 @@ class EngineRun:
 
 
 def run_engine(name: str, atoms: Any, settings: Settings, **options: Any) -> EngineRun:
-    """Hand a box to the engine of that name, run it, read it back.
+    """Run a box by the engine of that name and read it back.
 
     atoms: an ase.Atoms box. options: of the engine, see `rotor.fluid.engines.openmm.frames` and
     `rotor.fluid.engines.lammps.frames`.

@@ -307,9 +307,9 @@ def levels_of_f(
 
 def _within(block: SpinBlock, n_range: tuple[int, int]) -> SpinBlock:
     n = block.labels[:, 3] // 2
-    kept = (n >= n_range[0]) & (n <= n_range[1])
-    cut = {name: getattr(block, name)[kept] for name in ("energies_mhz", "labels", "mixing")}
-    return replace(block, vectors=block.vectors[:, kept], **cut)
+    chosen = (n >= n_range[0]) & (n <= n_range[1])
+    cut = {name: getattr(block, name)[chosen] for name in ("energies_mhz", "labels", "mixing")}
+    return replace(block, vectors=block.vectors[:, chosen], **cut)
 
 
 def _placed(blocks: Iterable[SpinBlock]) -> Iterator[SpinBlock]:
