@@ -280,7 +280,8 @@ def line_list(
 
     levels = solve_levels(top, jmax, effects=effects, executor=executor)
     cut = intensity_cut(levels, temperature_k, given.q, least) if given else None
-    found = all_transitions(levels, dipoles_by_state(top, dipole, levels.effects), range_mhz, cut)
+    others = [moment for effect in levels.effects for moment in effect.other_moments(top)]
+    found = all_transitions(levels, dipoles_by_state(top, dipole, levels.effects), range_mhz, cut, others)
     lines = Lines(
         top=top,
         levels=levels,

@@ -158,10 +158,10 @@ _COLUMNS = ("frequency_mhz", "intensity", "energy_lower_mhz", "g_upper", "upper"
 
 def transitions_of(group: Group, levels: Levels) -> Transitions:
     """The transitions between levels of a group that exist."""
-    if not group.effect.moments:
+    if not (group.effect.moments or group.effect.others):
         none = np.zeros(0, dtype=np.int32)
         return Transitions(np.zeros(0), np.zeros(0), none, none)
-    found = all_transitions(levels, dict(group.effect.moments))
+    found = all_transitions(levels, dict(group.effect.moments), moments=group.effect.others)
     exists = (levels.weight[found.lower] > 0) & (levels.weight[found.upper] > 0)
     if exists.all():
         return found

@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     from rotor.quantum.effect import QuantumEffect
     from rotor.tops.top import Top
 
+ROUND_OFF = 1e-13  # of sums of products of a few coefficients of size 1
+
 
 def amplitudes(up: SpinBlock, low: SpinBlock, tensors: Tensors) -> Floats:
     """Real reduced elements between all states of two blocks, (n_up, n_low); their squares are line strengths."""
@@ -55,9 +57,11 @@ def _acting(up: SpinBlock, low: SpinBlock, tensors: Tensors, rank: int) -> list[
         return []
     held, known = low.shared.cache.setdefault(id(tensors), (tensors, {}))
     del held  # the cache holds the tensors, so that their id stays theirs
-    found = []
+    found, t = [], _coefficients(up, low, rank)
     for target in up.parts:
         for source in low.parts:
+            if not t[target.patterns, source.patterns].any():
+                continue
             if abs(target.rotor.n - source.rotor.n) <= rank:
                 key = (target.number, source.number)
                 if key not in known:
@@ -96,7 +100,8 @@ def _tensor_coefficients(scheme: Scheme, rank: int, bra: Ints, ket: Ints) -> Flo
         return tensor_coefficients(scheme.twice, rank, bra, ket)
     plain = [patterns(scheme.twice, int(own[0, -1])) for own in (bra, ket)]
     left, right = (recoupling(scheme.twice, one, own) for one, own in zip(plain, (bra, ket), strict=True))
-    return np.asarray(left.T @ tensor_coefficients(scheme.twice, rank, *plain) @ right)
+    found = left.T @ tensor_coefficients(scheme.twice, rank, *plain) @ right
+    return np.where(np.abs(found) > ROUND_OFF, found, 0.0)
 
 
 def derivatives(top: Top, levels: Levels, names: Sequence[str], rows: Ints) -> Floats:
