@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
+import runpy
 from pathlib import Path
 
 import numpy as np
@@ -44,13 +45,22 @@ def write_lines(path: Path, noise: float = 0.003, seed: int = 5) -> None:
 def test_spfits_files_are_fitted_and_written(call, folder):
     (folder / "co.par").write_text(PAR)
     write_lines(folder / "co.lin")
-    code, out, err = call("fit", "co.par", "--out", "new", "--plot", "rest.png", "--table", "t.tex", "--json", "co.json")
+    code, out, err = call(
+        "fit", "co.par", "--out", "new", "--plot", "rest.png", "--table", "t.tex", "--json", "co.json"
+    )
     assert code == 0, err
     assert "CO: CONVERGED" in out
     content = json.loads((folder / "co.json").read_text(encoding="utf-8"))
     for name, true, error in (("B", 57635.96804, 3e-4), ("D", 0.1835053, 3e-6)):
         assert content["constants_mhz"][name] == pytest.approx(true, abs=error)  # about five of its standard errors
-    assert {path.name for path in folder.iterdir()} >= {"new.fit", "new.toml", "new.par", "new.var", "rest.png", "t.tex"}
+    assert {path.name for path in folder.iterdir()} >= {
+        "new.fit",
+        "new.toml",
+        "new.par",
+        "new.var",
+        "rest.png",
+        "t.tex",
+    }
     variances, again = read_par(folder / "new.var"), read_par(folder / "new.par")
     assert variances.parameters[0].error == pytest.approx(content["parameters"][0]["error"], rel=1e-8)  # digits printed
     assert again.parameters[1].error == 1e35
@@ -68,7 +78,9 @@ def test_the_covariance_reaches_the_errors_of_predicted_lines(call, folder):
     assert abs(file.covariance.correlations[1, 2]) > 0.9
     top = rotor.read(str(folder / "new.toml")).with_dipole((0.11, 0, 0), "a test")
     lines = rotor.line_list(top, jmax=30, min_lgint=None)
-    alone = math.sqrt(sum((s * d) ** 2 for s, d in zip(file.constants.uncertainties.values(), (60, -4 * 30**3, 0), strict=True)))
+    alone = math.sqrt(
+        sum((s * d) ** 2 for s, d in zip(file.constants.uncertainties.values(), (60, -4 * 30**3, 0), strict=True))
+    )
     high = lines.error_mhz[lines.levels.quanta["j"][lines.upper] == 30][0]
     assert 0 < high < alone
 
@@ -77,7 +89,9 @@ def test_not_converged_is_exit_code_1_with_the_reason_and_no_constants_written(c
     write_lines(folder / "co.csv")
     code, out, err = call("fit", "co.csv", "--constants", "B=57000 D=0.17 MHz", "--free", "B", "--out", "new")
     assert code == 1
-    assert err.splitlines()[-1].startswith("error: not converged: a minimum was reached, but it does not describe the lines")
+    assert err.splitlines()[-1].startswith(
+        "error: not converged: a minimum was reached, but it does not describe the lines"
+    )
     assert "NOT CONVERGED" in out
     assert [path.name for path in sorted(folder.glob("new*"))] == ["new.fit"]
     assert "NOT CONVERGED" in (folder / "new.fit").read_text(encoding="utf-8")
@@ -141,7 +155,9 @@ def test_spfits_options_are_honoured_or_refused_by_name(call, folder):
     call("fit", "co.par", "--json", "tied.json")
     content = json.loads((folder / "tied.json").read_text(encoding="utf-8"))
     assert [one["name"] for one in content["parameters"]] == ["B", "-D"]
-    assert content["constants_mhz"]["H"] / content["constants_mhz"]["D"] == pytest.approx(1.6e-7 / 0.17, rel=1e-12)  # the ratio of the file
+    assert content["constants_mhz"]["H"] / content["constants_mhz"]["D"] == pytest.approx(
+        1.6e-7 / 0.17, rel=1e-12
+    )  # the ratio of the file
 
 
 def test_trying_choosing_suggesting_and_resampling(call, folder):
@@ -258,3 +274,31 @@ def test_the_options_and_keys_are_in_the_documents(call, folder):
             assert f"`{option}" in section or option == "--help", (verb, option)
         for key in json.loads((folder / f"{verb}.json").read_text(encoding="utf-8")):
             assert f"`{key}`" in section, (verb, key)
+
+
+SAMPLES = Path(__file__).parent / "oracles" / "fits"
+
+
+@pytest.mark.parametrize("script", ["07_fit", "08_structure"])
+def test_the_examples_assert_what_they_claim(script, monkeypatch):
+    monkeypatch.chdir(SAMPLES.parents[2])
+    runpy.run_path(str(SAMPLES.parents[2] / "examples" / f"{script}.py"))
+
+
+def test_pictures_of_a_fit_and_of_a_molecule_are_the_same_file_each_time(call, folder):
+    (folder / "ocs.toml").write_text(FAMILY)
+    write_lines(folder / "co.csv")
+    for name in ("one", "two"):
+        call("fit", "co.csv", "--constants", CO, "--free", "B,D", "--plot", f"fit_{name}.svg")
+        call("structure", "ocs.toml", "--plot", f"molecule_{name}.svg")
+    for kind in ("fit", "molecule"):
+        one, two = ((folder / f"{kind}_{name}.svg").read_text() for name in ("one", "two"))
+        assert one.replace("one.svg", "two.svg") == two  # the command in the metadata apart
+        assert "(obs - calc)/error" in one or "1.15" in one
+
+
+def test_the_family_of_samples_gives_the_published_structure(call, folder):
+    code, out, err = call("structure", str(SAMPLES / "ocs.toml"), "--method", "rs", "--json", "-")
+    assert code == 0, err
+    values = {one["name"]: one["value"] for one in json.loads(out)["rs"]["values"]}
+    assert values == pytest.approx({"CO": 1.16054, "CS": 1.55967}, abs=1e-5)  # digits as published

@@ -23,40 +23,44 @@ _HEADINGS = {
 }
 
 
-def plot_fit(
-    fit: Fit, path: str | os.PathLike[str], *, title: str = "", provenance: Mapping[str, Any] | None = None
-) -> None:
-    """Draw (obs - calc)/error of every line into a .png, .pdf or .svg file; lines that do not count are crosses.
-
-    Raises ValueError for another suffix.
-    """
-    suffix = Path(path).suffix.lower()
-    if suffix not in (".png", ".pdf", ".svg"):
-        raise ValueError(f"{os.fspath(path)}: a picture is .png, .pdf or .svg; the suffix names the format")
-
+def fit_figure(fit: Fit, title: str = "") -> Any:
+    """A matplotlib figure of (obs - calc)/error of every line; lines that do not count are crosses."""
     import matplotlib as mpl
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    panels = [("frequency", fit.lines.frequency_mhz / 1e3)]
+    panels = [("frequency (GHz)", fit.lines.frequency_mhz / 1e3)]
     panels += [
         (_HEADINGS[name], fit.lines.upper[:, i].astype(float))
         for i, name in enumerate(fit.lines.names)
         if name in _HEADINGS
     ]
     with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(7.2, 1.6 * len(panels) + 0.6), dpi=DPI, layout="constrained")
-        FigureCanvasAgg(figure)
-        for place, (heading, x) in enumerate(panels, 1):
-            axes = figure.add_subplot(len(panels), 1, place)
+        figure = Figure(figsize=(7.2, 1.6 * len(panels) + 0.6), layout="constrained")
+        for (heading, x), axes in zip(panels, figure.subplots(len(panels), 1, squeeze=False).flat, strict=True):
             _draw(axes, fit, x)
-            axes.set_xlabel("frequency (GHz)" if heading == "frequency" else heading)
+            axes.set_xlabel(heading)
         status = "" if fit.converged else ", NOT CONVERGED"
-        heading = (
+        text = (
             f"{title or fit.lines.source}: weighted rms {fit.weighted_rms:.3g}, {len(fit.groups)} frequencies{status}"
         )
-        figure.axes[0].set_title(heading.replace("$", r"\$"), loc="left")
-        figure.savefig(path, dpi=DPI, metadata=_metadata(suffix, fit, provenance or {}))
+        figure.axes[0].set_title(text.replace("$", r"\$"), loc="left")
+    return figure
+
+
+def plot_fit(
+    fit: Fit, path: str | os.PathLike[str], *, title: str = "", provenance: Mapping[str, Any] | None = None
+) -> None:
+    """Draw `fit_figure` into a .png, .pdf or .svg file, with the provenance in its metadata.
+
+    Raises ValueError for another suffix.
+    """
+    suffix = Path(path).suffix.lower()
+    if suffix not in (".png", ".pdf", ".svg"):
+        raise ValueError(f"{os.fspath(path)}: a picture is .png, .pdf or .svg; the suffix names the format")
+    import matplotlib as mpl
+
+    with mpl.rc_context(STYLE):
+        fit_figure(fit, title).savefig(path, dpi=DPI, metadata=_metadata(suffix, fit, provenance or {}))
 
 
 def _draw(axes: Any, fit: Fit, x: np.ndarray[Any, Any]) -> None:
