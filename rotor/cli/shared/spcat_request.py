@@ -45,7 +45,9 @@ def prediction_asked(context: typer.Context, source: str | None, as_spcat: bool)
     if is_request(source):
         return prediction_of(context, str(source), as_spcat)
     if as_spcat:
-        raise ValueError("--as-spcat: what SPCAT leaves out of its basis stands in an .int and a .var file; give the .int")
+        raise ValueError(
+            "--as-spcat: what SPCAT leaves out of its basis stands in an .int and a .var file; give the .int"
+        )
     return None
 
 
