@@ -392,7 +392,7 @@ def test_no_answer_is_another_exit_code(call, folder):
         "spectrum", "--constants", "B=1 MHz", "--dipole-abc", "1,0,0", "--temperature", "3000", "--csv", "a.csv"
     )
     assert (code, out) == (1, "")
-    assert err.startswith("error: Q(3000 K) needs levels beyond")
+    assert err.startswith("error: lines above 10^-12 nm² MHz at 3000 K reach to J = 29481, more than 600; give J max")
     assert call("spectrum", "CH4", "--plot", "a.png")[0] == 1
     assert not list(folder.iterdir())
 

@@ -10,7 +10,7 @@ import typer
 
 from rotor.cli.shared import inputs
 from rotor.cli.shared.inputs import Input
-from rotor.cli.shared.output import Files, Table, deliver, json_text, show_facts, show_table
+from rotor.cli.shared.output import Files, Table, deliver, json_text, show_facts, show_table, sum_progress
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
@@ -65,7 +65,7 @@ def partition_table(top: Top, temperatures_k: Sequence[float]) -> list[dict[str,
     from rotor.thermo import partition_functions
 
     try:
-        found = partition_functions(top, temperatures_k)
+        found = partition_functions(top, temperatures_k, progress=sum_progress())
     except ValueError:  # one of them is out of reach: each for itself
         return [_row(top, t) for t in temperatures_k]
     return [_record(top, partition) for partition in found]

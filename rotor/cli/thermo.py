@@ -12,7 +12,17 @@ import typer
 from rotor.cli.shared import gas_layer as layer
 from rotor.cli.shared import inputs
 from rotor.cli.shared.inputs import Input
-from rotor.cli.shared.output import Files, Table, Writer, answering, deliver, json_with_rows, show_facts, show_table
+from rotor.cli.shared.output import (
+    Files,
+    Table,
+    Writer,
+    answering,
+    deliver,
+    json_with_rows,
+    show_facts,
+    show_table,
+    sum_progress,
+)
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -119,7 +129,14 @@ def _functions(
 ) -> ThermoFunctions:
     from rotor.thermo import thermodynamic_functions
 
-    return thermodynamic_functions(top, temperatures, species=species, vibrations=vibrations, pressure_bar=pressure_bar)
+    return thermodynamic_functions(
+        top,
+        temperatures,
+        species=species,
+        vibrations=vibrations,
+        pressure_bar=pressure_bar,
+        progress=sum_progress(),
+    )
 
 
 def _content(functions: ThermoFunctions, given: Input, command: str) -> dict[str, Any]:
@@ -134,7 +151,7 @@ def _content(functions: ThermoFunctions, given: Input, command: str) -> dict[str
         "rotational_temperatures_k": rotational_temperatures_k(top),
         "classical_above_k": classical_above_k(top, CLASSICAL_TOLERANCE),
         "classical_tolerance": CLASSICAL_TOLERANCE,
-        "classical_corrections": {"a_k": limit.a, "b_k2": limit.b, "d_per_k": limit.d},
+        "classical_corrections": {"a_k": limit.a, "b_k2": limit.b, "d_per_k": limit.d, "e_per_k2": limit.e},
         "species": functions.species,
         "species_known": species_names(top),
         "fractions": dict(functions.fractions),
@@ -191,7 +208,7 @@ def _facts(functions: ThermoFunctions, content: dict[str, Any]) -> list[tuple[st
     corrections = content["classical_corrections"]
     series = " ".join(
         f"{'-' if value < 0 else '+'} {abs(value):.6g}{unit}"
-        for value, unit in zip(corrections.values(), ("/T", "/T²", " T"), strict=True)
+        for value, unit in zip(corrections.values(), ("/T", "/T²", " T", " T²"), strict=True)
         if value
     )
     return [
@@ -204,7 +221,7 @@ def _facts(functions: ThermoFunctions, content: dict[str, Any]) -> list[tuple[st
             f"good to {CLASSICAL_TOLERANCE:.0%} of C_v above {content['classical_above_k']:.4g} K (rigid top, equilibrium)",
         ),
         ("corrected", f"classical Q times exp of the logarithm of 1 {series}, to that order"),
-        ("sums", f"to J = {content['jmax']} at most, Q, U and C_v to {content['relative_error']:.0e} of themselves"),
+        ("sums", f"{_summed_to(content['jmax'])}, Q, U and C_v to {content['relative_error']:.0e} of themselves"),
         ("vibration", content["vibrations"] or "left out: no states given"),
     ]
 
@@ -247,3 +264,7 @@ def _gas_table(functions: ThermoFunctions) -> Table:
     cells = [[f"{functions.temperature_k[i]:g}", *(f"{x[i]:.3f}" for x in data)] for i in _rows(functions)]
     spin = f"R ln {functions.spin_factor:.6g} of nuclear spin left out of S and G"
     return Table(f"ideal gas at {gas.pressure_bar:g} bar, {gas.mass_u:.6f} u; {spin}", columns, cells)
+
+
+def _summed_to(jmax: int) -> str:
+    return f"to J = {jmax} at most" if jmax >= 0 else "none: classical with corrections"
