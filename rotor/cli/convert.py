@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -58,7 +57,7 @@ def top_with_errors(source: str) -> Top:
     from rotor.formats.spcat.codes import constants_of
     from rotor.formats.spcat.par import read_par
 
-    return replace(top, constants=constants_of(read_par(path), errors=True))
+    return top.with_constants(constants_of(read_par(path), errors=True))
 
 
 def writer_of(top: Top, source: str, target: str, kmax: int) -> Writer:

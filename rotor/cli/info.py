@@ -34,6 +34,7 @@ def command(
     dipole: str | None = inputs.DIPOLE,
     dipole_abc: str | None = inputs.DIPOLE_ABC,
     spin_weights: str | None = inputs.SPIN_WEIGHTS,
+    symmetry_tolerance: str | None = inputs.SYMMETRY_TOLERANCE,
     calculator: str | None = inputs.CALCULATOR,
     hessian: str | None = inputs.HESSIAN,
     temperature: str | None = typer.Option(
@@ -48,7 +49,17 @@ def command(
     temperatures = TEMPERATURES_K if temperature is None else inputs.temperatures("--temperature", temperature)
     files = Files()
     files.ask_json(json)
-    given = Input(source, constants, isotope or [], dipole, dipole_abc, spin_weights, calculator, hessian)
+    given = Input(
+        source,
+        constants,
+        isotope or [],
+        dipole,
+        dipole_abc,
+        spin_weights,
+        calculator,
+        hessian,
+        symmetry_tolerance=symmetry_tolerance,
+    )
     top = inputs.read_top(given)
 
     from rotor.cli.shared.report import describe
@@ -136,7 +147,9 @@ def _facts(top: Top, content: dict[str, Any]) -> list[tuple[str, str]]:
         facts.append(("kind", _kind_text(content["kind"], content["kind_decision"])))
     if top.symmetry is not None:
         number = content["symmetry_number"]
-        facts.append(("point group", f"{content['point_group']}, rotational symmetry number {number}"))
+        facts.append(
+            ("point group", f"{content['point_group']}, rotational symmetry number {number}{_near_text(content)}")
+        )
     if top.constants.representation:
         facts.append(("meant in", report.form_text(top.constants)))
     dipole = report.vector_text(top.dipole_abc_debye)
@@ -149,6 +162,13 @@ def _facts(top: Top, content: dict[str, Any]) -> list[tuple[str, str]]:
         ("inertial defect", f"{content['inertial_defect_u_angstrom2']:.6g} u Å²"),
     ]
     return facts
+
+
+def _near_text(content: dict[str, Any]) -> str:
+    if content["near_point_group"] is None:
+        return ""
+    off = content["near_displacement_angstrom"]
+    return f"; near {content['near_point_group']}: nuclei are up to {off:.2g} Å off it (--symmetry-tolerance takes it)"
 
 
 def _kind_text(kind: str, decision: dict[str, Any]) -> str:

@@ -60,6 +60,7 @@ def command(
     min_relative: str = typer.Option("1e-6", metavar="X", help="Leave out lines below X of the strongest; or 'none'."),
     isotope: list[str] | None = inputs.ISOTOPE,
     spin_weights: str | None = inputs.SPIN_WEIGHTS,
+    symmetry_tolerance: str | None = inputs.SYMMETRY_TOLERANCE,
     vibration: str | None = layer.VIBRATION,
     vibrational_states: str | None = layer.VIBRATIONAL_STATES,
     csv: str | None = typer.Option(None, metavar="FILE", help="Write all lines as CSV."),
@@ -84,7 +85,7 @@ def command(
     files.ask("--plot", plot, (".png", ".pdf", ".svg"))
     files.ask_json(json)
 
-    given = Input(source, constants, isotope or [], None, None, spin_weights)
+    given = Input(source, constants, isotope or [], None, None, spin_weights, symmetry_tolerance=symmetry_tolerance)
     top = _with_polarizability(inputs.read_top(given), polarizability)
     with answering():
         lines = _lines(top, settings)

@@ -75,6 +75,7 @@ def command(
     dipole_abc: str | None = inputs.DIPOLE_ABC,
     isotope: list[str] | None = inputs.ISOTOPE,
     spin_weights: str | None = inputs.SPIN_WEIGHTS,
+    symmetry_tolerance: str | None = inputs.SYMMETRY_TOLERANCE,
     calculator: str | None = inputs.CALCULATOR,
     hessian: str | None = inputs.HESSIAN,
     q: float | None = typer.Option(None, metavar="Q", help="Partition function to use instead of the summed one."),
@@ -107,7 +108,17 @@ def command(
     )
     files.ask_json(json)
 
-    given = Input(source, constants, isotope or [], dipole, dipole_abc, spin_weights, calculator, hessian)
+    given = Input(
+        source,
+        constants,
+        isotope or [],
+        dipole,
+        dipole_abc,
+        spin_weights,
+        calculator,
+        hessian,
+        symmetry_tolerance=symmetry_tolerance,
+    )
     prediction = request.prediction_of(context, str(source)) if request.is_request(source) else None
     if prediction is not None:
         settings, tag = _requested(settings, prediction), prediction.request.tag

@@ -71,6 +71,7 @@ def command(
     ),
     isotope: list[str] | None = inputs.ISOTOPE,
     spin_weights: str | None = inputs.SPIN_WEIGHTS,
+    symmetry_tolerance: str | None = inputs.SYMMETRY_TOLERANCE,
     vibration: str | None = layer.VIBRATION,
     vibrational_states: str | None = layer.VIBRATIONAL_STATES,
     gas: bool = typer.Option(False, "--gas", help="Functions of the ideal gas too, with translation."),
@@ -87,7 +88,7 @@ def command(
     pressure_bar = inputs.positive("--pressure", pressure or "1", "bar") if gas else None
     states = layer.vibrations(vibration, vibrational_states)
     files = _files(csv, parquet, plot, json)
-    given = Input(source, constants, isotope or [], None, None, spin_weights)
+    given = Input(source, constants, isotope or [], None, None, spin_weights, symmetry_tolerance=symmetry_tolerance)
     top = inputs.read_top(given)
     _refuse(top, species, gas)
 

@@ -10,7 +10,6 @@ B (J(J+1) - Ka² - Kc²), is missed.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -73,7 +72,7 @@ def _simpler_mhz(top: Top, levels: Levels, rigid: Floats) -> tuple[Floats, Float
     """Energies (n,) in MHz of the rigid top and of the one with quartic distortion, in the order of the levels."""
     if top.kind != "asymmetric":
         return rigid, rigid + _first_order_quartic_mhz(top, levels)[0]
-    plain, quartic = (_energies_like(replace(top, constants=_truncated(top, order)), levels) for order in (1, 2))
+    plain, quartic = (_energies_like(top.with_constants(_truncated(top, order)), levels) for order in (1, 2))
     return plain, quartic
 
 

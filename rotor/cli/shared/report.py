@@ -27,6 +27,7 @@ def describe(top: Top, text: str, command: str) -> dict[str, Any]:
     import rotor
 
     constants, abc = top.constants, top.rotational_constants_mhz
+    near = top.symmetry.near if top.symmetry else None
     frame = top.frame
     return {
         "rotor_version": rotor.__version__,
@@ -39,6 +40,8 @@ def describe(top: Top, text: str, command: str) -> dict[str, Any]:
         "kind_decision": _decision(top.kind_of_top) if top.kind_of_top else None,
         "point_group": top.symmetry.point_group if top.symmetry else None,
         "symmetry_number": top.symmetry.symmetry_number if top.symmetry else None,
+        "near_point_group": near.point_group if near else None,
+        "near_displacement_angstrom": near.displacement_angstrom if near else None,
         "constants_mhz": dict(constants.values),
         "uncertainties_mhz": dict(constants.uncertainties),
         "reduction": constants.reduction,
