@@ -219,7 +219,8 @@ def _q_table(content: dict[str, Any]) -> Table:
     rows = []
     for row in content["partition_function"]:
         known = row["q"] is not None
-        summed = [f"{row['q']:.6g}", f"{row['jmax']}", f"{row['relative_error']:.0e}"] if known else ["-", "-", "-"]
+        last = "-" if row["jmax"] is None else f"{row['jmax']}"  # where the classical limit was as good as a sum
+        summed = [f"{row['q']:.6g}", last, f"{row['relative_error']:.0e}"] if known else ["-", "-", "-"]
         remark = "" if known else _reason(row["source"])
         rows.append([f"{row['temperature_k']:g}", summed[0], f"{row['classical']:.6g}", *summed[1:], remark])
     columns = ["T (K)", "Q", "Q classical", "J max", "error", "remark"]

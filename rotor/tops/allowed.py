@@ -22,22 +22,35 @@ if TYPE_CHECKING:
 
 NOISE_DEBYE = 1e-3  # forbidden components below it are round-off or noise, and left out
 NOISE = 1e-3  # the same of a polarizability, relative to the whole
+DEBYE_PER_ANGSTROM = 10.0  # what nuclei that are off their symmetry may add to a dipole, about two electron charges
+PER_ANGSTROM = 1.0  # the same of a polarizability, relative to the whole
 _JOINED = {"a": (("ee", "eo"), ("oe", "oo")), "b": (("ee", "oo"), ("eo", "oe")), "c": (("ee", "oe"), ("eo", "oo"))}
 _TENSOR = {"ab": "c", "ac": "b", "bc": "a"}  # an element of α joins the species that this component of μ joins
 
 
 def allowed_dipole(dipole: ArrayLike, symmetry: Symmetry) -> Floats:
-    """The part of a dipole that every operation leaves alike, where the rest is below 0.001 D; else the whole."""
+    """The part of a dipole that every operation leaves alike, where the rest is noise; else the whole.
+
+    Noise is up to 0.001 D, and 10 D for every Å that nuclei are off exact symmetry.
+    """
     vector = np.asarray(dipole, dtype=float)
     part = invariant_vector(vector, symmetry)
-    return part if np.linalg.norm(vector - part) < NOISE_DEBYE else vector
+    return part if np.linalg.norm(vector - part) < _noise_debye(symmetry) else vector
+
+
+def _noise_debye(symmetry: Symmetry) -> float:
+    return max(NOISE_DEBYE, DEBYE_PER_ANGSTROM * symmetry.deviation_angstrom)
+
+
+def _noise(symmetry: Symmetry) -> float:
+    return max(NOISE, PER_ANGSTROM * symmetry.deviation_angstrom)
 
 
 def allowed_polarizability(tensor: ArrayLike, symmetry: Symmetry) -> Floats:
-    """The part of a (3, 3) tensor that every operation leaves alike, where the rest is below 0.001 of it; else the whole."""
+    """The part of a (3, 3) tensor that every operation leaves alike, where the rest is noise, 0.001 of it; else the whole."""
     whole = np.asarray(tensor, dtype=float)
     part = invariant_tensor(whole, symmetry)
-    return part if np.linalg.norm(whole - part) < NOISE * np.linalg.norm(whole) else whole
+    return part if np.linalg.norm(whole - part) < _noise(symmetry) * np.linalg.norm(whole) else whole
 
 
 def invariant_vector(vector: Floats, symmetry: Symmetry) -> Floats:
@@ -67,7 +80,7 @@ def refuse_forbidden_dipole(
     values = np.asarray(dipole_abc, dtype=float)
     if symmetry is not None and frame is not None:
         rest = values - frame.axes @ invariant_vector(values @ frame.axes, symmetry)
-        wrong = [axis for axis, part in zip("abc", rest.tolist(), strict=True) if abs(part) > NOISE_DEBYE]
+        wrong = [axis for axis, part in zip("abc", rest.tolist(), strict=True) if abs(part) > _noise_debye(symmetry)]
         by, allowed = f"a molecule of {symmetry.point_group}", _allowed_axes(symmetry, frame)
     else:
         barred = [axis for axis in "abc" if not _joins_equals(axis, weights)]
@@ -89,7 +102,7 @@ def refuse_forbidden_polarizability(
     whole = np.asarray(tensor_abc, dtype=float)
     if symmetry is not None and frame is not None:
         part = frame.axes @ invariant_tensor(frame.axes.T @ whole @ frame.axes, symmetry) @ frame.axes.T
-        if np.linalg.norm(whole - part) > NOISE * np.linalg.norm(whole):
+        if np.linalg.norm(whole - part) > _noise(symmetry) * np.linalg.norm(whole):
             elements = [f"α{'abc'[i]}{'abc'[j]} = {whole[i, j]:g}" for i in range(3) for j in range(i, 3)]
             allowed = [f"{part[i, j]:.4g}" for i in range(3) for j in range(i, 3)]
             raise ValueError(

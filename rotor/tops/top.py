@@ -19,6 +19,7 @@ from rotor.geometry.inertia import EQUAL_MOMENTS, LINEAR_BELOW, Body, PrincipalF
 from rotor.tops.allowed import (
     allowed_dipole,
     allowed_polarizability,
+    invariant_vector,
     refuse_forbidden_dipole,
     refuse_forbidden_polarizability,
 )
@@ -117,12 +118,11 @@ class Top:
 
         The symmetry of the nuclei decides the kind where it can (C3v is a symmetric top), the moments where it cannot.
         Nuclear-spin weights follow from it and from `molecule.electronic`, inversion doublets unresolved;
-        `symmetry_within` is its tolerance, relative to the shortest distance. Dipole components that symmetry forbids
-        and that are below 0.001 D are round-off or noise, and left out; so is what symmetry forbids of a polarizability
-        and is below 0.001 of it.
+        `symmetry_within` is its tolerance, relative to the shortest distance. What symmetry forbids of a dipole or a
+        polarizability is left out where it is noise (`rotor.tops.allowed`).
 
-        Raises ValueError for a single atom. Neglected: everything that vibration and centrifugal distortion do, about
-        0.3 to 1 % between an equilibrium geometry and measured constants.
+        Raises ValueError for a single atom, and for a dipole or polarizability that symmetry forbids. Neglected: everything
+        that vibration and centrifugal distortion do, about 0.3 to 1 % between an equilibrium geometry and measured constants.
 
         >>> from rotor.molecules.molecule import Molecule
         >>> top = Top.from_molecule(Molecule(("C", "O"), [[0, 0, 0], [0, 0, 1.128323]]))
@@ -242,7 +242,7 @@ class Top:
         """The same top with a dipole in the frame of its geometry, of which what symmetry forbids is left out."""
         if self.frame is None or self.symmetry is None:
             raise ValueError(f"{self.name or 'this top'} has no geometry whose frame a dipole could be in")
-        allowed = allowed_dipole(dipole_debye, self.symmetry)
+        allowed = invariant_vector(np.asarray(dipole_debye, dtype=float), self.symmetry)
         return replace(self, dipole_abc_debye=_in_frame(self.frame, allowed), dipole_source=source)
 
     def with_weights(self, weights: dict[str, int], source: str) -> Top:
