@@ -65,7 +65,7 @@ FITS = {
     "H2CS": Fit(
         "c046509",
         _s_reduced(
-            291613.3, 17699.0, 16652.5, (*S_QUARTIC, *S_SEXTIC, "LJJK", "LJK", "LKKJ", "LK", "l2", "l4", "PKKJ", "PK")
+            291613.3, 17699.0, 16652.5, (*S_QUARTIC, *S_SEXTIC, "LJK", "LKKJ", "LK", "l2")
         ),
         60,
         12,
@@ -127,20 +127,33 @@ def fitted(fit: Fit, shared: Path) -> tuple[Constants, list[str]]:
         spread = np.sqrt(np.sum((vt[kept].T / s[kept]) ** 2, axis=1)) / scale
         values = dict(constants.values)
         values |= {name: values[name] + float(d) for name, d in zip(names, step, strict=True)}
-        settings = {"reduction": constants.reduction, "representation": constants.representation, "kind": constants.kind}
+        settings = {
+            "reduction": constants.reduction,
+            "representation": constants.representation,
+            "kind": constants.kind,
+        }
         constants = Constants(**settings, **values)  # type: ignore[arg-type]
         if np.all(np.abs(step) < 1e-3 * spread):
             break
     return constants, _report(names, constants, spread, seen, off, error)
 
 
-def _report(names, constants, spread, seen, off, error) -> list[str]:
+def _report(
+    names: tuple[str, ...],
+    constants: Constants,
+    spread: np.ndarray,
+    seen: list[tuple[tuple[int, ...], tuple[int, ...] | None, float, float]],
+    off: np.ndarray,
+    error: np.ndarray,
+) -> list[str]:
+    """How well the fit does, the lines of a molecule file, and the six worst observations."""
     lines = np.array([lower is not None for _, lower, *_ in seen])
     mhz = np.abs(off * error)[lines]
     chi = float(np.sqrt(np.sum(off[lines] ** 2) / max(lines.sum() - len(names), 1)))
+    of_energies = np.sqrt(np.mean((off * error)[~lines] ** 2)) if (~lines).any() else 0.0
     said = [
-        f"# {lines.sum()} lines, {(~lines).sum()} energies; reduced chi of the lines {chi:.2g}; rms {np.sqrt(np.mean(mhz**2)):.3g}, "
-        f"median {np.median(mhz):.2g}, worst {mhz.max():.3g} MHz; energies rms {np.sqrt(np.mean((off * error)[~lines] ** 2)) if (~lines).any() else 0:.2g} MHz"
+        f"# {lines.sum()} lines, {(~lines).sum()} energies; reduced chi of the lines {chi:.2g}; rms "
+        f"{np.sqrt(np.mean(mhz**2)):.3g}, median {np.median(mhz):.2g}, worst {mhz.max():.3g} MHz; energies rms {of_energies:.2g} MHz"
     ]
     for name, one in zip(names, spread.tolist(), strict=True):
         digits = max(1, int(np.ceil(np.log10(abs(constants[name]) / (one * 0.01)))))

@@ -26,6 +26,7 @@ FOLDER = Path(__file__).with_name("levels")
 CATALOGUES = {"H2O": "c018003", "HDO": "c019002", "D2O": "c020001"}
 ROUNDING_MHZ = 1e-4 * units.MHZ_PER_CM / np.sqrt(12)  # standard deviation of a number rounded in its last digit
 LEAST_ERROR_MHZ = 1e-3  # some lines are given errors of 0
+WORST_MHZ = 30.0  # levels that the catalogue knows worse, 0.001 cm-1, are left to the constants
 COLUMNS = "j,ka,kc,energy_mhz,error_mhz,measured_lines"
 HEAD = """\
 # Level energies E/h in MHz of {name} from {tag} of JPL (H. M. Pickett et al., J. Quant. Spectrosc. Radiat. Transfer 60 (1998) 883):
@@ -54,15 +55,21 @@ def solved(found: Catalogue) -> tuple[dict[Level, tuple[float, float, int]], np.
     count, lines = len(levels), len(found.frequency_mhz)
 
     error = np.maximum(found.error_mhz, LEAST_ERROR_MHZ)
-    design = np.zeros((2 * lines + 1, count))
+    design = np.zeros((2 * lines, count))
     design[np.arange(lines), up], design[np.arange(lines), low] = 1 / error, -1 / error
     design[lines + np.arange(lines), low] = 1 / ROUNDING_MHZ
-    design[-1, row[0, 0, 0]] = 1e6  # the zero of energy
-    data = np.concatenate([found.frequency_mhz / error, found.energy_lower_cm * units.MHZ_PER_CM / ROUNDING_MHZ, [0.0]])
+    data = np.concatenate([found.frequency_mhz / error, found.energy_lower_cm * units.MHZ_PER_CM / ROUNDING_MHZ])
     once = np.unique(low, return_index=True)[1]  # E″ of a level is one number, however many lines repeat it
-    kept = np.concatenate([np.arange(lines), lines + once, [2 * lines]])
-    energy, *_ = np.linalg.lstsq(design[kept], data[kept], rcond=None)
-    spread = np.sqrt(np.diag(np.linalg.inv(design[kept].T @ design[kept])))
+    kept = np.concatenate([np.arange(lines), lines + once])
+    free = np.arange(count) != row[0, 0, 0]  # the zero of energy
+    used = design[kept][:, free]
+    scale = np.linalg.norm(used, axis=0)
+    _, triangle = np.linalg.qr(used / scale)
+    inverse = np.linalg.inv(triangle) / scale[:, None]
+    energy, spread = np.zeros(count), np.zeros(count)
+    energy[free] = inverse @ (inverse.T @ (used.T @ data[kept]))
+    energy[free] += inverse @ (inverse.T @ (used.T @ (data[kept] - used @ energy[free])))  # once more, for round-off
+    spread[free] = np.linalg.norm(inverse, axis=1)
 
     measured = found.tag < 0
     ends = np.concatenate([up[measured], low[measured]])
@@ -76,11 +83,15 @@ def main(shared: Path) -> None:
     FOLDER.mkdir(exist_ok=True)
     for name, tag in CATALOGUES.items():
         table, off = solved(read_catalogue(shared, tag))
-        print(f"{name}: {len(table)} levels, {len(off)} measured lines, rms of (o-c)/error {np.sqrt(np.mean(off**2)):.2f}")
+        print(
+            f"{name}: {len(table)} levels, {len(off)} measured lines, rms of (o-c)/error {np.sqrt(np.mean(off**2)):.2f}"
+        )
         with (FOLDER / f"{name}.csv").open("w", encoding="utf-8", newline="") as file:
             file.write(HEAD.format(name=name, tag=tag) + COLUMNS + "\n")
             rows = csv.writer(file, lineterminator="\n")
             for (j, ka, kc), (energy, error, lines) in sorted(table.items()):
+                if error > WORST_MHZ:
+                    continue
                 rows.writerow([j, ka, kc, f"{round(energy, 4) + 0.0:.4f}", f"{error:.2g}", lines])
 
 

@@ -388,4 +388,6 @@ def test_orca_says_which_method_a_dipole_is_of(block, excited):
     output = Output("x.out", tuple(text.splitlines()), program_of(text))
     (start,) = dipole_lines(output)
     assert is_excited(output, start) is excited
-    assert printed_dipole(output, start) == pytest.approx(np.array([0.1, 0.2, 0.3]) * DEBYE_PER_AU, rel=1e-12)  # round-off
+    assert printed_dipole(output, start) == pytest.approx(
+        np.array([0.1, 0.2, 0.3]) * DEBYE_PER_AU, rel=1e-12
+    )  # round-off

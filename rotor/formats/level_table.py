@@ -1,4 +1,4 @@
-"""Reads a table of level energies: a .csv with a column for each quantum number, energy_mhz and error_mhz."""
+"""Reads and writes a table of level energies: a .csv with a column for each quantum number, energy_mhz and error_mhz."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import os
 
 import numpy as np
 
+from rotor.formats.atomic_write import open_atomic
 from rotor.tops.level_table import LevelTable
 
 _NUMBERS = ("energy_mhz", "error_mhz")
@@ -42,3 +43,11 @@ def read_level_table(path: str | os.PathLike[str], source: str = "") -> LevelTab
         return LevelTable(labels, np.array(columns["energy_mhz"]), np.array(columns["error_mhz"]), source)
     except ValueError as reason:
         raise ValueError(f"{path}: {reason}") from None
+
+
+def write_level_table(table: LevelTable, path: str | os.PathLike[str]) -> None:
+    """Writes a table of level energies, beside and renamed, every number in full."""
+    with open_atomic(path, "w", encoding="utf-8", newline="") as handle:
+        rows = csv.writer(handle, lineterminator="\n")
+        rows.writerow(table.columns)
+        rows.writerows(zip(*(column.tolist() for column in table.columns.values()), strict=True))

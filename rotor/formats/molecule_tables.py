@@ -45,11 +45,12 @@ class MeasuredLines:
 class Served:
     """The lines that a file's constants and level table are good for: up to `j_max`, `k_max` and `max_ghz`.
 
-    error_mhz: no line in that range is missed by more, three times the laboratory's error apart. None: no bound.
+    error_mhz: no measured line in that range is missed by more, three times the laboratory's error apart. None: there was no
+    catalogue to compare with, and the range is what the constants are meant for.
     """
 
     j_max: int
-    error_mhz: float
+    error_mhz: float | None = None
     k_max: int | None = None
     max_ghz: float | None = None
 
@@ -293,8 +294,8 @@ def served_of(table: TableReader | None) -> Served | None:
         return None
     table.refuse_unknown(("j_max", "k_max", "max_ghz", "error_mhz", "source"))
     j_max, error = table.whole("j_max"), table.number("error_mhz", 0.0)
-    if j_max is None or error is None:
-        raise ValueError(f"{table.place}: expected j_max and error_mhz; found {', '.join(table.content) or 'nothing'}")
+    if j_max is None:
+        raise ValueError(f"{table.place}: expected j_max; found {', '.join(table.content) or 'nothing'}")
     return Served(j_max, error, table.whole("k_max"), table.number("max_ghz", 0.0))
 
 
