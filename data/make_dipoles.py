@@ -62,7 +62,8 @@ def q_of_catalogue(shared: Path, tag: str) -> float:
     if number % 1000 < 500:
         rows = (folder / "jpl_catdir.cat").read_text(encoding="utf-8").splitlines()
         return 10 ** float(next(row[26:33] for row in rows if int(row[:6]) == number))
-    cells = ([cell.strip() for cell in row.split("|")] for row in (folder / "cdms_partfunc.cat").open(errors="replace"))
+    text = (folder / "cdms_partfunc.cat").read_text(encoding="utf-8", errors="replace")
+    cells = ([cell.strip() for cell in row.split("|")] for row in text.splitlines())
     return 10 ** float(next(row[6] for row in cells if len(row) > 6 and row[1] == str(number)))
 
 
