@@ -20,7 +20,7 @@ from rotor import units
 from rotor.formats.spcat.cat import read_cat
 from rotor.formats.spcat.catalogue import Catalogue
 from rotor.quantum.derivatives import level_derivatives
-from rotor.quantum.levels import solve_levels
+from rotor.quantum.solve import solve_levels
 from rotor.tops.constants import Constants
 from rotor.tops.top import Top
 
@@ -113,7 +113,7 @@ def fitted(fit: Fit, shared: Path) -> tuple[Constants, list[str]]:
     for _ in range(12):
         top = Top.from_constants(constants)
         levels = solve_levels(top, fit.j_max)
-        quanta = np.stack([levels.j, levels.ka, levels.kc], axis=1)[:, : len(seen[0][0])]
+        quanta = levels.quanta_of(np.arange(len(levels)))
         row = {tuple(q): i for i, q in enumerate(quanta.tolist())}
         slopes = level_derivatives(top, levels, names)
         up = np.array([row[upper] for upper, *_ in seen])

@@ -7,7 +7,8 @@ J. Quant. Spectrosc. Radiat. Transfer 60 (1998) 883, eq. 1), with the Q(300 K) o
 comes from the constants of data/molecules and is checked to be that of the catalogue's by how little μ differs between lines;
 g_I is GUP over 2J'+1. Components of hyperfine structure are added. The dipole is what the compilers put into their program:
 its source is in their documentation, and its accuracy is not the spread, which only says that the intensities hang together.
-Where that dipole depends on rotation, the lines of J <= 3 stand for the vibrational ground state.
+Where that dipole depends on rotation, the lines of J <= 3 stand for the vibrational ground state, and of linear molecules the
+limit of μ² = μ0² (1 + c m²), m = J'' + 1 (R. Herman and R. F. Wallis, J. Chem. Phys. 23 (1955) 637).
 
 Two lists print a Q that the intensities do not contain: of HC5N it counts the spin of 14N, which GUP does not; of N2O it
 contains vibration, with which μ would be 0.1711 D instead of the 0.1609 D of Stark measurements. There Q is summed here.
@@ -25,6 +26,7 @@ import numpy as np
 
 import rotor
 from rotor import units
+from rotor.arrays import Floats
 from rotor.formats.spcat.cat import read_cat
 from rotor.formats.spcat.catalogue import Catalogue
 
@@ -44,7 +46,7 @@ CATALOGUES = {
 INTENSITY_NM2_MHZ = 4.16231e-5  # the number of the catalogues, not CODATA's
 OWN_Q = ("N2O", "HC5N")
 HIGHEST_J, HIGHEST_K = 10, 4  # where the constants and a constant dipole serve
-LIGHT, LIGHT_J = ("H2O", "HDO", "D2O", "H2S", "CO", "H2CO", "HNCO"), 3
+LIGHT, LIGHT_J = ("H2O", "HDO", "D2O", "H2S", "H2CO", "HNCO"), 3
 Line = tuple[tuple[int, ...], tuple[int, ...]]  # quantum numbers of the upper and the lower level
 NAMES = {"linear": ("j",), "prolate": ("j", "k"), "oblate": ("j", "k"), "asymmetric": ("j", "ka", "kc")}
 
@@ -114,12 +116,24 @@ def dipoles(name: str, shared: Path) -> list[tuple[str, float, int, float]]:
     found = []
     for axis in sorted({axis_of(*key, top.kind) for key in seen}):
         ours = unit_strengths(name, axis)
-        squares = [value / ours[key] for key, value in seen.items() if axis_of(*key, top.kind) == axis and key in ours]
-        mu = np.sqrt(squares)
-        middle = float(np.median(mu))
-        kept = mu[np.abs(mu / middle - 1) < 0.02]  # lines whose label or mixing differs are none to learn from
-        found.append(("abc"[axis], float(np.mean(kept)), len(kept), float(np.std(kept) / np.mean(kept))))
+        of_axis = {
+            key: value / ours[key] for key, value in seen.items() if axis_of(*key, top.kind) == axis and key in ours
+        }
+        squares = np.array(list(of_axis.values()))
+        if top.kind == "linear":
+            mean, left = at_rest(np.array([upper[0] for upper, _ in of_axis]), squares)
+        else:
+            left = np.sqrt(squares)
+            left = left[np.abs(left / np.median(left) - 1) < 0.02]  # others differ in label or mixing
+            mean = float(np.mean(left))
+        found.append(("abc"[axis], mean, len(left), float(np.std(left) / mean)))
     return found
+
+
+def at_rest(m: Floats, squares: Floats) -> tuple[float, Floats]:
+    """μ0 of a linear molecule from the μ² of its lines, and what every line then says of it."""
+    slope, limit = np.polyfit(m.astype(float) ** 2, squares, 1)
+    return math.sqrt(limit), np.sqrt(squares - slope * m**2)
 
 
 def main(shared: Path) -> None:

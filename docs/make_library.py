@@ -19,7 +19,7 @@ from rotor.formats.molecule_file import MoleculeFile, read_molecule_file
 from rotor.formats.read_write import top_of_file
 from rotor.formats.spcat.cat import Catalogue, read_cat
 from rotor.formats.spcat.fields import BLANK
-from rotor.quantum.levels import solve_levels
+from rotor.quantum.solve import solve_levels
 from rotor.tops.level_table import tabulated_energies
 from rotor.tops.top import Top
 
@@ -178,8 +178,8 @@ def energies(file: MoleculeFile, jmax: int, tabulated: bool = False) -> dict[tup
     found = solve_levels(Top.from_constants(file.constants), jmax, vectors=False)
     energy = found.energy_mhz
     if tabulated and file.levels is not None:
-        energy, _ = tabulated_energies(file.levels, {"j": found.j, "ka": found.ka, "kc": found.kc}, energy)
-    quanta = np.stack([found.j, found.ka, found.kc], axis=1)[:, : WIDTH[found.kind]]
+        energy, _ = tabulated_energies(file.levels, found.quanta, energy)
+    quanta = found.quanta_of(np.arange(len(found)))
     return {tuple(q): float(e) for q, e in zip(quanta.tolist(), energy, strict=True)}
 
 

@@ -44,10 +44,10 @@ for kappa in kappas:
 curves = np.array(curves)
 
 figure, axis = plt.subplots(figsize=(5.5, 5))
-for i, ka in enumerate(levels.ka):
+for i, ka in enumerate(levels.quanta["ka"]):
     axis.plot(kappas, curves[:, i], lw=1.4, color="#0072B2" if ka % 2 == 0 else "#D55E00")
 for k in range(J + 1):
-    left, right = curves[0][levels.ka == k].mean(), curves[-1][levels.kc == k].mean()
+    left, right = curves[0][levels.quanta["ka"] == k].mean(), curves[-1][levels.quanta["kc"] == k].mean()
     axis.text(-1.03, left, f"$K_a={k}$", ha="right", va="center", fontsize=9)
     axis.text(1.03, right, f"$K_c={k}$", va="center", fontsize=9)
 axis.set(xlabel="Ray's asymmetry parameter κ", xlim=(-1, 1), yticks=[])

@@ -16,54 +16,88 @@ from rotor.version import version
 if TYPE_CHECKING:
     from rotor.classical.free.free_motion import FreeMotion as FreeMotion
     from rotor.classical.free.free_motion import free_motion as free_motion
+    from rotor.classical.tumble import TumbleRequest as TumbleRequest
+    from rotor.classical.tumble import answer_tumble as answer_tumble
+    from rotor.fluid.request import FluidRequest as FluidRequest
+    from rotor.fluid.request import NewBox as NewBox
+    from rotor.fluid.request import answer_fluid as answer_fluid
     from rotor.formats import read as read
     from rotor.formats import write as write
     from rotor.formats.streamed_lines import stream_lines as stream_lines
     from rotor.molecules.molecule import Molecule as Molecule
     from rotor.molecules.optimise import refine as refine
     from rotor.quantum.levels import Levels as Levels
-    from rotor.quantum.levels import solve_levels as solve_levels
+    from rotor.quantum.request import LevelsRequest as LevelsRequest
+    from rotor.quantum.request import answer_levels as answer_levels
+    from rotor.quantum.solve import solve_levels as solve_levels
     from rotor.spectra.lines import Lines as Lines
     from rotor.spectra.lines import line_list as line_list
     from rotor.spectra.raman import RamanLines as RamanLines
     from rotor.spectra.raman import raman_lines as raman_lines
+    from rotor.spectra.raman_request import RamanRequest as RamanRequest
+    from rotor.spectra.raman_request import answer_raman as answer_raman
+    from rotor.spectra.request import GasLayer as GasLayer
+    from rotor.spectra.request import SpectrumRequest as SpectrumRequest
+    from rotor.spectra.request import answer_spectrum as answer_spectrum
     from rotor.spectra.spectrum import Spectrum as Spectrum
     from rotor.thermo import VibrationalStates as VibrationalStates
     from rotor.thermo import partition_function as partition_function
     from rotor.thermo import thermodynamic_functions as thermodynamic_functions
+    from rotor.thermo.classical_gas import GasRequest as GasRequest
+    from rotor.thermo.classical_gas import answer_gas as answer_gas
+    from rotor.thermo.request import ThermoRequest as ThermoRequest
+    from rotor.thermo.request import answer_thermo as answer_thermo
+    from rotor.thermo.thermal_tumble import thermal_tumble as thermal_tumble
     from rotor.tops.constants import Constants as Constants
     from rotor.tops.top import Top as Top
 
-_HOME = {
+_MODULES = {
     "Constants": "rotor.tops.constants",
+    "FluidRequest": "rotor.fluid.request",
     "FreeMotion": "rotor.classical.free.free_motion",
+    "GasLayer": "rotor.spectra.request",
+    "GasRequest": "rotor.thermo.classical_gas",
     "Levels": "rotor.quantum.levels",
+    "LevelsRequest": "rotor.quantum.request",
     "Lines": "rotor.spectra.lines",
     "Molecule": "rotor.molecules.molecule",
+    "NewBox": "rotor.fluid.request",
     "RamanLines": "rotor.spectra.raman",
+    "RamanRequest": "rotor.spectra.raman_request",
     "Spectrum": "rotor.spectra.spectrum",
-    "VibrationalStates": "rotor.thermo",
+    "SpectrumRequest": "rotor.spectra.request",
+    "ThermoRequest": "rotor.thermo.request",
     "Top": "rotor.tops.top",
+    "TumbleRequest": "rotor.classical.tumble",
+    "VibrationalStates": "rotor.thermo",
+    "answer_fluid": "rotor.fluid.request",
+    "answer_gas": "rotor.thermo.classical_gas",
+    "answer_levels": "rotor.quantum.request",
+    "answer_raman": "rotor.spectra.raman_request",
+    "answer_spectrum": "rotor.spectra.request",
+    "answer_thermo": "rotor.thermo.request",
+    "answer_tumble": "rotor.classical.tumble",
     "free_motion": "rotor.classical.free.free_motion",
     "line_list": "rotor.spectra.lines",
     "partition_function": "rotor.thermo",
     "raman_lines": "rotor.spectra.raman",
     "read": "rotor.formats",
     "refine": "rotor.molecules.optimise",
-    "solve_levels": "rotor.quantum.levels",
+    "solve_levels": "rotor.quantum.solve",
     "stream_lines": "rotor.formats.streamed_lines",
+    "thermal_tumble": "rotor.thermo.thermal_tumble",
     "thermodynamic_functions": "rotor.thermo",
     "write": "rotor.formats",
 }
 
-__all__ = [*sorted(_HOME), "__version__"]
+__all__ = [*sorted(_MODULES), "__version__"]
 
 
 def __getattr__(name: str) -> Any:
     if name == "__version__":
         return version()
-    if name in _HOME:
-        return getattr(import_module(_HOME[name]), name)
+    if name in _MODULES:
+        return getattr(import_module(_MODULES[name]), name)
     raise AttributeError(f"module 'rotor' has no attribute {name!r}")
 
 

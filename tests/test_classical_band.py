@@ -19,7 +19,7 @@ from rotor.spectra.classical_band import (
     lines_area,
     rigid,
 )
-from rotor.spectra.lines import INTENSITY_NM2_MHZ
+from rotor.spectra.intensity import INTENSITY_NM2_MHZ
 from rotor.spectra.spectrum import Spectrum
 from rotor.tops.top import Top
 

@@ -128,7 +128,7 @@ def test_a_catalogue_is_drawn(call, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (("cat", "water"), "water: a catalogue is wanted"),
+        (("cat", "water"), "water: expected a catalogue"),
         (("cat", "no.cat"), "no.cat"),
         (("cat", OCS, "--range", "5"), "--range: '5' is not a range"),
         (("cat", OCS, "--min-lgint", "x"), "--min-lgint: 'x'"),

@@ -54,14 +54,14 @@ def test_an_engine_that_is_missing_is_one_line_and_leaves_no_file(call, folder, 
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        (("--engine", "gromacs"), "--engine: 'gromacs' is no engine; there are rotor, openmm, lammps"),
+        (("--engine", "gromacs"), "--engine: 'gromacs': expected one of rotor, openmm, lammps"),
         (
             ("--engine", "openmm", "--checkpoint", "a.npz"),
-            "--engine openmm: checkpoints are kept by --engine rotor alone",
+            "--engine openmm: checkpoints are written by the engine rotor alone",
         ),
         (
             ("--engine", "lammps", "--trajectory", "a.xyz", "--frames-every", "7"),
-            "--frames-every 7: with --engine lammps a multiple of --every, 5",
+            "--frames-every 7: with lammps expected a multiple of the 5 steps between rows",
         ),
     ],
 )

@@ -146,10 +146,10 @@ def test_tables_of_the_test_itself(folder):
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (("water", "--molecules", "1"), "--molecules: 1: a whole number from 2 to 10000000 is wanted"),
-        (("water", "--seed", "-1"), "--seed: -1: a whole number of 0 or more is wanted"),
-        (("water", "--confidence", "1"), "--confidence: '1': a probability between 0 and 1 is wanted"),
-        (("water", "--temperature", "0"), "--temperature: 0: a finite number above 0 K is wanted"),
+        (("water", "--molecules", "1"), "--molecules: 1: expected a whole number from 2 to 10000000"),
+        (("water", "--seed", "-1"), "--seed: -1: expected a whole number of 0 or more"),
+        (("water", "--confidence", "1"), "--confidence: 1: expected a number between 0 and 1"),
+        (("water", "--temperature", "0"), "--temperature: 0: expected a finite number above 0 K"),
         (("water", "--times", "5:1:3"), "--times: '5:1:3': the range must rise"),
         (("water", "--times", "0:1:200000"), "at most 100000 times"),
         (("water", "--plot", "x.txt"), "--plot x.txt: the name must end in .png or .pdf or .svg"),

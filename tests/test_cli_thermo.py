@@ -156,11 +156,11 @@ def test_one_temperature_is_drawn_too(call, folder):
         (("water", "--temperature", "0,10"), "error: --temperature: '0,10': temperatures are above 0 K\n"),
         (("water", "--temperature", "warm"), "error: --temperature: 'warm' is not a number"),
         (("water", "--pressure", "1bar"), "error: --pressure: is that of the ideal gas; give --gas too\n"),
-        (("water", "--gas", "--pressure", "0"), "error: --pressure: 0: a finite number above 0 bar is wanted\n"),
-        (("--constants", "B=1 cm-1", "--gas"), "error: --gas: the mass is not known, since bare constants have none; give a molecule\n"),
+        (("water", "--gas", "--pressure", "0"), "error: --pressure: 0: expected a finite number above 0 bar\n"),
+        (("--constants", "B=1 cm-1", "--gas"), "error: the ideal gas needs the mass, which bare constants do not have; give a molecule\n"),
         (("water", "--csv", "w.txt"), "error: --csv w.txt: the name must end in .csv\n"),
         (("water", "--vibration", "1", "--vibrational-states", "2"), "error: --vibration and --vibrational-states: give one"),
-        ((), "error: either a source or --constants is wanted, and neither was given; give one of them"),
+        ((), "error: expected either a source or --constants, and neither was given; give one of them"),
     ],
 )  # fmt: skip
 def test_wrong_input_is_one_line(call, folder, arguments, said):

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from slow_matrix import cubic_matrix, threefold_turn
 
-from rotor.quantum.levels import solve_levels
+from rotor.quantum.solve import solve_levels
 from rotor.quantum.spherical_top import DIMENSION, tensor_eigenvalues
 from rotor.thermo import partition_function
 from rotor.tops.constants import Constants
+from rotor.tops.operators import CUBIC_TENSOR
 from rotor.tops.spin_weights import CUBIC_IRREPS, SpinWeights
 from rotor.tops.top import Top
 
@@ -71,7 +72,7 @@ def test_how_many_of_each(j):
 def test_methane_has_its_order():
     """J = 3 of CH4, with its positive D_t: A2 is highest and F1 lowest, 300 and 240 D_t away from F2."""
     levels = solve_levels(Top(METHANE), 3, jmin=3)
-    energy = dict(zip(levels.irrep.tolist(), levels.energy_mhz, strict=True))
+    energy = dict(zip(levels.quanta["irrep"].tolist(), levels.energy_mhz, strict=True))
     assert energy["A2"] - energy["F2"] == pytest.approx(300 * 0.13294, rel=1e-6)
     assert energy["F2"] - energy["F1"] == pytest.approx(240 * 0.13294, rel=1e-6)
 
@@ -79,11 +80,11 @@ def test_methane_has_its_order():
 def test_levels_keep_their_barycentre():
     plain, split = (solve_levels(Top(c), 12) for c in (METHANE.replace(Dt=None), METHANE))
     for j in range(13):
-        here = split.j == j
+        here = split.quanta["j"] == j
         mean = (split.energy_mhz * split.components)[here].sum() / (2 * j + 1)
         assert mean == pytest.approx(plain.energy_mhz[j], rel=1e-13, abs=1e-9)
     assert len(plain) == 13
-    assert plain.irrep is None
+    assert "irrep" not in plain.quanta
 
 
 @pytest.mark.parametrize(
@@ -91,16 +92,16 @@ def test_levels_keep_their_barycentre():
 )
 def test_weights_add_up_to_those_of_j(weights):
     split = solve_levels(Top(METHANE, spin_weights=weights), 24)
-    sums = [split.weight[split.j == j].sum() for j in range(25)]
+    sums = [split.weight[split.quanta["j"] == j].sum() for j in range(25)]
     assert sums == weights.of_spherical(np.arange(25)).tolist()
 
 
 def test_sign_of_dt_turns_the_order_of_energy():
     up, down = (solve_levels(Top(METHANE.replace(Dt=s * 0.1)), 9, jmin=9) for s in (1, -1))
-    assert up.irrep.tolist() == down.irrep.tolist()
+    assert up.quanta["irrep"].tolist() == down.quanta["irrep"].tolist()
     for irrep in CUBIC_IRREPS:
         for levels in (up, down):
-            assert (np.diff(levels.energy_mhz[levels.irrep == irrep]) > 0).all()
+            assert (np.diff(levels.energy_mhz[levels.quanta["irrep"] == irrep]) > 0).all()
     mean = METHANE["B"] * 90 - METHANE["D"] * 90**2
     assert np.allclose(
         np.sort(up.energy_mhz - mean), np.sort(mean - down.energy_mhz), atol=1e-7
@@ -121,11 +122,13 @@ def test_table_says_the_irrep():
     assert frame.degeneracy.tolist() == [5, 9, 10, 15]
 
 
-def test_noncubic_terms_are_refused():
-    from rotor.quantum.spherical_top import scalar_and_tensor
+def test_noncubic_terms_leave_the_closed_form():
+    from rotor.quantum.spherical_top import is_cubic
 
-    with pytest.raises(ValueError, match="tensor of D_t alone"):
-        scalar_and_tensor({(1, 0, 0): 5.0, (0, 1, 0): 0.1})
+    assert is_cubic({(1, 0, 0): 5.0, (2, 0, 0): -1e-4})
+    assert is_cubic({(1, 0, 0): 5.0} | {powers: 0.1 * c for powers, c in CUBIC_TENSOR.items() if powers != (1, 0, 0)})
+    assert not is_cubic({(1, 0, 0): 5.0, (0, 1, 0): 0.1})
+    assert not is_cubic({(1, 0, 0): 5.0, (0, 0, 1): 0.1})
 
 
 @pytest.mark.parametrize(

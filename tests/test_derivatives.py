@@ -9,7 +9,7 @@ import pytest
 
 from rotor.quantum.derivatives import level_derivatives, term_expectations
 from rotor.quantum.effects.watson import operators_by_name
-from rotor.quantum.levels import solve_levels
+from rotor.quantum.solve import solve_levels
 from rotor.tops.constants import Constants
 from rotor.tops.top import Top
 
@@ -99,7 +99,7 @@ def test_rows_and_names_choose():
 
 def test_what_cannot_be_derived_is_said():
     top = Top(A_SET)
-    with pytest.raises(ValueError, match="no constant DJ here"):
+    with pytest.raises(ValueError, match="no parameter DJ here"):
         level_derivatives(top, solve_levels(top, 2), ["DJ"])
     with pytest.raises(ValueError, match="without vectors"):
         level_derivatives(top, solve_levels(top, 2, vectors=False))

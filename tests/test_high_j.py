@@ -8,7 +8,8 @@ import mpmath
 import numpy as np
 import pytest
 
-from rotor.quantum.levels import Levels, SolvedBlock, solve_levels
+from rotor.quantum.levels import Levels, SolvedBlock
+from rotor.quantum.solve import solve_levels
 from rotor.tops.constants import Constants
 from rotor.tops.top import Top
 

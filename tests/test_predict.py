@@ -113,8 +113,8 @@ def test_what_the_program_does_in_silence_is_said():
     [
         ({"fbgn": 5, "fend": 2}, "F runs from FBGN to FEND"),
         ({"fend": 360}, "from 0 to 359"),
-        ({"more": b" 11 100000 0\n"}, "another vibrational state"),
-        ({"more": b" 600000 1 0\n"}, "Coriolis"),
+        ({"more": b" 11 100000 0\n"}, "state 1 does not exist"),
+        ({"more": b" 600000 1 0\n"}, "connect different states only"),
     ],
 )
 def test_what_cannot_be_predicted_is_refused(change, words):

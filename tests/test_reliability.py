@@ -7,7 +7,7 @@ import pytest
 
 from rotor.formats.line_tables import provenance
 from rotor.quantum.convergence import RATIO_LIMIT, order_sizes_mhz, series_ratio, warnings_of
-from rotor.quantum.levels import hamiltonian, solve_levels
+from rotor.quantum.solve import hamiltonian, solve_levels
 from rotor.spectra.lines import line_list
 from rotor.tops.constants import Constants
 from rotor.tops.top import Top

@@ -12,7 +12,7 @@ import pytest
 import rotor
 from rotor import units
 from rotor.molecules.nuclei import data_folder
-from rotor.quantum.levels import solve_levels
+from rotor.quantum.solve import solve_levels
 from rotor.thermo import (
     classical_limit,
     classical_partition_function,

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 import rotor
 from rotor import units
-from rotor.quantum.levels import solve_levels
+from rotor.quantum.solve import solve_levels
 from rotor.thermo import (
     GAS_CONSTANT,
     VibrationalStates,

@@ -12,7 +12,7 @@ from rotor.formats.line_tables import catalogue, provenance, write_lines
 from rotor.formats.spcat.cat import read_cat
 from rotor.formats.spcat.codes import constants_of
 from rotor.formats.spcat.par import read_par
-from rotor.quantum.levels import solve_levels
+from rotor.quantum.solve import solve_levels
 from rotor.quantum.uncertainty import Covariance, level_errors
 from rotor.spectra.lines import line_list
 from rotor.tops.constants import Constants
@@ -137,5 +137,5 @@ def test_correlations_are_checked():
 def test_a_stranger_among_the_names_is_refused():
     top = Top(OCS, (0.7, 0, 0))
     lines = line_list(top, jmax=2, covariance=Covariance(("A",), np.eye(1)))
-    with pytest.raises(ValueError, match="no constant A here"):
+    with pytest.raises(ValueError, match="no parameter A here"):
         _ = lines.error_mhz

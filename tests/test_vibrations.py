@@ -76,7 +76,7 @@ def test_intensities_of_a_catalogue_are_met_with_vibration_alone(shared):
     j = cat.quanta_upper[:, 0].astype(int)
     few = (j >= 1) & (j <= 22)  # the lines that the constants were held against
     for lines, wanted in ((plain, 0.0288), (counted, 0.0)):
-        ours = dict(zip(lines.levels.j[lines.upper].tolist(), lines.lgint.tolist(), strict=True))
+        ours = dict(zip(lines.levels.quanta["j"][lines.upper].tolist(), lines.lgint.tolist(), strict=True))
         off = np.array([ours[k] for k in j[few].tolist()]) - cat.lgint[few]
         assert np.median(off) == pytest.approx(wanted, abs=5e-4)  # four decimals of LGINT, states left out
         assert np.ptp(off) < 2e-3  # the dipole's dependence on J, and four decimals

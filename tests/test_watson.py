@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from slow_matrix import AXES, body_operators, watson_matrix
 
-from rotor.quantum.levels import solve_levels
+from rotor.quantum.solve import solve_levels
 from rotor.tops.constants import Constants
 from rotor.tops.top import Top
 
@@ -30,7 +30,7 @@ def test_levels_are_those_of_the_full_matrix(reduction, values, representation):
     levels = solve_levels(Top(constants), 9)
     for j in range(10):
         slow = np.linalg.eigvalsh(watson_matrix(values, reduction, representation, j))
-        ours = np.sort(levels.energy_mhz[levels.j == j])
+        ours = np.sort(levels.energy_mhz[levels.quanta["j"] == j])
         assert np.allclose(ours, slow, rtol=0, atol=1e-8)  # round-off of a dense solver at 1e6 MHz
 
 
@@ -64,7 +64,9 @@ def test_levels_of_one_and_two(constants):
     levels = solve_levels(Top(Constants(A=a, B=b, C=c, representation="Ir")), 2)
     energy = {
         (int(j), int(p), int(q)): e
-        for j, p, q, e in zip(levels.j, levels.ka, levels.kc, levels.energy_mhz, strict=True)
+        for j, p, q, e in zip(
+            levels.quanta["j"], levels.quanta["ka"], levels.quanta["kc"], levels.energy_mhz, strict=True
+        )
     }
     root = 2 * np.sqrt((b - c) ** 2 + (a - c) * (a - b))
     closed = {
@@ -82,7 +84,7 @@ def test_all_representations_give_the_same_rigid_levels():
     reference = None
     for representation in AXES:
         levels = solve_levels(Top(Constants(representation=representation, **RIGID)), 30)
-        order = np.lexsort((levels.kc, levels.ka, levels.j))
+        order = np.lexsort((levels.quanta["kc"], levels.quanta["ka"], levels.quanta["j"]))
         energies = levels.energy_mhz[order]
         reference = energies if reference is None else reference
         assert np.allclose(energies, reference, rtol=1e-13, atol=1e-7)  # round-off of 8e6 MHz

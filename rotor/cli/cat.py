@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
 
+from rotor.checks import require_whole
 from rotor.cli.shared import inputs
+from rotor.cli.shared.inputs import Input, json_option
+from rotor.cli.shared.options import argument, file_option, grouped, option
 from rotor.cli.shared.output import (
     ComputationError,
     Files,
@@ -36,39 +39,48 @@ Examples:
   rotor cat case.cat --compare case.int --json difference.json"""
 
 
-def command(
-    context: typer.Context,
-    file: str = typer.Argument(..., metavar="FILE", help="Catalogue (.cat, .cat.gz).", show_default=False),
-    range_: str | None = typer.Option(None, "--range", metavar="A:B", help="First and last frequency (MHz)."),
-    min_lgint: str | None = typer.Option(None, metavar="X", help="Leave out lines with log10(nm² MHz) below."),
-    measured: str | None = typer.Option(None, metavar="FILE", help="Catalogue whose measured lines are merged in."),
-    compare: str | None = typer.Option(
+@dataclass(frozen=True)
+class Options:
+    """Which lines are shown, and what they are compared with."""
+
+    file: str = argument(..., metavar="FILE", help="Catalogue (.cat, .cat.gz).")
+    range_: str | None = option(None, "--range", metavar="A:B", help="First and last frequency (MHz).")
+    min_lgint: str | None = option(None, metavar="X", help="Leave out lines with log10(nm² MHz) below.")
+    measured: str | None = option(None, metavar="FILE", help="Catalogue whose measured lines are merged in.")
+    compare: str | None = option(
         None, metavar="OTHER", help="Another .cat, an .int, or a molecule to predict: what differs in OTHER."
-    ),
-    out: str | None = typer.Option(None, metavar="FILE", help="Write the lines that are left (.cat, .cat.gz)."),
-    plot: str | None = typer.Option(None, metavar="FILE", help="Draw the lines (.png, .pdf, .svg)."),
-    json: str | None = inputs.JSON,
-    top_lines: int = typer.Option(20, "--top", metavar="N", help="How many lines are shown."),
-) -> None:
+    )
+    top_lines: int = option(20, "--top", metavar="N", help="How many lines are shown.")
+
+
+@dataclass(frozen=True)
+class Outputs:
+    """Files to write."""
+
+    out: str | None = file_option(".cat", ".cat.gz", help="Write the lines that are left (.cat, .cat.gz).")
+    plot: str | None = file_option(".png", ".pdf", ".svg", help="Draw the lines (.png, .pdf, .svg).")
+    json: str | None = json_option()
+
+
+@grouped()
+def command(context: typer.Context, options: Options, outputs: Outputs) -> None:
     """A catalogue as a table; or how another list differs from it."""
-    inputs.whole("--top", top_lines, 0)
-    files = Files()
-    files.ask("--out", out, (".cat", ".cat.gz"))
-    files.ask("--plot", plot, (".png", ".pdf", ".svg"))
-    files.ask_json(json)
+    require_whole("--top", options.top_lines, 0)
+    files, file, measured, compare = Files.of(outputs), options.file, options.measured, options.compare
+    range_, min_lgint, top_lines = options.range_, options.min_lgint, options.top_lines
     lines = filtered(read_catalogue(file), range_, min_lgint)
     if measured is not None:
         from rotor.formats.spcat.compare import with_measured_lines
 
         lines = with_measured_lines(lines, read_catalogue(measured))
-    if plot and not len(lines):
+    if outputs.plot and not len(lines):
         raise ComputationError("--plot: no lines are left to draw")
     content = summary(lines, file, context.obj)
     found = None
     if compare is not None:
         found = compared(lines, compare, range_, min_lgint)
         content["compared"] = comparison_record(found, compare, top_lines)
-    content["files"] = [str(path) for path in files.wanted.values()]
+    content["files"] = files.names
     content["lines"] = [_record(lines, row) for row in range(len(lines))]
 
     show = lambda: _show(lines, content, found, top_lines)  # noqa: E731
@@ -78,7 +90,7 @@ def command(
 def read_catalogue(path: str) -> Catalogue:
     """The catalogue in a file; ValueError for a file of something else."""
     if not path.lower().endswith((".cat", ".cat.gz")):
-        raise ValueError(f"{path}: a catalogue is wanted, .cat or .cat.gz")
+        raise ValueError(f"{path}: expected a catalogue, .cat or .cat.gz")
     from rotor.formats.spcat.cat import read_cat
 
     return read_cat(path)
@@ -93,7 +105,7 @@ def filtered(lines: Catalogue, range_: str | None, min_lgint: str | None) -> Cat
 
     first, last = (0.0, math.inf)
     if range_ is not None:
-        first, last = inputs.option("--range", range_, lambda text: parse_range(text, "MHz"))
+        first, last = inputs.parsed("--range", range_, lambda text: parse_range(text, "MHz"))
     least = inputs.cut("--min-lgint", min_lgint) if min_lgint is not None else None
     frequency, _ = in_mhz(lines)
     kept = (frequency >= first) & (frequency <= last) & (lines.lgint >= (-np.inf if least is None else least))
@@ -142,7 +154,7 @@ def predicted(lines: Catalogue, source: str) -> Catalogue:
     import rotor
     from rotor.formats.line_tables import catalogue
 
-    top = inputs.with_some_dipole(inputs.read_top(inputs.Input(source, None, [], None, None, None)))
+    top = inputs.with_some_dipole(inputs.read_top(Input(source)))
     if not len(lines):
         raise ComputationError("--compare: no lines are left to compare")
     highest = int(max(lines.quanta_upper[:, 0].max(), lines.quanta_lower[:, 0].max()))

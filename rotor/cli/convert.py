@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import typer
 
+from rotor.checks import require_whole
 from rotor.cli.shared import inputs
+from rotor.cli.shared.inputs import Input, json_option
+from rotor.cli.shared.options import argument, grouped, option
 from rotor.cli.shared.output import Files, Writer, deliver, json_text, note
 
 if TYPE_CHECKING:
@@ -20,32 +24,36 @@ Examples:
   rotor convert water water.var"""
 
 
-def command(
-    context: typer.Context,
-    source: str = typer.Argument(..., help="File (.par, .var, .int, .toml, ...) or name.", show_default=False),
-    target: str = typer.Argument(..., help="File to write: .toml, .par or .var.", show_default=False),
-    kmax: int = typer.Option(99, metavar="N", help="Highest K of a .par or .var (KNMAX)."),
-    json: str | None = inputs.JSON,
-) -> None:
+@dataclass(frozen=True)
+class Options:
+    """What is read and what is written."""
+
+    source: str = argument(..., help="File (.par, .var, .int, .toml, ...) or name.")
+    target: str = argument(..., help="File to write: .toml, .par or .var.")
+    kmax: int = option(99, metavar="N", help="Highest K of a .par or .var (KNMAX).")
+    json: str | None = json_option()
+
+
+@grouped()
+def command(context: typer.Context, options: Options) -> None:
     """Constants, dipole and spin weights into another format; nothing is converted but the format."""
-    inputs.whole("--kmax", kmax, 0, 359)
-    files = Files()
+    require_whole("--kmax", options.kmax, 0, 359)
+    files, source, target = Files(), options.source, options.target
     files.ask("TARGET", target, (".toml", ".par", ".var"))
-    files.ask_json(json)
+    files.ask_json(options.json)
     top = top_with_errors(source)
 
     from rotor.cli.shared.report import describe
 
-    content = {**describe(top, source, context.obj), "files": [str(path) for path in files.wanted.values()]}
-    said = f"{source} → {target}: {top.constants.text()}"
-    writers = {"TARGET": writer_of(top, source, target, kmax)}
-    deliver(files, writers, lambda: json_text(content), lambda: print(said))
+    content = {**describe(top, source, context.obj), "files": files.names}
+    done = f"{source} → {target}: {top.constants.text()}"
+    writers = {"TARGET": writer_of(top, source, target, options.kmax)}
+    deliver(files, writers, lambda: json_text(content), lambda: print(done))
 
 
 def top_with_errors(source: str) -> Top:
     """The top a source means; of a .var file the errors of its parameters are the constants' uncertainties."""
-    given = inputs.Input(source, None, [], None, None, None)
-    top = inputs.read_top(given)
+    top = inputs.read_top(Input(source))
     path = Path(source)
     if path.suffix.lower() == ".int":
         from rotor.formats.spcat.predict import parameters_beside
@@ -66,16 +74,16 @@ def writer_of(top: Top, source: str, target: str, kmax: int) -> Writer:
         from rotor.formats.molecule_file import MoleculeFile
         from rotor.formats.molecule_writer import write_molecule_file
 
-        stories = {"constants": top.source, "dipole": top.dipole_source, "spin_weights": top.weights_source}
-        stories = {table: text or f"converted from {Path(source).name}" for table, text in stories.items()}
+        sources = {"constants": top.source, "dipole": top.dipole_source, "spin_weights": top.weights_source}
+        sources = {table: text or f"converted from {Path(source).name}" for table, text in sources.items()}
         if not top.dipole_abc_debye:
-            del stories["dipole"]
+            del sources["dipole"]
         file = MoleculeFile(
             name=top.name or Path(target).stem,
             constants=top.constants,
             dipole_abc_debye=top.dipole_abc_debye,
             spin_weights=top.spin_weights,
-            sources=stories,
+            sources=sources,
         )
         return lambda path: write_molecule_file(file, path)
 

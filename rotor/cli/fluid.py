@@ -1,15 +1,17 @@
-"""`rotor fluid`: a box of rigid molecules, run, kept and resumed."""
+"""`rotor fluid`: a box of rigid molecules, run, written as it runs, and resumed."""
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from math import isnan
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import typer
 
-from rotor.cli.shared import engines, inputs
+from rotor.cli.shared import inputs
+from rotor.cli.shared.inputs import json_option
+from rotor.cli.shared.options import argument, file_option, grouped, option
 from rotor.cli.shared.output import (
     ComputationError,
     Files,
@@ -22,11 +24,8 @@ from rotor.cli.shared.output import (
 )
 
 if TYPE_CHECKING:
-    from ase import Atoms
-
-    from rotor.fluid.motion.bodies import Bodies
-    from rotor.fluid.record import FluidRecord
-    from rotor.fluid.run import Outputs
+    from rotor.fluid.request import FluidAnswer, FluidRequest, NewBox
+    from rotor.fluid.run import Outputs as RunFiles
     from rotor.fluid.settings import Settings
 
 EXAMPLES = """\b
@@ -37,110 +36,121 @@ Examples:
   rotor fluid liquid.traj --steps 50000 --engine openmm --threads 2 --csv openmm.csv
   rotor fluid argon --molecules 500 --model argon --density 1.4 --temperature 90 --step 5fs"""
 
-TRAJECTORY = typer.Option(None, metavar="FILE", help="Write frames as they come (.traj, .xyz, .extxyz); repeatable.")
+NAMES = {
+    "engine": "--engine", "threads": "--threads", "frames_every": "--frames-every", "every": "--every", "model": "--model",
+    "molecules": "--molecules", "density_g_cm3": "--density",
+}  # fmt: skip  # field of the request -> option
 
 
-def command(
-    context: typer.Context,
-    source: str = typer.Argument(..., help="A box with its cell, or with --molecules 'water' or a model's name."),
-    model: str = typer.Option("spce", metavar="NAME", help="Rigid model; several joined by commas."),
-    molecules: int | None = typer.Option(None, metavar="N", help="Make a box of N molecules on a lattice, relaxed."),
-    density: str | None = typer.Option(None, metavar="D", help="Of the box that is made (g/cm³; by default 0.997)."),
-    ensemble: str = typer.Option("nve", metavar="NAME", help="nve, langevin or nose-hoover."),
-    temperature: str = typer.Option("298.15", metavar="T", help="Of thermostat and starting velocities (K)."),
-    step: str = typer.Option("2", metavar="T", help="Length of a step (fs)."),
-    steps: int = typer.Option(1000, metavar="N", help="How many steps."),
-    every: int = typer.Option(10, metavar="N", help="Steps between rows."),
-    cutoff: str = typer.Option("9", metavar="R", help="Of Lennard-Jones and charges (Å)."),
-    electrostatics: str = typer.Option("reaction-field", metavar="NAME", help="reaction-field, ewald or shifted."),
-    friction: str = typer.Option("1", metavar="F", help="Of langevin (1/ps)."),
-    relaxation: str = typer.Option("100", metavar="T", help="Time constant of nose-hoover (fs)."),
-    seed: int = typer.Option(1, metavar="N", help="Of the lattice, the velocities and the noise."),
-    threads: int = typer.Option(1, metavar="N", help="Threads of the built-in potential, or of the engine."),
-    csv: str | None = typer.Option(None, metavar="FILE", help="Write rows as they come (.csv)."),
-    trajectory: list[str] | None = TRAJECTORY,
-    frames_every: int | None = typer.Option(None, metavar="N", help="Steps between frames; by default as --every."),
-    checkpoint: str | None = typer.Option(None, metavar="FILE", help="Write what the run needs to continue (.npz)."),
-    checkpoint_every: int = typer.Option(1000, metavar="N", help="Steps between checkpoints."),
-    resume: bool = typer.Option(False, "--resume", help="Continue from --checkpoint."),
-    engine: str = typer.Option("rotor", metavar="NAME", help="Who runs it: rotor, openmm or lammps."),
-    json: str | None = inputs.JSON,
-) -> None:
-    """Rigid molecules that attract and repel: a run of a periodic box, its temperatures, energies and pressure."""
+@dataclass(frozen=True)
+class Options:
+    """The box and the run."""
+
+    source: str = argument(..., help="A box with its cell, or with --molecules 'water' or a model's name.")
+    model: str = option("spce", metavar="NAME", help="Rigid model; several joined by commas.")
+    molecules: int | None = option(None, metavar="N", help="Make a box of N molecules on a lattice, relaxed.")
+    density: str | None = option(None, metavar="D", help="Of the box that is made (g/cm³; by default 0.997).")
+    ensemble: str = option("nve", metavar="NAME", help="nve, langevin or nose-hoover.")
+    temperature: str = option("298.15", metavar="T", help="Of thermostat and starting velocities (K).")
+    step: str = option("2", metavar="T", help="Length of a step (fs).")
+    steps: int = option(1000, metavar="N", help="How many steps.")
+    every: int = option(10, metavar="N", help="Steps between rows.")
+    cutoff: str = option("9", metavar="R", help="Of Lennard-Jones and charges (Å).")
+    electrostatics: str = option("reaction-field", metavar="NAME", help="reaction-field, ewald or shifted.")
+    friction: str = option("1", metavar="F", help="Of langevin (1/ps).")
+    relaxation: str = option("100", metavar="T", help="Time constant of nose-hoover (fs).")
+    seed: int = option(1, metavar="N", help="Of the lattice, the velocities and the noise.")
+    threads: int = option(1, metavar="N", help="Threads of the built-in potential, or of the engine.")
+    engine: str = option("rotor", metavar="NAME", help="Which engine runs it: rotor, openmm or lammps.")
+
+
+@dataclass(frozen=True)
+class Outputs:
+    """Files that grow during the run, and the one written at its end."""
+
+    csv: str | None = file_option(".csv", help="Write rows as they come (.csv).")
+    trajectory: list[str] | None = option(
+        None, metavar="FILE", help="Write frames as they come (.traj, .xyz, .extxyz); repeatable."
+    )
+    frames_every: int | None = option(None, metavar="N", help="Steps between frames; by default as --every.")
+    checkpoint: str | None = file_option(".npz", help="Write what the run needs to continue (.npz).")
+    checkpoint_every: int = option(1000, metavar="N", help="Steps between checkpoints.")
+    resume: bool = option(False, "--resume", help="Continue from --checkpoint.")
+    json: str | None = json_option()
+
+
+@grouped()
+def command(context: typer.Context, options: Options, outputs: Outputs) -> None:
+    """Rigid molecules in a periodic box: a run, its temperatures, energies and pressure."""
+    settings = _settings(options)
+    growing, files = _files(options.source, outputs)
+    with inputs.fields_as_options(**NAMES):
+        request = _request(options, settings)
+        answer, start = _answer(request, growing, outputs, {"command": context.obj, "input": options.source})
+    for remark in answer.notes:
+        note(remark)
+    grown = [growing.csv, *growing.trajectories, growing.checkpoint, *files.paths.values()]
+    content = start | answer.facts() | {"files": [str(path) for path in grown if path is not None]}
+    text = lambda: json_with_rows(answer.record, "record", content)  # noqa: E731
+    deliver(files, {}, text, lambda: _show(content, settings))
+
+
+def _settings(options: Options) -> Settings:
+    from rotor.fluid.forces.models import model_of
     from rotor.fluid.settings import Settings
 
-    settings = Settings(
-        model=_model(model), ensemble=ensemble, temperature_k=inputs.positive("--temperature", temperature, "K"),
-        step_fs=inputs.positive("--step", step, "fs"), steps=steps, every=every,
-        cutoff_angstrom=inputs.positive("--cutoff", cutoff, "angstrom"), electrostatics=electrostatics,
-        friction_per_ps=inputs.positive("--friction", friction, ""),
-        relaxation_fs=inputs.positive("--relaxation", relaxation, "fs"), seed=seed,
+    for name in options.model.split(","):
+        inputs.parsed("--model", name.strip(), model_of)
+    return Settings(
+        model=options.model, ensemble=options.ensemble, steps=options.steps, every=options.every, seed=options.seed,
+        temperature_k=inputs.positive("--temperature", options.temperature, "K"),
+        step_fs=inputs.positive("--step", options.step, "fs"),
+        cutoff_angstrom=inputs.positive("--cutoff", options.cutoff, "angstrom"), electrostatics=options.electrostatics,
+        friction_per_ps=inputs.positive("--friction", options.friction, ""),
+        relaxation_fs=inputs.positive("--relaxation", options.relaxation, "fs"),
     )  # fmt: skip
-    outputs, files = _outputs(source, csv, trajectory or [], frames_every, checkpoint, checkpoint_every, json)
-    engines.check(engine, threads, outputs, resume)
-    atoms, start = _box(source, settings, molecules, density, threads, relaxing=not resume)
-    provenance = {
-        "command": context.obj,
-        "input": source,
-        "engine": engine,
-        "settings": asdict(settings),
-        "start": start,
-    }
-    if engine == "rotor":
-        record, about = _run(atoms, settings, outputs, resume, threads, provenance)
-    else:
-        about = {"start": f"{start}; velocities {_speeds(atoms, settings)}"}
-        record = engines.run(engine, atoms, settings, outputs, threads, _head(provenance))
-    _tell(record, {**_head(provenance), **about}, atoms, settings, outputs, files)
 
 
-def _model(names: str) -> str:
-    from rotor.fluid.forces.models import model_of
-
-    for name in names.split(","):
-        inputs.option("--model", name.strip(), model_of)
-    return names
-
-
-def _outputs(
-    source: str,
-    csv: str | None,
-    trajectories: list[str],
-    frames_every: int | None,
-    checkpoint: str | None,
-    every: int,
-    json: str | None,
-) -> tuple[Outputs, Files]:
+def _files(source: str, outputs: Outputs) -> tuple[RunFiles, Files]:
     """The files that grow, each with a suffix that can be written, and the one written at the end."""
-    from rotor.fluid.run import Outputs
+    from rotor.fluid.run import Outputs as RunFiles
 
     growing, last = Files(), Files()
-    growing.ask("--csv", csv, (".csv",))
-    for number, path in enumerate(trajectories):
+    growing.ask("--csv", outputs.csv, (".csv",))
+    for number, path in enumerate(outputs.trajectory or []):
         growing.ask(f"--trajectory{' ' * number}", path, (".traj", ".xyz", ".extxyz"))
-    growing.ask("--checkpoint", checkpoint, (".npz",))
-    last.ask_json(json)
-    for name, target in (growing.wanted | last.wanted).items():
+    growing.ask("--checkpoint", outputs.checkpoint, (".npz",))
+    last.ask_json(outputs.json)
+    for name, target in (growing.paths | last.paths).items():
         if target.resolve() == Path(source).resolve():
             raise ValueError(f"{name.strip()} {target}: is the box that is read; write to another file")
-    return Outputs(csv, tuple(trajectories), frames_every, checkpoint, every), last
+    files = RunFiles(
+        outputs.csv, tuple(outputs.trajectory or ()), outputs.frames_every, outputs.checkpoint, outputs.checkpoint_every
+    )
+    return files, last
 
 
-def _box(
-    source: str, settings: Settings, molecules: int | None, density: str | None, threads: int, relaxing: bool
-) -> tuple[Atoms, str]:
-    """The box of a file, or one that is made; and where it came from."""
-    if molecules is None:
-        if density is not None:
-            raise ValueError("--density: is wanted with --molecules; the box of a file has the density of its cell")
-        return _read(source), source
-    import numpy as np
+def _request(options: Options, settings: Settings) -> FluidRequest:
+    """The request: the box of a file, or one to make."""
+    from rotor.fluid.request import FluidRequest
 
-    from rotor.fluid.forces.models import MODELS, model_of, shapes_of
-    from rotor.fluid.initial_box import RELAXING_STEPS, lattice_box, relax
-    from rotor.fluid.run import calculator_of
+    if options.molecules is not None:
+        box = _new_box(options, settings)
+        return FluidRequest(box, settings, options.engine, options.threads)
+    if options.density is not None:
+        raise ValueError("--density: expected with --molecules; the box of a file has the density of its cell")
+    from rotor.formats.boxes import read_box
 
-    inputs.whole("--molecules", molecules, 1)
+    if not Path(options.source).is_file():
+        raise ValueError(f"{options.source}: no such file; with --molecules N a box is made of 'water' or of a model")
+    return FluidRequest(read_box(options.source), settings, options.engine, options.threads, options.source)
+
+
+def _new_box(options: Options, settings: Settings) -> NewBox:
+    from rotor.fluid.forces.models import MODELS, model_of
+    from rotor.fluid.request import WATER_G_CM3, NewBox
+
+    source = options.source
     if source != settings.model and source in MODELS:
         raise ValueError(f"{source!r}: the model is {settings.model}; write --model {source} too")
     if "," in settings.model or source not in ("water", settings.model):
@@ -150,124 +160,34 @@ def _box(
     model = model_of(settings.model)
     if source == "water" and model.symbols != ("O", "H", "H"):
         raise ValueError(f"{source!r}: --model {model.name} is no model of water; write {model.name!r}")
-    grams = inputs.positive("--density", density or "0.997", "")
-    atoms = lattice_box(model, molecules, grams, np.random.default_rng(settings.seed))
-    atoms.calc = calculator_of(settings, threads)
-    if relaxing:
-        relax(atoms, shapes=shapes_of([model]))
-    made = f"{molecules} molecules on a lattice at {grams:g} g/cm³, turned at random, {RELAXING_STEPS} quenched steps of 1 fs"
-    return atoms, made
+    grams = WATER_G_CM3 if options.density is None else inputs.positive("--density", options.density, "")
+    return NewBox(options.molecules or 0, grams)
 
 
-def _read(source: str) -> Atoms:
-    """The last frame of a file."""
-    from ase.io import read
-    from ase.io.formats import UnknownFileTypeError
+def _answer(
+    request: FluidRequest, growing: RunFiles, outputs: Outputs, said: dict[str, Any]
+) -> tuple[FluidAnswer, dict[str, Any]]:
+    """The run and the keys that begin its JSON; a run that stops on its way is no mistake of the user."""
+    import rotor
+    from rotor.fluid.request import answer_fluid
+    from rotor.fluid.run import RunStopped
 
-    if not Path(source).is_file():
-        raise ValueError(f"{source}: no such file; with --molecules N a box is made of 'water' or of a model")
-    try:
-        atoms: Any = read(source)
-    except (UnknownFileTypeError, OSError, ValueError, KeyError, IndexError, AssertionError) as error:
-        raise ValueError(
-            f"{source}: cannot be read as a box of atoms ({str(error) or type(error).__name__})"
-        ) from error
-    atoms.calc = None
-    if not atoms.pbc.any():
-        raise ValueError(f"{source}: has no cell that repeats; a box has one (in extended xyz, Lattice and pbc)")
-    return cast("Atoms", atoms)
-
-
-def _run(
-    atoms: Atoms, settings: Settings, outputs: Outputs, resume: bool, threads: int, provenance: dict[str, Any]
-) -> tuple[FluidRecord, dict[str, Any]]:
-    """The run of our own engine: what stops it on its way is no mistake of the user."""
-    from rotor.fluid.run import RunStopped, calculator_of, run_fluid
-
-    if atoms.calc is None:
-        atoms.calc = calculator_of(settings, threads)
-    speeds = _speeds(atoms, settings)
+    head = {"rotor_version": rotor.__version__, **said, "engine": request.engine, "settings": asdict(request.settings)}
 
     def on_start() -> None:
         from rotor.formats.line_tables import write_beside
 
-        if outputs.csv is not None and not resume:
-            write_beside(outputs.csv, _head(provenance))
+        if growing.csv is not None and not outputs.resume:
+            write_beside(growing.csv, {**head, "start": request.start})
 
     try:
-        record = run_fluid(atoms, settings, outputs, resume=resume, on_start=on_start)
+        return answer_fluid(request, growing, resume=outputs.resume, on_start=on_start), head
     except RunStopped as error:
         raise ComputationError(str(error)) from error
     except KeyboardInterrupt:
-        if outputs.checkpoint is not None and Path(outputs.checkpoint).is_file():
-            note(f"interrupted; the same command with --resume goes on from {outputs.checkpoint}")
+        if growing.checkpoint is not None and Path(growing.checkpoint).is_file():
+            note(f"interrupted; the same command with --resume goes on from {growing.checkpoint}")
         raise
-    start = f"resumed from {outputs.checkpoint}" if resume else f"{provenance['start']}; velocities {speeds}"
-    return record, {"start": start}
-
-
-def _speeds(atoms: Atoms, settings: Settings) -> str:
-    """Where the velocities of the start come from."""
-    return "those of the box" if atoms.get_momenta().any() else f"drawn at {settings.temperature_k:g} K"
-
-
-def _head(provenance: dict[str, Any]) -> dict[str, Any]:
-    import rotor
-
-    return {"rotor_version": rotor.__version__, **provenance}
-
-
-def _tell(
-    record: FluidRecord, content: dict[str, Any], atoms: Atoms, settings: Settings, outputs: Outputs, files: Files
-) -> None:
-    """Everything printed: as JSON, or as a report."""
-    from rotor.fluid.run import bodies_and_degrees
-    from rotor.fluid.summary import conserved, means
-
-    bodies, degrees, thermometer = bodies_and_degrees(atoms, settings)
-    if content["engine"] == "lammps":
-        thermometer = "mixed"  # its momenta are those on the step under its thermostat too
-    rms, drift = conserved(record)
-    grown = [outputs.csv, *outputs.trajectories, outputs.checkpoint, *files.wanted.values()]
-    content |= {
-        "box_angstrom": atoms.cell.lengths() if atoms.pbc.all() else None,
-        "density_g_cm3": _density(atoms, bodies),
-        "molecules": _species(bodies),
-        "degrees": {name: getattr(degrees, name) for name in ("translation", "rotation", "removed", "total")},
-        "thermometer": thermometer,
-        "means": [asdict(mean) for mean in means(record, len(bodies))],
-        "conserved_rms_ev": rms,
-        "conserved_drift_ev_per_ns": drift,
-        "notes": list(degrees.notes),
-        "files": [str(path) for path in grown if path is not None],
-    }
-    for text in degrees.notes:
-        note(text)
-    deliver(files, {}, lambda: json_with_rows(record, "record", content), lambda: _show(content, settings))
-
-
-def _density(atoms: Atoms, bodies: Bodies) -> float | None:
-    from rotor.units import ATOMIC_MASS_KG
-
-    return float(bodies.mass.sum()) * ATOMIC_MASS_KG * 1e27 / float(atoms.get_volume()) if atoms.pbc.all() else None
-
-
-def _species(bodies: Bodies) -> list[dict[str, Any]]:
-    """One record for each species."""
-    records = []
-    for number, name in enumerate(bodies.names):
-        members = (bodies.species == number).nonzero()[0]
-        moments = bodies.moments[members[0]]
-        records.append(
-            {
-                "name": name,
-                "count": len(members),
-                "mass_u": float(bodies.mass[members[0]]),
-                "moments_u_angstrom2": moments.tolist(),
-                "rotational_degrees": int((moments > 0.0).sum()),
-            }
-        )
-    return records
 
 
 def _claim(content: dict[str, Any], settings: Settings) -> str:
@@ -288,7 +208,7 @@ def _show(content: dict[str, Any], settings: Settings) -> None:
             f"{degrees['translation']} of translation, {degrees['rotation']} of rotation; {degrees['removed']} removed",
         ),
         ("thermometer", content["thermometer"] + _claim(content, settings)),
-        ("conserved", "one row alone tells nothing" if isnan(rms) else f"rms {rms:.3g} eV, drift {drift:.3g} eV/ns"),
+        ("conserved", "not known from one row alone" if isnan(rms) else f"rms {rms:.3g} eV, drift {drift:.3g} eV/ns"),
     ]
     if content["density_g_cm3"] is not None:
         edges = " x ".join(f"{edge:.6g}" for edge in content["box_angstrom"])

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import typer
 
+from rotor.checks import require_whole
 from rotor.cli.shared import inputs
-from rotor.cli.shared.inputs import Input
+from rotor.cli.shared.inputs import Input, json_option
+from rotor.cli.shared.options import grouped, option
 from rotor.cli.shared.output import Files, Table, deliver, json_text, show_facts, show_table, sum_progress
 
 if TYPE_CHECKING:
@@ -26,60 +29,34 @@ Examples:
   rotor info --constants "A=8.572 B=3.64 C=2.79 GHz" --temperature 10:300K:30"""
 
 
-def command(
-    context: typer.Context,
-    source: str | None = inputs.SOURCE,
-    constants: str | None = inputs.CONSTANTS,
-    isotope: list[str] | None = inputs.ISOTOPE,
-    dipole: str | None = inputs.DIPOLE,
-    dipole_abc: str | None = inputs.DIPOLE_ABC,
-    spin_weights: str | None = inputs.SPIN_WEIGHTS,
-    symmetry_tolerance: str | None = inputs.SYMMETRY_TOLERANCE,
-    calculator: str | None = inputs.CALCULATOR,
-    hessian: str | None = inputs.HESSIAN,
-    temperature: str | None = typer.Option(
-        None, metavar="GRID", help="Temperatures of the table: 10:300K:30 or 10,20,50 K."
-    ),
-    conformers: int | None = typer.Option(
+@dataclass(frozen=True)
+class Options:
+    """What is computed besides the top itself."""
+
+    temperature: str | None = option(None, metavar="GRID", help="Temperatures of the table: 10:300K:30 or 10,20,50 K.")
+    conformers: int | None = option(
         None, metavar="N", help="Of a SMILES: the different conformers among N that are tried, with their energies."
-    ),
-    json: str | None = inputs.JSON,
-) -> None:
-    """Frame, constants, kind of top with its margin, moments, dipole, table of Q(T)."""
-    temperatures = TEMPERATURES_K if temperature is None else inputs.temperatures("--temperature", temperature)
-    files = Files()
-    files.ask_json(json)
-    given = Input(
-        source,
-        constants,
-        isotope or [],
-        dipole,
-        dipole_abc,
-        spin_weights,
-        calculator,
-        hessian,
-        symmetry_tolerance=symmetry_tolerance,
     )
+    json: str | None = json_option()
+
+
+@grouped()
+def command(context: typer.Context, given: Input, options: Options) -> None:
+    """Frame, constants, kind of top with its margin, moments, dipole, table of Q(T)."""
+    temperatures = (
+        TEMPERATURES_K if options.temperature is None else inputs.temperatures("--temperature", options.temperature)
+    )
+    files = Files.of(options)
     top = inputs.read_top(given)
 
     from rotor.cli.shared.report import describe
+    from rotor.thermo.request import partition_table
 
     content = describe(top, given.text, context.obj)
-    content["partition_function"] = partition_table(top, temperatures)
-    if conformers is not None:
-        content["conformers"] = conformer_table(source, conformers)
+    content["partition_function"] = partition_table(top, temperatures, sum_progress())
+    if options.conformers is not None:
+        content["conformers"] = conformer_table(given.source, options.conformers)
     deliver(files, {}, lambda: json_text(content), lambda: _show(top, content))
-
-
-def partition_table(top: Top, temperatures_k: Sequence[float]) -> list[dict[str, Any]]:
-    """Q summed and classical at each temperature; where the sum means nothing, `q` is None and `source` says why."""
-    from rotor.thermo import partition_functions
-
-    try:
-        found = partition_functions(top, temperatures_k, progress=sum_progress())
-    except ValueError:  # one of them is out of reach: each for itself
-        return [_row(top, t) for t in temperatures_k]
-    return [_record(top, partition) for partition in found]
 
 
 def conformer_table(source: str | None, count: int) -> list[dict[str, Any]]:
@@ -87,7 +64,7 @@ def conformer_table(source: str | None, count: int) -> list[dict[str, Any]]:
     from rotor.molecules.readers.smiles import conformers
     from rotor.tops.top import Top
 
-    inputs.whole("--conformers", count, 1, MOST_CONFORMERS)
+    require_whole("--conformers", count, 1, MOST_CONFORMERS)
     if not (source or "").startswith("SMILES:"):
         raise ValueError(f"--conformers: {source or 'constants'!r} is one geometry; conformers are made of a SMILES")
     found = []
@@ -102,29 +79,6 @@ def conformer_table(source: str | None, count: int) -> list[dict[str, Any]]:
             }
         )
     return found
-
-
-def _row(top: Top, temperature_k: float) -> dict[str, Any]:
-    from rotor.thermo import classical_partition_function, partition_function
-
-    try:
-        return _record(top, partition_function(top, temperature_k))
-    except ValueError as error:
-        return {
-            "temperature_k": temperature_k,
-            "q": None,
-            "classical": classical_partition_function(top, temperature_k),
-            "jmax": None,
-            "relative_error": None,
-            "source": str(error),
-        }
-
-
-def _record(top: Top, partition: Any) -> dict[str, Any]:
-    from rotor.cli.shared.report import q_record
-    from rotor.thermo import classical_partition_function
-
-    return q_record(partition, classical_partition_function(top, partition.temperature_k))
 
 
 def _show(top: Top, content: dict[str, Any]) -> None:
@@ -151,7 +105,7 @@ def _facts(top: Top, content: dict[str, Any]) -> list[tuple[str, str]]:
             ("point group", f"{content['point_group']}, rotational symmetry number {number}{_near_text(content)}")
         )
     if top.constants.representation:
-        facts.append(("meant in", report.form_text(top.constants)))
+        facts.append(("reduction", report.form_text(top.constants)))
     dipole = report.vector_text(top.dipole_abc_debye)
     weights = report.weights_text(content["spin_weights"])
     facts += [

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import typer
 
 from rotor.cli.shared import inputs
-from rotor.cli.shared.inputs import Input
+from rotor.cli.shared.inputs import Input, json_option
+from rotor.cli.shared.options import grouped, option
 from rotor.cli.shared.output import Files, Table, deliver, json_text, note, show_table
 
 if TYPE_CHECKING:
@@ -16,10 +18,6 @@ if TYPE_CHECKING:
     from rotor.tops.top import Top
 
 MIN_ABUNDANCE = 1e-4
-EACH = typer.Option(None, metavar="O=18O", help="Each atom of an element substituted, one at a time; repeatable.")
-SITE = typer.Option(
-    None, metavar="2=2H", help="The isotopologue with this atom substituted; repeated, all of them together."
-)
 
 EXAMPLES = """\b
 Examples:
@@ -29,30 +27,35 @@ Examples:
   rotor isotopologues water --site 2=2H --site 3=2H"""
 
 
-def command(
-    context: typer.Context,
-    source: str | None = inputs.SOURCE,
-    min_abundance: float | None = typer.Option(
+@dataclass(frozen=True)
+class Options:
+    """Which isotopologues are listed."""
+
+    min_abundance: float | None = option(
         None,
         metavar="X",
         help=f"Least abundance in nature of those listed; {MIN_ABUNDANCE:g} unless others are asked for.",
-    ),
-    each: list[str] | None = EACH,
-    site: list[str] | None = SITE,
-    dipole: str | None = inputs.DIPOLE,
-    dipole_abc: str | None = inputs.DIPOLE_ABC,
-    json: str | None = inputs.JSON,
-) -> None:
+    )
+    each: list[str] | None = option(
+        None, metavar="O=18O", help="Each atom of an element substituted, one at a time; repeatable."
+    )
+    site: list[str] | None = option(
+        None, metavar="2=2H", help="The isotopologue with this atom substituted; repeated, all of them together."
+    )
+    json: str | None = json_option()
+
+
+@grouped(given=("constants", "isotope", "spin_weights", "calculator", "hessian", "symmetry_tolerance"))
+def command(context: typer.Context, given: Input, options: Options) -> None:
     """Isotopologues: abundance, constants, kind, axes, dipole and spin weights of each."""
-    files = Files()
-    files.ask_json(json)
-    parent = inputs.read_top(Input(source, None, [], dipole, dipole_abc, None))
-    family = _family(parent, min_abundance, each or [], site or [])
+    files = Files.of(options)
+    parent = inputs.read_top(given)
+    family = _family(parent, options.min_abundance, options.each or [], options.site or [])
     _tell(parent, family)
 
     content = {
         "command": context.obj,
-        "input": source,
+        "input": given.source,
         "name": parent.name or None,
         "isotopologues": [record(one) for one in family],
     }
@@ -68,11 +71,11 @@ def _family(
     family: list[Isotopologue] = []
     if min_abundance is not None or not (each or site):
         least = MIN_ABUNDANCE if min_abundance is None else min_abundance
-        family += inputs.option("--min-abundance", str(least), lambda _: isotopologues(parent, min_abundance=least))
+        family += inputs.parsed("--min-abundance", str(least), lambda _: isotopologues(parent, min_abundance=least))
     for text in each:
-        family += inputs.option("--each", text, lambda value: single_substitutions(parent, *_substitution(value)))
+        family += inputs.parsed("--each", text, lambda value: single_substitutions(parent, *_substitution(value)))
     if site:
-        family.append(inputs.option("--site", ",".join(site), lambda text: isotopologue(parent, text)))
+        family.append(inputs.parsed("--site", ",".join(site), lambda text: isotopologue(parent, text)))
     return tuple({one.label: one for one in family}.values())
 
 

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from json import dumps
 from pathlib import Path
 from typing import Any
 
 import typer
 
-from rotor.cli.shared import inputs
+from rotor.cli.shared.inputs import json_option
+from rotor.cli.shared.options import argument, grouped
 from rotor.cli.shared.output import Files, Table, deliver, plain, show_facts, show_table
 
 WIDEST_NAME = 24
@@ -20,16 +22,21 @@ Examples:
   rotor molecules --json -"""
 
 
-def command(
-    name: str | None = typer.Argument(None, help="Only this one, with all its sources.", show_default=False),
-    json: str | None = inputs.JSON,
-) -> None:
+@dataclass(frozen=True)
+class Options:
+    """Which molecules are listed."""
+
+    name: str | None = argument(help="Only this one, with all its sources.")
+    json: str | None = json_option()
+
+
+@grouped()
+def command(context: typer.Context, options: Options) -> None:
     """Molecules known by name: kind, κ, dipole, and where the numbers are from."""
-    files = Files()
-    files.ask_json(json)
-    records = [record(path) for path in _paths(name)]
+    files = Files.of(options)
+    records = [record(path) for path in _paths(options.name)]
     text = "[\n" + ",\n".join(dumps(one, ensure_ascii=False, allow_nan=False) for one in records) + "\n]\n"
-    deliver(files, {}, lambda: text, lambda: _show(records, alone=name is not None))
+    deliver(files, {}, lambda: text, lambda: _show(records, alone=options.name is not None))
 
 
 def _show(records: list[dict[str, Any]], alone: bool) -> None:

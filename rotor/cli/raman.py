@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from rotor.cli.shared import gas_layer as layer
-from rotor.cli.shared import inputs
-from rotor.cli.shared.inputs import Input
+from rotor.checks import require_between, require_whole
+from rotor.cli.shared import gas_layer, inputs
+from rotor.cli.shared.gas_layer import Vibration
+from rotor.cli.shared.inputs import Input, json_option
+from rotor.cli.shared.options import file_option, grouped, option
 from rotor.cli.shared.output import (
     ComputationError,
     Files,
@@ -26,7 +28,7 @@ from rotor.cli.shared.output import (
 
 if TYPE_CHECKING:
     from rotor.spectra.raman import RamanLines
-    from rotor.thermo import VibrationalStates
+    from rotor.spectra.raman_request import RamanAnswer
     from rotor.tops.top import Top
 
 EXAMPLES = """\b
@@ -35,83 +37,84 @@ Examples:
   rotor raman CO2 --laser 488 --temperature 500 --csv co2.csv --plot co2.png
   rotor raman --constants "B=1.98958 cm-1" --polarizability 2.22,1.53 --spin-weights even=2,odd=1"""
 
+NAMES = {
+    "temperature_k": "--temperature", "laser_nm": "--laser", "jmax": "--jmax", "min_relative": "--min-relative",
+}  # fmt: skip  # field of the request -> option
+
 
 @dataclass(frozen=True)
-class Settings:
-    """What the options ask for, in the units of the package."""
+class Options:
+    """What is computed, and how much of it is shown."""
 
-    temperature_k: float
-    laser_nm: float
-    jmax: int | None
-    min_relative: float | None
-    vibrations: VibrationalStates | None
-
-
-def command(
-    context: typer.Context,
-    source: str | None = inputs.SOURCE,
-    constants: str | None = inputs.CONSTANTS,
-    temperature: str = typer.Option("300", metavar="T", help="Temperature (K)."),
-    laser: str = typer.Option("532", metavar="W", help="Wavelength of the laser in vacuum (nm)."),
-    polarizability: str | None = typer.Option(
+    temperature: str = option("300", metavar="T", help="Temperature (K).")
+    laser: str = option("532", metavar="W", help="Wavelength of the laser in vacuum (nm).")
+    polarizability: str | None = option(
         None, metavar="LIST", help="In principal axes: aa,bb,cc[,ab,ac,bc] or parallel,perpendicular (Å³)."
-    ),
-    jmax: int | None = typer.Option(None, metavar="N", help="Highest J; by default what the cut needs."),
-    min_relative: str = typer.Option("1e-6", metavar="X", help="Leave out lines below X of the strongest; or 'none'."),
-    isotope: list[str] | None = inputs.ISOTOPE,
-    spin_weights: str | None = inputs.SPIN_WEIGHTS,
-    symmetry_tolerance: str | None = inputs.SYMMETRY_TOLERANCE,
-    vibration: str | None = layer.VIBRATION,
-    vibrational_states: str | None = layer.VIBRATIONAL_STATES,
-    csv: str | None = typer.Option(None, metavar="FILE", help="Write all lines as CSV."),
-    parquet: str | None = typer.Option(None, metavar="FILE", help="Write all lines as Parquet."),
-    plot: str | None = typer.Option(None, metavar="FILE", help="Draw the lines (.png, .pdf, .svg)."),
-    json: str | None = inputs.JSON,
-    top_lines: int = typer.Option(20, "--top", metavar="N", help="How many of the strongest lines are shown."),
-) -> None:
-    """Rotational Raman lines: Stokes and anti-Stokes shifts and their cross sections."""
-    inputs.whole("--jmax", jmax, 0)
-    inputs.whole("--top", top_lines, 0)
-    settings = Settings(
-        temperature_k=inputs.positive("--temperature", temperature, "K"),
-        laser_nm=inputs.positive("--laser", laser, "nm"),
-        jmax=jmax,
-        min_relative=_cut(min_relative),
-        vibrations=layer.vibrations(vibration, vibrational_states),
     )
-    files = Files()
-    files.ask("--csv", csv, (".csv",))
-    files.ask("--parquet", parquet, (".parquet",))
-    files.ask("--plot", plot, (".png", ".pdf", ".svg"))
-    files.ask_json(json)
+    jmax: int | None = option(None, metavar="N", help="Highest J; by default what the cut needs.")
+    min_relative: str = option("1e-6", metavar="X", help="Leave out lines below X of the strongest; or 'none'.")
+    top_lines: int = option(20, "--top", metavar="N", help="How many of the strongest lines are shown.")
 
-    given = Input(source, constants, isotope or [], None, None, spin_weights, symmetry_tolerance=symmetry_tolerance)
-    top = _with_polarizability(inputs.read_top(given), polarizability)
+
+@dataclass(frozen=True)
+class Outputs:
+    """Files to write."""
+
+    csv: str | None = file_option(".csv", help="Write all lines as CSV.")
+    parquet: str | None = file_option(".parquet", help="Write all lines as Parquet.")
+    plot: str | None = file_option(".png", ".pdf", ".svg", help="Draw the lines (.png, .pdf, .svg).")
+    json: str | None = json_option()
+
+
+@grouped(given=("dipole", "dipole_abc", "calculator", "hessian"))
+def command(context: typer.Context, given: Input, options: Options, vibration: Vibration, outputs: Outputs) -> None:
+    """Rotational Raman lines: Stokes and anti-Stokes shifts and their cross sections."""
+    from rotor.spectra.raman_request import RamanRequest, answer_raman
+
+    require_whole("--top", options.top_lines, 0)
+    settings = {**_settings(options), "vibrations": gas_layer.vibrations_of(vibration)}
+    files = Files.of(outputs)
+    top = _with_polarizability(inputs.read_top(given), options.polarizability)
+    with inputs.fields_as_options(**NAMES):
+        request = RamanRequest(top, **settings)
     with answering():
-        lines = _lines(top, settings)
-        content = _content(lines, settings, given, context.obj, top_lines)
-    if "--plot" in files.wanted and not len(lines):
-        raise ComputationError(f"--plot: no lines: {_why_none(lines)}")
-    for warning in lines.warnings:
+        answer = answer_raman(request)
+        content = _content(answer, given, context.obj, options.top_lines)
+    if "--plot" in files.paths and answer.why_no_lines:
+        raise ComputationError(f"--plot: no lines: {answer.why_no_lines}")
+    for warning in answer.lines.warnings:
         note(warning)
 
-    content["files"] = [str(path) for path in files.wanted.values()]
-    deliver(
-        files, _writers(lines, content), lambda: json_with_rows(lines, "lines", content), lambda: _show(lines, content)
-    )
+    content["files"] = files.names
+    text = lambda: json_with_rows(answer.lines, "lines", content)  # noqa: E731
+    deliver(files, _writers(answer.lines, content), text, lambda: _show(answer, content))
 
 
-def _cut(text: str) -> float | None:
-    least = inputs.cut("--min-relative", text)
-    if least is not None and not 0 < least < 1:
-        raise ValueError(f"--min-relative: {text!r}: a number between 0 and 1 is wanted, or 'none'")
-    return least
+def _settings(options: Options) -> dict[str, Any]:
+    """Fields of the request from the texts of the options."""
+    require_whole("--jmax", options.jmax, 0)
+    least = inputs.cut("--min-relative", options.min_relative)
+    if least is not None:
+        require_between("--min-relative", least, 0, 1)
+    return {
+        "temperature_k": inputs.positive("--temperature", options.temperature, "K"),
+        "laser_nm": inputs.positive("--laser", options.laser, "nm"),
+        "jmax": options.jmax,
+        "min_relative": least,
+    }
+
+
+def _content(answer: RamanAnswer, given: Input, command: str, shown: int) -> dict[str, Any]:
+    """What is printed and more, by the keys of docs/command_line.md."""
+    from rotor.cli.shared.report import begin
+
+    return {**begin(command, given.text), **answer.facts(), "strongest": answer.strongest(shown)}
 
 
 def _with_polarizability(top: Top, text: str | None) -> Top:
-    """The top with the polarizability given, else its own; ValueError where there is none to be had."""
+    """The top with the polarizability given, else its own; ValueError where none is known."""
     if text is not None:
-        return inputs.option("--polarizability", text, lambda value: _given(top, value))
+        return inputs.parsed("--polarizability", text, lambda value: _given(top, value))
     if top.polarizability_abc_angstrom3 is None and top.kind != "spherical":
         raise ValueError(
             "the polarizability is not known: give --polarizability aa,bb,cc (principal axes, Å³), or "
@@ -136,45 +139,6 @@ def _given(top: Top, text: str) -> Top:
     return top.with_polarizability([[aa, ab, ac], [ab, bb, bc], [ac, bc, cc]], source)
 
 
-def _lines(top: Top, settings: Settings) -> RamanLines:
-    from rotor.spectra.raman import raman_lines
-
-    return raman_lines(
-        top,
-        temperature_k=settings.temperature_k,
-        laser_nm=settings.laser_nm,
-        jmax=settings.jmax,
-        min_relative=settings.min_relative,
-        vibrations=settings.vibrations,
-    )
-
-
-def _content(lines: RamanLines, settings: Settings, given: Input, command: str, shown: int) -> dict[str, Any]:
-    """What is printed and more, by the keys of docs/command_line.md."""
-    import numpy as np
-
-    from rotor.cli.shared.report import describe, q_record
-    from rotor.spectra.raman import anisotropy_angstrom3, band_cross_section
-    from rotor.thermo import classical_partition_function
-
-    given_jmax = settings.jmax is not None
-    return {
-        **describe(lines.top, given.text, command),
-        "temperature_k": lines.temperature_k,
-        "laser_nm": lines.laser_nm,
-        "anisotropy_angstrom3": anisotropy_angstrom3(lines.top),
-        "band_cross_section_cm2_per_sr": band_cross_section(lines),
-        "q": q_record(lines.partition, classical_partition_function(lines.top, lines.temperature_k)),
-        "jmax": lines.jmax,
-        "jmax_source": "given"
-        if given_jmax
-        else f"beyond it no line reaches {settings.min_relative or 1e-6:g} of the strongest",
-        "min_relative": settings.min_relative,
-        "line_count": len(lines),
-        "strongest": np.sort(np.argsort(-lines.cross_section_cm2_per_sr, kind="stable")[:shown]),
-    }
-
-
 def _writers(lines: RamanLines, content: dict[str, Any]) -> dict[str, Writer]:
     provenance = {"command": content["command"], "input": content["input"]}
 
@@ -191,13 +155,14 @@ def _writers(lines: RamanLines, content: dict[str, Any]) -> dict[str, Writer]:
     return {"--csv": table, "--parquet": table, "--plot": draw}
 
 
-def _show(lines: RamanLines, content: dict[str, Any]) -> None:
+def _show(answer: RamanAnswer, content: dict[str, Any]) -> None:
     from rotor.cli.shared.report import heading
 
+    lines = answer.lines
     print(heading(lines.top))
     show_facts(_facts(lines, content))
     if not len(lines):
-        print(f"\nno lines: {_why_none(lines)}")
+        print(f"\nno lines: {answer.why_no_lines}")
     elif len(content["strongest"]):
         print()
         show_table(_table(lines, content["strongest"]))
@@ -230,21 +195,15 @@ def _facts(lines: RamanLines, content: dict[str, Any]) -> list[tuple[str, str]]:
     ]
 
 
-def _why_none(lines: RamanLines) -> str:
-    if lines.top.kind == "spherical":
-        return "the polarizability of a rigid spherical top is isotropic"
-    if lines.jmax < 2:
-        return "J max leaves none"
-    return "the polarizability is isotropic, or the levels that it connects do not exist"
-
-
 def _table(lines: RamanLines, rows: Any) -> Table:
     """The strongest lines in order of shift."""
+    from rotor.quantum import quanta
+
     shown = lines.where(rows)
-    names = " ".join(name.capitalize() for name in lines.quanta_names)
+    names = quanta.headings(lines.quanta_names)
     columns = ("shift (cm-1)", "dσ/dΩ (cm²/sr)", "λ (nm)", "E (cm-1)", "g", "S (Å⁶)", "from", "to")
     formats = ("{:.4f}", "{:.4e}", "{:.4f}", "{:.4f}", "{}", "{:.5g}")
     cells = [[form.format(x) for x in column] for form, column in zip(formats, shown.columns.values(), strict=False)]
-    labels = [[" ".join(f"{n:2d}" for n in quanta) for quanta in shown.quanta(s)] for s in (shown.initial, shown.final)]
+    labels = [shown.levels.labels(states) for states in (shown.initial, shown.final)]
     title = f"the {len(shown)} strongest lines" if len(shown) < len(lines) else "all lines"
     return Table(f"{title}, in order of shift (states: {names})", columns, list(zip(*cells, *labels, strict=True)))

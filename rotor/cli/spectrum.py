@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import typer
 
-from rotor.cli.shared import gas_layer as layer
-from rotor.cli.shared import inputs
-from rotor.cli.shared import spcat_request as request
-from rotor.cli.shared.inputs import Input
+from rotor.checks import require_whole
+from rotor.cli.shared import gas_layer, inputs
+from rotor.cli.shared import spcat_request as spcat
+from rotor.cli.shared.gas_layer import Layer, Vibration
+from rotor.cli.shared.inputs import Input, json_option
+from rotor.cli.shared.options import file_option, grouped, option
 from rotor.cli.shared.output import (
     ComputationError,
     Files,
@@ -27,14 +29,10 @@ from rotor.cli.shared.output import (
 )
 
 if TYPE_CHECKING:
-    from rotor.cli.shared.gas_layer import Layer
     from rotor.formats.spcat.predict import Prediction
     from rotor.spectra.lines import Lines
-    from rotor.spectra.spectrum import Spectrum
-    from rotor.thermo import VibrationalStates
+    from rotor.spectra.request import SpectrumAnswer, SpectrumRequest
     from rotor.tops.top import Top
-
-PROFILES = ("sticks", "gaussian", "lorentzian", "voigt")
 
 EXAMPLES = """\b
 Examples:
@@ -44,191 +42,130 @@ Examples:
   rotor spectrum --constants "A=835840.288 B=435351.717 C=278138.7 MHz" --dipole-abc 0,1.8546,0 --jmax 20
   rotor spectrum case.int --cat case.cat"""
 
+NAMES = {
+    "temperature_k": "--temperature", "jmax": "--jmax", "min_lgint": "--min-lgint", "range_mhz": "--range", "q": "--q",
+    "vibrational_factor": "--vibrational-factor", "profile": "--profile",
+    "fwhm_mhz": "--fwhm",
+}  # fmt: skip  # field of the request -> option
+
 
 @dataclass(frozen=True)
-class Settings:
-    """What the options ask for, in the units of the package."""
+class Options:
+    """What is computed, and how much of it is shown."""
 
-    temperature_k: float
-    jmax: int | None
-    min_lgint: float | None
-    range_mhz: tuple[float, float]
-    q: float | None
-    vibrational_factor: float
-    profile: str
-    fwhm_mhz: float | None
-    vibrations: VibrationalStates | None = None
-    gas: Layer | None = None
-
-
-def command(
-    context: typer.Context,
-    source: str | None = inputs.SOURCE,
-    constants: str | None = inputs.CONSTANTS,
-    temperature: str = typer.Option("300", metavar="T", help="Temperature (K)."),
-    jmax: int | None = typer.Option(None, metavar="N", help="Highest J; by default what the cut needs."),
-    min_lgint: str = typer.Option("-12", metavar="X", help="Leave out lines with log10(nm² MHz) below; or 'none'."),
-    range_: str | None = typer.Option(
+    temperature: str = option("300", metavar="T", help="Temperature (K).")
+    jmax: int | None = option(None, metavar="N", help="Highest J; by default what the cut needs.")
+    min_lgint: str = option("-12", metavar="X", help="Leave out lines with log10(nm² MHz) below; or 'none'.")
+    range_: str | None = option(
         None, "--range", metavar="A:B", help="First and last frequency, such as 0:2000GHz (MHz)."
-    ),
-    dipole: str | None = inputs.DIPOLE,
-    dipole_abc: str | None = inputs.DIPOLE_ABC,
-    isotope: list[str] | None = inputs.ISOTOPE,
-    spin_weights: str | None = inputs.SPIN_WEIGHTS,
-    symmetry_tolerance: str | None = inputs.SYMMETRY_TOLERANCE,
-    calculator: str | None = inputs.CALCULATOR,
-    hessian: str | None = inputs.HESSIAN,
-    q: float | None = typer.Option(None, metavar="Q", help="Partition function to use instead of the summed one."),
-    vibrational_factor: float = typer.Option(1.0, metavar="X", help="Multiplies Q."),
-    vibration: str | None = layer.VIBRATION,
-    vibrational_states: str | None = layer.VIBRATIONAL_STATES,
-    pressure: str | None = layer.PRESSURE,
-    path: str | None = layer.PATH,
-    profile: str | None = typer.Option(None, metavar="NAME", help="sticks, gaussian, lorentzian or voigt."),
-    fwhm: str | None = typer.Option(None, metavar="W", help="Full width at half maximum (MHz); by default Doppler's."),
-    cat: str | None = typer.Option(None, metavar="FILE", help="Write a catalogue of 80 columns (.cat, .cat.gz)."),
-    csv: str | None = typer.Option(None, metavar="FILE", help="Write all lines as CSV."),
-    parquet: str | None = typer.Option(None, metavar="FILE", help="Write all lines as Parquet."),
-    profile_csv: str | None = typer.Option(None, metavar="FILE", help="Write the profile on its grid as CSV."),
-    plot: str | None = typer.Option(None, metavar="FILE", help="Draw the spectrum (.png, .pdf, .svg)."),
-    json: str | None = inputs.JSON,
-    top_lines: int = typer.Option(20, "--top", metavar="N", help="How many of the strongest lines are shown."),
-    tag: int = typer.Option(0, metavar="N", help="Tag of the species in --cat."),
+    )
+    q: float | None = option(None, metavar="Q", help="Partition function to use instead of the summed one.")
+    vibrational_factor: float = option(1.0, metavar="X", help="Multiplies Q.")
+    profile: str | None = option(None, metavar="NAME", help="sticks, gaussian, lorentzian or voigt.")
+    fwhm: str | None = option(None, metavar="W", help="Full width at half maximum (MHz); by default Doppler's.")
+    top_lines: int = option(20, "--top", metavar="N", help="How many of the strongest lines are shown.")
+    tag: int = option(0, metavar="N", help="Tag of the species in --cat.")
+
+
+@dataclass(frozen=True)
+class Outputs:
+    """Files to write."""
+
+    cat: str | None = file_option(".cat", ".cat.gz", help="Write a catalogue of 80 columns (.cat, .cat.gz).")
+    csv: str | None = file_option(".csv", help="Write all lines as CSV.")
+    parquet: str | None = file_option(".parquet", help="Write all lines as Parquet.")
+    profile_csv: str | None = file_option(".csv", help="Write the profile on its grid as CSV.")
+    plot: str | None = file_option(".png", ".pdf", ".svg", help="Draw the spectrum (.png, .pdf, .svg).")
+    json: str | None = json_option()
+
+
+@grouped()
+def command(
+    context: typer.Context, given: Input, options: Options, vibration: Vibration, layer: Layer, outputs: Outputs
 ) -> None:
     """Rotational lines: frequencies, intensities, and what they were made from."""
-    gas = layer.layer(pressure, path)
-    profile = profile or ("gaussian" if gas else None)
-    settings = _settings(temperature, jmax, min_lgint, range_, q, vibrational_factor, profile, fwhm)
-    settings = replace(settings, vibrations=layer.vibrations(vibration, vibrational_states), gas=gas)
-    _refuse_contradictions(settings)
-    inputs.whole("--top", top_lines, 0)
-    inputs.whole("--tag", tag, 0, 999_999)
-    files = _files(
-        settings, {"--cat": cat, "--csv": csv, "--parquet": parquet, "--profile-csv": profile_csv, "--plot": plot}
-    )
-    files.ask_json(json)
+    require_whole("--top", options.top_lines, 0)
+    require_whole("--tag", options.tag, 0, 999_999)
+    files, shape = Files.of(outputs), _shape(options, layer)
+    settings = {**_settings(options), "vibrations": gas_layer.vibrations_of(vibration), **shape}
+    _refuse_profile_without_file(settings, files)
 
-    given = Input(
-        source,
-        constants,
-        isotope or [],
-        dipole,
-        dipole_abc,
-        spin_weights,
-        calculator,
-        hessian,
-        symmetry_tolerance=symmetry_tolerance,
-    )
-    prediction = request.prediction_of(context, str(source)) if request.is_request(source) else None
-    if prediction is not None:
-        settings, tag = _requested(settings, prediction), prediction.request.tag
-    top = prediction.lines.top if prediction else inputs.with_some_dipole(inputs.read_top(given))
-    _refuse_doppler_without_mass(top, settings)
-    with answering():
-        lines = prediction.lines if prediction else _lines(top, settings)
-        content = _content(lines, settings, given, context.obj, top_lines)
-    _refuse_nothing_to_draw(lines, files)
-    for warning in lines.warnings:
+    prediction = spcat.prediction_of(context, str(given.source)) if spcat.is_request(given.source) else None
+    with inputs.fields_as_options(**NAMES):
+        if prediction is not None:
+            answer, tag = spcat.answer_of(prediction, shape), prediction.request.tag
+        else:
+            answer, tag = _answer(inputs.with_some_dipole(inputs.read_top(given)), settings), options.tag
+    _refuse_nothing_to_draw(answer, files)
+    for warning in answer.lines.warnings:
         note(warning)
-    content["notes"] = [*content["notes"], *lines.warnings]
+    with answering():
+        content = _content(answer, given, context.obj, options.top_lines)
+    content["files"] = files.names
 
-    content["files"] = [str(path) for path in files.wanted.values()]
-    writers = _writers(lines, settings, content, tag)
+    writers = _writers(answer, content, tag)
     if prediction is not None:
         writers["--cat"] = _program_catalogue(prediction, content)
-    deliver(files, writers, lambda: json_with_rows(lines, "lines", content), lambda: _show(lines, content))
+    deliver(files, writers, lambda: json_with_rows(answer.lines, "lines", content), lambda: _show(answer, content))
 
 
-def _refuse_contradictions(settings: Settings) -> None:
-    if settings.vibrations is not None and settings.vibrational_factor != 1.0:
-        raise ValueError("--vibrational-factor and vibrational energies: give one of them")
-    if settings.gas is not None and settings.profile == "sticks":
-        raise ValueError("--pressure: an optical depth needs a width, and sticks have none; choose another --profile")
+def _settings(options: Options) -> dict[str, Any]:
+    """Fields of the request from the texts of the options."""
+    from rotor.units import parse_range
+
+    def whole_range(text: str) -> tuple[float, float]:
+        return parse_range(text, "MHz")
+
+    settings: dict[str, Any] = {
+        "temperature_k": inputs.positive("--temperature", options.temperature, "K"),
+        "jmax": options.jmax,
+        "min_lgint": inputs.cut("--min-lgint", options.min_lgint),
+        "q": options.q,
+        "vibrational_factor": options.vibrational_factor,
+    }
+    if options.range_ is not None:
+        settings["range_mhz"] = inputs.parsed("--range", options.range_, whole_range)
+    return settings
 
 
-def _files(settings: Settings, paths: dict[str, str | None]) -> Files:
-    """The files asked for, each with a name of its format, and a use for what was said of the profile."""
-    suffixes = {"--cat": (".cat", ".cat.gz"), "--parquet": (".parquet",), "--plot": (".png", ".pdf", ".svg")}
-    files = Files()
-    for name, path in paths.items():
-        files.ask(name, path, suffixes.get(name, (".csv",)))
-    if paths["--profile-csv"] and settings.profile == "sticks":
+def _shape(options: Options, layer: Layer) -> dict[str, Any]:
+    """Profile, width and layer of gas from the texts of the options."""
+    fwhm = inputs.positive("--fwhm", options.fwhm, "MHz") if options.fwhm else None
+    return {"profile": options.profile, "fwhm_mhz": fwhm, "layer": gas_layer.layer_of(layer)}
+
+
+def _answer(top: Top, settings: dict[str, Any]) -> SpectrumAnswer:
+    from rotor.spectra.request import SpectrumRequest, answer_spectrum
+
+    request: SpectrumRequest = SpectrumRequest(top, **settings)
+    with answering():
+        return answer_spectrum(request)
+
+
+def _refuse_profile_without_file(settings: dict[str, Any], files: Files) -> None:
+    """A profile needs a file that it goes to, and a file for the profile needs one."""
+    shaped = settings["profile"] not in (None, "sticks") or settings["fwhm_mhz"] is not None
+    if "--profile-csv" in files.paths and not (shaped or settings["layer"]):
         raise ValueError(
             "--profile-csv: sticks have no profile; give --fwhm or --profile gaussian, lorentzian or voigt"
         )
-    if settings.profile != "sticks" and not (settings.gas or paths["--profile-csv"] or paths["--plot"]):
-        raise ValueError(
-            f"a {settings.profile} profile was asked for, but not where to put it; add --plot or --profile-csv"
-        )
-    return files
+    if shaped and not (settings["layer"] or {"--profile-csv", "--plot"} & files.paths.keys()):
+        what = settings["profile"] or "gaussian"
+        raise ValueError(f"a {what} profile was asked for, but no file for it; add --plot or --profile-csv")
 
 
-def _refuse_doppler_without_mass(top: Top, settings: Settings) -> None:
-    doppler = settings.profile == "voigt" or (settings.profile == "gaussian" and settings.fwhm_mhz is None)
-    if doppler and top.mass_u is None:
-        raise ValueError(
-            "a Doppler width needs a mass, which constants alone do not have; give --fwhm, not --profile voigt"
-        )
+def _refuse_nothing_to_draw(answer: SpectrumAnswer, files: Files) -> None:
+    drawn = [name for name in ("--plot", "--profile-csv") if name in files.paths]
+    if drawn and answer.why_no_lines:
+        raise ComputationError(f"{drawn[0]}: no lines: {_why_none(answer)}")
 
 
-def _refuse_nothing_to_draw(lines: Lines, files: Files) -> None:
-    drawn = [name for name in ("--plot", "--profile-csv") if name in files.wanted]
-    if drawn and not len(lines):
-        raise ComputationError(f"{drawn[0]}: no lines: {_why_none(lines)}")
-
-
-def _settings(
-    temperature: str,
-    jmax: int | None,
-    min_lgint: str,
-    range_: str | None,
-    q: float | None,
-    vibrational_factor: float,
-    profile: str | None,
-    fwhm: str | None,
-) -> Settings:
-    """The options as numbers, each checked by itself."""
-    from rotor.units import parse_range
-
-    inputs.whole("--jmax", jmax, 0)
-    if q is not None:
-        inputs.above_zero("--q", q)
-    profile = profile or ("gaussian" if fwhm else "sticks")
-    if profile not in PROFILES:
-        raise ValueError(f"--profile: {profile!r} is none of {', '.join(PROFILES)}")
-    if profile == "sticks" and fwhm:
-        raise ValueError("--fwhm: sticks have no width; leave it out or choose another --profile")
-    if profile in ("lorentzian", "voigt") and not fwhm:
-        raise ValueError(f"--profile {profile}: the width of the Lorentzian is wanted, --fwhm")
-    return Settings(
-        temperature_k=inputs.positive("--temperature", temperature, "K"),
-        jmax=jmax,
-        min_lgint=inputs.cut("--min-lgint", min_lgint),
-        range_mhz=(0.0, math.inf)
-        if range_ is None
-        else inputs.option("--range", range_, lambda r: parse_range(r, "MHz")),
-        q=q,
-        vibrational_factor=inputs.above_zero("--vibrational-factor", vibrational_factor),
-        profile=profile,
-        fwhm_mhz=inputs.positive("--fwhm", fwhm, "MHz") if fwhm else None,
-    )
-
-
-def _requested(settings: Settings, prediction: Prediction) -> Settings:
-    """The settings that an .int file makes."""
-    wanted = prediction.request
-    return replace(
-        settings,
-        temperature_k=wanted.temperature_k,
-        jmax=wanted.fend,
-        min_lgint=wanted.str0,
-        range_mhz=prediction.lines.range_mhz,
-        q=prediction.q,
-    )
+def _why_none(answer: SpectrumAnswer) -> str:
+    return answer.why_no_lines.replace("the range or lower the cut", "--range or lower --min-lgint")
 
 
 def _program_catalogue(prediction: Prediction, content: dict[str, Any]) -> Writer:
-    """The catalogue as the field's program lists it: its weights, its zero of energy, K doublets parted."""
+    """The catalogue as SPCAT lists it: its weights, its zero of energy, K doublets as two lines."""
     from rotor.formats.line_tables import provenance, write_beside
     from rotor.formats.spcat.cat import write_cat
 
@@ -240,103 +177,46 @@ def _program_catalogue(prediction: Prediction, content: dict[str, Any]) -> Write
     return write
 
 
-def _lines(top: Top, settings: Settings) -> Lines:
-    from rotor.spectra.lines import line_list
-
-    if top.dipole_abc_debye is None:  # a spherical top: it has no lines, whatever the dipole
-        top = top.with_dipole((0.0, 0.0, 0.0), "none: a rigid spherical top has no rotational lines")
-    return line_list(
-        top,
-        temperature_k=settings.temperature_k,
-        jmax=settings.jmax,
-        min_lgint=settings.min_lgint,
-        range_mhz=settings.range_mhz,
-        q=settings.q,
-        vibrational_factor=settings.vibrational_factor,
-        vibrations=settings.vibrations,
-    )
-
-
-def _content(lines: Lines, settings: Settings, given: Input, command: str, shown: int) -> dict[str, Any]:
+def _content(answer: SpectrumAnswer, given: Input, command: str, shown: int) -> dict[str, Any]:
     """What is printed and more, by the keys of docs/command_line.md."""
-    import numpy as np
+    from rotor.cli.shared.report import begin
 
-    from rotor.cli.shared.report import describe, q_record
-    from rotor.thermo import classical_partition_function
-
-    q = q_record(lines.partition, classical_partition_function(lines.top, lines.temperature_k))
-    strongest = np.sort(np.argsort(-lines.intensity_nm2_mhz, kind="stable")[:shown])
-    return {
-        **describe(lines.top, given.text, command),
-        "temperature_k": lines.temperature_k,
-        "q": q,
-        "jmax": lines.jmax,
-        "jmax_source": "given" if settings.jmax is not None else _reach(settings.min_lgint),
-        "min_lgint": settings.min_lgint,
-        "range_mhz": lines.range_mhz,
-        "line_count": len(lines),
-        "profile": settings.profile,
-        "fwhm_mhz": settings.fwhm_mhz,
-        **layer.depths(lines, settings.gas, settings.profile, settings.fwhm_mhz),
-        "strongest": strongest,
-    }
+    return {**begin(command, given.text), **answer.facts(), "strongest": answer.strongest(shown)}
 
 
-def _reach(min_lgint: float | None) -> str:
-    if min_lgint is None:
-        return "beyond it no line reaches an lgint of -12"
-    return "beyond it no line reaches the cut"
-
-
-def _writers(lines: Lines, settings: Settings, content: dict[str, Any], tag: int) -> dict[str, Writer]:
+def _writers(answer: SpectrumAnswer, content: dict[str, Any], tag: int) -> dict[str, Writer]:
     """How each option's file is written, with the provenance that its format can hold."""
     import rotor
 
     record = {"command": content["command"], "input": content["input"], "tag": tag}
 
     def table(path: Path) -> None:
-        rotor.write(lines, path, settings=record)
+        rotor.write(answer.lines, path, settings=record)
 
     return {
         "--cat": table,
         "--csv": table,
         "--parquet": table,
-        "--profile-csv": lambda path: rotor.write(
-            _spectrum(lines, settings), path, settings={"command": record["command"]}
-        ),
-        "--plot": lambda path: _draw(lines, settings, path, record),
+        "--profile-csv": lambda path: rotor.write(answer.spectrum, path, settings={"command": record["command"]}),
+        "--plot": lambda path: _draw(answer, path, record),
     }
 
 
-def _spectrum(lines: Lines, settings: Settings) -> Spectrum:
-    """The lines with their shape, on a grid that follows each of them."""
-    from rotor.spectra.spectrum import Spectrum, resolving_grid
-
-    first, last = settings.range_mhz
-    shape: dict[str, Any] = {"profile": settings.profile, "fwhm_mhz": settings.fwhm_mhz}
-    grid = resolving_grid(lines, range_mhz=(first, last) if math.isfinite(last) else None, **shape)
-    spectrum = Spectrum.from_lines(lines, grid, **shape)
-    if settings.gas is None:
-        return spectrum
-    from rotor.spectra.opacity import optical_depth
-
-    return optical_depth(spectrum, settings.gas.pressure_bar, settings.gas.path_cm)
-
-
-def _draw(lines: Lines, settings: Settings, path: Path, record: dict[str, Any]) -> None:
+def _draw(answer: SpectrumAnswer, path: Path, record: dict[str, Any]) -> None:
     from rotor.plots.spectrum import plot_spectrum
 
-    sticks = settings.profile == "sticks"
-    plot_spectrum(lines if sticks else _spectrum(lines, settings), path, provenance={"command": record["command"]})
+    thing = answer.lines if answer.request.shape == "sticks" else answer.spectrum
+    plot_spectrum(thing, path, provenance={"command": record["command"]})
 
 
-def _show(lines: Lines, content: dict[str, Any]) -> None:
+def _show(answer: SpectrumAnswer, content: dict[str, Any]) -> None:
     from rotor.cli.shared.report import heading
 
+    lines = answer.lines
     print(heading(lines.top))
     show_facts(_facts(lines, content))
     if len(lines) == 0:
-        print(f"\nno lines: {_why_none(lines)}")
+        print(f"\nno lines: {_why_none(answer)}")
         return
     if len(content["strongest"]):
         print()
@@ -386,28 +266,39 @@ def _count_text(lines: Lines) -> str:
     return f"{len(lines)}, from {lines.frequency_mhz[0]:.4f} to {lines.frequency_mhz[-1]:.4f} MHz"
 
 
-def _why_none(lines: Lines) -> str:
-    if lines.top.kind == "spherical":
-        return "a rigid spherical top has none (neither field nor distortion dipole is taken in)"
-    if not any(lines.top.dipole_abc_debye or ()):
-        return "without a permanent dipole there is no rotational absorption"
-    return "none of the allowed ones is inside the range and above the cut; widen --range or lower --min-lgint"
+class _Column(NamedTuple):
+    """A column of the table: its name in `Lines.columns`, its heading, and how a number is printed."""
+
+    name: str
+    heading: str
+    form: str
+
+
+_COLUMNS = (
+    _Column("frequency_mhz", "frequency (MHz)", "{:.4f}"),
+    _Column("error_mhz", "error (MHz)", "{:.4f}"),
+    _Column("lgint", "lgint", "{:.4f}"),
+    _Column("energy_lower_cm", 'E" (cm-1)', "{:.4f}"),
+    _Column("g_upper", "g'", "{}"),
+    _Column("einstein_a_per_s", "A (1/s)", "{:.2e}"),
+    _Column("strength_debye2", "Sμ² (D²)", "{:.5g}"),
+)
 
 
 def _lines_table(lines: Lines, rows: Any, depth: Any = None) -> Table:
     """The strongest lines in order of frequency, with their optical depths where there is a layer of gas."""
+    from rotor.quantum import quanta
+
     shown = lines.where(rows)
-    names = " ".join(name.capitalize() for name in lines.quanta_names)
-    columns: tuple[str, ...] = ("frequency (MHz)", "lgint", 'E" (cm-1)', "g'", "A (1/s)", "Sμ² (D²)", "upper", "lower")
-    formats = ("{:.4f}", "{:.4f}", "{:.4f}", "{}", "{:.2e}", "{:.5g}")
-    numbers = list(shown.columns.values())[: len(formats)]
-    labels = [
-        [" ".join(f"{n:2d}" for n in quanta) for quanta in shown.quanta(states)]
-        for states in (shown.upper, shown.lower)
-    ]
-    cells = [[form.format(x) for x in column] for form, column in zip(formats, numbers, strict=True)]
+    names = quanta.headings(lines.quanta_names)
+    values = shown.columns
+    present = [column for column in _COLUMNS if column.name in values]
+    cells = [[column.form.format(x) for x in values[column.name]] for column in present]
+    headings = [column.heading for column in present]
     if depth is not None:
-        columns = (*columns[: len(formats)], "τ", *columns[len(formats) :])
+        headings.append("τ")
         cells.append([f"{x:.3e}" for x in depth[rows]])
+    labels = [shown.levels.labels(states) for states in (shown.upper, shown.lower)]
+    columns = (*headings, "upper", "lower")
     title = f"the {len(shown)} strongest lines" if len(shown) < len(lines) else "all lines"
     return Table(f"{title}, in order of frequency (states: {names})", columns, list(zip(*cells, *labels, strict=True)))

@@ -41,8 +41,7 @@ def catalogue(lines: Lines, tag: int = 0) -> Catalogue:
 
     n, levels = len(lines), lines.levels
     quanta = np.full((len(levels), 6), BLANK, dtype=np.int16)
-    for i, name in enumerate(lines.quanta_names):
-        quanta[:, i] = levels.ka if name == "k" else getattr(levels, name)
+    quanta[:, : len(levels.quanta)] = levels.quanta_of(np.arange(len(levels)))
     return Catalogue(
         frequency_mhz=lines.frequency_mhz,
         error_mhz=np.zeros(n) if (error := lines.error_mhz) is None else error,

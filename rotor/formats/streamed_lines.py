@@ -11,7 +11,7 @@ import json
 import math
 import os
 import shutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,10 +25,12 @@ from rotor.formats.line_tables import QNFMT, errors_from, finite_or_none, top_pr
 from rotor.formats.spcat.cat import format_lines
 from rotor.formats.spcat.catalogue import Catalogue
 from rotor.formats.spcat.fields import BLANK
-from rotor.quantum.levels import Levels, solve_levels
-from rotor.spectra.lines import DEFAULT_MIN_LGINT, INTENSITY_NM2_MHZ, Lines, line_list
-from rotor.spectra.reach import jmax_for_cut
-from rotor.spectra.transitions import IntensityCut, all_transitions
+from rotor.quantum.effect import QuantumEffect
+from rotor.quantum.effects.watson import SEMI_RIGID
+from rotor.quantum.solve import solve_levels
+from rotor.spectra.intensity import intensity_cut, jmax_for_cut
+from rotor.spectra.lines import DEFAULT_MIN_LGINT, Lines, dipoles_by_state, line_list
+from rotor.spectra.transitions import all_transitions
 from rotor.thermo import PartitionFunction
 from rotor.tops.top import Top
 
@@ -62,6 +64,7 @@ class _Plan:
     range_mhz: tuple[float, float]
     ground_mhz: float
     folder: Path
+    effects: tuple[QuantumEffect, ...] = SEMI_RIGID
 
     def piece(self, first: int, last: int) -> Path:
         """The file of the lines with lower J from `first` to `last`."""
@@ -81,6 +84,7 @@ def stream_lines(
     tag: int = 0,
     memory_mb: int = 500,
     piece_lines: int = PIECE_LINES,
+    effects: Sequence[QuantumEffect] = SEMI_RIGID,
     executor: Executor | None = None,
 ) -> StreamedList:
     """The lines of `rotor.line_list`, rising in frequency, written to a .parquet or .cat file without being in memory.
@@ -103,7 +107,13 @@ def stream_lines(
         raise ValueError(f"piece_lines = {piece_lines}, memory_mb = {memory_mb}: at least 1 line and 100 MB are wanted")
     _refuse_forks(executor)
     start = line_list(
-        top, temperature_k=temperature_k, jmax=0, min_lgint=None, q=q, vibrational_factor=vibrational_factor
+        top,
+        temperature_k=temperature_k,
+        jmax=0,
+        min_lgint=None,
+        q=q,
+        vibrational_factor=vibrational_factor,
+        effects=effects,
     )
     plan = _plan(start, jmax, -math.inf if min_lgint is None else min_lgint, range_mhz, Path(f"{target}.pieces"))
     ranges = list(_ranges(plan, piece_lines))
@@ -135,8 +145,11 @@ def _plan(start: Lines, jmax: int | None, least: float, range_mhz: tuple[float, 
         jmax = jmax_for_cut(top, dipole, start.temperature_k, q.q, least)
     if jmax < 1:
         raise ValueError(f"J max = {jmax}: 1 or more is wanted, J = 0 alone has no line")
-    ground = solve_levels(top, 3, vectors=False).ground_mhz  # whatever the weights are, it is among these
-    return _Plan(top, dipole, jmax, start.temperature_k, q, least, range_mhz, ground, folder)
+    effects = start.levels.effects
+    ground = solve_levels(
+        top, 3, effects=effects, vectors=False
+    ).ground_mhz  # whatever the weights are, it is among these
+    return _Plan(top, dipole, jmax, start.temperature_k, q, least, range_mhz, ground, folder, effects)
 
 
 def _ranges(plan: _Plan, piece_lines: int) -> Iterator[tuple[int, int]]:
@@ -199,9 +212,12 @@ def _make_piece(plan: _Plan, first: int, last: int) -> None:
     import polars as pl
 
     top_j = min(last + 1, plan.jmax)
-    levels = solve_levels(plan.top, top_j, jmin=first)
-    found = all_transitions(levels, plan.dipole_abc, plan.range_mhz, _cut(plan, levels))
-    own = np.minimum(levels.j[found.upper], levels.j[found.lower]) <= last
+    levels = solve_levels(plan.top, top_j, jmin=first, effects=plan.effects)
+    rotational = levels.rotational
+    cut = intensity_cut(levels, plan.temperature_k, plan.partition.q, plan.min_lgint, plan.ground_mhz)
+    dipoles = dipoles_by_state(plan.top, plan.dipole_abc, plan.effects)
+    found = all_transitions(levels, dipoles, plan.range_mhz, cut)
+    own = np.minimum(rotational[found.upper], rotational[found.lower]) <= last
     lines = Lines(
         plan.top,
         levels,
@@ -216,15 +232,6 @@ def _make_piece(plan: _Plan, first: int, last: int) -> None:
     )
     with atomic_path(plan.piece(first, last)) as unfinished:
         pl.DataFrame(_columns(plan, lines)).sort("frequency_mhz").write_parquet(unfinished, compression="lz4")
-
-
-def _cut(plan: _Plan, levels: Levels) -> IntensityCut | None:
-    if math.isinf(plan.min_lgint):
-        return None
-    above_k = (levels.energy_mhz - plan.ground_mhz) / units.MHZ_PER_K
-    per_component = INTENSITY_NM2_MHZ / plan.partition.q * levels.weight / levels.components
-    population = per_component * np.exp(-above_k / plan.temperature_k)
-    return IntensityCut(population, plan.temperature_k * units.MHZ_PER_K, 10.0**plan.min_lgint)
 
 
 def _columns(plan: _Plan, lines: Lines) -> dict[str, Any]:

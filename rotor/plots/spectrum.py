@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats
+from rotor.quantum.quanta import state_text
 from rotor.spectra.lines import Lines
 from rotor.spectra.spectrum import Spectrum, line_widths
 from rotor.version import version
@@ -240,17 +241,6 @@ def formula_text(formula: str) -> str:
     return re.sub(r"<(\d+)>", r"$^{\1}$", text)
 
 
-def state_text(names: Sequence[str], quanta: Sequence[int]) -> str:
-    """Quantum numbers of a state as they are printed: J, or J with K or Ka,Kc as subscripts.
-
-    >>> state_text(("j", "ka", "kc"), (4, 1, 3)), state_text(("j",), (7,))
-    ('$4_{1,3}$', '7')
-    """
-    if len(names) == 1:
-        return str(quanta[0])
-    return f"${quanta[0]}_{{{','.join(map(str, quanta[1:]))}}}$"
-
-
 def _name_lines(
     figure: Any, axes: Any, thing: Lines | Spectrum, lines: Lines, heights: Floats, x: _Axis, most: int
 ) -> None:
@@ -301,11 +291,11 @@ def _fits(box: Any, room: Any, taken: Sequence[Any], drawn: Floats) -> bool:
 
 
 def _label(axes: Any, lines: Lines, row: int, height: float, x: _Axis) -> Any:
-    rows = np.array([row], dtype=np.int32)
-    upper, lower = (lines.quanta(states[rows])[0].tolist() for states in (lines.upper, lines.lower))
-    names = lines.quanta_names
+    upper, lower = (
+        state_text(lines.levels.quanta, int(states[row]), lines.levels.halves) for states in (lines.upper, lines.lower)
+    )
     name = axes.annotate(
-        f"{state_text(names, upper)} – {state_text(names, lower)}",
+        f"{upper} – {lower}",
         (lines.frequency_mhz[row] / x.mhz, height),
         xytext=(0, 3),
         textcoords="offset points",

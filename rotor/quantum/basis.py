@@ -17,14 +17,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-REPRESENTATIONS = {
-    "Ir": "bca",
-    "Il": "cba",
-    "IIr": "cab",
-    "IIl": "acb",
-    "IIIr": "abc",
-    "IIIl": "bac",
-}  # axes at x, y, z
+from rotor.tops.operators import REPRESENTATIONS as REPRESENTATIONS
+from rotor.tops.operators import axes_of
 
 _WANG = ((0, 1), (2, -1), (1, 1), (1, -1))  # E+, E-, O+, O-: lowest K and s
 
@@ -60,7 +54,7 @@ def wang_blocks(j: int, representation: str) -> list[WangBlock]:
     >>> [(b.species, b.size) for b in wang_blocks(1, "Ir")]
     [('eo', 1), ('oe', 1), ('oo', 1)]
     """
-    axes = REPRESENTATIONS[representation]
+    axes = axes_of(representation)
     sized = [(first, sign, (j - first) // 2 + 1) for first, sign in _WANG if j >= first]
     return sorted(WangBlock(j, _species(j, first, sign, axes), first, sign, size) for first, sign, size in sized)
 
@@ -78,3 +72,34 @@ def ka_kc(j: int, species: str, size: int) -> tuple[NDArray[np.int64], NDArray[n
     first = 1 if ka_odd else (0 if at_j else 2)
     ka = first + 2 * np.arange(size)
     return ka, (j if at_j else j + 1) - ka
+
+
+def limited(block: WangBlock, kmin: int, kmax: int) -> WangBlock | None:
+    """The part of a block with `kmin` ≤ K ≤ `kmax`, None where nothing is left.
+
+    >>> limited(WangBlock(5, "eo", 0, 1, 3), 1, 3)
+    WangBlock(j=5, species='eo', first_k=2, sign=1, size=1)
+    """
+    skipped = max(0, -(-(kmin - block.first_k) // 2))
+    first = block.first_k + 2 * skipped
+    size = min(block.size - skipped, (kmax - first) // 2 + 1)
+    return block._replace(first_k=first, size=size) if size > 0 else None
+
+
+def names_of(block: WangBlock, representation: str) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Ka and Kc of the states of a block, of which some K may be left out, in order of energy.
+
+    >>> names_of(WangBlock(5, "eo", 2, 1, 1), "Ir")
+    (array([2]), array([3]))
+    """
+    whole = (block.j - block.first_k % 2) // 2 + 1 - (block.first_k % 2 == 0 and block.sign < 0)
+    if block.size == whole:
+        return ka_kc(block.j, block.species, block.size)
+    axis = REPRESENTATIONS[representation][2]
+    if axis == "b":
+        raise ValueError(f"K limited in representation {representation}: its z is b, where K is neither Ka nor Kc")
+    lowest = block.first_k % 2 if block.first_k % 2 or block.sign > 0 else 2
+    first = (block.first_k - lowest) // 2
+    ka, kc = ka_kc(block.j, block.species, whole)
+    chosen = slice(first, first + block.size) if axis == "a" else slice(whole - first - block.size, whole - first)
+    return ka[chosen], kc[chosen]

@@ -8,13 +8,17 @@ Izv. Akad. Nauk SSSR 7 (1931) 749).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rotor.quantum.effects.watson import JMatrix, scalar_energy
-from rotor.quantum.levels import Levels, disordered_blocks, hamiltonian
+from rotor.arrays import Floats
+from rotor.quantum.effect import QuantumEffect
+from rotor.quantum.effects.watson import SEMI_RIGID, JMatrix, Rigid, block_bands, rigid_operators, scalar_energy
+from rotor.quantum.levels import Levels, SolvedBlock
+from rotor.quantum.solve import hamiltonian
 from rotor.tops.operators import Operators
 
 if TYPE_CHECKING:
@@ -23,7 +27,9 @@ if TYPE_CHECKING:
 RATIO_LIMIT = 0.3  # of successive orders, above which the series is said not to converge
 
 
-def order_sizes_mhz(top: Top, j: int, kmax: int | None = None) -> dict[int, float]:
+def order_sizes_mhz(
+    top: Top, j: int, kmax: int | None = None, effects: Sequence[QuantumEffect] = SEMI_RIGID
+) -> dict[int, float]:
     """How large every order of the Hamiltonian is for one J and |K| up to `kmax` (J, if None), {power of J: MHz}.
 
     >>> from rotor.tops.top import Top
@@ -31,7 +37,7 @@ def order_sizes_mhz(top: Top, j: int, kmax: int | None = None) -> dict[int, floa
     {2: 660000.0, 4: 121.0}
     """
     by_order: dict[int, Operators] = {}
-    for powers, value in hamiltonian(top).items():
+    for powers, value in hamiltonian(top, effects).items():
         by_order.setdefault(2 * sum(powers), {})[powers] = value
     if top.kind == "spherical":  # D_t, whose expansion has terms of J² too, is all of order four
         by_order = _without_mixture(by_order)
@@ -54,7 +60,7 @@ def _row_bound(operators: Operators, j: int, kmax: int) -> float:
     return float(rows.max())
 
 
-def series_ratio(top: Top, jmax: int, kmax: int | None = None) -> float:
+def series_ratio(top: Top, jmax: int, kmax: int | None = None, effects: Sequence[QuantumEffect] = SEMI_RIGID) -> float:
     """The largest ratio of one order of the Hamiltonian to the order before it, at J = `jmax` and |K| ≤ `kmax`.
 
     Orders without a constant are passed over; 0 for a rigid top. Above 0.3 the series is not to be trusted.
@@ -63,18 +69,20 @@ def series_ratio(top: Top, jmax: int, kmax: int | None = None) -> float:
     >>> round(series_ratio(Top.from_constants("A=835840 B=435352 C=278139 DeltaK=973 MHz"), 20), 2)
     0.45
     """
-    return max((ratio for ratio, _ in _ratios(top, jmax, kmax)), default=0.0)
+    return max((ratio for ratio, _ in _ratios(top, jmax, kmax, effects)), default=0.0)
 
 
-def _ratios(top: Top, j: int, kmax: int | None) -> list[tuple[float, int]]:
+def _ratios(
+    top: Top, j: int, kmax: int | None, effects: Sequence[QuantumEffect] = SEMI_RIGID
+) -> list[tuple[float, int]]:
     """(ratio to the order before, order) of every order above the first."""
-    sizes = list(order_sizes_mhz(top, j, kmax).items())
+    sizes = list(order_sizes_mhz(top, j, kmax, effects).items())
     pairs = pairwise(sizes)
     return [(size / before if before else 0.0, order) for (_, before), (order, size) in pairs]
 
 
 def warnings_of(top: Top, levels: Levels) -> tuple[str, ...]:
-    """What somebody who uses these levels must be told, in sentences; empty where all is well.
+    """The limits of these levels, in sentences; empty where there are none.
 
     That the distortion series does not converge at the highest J and K of the levels, and from which J on; that in
     some blocks energies are not in the order of the rigid top any more, so that Ka and Kc only count states. Levels
@@ -84,24 +92,24 @@ def warnings_of(top: Top, levels: Levels) -> tuple[str, ...]:
 
 
 def _divergence(top: Top, levels: Levels) -> str:
-    j = int(levels.j.max(initial=0))
-    k = int(levels.ka.max(initial=0)) if levels.kind in ("prolate", "oblate") else None
-    if not j or series_ratio(top, j, k) <= RATIO_LIMIT:
+    j = int(levels.rotational.max(initial=0))
+    k = int(np.abs(levels.quanta["k"]).max(initial=0)) if "k" in levels.quanta else None
+    if not j or series_ratio(top, j, k, levels.effects) <= RATIO_LIMIT:
         return ""
-    ratio, order = max(_ratios(top, j, k))
-    first = _first(top, j, k)
+    ratio, order = max(_ratios(top, j, k, levels.effects))
+    first = _first(top, j, k, levels.effects)
     return (
         f"the distortion series does not converge at J = {j}: the terms of order J^{order} are up to {ratio:.2g} of the "
         f"order before (limit {RATIO_LIMIT:g}); energies above J = {first - 1} at the highest K are not to be trusted"
     )
 
 
-def _first(top: Top, jmax: int, kmax: int | None) -> int:
+def _first(top: Top, jmax: int, kmax: int | None, effects: Sequence[QuantumEffect]) -> int:
     """The lowest J with a ratio above the limit, by halving: ratios rise with J."""
     low, high = 0, jmax
     while high - low > 1:
         middle = (low + high) // 2
-        low, high = (low, middle) if series_ratio(top, middle, kmax) > RATIO_LIMIT else (middle, high)
+        low, high = (low, middle) if series_ratio(top, middle, kmax, effects) > RATIO_LIMIT else (middle, high)
     return high
 
 
@@ -114,3 +122,31 @@ def _disorder(top: Top, levels: Levels) -> str:
         f"in {len(found)} blocks from J = {first} on the order of energies is not that of the rigid top: Ka and Kc count "
         "states there and say nothing about the motion"
     )
+
+
+def disordered_blocks(top: Top, levels: Levels) -> list[tuple[int, str]]:
+    """(J, species) of Wang blocks where the order of energy is not that of the rigid energy ⟨A Ja² + B Jb² + C Jc²⟩.
+
+    There Ka and Kc only count states: distortion has outgrown the rigid energies (quartic-only water from J = 15 on).
+    ⟨Jz²⟩ itself (`SolvedBlock.jz_squared`) is not the measure, since it falls by a little near the separatrix of a
+    rigid top, where labels are in perfect order.
+    """
+    out: list[tuple[int, str]] = []
+    if hamiltonian(top, levels.effects) == hamiltonian(top, (Rigid(),)):  # a rigid top is in order
+        return out
+    for block in levels.blocks:
+        if not isinstance(block, SolvedBlock):
+            continue
+        bands = block_bands(JMatrix(rigid_operators(top.constants), block.basis.j), block.basis)
+        rigid = _expectations(bands, block.vectors)
+        if (np.diff(rigid) < -1e-9 * np.abs(rigid).max()).any():
+            out.append((block.basis.j, block.basis.species))
+    return out
+
+
+def _expectations(bands: list[Floats], vectors: Floats) -> Floats:
+    """⟨v|H|v⟩ for every column of `vectors`, H given by its diagonals."""
+    total = bands[0] @ vectors**2
+    for n, band in enumerate(bands[1:], 1):
+        total += 2 * (band @ (vectors[:-n] * vectors[n:]))
+    return np.asarray(total)

@@ -20,10 +20,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats
-from rotor.quantum.effects.watson import operators_by_name
+from rotor.quantum.coupled import CoupledBlock, parameter_matrix
+from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.levels import Levels
-from rotor.quantum.spherical_top import tensor_eigenvalues
-from rotor.tops.operators import Powers
+from rotor.quantum.solve import hamiltonian
+from rotor.quantum.spherical_top import scalar_and_tensor, tensor_eigenvalues
+from rotor.tops.operators import Operators, Powers
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
@@ -34,29 +36,35 @@ _AT_ONCE = 1 << 22  # coefficients that are gathered at a time: 32 MB
 
 
 def level_derivatives(top: Top, levels: Levels, names: Sequence[str] | None = None, rows: Rows | None = None) -> Floats:
-    """∂E/∂c of levels by named constants, (rows, names), MHz per MHz.
+    """∂E/∂c of levels by named parameters of their effects, (rows, names), MHz per MHz.
 
-    names : constants of the set, in the order of the columns; all of them, in the order of `constants.values`, if None
-    rows : indices of the levels wanted; all if None
+    names : parameters, in the order of the columns; all of the levels' effects, in their order, if None
+    rows : indices of the levels; all if None
 
-    Exact at the constants that `levels` were solved with. Raises ValueError for a name that the set does not have and
+    Exact at the parameters that `levels` were solved with. Raises ValueError for a name that no effect has and
     for levels of an asymmetric top that were solved without vectors.
 
-    >>> from rotor.quantum.levels import solve_levels
+    >>> from rotor.quantum.solve import solve_levels
     >>> from rotor.tops.top import Top
     >>> top = Top.from_constants("A=10 B=6 C=4 MHz")
     >>> level_derivatives(top, solve_levels(top, 1)).round(12).tolist()[1:]
     [[0.0, 1.0, 1.0], [1.0, 1.0, 0.0], [1.0, 0.0, 1.0]]
     """
-    by_name = operators_by_name(top.constants)
+    by_name = parameter_operators(top, levels.effects)
     names = tuple(by_name) if names is None else tuple(names)
     for name in names:
         if name not in by_name:
-            raise ValueError(f"no constant {name} here to derive by: the set has {', '.join(by_name)}")
+            raise ValueError(f"no parameter {name} here to derive by: the effects have {', '.join(by_name)}")
     rows = np.arange(len(levels)) if rows is None else np.asarray(rows)
 
-    if levels.irrep is not None:
+    if "f" in levels.quanta:
+        from rotor.quantum.spins import spin_derivatives
+
+        return spin_derivatives(top, levels, names, np.asarray(rows, dtype=np.int64))
+    if "irrep" in levels.quanta:
         return _of_spherical(top, levels, names, rows)
+    if any(isinstance(block, CoupledBlock) for block in levels.blocks):
+        return _of_coupled(top, levels, names, rows)
     terms = sorted({powers for name in names for powers in by_name[name]})
     if not terms:
         return np.zeros((len(rows), len(names)))
@@ -65,28 +73,58 @@ def level_derivatives(top: Top, levels: Levels, names: Sequence[str] | None = No
     return np.asarray(expectations @ factors)
 
 
+def parameter_operators(top: Top, effects: Sequence[QuantumEffect]) -> dict[str, Operators]:
+    """∂H/∂c by powers (p, q, n) of every parameter of the effects, by name; empty for one that has other operators.
+
+    The operators of a name that two effects share are added.
+    """
+    found: dict[str, Operators] = {}
+    for effect in effects:
+        operators = effect.operators(top)
+        for name in effect.parameters(top):
+            total = found.setdefault(name, {})
+            for powers, factor in operators.get(name, {}).items():
+                total[powers] = total.get(powers, 0.0) + factor
+    return found
+
+
+def _of_coupled(top: Top, levels: Levels, names: Sequence[str], rows: Rows) -> Floats:
+    """⟨i|∂H/∂c|i⟩ from the matrices of each parameter over coupled blocks."""
+    out = np.zeros((len(levels), len(names)))
+    for block in levels.blocks:
+        place = slice(block.start, block.start + len(block.energies_mhz))
+        for column, name in enumerate(names):
+            matrix = parameter_matrix(top, levels.effects, str(levels.representation), block, name)
+            out[place, column] = np.einsum("in,ij,jn->n", block.vectors, matrix, block.vectors, optimize=True)
+    return out[rows]
+
+
 def _of_spherical(top: Top, levels: Levels, names: Sequence[str], rows: Rows) -> Floats:
-    """X^p of the scalar constants and the eigenvalue of the tensor for D_t, of a spherical top's split levels."""
-    by_name = operators_by_name(top.constants)
-    sign = 1 if top.constants["Dt"] > 0 else -1
-    x = (levels.j * (levels.j + 1)).astype(float)
+    """X^p of the scalar constants and the eigenvalue of the tensor for D_t, of a spherical top's split levels.
+
+    A parameter whose operators are d times the tensor, and scalars, has ω - ω_scalar for each d.
+    """
+    by_name = parameter_operators(top, levels.effects)
+    total = hamiltonian(top, levels.effects)
+    sign = 1 if scalar_and_tensor(total)[1] > 0 else -1
+    j = levels.quanta["j"]
+    omega = np.concatenate([tensor_eigenvalues(int(value), sign)[1] for value in np.unique(j)])
+    x = (j * (j + 1)).astype(float)
     out = np.empty((len(levels), len(names)))
     for i, name in enumerate(names):
-        if name == "Dt":
-            out[:, i] = np.concatenate([tensor_eigenvalues(int(j), sign)[1] for j in np.unique(levels.j)])
-        else:
-            out[:, i] = sum(factor * x**p for (p, _, _), factor in by_name[name].items())
+        scalars, dt = scalar_and_tensor(by_name[name])
+        out[:, i] = dt * omega + sum(factor * x**p for (p, _, _), factor in scalars.items())
     return out[rows]
 
 
 def term_expectations(levels: Levels, terms: Sequence[Powers], rows: Rows) -> Floats:
     """⟨J^2p ½[Jz^2q, J₊^2n + J₋^2n]₊⟩ of the levels `rows`, (rows, terms)."""
-    j = levels.j[rows].astype(float)
+    j = levels.rotational[rows].astype(float)
     x = j * (j + 1)
-    if levels.kind == "asymmetric":
+    if "kc" in levels.quanta:
         by_k = _expectations_of_blocks(levels, [(q, n) for _, q, n in terms], rows)
     else:
-        k = np.maximum(levels.ka[rows], 0).astype(float)
+        k = levels.quanta["k"][rows].astype(float) if "k" in levels.quanta else np.zeros_like(j)
         by_k = np.stack([k ** (2 * q) for _, q, _ in terms], axis=1)
     return np.asarray(by_k * np.stack([x**p for p, _, _ in terms], axis=1))
 
@@ -115,7 +153,7 @@ def _of_one_parity(levels: Levels, terms: Sequence[tuple[int, int]], rows: Rows,
     margin = 2 * max((n for _, n in terms), default=0)  # K from -margin + odd on: pairs across K = 0 are at hand
     states = _signed_coefficients(levels, rows, odd, margin)
     k: Floats = odd - margin + 2 * np.arange(states.shape[1], dtype=np.float64)
-    j = levels.j[rows].astype(float)
+    j = levels.rotational[rows].astype(float)
 
     out = np.empty((len(rows), len(terms)))
     for n in {n for _, n in terms}:
@@ -147,7 +185,7 @@ def _signed_coefficients(levels: Levels, rows: Rows, odd: int, margin: int) -> F
     """a_K of states over K = odd - margin, ..., zero beyond each J: (a_K = v_K/√2, a_0 = v_0, a_{-K} = s a_K)."""
     starts = np.array([b.start for b in levels.blocks])
     block_of = np.searchsorted(starts, rows, side="right") - 1
-    highest = int(levels.j[rows].max(initial=0))
+    highest = int(levels.rotational[rows].max(initial=0))
     zero = margin // 2  # place of K = odd
     out = np.zeros((len(rows), zero + highest // 2 + 1))
     signs = np.array([b.basis.sign for b in levels.blocks])[block_of]
@@ -161,6 +199,6 @@ def _signed_coefficients(levels: Levels, rows: Rows, odd: int, margin: int) -> F
 
     out[:, zero + (1 - odd) :] *= np.sqrt(0.5)
     mirrored = zero + np.arange(1, zero + 1) - odd  # places of K = 2 - odd, ... behind K = -2 + odd, ...
-    kept = mirrored < out.shape[1]
-    out[:, zero - 1 - np.flatnonzero(kept)] = signs[:, None] * out[:, mirrored[kept]]
+    inside = mirrored < out.shape[1]
+    out[:, zero - 1 - np.flatnonzero(inside)] = signs[:, None] * out[:, mirrored[inside]]
     return out

@@ -1,30 +1,132 @@
-"""The face of a quantum effect.
+"""The face of a quantum effect, and the registry of effects by name.
 
-An effect is one object in one file of `rotor.quantum.effects`. Levels take a list of effects and compute only what is
-in it.
+The Hamiltonian is a sum over effects, each a sum over named parameters,
+
+    H = Σ_effects Σ_name c_name (O_name + Σ V^k · W^k),
+
+O being operators of the rotational angular momentum alone, V^k of the rotation and W^k of spins. An effect is one object in
+one file of `rotor.quantum.effects`. `solve_levels` looks at all effects first and takes the smallest basis and the cheapest
+exact method that holds every one of their operators.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
+
+from rotor.tops.operators import Operators
 
 if TYPE_CHECKING:
+    from rotor.quantum.j_operators import JOperator
+    from rotor.quantum.spins import Spin, SpinTerm
+    from rotor.quantum.states import Coupling, State
     from rotor.tops.top import Top
+
+EFFECTS: dict[str, type[QuantumEffect]] = {}
 
 
 class QuantumEffect(ABC):
-    """A term of the rotational Hamiltonian.
+    """A part of the rotational Hamiltonian, linear in its named parameters.
 
-    A term is a sum of operators ½[Jz^2q, J₊^2n + J₋^2n]₊ J^2p (n = 0: Jz^2q J^2p), which is what any effective
-    Hamiltonian of a semi-rigid top in one vibrational state consists of. Effects that need a larger basis
-    (nuclear spin, fields) will extend the face by the basis they ask for.
+    name: how files, reports and errors call it; a subclass with a name is entered into `EFFECTS`.
+    conserved: quantum numbers that stay good under it, of "j" (the rotational angular momentum), "species" (the parities of
+    Ka and Kc) and "m" (the projection in space). What is not named is taken as mixed.
+
+    A subclass gives its parameters and, for each of them, operators of one or more of these kinds:
+
+    - `operators`: J^2p ½[Jz^2q, J₊^2n + J₋^2n]₊, by their powers (p, q, n): the fast path, for any kind of top;
+    - `j_operator`: any other Hermitian operator of J, as a `rotor.quantum.j_operators.JOperator`;
+    - `spin_terms`: molecule-fixed tensors coupled to spins, with the `spins` they need;
+    - `states`, `couplings` and `dipoles`: further vibrational or tunnelling states, and what connects them.
     """
 
-    @abstractmethod
-    def operators(self, top: Top) -> dict[tuple[int, int, int], float]:
-        """Coefficients in MHz, keyed by the powers (p, q, n) above."""
+    name: ClassVar[str] = ""
+    conserved: ClassVar[frozenset[str]] = frozenset({"j", "species", "m"})
+
+    def __init_subclass__(cls) -> None:
+        if cls.name:
+            EFFECTS[cls.name] = cls
 
     @abstractmethod
-    def estimate_mhz(self, top: Top, j: int) -> float:
-        """How large the effect is for levels of angular momentum `j`, in MHz; rough, never an underestimate by 10."""
+    def parameters(self, top: Top) -> dict[str, float]:
+        """The value of every parameter in MHz, by name."""
+
+    @abstractmethod
+    def size_mhz(self, top: Top, j: int) -> float:
+        """How large the effect is for levels of angular momentum `j`, in MHz: a bound or an estimate within a factor of 3."""
+
+    def operators(self, top: Top) -> dict[str, Operators]:
+        """∂H/∂c of parameters by powers (p, q, n), by name."""
+        return {}
+
+    def j_operator(self, top: Top, name: str, j: int, representation: str) -> JOperator | None:
+        """∂H/∂c of one parameter for one J in |J k⟩ of a representation; None where `operators` has all of it."""
+        return None
+
+    def spins(self, top: Top) -> tuple[Spin, ...]:
+        """The spins that the effect needs, in the order in which they are coupled."""
+        return ()
+
+    def spin_terms(self, top: Top) -> tuple[SpinTerm, ...]:
+        """What couples the rotation to the spins."""
+        return ()
+
+    def states(self, top: Top) -> tuple[State, ...]:
+        """States beyond the top's own (v = 0), with their numbers v."""
+        return ()
+
+    def couplings(self, top: Top) -> tuple[Coupling, ...]:
+        """What connects states of different v."""
+        return ()
+
+    def k_limits(self, top: Top) -> dict[int, tuple[int, int]]:
+        """The least and the largest K of states v whose basis does not have all of them, such as K = 1 of a Π state."""
+        return {}
+
+    def dipoles(self, top: Top) -> dict[tuple[int, int], tuple[float, float, float]]:
+        """(μa, μb, μc) in debye by pairs of states (v', v): of the effect's states, and between states."""
+        return {}
+
+
+class EffectSize(NamedTuple):
+    """The size of one effect: its name, the size in MHz at one J, and whether the calculation has it."""
+
+    name: str
+    size_mhz: float
+    present: bool
+
+
+def effect_sizes(
+    top: Top, j: int, present: Sequence[QuantumEffect], absent: Iterable[QuantumEffect] = ()
+) -> list[EffectSize]:
+    """The sizes of effects at one J, largest first, those of the calculation and those that it leaves out.
+
+    The one source of sizes: `rotor info`, the limitations shown with a spectrum and plans use it.
+
+    >>> from rotor.quantum.effects.watson import SEMI_RIGID
+    >>> from rotor.tops.top import Top
+    >>> [(s.name, round(s.size_mhz, 6)) for s in effect_sizes(Top.from_constants("B=6000 D=0.001 MHz"), 10, SEMI_RIGID)]
+    [('rigid rotor', 660000.0), ('centrifugal distortion', 12.1)]
+    """
+    sizes = [EffectSize(effect.name or type(effect).__name__, effect.size_mhz(top, j), True) for effect in present]
+    sizes += [EffectSize(effect.name or type(effect).__name__, effect.size_mhz(top, j), False) for effect in absent]
+    return sorted((size for size in sizes if size.size_mhz > 0), key=lambda size: -size.size_mhz)
+
+
+def k_limits_of(top: Top, effects: Iterable[QuantumEffect]) -> dict[int, tuple[int, int]]:
+    """The limits of K that the effects set, by states."""
+    return {v: limits for effect in effects for v, limits in effect.k_limits(top).items()}
+
+
+def named_effect(name: str) -> type[QuantumEffect]:
+    """The class of the effect with this name.
+
+    Raises ValueError, with the names that there are, for another one.
+    """
+    from rotor.quantum import effects
+
+    effects.load_all()
+    if name not in EFFECTS:
+        raise ValueError(f"effect {name!r}: known are {', '.join(sorted(EFFECTS))}")
+    return EFFECTS[name]

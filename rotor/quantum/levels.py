@@ -1,41 +1,38 @@
-"""Levels: adds the terms it is given, diagonalises block by block, labels.
+"""The table of levels: energies, named quantum numbers, degeneracies, and the solved blocks behind them.
 
-Linear, spherical and symmetric tops have closed forms; asymmetric ones are solved in Wang blocks, each by itself, so
-that labels are parity-correct by construction: inside a block, states in order of energy take (Ka, Kc) in order.
+What a level is called is in `Levels.quanta` alone; how many states it holds, in `multiplicity`, `components` and `weight`.
+Nothing outside this folder computes a row from quantum numbers: `Levels.find` and `Levels.rows_of` do.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from concurrent.futures import Executor
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.basis import WangBlock, ka_kc, wang_blocks
-from rotor.quantum.effect import QuantumEffect
-from rotor.quantum.effects.watson import (
-    Centrifugal,
-    JMatrix,
-    Rigid,
-    block_bands,
-    centrifugal_operators,
-    rigid_operators,
-    scalar_energy,
-)
-from rotor.quantum.spherical_top import DIMENSION, scalar_and_tensor, tensor_eigenvalues
+from rotor.quantum import quanta as names_of
+from rotor.quantum.basis import WangBlock
 from rotor.table import Table
-from rotor.tops.operators import Operators
 from rotor.tops.spin_weights import SpinWeights
 
 if TYPE_CHECKING:
-    from rotor.tops.top import Top
+    from rotor.quantum.effect import QuantumEffect
 
 
-SEMI_RIGID: tuple[QuantumEffect, ...] = (Rigid(), Centrifugal())
+class Block(Protocol):
+    """States solved together: energies (n,) in MHz, rising, at the rows `start` ... of the levels."""
+
+    @property
+    def energies_mhz(self) -> Floats:
+        """Energies (n,) in MHz, rising."""
+
+    @property
+    def start(self) -> int:
+        """Row of the first state."""
 
 
 @dataclass(frozen=True)
@@ -59,35 +56,59 @@ class SolvedBlock:
 
 @dataclass(frozen=True)
 class Levels(Table):
-    """Rotational levels as columns of equal length; the key of a level is (J, block, rank in the block).
+    """Energy levels as columns of equal length.
 
-    energy_mhz: E/h in MHz from the Hamiltonian's zero. j, ka, kc: quantum numbers; a symmetric top has K in `ka` (one
-    row for both signs of K, `components` = 2) and -1 in `kc`, linear and spherical tops -1 in both. components: levels
-    that coincide in the row (2J+1 for a spherical top). weight: nuclear-spin weight summed over the components.
-    degeneracy: (2J+1) times that. irrep: A1, A2, E, F1 or F2 of the levels into which D_t splits a spherical top, else
-    None. representation: of the Wang blocks, None for closed forms. blocks: the solved Wang
-    blocks of an asymmetric top, empty for closed forms.
+    kind: of the top. representation: of the Wang functions, None for closed forms. jmax: the highest rotational angular
+    momentum in the basis. energy_mhz: E/h in MHz from the Hamiltonian's zero. quanta: the quantum numbers that the case
+    has, by name (see `rotor.quantum.quanta`); a symmetric top has one row for both signs of K, linear and spherical tops
+    have j alone. multiplicity: states of one component that differ in their projection in space, 2J+1 (2F+1 with spins, 1 where M
+    is resolved). components: levels that coincide in the row (2 for ±K, 2J+1 for a spherical top). weight:
+    nuclear-spin weight summed over the components. halves: names whose column holds twice the quantum number.
+    effects: what the Hamiltonian consists of. blocks: the solved blocks, empty for closed forms and without vectors.
+    mixing: share (n,) of the function that names a level, where blocks of different species or states are mixed.
     """
 
     kind: str
     representation: str | None
     jmax: int
     energy_mhz: Floats
-    j: Ints
-    ka: Ints
-    kc: Ints
+    quanta: dict[str, NDArray[Any]]
+    multiplicity: Ints
     components: Ints
     weight: Ints
-    irrep: NDArray[np.str_] | None = None
-    blocks: tuple[SolvedBlock, ...] = field(default=(), repr=False)
+    halves: frozenset[str] = frozenset()
+    effects: tuple[QuantumEffect, ...] = ()
+    blocks: tuple[Any, ...] = field(default=(), repr=False)
+    mixing: Floats | None = None
 
     def __len__(self) -> int:
         return len(self.energy_mhz)
 
+    def __repr__(self) -> str:
+        if not len(self):
+            return f"Levels({self.kind}, none)"
+        low, high = self.energy_mhz.min(), self.energy_mhz.max()
+        return f"Levels({self.kind}, {len(self)} by {', '.join(self.quanta)}; {low:.4f} to {high:.4f} MHz)"
+
+    @property
+    def quanta_names(self) -> tuple[str, ...]:
+        """Which quantum numbers label a level: j; j, k; j, ka, kc; ..."""
+        return tuple(self.quanta)
+
     @property
     def degeneracy(self) -> Ints:
-        """(2J+1) times the spin weight, over all components of the row."""
-        return (2 * self.j + 1) * self.weight
+        """States of the row, projections in space and components, each with its nuclear-spin weight."""
+        return self.multiplicity * self.weight
+
+    @property
+    def states(self) -> Ints:
+        """States of the row without nuclear-spin weights: projections in space times components."""
+        return self.multiplicity * self.components
+
+    @cached_property
+    def weight_per_component(self) -> Floats:
+        """Nuclear-spin weight of one component, (n,), its mean where components differ."""
+        return np.asarray(self.weight / self.components)
 
     @property
     def ground_mhz(self) -> float:
@@ -95,27 +116,80 @@ class Levels(Table):
         return float(self.energy_mhz[self.weight > 0].min())
 
     @property
-    def quanta_names(self) -> tuple[str, ...]:
-        """Which quantum numbers label a level: j; j, k; or j, ka, kc."""
-        if self.kind in ("linear", "spherical"):
-            return ("j",)
-        return ("j", "ka", "kc") if (self.kc >= 0).any() else ("j", "k")
+    def rotational(self) -> Ints:
+        """The rotational angular momentum of every level: n where spins are coupled to it, else j."""
+        return np.asarray(self.quanta["n" if "n" in self.quanta else "j"])
 
-    def quanta(self, rows: NDArray[Any]) -> Ints:
-        """Quantum numbers (n, 1 to 3) of the levels `rows`, in the order of `quanta_names`."""
-        columns = (self.j, self.ka, self.kc)[: len(self.quanta_names)]
-        return np.stack([column[rows] for column in columns], axis=1)
+    def find(self, **quanta: int | str) -> int:
+        """The row of the level with these quantum numbers, all of them named.
 
-    def quanta_columns(self, rows: NDArray[Any], suffix: str) -> dict[str, Ints]:
+        Raises ValueError for a missing or unknown name, and for a level that is not in the table.
+
+        >>> from rotor.quantum.solve import solve_levels
+        >>> from rotor.tops.top import Top
+        >>> solve_levels(Top.from_constants("A=10 B=6 C=4 MHz"), 4).find(j=4, ka=1, kc=3)
+        23
+        """
+        row = int(self.rows_of(**{name: [value] for name, value in quanta.items()})[0])
+        if row < 0:
+            label = ", ".join(f"{name} = {value}" for name, value in quanta.items())
+            raise ValueError(f"no level with {label} among {len(self)} levels up to {self._total} = {self.jmax}")
+        return row
+
+    @property
+    def _total(self) -> str:
+        return "N" if "n" in self.quanta else "J"
+
+    def rows_of(self, **quanta: ArrayLike) -> Ints:
+        """Rows of the levels with these quantum numbers, arrays (n,) by name; -1 where there is none.
+
+        Raises ValueError where not all the names that label a level are given, or others.
+        """
+        if set(quanta) != set(self.quanta):
+            raise ValueError(
+                f"quantum numbers {', '.join(quanta)}: these levels are labelled by {', '.join(self.quanta)}"
+            )
+        codes, rows, scales = self._index
+        wanted = np.zeros(np.shape(next(iter(quanta.values()))), dtype=np.int64)
+        inside = np.ones(wanted.shape, dtype=bool)
+        for name, (values, scale) in zip(self.quanta, scales, strict=True):
+            place = np.searchsorted(values, np.asarray(quanta[name]))
+            place = np.minimum(place, len(values) - 1)
+            inside &= values[place] == np.asarray(quanta[name])
+            wanted += place * scale
+        place = np.minimum(np.searchsorted(codes, wanted), max(len(codes) - 1, 0))
+        found = inside & (codes[place] == wanted) if len(codes) else np.zeros(wanted.shape, dtype=bool)
+        return np.where(found, rows[place] if len(codes) else -1, -1)
+
+    @cached_property
+    def _index(self) -> tuple[Ints, Ints, list[tuple[NDArray[Any], int]]]:
+        """One whole number for each level (sorted), its row, and the values and scale of each quantum number."""
+        code, scale, scales = np.zeros(len(self), dtype=np.int64), 1, []
+        for column in self.quanta.values():
+            values, place = np.unique(column, return_inverse=True)
+            scales.append((values, scale))
+            code += place * scale
+            scale *= max(len(values), 1)
+        rows = np.argsort(code, kind="stable")
+        return code[rows], rows, scales
+
+    def labels(self, rows: NDArray[Any]) -> list[str]:
+        """The levels `rows` as text, one row of quantum numbers each."""
+        return names_of.labels(self.quanta, rows, self.halves)
+
+    def quanta_of(self, rows: NDArray[Any]) -> Ints:
+        """Quantum numbers (n, names) of the levels `rows`, in the order of `quanta_names`."""
+        return names_of.matrix(self.quanta, rows)
+
+    def quanta_columns(self, rows: NDArray[Any], suffix: str) -> dict[str, NDArray[Any]]:
         """The same as columns by name: j_upper, ka_upper, kc_upper for the suffix upper."""
-        return {f"{name}_{suffix}": column for name, column in zip(self.quanta_names, self.quanta(rows).T, strict=True)}
+        return names_of.columns(self.quanta, rows, suffix)
 
     @property
     def columns(self) -> dict[str, NDArray[Any]]:
-        """Quantum numbers or irreps, energy_mhz, components, weight and degeneracy, by name."""
-        labels = ("j", "ka", "kc") if self.irrep is None else ("j", "irrep")
-        names = (*labels, "energy_mhz", "components", "weight", "degeneracy")
-        return {name: getattr(self, name) for name in names}
+        """Quantum numbers, energy_mhz, components, weight and degeneracy, by name."""
+        names = ("energy_mhz", "components", "weight", "degeneracy")
+        return self.quanta | {name: getattr(self, name) for name in names}
 
 
 class TransitionTable(Table):
@@ -125,210 +199,38 @@ class TransitionTable(Table):
 
     @property
     def quanta_names(self) -> tuple[str, ...]:
-        """Which quantum numbers label a state: j; j, k; or j, ka, kc."""
+        """Which quantum numbers label a state: j; j, k; j, ka, kc; ..."""
         return self.levels.quanta_names
 
     def quanta(self, rows: NDArray[Any]) -> Ints:
-        """Quantum numbers (n, 1 to 3) of the states `rows`, such as those above or below each transition."""
-        return self.levels.quanta(rows)
+        """Quantum numbers (n, names) of the states `rows`, such as those above or below each transition."""
+        return self.levels.quanta_of(rows)
 
 
-def disordered_blocks(top: Top, levels: Levels) -> list[tuple[int, str]]:
-    """(J, species) of Wang blocks where the order of energy is not that of the rigid energy ⟨A Ja² + B Jb² + C Jc²⟩.
-
-    There Ka and Kc only count states: distortion has outgrown the rigid energies (quartic-only water from J = 15 on).
-    ⟨Jz²⟩ itself (`SolvedBlock.jz_squared`) is not the measure, since it falls by a little near the separatrix of a
-    rigid top, where labels are in perfect order.
-    """
-    out: list[tuple[int, str]] = []
-    if not centrifugal_operators(top.constants):  # a rigid top is in order
-        return out
-    for block in levels.blocks:
-        bands = block_bands(JMatrix(rigid_operators(top.constants), block.basis.j), block.basis)
-        rigid = _expectations(bands, block.vectors)
-        if (np.diff(rigid) < -1e-9 * np.abs(rigid).max()).any():
-            out.append((block.basis.j, block.basis.species))
-    return out
+def weights_of_levels(levels: Levels, weights: SpinWeights) -> Ints:
+    """Spin weights of levels, summed over the components of each row, by other weights than they were solved with."""
+    quanta = levels.quanta
+    if "irrep" in quanta:
+        of = {name: weights.of_irrep(name) for name in np.unique(quanta["irrep"]).tolist()}
+        return np.array([of[name] for name in quanta["irrep"].tolist()], dtype=np.int64)
+    if "kc" in quanta:
+        return _of_asymmetric(levels, weights)
+    if "k" in quanta:
+        return weights.of_symmetric(levels.rotational, np.abs(quanta["k"]), oblate=levels.kind == "oblate")
+    return weights.of_spherical(levels.rotational) if levels.kind == "spherical" else weights.of_j(levels.rotational)
 
 
-def _expectations(bands: list[Floats], vectors: Floats) -> Floats:
-    """⟨v|H|v⟩ for every column of `vectors`, H given by its diagonals."""
-    total = bands[0] @ vectors**2
-    for n, band in enumerate(bands[1:], 1):
-        total += 2 * (band @ (vectors[:-n] * vectors[n:]))
-    return np.asarray(total)
-
-
-def hamiltonian(top: Top, effects: Sequence[QuantumEffect] = SEMI_RIGID) -> Operators:
-    """The operators of all effects added: {(p, q, n): MHz}, zeros left out."""
-    total: Operators = {}
-    for effect in effects:
-        for powers, value in effect.operators(top).items():
-            total[powers] = total.get(powers, 0.0) + value
-    return {powers: value for powers, value in total.items() if value}
-
-
-def solve_levels(
-    top: Top,
-    jmax: int,
-    *,
-    jmin: int = 0,
-    effects: Sequence[QuantumEffect] = SEMI_RIGID,
-    vectors: bool = True,
-    executor: Executor | None = None,
-) -> Levels:
-    """All rotational levels from J = `jmin` to `jmax`.
-
-    effects: what the Hamiltonian consists of. vectors: False leaves the eigenvectors of an asymmetric top out.
-    executor: any `concurrent.futures.Executor`; J are spread over it. Energies are true eigenvalues of the truncated
-    effective Hamiltonian; nothing is treated to first order. Raises ValueError for a J max below zero.
-
-    >>> from rotor.tops.top import Top
-    >>> levels = solve_levels(Top.from_constants("A=10 B=6 C=4 MHz"), 1)
-    >>> levels.energy_mhz.tolist(), levels.ka.tolist(), levels.kc.tolist()
-    ([0.0, 10.0, 16.0, 14.0], [0, 0, 1, 1], [0, 1, 0, 1])
-    """
-    if jmax < 0 or jmin < 0 or jmin > jmax:
-        raise ValueError(f"J from {jmin} to {jmax}: J max must be 0 or more and not below J min")
-
-    operators = hamiltonian(top, effects)
-    if top.kind == "asymmetric":
-        return _asymmetric(top, operators, jmin, jmax, vectors, executor)
-    if top.kind in ("prolate", "oblate"):
-        return _symmetric(top.kind, operators, top.spin_weights, jmin, jmax)
-    if top.kind == "spherical":
-        return _spherical(operators, top.spin_weights, jmin, jmax)
-    return _linear(operators, top.spin_weights, jmin, jmax)
-
-
-def _scalar_energies(operators: Operators, jmin: int, jmax: int) -> tuple[Ints, Floats]:
-    j = np.arange(jmin, jmax + 1)
-    return j, np.array([scalar_energy(operators, int(value)) for value in j])
-
-
-def _linear(operators: Operators, weights: SpinWeights, jmin: int, jmax: int) -> Levels:
-    """Linear tops: E = Σ c X^p."""
-    j, energy = _scalar_energies(operators, jmin, jmax)
-    none = np.full(j.shape, -1)
-    return Levels("linear", None, jmax, energy, j, none, none, np.ones_like(j), weights.of_j(j))
-
-
-def _spherical(operators: Operators, weights: SpinWeights, jmin: int, jmax: int) -> Levels:
-    """Spherical tops: E = Σ c X^p in one row of 2J+1 components, or, with D_t, a row for every level that it splits."""
-    scalars, dt = scalar_and_tensor(operators)
-    j, energy = _scalar_energies(scalars, jmin, jmax)
-    if not dt:
-        none = np.full(j.shape, -1)
-        return Levels("spherical", None, jmax, energy, j, none, none, 2 * j + 1, weights.of_spherical(j))
-
-    split = [tensor_eigenvalues(int(value), 1 if dt > 0 else -1) for value in j]
-    sizes = [len(irreps) for irreps, _ in split]
-    irreps = np.concatenate([irreps for irreps, _ in split])
-    none = np.full(irreps.shape, -1)
-    return Levels(
-        kind="spherical",
-        representation=None,
-        jmax=jmax,
-        energy_mhz=np.repeat(energy, sizes) + dt * np.concatenate([omega for _, omega in split]),
-        j=np.repeat(j, sizes),
-        ka=none,
-        kc=none,
-        components=np.array([DIMENSION[irrep] for irrep in irreps]),
-        weight=np.array([weights.of_irrep(irrep) for irrep in irreps]),
-        irrep=irreps,
-    )
-
-
-def _symmetric(kind: str, operators: Operators, weights: SpinWeights, jmin: int, jmax: int) -> Levels:
-    """Symmetric tops: E(J, K) = Σ c X^p K^2q, one row for ±K."""
-    j = np.repeat(np.arange(jmin, jmax + 1), np.arange(jmin, jmax + 1) + 1)
-    k = np.concatenate([np.arange(value + 1) for value in range(jmin, jmax + 1)])
-    x, squares = (j * (j + 1)).astype(float), (k * k).astype(float)
-    energy = np.zeros(j.shape)
-    for (p, q, _), c in operators.items():
-        energy += c * x**p * squares**q
-
-    components = np.where(k == 0, 1, 2)
-    weight = weights.of_symmetric(j, k, oblate=kind == "oblate")
-    return Levels(kind, None, jmax, energy, j, k, np.full(j.shape, -1), components, weight)
-
-
-def _asymmetric(
-    top: Top, operators: Operators, jmin: int, jmax: int, vectors: bool, executor: Executor | None
-) -> Levels:
-    pieces = [(operators, j, str(top.constants.representation), vectors) for j in range(jmin, jmax + 1)]
-    solved = executor.map(solve_j, *zip(*pieces, strict=True)) if executor else (solve_j(*piece) for piece in pieces)
-    blocks = tuple(_placed(block for of_one_j in solved for block in of_one_j))
-
-    labels = [ka_kc(b.basis.j, b.basis.species, b.basis.size) for b in blocks]
-    sizes = [b.basis.size for b in blocks]
-    weight = np.repeat([top.spin_weights.of_ka_kc(b.basis.species) for b in blocks], sizes)
-    return Levels(
-        kind="asymmetric",
-        representation=str(top.constants.representation),
-        jmax=jmax,
-        energy_mhz=np.concatenate([b.energies_mhz for b in blocks]),
-        j=np.repeat([b.basis.j for b in blocks], sizes),
-        ka=np.concatenate([ka for ka, _ in labels]),
-        kc=np.concatenate([kc for _, kc in labels]),
-        components=np.ones(sum(sizes), dtype=np.int64),
-        weight=weight,
-        blocks=blocks if vectors else (),
-    )
-
-
-def _placed(solved: Iterator[tuple[WangBlock, Floats, Floats]]) -> Iterator[SolvedBlock]:
-    start = 0
-    for basis, energies, vectors in solved:
-        yield SolvedBlock(basis, energies, vectors, start)
-        start += basis.size
-
-
-def solve_j(
-    operators: Operators, j: int, representation: str, vectors: bool = True
-) -> list[tuple[WangBlock, Floats, Floats]]:
-    """The Wang blocks of one J solved: (block, energies in MHz, eigenvectors) in the order ee, eo, oe, oo."""
-    scalar, multiplet = scalar_energy(operators, j), JMatrix(operators, j)
-    out = []
-    for block in wang_blocks(j, representation):
-        energies, states = diagonalise(block_bands(multiplet, block), vectors)
-        out.append((block, energies + scalar, states))
-    return out
-
-
-def diagonalise(bands: list[Floats], vectors: bool = True) -> tuple[Floats, Floats]:
-    """Eigenvalues, rising, and eigenvectors in columns of a symmetric matrix given by its diagonals.
-
-    Tridiagonal matrices go to LAPACK's divide and conquer (dstevd), wider ones to its dense form (dsyevd).
-    Raises ValueError where LAPACK does not converge or the matrix has numbers that are not finite.
-    """
-    if len(bands[0]) == 1:
-        return bands[0], np.ones((1, 1))
-    if not all(np.isfinite(band).all() for band in bands):
-        raise ValueError("a block of the Hamiltonian overflows: J max is too high for these distortion constants")
-    if len(bands) > 2:
-        return _dense(bands, vectors)
-    if len(bands) == 1:
-        return _diagonal(bands[0], vectors)
-
-    from scipy.linalg.lapack import dstevd
-
-    energies, states, info = dstevd(bands[0], bands[1], compute_v=int(vectors))
-    if info:
-        raise ValueError(f"LAPACK dstevd did not converge on a block of size {len(bands[0])} (info = {info})")
-    return energies, states
-
-
-def _diagonal(band: Floats, vectors: bool) -> tuple[Floats, Floats]:
-    order = np.argsort(band, kind="stable")
-    return band[order], np.eye(len(band))[:, order] if vectors else np.zeros((0, 0))
-
-
-def _dense(bands: list[Floats], vectors: bool) -> tuple[Floats, Floats]:
-    matrix = np.diag(bands[0])
-    for n, band in enumerate(bands[1:], 1):
-        matrix += np.diag(band, -n)  # eigh reads the lower triangle
-    if not vectors:
-        return np.asarray(np.linalg.eigvalsh(matrix), dtype=np.float64), np.zeros((0, 0))
-    solved = np.linalg.eigh(matrix)
-    return np.asarray(solved.eigenvalues, dtype=np.float64), np.asarray(solved.eigenvectors, dtype=np.float64)
+def _of_asymmetric(levels: Levels, weights: SpinWeights) -> Ints:
+    """By parities of (Ka, Kc); a symmetric top whose ±K are split has weights by K, one component each."""
+    ka, kc = levels.quanta["ka"], levels.quanta["kc"]
+    if levels.kind in ("prolate", "oblate") and weights.rule == "K":
+        k = kc if levels.kind == "oblate" else ka
+        both = weights.of_symmetric(levels.rotational, k, oblate=levels.kind == "oblate")
+        if "0odd" in weights.classes:
+            raise ValueError(
+                "spin weights by 0even and 0odd: the components of a split ±K pair differ in weight, and which is which is "
+                "not known here; give weights by parity of (Ka, Kc) or by K alone"
+            )
+        return np.asarray(both // np.where(k == 0, 1, 2))
+    of_parity = np.array([[weights.of_ka_kc(a + c) for c in "eo"] for a in "eo"], dtype=np.int64)
+    return np.asarray(of_parity[ka % 2, kc % 2])

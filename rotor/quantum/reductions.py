@@ -29,11 +29,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rotor.quantum.basis import REPRESENTATIONS as AXES
 from rotor.quantum.effects.watson import centrifugal_operators, operators_by_name, rigid_operators
 from rotor.quantum.uncertainty import Covariance
-from rotor.tops.constants import REPRESENTATIONS, Constants
-from rotor.tops.operators import Operators, Powers, distortion_terms
+from rotor.tops.constants import Constants
+from rotor.tops.operators import Operators, Powers, axes_of, distortion_terms
 
 # the quartic and quadratic terms by (p, q, n), and what each is in Jα⁴, JαJα JβJβ + JβJβ JαJα, Jα², for (x, y, z, xy, yz, zx)
 _TERMS: tuple[Powers, ...] = (
@@ -121,7 +120,7 @@ def _converted(
 
 def _values(operators: Operators, old: str, reduction: str, new: str) -> tuple[dict[str, float], float]:
     """The new constants by name, and the turn s, of an operator written in the axes of `old`."""
-    exchanged = _exchange_axes(operators, AXES[old], AXES[new])
+    exchanged = _exchange_axes(operators, axes_of(old), axes_of(new))
     s = _turn(exchanged, reduction)
     return _named(_turned(exchanged, s), reduction, new), s
 
@@ -154,8 +153,7 @@ def _refuse(constants: Constants, reduction: str | None, representation: str) ->
         raise ValueError(f"a top of kind {constants.kind!r} has neither reduction nor representation to convert")
     if reduction not in ("A", "S", None):
         raise ValueError(f"reduction {reduction!r}: Watson's reductions are 'A' and 'S'")
-    if representation not in REPRESENTATIONS:
-        raise ValueError(f"representation {representation!r}: known are {', '.join(REPRESENTATIONS)}")
+    axes_of(representation)  # refuses one that does not exist
     quartic = [n for n, term in distortion_terms("asymmetric", constants.reduction).items() if _order(term) == 2]
     higher = [name for name in constants.values if name not in (*"ABC", *quartic)]
     if higher:
@@ -203,7 +201,9 @@ def _turned(operators: Operators, s: float) -> Operators:
 def _named(operators: Operators, reduction: str, representation: str) -> dict[str, float]:
     """A, B, C and the five quartic constants of a reduction; the sixth term is zero by construction."""
     mean, along, across = (operators[powers] for powers in ((1, 0, 0), (0, 1, 0), (0, 0, 1)))
-    rigid = dict(zip(AXES[representation].upper(), (mean + 2 * across, mean - 2 * across, mean + along), strict=True))
+    rigid = dict(
+        zip(axes_of(representation).upper(), (mean + 2 * across, mean - 2 * across, mean + along), strict=True)
+    )
     values = {name: rigid[name] for name in "ABC"}
     for name, term in distortion_terms("asymmetric", reduction).items():
         if _order(term) == 2:

@@ -30,19 +30,25 @@ _SUBBLOCKS = {"A1": (0, 1), "B1": (2, 1), "A2": (0, -1), "B2": (2, -1)}  # K mod
 DIMENSION = {"A1": 1, "A2": 1, "E": 2, "F1": 3, "F2": 3}
 
 
+def is_cubic(operators: Operators) -> bool:
+    """Whether operators are those of a spherical top: J² alone, and the tensor of D_t."""
+    dt = operators.get((0, 0, 2), 0.0) / CUBIC_TENSOR[0, 0, 2]
+    others = {powers for powers in operators if powers[1] or powers[2]}
+    return all(
+        abs(operators[powers] - dt * CUBIC_TENSOR.get(powers, 0.0)) <= 1e-12 * abs(operators[powers])
+        for powers in others
+    )
+
+
 def scalar_and_tensor(operators: Operators) -> tuple[Operators, float]:
     """Operators of a spherical top taken apart: those of J² alone, and D_t.
 
-    Raises ValueError for operators that are not cubic, such as Jz² alone: they belong to no spherical top.
+    Terms that are not cubic are not held here; see `is_cubic`.
     """
     dt = operators.get((0, 0, 2), 0.0) / CUBIC_TENSOR[0, 0, 2]
-    scalars: Operators = {}
-    for powers, value in operators.items():
-        rest = value - dt * CUBIC_TENSOR.get(powers, 0.0)
-        if powers[1] == powers[2] == 0:
-            scalars[powers] = rest
-        elif abs(rest) > 1e-12 * abs(value):
-            raise ValueError(f"term {powers} of {value} MHz: a spherical top has J² and the tensor of D_t alone")
+    scalars = {
+        powers: value - dt * CUBIC_TENSOR.get(powers, 0.0) for powers, value in operators.items() if not any(powers[1:])
+    }
     return scalars, dt
 
 

@@ -110,7 +110,7 @@ def level_errors(top: Top, levels: Levels, covariance: Covariance) -> Floats:
     """One standard deviation of every level's energy, (levels,) in MHz, against the Hamiltonian's zero.
 
     >>> from rotor.tops.constants import Constants
-    >>> from rotor.quantum.levels import solve_levels
+    >>> from rotor.quantum.solve import solve_levels
     >>> from rotor.tops.top import Top
     >>> top = Top(Constants(B=6000.0, uncertainties={"B": 0.1}))
     >>> covariance = Covariance.of_uncertainties(top.constants)

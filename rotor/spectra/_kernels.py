@@ -14,7 +14,6 @@ def fill_pair(
     energies_up: NDArray[np.float64],
     energies_low: NDArray[np.float64],
     amplitude: NDArray[np.float64],
-    dipole2: float,
     start_up: int,
     start_low: int,
     frequency: NDArray[np.float64],
@@ -30,7 +29,7 @@ def fill_pair(
             difference = energies_up[i] - energies_low[k]
             falls = difference < 0
             frequency[at] = abs(difference)
-            strength[at] = amplitude[i, k] * amplitude[i, k] * dipole2
+            strength[at] = amplitude[i, k] * amplitude[i, k]
             upper[at] = start_low + k if falls else start_up + i
             lower[at] = start_up + i if falls else start_low + k
 

@@ -10,6 +10,7 @@ all components that coincide in the line, g_I is the spin weight of one componen
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -21,20 +22,26 @@ from numpy.typing import NDArray
 from rotor import units
 from rotor.arrays import Floats, Ints
 from rotor.quantum.convergence import warnings_of
-from rotor.quantum.levels import Levels, TransitionTable, solve_levels
+from rotor.quantum.effect import QuantumEffect
+from rotor.quantum.effects.watson import SEMI_RIGID
+from rotor.quantum.levels import Levels, TransitionTable
+from rotor.quantum.solve import solve_levels
 from rotor.quantum.uncertainty import Covariance, level_spread, line_errors
-from rotor.spectra.reach import jmax_for_cut
-from rotor.spectra.transitions import IntensityCut, all_transitions
+from rotor.spectra.intensity import (
+    EINSTEIN_PER_MHZ3,
+    INTENSITY_NM2_MHZ,
+    LGINT_NM2_MHZ,
+    intensity_cut,
+    jmax_for_cut,
+    population,
+)
+from rotor.spectra.transitions import all_transitions
 from rotor.thermo import PartitionFunction, VibrationalStates, partition_function
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
 
 
-INTENSITY_NM2_MHZ = (
-    4.16231e-5  # 8π³/3hc for MHz and D² as catalogues use it; CODATA 2022 gives 4.16238e-5 (7e-6 in log10)
-)
-EINSTEIN_PER_MHZ3 = 1.1639654e-20  # 64π⁴/3hc³ for MHz and D², CODATA 2022
 DEFAULT_MIN_LGINT = -12.0
 
 
@@ -71,7 +78,7 @@ class Lines(TransitionTable):
     @cached_property
     def partition(self) -> PartitionFunction:
         """Q(T) behind the intensities, summed when first asked for unless it was given."""
-        return self.given_partition or partition_function(self.top, self.temperature_k)
+        return self.given_partition or partition_function(self.top, self.temperature_k, effects=self.levels.effects)
 
     @property
     def q(self) -> float:
@@ -121,12 +128,9 @@ class Lines(TransitionTable):
     @property
     def intensity_nm2_mhz(self) -> Floats:
         """Integrated absorption I(T) in nm² MHz."""
-        levels = self.levels
-        per_component = (levels.weight / levels.components)[self.lower]
-        scaled = INTENSITY_NM2_MHZ * self.frequency_mhz * per_component * self.strength_debye2 / self.q
-        lower_k = (levels.energy_mhz[self.lower] - levels.ground_mhz) / units.MHZ_PER_K
-        photon_k = self.frequency_mhz / units.MHZ_PER_K
-        return scaled * np.exp(-lower_k / self.temperature_k) * -np.expm1(-photon_k / self.temperature_k)
+        below = population(self.levels, self.temperature_k, self.q)[self.lower]
+        photon = -np.expm1(-self.frequency_mhz / (self.temperature_k * units.MHZ_PER_K))
+        return np.asarray(INTENSITY_NM2_MHZ * self.frequency_mhz * self.strength_debye2 * below * photon)
 
     @property
     def intensity_cm_per_molecule(self) -> Floats:
@@ -135,16 +139,15 @@ class Lines(TransitionTable):
 
     @property
     def lgint(self) -> Floats:
-        """log10 of I(T) in nm² MHz."""
+        """log10 of I(T) in nm² MHz, with the value of 8π³/3hc that catalogues use."""
         with np.errstate(divide="ignore"):  # a line of zero strength is -inf, as it should be
-            return np.log10(self.intensity_nm2_mhz)
+            return np.log10(self.intensity_nm2_mhz * (LGINT_NM2_MHZ / INTENSITY_NM2_MHZ))
 
     @property
     def einstein_a_per_s(self) -> Floats:
         """Einstein coefficient of spontaneous emission, 1/s, of one component and M averaged."""
-        upper = self.upper
-        states = (2 * self.levels.j + 1) * self.levels.components
-        return EINSTEIN_PER_MHZ3 * self.frequency_mhz**3 * self.strength_debye2 / states[upper]
+        states = self.levels.states[self.upper]
+        return EINSTEIN_PER_MHZ3 * self.frequency_mhz**3 * self.strength_debye2 / states
 
     def where(self, chosen: NDArray[Any] | slice) -> Lines:
         """The lines that a slice, a boolean mask or an array of indices chooses, in its order."""
@@ -194,6 +197,7 @@ def line_list(
     vibrations: VibrationalStates | None = None,
     covariance: Covariance | None = None,
     sort: bool = True,
+    effects: Sequence[QuantumEffect] = SEMI_RIGID,
     executor: Executor | None = None,
 ) -> Lines:
     """Electric-dipole lines of a top: every transition that the selection rules allow, cut only where you say.
@@ -218,15 +222,15 @@ def line_list(
         raise ValueError(f"temperature {temperature_k} K: a temperature is above 0 K")
     dipole = _dipole_of(top)
     least = -math.inf if min_lgint is None else min_lgint
-    given = partition_of(top, temperature_k, q, vibrational_factor, vibrations)
+    given = partition_of(top, temperature_k, q, vibrational_factor, vibrations, effects)
     if given is None and (jmax is None or math.isfinite(least)):
-        given = partition_function(top, temperature_k)
+        given = partition_function(top, temperature_k, effects=effects)
     if jmax is None:
         jmax = jmax_for_cut(top, dipole, temperature_k, given.q if given else 1.0, least)
 
-    levels = solve_levels(top, jmax, executor=executor)
-    cut = _intensity_cut(levels, temperature_k, given.q, least) if given and math.isfinite(least) else None
-    found = all_transitions(levels, dipole, range_mhz, cut)
+    levels = solve_levels(top, jmax, effects=effects, executor=executor)
+    cut = intensity_cut(levels, temperature_k, given.q, least) if given else None
+    found = all_transitions(levels, dipoles_by_state(top, dipole, levels.effects), range_mhz, cut)
     lines = Lines(
         top=top,
         levels=levels,
@@ -243,6 +247,16 @@ def line_list(
     return lines.sorted() if sort else lines
 
 
+def dipoles_by_state(
+    top: Top, dipole_abc: tuple[float, float, float], effects: Sequence[QuantumEffect]
+) -> dict[tuple[int, int], tuple[float, float, float]]:
+    """The dipole of every state, the top's own where its effect gives none, and those between states."""
+    found = {(0, 0): dipole_abc}
+    for effect in effects:
+        found |= {(state.v, state.v): dipole_abc for state in effect.states(top)} | effect.dipoles(top)
+    return found
+
+
 def _dipole_of(top: Top) -> tuple[float, float, float]:
     if top.dipole_abc_debye is None:
         raise ValueError(
@@ -252,7 +266,12 @@ def _dipole_of(top: Top) -> tuple[float, float, float]:
 
 
 def partition_of(
-    top: Top, temperature_k: float, q: float | None, vibrational_factor: float, vibrations: VibrationalStates | None
+    top: Top,
+    temperature_k: float,
+    q: float | None,
+    vibrational_factor: float,
+    vibrations: VibrationalStates | None,
+    effects: Sequence[QuantumEffect] = SEMI_RIGID,
 ) -> PartitionFunction | None:
     """Q as the user gave it, or the summed one times a vibrational factor; None where it is to be summed as it is."""
     if vibrations is not None:
@@ -268,13 +287,6 @@ def partition_of(
         return PartitionFunction(temperature_k, q * vibrational_factor, None, math.nan, source)
     if vibrational_factor == 1.0:
         return None
-    summed = partition_function(top, temperature_k)
+    summed = partition_function(top, temperature_k, effects=effects)
     source = f"{summed.source}, times {named}"
     return replace(summed, q=summed.q * vibrational_factor, source=source)
-
-
-def _intensity_cut(levels: Levels, temperature_k: float, q: float, least: float) -> IntensityCut:
-    above_k = (levels.energy_mhz - levels.ground_mhz) / units.MHZ_PER_K
-    per_component = levels.weight / levels.components
-    population = INTENSITY_NM2_MHZ / q * per_component * np.exp(-above_k / temperature_k)
-    return IntensityCut(population, temperature_k * units.MHZ_PER_K, 10.0**least)

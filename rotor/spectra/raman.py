@@ -13,6 +13,7 @@ final states (2J+1) γ². A count of photons goes with ν_laser ν_s³ instead o
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -24,10 +25,13 @@ from numpy.typing import NDArray
 from rotor import units
 from rotor.arrays import Floats, Ints
 from rotor.quantum.convergence import warnings_of
-from rotor.quantum.levels import Levels, TransitionTable, solve_levels
+from rotor.quantum.effect import QuantumEffect
+from rotor.quantum.effects.watson import SEMI_RIGID
+from rotor.quantum.levels import Levels, TransitionTable
+from rotor.quantum.solve import solve_levels
+from rotor.spectra.intensity import JMAX_DEFAULT_LIMIT
 from rotor.spectra.lines import partition_of
 from rotor.spectra.raman_strengths import RamanTransitions, anisotropy_squared, raman_transitions
-from rotor.spectra.reach import JMAX_DEFAULT_LIMIT
 from rotor.thermo import PartitionFunction, VibrationalStates, partition_function
 
 if TYPE_CHECKING:
@@ -134,6 +138,7 @@ def raman_lines(
     min_relative: float | None = DEFAULT_MIN_RELATIVE,
     q: float | None = None,
     vibrations: VibrationalStates | None = None,
+    effects: Sequence[QuantumEffect] = SEMI_RIGID,
     executor: Executor | None = None,
 ) -> RamanLines:
     """Rotational Raman lines of a top: every transition that its polarizability allows, cut only where you say.
@@ -154,6 +159,8 @@ def raman_lines(
         Partition function to use instead of the summed one, spin weights reduced by their common divisor.
     vibrations : VibrationalStates, optional
         States or fundamentals whose factor multiplies Q.
+    effects : sequence of QuantumEffect, optional
+        What the Hamiltonian consists of.
     executor : Executor, optional
         J are spread over it.
 
@@ -175,9 +182,11 @@ def raman_lines(
     if jmax is None:
         jmax = jmax_for_raman(top, temperature_k, min_relative or DEFAULT_MIN_RELATIVE)
 
-    levels = solve_levels(top, jmax, executor=executor)
+    levels = solve_levels(top, jmax, effects=effects, executor=executor)
     found = raman_transitions(levels, tensor, top.spin_weights)
-    partition = partition_of(top, temperature_k, q, 1.0, vibrations) or partition_function(top, temperature_k)
+    partition = partition_of(top, temperature_k, q, 1.0, vibrations, effects) or partition_function(
+        top, temperature_k, effects=effects
+    )
     lines = _both_ways(top, levels, found, temperature_k, laser_nm, least, partition)
     lines = lines.where(lines.scattered_cm > 0)
     if len(lines) and least:

@@ -3,33 +3,27 @@
 S(i, f) = (3/2) Σ_{M' M p} |⟨f M'|α_2p(space)|i M⟩|²,     Σ_f S(i, f) = (2J+1) γ²,     γ² = (3 Σ α_gh² - (Σ α_gg)²)/2,
 
 the elastic term f = i among them, so that S = (2J+1) b γ² with the coefficients b of G. Placzek and E. Teller, Z. Phys. 81,
-209 (1933). With D functions α_2p(space) = Σ_q D²*_pq α_2q(body), and after the sum over M', M and p what is left is
-
-    S = (3/2) |Σ_{k q} c'_{k+q} c_k α_2q √(2J+1) ⟨J k 2 q|J' k+q⟩|²
-
-(R. N. Zare, Angular Momentum, 1988, eq. 3.118 for the integral over three D functions). Body components, with the
-phases of conventions.md: α_20 = (2α_zz - α_xx - α_yy)/√6, α_2±1 = ∓α_xz - iα_yz, α_2±2 = (α_xx - α_yy)/2 ± iα_xy.
-The diagonal elements and each of α_xy, α_xz, α_yz connect different pairs of symmetry species, so they never interfere.
+209 (1933). Sums over M', M and p leave the squares of the reduced elements in `quantum.tensors`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.basis import REPRESENTATIONS, wang_blocks
-from rotor.quantum.levels import Levels, SolvedBlock
+from rotor.quantum import reduced
+from rotor.quantum.basis import wang_blocks
+from rotor.quantum.levels import Block, Levels, SolvedBlock
+from rotor.quantum.tensors import amplitudes, body_tensor, connected_pairs, coupling
+from rotor.tops.operators import AXIAL_REPRESENTATION, axes_of
 from rotor.tops.spin_weights import SpinWeights
-
-Parts = dict[int, float]  # α_2q by q, up to a common phase
 
 NO_WEIGHTS = SpinWeights()
 ROUND_OFF = 1e-6  # of a tensor: what differs less from an axial or an isotropic one is the rounding of a frame
-_MIXED = {"oe": "ab", "oo": "ac", "eo": "bc"}  # parities of (ΔKa, ΔKc) -> element off the diagonal
 
 
 @dataclass(frozen=True)
@@ -54,51 +48,6 @@ def anisotropy_squared(polarizability: ArrayLike) -> float:
     tensor = np.asarray(polarizability, dtype=float)
     spread = tensor - np.eye(3) * np.trace(tensor) / 3
     return float(1.5 * np.sum(spread * spread))
-
-
-def coupling(j: int, k: ArrayLike, q: int, rise: int) -> Floats:
-    """√(2J+1) ⟨J k 2 q|J+rise k+q⟩ for an array of k with |k + q| ≤ J + rise, rise = 0, 1 or 2.
-
-    Closed forms of the Clebsch-Gordan coefficients of rank 2 (D. A. Varshalovich, A. N. Moskalev and V. K. Khersonskii,
-    Quantum Theory of Angular Momentum, 1988, table 8.4), those of negative q by ⟨J -k 2 -q|J' -k'⟩ = (-1)^rise ⟨J k 2 q|J' k'⟩.
-
-    >>> round(float(coupling(1, 0, 0, 2)) ** 2, 6)  # (3/2) (J+1)(J+2)/(2J+3) of a linear molecule
-    1.8
-    """
-    k = np.asarray(k, dtype=float)
-    if q < 0:
-        return np.asarray((-1) ** rise * coupling(j, -k, -q, rise))
-    if rise == 2:
-        return np.asarray(np.sqrt(_two_up(j, k, q) / ((j + 1) * (2 * j + 3) * (j + 2))))
-    if j == 0:  # nothing of rank 2 leads from 0 to 0 or 1
-        return np.zeros_like(k)
-    factor, above = _one_up(j, k, q) if rise == 1 else _level(j, k, q)
-    norm = 2 * j * (j + 1) * (j + 2) if rise == 1 else (2 * j - 1) * 2 * j * (j + 1) * (2 * j + 3) / (2 * j + 1)
-    return np.asarray(factor * np.sqrt(above / norm))
-
-
-def _two_up(j: int, k: Floats, q: int) -> Floats:
-    if q == 0:
-        return 1.5 * (j - k + 1) * (j - k + 2) * (j + k + 1) * (j + k + 2)
-    if q == 1:
-        return (j - k + 1) * (j + k + 1) * (j + k + 2) * (j + k + 3)
-    return 0.25 * (j + k + 1) * (j + k + 2) * (j + k + 3) * (j + k + 4)
-
-
-def _one_up(j: int, k: Floats, q: int) -> tuple[Floats, Floats]:
-    if q == 0:
-        return k, 6 * (j - k + 1) * (j + k + 1)
-    if q == 1:
-        return 2 * k - j, (j + k + 1) * (j + k + 2)
-    return np.full_like(k, -1.0), (j - k) * (j + k + 1) * (j + k + 2) * (j + k + 3)
-
-
-def _level(j: int, k: Floats, q: int) -> tuple[Floats, Floats]:
-    if q == 0:
-        return 3 * k * k - j * (j + 1), np.full_like(k, 2.0)
-    if q == 1:
-        return -(2 * k + 1), 3 * (j - k) * (j + k + 1)
-    return np.ones_like(k), 3 * (j - k) * (j - k - 1) * (j + k + 1) * (j + k + 2)
 
 
 def raman_transitions(
@@ -145,7 +94,7 @@ def _ordered(levels: Levels, strength: Floats, first: Ints, second: Ints, weight
 
 def _of_both(levels: Levels, first: Ints, second: Ints) -> Floats:
     """Weight of one component where both states have the same; 0 where one of them does not exist."""
-    each = levels.weight / levels.components
+    each = levels.weight_per_component
     return np.asarray(np.where(each[second] > 0, each[first], 0.0))
 
 
@@ -155,57 +104,58 @@ def _of_both(levels: Levels, first: Ints, second: Ints) -> Floats:
 def _linear(levels: Levels, tensor: Floats) -> RamanTransitions:
     """S = (3/2) (J+1)(J+2)/(2J+3) Δα² from J to J + 2."""
     anisotropy = tensor[0, 0] - (tensor[1, 1] + tensor[2, 2]) / 2
-    first = np.arange(max(len(levels) - 2, 0))
-    j = levels.j[first]
+    all_j = levels.quanta["j"]
+    first = np.flatnonzero(all_j + 2 <= levels.jmax)
+    j, second = all_j[first], levels.rows_of(j=all_j[first] + 2)
     strength = 1.5 * (j + 1) * (j + 2) / (2 * j + 3) * anisotropy**2
-    return _ordered(levels, strength, first, first + 2, _of_both(levels, first, first + 2))
+    return _ordered(levels, strength, first, second, _of_both(levels, first, second))
 
 
 def _symmetric(levels: Levels, tensor: Floats, spin_weights: SpinWeights) -> RamanTransitions:
     """ΔK = 0 where the tensor has the axis of the top; else, for a top symmetric by numbers alone, as in Wang's basis."""
-    axes = REPRESENTATIONS["Ir" if levels.kind == "prolate" else "IIIr"]
-    x, y, z = ("abc".index(axis) for axis in axes)
+    representation = AXIAL_REPRESENTATION[levels.kind]
+    x, y, z = ("abc".index(axis) for axis in axes_of(representation))
     along = (2 * tensor[z, z] - tensor[x, x] - tensor[y, y]) / np.sqrt(6)
     if anisotropy_squared(tensor) - 1.5 * along**2 > (ROUND_OFF * np.linalg.norm(tensor)) ** 2:
         if spin_weights.rule == "K":
             raise ValueError("spin weights by K need an axis, and the polarizability has none; check the tensor")
-        return _without_axis(levels, tensor, spin_weights, axes)
-    pieces = [_of_axial(levels, rise, float(along)) for rise in (1, 2)]
+        return _without_axis(levels, tensor, spin_weights, representation)
+    pieces = [_of_axial(levels, delta_j, float(along)) for delta_j in (1, 2)]
     return _joined([piece for piece in pieces if len(piece.lower)])
 
 
-def _of_axial(levels: Levels, rise: int, along: float) -> RamanTransitions:
-    """K → K, J → J + rise, both signs of K together; J → J with ΔK = 0 is Rayleigh scattering."""
-    j = np.repeat(np.arange(levels.jmax + 1 - rise), np.arange(1, levels.jmax + 2 - rise))
+def _of_axial(levels: Levels, delta_j: int, along: float) -> RamanTransitions:
+    """K → K, J → J + ΔJ, both signs of K together; J → J with ΔK = 0 is Rayleigh scattering."""
+    all_j, all_k = levels.quanta["j"], levels.quanta["k"]
+    lower = all_j + delta_j <= levels.jmax
+    j, k = all_j[lower], all_k[lower]
     if not len(j):
         return _joined([])
-    k = np.concatenate([np.arange(value + 1) for value in range(levels.jmax + 1 - rise)])
-    factor = np.concatenate([coupling(value, np.arange(value + 1), 0, rise) for value in range(levels.jmax + 1 - rise)])
-    first, second = _row(j, k), _row(j + rise, k)
+    factor = np.empty(len(j))
+    for value in np.unique(j).tolist():
+        factor[j == value] = coupling(value, value + delta_j, 2, 0, k[j == value])
+    first, second = levels.rows_of(j=j, k=k), levels.rows_of(j=j + delta_j, k=k)
     strength = 1.5 * (along * factor) ** 2 * np.where(k == 0, 1, 2)
     return _ordered(levels, strength, first, second, _of_both(levels, first, second))
 
 
-def _row(j: int | Ints, k: Ints) -> Ints:
-    return np.asarray(j * (j + 1) // 2 + k)
-
-
-def _without_axis(levels: Levels, tensor: Floats, spin_weights: SpinWeights, axes: str) -> RamanTransitions:
+def _without_axis(levels: Levels, tensor: Floats, spin_weights: SpinWeights, representation: str) -> RamanTransitions:
     """Between Wang functions, which the states are whose K pairs have one weight each; one line for a pair of rows.
 
     Of K = 1 both functions of a pair have different strengths, α_20 and α_2±2 adding up in one and not in the other.
     """
-    representation = "Ir" if levels.kind == "prolate" else "IIIr"
+    anisotropic = body_tensor(tensor, 2, representation)
     blocks = [
         SolvedBlock(basis, np.zeros(basis.size), np.eye(basis.size), 0)
         for j in range(levels.jmax + 1)
         for basis in wang_blocks(j, representation)
     ]
     pieces = []
-    for up, low, parts in _pairs(blocks, tensor, axes):
-        strength = 1.5 * amplitudes(up, low, parts) ** 2
+    for up, low in connected_pairs(blocks, anisotropic):
+        strength = 1.5 * amplitudes(up, low, anisotropic) ** 2
         i, k = np.nonzero(_once(up, low))
-        first, second = _row(low.basis.j, low.basis.k[k]), _row(up.basis.j, up.basis.k[i])
+        first = levels.rows_of(j=np.full(len(k), low.basis.j), k=low.basis.k[k])
+        second = levels.rows_of(j=np.full(len(i), up.basis.j), k=up.basis.k[i])
         other = first != second
         weight = np.full(int(other.sum()), float(spin_weights.of_ka_kc(low.basis.species)))
         pieces.append(_ordered(levels, strength[i, k][other], first[other], second[other], weight))
@@ -224,74 +174,22 @@ def _summed(levels: Levels, found: RamanTransitions) -> RamanTransitions:
 # Asymmetric tops
 
 
-def parts_of(tensor: Floats, species: str, other: str, axes: str) -> Parts:
-    """The α_2q, up to a common phase, of the elements that connect two species; empty where they are 0.
-
-    axes: the principal axes at x, y, z of the representation.
-    """
-    change = "".join("e" if p == q else "o" for p, q in zip(species, other, strict=True))
-    x, y, z = ("abc".index(axis) for axis in axes)
-    if change == "ee":
-        along = (2 * tensor[z, z] - tensor[x, x] - tensor[y, y]) / np.sqrt(6)
-        across = (tensor[x, x] - tensor[y, y]) / 2
-        return {q: float(value) for q, value in ((0, along), (2, across), (-2, across)) if value}
-    first, second = ("abc".index(axis) for axis in _MIXED[change])
-    value = float(tensor[first, second])
-    if not value:
-        return {}
-    if {first, second} == {x, y}:
-        return {2: value, -2: -value}
-    return {1: -value, -1: value} if {first, second} == {x, z} else {1: value, -1: value}
-
-
-def amplitudes(up: SolvedBlock, low: SolvedBlock, parts: Parts) -> Floats:
-    """√(2J+1) Σ c' c α_2q ⟨J k 2 q|J' k+q⟩ between all states of two blocks, (n_up, n_low); S = 3/2 of its square.
-
-    |K s⟩ = n_K (|K⟩ + s|-K⟩), n_0 = 1/2, else 1/√2; a function of the upper block has √2 of its coefficient at K > 0.
-    """
-    j, rise = low.basis.j, up.basis.j - low.basis.j
-    own = np.where(low.basis.k == 0, 0.5, np.sqrt(0.5))
-    between = np.zeros((up.basis.size, low.basis.size))
-    for side in (1, -1):
-        for q, value in parts.items():
-            target = side * low.basis.k + q
-            place = (target - up.basis.first_k) // 2
-            column = np.flatnonzero((target >= 0) & (place >= 0) & (place < up.basis.size))
-            other = np.where(target[column] == 0, 1.0, np.sqrt(2.0))
-            sign = low.basis.sign if side < 0 else 1
-            factor = coupling(j, side * low.basis.k[column], q, rise)
-            between[place[column], column] += sign * value * own[column] * other * factor
-    return np.asarray(up.vectors.T @ between @ low.vectors)
-
-
-def _pairs(
-    blocks: Iterable[SolvedBlock], tensor: Floats, axes: str
-) -> Iterator[tuple[SolvedBlock, SolvedBlock, Parts]]:
-    """Every pair of blocks (higher or equal J first, each once) that the tensor connects, with the parts that do."""
-    by_j: dict[int, list[SolvedBlock]] = {}
-    for block in blocks:
-        by_j.setdefault(block.basis.j, []).append(block)
-    for j, lows in by_j.items():
-        for i, low in enumerate(lows):
-            for up in (*lows[i:], *by_j.get(j + 1, []), *by_j.get(j + 2, [])):
-                parts = parts_of(tensor, up.basis.species, low.basis.species, axes)
-                if parts:
-                    yield up, low, parts
-
-
 def _of_blocks(levels: Levels, tensor: Floats) -> Iterator[RamanTransitions]:
-    for up, low, parts in _pairs(levels.blocks, tensor, REPRESENTATIONS[str(levels.representation)]):
-        if levels.weight[up.start] > 0 and levels.weight[low.start] > 0:
-            yield _between(levels, up, low, 1.5 * amplitudes(up, low, parts) ** 2)
+    """Between solved blocks; several states have the polarizability of the first, and none connects two of them."""
+    anisotropic = body_tensor(tensor, 2, str(levels.representation))
+    tensors = {(v, v): anisotropic for v in np.unique(levels.quanta.get("v", np.zeros(1, dtype=np.int64))).tolist()}
+    existing = (block for block in levels.blocks if levels.weight[block.start] > 0)
+    for up, low in reduced.connected_pairs(existing, tensors):
+        yield _between(levels, up, low, 1.5 * reduced.amplitudes(up, low, tensors) ** 2)
 
 
-def _once(up: SolvedBlock, low: SolvedBlock) -> NDArray[np.bool_]:
+def _once(up: Block, low: Block) -> NDArray[np.bool_]:
     """Which pairs of states of two blocks are counted: all, or of a block with itself one triangle."""
-    all_pairs = np.ones((up.basis.size, low.basis.size), dtype=bool)
+    all_pairs = np.ones((len(up.energies_mhz), len(low.energies_mhz)), dtype=bool)
     return np.tril(all_pairs, -1) if up is low else all_pairs
 
 
-def _between(levels: Levels, up: SolvedBlock, low: SolvedBlock, strength: Floats) -> RamanTransitions:
+def _between(levels: Levels, up: Block, low: Block, strength: Floats) -> RamanTransitions:
     """All transitions between two blocks; none of a state with itself."""
     i, k = np.nonzero(_once(up, low))
     first, second = k + low.start, i + up.start

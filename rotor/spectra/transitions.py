@@ -5,19 +5,24 @@ Nothing weak is left out here but what an `IntensityCut` or a range of frequenci
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Indices
-from rotor.quantum.basis import REPRESENTATIONS
-from rotor.quantum.levels import Levels
-from rotor.spectra.strengths import PairOfBlocks, allowed_pairs, amplitudes
+from rotor.quantum.levels import Block, Levels
+from rotor.quantum.reduced import Tensors, amplitudes, connected_pairs
+from rotor.quantum.tensors import body_tensor
+from rotor.spectra.intensity import IntensityCut
+from rotor.tops.operators import FIGURE_AXIS
 
 EVERYTHING = (0.0, float("inf"))
 LONG_LIST = 1_000_000  # lines above which the compiled loop is loaded
+
+Vector = tuple[float, float, float]
+Pair = tuple[Block, Block]  # two blocks with an allowed transition, the one of higher or equal J first
 
 
 @dataclass(frozen=True)
@@ -30,41 +35,39 @@ class Transitions:
     lower: Indices
 
 
-@dataclass(frozen=True)
-class IntensityCut:
-    """What an intensity needs besides frequency and strength, and the least one wanted.
-
-    population: (levels,) intensity per MHz and D² of a line from each state, the photon factor apart. kt_mhz: kT/h.
-    """
-
-    population: Floats
-    kt_mhz: float
-    least: float
-
-    def keeps(self, frequency_mhz: Floats, strength: Floats, population: Floats) -> NDArray[np.bool_]:
-        """Which lines are strong enough."""
-        scaled = frequency_mhz * strength * population
-        return scaled * -np.expm1(-frequency_mhz / self.kt_mhz) >= self.least
-
-
 def all_transitions(
     levels: Levels,
-    dipole_abc: tuple[float, float, float],
+    dipoles_abc: Vector | Mapping[tuple[int, int], Vector],
     range_mhz: tuple[float, float] = EVERYTHING,
     cut: IntensityCut | None = None,
 ) -> Transitions:
     """Every transition between `levels` that is allowed, in the range and above the cut, in no particular order.
 
-    dipole_abc: components of μ along a, b, c in debye.
+    dipoles_abc: components of μ along a, b, c in debye; of several states by pairs (v', v), each pair once.
     """
+    dipoles = dipoles_abc if isinstance(dipoles_abc, Mapping) else {(0, 0): dipoles_abc}
     if levels.representation is None:
-        return _joined(list(_closed_form(levels, dipole_abc, range_mhz, cut)))
+        return _joined(list(_closed_form(levels, dipoles[0, 0], range_mhz, cut)))
 
-    axes = REPRESENTATIONS[levels.representation]
-    pairs = list(allowed_pairs(levels, dipole_abc))
-    if cut is None and range_mhz == EVERYTHING:
-        return _every_pair(pairs, axes, dipole_abc)
-    return _joined(list(_chosen(pairs, axes, dipole_abc, range_mhz, cut)))
+    tensors = {states: body_tensor(mu, 1, levels.representation) for states, mu in dipoles.items()}
+    blocks, some_without = _blocks_with_weight(levels)
+    pairs = list(connected_pairs(blocks, tensors))
+    if cut is None and range_mhz == EVERYTHING and not any(up is low for up, low in pairs):
+        found = _every_pair(pairs, tensors)
+    else:
+        found = _joined(list(_chosen(pairs, tensors, range_mhz, cut)))
+    return _rows(found, levels.weight[found.lower] > 0) if some_without else found
+
+
+def _blocks_with_weight(levels: Levels) -> tuple[list[Block], bool]:
+    """Blocks in which a level exists by its spin weight, and whether one of them also holds levels that do not."""
+    weights = [(block, levels.weight[block.start : block.start + len(block.energies_mhz)]) for block in levels.blocks]
+    with_some = [(block, weight) for block, weight in weights if (weight > 0).any()]
+    return [block for block, _ in with_some], any((weight <= 0).any() for _, weight in with_some)
+
+
+def _rows(lines: Transitions, rows: NDArray[np.bool_]) -> Transitions:
+    return Transitions(lines.frequency_mhz[rows], lines.strength_debye2[rows], lines.upper[rows], lines.lower[rows])
 
 
 def _joined(pieces: list[Transitions]) -> Transitions:
@@ -78,21 +81,19 @@ def _joined(pieces: list[Transitions]) -> Transitions:
     )
 
 
-def _every_pair(pairs: list[PairOfBlocks], axes: str, dipole_abc: tuple[float, float, float]) -> Transitions:
+def _every_pair(pairs: list[Pair], dipoles: Tensors) -> Transitions:
     """All lines of all pairs, written straight into columns of their final length."""
-    sizes = [pair.up.basis.size * pair.low.basis.size for pair in pairs]
+    sizes = [len(up.energies_mhz) * len(low.energies_mhz) for up, low in pairs]
     total = sum(sizes)
     out = Transitions(np.empty(total), np.empty(total), np.empty(total, np.int32), np.empty(total, np.int32))
     fill = _fill_of(total)
 
     at = 0
-    for pair, size in zip(pairs, sizes, strict=True):
+    for (up, low), size in zip(pairs, sizes, strict=True):
         here = slice(at, at + size)
         at += size
-        up, low = pair.up, pair.low
         fill(
-            up.energies_mhz, low.energies_mhz, amplitudes(pair, axes), dipole_abc["abc".index(pair.axis)] ** 2,
-            up.start, low.start,
+            up.energies_mhz, low.energies_mhz, amplitudes(up, low, dipoles), up.start, low.start,
             out.frequency_mhz[here], out.strength_debye2[here], out.upper[here], out.lower[here],
         )  # fmt: skip
     return out
@@ -109,14 +110,14 @@ def _fill_of(total: int) -> Callable[..., None]:
 
 
 def _fill_pair(
-    energies_up: Floats, energies_low: Floats, amplitude: Floats, dipole2: float, start_up: int, start_low: int,
+    energies_up: Floats, energies_low: Floats, amplitude: Floats, start_up: int, start_low: int,
     frequency: Floats, strength: Floats, upper: Indices, lower: Indices,
 ) -> None:  # fmt: skip
     """Frequency, strength and states of all lines between two blocks, the upper state being the one higher in energy."""
     shape = amplitude.shape
     difference = np.subtract.outer(energies_up, energies_low)
     np.abs(difference, out=frequency.reshape(shape))
-    np.multiply(amplitude * amplitude, dipole2, out=strength.reshape(shape))
+    np.multiply(amplitude, amplitude, out=strength.reshape(shape))
 
     first = np.arange(start_up, start_up + shape[0], dtype=np.int32)[:, None]
     second = np.arange(start_low, start_low + shape[1], dtype=np.int32)[None, :]
@@ -126,18 +127,15 @@ def _fill_pair(
 
 
 def _chosen(
-    pairs: list[PairOfBlocks],
-    axes: str,
-    dipole_abc: tuple[float, float, float],
-    range_mhz: tuple[float, float],
-    cut: IntensityCut | None,
+    pairs: list[Pair], dipoles: Tensors, range_mhz: tuple[float, float], cut: IntensityCut | None
 ) -> Iterator[Transitions]:
-    choose = _choice_of(sum(pair.up.basis.size * pair.low.basis.size for pair in pairs))
-    for pair in pairs:
-        up, low = pair.up, pair.low
+    choose = _choice_of(sum(len(up.energies_mhz) * len(low.energies_mhz) for up, low in pairs))
+    for up, low in pairs:
         energies = (up.energies_mhz, low.energies_mhz)
-        strength = dipole_abc["abc".index(pair.axis)] ** 2 * amplitudes(pair, axes) ** 2
+        strength = amplitudes(up, low, dipoles) ** 2
         i, k = choose(*energies, strength, range_mhz, cut, up.start, low.start)
+        if up is low:  # both ways round stand in the matrix
+            i, k = i[i > k], k[i > k]
 
         difference = energies[0][i] - energies[1][k]
         first, second = (i + up.start).astype(np.int32), (k + low.start).astype(np.int32)
@@ -190,10 +188,10 @@ def _closed_form(
     if levels.kind == "spherical":
         return
     along, across2 = _split(levels.kind, dipole_abc)
-    for rise, step, dipole2 in ((1, 0, along**2), (0, 1, across2), (1, 1, across2), (1, -1, across2)):
+    for delta_j, delta_k, dipole2 in ((1, 0, along**2), (0, 1, across2), (1, 1, across2), (1, -1, across2)):
         if dipole2 == 0:
             continue
-        first, second, strength = _hoenl_london(levels, rise, step)
+        first, second, strength = _hoenl_london(levels, delta_j, delta_k)
         difference = levels.energy_mhz[second] - levels.energy_mhz[first]
         frequency, strength = np.abs(difference), strength * dipole2
         upper, lower = np.where(difference < 0, first, second), np.where(difference < 0, second, first)
@@ -209,27 +207,29 @@ def _split(kind: str, dipole_abc: tuple[float, float, float]) -> tuple[float, fl
     a, b, c = dipole_abc
     if kind == "linear":
         return a, 0.0
-    return (a, b * b + c * c) if kind == "prolate" else (c, a * a + b * b)
+    return (a, b * b + c * c) if FIGURE_AXIS[kind] == "a" else (c, a * a + b * b)
 
 
-def _hoenl_london(levels: Levels, rise: int, step: int) -> tuple[NDArray[np.int64], NDArray[np.int64], Floats]:
-    """Rows of J, K and of J + rise, K + step, and S summed over both signs of K, for a unit dipole.
+def _hoenl_london(levels: Levels, delta_j: int, delta_k: int) -> tuple[NDArray[np.int64], NDArray[np.int64], Floats]:
+    """Rows of J, K and of J + ΔJ, K + ΔK, and S summed over both signs of K, for a unit dipole.
 
     Parallel: [(J+1)² - K²]/(J+1) for R, nothing for Q (no change of energy). Perpendicular, with the square of the
     dipole across the axis: Q: (2J+1)(J∓K)(J±K+1)/(2J(J+1)), R: (J±K+1)(J±K+2)/(2(J+1)), over both signs of K (the
-    squares of the amplitudes in `strengths`; W. Gordy and R. L. Cook, Microwave Molecular Spectra, table 2.1). Q with
-    K - 1 is Q with K + 1 from the other side. The levels must start at J = 0.
+    squares of `tensors.coupling`; W. Gordy and R. L. Cook, Microwave Molecular Spectra, table 2.1). Q with
+    K - 1 is Q with K + 1 from the other side.
     """
-    all_j, all_k = levels.j, np.maximum(levels.ka, 0)
-    first = np.nonzero((all_j + rise <= levels.jmax) & (all_k + step >= 0) & (all_k + step <= all_j + rise))[0]
-    to_j, to_k = all_j[first] + rise, all_k[first] + step
-    second = to_j if levels.kind == "linear" else to_j * (to_j + 1) // 2 + to_k
+    all_j = levels.quanta["j"]
+    all_k = levels.quanta.get("k", np.zeros_like(all_j))
+    to_j, to_k = all_j + delta_j, all_k + delta_k
+    first = np.nonzero((to_j <= levels.jmax) & (to_k >= 0) & (to_k <= to_j))[0]
+    reached = {"j": to_j[first]} | ({"k": to_k[first]} if "k" in levels.quanta else {})
+    second = levels.rows_of(**reached)
 
     j, k = all_j[first].astype(float), all_k[first].astype(float)
-    if step == 0:
+    if delta_k == 0:
         strength = np.where(k == 0, 1.0, 2.0) * ((j + 1) ** 2 - k**2) / (j + 1)
-    elif rise:
-        strength = (j + step * k + 1) * (j + step * k + 2) / (2 * (j + 1))
+    elif delta_j:
+        strength = (j + delta_k * k + 1) * (j + delta_k * k + 2) / (2 * (j + 1))
     else:
         strength = (2 * j + 1) * (j - k) * (j + k + 1) / (2 * j * (j + 1))
     return first, second, strength

@@ -40,10 +40,9 @@ from numpy.typing import ArrayLike
 
 from rotor import units
 from rotor.arrays import Floats
-from rotor.quantum.basis import REPRESENTATIONS
 from rotor.quantum.effects.watson import centrifugal_operators
 from rotor.quantum.spherical_top import scalar_and_tensor
-from rotor.tops.operators import Operators
+from rotor.tops.operators import AXIAL_REPRESENTATION, REPRESENTATIONS, Operators
 from rotor.tops.spin_weights import SpinWeights
 
 if TYPE_CHECKING:
@@ -217,11 +216,9 @@ def _classical_energy(operators: Operators, order: int, x: Floats, y: Floats, z:
 
 def _variances(top: Top) -> tuple[float, float, float]:
     """1/2A, 1/2B, 1/2C of the axes x, y, z of the operators, in 1/MHz: variances of J/ħ per MHz of kT/h."""
-    names = {"prolate": "bca", "oblate": "abc"}.get(
-        top.kind, REPRESENTATIONS.get(str(top.constants.representation), ())
-    )
+    names = REPRESENTATIONS.get(AXIAL_REPRESENTATION.get(top.kind) or str(top.constants.representation), "bca")
     of_axis = dict(zip("abc", top.rotational_constants_mhz, strict=True))
-    x, y, z = (0.5 / of_axis[axis] for axis in (names or "bca"))
+    x, y, z = (0.5 / of_axis[axis] for axis in names)
     return x, y, z
 
 

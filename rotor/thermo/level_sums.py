@@ -26,7 +26,10 @@ from numpy.typing import ArrayLike
 
 from rotor import units
 from rotor.arrays import Floats, Ints
-from rotor.quantum.levels import Levels, solve_levels
+from rotor.quantum.effect import QuantumEffect
+from rotor.quantum.effects.watson import SEMI_RIGID
+from rotor.quantum.levels import weights_of_levels
+from rotor.quantum.solve import solve_levels
 from rotor.thermo.classical_limit import classical_limit
 from rotor.thermo.trusted_levels import trusted_energies_mhz
 from rotor.tops.spin_weights import SpinWeights
@@ -86,6 +89,7 @@ def level_sums(
     energies: bool = True,
     at_worst: float = AT_WORST,
     progress: Progress | None = None,
+    effects: Sequence[QuantumEffect] = SEMI_RIGID,
 ) -> list[LevelSums]:
     """Q, U/RT and C_v/R of a top's levels for each of several sets of spin weights, from levels solved once.
 
@@ -104,6 +108,8 @@ def level_sums(
         Estimated error up to which a sum is given at all.
     progress : callable, optional
         Called as `progress(j, last)` whenever more levels are solved, with the J that the sum is expected to end at.
+    effects : sequence of QuantumEffect
+        What the Hamiltonian consists of. With others than the semi-rigid ones every level is solved and trusted.
 
     Returns
     -------
@@ -123,7 +129,7 @@ def level_sums(
     (104.5171, 1.000002)
     """
     temperatures, kinds = checked_temperatures(temperatures_k), 3 if energies else 1
-    ladder = _Ladder(top, tuple(weights), progress)
+    ladder = _Ladder(top, tuple(weights), tuple(effects), progress)
     longest = MOST_J.get(top.kind, JMAX_LIMIT)
     expected = _last_j(top, temperatures, relative_error)
     found = []
@@ -131,6 +137,7 @@ def level_sums(
         errors = classical_limit(top, one).errors(temperatures)[:kinds].max(axis=0)
         classical = (expected > LONG_SUM) & (errors <= relative_error)
         classical |= (expected > longest) & (errors <= at_worst)
+        classical &= ladder.semi_rigid
         parts = np.zeros((7, len(temperatures)))
         parts[:, classical] = _expanded(ladder, s, temperatures[classical])
         if not classical.all():
@@ -187,8 +194,15 @@ class Shell(NamedTuple):
 class _Ladder:
     """Levels J by J, solved when first asked for."""
 
-    def __init__(self, top: Top, weights: tuple[SpinWeights, ...], progress: Progress | None = None) -> None:
-        self.top, self.weights, self._progress = top, weights, progress
+    def __init__(
+        self,
+        top: Top,
+        weights: tuple[SpinWeights, ...],
+        effects: tuple[QuantumEffect, ...] = SEMI_RIGID,
+        progress: Progress | None = None,
+    ) -> None:
+        self.top, self.weights, self._effects, self._progress = top, weights, effects, progress
+        self.semi_rigid = effects == SEMI_RIGID
         self._by_j: list[Shell] = []
         self.last = 0
         self.heaviest = [heaviest_component(one) for one in weights]
@@ -205,12 +219,15 @@ class _Ladder:
         last = first + max(STRIDE, first // 8) - 1
         if self._progress is not None:
             self._progress(first, max(self.last, first))
-        levels = solve_levels(self.top, last, jmin=first, vectors=False)
-        plain = ((2 * levels.j + 1) * levels.components).astype(np.float64)
-        spin = np.array([(2 * levels.j + 1) * weights_of_levels(levels, one) for one in self.weights], dtype=float)
-        energies, lower = trusted_energies_mhz(self.top, levels)
+        levels = solve_levels(self.top, last, jmin=first, effects=self._effects, vectors=False)
+        plain = levels.states.astype(np.float64)
+        spin = np.array([levels.multiplicity * weights_of_levels(levels, one) for one in self.weights], dtype=float)
+        energies = lower = levels.energy_mhz
+        if self.semi_rigid:
+            energies, lower = trusted_energies_mhz(self.top, levels)
+        rotational = levels.rotational
         for j in range(first, last + 1):
-            here = levels.j == j
+            here = rotational == j
             kelvin, low = energies[here] / units.MHZ_PER_K, lower[here] / units.MHZ_PER_K
             self._by_j.append(Shell(kelvin, plain[here], spin[:, here], low if (low < kelvin).any() else None))
 
@@ -224,21 +241,6 @@ class _Ladder:
             if found:
                 energy, j = min(found)
                 return float(energy), j
-
-
-def weights_of_levels(levels: Levels, weights: SpinWeights) -> Ints:
-    """Spin weights of levels, summed over the components of each row, by other weights than they were solved with."""
-    if levels.kind == "linear":
-        return weights.of_j(levels.j)
-    if levels.irrep is not None:
-        of = {name: weights.of_irrep(name) for name in np.unique(levels.irrep).tolist()}
-        return np.array([of[name] for name in levels.irrep.tolist()], dtype=np.int64)
-    if levels.kind == "spherical":
-        return weights.of_spherical(levels.j)
-    if levels.kind in ("prolate", "oblate"):
-        return weights.of_symmetric(levels.j, levels.ka, oblate=levels.kind == "oblate")
-    of_parity = np.array([[weights.of_ka_kc(ka + kc) for kc in "eo"] for ka in "eo"], dtype=np.int64)
-    return np.asarray(of_parity[levels.ka % 2, levels.kc % 2])
 
 
 def heaviest_component(weights: SpinWeights) -> float:

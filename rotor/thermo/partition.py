@@ -10,8 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rotor.arrays import Floats, Ints
+from rotor.quantum.effect import QuantumEffect
+from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.table import Table
-from rotor.thermo.level_sums import AT_WORST, NOT_SUMMED, LevelSums, Progress, checked_temperatures, level_sums
+from rotor.thermo.level_sums import NOT_SUMMED, LevelSums, Progress, checked_temperatures, level_sums
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -68,17 +70,25 @@ class PartitionFunctions(Table):
 
 
 @overload
-def partition_function(top: Top, temperature_k: float, relative_error: float = 1e-6) -> PartitionFunction: ...
+def partition_function(
+    top: Top, temperature_k: float, relative_error: float = 1e-6, effects: Sequence[QuantumEffect] = SEMI_RIGID
+) -> PartitionFunction: ...
 
 
 @overload
 def partition_function(
-    top: Top, temperature_k: Sequence[float] | Floats, relative_error: float = 1e-6
+    top: Top,
+    temperature_k: Sequence[float] | Floats,
+    relative_error: float = 1e-6,
+    effects: Sequence[QuantumEffect] = SEMI_RIGID,
 ) -> PartitionFunctions: ...
 
 
 def partition_function(
-    top: Top, temperature_k: float | Sequence[float] | Floats, relative_error: float = 1e-6
+    top: Top,
+    temperature_k: float | Sequence[float] | Floats,
+    relative_error: float = 1e-6,
+    effects: Sequence[QuantumEffect] = SEMI_RIGID,
 ) -> PartitionFunction | PartitionFunctions:
     """Q(T) of a top: one for a number, a table of arrays for a list or an array of temperatures.
 
@@ -92,18 +102,22 @@ def partition_function(
     >>> round(partition_function(top, 300.0).q, 2), partition_function(top, [10.0, 300.0]).q.round(2).tolist()
     (108.79, [3.97, 108.79])
     """
-    found = partition_functions(top, temperature_k, relative_error)
+    found = partition_functions(top, temperature_k, relative_error, effects)
     return found if np.ndim(temperature_k) else found[0]
 
 
 def partition_functions(
-    top: Top, temperatures_k: ArrayLike, relative_error: float = 1e-6, *, progress: Progress | None = None
+    top: Top,
+    temperatures_k: ArrayLike,
+    relative_error: float = 1e-6,
+    effects: Sequence[QuantumEffect] = SEMI_RIGID,
+    *,
+    progress: Progress | None = None,
 ) -> PartitionFunctions:
     """Q at several temperatures from one set of levels; see `partition_function`, and for progress `level_sums`."""
     temperatures = checked_temperatures(temperatures_k)
-    sums = level_sums(
-        top, [top.spin_weights], temperatures, relative_error, energies=False, at_worst=AT_WORST, progress=progress
-    )[0]
+    weights = [top.spin_weights]
+    sums = level_sums(top, weights, temperatures, relative_error, energies=False, progress=progress, effects=effects)[0]
     return PartitionFunctions(temperatures, sums.q, sums.jmax, sums.error_q, _sources(sums, relative_error))
 
 

@@ -16,11 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats
-from rotor.quantum.basis import REPRESENTATIONS
 from rotor.quantum.effects.watson import centrifugal_operators, operators_by_name
-from rotor.quantum.levels import Levels, solve_levels
+from rotor.quantum.levels import Levels
+from rotor.quantum.solve import solve_levels
 from rotor.quantum.spherical_top import scalar_and_tensor
 from rotor.tops.constants import Constants
+from rotor.tops.operators import REPRESENTATIONS
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
@@ -34,19 +35,30 @@ def rigid_energies_mhz(top: Top, levels: Levels) -> Floats:
 
     >>> from rotor.tops.top import Top
     >>> top = Top.from_constants("A=9 B=3 MHz")
+    >>> from rotor.quantum.solve import solve_levels
     >>> levels = solve_levels(top, 20)
     >>> bool(np.allclose(rigid_energies_mhz(top, levels), levels.energy_mhz))
     True
     """
     a, b, c = top.rotational_constants_mhz
-    squared = levels.j * (levels.j + 1.0)
-    if top.kind in ("linear", "spherical"):
-        return np.asarray(b * squared)
-    if top.kind == "prolate":
-        return np.asarray(b * squared + (a - b) * levels.ka**2)
-    if top.kind == "oblate":
-        return np.asarray(b * squared + (c - b) * levels.ka**2)
-    return np.asarray(b * squared + (a - b) * levels.ka**2 + (c - b) * levels.kc**2)
+    along_a, along_c = _squared_labels(top, levels)
+    finite = a if np.isfinite(a) else 0.0  # of a linear top, which has no K
+    return np.asarray(b * _j_squared(levels) + (finite - b) * along_a + (c - b) * along_c)
+
+
+def _j_squared(levels: Levels) -> Floats:
+    return np.asarray(levels.rotational * (levels.rotational + 1.0))
+
+
+def _squared_labels(top: Top, levels: Levels) -> tuple[Floats, Floats]:
+    """Ka² and Kc² of every level, (n,) each; 0 for what a kind of top has not."""
+    quanta, none = levels.quanta, np.zeros(len(levels))
+    if "kc" in quanta:
+        return quanta["ka"] ** 2.0, quanta["kc"] ** 2.0
+    if "k" not in quanta:
+        return none, none
+    k2 = quanta["k"] ** 2.0
+    return (none, k2) if top.kind == "oblate" else (k2, none)
 
 
 def trusted_energies_mhz(top: Top, levels: Levels) -> tuple[Floats, Floats]:
@@ -65,7 +77,7 @@ def trusted_energies_mhz(top: Top, levels: Levels) -> tuple[Floats, Floats]:
 
 def _untrusted(levels: Levels, energy: Floats, rigid: Floats) -> NDArray[np.bool_]:
     low, high = energy < TRUSTED[0] * rigid, energy > TRUSTED[1] * rigid
-    return np.asarray(high | np.isin(levels.j, levels.j[low]))
+    return np.asarray(high | np.isin(levels.rotational, levels.rotational[low]))
 
 
 def _simpler_mhz(top: Top, levels: Levels, rigid: Floats) -> tuple[Floats, Floats]:
@@ -87,16 +99,14 @@ def _truncated(top: Top, order: int) -> Constants:
 
 def _energies_like(top: Top, levels: Levels) -> Floats:
     """Energies of a top in the order of the levels of another, by their labels."""
-    found = solve_levels(top, int(levels.j.max()), jmin=int(levels.j.min()), vectors=False)
-    ours, theirs = (np.lexsort((one.kc, one.ka, one.j)) for one in (levels, found))
-    energies = np.empty(len(levels))
-    energies[ours] = found.energy_mhz[theirs]
-    return energies
+    j = levels.rotational
+    found = solve_levels(top, int(j.max()), jmin=int(j.min()), vectors=False)
+    return np.asarray(found.energy_mhz[found.rows_of(**{name: levels.quanta[name] for name in ("j", "ka", "kc")})])
 
 
 def _first_order_quartic_mhz(top: Top, levels: Levels) -> tuple[Floats, Floats]:
     """The diagonal quartic terms (n,) in MHz with K² of the label for Jz², and the sum of the sizes of all of them."""
-    squared = levels.j * (levels.j + 1.0)
+    squared = _j_squared(levels)
     k2 = _k_squared(top, levels, squared)
     operators = centrifugal_operators(top.constants)
     if top.kind == "spherical":
@@ -112,10 +122,8 @@ def _first_order_quartic_mhz(top: Top, levels: Levels) -> tuple[Floats, Floats]:
 
 def _k_squared(top: Top, levels: Levels, squared: Floats) -> Floats:
     """K² along the z of the representation, from the labels."""
-    if top.kind in ("linear", "spherical"):
-        return np.zeros(len(squared))
-    if top.kind in ("prolate", "oblate"):
-        return np.asarray(levels.ka**2.0)
+    along_a, along_c = _squared_labels(top, levels)
+    if top.kind != "asymmetric":
+        return np.asarray(along_a + along_c)
     z = REPRESENTATIONS[str(top.constants.representation)][2]
-    along = {"a": levels.ka**2.0, "c": levels.kc**2.0}
-    return np.asarray(along.get(z, np.maximum(squared - levels.ka**2 - levels.kc**2, 0.0)))
+    return np.asarray({"a": along_a, "c": along_c}.get(z, np.maximum(squared - along_a - along_c, 0.0)))

@@ -16,12 +16,9 @@ from types import MappingProxyType
 from typing import Any
 
 from rotor.tops import operators as published
-from rotor.tops.operators import Powers, powers_of_spelled, published_name, spelled_term
+from rotor.tops.operators import KINDS, Powers, axes_of, powers_of_spelled, published_name, spelled_term
 from rotor.tops.uncertain_numbers import parse_named, write_number
 from rotor.units import parse_quantity
-
-KINDS = ("linear", "spherical", "prolate", "oblate", "asymmetric")
-REPRESENTATIONS = ("Ir", "Il", "IIr", "IIl", "IIIr", "IIIl")
 
 RIGID = ("A", "B", "C")
 LINEAR, SPHERICAL, SYMMETRIC = tuple(published.LINEAR), tuple(published.SPHERICAL), tuple(published.SYMMETRIC)
@@ -415,8 +412,8 @@ def _reduction(kind: str, names: Mapping[str, float], reduction: str | None) -> 
 
 
 def _representation(kind: str, values: Mapping[str, float], representation: str | None) -> str | None:
-    if representation is not None and representation not in REPRESENTATIONS:
-        raise ValueError(f"representation {representation!r}: known are {', '.join(REPRESENTATIONS)}")
+    if representation is not None:
+        axes_of(representation)  # refuses one that does not exist
     if kind != "asymmetric":
         if representation:
             raise ValueError(f"representation {representation!r} belongs to asymmetric tops; kind is {kind!r}")

@@ -21,11 +21,11 @@ from rotor.arrays import Floats
 from rotor.molecules.force_field import ForceField
 from rotor.tops.constants import Constants
 from rotor.tops.inertial_defect import inertia_by_modes, inertial_defect_u_angstrom2, is_planar
+from rotor.tops.operators import axes_of
 from rotor.tops.top import Top
 from rotor.units import ELEMENTARY_CHARGE_C, PLANCK_J_S, ROTATIONAL_MHZ_U_ANGSTROM2
 
 MHZ_PER_EV = ELEMENTARY_CHARGE_C / PLANCK_J_S * 1e-6
-_AXES = {"Ir": "bca", "Il": "cba", "IIr": "cab", "IIl": "acb", "IIIr": "abc", "IIIl": "bac"}
 _NEAR_SYMMETRIC = 1e-4  # (Bx - By)/Bz below which the A-reduction divides by nothing
 
 
@@ -157,7 +157,7 @@ def distortion_constants(field: ForceField, *, reduction: str = "S", representat
 
 def _asymmetric(rigid: Constants, tensor: Floats, reduction: str, representation: str) -> Constants:
     rigid = rigid.replace(representation=representation)
-    x, y, z = ("abc".index(letter) for letter in _AXES[representation])
+    x, y, z = ("abc".index(letter) for letter in axes_of(representation))
     found = reduced(tensor, np.array(rigid.rigid), (x, y, z), reduction)
     if reduction == "S":
         return rigid.replace(DJ=-found.jj, DJK=-found.jz, DK=-found.zz, d1=found.ju / 2, d2=found.four)

@@ -16,6 +16,33 @@ import re
 Powers = tuple[int, int, int]  # p, q, n
 Operators = dict[Powers, float]  # coefficient of every term
 
+REPRESENTATIONS = {
+    "Ir": "bca",
+    "Il": "cba",
+    "IIr": "cab",
+    "IIl": "acb",
+    "IIIr": "abc",
+    "IIIl": "bac",
+}  # principal axes at x, y, z
+
+KINDS = ("linear", "spherical", "prolate", "oblate", "asymmetric")
+FIGURE_AXIS = {"linear": "a", "prolate": "a", "oblate": "c"}  # the axis of a top that has one
+AXIAL_REPRESENTATION = {"prolate": "Ir", "spherical": "Ir", "oblate": "IIIr"}  # in which that axis is z
+
+
+def axes_of(representation: str) -> str:
+    """The principal axes at x, y, z of a representation.
+
+    Raises ValueError for one that does not exist.
+
+    >>> axes_of("IIIl")
+    'bac'
+    """
+    if representation not in REPRESENTATIONS:
+        raise ValueError(f"representation {representation!r}: known are {', '.join(REPRESENTATIONS)}")
+    return REPRESENTATIONS[representation]
+
+
 _QUARTIC = {"J": (2, 0), "JK": (1, 1), "K": (0, 2)}
 _SEXTIC = {"J": (3, 0), "JK": (2, 1), "KJ": (1, 2), "K": (0, 3)}
 _OCTIC = {"LJ": (4, 0), "LJJK": (3, 1), "LJK": (2, 2), "LKKJ": (1, 3), "LK": (0, 4)}

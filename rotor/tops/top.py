@@ -26,6 +26,7 @@ from rotor.tops.allowed import (
 from rotor.tops.constants import Constants
 from rotor.tops.kind import KindOfTop, kind_from_moments, kind_with_symmetry
 from rotor.tops.level_table import LevelTable
+from rotor.tops.operators import KINDS
 from rotor.tops.spin_weights import SpinWeights
 
 if TYPE_CHECKING:
@@ -38,7 +39,6 @@ Tensor = tuple[Vector, Vector, Vector]
 NOISE_ANGSTROM = 0.01  # displacements below it may be noise of a geometry: a symmetry that they spoil is named
 SYMMETRIC_WITHIN = 1e-3  # of the shortest distance between nuclei: displacements that symmetry may overlook
 NO_WEIGHTS = SpinWeights()
-_KINDS = ("linear", "spherical", "prolate", "oblate", "asymmetric")
 
 
 @dataclass(frozen=True)
@@ -274,8 +274,8 @@ def _electrons(molecule: Molecule, weights: SpinWeights) -> str:
 
 def constants_of_moments(moments: ArrayLike, kind: str) -> Constants:
     """The rigid constants that a kind of top has, from moments in u Å²; degenerate ones are averaged."""
-    if kind not in _KINDS:
-        raise ValueError(f"kind {kind!r} is none of {', '.join(_KINDS)}")
+    if kind not in KINDS:
+        raise ValueError(f"kind {kind!r} is none of {', '.join(KINDS)}")
     ia, ib, ic = (float(m) for m in np.asarray(moments))
     f = units.ROTATIONAL_MHZ_U_ANGSTROM2
     if kind == "linear":

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, TypeVar
+import re
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, TypeVar
 
-import typer
-
+from rotor.checks import require_positive
+from rotor.cli.shared.options import argument, option
 from rotor.cli.shared.output import note
 
 if TYPE_CHECKING:
@@ -17,42 +19,47 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-SOURCE = typer.Argument(None, help="File, name, SMILES:... or - for standard input.", show_default=False)
-CONSTANTS = typer.Option(None, metavar="TEXT", help='Constants instead of a source: "A=9.2(1) B=3 C=2.5 GHz" (MHz).')
-DIPOLE = typer.Option(None, metavar="X,Y,Z", help="Dipole in the frame of the input (D).")
-DIPOLE_ABC = typer.Option(None, metavar="A,B,C", help="Dipole in principal axes (D).")
-ISOTOPE = typer.Option(None, metavar="1=2H", help="Another isotope, by atom number or element; repeatable.")
-CALCULATOR = typer.Option(
-    None, metavar="NAME", help="Refine the geometry with an ASE calculator of that name, such as xtb, tblite or psi4."
-)
-HESSIAN = typer.Option(
-    None,
-    metavar="FILE",
-    help="Quartic distortion from a Hessian at the geometry (hartree/bohr², rows or lower triangle), or, with the word "
-    "'calculator', from one that --calculator makes.",
-)
-SYMMETRY_TOLERANCE = typer.Option(
-    None,
-    metavar="DISTANCE",
-    help="How far nuclei may be off the symmetry that is taken, such as 0.005 (Å).",
-)
-SPIN_WEIGHTS = typer.Option(None, metavar="LIST", help='Nuclear-spin weights: "ee=1,eo=3,oe=3,oo=1", "even=1,odd=3".')
-JSON = typer.Option(None, "--json", metavar="FILE", help="Everything printed, as JSON; - is standard output.")
+MOST_TIMES = 10_000_000
+
+
+def json_option() -> Any:
+    """The field of a group for the JSON that every verb can write."""
+    return option(None, "--json", metavar="FILE", help="Everything printed, as JSON; - is standard output.")
 
 
 @dataclass(frozen=True)
 class Input:
-    """The texts that say which top is meant."""
+    """The texts that say which top is meant; a verb takes those of them that it has a use for."""
 
-    source: str | None
-    constants: str | None
-    isotopes: Sequence[str]
-    dipole: str | None
-    dipole_abc: str | None
-    spin_weights: str | None
-    calculator: str | None = None
-    hessian: str | None = None
-    symmetry_tolerance: str | None = None
+    source: str | None = argument(help="File, name, SMILES:... or - for standard input.")
+    constants: str | None = option(
+        None, metavar="TEXT", help='Constants instead of a source: "A=9.2(1) B=3 C=2.5 GHz" (MHz).'
+    )
+    isotope: list[str] | None = option(
+        None, metavar="1=2H", help="Another isotope, by atom number or element; repeatable."
+    )
+    dipole: str | None = option(None, metavar="X,Y,Z", help="Dipole in the frame of the input (D).")
+    dipole_abc: str | None = option(None, metavar="A,B,C", help="Dipole in principal axes (D).")
+    spin_weights: str | None = option(
+        None, metavar="LIST", help='Nuclear-spin weights: "ee=1,eo=3,oe=3,oo=1", "even=1,odd=3".'
+    )
+    calculator: str | None = option(
+        None, metavar="NAME", help="Refine the geometry with an ASE calculator of that name, such as xtb or psi4."
+    )
+    hessian: str | None = option(
+        None,
+        metavar="FILE",
+        help="Quartic distortion from a Hessian at the geometry (hartree/bohr², rows or lower triangle), or, with the "
+        "word 'calculator', from one that --calculator makes.",
+    )
+    symmetry_tolerance: str | None = option(
+        None, metavar="DISTANCE", help="How far nuclei may be off the symmetry that is taken, such as 0.005 (Å)."
+    )
+
+    @property
+    def isotopes(self) -> str | None:
+        """All substitutions as one text."""
+        return ",".join(self.isotope) if self.isotope else None
 
     @property
     def text(self) -> str:
@@ -60,7 +67,7 @@ class Input:
         return self.source or self.constants or ""
 
 
-def option(name: str, text: str, parse: Callable[[str], T]) -> T:
+def parsed(name: str, text: str, parse: Callable[[str], T]) -> T:
     """The value of an option; a ValueError says which option."""
     try:
         return parse(text)
@@ -72,36 +79,53 @@ def quantity(name: str, text: str, unit: str) -> float:
     """A number with an optional unit, in `unit`."""
     from rotor.units import parse_quantity
 
-    return option(name, text, lambda value: parse_quantity(value, unit))
+    return parsed(name, text, lambda value: parse_quantity(value, unit))
 
 
 def positive(name: str, text: str, unit: str) -> float:
     """The same, above zero."""
-    return above_zero(name, quantity(name, text, unit), unit)
+    return require_positive(name, quantity(name, text, unit), unit)
 
 
-def above_zero(name: str, value: float, unit: str = "") -> float:
-    """The value, refused unless it is finite and above zero."""
-    if not (math.isfinite(value) and value > 0):
-        raise ValueError(f"{name}: {value:g}: a finite number above 0{' ' if unit else ''}{unit} is wanted")
-    return value
+@contextmanager
+def fields_as_options(**names: str) -> Iterator[None]:
+    """Inside, a ValueError that names fields of a request names the options they come from.
+
+    A name with an underscore is replaced wherever it stands; one that is an ordinary word, such as model, only at the start.
+    """
+    words = re.compile("|".join(rf"\b{name}\b" if "_" in name else rf"^{name}\b" for name in names))
+    try:
+        yield
+    except ValueError as error:
+        raise ValueError(words.sub(lambda found: names[found[0]], str(error))) from None
 
 
 def temperatures(name: str, text: str) -> list[float]:
     """A grid or list of temperatures in K, refused unless all are above 0 K."""
     from rotor.units import parse_grid
 
-    found: list[float] = option(name, text, lambda value: parse_grid(value, "K").tolist())
+    found: list[float] = parsed(name, text, lambda value: parse_grid(value, "K").tolist())
     if not all(0 < t < float("inf") for t in found):
         raise ValueError(f"{name}: {text!r}: temperatures are above 0 K")
     return found
 
 
-def whole(name: str, value: int | None, least: int, most: int | None = None) -> None:
-    """Refuse a whole number out of bounds."""
-    if value is not None and (value < least or (most is not None and value > most)):
-        bounds = f"of {least} or more" if most is None else f"from {least} to {most}"
-        raise ValueError(f"{name}: {value}: a whole number {bounds} is wanted")
+def times(name: str, text: str | None, unit: str) -> tuple[float, ...] | None:
+    """Finite times in `unit` from a grid or a list; None: none were given."""
+    if text is None:
+        return None
+    from rotor.units import parse_grid
+
+    def parse(value: str) -> tuple[float, ...]:
+        count = value.rpartition(":")[2].strip()
+        if ":" in value and count.isdecimal() and int(count) > MOST_TIMES:
+            raise ValueError(f"{value!r}: at most {MOST_TIMES} times in one run; ask for fewer")
+        found = tuple(parse_grid(value, unit).tolist())
+        if not all(map(math.isfinite, found)):
+            raise ValueError(f"{value!r}: a time is larger than a floating-point number can be")
+        return found
+
+    return parsed(name, text, parse)
 
 
 def cut(name: str, text: str) -> float | None:
@@ -118,20 +142,20 @@ def cut(name: str, text: str) -> float | None:
             raise ValueError(f"{value!r} is not a finite number or 'none'")
         return number
 
-    return option(name, text, parse)
+    return parsed(name, text, parse)
 
 
 def vector(name: str, text: str) -> tuple[float, float, float]:
-    """Three components of a dipole in debye, from `x,y,z` with a unit at the end if wanted."""
+    """Three components of a dipole in debye, from `x,y,z` with an optional unit at the end."""
     from rotor.units import parse_grid
 
     def parse(value: str) -> tuple[float, float, float]:
         numbers = parse_grid(value, "D").tolist() if ":" not in value else []
         if len(numbers) != 3 or not all(map(math.isfinite, numbers)):
-            raise ValueError(f"{value!r}: three finite numbers are wanted, such as 0,0,1.85 (debye)")
+            raise ValueError(f"{value!r}: expected three finite numbers, such as 0,0,1.85 (debye)")
         return numbers[0], numbers[1], numbers[2]
 
-    return option(name, text, parse)
+    return parsed(name, text, parse)
 
 
 def weights(name: str, text: str) -> dict[str, int]:
@@ -141,26 +165,25 @@ def weights(name: str, text: str) -> dict[str, int]:
         key, equals, number = (part.strip() for part in item.partition("="))
         if not (key and equals and number.isdecimal()) or key in table:
             raise ValueError(
-                f"{name}: {item.strip()!r} in {text!r}: class=number is wanted, each class once, such as ee=1"
+                f"{name}: {item.strip()!r} in {text!r}: expected class=number, each class once, such as ee=1"
             )
         table[key] = int(number)
     return table
 
 
 def read_top(given: Input) -> Top:
-    """The top that the options mean, with the dipole and weights given by hand; what it is noted for is said."""
+    """The top that the options mean, with the dipole and weights given by hand; its notes go to standard error."""
     _refuse_contradictions(given)
     top = _from_constants(given) if given.constants is not None else _from_source(given)
     if given.dipole_abc is not None:
-        abc = vector("--dipole-abc", given.dipole_abc)
-        said = "given in principal axes (--dipole-abc)"
-        top = option("--dipole-abc", given.dipole_abc, lambda _: top.with_dipole(abc, said))
+        abc, said = vector("--dipole-abc", given.dipole_abc), "given in principal axes (--dipole-abc)"
+        top = parsed("--dipole-abc", given.dipole_abc, lambda _: top.with_dipole(abc, said))
     if given.dipole is not None:
         xyz = vector("--dipole", given.dipole)
-        top = option("--dipole", given.dipole, lambda _: _with_dipole_of_input(top, xyz))
+        top = parsed("--dipole", given.dipole, lambda _: _with_dipole_of_input(top, xyz))
     if given.spin_weights is not None:
         table = weights("--spin-weights", given.spin_weights)
-        top = option("--spin-weights", given.spin_weights, lambda _: top.with_weights(table, "given (--spin-weights)"))
+        top = parsed("--spin-weights", given.spin_weights, lambda _: top.with_weights(table, "given (--spin-weights)"))
     _refuse_weights_of_another_kind(top)
     for text in top.notes:
         note(text)
@@ -171,7 +194,7 @@ def _refuse_contradictions(given: Input) -> None:
     if (given.source is None) == (given.constants is None):
         both = "both were given" if given.source is not None else "neither was given"
         raise ValueError(
-            f"either a source or --constants is wanted, and {both}; give one of them, such as the name water"
+            f"expected either a source or --constants, and {both}; give one of them, such as the name water"
         )
     if given.dipole is not None and given.dipole_abc is not None:
         raise ValueError("--dipole and --dipole-abc: give one of them, in the frame of the input or in principal axes")
@@ -188,7 +211,7 @@ def _refuse_contradictions(given: Input) -> None:
 def _from_constants(given: Input) -> Top:
     from rotor.tops.top import Top
 
-    return option(
+    return parsed(
         "--constants", given.constants or "", lambda text: Top.from_constants(text, source="given (--constants)")
     )
 
@@ -196,17 +219,17 @@ def _from_constants(given: Input) -> Top:
 def _from_source(given: Input) -> Top:
     import rotor
 
-    top: Top = rotor.read(given.source, isotopes=",".join(given.isotopes) or None)
+    top: Top = rotor.read(given.source, isotopes=given.isotopes)
     if not isinstance(top, rotor.Top):
         raise ValueError(f"{given.source}: holds a {type(top).__name__.lower()}, not a molecule or constants")
     if given.calculator is not None:
-        top = option("--calculator", given.calculator, lambda name: _refined(top, name))
+        top = parsed("--calculator", given.calculator, lambda name: _refined(top, name))
     if given.symmetry_tolerance is not None:
         reach = positive("--symmetry-tolerance", given.symmetry_tolerance, "Å")
-        top = option("--symmetry-tolerance", given.symmetry_tolerance, lambda _: top.with_symmetry_within(reach))
+        top = parsed("--symmetry-tolerance", given.symmetry_tolerance, lambda _: top.with_symmetry_within(reach))
     if given.hessian is None:
         return top
-    return option("--hessian", given.hessian, lambda path: _semirigid(top, path, given.calculator))
+    return parsed("--hessian", given.hessian, lambda path: _semirigid(top, path, given.calculator))
 
 
 def _refined(top: Top, name: str) -> Top:
@@ -231,7 +254,7 @@ def _semirigid(top: Top, path: str, calculator: str | None) -> Top:
 
 def _geometry(top: Top) -> Molecule:
     if top.molecule is None:
-        raise ValueError(f"{top.name or 'the source'} has constants alone; a geometry is wanted")
+        raise ValueError(f"{top.name or 'the source'} has constants alone; expected a geometry")
     return top.molecule
 
 
@@ -242,23 +265,20 @@ def _with_dipole_of_input(top: Top, dipole_debye: tuple[float, float, float]) ->
 
 
 def _refuse_weights_of_another_kind(top: Top) -> None:
-    from rotor.quantum.levels import solve_levels
+    from rotor.quantum.solve import solve_levels
 
     solve_levels(top, 1, vectors=False)
 
 
 def with_some_dipole(top: Top) -> Top:
-    """The top with an estimated dipole where none is known; ValueError where it cannot be estimated either."""
-    if top.dipole_abc_debye is not None or top.kind == "spherical":
-        return top
-    remedy = "give --dipole x,y,z (frame of the input) or --dipole-abc a,b,c (principal axes)"
-    if top.molecule is None:
-        raise ValueError(f"the dipole is not known: {remedy.replace('--dipole x,y,z (frame of the input) or ', '')}")
+    """The top with an estimated dipole, noted as such, where none is known; ValueError where it cannot be estimated either."""
+    from rotor.tops.estimated_dipole import with_dipole_estimate
 
-    from rotor.molecules.mmff_dipole import CHARGES_SOURCE, estimate_dipole
-
-    dipole, said = estimate_dipole(top.molecule)
-    if dipole is None:
-        raise ValueError(f"{said}: {remedy}")
-    note(said)
-    return replace(top.with_estimated_dipole(dipole, CHARGES_SOURCE), notes=(*top.notes, said))
+    try:
+        found = with_dipole_estimate(top)
+    except ValueError as error:
+        of_input = "--dipole x,y,z (frame of the input) or " if top.frame is not None else ""
+        raise ValueError(f"{error}: give {of_input}--dipole-abc a,b,c (principal axes)") from None
+    for text in found.notes[len(top.notes) :]:
+        note(text)
+    return found

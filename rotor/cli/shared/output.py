@@ -1,4 +1,4 @@
-"""What goes out: tables for people, JSON for programs, notes and files written all or none."""
+"""Output: tables for people, JSON for programs, notes, and files that are written all or none."""
 
 from __future__ import annotations
 
@@ -14,6 +14,8 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from rotor.cli.shared.options import files_asked
 
 if TYPE_CHECKING:
     from rotor.table import Table as Columns
@@ -105,7 +107,7 @@ def _draw(table: Table) -> None:
     console = Console()
     if console.measure(drawn, options=console.options.update(width=10_000)).maximum <= console.width:
         console.print(drawn)
-    else:  # too narrow for it: lines that break, rather than numbers cut short
+    else:  # a terminal too narrow for it: lines break, numbers are not cut
         print(table_text(table))
 
 
@@ -161,8 +163,22 @@ def _json_value(value: Any) -> str:
 class Files:
     """Files asked for, by option: checked before any work is done, written together after all of it."""
 
-    wanted: dict[str, Path] = field(default_factory=dict)
+    paths: dict[str, Path] = field(default_factory=dict)
     screen: set[str] = field(default_factory=set)  # options whose text goes to standard output: --json -
+
+    @classmethod
+    def of(cls, group: Any) -> Files:
+        """The files that a group of options asks for, the JSON of its field `json` among them."""
+        files = cls()
+        for name, path, suffixes in files_asked(group):
+            files.ask(name, path, suffixes)
+        files.ask_json(group.json)
+        return files
+
+    @property
+    def names(self) -> list[str]:
+        """The paths written, as texts."""
+        return [str(path) for path in self.paths.values()]
 
     def ask_json(self, path: str | None) -> None:
         """Remember where the JSON goes: to a file, to standard output (`-`), or nowhere."""
@@ -184,15 +200,15 @@ class Files:
             raise ValueError(f"{option} {path}: there is no folder {target.parent}; make it first")
         if not os.access(target.parent, os.W_OK):
             raise ValueError(f"{option} {path}: cannot write in {target.parent}: no permission")
-        if any(target.resolve() == other.resolve() for other in self.wanted.values()):
+        if any(target.resolve() == other.resolve() for other in self.paths.values()):
             raise ValueError(f"{option} {path}: another option writes the same file")
-        self.wanted[option] = target
+        self.paths[option] = target
 
     def write(self, writers: Mapping[str, Writer]) -> None:
         """Make every file in a folder beside its place by the writer of its option, then rename: all appear, or none."""
         with ExitStack() as stack:
             moves: list[tuple[Path, Path]] = []
-            for option, target in self.wanted.items():
+            for option, target in self.paths.items():
                 try:
                     folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix=".rotor-", dir=target.parent)))
                 except OSError as error:

@@ -1,16 +1,14 @@
-"""What a top is, as content for JSON and as lines for people; the same for every verb that prints one."""
+"""A top as content for JSON and as lines for people, the same for every verb that prints one."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from rotor.units import MHZ_PER_CM
+from rotor.tops.facts import formula_of, top_facts
 
 if TYPE_CHECKING:
-    from rotor.thermo import PartitionFunction
     from rotor.tops.constants import Constants
-    from rotor.tops.kind import KindOfTop
     from rotor.tops.top import Top
 
 KINDS = {
@@ -22,75 +20,16 @@ KINDS = {
 }
 
 
-def describe(top: Top, text: str, command: str) -> dict[str, Any]:
-    """Everything about a top but its partition function, by the keys of docs/command_line.md."""
+def begin(command: str, text: str) -> dict[str, Any]:
+    """The first keys of every JSON: version, command line, and the input as given."""
     import rotor
 
-    constants, abc = top.constants, top.rotational_constants_mhz
-    near = top.symmetry.near if top.symmetry else None
-    frame = top.frame
-    return {
-        "rotor_version": rotor.__version__,
-        "command": command,
-        "input": text,
-        "name": top.name or None,
-        "formula": formula_of(top),
-        "mass_u": top.mass_u,
-        "kind": top.kind,
-        "kind_decision": _decision(top.kind_of_top) if top.kind_of_top else None,
-        "point_group": top.symmetry.point_group if top.symmetry else None,
-        "symmetry_number": top.symmetry.symmetry_number if top.symmetry else None,
-        "near_point_group": near.point_group if near else None,
-        "near_displacement_angstrom": near.displacement_angstrom if near else None,
-        "constants_mhz": dict(constants.values),
-        "uncertainties_mhz": dict(constants.uncertainties),
-        "reduction": constants.reduction,
-        "representation": constants.representation,
-        "rotational_constants_mhz": abc,
-        "rotational_constants_cm": [x / MHZ_PER_CM for x in abc],
-        "kappa": top.kappa,
-        "moments_u_angstrom2": top.moments_u_angstrom2,
-        "planar_moments_u_angstrom2": top.planar_moments_u_angstrom2,
-        "inertial_defect_u_angstrom2": top.inertial_defect_u_angstrom2,
-        "frame": {"axes": frame.axes, "centre_angstrom": frame.centre} if frame else None,
-        "dipole_abc_debye": top.dipole_abc_debye,
-        "dipole_source": top.dipole_source or None,
-        "polarizability_abc_angstrom3": top.polarizability_abc_angstrom3,
-        "polarizability_source": top.polarizability_source or None,
-        "spin_weights": top.spin_weights.to_mapping(),
-        "spin_weights_source": top.weights_source or None,
-        "source": top.source or None,
-        "notes": list(top.notes),
-    }
+    return {"rotor_version": rotor.__version__, "command": command, "input": text}
 
 
-def _decision(kind: KindOfTop) -> dict[str, Any]:
-    return {
-        "kind": kind.kind,
-        "ia_over_ic": kind.linearity,
-        "ib_minus_ia_over_ib": kind.ab,
-        "ic_minus_ib_over_ic": kind.bc,
-        "linear_below": kind.linear_below,
-        "equal_within": kind.equal_within,
-        "margin": kind.margin,
-    }
-
-
-def formula_of(top: Top) -> str | None:
-    """The formula of the molecule behind a top; None for constants alone."""
-    return top.molecule.formula if top.molecule is not None else None
-
-
-def q_record(partition: PartitionFunction, classical: float) -> dict[str, Any]:
-    """One row of a table of Q."""
-    return {
-        "temperature_k": partition.temperature_k,
-        "q": partition.q,
-        "classical": classical,
-        "jmax": partition.jmax,
-        "relative_error": partition.relative_error,
-        "source": partition.source,
-    }
+def describe(top: Top, text: str, command: str) -> dict[str, Any]:
+    """Everything about a top but its partition function, by the keys of docs/command_line.md."""
+    return {**begin(command, text), **top_facts(top)}
 
 
 def heading(top: Top) -> str:

@@ -1,8 +1,8 @@
-"""`rotor spectrum case.int`: what SPCAT does with that file and the .var or .par beside it."""
+"""`rotor spectrum case.int`: what SPCAT computes from that file and the .var or .par beside it."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import typer
 
@@ -10,9 +10,10 @@ from rotor.cli.shared.output import note
 
 if TYPE_CHECKING:
     from rotor.formats.spcat.predict import Prediction
+    from rotor.spectra.request import SpectrumAnswer
 
 # what the .int and its parameter file say themselves: option of the verb -> field of the files
-SAID = {
+FIELDS = {
     "temperature": "TEMP",
     "jmax": "FEND",
     "min_lgint": "STR0 and STR1",
@@ -37,15 +38,34 @@ def is_request(source: str | None) -> bool:
 
 
 def prediction_of(context: typer.Context, source: str) -> Prediction:
-    """The prediction of an .int file; its notes are said. Options that the files answer themselves are refused."""
-    for name, said in SAID.items():
+    """The prediction of an .int file; its notes go to standard error. Options that the files answer themselves are refused."""
+    for name, field in FIELDS.items():
         given = context.get_parameter_source(name)
         if given is not None and given.name != "DEFAULT":
             option = "--" + name.rstrip("_").replace("_", "-")
-            raise ValueError(f"{option}: {source} says that itself ({said}); change it there, or give its .var instead")
+            raise ValueError(
+                f"{option}: {source} says that itself ({field}); change it there, or give its .var instead"
+            )
     from rotor.formats.spcat.predict import predict_file
 
     prediction = predict_file(source)
     for text in prediction.notes:
         note(text)
     return prediction
+
+
+def answer_of(prediction: Prediction, shape: dict[str, Any]) -> SpectrumAnswer:
+    """The lines of a prediction as the answer to the request that its files make; shape: profile, width and layer."""
+    from rotor.spectra.request import SpectrumAnswer, SpectrumRequest
+
+    asked, lines = prediction.request, prediction.lines
+    request = SpectrumRequest(
+        lines.top,
+        temperature_k=asked.temperature_k,
+        jmax=asked.fend,
+        min_lgint=asked.str0,
+        range_mhz=lines.range_mhz,
+        q=prediction.q,
+        **shape,
+    )
+    return SpectrumAnswer(request, lines)

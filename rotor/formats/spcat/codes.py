@@ -19,11 +19,11 @@ from typing import Any, NamedTuple
 
 from rotor.formats.spcat.par import Options, Parameter, ParameterFile
 from rotor.tops.constants import RIGID, Constants
-from rotor.tops.operators import powers_of_spelled
+from rotor.tops.operators import axes_of, powers_of_spelled
 
 NOT_YET = "is read but not computed yet"
 
-AXES = {"Ir": "bca", "IIIl": "bac"}  # x, y, z of the two bases
+AXES = {basis: axes_of(basis) for basis in ("Ir", "IIIl")}  # x, y, z of the two bases
 
 
 class Digits(NamedTuple):

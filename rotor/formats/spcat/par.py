@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 from rotor.formats.atomic_write import open_atomic
@@ -101,7 +102,7 @@ def read_par(source: str | os.PathLike[str] | bytes) -> ParameterFile:
         at = 2 + len(options)
         if at == len(lines):
             raise lines[-1].error(0, "VSYM is negative, so that another option line should follow; the file ends here")
-        options.append(_options(lines[at]))
+        options.append(_options(lines[at], options[0]))
 
     first = 2 + len(options)
     end = first
@@ -129,11 +130,12 @@ def _header(line: Line) -> Header:
     return Header(**values, text=line.text)
 
 
-def _options(line: Line) -> Options:
+def _options(line: Line, defaults: Options = Options()) -> Options:
+    """An option line; the first one sets the defaults of those that follow, but for VSYM."""
     letter = _LETTER.match(line.body)
     start = letter.end() if letter else 0
     words, _ = read_words(line, start, len(_OPTIONS))
-    defaults = Options()
+    defaults = replace(defaults, vsym=0)
     values = {
         name: whole(line, words, index, name.upper(), getattr(defaults, name)) for index, name in enumerate(_OPTIONS)
     }
@@ -157,10 +159,15 @@ def format_par(file: ParameterFile) -> bytes:
     return encode([
         title or _line(file.title),
         _kept(file.header, _header) or _header_text(file.header),
-        *(_kept(options, _options) or _options_text(options) for options in file.options),
+        *(_kept(options, partial(_options, defaults=_defaults(file, at))) or _options_text(options)
+          for at, options in enumerate(file.options)),
         *(_kept(parameter, _parameter) or _parameter_text(parameter) for parameter in file.parameters),
         file.rest,
     ])  # fmt: skip
+
+
+def _defaults(file: ParameterFile, at: int) -> Options:
+    return file.options[0] if at else Options()
 
 
 def _kept(thing: Any, read: Any) -> str:

@@ -17,18 +17,21 @@ from rotor import units
 from rotor.formats.line_tables import catalogue
 from rotor.formats.spcat.catalogue import Catalogue
 from rotor.formats.spcat.codes import is_linear
+from rotor.formats.spcat.egy import LevelList
 from rotor.formats.spcat.fields import QUANTUM_RANGE
+from rotor.formats.spcat.file_lines import LEAST_MHZ
 from rotor.formats.spcat.int_file import IntensityFile, Request, read_int
 from rotor.formats.spcat.model import FOLD, common_weight, top_of
 from rotor.formats.spcat.par import Options, ParameterFile, read_par
+from rotor.formats.spcat.predict_states import is_plain, predicted
 from rotor.quantum.basis import wang_blocks
 from rotor.quantum.effects.watson import JMatrix, block_bands
-from rotor.quantum.levels import Levels, hamiltonian, solve_levels
+from rotor.quantum.levels import Levels
+from rotor.quantum.solve import hamiltonian, solve_levels
 from rotor.spectra.lines import Lines, line_list
 from rotor.thermo import PartitionFunction, partition_function
 from rotor.tops.top import Top
 
-LEAST_MHZ = 0.00005  # a line that would print as 0.0000 is not in the program's files
 _STR_SCALE_MHZ = 300_000.0  # STR1 counts (ν/300 GHz)²
 
 
@@ -39,7 +42,8 @@ class Prediction:
     catalogue: as the program would list it, E″ from the Hamiltonian's zero, degeneracies with the weights as the file
     has them. lines: the same lines before K doublets were parted, weights reduced, E″ from the lowest level.
     q: the partition function used, as a file counts it: unreduced weights, energies from the Hamiltonian's zero.
-    request: line 2 of the .int file. notes: what the program would have passed over in silence.
+    request: line 2 of the .int file. notes: what the program would have passed over in silence. levels: as the program would list
+    them, where the file has spins or several states.
     """
 
     catalogue: Catalogue
@@ -47,14 +51,15 @@ class Prediction:
     q: float
     request: Request
     notes: tuple[str, ...] = ()
+    levels: LevelList | None = None
 
 
-def predict_file(path: str | os.PathLike[str], *, own_q: bool = False) -> Prediction:
+def predict_file(path: str | os.PathLike[str], *, own_q: bool = False, as_spcat: bool = False) -> Prediction:
     """The catalogue that belongs to an .int file, with the .var (else .par) file of the same name beside it.
 
-    own_q: see `predict`. Raises ValueError, with file and line, for what cannot be read or is not computed yet.
+    own_q, as_spcat: see `predict`. Raises ValueError, with file and line, for what cannot be read or is not computed yet.
     """
-    return predict(read_par(parameters_beside(path)), read_int(path), own_q=own_q)
+    return predict(read_par(parameters_beside(path)), read_int(path), own_q=own_q, as_spcat=as_spcat)
 
 
 def parameters_beside(path: str | os.PathLike[str]) -> Path:
@@ -66,16 +71,19 @@ def parameters_beside(path: str | os.PathLike[str]) -> Path:
     return found
 
 
-def predict(parameters: ParameterFile, intensities: IntensityFile, *, own_q: bool = False) -> Prediction:
+def predict(
+    parameters: ParameterFile, intensities: IntensityFile, *, own_q: bool = False, as_spcat: bool = False
+) -> Prediction:
     """The catalogue that SPCAT makes of its two input files, from true eigenvalues.
 
     A line is listed when both its J (F, without nuclear spins) lie from FBGN to FEND, its frequency below FQLIM, and its
     intensity, that of one component of a K doublet, above 10^STR0 + 10^STR1 (ν/300 GHz)² nm² MHz.
 
-    own_q: the partition function is summed from the levels, whatever FEND is, instead of taken from QROT.
+    own_q: the partition function is summed from the levels, whatever FEND is, instead of taken from QROT. as_spcat: K beyond
+    KNMAX is left out of the basis, as the program does in silence; by default all K are in it.
 
     Raises ValueError for an empty range of F, for a Q or a temperature that is not above 0, and for what is read but not
-    computed yet: nuclear spins, several vibrational states, internal rotation.
+    computed yet, by its meaning: internal rotation, Euler series, l-doubled states, spins of equivalent nuclei in a total spin.
 
     >>> from rotor.formats.spcat.int_file import read_int
     >>> from rotor.formats.spcat.par import read_par
@@ -85,17 +93,20 @@ def predict(parameters: ParameterFile, intensities: IntensityFile, *, own_q: boo
     [12162.984, 24325.968, 36488.952]
     """
     options, request = parameters.options[0], intensities.request
-    top = top_of(parameters, intensities)
     if not 0 <= request.fbgn <= request.fend <= QUANTUM_RANGE[1]:
         raise ValueError(
             f"FBGN = {request.fbgn}, FEND = {request.fend}: F runs from FBGN to FEND, from 0 to {QUANTUM_RANGE[1]}, the "
             "highest that two characters of a catalogue can say"
         )
+    if not (own_q or (math.isfinite(request.qrot) and request.qrot > 0)):
+        raise ValueError(f"QROT = {request.qrot}: a partition function is a number above 0")
+    if not is_plain(parameters, intensities) or (as_spcat and options.knmax < request.fend and not is_linear(options)):
+        made, of_states, q, levels, notes = predicted(parameters, intensities, own_q=own_q, as_spcat=as_spcat)
+        return Prediction(made, of_states, q, request, tuple(notes), levels)
 
+    top = top_of(parameters, intensities)
     common = common_weight(options)
     q = summed_q(top, options, request.temperature_k).q if own_q else request.qrot
-    if not (math.isfinite(q) and q > 0):
-        raise ValueError(f"QROT = {request.qrot}: a partition function is a number above 0")
     lines = _wanted_lines(top, request, q / common)
     return Prediction(
         catalogue=_as_the_program_lists(lines, options, common, request.tag),
@@ -130,11 +141,9 @@ def _wanted_lines(top: Top, request: Request, q_reduced: float) -> Lines:
         min_lgint=request.str0,
         range_mhz=(LEAST_MHZ, request.fqlim_ghz * 1e3),
     )
-    j, components = lines.levels.j, lines.levels.components[lines.lower]
+    j, components = lines.levels.rotational, lines.levels.components[lines.lower]
     in_range = np.minimum(j[lines.upper], j[lines.lower]) >= request.fbgn
-    return lines.where(
-        in_range & (lines.intensity_nm2_mhz / components > least_intensity(request, lines.frequency_mhz))
-    )
+    return lines.where(in_range & (10.0**lines.lgint / components > least_intensity(request, lines.frequency_mhz)))
 
 
 def least_intensity(request: Request, frequency_mhz: NDArray[np.float64]) -> NDArray[np.float64]:

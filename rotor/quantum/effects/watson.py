@@ -17,9 +17,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor.quantum.basis import REPRESENTATIONS, WangBlock
+from rotor.quantum.basis import WangBlock
 from rotor.quantum.effect import QuantumEffect
-from rotor.tops.operators import Operators, Powers, distortion_terms, powers_of_spelled
+from rotor.tops.operators import Operators, Powers, axes_of, distortion_terms, powers_of_spelled
 
 if TYPE_CHECKING:
     from rotor.tops.constants import Constants
@@ -33,8 +33,18 @@ def operators_by_name(constants: Constants) -> dict[str, Operators]:
     >>> operators_by_name(Constants(A=9.0, B=3.0, C=2.0))["C"]
     {(1, 0, 0): 0.5, (0, 1, 0): -0.5, (0, 0, 1): -0.25}
     """
+    return {name: operators_of_name(constants, name) for name in constants.values}
+
+
+def operators_of_name(constants: Constants, name: str) -> Operators:
+    """∂H/∂c of one name of the vocabulary that a set of constants has, whether or not it is in the set.
+
+    >>> from rotor.tops.constants import Constants
+    >>> operators_of_name(Constants(A=9.0, B=3.0, C=2.0, reduction="A"), "DeltaJ")
+    {(2, 0, 0): -1.0}
+    """
     table = _rigid_terms(constants) | distortion_terms(constants.kind, constants.reduction)
-    return {name: table[name] if name in table else {_powers(name): 1.0} for name in constants.values}
+    return table[name] if name in table else {_powers(name): 1.0}
 
 
 def _powers(name: str) -> Powers:
@@ -55,7 +65,7 @@ def _rigid_terms(constants: Constants) -> dict[str, Operators]:
     if constants.kind in ("prolate", "oblate"):
         along, equal = ("A", "C") if constants.kind == "prolate" else ("C", "A")
         return {along: {(0, 1, 0): 1.0}, "B": {(1, 0, 0): 1.0, (0, 1, 0): -1.0}, equal: {}}
-    x, y, z = (axis.upper() for axis in REPRESENTATIONS[str(constants.representation)])
+    x, y, z = (axis.upper() for axis in axes_of(str(constants.representation)))
     return {
         z: {(0, 1, 0): 1.0},
         x: {(1, 0, 0): 0.5, (0, 1, 0): -0.5, (0, 0, 1): 0.25},
@@ -85,27 +95,42 @@ def centrifugal_operators(constants: Constants) -> Operators:
 class Rigid(QuantumEffect):
     """The rigid rotor: A, B, C."""
 
-    def operators(self, top: Top) -> Operators:
-        """Coefficients in MHz, see `rigid_operators`."""
-        return rigid_operators(top.constants)
+    name = "rigid rotor"
 
-    def estimate_mhz(self, top: Top, j: int) -> float:
+    def parameters(self, top: Top) -> dict[str, float]:
+        """A, B, C in MHz, those that the set has."""
+        return {name: value for name, value in top.constants.values.items() if name in "ABC"}
+
+    def operators(self, top: Top) -> dict[str, Operators]:
+        """∂H/∂A, ∂H/∂B, ∂H/∂C."""
+        return {name: terms for name, terms in operators_by_name(top.constants).items() if name in "ABC"}
+
+    def size_mhz(self, top: Top, j: int) -> float:
         """A J(J+1) bounds the rigid energy."""
-        return max(top.constants.values.values()) * j * (j + 1)
+        return max(self.parameters(top).values()) * j * (j + 1)
 
 
 class Centrifugal(QuantumEffect):
     """Centrifugal distortion of every order that the constants carry."""
 
-    def operators(self, top: Top) -> Operators:
-        """Coefficients in MHz, see `centrifugal_operators`."""
-        return centrifugal_operators(top.constants)
+    name = "centrifugal distortion"
 
-    def estimate_mhz(self, top: Top, j: int) -> float:
+    def parameters(self, top: Top) -> dict[str, float]:
+        """The distortion constants in MHz."""
+        return {name: value for name, value in top.constants.values.items() if name not in "ABC"}
+
+    def operators(self, top: Top) -> dict[str, Operators]:
+        """∂H/∂c of every distortion constant."""
+        return {name: terms for name, terms in operators_by_name(top.constants).items() if name not in "ABC"}
+
+    def size_mhz(self, top: Top, j: int) -> float:
         """Every term at K = J, all added in size."""
         x = j * (j + 1.0)
-        terms = self.operators(top).items()
+        terms = centrifugal_operators(top.constants).items()
         return float(sum(abs(c) * x**p * float(j) ** (2 * q) * (2 * x**n if n else 1.0) for (p, q, n), c in terms))
+
+
+SEMI_RIGID: tuple[QuantumEffect, ...] = (Rigid(), Centrifugal())
 
 
 def scalar_energy(operators: Operators, j: int) -> float:

@@ -1,0 +1,38 @@
+"""Checks of arguments, each with one wording: name, value found, rule."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection
+
+
+def require_positive(name: str, value: float, unit: str = "") -> float:
+    """The value, refused with a ValueError unless it is finite and above zero.
+
+    >>> require_positive("temperature_k", 300.0)
+    300.0
+    """
+    if not (math.isfinite(value) and value > 0):
+        raise ValueError(f"{name}: {value:g}: expected a finite number above 0{' ' if unit else ''}{unit}")
+    return value
+
+
+def require_whole(name: str, value: int | None, least: int, most: int | None = None) -> None:
+    """Refuse, with a ValueError, a whole number out of bounds; None passes."""
+    if value is not None and (value < least or (most is not None and value > most)):
+        bounds = f"of {least} or more" if most is None else f"from {least} to {most}"
+        raise ValueError(f"{name}: {value}: expected a whole number {bounds}")
+
+
+def require_between(name: str, value: float, low: float, high: float) -> float:
+    """The value, refused with a ValueError unless it lies between two bounds, neither of them included."""
+    if not low < value < high:
+        raise ValueError(f"{name}: {value:g}: expected a number between {low:g} and {high:g}")
+    return value
+
+
+def require_one_of(name: str, value: str, known: Collection[str]) -> str:
+    """The value, refused with a ValueError unless it is one of those known."""
+    if value not in known:
+        raise ValueError(f"{name}: {value!r}: expected one of {', '.join(known)}")
+    return value

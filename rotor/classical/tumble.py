@@ -1,0 +1,206 @@
+"""A request for the free rotation of one rigid body, and what answers it: the exact motion, its table, its stability.
+
+Moments and angular momentum are the exact data of the motion. A body known by its angular velocity starts at
+`TumbleRequest.of_angular_velocity`; a molecule at `rotor.thermo.thermal_tumble`.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rotor.arrays import Floats
+from rotor.classical.euler import checked_moments, checked_momentum, energy
+from rotor.classical.free.free_motion import FreeMotion, free_motion
+from rotor.classical.free.stability import Stability, stability
+from rotor.classical.motion import InvariantDrift, MotionTable, invariant_drift, sampled
+
+PERIODS, TURNS, POINTS = 2, 10, 201
+Three = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Units:
+    """Names of the units of an answer, and their size: a number of the motion times the factor is the number given.
+
+    Without names all numbers are in one coherent set. moment: the unit of the moments, which are never converted.
+    """
+
+    time: str = ""
+    angular_momentum: str = ""
+    energy: str = ""
+    time_factor: float = 1.0
+    momentum_factor: float = 1.0
+    energy_factor: float = 1.0
+    moment: str = ""
+
+
+COHERENT = Units()
+SI = Units("s", "kg m²/s", "J", moment="kg m²")
+
+
+@dataclass(frozen=True)
+class TumbleRequest:
+    """A free rotation to compute; every field is checked when the request is made.
+
+    moments: (3,), principal moments of inertia in any order. angular_momentum: (3,) at time 0 in the principal axes, in the
+    unit that `units` names. times: (n,) in the unit that `units` names; None: two periods of the motion. axes: names of the
+    principal axes. source: how the angular momentum was chosen.
+    """
+
+    moments: Three
+    angular_momentum: Three
+    times: tuple[float, ...] | None = None
+    units: Units = COHERENT
+    axes: tuple[str, str, str] = ("1", "2", "3")
+    source: str = "given"
+
+    def __post_init__(self) -> None:
+        moments = checked_moments(self.moments)
+        if moments.shape != (3,):
+            raise ValueError(f"moments: {self.moments}: expected the three moments of one body")
+        momentum = checked_momentum(self.angular_momentum, moments)
+        if momentum.shape != (3,) or not momentum.any():
+            raise ValueError(
+                f"angular_momentum: {self.angular_momentum}: expected three components, one of them not 0; a body at rest "
+                "does not tumble"
+            )
+        if self.times is not None and not (len(self.times) and np.isfinite(self.times).all()):
+            raise ValueError("times: expected at least one finite time")
+
+    @classmethod
+    def of_angular_velocity(cls, moments: ArrayLike, omega: ArrayLike, **others: Any) -> TumbleRequest:
+        """The request for a body that starts with an angular velocity ω in rad per unit of time: L_i = I_i ω_i.
+
+        others: further fields of the request; moments and ω are in one coherent set, such as kg m² and rad/s.
+
+        >>> TumbleRequest.of_angular_velocity([1.0, 2.0, 3.0], [0.0, 5.0, 0.1], units=SI).angular_momentum[1]
+        10.0
+        """
+        body = np.asarray(moments, dtype=np.float64)
+        a, b, c = (float(x) for x in body)
+        p, q, r = (float(x) for x in body * np.asarray(omega, dtype=np.float64))
+        return cls((a, b, c), (p, q, r), **others)
+
+    @property
+    def body(self) -> Floats:
+        """The moments as an array (3,)."""
+        return np.array(self.moments)
+
+    @property
+    def momentum(self) -> Floats:
+        """The angular momentum (3,) in the coherent set of the motion."""
+        return np.array(self.angular_momentum) / self.units.momentum_factor
+
+    @property
+    def kind(self) -> str:
+        """Kind of body by exact equality of the moments given."""
+        low, middle, high = sorted(self.moments)
+        if low == 0.0:
+            return "linear"
+        equal = {(True, True): "spherical", (True, False): "oblate", (False, True): "prolate"}
+        return equal.get((low == middle, middle == high), "asymmetric")
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What is unusual about the body."""
+        low, middle, high = sorted(self.moments)
+        if low + middle >= high * (1 - 1e-12):
+            return ()
+        return (
+            f"no real body has these moments: {low:g} + {middle:g} is less than {high:g}; the equations do not need it",
+        )
+
+
+@dataclass(frozen=True)
+class TumbleAnswer:
+    """The exact motion that a request asked for.
+
+    motion: in the coherent set of the moments. table: the motion at the times asked for, in the units of the request.
+    drift: of what the motion conserves, over the table.
+    """
+
+    request: TumbleRequest
+    motion: FreeMotion
+    table: MotionTable
+    drift: InvariantDrift
+    times_source: str = field(default="given")
+
+    @cached_property
+    def stability(self) -> Stability:
+        """What can be said without integrating: which axes are stable, and how fast a small push grows."""
+        return stability(self.request.body, self.request.momentum)
+
+    @property
+    def motion_kind(self) -> str:
+        """steady, separatrix, or about which axis L goes round."""
+        if self.motion.steady:
+            return "steady"
+        if self.motion.separatrix:
+            return "separatrix"
+        return f"about axis {self.request.axes[self.motion.centre_axis]}"
+
+    def facts(self) -> dict[str, Any]:
+        """Everything about the answer but its table, by the keys of docs/command_line.md."""
+        request, units = self.request, self.request.units
+        return {
+            "units": {"time": units.time, "angular_momentum": units.angular_momentum, "energy": units.energy},
+            "moments": request.body,
+            "axes": list(request.axes),
+            "angular_momentum": request.momentum * units.momentum_factor,
+            "angular_momentum_size": float(math.hypot(*request.momentum)) * units.momentum_factor,
+            "angular_momentum_source": request.source,
+            **self._facts_of_motion(),
+            "times_source": self.times_source,
+            "invariant_drift": asdict(self.drift),
+        }
+
+    def _facts_of_motion(self) -> dict[str, Any]:
+        request, units, closed = self.request, self.request.units, self.stability
+        distinct = len(set(request.moments)) == 3
+        return {
+            "energy": float(energy(request.momentum, request.body)) * units.energy_factor,
+            "motion_kind": self.motion_kind,
+            "period": float(self.motion.period) * units.time_factor,
+            "turning_rate": float(self.motion.turning_rate) / units.time_factor,
+            "fixed_axes": [
+                {"axis": name, "moment": moment, "kind": fixed.kind, "rate": fixed.rate / units.time_factor}
+                for name, moment, fixed in zip(request.axes, request.moments, closed.axes, strict=True)
+            ],
+            "separatrix_ratio": closed.separatrix_ratio if distinct else None,
+            "growth_rate": closed.growth_rate / units.time_factor,
+            "asymptotic_period": closed.asymptotic_period * units.time_factor,
+            "chaos": closed.chaos,
+        }
+
+
+def answer_tumble(request: TumbleRequest) -> TumbleAnswer:
+    """The exact free rotation of a request, at its times or at some that show it.
+
+    >>> answer = answer_tumble(TumbleRequest((0.6, 0.8, 1.0), (1.8, 0.4, -0.9)))
+    >>> answer.motion_kind, round(float(answer.table.times[-1]), 6), answer.times_source
+    ('about axis 1', 13.725232, '2 periods, 201 points')
+    """
+    units = request.units
+    motion = free_motion(request.body, request.momentum)
+    times, source = (np.array(request.times), "given") if request.times is not None else _chosen_times(motion, units)
+    inner = sampled(motion, times / units.time_factor)
+    table = MotionTable(
+        times, inner.momentum * units.momentum_factor, inner.attitude, inner.energy * units.energy_factor
+    )
+    return TumbleAnswer(request, motion, table, invariant_drift(inner, motion), source)
+
+
+def _chosen_times(motion: FreeMotion, units: Units) -> tuple[Floats, str]:
+    """Times in the unit of the answer that show a motion, and the sentence that says so."""
+    if math.isfinite(motion.period):
+        span, source = PERIODS * float(motion.period), f"{PERIODS} periods, {POINTS} points"
+    else:
+        span = TURNS * 2.0 * math.pi / float(motion.turning_rate)
+        source = f"{TURNS} turns about L, {POINTS} points, as the motion in the body has no period"
+    return np.linspace(0.0, span * units.time_factor, POINTS), source

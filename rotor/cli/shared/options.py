@@ -1,0 +1,96 @@
+"""Options of a verb in groups: a frozen dataclass holds one group, and the command has one parameter for each of its fields.
+
+@dataclass(frozen=True)
+class Options:
+    temperature: str = option("300", metavar="T", help="Temperature (K).")
+    csv: str | None = file_option(".csv", help="Write all lines as CSV.")
+
+@grouped()
+def command(context: typer.Context, given: Input, options: Options) -> None: ...
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Sequence
+from dataclasses import MISSING, Field, field, fields, is_dataclass
+from typing import Any, get_type_hints
+
+import typer
+
+Command = Callable[..., None]
+
+
+def option(default: Any, *names: str, **settings: Any) -> Any:
+    """A field of a group: its default, its name on the command line if that is not its own, and what `typer.Option` takes."""
+    return field(default=default, metadata={"parameter": typer.Option(default, *names, **settings)})
+
+
+def argument(default: Any = None, **settings: Any) -> Any:
+    """A field that stands on the command line without a name."""
+    return field(default=default, metadata={"parameter": typer.Argument(default, show_default=False, **settings)})
+
+
+def file_option(*suffixes: str, name: str | None = None, **settings: Any) -> Any:
+    """A field that names a file to write, with the suffixes that it may have; see `rotor.cli.shared.output.Files`."""
+    made = typer.Option(None, *([name] if name else []), metavar="FILE", **settings)
+    return field(default=None, metadata={"parameter": made, "suffixes": suffixes})
+
+
+def name_of(one: Field[Any]) -> str:
+    """How a field is called on the command line: `--range` for `range_`.
+
+    >>> from dataclasses import make_dataclass
+    >>> name_of(fields(make_dataclass("Group", [("min_lgint", str, option("-12"))]))[0])
+    '--min-lgint'
+    """
+    declared = [text for text in one.metadata["parameter"].param_decls or () if text.startswith("--")]
+    return declared[0] if declared else "--" + one.name.rstrip("_").replace("_", "-")
+
+
+def files_asked(group: Any) -> list[tuple[str, str | None, Sequence[str]]]:
+    """Option, path and suffixes of every field of a group that names a file to write."""
+    return [
+        (name_of(one), getattr(group, one.name), one.metadata["suffixes"])
+        for one in fields(group)
+        if "suffixes" in one.metadata
+    ]
+
+
+def grouped(**omitted: Sequence[str]) -> Callable[[Command], Command]:
+    """A decorator: the command with a parameter for every field of the dataclasses in its signature.
+
+    omitted: by the name of a group, fields that this command does not have; they keep their defaults.
+    """
+
+    def decorate(command: Command) -> Command:
+        hints = get_type_hints(command)
+        groups = {name: hints[name] for name in inspect.signature(command).parameters if is_dataclass(hints[name])}
+        chosen = {
+            name: [one for one in fields(group) if one.name not in omitted.get(name, ())]
+            for name, group in groups.items()
+        }
+
+        def flat(context: typer.Context, **values: Any) -> None:
+            made = {
+                name: group(**{one.name: values[one.name] for one in chosen[name]}) for name, group in groups.items()
+            }
+            command(context, **made)
+
+        parameters = [inspect.Parameter("context", inspect.Parameter.KEYWORD_ONLY, annotation=typer.Context)]
+        for name, group in groups.items():
+            types = get_type_hints(group)
+            parameters += [_parameter(one, types[one.name]) for one in chosen[name]]
+        flat.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+        flat.__annotations__ = {one.name: one.annotation for one in parameters}
+        flat.__doc__ = command.__doc__
+        return flat
+
+    return decorate
+
+
+def _parameter(one: Field[Any], kind: Any) -> inspect.Parameter:
+    assert one.default is not MISSING, f"{one.name}: an option has a default"
+    return inspect.Parameter(
+        one.name, inspect.Parameter.KEYWORD_ONLY, default=one.metadata["parameter"], annotation=kind
+    )

@@ -1,0 +1,27 @@
+"""A periodic box of atoms from a file, in whatever format ASE reads with its cell."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, cast
+
+if TYPE_CHECKING:
+    from ase import Atoms
+
+
+def read_box(path: str | os.PathLike[str]) -> Atoms:
+    """The last frame of a file, without its calculator; ValueError for what cannot be read and for a box without a cell."""
+    from ase.io import read
+    from ase.io.formats import UnknownFileTypeError
+
+    if not Path(path).is_file():
+        raise ValueError(f"{path}: no such file")
+    try:
+        atoms: Any = read(Path(path))
+    except (UnknownFileTypeError, OSError, ValueError, KeyError, IndexError, AssertionError) as error:
+        raise ValueError(f"{path}: cannot be read as a box of atoms ({str(error) or type(error).__name__})") from error
+    atoms.calc = None
+    if not atoms.pbc.any():
+        raise ValueError(f"{path}: has no cell that repeats; a box has one (in extended xyz, Lattice and pbc)")
+    return cast("Atoms", atoms)

@@ -1,0 +1,155 @@
+"""The Hamiltonian of a .par or .var file as one effect: every parameter line under its code, states and spins as the file has them.
+
+`codes.constants_of` turns files with one state and no spin into named constants; this is for all others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
+
+from rotor.formats.spcat.codes import AXES, split_code
+from rotor.formats.spcat.operators import CodedOperator, operator_of, plain_of_j
+from rotor.formats.spcat.par import Parameter
+from rotor.quantum.effect import QuantumEffect
+from rotor.quantum.spins import Spin
+from rotor.quantum.spins.operators import EVERY_STATE, SpinTerm
+from rotor.quantum.states import Coupling, State
+from rotor.tops.operators import Operators
+
+if TYPE_CHECKING:
+    from rotor.tops.top import Top
+
+Vector = tuple[float, float, float]
+
+
+class CodedLine(NamedTuple):
+    """One parameter line: its name, value, operator, and the two states, lower first; None for every state."""
+
+    name: str
+    value: float
+    operator: CodedOperator
+    states: tuple[int, int] | None
+
+
+def coded_lines(parameters: Iterable[Parameter], states: int, oblate: bool) -> list[CodedLine]:
+    """The parameter lines of a file with so many states; ValueError, naming the line, for what does not compute.
+
+    A parameter of value zero does nothing and is not looked at, nor is one of a state and 9 (99, 999), which SPFIT takes for a
+    place holder.
+    """
+    wild, axes = 10 ** (1 if states <= 9 else 2 if states <= 99 else 3) - 1, AXES["IIIl" if oblate else "Ir"]
+    found: list[CodedLine] = []
+    for place, parameter in enumerate(parameters, 1):
+        digits = split_code(parameter.code, states)
+        low, high = sorted((digits.v1, digits.v2))
+        if parameter.value == 0.0 or (high == wild and low != wild):
+            continue
+        label = f" /{parameter.label}" if parameter.label else ""
+        try:
+            if states <= high != wild:
+                raise ValueError(f"state {high} does not exist, NVIB = {states} counts from 0")
+            operator = operator_of(digits, axes)
+            if operator.odd and low == high:
+                raise ValueError(
+                    "time reversal changes the sign of the operator, so that it can connect different states only"
+                )
+        except ValueError as error:
+            raise ValueError(f"parameter {parameter.code}{label}: {error}") from None
+        found.append(
+            CodedLine(f"{parameter.code}#{place}", parameter.value, operator, None if low == wild else (low, high))
+        )
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class FileEffect(QuantumEffect):
+    """What the parameter lines of a file add up to for some of its states, which are numbered here from 0.
+
+    lines: with the file's numbers of states. numbers: the states taken, in their order here. coupled: the spins by place. moments:
+    dipoles in debye by pairs of numbers here. limits: least and largest K of states, by number here.
+    """
+
+    name: ClassVar[str] = ""
+    conserved: ClassVar[frozenset[str]] = frozenset()
+
+    lines: tuple[CodedLine, ...]
+    numbers: tuple[int, ...]
+    coupled: tuple[Spin, ...]
+    moments: dict[tuple[int, int], Vector]
+    limits: dict[int, tuple[int, int]]
+
+    @cached_property
+    def _own(self) -> tuple[tuple[CodedLine, tuple[int, int] | None], ...]:
+        """The lines that concern these states, with the numbers here; None for every state."""
+        here = {v: place for place, v in enumerate(self.numbers)}
+        out: list[tuple[CodedLine, tuple[int, int] | None]] = []
+        for line in self.lines:
+            if line.states is None:
+                out.append((line, None))
+            elif line.states[0] in here and line.states[1] in here:
+                out.append((line, (here[line.states[0]], here[line.states[1]])))
+        return tuple(out)
+
+    def parameters(self, top: Top) -> dict[str, float]:
+        """The values in MHz by code and number of the line."""
+        return {line.name: line.value for line, _ in self._own}
+
+    def operators(self, top: Top) -> dict[str, Operators]:
+        """The operators of the first state."""
+        return self._plain(0)
+
+    def _plain(self, v: int) -> dict[str, Operators]:
+        return {
+            line.name: line.operator.plain
+            for line, states in self._own
+            if line.operator.plain is not None and states in (None, (v, v))
+        }
+
+    def states(self, top: Top) -> tuple[State, ...]:
+        """The other states."""
+        return tuple(State(v, self._plain(v)) for v in range(1, len(self.numbers)))
+
+    def couplings(self, top: Top) -> tuple[Coupling, ...]:
+        """What connects states, and operators of one state that no powers (p, q, n) describe."""
+        found = []
+        for line, states in self._own:
+            operator = line.operator
+            if operator.rotor is not None:
+                continue
+            if operator.of_j is not None:
+                pairs = [states] if states else [(v, v) for v in range(len(self.numbers))]
+                found += [Coupling(line.name, *pair, operator.of_j) for pair in pairs]
+            elif states and states[0] != states[1]:
+                assert operator.plain is not None
+                found.append(Coupling(line.name, *states, plain_of_j(operator.plain)))
+        return tuple(found)
+
+    def spins(self, top: Top) -> tuple[Spin, ...]:
+        """The spins, in the order of the file."""
+        return self.coupled
+
+    def spin_terms(self, top: Top) -> tuple[SpinTerm, ...]:
+        """Every line with a spin."""
+        found = []
+        for line, states in self._own:
+            o = line.operator
+            if o.rotor is not None:
+                names = tuple(self.coupled[place - 1].name for place in o.spins)
+                bra, ket = states or (EVERY_STATE, EVERY_STATE)
+                found.append(SpinTerm(line.name, names, o.rotor, 1.0, o.n2, o.nz2, o.ns, bra, ket))
+        return tuple(found)
+
+    def dipoles(self, top: Top) -> dict[tuple[int, int], Vector]:
+        """The dipoles of the .int file."""
+        return dict(self.moments)
+
+    def k_limits(self, top: Top) -> dict[int, tuple[int, int]]:
+        """KNMIN and KNMAX where they leave K out."""
+        return dict(self.limits)
+
+    def size_mhz(self, top: Top, j: int) -> float:
+        """Not estimated: a file's Hamiltonian is one piece."""
+        return 0.0

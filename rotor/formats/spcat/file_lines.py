@@ -1,0 +1,251 @@
+"""Levels and lines of any .par or .var file as SPCAT lists them: quantum numbers by its rules, K doublets as two lines.
+
+Quantum numbers are N, then nothing, K or Ka Kc, then v where there are several states, then J, F1, ... F, half-integers rounded up.
+Where that makes more than six (ten, where NLINE is negative), one number that counts the coupling patterns stands for all but F.
+QNFMT = 100 Q + 10 H + NQN: Q tells the kind of quanta, H in binary which of the last ones are half-integers.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor import units
+from rotor.arrays import Floats, Ints
+from rotor.formats.spcat.catalogue import Catalogue
+from rotor.formats.spcat.egy import LevelList
+from rotor.formats.spcat.fields import BLANK
+from rotor.formats.spcat.file_model import Group
+from rotor.formats.spcat.int_file import Request
+from rotor.formats.spcat.par import ParameterFile
+from rotor.formats.spcat.states import is_odd
+from rotor.quantum.levels import Levels
+from rotor.spectra.intensity import LGINT_NM2_MHZ
+from rotor.spectra.transitions import Transitions, all_transitions
+
+
+@dataclass(frozen=True)
+class Format:
+    """How a file's levels are called: columns of rotation (1, 2 or 3), whether v is told, spins at most, columns at most."""
+
+    rotation: int
+    states: bool
+    spins: int
+    most: int = 6
+
+    @property
+    def before_spins(self) -> int:
+        """Columns before those of spins."""
+        return self.rotation + self.states
+
+    @property
+    def aggregate(self) -> bool:
+        """Whether one number stands for the coupling pattern."""
+        return self.before_spins + self.spins > self.most
+
+    @property
+    def width(self) -> int:
+        """Number of columns."""
+        return self.before_spins + (2 if self.aggregate else self.spins)
+
+    def qnfmt(self, spins: tuple[int, ...]) -> int:
+        """The code of a group whose doubled spins are these.
+
+        >>> Format(3, True, 1).qnfmt((2,)), Format(3, False, 2).qnfmt((3, 3)), Format(1, False, 0).qnfmt(())
+        (1405, 325, 101)
+        """
+        code = 1000 * self.states + 100 * self.before_spins + self.width
+        odd = np.cumsum(spins) % 2 if spins else np.zeros(0, dtype=np.int64)
+        total = int(odd[-1]) if len(odd) else 0
+        if self.aggregate:
+            return code + 4000 + 10 * total
+        halves = [int(odd[i]) if i < len(odd) else total for i in range(self.spins)]
+        h = 0
+        for bit in halves:
+            h = 2 * h + bit
+        return code + 10 * (h & 7 if h > 9 else h)
+
+
+def format_of(file: ParameterFile, groups: list[Group]) -> Format:
+    """How the levels of a file are called."""
+    first = file.options[0]
+    linear = all(state.linear for group in groups for state in group.states)
+    rotation = 3 if first.spind > 0 else 1 if linear else 2
+    spins = max(len(group.spins) for group in groups)
+    return Format(rotation, abs(first.nvib) > 1, spins, 10 if file.header.nline < 0 else 6)
+
+
+def quanta_of(group: Group, levels: Levels, form: Format, negative: bool = False) -> Ints:
+    """The quantum numbers of every row as the file prints them, (n, width), of one component of ±K.
+
+    negative: of a K doublet whose two levels differ in species, the one with -K.
+    """
+    quanta, n = levels.quanta, levels.rotational
+    v = quanta.get("v", np.zeros(len(levels), dtype=np.int64))
+    columns = [n, *_rotation(group, levels, v, form, negative)]
+    if form.states:
+        columns.append(np.array([state.number for state in group.states])[v])
+    names = [name for name in quanta if name not in ("v", "n", "k", "ka", "kc")] if group.spins else []
+    totals = [(quanta[name] + 1) // 2 if name in levels.halves else quanta[name] for name in names] or [n]
+    if form.aggregate:
+        columns += [_pattern_numbers(group, levels, names), totals[-1]]
+    elif form.spins:
+        columns += totals + [totals[-1]] * (form.spins - len(totals))
+    return np.stack(columns, axis=1)
+
+
+def _rotation(group: Group, levels: Levels, v: Ints, form: Format, negative: bool) -> list[Ints]:
+    """Nothing, signed K, or Ka and Kc."""
+    quanta = levels.quanta
+    if form.rotation == 1:
+        return []
+    if form.rotation == 3:
+        if "kc" in quanta:
+            return [quanta["ka"], quanta["kc"]]
+        n = levels.rotational  # linear, in a file with the quanta of asymmetric tops
+        return [np.zeros_like(n), n]
+    if "kc" in quanta:
+        k = quanta["kc"] if group.oblate else quanta["ka"]
+        odd = is_odd(quanta["ka"], quanta["kc"])
+    else:
+        k = quanta.get("k", np.zeros(len(levels), dtype=np.int64))
+        odd = np.full(len(levels), negative)
+    e_level = np.zeros(len(levels), dtype=bool)
+    for place, state in enumerate(group.states):
+        e_level |= (v == place) & state.is_e(k)
+    return [np.where(odd & ~e_level, -k, k)]
+
+
+def _pattern_numbers(group: Group, levels: Levels, names: list[str]) -> Ints:
+    """The number of the coupling pattern among those of any F, by rising N - F, then by J_i - J_(i-1), the last spin first."""
+    doubled = [levels.quanta[name] * (1 if name in levels.halves else 2) for name in names]
+    chain = np.stack([2 * levels.rotational, *doubled], axis=1)
+    steps = (np.diff(chain, axis=1) + np.array(group.spins)) // 2
+    every = np.stack(np.meshgrid(*(np.arange(spin + 1) for spin in group.spins), indexing="ij"), axis=-1)
+    every = every.reshape(-1, len(group.spins))
+    difference = (np.array(group.spins) - 2 * every).sum(axis=1)  # 2(N - F)
+    order = np.lexsort((*every.T, difference))
+    number = {tuple(every[place].tolist()): place_in_order for place_in_order, place in enumerate(order.tolist())}
+    return np.array([number[tuple(step)] for step in steps.tolist()], dtype=np.int64)
+
+
+@dataclass(frozen=True)
+class GroupLines:
+    """The lines of one group, one component of a K doublet each: columns (n,) and quantum numbers (n, width)."""
+
+    frequency_mhz: Floats
+    intensity: Floats
+    energy_lower_mhz: Floats
+    g_upper: Ints
+    upper: Ints
+    lower: Ints
+
+
+_COLUMNS = ("frequency_mhz", "intensity", "energy_lower_mhz", "g_upper", "upper", "lower")
+
+
+def transitions_of(group: Group, levels: Levels) -> Transitions:
+    """The transitions between levels of a group that exist."""
+    if not group.effect.moments:
+        none = np.zeros(0, dtype=np.int32)
+        return Transitions(np.zeros(0), np.zeros(0), none, none)
+    found = all_transitions(levels, dict(group.effect.moments))
+    exists = (levels.weight[found.lower] > 0) & (levels.weight[found.upper] > 0)
+    if exists.all():
+        return found
+    return Transitions(
+        *(getattr(found, name)[exists] for name in ("frequency_mhz", "strength_debye2", "upper", "lower"))
+    )
+
+
+LEAST_MHZ = 0.00005  # a line that would print as 0.0000 is not in the program's files
+_STR_SCALE_MHZ = 300_000.0  # STR1 counts (ν/300 GHz)²
+
+
+def within(request: Request, frequency_mhz: Floats, intensity: Floats) -> NDArray[np.bool_]:
+    """Which lines are below FQLIM and stronger than 10^STR0 + 10^STR1 (ν/300 GHz)² nm² MHz."""
+    least = 10.0**request.str0 + 10.0**request.str1 * (frequency_mhz / _STR_SCALE_MHZ) ** 2
+    limits = (frequency_mhz > LEAST_MHZ) & (frequency_mhz < request.fqlim_ghz * 1e3)
+    return np.asarray(limits & (intensity > least))
+
+
+def lines_of(group: Group, levels: Levels, found: Transitions, form: Format, request: Request, q: float) -> GroupLines:
+    """The lines of a group within the limits of an .int file, with intensities in nm² MHz, those of one component."""
+    count = np.maximum(levels.components[found.upper], levels.components[found.lower])
+    weight = (levels.weight // levels.components)[found.lower]
+    energy, kt = levels.energy_mhz[found.lower], request.temperature_k * units.MHZ_PER_K
+    below = np.exp(-energy / kt) * -np.expm1(-found.frequency_mhz / kt)
+    intensity = LGINT_NM2_MHZ / q * found.frequency_mhz * found.strength_debye2 / count * weight * below
+    kept = np.flatnonzero(within(request, found.frequency_mhz, intensity))
+    up, low = found.upper[kept], found.lower[kept]
+    columns = (found.frequency_mhz[kept], intensity[kept], energy[kept], levels.multiplicity[up] * weight[kept])
+    pair = levels.components[up], levels.components[low]
+    count = np.maximum(*pair)
+    plus, minus = (quanta_of(group, levels, form, negative) for negative in (False, True))
+    twice = np.flatnonzero((pair[0] == 2) & (pair[1] == 2))
+    rest = np.flatnonzero(count == 1)
+    mixed = np.flatnonzero((count == 2) & (np.minimum(*pair) == 1))
+    pieces = [
+        (rest, plus[up[rest]], plus[low[rest]]),
+        (twice, minus[up[twice]], plus[low[twice]]),
+        (twice, plus[up[twice]], minus[low[twice]]),
+        (mixed, plus[up[mixed]], plus[low[mixed]]),
+        (mixed, minus[up[mixed]], minus[low[mixed]]),
+    ]
+    index = np.concatenate([piece[0] for piece in pieces])
+    upper, lower = (np.concatenate([piece[i] for piece in pieces]) for i in (1, 2))
+    frequency, strength, energy, g = (column[index] for column in columns)
+    return GroupLines(frequency, strength, energy, g, upper, lower)
+
+
+def as_catalogue(lines: list[tuple[GroupLines, int]], form: Format, tag: int, dr: int) -> Catalogue:
+    """Lines of all groups, each with its QNFMT, in order of frequency."""
+    joined = {name: np.concatenate([getattr(each, name) for each, _ in lines]) for name in _COLUMNS}
+    qnfmt = np.concatenate([np.full(len(each.frequency_mhz), code) for each, code in lines])
+    order = np.argsort(joined["frequency_mhz"], kind="stable")
+    width = max(6, form.width)
+    quanta = {}
+    for name in ("upper", "lower"):
+        table = np.full((len(order), width), BLANK, dtype=np.int16)
+        table[:, : form.width] = joined[name][order]
+        quanta[name] = table
+    with np.errstate(divide="ignore"):
+        lgint = np.log10(joined["intensity"][order])
+    return Catalogue(
+        frequency_mhz=joined["frequency_mhz"][order],
+        error_mhz=np.zeros(len(order)),
+        lgint=lgint,
+        dr=np.full(len(order), dr, dtype=np.int16),
+        energy_lower_cm=joined["energy_lower_mhz"][order] / units.MHZ_PER_CM,
+        g_upper=joined["g_upper"][order].astype(np.int32),
+        tag=np.full(len(order), tag, dtype=np.int32),
+        qnfmt=qnfmt[order].astype(np.int32),
+        quanta_upper=quanta["upper"],
+        quanta_lower=quanta["lower"],
+    )
+
+
+def as_level_list(solved: list[tuple[Group, Levels]], form: Format) -> LevelList:
+    """The levels of all groups as an .egy file has them, ±K apart; block and rank count the blocks here."""
+    tables = []
+    for group, levels in solved:
+        for negative in (False, True):
+            rows = np.flatnonzero((levels.weight > 0) & (levels.components > int(negative)))
+            mixing = np.ones(len(levels)) if levels.mixing is None else levels.mixing
+            g = levels.multiplicity * (levels.weight // levels.components)
+            quanta = quanta_of(group, levels, form, negative)
+            tables.append((levels.energy_mhz[rows] / units.MHZ_PER_CM, mixing[rows], g[rows], quanta[rows]))
+    energy, mixing, g, quanta = (np.concatenate([table[i] for table in tables]) for i in range(4))
+    order = np.lexsort((energy, quanta[:, -1] if form.spins else quanta[:, 0]))
+    n = len(order)
+    return LevelList(
+        block=np.ones(n, dtype=np.int32),
+        rank=np.arange(1, n + 1, dtype=np.int32),
+        energy_cm=energy[order],
+        error_cm=np.zeros(n),
+        mixing=mixing[order],
+        degeneracy=g[order].astype(np.int32),
+        quanta=quanta[order].astype(np.int16),
+    )

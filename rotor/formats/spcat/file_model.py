@@ -1,0 +1,203 @@
+"""Levels of any .par or .var file: states that are connected are solved together, the others apart, then listed as one.
+
+Each group of connected states has a top that stands for its symmetry, and the file's own operators as its one effect.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from concurrent.futures import Executor
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rotor.arrays import Ints
+from rotor.formats.spcat.file_effect import CodedLine, FileEffect, Vector, coded_lines
+from rotor.formats.spcat.int_file import Dipole, IntensityFile
+from rotor.formats.spcat.par import ParameterFile
+from rotor.formats.spcat.states import StateOptions, states_of
+from rotor.quantum.levels import Levels
+from rotor.quantum.solve import solve_levels
+from rotor.quantum.spins import Spin
+from rotor.quantum.spins.blocks import levels_of_f
+from rotor.quantum.spins.operators import is_axial
+from rotor.tops.constants import Constants
+from rotor.tops.top import Top
+
+Dipoles = dict[tuple[int, int], Vector]
+
+
+@dataclass(frozen=True)
+class Group:
+    """States that are solved together: their options by number here, the top that stands for their symmetry, the effect."""
+
+    states: tuple[StateOptions, ...]
+    top: Top
+    effect: FileEffect
+    oblate: bool
+
+    @property
+    def spins(self) -> tuple[int, ...]:
+        """Doubled spins."""
+        return self.states[0].spins
+
+    def levels(self, twice_f: tuple[int, int], executor: Executor | None = None) -> Levels:
+        """The levels with F (doubled) from the first to the last of `twice_f`, with the file's weights.
+
+        The zero weights of levels that do not exist stay in the table.
+        """
+        if self.spins:
+            every = range(max(twice_f[0], sum(self.spins) % 2), twice_f[1] + 1, 2)
+            levels = levels_of_f(self.top, (self.effect,), every, None, executor)
+        else:
+            levels = solve_levels(
+                self.top, twice_f[1] // 2, jmin=twice_f[0] // 2, effects=(self.effect,), executor=executor
+            )
+        return replace(levels, weight=self._weights(levels))
+
+    def _weights(self, levels: Levels) -> Ints:
+        n, quanta = levels.rotational, levels.quanta
+        v = quanta.get("v", np.zeros(len(levels), dtype=np.int64))
+        total = np.zeros(len(levels), dtype=np.int64)
+        for place, state in enumerate(self.states):
+            for ka, kc, k, alike in _components(levels, n, self.oblate):
+                total += np.where((v == place) & alike, np.maximum(state.weights(n, ka, kc, k), 0), 0)
+        return total
+
+
+def _components(levels: Levels, n: Ints, oblate: bool) -> list[tuple[Ints, Ints, Ints, Ints]]:
+    """Ka, Kc, K of each component of the rows, and which rows have it: ±K of a symmetric top are two."""
+    quanta, every = levels.quanta, np.ones(len(levels), dtype=bool)
+    if "kc" in quanta:
+        return [(quanta["ka"], quanta["kc"], quanta["kc"] if oblate else quanta["ka"], every)]
+    k = quanta.get("k", np.zeros_like(n))
+    upper, lower = n - k, n - k + 1  # the other K of the two components; of K = 0 the first alone
+    pairs = [(upper, every), (lower, k > 0)]
+    return [(other, k, k, alike) if oblate else (k, other, k, alike) for other, alike in pairs]
+
+
+def groups_of(file: ParameterFile, intensities: IntensityFile, *, as_spcat: bool = False) -> list[Group]:
+    """The groups of connected states, by their lowest numbers.
+
+    as_spcat: K beyond KNMAX is left out of the basis, as SPCAT does; else every K to N is in it, unless KNMIN = KNMAX.
+    """
+    states = states_of(file)
+    first = file.options[0]
+    oblate, symmetric = first.nvib < 0, first.spind < 0
+    lines = coded_lines(file.parameters, len(states), oblate)
+    dipoles = dipoles_of(intensities.dipoles, len(states))
+    pairs = [line.states for line in lines if line.states] + list(dipoles)
+    _refuse_missing_spins(lines, states)
+    return [
+        _group([states[v] for v in numbers], lines, dipoles, oblate, symmetric, as_spcat, file.title)
+        for numbers in _connected(len(states), pairs)
+    ]
+
+
+def _connected(count: int, pairs: Iterable[tuple[int, int]]) -> list[list[int]]:
+    group = list(range(count))
+    for i, k in pairs:
+        low, high = sorted((group[i], group[k]))
+        group = [low if g == high else g for g in group]
+    return [[i for i in range(count) if group[i] == g] for g in sorted(set(group))]
+
+
+def _refuse_missing_spins(lines: list[CodedLine], states: tuple[StateOptions, ...]) -> None:
+    for line in lines:
+        needed = max((*line.operator.spins, 1 if line.operator.ns else 0), default=0)
+        concerned = states if line.states is None else [states[v] for v in line.states]
+        have = (
+            max(len(state.spins) for state in concerned)
+            if line.states is None
+            else min(len(s.spins) for s in concerned)
+        )
+        if needed > have:
+            raise ValueError(
+                f"parameter {line.name.partition('#')[0]}: spin {needed} is not among the {have} that SPIND names"
+            )
+
+
+def _group(
+    states: list[StateOptions],
+    lines: list[CodedLine],
+    dipoles: Dipoles,
+    oblate: bool,
+    symmetric: bool,
+    as_spcat: bool,
+    title: str,
+) -> Group:
+    numbers = tuple(state.number for state in states)
+    spins = states[0].spins
+    if any(state.spins != spins for state in states):
+        raise ValueError(f"states {numbers} are connected and have different spins: that is read but not computed yet")
+    here = {v: place for place, v in enumerate(numbers)}
+    moments = {(here[b], here[a]): mu for (a, b), mu in dipoles.items() if a in here and b in here}
+    own = tuple(line for line in lines if line.states is None or set(line.states) <= set(here))
+    usable = tuple(
+        line for line in own if max((*line.operator.spins, 1 if line.operator.ns else 0), default=0) <= len(spins)
+    )
+    kind = _kind(states, usable, oblate, symmetric)
+    limits = {} if kind in ("linear", "prolate", "oblate") else _limits(states, as_spcat)
+    coupled = tuple(Spin(f"I{place}", twice) for place, twice in enumerate(spins, 1))
+    effect = FileEffect(usable, numbers, coupled, moments, limits)
+    top = Top(_STANDS_FOR[kind, oblate], dipole_abc_debye=moments.get((0, 0), (0.0, 0.0, 0.0)), name=title)
+    return Group(tuple(states), top, effect, oblate)
+
+
+# the symmetry alone counts: the file's own operators are the whole Hamiltonian
+_STANDS_FOR = {
+    ("linear", False): Constants(B=1.0), ("linear", True): Constants(B=1.0),
+    ("prolate", False): Constants(A=2.0, B=1.0), ("oblate", True): Constants(B=2.0, C=1.0),
+    ("asymmetric", False): Constants(A=3.0, B=2.0, C=1.0, representation="Ir"),
+    ("asymmetric", True): Constants(A=3.0, B=2.0, C=1.0, representation="IIIl"),
+}  # fmt: skip
+
+
+def _kind(states: list[StateOptions], lines: tuple[CodedLine, ...], oblate: bool, symmetric: bool) -> str:
+    """linear; the symmetric kind whose axis is that of the basis, where K is good; else asymmetric."""
+    alone = len(states) == 1
+    plain = [powers for line in lines if line.operator.plain for powers in line.operator.plain]
+    if (
+        alone
+        and states[0].linear
+        and all(q == n == 0 for _, q, n in plain)
+        and not any(line.operator.of_j for line in lines)
+    ):
+        return "linear"
+    rotors = [line.operator.rotor for line in lines if line.operator.rotor is not None]
+    axis = "c" if oblate else "a"
+    good = all(n == 0 for _, _, n in plain) and all(is_axial(rotor, axis) for rotor in rotors)
+    whole = alone and states[0].kmin == 0 and states[0].kmax > 0
+    if symmetric and whole and good and not any(line.operator.of_j for line in lines):
+        return "oblate" if oblate else "prolate"
+    return "asymmetric"
+
+
+def _limits(states: list[StateOptions], as_spcat: bool) -> dict[int, tuple[int, int]]:
+    found = {}
+    for place, state in enumerate(states):
+        kmax = state.kmax if as_spcat or state.kmin == state.kmax else 10**6
+        if state.kmin > 0 or kmax < 10**6:
+            found[place] = (state.kmin, kmax)
+    return found
+
+
+def dipoles_of(dipoles: Iterable[Dipole], states: int) -> Dipoles:
+    """(μa, μb, μc) in D by pairs of states, lower first; lines of one code are added.
+
+    Raises ValueError for a dipole of another kind than a plain component along a, b or c.
+    """
+    found: dict[tuple[int, int], list[float]] = {}
+    step = 10 ** (1 if states <= 9 else 2 if states <= 99 else 3)
+    for dipole in dipoles:
+        rest, axis = divmod(dipole.code, 10)
+        rest, v1 = divmod(rest, step)
+        kind, v2 = divmod(rest, step)
+        if kind or axis not in (1, 2, 3):
+            raise ValueError(
+                f"dipole {dipole.code}: a moment other than a component along a, b or c (1, 2, 3) is read but not computed yet"
+            )
+        low, high = sorted((v1, v2))
+        if high < states:
+            found.setdefault((low, high), [0.0, 0.0, 0.0])[axis - 1] += dipole.value
+    return {pair: (mu[0], mu[1], mu[2]) for pair, mu in found.items()}

@@ -1,0 +1,166 @@
+"""What each parameter code of SPFIT means as an operator of this package: the one table of codes that compute.
+
+| field | meaning here |
+|---|---|
+| TYP 0; 1, 2, 3; 3 + n | 1; Na², Nb², Nc²; N₊^2n + N₋^2n |
+| TYP 20, 40, 60 | Na, Nb, Nc, between states with the factor i |
+| TYP 21, 41, 61 | NbNc + NcNb, NaNc + NcNa, NaNb + NbNa |
+| I1 | one N is replaced by that spin: Σ c_ij ½{φ_pi, N_j} S_p; TYP 20, 40, 60: φ_a·S, between states |
+| I1 = I2 | two N are: (Ia² - I²/3)/(2I(2I-1)), ... |
+| I1 ≠ I2 | I1·I2 with TYP 0, else the traceless tensor I1a I2a - I1·I2/3, ... |
+| KSQ, NSQ, NS | half anticommutators with Nz^2KSQ, then N^2NSQ (N·S1)^NS; NS > 4: NS - 5, and N_z S_z in place of the 1 of TYP 0 |
+
+(H. M. Pickett, documentation of SPFIT and SPCAT, and J. Mol. Spectrosc. 148, 371 (1991); each kind compared with the program's
+own levels.) Any other code is refused with its meaning.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from rotor.formats.spcat.codes import Digits
+from rotor.quantum.effects.interactions import with_powers
+from rotor.quantum.effects.spin_effect import ParameterName, matrix_of
+from rotor.quantum.j_operators import JOperator, anticommutator, components, identity, lowering, raising
+from rotor.quantum.spins.operators import Cosines, CosinesWithN, Matrix, Rotor, Scalar, Vector
+from rotor.quantum.states import OperatorOfJ
+from rotor.tops.operators import Operators
+
+ODD = {20: "a", 40: "b", 60: "c"}  # change sign under time reversal
+CROSS = {21: "bc", 41: "ac", 61: "ab"}
+REFUSED = {
+    "ex": "a term of an Euler series",
+    "ff": "a Fourier term of internal rotation, or a constant of one K",
+    "commutator": "a commutator of a spin term with Nz²",
+    "own": "the energy of one K",
+    "series": "a constant of an Euler or Fourier series",
+    "x": "an operator of odd order with ΔK = 2, 4, ... that keeps the species",
+    "high": "an operator of third or higher order outside orthorhombic symmetry",
+    "szsz": "N_z S_z together with another operator",
+}
+
+
+@dataclass(frozen=True)
+class CodedOperator:
+    """The operator of a code, without its states.
+
+    plain: by powers (p, q, n), of a term without spins. of_j: of one without spins that has no such powers. rotor, spins: of a spin
+    term, the places of the spins counted from 1. odd: time reversal changes its sign.
+    """
+
+    plain: Operators | None = None
+    of_j: OperatorOfJ | None = None
+    rotor: Rotor | None = None
+    spins: tuple[int, ...] = ()
+    odd: bool = False
+    n2: int = 0
+    nz2: int = 0
+    ns: int = 0
+
+
+def operator_of(digits: Digits, axes: str) -> CodedOperator:
+    """The operator of a code; axes: those at x, y, z (bca or bac).
+
+    Raises ValueError with the meaning of a code that does not compute.
+    """
+    _refuse(digits)
+    spins = tuple(place for place in (digits.i1, digits.i2) if place)
+    ns, typ = digits.ns, digits.typ
+    if ns > 4:  # N_z S_z of the first spin: with TYP 0 the product of both projections on z
+        spins, typ, ns = (1,), "abc".index(axes[2]) + 1, ns - 5
+    if spins or ns:
+        return _with_spins(digits._replace(typ=typ, ns=ns), spins, axes)
+    if typ in ODD or typ in CROSS:
+        return CodedOperator(of_j=_of_j(digits, axes), odd=typ in ODD)
+    return CodedOperator(plain=_plain(digits, axes))
+
+
+def _refuse(d: Digits) -> None:
+    found = {
+        "ex": d.ex > 0,
+        "ff": d.ff > 0,
+        "commutator": d.i1 == 0 and d.i2 > 0,
+        "own": 80 <= d.typ < 90,
+        "series": d.typ >= 90,
+        "x": 12 <= d.typ < 20,
+        "high": 20 <= d.typ < 80 and d.typ not in ODD and d.typ not in CROSS,
+        "szsz": d.ns > 4 and (d.typ != 0 or d.i1 > 0 or d.i2 > 0),
+    }
+    for reason, applies in found.items():
+        if applies:
+            raise ValueError(f"{REFUSED[reason]} is read but not computed yet")
+
+
+def _plain(d: Digits, axes: str) -> Operators:
+    """TYP 0 to 11 by powers (p, q, n): Nx² = ½(N² - Nz²) + ¼(N₊² + N₋²), Ny² with -¼."""
+    p, q = d.nsq, d.ksq
+    if d.typ == 0:
+        return {(p, q, 0): 1.0}
+    if d.typ > 3:
+        return {(p, q, d.typ - 3): 1.0}
+    place = axes.index("abc"[d.typ - 1])
+    if place == 2:
+        return {(p, q + 1, 0): 1.0}
+    return {(p + 1, q, 0): 0.5, (p, q + 1, 0): -0.5, (p, q, 1): 0.25 if place == 0 else -0.25}
+
+
+def _of_j(d: Digits, axes: str) -> OperatorOfJ:
+    powers = ParameterName("", d.nsq, d.ksq)
+
+    def operator(j: int, representation: str) -> JOperator:
+        of = components(j, representation)
+        if d.typ in ODD:
+            return with_powers(1j * of[ODD[d.typ]], powers)
+        return with_powers(anticommutator(of[CROSS[d.typ][0]], of[CROSS[d.typ][1]]), powers)
+
+    return operator
+
+
+def plain_of_j(operators: Operators) -> OperatorOfJ:
+    """Powers (p, q, n) as an operator of one J, for what connects two states."""
+
+    def operator(j: int, representation: str) -> JOperator:
+        total = 0.0 * identity(j)
+        for (p, q, n), factor in operators.items():
+            ladder = raising(j) ** (2 * n) + lowering(j) ** (2 * n) if n else identity(j)
+            total = total + factor * with_powers(ladder, ParameterName("", p, q))
+        return total
+
+    return operator
+
+
+def _with_spins(d: Digits, spins: tuple[int, ...], axes: str) -> CodedOperator:
+    powered = CodedOperator(spins=spins, n2=d.nsq, nz2=d.ksq, ns=d.ns)
+    if not spins:
+        plain = _plain(d._replace(nsq=0, ksq=0), axes)
+        if d.typ in ODD or d.typ in CROSS:
+            raise ValueError(f"N·S times an operator outside orthorhombic symmetry {NOT_YET}")
+        return replace(powered, rotor=Scalar(tuple(plain.items())))
+    if len(spins) == 2 and d.typ == 0:
+        if spins[0] == spins[1]:
+            raise ValueError(f"I·I of one spin is a number; it {NOT_YET}")
+        return replace(powered, rotor=Scalar())
+    if d.typ in ODD:
+        if len(spins) == 2:
+            raise ValueError(f"a vector product of two spins {NOT_YET}")
+        vector: Vector = tuple(float(axis == ODD[d.typ]) for axis in "abc")  # type: ignore[assignment]
+        return replace(powered, rotor=Cosines(vector), odd=True)
+    matrix = _matrix(d.typ, axes)
+    return replace(powered, rotor=CosinesWithN(matrix) if len(spins) == 1 else Cosines(matrix))
+
+
+NOT_YET = "is read but not computed yet"
+
+
+def _matrix(typ: int, axes: str) -> Matrix:
+    """c_ij of TYP 0 to 4 and the products of two axes."""
+    if typ == 0:
+        return matrix_of("iso")
+    if typ <= 3:
+        return matrix_of("abc"[typ - 1] * 2)
+    if typ == 4:  # N₊² + N₋² = 2 (Nx² - Ny²)
+        plain = matrix_of(f"{axes[0] * 2}-{axes[1] * 2}")
+        return tuple(tuple(2 * value for value in row) for row in plain)  # type: ignore[return-value]
+    if typ in CROSS:
+        return matrix_of(CROSS[typ])
+    raise ValueError(f"a spin term with ΔK = {2 * (typ - 3)} {NOT_YET}")

@@ -1,0 +1,210 @@
+"""What SPCAT does with files that have spins, several states or operators outside orthorhombic symmetry.
+
+The other files go through `predict`, with constants by their names.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from rotor import units
+from rotor.arrays import Ints
+from rotor.formats.spcat.catalogue import Catalogue
+from rotor.formats.spcat.codes import constants_of, split_code
+from rotor.formats.spcat.egy import LevelList
+from rotor.formats.spcat.file_lines import (
+    LEAST_MHZ,
+    Format,
+    as_catalogue,
+    as_level_list,
+    format_of,
+    lines_of,
+    transitions_of,
+    within,
+)
+from rotor.formats.spcat.file_model import Group, groups_of
+from rotor.formats.spcat.int_file import IntensityFile, Request
+from rotor.formats.spcat.par import ParameterFile
+from rotor.formats.spcat.states import doubled_spins
+from rotor.quantum.levels import Levels
+from rotor.spectra.lines import Lines
+from rotor.spectra.transitions import Transitions
+from rotor.thermo import PartitionFunction
+from rotor.tops.top import Top
+
+_TAIL = 1e-7  # of Q: what may lie beyond the last F
+_STEP = 8  # F that are added to Q at a time
+_LAST = 2000
+
+
+def is_plain(parameters: ParameterFile, intensities: IntensityFile | None) -> bool:
+    """Whether a file has one state, no spin and operators of orthorhombic symmetry, so that its constants have names."""
+    first = parameters.options[0]
+    one = abs(first.nvib) == 1 and len(parameters.options) == 1 and not doubled_spins(first.spind)
+    if not one or first.knmin != 0 or first.iax < 0:
+        return False
+    digits = [split_code(parameter.code) for parameter in parameters.parameters]
+    orthorhombic = all(
+        not (d.i1 or d.i2 or d.ns) and (d.typ < 12 or d.typ >= 80) and (d.v1, d.v2) in ((0, 0), (9, 9)) for d in digits
+    )
+    energies = any(not any(d[:8]) for d in digits)
+    own = intensities is None or all(dipole.code in (1, 2, 3) for dipole in intensities.dipoles)
+    return orthorhombic and own and not energies
+
+
+def predicted(
+    parameters: ParameterFile, intensities: IntensityFile, *, own_q: bool = False, as_spcat: bool = False
+) -> tuple[Catalogue, Lines, float, LevelList, list[str]]:
+    """Catalogue, lines, Q, levels and notes; see `predict.predict`."""
+    request = intensities.request
+    groups = groups_of(parameters, intensities, as_spcat=as_spcat)
+    form = format_of(parameters, groups)
+    q = summed_q(groups, request.temperature_k).q if own_q else request.qrot
+    solved = [(group, group.levels(f_range(group, request))) for group in groups]
+    transitions = [transitions_of(group, levels) for group, levels in solved]
+    pieces = [
+        (lines_of(group, levels, found, form, request, q), form.qnfmt(group.spins))
+        for (group, levels), found in zip(solved, transitions, strict=True)
+    ]
+    made = as_catalogue(pieces, form, request.tag, 2 if all(s.linear for g in groups for s in g.states) else 3)
+    notes = _notes(parameters, groups, request, as_spcat)
+    lines = _lines(parameters, solved, transitions, form, request, q)
+    return made, lines, q, as_level_list(solved, form), notes
+
+
+def f_range(group: Group, request: Request) -> tuple[int, int]:
+    """The doubled F from FBGN to FEND, which are rounded up."""
+    half = sum(group.spins) % 2
+    return max(0, 2 * request.fbgn - half), 2 * request.fend - half
+
+
+def summed_q(groups: list[Group], temperature_k: float) -> PartitionFunction:
+    """Q summed over all levels of all groups, F by F until the rest is below 1e-7 of it; the file's weights, its zero of energy."""
+    if not (math.isfinite(temperature_k) and temperature_k > 0):
+        raise ValueError(f"temperature {temperature_k} K: a temperature is above 0 K")
+    kt = temperature_k * units.MHZ_PER_K
+    total, last = 0.0, 0
+    for group in groups:
+        half, f, own, before = sum(group.spins) % 2, 0, 0.0, math.inf
+        while True:
+            levels = group.levels((2 * f + half, 2 * (f + _STEP) - 2 + half))
+            piece = float((levels.degeneracy * np.exp(-levels.energy_mhz / kt)).sum())
+            own, f = own + piece, f + _STEP
+            if piece < before and piece * piece / (before - piece) < _TAIL * own:
+                break
+            if f > _LAST:
+                raise ValueError(f"Q({temperature_k:g} K) needs levels beyond F = {_LAST}; give QROT")
+            before = piece
+        total, last = total + own, max(last, f - 1)
+    return PartitionFunction(
+        temperature_k, total, last, _TAIL, f"summed from levels to F = {last}, relative error below {_TAIL:g}"
+    )
+
+
+def _lines(
+    parameters: ParameterFile,
+    solved: list[tuple[Group, Levels]],
+    transitions: list[Transitions],
+    form: Format,
+    request: Request,
+    q: float,
+) -> Lines:
+    """The lines as this package has them: one table of levels for all groups, one line for both components of ±K."""
+    starts = np.cumsum([0, *(len(levels) for _, levels in solved)])
+    levels = _joined(solved, form)
+    t = request.temperature_k
+    above = math.exp(levels.ground_mhz / units.MHZ_PER_K / t)  # Q counts from zero, `Lines` from the lowest level
+    lines = Lines(
+        top=_shown(parameters, solved[0][0]),
+        levels=levels,
+        frequency_mhz=np.concatenate([each.frequency_mhz for each in transitions]),
+        strength_debye2=np.concatenate([each.strength_debye2 for each in transitions]),
+        upper=np.concatenate([each.upper + start for each, start in zip(transitions, starts, strict=False)]).astype(
+            np.int32
+        ),
+        lower=np.concatenate([each.lower + start for each, start in zip(transitions, starts, strict=False)]).astype(
+            np.int32
+        ),
+        temperature_k=t,
+        min_lgint=request.str0,
+        range_mhz=(LEAST_MHZ, request.fqlim_ghz * 1e3),
+        given_partition=PartitionFunction(t, q * above, None, math.nan, "given"),
+    )
+    kept = within(request, lines.frequency_mhz, lines.intensity_nm2_mhz / levels.components[lines.lower])
+    return lines.where(kept).sorted()
+
+
+def _joined(tables: list[tuple[Group, Levels]], form: Format) -> Levels:
+    """The levels of all groups in one table, v as the file numbers it; a level without a spin that others have repeats its total."""
+    most = max((levels for _, levels in tables), key=lambda levels: len(levels.quanta))
+    names = [name for name in most.quanta if name != "v"]
+    quanta: dict[str, Ints] = {}
+    if form.states:
+        quanta["v"] = np.concatenate([_file_numbers(group, levels) for group, levels in tables])
+    for name in names:
+        quanta[name] = np.concatenate([_column(levels, name, most) for _, levels in tables])
+    joined: dict[str, Any] = {
+        name: np.concatenate([getattr(levels, name) for _, levels in tables])
+        for name in ("energy_mhz", "multiplicity", "components", "weight")
+    }
+    mixing = [np.ones(len(levels)) if levels.mixing is None else levels.mixing for _, levels in tables]
+    return replace(most, quanta=quanta, blocks=(), mixing=np.concatenate(mixing), **joined)
+
+
+def _file_numbers(group: Group, levels: Levels) -> Ints:
+    numbers = np.array([state.number for state in group.states])
+    return np.asarray(numbers[levels.quanta.get("v", np.zeros(len(levels), dtype=np.int64))])
+
+
+def _column(levels: Levels, name: str, most: Levels) -> Ints:
+    if name in levels.quanta:
+        return np.asarray(levels.quanta[name])
+    if name in ("n", "j"):
+        return levels.rotational
+    if name in ("k", "ka"):
+        return np.asarray(levels.quanta.get("k", np.zeros(len(levels), dtype=np.int64)))
+    if name == "kc":
+        return np.asarray(levels.rotational - levels.quanta.get("k", np.zeros(len(levels), dtype=np.int64)))
+    total = (levels.multiplicity - 1).astype(np.int64)
+    return np.asarray(total if name in most.halves else total // 2)
+
+
+def _shown(parameters: ParameterFile, group: Group) -> Top:
+    """The top of the lowest state by its named constants, where they have names; else the one that stands for the symmetry."""
+    states = max(abs(parameters.options[0].nvib), 1)
+    own = []
+    for parameter in parameters.parameters:
+        d = split_code(parameter.code, states)
+        wild = d.v1 == d.v2 and d.v1 >= states
+        if not (d.i1 or d.i2 or d.ns) and d.typ < 12 and any(d[:8]) and (wild or d.v1 == d.v2 == 0):
+            code = (d.typ * 10 + d.ksq) * 1000 + d.nsq * 100
+            own.append(replace(parameter, code=code, constrained=False, text=""))
+    first = parameters.options[0]
+    option = replace(first, spind=-1 if first.spind < 0 else 1, nvib=-1 if first.nvib < 0 else 1, knmin=0, text="")
+    if group.states[0].linear:
+        option = replace(option, spind=-1, knmax=0)
+    try:
+        constants = constants_of(replace(parameters, options=(option,), parameters=tuple(own)))
+    except ValueError:
+        return group.top
+    return replace(group.top, constants=constants)
+
+
+def _notes(parameters: ParameterFile, groups: list[Group], request: Request, as_spcat: bool) -> list[str]:
+    """What SPCAT does in silence with these files, and what is done here."""
+    found, notes = len(parameters.parameters), []
+    if parameters.header.npar > found:
+        notes.append(f"NPAR = {parameters.header.npar}, but {found} parameters stand in the file: those are used")
+    for group in groups:
+        highest = request.fend + sum(group.spins) // 2
+        for state in group.states:
+            if state.kmin < state.kmax < highest and not as_spcat:
+                notes.append(
+                    f"KNMAX = {state.kmax} of state {state.number} is below the highest N, {highest}: SPCAT leaves K > {state.kmax} "
+                    "out of its basis without a word; here every K to N is in it"
+                )
+    return notes

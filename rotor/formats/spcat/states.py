@@ -1,0 +1,108 @@
+"""What the option lines of a .par file say of each state: spins, range of K, weights; and how levels are called there.
+
+The first line sets the defaults of all states; where VSYM is negative another line follows, for the state |NVIB|, and says what
+differs there (H. M. Pickett, documentation of SPFIT and SPCAT, "line 3, option information").
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor.arrays import Ints
+from rotor.formats.spcat.par import Options, ParameterFile
+
+SPECIES = {"ee": "A", "eo": "a", "oo": "b", "oe": "c"}  # of the rotational function, by parities of Ka and Kc
+_FOLDS = {6: 3, 9: 5}  # IAX of tops whose E levels have one weight
+_DOUBLED = 2
+
+
+@dataclass(frozen=True)
+class StateOptions:
+    """Of one state: doubled spins in the order of coupling, range of K, axis and weights, weight of E levels, l, I_tot basis."""
+
+    number: int
+    spins: tuple[int, ...]
+    kmin: int
+    kmax: int
+    iax: int
+    plus: int
+    minus: int
+    e_weight: int
+    l_code: int
+    i_tot: bool
+
+    @property
+    def linear(self) -> bool:
+        """Whether K = 0 alone is in the basis."""
+        return self.kmin == self.kmax == 0
+
+    def weights(self, n: Ints, ka: Ints, kc: Ints, k: Ints) -> Ints:
+        """Nuclear-spin weight of one component of levels, as the file has it; zero or less where a level does not exist.
+
+        n, ka, kc: (n,) labels, k: K along the axis of the basis.
+        """
+        even = {1: ka % 2 == 0, 2: (ka + kc) % 2 == 0, 3: kc % 2 == 0}.get(self.iax, (ka + kc) % 2 == 0)
+        weight = np.where(even, self.plus, self.minus)
+        fold = _FOLDS.get(self.iax)
+        return np.where((k - self.l_code) % fold != 0, self.e_weight, weight) if fold else weight
+
+    def is_e(self, k: Ints) -> NDArray[np.bool_]:
+        """Which levels are of E species, whose K is not signed."""
+        fold = _FOLDS.get(self.iax)
+        return (k - self.l_code) % fold != 0 if fold else np.zeros(np.shape(k), dtype=bool)
+
+
+def doubled_spins(spind: int) -> tuple[int, ...]:
+    """2I of every spin that SPIND names, the one coupled first at its end; with a last digit 0 two digits a spin.
+
+    >>> doubled_spins(44), doubled_spins(-32), doubled_spins(1), doubled_spins(-1080)
+    ((3, 3), (1, 2), (), (7, 0))
+    """
+    digits, width = str(abs(spind)), 1
+    if digits.endswith("0") and len(digits) > 1:
+        digits, width = digits[:-1], 2
+    sizes = [int(digits[max(end - width, 0) : end]) for end in range(len(digits), 0, -width)]
+    while sizes and sizes[-1] <= 1:
+        sizes.pop()
+    return tuple(size - 1 for size in sizes)
+
+
+def states_of(file: ParameterFile) -> tuple[StateOptions, ...]:
+    """The options of every state; ValueError for an axis of weights that is not computed yet, and l-doubled states."""
+    first = file.options[0]
+    digits = str(max(first.vsym, 0))[::-1]
+    found = []
+    for v in range(max(abs(first.nvib), 1)):
+        own = [line for line in file.options[1:] if abs(line.nvib) == v]
+        swapped = not file.options[1:] and v < len(digits) and int(digits[v]) % 2 == 1
+        found.append(_state(v, own[-1] if own else first, first, swapped))
+    return tuple(found)
+
+
+def _state(v: int, line: Options, first: Options, swapped: bool) -> StateOptions:
+    factor = 100 if first.ewt >= 0 else 1000
+    code, weight = divmod(abs(line.ewt), factor)
+    iax = abs(line.iax)
+    if iax not in (0, 1, 2, 3, *_FOLDS):
+        raise ValueError(
+            f"IAX = {line.iax} of state {v}: weights other than by IAX 1, 2, 3, 6 or 9 are read but not computed yet"
+        )
+    if code:
+        raise ValueError(f"EWT = {line.ewt} of state {v}: l-doubled states are read but not computed yet")
+    if line.iax < 0:
+        raise ValueError(
+            f"IAX = {line.iax} of state {v}: the basis of a total spin of equivalent nuclei is read but not computed yet"
+        )
+    kmax = line.knmax if 0 <= line.knmax <= 359 else 359
+    plus, minus = (line.wtmn, line.wtpl) if swapped else (line.wtpl, line.wtmn)
+    return StateOptions(
+        v, doubled_spins(line.spind), line.knmin, max(kmax, line.knmin), iax, plus, minus, weight, code, line.iax < 0
+    )
+
+
+def is_odd(ka: Ints, kc: Ints) -> NDArray[np.bool_]:
+    """Which levels have a species that SPCAT counts as odd: Ba and Bc, Ka + Kc odd."""
+    return np.asarray((ka + kc) % 2 == 1)

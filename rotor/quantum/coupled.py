@@ -1,0 +1,317 @@
+"""Levels whose Wang blocks are connected: several states, and operators outside orthorhombic symmetry.
+
+Of each J the Wang blocks of all states are the vertices of a graph, whose edges are the operators that connect two of them;
+every connected part is one matrix, real in functions with the factors of `j_operators.phase`, and is solved whole. A
+level is named after the function of one state and one Wang block, solved by itself, that it overlaps with; names are given one to
+one, so that the sum of all these overlaps is largest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from concurrent.futures import Executor
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from rotor.arrays import Floats, Ints
+from rotor.quantum.basis import WangBlock, limited, names_of, wang_blocks
+from rotor.quantum.effect import k_limits_of
+from rotor.quantum.effects.watson import JMatrix, block_bands, scalar_energy
+from rotor.quantum.j_operators import Complexes, JOperator, between_blocks
+from rotor.quantum.levels import Levels, weights_of_levels
+from rotor.quantum.states import Coupling, State
+from rotor.tops.operators import Operators
+
+if TYPE_CHECKING:
+    from rotor.quantum.effect import QuantumEffect
+    from rotor.tops.top import Top
+
+_NOTHING = 1e-13  # of an operator's largest element: what is smaller between two blocks is round-off of zero
+
+
+class Part(NamedTuple):
+    """The functions of one state v and one Wang block, at `start` ... in a coupled block."""
+
+    v: int
+    basis: WangBlock
+    start: int
+
+    @property
+    def place(self) -> slice:
+        """Where the functions stand in the block."""
+        return slice(self.start, self.start + self.basis.size)
+
+
+@dataclass(frozen=True)
+class CoupledBlock:
+    """Wang blocks of one J solved together: energies (n,) in MHz, rising, eigenvectors (n, n) in columns over the parts.
+
+    labels: (n, 3) v, Ka, Kc of every state. mixing: (n,) its overlap, squared, with the function that names it. Functions
+    carry the factor of `j_operators.phase`. start: row of the first state.
+    """
+
+    j: int
+    parts: tuple[Part, ...]
+    energies_mhz: Floats
+    vectors: Floats
+    labels: Ints
+    mixing: Floats
+    start: int = 0
+
+
+@dataclass(frozen=True)
+class Model:
+    """What a coupled calculation consists of: operators of every state by v, couplings with their values in MHz, and the representation."""
+
+    states: dict[int, Operators]
+    couplings: tuple[tuple[float, Coupling], ...]
+    representation: str
+    limits: dict[int, tuple[int, int]] = field(default_factory=dict)
+
+
+def model_of(top: Top, effects: tuple[QuantumEffect, ...], operators: Operators, representation: str) -> Model:
+    """The states and couplings that the effects bring, beside the operators of the top's own state."""
+    states, couplings = {0: operators}, []
+    for effect in effects:
+        values = effect.parameters(top)
+        couplings += [(values[coupling.name], coupling) for coupling in effect.couplings(top)]
+        couplings += [
+            (value, _own_coupling(top, effect, name))
+            for name, value in values.items()
+            if effect.j_operator(top, name, 1, representation) is not None
+        ]
+        states |= {state.v: state.operators(values) for state in effect.states(top)}
+    extra_states(top, effects)
+    for _, coupling in couplings:
+        for v in (coupling.bra, coupling.ket):
+            if v not in states:
+                raise ValueError(f"coupling {coupling.name}: state {v} is not defined; known are {sorted(states)}")
+    return Model(states, tuple(couplings), representation, k_limits_of(top, effects))
+
+
+def _own_coupling(top: Top, effect: QuantumEffect, name: str) -> Coupling:
+    def operator(j: int, representation: str) -> JOperator:
+        found = effect.j_operator(top, name, j, representation)
+        assert found is not None
+        return found
+
+    return Coupling(name, 0, 0, operator)
+
+
+def extra_states(top: Top, effects: tuple[QuantumEffect, ...]) -> list[State]:
+    """The states that effects bring; ValueError where two have one number."""
+    found = [state for effect in effects for state in effect.states(top)]
+    numbers = [0, *(state.v for state in found)]
+    if len(set(numbers)) < len(numbers):
+        raise ValueError(f"states {numbers}: every state has a number v of its own, and 0 is the top's")
+    return found
+
+
+def coupled_levels(
+    top: Top, effects: tuple[QuantumEffect, ...], model: Model, jmin: int, jmax: int, executor: Executor | None = None
+) -> Levels:
+    """All levels of a coupled calculation from J = `jmin` to `jmax`, by quantum numbers j, ka, kc and, of several states, v."""
+    every_j = range(jmin, jmax + 1)
+    pieces = [(model, j) for j in every_j]
+    solved = (
+        executor.map(solve_coupled, *zip(*pieces, strict=True)) if executor else (solve_coupled(*p) for p in pieces)
+    )
+    blocks = tuple(_placed(block for of_one_j in solved for block in of_one_j))
+
+    labels = np.concatenate([block.labels for block in blocks])
+    quanta = {"v": labels[:, 0]} if len(model.states) > 1 else {}
+    j = np.repeat([block.j for block in blocks], [len(block.energies_mhz) for block in blocks])
+    levels = Levels(
+        kind=top.kind,
+        representation=model.representation,
+        jmax=jmax,
+        energy_mhz=np.concatenate([block.energies_mhz for block in blocks]),
+        quanta=quanta | {"j": j, "ka": labels[:, 1], "kc": labels[:, 2]},
+        multiplicity=2 * j + 1,
+        components=np.ones_like(j),
+        weight=np.ones_like(j),
+        effects=effects,
+        blocks=blocks,
+        mixing=np.concatenate([block.mixing for block in blocks]),
+    )
+    weighted = replace(levels, weight=_weights(top, effects, levels))
+    _refuse_mixed_weights(weighted)
+    return weighted
+
+
+def _weights(top: Top, effects: tuple[QuantumEffect, ...], levels: Levels) -> Ints:
+    weight = weights_of_levels(levels, top.spin_weights)
+    for state in extra_states(top, effects):
+        if state.spin_weights is not None:
+            weight = np.where(levels.quanta["v"] == state.v, weights_of_levels(levels, state.spin_weights), weight)
+    return weight
+
+
+def _refuse_mixed_weights(levels: Levels) -> None:
+    """States of one block have one symmetry, so that their nuclear-spin weights are one number."""
+    for block in levels.blocks:
+        found = levels.weight[block.start : block.start + len(block.energies_mhz)]
+        if len(found) and (found != found[0]).any():
+            row = block.start + int(np.argmax(found != found[0]))
+            raise ValueError(
+                f"an effect mixes levels of nuclear-spin weights {found[0]} and {levels.weight[row]} "
+                f"({', '.join(levels.quanta)} = {levels.labels(np.array([block.start]))[0].strip()} and "
+                f"{levels.labels(np.array([row]))[0].strip()}): symmetry forbids that; check the effect or the spin weights"
+            )
+
+
+def _placed(solved: Iterator[CoupledBlock]) -> Iterator[CoupledBlock]:
+    start = 0
+    for block in solved:
+        yield replace(block, start=start)
+        start += len(block.energies_mhz)
+
+
+def solve_coupled(model: Model, j: int) -> list[CoupledBlock]:
+    """The coupled blocks of one J."""
+    vertices = [(v, basis) for v in sorted(model.states) for basis in _blocks_of_state(model, v, j)]
+    edges = _edges(model, vertices, j)
+    diagonal = {v: JMatrix(operators, j) for v, operators in model.states.items()}
+    scalars = {v: scalar_energy(operators, j) for v, operators in model.states.items()}
+    zero = scalars[0]  # taken out of the matrices for the sake of digits
+    out = []
+    for members in _connected(len(vertices), edges):
+        parts = _parts([vertices[i] for i in members])
+        matrix = np.zeros((parts[-1].place.stop,) * 2)
+        for part in parts:
+            matrix[part.place, part.place] = _dense(block_bands(diagonal[part.v], part.basis))
+            matrix[part.place, part.place] += (scalars[part.v] - zero) * np.eye(part.basis.size)
+        for a, i in enumerate(members):
+            for b, k in enumerate(members):
+                if (i, k) in edges:
+                    matrix[parts[a].place, parts[b].place] += edges[i, k]
+        out.append(_solved(j, parts, matrix, zero, model.representation))
+    return out
+
+
+def _blocks_of_state(model: Model, v: int, j: int) -> list[WangBlock]:
+    whole = wang_blocks(j, model.representation)
+    return [part for b in whole if (part := limited(b, *model.limits[v]))] if v in model.limits else whole
+
+
+def _edges(model: Model, vertices: list[tuple[int, WangBlock]], j: int) -> dict[tuple[int, int], Floats]:
+    """What connects two vertices, both ways round, and a vertex with itself; nothing for what round-off alone leaves."""
+    found: dict[tuple[int, int], Floats] = {}
+    for value, coupling in model.couplings:
+        operator = value * coupling.operator(j, model.representation)
+        largest = max((float(np.abs(band).max(initial=0.0)) for band in operator.bands.values()), default=0.0)
+        for i, (bra, up) in enumerate(vertices):
+            for k, (ket, low) in enumerate(vertices):
+                if (bra, ket) != (coupling.bra, coupling.ket) or not largest:
+                    continue
+                between = between_blocks(up, low, operator)
+                if np.abs(between).max() <= _NOTHING * largest:
+                    continue
+                _refuse_imaginary(coupling, between, largest)
+                _add(found, (i, k), between.real)
+                if bra != ket:
+                    _add(found, (k, i), between.real.T)
+    return found
+
+
+def _add(found: dict[tuple[int, int], Floats], key: tuple[int, int], matrix: Floats) -> None:
+    found[key] = found[key] + matrix if key in found else matrix
+
+
+def _refuse_imaginary(coupling: Coupling, between: Complexes, largest: float) -> None:
+    if np.abs(between.imag).max() > _NOTHING * largest:
+        raise ValueError(
+            f"{coupling.name}: the operator is not invariant under time reversal; an odd power of J is Hermitian and allowed "
+            "between two states only, with the factor i"
+        )
+
+
+def _connected(count: int, edges: dict[tuple[int, int], Floats]) -> list[list[int]]:
+    """The connected parts of the graph, each in rising order."""
+    group = list(range(count))
+    for i, k in edges:
+        low, high = sorted((group[i], group[k]))
+        group = [low if g == high else g for g in group]
+    return [[i for i in range(count) if group[i] == g] for g in dict.fromkeys(group)]
+
+
+def _parts(members: list[tuple[int, WangBlock]]) -> tuple[Part, ...]:
+    starts = np.cumsum([0, *(basis.size for _, basis in members)])
+    return tuple(Part(v, basis, int(start)) for (v, basis), start in zip(members, starts, strict=False))
+
+
+def _dense(bands: list[Floats]) -> Floats:
+    matrix = np.diag(bands[0])
+    for n, band in enumerate(bands[1:], 1):
+        matrix += np.diag(band, n) + np.diag(band, -n)
+    return np.asarray(matrix)
+
+
+def _solved(j: int, parts: tuple[Part, ...], matrix: Floats, zero: float, representation: str) -> CoupledBlock:
+    if not np.isfinite(matrix).all():
+        raise ValueError("a block of the Hamiltonian overflows: J max is too high for these constants")
+    energies, vectors = np.linalg.eigh(matrix)
+    names, functions = [], []
+    for part in parts:
+        ka, kc = names_of(part.basis, representation)
+        names.append(np.stack([np.full_like(ka, part.v), ka, kc], axis=1))
+        functions.append(np.linalg.eigh(matrix[part.place, part.place]).eigenvectors.T @ vectors[part.place])
+    overlaps = np.concatenate(functions) ** 2
+    of_state = one_to_one(overlaps) if len(parts) > 1 else np.arange(len(energies))
+    labels = np.concatenate(names)[of_state]
+    return CoupledBlock(j, parts, energies + zero, vectors, labels, overlaps[of_state, np.arange(len(energies))])
+
+
+def one_to_one(overlaps: Floats) -> Ints:
+    """Which function names each state: (n,) rows of `overlaps` (functions, states), each once, their sum largest."""
+    clear = overlaps.argmax(axis=0)
+    if len(set(clear.tolist())) == len(clear):
+        return np.asarray(clear)
+    from scipy.optimize import linear_sum_assignment
+
+    rows, columns = linear_sum_assignment(overlaps, maximize=True)
+    out = np.empty(len(rows), dtype=np.int64)
+    out[columns] = rows
+    return out
+
+
+def parameter_matrix(
+    top: Top, effects: tuple[QuantumEffect, ...], representation: str, block: CoupledBlock, name: str
+) -> Floats:
+    """∂H/∂c of one parameter over the functions of a coupled block, (n, n).
+
+    A parameter enters through operators of the top's own state, through other operators of J, and through the couplings of
+    its name.
+    """
+    out = np.zeros((len(block.energies_mhz),) * 2)
+    for effect in effects:
+        own = [State(0, effect.operators(top)), *effect.states(top)]
+        for state in own:
+            _add_own(out, block, state.v, state.terms.get(name, {}))
+        if name in effect.parameters(top) and (operator := effect.j_operator(top, name, block.j, representation)):
+            _add_between(out, block, 0, 0, operator)
+        for coupling in effect.couplings(top):
+            if coupling.name == name:
+                _add_between(out, block, coupling.bra, coupling.ket, coupling.operator(block.j, representation))
+    return out
+
+
+def _add_own(out: Floats, block: CoupledBlock, v: int, operators: Operators) -> None:
+    if not operators:
+        return
+    of_j, scalar = JMatrix(operators, block.j), scalar_energy(operators, block.j)
+    for part in block.parts:
+        if part.v == v:
+            out[part.place, part.place] += _dense(block_bands(of_j, part.basis)) + scalar * np.eye(part.basis.size)
+
+
+def _add_between(out: Floats, block: CoupledBlock, bra: int, ket: int, operator: JOperator) -> None:
+    for up in block.parts:
+        for low in block.parts:
+            if (up.v, low.v) == (bra, ket):
+                between = between_blocks(up.basis, low.basis, operator).real
+                out[up.place, low.place] += between
+                if bra != ket:
+                    out[low.place, up.place] += between.T

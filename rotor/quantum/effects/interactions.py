@@ -1,0 +1,146 @@
+"""Several vibrational or tunnelling states: their own constants, and Coriolis and Fermi terms between them.
+
+    ⟨v|H|v'⟩ = Σ i G_a N_a + Σ F_bc {N_b, N_c} + W,     v < v',     [N_a, N_b] = -i N_c
+
+and the Hermitian conjugate for v' < v. G has a factor i because N changes its sign under time reversal; the sign is that of SPFIT
+(measured: the other sign of G against F moves levels by 0.01 cm⁻¹ at J = 15). Parameters, MHz: E[1] and any constant of the top's own
+vocabulary with a state, A[1], DeltaJK[1]; between states G_a[0,1], F_bc[0,1], W[0,1], W_pm2[0,1] (with N₊² + N₋²), each with powers,
+G_c_J[0,1] with N², F_ab_K[0,1] with Nz², as half anticommutators. Every other constant of a state must be given: none is taken from
+the top's own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import TYPE_CHECKING, ClassVar, Self
+
+from rotor.quantum.effect import QuantumEffect
+from rotor.quantum.effects.spin_effect import ParameterName, parse_name
+from rotor.quantum.effects.watson import operators_of_name
+from rotor.quantum.j_operators import JOperator, anticommutator, components, identity, j_z, lowering, raising
+from rotor.quantum.states import Coupling, State
+from rotor.tops.operators import Operators
+from rotor.tops.spin_weights import SpinWeights
+
+if TYPE_CHECKING:
+    from rotor.tops.top import Top
+
+Vector = tuple[float, float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class InteractingStates(QuantumEffect):
+    """States beyond the top's own (v = 0), by parameters with their states in square brackets.
+
+    values: MHz by name. weights: spin weights of states that differ from the top's. moments: dipoles (a, b, c) in debye by pairs of
+    states (v', v), within states and between them; those between states are real in the phases of the couplings.
+    """
+
+    name: ClassVar[str] = "interacting states"
+    conserved: ClassVar[frozenset[str]] = frozenset({"j"})
+
+    values: Mapping[str, float]
+    weights: Mapping[int, SpinWeights] = field(default_factory=dict)
+    moments: Mapping[tuple[int, int], Vector] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        names = {}
+        for name, value in self.values.items():
+            if state_of_constant(name):
+                names[name] = float(value)
+            else:
+                names[_coupling(name, parse_name(name)).name] = float(value)
+        object.__setattr__(self, "values", MappingProxyType(names))
+        moments = {(max(pair), min(pair)): tuple(vector) for pair, vector in self.moments.items()}
+        object.__setattr__(self, "moments", MappingProxyType(moments))
+        object.__setattr__(self, "weights", MappingProxyType(dict(self.weights)))
+
+    def __reduce__(self) -> tuple[type[Self], tuple[object, ...]]:
+        return type(self), (dict(self.values), dict(self.weights), dict(self.moments))
+
+    def parameters(self, top: Top) -> dict[str, float]:
+        """The values in MHz."""
+        return dict(self.values)
+
+    def states(self, top: Top) -> tuple[State, ...]:
+        """Every state that has a constant of its own."""
+        terms: dict[int, dict[str, Operators]] = {}
+        for name in self.values:
+            if own := state_of_constant(name):
+                constant, v = own
+                terms.setdefault(v, {})[name] = (
+                    {(0, 0, 0): 1.0} if constant == "E" else operators_of_name(top.constants, constant)
+                )
+        return tuple(State(v, terms[v], self.weights.get(v)) for v in sorted(terms))
+
+    def couplings(self, top: Top) -> tuple[Coupling, ...]:
+        """Every parameter between two states."""
+        return tuple(_coupling(name, parse_name(name)) for name in self.values if not state_of_constant(name))
+
+    def dipoles(self, top: Top) -> dict[tuple[int, int], Vector]:
+        """The dipoles given, by pairs of states."""
+        return dict(self.moments)
+
+    def with_values(self, values: Mapping[str, float]) -> Self:
+        """The same effect with other values of some of its parameters."""
+        return type(self)({**self.values, **values}, self.weights, self.moments)
+
+    def size_mhz(self, top: Top, j: int) -> float:
+        """The largest coupling at K = J."""
+        sizes = [0.0]
+        for name, value in self.values.items():
+            if not state_of_constant(name):
+                parts = parse_name(name)
+                order = {"G": 1, "F": 2}.get(parts.symbol[0], 2 * ("pm" in parts.symbol)) + 2 * (parts.n2 + parts.nz2)
+                sizes.append(abs(value) * max(j, 1) ** order)
+        return max(sizes)
+
+
+def state_of_constant(name: str) -> tuple[str, int] | None:
+    """The constant and the state of a name such as A[1]; None for what connects two states.
+
+    >>> state_of_constant("DeltaJK[2]"), state_of_constant("G_c[0,1]")
+    (('DeltaJK', 2), None)
+    """
+    head, bracket, tail = name.partition("[")
+    if not bracket or not tail.endswith("]") or "," in tail:
+        return None
+    number = tail[:-1].strip()
+    if not number.isdigit() or int(number) < 1:
+        raise ValueError(f"{name}: states are numbered from 1; 0 is the top's own, whose constants have no brackets")
+    return head.strip(), int(number)
+
+
+_ORDERS = {"pm2": 2, "pm4": 4, "pm6": 6}
+
+
+def _coupling(name: str, parts: ParameterName) -> Coupling:
+    if parts.states is None or parts.states[0] == parts.states[1] or parts.spins or parts.ns:
+        raise ValueError(f"{name}: an interaction connects two states, in square brackets, as in G_c[0,1]")
+    kind, _, letters = parts.symbol.partition("_")
+    known = {"G": ("a", "b", "c"), "F": ("bc", "ac", "ab"), "W": ("", *_ORDERS)}
+    if letters not in known.get(kind, ()):
+        spelled = ", ".join(f"{k}_{x}" if x else k for k, names in known.items() for x in names)
+        raise ValueError(f"{name}: interactions between states are {spelled}")
+
+    def operator(j: int, representation: str) -> JOperator:
+        return with_powers(_plain(kind, letters, j, representation), parts)
+
+    return Coupling(parts.text, parts.states[0], parts.states[1], operator)
+
+
+def _plain(kind: str, letters: str, j: int, representation: str) -> JOperator:
+    if kind == "W":
+        return identity(j) if not letters else raising(j) ** _ORDERS[letters] + lowering(j) ** _ORDERS[letters]
+    of = components(j, representation)
+    return 1j * of[letters] if kind == "G" else anticommutator(of[letters[0]], of[letters[1]])
+
+
+def with_powers(operator: JOperator, parts: ParameterName) -> JOperator:
+    """½{Jz^2q, O} J^2p."""
+    j = operator.j
+    if parts.nz2:
+        operator = 0.5 * anticommutator(j_z(j) ** (2 * parts.nz2), operator)
+    return (j * (j + 1.0)) ** parts.n2 * operator

@@ -1,0 +1,171 @@
+"""What the effects of spins have in common: parameters by name, each with the spins and the powers it belongs to.
+
+    symbol [_powers] (spin [, spin]) [state]          chi_aa(14N), C_ab_J(H1), T_bb-cc(S, 14N), chi_aa(14N)[1]
+
+powers: J for N², K for Nz², S for N·S of the first spin, as half anticommutators, one letter a factor. Without a state in square
+brackets a parameter belongs to every state. The values are in MHz.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from types import MappingProxyType
+from typing import TYPE_CHECKING, ClassVar, NamedTuple, Self
+
+from rotor.quantum.effect import QuantumEffect
+from rotor.quantum.spins import Spin
+from rotor.quantum.spins.operators import EVERY_STATE, Matrix, Rotor, SpinTerm
+
+if TYPE_CHECKING:
+    from rotor.tops.top import Top
+
+_NAME = re.compile(
+    r"(?P<symbol>[A-Za-z]+(?:_(?:[abc]{2}(?:-[abc]{2})?|[abcF]|iso|pm\d))?)(?:_(?P<powers>[JKS]+))?"
+    r"(?:\((?P<spins>[^()]*)\))?(?:\[(?P<states>\d+(?:,\s*\d+)?)\])?"
+)
+
+
+class ParameterName(NamedTuple):
+    """A name taken apart: symbol, powers of N², Nz² and N·S, spins, and the states v', v that it connects (None: all)."""
+
+    symbol: str
+    n2: int = 0
+    nz2: int = 0
+    ns: int = 0
+    spins: tuple[str, ...] = ()
+    states: tuple[int, int] | None = None
+
+    @property
+    def text(self) -> str:
+        """The name as it is written."""
+        powers = "J" * self.n2 + "K" * self.nz2 + "S" * self.ns
+        states = "" if self.states is None else f"[{','.join(str(v) for v in dict.fromkeys(self.states))}]"
+        spins = f"({','.join(self.spins)})" if self.spins else ""
+        return self.symbol + (f"_{powers}" if powers else "") + spins + states
+
+
+def parse_name(name: str) -> ParameterName:
+    """The parts of a parameter's name.
+
+    >>> parse_name("chi_bb-cc_J(14N)[1]")
+    ParameterName(symbol='chi_bb-cc', n2=1, nz2=0, ns=0, spins=('14N',), states=(1, 1))
+    >>> parse_name("G_c_JK[0,1]").text
+    'G_c_JK[0,1]'
+    """
+    match = _NAME.fullmatch(name.strip())
+    if not match:
+        raise ValueError(
+            f"parameter {name!r}: a name has the form symbol_powers(spins)[states], such as chi_aa(14N), C_bb_J(H1) or G_c[0,1]"
+        )
+    powers = match["powers"] or ""
+    spins = tuple(part.strip() for part in (match["spins"] or "").split(",") if part.strip())
+    states = None
+    if match["states"]:
+        numbers = [int(part) for part in match["states"].split(",")]
+        states = (min(numbers), max(numbers))
+    return ParameterName(match["symbol"], powers.count("J"), powers.count("K"), powers.count("S"), spins, states)
+
+
+class Symbol(NamedTuple):
+    """What a symbol stands for: the operator of N, a factor, how many spins its name has, whether one acts twice (a quadrupole)."""
+
+    rotor: Rotor
+    factor: float
+    spins: int
+    squared: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class SpinEffect(QuantumEffect):
+    """A sum of named parameters, each an operator of N times one of spins.
+
+    values: MHz by name. coupled: the spins that the names use, in the order in which they are coupled.
+    """
+
+    values: Mapping[str, float]
+    coupled: tuple[Spin, ...]
+    symbols: ClassVar[Mapping[str, Symbol]] = {}
+
+    def __post_init__(self) -> None:
+        names = {parse_name(name).text: float(value) for name, value in self.values.items()}
+        object.__setattr__(self, "values", MappingProxyType(names))
+        self.terms  # noqa: B018  every name is checked when the effect is made
+
+    def __reduce__(self) -> tuple[type[Self], tuple[dict[str, float], tuple[Spin, ...]]]:
+        return type(self), (dict(self.values), self.coupled)
+
+    @cached_property
+    def terms(self) -> tuple[SpinTerm, ...]:
+        """Every parameter as an operator."""
+        return tuple(self._term(name) for name in self.values)
+
+    def _term(self, name: str) -> SpinTerm:
+        parts = parse_name(name)
+        if parts.symbol not in self.symbols:
+            raise ValueError(f"{name}: {self.name} knows {', '.join(self.symbols)}")
+        symbol = self.symbols[parts.symbol]
+        known = [spin.name for spin in self.coupled]
+        if len(parts.spins) != symbol.spins or not set(parts.spins) <= set(known):
+            raise ValueError(
+                f"{name}: {parts.symbol} belongs to {symbol.spins} of the spins {', '.join(known) or '(none)'}, in round brackets"
+            )
+        spins = parts.spins * 2 if symbol.squared else parts.spins
+        factor = symbol.factor * self.scale(name, parts)
+        bra, ket = parts.states or (EVERY_STATE, EVERY_STATE)
+        return SpinTerm(name, spins, symbol.rotor, factor, parts.n2, parts.nz2, parts.ns, bra, ket)
+
+    def scale(self, name: str, parts: ParameterName) -> float:
+        """A further factor that depends on the spins."""
+        return 1.0
+
+    def with_values(self, values: Mapping[str, float]) -> Self:
+        """The same effect with other values of some of its parameters."""
+        return replace(self, values={**self.values, **values})
+
+    def parameters(self, top: Top) -> dict[str, float]:
+        """The values in MHz."""
+        return dict(self.values)
+
+    def spins(self, top: Top) -> tuple[Spin, ...]:
+        """The spins that are coupled."""
+        return self.coupled
+
+    def spin_terms(self, top: Top) -> tuple[SpinTerm, ...]:
+        """Every parameter as an operator."""
+        return self.terms
+
+
+def matrix_of(letters: str) -> Matrix:
+    """The matrix c_ij along a, b, c that a component stands for: aa, ab (both orders), bb-cc, and iso for the unit matrix.
+
+    >>> matrix_of("ab")
+    ((0.0, 1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    """
+    rows = [[0.0] * 3 for _ in range(3)]
+    if letters == "iso":
+        rows = [[float(i == k) for k in range(3)] for i in range(3)]
+    else:
+        for sign, pair in zip((1.0, -1.0), letters.split("-"), strict=False):
+            i, k = ("abc".index(letter) for letter in pair)
+            rows[i][k] = rows[k][i] = sign
+    return tuple(tuple(row) for row in rows)  # type: ignore[return-value]
+
+
+def traceless_of(letters: str) -> Matrix:
+    """The traceless symmetric matrix of which a component is 1: aa with -½ twice, bb-cc with ±½, ab.
+
+    >>> traceless_of("bb-cc")
+    ((0.0, 0.0, 0.0), (0.0, 0.5, 0.0), (0.0, 0.0, -0.5))
+    """
+    plain = matrix_of(letters)
+    if "-" in letters:
+        return tuple(tuple(value / 2 for value in row) for row in plain)  # type: ignore[return-value]
+    if letters[0] != letters[1]:
+        return plain
+    return tuple(tuple(1.5 * plain[i][k] - 0.5 * (i == k) for k in range(3)) for i in range(3))  # type: ignore[return-value]
+
+
+TRACELESS = ("aa", "bb-cc", "cc-aa", "bb-aa", "aa-bb", "bb", "cc", "ab", "ac", "bc")

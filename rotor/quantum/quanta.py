@@ -1,0 +1,103 @@
+"""Names of quantum numbers: their order, and from them column names, headings of tables and labels of states.
+
+| name | what it is |
+|---|---|
+| `v` | number of the vibrational or tunnelling state |
+| `n` | rotational angular momentum where spins are coupled to it (`j` where there are none) |
+| `j` | total angular momentum without nuclear spins; the rotational one where there is no spin |
+| `k`, `ka`, `kc` | projection on the axis of a symmetric top; on a and on c in the limits of an asymmetric one |
+| `irrep` | irreducible representation of a spherical top's level |
+| `f1`, `f2`, ... `f` | angular momenta after each spin is coupled, the last one `f` |
+| `i_tot` | total spin of equivalent nuclei |
+| `m` | projection on the field |
+
+A half-integer quantum number is stored as twice its value; `Levels.halves` names those columns.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor.arrays import Ints
+
+ORDER = ("v", "n", "j", "k", "ka", "kc", "irrep", "i_tot", "f1", "f2", "f3", "f4", "f5", "f6", "f7", "f8", "f", "m")
+_HEADINGS = {"ka": "Ka", "kc": "Kc", "i_tot": "I", "irrep": "irrep", "v": "v"}
+
+_SUBSCRIPTED = {f"f{i}": f"F_{i}" for i in range(1, 9)} | {"i_tot": "I"}
+
+Quanta = Mapping[str, NDArray[Any]]
+
+
+def heading(name: str) -> str:
+    """How a table or a plot calls a quantum number: J, Ka, F1, v.
+
+    >>> [heading(name) for name in ("v", "n", "ka", "f1", "i_tot")]
+    ['v', 'N', 'Ka', 'F1', 'I']
+    """
+    return _HEADINGS.get(name, name.upper())
+
+
+def headings(names: Iterable[str]) -> str:
+    """The headings of several quantum numbers, blank between them.
+
+    >>> headings(("j", "ka", "kc"))
+    'J Ka Kc'
+    """
+    return " ".join(heading(name) for name in names)
+
+
+def columns(quanta: Quanta, rows: NDArray[Any] | slice, suffix: str) -> dict[str, NDArray[Any]]:
+    """The quantum numbers of some levels as columns by name: j_upper, ka_upper, kc_upper for the suffix upper."""
+    return {f"{name}_{suffix}": column[rows] for name, column in quanta.items()}
+
+
+def matrix(quanta: Quanta, rows: NDArray[Any]) -> Ints:
+    """The quantum numbers of some levels side by side, (rows, names)."""
+    return np.stack([column[rows] for column in quanta.values()], axis=1)
+
+
+def value_text(value: Any, half: bool = False) -> str:
+    """One quantum number as text, of which twice the value is stored where it may be half-integer.
+
+    >>> value_text(3), value_text(3, half=True), value_text(4, half=True)
+    ('3', '3/2', '2')
+    """
+    if not half:
+        return str(value)
+    return f"{value}/2" if value % 2 else str(value // 2)
+
+
+def labels(quanta: Quanta, rows: NDArray[Any], halves: Collection[str] = (), width: int = 2) -> list[str]:
+    """Each level as its quantum numbers in a row of text, each at least `width` characters wide.
+
+    >>> labels({"j": np.array([4]), "ka": np.array([1]), "kc": np.array([3])}, np.array([0]))
+    [' 4  1  3']
+    """
+    texts = [
+        [f"{value_text(value, name in halves):>{width}}" for value in column[rows].tolist()]
+        for name, column in quanta.items()
+    ]
+    return [" ".join(row) for row in zip(*texts, strict=True)]
+
+
+def state_text(quanta: Quanta, row: int, halves: Collection[str] = ()) -> str:
+    r"""One level as a plot names it: J, J with K or Ka,Kc as subscripts, F after a comma, v before it all.
+
+    >>> state_text({"j": np.array([4]), "ka": np.array([1]), "kc": np.array([3])}, 0)
+    '$4_{1,3}$'
+    >>> state_text({"v": np.array([1]), "n": np.array([2]), "f": np.array([5])}, 0, halves={"f"})
+    '$v{=}1\\;2, F{=}5/2$'
+    >>> state_text({"j": np.array([7])}, 0)
+    '7'
+    """
+    text = {name: value_text(column[row], name in halves) for name, column in quanta.items()}
+    total = text.pop("n", None) or text.pop("j")
+    below = [text.pop(name) for name in ("k", "ka", "kc", "irrep") if name in text]
+    before = f"v{{=}}{text.pop('v')}\\;" if "v" in text else ""
+    after = "".join(f", {_SUBSCRIPTED.get(name, heading(name))}{{=}}{value}" for name, value in text.items())
+    subscript = f"_{{{','.join(below)}}}" if below else ""
+    return f"${before}{total}{subscript}{after}$" if before or subscript or after else total

@@ -1,0 +1,94 @@
+"""Reduced matrix elements of molecule-fixed tensors between solved blocks of every kind, and which blocks they connect.
+
+For several states a tensor is given for each pair (v′, v); that of (v, v′) is the same. Elements are those of `tensors`: real,
+of odd rank i times real, their squares summed over all M the line strengths.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from rotor.arrays import Floats
+from rotor.quantum import tensors as of_wang
+from rotor.quantum.coupled import CoupledBlock
+from rotor.quantum.levels import SolvedBlock
+from rotor.quantum.tensors import BodyTensor
+
+Tensors = Mapping[tuple[int, int], BodyTensor]
+AnyBlock = Any  # SolvedBlock, CoupledBlock or SpinBlock
+
+
+def tensor_between(tensors: Tensors, up: int, low: int) -> BodyTensor | None:
+    """The tensor that acts between two states, None where there is none."""
+    return tensors.get((up, low)) or tensors.get((low, up))
+
+
+def rank_of(tensors: Tensors) -> int:
+    """The rank of the tensors; ValueError where they differ."""
+    ranks = {tensor.rank for tensor in tensors.values()}
+    if len(ranks) != 1:
+        raise ValueError(f"tensors of ranks {sorted(ranks)}: one rank at a time")
+    return ranks.pop()
+
+
+def amplitudes(up: AnyBlock, low: AnyBlock, tensors: Tensors) -> Floats:
+    """Real reduced elements between all states of two blocks of one kind, (n_up, n_low)."""
+    if isinstance(up, SolvedBlock):
+        return of_wang.amplitudes(up, low, tensors[0, 0])
+    if isinstance(up, CoupledBlock):
+        return _of_coupled(up, low, tensors)
+    from rotor.quantum.spins import spin_amplitudes
+
+    return spin_amplitudes(up, low, tensors)
+
+
+def _of_coupled(up: CoupledBlock, low: CoupledBlock, tensors: Tensors) -> Floats:
+    moved = np.zeros((len(up.energies_mhz), len(low.energies_mhz)))
+    for target in up.parts:
+        for source in low.parts:
+            tensor = tensor_between(tensors, target.v, source.v)
+            if tensor is not None:
+                moved[target.place] += of_wang.acting_on(low.vectors[source.place], target.basis, source.basis, tensor)
+    return np.asarray(up.vectors.T @ moved)
+
+
+def connected_pairs(blocks: Iterable[AnyBlock], tensors: Tensors) -> Iterator[tuple[AnyBlock, AnyBlock]]:
+    """Every pair (up, low) of blocks that the tensors connect, each once, the higher or equal J (or F) first, J rising.
+
+    A block with itself is among them where it has elements between its states.
+    """
+    blocks = list(blocks)
+    if not blocks:
+        return
+    if isinstance(blocks[0], SolvedBlock):
+        yield from of_wang.connected_pairs(blocks, tensors[0, 0])
+        return
+    rank = rank_of(tensors)
+    by_total: dict[int, list[AnyBlock]] = {}
+    for block in blocks:
+        by_total.setdefault(twice_total(block), []).append(block)
+    for twice, lows in sorted(by_total.items()):
+        above = [block for rise in range(1, rank + 1) for block in by_total.get(twice + 2 * rise, [])]
+        for i, low in enumerate(lows):
+            for up in lows[i:] + above:
+                if _connects(up, low, tensors):
+                    yield up, low
+
+
+def twice_total(block: AnyBlock) -> int:
+    """Twice the total angular momentum of a block."""
+    if isinstance(block, SolvedBlock):
+        return 2 * block.basis.j
+    return 2 * block.j if isinstance(block, CoupledBlock) else int(block.twice_f)
+
+
+def _connects(up: AnyBlock, low: AnyBlock, tensors: Tensors) -> bool:
+    if not isinstance(up, CoupledBlock):
+        from rotor.quantum.spins import spin_blocks_connected
+
+        return spin_blocks_connected(up, low, tensors)
+    found = ((tensor_between(tensors, p.v, q.v), p, q) for p in up.parts for q in low.parts)
+    return any(tensor is not None and tensor.between(p.basis, q.basis) is not None for tensor, p, q in found)

@@ -1,0 +1,160 @@
+"""A request for energy levels, and what answers it: a range of J and K, energies in MHz, cm⁻¹ and K, terms for a diagram."""
+
+from __future__ import annotations
+
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor import units
+from rotor.arrays import Floats, Ints
+from rotor.checks import require_positive, require_whole
+from rotor.quantum.convergence import warnings_of
+from rotor.quantum.effect import QuantumEffect
+from rotor.quantum.effects.watson import SEMI_RIGID
+from rotor.quantum.levels import Levels
+from rotor.quantum.solve import solve_levels
+from rotor.table import Table
+from rotor.tops.facts import top_facts
+
+if TYPE_CHECKING:
+    from rotor.tops.top import Top
+
+DEFAULT_JMAX = 10
+
+
+@dataclass(frozen=True)
+class LevelsRequest:
+    """Energy levels to compute; every field is checked when the request is made.
+
+    jmin, jmax: of the rotational angular momentum. kmin, kmax: of |K| of a symmetric top, of Ka of a near-prolate and Kc of
+    a near-oblate asymmetric one; None: all. max_energy_mhz: above the lowest level that exists; None: no limit.
+    effects: what the Hamiltonian consists of.
+    """
+
+    top: Top
+    jmax: int = DEFAULT_JMAX
+    jmin: int = 0
+    kmin: int | None = None
+    kmax: int | None = None
+    max_energy_mhz: float | None = None
+    effects: tuple[QuantumEffect, ...] = SEMI_RIGID
+
+    def __post_init__(self) -> None:
+        require_whole("jmin", self.jmin, 0)
+        require_whole("jmax", self.jmax, self.jmin)
+        require_whole("kmin", self.kmin, 0)
+        require_whole("kmax", self.kmax, self.kmin or 0)
+        if self.max_energy_mhz is not None:
+            require_positive("max_energy_mhz", self.max_energy_mhz)
+        if (self.kmin is not None or self.kmax is not None) and self.top.kind in ("linear", "spherical"):
+            raise ValueError(f"kmin and kmax: the levels of a {self.top.kind} top have no K; give J alone")
+
+
+@dataclass(frozen=True)
+class LevelTable(Table):
+    """Energy levels in order of their rows, energies in three units from the lowest level that exists.
+
+    levels: all that were solved. rows: (n,) those asked for. ground_mhz: energy of the lowest level that exists, from the
+    Hamiltonian's zero.
+    """
+
+    levels: Levels
+    rows: Ints
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    @cached_property
+    def ground_mhz(self) -> float:
+        """Energy of the lowest level that exists, from the Hamiltonian's zero."""
+        return self.levels.ground_mhz
+
+    @property
+    def energy_mhz(self) -> Floats:
+        """E/h in MHz above the lowest level that exists."""
+        return np.asarray(self.levels.energy_mhz[self.rows] - self.ground_mhz)
+
+    @property
+    def energy_cm(self) -> Floats:
+        """E/hc in cm⁻¹ above the lowest level that exists."""
+        return self.energy_mhz / units.MHZ_PER_CM
+
+    @property
+    def energy_k(self) -> Floats:
+        """E/k in K above the lowest level that exists."""
+        return self.energy_mhz / units.MHZ_PER_K
+
+    @property
+    def labels(self) -> list[str]:
+        """The quantum numbers of each level as text."""
+        return self.levels.labels(self.rows)
+
+    @property
+    def columns(self) -> dict[str, NDArray[Any]]:
+        """Quantum numbers, energies in three units, spin weight and degeneracy, by name."""
+        numbers = {"energy_mhz": self.energy_mhz, "energy_cm": self.energy_cm, "energy_k": self.energy_k}
+        counts = {name: getattr(self.levels, name)[self.rows] for name in ("weight", "degeneracy")}
+        return {name: column[self.rows] for name, column in self.levels.quanta.items()} | numbers | counts
+
+
+@dataclass(frozen=True)
+class LevelsAnswer:
+    """The levels that a request asked for, and the limits of the model behind them."""
+
+    request: LevelsRequest
+    table: LevelTable
+
+    @cached_property
+    def warnings(self) -> tuple[str, ...]:
+        """The limits of these levels, in sentences."""
+        return warnings_of(self.request.top, self.table.levels)
+
+    def facts(self) -> dict[str, Any]:
+        """Everything about the answer but its table, by the keys of docs/command_line.md."""
+        request = self.request
+        return {
+            **top_facts(request.top),
+            "jmin": request.jmin,
+            "jmax": request.jmax,
+            "kmin": request.kmin,
+            "kmax": request.kmax,
+            "max_energy_mhz": request.max_energy_mhz,
+            "quantum_numbers": list(self.table.levels.quanta_names),
+            "level_count": len(self.table),
+            "ground_mhz": self.table.ground_mhz,
+            "effects": [effect.name for effect in request.effects],
+            "notes": [*request.top.notes, *self.warnings],
+        }
+
+
+def answer_levels(request: LevelsRequest, executor: Executor | None = None) -> LevelsAnswer:
+    """The levels of a request, in order of J and, within it, of the solution. executor: J are spread over it.
+
+    >>> from rotor.tops.top import Top
+    >>> answer = answer_levels(LevelsRequest(Top.from_constants("A=10 B=6 C=4 MHz"), jmin=1, jmax=1))
+    >>> answer.table.energy_mhz.tolist(), answer.table.labels  # B + C, A + C, A + B
+    ([10.0, 16.0, 14.0], [' 1  0  1', ' 1  1  0', ' 1  1  1'])
+    """
+    # from J = 0 and for some J more, so that the lowest level that exists is among them whatever the spin weights are
+    levels = solve_levels(request.top, max(request.jmax, 3), effects=request.effects, executor=executor)
+    asked = (levels.rotational >= request.jmin) & (levels.rotational <= request.jmax)
+    if request.kmin is not None or request.kmax is not None:
+        k = _projection(levels, request.top)
+        asked &= (k >= (request.kmin or 0)) & (k <= (request.jmax if request.kmax is None else request.kmax))
+    if request.max_energy_mhz is not None:
+        asked &= levels.energy_mhz - levels.ground_mhz <= request.max_energy_mhz
+    return LevelsAnswer(request, LevelTable(levels, np.flatnonzero(asked)))
+
+
+def _projection(levels: Levels, top: Top) -> Ints:
+    """|K| of a symmetric top; Ka, or Kc where κ is above 0, of an asymmetric one."""
+    quanta = levels.quanta
+    if "k" in quanta:
+        return np.asarray(np.abs(quanta["k"]))
+    near_oblate = top.kind == "oblate" or (top.kind == "asymmetric" and (top.kappa or 0.0) > 0)
+    return np.asarray(quanta["kc" if near_oblate else "ka"])

@@ -1,0 +1,70 @@
+"""Spins coupled to the rotation, N + S1 = J, J + I1 = F1, ... = F: the levels, and what lines and fits need of them.
+
+    H = H_rot + Σ_terms (`operators`)
+
+Levels are solved F by F (`blocks`) over the eigenstates of the rotation (`rotor`), with coefficients of coupling (`coupling`);
+`lines` has elements of dipoles between them, and derivatives; `scheme` the spins themselves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from concurrent.futures import Executor
+from typing import TYPE_CHECKING
+
+from rotor.arrays import Floats, Ints
+from rotor.quantum.spins.operators import SpinTerm
+from rotor.quantum.spins.scheme import Scheme, Spin, scheme_of
+
+if TYPE_CHECKING:
+    from rotor.quantum.effect import QuantumEffect
+    from rotor.quantum.levels import Levels
+    from rotor.quantum.reduced import Tensors
+    from rotor.quantum.spins.blocks import SpinBlock
+    from rotor.tops.top import Top
+
+__all__ = [
+    "Scheme",
+    "Spin",
+    "SpinTerm",
+    "scheme_of",
+    "spin_amplitudes",
+    "spin_blocks_connected",
+    "spin_derivatives",
+    "spin_levels",
+]
+
+
+def spin_levels(
+    top: Top, effects: tuple[QuantumEffect, ...], jmin: int, jmax: int, executor: Executor | None = None
+) -> Levels:
+    """All levels of a top with spins whose label has N from `jmin` to `jmax`, by (v), n, k or ka and kc, j, f1, ... f.
+
+    Every F that such an N reaches is solved with all its N, so that nothing is left out of a block.
+    """
+    from rotor.quantum.spins.blocks import levels_of_f
+
+    total = scheme_of(top, effects).total
+    first = max(2 * jmin - total, total % 2)
+    return levels_of_f(top, effects, range(first, 2 * jmax + total + 1, 2), (jmin, jmax), executor)
+
+
+def spin_derivatives(top: Top, levels: Levels, names: Sequence[str], rows: Ints) -> Floats:
+    """∂E/∂c of levels with spins, (rows, names)."""
+    from rotor.quantum.spins.lines import derivatives
+
+    return derivatives(top, levels, names, rows)
+
+
+def spin_amplitudes(up: SpinBlock, low: SpinBlock, tensors: Tensors) -> Floats:
+    """Real reduced elements between all states of two blocks, (n_up, n_low)."""
+    from rotor.quantum.spins.lines import amplitudes
+
+    return amplitudes(up, low, tensors)
+
+
+def spin_blocks_connected(up: SpinBlock, low: SpinBlock, tensors: Tensors) -> bool:
+    """Whether the tensors have an element between two blocks."""
+    from rotor.quantum.spins.lines import connected
+
+    return connected(up, low, tensors)

@@ -1,0 +1,319 @@
+"""Levels of each F: rotational eigenstates coupled with the spins, one real symmetric matrix for each connected part.
+
+The rotation, with all states v and what connects them, is solved first. Its eigenstates r of every N from F - ΣS to F + ΣS,
+times the coupling patterns p of that N, are the basis of an F,
+
+    ⟨r' p'|H|r p⟩ = E_r δ + Σ_channels c(p', p) ⟨r'|X|r⟩,
+
+a Kronecker product for each pair of solved blocks. Blocks that no channel connects are solved apart.
+
+A level is named after a sub-block: a Wang block of one state, and one pattern. The names are given one to one, the largest share
+first, and among the levels of one sub-block Ka rises with energy.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from rotor.arrays import Floats, Ints
+from rotor.quantum.effect import QuantumEffect
+from rotor.quantum.levels import Levels, weights_of_levels
+from rotor.quantum.spins.coupling import coefficients, n_dot_s, patterns
+from rotor.quantum.spins.operators import AxialState
+from rotor.quantum.spins.rotor import (
+    Channel,
+    Channels,
+    RotorBlock,
+    channels_of,
+    in_both_orders,
+    solved_rotor,
+    valued_terms,
+)
+from rotor.quantum.spins.scheme import Scheme, scheme_of
+
+if TYPE_CHECKING:
+    from rotor.tops.top import Top
+
+
+class SpinPart(NamedTuple):
+    """The states of the solved block `number` with every pattern of its N, pattern by pattern.
+
+    patterns: the rows of these patterns among those of the F, which are in the order of N.
+    """
+
+    number: int
+    rotor: RotorBlock
+    patterns: slice
+    place: slice
+
+    @property
+    def repeats(self) -> int:
+        """Number of patterns."""
+        return int(self.patterns.stop - self.patterns.start)
+
+
+@dataclass(frozen=True)
+class Shared:
+    """What all blocks of a calculation share: the scheme, the representation, and elements that were computed once."""
+
+    scheme: Scheme
+    representation: str
+    cache: dict[Any, Any] = field(default_factory=dict, repr=False, compare=False)
+
+
+@dataclass(frozen=True)
+class SpinBlock:
+    """States of one F solved together: energies (n,) in MHz, rising, and eigenvectors (functions, n) over the parts.
+
+    patterns: all coupling patterns of the F, doubled.
+    labels: (n, columns) v, Ka (K of an axial top), Kc, then the doubled pattern N, J ... F of every state. mixing: (n,) the share
+    of the sub-block that names it. start: row of the first state.
+    """
+
+    twice_f: int
+    patterns: Ints
+    parts: tuple[SpinPart, ...]
+    energies_mhz: Floats
+    vectors: Floats
+    labels: Ints
+    mixing: Floats
+    shared: Shared
+    start: int = 0
+
+
+class Plan(NamedTuple):
+    """Solved rotation, operators of every channel by pairs of blocks (i ≥ k), and which blocks are connected."""
+
+    shared: Shared
+    blocks: list[RotorBlock]
+    operators: dict[tuple[int, int], dict[Channel, Floats]]
+    families: list[list[int]]
+
+
+def plan_of(top: Top, effects: tuple[QuantumEffect, ...], nmin: int, nmax: int, executor: Executor | None) -> Plan:
+    """The rotation solved from N = `nmin` to `nmax`, and every channel contracted to it."""
+    scheme, terms = scheme_of(top, effects), valued_terms(top, effects)
+    blocks, representation = solved_rotor(top, effects, terms, nmin, nmax, executor)
+    channels = channels_of(terms, scheme)
+    operators = {}
+    for i, k in _near(blocks):
+        if found := operators_between(blocks[i], blocks[k], channels, representation):
+            operators[i, k] = found
+    return Plan(Shared(scheme, representation), blocks, operators, _families(len(blocks), operators))
+
+
+def _near(blocks: list[RotorBlock]) -> Iterator[tuple[int, int]]:
+    """Pairs (i, k), i ≥ k, whose N differ by 2 at most."""
+    by_n: dict[int, list[int]] = {}
+    for i, block in enumerate(blocks):
+        by_n.setdefault(block.n, []).append(i)
+    for i, block in enumerate(blocks):
+        yield from ((i, k) for n in range(block.n - 2, block.n + 1) for k in by_n.get(n, ()) if k <= i)
+
+
+def operators_between(
+    up: RotorBlock, low: RotorBlock, channels: Channels, representation: str
+) -> dict[Channel, Floats]:
+    """Σ c ⟨r'|X|r⟩ of every channel that acts."""
+    bases = up.parts[0].basis, low.parts[0].basis
+    if isinstance(bases[0], AxialState) and isinstance(bases[1], AxialState) and bases[0].axial_k != bases[1].axial_k:
+        return {}
+    acting = [channel for channel in channels if abs(up.n - low.n) <= channel.rank <= up.n + low.n]
+    found = {channel: in_both_orders(up, low, channels[channel], representation) for channel in acting}
+    return {channel: operator for channel, operator in found.items() if operator is not None}
+
+
+def _families(count: int, pairs: Iterable[tuple[int, int]]) -> list[list[int]]:
+    """Blocks that pairs connect, each family in rising order."""
+    above = list(range(count))
+
+    def root(i: int) -> int:
+        while above[i] != i:
+            above[i] = above[above[i]]
+            i = above[i]
+        return i
+
+    for i, k in pairs:
+        low, high = sorted((root(i), root(k)))
+        above[high] = low
+    members: dict[int, list[int]] = {}
+    for i in range(count):
+        members.setdefault(root(i), []).append(i)
+    return list(members.values())
+
+
+def solve_f(plan: Plan, twice_f: int) -> list[SpinBlock]:
+    """The blocks of one F."""
+    every = patterns(plan.shared.scheme.twice, twice_f)
+    found, first = np.unique(every[:, 0], return_index=True)
+    stops = [*first[1:].tolist(), len(every)]
+    by_n = {n // 2: slice(a, b) for n, a, b in zip(found.tolist(), first.tolist(), stops, strict=True)}
+    acting = {channel for operators in plan.operators.values() for channel in operators}
+    known = {channel: coefficients_of(plan.shared.scheme, channel, every) for channel in acting}
+    out = []
+    for family in plan.families:
+        members = [i for i in family if plan.blocks[i].n in by_n]
+        if members:
+            out.append(_solved(plan, twice_f, every, _parts(plan, members, by_n), known))
+    return out
+
+
+def _parts(plan: Plan, members: list[int], by_n: dict[int, slice]) -> tuple[SpinPart, ...]:
+    parts, start = [], 0
+    for i in members:
+        block = plan.blocks[i]
+        rows = by_n[block.n]
+        stop = start + (rows.stop - rows.start) * len(block.energies_mhz)
+        parts.append(SpinPart(i, block, rows, slice(start, stop)))
+        start = stop
+    return tuple(parts)
+
+
+def _solved(
+    plan: Plan, twice_f: int, every: Ints, parts: tuple[SpinPart, ...], known: dict[Channel, Floats]
+) -> SpinBlock:
+    zero = float(parts[0].rotor.energies_mhz[0])  # taken out of the matrix for the sake of digits
+    diagonal = [np.tile(part.rotor.energies_mhz - zero, part.repeats) for part in parts]
+    matrix = np.diag(np.concatenate(diagonal))
+    for a, up in enumerate(parts):
+        for low in parts[: a + 1]:
+            for channel, operator in plan.operators.get((up.number, low.number), {}).items():
+                matrix[up.place, low.place] += product(known[channel][up.patterns, low.patterns], operator)
+    if not np.isfinite(matrix).all():
+        raise ValueError("a block of the Hamiltonian overflows: N max is too high for these constants")
+    energies, vectors = np.linalg.eigh(matrix)  # reads the lower triangle
+    labels, mixing = _labels(parts, every, vectors)
+    return SpinBlock(twice_f, every, parts, energies + zero, vectors, labels, mixing, plan.shared)
+
+
+def product(left: Floats, right: Floats) -> Floats:
+    """The Kronecker product of two matrices."""
+    rows, columns = left.shape[0] * right.shape[0], left.shape[1] * right.shape[1]
+    return (left[:, None, :, None] * right[None, :, None, :]).reshape(rows, columns)
+
+
+def coefficients_of(scheme: Scheme, channel: Channel, every: Ints) -> Floats:
+    """c(p', p) of a channel between all patterns of an F, with its powers of N·S."""
+    found = coefficients(scheme.twice, channel.acting, channel.rank, every, every)
+    if not channel.ns:
+        return found
+    n = every[:, 0] / 2.0
+    of_each = (n * (n + 1)) ** channel.n2 * n_dot_s(every, scheme.twice[0]) ** channel.ns
+    return np.asarray(found * (of_each[:, None] + of_each) / 2)
+
+
+def _labels(parts: tuple[SpinPart, ...], every: Ints, vectors: Floats) -> tuple[Ints, Floats]:
+    """Names (n, 3 + pattern) of the states of a block, energies rising, and the shares of the sub-blocks that give them."""
+    shares: list[Floats] = []
+    names: list[Ints] = []
+    for part in parts:
+        states = len(part.rotor.energies_mhz)
+        rows = vectors[part.place].reshape(part.repeats, states, -1)
+        for own in part.rotor.parts:
+            inside = (
+                rows if len(part.rotor.parts) == 1 else np.einsum("kr,prn->pkn", part.rotor.vectors[own.place], rows)
+            )
+            shares += list((inside**2).sum(axis=1))
+            of_k = np.column_stack([np.full(len(own.names), own.v), own.names])
+            names += [np.column_stack([of_k, np.tile(pattern, (len(of_k), 1))]) for pattern in every[part.patterns]]
+    table = np.array(shares)
+    of_state = assigned(table, np.array([len(own) for own in names]))
+    labels = np.empty((vectors.shape[1], names[0].shape[1]), dtype=np.int64)
+    labels[np.argsort(of_state, kind="stable")] = np.concatenate(names)
+    return labels, np.asarray(table[of_state, np.arange(len(of_state))])
+
+
+def assigned(shares: Floats, capacity: Ints) -> Ints:
+    """Which sub-block names each state: shares (sub-blocks, states), the largest first, none beyond its capacity.
+
+    >>> assigned(np.array([[0.9, 0.6, 0.0], [0.1, 0.4, 1.0]]), np.array([1, 2])).tolist()
+    [0, 1, 1]
+    """
+    found = shares.argmax(axis=0)
+    if (np.bincount(found, minlength=len(capacity)) == capacity).all():
+        return np.asarray(found)
+    found, left = np.full(shares.shape[1], -1), capacity.copy()
+    for place in np.argsort(-shares, axis=None, kind="stable").tolist():
+        sub, state = divmod(place, shares.shape[1])
+        if found[state] < 0 and left[sub]:
+            found[state], left[sub] = sub, left[sub] - 1
+    return found
+
+
+def levels_of_f(
+    top: Top,
+    effects: tuple[QuantumEffect, ...],
+    every_f: Sequence[int],
+    n_range: tuple[int, int] | None = None,
+    executor: Executor | None = None,
+) -> Levels:
+    """The levels of all F (doubled) in `every_f`, those whose label has N within `n_range`, if that is given."""
+    total = scheme_of(top, effects).total
+    lowest = min(max(0, (f - total) // 2) for f in every_f)
+    highest = max((f + total) // 2 for f in every_f)
+    plan = plan_of(top, effects, lowest, highest, executor)
+    solved = [block for f in every_f for block in solve_f(plan, f)]
+    if n_range:
+        solved = [_within(block, n_range) for block in solved]
+    blocks = tuple(_placed(solved))
+    return _table(top, effects, plan.shared, blocks, highest if n_range is None else n_range[1])
+
+
+def _within(block: SpinBlock, n_range: tuple[int, int]) -> SpinBlock:
+    n = block.labels[:, 3] // 2
+    kept = (n >= n_range[0]) & (n <= n_range[1])
+    cut = {name: getattr(block, name)[kept] for name in ("energies_mhz", "labels", "mixing")}
+    return replace(block, vectors=block.vectors[:, kept], **cut)
+
+
+def _placed(blocks: Iterable[SpinBlock]) -> Iterator[SpinBlock]:
+    start = 0
+    for block in blocks:
+        if len(block.energies_mhz):
+            yield replace(block, start=start)
+            start += len(block.energies_mhz)
+
+
+def _table(
+    top: Top, effects: tuple[QuantumEffect, ...], shared: Shared, blocks: tuple[SpinBlock, ...], jmax: int
+) -> Levels:
+    labels = np.concatenate([block.labels for block in blocks])
+    axial = isinstance(blocks[0].parts[0].rotor.parts[0].basis, AxialState)
+    quanta = {"v": labels[:, 0]} if any(effect.states(top) for effect in effects) else {}
+    quanta |= {"n": labels[:, 3] // 2}
+    if axial:
+        quanta |= {"k": labels[:, 1]}
+    elif top.kind != "linear":
+        quanta |= {"ka": labels[:, 1], "kc": labels[:, 2]}
+    scheme = shared.scheme
+    for column, (name, half) in enumerate(zip(scheme.names, scheme.half, strict=True), 4):
+        quanta[name] = labels[:, column] if half else labels[:, column] // 2
+    ones = np.ones(len(labels), dtype=np.int64)
+    levels = Levels(
+        kind=top.kind,
+        representation=shared.representation,
+        jmax=jmax,
+        energy_mhz=np.concatenate([block.energies_mhz for block in blocks]),
+        quanta=quanta,
+        multiplicity=labels[:, -1] + 1,
+        components=np.where(labels[:, 1] > 0, 2, 1) if axial else ones,
+        weight=ones,
+        halves=frozenset(name for name, half in zip(scheme.names, scheme.half, strict=True) if half),
+        effects=effects,
+        blocks=blocks,
+        mixing=np.concatenate([block.mixing for block in blocks]),
+    )
+    return replace(levels, weight=_weights(top, effects, levels))
+
+
+def _weights(top: Top, effects: tuple[QuantumEffect, ...], levels: Levels) -> Ints:
+    weight = weights_of_levels(levels, top.spin_weights)
+    for state in (state for effect in effects for state in effect.states(top)):
+        if state.spin_weights is not None:
+            weight = np.where(levels.quanta["v"] == state.v, weights_of_levels(levels, state.spin_weights), weight)
+    return weight

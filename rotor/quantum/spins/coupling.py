@@ -1,0 +1,132 @@
+"""Angular momenta coupled one after another, N + S1 = J1, J1 + S2 = J2, ... = F: the functions of an F, and coefficients between them.
+
+A coupling pattern is (N, J1, ..., F), stored doubled. A scalar operator T^K(N) · W^K(spins) has the element
+
+    ⟨p'|T·W|p⟩ = c(p', p) ⟨N'‖T^K‖N⟩
+
+whose coefficient c is a product over the steps of the chain, each with one symbol (A. R. Edmonds, Angular Momentum in Quantum
+Mechanics, 1957): with T^K alone, (7.1.7); where a spin closes the scalar product, (7.1.6); where T^L and a first spin
+make a tensor that a second spin closes, (7.1.5). Reduced elements are defined as there and in `tensors`.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+
+import numpy as np
+
+from rotor.arrays import Floats, Ints
+from rotor.quantum.wigner import nine_j, six_j
+
+
+def patterns(spins: tuple[int, ...], f: int) -> Ints:
+    """All coupling patterns of one F, (number, 1 + spins), everything doubled; N whole, rising from the first column on.
+
+    >>> patterns((2,), 2).tolist()  # I = 1, F = 1: N = 0, 1, 2
+    [[0, 2], [2, 2], [4, 2]]
+    """
+    found: list[tuple[int, ...]] = [(f,)]
+    for spin in reversed(spins):
+        found = [(j, *rest) for rest in found for j in range(abs(rest[0] - spin), rest[0] + spin + 1, 2)]
+    whole = sorted(pattern for pattern in found if pattern[0] % 2 == 0)
+    return np.array(whole, dtype=np.int64).reshape(-1, 1 + len(spins))
+
+
+def reduced_spin(spin: int, rank: int) -> float:
+    """⟨I‖W^K‖I⟩ of the spin vector (rank 1) and of T²(I, I)/(2I(2I-1)) (rank 2), the form of a quadrupole; 2I is given.
+
+    √(I(I+1)(2I+1)), and √((I+1)(2I+1)(2I+3)/(24 I(2I-1))) with T²_0(I, I) = (3Iz² - I²)/√6.
+
+    >>> round(reduced_spin(1, 1) ** 2, 12), round(reduced_spin(2, 2) ** 2, 12)
+    (1.5, 1.25)
+    """
+    i = spin / 2
+    if rank == 1:
+        return sqrt(i * (i + 1) * (2 * i + 1))
+    if spin < 2:
+        raise ValueError(f"a spin of {spin}/2 has no quadrupole moment; that needs a spin of 1 or more")
+    return sqrt((i + 1) * (2 * i + 1) * (2 * i + 3) / (24 * i * (2 * i - 1)))
+
+
+def passed_on(bra: Ints, ket: Ints, spin: int, rank: int) -> Floats:
+    """⟨(j' S)J'‖T^K‖(j S)J⟩ over ⟨j'‖T^K‖j⟩ where T does not touch S: bra and ket are pairs (..., 2) of doubled j, J.
+
+    (-1)^(j'+S+J+K) √((2J'+1)(2J+1)) {j' J' S; J j K}
+    """
+    a, b, c, d = bra[..., 0], bra[..., 1], ket[..., 0], ket[..., 1]
+    root = np.sqrt((b + 1.0) * (d + 1.0))
+    return _sign(a + spin + d + 2 * rank) * root * six_j(a / 2, b / 2, spin / 2, d / 2, c / 2, rank)
+
+
+def closed(bra: Ints, ket: Ints, spin: int, rank: int) -> Floats:
+    """⟨(j' S)J'|T^K · W^K(S)|(j S)J⟩ over ⟨j'‖T‖j⟩⟨S‖W‖S⟩: (-1)^(j+S+J) {J S j'; K j S}, zero where J' ≠ J."""
+    a, b, c, d = bra[..., 0], bra[..., 1], ket[..., 0], ket[..., 1]
+    symbol = six_j(d / 2, spin / 2, a / 2, rank, c / 2, spin / 2)
+    return np.where(b == d, _sign(c + spin + d) * symbol, 0.0)
+
+
+def opened(bra: Ints, ket: Ints, spin: int, rank: int) -> Floats:
+    """⟨(j' S)J'‖[T^L x S]^1‖(j S)J⟩ over ⟨j'‖T^L‖j⟩⟨S‖S‖S⟩: √(3 (2J'+1)(2J+1)) {j' j L; S S 1; J' J 1}."""
+    a, b, c, d = np.broadcast_arrays(bra[..., 0], bra[..., 1], ket[..., 0], ket[..., 1])
+    rows = [[a, c, np.full_like(a, 2 * rank)], [spin + 0 * a, spin + 0 * a, 2 + 0 * a], [b, d, 2 + 0 * a]]
+    table = np.moveaxis(np.array(rows, dtype=float) / 2, (0, 1), (-2, -1))
+    return np.sqrt(3 * (b + 1.0) * (d + 1.0)) * nine_j(table)
+
+
+def _sign(doubled: Ints) -> Floats:
+    return np.where(doubled // 2 % 2, -1.0, 1.0)
+
+
+_RECOUPLED = {0: 1.0, 2: -sqrt(5 / 3)}
+
+
+def coefficients(spins: tuple[int, ...], acting: tuple[int, ...], rank: int, bra: Ints, ket: Ints) -> Floats:
+    """c(p', p) of T^K(N) with the spins `acting`, (patterns of bra, patterns of ket).
+
+    Parameters
+    ----------
+    spins : 2S of every spin, in the order of coupling
+    acting : places of the spins in the operator, from 0: (i,) the vector of one spin (K = 1), (i, i) its quadrupole (K = 2),
+        (i, j) the product of two, coupled to K = 0 (S_i · S_j) or 2; () none
+    rank : K of the operator of N. One of rank 0 is given as a plain matrix, not as a reduced one.
+    bra, ket : patterns (n, 1 + spins), doubled
+
+    Returns
+    -------
+    (n, m). T² · [S_i x S_j]² is -√(5/3) [T² x S_i]¹ · S_j, by the recoupling of three tensors to a scalar.
+    """
+    left, right = bra[:, None, :], ket[None, :, :]
+    if not acting:
+        return np.asarray((left == right).all(axis=-1).astype(float))
+    first, last = min(acting), max(acting)
+    total = np.sqrt(left[..., 0] + 1.0) if rank == 0 else np.ones((len(bra), len(ket)))
+    carried = rank
+    for place, spin in enumerate(spins):
+        pair = left[..., place : place + 2], right[..., place : place + 2]
+        if place > last:
+            total = total * (pair[0][..., 1] == pair[1][..., 1])
+        elif place == last:
+            own = 2 if acting == (last, last) else 1
+            total = total * closed(*pair, spin, own) * reduced_spin(spin, own)
+        elif place == first:
+            total = total * opened(*pair, spin, carried) * reduced_spin(spin, 1)
+            carried = 1
+        else:
+            total = total * passed_on(*pair, spin, carried)
+    if first != last:
+        total = total * _RECOUPLED[rank]
+    return np.asarray(np.where((left[..., 0] == right[..., 0]), total, 0.0) if rank == 0 else total)
+
+
+def tensor_coefficients(spins: tuple[int, ...], rank: int, bra: Ints, ket: Ints) -> Floats:
+    """⟨p'‖T^K‖p⟩ over ⟨N'‖T^K‖N⟩ of an operator that touches no spin, such as the dipole: (patterns, patterns)."""
+    total = np.ones((len(bra), len(ket)))
+    for place, spin in enumerate(spins):
+        total = total * passed_on(bra[:, None, place : place + 2], ket[None, :, place : place + 2], spin, rank)
+    return total
+
+
+def n_dot_s(pattern: Ints, spin: int) -> Floats:
+    """N·S of the first spin, (n,): ½[J(J+1) - N(N+1) - S(S+1)]."""
+    n, j = pattern[:, 0], pattern[:, 1]
+    return np.asarray((j * (j + 2) - n * (n + 2) - spin * (spin + 2)) / 8)

@@ -1,0 +1,178 @@
+"""Elements of molecule-fixed tensors between levels with spins, and how such levels depend on the parameters.
+
+A dipole touches no spin: its element between two functions is that of the rotation times a product of 6j symbols,
+
+    ⟨r' p'‖T^K‖r p⟩ = t(p', p) ⟨r'‖T^K‖r⟩,
+
+see `coupling.tensor_coefficients`. Elements of the rotation are computed once for all F.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rotor.arrays import Floats, Ints
+from rotor.quantum.basis import WangBlock
+from rotor.quantum.j_operators import JOperator, between_blocks
+from rotor.quantum.levels import Levels
+from rotor.quantum.reduced import Tensors, rank_of, tensor_between
+from rotor.quantum.spins.blocks import Shared, SpinBlock, SpinPart, coefficients_of, operators_between, product
+from rotor.quantum.spins.coupling import tensor_coefficients
+from rotor.quantum.spins.operators import AxialState, Scalar, tensor_elements
+from rotor.quantum.spins.rotor import Channel, RotorBlock, channels_of
+
+if TYPE_CHECKING:
+    from rotor.quantum.effect import QuantumEffect
+    from rotor.tops.top import Top
+
+
+def amplitudes(up: SpinBlock, low: SpinBlock, tensors: Tensors) -> Floats:
+    """Real reduced elements between all states of two blocks, (n_up, n_low); their squares are line strengths."""
+    rank, moved = rank_of(tensors), np.zeros((up.vectors.shape[0], low.vectors.shape[1]))
+    t = _coefficients(up, low, rank)
+    for target, source, element in _acting(up, low, tensors, rank):
+        moved[target.place] += product(t[target.patterns, source.patterns], element) @ low.vectors[source.place]
+    return np.asarray(up.vectors.T @ moved)
+
+
+def connected(up: SpinBlock, low: SpinBlock, tensors: Tensors) -> bool:
+    """Whether the tensors have an element between two blocks."""
+    rank, bases = rank_of(tensors), (up.parts[0].rotor.parts[0].basis, low.parts[0].rotor.parts[0].basis)
+    if isinstance(bases[0], AxialState) and isinstance(bases[1], AxialState):  # each block has one K
+        q = bases[0].axial_k - bases[1].axial_k
+        if abs(q) > rank or not any(tensor.components[rank + q] for tensor in tensors.values()):
+            return False
+    return bool(_acting(up, low, tensors, rank))
+
+
+def _acting(up: SpinBlock, low: SpinBlock, tensors: Tensors, rank: int) -> list[tuple[SpinPart, SpinPart, Floats]]:
+    """Pairs of parts between which the tensors act, with the element of the rotation."""
+    if not abs(up.twice_f - low.twice_f) <= 2 * rank <= up.twice_f + low.twice_f:
+        return []
+    held, known = low.shared.cache.setdefault(id(tensors), (tensors, {}))
+    del held  # the cache holds the tensors, so that their id stays theirs
+    found = []
+    for target in up.parts:
+        for source in low.parts:
+            if abs(target.rotor.n - source.rotor.n) <= rank:
+                key = (target.number, source.number)
+                if key not in known:
+                    known[key] = _rotor_element(target.rotor, source.rotor, tensors)
+                if known[key] is not None:
+                    found.append((target, source, known[key]))
+    return found
+
+
+def _rotor_element(up: RotorBlock, low: RotorBlock, tensors: Tensors) -> Floats | None:
+    """⟨r'‖T‖r⟩; of axial states √(number of components) of it, so that squares are summed over both signs of K."""
+    total: Floats | None = None
+    for left in up.parts:
+        for right in low.parts:
+            found = tensor_elements(left.basis, right.basis, tensor_between(tensors, left.v, right.v))
+            if found is not None and found.any():
+                moved = up.vectors[left.place].T @ found @ low.vectors[right.place]
+                total = moved if total is None else total + moved
+    basis = up.parts[0].basis
+    if total is not None and isinstance(basis, AxialState) and (basis.axial_k or low.parts[0].basis.k[0]):
+        return np.asarray(np.sqrt(2.0) * total)
+    return total
+
+
+def _coefficients(up: SpinBlock, low: SpinBlock, rank: int) -> Floats:
+    """t(p', p) between all patterns of two F."""
+    shared, key = low.shared, ("tensor", rank, up.twice_f, low.twice_f)
+    if key not in shared.cache:
+        shared.cache[key] = tensor_coefficients(shared.scheme.twice, rank, up.patterns, low.patterns)
+    found: Floats = shared.cache[key]
+    return found
+
+
+def derivatives(top: Top, levels: Levels, names: Sequence[str], rows: Ints) -> Floats:
+    """∂E/∂c = ⟨i|∂H/∂c|i⟩ of levels with spins, (rows, names); see `derivatives.level_derivatives`."""
+    out = np.zeros((len(levels), len(names)))
+    if not levels.blocks:
+        raise ValueError("these levels have no vectors; solve them with their spins anew")
+    shared = levels.blocks[0].shared
+    for column, name in enumerate(names):
+        of_name = _Derivative(top, levels.effects, name, shared)
+        for block in levels.blocks:
+            out[block.start : block.start + len(block.energies_mhz), column] = of_name.expectations(block)
+    return np.asarray(out[rows])
+
+
+class _Derivative:
+    """∂H/∂c of one parameter over the parts of spin blocks, each element of the rotation computed once."""
+
+    def __init__(self, top: Top, effects: Sequence[QuantumEffect], name: str, shared: Shared) -> None:
+        self._top, self._effects, self._name, self._shared = top, effects, name, shared
+        terms = [term for effect in effects for term in effect.spin_terms(top) if term.name == name]
+        self._channels = channels_of([(term.factor, term) for term in terms], shared.scheme)
+        self._known: dict[tuple[int, int], dict[Channel, Floats]] = {}
+
+    def expectations(self, block: SpinBlock) -> Floats:
+        """⟨i|∂H/∂c|i⟩ of every state of a block, (n,)."""
+        total = np.zeros(len(block.energies_mhz))
+        known: dict[Channel, Floats] = {}
+        for a, up in enumerate(block.parts):
+            for low in block.parts[: a + 1]:
+                for channel, element in self._elements(up, low).items():
+                    if channel not in known:
+                        known[channel] = coefficients_of(self._shared.scheme, channel, block.patterns)
+                    matrix = product(known[channel][up.patterns, low.patterns], element)
+                    bra, ket = block.vectors[up.place], block.vectors[low.place]
+                    total += (2.0 if low is not up else 1.0) * np.einsum("in,in->n", bra, matrix @ ket)
+        return total
+
+    def _elements(self, up: SpinPart, low: SpinPart) -> dict[Channel, Floats]:
+        key = (up.number, low.number)
+        if key not in self._known:
+            found = operators_between(up.rotor, low.rotor, self._channels, self._shared.representation)
+            if up.number == low.number and (own := self._rotation(up.rotor)) is not None:
+                found[_ALONE] = found[_ALONE] + own if _ALONE in found else own
+            self._known[key] = found
+        return self._known[key]
+
+    def _rotation(self, block: RotorBlock) -> Floats | None:
+        """The derivative of the Hamiltonian of the rotation over the states of a block."""
+        size = sum(part.basis.size for part in block.parts)
+        total = np.zeros((size, size))
+        for effect in self._effects:
+            own = {0: effect.operators(self._top)} | {state.v: state.terms for state in effect.states(self._top)}
+            for part in block.parts:
+                if operators := own.get(part.v, {}).get(self._name):
+                    matrix = Scalar(tuple(operators.items())).elements(
+                        part.basis, part.basis, self._shared.representation
+                    )
+                    assert matrix is not None
+                    total[part.place, part.place] += matrix
+            for bra, ket, operator in self._operators_of_j(effect, block.n):
+                _add_between(total, block, bra, ket, operator)
+        return block.vectors.T @ total @ block.vectors if total.any() else None
+
+    def _operators_of_j(self, effect: QuantumEffect, n: int) -> Iterator[tuple[int, int, JOperator]]:
+        representation = self._shared.representation
+        if self._name in effect.parameters(self._top):
+            operator = effect.j_operator(self._top, self._name, n, representation)
+            if operator is not None:
+                yield 0, 0, operator
+        for coupling in effect.couplings(self._top):
+            if coupling.name == self._name:
+                yield coupling.bra, coupling.ket, coupling.operator(n, representation)
+
+
+_ALONE = Channel((), 0)
+
+
+def _add_between(total: Floats, block: RotorBlock, bra: int, ket: int, operator: JOperator) -> None:
+    for up in block.parts:
+        for low in block.parts:
+            if (up.v, low.v) == (bra, ket):
+                assert isinstance(up.basis, WangBlock)
+                assert isinstance(low.basis, WangBlock)
+                between = between_blocks(up.basis, low.basis, operator).real
+                total[up.place, low.place] += between
+                if bra != ket:
+                    total[low.place, up.place] += between.T

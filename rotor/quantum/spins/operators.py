@@ -1,0 +1,232 @@
+"""Terms of the Hamiltonian that couple the rotation with spins: an operator of N, an operator of spins, and powers.
+
+    c · factor · ½{N^2p (N·S1)^r, ½{Nz^2q, X^K(N)}} · W^K(spins)
+
+X^K is made of direction cosines φ_pi between space-fixed p and molecule-fixed i, and of N:
+
+| operator | X^K | terms |
+|---|---|---|
+| `Scalar` | operators J^2p ½[Jz^2q, J₊^2n + J₋^2n]₊ of N, K = 0 | Fermi contact, S1·S2, N·S with powers |
+| `Cosines` of a vector | Σ_i c_i φ_pi, K = 1 | spin-orbit, between states |
+| `Cosines` of a matrix | T² of the symmetric traceless c_ij, K = 2 | quadrupole, dipolar spin-spin |
+| `CosinesWithN` | Σ_ij c_ij ½{φ_pi, N_j}, K = 1 | spin-rotation |
+
+The last one is no tensor of the molecule alone. With c = c0 1 + c_s + c_a, symmetric and traceless, antisymmetric with the vector
+v_k = c_ij,
+
+    ⟨N'‖X‖N⟩ = c0 √(N(N+1)(2N+1)) δ + √{[(N'+N+1)² - 4][1 - (N'-N)²/4]/6} ⟨N'‖T²(c_s)‖N⟩ + (i/2)[N'(N'+1) - N(N+1)] ⟨N'‖φ·v‖N⟩
+
+(the last part is the commutator [N², φ·v] i/2, so that it has ΔN = ±1 alone). All matrices are real, over the functions of `tensors`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import lru_cache
+from math import sqrt
+from typing import NamedTuple
+
+import numpy as np
+
+from rotor.arrays import Floats, Ints
+from rotor.quantum.basis import WangBlock
+from rotor.quantum.effects.watson import JMatrix, block_bands, scalar_energy
+from rotor.quantum.tensors import BodyTensor, block_elements, body_tensor, coupling
+from rotor.tops.operators import Operators, Powers
+
+EVERY_STATE = -1  # in place of v: a term that is diagonal in the states, and the same in all of them
+
+Matrix = tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]
+Vector = tuple[float, float, float]
+
+
+class AxialState(NamedTuple):
+    """|N K⟩ of a symmetric top with K ≥ 0, which stands for -K too: K is good where everything is axial."""
+
+    j: int
+    axial_k: int
+    size: int = 1
+
+    @property
+    def k(self) -> Ints:
+        """K, (1,)."""
+        return np.array([self.axial_k])
+
+
+Basis = WangBlock | AxialState
+
+
+def tensor_elements(up: Basis, low: Basis, tensor: BodyTensor | None) -> Floats | None:
+    """Real reduced elements of a tensor between two blocks, None where it does not act.
+
+    Between axial states the element of one sign of K; a component across the axis has its absolute value.
+    """
+    if tensor is None:
+        return None
+    if isinstance(up, AxialState) and isinstance(low, AxialState):
+        q = up.axial_k - low.axial_k
+        if abs(q) > tensor.rank or not abs(up.j - low.j) <= tensor.rank <= up.j + low.j:
+            return None
+        part = tensor.components[tensor.rank + q]
+        return (
+            (abs(part) if q else part.real) * coupling(low.j, up.j, tensor.rank, q, [low.axial_k])[:, None]
+            if part
+            else None
+        )
+    assert isinstance(up, WangBlock)
+    assert isinstance(low, WangBlock)
+    return None if tensor.between(up, low) is None else block_elements(up, low, tensor)
+
+
+@dataclass(frozen=True)
+class Scalar:
+    """Operators of N by powers (p, q, n): X of rank 0, given as a plain matrix."""
+
+    operators: tuple[tuple[Powers, float], ...] = (((0, 0, 0), 1.0),)
+    rank = 0
+    odd = False
+
+    def elements(self, up: Basis, low: Basis, representation: str) -> Floats | None:
+        """The matrix between two blocks, None where it is zero."""
+        if up != low:
+            return None
+        operators: Operators = dict(self.operators)
+        scalar = scalar_energy(operators, low.j)
+        if isinstance(low, AxialState):
+            x = low.j * (low.j + 1.0)
+            along = sum(c * x**p * low.axial_k ** (2 * q) for (p, q, _), c in self.operators if q)
+            return np.array([[scalar + along]])
+        bands = block_bands(JMatrix(operators, low.j), low)
+        matrix = np.diag(bands[0] + scalar)
+        for n, band in enumerate(bands[1:], 1):
+            matrix += np.diag(band, n) + np.diag(band, -n)
+        return np.asarray(matrix)
+
+
+@dataclass(frozen=True)
+class Cosines:
+    """Direction cosines with components along a, b, c: a vector (rank 1), or a matrix of which T² acts (rank 2)."""
+
+    components: Vector | Matrix
+
+    @property
+    def rank(self) -> int:
+        """1 of a vector, 2 of a matrix."""
+        return np.ndim(self.components)
+
+    @property
+    def odd(self) -> bool:
+        """Whether time reversal changes the sign once spins are contracted with it."""
+        return self.rank == 1
+
+    def elements(self, up: Basis, low: Basis, representation: str) -> Floats | None:
+        """The real reduced matrix; of a vector that of i times it, Hermitian and invariant under time reversal."""
+        found = tensor_elements(up, low, _tensor(self.components, self.rank, representation))
+        return -found if found is not None and self.rank == 1 else found  # i (i E)
+
+
+@dataclass(frozen=True)
+class CosinesWithN:
+    """Σ_ij c_ij ½{φ_pi, N_j} with any c (3, 3) along a, b, c: rank 1."""
+
+    components: Matrix
+    rank = 1
+    odd = False
+
+    def elements(self, up: Basis, low: Basis, representation: str) -> Floats | None:
+        """The real reduced matrix between two blocks, None where it is zero."""
+        c, n, m = np.array(self.components), low.j, up.j
+        if abs(m - n) > 1 or not m + n:
+            return None
+        stretch = sqrt(max(((m + n + 1) ** 2 - 4) * (1 - (m - n) ** 2 / 4) / 6, 0.0))
+        found = [
+            (stretch, tensor_elements(up, low, _tensor(self.components, 2, representation))),
+            ((n * (n + 1) - m * (m + 1)) / 2, tensor_elements(up, low, _axis(self.components, representation))),
+            (float(np.trace(c)) / 3, sqrt(n * (n + 1.0) * (2 * n + 1)) * np.eye(low.size) if up == low else None),
+        ]
+        acting = [factor * matrix for factor, matrix in found if matrix is not None and factor]
+        return np.asarray(sum(acting)) if acting else None
+
+
+Rotor = Scalar | Cosines | CosinesWithN
+
+
+@lru_cache(maxsize=256)
+def _tensor(components: Vector | Matrix, rank: int, representation: str) -> BodyTensor | None:
+    parts = np.array(components, dtype=float)
+    if rank == 2:
+        parts = (parts + parts.T) / 2 - np.eye(3) * np.trace(parts) / 3
+    return body_tensor(parts, rank, representation) if parts.any() else None
+
+
+def _axis(components: Matrix, representation: str) -> BodyTensor | None:
+    """The vector of the antisymmetric part."""
+    c = np.array(components, dtype=float)
+    c = (c - c.T) / 2
+    return _tensor((float(c[1, 2]), float(c[2, 0]), float(c[0, 1])), 1, representation)
+
+
+def is_axial(rotor: Rotor, axis: str) -> bool:
+    """Whether an operator leaves K good in a symmetric top about a or c.
+
+    >>> is_axial(Cosines(((1.0, 0, 0), (0, -0.5, 0), (0, 0, -0.5))), "a")
+    True
+    """
+    if isinstance(rotor, Scalar):
+        return all(n == 0 for (_, _, n), _ in rotor.operators)
+    c = np.array(rotor.components, dtype=float)
+    across = (1, 2) if axis == "a" else (0, 1)
+    return (
+        c.ndim == 2
+        and bool((c == np.diag(np.diag(c))).all())
+        and bool(c[across[0], across[0]] == c[across[1], across[1]])
+    )
+
+
+@dataclass(frozen=True)
+class SpinTerm:
+    """What a parameter of an effect multiplies, besides `factor`: X^K(N) · W^K of the spins named.
+
+    name: of the parameter. spins: none, one (its vector), one twice (its quadrupole, T²(I, I)/(2I(2I-1))) or two (their product,
+    coupled to the rank of `rotor`). n2, nz2: powers of N² and Nz², ns: power of N·S1. bra, ket: the states v that it connects, h.c.
+    added where they differ; an operator that is odd under time reversal has the factor i there.
+    """
+
+    name: str
+    spins: tuple[str, ...]
+    rotor: Rotor
+    factor: float = 1.0
+    n2: int = 0
+    nz2: int = 0
+    ns: int = 0
+    bra: int = EVERY_STATE
+    ket: int = EVERY_STATE
+
+    def __post_init__(self) -> None:
+        wanted = {0: (0,), 1: (1,), 2: (0, 2)}.get(len(self.spins), ())
+        if self.rotor.rank not in wanted or (len(set(self.spins)) < len(self.spins) and self.rotor.rank != 2):
+            raise ValueError(
+                f"{self.name}: {len(self.spins)} spins {self.spins} cannot close an operator of rank {self.rotor.rank}"
+            )
+        if self.rotor.odd and self.bra == self.ket:
+            raise ValueError(
+                f"{self.name}: time reversal changes its sign; such an operator connects different states only"
+            )
+
+
+def summed(weighted: Iterable[tuple[float, Rotor]]) -> list[tuple[float, Rotor]]:
+    """Operators times numbers, those of one form that differ in their components alone added to one."""
+    out: list[tuple[float, Rotor]] = []
+    sums: dict[tuple[type, int], Floats] = {}
+    for value, rotor in weighted:
+        if isinstance(rotor, Scalar):
+            out.append((value, rotor))
+        else:
+            key = (type(rotor), rotor.rank)
+            sums[key] = sums.get(key, 0.0) + value * np.array(rotor.components)
+    return out + [(1.0, form(_nested(total))) for (form, _), total in sums.items()]
+
+
+def _nested(array: Floats) -> tuple:  # type: ignore[type-arg]
+    return tuple(_nested(row) if row.ndim else float(row) for row in array)

@@ -1,0 +1,183 @@
+"""The rotation as spins see it: solved blocks of N, and operators of N contracted to their eigenstates.
+
+Terms that have the same spins, rank and power of N·S share every coefficient of coupling; they are one channel, whose
+contracted matrices Σ_terms c ⟨r'‖X^K‖r⟩ between solved blocks are computed once for all F.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from rotor.arrays import Floats, Ints
+from rotor.quantum.basis import names_of
+from rotor.quantum.coupled import CoupledBlock
+from rotor.quantum.effect import k_limits_of
+from rotor.quantum.levels import SolvedBlock
+from rotor.quantum.solve import hamiltonian, solve_rotation
+from rotor.quantum.spins.operators import EVERY_STATE, AxialState, Basis, Rotor, SpinTerm, is_axial, summed
+from rotor.quantum.spins.scheme import Scheme
+
+if TYPE_CHECKING:
+    from rotor.quantum.effect import QuantumEffect
+    from rotor.tops.top import Top
+
+
+class RotorPart(NamedTuple):
+    """Functions of one state v within a block: a Wang block, or |N K⟩ of a symmetric top; where they stand."""
+
+    v: int
+    basis: Basis
+    place: slice
+    names: Ints  # Ka and Kc of the functions in order of energy, (size, 2); K and 0 of |N K⟩
+
+
+class RotorBlock(NamedTuple):
+    """States of one N solved together: energies (n,) in MHz, eigenvectors (n, n) in columns over the parts."""
+
+    n: int
+    parts: tuple[RotorPart, ...]
+    energies_mhz: Floats
+    vectors: Floats
+
+
+class Channel(NamedTuple):
+    """Places of the spins that act, the rank, and the powers of N·S1 and, with it, of N²."""
+
+    acting: tuple[int, ...]
+    rank: int
+    ns: int = 0
+    n2: int = 0
+
+
+@dataclass(frozen=True)
+class Piece:
+    """An operator of N between two states, with its powers of N² and Nz², times a value in MHz."""
+
+    value: float
+    rotor: Rotor
+    bra: int
+    ket: int
+    n2: int
+    nz2: int
+
+
+Channels = dict[Channel, list[Piece]]
+Terms = list[tuple[float, SpinTerm]]
+
+
+def solved_rotor(
+    top: Top, effects: tuple[QuantumEffect, ...], terms: Terms, nmin: int, nmax: int, executor: Executor | None
+) -> tuple[list[RotorBlock], str]:
+    """The rotation solved from N = `nmin` to `nmax`, and the representation of its functions.
+
+    A symmetric top whose terms are all axial is left in |N K⟩, one function a block.
+    """
+    if top.kind in ("prolate", "oblate") and _all_axial(top, effects, terms):
+        levels = solve_rotation(top, effects, nmin, nmax, False, executor)
+        rows = zip(levels.rotational.tolist(), levels.quanta["k"].tolist(), levels.energy_mhz.tolist(), strict=True)
+        return [_axial_block(n, k, e) for n, k, e in rows], "Ir" if top.kind == "prolate" else "IIIr"
+    levels = solve_rotation(top, effects, nmin, nmax, True, executor, in_blocks=True)
+    representation = str(levels.representation)
+    return [_rotor_block(block, representation) for block in levels.blocks], representation
+
+
+def _all_axial(top: Top, effects: tuple[QuantumEffect, ...], terms: Terms) -> bool:
+    axis = "a" if top.kind == "prolate" else "c"
+    if k_limits_of(top, effects) or any(n for _, _, n in hamiltonian(top, effects)):
+        return False
+    if not all(is_axial(term.rotor, axis) for _, term in terms):
+        return False
+    own = (effect.j_operator(top, name, 1, "Ir") for effect in effects for name in effect.parameters(top))
+    states = any(effect.states(top) or effect.couplings(top) for effect in effects)
+    return not states and all(operator is None for operator in own)
+
+
+def _axial_block(n: int, k: int, energy_mhz: float) -> RotorBlock:
+    part = RotorPart(0, AxialState(n, k), slice(0, 1), np.array([[k, 0]]))
+    return RotorBlock(n, (part,), np.array([energy_mhz]), np.ones((1, 1)))
+
+
+def _rotor_block(block: SolvedBlock | CoupledBlock, representation: str) -> RotorBlock:
+    if isinstance(block, CoupledBlock):
+        n, where = block.j, [(part.v, part.basis, part.place) for part in block.parts]
+    else:
+        n, where = block.basis.j, [(0, block.basis, slice(0, block.basis.size))]
+    parts = (RotorPart(v, basis, place, np.stack(names_of(basis, representation), axis=1)) for v, basis, place in where)
+    return RotorBlock(n, tuple(parts), block.energies_mhz, block.vectors)
+
+
+def valued_terms(top: Top, effects: Iterable[QuantumEffect]) -> Terms:
+    """Every spin term of the effects with the value of its parameter times its factor, zeros left out."""
+    found = []
+    for effect in effects:
+        values = effect.parameters(top)
+        found += [(values[term.name] * term.factor, term) for term in effect.spin_terms(top)]
+    return [(value, term) for value, term in found if value]
+
+
+def channels_of(terms: Terms, scheme: Scheme) -> Channels:
+    """Terms by channel; operators that differ only in their components are added to one."""
+    groups: dict[tuple[Any, ...], list[tuple[float, Rotor]]] = {}
+    for value, term in terms:
+        acting = tuple(sorted(scheme.place(name) for name in term.spins))
+        channel = Channel(acting, term.rotor.rank, term.ns, term.n2 if term.ns else 0)
+        key = (channel, term.bra, term.ket, 0 if term.ns else term.n2, term.nz2)
+        groups.setdefault(key, []).append((value, term.rotor))
+    found: Channels = {}
+    for (channel, *where), members in groups.items():
+        found.setdefault(channel, []).extend(Piece(value, rotor, *where) for value, rotor in summed(members))
+    return found
+
+
+def contracted(up: RotorBlock, low: RotorBlock, pieces: Sequence[Piece], representation: str) -> Floats | None:
+    """Σ value ⟨r'‖X‖r⟩ between the states of two blocks, None where nothing acts.
+
+    A piece between different states acts from its ket to its bra; the other way round it is the transposed element, which
+    belongs to the other order of the two blocks.
+    """
+    total: Floats | None = None
+    for piece in pieces:
+        for left in up.parts:
+            for right in low.parts:
+                if not _acts(piece, left.v, right.v):
+                    continue
+                found = piece.rotor.elements(left.basis, right.basis, representation)
+                if found is None or not found.any():
+                    continue
+                scaled = _powers(piece, left, right) * found
+                moved = up.vectors[left.place].T @ scaled @ low.vectors[right.place]
+                total = moved if total is None else total + moved
+    return total
+
+
+def _acts(piece: Piece, left: int, right: int) -> bool:
+    return left == right if piece.bra == EVERY_STATE else (left, right) == (piece.bra, piece.ket)
+
+
+def _powers(piece: Piece, left: RotorPart, right: RotorPart) -> Floats:
+    """value ½(bra + ket) of N^2p, times ½(bra + ket) of Nz^2q."""
+    m, n = left.basis.j, right.basis.j
+    value = piece.value * ((m * (m + 1.0)) ** piece.n2 + (n * (n + 1.0)) ** piece.n2) / 2
+    if not piece.nz2:
+        return np.asarray(value)
+    bra, ket = left.basis.k.astype(float) ** (2 * piece.nz2), right.basis.k.astype(float) ** (2 * piece.nz2)
+    return np.asarray(value * (bra[:, None] + ket) / 2)
+
+
+def in_both_orders(up: RotorBlock, low: RotorBlock, pieces: Sequence[Piece], representation: str) -> Floats | None:
+    """`contracted` and, for pieces between different states, their Hermitian conjugates from the other order.
+
+    Coefficients of coupling have c(p', p) = (-1)^(N'-N) c(p, p').
+    """
+    found = contracted(up, low, pieces, representation)
+    between = [piece for piece in pieces if piece.bra != piece.ket]
+    back = contracted(low, up, between, representation) if between else None
+    if back is None:
+        return found
+    turned = (-1.0) ** (up.n - low.n) * back.T
+    return turned if found is None else found + turned

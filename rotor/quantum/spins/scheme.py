@@ -1,0 +1,79 @@
+"""Which spins there are, in which order they are coupled, N + S1 = J, J + I1 = F1, ... = F, and what their sums are called."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from itertools import accumulate
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rotor.quantum.effect import QuantumEffect
+    from rotor.tops.top import Top
+
+
+@dataclass(frozen=True)
+class Spin:
+    """One spin: its name, as parameters have it, twice its size (2I, a whole number), and whether it is an electron's.
+
+    Spins are coupled in the order in which effects first name them, electrons' before nuclei's.
+    """
+
+    name: str
+    twice: int
+    electron: bool = False
+
+    def __post_init__(self) -> None:
+        if self.twice < 1 or self.twice != int(self.twice):
+            raise ValueError(f"spin {self.name}: 2I = {self.twice}; twice a spin is a whole number, 1 or more")
+
+
+@dataclass(frozen=True)
+class Scheme:
+    """Which spins are coupled, and what the angular momenta on the way to F are called."""
+
+    spins: tuple[Spin, ...]
+    twice: tuple[int, ...] = field(init=False)
+
+    def __post_init__(self) -> None:
+        names = [spin.name for spin in self.spins]
+        if len(set(names)) < len(names):
+            raise ValueError(f"spins {', '.join(names)}: every spin has a name of its own")
+        object.__setattr__(self, "twice", tuple(spin.twice for spin in self.spins))
+
+    @property
+    def total(self) -> int:
+        """Twice the sum of all spins."""
+        return sum(self.twice)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the quantum numbers after each spin: j after electrons, f1, f2, ..., f after the last nucleus.
+
+        >>> Scheme((Spin("S", 1, True), Spin("14N", 2))).names, Scheme((Spin("Cl1", 3), Spin("Cl2", 3))).names
+        (('j', 'f'), ('f1', 'f'))
+        """
+        electrons = [f"j{i + 1}" if i else "j" for i, spin in enumerate(self.spins) if spin.electron]
+        nuclei = len(self.spins) - len(electrons)
+        return (*electrons, *(f"f{i + 1}" for i in range(nuclei - 1)), *(["f"] if nuclei else []))
+
+    @property
+    def half(self) -> tuple[bool, ...]:
+        """Which of them are half-integers."""
+        return tuple(bool(total % 2) for total in accumulate(self.twice))
+
+    def place(self, name: str) -> int:
+        """The place of a spin by its name."""
+        for place, spin in enumerate(self.spins):
+            if spin.name == name:
+                return place
+        raise ValueError(f"spin {name}: the spins here are {', '.join(spin.name for spin in self.spins) or 'none'}")
+
+
+def scheme_of(top: Top, effects: Sequence[QuantumEffect]) -> Scheme:
+    """The spins of all effects, each once, electrons first; ValueError where two effects give one of them another size."""
+    found: dict[str, Spin] = {}
+    for spin in (spin for effect in effects for spin in effect.spins(top)):
+        if found.setdefault(spin.name, spin) != spin:
+            raise ValueError(f"spin {spin.name}: given as {found[spin.name].twice}/2 and as {spin.twice}/2")
+    return Scheme(tuple(sorted(found.values(), key=lambda spin: not spin.electron)))

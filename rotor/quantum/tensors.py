@@ -1,0 +1,371 @@
+"""Reduced matrix elements of molecule-fixed tensors: between symmetric-top functions, Wang blocks and solved states.
+
+A tensor T^K_q that is fixed in the molecule has, in space, the components T^K_p = Σ_q D^K*_pq T^K_q, and
+
+    ⟨J'k'M'|T^K_p|J k M⟩ = (-1)^(J'-M') (J' K J; -M' p M) ⟨J'k'‖T^K‖J k⟩
+    ⟨J'k'‖T^K‖J k⟩       = Σ_q T^K_q √((2J'+1)(2J+1)) (-1)^(J'-k') (J' K J; -k' q k)
+
+with |J k M⟩ = √((2J+1)/8π²) D^J*_Mk, from the integral over three D functions (R. N. Zare, Angular Momentum, 1988, eq.
+3.118). These functions have the phases of `basis` and `watson`: ⟨J,k±1|Jx ∓ iJy|J,k⟩ = √(J(J+1) - k(k±1)). Such ladders
+belong to a right-handed frame. A left-handed representation has the same, so that its frame is (x, -y, z) here: in every
+representation [Ja, T_b] = -i T_c of a vector, and in left-handed ones [Jx, Jy] = +i Jz (`frame_of`).
+
+Real matrices. A tensor with real Cartesian components has T_-q = (-1)^q T_q*, hence elements M with M(-k',-k) =
+(-1)^(J'+J+K+k'-k) M(k',k)*. Over the Wang functions with the phases
+
+    |J K s))  =  i^J i^e |J K s⟩,      e = 0 where s (-1)^K = +1, else 1
+
+every tensor of even rank is real, every one of odd rank i times real: "elements" below are the real matrices, without
+that i. Energies and eigenvectors of a semi-rigid top are the same over |J K s)) and |J K s⟩, since a block has one phase.
+The other triangle, J' → J, is (-1)^(J'-J+K) times the transpose. Between two blocks either Re T_q or Im T_q acts, and
+either even q or odd, by the characters of the blocks under C2y and C2z: of a vector at most one of T_x, T_y, T_z.
+
+Line strengths: Σ_{M' M p} |⟨J'τ'M'|T^K_p|J τ M⟩|² is the square of the reduced element.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rotor.arrays import Floats
+from rotor.quantum.basis import WangBlock
+from rotor.quantum.wigner import three_j
+from rotor.tops.operators import axes_of as axes_of
+
+if TYPE_CHECKING:
+    from rotor.quantum.levels import SolvedBlock
+
+Complexes = NDArray[np.complex128]
+
+ROUND_OFF = 1e-9  # of the largest component: how far T_-q may be from (-1)^q T_q*
+
+
+# Components
+
+
+def frame_of(representation: str) -> Floats:
+    """The rotation (3, 3) from components along a, b, c to those along the right-handed frame of a representation.
+
+    x, y, z of a right-handed representation, x, -y, z of a left-handed one.
+
+    >>> frame_of("Il").tolist()
+    [[0.0, 0.0, 1.0], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0]]
+    """
+    rows = np.eye(3)[["abc".index(axis) for axis in axes_of(representation)]]
+    if axes_of(representation) not in ("abc", "bca", "cab"):
+        rows[1] = -rows[1] + 0.0  # no -0.0
+    return rows
+
+
+def spherical_components(cartesian: ArrayLike, rank: int, representation: str) -> Complexes:
+    """T^K_q, q = -K ... K, of a vector (3,) or a matrix (3, 3) along a, b, c, in the frame of a representation.
+
+    Vector: T_0 = v_z, T_±1 = ∓(v_x ± i v_y)/√2. Matrix: T^K_q = Σ ⟨1 m 1 n|K q⟩ T_mn, that is
+
+        T^0_0 = -(xx + yy + zz)/√3,        T^2_0 = (2zz - xx - yy)/√6
+        T^1_0 = i(xy - yx)/√2,             T^1_±1 = [(zx - xz) ∓ i(yz - zy)]/2
+        T^2_±1 = ∓[(xz + zx) ± i(yz + zy)]/2,    T^2_±2 = [(xx - yy) ± i(xy + yx)]/2.
+
+    Raises ValueError for a rank that such an array does not have.
+
+    >>> spherical_components([1.0, 0, 0], 1, "Ir")[1].item()  # a is z
+    (1+0j)
+    """
+    array, turn = np.asarray(cartesian, dtype=float), frame_of(representation)
+    if array.shape == (3,) and rank == 1:
+        x, y, z = turn @ array
+        return np.array([(x - 1j * y) / np.sqrt(2), z, -(x + 1j * y) / np.sqrt(2)])
+    if array.shape == (3, 3) and rank in (0, 1, 2):
+        return _of_matrix(turn @ array @ turn.T, rank)
+    raise ValueError(
+        f"rank {rank} of an array {array.shape}: a vector (3,) has rank 1, a matrix (3, 3) ranks 0, 1 and 2"
+    )
+
+
+def _of_matrix(t: Floats, rank: int) -> Complexes:
+    if rank == 0:
+        return np.array([-np.trace(t) / np.sqrt(3)], dtype=complex)
+    if rank == 1:
+        (x, y, z) = t[1, 2] - t[2, 1], t[2, 0] - t[0, 2], t[0, 1] - t[1, 0]
+        return np.array([(y + 1j * x) / 2, 1j * z / np.sqrt(2), (y - 1j * x) / 2])
+    along = (2 * t[2, 2] - t[0, 0] - t[1, 1]) / np.sqrt(6)
+    one = (t[0, 2] + t[2, 0] + 1j * (t[1, 2] + t[2, 1])) / 2
+    two = (t[0, 0] - t[1, 1] + 1j * (t[0, 1] + t[1, 0])) / 2
+    return np.array([two.conjugate(), one.conjugate(), along, -one, two])
+
+
+@dataclass(frozen=True)
+class BodyTensor:
+    """A tensor fixed in the molecule whose Cartesian components are real: T^K_q, q = -K ... K, in one representation.
+
+    `components` must be T_-q = (-1)^q T_q*; ValueError where they are not. The antisymmetric part of a matrix is i times
+    such a tensor of rank 1, that of the vector (T_bc - T_cb, T_ca - T_ac, T_ab - T_ba)/√2.
+    """
+
+    rank: int
+    components: tuple[complex, ...]
+
+    def __post_init__(self) -> None:
+        parts = np.array(self.components)
+        if self.rank < 0 or len(parts) != 2 * self.rank + 1:
+            raise ValueError(
+                f"rank {self.rank}: 2K + 1 = {2 * self.rank + 1} components belong to it, found {len(parts)}"
+            )
+        mirrored = np.where(np.arange(-self.rank, self.rank + 1) % 2, -1, 1) * parts[::-1].conj()
+        if not np.abs(parts - mirrored).max() <= ROUND_OFF * np.abs(parts).max():
+            raise ValueError(
+                f"components {self.components}: a tensor with real Cartesian components has T_-q = (-1)^q T_q*"
+            )
+
+    @cached_property
+    def _halves(self) -> dict[bool, list[float]]:
+        """Re T_q by True, Im T_q by False."""
+        return {True: [part.real for part in self.components], False: [part.imag for part in self.components]}
+
+    @cached_property
+    def _acting(self) -> set[tuple[int, bool]]:
+        """Which of (even or odd q, real or imaginary part) are not zero."""
+        halves = self._halves.items()
+        return {(q % 2, real) for real, half in halves for q, value in enumerate(half, -self.rank) if value}
+
+    def is_real_between(self, up: WangBlock, low: WangBlock) -> bool:
+        """Whether Re T_q acts from `low` to `up`: the product of their characters under C2y is (-1)^K. Else Im T_q does."""
+        odd = (up.first_k + low.first_k + up.j + low.j + self.rank) % 2
+        return up.sign * low.sign == (-1 if odd else 1)
+
+    def between(self, up: WangBlock, low: WangBlock) -> list[float] | None:
+        """Re T_q or Im T_q, q = -K ... K, that acts from `low` to `up`; None where nothing does."""
+        real = self.is_real_between(up, low)
+        if ((up.first_k + low.first_k) % 2, real) not in self._acting:
+            return None
+        return self._halves[real] if abs(up.j - low.j) <= self.rank <= up.j + low.j else None
+
+
+def body_tensor(cartesian: ArrayLike, rank: int, representation: str) -> BodyTensor:
+    """The part of one rank of a vector (3,) or a matrix (3, 3) along a, b, c, ready to act in a representation.
+
+    Raises ValueError as `spherical_components` does, and for rank 1 of a matrix, which is i times a vector: give that.
+    """
+    return BodyTensor(rank, tuple(spherical_components(cartesian, rank, representation).tolist()))
+
+
+# Between symmetric-top functions
+
+
+def coupling(j_low: int, j_up: int, rank: int, q: int, k: ArrayLike) -> Floats:
+    """√((2J'+1)(2J+1)) (-1)^(J'-k') (J' K J; -k' q k) from k to k' = k + q, for an array of k; 0 where k or k' do not exist.
+
+    It is √(2J+1) ⟨J k K q|J' k'⟩. For K ≤ 2 in closed forms: K = 1 as the direction cosines of P. C. Cross, R. M. Hainer and
+    G. W. King, J. Chem. Phys. 12, 210 (1944), table I; K = 2 from D. A. Varshalovich, A. N. Moskalev and V. K. Khersonskii,
+    Quantum Theory of Angular Momentum, 1988, table 8.4. Else from `three_j`. J' < J and q < 0 follow from
+
+        c(J → J', q, k) = (-1)^(J'-J-q) c(J' → J, -q, k+q) = (-1)^(J'-J-K) c(J → J', -q, -k).
+
+    >>> round(float(coupling(1, 3, 2, 0, 0)) ** 2, 6)  # (3/2) (J+1)(J+2)/(2J+3) of a linear molecule
+    1.8
+    """
+    k = np.asarray(k, dtype=float)
+    exists = (np.abs(k) <= j_low) & (np.abs(k + q) <= j_up)
+    if not abs(j_up - j_low) <= rank <= j_up + j_low or abs(q) > rank:
+        return np.zeros(k.shape)
+    values = _existing(j_low, j_up, rank, q, np.where(exists, k, max(-j_low, -j_up - q)))
+    return np.where(exists, values, 0.0)
+
+
+def _existing(j: int, j_up: int, rank: int, q: int, k: Floats) -> Floats:
+    """`coupling` for k and k + q that exist."""
+    if rank <= 2:
+        return _closed(j, j_up, rank, q, k)
+    root = np.sqrt((2.0 * j_up + 1) * (2 * j + 1))
+    return np.asarray(np.where((j_up - k - q) % 2, -root, root) * three_j(j_up, rank, j, -k - q, q, k))
+
+
+def _closed(j: int, j_up: int, rank: int, q: int, k: Floats) -> Floats:
+    """Rank 0, 1 or 2, for k and k + q that exist."""
+    if j_up < j:
+        return _sign(j_up - j - q) * _closed(j_up, j, rank, -q, k + q)
+    if q < 0:
+        return _sign(j_up - j - rank) * _closed(j, j_up, rank, -q, -k)
+    if rank == 0:
+        return np.full(k.shape, np.sqrt(2 * j + 1.0))
+    if rank == 1:
+        return _vector_up(j, k, q) if j_up > j else _vector_level(j, k, q)
+    return (_tensor_level, _tensor_one_up, _tensor_two_up)[j_up - j](j, k, q)
+
+
+def _sign(power: int) -> float:
+    return -1.0 if power % 2 else 1.0
+
+
+def _vector_up(j: int, k: Floats, q: int) -> Floats:
+    if q == 0:
+        return np.asarray(np.sqrt((j - k + 1) * (j + k + 1) / (j + 1)))
+    return np.asarray(np.sqrt((j + k + 1) * (j + k + 2) / (2 * (j + 1))))
+
+
+def _vector_level(j: int, k: Floats, q: int) -> Floats:
+    if q == 0:
+        return np.asarray(k * np.sqrt((2 * j + 1) / (j * (j + 1))))
+    return np.asarray(-np.sqrt((j - k) * (j + k + 1) * ((2 * j + 1) / (2 * j * (j + 1)))))
+
+
+def _tensor_two_up(j: int, k: Floats, q: int) -> Floats:
+    if q == 0:
+        above = 1.5 * (j - k + 1) * (j - k + 2) * (j + k + 1) * (j + k + 2)
+    elif q == 1:
+        above = (j - k + 1) * (j + k + 1) * (j + k + 2) * (j + k + 3)
+    else:
+        above = 0.25 * (j + k + 1) * (j + k + 2) * (j + k + 3) * (j + k + 4)
+    return np.asarray(np.sqrt(above / ((j + 1.0) * (2 * j + 3) * (j + 2))))
+
+
+def _tensor_one_up(j: int, k: Floats, q: int) -> Floats:
+    norm = 2.0 * j * (j + 1) * (j + 2)
+    if q == 0:
+        return np.asarray(k * np.sqrt(6 * (j - k + 1) * (j + k + 1) / norm))
+    if q == 1:
+        return np.asarray((2 * k - j) * np.sqrt((j + k + 1) * (j + k + 2) / norm))
+    return np.asarray(-np.sqrt((j - k) * (j + k + 1) * (j + k + 2) * (j + k + 3) / norm))
+
+
+def _tensor_level(j: int, k: Floats, q: int) -> Floats:
+    norm = (2 * j - 1) * 2.0 * j * (j + 1) * (2 * j + 3) / (2 * j + 1)
+    if q == 0:
+        return np.asarray((3 * k * k - j * (j + 1)) * np.sqrt(2 / norm))
+    if q == 1:
+        return np.asarray(-(2 * k + 1) * np.sqrt(3 * (j - k) * (j + k + 1) / norm))
+    return np.asarray(np.sqrt(3 * (j - k) * (j - k - 1) * (j + k + 1) * (j + k + 2) / norm))
+
+
+def symmetric_top_elements(j_up: int, j_low: int, components: ArrayLike) -> Complexes:
+    """⟨J'k'‖T^K‖J k⟩ over all k' and k, rising from -J' and -J, (2J'+1, 2J+1): the plain form, for any T^K_q.
+
+    components: T^K_q, q = -K ... K.
+    """
+    parts = np.asarray(components, dtype=complex)
+    rank, k = len(parts) // 2, np.arange(-j_low, j_low + 1)
+    out = np.zeros((2 * j_up + 1, 2 * j_low + 1), dtype=complex)
+    for q, part in enumerate(parts, -rank):
+        reached = np.abs(k + q) <= j_up
+        out[k[reached] + q + j_up, k[reached] + j_low] = part * coupling(j_low, j_up, rank, q, k[reached])
+    return out
+
+
+# Between Wang blocks
+
+
+class Band(NamedTuple):
+    """Elements along one diagonal: from the basis states `source` of the lower block to `target` of the upper one."""
+
+    source: slice
+    target: slice
+    elements: Floats
+
+
+def phase_exponent(block: WangBlock) -> int:
+    """The n of i^n, by which a basis function |J K s)) differs from |J K s⟩: J + e modulo 4."""
+    return (block.j + (block.sign != _sign(block.first_k))) % 4
+
+
+def bands_between(up: WangBlock, low: WangBlock, tensor: BodyTensor) -> list[Band]:
+    """The real elements of a tensor from one Wang block to another; those of odd rank stand for i times themselves.
+
+    ((K's'|T|K s)) = n' n [X(K', K) + s X(K', -K)], n = 1/√2 for K = 0 and else 1, X the real or the imaginary part of
+    ⟨K'‖T‖K⟩ that acts between the blocks. The second term is the first again where K or K' is 0, and else needs
+    K + K' ≤ rank.
+    """
+    parts = tensor.between(up, low)
+    if parts is None:
+        return []
+    rank = tensor.rank
+    exponent = phase_exponent(low) - phase_exponent(up) + (not tensor.is_real_between(up, low))
+    sign = -1.0 if (exponent - rank % 2) % 4 else 1.0
+
+    out = []
+    for step in range(-rank + (rank + up.first_k + low.first_k) % 2, rank + 1, 2):
+        source, target = _overlap(up, low, step)
+        folded = _folded(up, low, rank, step, parts) if rank > 1 else ()
+        if source.start >= source.stop or not (parts[rank + step] or folded):
+            continue
+        factors = _wang_coupling(low.j, up.j, rank, step)[low.first_k :: 2]
+        elements = factors[source] * (sign * parts[rank + step])
+        for place, value in folded:
+            elements[place - source.start] += sign * value
+        out.append(Band(source, target, elements))
+    return out
+
+
+def _overlap(up: WangBlock, low: WangBlock, step: int) -> tuple[slice, slice]:
+    """Which K of `low` land on which K of `up` when K changes by `step`."""
+    first = (up.first_k - step - low.first_k) // 2  # place in `low` that lands on place 0 of `up`
+    start, stop = max(first, 0), min(low.size, first + up.size)
+    return slice(start, stop), slice(start - first, stop - first)
+
+
+@lru_cache(maxsize=2048)  # some 16 MB at J = 1000; a dipole needs 6 tables for every J
+def _wang_coupling(j_low: int, j_up: int, rank: int, step: int) -> Floats:
+    """`coupling` for K = 0 ... J, times √2 where one of K and K + step is 0."""
+    first, last = max(0, -step), min(j_low, j_up - step)
+    out = np.zeros(j_low + 1)
+    if first <= last:
+        out[first : last + 1] = _existing(j_low, j_up, rank, step, np.arange(first, last + 1.0))
+        out[first] *= np.sqrt(2.0) if step else 1.0
+    out.flags.writeable = False  # it is shared
+    return out
+
+
+def _folded(up: WangBlock, low: WangBlock, rank: int, step: int, parts: list[float]) -> list[tuple[int, float]]:
+    """Places in the lower block and values of s X(K', -K), K' = K + step, where 1 ≤ K, K' and K + K' ≤ rank."""
+    out = []
+    for k in range(max(low.first_k, 1, 1 - step), (rank - step) // 2 + 1):
+        if (k - low.first_k) % 2 == 0 and k <= low.j and up.first_k <= k + step <= up.j and parts[rank + 2 * k + step]:
+            factor = float(coupling(low.j, up.j, rank, 2 * k + step, -k))
+            out.append(((k - low.first_k) // 2, low.sign * factor * parts[rank + 2 * k + step]))
+    return out
+
+
+def block_elements(up: WangBlock, low: WangBlock, tensor: BodyTensor) -> Floats:
+    """The same as a matrix (up.size, low.size)."""
+    return acting_on(np.eye(low.size), up, low, tensor)
+
+
+def acting_on(vectors: Floats, up: WangBlock, low: WangBlock, tensor: BodyTensor) -> Floats:
+    """T times columns (low.size, n) over the lower block: columns (up.size, n) over the upper one."""
+    states = vectors.T
+    moved = np.zeros((states.shape[0], up.size))
+    for source, target, elements in bands_between(up, low, tensor):
+        moved[:, target] += states[:, source] * elements
+    return moved.T
+
+
+# Between solved states
+
+
+def amplitudes(up: SolvedBlock, low: SolvedBlock, tensor: BodyTensor) -> Floats:
+    """Real reduced elements between all states of two blocks, (n_up, n_low); their squares are the line strengths.
+
+    An odd rank stands for i times them, in the phases of |J K s)).
+    """
+    return np.asarray(up.vectors.T @ acting_on(low.vectors, up.basis, low.basis, tensor))
+
+
+def connected_pairs(blocks: Iterable[SolvedBlock], tensor: BodyTensor) -> Iterator[tuple[SolvedBlock, SolvedBlock]]:
+    """Every pair (up, low) that a tensor connects, each once, the higher or equal J first, J rising.
+
+    A block with itself is among them where a tensor has diagonal elements, as those of even rank do.
+    """
+    by_j: dict[int, list[SolvedBlock]] = {}
+    for block in blocks:
+        by_j.setdefault(block.basis.j, []).append(block)
+    for j, lows in by_j.items():
+        above = [block for rise in range(1, tensor.rank + 1) for block in by_j.get(j + rise, [])]
+        for i, low in enumerate(lows):
+            for up in lows[i:] + above:
+                if tensor.between(up.basis, low.basis) is not None:
+                    yield up, low

@@ -1,0 +1,94 @@
+"""Intensities of lines: the constants, the population of a level, and how far in J a list has to go for a cut.
+
+    I(T) = (8π³/3hc) ν S μ² [exp(-E″/kT) - exp(-E′/kT)] g_I / Q(T)      absorption, integrated, nm² MHz
+
+(H. M. Pickett et al., J. Quant. Spectrosc. Radiat. Transf. 60, 883 (1998), eq. 1). Catalogues print log10 I (LGINT) with
+8π³/3hc = 4.16231e-5 nm² MHz / (MHz D²); every other intensity has the value of CODATA 2022, 4.16238e-5, 1.66e-5 larger.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor import units
+from rotor.arrays import Floats
+from rotor.quantum.levels import Levels
+
+if TYPE_CHECKING:
+    from rotor.tops.top import Top
+
+LGINT_NM2_MHZ = 4.16231e-5  # 8π³/3hc for MHz and D² as catalogues use it, in LGINT alone
+EINSTEIN_PER_MHZ3 = 1.1639654e-20  # 64π⁴/3hc³ for MHz and D², CODATA 2022
+INTENSITY_NM2_MHZ = EINSTEIN_PER_MHZ3 * units.SPEED_OF_LIGHT_M_PER_S**2 / (8 * math.pi)  # 8π³/3hc = (64π⁴/3hc³) c²/8π
+
+JMAX_DEFAULT_LIMIT = 600
+USUAL_CUT = -12.0
+
+
+def jmax_for_cut(top: Top, dipole_abc: tuple[float, float, float], temperature_k: float, q: float, cut: float) -> int:
+    """The J beyond which every line is weaker than 10^cut nm² MHz at this temperature.
+
+    The lowest level of each J is above C J(J+1) in a rigid top, a line's strength is at most (J+1) μ² times the spin
+    weight, its frequency is taken as 2A(J+1). Without a cut, the reach of the usual cut of -12 is taken.
+    Raises ValueError where more than J = 600 would be needed.
+    """
+    constants = top.rotational_constants_mhz
+    a, c = max(x for x in constants if math.isfinite(x)), constants[2]
+    kt_mhz = temperature_k * units.MHZ_PER_K
+    dipole2 = sum(mu * mu for mu in dipole_abc) or 1.0
+    weight = max(top.spin_weights.values)
+    least = 10.0 ** (USUAL_CUT if math.isinf(cut) else cut)
+
+    for j in range(1, 100_000):
+        frequency = 2 * a * (j + 1)
+        photon = -math.expm1(-frequency / kt_mhz)
+        population = weight * math.exp(-c * j * (j - 1) / kt_mhz) / q
+        if j > 1 and LGINT_NM2_MHZ * frequency * (j + 1) * dipole2 * photon * population < least and c * j * j > kt_mhz:
+            break
+    if j > JMAX_DEFAULT_LIMIT:
+        raise ValueError(
+            f"lines above 10^{math.log10(least):g} nm² MHz at {temperature_k:g} K reach to J = {j}, more than "
+            f"{JMAX_DEFAULT_LIMIT}; give J max yourself, a lower temperature or a higher cut"
+        )
+    return j
+
+
+def population(levels: Levels, temperature_k: float, q: float, ground_mhz: float | None = None) -> Floats:
+    """The fraction of molecules in one state, one component and one M, of every level, with its spin weight, (n,).
+
+    ground_mhz: the energy from which Q counts; that of the lowest of these levels that exists if None.
+    """
+    above_k = (levels.energy_mhz - (levels.ground_mhz if ground_mhz is None else ground_mhz)) / units.MHZ_PER_K
+    return np.asarray(levels.weight_per_component / q * np.exp(-above_k / temperature_k))
+
+
+@dataclass(frozen=True)
+class IntensityCut:
+    """What an intensity needs besides frequency and strength, and the least one that counts.
+
+    population: (levels,) intensity per MHz and D² of a line from each state, the photon factor apart. kt_mhz: kT/h.
+    """
+
+    population: Floats
+    kt_mhz: float
+    least: float
+
+    def keeps(self, frequency_mhz: Floats, strength: Floats, population: Floats) -> NDArray[np.bool_]:
+        """Which lines are strong enough."""
+        scaled = frequency_mhz * strength * population
+        return scaled * -np.expm1(-frequency_mhz / self.kt_mhz) >= self.least
+
+
+def intensity_cut(
+    levels: Levels, temperature_k: float, q: float, least_lgint: float, ground_mhz: float | None = None
+) -> IntensityCut | None:
+    """The cut at an LGINT of `least_lgint`; None for -inf, which cuts nothing. ground_mhz: as in `population`."""
+    if math.isinf(least_lgint):
+        return None
+    scaled = LGINT_NM2_MHZ * population(levels, temperature_k, q, ground_mhz)
+    return IntensityCut(scaled, temperature_k * units.MHZ_PER_K, 10.0**least_lgint)

@@ -1,0 +1,128 @@
+"""A request for rotational Raman lines, and what answers it."""
+
+from __future__ import annotations
+
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rotor.arrays import Ints
+from rotor.checks import require_between, require_positive, require_whole
+from rotor.quantum.effect import QuantumEffect
+from rotor.quantum.effects.watson import SEMI_RIGID
+from rotor.spectra.raman import (
+    DEFAULT_LASER_NM,
+    DEFAULT_MIN_RELATIVE,
+    RamanLines,
+    anisotropy_angstrom3,
+    band_cross_section,
+    raman_lines,
+)
+from rotor.thermo import VibrationalStates
+from rotor.thermo.request import partition_facts
+from rotor.tops.facts import top_facts
+
+if TYPE_CHECKING:
+    from rotor.tops.top import Top
+
+
+@dataclass(frozen=True)
+class RamanRequest:
+    """Rotational Raman lines to compute; every field is checked when the request is made.
+
+    top: with its polarizability; a spherical one needs none. temperature_k: of the gas. laser_nm: wavelength in vacuum.
+    jmax: the highest J; None: what the cut needs. min_relative: cross section, of the strongest line, below which lines
+    are left out; None: every allowed line. q, vibrations: as in a `SpectrumRequest`. effects: of the Hamiltonian.
+    """
+
+    top: Top
+    temperature_k: float = 300.0
+    laser_nm: float = DEFAULT_LASER_NM
+    jmax: int | None = None
+    min_relative: float | None = DEFAULT_MIN_RELATIVE
+    q: float | None = None
+    vibrations: VibrationalStates | None = None
+    effects: tuple[QuantumEffect, ...] = SEMI_RIGID
+
+    def __post_init__(self) -> None:
+        require_positive("temperature_k", self.temperature_k)
+        require_positive("laser_nm", self.laser_nm)
+        require_whole("jmax", self.jmax, 0)
+        if self.q is not None:
+            require_positive("q", self.q)
+        if self.min_relative is not None:
+            require_between("min_relative", self.min_relative, 0, 1)
+        if self.top.polarizability_abc_angstrom3 is None and self.top.kind != "spherical":
+            raise ValueError(
+                f"the polarizability of {self.top.name or 'this top'} is not known; give one, in principal axes"
+            )
+
+
+@dataclass(frozen=True)
+class RamanAnswer:
+    """The Raman lines that a request asked for."""
+
+    request: RamanRequest
+    lines: RamanLines
+
+    def strongest(self, count: int) -> Ints:
+        """Rows of the `count` lines of largest cross section, in order of shift."""
+        return np.sort(np.argsort(-self.lines.cross_section_cm2_per_sr, kind="stable")[:count])
+
+    @property
+    def jmax_source(self) -> str:
+        """How the highest J was chosen."""
+        if self.request.jmax is not None:
+            return "given"
+        return f"beyond it no line reaches {self.request.min_relative or DEFAULT_MIN_RELATIVE:g} of the strongest"
+
+    @property
+    def why_no_lines(self) -> str:
+        """Why the list is empty; nothing where it is not."""
+        if len(self.lines):
+            return ""
+        if self.lines.top.kind == "spherical":
+            return "the polarizability of a rigid spherical top is isotropic"
+        if self.lines.jmax < 2:
+            return "J max leaves none"
+        return "the polarizability is isotropic, or the levels that it connects do not exist"
+
+    def facts(self) -> dict[str, Any]:
+        """Everything about the answer but its table of lines, by the keys of docs/command_line.md."""
+        lines = self.lines
+        return {
+            **top_facts(lines.top),
+            "temperature_k": lines.temperature_k,
+            "laser_nm": lines.laser_nm,
+            "anisotropy_angstrom3": anisotropy_angstrom3(lines.top),
+            "band_cross_section_cm2_per_sr": band_cross_section(lines),
+            "q": partition_facts(lines.top, lines.partition),
+            "jmax": lines.jmax,
+            "jmax_source": self.jmax_source,
+            "min_relative": self.request.min_relative,
+            "line_count": len(lines),
+        }
+
+
+def answer_raman(request: RamanRequest, executor: Executor | None = None) -> RamanAnswer:
+    """The Raman lines of a request. executor: J are spread over it.
+
+    >>> from rotor.tops.top import Top
+    >>> rod = Top.from_constants("B=2 cm-1", polarizability_abc_angstrom3=((2.2, 0, 0), (0, 1.5, 0), (0, 0, 1.5)))
+    >>> answer_raman(RamanRequest(rod, jmax=2)).lines.shift_cm.round(6).tolist()  # 6B
+    [-12.0, 12.0]
+    """
+    lines = raman_lines(
+        request.top,
+        temperature_k=request.temperature_k,
+        laser_nm=request.laser_nm,
+        jmax=request.jmax,
+        min_relative=request.min_relative,
+        q=request.q,
+        vibrations=request.vibrations,
+        effects=request.effects,
+        executor=executor,
+    )
+    return RamanAnswer(request, lines)

@@ -1,0 +1,157 @@
+"""A request for thermodynamic functions of rotation, and what answers it; and Q(T) of a top as plain records."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+from rotor.checks import require_positive
+from rotor.thermo.classical_limit import (
+    classical_limit,
+    classical_partition_function,
+    rotational_temperatures_k,
+)
+from rotor.thermo.classical_onset import classical_above_k
+from rotor.thermo.functions import ThermoFunctions, species_names, thermodynamic_functions
+from rotor.thermo.level_sums import Progress
+from rotor.thermo.partition import PartitionFunction, partition_function, partition_functions
+from rotor.thermo.vibration import VibrationalStates
+from rotor.tops.facts import top_facts
+
+if TYPE_CHECKING:
+    from rotor.tops.top import Top
+
+TEMPERATURES_K = (
+    5.0, 10.0, 20.0, 50.0, 100.0, 150.0, 200.0, 298.15, 300.0, 400.0, 500.0, 600.0, 700.0, 800.0, 900.0, 1000.0,
+)  # fmt: skip
+CLASSICAL_TOLERANCE = 0.01  # of the classical heat capacity: where the quantum one differs by it
+
+
+@dataclass(frozen=True)
+class ThermoRequest:
+    """Thermodynamic functions to compute; every field is checked when the request is made.
+
+    temperatures_k: above 0 K, in any order. species: see `species_names`. vibrations: vibrational states; None leaves
+    vibration out. pressure_bar: of the ideal gas, whose functions are then given too; the top must have a mass.
+    relative_error: of Q, U and C_v.
+    """
+
+    top: Top
+    temperatures_k: Sequence[float] = TEMPERATURES_K
+    species: str = "equilibrium"
+    vibrations: VibrationalStates | None = None
+    pressure_bar: float | None = None
+    relative_error: float = 1e-6
+
+    def __post_init__(self) -> None:
+        if not len(self.temperatures_k):
+            raise ValueError("temperatures_k: expected at least one temperature")
+        for temperature in self.temperatures_k:
+            require_positive("temperatures_k", temperature, "K")
+        require_positive("relative_error", self.relative_error)
+        known = species_names(self.top)
+        if self.species not in known:
+            only = "; its levels are all of one nuclear-spin species" if len(known) == 1 else ""
+            raise ValueError(f"species: {self.species!r}: {self.top.name or 'this top'} has {', '.join(known)}{only}")
+        if self.pressure_bar is not None:
+            require_positive("pressure_bar", self.pressure_bar, "bar")
+            if self.top.mass_u is None:
+                raise ValueError("the ideal gas needs the mass, which bare constants do not have; give a molecule")
+
+
+@dataclass(frozen=True)
+class ThermoAnswer:
+    """The functions that a request asked for, and what follows from the top."""
+
+    request: ThermoRequest
+    functions: ThermoFunctions
+
+    @cached_property
+    def classical_above_k(self) -> float:
+        """The temperature above which the heat capacity is classical within 1 %."""
+        return classical_above_k(self.request.top, CLASSICAL_TOLERANCE)
+
+    def facts(self) -> dict[str, Any]:
+        """Everything about the answer but its table, by the keys of docs/command_line.md."""
+        functions = self.functions
+        top, limit = functions.top, classical_limit(functions.top)
+        gas, vibrations = functions.gas, functions.vibrations
+        return {
+            **top_facts(top),
+            "rotational_temperatures_k": rotational_temperatures_k(top),
+            "classical_above_k": self.classical_above_k,
+            "classical_tolerance": CLASSICAL_TOLERANCE,
+            "classical_corrections": {"a_k": limit.a, "b_k2": limit.b, "d_per_k": limit.d, "e_per_k2": limit.e},
+            "species": functions.species,
+            "species_known": species_names(top),
+            "fractions": dict(functions.fractions),
+            "symmetry_number_counted": functions.symmetry_number,
+            "spin_factor": functions.spin_factor,
+            "jmax": int(functions.jmax.max()),
+            "relative_error": float(functions.relative_error.max()),
+            "vibrations": vibrations.text if vibrations is not None else None,
+            "pressure_bar": gas.pressure_bar if gas is not None else None,
+        }
+
+
+def answer_thermo(request: ThermoRequest, progress: Progress | None = None) -> ThermoAnswer:
+    """The functions of a request; ValueError where a sum over levels gives no answer. progress: see `level_sums`.
+
+    >>> from rotor.tops.top import Top
+    >>> answer = answer_thermo(ThermoRequest(Top.from_constants("B=10 cm-1"), (300.0,)))
+    >>> round(float(answer.functions.cv_over_r[0]), 4)  # 1 + (Θ/T)²/45
+    1.0001
+    """
+    functions = thermodynamic_functions(
+        request.top,
+        request.temperatures_k,
+        species=request.species,
+        vibrations=request.vibrations,
+        pressure_bar=request.pressure_bar,
+        relative_error=request.relative_error,
+        progress=progress,
+    )
+    return ThermoAnswer(request, functions)
+
+
+def partition_facts(top: Top, partition: PartitionFunction) -> dict[str, Any]:
+    """Q at one temperature beside its classical limit, by the keys of docs/command_line.md."""
+    return {
+        "temperature_k": partition.temperature_k,
+        "q": partition.q,
+        "classical": classical_partition_function(top, partition.temperature_k),
+        "jmax": partition.jmax,
+        "relative_error": partition.relative_error,
+        "source": partition.source,
+    }
+
+
+def partition_table(
+    top: Top, temperatures_k: Sequence[float], progress: Progress | None = None
+) -> list[dict[str, Any]]:
+    """Q summed and classical at each temperature; where there is no sum, `q` is None and `source` says why.
+
+    >>> from rotor.tops.top import Top
+    >>> [round(row["q"], 2) for row in partition_table(Top.from_constants("B=57635.968 MHz"), [10.0, 300.0])]
+    [3.97, 108.79]
+    """
+    try:
+        return [partition_facts(top, one) for one in partition_functions(top, temperatures_k, progress=progress)]
+    except ValueError:  # one of them is out of reach: each for itself
+        return [_partition_row(top, temperature) for temperature in temperatures_k]
+
+
+def _partition_row(top: Top, temperature_k: float) -> dict[str, Any]:
+    try:
+        return partition_facts(top, partition_function(top, temperature_k))
+    except ValueError as error:
+        return {
+            "temperature_k": temperature_k,
+            "q": None,
+            "classical": classical_partition_function(top, temperature_k),
+            "jmax": None,
+            "relative_error": None,
+            "source": str(error),
+        }

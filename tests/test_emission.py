@@ -1,0 +1,121 @@
+"""Brightness temperatures: thick and thin limits, widths and velocities, and what is refused."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy import constants as si
+
+import rotor
+from rotor.spectra.emission import (
+    BACKGROUND_K,
+    Source,
+    band_mhz,
+    emission,
+    planck_k,
+    radio_velocity_km_s,
+    source_grid,
+)
+from rotor.spectra.lines import line_list
+from rotor.tops.top import Top
+
+CO = Top.from_constants("B=57635.968 D=0.1835 MHz", dipole_abc_debye=(0.11011, 0, 0))
+REST = 2 * 57635.968 - 4 * 0.1835
+
+
+def lines_at(temperature_k: float):
+    return line_list(CO, temperature_k=temperature_k, jmax=12, min_lgint=None)
+
+
+def test_a_thick_line_has_the_temperature_of_the_gas():
+    source = Source(1e22, 25.0, 2.0, filling=0.3)
+    seen = emission(lines_at(25.0), source, [REST - 1e3, REST])
+    contrast = planck_k(REST, 25.0) - planck_k(REST, BACKGROUND_K)
+    assert seen.brightness_k[1] == pytest.approx(0.3 * contrast, rel=1e-12)
+    assert seen.brightness_k[0] == 0.0
+
+
+def test_a_thin_line_gives_its_column_density_back():
+    """∫T_B dv of a thin line, inverted by N = (8πν²·k/(h c³ A g)) Q e^(E/kT) ∫T dv J-corrected, without `intensity`."""
+    temperature, column = 15.0, 1e12
+    lines = lines_at(temperature)
+    source = Source(column, temperature, 1.5, background_k=0.0)
+    grid = np.linspace(REST - 4.0, REST + 4.0, 4001)
+    seen = emission(lines, source, grid)
+    velocity = radio_velocity_km_s(grid, REST)
+    area_k_m_s = -np.trapezoid(seen.brightness_k, velocity) * 1e3
+    nu, row = REST * 1e6, int(np.argmin(np.abs(lines.frequency_mhz - REST)))
+    a, g = lines.einstein_a_per_s[row], lines.g_upper[row]
+    q = lines.q
+    upper_k = lines.energy_lower_cm[row] * 1.438776877 + si.h * nu / si.k
+    n_upper = 8 * math.pi * si.k * nu**2 / (si.h * si.c**3 * a) * area_k_m_s
+    found = n_upper / g * q * math.exp(upper_k / temperature) * 1e-4
+    assert found == pytest.approx(column, rel=2e-5)  # τ = 1e-4 at most, and the grid
+
+
+def test_width_and_velocity_are_the_sources():
+    source = Source(1e12, 10.0, 0.8, velocity_km_s=12.5)
+    grid = source_grid(REST - 20, REST + 5, source, 60)
+    seen = emission(lines_at(10.0), source, grid)
+    velocity = seen.velocity_km_s(REST)
+    weight = seen.optical_depth / seen.optical_depth.sum()
+    assert float(velocity @ weight) == pytest.approx(12.5, abs=1e-3)
+    above = velocity[seen.optical_depth > seen.optical_depth.max() / 2]
+    assert above.max() - above.min() == pytest.approx(0.8, abs=0.03)  # two steps of the grid
+
+
+def test_molecules_in_one_source_add_their_depths():
+    other = Top.from_constants("B=57600 MHz", dipole_abc_debye=(0.2, 0, 0))
+    source = Source(1e14, 10.0, 1.0)
+    grid = np.linspace(115150, 115300, 3001)
+    lists = [lines_at(10.0), line_list(other, temperature_k=10.0, jmax=12)]
+    both = emission(lists, source, grid).optical_depth
+    assert both == pytest.approx(sum(emission(one, source, grid).optical_depth for one in lists), rel=1e-12)
+
+
+def test_absorption_against_a_hot_background_is_negative():
+    seen = emission(lines_at(5.0), Source(1e16, 5.0, 1.0, background_k=30.0), [REST])
+    assert seen.brightness_k[0] < 0
+
+
+def test_planck_limits():
+    assert planck_k(1.0, 300.0) == pytest.approx(300.0, rel=1e-6)  # Rayleigh-Jeans
+    assert planck_k(1e5, 0.0) == 0.0
+    assert BACKGROUND_K == 2.725
+
+
+def test_bands_by_name():
+    assert band_mhz("ALMA 3") == (84000.0, 116000.0)
+    with pytest.raises(ValueError, match="known are ALMA1"):
+        band_mhz("VLA")
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"column_per_cm2": 0.0}, {"excitation_k": -1.0}, {"fwhm_km_s": math.nan}, {"filling": 1.5}, {"background_k": -1.0},
+        {"velocity_km_s": 3e5},
+    ],
+)  # fmt: skip
+def test_impossible_sources_are_refused(change):
+    with pytest.raises(ValueError, match="expected"):
+        Source(**({"column_per_cm2": 1e14, "excitation_k": 10.0, "fwhm_km_s": 1.0} | change))
+
+
+def test_other_temperatures_and_grids_are_refused():
+    with pytest.raises(ValueError, match="temperature of the source"):
+        emission(lines_at(10.0), Source(1e14, 11.0, 1.0), [REST])
+    with pytest.raises(ValueError, match="rising"):
+        emission(lines_at(10.0), Source(1e14, 10.0, 1.0), [REST, REST])
+
+
+def test_a_library_molecule_in_a_band():
+    low, high = band_mhz("ALMA3")
+    top = rotor.read("HC3N")
+    source = Source(1e13, 20.0, 3.0, 5.0)
+    lines = line_list(top, temperature_k=20.0, range_mhz=(low, high))
+    seen = emission(lines, source, source_grid(low, high, source))
+    assert 0 < seen.brightness_k.max() < 17.0
+    assert list(seen.columns) == ["frequency_mhz", "optical_depth", "brightness_k"]
