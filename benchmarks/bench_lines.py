@@ -33,7 +33,7 @@ RESULTS = Path(__file__).parent / "results" / "lines.json"
 
 def measure(jmax: int, work: str) -> dict[str, float]:
     """One figure, in this process: seconds of the best of five runs, and how many lines."""
-    from rotor.formats.line_tables import write_lines
+    import rotor
     from rotor.spectra import transitions
     from rotor.spectra.lines import line_list
     from rotor.tops.top import Top
@@ -47,7 +47,7 @@ def measure(jmax: int, work: str) -> dict[str, float]:
         def run(j: int) -> int:
             lines = line_list(top, jmax=j, min_lgint=cut, q=Q, sort=work.startswith("sorted"))
             if work.startswith("sorted"):
-                write_lines(lines, path)
+                rotor.write(lines, path)
             return len(lines)
 
         long_list, transitions.LONG_LIST = transitions.LONG_LIST, 0

@@ -22,7 +22,7 @@ from pathlib import Path
 import numpy as np
 
 from rotor.classical.euler import energy
-from rotor.classical.integrators.batch import advance
+from rotor.classical.integrators.batch import propagate
 from rotor.geometry.rotations import uniform
 
 STEP, MOMENTS = 0.1, (0.6, 0.8, 1.0)
@@ -47,15 +47,15 @@ def best(run: Callable[[], None], work: float, repeats: int = 3) -> float:
 def ours(n: int, steps: int) -> dict[str, float]:
     """One core and, where there are two, two threads; and what a thousand steps do to the invariants."""
     momentum, attitude = bodies(n)
-    advance(MOMENTS, momentum[:1], attitude[:1], STEP, 1)  # compile
+    propagate(MOMENTS, momentum[:1], attitude[:1], STEP, 1)  # compile
     step = STEP / np.max(np.linalg.norm(momentum, axis=-1))  # the fastest body turns by at most STEP / smallest moment
-    one = best(lambda: advance(MOMENTS, momentum, attitude, step, steps), n * steps)
+    one = best(lambda: propagate(MOMENTS, momentum, attitude, step, steps), n * steps)
     rates = {"rotor, 1 core": one}
     if cores() > 1:
         with ThreadPoolExecutor(2) as pool:
-            two = best(lambda: advance(MOMENTS, momentum, attitude, step, steps, executor=pool), n * steps)
+            two = best(lambda: propagate(MOMENTS, momentum, attitude, step, steps, executor=pool), n * steps)
         rates["rotor, 2 threads"] = two
-    end, turned = advance(MOMENTS, momentum, attitude, step, 1000)
+    end, turned = propagate(MOMENTS, momentum, attitude, step, 1000)
     drift = np.abs(energy(end, np.array(MOMENTS)) / energy(momentum, np.array(MOMENTS)) - 1)
     return rates | {
         "energy error after 1000 steps": float(np.max(drift)),

@@ -24,6 +24,7 @@ from rotor.classical.integrators.lie_runge_kutta import LieRungeKutta
 from rotor.classical.integrators.method import Method, integrate
 from rotor.classical.integrators.moser_veselov import MoserVeselov
 from rotor.classical.integrators.splitting import RotationSplitting, SymmetricTopSplitting
+from rotor.geometry.quaternions import product
 from rotor.geometry.rotations import IDENTITY, distance
 
 MOMENTS, MOMENTUM, PERIODS = np.array([1.0, 1.875, 2.875]), np.array([0.5, 0.75, 1.0]), 1000
@@ -37,9 +38,8 @@ def scipy_motion(tolerance: float, span: float) -> np.ndarray:
     def rates(_: float, y: np.ndarray) -> list[float]:
         m1, m2, m3, w, x, y_, z = y.tolist()
         w1, w2, w3 = m1 / MOMENTS[0], m2 / MOMENTS[1], m3 / MOMENTS[2]
-        first = (-x * w1 - y_ * w2 - z * w3, w * w1 + y_ * w3 - z * w2)
-        second = (w * w2 + z * w1 - x * w3, w * w3 + x * w2 - y_ * w1)
-        return [*gyroscopic_term(m1, m2, m3, w1, w2, w3), *(0.5 * part for part in first + second)]
+        turning = product((w, x, y_, z), (0.0, w1, w2, w3))
+        return [*gyroscopic_term((m1, m2, m3), (w1, w2, w3)), *(0.5 * part for part in turning)]
 
     start = [*MOMENTUM, *IDENTITY]
     return solve_ivp(rates, (0.0, span), start, "DOP853", t_eval=[span], rtol=tolerance, atol=tolerance).y[3:, -1]

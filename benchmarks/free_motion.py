@@ -18,6 +18,7 @@ from scipy.integrate import solve_ivp
 
 from rotor.classical.euler import gyroscopic_term
 from rotor.classical.free.free_motion import free_motion
+from rotor.geometry.quaternions import product
 from rotor.geometry.rotations import IDENTITY
 
 BODIES = {
@@ -67,14 +68,9 @@ def stepped_period() -> None:
     moments, momentum = (np.array(x) for x in BODIES["asymmetric (water-like)"])
 
     def rates(_: float, y: np.ndarray) -> np.ndarray:
-        (m1, m2, m3), (w1, w2, w3), (q0, q1, q2, q3) = y[:3], y[:3] / moments, y[3:]
-        turning = [
-            -q1 * w1 - q2 * w2 - q3 * w3,
-            q0 * w1 + q2 * w3 - q3 * w2,
-            q0 * w2 + q3 * w1 - q1 * w3,
-            q0 * w3 + q1 * w2 - q2 * w1,
-        ]
-        return np.array([*gyroscopic_term(m1, m2, m3, w1, w2, w3), *(0.5 * rate for rate in turning)])
+        momentum, omega = y[:3], y[:3] / moments
+        turning = product(y[3:], (0.0, *omega))
+        return np.array([*gyroscopic_term(momentum, omega), *(0.5 * rate for rate in turning)])
 
     start = np.concatenate([momentum, IDENTITY])
     solve_ivp(rates, (0.0, 20.6947551192268), start, method="DOP853", rtol=1e-12, atol=1e-12)

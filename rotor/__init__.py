@@ -14,6 +14,10 @@ from typing import TYPE_CHECKING, Any
 from rotor.version import version
 
 if TYPE_CHECKING:
+    from rotor.alignment.align import AlignmentTrace as AlignmentTrace
+    from rotor.alignment.align import align as align
+    from rotor.alignment.request import AlignRequest as AlignRequest
+    from rotor.alignment.request import answer_align as answer_align
     from rotor.classical.free.free_motion import FreeMotion as FreeMotion
     from rotor.classical.free.free_motion import free_motion as free_motion
     from rotor.classical.tumble import TumbleRequest as TumbleRequest
@@ -26,10 +30,13 @@ if TYPE_CHECKING:
     from rotor.formats.streamed_lines import stream_lines as stream_lines
     from rotor.molecules.molecule import Molecule as Molecule
     from rotor.molecules.optimise import refine as refine
+    from rotor.quantum.effects.stark import stark_map as stark_map
     from rotor.quantum.levels import Levels as Levels
     from rotor.quantum.request import LevelsRequest as LevelsRequest
     from rotor.quantum.request import answer_levels as answer_levels
     from rotor.quantum.solve import solve_levels as solve_levels
+    from rotor.quantum.stark_request import StarkRequest as StarkRequest
+    from rotor.quantum.stark_request import answer_stark as answer_stark
     from rotor.spectra.lines import Lines as Lines
     from rotor.spectra.lines import line_list as line_list
     from rotor.spectra.raman import RamanLines as RamanLines
@@ -52,6 +59,8 @@ if TYPE_CHECKING:
     from rotor.tops.top import Top as Top
 
 _MODULES = {
+    "AlignRequest": "rotor.alignment.request",
+    "AlignmentTrace": "rotor.alignment.align",
     "Constants": "rotor.tops.constants",
     "FluidRequest": "rotor.fluid.request",
     "FreeMotion": "rotor.classical.free.free_motion",
@@ -66,15 +75,19 @@ _MODULES = {
     "RamanRequest": "rotor.spectra.raman_request",
     "Spectrum": "rotor.spectra.spectrum",
     "SpectrumRequest": "rotor.spectra.request",
+    "StarkRequest": "rotor.quantum.stark_request",
     "ThermoRequest": "rotor.thermo.request",
     "Top": "rotor.tops.top",
     "TumbleRequest": "rotor.classical.tumble",
     "VibrationalStates": "rotor.thermo",
+    "align": "rotor.alignment.align",
+    "answer_align": "rotor.alignment.request",
     "answer_fluid": "rotor.fluid.request",
     "answer_gas": "rotor.thermo.classical_gas",
     "answer_levels": "rotor.quantum.request",
     "answer_raman": "rotor.spectra.raman_request",
     "answer_spectrum": "rotor.spectra.request",
+    "answer_stark": "rotor.quantum.stark_request",
     "answer_thermo": "rotor.thermo.request",
     "answer_tumble": "rotor.classical.tumble",
     "free_motion": "rotor.classical.free.free_motion",
@@ -84,6 +97,7 @@ _MODULES = {
     "read": "rotor.formats",
     "refine": "rotor.molecules.optimise",
     "solve_levels": "rotor.quantum.solve",
+    "stark_map": "rotor.quantum.effects.stark",
     "stream_lines": "rotor.formats.streamed_lines",
     "thermal_tumble": "rotor.thermo.thermal_tumble",
     "thermodynamic_functions": "rotor.thermo",

@@ -1,12 +1,17 @@
-"""Tables of equal columns: what turns them into data frames, once for lines, levels, spectra and motions."""
+"""Tables of equal columns: what lines, levels, spectra and motions have in common."""
 
 from __future__ import annotations
 
+import html
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
+
+EXTRA = 'python -m pip install "molrotor[tables]"'
+_SHOWN = 6  # rows of a table that its text shows: the first and the last half of them
 
 
 class Table(ABC):
@@ -14,8 +19,12 @@ class Table(ABC):
 
     >>> class Squares(Table):
     ...     columns = {"n": [1, 2, 3], "square": [1, 4, 9]}
-    >>> Squares().to_pandas()["square"].tolist()
-    [1, 4, 9]
+    >>> Squares()
+    Squares, 3 rows
+    n  square
+    1       1
+    2       4
+    3       9
     """
 
     @property
@@ -23,14 +32,81 @@ class Table(ABC):
     def columns(self) -> Mapping[str, NDArray[Any]]:
         """Every column by its name with unit."""
 
-    def to_pandas(self) -> Any:
-        """All columns as a pandas DataFrame."""
-        import pandas as pd
+    def __len__(self) -> int:
+        return len(next(iter(self.columns.values()), ()))
 
-        return pd.DataFrame(self.columns)
+    @property
+    def provenance(self) -> dict[str, Any]:
+        """What the table was made from, as numbers, texts, lists and dictionaries of them."""
+        return {"rows": len(self)}
+
+    def to_pandas(self) -> Any:
+        """All columns as a pandas DataFrame.
+
+        Raises ImportError, with the command that installs it, where pandas is not there.
+        """
+        return _frame("pandas", self.columns)
 
     def to_polars(self) -> Any:
-        """All columns as a polars DataFrame."""
-        import polars as pl
+        """All columns as a polars DataFrame.
 
-        return pl.DataFrame(self.columns)
+        Raises ImportError, with the command that installs it, where polars is not there.
+        """
+        return _frame("polars", self.columns)
+
+    def _title(self) -> str:
+        """One line that says what the table is."""
+        return f"{type(self).__name__}, {len(self)} rows"
+
+    def _texts(self, rows: NDArray[np.int64]) -> dict[str, list[str]]:
+        """Some rows as text, by the headings of the columns that are worth showing."""
+        return {name: [_text(column[row]) for row in rows.tolist()] for name, column in self.columns.items()}
+
+    def __repr__(self) -> str:
+        """The title, and the first and last rows below it."""
+        heads, lines = self._shown()
+        widths = [max(map(len, column)) for column in zip(heads, *lines, strict=True)]
+        rows = ["  ".join(t.rjust(w) for t, w in zip(line, widths, strict=True)) for line in (heads, *lines)]
+        return "\n".join([self._title(), *(rows if lines else [])])
+
+    def _repr_html_(self) -> str:
+        """The same for notebooks."""
+        heads, lines = self._shown()
+        rows = ["".join(f"<td>{html.escape(text)}</td>" for text in line) for line in lines]
+        head = "".join(f"<th>{html.escape(name)}</th>" for name in heads)
+        body = "".join(f"<tr>{row}</tr>" for row in rows)
+        return f"<p>{html.escape(self._title())}</p><table><tr>{head}</tr>{body}</table>"
+
+    def _shown(self) -> tuple[list[str], list[list[str]]]:
+        """Headings, and some rows of text; three dots stand for the rows between."""
+        count = len(self)
+        short = count <= _SHOWN
+        rows = np.arange(count) if short else np.r_[0 : _SHOWN // 2, count - _SHOWN // 2 : count]
+        texts = self._texts(rows)
+        lines = [list(line) for line in zip(*texts.values(), strict=True)]
+        if not short:
+            lines.insert(_SHOWN // 2, ["..."] * len(texts))
+        return list(texts), lines
+
+
+def _text(value: Any) -> str:
+    """A number with six digits, more where it is large.
+
+    >>> _text(115271.936), _text(1.23456789e-7), _text(12)
+    ('115271.9360', '1.23457e-07', '12')
+    """
+    if not isinstance(value, float | np.floating):
+        return str(value)
+    number = float(value)
+    return f"{number:.4f}" if 1e3 <= abs(number) < 1e12 else f"{number:.6g}"
+
+
+def _frame(library: str, columns: Mapping[str, NDArray[Any]]) -> Any:
+    from importlib import import_module
+
+    try:
+        return import_module(library).DataFrame(dict(columns))
+    except ModuleNotFoundError as error:
+        if error.name != library:
+            raise
+        raise ImportError(f"{library} is not installed: {EXTRA}", name=library) from None

@@ -25,6 +25,7 @@ VACUUM_PERMITTIVITY_F_PER_M = 8.8541878188e-12  # CODATA 2022
 MHZ_PER_CM = 29979.2458  # 1 cm^-1 in MHz, exact
 MHZ_PER_K = BOLTZMANN_J_PER_K / PLANCK_J_S * 1e-6  # 1 K in MHz, exact ratio: 20836.6191...
 DEBYE_C_M = 1e-21 / SPEED_OF_LIGHT_M_PER_S  # 1 D = 1e-18 esu cm, exact by definition
+MHZ_PER_DEBYE_KV_PER_CM = DEBYE_C_M * 1e5 / PLANCK_J_S * 1e-6  # μE/h of 1 D in 1 kV/cm: 503.4116...
 DEBYE_PER_E_ANGSTROM = ELEMENTARY_CHARGE_C * 1e-10 / DEBYE_C_M  # 4.80320...
 
 # the set of ASE, in which molecules move classically: eV, Å, u, and what follows from them
@@ -61,6 +62,9 @@ _KINDS: dict[str, dict[str, float]] = {
     "polarizability": {"angstrom3": 1.0, "Å3": 1.0, "bohr3": BOHR_RADIUS_ANGSTROM**3},
     "time": {"fs": 1e-3, "ps": 1.0, "ns": 1e3, "us": 1e6, "s": 1e12},
     "field": {"V/cm": 1e-3, "kV/cm": 1.0, "V/m": 1e-5, "MV/m": 10.0},
+    "intensity": {"W/cm2": 1.0, "GW/cm2": 1e9, "TW/cm2": 1e12, "W/m2": 1e-4},
+    "fluence": {"J/cm2": 1.0, "mJ/cm2": 1e-3, "J/m2": 1e-4},
+    "magnetic field": {"T": 1.0, "mT": 1e-3, "G": 1e-4, "gauss": 1e-4},
     "mass": {"u": 1.0, "amu": 1.0, "Da": 1.0, "kg": 1.0 / ATOMIC_MASS_KG},
     "number": {"": 1.0},
     "pressure": {"Pa": 1e-5, "mbar": 1e-3, "kPa": 1e-2, "bar": 1.0, "Torr": 1.33322368421e-3, "atm": 1.01325},
@@ -68,6 +72,7 @@ _KINDS: dict[str, dict[str, float]] = {
 _ALIASES = {
     "cm^-1": "cm-1", "cm⁻¹": "cm-1", "1/cm": "cm-1", "μs": "us", "μm": "um", "Debye": "debye", "Angstrom": "angstrom",
     "Å^3": "Å3", "Å³": "Å3", "angstrom^3": "angstrom3",
+    "W/cm^2": "W/cm2", "W/cm²": "W/cm2", "TW/cm^2": "TW/cm2", "TW/cm²": "TW/cm2", "J/cm^2": "J/cm2", "J/cm²": "J/cm2",
 }  # fmt: skip
 _NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(\S.*?)?\s*$")
 

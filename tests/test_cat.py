@@ -131,7 +131,7 @@ def random_catalogue(n: int, rng: np.random.Generator) -> Catalogue:
 
 def test_compiled_rows_are_the_plain_rows():
     catalogue = random_catalogue(5000, np.random.default_rng(7))
-    columns = catalogue.columns(0, 5000)
+    columns = catalogue.rows(0, 5000)
     plain, compiled = (np.zeros((5000, 81), dtype=np.uint8) for _ in range(2))
     fits, fits_compiled = (
         form.put_rows(out, columns, (4, 4, 4, 4)) for form, out in ((rows, plain), (_kernels, compiled))

@@ -152,3 +152,14 @@ def test_spectra_on_different_grids_are_not_compared():
     b = linear_band(OCS, np.linspace(1, 10, 11) * CM, CM)
     with pytest.raises(ValueError, match="different grids"):
         compare_bands(a, b)
+
+
+def test_ocs_at_0_6_k_in_the_limit_of_narrow_smoothing():
+    """The figures of docs/gas.md: smoothed to 1 cm-1 a part of the lowest line, at 0.4 cm-1, falls below ν = 0."""
+    grid = np.linspace(0, 12, 4801) * CM
+    lines = rotor.line_list(OCS, temperature_k=0.6, min_lgint=-14)
+    beside = compare_bands(
+        linear_band(OCS, grid, 0.05 * CM, temperature_k=0.6), Spectrum.from_lines(lines, grid, fwhm_mhz=0.05 * CM)
+    )
+    assert beside.area == pytest.approx(1.0, abs=1e-5)  # the same number, but for smoothing, 0.05²
+    assert beside.mean == pytest.approx(0.9662, abs=1e-4)

@@ -25,8 +25,8 @@ INFO = """
     near_displacement_angstrom constants_mhz uncertainties_mhz reduction
     representation rotational_constants_mhz rotational_constants_cm kappa moments_u_angstrom2 planar_moments_u_angstrom2
     inertial_defect_u_angstrom2 frame dipole_abc_debye dipole_source
-    polarizability_abc_angstrom3 polarizability_source spin_weights spin_weights_source
-    partition_function source notes
+    polarizability_abc_angstrom3 polarizability_source spin_weights spin_weights_source spin_constants_mhz spins spin_constants_source
+    partition_function source notes sizes_at_j effects limits
 """
 SPECTRUM = """
     temperature_k q jmax jmax_source min_lgint range_mhz line_count profile fwhm_mhz pressure_bar path_cm column_per_cm2 optical_depth
@@ -66,7 +66,7 @@ def test_water_has_its_lines(call):
     ):
         assert re.search(rf"^{name} +{re.escape(beginning)}", out, re.MULTILINE), name
 
-    table = out.split("in order of frequency (states: J Ka Kc)\n")[1].splitlines()
+    table = out.split("in order of frequency (states: J Ka Kc)\n")[1].split("\n\n")[0].splitlines()
     frequencies = [float(row.split()[0]) for row in table[1:]]
     assert frequencies == sorted(frequencies)
     assert np.allclose(frequencies, np.sort(lines.strongest(5).frequency_mhz), rtol=0, atol=5.1e-5)  # four decimals
@@ -432,7 +432,7 @@ def test_help_shows_examples_and_every_option_is_documented(call):
     assert code == 0
     assert "rotor spectrum water\n" in out
     text = (ROOT / "docs" / "command_line.md").read_text(encoding="utf-8")
-    for verb in ("spectrum", "info"):
+    for verb in ("spectrum", "info", "levels"):
         code, out, _ = call(verb, "--help")
         assert code == 0
         assert f"rotor {verb} water\n" in out

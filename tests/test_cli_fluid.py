@@ -85,7 +85,7 @@ def test_other_models_and_a_file_without_velocities(call, folder):
         (("tip4p", "--molecules", "8"), "write --model tip4p too"),
         (("water", "--molecules", "8", "--step", "0"), "--step: 0: expected a finite number above 0 fs"),
         (("water", "--molecules", "8", "--relaxation", "9x"), "the default is 'fs'"),
-        (("water", "--molecules", "8", "--seed", "-1"), "seed = -1: at least 0 is wanted"),
+        (("water", "--molecules", "8", "--seed", "-1"), "seed = -1: expected at least 0"),
         (("overlap.xyz", "--trajectory", "./overlap.xyz"), "--trajectory overlap.xyz: is the box that is read"),
         (("far.xyz", "--model", "tip4p", "--cutoff", "4"), "in the shape of its model, more than 0.01 Å"),
         (("water", "--molecules", "8", "--ensemble", "npt"), "'npt' is no ensemble"),

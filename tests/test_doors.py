@@ -75,7 +75,7 @@ def test_isotopes_of_constants_alone_cannot_change(tmp_path):
     with pytest.raises(ValueError, match="there is no geometry"):
         rotor.read(rotor.Constants(B=57635.968), isotopes="O=18O")
     rotor.write(co_lines(), tmp_path / "co.cat")
-    with pytest.raises(ValueError, match="in a catalogue"):
+    with pytest.raises(ValueError, match="holds a Catalogue, which has no atoms"):
         rotor.read(tmp_path / "co.cat", isotopes="O=18O")
 
 

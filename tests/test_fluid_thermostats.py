@@ -185,7 +185,7 @@ def test_wrong_thermostats_are_refused():
         lambda: NoseHoover(300.0, 1.0, links=0),
         lambda: NoseHoover(math.nan, 1.0),
     ):
-        with pytest.raises(ValueError, match="wanted"):
+        with pytest.raises(ValueError, match="expected"):
             make()
     argon = Atoms("Ar2", [[0, 0, 0], [4, 0, 0]])
     argon.calc = Free(argon)

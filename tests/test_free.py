@@ -376,3 +376,26 @@ def test_double_double_phases_are_what_keeps_a_million_periods():
 def test_bad_input_is_named(call, message):
     with pytest.raises(ValueError, match=message):
         call()
+
+
+def test_moments_too_far_apart_are_refused_with_a_remedy():
+    with pytest.raises(ValueError, match=r"expected the smallest above 1e-100 of the largest.*\(0, I, I\)"):
+        free_motion([1e-300, 1.0, 2.0], [0.0, 1.0, 1.0])
+    with pytest.raises(ValueError, match="1e-100 of the largest"):
+        free_motion([1.0, 2.0, 1e300], [1.0, 2.0, 3.0])
+    with pytest.raises(ValueError, match="choose units"):
+        free_motion([1e-300, 2e-300, 2.5e-300], [1e5, 2.0, 3.0])
+    steady = free_motion([1e-300, 1.0, 1.0], [0.0, 1.0, 1.0]).at(0.3)[1]  # L stands still: exact all the same
+    assert np.allclose(steady, exp(0.3 * np.array([0.0, 1.0, 1.0])), atol=1e-15)
+    tiny = free_motion([1e-300, 2e-300, 2.5e-300], [1e-300, 2e-300, 3e-300])  # small moments are no matter, only units
+    usual = free_motion([1.0, 2.0, 2.5], [1.0, 2.0, 3.0])
+    assert np.allclose(tiny.at(0.7)[1], usual.at(0.7)[1], atol=1e-14)
+
+
+def test_a_moment_just_above_the_limit_moves_as_it_should():
+    """I1 = 1e-90: L turns about axis 1 at L1/I1, so that the phase is known in steps of I1 and the motion is a cone."""
+    motion = free_motion([1e-90, 1.0, 1.0 + 1e-3], [1e-92, 0.6, 0.8])
+    momentum, attitude = motion.at(np.linspace(0.0, 3e-90, 7))
+    assert np.all(np.isfinite(attitude))
+    assert np.allclose(np.linalg.norm(momentum, axis=-1), 1.0, atol=1e-14)
+    assert np.allclose(rotate(attitude, momentum), [0.0, 0.6, 0.8], atol=1e-14)

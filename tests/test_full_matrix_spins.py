@@ -6,16 +6,15 @@ basis with one N more, so that products are exact below.
 
 from __future__ import annotations
 
-from functools import cache
 from itertools import product
 
 import numpy as np
 import pytest
 import qutip
+from direct_product import on_spins, rotor_matrix, space_cosines, states_up_to
 from full_matrix import block, cartesian, pieces
 from full_matrix_codes import Case, case_of
-from full_matrix_rotor import in_frame, momenta, wigner_3j, wigner_6j, wigner_9j
-from scipy.linalg import block_diag
+from full_matrix_rotor import wigner_3j, wigner_6j, wigner_9j
 
 from rotor.formats.spcat.int_file import read_int
 from rotor.formats.spcat.par import read_par
@@ -29,56 +28,11 @@ def _case(options: str, *parameters: tuple[int, float]) -> Case:
     return case_of(par, read_int(b"a case\n0 999 1000.0 0 9 -30 -30 9999.99 300.0\n"))
 
 
-def _states(top: int) -> list[tuple[int, int, int]]:
-    return [(n, k, m) for n in range(top + 1) for k in range(-n, n + 1) for m in range(-n, n + 1)]
-
-
-@cache
-def _cosines(top: int) -> dict[tuple[int, str], np.ndarray]:
-    """φ_pi for p = -1, 0, 1 (spherical, space) and i = a, b, c on |N k m⟩, z = a."""
-    states = _states(top)
-    index = {s: i for i, s in enumerate(states)}
-    found = {}
-    for p, axis in product((-1, 0, 1), "abc"):
-        x, y, z = in_frame(np.eye(3)["abc".index(axis)], "a")
-        parts = {0: z, 1: -(x + 1j * y) / np.sqrt(2), -1: (x - 1j * y) / np.sqrt(2)}
-        matrix = np.zeros((len(states),) * 2, complex)
-        for (n, k, m), q, other in product(states, (-1, 0, 1), range(top + 1)):
-            if (other, k + q, m + p) in index and parts[q]:
-                size = np.sqrt((2 * n + 1) * (2 * other + 1)) * (-1) ** (m + p - k - q)
-                size *= wigner_3j(2 * other, 2, 2 * n, -2 * (m + p), 2 * p, 2 * m)
-                size *= wigner_3j(2 * other, 2, 2 * n, -2 * (k + q), 2 * q, 2 * k)
-                matrix[index[other, k + q, m + p], index[n, k, m]] += parts[q] * size
-        found[p, axis] = matrix
-    return found
-
-
-def _space_cosines(top: int) -> dict[tuple[str, str], np.ndarray]:
-    """φ_FI, F = X, Y, Z in space, I = a, b, c in the molecule."""
-    phi = _cosines(top)
-    found = {}
-    for axis in "abc":
-        found["z", axis] = phi[0, axis]
-        found["x", axis] = (phi[-1, axis] - phi[1, axis]) / np.sqrt(2)
-        found["y", axis] = 1j * (phi[-1, axis] + phi[1, axis]) / np.sqrt(2)
-    return found
-
-
-def _rotor(axis: str, top: int) -> np.ndarray:
-    """N_axis of the molecule on |N k m⟩."""
-    return block_diag(*(np.kron(momenta(n, "a")[axis], np.eye(2 * n + 1)) for n in range(top + 1)))
-
-
-def _product(rotor: np.ndarray, spins2: tuple[int, ...], acting: dict[int, np.ndarray]) -> np.ndarray:
-    factors = [qutip.Qobj(acting.get(i, np.eye(s + 1))) for i, s in enumerate(spins2, 1)]
-    return qutip.tensor(qutip.Qobj(rotor), *factors).full()
-
-
 def _direct(case: Case, top: int) -> np.ndarray:
     """The Hamiltonian of one state, N ≤ top, in the direct product."""
-    spins2, wide = case.states[0].spins2, len(_states(top + 1))
-    keep = [i for i, s in enumerate(_states(top + 1)) if s[0] <= top]
-    phi, momentum = _space_cosines(top + 1), {axis: _rotor(axis, top + 1) for axis in "abc"}
+    spins2, wide = case.states[0].spins2, len(states_up_to(top + 1))
+    keep = [i for i, s in enumerate(states_up_to(top + 1)) if s[0] <= top]
+    phi, momentum = space_cosines(top + 1), {axis: rotor_matrix(axis, top + 1) for axis in "abc"}
     squared = sum(m @ m for m in momentum.values())
     spin = {(i, p): qutip.jmat(s / 2, p).full() for i, s in enumerate(spins2, 1) for p in "xyz"}
     total = 0.0
@@ -90,7 +44,7 @@ def _direct(case: Case, top: int) -> np.ndarray:
         for c, parts in _operator(term, phi, momentum, spin, spins2, wide):
             rotor = (k2 @ c + c @ k2) / 2
             rotor = (n2 @ rotor + rotor @ n2) / 2
-            total = total + term.value * _product(rotor[np.ix_(keep, keep)], spins2, parts)
+            total = total + term.value * on_spins(rotor[np.ix_(keep, keep)], spins2, parts)
     return total
 
 

@@ -220,7 +220,7 @@ def test_refusals_say_what_would_do():
         RotationSplitting(-0.1)
     with pytest.raises(ValueError, match="order 2, 4, 6 or 8"):
         MoserVeselov(0.1, 5)
-    with pytest.raises(ValueError, match="no classical effect"):
+    with pytest.raises(ValueError, match="expected classical effects"):
         integrate(RotationSplitting(0.1), MOMENTS, MOMENTUM, [0.0, 1.0], effects=["drag"])
 
 

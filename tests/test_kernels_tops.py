@@ -21,7 +21,7 @@ def gas(n):
 
 def test_blocks_make_the_same_steps_as_one_body_at_a_time():
     moments, momentum, attitude = gas(2 * LANES + 5)  # a last block that is not full
-    m, q = batch.advance(moments, momentum, attitude, 0.02, 50)
+    m, q = batch.propagate(moments, momentum, attitude, 0.02, 50)
     slow = integrate(SymmetricTopSplitting(0.02), moments, momentum, [0.0, 1.0], attitude)
     assert np.max(np.abs(m - slow.momentum[:, -1])) < 5e-14  # 50 steps of rounding, |L| up to 3
     assert np.max(distance(q, slow.attitude[:, -1])) < 5e-14
@@ -30,7 +30,9 @@ def test_blocks_make_the_same_steps_as_one_body_at_a_time():
 def test_second_order_against_the_exact_motion():
     moments, momentum, attitude = gas(300)
     exact = free_motion(moments, momentum, attitude).at(1.0)[1]
-    errors = [np.median(distance(batch.advance(moments, momentum, attitude, 1.0 / n, n)[1], exact)) for n in (50, 100)]
+    errors = [
+        np.median(distance(batch.propagate(moments, momentum, attitude, 1.0 / n, n)[1], exact)) for n in (50, 100)
+    ]
     assert np.log2(errors[0] / errors[1]) == pytest.approx(2.0, abs=0.01)
 
 
@@ -38,7 +40,7 @@ def test_the_sphere_leaves_a_smaller_error_than_turns_about_three_axes():
     moments, momentum, attitude = gas(300)
     exact = free_motion(moments, momentum, attitude).at(1.0)[1]
     three = integrate(RotationSplitting(0.02), moments, momentum, [0.0, 1.0], attitude).attitude[:, -1]
-    two = batch.advance(moments, momentum, attitude, 0.02, 50)[1]
+    two = batch.propagate(moments, momentum, attitude, 0.02, 50)[1]
     assert np.median(distance(two, exact)) < np.median(distance(three, exact)) / 20  # measured: 47
 
 
@@ -56,7 +58,7 @@ def test_the_sphere_takes_the_middle_and_the_outer_turn_the_larger_remainder():
 def test_exact_for_symmetric_tops_spheres_and_linear_rotors(moments):
     along = 0.0 if moments[1] == 0.0 else 0.7
     momentum = np.array([[0.3, along, -0.4], [-0.5, along, 0.2]])
-    m, q = batch.advance(moments, momentum, [1.0, 0, 0, 0], 0.8, 100)
+    m, q = batch.propagate(moments, momentum, [1.0, 0, 0, 0], 0.8, 100)
     m_exact, q_exact = free_motion(moments, momentum).at(80.0)
     assert np.max(np.abs(m - m_exact)) < 1e-13  # rounding of 100 steps
     assert np.max(distance(q, q_exact)) < 1e-13
@@ -65,7 +67,7 @@ def test_exact_for_symmetric_tops_spheres_and_linear_rotors(moments):
 def test_invariants_over_many_steps():
     moments, momentum, attitude = gas(LANES)
     for steps in (10_000, 1_000_000):
-        m, q = batch.advance(moments, momentum, attitude, 0.02, steps)
+        m, q = batch.propagate(moments, momentum, attitude, 0.02, steps)
         walk = 1e-15 * np.sqrt(steps)  # 7e-17 √steps is the spread measured, the largest of 128 is four times that
         assert np.max(np.abs(np.linalg.norm(q, axis=-1) - 1)) < walk  # a bias of 1e-17 a step would be ten times more
         assert np.max(np.abs(np.linalg.norm(m, axis=-1) / np.linalg.norm(momentum, axis=-1) - 1)) < 2 * walk
@@ -75,23 +77,23 @@ def test_invariants_over_many_steps():
 
 def test_a_negative_step_goes_back():
     moments, momentum, attitude = gas(10)
-    there = batch.advance(moments, momentum, attitude, 0.03, 200)
-    m, q = batch.advance(moments, *there, -0.03, 200)
+    there = batch.propagate(moments, momentum, attitude, 0.03, 200)
+    m, q = batch.propagate(moments, *there, -0.03, 200)
     assert np.max(np.abs(m - momentum)) < 1e-13
     assert np.max(distance(q, attitude)) < 1e-13
 
 
 def test_threads_change_nothing():
     moments, momentum, attitude = gas(1000)
-    alone = batch.advance(moments, momentum, attitude, 0.02, 20)
+    alone = batch.propagate(moments, momentum, attitude, 0.02, 20)
     with ThreadPoolExecutor(2) as pool:
-        together = batch.advance(moments, momentum, attitude, 0.02, 20, executor=pool)
+        together = batch.propagate(moments, momentum, attitude, 0.02, 20, executor=pool)
     assert np.array_equal(alone[0], together[0])
     assert np.array_equal(alone[1], together[1])
 
 
 def test_no_steps_and_shared_moments():
-    m, q = batch.advance([1.0, 2.0, 3.0], [[1.0, 0.5, 0.2]], [1.0, 0, 0, 0], 0.1, 0)
+    m, q = batch.propagate([1.0, 2.0, 3.0], [[1.0, 0.5, 0.2]], [1.0, 0, 0, 0], 0.1, 0)
     assert m.tolist() == [[1.0, 0.5, 0.2]]
     assert q.tolist() == [[1.0, 0.0, 0.0, 0.0]]
 
@@ -105,10 +107,10 @@ def test_polynomials_of_sine_and_cosine():
 
 def test_refusals():
     with pytest.raises(ValueError, match="shorter step"):
-        batch.advance([1.0, 2.0, 3.0], [[0.0, 0.0, 20.0]], [1.0, 0, 0, 0], 0.1, 1)
+        batch.propagate([1.0, 2.0, 3.0], [[0.0, 0.0, 20.0]], [1.0, 0, 0, 0], 0.1, 1)
     with pytest.raises(ValueError, match="about its own axis"):
-        batch.advance([0.0, 1.0, 1.0], [[1.0, 1.0, 0.0]], [1.0, 0, 0, 0], 0.1, 1)
+        batch.propagate([0.0, 1.0, 1.0], [[1.0, 1.0, 0.0]], [1.0, 0, 0, 0], 0.1, 1)
     with pytest.raises(ValueError, match="shape"):
-        batch.advance([1.0, 1.0, 1.0], [1.0, 0.0, 0.0], [1.0, 0, 0, 0], 0.1, 1)
+        batch.propagate([1.0, 1.0, 1.0], [1.0, 0.0, 0.0], [1.0, 0, 0, 0], 0.1, 1)
     with pytest.raises(ValueError, match="negative step"):
-        batch.advance([1.0, 1.0, 1.0], [[1.0, 0.0, 0.0]], [1.0, 0, 0, 0], 0.1, -1)
+        batch.propagate([1.0, 1.0, 1.0], [[1.0, 0.0, 0.0]], [1.0, 0, 0, 0], 0.1, -1)

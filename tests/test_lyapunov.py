@@ -159,3 +159,26 @@ def test_refusals():
         body_flow(np.ones((2, 3)), np.ones((2, 3)))
     with pytest.raises(ValueError, match="without bound"):
         lyapunov_exponents(Flow(lambda t, y: y * y, np.array([1.0])), 10.0)
+
+
+@pytest.mark.parametrize("time", [100.0, 1000.0, 10_000.0])
+@pytest.mark.parametrize("transient", [0.0, 300.0])
+def test_exponents_of_a_free_top_are_zero_within_their_errors(time, transient):
+    found = lyapunov_exponents(body_flow([0.6, 0.8, 1.0], [1.8, 0.4, -0.9]), time=time, transient=transient)
+    assert np.all(np.abs(found.values) < 1.5 * found.errors)  # a shear grows as t: one bias, and the spread beside it
+    assert found.kaplan_yorke == 3.0  # all count as zero: the spectrum of a flow that keeps volumes
+    assert found.errors[0] < 20.0 * np.log(time) / time  # and the errors do not hide everything
+
+
+def test_the_bias_is_counted_for_segments_side_by_side_too():
+    flow = body_flow([0.6, 0.8, 1.0], [1.8, 0.4, -0.9])
+    timed = Flow(flow.rate, flow.start, timed=True)  # not the compiled loop
+    found = lyapunov_exponents(timed, time=200.0, segments=4, tolerance=1e-9)
+    assert np.all(np.abs(found.values) < 1.5 * found.errors)
+    assert found.bias == pytest.approx(np.log(6.0) / 50.0)  # from a fifth of a segment to six fifths
+
+
+def test_the_bias_does_not_hide_chaos():
+    found = lyapunov_exponents(Flow(leipnik_newton, np.array([0.349, 0.0, -0.160])), time=2000.0, transient=200.0)
+    assert found.values[0] > 10.0 * found.errors[0]
+    assert abs(found.values[1]) < 3.0 * found.errors[1]  # along the orbit

@@ -9,6 +9,7 @@ import pytest
 
 import rotor
 from rotor.plots import spectrum as plots
+from rotor.plots.picture import formula_text
 from rotor.plots.spectrum import plot_spectrum
 from rotor.spectra.spectrum import Spectrum, resolving_grid
 
@@ -112,7 +113,7 @@ def test_thinning_keeps_every_peak():
     [("CO", "CO"), ("[2H]2O", "$^{2}$H$_{2}$O"), ("C2H5OH", "C$_{2}$H$_{5}$OH"), ("Fe(2+)", "Fe$^{2+}$")],
 )
 def test_formulas_are_set_as_chemists_do(formula, text):
-    assert plots.formula_text(formula) == text
+    assert formula_text(formula) == text
 
 
 def test_nothing_to_draw_is_an_error(water, tmp_path):

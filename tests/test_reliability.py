@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rotor.formats.line_tables import provenance
 from rotor.quantum.convergence import RATIO_LIMIT, order_sizes_mhz, series_ratio, warnings_of
 from rotor.quantum.solve import hamiltonian, solve_levels
 from rotor.spectra.lines import line_list
@@ -79,5 +78,5 @@ def test_lines_carry_warnings_into_provenance():
     lines = line_list(top, jmax=20, q=100.0)
     assert len(lines.warnings) == 3
     assert "take B, C, DeltaJ" in lines.warnings[2]
-    assert provenance(lines)["warnings"] == list(lines.warnings)
+    assert lines.provenance["warnings"] == list(lines.warnings)
     assert line_list(Top(Constants(B=6000.0), (1, 0, 0)), jmax=5).warnings == ()

@@ -191,3 +191,15 @@ def test_scipy_order_at_the_door():
 def test_bad_input_is_named(call, message):
     with pytest.raises(ValueError, match=message):
         call()
+
+
+@pytest.mark.parametrize("size", [1e-8, 1e-100, 1e-154, 1e-160, 1e-200, 1e-290])
+def test_log_gives_back_the_smallest_rotation_vectors_in_any_direction(size):
+    vectors = size * np.random.default_rng(8).normal(size=(2000, 3))
+    assert np.allclose(
+        rot.log(rot.exp(vectors)), vectors, rtol=4e-16, atol=0.0
+    )  # two roundings; subnormal numbers begin at 1e-308
+
+
+def test_log_scales_with_the_vector_where_squares_underflow():
+    assert rot.log(rot.exp([3e-160, 4e-160, 0.0])).tolist() == pytest.approx([3e-160, 4e-160, 0.0], rel=4e-16, abs=0.0)

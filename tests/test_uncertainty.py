@@ -8,14 +8,16 @@ import json
 import numpy as np
 import pytest
 
-from rotor.formats.line_tables import catalogue, provenance, write_lines
+import rotor
+from rotor.formats.line_tables import catalogue
 from rotor.formats.spcat.cat import read_cat
 from rotor.formats.spcat.codes import constants_of
 from rotor.formats.spcat.par import read_par
 from rotor.quantum.solve import solve_levels
-from rotor.quantum.uncertainty import Covariance, level_errors
+from rotor.quantum.uncertainty import level_errors
 from rotor.spectra.lines import line_list
 from rotor.tops.constants import Constants
+from rotor.tops.covariance import Covariance
 from rotor.tops.top import Top
 
 OCS = Constants(B=6081.492, D=1.3e-3, uncertainties={"B": 6e-6, "D": 2e-8})
@@ -89,16 +91,16 @@ def test_unknown_stays_unknown():
     assert lines.error_mhz is None
     assert "error_mhz" not in lines.columns
     assert (catalogue(lines).error_mhz == 0).all()
-    assert provenance(lines)["errors_from"] is None
+    assert lines.provenance["errors_from"] is None
 
 
 def test_errors_reach_tables_and_files(tmp_path):
     lines = line_list(Top(Constants(B=6081.492, uncertainties={"B": 0.01}), (0.7, 0, 0)), jmax=3, min_lgint=None)
     assert list(lines.columns)[:2] == ["frequency_mhz", "error_mhz"]
     assert lines.strongest(1).error_mhz.tolist() == pytest.approx([0.06])
-    write_lines(lines, tmp_path / "x.cat")
+    rotor.write(lines, tmp_path / "x.cat")
     assert read_cat(tmp_path / "x.cat").error_mhz.tolist() == [0.02, 0.04, 0.06]
-    write_lines(lines, tmp_path / "x.json")
+    rotor.write(lines, tmp_path / "x.json")
     content = json.loads((tmp_path / "x.json").read_text(encoding="utf-8"))
     assert content["provenance"]["errors_from"] == "uncertainties of B, uncorrelated"
     assert content["lines"][2]["error_mhz"] == pytest.approx(0.06)

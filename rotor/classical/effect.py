@@ -1,4 +1,4 @@
-"""The face of a classical effect: a torque, an inner angular momentum, or moments that change in time.
+"""The interface of a classical effect: a torque, an inner angular momentum, added inertia, or moments that change in time.
 
 An effect is one object in one file of `rotor.classical.effects`. Integrators take a list of effects and compute only
 what is in it.
@@ -15,11 +15,11 @@ from rotor.arrays import Floats
 class ClassicalEffect:
     """A change of Euler's equations, which with all effects present read, in the body's principal axes,
 
-        dL/dt = L x ω + Σ torques,   ω_i = (L_i - h_i) / I_i(t),   h = Σ inner momenta.
+        dL/dt = L x ω + Σ torques,   L = (I(t) + A) ω + h,   h = Σ inner momenta,   A = Σ added inertia.
 
-    An effect is one of the three kinds below; this base only names what each says of itself: `conserves_energy`
-    means ½ Σ (L_i - h_i)²/I_i + potential energy, `conserves_momentum` means L seen from space;
-    `depends_on_time` says whether the time itself enters, as in a drive.
+    An effect is one or more of the four kinds below; this base only names what each says of itself: `conserves_energy`
+    means ½ (L - h)·ω + potential energy, `conserves_momentum` means L seen from space; `depends_on_time` says whether the
+    time itself enters, as in a drive.
     """
 
     conserves_energy: ClassVar[bool] = False
@@ -55,6 +55,23 @@ class InnerMomentum(ClassicalEffect, ABC):
     @abstractmethod
     def inner_momentum(self, time: float) -> Floats:
         """h in body axes (3,) at `time`."""
+
+
+class AddedInertia(ClassicalEffect, ABC):
+    """Inertia that comes with the motion from outside: a contact that the body rolls on, a fluid that is pushed aside.
+
+    L then includes A ω. No splitting into drifts and kicks serves; `LieRungeKutta` does. Constant inertia along the principal
+    axes needs no effect: add it to the moments.
+    """
+
+    @property
+    def needs_attitude(self) -> bool:
+        """Whether A depends on the attitude."""
+        return True
+
+    @abstractmethod
+    def inertia(self, time: float, attitude: Floats) -> Floats:
+        """A in body axes, symmetric (..., 3, 3), at attitudes (..., 4)."""
 
 
 class InertiaChange(ClassicalEffect, ABC):

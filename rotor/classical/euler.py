@@ -20,6 +20,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rotor.arrays import Floats
+from rotor.geometry.inertia import kinetic_energy_by_axis
+from rotor.geometry.quaternions import cross
 from rotor.geometry.rotations import multiply, rotate
 
 LINEAR_MISMATCH = 1e-12  # the two moments of a linear rotor are the same number but for round-off
@@ -37,15 +39,33 @@ class Invariants:
     space_momentum: Floats
 
 
-def gyroscopic_term(m1: Any, m2: Any, m3: Any, w1: Any, w2: Any, w3: Any) -> tuple[Any, Any, Any]:
-    """L x ω by components: the one place where the gyroscopic term is written.
+def gyroscopic_term(momentum: Any, omega: Any) -> Any:
+    """L x ω by components, three floats or arrays each: what turns L in the body where there is no torque.
 
-    Components are floats or arrays; compiled kernels compile this very function.
-
-    >>> gyroscopic_term(0.0, 2.0, 3.0, 0.0, 1.0, 1.0)
+    >>> gyroscopic_term((0.0, 2.0, 3.0), (0.0, 1.0, 1.0))
     (-1.0, 0.0, 0.0)
     """
-    return m2 * w3 - m3 * w2, m3 * w1 - m1 * w3, m1 * w2 - m2 * w1
+    return cross(momentum, omega)
+
+
+def gyroscopic_rate(momentum: Floats, omega: Floats) -> Floats:
+    """L x ω of arrays (..., 3): the right-hand side of Euler's equations without torque.
+
+    >>> gyroscopic_rate(np.array([0.0, 2.0, 3.0]), np.array([0.0, 1.0, 1.0])).tolist()
+    [-1.0, 0.0, 0.0]
+    """
+    m1, m2, m3 = momentum[..., 0], momentum[..., 1], momentum[..., 2]
+    w1, w2, w3 = omega[..., 0], omega[..., 1], omega[..., 2]
+    return np.stack(gyroscopic_term((m1, m2, m3), (w1, w2, w3)), axis=-1)
+
+
+def kinetic_energy(momentum: Floats, omega: Floats) -> Floats:
+    """½ L·ω, (...), of arrays (..., 3).
+
+    >>> float(kinetic_energy(np.array([1.0, 2.0, 2.0]), np.array([1.0, 1.0, 0.5])))
+    2.0
+    """
+    return np.asarray(np.sum(kinetic_energy_by_axis(momentum, omega), axis=-1))
 
 
 def checked_moments(moments: ArrayLike) -> Floats:
@@ -108,8 +128,7 @@ def momentum_rate(momentum: ArrayLike, moments: ArrayLike, torque: ArrayLike = 0
     """
     momentum = np.asarray(momentum, dtype=np.float64)
     omega = angular_velocity(momentum, moments)
-    turning = gyroscopic_term(*np.moveaxis(momentum, -1, 0), *np.moveaxis(omega, -1, 0))
-    return np.asarray(np.stack(turning, axis=-1) + np.asarray(torque, dtype=np.float64))
+    return np.asarray(gyroscopic_rate(momentum, omega) + np.asarray(torque, dtype=np.float64))
 
 
 def attitude_rate(attitude: ArrayLike, omega: ArrayLike) -> Floats:
@@ -129,7 +148,7 @@ def energy(momentum: ArrayLike, moments: ArrayLike) -> Floats:
     np.float64(2.0)
     """
     omega = angular_velocity(momentum, moments)
-    return np.asarray(0.5 * np.sum(np.asarray(momentum, dtype=np.float64) * omega, axis=-1))[()]
+    return kinetic_energy(np.asarray(momentum, dtype=np.float64), omega)[()]
 
 
 def invariants(momentum: ArrayLike, attitude: ArrayLike, moments: ArrayLike) -> Invariants:

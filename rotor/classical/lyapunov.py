@@ -1,11 +1,14 @@
 """Chaos of driven and damped bodies: Lyapunov exponents, Kaplan-Yorke dimension, Poincaré sections.
 
-Exponents are those of the linearised flow along an orbit: as many tangent vectors as exponents are wanted are carried
-along, made orthogonal again at short intervals, and the logarithms of what they grew by are averaged (G. Benettin,
-L. Galgani, A. Giorgilli, J.-M. Strelcyn, Meccanica 15, 9 (1980)). The full sum equals the mean divergence of the flow,
-which is integrated beside it and is the check that every result carries.
+Exponents are those of the linearised flow along an orbit: one tangent vector for each exponent is carried along, made
+orthogonal again at short intervals, and the logarithms of what they grew by are averaged (G. Benettin, L. Galgani,
+A. Giorgilli, J.-M. Strelcyn, Meccanica 15, 9 (1980)). The full sum equals the mean divergence of the flow, which is
+integrated beside it and is the check that every result carries.
 
-A free top has no positive exponent: its tumbling is periodic in the body.
+A free top has no positive exponent: its tumbling is periodic in the body. Its tangent vectors grow all the same, in proportion
+to time, because neighbouring orbits have other periods. Over a finite time that reads as an exponent: a length that grows from
+t1 to t2 in proportion to t gives ln(t2/t1)/(t2 - t1), which vanishes as ln t/t. No finite calculation can tell that apart from
+a small exponent, so this bias is part of every error.
 """
 
 from __future__ import annotations
@@ -22,6 +25,7 @@ from rotor.classical.euler import attitude_rate, checked_momentum
 from rotor.classical.system import system_of
 from rotor.geometry.rotations import IDENTITY, normalised
 
+ALIGNING = 0.2  # of a segment
 DIFFERENCE = 6e-6  # relative step of central differences: cube root of the rounding of doubles
 
 
@@ -53,14 +57,16 @@ class Flow:
 class Exponents:
     """Lyapunov exponents, natural logarithm per time, largest first.
 
-    values, errors: (m,), mean over segments of orbit and its standard error.  divergence: mean trace of the Jacobian,
-    which the sum of a full spectrum equals.  time: total time averaged over.
+    values: (m,), means over segments of orbit. errors: (m,), the standard error of the mean and `bias`, added in squares.
+    bias: what a growth in proportion to time, which is no exponent, would add to a value (see the head of this module).
+    divergence: mean trace of the Jacobian, which the sum of a full spectrum equals. time: total time averaged over.
     """
 
     values: Floats
     errors: Floats
     divergence: float
     time: float
+    bias: float
 
     @property
     def kaplan_yorke(self) -> float:
@@ -93,7 +99,7 @@ def body_flow(
 
     def of_both(time: float, y: Floats) -> Floats:
         momentum, attitude = y[:, :3], y[:, 3:]
-        turning = attitude_rate(attitude, system.omega(time, momentum))
+        turning = attitude_rate(attitude, system.omega(time, momentum, attitude))
         return np.concatenate([system.momentum_rate(time, momentum, attitude), turning], axis=-1)
 
     if system.needs_attitude:
@@ -110,15 +116,41 @@ def lyapunov_exponents(
     interval: float = 1.0,
     tolerance: float = 1e-10,
 ) -> Exponents:
-    """The `count` largest exponents (all where None) along the orbit of flow.start, after `transient`.
+    """The largest Lyapunov exponents along the orbit of flow.start.
 
-    The orbit of length `time` is cut in `segments` of equal length; the standard error is that of the segments' mean.
-    Tangent vectors align over a fifth of a segment first, and are made orthogonal every `interval`. A flow that is
-    found to be quadratic (`quadratic_form`) is followed by a compiled loop, about a hundred times faster; of others the
-    segments are followed side by side, which costs hardly more than one.
+    Parameters
+    ----------
+    flow : Flow
+        What is followed. A flow that is found to be quadratic (`quadratic_form`) is followed by a compiled loop, about a
+        hundred times faster; of others the segments are followed side by side, which costs hardly more than one.
+    time : float
+        Length of orbit that is averaged over, after `transient`.
+    count : int, optional
+        How many exponents; all by default.
+    transient : float
+        Time from the start of the orbit that is left out.
+    segments : int
+        Into how many parts of equal length the orbit is cut; the standard error is that of their mean.
+    interval : float
+        Time between two orthogonalisations.
+    tolerance : float
+        Of the integration (DOP853), relative and absolute.
 
-    Neglected: the memory of the alignment, exp(-gap x aligning time); the error of the orbit itself, which follows a
-    shadow of the one asked for with the same exponents. Where two attractors exist the start chooses.
+    Returns
+    -------
+    Exponents
+        Values with errors; a value within about two errors of zero is not distinguished from zero.
+
+    Raises
+    ------
+    ValueError
+        A count, time or number of segments that cannot be; an orbit that grows without bound.
+
+    Notes
+    -----
+    Neglected: the memory of the alignment over a fifth of a segment, exp(-gap x aligning time); the error of the orbit itself,
+    which follows a shadow of the one asked for with the same exponents. Where two attractors exist the start chooses.
+    Included in the errors: the bias of vectors that grow in proportion to time.
 
     >>> saddle = Flow(lambda t, y: y * np.array([1.0, -2.0]), np.array([0.0, 0.0]))
     >>> lyapunov_exponents(saddle, time=40.0, segments=2).values.round(9).tolist()
@@ -134,9 +166,11 @@ def lyapunov_exponents(
     form = None if flow.timed else quadratic_form(flow)
     grown, divergence = _along(flow, form, count, plan) if form else _side_by_side(flow, count, plan)
     each = grown / plan.length
-    values, errors = np.mean(each, axis=0), np.std(each, axis=0, ddof=1) / np.sqrt(segments)
+    values, spread = np.mean(each, axis=0), np.std(each, axis=0, ddof=1) / np.sqrt(segments)
+    bias = plan.bias(together=form is not None)
     order = np.argsort(-values, kind="stable")
-    return Exponents(values[order], errors[order], float(np.mean(divergence) / plan.length), time)
+    errors = np.hypot(spread, bias)[order]
+    return Exponents(values[order], errors, float(np.mean(divergence) / plan.length), time, bias)
 
 
 def quadratic_form(flow: Flow) -> tuple[Floats, Floats, Floats] | None:
@@ -158,9 +192,9 @@ def quadratic_form(flow: Flow) -> tuple[Floats, Floats, Floats] | None:
     mixed[np.arange(d), np.arange(d)] = squares
     quadratic = np.moveaxis(mixed, -1, 0)
     y = np.random.default_rng(0).normal(size=(16, d)) * (1.0 + np.max(np.abs(flow.start)))
-    wanted = flow.rate(0.0, y)
+    expected = flow.rate(0.0, y)
     found = constant + y @ linear + np.einsum("ijk,nj,nk->ni", quadratic, y, y)
-    if np.max(np.abs(found - wanted)) > 1e-12 * np.max(np.abs(wanted)):
+    if np.max(np.abs(found - expected)) > 1e-12 * np.max(np.abs(expected)):
         return None
     return constant, np.ascontiguousarray(linear.T), np.ascontiguousarray(quadratic)
 
@@ -248,6 +282,17 @@ class _Plan:
     interval: float
     tolerance: float
 
+    @property
+    def aligning(self) -> float:
+        """Time given to the tangent vectors before anything is measured."""
+        return ALIGNING * self.length
+
+    def bias(self, together: bool) -> float:
+        """ln(t2/t1)/(t2 - t1) of vectors that have grown since before the aligning, along the whole orbit or a segment."""
+        before = self.aligning + (self.transient if together else 0.0)
+        measured = self.length * (self.segments if together else 1)
+        return float(np.log1p(measured / before) / measured)
+
     def intervals(self, part: float) -> tuple[int, float]:
         """How many intervals, of what length, make up `part`."""
         number = max(1, round(part / self.interval))
@@ -266,7 +311,7 @@ def _along(flow: Flow, form: tuple[Floats, Floats, Floats], count: int, plan: _P
     table = np.zeros((d + 1, 1 + count))
     table[:d, 0], table[:d, 1:] = flow.start, np.eye(d)[:, :count]
     grown, divergence = np.zeros((plan.segments, count)), np.zeros(plan.segments)
-    step, before = 1e-3 * plan.interval, plan.transient + 0.2 * plan.length
+    step, before = 1e-3 * plan.interval, plan.transient + plan.aligning
     number, length = plan.intervals(before)
     step = _checked_step(follow(form, tableau, table, length, number, step, np.zeros(count)))
     number, length = plan.intervals(plan.length)
@@ -284,7 +329,7 @@ def _side_by_side(flow: Flow, count: int, plan: _Plan) -> tuple[Floats, Floats]:
     points = orbit(flow, starts, plan.tolerance)
     tracker = _Tracker(flow, starts - starts[0], plan.tolerance)
     y = (points, np.broadcast_to(np.eye(d)[:, :count], (plan.segments, d, count)))
-    clock, y, _, _ = tracker.follow(float(starts[0]), y, *plan.intervals(0.2 * plan.length))
+    clock, y, _, _ = tracker.follow(float(starts[0]), y, *plan.intervals(plan.aligning))
     _, _, grown, divergence = tracker.follow(clock, y, *plan.intervals(plan.length))
     return grown, divergence
 

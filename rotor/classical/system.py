@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rotor.arrays import Floats
-from rotor.classical.effect import ClassicalEffect, InertiaChange, InnerMomentum, Torque
-from rotor.classical.euler import checked_moments, gyroscopic_term, inverse_moments
+from rotor.classical.effect import AddedInertia, ClassicalEffect, InertiaChange, InnerMomentum, Torque
+from rotor.classical.euler import checked_moments, gyroscopic_rate, inverse_moments, kinetic_energy
+from rotor.geometry.rotations import IDENTITY
 
 
 @dataclass(frozen=True)
@@ -25,12 +26,13 @@ class System:
     start_acting: Floats
     torques: tuple[Torque, ...]
     inner: tuple[InnerMomentum, ...]
+    added: tuple[AddedInertia, ...]
     inertia: InertiaChange | None
 
     @property
     def free(self) -> bool:
         """Whether no effect is present."""
-        return not (self.torques or self.inner or self.inertia)
+        return not (self.torques or self.inner or self.added or self.inertia)
 
     @property
     def needs_velocity(self) -> bool:
@@ -39,8 +41,8 @@ class System:
 
     @property
     def needs_attitude(self) -> bool:
-        """Whether a torque depends on the attitude; otherwise dL/dt follows from L and time alone."""
-        return any(effect.needs_attitude for effect in self.torques)
+        """Whether a torque or an added inertia depends on the attitude; else dL/dt follows from L and time alone."""
+        return any(torque.needs_attitude for torque in self.torques) or any(a.needs_attitude for a in self.added)
 
     def inverse(self, time: float) -> Floats:
         """1/I_i (n, 3) at `time`, 0 for the axis of a linear rotor."""
@@ -60,10 +62,22 @@ class System:
         """Sum h (3,) of the inner momenta, 0.0 where there is none."""
         return sum((effect.inner_momentum(time) for effect in self.inner), start=0.0)
 
-    def omega(self, time: float, momentum: Floats) -> Floats:
-        """ω = (L - h)/I(t) in body axes, (n, 3)."""
-        relative = momentum - self.inner_momentum(time) if self.inner else momentum
-        return np.asarray(relative * self.inverse(time))
+    def omega(self, time: float, momentum: Floats, attitude: Floats) -> Floats:
+        """ω in body axes, (n, 3), from L = (I(t) + A) ω + h with the added inertia A."""
+        if self.added:
+            return self.stepping_omega(time, momentum, attitude)
+        return np.asarray(self._relative(time, momentum) * self.inverse(time))
+
+    def stepping_omega(self, time: float, momentum: Floats, attitude: Floats) -> Floats:
+        """The same with `acting_inverse`, so that rounding about the axis of a linear rotor does not stay."""
+        relative = self._relative(time, momentum)
+        if not self.added:
+            return np.asarray(relative * self.acting(time))
+        total = sum((effect.inertia(time, attitude) for effect in self.added), start=_diagonal(1.0 / self.acting(time)))
+        return np.asarray(np.linalg.solve(total, relative[..., None])[..., 0])
+
+    def _relative(self, time: float, momentum: Floats) -> Floats:
+        return momentum - self.inner_momentum(time) if self.inner else momentum
 
     def torque(self, time: float, attitude: Floats, omega: Floats) -> Floats:
         """Sum of the torques in body axes, (n, 3)."""
@@ -74,14 +88,13 @@ class System:
 
     def momentum_rate(self, time: float, momentum: Floats, attitude: Floats) -> Floats:
         """dL/dt = L x ω + Σ torques in body axes, (n, 3)."""
-        omega = self.omega(time, momentum)
-        rate = np.stack(gyroscopic_term(*np.moveaxis(momentum, -1, 0), *np.moveaxis(omega, -1, 0)), axis=-1)
+        omega = self.omega(time, momentum, attitude)
+        rate = gyroscopic_rate(momentum, omega)
         return rate + self.torque(time, attitude, omega) if self.torques else rate
 
     def energy(self, time: float, momentum: Floats, attitude: Floats) -> Floats:
-        """½ Σ (L_i - h_i)²/I_i + potential energies, (n,)."""
-        relative = momentum - self.inner_momentum(time)
-        total = 0.5 * np.sum(relative * self.omega(time, momentum), axis=-1)
+        """½ (L - h)·ω + potential energies, (n,)."""
+        total = kinetic_energy(self._relative(time, momentum), self.omega(time, momentum, attitude))
         for effect in self.torques:
             total = total + effect.potential_energy(time, attitude)
         return np.asarray(total)
@@ -92,13 +105,15 @@ def system_of(moments: ArrayLike, effects: Sequence[ClassicalEffect] = ()) -> Sy
 
     >>> from rotor.classical.effects.gyrostat import SpinningRotor
     >>> system = system_of([1.0, 2.0, 4.0], [SpinningRotor([0, 0, 1.0])])
-    >>> system.omega(0.0, np.array([[1.0, 2.0, 3.0]])).tolist()
+    >>> system.omega(0.0, np.array([[1.0, 2.0, 3.0]]), np.array([[1.0, 0.0, 0.0, 0.0]])).tolist()
     [[1.0, 1.0, 0.5]]
     """
-    kinds = (Torque, InnerMomentum, InertiaChange)
+    kinds = (Torque, InnerMomentum, AddedInertia, InertiaChange)
     for effect in effects:
         if not isinstance(effect, kinds):
-            raise ValueError(f"{effect!r} is no classical effect; give torques, inner momenta or a change of inertia")
+            raise ValueError(
+                f"expected classical effects (torques, inner momenta, added inertia, a change of inertia); got {effect!r}"
+            )
     changes = [effect for effect in effects if isinstance(effect, InertiaChange)]
     if len(changes) > 1:
         raise ValueError(f"{len(changes)} effects set the moments of inertia; give one function with all the changes")
@@ -109,8 +124,55 @@ def system_of(moments: ArrayLike, effects: Sequence[ClassicalEffect] = ()) -> Sy
         start_acting=acting_inverse(checked),
         torques=tuple(effect for effect in effects if isinstance(effect, Torque)),
         inner=tuple(effect for effect in effects if isinstance(effect, InnerMomentum)),
+        added=tuple(effect for effect in effects if isinstance(effect, AddedInertia)),
         inertia=changes[0] if changes else None,
     )
+
+
+def momentum_of(
+    omega: ArrayLike,
+    moments: ArrayLike,
+    effects: Sequence[ClassicalEffect] = (),
+    attitude: ArrayLike = IDENTITY,
+    time: float = 0.0,
+) -> Floats:
+    """The angular momentum L = (I + A) ω + h (..., 3) with which a body under effects turns at ω.
+
+    Parameters
+    ----------
+    omega : (..., 3) array
+        Angular velocity in body axes.
+    moments : (..., 3) array
+        Principal moments, those of `integrate`.
+    effects : sequence of ClassicalEffect
+        As of `integrate`; inner momenta h, added inertia A and a change of inertia enter.
+    attitude : (..., 4) array
+        Body to space.
+    time : float
+        At which effects that depend on time are taken.
+
+    Returns
+    -------
+    (..., 3) array
+        L in body axes.
+
+    >>> from rotor.classical.effects.gyrostat import SpinningRotor
+    >>> momentum_of([1.0, 1.0, 0.5], [1.0, 2.0, 4.0], [SpinningRotor([0, 0, 1.0])]).tolist()
+    [1.0, 2.0, 3.0]
+    """
+    system = system_of(moments, effects)
+    w, q = np.asarray(omega, dtype=np.float64), np.asarray(attitude, dtype=np.float64)
+    shape = np.broadcast_shapes(w.shape[:-1], q.shape[:-1], np.shape(moments)[:-1])
+    w, q = np.broadcast_to(w, (*shape, 3)).reshape(-1, 3), np.broadcast_to(q, (*shape, 4)).reshape(-1, 4)
+    total = system.moments(time) * w + system.inner_momentum(time)
+    for effect in system.added:
+        total = total + (effect.inertia(time, q) @ w[..., None])[..., 0]
+    return np.asarray(total).reshape(*shape, 3)
+
+
+def _diagonal(values: Floats) -> Floats:
+    """Diagonal matrices (n, 3, 3) of values (n, 3)."""
+    return values[..., None] * np.eye(3)
 
 
 def acting_inverse(moments: Floats) -> Floats:

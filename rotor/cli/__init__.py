@@ -10,13 +10,18 @@ import os
 import shlex
 import sys
 from collections.abc import Sequence
+from importlib import import_module
 from typing import cast
 
 import typer
 
-from rotor.cli import cat, convert, fluid, gas, info, isotopologues, molecules, raman, spectrum, thermo, tumble
+from rotor.cli.shared.options import PlainCommand
 from rotor.cli.shared.output import ComputationError
 
+VERBS = (
+    "spectrum", "info", "levels", "molecules", "isotopologues", "raman", "thermo", "tumble", "stark", "align", "gas", "fluid",
+    "fit", "structure", "convert", "cat",
+)  # fmt: skip
 NO_ANSWER, WRONG_INPUT, INTERRUPTED = 1, 2, 130
 # click's ClickException, whether click is a package of its own or, in a newer typer, a part of it
 _ERROR_OF_USE = cast(type[Exception], typer.BadParameter.__mro__[2])
@@ -28,15 +33,21 @@ Examples:
   rotor spectrum my.xyz --dipole 0,0,1.85 --range 0:2000GHz --cat out.cat --plot out.png
   rotor spectrum --constants "A=835840.288 B=435351.717 C=278138.7 MHz" --dipole-abc 0,1.8546,0
   rotor info my.sdf
+  rotor levels water --jmax 5 --plot terms.png
   rotor isotopologues water
   rotor raman N2 --laser 488
   rotor thermo water --temperature 10:1000K:100 --plot heat.png
   rotor tumble water --plot water.png
+  rotor stark OCS --field 0:200kV/cm --plot stark.png
+  rotor align OCS --pulse "1e13 W/cm2, 1 ps" --plot align.png
   rotor gas water --molecules 20000 --seed 7
-  rotor fluid water --molecules 216 --csv run.csv"""
+  rotor fluid water --molecules 216 --csv run.csv
+  rotor fit case.par --out fitted
+  rotor structure family.toml --plot molecule.png"""
 
 
-def _application() -> typer.Typer:
+def _application(verbs: Sequence[str] = VERBS) -> typer.Typer:
+    """The command with some of its verbs."""
     app = typer.Typer(
         add_completion=False,
         pretty_exceptions_enable=False,
@@ -52,17 +63,9 @@ def _application() -> typer.Typer:
     ) -> None:
         pass
 
-    app.command("spectrum", epilog=spectrum.EXAMPLES)(spectrum.command)
-    app.command("info", epilog=info.EXAMPLES)(info.command)
-    app.command("molecules", epilog=molecules.EXAMPLES)(molecules.command)
-    app.command("isotopologues", epilog=isotopologues.EXAMPLES)(isotopologues.command)
-    app.command("raman", epilog=raman.EXAMPLES)(raman.command)
-    app.command("thermo", epilog=thermo.EXAMPLES)(thermo.command)
-    app.command("tumble", epilog=tumble.EXAMPLES)(tumble.command)
-    app.command("gas", epilog=gas.EXAMPLES)(gas.command)
-    app.command("fluid", epilog=fluid.EXAMPLES)(fluid.command)
-    app.command("convert", epilog=convert.EXAMPLES)(convert.command)
-    app.command("cat", epilog=cat.EXAMPLES)(cat.command)
+    for verb in verbs:
+        module = import_module(f"rotor.cli.{verb}")
+        app.command(verb, cls=PlainCommand, epilog=module.EXAMPLES)(module.command)
     return app
 
 
@@ -77,7 +80,8 @@ def _print_version(wanted: bool) -> None:
 def run(arguments: Sequence[str] | None = None) -> int:
     """Carry out a command and return its exit code; a mistake of the user is one line on standard error."""
     arguments = sys.argv[1:] if arguments is None else list(arguments)
-    command = typer.main.get_command(_application())
+    verbs = arguments[:1] if arguments[:1] and arguments[0] in VERBS else VERBS  # what is not asked for is not loaded
+    command = typer.main.get_command(_application(verbs))
     provenance = shlex.join(["rotor", *arguments])
     try:
         with command.make_context("rotor", arguments or ["--help"], obj=provenance) as context:

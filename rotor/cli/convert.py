@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -65,7 +65,7 @@ def top_with_errors(source: str) -> Top:
     from rotor.formats.spcat.codes import constants_of
     from rotor.formats.spcat.par import read_par
 
-    return top.with_constants(constants_of(read_par(path), errors=True))
+    return replace(top, constants=constants_of(read_par(path), errors=True))
 
 
 def writer_of(top: Top, source: str, target: str, kmax: int) -> Writer:

@@ -175,7 +175,7 @@ def _answer(
     head = {"rotor_version": rotor.__version__, **said, "engine": request.engine, "settings": asdict(request.settings)}
 
     def on_start() -> None:
-        from rotor.formats.line_tables import write_beside
+        from rotor.formats.provenance import write_beside
 
         if growing.csv is not None and not outputs.resume:
             write_beside(growing.csv, {**head, "start": request.start})

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 TEMPERATURES_K = (9.375, 18.75, 37.5, 75.0, 150.0, 225.0, 300.0, 500.0, 1000.0)  # those of the catalogues, and two more
 
 MOST_CONFORMERS = 1000
+ROOM_K = 300.0  # at the J most populated there effects are compared
 
 EXAMPLES = """\b
 Examples:
@@ -50,9 +51,12 @@ def command(context: typer.Context, given: Input, options: Options) -> None:
     top = inputs.read_top(given)
 
     from rotor.cli.shared.report import describe
+    from rotor.quantum.effects.watson import SEMI_RIGID
+    from rotor.quantum.limits import limit_facts, populated_j
     from rotor.thermo.request import partition_table
 
     content = describe(top, given.text, context.obj)
+    content |= limit_facts(top, populated_j(top, ROOM_K), SEMI_RIGID)
     content["partition_function"] = partition_table(top, temperatures, sum_progress())
     if options.conformers is not None:
         content["conformers"] = conformer_table(given.source, options.conformers)
@@ -82,15 +86,17 @@ def conformer_table(source: str | None, count: int) -> list[dict[str, Any]]:
 
 
 def _show(top: Top, content: dict[str, Any]) -> None:
-    from rotor.cli.shared.report import heading
+    from rotor.cli.shared import report
 
-    print(heading(top))
+    print(report.heading(top))
     show_facts(_facts(top, content))
     others = _conformers_of(content.get("conformers", []))
     for table in (_constants_table(top), _axes_table(content), _q_table(content), others):
         if table:
             print()
             show_table(table)
+    print()
+    show_facts(report.model_facts(content))
 
 
 def _facts(top: Top, content: dict[str, Any]) -> list[tuple[str, str]]:

@@ -74,7 +74,7 @@ def command(context: typer.Context, given: Input, options: Options, vibration: V
     require_whole("--top", options.top_lines, 0)
     settings = {**_settings(options), "vibrations": gas_layer.vibrations_of(vibration)}
     files = Files.of(outputs)
-    top = _with_polarizability(inputs.read_top(given), options.polarizability)
+    top = with_polarizability(inputs.read_top(given), options.polarizability)
     with inputs.fields_as_options(**NAMES):
         request = RamanRequest(top, **settings)
     with answering():
@@ -111,7 +111,7 @@ def _content(answer: RamanAnswer, given: Input, command: str, shown: int) -> dic
     return {**begin(command, given.text), **answer.facts(), "strongest": answer.strongest(shown)}
 
 
-def _with_polarizability(top: Top, text: str | None) -> Top:
+def with_polarizability(top: Top, text: str | None) -> Top:
     """The top with the polarizability given, else its own; ValueError where none is known."""
     if text is not None:
         return inputs.parsed("--polarizability", text, lambda value: _given(top, value))

@@ -30,6 +30,7 @@ from rotor.cli.shared.output import (
 
 if TYPE_CHECKING:
     from rotor.formats.spcat.predict import Prediction
+    from rotor.quantum.effect import QuantumEffect
     from rotor.spectra.lines import Lines
     from rotor.spectra.request import SpectrumAnswer, SpectrumRequest
     from rotor.tops.top import Top
@@ -63,6 +64,11 @@ class Options:
     vibrational_factor: float = option(1.0, metavar="X", help="Multiplies Q.")
     profile: str | None = option(None, metavar="NAME", help="sticks, gaussian, lorentzian or voigt.")
     fwhm: str | None = option(None, metavar="W", help="Full width at half maximum (MHz); by default Doppler's.")
+    hyperfine: bool | None = option(
+        None,
+        "--hyperfine/--no-hyperfine",
+        help="Split lines by the spins of nuclei; by default where --spin-constants are given.",
+    )
     top_lines: int = option(20, "--top", metavar="N", help="How many of the strongest lines are shown.")
     tag: int = option(0, metavar="N", help="Tag of the species in --cat.")
 
@@ -95,7 +101,9 @@ def command(
         if prediction is not None:
             answer, tag = spcat.answer_of(prediction, shape), prediction.request.tag
         else:
-            answer, tag = _answer(inputs.with_some_dipole(inputs.read_top(given)), settings), options.tag
+            top = inputs.with_some_dipole(inputs.read_top(given))
+            settings |= {"effects": _effects(top, given, options)}
+            answer, tag = _answer(top, settings), options.tag
     _refuse_nothing_to_draw(answer, files)
     for warning in answer.lines.warnings:
         note(warning)
@@ -134,6 +142,13 @@ def _shape(options: Options, layer: Layer) -> dict[str, Any]:
     return {"profile": options.profile, "fwhm_mhz": fwhm, "layer": gas_layer.layer_of(layer)}
 
 
+def _effects(top: Top, given: Input, options: Options) -> tuple[QuantumEffect, ...]:
+    from rotor.quantum.effects.of_top import effects_of
+
+    asked = given.spin_constants is not None if options.hyperfine is None else options.hyperfine
+    return inputs.parsed("--hyperfine", "", lambda _: effects_of(top, asked))
+
+
 def _answer(top: Top, settings: dict[str, Any]) -> SpectrumAnswer:
     from rotor.spectra.request import SpectrumRequest, answer_spectrum
 
@@ -166,12 +181,12 @@ def _why_none(answer: SpectrumAnswer) -> str:
 
 def _program_catalogue(prediction: Prediction, content: dict[str, Any]) -> Writer:
     """The catalogue as SPCAT lists it: its weights, its zero of energy, K doublets as two lines."""
-    from rotor.formats.line_tables import provenance, write_beside
+    from rotor.formats.provenance import record_of, write_beside
     from rotor.formats.spcat.cat import write_cat
 
     def write(path: Path) -> None:
         write_cat(prediction.catalogue, path)
-        record = provenance(prediction.lines) | {"command": content["command"], "input": content["input"]}
+        record = record_of(prediction.lines, {"command": content["command"], "input": content["input"]})
         write_beside(path, record | {"q": prediction.q, "lines": len(prediction.catalogue)})
 
     return write
@@ -210,10 +225,10 @@ def _draw(answer: SpectrumAnswer, path: Path, record: dict[str, Any]) -> None:
 
 
 def _show(answer: SpectrumAnswer, content: dict[str, Any]) -> None:
-    from rotor.cli.shared.report import heading
+    from rotor.cli.shared import report
 
     lines = answer.lines
-    print(heading(lines.top))
+    print(report.heading(lines.top))
     show_facts(_facts(lines, content))
     if len(lines) == 0:
         print(f"\nno lines: {_why_none(answer)}")
@@ -221,6 +236,8 @@ def _show(answer: SpectrumAnswer, content: dict[str, Any]) -> None:
     if len(content["strongest"]):
         print()
         show_table(_lines_table(lines, content["strongest"], content["optical_depth"]))
+    print()
+    show_facts(report.model_facts(content))
 
 
 def _facts(lines: Lines, content: dict[str, Any]) -> list[tuple[str, str]]:

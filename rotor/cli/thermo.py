@@ -111,14 +111,15 @@ def _writers(answer: ThermoAnswer, content: dict[str, Any]) -> dict[str, Writer]
         rotor.write(answer.functions, path, settings=provenance)
 
     def draw(path: Path) -> None:
-        from rotor.plots.heat_capacity import Panel, curve_temperatures, name_of, plot_heat_capacity
+        from rotor.plots.heat_capacity import Panel, curve_temperatures, plot_heat_capacity
+        from rotor.plots.picture import name_of_top
         from rotor.thermo.request import answer_thermo
 
         request = answer.request
         grid = tuple(curve_temperatures(answer.functions.temperature_k).tolist())
         smooth = answer_thermo(replace(request, temperatures_k=grid, pressure_bar=None)).functions
         label = "quantum" if request.species == "equilibrium" else f"quantum, {request.species}"
-        plot_heat_capacity([Panel(name_of(request.top), {label: smooth})], path, provenance=provenance)
+        plot_heat_capacity([Panel(name_of_top(request.top), {label: smooth})], path, provenance=provenance)
 
     return {
         "--csv": table,

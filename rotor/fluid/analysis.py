@@ -21,7 +21,7 @@ YEH_HUMMER_XI = 2.837297  # of a cubic cell; I.-C. Yeh and G. Hummer, J. Phys. C
 M2_PER_S = 1e-8  # 1 Å²/ps in m²/s
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class PairDistribution(Table):
     """r_angstrom: (bins,) middles of shells. g: (bins,). coordination: (bins,) neighbours up to the end of each shell."""
 
@@ -120,7 +120,7 @@ def diffusion(
     if not 0 <= first < last < min(map(len, parts)):
         raise ValueError(
             f"a window of {window_ps[0]:g} to {window_ps[1]:g} ps in {blocks} parts of {len(parts[-1]) * interval_ps:g} ps: "
-            "longer parts or an earlier window are wanted"
+            "expected longer parts or an earlier window"
         )
     slopes = [_slope(mean_square_displacement(part)[first : last + 1], interval_ps) for part in parts]
     values = np.array(slopes) / 6 * M2_PER_S
@@ -148,7 +148,7 @@ def yeh_hummer_correction(
 
 
 def block_errors(series: ArrayLike) -> Floats:
-    """Standard errors by pairing neighbours again and again, (levels,): they rise to a plateau where blocks are independent.
+    """Standard errors by pairing neighbours again and again, (levels,): they increase to a plateau where blocks are independent.
 
     H. Flyvbjerg and H. G. Petersen, J. Chem. Phys. 91, 461 (1989), eqs. 23-27. The last level has eight blocks or more.
 
@@ -175,5 +175,5 @@ def drift_per_ns(time_ps: ArrayLike, energy: ArrayLike) -> tuple[float, float]:
 def _path(path: Any) -> Floats:
     points = np.asarray(path, dtype=np.float64)
     if points.ndim != 3 or points.shape[-1] != 3 or not len(points):
-        raise ValueError(f"a path of shape {points.shape}: (frames, n, 3) with frames > 0 is wanted")
+        raise ValueError(f"a path of shape {points.shape}: expected (frames, n, 3) with frames > 0")
     return points

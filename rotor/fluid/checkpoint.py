@@ -1,6 +1,6 @@
 """What a long run leaves on disk: rows and frames that grow, and checkpoints that are whole or not there.
 
-A checkpoint is written beside, forced to the disk and renamed. It remembers how long the growing files were; a run that
+A checkpoint is written beside, forced to the disk and renamed. It records how long the growing files were; a run that
 continues cuts them back to that length first, so that nothing stands in them twice and no half line stays.
 """
 

@@ -27,7 +27,7 @@ RELAXING_K = 300.0  # of the speeds that relaxing molecules may reach
 def lattice_box(model: RigidModel, molecules: int, density_g_cm3: float, rng: np.random.Generator) -> Atoms:
     """A cubic periodic box of molecules on a simple cubic lattice, turned at random, labelled in arrays["molecule"].
 
-    The smallest lattice with room for all is used, sites left empty at random; the edge follows from the density and the
+    The smallest lattice with enough sites is used, some left empty at random; the edge follows from the density and the
     masses of the most abundant isotopes. Neighbours may stand too close: `relax` the box before anything is measured.
 
     >>> from rotor.fluid.forces.models import model_of
@@ -40,9 +40,9 @@ def lattice_box(model: RigidModel, molecules: int, density_g_cm3: float, rng: np
     from rotor.fluid.motion.bodies import atom_masses
 
     if molecules < 1:
-        raise ValueError(f"{molecules} molecules: at least 1 is wanted")
+        raise ValueError(f"{molecules} molecules: expected at least 1")
     if not (math.isfinite(density_g_cm3) and density_g_cm3 > 0.0):
-        raise ValueError(f"a density of {density_g_cm3} g/cm³: a number above 0 is wanted")
+        raise ValueError(f"a density of {density_g_cm3} g/cm³: expected a number above 0")
     single = Atoms("".join(model.symbols), model.positions_angstrom[: len(model.symbols)])
     masses = atom_masses(single)
     volume = molecules * masses.sum() * units.ATOMIC_MASS_KG / (density_g_cm3 * 1e-27)  # 1 g/cm³ = 1e-27 kg/Å³
@@ -74,9 +74,9 @@ def model_labels(atoms: Atoms, models: Sequence[RigidModel]) -> NDArray[np.int64
     while at < len(symbols):
         fits = next((elements for elements in ordered if symbols[at : at + len(elements)] == elements), None)
         if fits is None:
-            wanted = " or ".join(" ".join(elements) for elements in ordered)
+            expected = " or ".join(" ".join(elements) for elements in ordered)
             raise ValueError(
-                f"atom {at} ({symbols[at]}) begins no molecule of the models given: {wanted} is wanted, in this order"
+                f"atom {at} ({symbols[at]}) begins no molecule of the models given: expected {expected}, in this order"
             )
         labels[at : at + len(fits)] = number
         at, number = at + len(fits), number + 1
@@ -100,7 +100,7 @@ def check_apart(atoms: Atoms, bodies: Bodies) -> None:
 
 
 def relax(atoms: Atoms, steps: int = RELAXING_STEPS, **how: Any) -> None:
-    """Let molecules slide off each other, in place: a quench, in which whoever moves against its force is stopped.
+    """Let molecules slide off each other, in place: a quench, in which a molecule that moves against its force is stopped.
 
     Steps of 1 fs; speeds are held below those of 300 K. It finds no minimum of energy, only places from which a motion can
     start. The atoms keep no momenta. how: as of `RigidDynamics`.

@@ -1,6 +1,6 @@
 """Long runs of a fluid: rows and frames as they come, checkpoints, and exact restarts.
 
-After each checkpoint the calculator is told to forget what it knows (lists of neighbours, the last result), as it has after a
+After each checkpoint the calculator discards its state (lists of neighbours, the last result), as after a
 restart: what follows depends on the checkpoint alone, and a run that was killed and resumed ends bit for bit where the
 uninterrupted one does, on one machine with the same settings and the same interval of checkpoints.
 """
@@ -51,7 +51,7 @@ Progress = Callable[[int, int, float], None]
 
 
 class RunStopped(ValueError):
-    """A run that began could not go on; what was written before stays."""
+    """A run that began could not continue; what was written before stays."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ class Outputs:
         for name in ("frames_every", "checkpoint_every"):
             value = getattr(self, name)
             if value is not None and value < 1:
-                raise ValueError(f"{name} = {value}: at least 1 is wanted")
+                raise ValueError(f"{name} = {value}: expected at least 1")
 
 
 def run_fluid(
@@ -94,9 +94,9 @@ def run_fluid(
         drawn at `settings.temperature_k`.
     resume : bool
         Continue from `outputs.checkpoint`; the files that grow are cut back to where they were then.
-    told : callable, optional
-        Progress step, steps and ns per day from time to time; without it a bar is shown on a terminal.
-    begun : callable, optional
+    progress : callable, optional
+        Called with step, steps and ns per day from time to time; without it a bar is shown on a terminal.
+    on_start : callable, optional
         Called once everything is found to be in order and the files are open.
 
     Raises
@@ -116,7 +116,7 @@ def run_fluid(
     if resume:
         assert outputs.checkpoint is not None
         run.restore(read_checkpoint(outputs.checkpoint))
-    dynamics.wrench()  # what cannot begin is told before any file is opened
+    dynamics.wrench()  # a state that cannot begin is refused before any file is opened
     with run.files(), progress_bar(settings.steps, progress) as shown:
         on_start()
         run.go(shown)
@@ -215,7 +215,7 @@ class _Run:
         self._csv: TextFile | None = None
         self._frames: list[ExtendedXyz | AseTrajectory] = []
         self._lengths: dict[str, int] = {}
-        self._kept_at: int | None = None
+        self._saved_at: int | None = None
 
     @contextmanager
     def files(self) -> Iterator[None]:
@@ -236,26 +236,26 @@ class _Run:
         dynamics, steps = self.dynamics, self.settings.steps
         first, started, shown = dynamics.nsteps, time.perf_counter(), 0.0
         try:
-            if self._kept_at is None:
+            if self._saved_at is None:
                 self._write()
-                self._keep()
+                self._save()
             while dynamics.nsteps < steps:
                 dynamics.step()
                 dynamics.nsteps += 1
                 self._write()
                 if dynamics.nsteps % self.outputs.checkpoint_every == 0 or dynamics.nsteps == steps:
-                    self._keep()
+                    self._save()
                 now = time.perf_counter() - started
                 if now - shown > BAR_EVERY_S or dynamics.nsteps == steps:
                     shown = now
                     progress(dynamics.nsteps, steps, ns_per_day(self.settings, dynamics.nsteps - first, now))
         except (ValueError, FloatingPointError) as error:
             where = f"step {dynamics.nsteps + 1} of {steps}, {self.settings.step_fs:g} fs each"
-            raise RunStopped(f"{error} ({where}){self._told_checkpoint()}") from error
+            raise RunStopped(f"{error} ({where}){self._named_checkpoint()}") from error
         except OSError as error:
             what = f"{error.filename}: {error.strerror}" if error.filename else error.strerror
             raise RunStopped(
-                f"{what} at step {dynamics.nsteps}; what was written before is whole{self._told_checkpoint()}"
+                f"{what} at step {dynamics.nsteps}; what was written before is whole{self._named_checkpoint()}"
             ) from error
 
     def record(self) -> FluidRecord:
@@ -276,13 +276,13 @@ class _Run:
             before = ", ".join(about["files"]) or "none"
             raise ValueError(f"{path}: the run that is resumed wrote these files: {before}; name the same ones")
         if about["step"] > self.settings.steps:
-            raise ValueError(f"{path}: is of step {about['step']}, beyond the {self.settings.steps} steps wanted")
+            raise ValueError(f"{path}: is of step {about['step']}, beyond the {self.settings.steps} steps of this run")
         state = State(*(np.array(arrays[name]) for name in ("centres", "momentum", "spin", "carry")))
         if self.dynamics.thermostat is not None:
             self.dynamics.thermostat.restore(about["thermostat"])
         self.dynamics.restore(state, about["step"])
         self._lengths = dict(about["files"])
-        self._kept_at = about["step"]
+        self._saved_at = about["step"]
         csv = self.outputs.csv
         self.rows = arrays["rows"].tolist() if csv is None else read_rows(csv, about["files"]["csv"])
 
@@ -313,7 +313,7 @@ class _Run:
             pressure_bar(dynamics),
         ]
 
-    def _keep(self) -> None:
+    def _save(self) -> None:
         """A checkpoint, after which the calculator begins afresh."""
         path, dynamics = self.outputs.checkpoint, self.dynamics
         if path is None:
@@ -331,11 +331,11 @@ class _Run:
             "files": {name: file.sync() for name, file in zip(self._names(), files, strict=True)},
         }
         Checkpoint(arrays, about).write(path)
-        self._kept_at = dynamics.nsteps
+        self._saved_at = dynamics.nsteps
         dynamics.refresh()
 
     def _names(self) -> list[str]:
-        """Names of the growing files that were asked for."""
+        """Names of the growing files of this run."""
         return [*(["csv"] if self.outputs.csv is not None else []), *map(str, self.outputs.trajectories)]
 
     def _box(self) -> str:
@@ -344,10 +344,10 @@ class _Run:
         parts = (atoms.numbers, bodies.order, bodies.starts, bodies.masses, bodies.sites, atoms.cell.array, atoms.pbc)
         return hashlib.sha256(b"".join(np.ascontiguousarray(part).tobytes() for part in parts)).hexdigest()
 
-    def _told_checkpoint(self) -> str:
-        if self._kept_at is None or self.outputs.checkpoint is None:
+    def _named_checkpoint(self) -> str:
+        if self._saved_at is None or self.outputs.checkpoint is None:
             return ""
-        return f"; {self.outputs.checkpoint} is of step {self._kept_at}, resume from it"
+        return f"; {self.outputs.checkpoint} is of step {self._saved_at}, resume from it"
 
 
 def ns_per_day(settings: Settings, steps: int, seconds: float) -> float:
@@ -357,7 +357,7 @@ def ns_per_day(settings: Settings, steps: int, seconds: float) -> float:
 
 @contextmanager
 def progress_bar(steps: int, progress: Progress | None) -> Iterator[Progress]:
-    """Who is told of the progress: the caller's function, else a bar on a terminal, else nobody."""
+    """Where progress goes: the caller's function, else a bar on a terminal, else nowhere."""
     if progress is not None or not sys.stderr.isatty():
         yield progress or (lambda step, steps, speed: None)
         return

@@ -1,4 +1,4 @@
-"""What a run of a fluid is: the box, the potential, the ensemble, how long; every engine is handed the same."""
+"""Settings of a run of a fluid: box, potential, ensemble, length; the same for every engine."""
 
 from __future__ import annotations
 
@@ -36,10 +36,10 @@ class Settings:
         for name in ("temperature_k", "step_fs", "cutoff_angstrom", "friction_per_ps", "relaxation_fs"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value > 0):
-                raise ValueError(f"{name} = {value}: a number above 0 is wanted")
+                raise ValueError(f"{name} = {value}: expected a number above 0")
         for name, least in (("steps", 0), ("every", 1), ("seed", 0)):
             if getattr(self, name) < least:
-                raise ValueError(f"{name} = {getattr(self, name)}: at least {least} is wanted")
+                raise ValueError(f"{name} = {getattr(self, name)}: expected at least {least}")
         if self.ensemble not in ENSEMBLES:
             raise ValueError(f"{self.ensemble!r} is no ensemble; there are {', '.join(ENSEMBLES)}")
         if self.electrostatics not in ELECTROSTATICS:

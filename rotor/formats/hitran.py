@@ -14,6 +14,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -21,9 +22,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from rotor import units
 from rotor.formats.atomic_write import open_atomic
+from rotor.formats.packed import first_bytes
 from rotor.formats.spcat.fields import read_decimal, read_whole
 from rotor.formats.spcat.freeform import Line, encode, read_lines
 from rotor.spectra.lines import Lines
+from rotor.table import Table
 
 LENGTH = 160
 TEMPERATURE_K = 296.0
@@ -62,8 +65,8 @@ _FIELDS = (
 )
 
 
-@dataclass(frozen=True, eq=False)
-class HitranLines:
+@dataclass(frozen=True, eq=False, repr=False)
+class HitranLines(Table):
     """Records as columns of equal length n.
 
     molecule, isotopologue (n,): HITRAN's numbers. wavenumber_cm (n,): cm⁻¹. intensity_cm (n,): cm/molecule at 296 K with
@@ -111,11 +114,10 @@ class HitranLines:
         """The content of one record by field."""
         return {f.name: getattr(self, f.name)[index].item() for f in _FIELDS}
 
-    def to_polars(self) -> Any:
-        """All columns as a polars DataFrame."""
-        import polars as pl
-
-        return pl.DataFrame({f.name: getattr(self, f.name) for f in _FIELDS})
+    @property
+    def columns(self) -> dict[str, NDArray[Any]]:
+        """Every field of the records by its name."""
+        return {f.name: getattr(self, f.name) for f in _FIELDS}
 
 
 def cm_per_molecule(intensity_nm2_mhz: ArrayLike) -> NDArray[np.float64]:
@@ -145,10 +147,11 @@ def read_hitran(source: str | os.PathLike[str] | bytes) -> HitranLines:
     return HitranLines(**columns, texts=texts)
 
 
-def looks_like_hitran(first_line: str) -> bool:
-    """Whether the first line of a file is a record of 160 characters."""
+def is_hitran_file(path: Path) -> bool:
+    """Whether the first line of a file, packed with gzip or not, is a record; HITRAN and SPFIT share the suffix .par."""
+    first = first_bytes(path, LENGTH + 2).split(b"\n")[0]
     try:
-        _record(Line(first_line, 1, ""))
+        _record(Line(first.decode("latin-1"), 1, ""))
     except ValueError:
         return False
     return True

@@ -1,141 +1,102 @@
-"""A line list as a file: .cat, .csv, .parquet, .json, .hitran, each with its provenance inside or in a file beside it."""
+"""A line list as a catalogue, and as files whose formats know lines: .cat, .hitran, .json.
+
+Tables of any kind, lines among them, become .csv and .parquet in `tables`.
+"""
 
 from __future__ import annotations
 
 import gzip
-import json
-import math
 import os
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
-from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from rotor.formats.atomic_write import atomic_path, open_atomic
+from rotor.formats.atomic_write import atomic_path
+from rotor.formats.provenance import record_of, write_beside
 from rotor.formats.spcat.cat import format_lines, write_cat
-from rotor.formats.spcat.catalogue import Catalogue
+from rotor.formats.spcat.catalogue import Catalogue, catalogue_of
 from rotor.formats.spcat.fields import BLANK
 from rotor.spectra.lines import Lines
-from rotor.tops.top import Top
-from rotor.version import version
 
-QNFMT = {("j",): 101, ("j", "k"): 202, ("j", "ka", "kc"): 303}
-MAX_TAG = 999_999
+if TYPE_CHECKING:
+    from rotor.formats.hitran import HitranLines
+
+MAX_QUANTA = 9  # the last digit of QNFMT counts them
+_BEFORE_SPINS = ("n", "j", "k", "ka", "kc", "v")
+_IN_A_CATALOGUE = (*_BEFORE_SPINS, "i_tot", *(f"f{i}" for i in range(1, 9)), "f")
 PIECE = 1 << 15  # lines of a long list that are made into text at once
+
+Settings = Mapping[str, Any]
 
 
 def catalogue(lines: Lines, tag: int = 0) -> Catalogue:
     """The lines as a catalogue of the 80-column format.
 
     Lines of zero strength have no logarithm and are left out; ERR is 0 where no uncertainty of a constant is known.
-    Raises ValueError for a tag that has no place in its six digits.
+    Raises ValueError for a tag that has no place in its six digits, and for quantum numbers that the format has not.
     """
-    if not 0 <= tag <= MAX_TAG:
-        raise ValueError(f"tag {tag}: a catalogue's tag has at most six digits")
     lgint = lines.lgint
     if not np.isfinite(lgint).all():
         lines, lgint = lines.where(np.isfinite(lgint)), lgint[np.isfinite(lgint)]
-
-    n, levels = len(lines), lines.levels
-    quanta = np.full((len(levels), 6), BLANK, dtype=np.int16)
-    quanta[:, : len(levels.quanta)] = levels.quanta_of(np.arange(len(levels)))
-    return Catalogue(
-        frequency_mhz=lines.frequency_mhz,
-        error_mhz=np.zeros(n) if (error := lines.error_mhz) is None else error,
-        lgint=lgint,
-        dr=np.full(n, 2 if levels.kind == "linear" else 3, dtype=np.int16),
-        energy_lower_cm=lines.energy_lower_cm,
-        g_upper=lines.g_upper.astype(np.int32),
-        tag=np.full(n, tag, dtype=np.int32),
-        qnfmt=np.full(n, QNFMT[lines.quanta_names], dtype=np.int32),
-        quanta_upper=quanta[lines.upper],
-        quanta_lower=quanta[lines.lower],
-    )
-
-
-def top_provenance(top: Top) -> dict[str, Any]:
-    """What a top consists of: constants and their source, dipole, weights, notes, and the version of the package."""
-    return {
-        "program": "rotor",
-        "version": version(),
-        "name": top.name,
-        "kind": top.kind,
-        "constants": top.constants.text(),
-        "reduction": top.constants.reduction,
-        "representation": top.constants.representation,
-        "constants_source": top.source,
-        "dipole_abc_debye": top.dipole_abc_debye,
-        "dipole_source": top.dipole_source,
-        "spin_weights": top.spin_weights.to_mapping(),
-        "spin_weights_source": top.weights_source,
-        "notes": list(top.notes),
+    numbers = {
+        "frequency_mhz": lines.frequency_mhz,
+        "lgint": lgint,
+        "energy_lower_cm": lines.energy_lower_cm,
+        "g_upper": lines.g_upper,
     }
+    if (error := lines.error_mhz) is not None:
+        numbers["error_mhz"] = error
+    quanta, qnfmt = as_printed(lines.levels.quanta, lines.levels.halves)
+    linear = lines.levels.kind == "linear"
+    return catalogue_of(numbers, quanta[lines.upper], quanta[lines.lower], qnfmt, tag, linear=linear)
 
 
-def provenance(lines: Lines) -> dict[str, Any]:
-    """What the lines were made from: the top and its sources, the settings, Q."""
-    return top_provenance(lines.top) | {
-        "errors_from": errors_from(lines),
-        "temperature_k": lines.temperature_k,
-        "jmax": lines.jmax,
-        "min_lgint": finite_or_none(lines.min_lgint),
-        "range_mhz": [finite_or_none(bound) for bound in lines.range_mhz],
-        "q": lines.q,
-        "q_source": lines.partition.source,
-        "lines": len(lines),
-        "warnings": list(lines.warnings),
-    }
+def as_printed(quanta: Mapping[str, NDArray[Any]], halves: Collection[str]) -> tuple[NDArray[np.int16], int]:
+    """Quantum numbers of levels in the order of a catalogue, (n, 6) or wider, and QNFMT.
 
-
-def errors_from(lines: Lines) -> str | None:
-    """Which uncertainties the errors of frequencies come from, None where there are none."""
-    if lines.covariance is not None:
-        return f"covariance of {', '.join(lines.covariance.names)}"
-    known = lines.top.constants.uncertainties
-    if known and lines.covariance_used is None:
-        return "none: the constants are from a fit whose correlations are not known"
-    return f"uncertainties of {', '.join(known)}, uncorrelated" if known else None
-
-
-def finite_or_none(value: float) -> float | None:
-    """The value as JSON can say it: None for an open limit."""
-    return value if math.isfinite(value) else None
-
-
-def write_lines(lines: Lines, path: str | os.PathLike[str], settings: Mapping[str, Any] | None = None) -> None:
-    """Write lines in the format that the suffix of `path` names: .cat, .cat.gz, .csv, .parquet, .json or .hitran.
-
-    settings: what else the provenance shall say (the command line, for instance); its key "tag" is the tag of a .cat,
-    "molecule" (always), "isotopologue" and "abundance" are those of a .hitran.
-    Parquet and JSON carry the provenance inside, the others in a file beside, `path` + ".provenance.json".
+    quanta: columns (n,) by name. halves: names of those that hold twice the number; they are printed rounded up. QNFMT is
+    100 Q + 10 H + NQN: NQN counts the numbers, Q is that of those before the spins, 10 more with a v, H has a bit for each of the
+    last three that is half-integer (H. M. Pickett et al., J. Quant. Spectrosc. Radiat. Transf. 60, 883 (1998)).
+    Raises ValueError for quantum numbers that a catalogue has no place for.
     """
-    name = Path(path).name.lower()
-    record = provenance(lines) | {k: v for k, v in (settings or {}).items() if k != "tag"}
-    if name.endswith((".cat", ".cat.gz")):
-        _write_catalogue(lines, path, int((settings or {}).get("tag", 0)))
-        write_beside(path, record)
-    elif name.endswith((".csv", ".parquet")):
-        write_frame(lines.to_polars(), path, record)
-    elif name.endswith(".json"):
-        with open_atomic(path, "w", encoding="utf-8") as handle:
-            json.dump({"provenance": record, "lines": records(lines)}, handle, indent=1, allow_nan=False)
-    elif name.endswith(".hitran"):
-        _write_hitran(lines, path, settings or {})
-        write_beside(path, record)
-    else:
+    foreign = [name for name in quanta if name not in _IN_A_CATALOGUE]
+    names = sorted(quanta, key=_IN_A_CATALOGUE.index) if not foreign else []
+    if foreign or len(names) > MAX_QUANTA:
         raise ValueError(
-            f"{path}: lines can be written as .cat, .cat.gz, .csv, .parquet, .json or .hitran; the suffix names the format"
+            f"quantum numbers {', '.join(quanta)}: a catalogue has no place for {', '.join(foreign) or 'more than 9'}; "
+            "write .csv or .parquet"
         )
+    columns = [(quanta[name] + 1) // 2 if name in halves else quanta[name] for name in names]
+    out = np.full((len(columns[0]), max(6, len(names))), BLANK, dtype=np.int16)
+    out[:, : len(names)] = np.stack(columns, axis=1)
+
+    before = [name for name in names if name in _BEFORE_SPINS]
+    odd = [name in halves and bool((quanta[name] % 2).any()) for name in names[len(before) :]][-3:]
+    h = sum(bit << place for place, bit in enumerate(reversed(odd)))
+    return out, 1000 * ("v" in names) + 100 * len(before) + 10 * h + len(names)
 
 
-def _write_catalogue(lines: Lines, path: str | os.PathLike[str], tag: int) -> None:
-    """The 80-column file; a long list in pieces, made side by side on all cores and written in order."""
+def write_catalogue(lines: Lines, path: str | os.PathLike[str], settings: Settings) -> None:
+    """Write lines as a catalogue, their provenance beside it; `settings["tag"]` is the tag of the species."""
+    tag = int(settings.get("tag", 0))
     if len(lines) <= PIECE:
-        return write_cat(catalogue(lines, tag), path)
+        write_cat(catalogue(lines, tag), path)
+    else:
+        _write_in_pieces(lines, path, tag)
+    write_beside(path, record_of(lines, settings))
 
+
+def write_read_catalogue(lines: Catalogue, path: str | os.PathLike[str], settings: Settings) -> None:
+    """Write a catalogue as it is; nothing is known of where it is from."""
+    write_cat(lines, path)
+
+
+def _write_in_pieces(lines: Lines, path: str | os.PathLike[str], tag: int) -> None:
+    """The 80-column file of a long list: pieces made side by side on all cores and written in order."""
     _ = lines.partition, lines.spread  # made once, before the pieces ask for them
 
     def text(start: int) -> bytes:
@@ -148,18 +109,6 @@ def _write_catalogue(lines: Lines, path: str | os.PathLike[str], tag: int) -> No
         ThreadPoolExecutor(os.cpu_count()) as pool,
     ):
         handle.writelines(_in_order(pool, text, range(0, len(lines), PIECE)))
-    return None
-
-
-def _write_hitran(lines: Lines, path: str | os.PathLike[str], settings: Mapping[str, Any]) -> None:
-    from rotor.formats.hitran import hitran_lines, write_hitran
-
-    if "molecule" not in settings:
-        raise ValueError(
-            f'{path}: HITRAN\'s records begin with its number of the molecule; give settings={{"molecule": 5}} (5 is CO)'
-        )
-    known = {key: settings[key] for key in ("molecule", "isotopologue", "abundance") if key in settings}
-    write_hitran(hitran_lines(lines, **known), path)
 
 
 def _in_order(pool: ThreadPoolExecutor, make: Callable[[int], bytes], starts: Iterable[int]) -> Iterator[bytes]:
@@ -173,29 +122,31 @@ def _in_order(pool: ThreadPoolExecutor, make: Callable[[int], bytes], starts: It
         yield under_way.popleft().result()
 
 
-def records(lines: Lines) -> list[dict[str, float | int | None]]:
-    """The lines as a list of plain records, numbers that are not finite as None."""
-    columns = {name: column.tolist() for name, column in lines.columns.items()}
-    rows = zip(*columns.values(), strict=True)
-    return [
-        {k: None if v != v or v in (math.inf, -math.inf) else v for k, v in zip(columns, row, strict=True)}
-        for row in rows
-    ]
+def write_hitran_lines(lines: Lines, path: str | os.PathLike[str], settings: Settings) -> None:
+    """Write lines as records of HITRAN, their provenance beside them.
+
+    settings: "molecule" (needed), "isotopologue" and "abundance" are what `hitran_lines` asks for.
+    """
+    from rotor.formats.hitran import hitran_lines, write_hitran
+
+    if "molecule" not in settings:
+        raise ValueError(
+            f'{path}: HITRAN\'s records begin with its number of the molecule; give settings={{"molecule": 5}} (5 is CO)'
+        )
+    known = {key: settings[key] for key in ("molecule", "isotopologue", "abundance") if key in settings}
+    write_hitran(hitran_lines(lines, **known), path)
+    write_beside(path, record_of(lines, settings))
 
 
-def write_frame(frame: Any, path: str | os.PathLike[str], record: Mapping[str, Any]) -> None:
-    """Write a polars frame as .csv with its provenance beside it, or as .parquet with it inside."""
-    if Path(path).suffix.lower() == ".csv":
-        with open_atomic(path) as handle:
-            frame.write_csv(handle)
-        write_beside(path, record)
-    else:
-        with atomic_path(path) as unfinished:
-            frame.write_parquet(unfinished, metadata={"provenance": json.dumps(record)})
+def write_records(lines: HitranLines, path: str | os.PathLike[str], settings: Settings) -> None:
+    """Write records of HITRAN as they are; nothing is known of where they are from."""
+    from rotor.formats.hitran import write_hitran
+
+    write_hitran(lines, path)
 
 
-def write_beside(path: str | os.PathLike[str], record: Mapping[str, Any]) -> None:
-    """Write the provenance of a file whose format has no place for it, as `path` + ".provenance.json"."""
-    with open_atomic(f"{os.fspath(path)}.provenance.json", "w", encoding="utf-8") as handle:
-        json.dump(record, handle, indent=1, ensure_ascii=False)
-        handle.write("\n")
+def write_lines_json(lines: Lines, path: str | os.PathLike[str], settings: Settings) -> None:
+    """Write lines as JSON: `provenance` and `lines`, a record for each."""
+    from rotor.formats.tables import write_json
+
+    write_json(lines, path, settings, key="lines")

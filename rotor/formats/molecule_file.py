@@ -20,6 +20,10 @@
     A = 835852.4
     DJ = { value = 34.8, uncertainty = 0.1, source = "..." }
 
+    [covariance]                        # of constants that were fitted together: their correlation coefficients, row by row as
+    names = ["A", "DJ"]                 # far as the diagonal; the standard errors are the uncertainties above
+    correlations = [[1.0], [0.3, 1.0]]
+
     [dipole]                            # along the principal axes a, b, c
     unit = "D"
     source = "..."
@@ -73,6 +77,7 @@ from rotor.formats.molecule_tables import (
     TableReader,
     catalogue_of,
     constants_of,
+    covariance_of,
     dipole_of,
     geometry,
     level_table_of,
@@ -85,6 +90,7 @@ from rotor.formats.molecule_tables import (
 )
 from rotor.molecules.molecule import Molecule
 from rotor.tops.constants import Constants
+from rotor.tops.covariance import Covariance
 from rotor.tops.level_table import LevelTable
 from rotor.tops.spin_weights import SpinWeights
 from rotor.tops.top import Tensor
@@ -92,7 +98,17 @@ from rotor.tops.top import Tensor
 __all__ = ["GEOMETRY_KINDS", "MeasuredLines", "MoleculeFile", "Served", "parse_molecule_file", "read_molecule_file"]
 
 GEOMETRY_KINDS = ("r0", "rs", "re", "computed")
-_TABLES = ("geometry", "constants", "dipole", "polarizability", "spin_weights", "levels", "catalogue", "serves")
+_TABLES = (
+    "geometry",
+    "constants",
+    "covariance",
+    "dipole",
+    "polarizability",
+    "spin_weights",
+    "levels",
+    "catalogue",
+    "serves",
+)
 
 
 @dataclass(frozen=True)
@@ -112,6 +128,7 @@ class MoleculeFile:
     levels : energies that count instead of those of the constants
     serves : the lines that the file is good for
     unverified : tables, or entries such as "constants.DK", whose numbers were not read in a source
+    covariance : of the constants, where the file has their correlations
     """
 
     name: str
@@ -125,6 +142,7 @@ class MoleculeFile:
     sources: Mapping[str, str] = field(default_factory=dict)
     catalogue: MeasuredLines | None = None
     polarizability_abc_angstrom3: Tensor | None = None
+    covariance: Covariance | None = None
     levels: LevelTable | None = None
     serves: Served | None = None
     unverified: frozenset[str] = frozenset()
@@ -189,4 +207,5 @@ def parse_molecule_file(
         levels=level_table_of(tables.get("levels"), folder),
         serves=served_of(tables.get("serves")),
         unverified=frozenset().union(*(unverified_in(name, table) for name, table in tables.items())),
+        covariance=covariance_of(tables.get("covariance"), constants),
     )

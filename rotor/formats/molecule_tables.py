@@ -16,6 +16,7 @@ from rotor.formats.level_table import read_level_table
 from rotor.geometry.inertia import PrincipalFrame, point_masses, principal_frame
 from rotor.molecules.molecule import ELECTRONIC, Molecule
 from rotor.tops.constants import Constants
+from rotor.tops.covariance import Covariance
 from rotor.tops.kind import kind_from_moments
 from rotor.tops.level_table import LevelTable
 from rotor.tops.spin_weights import SpinWeights
@@ -197,6 +198,32 @@ def constants_of(table: TableReader | None) -> Constants | None:
             sources[name] = one.text("source")
     try:
         return Constants(**settings, uncertainties=uncertainties, sources=sources, **values)  # type: ignore[arg-type]
+    except ValueError as reason:
+        raise ValueError(f"{table.place}: {reason}") from None
+
+
+def covariance_of(table: TableReader | None, constants: Constants | None) -> Covariance | None:
+    """From the lower triangle of the correlations and the uncertainties of the constants."""
+    if table is None:
+        return None
+    table.refuse_unknown(("source", "names", "correlations"))
+    names = table.texts("names")
+    known = constants.uncertainties if constants is not None else {}
+    lost = [name for name in names if name not in known]
+    if lost or not names:
+        raise table.error("names", f"{', '.join(lost) or 'none'}: constants of the file with an uncertainty are needed")
+    rows: Any = table.content.get("correlations") or []
+    lengths = [len(row) if isinstance(row, list) else 0 for row in rows] if isinstance(rows, list) else []
+    if lengths != [*range(1, len(names) + 1)] or not all(is_number(value) for row in rows for value in row):
+        raise table.error(
+            "correlations", f"{len(names)} rows of 1 to {len(names)} numbers are needed, the lower triangle"
+        )
+    matrix = np.zeros((len(names), len(names)))
+    for i, row in enumerate(rows):
+        matrix[i, : i + 1] = row
+    matrix += np.tril(matrix, -1).T
+    try:
+        return Covariance.of_correlations(names, [known[name] for name in names], matrix)
     except ValueError as reason:
         raise ValueError(f"{table.place}: {reason}") from None
 

@@ -44,6 +44,7 @@ def molecule_file_text(molecule: MoleculeFile, levels_file: str = "") -> str:
     tables: dict[str, Mapping[str, Any]] = {
         "geometry": _geometry(molecule),
         "constants": _constants(molecule),
+        "covariance": _covariance(molecule),
         "dipole": _dipole(molecule),
         "polarizability": _polarizability(molecule),
         "spin_weights": molecule.spin_weights.to_mapping(),
@@ -95,6 +96,14 @@ def _constants(molecule: MoleculeFile) -> dict[str, Any]:
         "representation": constants.representation,
         **numbers,
     }
+
+
+def _covariance(molecule: MoleculeFile) -> dict[str, Any]:
+    """Correlations as far as the diagonal; the standard errors stand with the constants."""
+    if molecule.covariance is None:
+        return {}
+    rows = [[float(value) for value in row[: i + 1]] for i, row in enumerate(molecule.covariance.correlations.tolist())]
+    return {"names": list(molecule.covariance.names), "correlations": rows}
 
 
 def _dipole(molecule: MoleculeFile) -> dict[str, Any]:

@@ -11,6 +11,7 @@ from typing import Any
 
 from rotor.formats.library import library_file, names
 from rotor.formats.molecule_file import MoleculeFile, parse_molecule_file, read_molecule_file
+from rotor.formats.registry import reader_of, writer_of
 from rotor.molecules.readers.read import g2_names, read_molecule
 from rotor.tops.constants import Constants
 from rotor.tops.isotopologues import isotopologue
@@ -29,14 +30,15 @@ def read(source: Any, *, isotopes: Isotopes | None = None) -> Any:
         a path and a molecule of one name are an error. `"SMILES:C=O"` is built with RDKit; `"-"` reads a geometry
         (xyz, sdf) or a TOML of constants from standard input. Paths: .xyz, .extxyz, .mol, .sdf, whatever
         `ase.io.read` knows; .toml: a molecule file or constants alone; .par, .var, .int: input of SPFIT and SPCAT;
-        .cat: a catalogue; .hitran, and .par where its first line is a record of 160 characters: HITRAN's lines.
+        .cat: a catalogue; .lin: measured lines; .egy: levels; .hitran, and .par where its first line is a record of 160
+        characters: HITRAN's lines. `rotor.formats.registry` has them all.
     isotopes : mapping or str, optional
         Substitutions such as `"1=2H"` (atom 1) or `"O=18O"` (every O). Measured constants of a library molecule are then
         carried over by the ratio of those calculated from its geometry, and a note says so (`rotor.tops.isotopologues`).
 
     Returns
     -------
-    Top, or Catalogue for a .cat file, HitranLines for one of HITRAN
+    Top, or Catalogue for a .cat file, HitranLines for one of HITRAN, LineList for .lin, LevelList for .egy
 
     Raises
     ------
@@ -91,35 +93,18 @@ def _read_path(path: Path, isotopes: Isotopes | None) -> Any:
         raise ValueError(f"{path}: is a folder; give a file in it")
     if path.stat().st_size == 0:
         raise ValueError(f"{path}: the file is empty")
-    suffixes = "".join(path.suffixes[-2:]).lower()
-    if suffixes.endswith((".cat", ".cat.gz")):
-        from rotor.formats.spcat.cat import read_cat
-
-        if isotopes:
-            raise ValueError(f"{path}: isotopes cannot be changed in a catalogue; give a molecule with a geometry")
-        return read_cat(path)
-    if suffixes.endswith((".hitran", ".hitran.gz")) or _is_hitran(path):
-        from rotor.formats.hitran import read_hitran
-
-        return read_hitran(path)
-    if suffixes.endswith((".par", ".var", ".int")):
-        return _with_isotopes(_read_spcat(path), isotopes)
-    if suffixes.endswith(".toml"):
-        return top_of_file(read_molecule_file(path), isotopes)
-    return _with_isotopes(Top.from_molecule(read_molecule(path)), isotopes)
+    reader = reader_of(path)
+    found = reader(path) if reader else Top.from_molecule(read_molecule(path))
+    if isinstance(found, Top):
+        return _with_isotopes(found, isotopes)
+    if isotopes:
+        raise ValueError(
+            f"{path}: holds a {type(found).__name__}, which has no atoms to substitute; leave the isotopes out"
+        )
+    return found
 
 
-def _is_hitran(path: Path) -> bool:
-    """Whether a .par file is one of HITRAN, which gives its files the suffix of SPFIT's parameters."""
-    if path.suffix.lower() != ".par":
-        return False
-    from rotor.formats.hitran import looks_like_hitran
-
-    with open(path, encoding="latin-1") as handle:
-        return looks_like_hitran(handle.readline())
-
-
-def _read_spcat(path: Path) -> Top:
+def read_spcat_top(path: Path) -> Top:
     """The top of a .par or .var file, with the dipole of the .int file beside it; or of an .int file likewise."""
     from rotor.formats.spcat.int_file import read_int
     from rotor.formats.spcat.model import top_of
@@ -153,6 +138,11 @@ def _with_isotopes(top: Top, isotopes: Isotopes | None) -> Top:
     return isotopologue(top, isotopes).top if isotopes else top
 
 
+def read_top_file(path: Path) -> Top:
+    """The top that a molecule file in TOML describes."""
+    return top_of_file(read_molecule_file(path))
+
+
 def top_of_file(file: MoleculeFile, isotopes: Isotopes | None = None) -> Top:
     """The top that a molecule file describes: its constants if it has some, else those of its geometry."""
     return _with_isotopes(_top_as_written(file), isotopes)
@@ -176,40 +166,19 @@ def _top_as_written(file: MoleculeFile) -> Top:
         polarizability_source=file.cited("polarizability"),
         independent_errors=len(file.constants.uncertainties) < 2,
         level_table=file.levels,
+        covariance=file.covariance,
     )
 
 
 def write(thing: Any, path: str | os.PathLike[str], *, settings: Mapping[str, Any] | None = None) -> None:
     """Write lines, a catalogue, or any table of the package; the suffix of `path` names the format.
 
-    Lines: .cat, .cat.gz, .csv, .parquet, .json, .hitran; catalogue: .cat, .cat.gz; HITRAN's lines: .hitran; every other table
-    (levels, Raman lines, spectra, motions, thermodynamic functions, correlation functions, tests of equipartition, runs of a
-    fluid): .csv, .parquet, .json. An existing file is replaced at the end, whole or not at all. settings: what the
-    provenance shall say besides; for lines, `{"tag": 18003}` is the tag of a .cat, `{"molecule": 1, "isotopologue": 1,
-    "abundance": 0.997}` what `hitran_lines` asks for. Raises ValueError for a thing or a suffix that has no format.
+    Lines: .cat, .cat.gz, .hitran, .csv, .parquet, .json; catalogue: .cat, .cat.gz; HITRAN's lines: .hitran; these and every
+    other table (levels, Raman lines, spectra, motions, thermodynamic functions, correlation functions, tests of
+    equipartition, runs of a fluid): .csv, .parquet, .json; levels that were selected (`answer_levels`): .egy too. An existing
+    file is replaced at the end, whole or not at all. settings: what the provenance shall say besides; for lines,
+    `{"tag": 18003}` is the tag of a .cat, `{"molecule": 1, "isotopologue": 1, "abundance": 0.997}` what `hitran_lines` asks
+    for. Parquet and JSON carry the provenance inside, the others in a file beside, `path` + ".provenance.json". Raises
+    ValueError for a thing or a suffix that has no format.
     """
-    from rotor.classical.integrators.method import Motion
-    from rotor.formats.hitran import HitranLines, write_hitran
-    from rotor.formats.spcat.catalogue import Catalogue
-    from rotor.spectra.lines import Lines
-    from rotor.table import Table
-
-    if isinstance(thing, Motion):
-        from rotor.classical.motion import MotionTable
-
-        thing = MotionTable.of(thing)
-    if isinstance(thing, Lines):
-        from rotor.formats.line_tables import write_lines
-
-        return write_lines(thing, path, settings)
-    if isinstance(thing, Table):
-        from rotor.formats.tables import write_table
-
-        return write_table(thing, path, settings)
-    if isinstance(thing, Catalogue) and os.fspath(path).lower().endswith((".cat", ".cat.gz")):
-        from rotor.formats.spcat.cat import write_cat
-
-        return write_cat(thing, path)
-    if isinstance(thing, HitranLines) and os.fspath(path).lower().endswith(".hitran"):
-        return write_hitran(thing, path)
-    raise ValueError(f"{path}: there is no format of that suffix for a {type(thing).__name__}")
+    writer_of(thing, path)(thing, path, settings or {})

@@ -13,18 +13,20 @@ import os
 import shutil
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from rotor import units
 from rotor.formats.atomic_write import atomic_path, open_atomic
-from rotor.formats.line_tables import QNFMT, errors_from, finite_or_none, top_provenance, write_beside
+from rotor.formats.line_tables import as_printed
+from rotor.formats.provenance import write_beside
 from rotor.formats.spcat.cat import format_lines
-from rotor.formats.spcat.catalogue import Catalogue
-from rotor.formats.spcat.fields import BLANK
+from rotor.formats.spcat.catalogue import Catalogue, catalogue_of
+from rotor.formats.tables import copy_columns, quoted, run
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.solve import solve_levels
@@ -33,6 +35,10 @@ from rotor.spectra.lines import DEFAULT_MIN_LGINT, Lines, dipoles_by_state, line
 from rotor.spectra.transitions import all_transitions
 from rotor.thermo import PartitionFunction
 from rotor.tops.top import Top
+from rotor.version import version
+
+if TYPE_CHECKING:
+    from duckdb import DuckDBPyConnection
 
 PIECE_LINES = 300_000  # transitions of a piece before the cut, where one J has not more of its own
 _BATCH = 1 << 18  # lines that are made into text at once
@@ -64,6 +70,8 @@ class _Plan:
     range_mhz: tuple[float, float]
     ground_mhz: float
     folder: Path
+    quanta_names: tuple[str, ...]
+    halves: frozenset[str]
     effects: tuple[QuantumEffect, ...] = SEMI_RIGID
 
     def piece(self, first: int, last: int) -> Path:
@@ -95,7 +103,7 @@ def stream_lines(
     jmax ... vibrational_factor: as in `rotor.line_list`. tag: of a .cat. memory_mb: what the sort may take beside the
     program itself. piece_lines: transitions of a piece; one J is never parted, and with all three dipole components it
     has about 4.5 J². executor: pieces are spread over it, a process pool for instance, whose processes must be spawned:
-    a forked copy of polars' threads never answers.
+    a forked copy of a program with threads may never answer.
 
     Raises ValueError for another suffix, for a pool that forks, for what `line_list` refuses, and where the folder holds
     pieces of another list.
@@ -117,7 +125,7 @@ def stream_lines(
     )
     plan = _plan(start, jmax, -math.inf if min_lgint is None else min_lgint, range_mhz, Path(f"{target}.pieces"))
     ranges = list(_ranges(plan, piece_lines))
-    record = _provenance(plan, ranges) | {"errors_from": errors_from(start)}
+    record = _provenance(plan, ranges) | {"errors_from": start.errors_from}
     _open_folder(plan.folder, record)
 
     missing = [r for r in ranges if not plan.piece(*r).exists()]
@@ -133,7 +141,7 @@ def _refuse_forks(executor: Executor | None) -> None:
     context = getattr(executor, "_mp_context", None)  # of a ProcessPoolExecutor; it has no public name
     if context is not None and context.get_start_method() == "fork":
         raise ValueError(
-            "the executor forks its processes, and a forked copy of polars never answers; give "
+            "the executor forks its processes, and a forked copy of a program with threads may never answer; give "
             'ProcessPoolExecutor(mp_context=multiprocessing.get_context("spawn"))'
         )
 
@@ -149,7 +157,20 @@ def _plan(start: Lines, jmax: int | None, least: float, range_mhz: tuple[float, 
     ground = solve_levels(
         top, 3, effects=effects, vectors=False
     ).ground_mhz  # whatever the weights are, it is among these
-    return _Plan(top, dipole, jmax, start.temperature_k, q, least, range_mhz, ground, folder, effects)
+    return _Plan(
+        top,
+        dipole,
+        jmax,
+        start.temperature_k,
+        q,
+        least,
+        range_mhz,
+        ground,
+        folder,
+        start.quanta_names,
+        start.levels.halves,
+        effects,
+    )
 
 
 def _ranges(plan: _Plan, piece_lines: int) -> Iterator[tuple[int, int]]:
@@ -168,16 +189,20 @@ def _ranges(plan: _Plan, piece_lines: int) -> Iterator[tuple[int, int]]:
 
 def _provenance(plan: _Plan, ranges: list[tuple[int, int]]) -> dict[str, Any]:
     """The provenance of the list, which also tells pieces of another list from its own."""
-    return top_provenance(plan.top) | {
-        "temperature_k": plan.temperature_k,
-        "jmax": plan.jmax,
-        "min_lgint": finite_or_none(plan.min_lgint),
-        "range_mhz": [finite_or_none(bound) for bound in plan.range_mhz],
-        "q": plan.partition.q,
-        "q_source": plan.partition.source,
-        "pieces": len(ranges),
-        "pieces_end_at_j": [last for _, last in ranges],
-    }
+    return (
+        {"program": "rotor", "version": version()}
+        | plan.top.provenance
+        | {
+            "temperature_k": plan.temperature_k,
+            "jmax": plan.jmax,
+            "min_lgint": plan.min_lgint if math.isfinite(plan.min_lgint) else None,
+            "range_mhz": [bound if math.isfinite(bound) else None for bound in plan.range_mhz],
+            "q": plan.partition.q,
+            "q_source": plan.partition.source,
+            "pieces": len(ranges),
+            "pieces_end_at_j": [last for _, last in ranges],
+        }
+    )
 
 
 def _open_folder(folder: Path, record: Mapping[str, Any]) -> None:
@@ -209,8 +234,6 @@ def _first_difference(before: Mapping[str, Any], now: Mapping[str, Any]) -> str:
 
 def _make_piece(plan: _Plan, first: int, last: int) -> None:
     """Lines with lower J from `first` to `last`, sorted, as a Parquet file."""
-    import polars as pl
-
     top_j = min(last + 1, plan.jmax)
     levels = solve_levels(plan.top, top_j, jmin=first, effects=plan.effects)
     rotational = levels.rotational
@@ -230,8 +253,9 @@ def _make_piece(plan: _Plan, first: int, last: int) -> None:
         plan.range_mhz,
         plan.partition,
     )
+    columns = _columns(plan, lines.sorted())
     with atomic_path(plan.piece(first, last)) as unfinished:
-        pl.DataFrame(_columns(plan, lines)).sort("frequency_mhz").write_parquet(unfinished, compression="lz4")
+        copy_columns(columns, unfinished, "(FORMAT parquet)")
 
 
 def _columns(plan: _Plan, lines: Lines) -> dict[str, Any]:
@@ -265,7 +289,7 @@ def _merge(plan: _Plan, pieces: list[Path], target: Path, record: Mapping[str, A
     _sort(pieces, merged, record, plan.folder, memory_mb)
     with open_atomic(target) as handle:
         count = 0
-        for part in _catalogues(plan, merged, tag):
+        for part in _catalogues(plan, merged, tag, memory_mb):
             handle.write(format_lines(part))
             count += len(part)
     write_beside(target, dict(record) | {"lines": count})
@@ -274,56 +298,45 @@ def _merge(plan: _Plan, pieces: list[Path], target: Path, record: Mapping[str, A
 
 def _sort(pieces: list[Path], target: Path, record: Mapping[str, Any], folder: Path, memory_mb: int) -> int:
     """DuckDB's external merge sort: what exceeds its memory goes to files in `folder`."""
+    with _engine(folder, memory_mb) as engine:
+        files = ", ".join(quoted(str(piece)) for piece in pieces)
+        text = quoted(json.dumps(record, ensure_ascii=False))
+        run(
+            engine,
+            f"COPY (SELECT * FROM read_parquet([{files}]) ORDER BY frequency_mhz) TO {quoted(str(target))} "
+            f"(FORMAT parquet, KV_METADATA {{provenance: {text}}})",
+            target,
+        )
+        return _count(engine, target)
+
+
+@contextmanager
+def _engine(folder: Path, memory_mb: int) -> Iterator[DuckDBPyConnection]:
     import duckdb
 
     with duckdb.connect() as engine:
         engine.execute("SET memory_limit = $limit", {"limit": f"{memory_mb}MB"})
         engine.execute("SET temp_directory = $folder", {"folder": str(folder / "sort")})
         engine.execute("SET preserve_insertion_order = true")
-        files = ", ".join(_quoted(str(piece)) for piece in pieces)
-        text = _quoted(json.dumps(record, ensure_ascii=False))
-        engine.execute(
-            f"COPY (SELECT * FROM read_parquet([{files}]) ORDER BY frequency_mhz) TO {_quoted(str(target))} "
-            f"(FORMAT parquet, KV_METADATA {{provenance: {text}}})"
-        )
-        row = engine.execute(f"SELECT count(*) FROM read_parquet({_quoted(str(target))})").fetchone()
-        assert row is not None  # a count always has one row
-        return int(row[0])
+        yield engine
 
 
-def _quoted(text: str) -> str:
-    """A literal of SQL."""
-    return "'" + text.replace("'", "''") + "'"
+def _count(engine: DuckDBPyConnection, path: Path) -> int:
+    row = engine.execute(f"SELECT count(*) FROM read_parquet({quoted(str(path))})").fetchone()
+    assert row is not None  # a count always has one row
+    return int(row[0])
 
 
-def _catalogues(plan: _Plan, merged: Path, tag: int) -> Iterator[Catalogue]:
+def _catalogues(plan: _Plan, merged: Path, tag: int, memory_mb: int) -> Iterator[Catalogue]:
     """The sorted lines as catalogues of some hundred thousand; lines of zero strength have no logarithm."""
-    import polars as pl
-
-    table = pl.scan_parquet(merged)
-    names = [name.removesuffix("_upper") for name in table.collect_schema().names() if name.endswith("_upper")]
-    names = [name for name in names if name != "g"]
-    total = int(table.select(pl.len()).collect().item())
-    for start in range(0, total, _BATCH):
-        part = table.slice(start, _BATCH).filter(pl.col("lgint").is_finite()).collect()
-        yield _catalogue(part, tuple(names), plan.top.kind, tag)
-
-
-def _catalogue(part: Any, names: tuple[str, ...], kind: str, tag: int) -> Catalogue:
-    n = len(part)
-    quanta = {side: np.full((n, 6), BLANK, dtype=np.int16) for side in ("upper", "lower")}
-    for side, columns in quanta.items():
-        for i, name in enumerate(names):
-            columns[:, i] = part[f"{name}_{side}"].to_numpy()
-    return Catalogue(
-        frequency_mhz=part["frequency_mhz"].to_numpy(),
-        error_mhz=part["error_mhz"].to_numpy() if "error_mhz" in part.columns else np.zeros(n),
-        lgint=part["lgint"].to_numpy(),
-        dr=np.full(n, 2 if kind == "linear" else 3, dtype=np.int16),
-        energy_lower_cm=part["energy_lower_cm"].to_numpy(),
-        g_upper=part["g_upper"].to_numpy().astype(np.int32),
-        tag=np.full(n, tag, dtype=np.int32),
-        qnfmt=np.full(n, QNFMT[names], dtype=np.int32),
-        quanta_upper=quanta["upper"],
-        quanta_lower=quanta["lower"],
-    )
+    names = plan.quanta_names
+    with _engine(plan.folder, memory_mb) as engine:
+        for start in range(0, _count(engine, merged), _BATCH):
+            part = engine.execute(
+                f"SELECT * FROM read_parquet({quoted(str(merged))}, file_row_number = true) WHERE lgint IS NOT NULL "
+                f"AND file_row_number >= {start} AND file_row_number < {start + _BATCH}"
+            ).fetchnumpy()
+            (upper, qnfmt), (lower, _) = (
+                as_printed({name: part[f"{name}_{side}"] for name in names}, plan.halves) for side in ("upper", "lower")
+            )
+            yield catalogue_of(part, upper, lower, qnfmt, tag, linear=plan.top.kind == "linear")

@@ -1,116 +1,122 @@
-"""Tables as files: motions, Raman lines, spectra, thermodynamic functions, gases, fluids, each with where it came from.
+"""Every table of the package as a file: CSV and Parquet by DuckDB, JSON, each with where it came from.
 
-One way for all of them: .csv, .parquet or .json by suffix, every number the shortest text that gives the same double
-back. The provenance stands inside a .parquet and a .json, and beside a .csv in `path` + ".provenance.json".
+One way for all of them: every number is the shortest text that gives the same double back, and what is not a number is an
+empty field or null. The provenance stands inside a .parquet and a .json, and beside a .csv in `path` + ".provenance.json".
+Short tables become CSV without DuckDB, in the same characters.
 """
 
 from __future__ import annotations
 
+import csv
 import json
+import math
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rotor.formats.atomic_write import open_atomic
-from rotor.formats.line_tables import provenance, top_provenance, write_frame
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor.formats.atomic_write import atomic_path, open_atomic
+from rotor.formats.provenance import record_of, write_beside
 from rotor.table import Table
-from rotor.version import version
 
 if TYPE_CHECKING:
-    from rotor.classical.gas.ensembles import Correlations
-    from rotor.spectra.raman import RamanLines
-    from rotor.spectra.spectrum import Spectrum
-    from rotor.statistics.equipartition import Equipartition
-    from rotor.thermo import ThermoFunctions
+    from duckdb import DuckDBPyConnection
 
-SUFFIXES = (".csv", ".parquet", ".json")
+LONG_TABLE = 10_000  # rows from which DuckDB, some 0.1 s to load, writes CSV
+
+Settings = Mapping[str, Any]
+Columns = Mapping[str, NDArray[Any]]
 
 
-def write_table(table: Table, path: str | os.PathLike[str], settings: Mapping[str, Any] | None = None) -> None:
-    """Write a table in the format that the suffix of `path` names; what is not a number is an empty field or null.
-
-    settings: what the provenance shall say besides what the table itself knows. Raises ValueError for another suffix.
-    """
-    suffix, record = Path(path).suffix.lower(), _provenance(table) | dict(settings or {})
-    if suffix not in SUFFIXES:
-        raise ValueError(
-            f"{os.fspath(path)}: this table can be written as .csv, .parquet or .json; the suffix names the format"
-        )
-    frame = table.to_polars().fill_nan(None)
-    if suffix != ".json":
-        write_frame(frame, path, record)
+def write_csv(table: Table, path: str | os.PathLike[str], settings: Settings) -> None:
+    """Write a table as comma-separated values, names of columns first, its provenance beside it."""
+    columns, record = dict(table.columns), record_of(table, settings)
+    if len(table) < LONG_TABLE:
+        with open_atomic(path, "w", encoding="utf-8", newline="") as handle:
+            rows = csv.writer(handle, lineterminator="\n")
+            rows.writerow(columns)
+            rows.writerows(_rows({name: _spelled(np.asarray(column)) for name, column in columns.items()}))
     else:
-        with open_atomic(path, "w", encoding="utf-8") as handle:
-            json.dump({"provenance": record, "rows": frame.to_dicts()}, handle, indent=1, allow_nan=False)
-            handle.write("\n")
+        with atomic_path(path) as unfinished:
+            copy_columns(columns, unfinished, "(FORMAT csv, HEADER, DELIMITER ',')")
+    write_beside(path, record)
 
 
-def _provenance(table: Table) -> dict[str, Any]:
-    """What the table knows of where it came from."""
-    from rotor.classical.gas.ensembles import Correlations
-    from rotor.spectra.raman import RamanLines
-    from rotor.spectra.spectrum import Spectrum
-    from rotor.statistics.equipartition import Equipartition
-    from rotor.thermo import ThermoFunctions
-
-    if isinstance(table, RamanLines):
-        return raman_provenance(table)
-    if isinstance(table, Spectrum):
-        return _spectrum_provenance(table)
-    if isinstance(table, ThermoFunctions):
-        return thermo_provenance(table)
-    record = {"program": "rotor", "version": version()}
-    if isinstance(table, Correlations | Equipartition):
-        record |= _gas_facts(table)
-    return record | {"rows": len(next(iter(table.columns.values())))}
+def write_parquet(table: Table, path: str | os.PathLike[str], settings: Settings) -> None:
+    """Write a table as Parquet, its provenance in the metadata under that name."""
+    record = json.dumps(record_of(table, settings), ensure_ascii=False)
+    with atomic_path(path) as unfinished:
+        copy_columns(table.columns, unfinished, f"(FORMAT parquet, KV_METADATA {{provenance: {quoted(record)}}})")
 
 
-def raman_provenance(lines: RamanLines) -> dict[str, Any]:
-    """What Raman lines were made from: the top and its sources, the settings, Q."""
-    return top_provenance(lines.top) | {
-        "polarizability_abc_angstrom3": lines.top.polarizability_abc_angstrom3,
-        "polarizability_source": lines.top.polarizability_source,
-        "temperature_k": lines.temperature_k,
-        "laser_nm": lines.laser_nm,
-        "jmax": lines.jmax,
-        "min_relative": lines.min_relative or None,
-        "q": lines.partition.q,
-        "q_source": lines.partition.source,
-        "lines": len(lines),
-        "warnings": list(lines.warnings),
-    }
+def write_json(table: Table, path: str | os.PathLike[str], settings: Settings, key: str = "rows") -> None:
+    """Write a table as JSON: `provenance`, and under `key` a record for each row."""
+    columns = dict(table.columns)
+    rows = [dict(zip(columns, row, strict=True)) for row in _rows(columns)]
+    with open_atomic(path, "w", encoding="utf-8") as handle:
+        json.dump({"provenance": record_of(table, settings), key: rows}, handle, indent=1, allow_nan=False)
+        handle.write("\n")
 
 
-def thermo_provenance(functions: ThermoFunctions) -> dict[str, Any]:
-    """What the functions were made from: the top and its sources, species, vibration, pressure, errors of the sums."""
-    gas, vibrations = functions.gas, functions.vibrations
-    return top_provenance(functions.top) | {
-        "species": functions.species,
-        "fractions": dict(functions.fractions),
-        "symmetry_number": functions.symmetry_number,
-        "spin_factor": functions.spin_factor,
-        "vibrations": vibrations.text if vibrations is not None else None,
-        "pressure_bar": gas.pressure_bar if gas is not None else None,
-        "mass_u": gas.mass_u if gas is not None else None,
-        "jmax": int(functions.jmax.max()),
-        "relative_error": float(functions.relative_error.max()),
-        "rows": len(functions),
-    }
+def write_motion(motion: Any, path: str | os.PathLike[str], settings: Settings) -> None:
+    """Write the motion of one body, as an integrator made it, in the format of the suffix."""
+    from rotor.classical.motion import MotionTable
+    from rotor.formats.registry import writer_of
+
+    table = MotionTable.of(motion)
+    writer_of(table, path)(table, path, settings)
 
 
-def _spectrum_provenance(spectrum: Spectrum) -> dict[str, Any]:
-    return (provenance(spectrum.lines) if spectrum.lines is not None else {}) | {
-        "profile": spectrum.profile,
-        "fwhm_mhz": spectrum.fwhm_mhz,
-        "unit": spectrum.unit,
-        "outside": spectrum.outside,
-    }
+def _rows(columns: Columns) -> Iterable[tuple[Any, ...]]:
+    """Rows of plain values, None for numbers that are not finite."""
+    return zip(*(_plain(np.asarray(column)) for column in columns.values()), strict=True)
 
 
-def _gas_facts(table: Correlations | Equipartition) -> dict[str, Any]:
-    from rotor.statistics.equipartition import Equipartition
+def _plain(column: NDArray[Any]) -> list[Any]:
+    values: list[Any] = column.tolist()
+    if column.dtype.kind == "f" and not np.isfinite(column).all():
+        return [value if math.isfinite(value) else None for value in values]
+    return values
 
-    if isinstance(table, Equipartition):
-        return {"accepted": table.accepted, "p_value": table.p_value, "confidence": table.confidence, "kt": table.kt}
-    return {"molecules": table.molecules}
+
+def _spelled(column: NDArray[Any]) -> NDArray[Any]:
+    """Truth values as DuckDB spells them: true, false."""
+    return np.where(column, "true", "false") if column.dtype.kind == "b" else column
+
+
+def copy_columns(columns: Columns, path: Path, options: str) -> None:
+    """Write columns through DuckDB's COPY with its options; numbers that are not finite become NULL, texts stay texts."""
+    import duckdb
+
+    given = {name: _without_infinities(np.asarray(column)) for name, column in columns.items()}
+    chosen = ", ".join(
+        f'"{name}"::VARCHAR AS "{name}"' if given[name].dtype.kind in "UO" else f'"{name}"' for name in given
+    )
+    with duckdb.connect() as engine:
+        engine.register("given", given)
+        run(engine, f"COPY (SELECT {chosen} FROM given) TO {quoted(str(path))} {options}", path)
+
+
+def run(engine: DuckDBPyConnection, command: str, path: Path) -> None:
+    """Carry out a command that writes a file; a disk that is full is an OSError with the file's name."""
+    import duckdb
+
+    try:
+        engine.execute(command)
+    except duckdb.IOException as error:
+        raise OSError(f"{path}: cannot be written: {error}") from None
+
+
+def _without_infinities(column: NDArray[Any]) -> NDArray[Any]:
+    """DuckDB takes NaN of numpy as NULL, infinities as numbers."""
+    if column.dtype.kind == "f" and np.isinf(column).any():
+        return np.where(np.isinf(column), np.nan, column)
+    return column
+
+
+def quoted(text: str) -> str:
+    """A literal of SQL."""
+    return "'" + text.replace("'", "''") + "'"

@@ -19,7 +19,7 @@ LINEAR_BELOW = 1e-6  # I_a / I_c below which a body is linear, unless the caller
 EQUAL_MOMENTS = 1e-6  # relative difference below which two moments count as equal, unless the caller says otherwise
 _SAME = 1e-5  # relative difference below which two odd moments of the masses do not decide a sign
 
-# a^i b^j c^k whose sums over the masses tell frames apart that differ by the signs of two axes
+# a^i b^j c^k whose sums over the masses distinguish frames that differ by the signs of two axes
 _ODD_MOMENTS = (
     (3, 0, 0), (0, 3, 0), (0, 0, 3), (1, 2, 0), (1, 0, 2), (2, 1, 0), (0, 1, 2), (2, 0, 1), (0, 2, 1), (1, 1, 1),
     (3, 1, 0), (1, 3, 0), (3, 0, 1), (1, 0, 3), (0, 3, 1), (0, 1, 3), (2, 1, 1), (1, 2, 1), (1, 1, 2),
@@ -58,6 +58,15 @@ class Body:
         return Body(self.mass, r @ self.centre, r @ self.tensor @ r.T)
 
 
+def kinetic_energy_by_axis(momentum: Floats, omega: Floats) -> Floats:
+    """½ L_i ω_i, (..., 3), of angular momenta and angular velocities along any axes; their sum is the energy of rotation.
+
+    >>> kinetic_energy_by_axis(np.array([1.0, 2.0, 3.0]), np.array([1.0, 1.0, 0.5])).tolist()
+    [0.5, 1.0, 0.75]
+    """
+    return 0.5 * momentum * omega
+
+
 def _steiner(shift: Floats) -> Floats:
     return np.asarray(shift @ shift * np.eye(3) - np.outer(shift, shift))
 
@@ -70,9 +79,7 @@ def point_masses(masses: ArrayLike, positions: ArrayLike) -> Body:
     """
     m, r = np.asarray(masses, dtype=float), np.asarray(positions, dtype=float)
     if m.ndim != 1 or r.shape != (len(m), 3) or not len(m):
-        raise ValueError(
-            f"masses of shape {m.shape} and positions of shape {r.shape}: wanted are (n,) and (n, 3), n > 0"
-        )
+        raise ValueError(f"masses of shape {m.shape} and positions of shape {r.shape}: expected (n,) and (n, 3), n > 0")
     if not (np.isfinite(m).all() and (m > 0).all() and np.isfinite(r).all()):
         raise ValueError("masses must be finite and above 0, positions finite")
     centre = m @ r / m.sum()
@@ -112,7 +119,7 @@ def hemisphere(mass: float, radius: float) -> Body:
 
 @dataclass(frozen=True)
 class PrincipalFrame:
-    """Moments (3,) rising, and the axes a, b, c as rows (3, 3), right-handed, in the frame of the input."""
+    """Moments (3,) in increasing order, and the axes a, b, c as rows (3, 3), right-handed, in the frame of the input."""
 
     moments: Floats
     axes: Floats
@@ -126,7 +133,7 @@ def principal_frame(
 
     With the masses and positions that make the body the frame is unique: of all frames that the tensor allows, the
     one is taken whose odd moments Σ m a³, Σ m b³, Σ m c³, Σ m a b², ... come first in order of size. Frames that this
-    does not tell apart are alike by symmetry. Where moments coincide within `equal`, candidates inside the degenerate
+    does not distinguish are alike by symmetry. Where moments coincide within `equal`, candidates inside the degenerate
     space point at the masses with the largest m ρ². Moments below round-off are returned as 0, never negative.
 
     >>> frame = principal_frame(Body(1.0, np.zeros(3), np.array([[5.0, -2, 0], [-2, 8, 0], [0, 0, 13]])))

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rotor.arrays import Floats
+from rotor.geometry import quaternions
 
 IDENTITY: Floats = np.array([1.0, 0.0, 0.0, 0.0])
 IDENTITY.setflags(write=False)
@@ -26,7 +27,7 @@ class NearestRotation:
     """The rotation nearest to a matrix, how far the matrix was from it, and whether another is as near.
 
     rotation: (..., 3, 3), proper orthogonal.
-    departure: (...), Frobenius norm of matrix - rotation.
+    distance_from_input: (...), Frobenius norm of matrix - rotation.
     unique: (...), False where the nearest rotation is not unique (a rank below 2, or a reflection with equal axes).
     """
 
@@ -57,18 +58,7 @@ def multiply(p: ArrayLike, q: ArrayLike) -> Floats:
     >>> multiply([0, 1, 0, 0], [0, 0, 1, 0])
     array([0., 0., 0., 1.])
     """
-    p, q = _components(p), _components(q)
-    pw, px, py, pz = np.moveaxis(p, -1, 0)
-    qw, qx, qy, qz = np.moveaxis(q, -1, 0)
-    return np.stack(
-        [
-            pw * qw - px * qx - py * qy - pz * qz,
-            pw * qx + px * qw + py * qz - pz * qy,
-            pw * qy - px * qz + py * qw + pz * qx,
-            pw * qz + px * qy - py * qx + pz * qw,
-        ],
-        axis=-1,
-    )
+    return _joined(quaternions.product(_separate(_components(p)), _separate(_components(q))))
 
 
 def conjugate(q: ArrayLike) -> Floats:
@@ -77,7 +67,7 @@ def conjugate(q: ArrayLike) -> Floats:
     >>> conjugate([0.6, 0.8, 0, 0])
     array([ 0.6, -0.8, -0. , -0. ])
     """
-    return np.asarray(_components(q) * np.array([1.0, -1.0, -1.0, -1.0]))
+    return _joined(quaternions.conjugate(_separate(_components(q))))
 
 
 def normalised(q: ArrayLike) -> Floats:
@@ -96,10 +86,16 @@ def rotate(q: ArrayLike, vector: ArrayLike) -> Floats:
     >>> rotate(exp([0, 0, np.pi / 2]), [1, 0, 0]).round(15)
     array([0., 1., 0.])
     """
-    q, vector = normalised(q), _vectors(vector)
-    axis = q[..., 1:]
-    u = np.cross(axis, vector)
-    return vector + 2.0 * (q[..., :1] * u + np.cross(axis, u))
+    return _joined(quaternions.turned(_separate(normalised(q)), _separate(_vectors(vector))))
+
+
+def vector_product(a: ArrayLike, b: ArrayLike) -> Floats:
+    """a x b of vectors (..., 3).
+
+    >>> vector_product([1, 0, 0], [0, 1, 0])
+    array([0., 0., 1.])
+    """
+    return _joined(quaternions.cross(_separate(_vectors(a)), _separate(_vectors(b))))
 
 
 def exp(rotation_vector: ArrayLike) -> Floats:
@@ -111,7 +107,7 @@ def exp(rotation_vector: ArrayLike) -> Floats:
     r = _vectors(rotation_vector)
     half = 0.5 * _norm3(r)
     sinc = np.divide(np.sin(half), half, out=np.ones_like(half), where=half > 0.0)
-    return np.concatenate([np.cos(half)[..., None], 0.5 * sinc[..., None] * r], axis=-1)
+    return _joined(quaternions.exponential(np.cos(half), 0.5 * sinc, _separate(r)))
 
 
 def log(q: ArrayLike) -> Floats:
@@ -175,20 +171,14 @@ def to_matrix(q: ArrayLike) -> Floats:
            [ 0., -1.,  0.],
            [ 0.,  0.,  1.]])
     """
-    w, x, y, z = np.moveaxis(normalised(q), -1, 0)
-    rows = [
-        [w * w + x * x - y * y - z * z, 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), w * w - x * x + y * y - z * z, 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z],
-    ]
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+    return np.stack([_joined(row) for row in quaternions.matrix(_separate(normalised(q)))], axis=-2)
 
 
 def from_matrix(matrix: ArrayLike) -> Floats:
     """Quaternions of rotation matrices (..., 3, 3), scalar part not negative.
 
     The entries of R give the symmetric matrix 4 q qᵀ; its row with the largest diagonal never cancels (Shepperd,
-    J. Guidance Control 1, 223 (1978)). A matrix that is no rotation to 1e-6 is refused; `nearest_rotation` mends it.
+    J. Guidance Control 1, 223 (1978)). A matrix that is no rotation to 1e-6 is refused; `nearest_rotation` finds the nearest one.
 
     >>> from_matrix(np.diag([1.0, -1.0, -1.0]))
     array([0., 1., 0., 0.])
@@ -212,11 +202,11 @@ def nearest_rotation(matrix: ArrayLike) -> NearestRotation:
     """
     m = _matrices(matrix)
     u, s, vt = np.linalg.svd(m)
-    handed = np.sign(np.linalg.det(u) * np.linalg.det(vt))
-    signs = np.stack([np.ones_like(handed), np.ones_like(handed), handed], axis=-1)
+    parity = np.sign(np.linalg.det(u) * np.linalg.det(vt))
+    signs = np.stack([np.ones_like(parity), np.ones_like(parity), parity], axis=-1)
     rotation = (u * signs[..., None, :]) @ vt
     distance_from_input = np.linalg.norm(m - rotation, axis=(-2, -1))
-    gap = s[..., 1] + handed * s[..., 2]
+    gap = s[..., 1] + parity * s[..., 2]
     return NearestRotation(rotation, distance_from_input, gap > 1e-12 * np.maximum(s[..., 0], np.finfo(float).tiny))
 
 
@@ -300,6 +290,19 @@ def _matrices(m: ArrayLike) -> Floats:
     return array
 
 
+def _separate(array: Floats) -> tuple[Floats, ...]:
+    """The components (...) of an array (..., n)."""
+    return tuple(array[..., k] for k in range(array.shape[-1]))
+
+
+def _joined(components: tuple[Floats, ...]) -> Floats:
+    """An array (..., n) of n components (...)."""
+    out = np.empty((*components[0].shape, len(components)))
+    for k, component in enumerate(components):
+        out[..., k] = component
+    return out
+
+
 def _norm3(v: Floats) -> Floats:
     """|v| without overflow or underflow of the squares."""
     return np.asarray(np.hypot(np.hypot(v[..., 0], v[..., 1]), v[..., 2]))
@@ -333,7 +336,7 @@ def _require_rotation(m: Floats) -> None:
     if worst > ORTHOGONALITY_TOLERANCE:
         raise ValueError(
             f"not a rotation matrix: RᵀR departs from 1 by {worst:.3g} (at most {ORTHOGONALITY_TOLERANCE:g} is taken "
-            "for round-off); nearest_rotation() mends it and says how far it was"
+            "for round-off); nearest_rotation() gives the nearest rotation and its distance"
         )
     if np.any(np.linalg.det(m) < 0.0):
         raise ValueError("a matrix of determinant -1 is a reflection, no rotation; nearest_rotation() finds one")

@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from rotor.classical.gas.ensembles import Correlations
-from rotor.plots.spectrum import BLUE, DPI, GREY, SIZE_INCHES, STYLE
+from rotor.plots.picture import BLUE, GREEN, GREY, ORANGE, SIZE_INCHES, checked_suffix, new_figure, save, styled
 from rotor.spectra.spectrum import Spectrum
 from rotor.statistics.equipartition import Equipartition
 from rotor.units import MHZ_PER_CM
-from rotor.version import version
-
-ORANGE, GREEN = "#D55E00", "#009E73"  # of Okabe and Ito's palette
 
 
 def equipartition_figure(tests: Mapping[str, Equipartition], columns: int = 3) -> Any:
@@ -64,34 +59,27 @@ def plot_gas(
 ) -> None:
     """Draw the test, and the correlation functions beside it where there are some, into a .png, .pdf or .svg file.
 
-    plateau: where C1 ends, drawn as a line. provenance: kept in the metadata. ValueError for a suffix that is no picture.
+    plateau: where C1 ends, drawn as a line. provenance: written into the metadata. ValueError for a suffix that is no picture.
     """
-    suffix = Path(path).suffix.lower()
-    if suffix not in (".png", ".pdf", ".svg"):
-        raise ValueError(f"{os.fspath(path)}: a picture is .png, .pdf or .svg; the suffix names the format")
-    import matplotlib as mpl
-
+    checked_suffix(path)
     figure, axes = _panels(1 if curves is None else 2, 2, SIZE_INCHES[1])
-    with mpl.rc_context(STYLE):
+    with styled():
         verdict = "accepted" if test.accepted else "rejected"
         _draw_test(axes[0], test, f"equipartition {verdict}, p = {test.p_value:.2g}")
         if curves is not None:
             _draw_curves(axes[1], curves, "correlation functions", plateau)
         figure.suptitle(title.replace("$", r"\$"), fontsize=10, x=0.01, ha="left")
-        figure.savefig(path, dpi=DPI, metadata=_metadata(suffix, title, provenance or {}))
+        save(figure, path, title, provenance or {})
 
 
 def _panels(count: int, columns: int, height: float) -> tuple[Any, list[Any]]:
     """A figure and its diagrams, in rows."""
     if not count:
         raise ValueError("there is nothing to draw")
-    import matplotlib as mpl
-    from matplotlib.figure import Figure
-
     across = min(columns, count)
     rows = -(-count // across)
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(max(SIZE_INCHES[0], 3.3 * across), height * rows), layout="constrained")
+    with styled():
+        figure = new_figure((max(SIZE_INCHES[0], 3.3 * across), height * rows))
         axes = list(figure.subplots(rows, across, squeeze=False).flat)
     for empty in axes[count:]:
         empty.set_visible(False)
@@ -125,18 +113,8 @@ def _draw_curves(axes: Any, curves: Correlations, title: str, plateau: float | N
             axes.fill_between(t, mean - band, mean + band, color=colour, alpha=0.2, linewidth=0.0)
             axes.plot(t, mean, color=colour, linewidth=1.2, label=name)
     if plateau is not None:
-        axes.axhline(plateau, color=BLUE, linewidth=0.7, linestyle=":", label="$C_1$ for ever")
+        axes.axhline(plateau, color=BLUE, linewidth=0.7, linestyle=":", label="$C_1$ at $t → ∞$")
     axes.axhline(0.0, color=GREY, linewidth=0.7)
     axes.set_xlabel("$t$ (ps)")
     axes.set_title(title, loc="left")
     axes.legend(frameon=False)
-
-
-def _metadata(suffix: str, title: str, facts: Mapping[str, Any]) -> dict[str, Any]:
-    """Provenance by the keys that each format has; no date, so that the same picture is the same file."""
-    description, program = json.dumps(dict(facts), ensure_ascii=False), f"rotor {version()}"
-    if suffix == ".png":
-        return {"Software": program, "Title": title, "Description": description}
-    if suffix == ".pdf":
-        return {"Creator": program, "Title": title, "Subject": description, "CreationDate": None}
-    return {"Creator": program, "Title": title, "Description": description, "Date": None}

@@ -2,23 +2,18 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor.plots.spectrum import DPI, SIZE_INCHES, STYLE, formula_text
+from rotor.plots.picture import PALETTE, SIZE_INCHES, checked_suffix, new_figure, save, styled
 from rotor.thermo import ThermoFunctions
-from rotor.tops.top import Top
 from rotor.version import version
 
-# of Okabe and Ito's palette, told apart by everyone
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 GREY = "#777777"
 LOG_FROM = 30.0  # of the last to the first temperature: beyond it the axis is logarithmic
 CURVE_POINTS = 300
@@ -50,14 +45,11 @@ def heat_capacity_figure(panels: Sequence[Panel], columns: int = 2) -> Any:
     """
     if not panels or not all(panel.curves for panel in panels):
         raise ValueError("a picture of heat capacities needs a panel, and a curve in each")
-    import matplotlib as mpl
-    from matplotlib.figure import Figure
-
     rows = -(-len(panels) // columns)
     across = min(columns, len(panels))
     size = SIZE_INCHES if len(panels) == 1 else (4.6 * across, 3.4 * rows)
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=size, layout="constrained")
+    with styled():
+        figure = new_figure(size)
         for panel, axes in zip(panels, figure.subplots(rows, across, squeeze=False).flat, strict=False):
             _draw(axes, panel)
     return figure
@@ -70,14 +62,15 @@ def plot_heat_capacity(
 
     Raises ValueError for a suffix that is no picture, and for nothing to draw.
     """
-    suffix = Path(path).suffix.lower()
-    if suffix not in (".png", ".pdf", ".svg"):
-        raise ValueError(f"{os.fspath(path)}: a picture is .png, .pdf or .svg; the suffix names the format")
-    import matplotlib as mpl
-
+    checked_suffix(path)
     figure = heat_capacity_figure(panels)
-    with mpl.rc_context(STYLE):
-        figure.savefig(path, dpi=DPI, metadata=_metadata(suffix, panels, provenance or {}))
+    curves = {panel.title: list(panel.curves) for panel in panels}
+    save(
+        figure,
+        path,
+        "heat capacity",
+        {"program": "rotor", "version": version(), "curves": curves, **(provenance or {})},
+    )
 
 
 def curve_temperatures(temperatures_k: Sequence[float] | NDArray[np.float64]) -> NDArray[np.float64]:
@@ -88,12 +81,6 @@ def curve_temperatures(temperatures_k: Sequence[float] | NDArray[np.float64]) ->
     return np.geomspace(low, high, CURVE_POINTS) if high > LOG_FROM * low else np.linspace(low, high, CURVE_POINTS)
 
 
-def name_of(top: Top) -> str:
-    """Name and formula of a top for the head of a diagram."""
-    formula = formula_text(top.molecule.formula) if top.molecule is not None else ""
-    return ", ".join(part for part in (top.name.replace("$", r"\$"), formula) if part) or f"{top.kind} top"
-
-
 def _draw(axes: Any, panel: Panel) -> None:
     first = next(iter(panel.curves.values()))
     t = np.sort(first.temperature_k)
@@ -101,7 +88,7 @@ def _draw(axes: Any, panel: Panel) -> None:
     axes.axhline(classical, color=GREY, linewidth=2.5, alpha=0.5, label="classical")
     if np.isfinite(first.cv_over_r_corrected).any():
         _line(axes, first, first.cv_over_r_corrected, color="black", linestyle=":", linewidth=1.1, label="corrected")
-    colour = dict(zip(panel.curves, COLOURS * len(panel.curves), strict=False))
+    colour = dict(zip(panel.curves, PALETTE * len(panel.curves), strict=False))
     for label, functions in panel.curves.items():
         _line(axes, functions, functions.cv_over_r, color=colour[label], linewidth=1.5, label=label)
         if functions.cv_vib_over_r is not None:
@@ -147,15 +134,3 @@ def _highest(panel: Panel, classical: float) -> float:
         values.append(float(np.max(functions.cv_over_r + vibration)))
     values += [float(points.cv_over_r.max()) for points in panel.points if len(points.cv_over_r)]
     return 1.12 * max(values)
-
-
-def _metadata(suffix: str, panels: Sequence[Panel], provenance: Mapping[str, Any]) -> dict[str, Any]:
-    """What made the picture, under the names that each format allows; no date, so that the same picture is the same file."""
-    curves = {panel.title: list(panel.curves) for panel in panels}
-    record = {"program": "rotor", "version": version(), "curves": curves, **provenance}
-    text = json.dumps(record, ensure_ascii=False)
-    if suffix == ".pdf":
-        return {"Title": "heat capacity", "Subject": text, "CreationDate": None}
-    if suffix == ".svg":
-        return {"Title": "heat capacity", "Description": text, "Date": None}
-    return {"Title": "heat capacity", "Description": text}

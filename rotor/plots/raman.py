@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from rotor.plots.spectrum import BLUE, DPI, GREY, MOST_VECTOR_STICKS, SIZE_INCHES, STYLE, VISIBLE, formula_text
+from rotor.plots.picture import BLUE, GREY, MOST_VECTOR_STICKS, checked_suffix, name_of_top, new_figure, save, styled
+from rotor.plots.spectrum import VISIBLE
 from rotor.spectra.raman import RamanLines
-from rotor.tops.top import Top
-from rotor.version import version
 
 
 def plot_raman(
@@ -28,23 +26,15 @@ def plot_raman(
     and settings. Lines below 0.4 % of the strongest do not stretch the axis. Raises ValueError for a suffix that is no
     picture and for no lines.
     """
-    suffix = Path(path).suffix.lower()
-    if suffix not in (".png", ".pdf", ".svg"):
-        raise ValueError(f"{os.fspath(path)}: a picture is .png, .pdf or .svg; the suffix names the format")
+    checked_suffix(path)
     if not len(lines):
         raise ValueError(f"there is no Raman line to draw for {lines.top.name or 'this top'}")
-
-    import matplotlib as mpl
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=SIZE_INCHES, dpi=DPI, layout="constrained")
-        FigureCanvasAgg(figure)
+    with styled():
+        figure = new_figure()
         axes = figure.add_subplot()
         _draw(axes, lines)
         axes.set_title(title if title is not None else _title(lines), loc="left")
-        figure.savefig(path, dpi=DPI, metadata=_metadata(suffix, lines, provenance or {}))
+        save(figure, path, title or _title(lines), {**(provenance or {}), **_facts(lines)})
 
 
 def _draw(axes: Any, lines: RamanLines) -> None:
@@ -60,20 +50,13 @@ def _draw(axes: Any, lines: RamanLines) -> None:
 
 
 def _title(lines: RamanLines) -> str:
-    what = f"{lines.temperature_k:g} K, laser at {lines.laser_nm:g} nm"
-    return f"{_name(lines.top)}, {what}"
+    return f"{name_of_top(lines.top)}, {lines.temperature_k:g} K, laser at {lines.laser_nm:g} nm"
 
 
-def _name(top: Top) -> str:
-    formula = formula_text(top.molecule.formula) if top.molecule is not None else ""
-    return ", ".join(part for part in (top.name.replace("$", r"\$"), formula) if part) or f"{top.kind} top"
-
-
-def _metadata(suffix: str, lines: RamanLines, more: Mapping[str, Any]) -> dict[str, Any]:
-    """Provenance by the keys that each format has; no date, so that the same picture is the same file."""
+def _facts(lines: RamanLines) -> dict[str, Any]:
+    """What the metadata of the file say of the lines."""
     top = lines.top
-    facts = {
-        **more,
+    return {
         "constants": top.constants.text(),
         "polarizability": top.polarizability_abc_angstrom3,
         "temperature_k": lines.temperature_k,
@@ -81,10 +64,3 @@ def _metadata(suffix: str, lines: RamanLines, more: Mapping[str, Any]) -> dict[s
         "q": lines.partition.q,
         "jmax": lines.jmax,
     }
-    description = "; ".join(f"{name}: {value}" for name, value in facts.items())
-    program, title = f"rotor {version()}", _title(lines).replace("$", "")
-    if suffix == ".png":
-        return {"Software": program, "Title": title, "Description": description}
-    if suffix == ".pdf":
-        return {"Creator": program, "Title": title, "Subject": description, "CreationDate": None}
-    return {"Creator": program, "Title": title, "Description": description, "Date": None}

@@ -4,45 +4,23 @@ from __future__ import annotations
 
 import math
 import os
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats
+from rotor.plots.picture import BLUE, GREY, MOST_VECTOR_STICKS, checked_suffix, name_of_top, new_figure, save, styled
 from rotor.quantum.quanta import state_text
 from rotor.spectra.lines import Lines
 from rotor.spectra.spectrum import Spectrum, line_widths
-from rotor.version import version
 
-BLUE, GREY = "#0072B2", "#555555"  # of Okabe and Ito's palette, told apart by everyone
-STYLE: dict[Any, Any] = {
-    "font.size": 9.0,
-    "axes.labelsize": 9.0,
-    "axes.titlesize": 10.0,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.linewidth": 0.7,
-    "xtick.direction": "out",
-    "ytick.direction": "out",
-    "xtick.major.width": 0.7,
-    "ytick.major.width": 0.7,
-    "axes.formatter.use_mathtext": True,
-    "svg.fonttype": "none",
-    "svg.hashsalt": "rotor",  # the same picture is the same file
-    "pdf.fonttype": 42,
-}
-SIZE_INCHES = (7.2, 3.8)
-DPI = 200
 VISIBLE = 4e-3  # lines below this part of the strongest do not stretch the axis of frequency
 TALL = 1e-2  # and below this they cannot be seen on a linear axis
 MOST_DECADES = 8
 MOST_VERTICES = 20_000  # of a curve; more cannot be told apart on paper
-MOST_VECTOR_STICKS = 5_000  # more are drawn as pixels inside a PDF or SVG
 
 
 @dataclass(frozen=True)
@@ -87,19 +65,11 @@ def plot_spectrum(
     The axis of intensity is logarithmic where fewer than ten lines would be seen on a linear one. Raises ValueError for
     a suffix that is no picture and for a spectrum without lines or with nothing in the range.
     """
-    suffix = Path(path).suffix.lower()
-    if suffix not in (".png", ".pdf", ".svg"):
-        raise ValueError(f"{os.fspath(path)}: a picture is .png, .pdf or .svg; the suffix names the format")
-
-    import matplotlib as mpl
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
+    checked_suffix(path)
     lines = thing if isinstance(thing, Lines) else thing.lines
     heights = _heights(thing, lines)
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=SIZE_INCHES, dpi=DPI, layout="constrained")
-        FigureCanvasAgg(figure)
+    with styled():
+        figure = new_figure()
         axes = figure.add_subplot()
         x = _frequency_axis(thing, lines, heights, range_mhz)
         _draw(axes, thing, x)
@@ -107,7 +77,7 @@ def plot_spectrum(
         _inscribe(axes, thing, lines, x, title)
         if lines is not None:
             _name_lines(figure, axes, thing, lines, heights, x, labels)
-        figure.savefig(path, dpi=DPI, metadata=_metadata(suffix, thing, lines, provenance or {}))
+        save(figure, path, title or _title(thing, lines), {**(provenance or {}), **_facts(thing, lines)})
 
 
 def _heights(thing: Lines | Spectrum, lines: Lines | None) -> Floats:
@@ -216,29 +186,8 @@ def _ordinate(spectrum: Spectrum) -> str:
 
 
 def _title(thing: Lines | Spectrum, lines: Lines | None) -> str:
-    parts = []
-    if lines is not None:
-        top = lines.top
-        formula = formula_text(top.molecule.formula) if top.molecule is not None else ""
-        name = top.name.replace("$", r"\$")
-        known = {name, top.molecule.formula if top.molecule is not None else ""}
-        parts = [name] if name and not (formula and len(known) == 1) else []
-        parts += [formula] if formula else []
-        parts = parts or [lines.top.constants.kind + " top"]
-    temperature = thing.temperature_k
-    return ", ".join([*parts, *([f"{temperature:g} K"] if temperature else [])])
-
-
-def formula_text(formula: str) -> str:
-    """A formula with subscripts and isotope numbers in matplotlib's mathtext.
-
-    >>> formula_text("C[13C]H6O"), formula_text("H3O+")
-    ('C$^{13}$CH$_{6}$O', 'H$_{3}$O$^{+}$')
-    """
-    text = re.sub(r"\[(\d+)([A-Z][a-z]?)\]", r"<\1>\2", formula)
-    text = re.sub(r"(?<=[A-Za-z)])(\d+)", r"$_{\1}$", text)
-    text = re.sub(r"\((\d+[+-])\)$|([+-])$", lambda m: f"$^{{{m[1] or m[2]}}}$", text)
-    return re.sub(r"<(\d+)>", r"$^{\1}$", text)
+    temperature = f"{thing.temperature_k:g} K" if thing.temperature_k else ""
+    return ", ".join(filter(None, (name_of_top(lines.top) if lines is not None else "", temperature)))
 
 
 def _name_lines(
@@ -309,12 +258,12 @@ def _label(axes: Any, lines: Lines, row: int, height: float, x: _Axis) -> Any:
     return name
 
 
-def _metadata(suffix: str, thing: Lines | Spectrum, lines: Lines | None, more: Mapping[str, Any]) -> dict[str, Any]:
-    """Provenance by the keys that each format has; no date, so that the same picture is the same file."""
-    facts = dict(more)
+def _facts(thing: Lines | Spectrum, lines: Lines | None) -> dict[str, Any]:
+    """What the metadata of the file say of the lines and of their shape."""
+    facts: dict[str, Any] = {}
     if lines is not None:
         top = lines.top
-        facts |= {
+        facts = {
             "constants": top.constants.text(),
             "constants source": top.source,
             "dipole": top.dipole_abc_debye,
@@ -327,11 +276,4 @@ def _metadata(suffix: str, thing: Lines | Spectrum, lines: Lines | None, more: M
         }
     if isinstance(thing, Spectrum):
         facts |= {"profile": thing.profile, "fwhm_mhz": thing.fwhm_mhz}
-    title = _title(thing, lines).replace("$", "")
-    description = "; ".join(f"{name}: {value}" for name, value in facts.items())
-    program = f"rotor {version()}"
-    if suffix == ".png":
-        return {"Software": program, "Title": title, "Description": description}
-    if suffix == ".pdf":
-        return {"Creator": program, "Title": title, "Subject": description, "CreationDate": None}
-    return {"Creator": program, "Title": title, "Description": description, "Date": None}
+    return facts

@@ -96,6 +96,17 @@ class Levels(Table):
         return tuple(self.quanta)
 
     @property
+    def provenance(self) -> dict[str, Any]:
+        """The Hamiltonian that the levels are of, and how far they go."""
+        return {
+            "kind": self.kind,
+            "representation": self.representation,
+            "jmax": self.jmax,
+            "effects": [effect.name or type(effect).__name__ for effect in self.effects],
+            "rows": len(self),
+        }
+
+    @property
     def degeneracy(self) -> Ints:
         """States of the row, projections in space and components, each with its nuclear-spin weight."""
         return self.multiplicity * self.weight

@@ -30,8 +30,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from rotor.quantum.effects.watson import centrifugal_operators, operators_by_name, rigid_operators
-from rotor.quantum.uncertainty import Covariance
 from rotor.tops.constants import Constants
+from rotor.tops.covariance import Covariance
 from rotor.tops.operators import Operators, Powers, axes_of, distortion_terms
 
 # the quartic and quadratic terms by (p, q, n), and what each is in Jα⁴, JαJα JβJβ + JβJβ JαJα, Jα², for (x, y, z, xy, yz, zx)

@@ -17,6 +17,7 @@ from rotor.quantum.convergence import warnings_of
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.levels import Levels
+from rotor.quantum.limits import limit_facts
 from rotor.quantum.solve import solve_levels
 from rotor.table import Table
 from rotor.tops.facts import top_facts
@@ -52,11 +53,11 @@ class LevelsRequest:
         if self.max_energy_mhz is not None:
             require_positive("max_energy_mhz", self.max_energy_mhz)
         if (self.kmin is not None or self.kmax is not None) and self.top.kind in ("linear", "spherical"):
-            raise ValueError(f"kmin and kmax: the levels of a {self.top.kind} top have no K; give J alone")
+            raise ValueError(f"kmax: the levels of a {self.top.kind} top have no K; give J alone")
 
 
-@dataclass(frozen=True)
-class LevelTable(Table):
+@dataclass(frozen=True, repr=False)
+class SelectedLevels(Table):
     """Energy levels in order of their rows, energies in three units from the lowest level that exists.
 
     levels: all that were solved. rows: (n,) those asked for. ground_mhz: energy of the lowest level that exists, from the
@@ -68,6 +69,11 @@ class LevelTable(Table):
 
     def __len__(self) -> int:
         return len(self.rows)
+
+    @property
+    def provenance(self) -> dict[str, Any]:
+        """The Hamiltonian that the levels are of, and the energy that theirs count from."""
+        return self.levels.provenance | {"ground_mhz": self.ground_mhz, "rows": len(self)}
 
     @cached_property
     def ground_mhz(self) -> float:
@@ -107,7 +113,7 @@ class LevelsAnswer:
     """The levels that a request asked for, and the limits of the model behind them."""
 
     request: LevelsRequest
-    table: LevelTable
+    table: SelectedLevels
 
     @cached_property
     def warnings(self) -> tuple[str, ...]:
@@ -127,8 +133,8 @@ class LevelsAnswer:
             "quantum_numbers": list(self.table.levels.quanta_names),
             "level_count": len(self.table),
             "ground_mhz": self.table.ground_mhz,
-            "effects": [effect.name for effect in request.effects],
             "notes": [*request.top.notes, *self.warnings],
+            **limit_facts(request.top, max(request.jmax, 1), request.effects),
         }
 
 
@@ -148,7 +154,7 @@ def answer_levels(request: LevelsRequest, executor: Executor | None = None) -> L
         asked &= (k >= (request.kmin or 0)) & (k <= (request.jmax if request.kmax is None else request.kmax))
     if request.max_energy_mhz is not None:
         asked &= levels.energy_mhz - levels.ground_mhz <= request.max_energy_mhz
-    return LevelsAnswer(request, LevelTable(levels, np.flatnonzero(asked)))
+    return LevelsAnswer(request, SelectedLevels(levels, np.flatnonzero(asked)))
 
 
 def _projection(levels: Levels, top: Top) -> Ints:

@@ -13,6 +13,7 @@ what a method does not hold is solved by another one, or refused.
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor
 from typing import TYPE_CHECKING
@@ -32,6 +33,8 @@ from rotor.tops.spin_weights import SpinWeights
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
+
+SMALL = 100  # rows of a tridiagonal block up to which scipy.linalg, 0.2 s to load, is not loaded for it
 
 
 def hamiltonian(top: Top, effects: Sequence[QuantumEffect] = SEMI_RIGID) -> Operators:
@@ -281,23 +284,26 @@ def solve_j(
 def diagonalise(bands: list[Floats], vectors: bool = True) -> tuple[Floats, Floats]:
     """Eigenvalues, rising, and eigenvectors in columns of a symmetric matrix given by its diagonals.
 
-    Tridiagonal matrices go to LAPACK's divide and conquer (dstevd), wider ones to its dense form (dsyevd).
+    Tridiagonal matrices go to LAPACK's divide and conquer (dstevd), wider ones to its dense form (dsyevd, numpy's eigh). So do
+    tridiagonal ones of up to `SMALL` rows where scipy.linalg is not loaded, which takes longer than all of them together: the
+    dense form leaves a tridiagonal matrix as it is and goes on like the other, to the same bits.
     Raises ValueError where LAPACK does not converge or the matrix has numbers that are not finite.
     """
-    if len(bands[0]) == 1:
+    size = len(bands[0])
+    if size == 1:
         return bands[0], np.ones((1, 1))
     if not all(np.isfinite(band).all() for band in bands):
         raise ValueError("a block of the Hamiltonian overflows: J max is too high for these distortion constants")
-    if len(bands) > 2:
-        return _dense(bands, vectors)
     if len(bands) == 1:
         return _diagonal(bands[0], vectors)
+    if len(bands) > 2 or (size <= SMALL and "scipy.linalg" not in sys.modules):
+        return _dense(bands, vectors)
 
     from scipy.linalg.lapack import dstevd
 
     energies, states, info = dstevd(bands[0], bands[1], compute_v=int(vectors))
     if info:
-        raise ValueError(f"LAPACK dstevd did not converge on a block of size {len(bands[0])} (info = {info})")
+        raise ValueError(f"LAPACK dstevd did not converge on a block of size {size} (info = {info})")
     return energies, states
 
 
@@ -307,9 +313,10 @@ def _diagonal(band: Floats, vectors: bool) -> tuple[Floats, Floats]:
 
 
 def _dense(bands: list[Floats], vectors: bool) -> tuple[Floats, Floats]:
-    matrix = np.diag(bands[0])
-    for n, band in enumerate(bands[1:], 1):
-        matrix += np.diag(band, -n)  # eigh reads the lower triangle
+    size = len(bands[0])
+    matrix = np.zeros((size, size))
+    for n, band in enumerate(bands):
+        matrix.flat[n * size :: size + 1] = band  # eigh reads the lower triangle
     if not vectors:
         return np.asarray(np.linalg.eigvalsh(matrix), dtype=np.float64), np.zeros((0, 0))
     solved = np.linalg.eigh(matrix)

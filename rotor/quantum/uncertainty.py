@@ -9,96 +9,21 @@ length of the row d F, so that a list of lines needs the rows of its levels only
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from rotor.arrays import Floats
 from rotor.quantum.derivatives import level_derivatives
 from rotor.quantum.levels import Levels
+from rotor.tops.covariance import Covariance
 
 if TYPE_CHECKING:
-    from rotor.tops.constants import Constants
     from rotor.tops.top import Top
 
 
 _AT_ONCE = 1 << 16  # lines whose rows are gathered at a time
-_NEGATIVE = 1e-4  # a correlation matrix printed with few digits has eigenvalues below zero by so much
-
-
-@dataclass(frozen=True, eq=False)
-class Covariance:
-    """Covariance of some constants of a set.
-
-    names: which. matrix_mhz2: (n, n), symmetric, MHz². Constants that are not named are taken as exact.
-    Raises ValueError for names given twice, a matrix of another shape, and one that is no covariance.
-    """
-
-    names: tuple[str, ...]
-    matrix_mhz2: Floats
-
-    def __post_init__(self) -> None:
-        matrix = np.asarray(self.matrix_mhz2, dtype=np.float64)
-        _refuse_impossible(self.names, matrix)
-        object.__setattr__(self, "matrix_mhz2", matrix)
-
-    @classmethod
-    def of_uncertainties(cls, constants: Constants) -> Covariance | None:
-        """Uncorrelated constants with the uncertainties they carry; None where they carry none.
-
-        Published constants are correlated, which is not printed as often as it should be: errors of lines from
-        uncertainties alone are mostly too large.
-        """
-        if not constants.uncertainties:
-            return None
-        return cls(tuple(constants.uncertainties), np.diag([s**2 for s in constants.uncertainties.values()]))
-
-    @classmethod
-    def of_correlations(cls, names: Sequence[str], uncertainties_mhz: ArrayLike, correlations: ArrayLike) -> Covariance:
-        """From standard deviations (n,) in MHz and their correlation coefficients (n, n).
-
-        >>> Covariance.of_correlations(["B", "D"], [0.1, 0.01], [[1, 0.5], [0.5, 1]]).matrix_mhz2.round(6).tolist()
-        [[0.01, 0.0005], [0.0005, 0.0001]]
-        """
-        sigma = np.asarray(uncertainties_mhz, dtype=np.float64)
-        matrix = np.asarray(correlations, dtype=np.float64)
-        if sigma.shape != (len(names),) or matrix.shape != (len(names), len(names)):
-            raise ValueError(
-                f"{len(names)} constants with uncertainties of shape {sigma.shape} and correlations of shape "
-                f"{matrix.shape}; ({len(names)},) and ({len(names)}, {len(names)}) are wanted"
-            )
-        if not np.allclose(np.diag(matrix), 1.0):
-            raise ValueError("a correlation matrix has 1 on its diagonal; is this a covariance?")
-        return cls(tuple(names), matrix * np.outer(sigma, sigma))
-
-    @property
-    def factor(self) -> Floats:
-        """F with C = F Fᵀ, (n, n), in MHz."""
-        sigma = np.sqrt(np.diag(self.matrix_mhz2))
-        safe = np.where(sigma > 0, sigma, 1.0)
-        values, vectors = np.linalg.eigh(self.matrix_mhz2 / np.outer(safe, safe))
-        return np.asarray(sigma[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)))
-
-
-def _refuse_impossible(names: Sequence[str], matrix: Floats) -> None:
-    if len(set(names)) != len(names):
-        raise ValueError(f"covariance of {', '.join(names)}: a name stands twice")
-    if matrix.shape != (len(names), len(names)):
-        raise ValueError(
-            f"covariance of {len(names)} constants of shape {matrix.shape}: a square of that size is wanted"
-        )
-    variances = np.diag(matrix)
-    if not np.isfinite(matrix).all() or (variances < 0).any():
-        raise ValueError("covariance: finite numbers are wanted, and variances of 0 or more")
-    sigma = np.sqrt(variances)
-    scale = np.outer(np.where(sigma > 0, sigma, 1.0), np.where(sigma > 0, sigma, 1.0))
-    if not np.allclose(matrix / scale, matrix.T / scale, rtol=0, atol=1e-9):
-        raise ValueError("covariance: a covariance is symmetric, this matrix is not")
-    if len(names) and np.linalg.eigvalsh(matrix / scale).min() < -_NEGATIVE:
-        raise ValueError("covariance: some combination of the constants has a negative variance; check the matrix")
 
 
 def level_spread(top: Top, levels: Levels, covariance: Covariance) -> Floats:

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -69,7 +69,7 @@ class Source:
             )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Emission(Table):
     """Optical depth and brightness temperature (n,) on a grid of frequencies (n,), and the source they belong to."""
 
@@ -77,6 +77,11 @@ class Emission(Table):
     optical_depth: Floats
     brightness_k: Floats
     source: Source
+
+    @property
+    def provenance(self) -> dict[str, Any]:
+        """The source, by the names of its fields."""
+        return {**asdict(self.source), "rows": len(self)}
 
     @property
     def columns(self) -> Mapping[str, NDArray[Any]]:

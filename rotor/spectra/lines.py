@@ -25,8 +25,9 @@ from rotor.quantum.convergence import warnings_of
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.levels import Levels, TransitionTable
+from rotor.quantum.quanta import heading
 from rotor.quantum.solve import solve_levels
-from rotor.quantum.uncertainty import Covariance, level_spread, line_errors
+from rotor.quantum.uncertainty import level_spread, line_errors
 from rotor.spectra.intensity import (
     EINSTEIN_PER_MHZ3,
     INTENSITY_NM2_MHZ,
@@ -37,6 +38,7 @@ from rotor.spectra.intensity import (
 )
 from rotor.spectra.transitions import all_transitions
 from rotor.thermo import PartitionFunction, VibrationalStates, partition_function
+from rotor.tops.covariance import Covariance
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
@@ -45,7 +47,7 @@ if TYPE_CHECKING:
 DEFAULT_MIN_LGINT = -12.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Lines(TransitionTable):
     """Lines as columns of equal length, rising in frequency unless they were asked for unsorted.
 
@@ -102,10 +104,11 @@ class Lines(TransitionTable):
 
     @property
     def covariance_used(self) -> Covariance | None:
-        """The covariance given, else the uncertainties of the constants where these may count as uncorrelated."""
-        if self.covariance is None and self.top.independent_errors:
+        """The covariance given, else the top's, else the uncertainties of the constants where these may count as uncorrelated."""
+        known = self.covariance or self.top.covariance
+        if known is None and self.top.independent_errors:
             return Covariance.of_uncertainties(self.top.constants)
-        return self.covariance
+        return known
 
     @property
     def error_mhz(self) -> Floats | None:
@@ -114,6 +117,31 @@ class Lines(TransitionTable):
         Neglected: what the Hamiltonian leaves out. Constants without an uncertainty count as exact.
         """
         return None if self.spread is None else line_errors(self.spread, self.upper, self.lower)
+
+    @property
+    def errors_from(self) -> str | None:
+        """Which uncertainties the errors of frequencies come from, None where there are none."""
+        if self.covariance is not None:
+            return f"covariance of {', '.join(self.covariance.names)}"
+        known = self.top.constants.uncertainties
+        if known and self.covariance_used is None:
+            return "none: the constants are from a fit whose correlations are not known"
+        return f"uncertainties of {', '.join(known)}, uncorrelated" if known else None
+
+    @property
+    def provenance(self) -> dict[str, Any]:
+        """What the lines were made from: the top and its sources, the settings, Q."""
+        return self.top.provenance | {
+            "errors_from": self.errors_from,
+            "temperature_k": self.temperature_k,
+            "jmax": self.jmax,
+            "min_lgint": self.min_lgint,
+            "range_mhz": list(self.range_mhz),
+            "q": self.q,
+            "q_source": self.partition.source,
+            "lines": len(self),
+            "warnings": list(self.warnings),
+        }
 
     @property
     def energy_lower_cm(self) -> Floats:
@@ -183,6 +211,28 @@ class Lines(TransitionTable):
         if (error := self.error_mhz) is not None:
             out = {"frequency_mhz": out["frequency_mhz"], "error_mhz": error} | out
         return out | self.levels.quanta_columns(self.upper, "upper") | self.levels.quanta_columns(self.lower, "lower")
+
+    def __getitem__(self, chosen: NDArray[Any] | slice) -> Lines:
+        """The same as `where`: lines[mask], lines[:10]."""
+        return self.where(chosen)
+
+    def _title(self) -> str:
+        name = self.top.name or "a top"
+        extent = f", {self.frequency_mhz.min():.4f} to {self.frequency_mhz.max():.4f} MHz" if len(self) else ""
+        return f"{len(self)} lines of {name} at {self.temperature_k:g} K, J up to {self.jmax}{extent}"
+
+    def _texts(self, rows: NDArray[np.int64]) -> dict[str, list[str]]:
+        few = self.where(rows)
+        names = ["frequency_mhz", "strength_debye2", "energy_lower_cm", "g_upper"]
+        if few.given_partition is not None:  # Q is not summed for the sake of a text
+            names.insert(1, "lgint")
+        texts = {name: [f"{value:.6g}" for value in getattr(few, name).tolist()] for name in names}
+        texts["frequency_mhz"] = [f"{value:.4f}" for value in few.frequency_mhz.tolist()]
+        label = " ".join(heading(name) for name in self.quanta_names)
+        return texts | {
+            f"upper {label}": self.levels.labels(few.upper),
+            f"lower {label}": self.levels.labels(few.lower),
+        }
 
 
 def line_list(

@@ -44,7 +44,7 @@ DEFAULT_LASER_NM = 532.0
 DEFAULT_MIN_RELATIVE = 1e-6
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class RamanLines(TransitionTable):
     """Raman lines as columns of equal length, rising in shift.
 
@@ -73,6 +73,22 @@ class RamanLines(TransitionTable):
     def jmax(self) -> int:
         """The highest J of a level in the list's making."""
         return self.levels.jmax
+
+    @property
+    def provenance(self) -> dict[str, Any]:
+        """What the lines were made from: the top and its sources, the settings, Q."""
+        return self.top.provenance | {
+            "polarizability_abc_angstrom3": self.top.polarizability_abc_angstrom3,
+            "polarizability_source": self.top.polarizability_source,
+            "temperature_k": self.temperature_k,
+            "laser_nm": self.laser_nm,
+            "jmax": self.jmax,
+            "min_relative": self.min_relative or None,
+            "q": self.partition.q,
+            "q_source": self.partition.source,
+            "lines": len(self),
+            "warnings": list(self.warnings),
+        }
 
     @property
     def shift_cm(self) -> Floats:

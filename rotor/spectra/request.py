@@ -17,13 +17,14 @@ from rotor.arrays import Floats, Ints
 from rotor.checks import require_one_of, require_positive, require_whole
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.watson import SEMI_RIGID
-from rotor.quantum.uncertainty import Covariance
+from rotor.quantum.limits import limit_facts, populated_j
 from rotor.spectra.intensity import USUAL_CUT
 from rotor.spectra.lines import DEFAULT_MIN_LGINT, Lines, line_list
 from rotor.spectra.opacity import column_density_per_cm2, line_optical_depth, optical_depth
 from rotor.spectra.spectrum import Spectrum, resolving_grid
 from rotor.thermo import VibrationalStates
 from rotor.thermo.request import partition_facts
+from rotor.tops.covariance import Covariance
 from rotor.tops.facts import top_facts
 
 if TYPE_CHECKING:
@@ -163,6 +164,11 @@ class SpectrumAnswer:
         return "beyond it no line reaches the cut"
 
     @property
+    def typical_j(self) -> int:
+        """The J at which effects are compared: the most populated one, as far as the list goes."""
+        return min(populated_j(self.lines.top, self.lines.temperature_k), max(self.lines.jmax, 1))
+
+    @property
     def why_no_lines(self) -> str:
         """Why the list is empty; nothing where it is not."""
         if len(self.lines):
@@ -192,6 +198,7 @@ class SpectrumAnswer:
             "column_per_cm2": self.column_per_cm2,
             "optical_depth": self.optical_depth,
             "notes": [*lines.top.notes, *lines.warnings],
+            **limit_facts(lines.top, self.typical_j, lines.levels.effects),
         }
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -28,7 +29,7 @@ _STEP = 0.1  # a resolving grid goes in steps of a fortieth of the width at a ce
 _BACKGROUND = 2001  # and has so many even points
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Spectrum(Table):
     """Intensity on a grid of frequencies.
 
@@ -55,6 +56,17 @@ class Spectrum(Table):
 
     def __len__(self) -> int:
         return len(self.frequency_mhz)
+
+    @property
+    def provenance(self) -> dict[str, Any]:
+        """What the spectrum was made from: its lines, their shape, the unit."""
+        return (self.lines.provenance if self.lines is not None else {}) | {
+            "profile": self.profile,
+            "fwhm_mhz": self.fwhm_mhz,
+            "unit": self.unit,
+            "outside": self.outside,
+            "rows": len(self),
+        }
 
     @classmethod
     def from_lines(

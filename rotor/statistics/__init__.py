@@ -1,1 +1,1 @@
-"""Degrees of freedom and the test of equipartition."""
+"""Degrees of freedom, the test of equipartition, least squares and what a fit knows of its parameters."""

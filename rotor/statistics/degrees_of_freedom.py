@@ -2,7 +2,7 @@
 
 A rigid body has 3 translations and 3 rotations; a linear one 2 rotations, an atom none. What is removed (the total
 momentum: 3) is subtracted. N atoms held together by forces instead have 3N - 6 vibrations, 3N - 5 in a line (G. Herzberg,
-Molecular Spectra and Molecular Structure II, chapter II, 2). Nothing is remembered: whoever puts a molecule into a box counts anew.
+Molecular Spectra and Molecular Structure II, chapter II, 2). Nothing is stored: each box is counted anew.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rotor.geometry.inertia import LINEAR_BELOW
 
-NEARLY = 1e3  # a body within this factor of the limit between linear and bent is told of
+NEARLY = 1e3  # a body within this factor of the limit between linear and bent is listed in the notes
 
 
 @dataclass(frozen=True)
@@ -22,7 +22,7 @@ class Degrees:
     """The count for a box of rigid bodies.
 
     bodies: how many. translation, rotation: degrees that move, what is removed already subtracted. removed: how many
-    were. notes: bodies whose count hangs on the rule for linear ones, with the number that decided.
+    were. notes: bodies whose count depends on the rule for linear ones, with the number that decided.
     """
 
     bodies: int
@@ -56,7 +56,7 @@ def rotating_axes(moments: ArrayLike, linear_below: float = LINEAR_BELOW) -> NDA
     if array.ndim == 0 or array.shape[-1] != 3 or not np.isfinite(array).all() or (array < 0.0).any():
         raise ValueError(f"principal moments are finite, not negative and of shape (..., 3); got {array.tolist()}")
     if not 0.0 < linear_below < 1.0:
-        raise ValueError(f"linear_below = {linear_below}: a ratio between 0 and 1 is wanted")
+        raise ValueError(f"linear_below = {linear_below}: expected a ratio between 0 and 1")
     largest = array.max(axis=-1, keepdims=True)
     turns = (array >= linear_below * largest) & (largest > 0.0)
     if np.any(turns.sum(axis=-1) == 1):

@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rotor.arrays import Floats
-from rotor.geometry.inertia import LINEAR_BELOW
+from rotor.geometry.inertia import LINEAR_BELOW, kinetic_energy_by_axis
 from rotor.statistics.degrees_of_freedom import rotating_axes
 from rotor.table import Table
 
@@ -78,7 +78,7 @@ class DegreeTest:
     ks_p_value: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Equipartition(Table):
     """The answer for all degrees.
 
@@ -97,6 +97,17 @@ class Equipartition(Table):
     p_value: float
     accepted: bool
     failing: tuple[str, ...] = ()
+
+    @property
+    def provenance(self) -> dict[str, Any]:
+        """What the test found."""
+        return {
+            "accepted": self.accepted,
+            "p_value": self.p_value,
+            "confidence": self.confidence,
+            "kt": self.kt,
+            "rows": len(self.degrees),
+        }
 
     @property
     def columns(self) -> dict[str, NDArray[Any]]:
@@ -149,13 +160,13 @@ def kinetic_degrees(
         _check_shape("momenta", m, len(inertia))
         found += _rotations(inertia, m, _groups(species, len(inertia)), linear_below)
     if not found:
-        raise ValueError("no degree of freedom: masses with velocities are wanted, moments with momenta, or both")
+        raise ValueError("no degree of freedom: expected masses with velocities, moments with momenta, or both")
     return KineticDegrees({name: values for name, values, _ in found}, {name: count for name, _, count in found})
 
 
 def _check_shape(name: str, vectors: Floats, bodies: int) -> None:
     if vectors.ndim not in (2, 3) or vectors.shape[-2:] != (bodies, 3):
-        raise ValueError(f"{name} of shape {vectors.shape} for {bodies} bodies: (N, 3) or (frames, N, 3) is wanted")
+        raise ValueError(f"{name} of shape {vectors.shape} for {bodies} bodies: expected (N, 3) or (frames, N, 3)")
 
 
 def _translations(mass: Floats, v: Floats, groups: Groups, removed: bool) -> list[tuple[str, Floats, float]]:
@@ -182,7 +193,8 @@ def _rotations(inertia: Floats, m: Floats, groups: Groups, linear_below: float) 
         for axis, name in enumerate("abc"):
             here = rows[turns[rows, axis]]
             if len(here):
-                energies = 0.5 * m[..., here, axis] ** 2 / inertia[here, axis]
+                along = m[..., here, axis]
+                energies = kinetic_energy_by_axis(along, along / inertia[here, axis])
                 found.append((f"{prefix}rotation {name}", energies, float(len(here))))
     return found
 
@@ -210,9 +222,9 @@ def equipartition(
     (False, ('y',))
     """
     if not 0.0 < confidence < 1.0:
-        raise ValueError(f"confidence {confidence}: a probability between 0 and 1 is wanted")
+        raise ValueError(f"confidence {confidence}: expected a probability between 0 and 1")
     if kt is not None and not (math.isfinite(kt) and kt > 0.0):
-        raise ValueError(f"kT = {kt}: a finite energy above 0 is wanted")
+        raise ValueError(f"kT = {kt}: expected a finite energy above 0")
     table = energies if isinstance(energies, KineticDegrees) else _plain(energies)
     data = {name: _checked(name, values) for name, values in table.energies.items()}
     total = math.fsum(table.counts[name] * len(values) for name, values in data.items())
@@ -261,7 +273,7 @@ def _checked(name: str, values: ArrayLike) -> Floats:
     array = np.asarray(values, dtype=np.float64)
     if array.ndim not in (1, 2) or array.size == 0 or not np.isfinite(array).all() or (array < 0.0).any():
         raise ValueError(
-            f"{name}: energies of shape {array.shape}: (n,) or (frames, n), finite and not negative, are wanted"
+            f"{name}: energies of shape {array.shape}: expected (n,) or (frames, n), finite and not negative"
         )
     return np.atleast_2d(array)
 

@@ -57,7 +57,7 @@ class IdealGas:
     gibbs_j_per_mol_k: Floats
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class ThermoFunctions(Table):
     """Thermodynamic functions of a top at n temperatures; every array is (n,).
 
@@ -93,6 +93,22 @@ class ThermoFunctions(Table):
 
     def __len__(self) -> int:
         return len(self.temperature_k)
+
+    @property
+    def provenance(self) -> dict[str, Any]:
+        """What the functions were made from: the top and its sources, species, vibration, pressure, errors of the sums."""
+        return self.top.provenance | {
+            "species": self.species,
+            "fractions": dict(self.fractions),
+            "symmetry_number": self.symmetry_number,
+            "spin_factor": self.spin_factor,
+            "vibrations": self.vibrations.text if self.vibrations is not None else None,
+            "pressure_bar": self.gas.pressure_bar if self.gas is not None else None,
+            "mass_u": self.gas.mass_u if self.gas is not None else None,
+            "jmax": int(self.jmax.max()),
+            "relative_error": float(self.relative_error.max()),
+            "rows": len(self),
+        }
 
     @property
     def columns(self) -> dict[str, NDArray[Any]]:

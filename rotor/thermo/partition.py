@@ -14,6 +14,7 @@ from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.table import Table
 from rotor.thermo.level_sums import NOT_SUMMED, LevelSums, Progress, checked_temperatures, level_sums
+from rotor.thermo.spin_factor import without_spins
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -117,8 +118,11 @@ def partition_functions(
     """Q at several temperatures from one set of levels; see `partition_function`, and for progress `level_sums`."""
     temperatures = checked_temperatures(temperatures_k)
     weights = [top.spin_weights]
-    sums = level_sums(top, weights, temperatures, relative_error, energies=False, progress=progress, effects=effects)[0]
-    return PartitionFunctions(temperatures, sums.q, sums.jmax, sums.error_q, _sources(sums, relative_error))
+    spinless, factor = without_spins(top, effects)
+    sums = level_sums(top, weights, temperatures, relative_error, energies=False, progress=progress, effects=spinless)[
+        0
+    ]
+    return PartitionFunctions(temperatures, factor * sums.q, sums.jmax, sums.error_q, _sources(sums, relative_error))
 
 
 def _sources(sums: LevelSums, relative_error: float) -> tuple[str, ...]:

@@ -128,6 +128,14 @@ class Constants:
         """The constant of that name in MHz, `default` when the set has none."""
         return self.values.get(_name_in(self.kind, _published_name(name)), default)
 
+    def own_name(self, name: str) -> str:
+        """How this set spells a name: Greek letters written out, no underscores, D for DJ of a linear molecule.
+
+        >>> Constants(B=5.0).own_name("D_J")
+        'D'
+        """
+        return _name_in(self.kind, _published_name(name))
+
     @property
     def rigid(self) -> tuple[float, float, float]:
         """A, B, C in MHz for every kind of top, the equal ones filled in.

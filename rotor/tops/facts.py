@@ -50,6 +50,9 @@ def top_facts(top: Top) -> dict[str, Any]:
         "polarizability_source": top.polarizability_source or None,
         "spin_weights": top.spin_weights.to_mapping(),
         "spin_weights_source": top.weights_source or None,
+        "spin_constants_mhz": dict(top.spin_constants.values) if top.spin_constants else None,
+        "spins": {name: twice / 2 for name, twice in top.spin_constants.twice.items()} if top.spin_constants else None,
+        "spin_constants_source": (top.spin_constants.source or None) if top.spin_constants else None,
         "source": top.source or None,
         "notes": list(top.notes),
     }

@@ -24,9 +24,11 @@ from rotor.tops.allowed import (
     refuse_forbidden_polarizability,
 )
 from rotor.tops.constants import Constants
+from rotor.tops.covariance import Covariance
 from rotor.tops.kind import KindOfTop, kind_from_moments, kind_with_symmetry
 from rotor.tops.level_table import LevelTable
 from rotor.tops.operators import KINDS
+from rotor.tops.spin_constants import SpinConstants
 from rotor.tops.spin_weights import SpinWeights
 
 if TYPE_CHECKING:
@@ -50,12 +52,12 @@ class Top:
     nuclear-spin weights. mass_u: for Doppler widths. frame: principal frame of a geometry, None without one.
     kind_of_top: how the kind was decided. molecule, symmetry: of a geometry. source: where the constants are from.
     independent_errors: whether the uncertainties of the constants may count as uncorrelated; not those of a fit whose
-    correlations are unknown. notes: what a user must be told. level_table: energies that count instead of those of the
+    correlations are unknown. covariance: of the constants, where it is known. notes: limits of the data. spin_constants: of
+    nuclear and electron spins, None where none are known. level_table: energies that count instead of those of the
     constants where it has them; it belongs to these constants alone (`with_constants` leaves it out). symmetry_checked:
-    False takes a dipole that spin weights forbid as it is, as files of SPCAT are taken at their word.
+    False takes a dipole that spin weights forbid as it is, as SPCAT does.
 
-    Raises ValueError for a dipole or a polarizability that the symmetry of the nuclei, or what the spin weights tell of
-    it, forbids.
+    Raises ValueError for a dipole or a polarizability that the symmetry of the nuclei, or of the spin weights, forbids.
     """
 
     constants: Constants
@@ -74,6 +76,9 @@ class Top:
     notes: tuple[str, ...] = ()
     polarizability_abc_angstrom3: Tensor | None = None
     polarizability_source: str = ""
+    covariance: Covariance | None = None
+    spin_constants: SpinConstants | None = None
+
     level_table: LevelTable | None = None
     symmetry_checked: bool = True
 
@@ -85,6 +90,23 @@ class Top:
         if self.polarizability_abc_angstrom3 is not None:
             tensor = self.polarizability_abc_angstrom3
             refuse_forbidden_polarizability(tensor, self.symmetry, self.frame, self.spin_weights)
+
+    @property
+    def provenance(self) -> dict[str, Any]:
+        """What the top consists of and where that is from: constants, dipole, weights, notes."""
+        return {
+            "name": self.name,
+            "kind": self.kind,
+            "constants": self.constants.text(),
+            "reduction": self.constants.reduction,
+            "representation": self.constants.representation,
+            "constants_source": self.source,
+            "dipole_abc_debye": self.dipole_abc_debye,
+            "dipole_source": self.dipole_source,
+            "spin_weights": self.spin_weights.to_mapping(),
+            "spin_weights_source": self.weights_source,
+            "notes": list(self.notes),
+        }
 
     @classmethod
     def from_constants(
@@ -226,8 +248,8 @@ class Top:
         return Top.from_molecule(self.molecule, symmetry_within=2.1 * displacement_angstrom / shortest)
 
     def with_constants(self, constants: Constants, source: str = "") -> Top:
-        """The same top with other constants, and without the level energies that belong to its own."""
-        return replace(self, constants=constants, source=source or self.source, level_table=None)
+        """The same top with other constants, and without the covariance and the level energies of its own."""
+        return replace(self, constants=constants, source=source or self.source, covariance=None, level_table=None)
 
     def with_dipole(self, dipole_abc_debye: ArrayLike, source: str) -> Top:
         """The same top with another dipole in principal axes."""

@@ -1,4 +1,4 @@
-"""Moments of inertia that change in time: a skater's arms, panels that unfold. Angular momentum is kept."""
+"""Moments of inertia that change in time: a skater's arms, panels that unfold. Angular momentum is conserved."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class ChangingInertia(InertiaChange):
     """Principal moments (..., 3) as a function of time, about axes that stay where they are in the body.
 
     The moving masses carry no angular momentum relative to the body (they move along radii, or in mirror pairs); where
-    they do, add it as an inner momentum. Whoever moves them does the work, so energy changes and L does not.
+    they do, add it as an inner momentum. The work that moves them changes the energy; L does not change.
 
     >>> skater = ChangingInertia(lambda time: [4.0, 4.0, 2.0 / (1.0 + time)])
     >>> skater.moments(1.0)

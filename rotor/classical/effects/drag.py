@@ -38,7 +38,7 @@ class LinearDrag(Torque):
 
     @property
     def needs_attitude(self) -> bool:
-        """False: drag knows ω alone."""
+        """False: drag depends on ω alone."""
         return False
 
     def torque(self, time: float, attitude: Floats, omega: Floats) -> Floats:
@@ -67,7 +67,7 @@ class QuadraticDrag(Torque):
 
     @property
     def needs_attitude(self) -> bool:
-        """False: drag knows ω alone."""
+        """False: drag depends on ω alone."""
         return False
 
     def torque(self, time: float, attitude: Floats, omega: Floats) -> Floats:

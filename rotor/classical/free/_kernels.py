@@ -12,25 +12,17 @@ import numpy as np
 from numba import njit
 
 from rotor.arrays import Floats
+from rotor.classical._kernels import two_product, two_sum
 from rotor.classical.free.theta import CIRCULATING, SEPARATRIX, STEADY, Rows
-
-SPLITTER = 134217729.0  # 2^27 + 1
+from rotor.geometry._kernels import product, to_third, vector_at
 
 
 @njit(cache=True, inline="always")
 def _phase(t: float, rate_hi: float, rate_lo: float, start_hi: float, start_lo: float) -> Any:
-    """t rate + start as an unevaluated sum of two doubles (Dekker's product, Knuth's sum)."""
-    c = SPLITTER * t
-    th = c - (c - t)
-    tl = t - th
-    c = SPLITTER * rate_hi
-    rh = c - (c - rate_hi)
-    rl = rate_hi - rh
-    p = t * rate_hi
-    e = ((th * rh - p) + th * rl + tl * rh) + tl * rl + t * rate_lo
-    s = p + start_hi
-    b = s - p
-    return s, ((p - (s - b)) + (start_hi - b)) + (e + start_lo)
+    """t rate + start as an unevaluated sum of two doubles."""
+    p, p_low = two_product(t, rate_hi)
+    s, s_low = two_sum(p, start_hi)
+    return s, s_low + ((p_low + t * rate_lo) + start_lo)
 
 
 @njit(cache=True, inline="always")
@@ -98,27 +90,12 @@ def _near_separatrix(v: float, c: Any) -> Any:
 
 
 @njit(cache=True, inline="always")
-def _product(a: Any, w: float, x: float, y: float, z: float) -> Any:
-    return (
-        a[0] * w - a[1] * x - a[2] * y - a[3] * z,
-        a[0] * x + a[1] * w + a[2] * z - a[3] * y,
-        a[0] * y - a[1] * z + a[2] * w + a[3] * x,
-        a[0] * z + a[1] * y - a[2] * x + a[3] * w,
-    )
-
-
-@njit(cache=True, inline="always")
 def _placed(left: Any, right: Any, w: float, x: float, y: float, z: float, half_turn: float, out: Any) -> None:
     """left e^{i half turn} (α, β) right at unit length."""
-    c, s = math.cos(half_turn), math.sin(half_turn)
-    w, z = c * w - s * z, c * z + s * w
-    x, y = c * x - s * y, c * y + s * x
     scale = 1.0 / math.sqrt((w * w + z * z) + (x * x + y * y))
-    w, x, y, z = _product(left, w * scale, x * scale, y * scale, z * scale)
-    out[0] = w * right[0] - x * right[1] - y * right[2] - z * right[3]
-    out[1] = w * right[1] + x * right[0] + y * right[3] - z * right[2]
-    out[2] = w * right[2] - x * right[3] + y * right[0] + z * right[1]
-    out[3] = w * right[3] + x * right[2] - y * right[1] + z * right[0]
+    about_l = (scale * math.cos(half_turn), 0.0, 0.0, scale * math.sin(half_turn))
+    q = product(product(left, product(about_l, (w, x, y, z))), right)
+    out[0], out[1], out[2], out[3] = q
 
 
 @njit(cache=True, nogil=True)
@@ -150,3 +127,12 @@ def evaluate(rows: Rows, times: Floats, momentum: Floats, attitude: Floats) -> N
             momentum[b, i, axis[1]] = sign[1] * parity * m2
             momentum[b, i, axis[2]] = sign[2] * m3
             _placed(rows.left[b], rows.right[b], w, parity * x, parity * y, z, half_turn, attitude[b, i])
+
+
+@njit(cache=True, nogil=True)
+def upright(directions: Floats) -> Floats:
+    """Rotations (n, 4) that take unit vectors (n, 3) to the third axis."""
+    out = np.empty((directions.shape[0], 4))
+    for i in range(directions.shape[0]):
+        out[i] = to_third(vector_at(directions, i))
+    return out

@@ -14,23 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats
-
-SPLITTER = 134217729.0  # 2^27 + 1, cuts a double into two halves of 26 bits
-
-
-def two_sum(a: Floats | float, b: Floats | float) -> tuple[Floats, Floats]:
-    """The rounded sum and its rounding error, exactly (Knuth)."""
-    s = np.asarray(a + b)
-    t = s - a
-    return s, np.asarray((a - (s - t)) + (b - t))
-
-
-def two_product(a: Floats | float, b: Floats | float) -> tuple[Floats, Floats]:
-    """The rounded product and its rounding error, exactly (Dekker, Veltkamp's splitting)."""
-    p = np.asarray(a * b)
-    a_high, a_low = _halves(a)
-    b_high, b_low = _halves(b)
-    return p, ((a_high * b_high - p) + a_high * b_low + a_low * b_high) + a_low * b_low
+from rotor.classical.error_free import two_product, two_sum
 
 
 @dataclass(frozen=True)
@@ -54,12 +38,12 @@ class DoubleDouble:
     @classmethod
     def product(cls, a: Floats | float, b: Floats | float) -> DoubleDouble:
         """a b of two doubles, exactly."""
-        return cls(*two_product(a, b))
+        return cls(*_arrays(two_product(a, b)))
 
     @classmethod
     def difference(cls, a: Floats | float, b: Floats | float) -> DoubleDouble:
         """a - b of two doubles, exactly."""
-        return cls(*two_sum(a, -b))
+        return cls(*_arrays(two_sum(a, -b)))
 
     def __add__(self, other: DoubleDouble | Floats | float) -> DoubleDouble:
         other = _lift(other)
@@ -87,7 +71,7 @@ class DoubleDouble:
         third = (rest - other * second).hi / other.hi
         return DoubleDouble(*_fast_two_sum(first, second)) + third
 
-    __array_ufunc__ = None  # let numpy hand array - number over to __rsub__ and its kin
+    __array_ufunc__ = None  # numpy then leaves array - number to __rsub__, __radd__, ...
 
     def __radd__(self, other: Floats | float) -> DoubleDouble:
         return self + other
@@ -144,10 +128,9 @@ def exact_sum(terms: list[Floats], passes: int = 4) -> DoubleDouble:
     return total
 
 
-def _halves(a: Floats | float) -> tuple[Floats, Floats]:
-    c = np.asarray(SPLITTER * a)
-    high = c - (c - a)
-    return high, np.asarray(a - high)
+def _arrays(pair: tuple[Floats | float, Floats | float]) -> tuple[Floats, Floats]:
+    high, low = pair
+    return np.asarray(high), np.asarray(low)
 
 
 def _fast_two_sum(a: Floats, b: Floats) -> tuple[Floats, Floats]:

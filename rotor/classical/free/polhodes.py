@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rotor.arrays import Floats
-from rotor.classical.euler import checked_moments
+from rotor.classical.euler import checked_moments, kinetic_energy
 
 
 def level(moments: ArrayLike, momentum: ArrayLike) -> Floats:
@@ -23,8 +23,8 @@ def level(moments: ArrayLike, momentum: ArrayLike) -> Floats:
     0.5
     """
     moments, momentum = _massive(moments), np.asarray(momentum, dtype=np.float64)
-    squares = (momentum / np.linalg.norm(momentum, axis=-1, keepdims=True)) ** 2
-    return np.asarray(np.sum(squares / moments, axis=-1))
+    direction = momentum / np.linalg.norm(momentum, axis=-1, keepdims=True)
+    return 2.0 * kinetic_energy(direction, direction / moments)
 
 
 def centre_axis(moments: ArrayLike, level: float) -> int:

@@ -34,7 +34,7 @@ from numpy.typing import NDArray
 from rotor.arrays import Floats
 from rotor.classical.free.double_double import PI, DoubleDouble, choose, exact_sum, products
 from rotor.classical.free.elliptic import carlson_rf, complete
-from rotor.geometry.rotations import from_matrix, multiply
+from rotor.geometry.rotations import from_matrix
 
 STEADY, CIRCULATING, NEAR_SEPARATRIX, SEPARATRIX = 0.0, 1.0, 2.0, 3.0
 TRANSFORM_BELOW = 0.2  # mc under which q' is the smaller nome for both kinds of series: q, q' stay below 0.1
@@ -176,6 +176,8 @@ def moving_rows(moments: Floats, momentum: Floats) -> Rows:
 
 def steady_rows(moments: Floats, momentum: Floats) -> Rows:
     """Rows of bodies (n, 3) whose momentum stays in the body: they turn about L at the rate 2T/|L|."""
+    from rotor.classical.free._kernels import upright
+
     squares = [DoubleDouble.product(m, m) for m in momentum.T]
     divisors = [np.where(j > 0.0, j, 1.0) for j in moments.T]  # where a moment is zero, so is the square above it
     total = squares[0] + squares[1] + squares[2]
@@ -192,7 +194,7 @@ def steady_rows(moments: Floats, momentum: Floats) -> Rows:
         axes=np.tile(np.arange(3), (n, 1)),
         signs=np.ones((n, 3)),
         left=_identities(n),
-        right=_turn_to_third(np.where(moves[:, None], momentum / g.hi[:, None], [0.0, 0.0, 1.0])),
+        right=upright(np.where(moves[:, None], momentum / g.hi[:, None], [0.0, 0.0, 1.0])),
         momentum0=momentum,
     )
 
@@ -271,15 +273,6 @@ def _rows_of_axes(frame: Frame) -> Floats:
     matrix = np.zeros((len(frame.axes), 3, 3))
     np.put_along_axis(matrix, frame.axes[:, :, None], frame.signs[:, :, None], axis=-1)
     return matrix
-
-
-def _turn_to_third(direction: Floats) -> Floats:
-    """A rotation that takes each unit vector to the third axis, after a half turn about the second if it is down."""
-    up = direction[:, 2:] >= 0.0
-    x, y, z = np.where(up, direction, direction * [-1.0, 1.0, -1.0]).T
-    half = np.sqrt(0.5 * (1.0 + z))
-    shortest = np.stack([half, y / (2.0 * half), -x / (2.0 * half), np.zeros_like(half)], axis=-1)
-    return np.where(up, shortest, multiply(shortest, [0.0, 0.0, 1.0, 0.0]))
 
 
 def _identities(n: int) -> Floats:

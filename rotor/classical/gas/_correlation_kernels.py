@@ -1,4 +1,4 @@
-"""Compiled sums behind correlation functions of a free gas: exact attitudes, one body after another, never kept.
+"""Compiled sums behind correlation functions of a free gas: exact attitudes, one body after another, never stored.
 
 Measured (`benchmarks/bench_gas.py`): 0.09 µs for one body at one time, nearly all of it the attitude; a step of 128 bodies
 side by side 0.006 µs for each. The plain forms stand in `tests/test_ensembles.py`.
@@ -13,9 +13,11 @@ import numpy as np
 from numba import njit
 
 from rotor.arrays import Floats
+from rotor.classical._kernels import symmetric_steps
 from rotor.classical.free._kernels import evaluate
 from rotor.classical.free.theta import Rows
-from rotor.classical.integrators._kernels import LANES, _conjugate, _length, _product, _to_third, _two_turns
+from rotor.classical.integrators._kernels import FINITE, LANES, ONE, _length, _upright, block_turns
+from rotor.geometry._kernels import conjugate, product
 
 
 @njit(cache=True, inline="always")
@@ -86,31 +88,27 @@ def add_stepped(
         here = min(LANES, len(momentum) - block * LANES)
         for k in range(here):
             size = _length(momentum[block * LANES + k])
-            tilt = _to_third(momentum[block * LANES + k], size)
-            row[k], row[LANES + k], row[2 * LANES + k], row[3 * LANES + k] = _product(tilt, _conjugate(turn))
+            tilt = _upright(momentum[block * LANES + k], size)
+            row[k], row[LANES + k], row[2 * LANES + k], row[3 * LANES + k] = product(tilt, conjugate(turn))
             row[4 * LANES + k], row[5 * LANES + k] = size * rates[0], size * rates[1]
-            back = _product(turn, _conjugate(tilt))
+            back = product(turn, conjugate(tilt))
             row[6 * LANES + k], row[7 * LANES + k], row[8 * LANES + k], row[9 * LANES + k] = back
             half = 0.5 * size * rates[2] * step * steps
             row[10 * LANES + k], row[11 * LANES + k] = math.cos(half), math.sin(half)
         for i in range(sums.shape[1]):
             if i > 0:
-                _two_turns(row, 0.0, 0.5 * step)
-                for _ in range(steps - 1):
-                    _two_turns(row, step, step)
-                _two_turns(row, step, 0.5 * step)
+                symmetric_steps(block_turns, row, ONE, step, steps)
                 _turn_about_l(row)
             _add_block(row, here, vector, axes, beta, sums[:, i])
 
 
-@njit(cache=True, fastmath={"contract"}, error_model="numpy")
+@njit(cache=True, fastmath=FINITE, error_model="numpy")
 def _turn_about_l(row: Floats) -> None:
     """q from the frame of L to space, times (c, 0, 0, s)."""
     for k in range(LANES):
-        w, x, y, z = row[6 * LANES + k], row[7 * LANES + k], row[8 * LANES + k], row[9 * LANES + k]
-        c, s = row[10 * LANES + k], row[11 * LANES + k]
-        row[6 * LANES + k], row[7 * LANES + k] = c * w - s * z, c * x + s * y
-        row[8 * LANES + k], row[9 * LANES + k] = c * y - s * x, c * z + s * w
+        q = row[6 * LANES + k], row[7 * LANES + k], row[8 * LANES + k], row[9 * LANES + k]
+        q = product(q, (row[10 * LANES + k], 0.0, 0.0, row[11 * LANES + k]))
+        row[6 * LANES + k], row[7 * LANES + k], row[8 * LANES + k], row[9 * LANES + k] = q
 
 
 @njit(cache=True, fastmath={"contract", "reassoc", "nsz"}, error_model="numpy")
@@ -118,10 +116,8 @@ def _add_block(row: Floats, here: int, vector: Floats, axes: Floats, beta: Float
     """Sums over the bodies of a block, seen in the frame of `add_stepped`."""
     s1 = s2 = s3 = s4 = 0.0
     for k in range(here):
-        pw, px, py, pz = row[6 * LANES + k], row[7 * LANES + k], row[8 * LANES + k], row[9 * LANES + k]
-        qw, qx, qy, qz = row[k], row[LANES + k], row[2 * LANES + k], row[3 * LANES + k]
-        w, x = pw * qw - px * qx - py * qy - pz * qz, pw * qx + px * qw + py * qz - pz * qy
-        y, z = pw * qy - px * qz + py * qw + pz * qx, pw * qz + px * qy - py * qx + pz * qw
+        p = row[6 * LANES + k], row[7 * LANES + k], row[8 * LANES + k], row[9 * LANES + k]
+        w, x, y, z = product(p, (row[k], row[LANES + k], row[2 * LANES + k], row[3 * LANES + k]))
         one, two = _turned_vector(w, x, y, z, vector), _turned_tensor(w, x, y, z, axes, beta)
         s1, s2, s3, s4 = s1 + one, s2 + one * one, s3 + two, s4 + two * two
     out[0] += s1

@@ -1,4 +1,4 @@
-"""What is known of a free gas without moving it: beginnings, whole curves of simple tops, and what is never forgotten.
+"""What is known of a free gas without moving it: short times, whole curves of simple tops, and long times.
 
 Short times (R. G. Gordon, J. Chem. Phys. 40, 1973 (1964); 41, 1819 (1964)), e a unit vector and β a tensor in principal axes:
 
@@ -11,7 +11,7 @@ Whole curves (A. G. St. Pierre and W. A. Steele, Phys. Rev. 184, 172 (1969)), τ
     spherical    C_l = [1 + 2 Σ_m g(mτ)]/(2l+1), m = 1 ... l,     g(x) = (1 - x²) exp(-x²/2)
     symmetric    the axis of the figure precesses about L: one integral over the angle between them, `symmetric_curves`.
 
-What stays: a free body turns about L for ever, so the part of u along L, averaged over the polhode, is never lost,
+Long times: a free body turns about L for ever, so the part of u along L, averaged over the polhode, never decays,
 
     C1(∞) = Σ_i e_i² <(mean of L_i/|L| over a polhode)²>:   ⅓ for a sphere, 0 for a linear molecule and along the
     intermediate axis, and for the axis that L circles B3/|L| · π/2K with the constants in the head of `theta.py`.
@@ -25,14 +25,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rotor.arrays import Floats
-from rotor.classical.euler import checked_moments, inverse_moments
+from rotor.classical.euler import checked_moments, gyroscopic_rate, inverse_moments
 
 NODES = 96  # of Gauss and Legendre's quadrature
 
 
 @dataclass(frozen=True)
 class ShortTime:
-    """Coefficients at the beginning: M2, M4 of a vector, N2 of a tensor, in 1/time², 1/time⁴, 1/time²; see the head."""
+    """Coefficients of short times: M2, M4 of a vector, N2 of a tensor, in 1/time², 1/time⁴, 1/time²; see the head."""
 
     m2: float
     m4: float
@@ -42,7 +42,7 @@ class ShortTime:
 def short_time(
     moments: ArrayLike, kt: float, vector: ArrayLike = (1.0, 0.0, 0.0), tensor: ArrayLike | None = None
 ) -> ShortTime:
-    """How C1 and C2 begin; the tensor is by default that of the vector itself, u uᵀ.
+    """C1 and C2 at short times; the tensor is by default that of the vector itself, u uᵀ.
 
     M4 = <|ü|²> with ü = ω̇ x u + ω x (ω x u), Euler's equations for ω̇, and <ω_i²> = kT/I_i.
 
@@ -81,7 +81,7 @@ def linear_curves(times: ArrayLike, moment: float, kt: float) -> tuple[Floats, F
 def spherical_curves(times: ArrayLike, moment: float, kt: float) -> tuple[Floats, Floats]:
     """C1 of any vector and C2 of any tensor of a spherical top.
 
-    >>> c1, c2 = spherical_curves([0.0, 1e3], 1.0, 1.0)  # and what stays
+    >>> c1, c2 = spherical_curves([0.0, 1e3], 1.0, 1.0)  # and at long times
     >>> c1.round(4).tolist(), c2.round(4).tolist()
     ([1.0, 0.3333], [1.0, 0.2])
     """
@@ -112,7 +112,7 @@ def symmetric_curves(times: ArrayLike, moment: float, moment_of_axis: float, kt:
 
 
 def plateau(moments: ArrayLike, vector: ArrayLike) -> float:
-    """C1(∞), what a free gas never forgets of a vector in principal axes; it does not depend on the temperature.
+    """C1(∞), the limit of C1 at long times, of a vector in principal axes; it does not depend on the temperature.
 
     moments: (3,), any order and unit. By quadrature over the directions of L, to about 2e-7.
 
@@ -128,13 +128,13 @@ def plateau(moments: ArrayLike, vector: ArrayLike) -> float:
     ascending = inertia[order]
     if ascending[0] == ascending[2]:
         return 1.0 / 3.0
-    kept = np.zeros(3)
-    kept[order[2]] = _kept_along_third(ascending)
-    kept[order[0]] = _kept_along_third(ascending[::-1])
-    return float(kept @ unit**2)
+    limit = np.zeros(3)
+    limit[order[2]] = _limit_along_third(ascending)
+    limit[order[0]] = _limit_along_third(ascending[::-1])
+    return float(limit @ unit**2)
 
 
-def _kept_along_third(moments: Floats) -> float:
+def _limit_along_third(moments: Floats) -> float:
     """<(mean of L3/|L|)²> over all L that circle axis 3, moments in rising or falling order.
 
     With L2/|L| = s and the angle φ in the plane of axes 1 and 3 they fill 0 < φ < atan √(I1 (I3-I2)/(I3 (I2-I1))); 1/K²
@@ -175,11 +175,17 @@ def _generators() -> Floats:
 def _fourth(moments: Floats, w: Floats, axis: int) -> float:
     """<|ü|²> of the unit vector along an axis, the third of (i, j, k) cyclic; w = <ω²>, normal deviates.
 
-    |ü|² = ω̇_i² + ω̇_j² + ω² (ω_i² + ω_j²) + 2 ω_k (ω̇_j ω_i - ω̇_i ω_j), with I ω̇_i = (I_j - I_k) ω_j ω_k, cyclic.
+    |ü|² = ω̇_i² + ω̇_j² + ω² (ω_i² + ω_j²) + 2 ω_k (ω̇_j ω_i - ω̇_i ω_j), where Euler's equations give ω̇_i = d_i ω_j ω_k, cyclic.
     """
     i, j, k = (axis + 1) % 3, (axis + 2) % 3, axis
-    inverse = inverse_moments(moments)
-    di, dj = (moments[j] - moments[k]) * inverse[i], (moments[k] - moments[i]) * inverse[j]
+    unit = np.eye(3)
+    di = _acceleration(moments, unit[j] + unit[k])[i]
+    dj = _acceleration(moments, unit[k] + unit[i])[j]
     turning = di**2 * w[j] * w[k] + dj**2 * w[k] * w[i]
     across = 3.0 * w[i] ** 2 + 3.0 * w[j] ** 2 + 2.0 * w[i] * w[j] + w[k] * (w[i] + w[j])
     return float(turning + across + 2.0 * w[k] * (dj * w[i] - di * w[j]))
+
+
+def _acceleration(moments: Floats, omega: Floats) -> Floats:
+    """ω̇ of a free body, 0 about the axis of a linear rotor."""
+    return gyroscopic_rate(moments * omega, omega) * inverse_moments(moments)

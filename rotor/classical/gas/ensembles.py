@@ -1,7 +1,7 @@
-"""A gas of free rigid molecules in thermal equilibrium: drawn exactly, moved exactly, and how fast it forgets.
+"""A gas of free rigid molecules in thermal equilibrium: sampled exactly, moved exactly, and its correlation functions.
 
-Drawn: L_i normal with variance I_i kT (`thermal.py` says why), orientations uniform, velocities normal with variance kT/m.
-Moved: by the exact free motion at any time. Forgotten: with u a vector fixed in the molecule and β a traceless tensor,
+Sampled: L_i normal with variance I_i kT (`thermal_momentum.py` says why), orientations uniform, velocities normal with variance kT/m.
+Moved: by the exact free motion at any time. Correlations: with u a vector fixed in the molecule and β a traceless tensor,
 
     C1(t) = <u(0)·u(t)>/<u²>,       C2(t) = <β(0):β(t)>/<β:β> ,
 
@@ -15,6 +15,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -70,7 +71,7 @@ class Ensemble:
         return replace(self, momentum=momentum, attitude=attitude)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Correlations(Table):
     """C1 and C2 at n times with the standard errors of their means; c1 or c2 is None where it was not asked for.
 
@@ -87,6 +88,11 @@ class Correlations(Table):
 
     def __len__(self) -> int:
         return len(self.times)
+
+    @property
+    def provenance(self) -> dict[str, Any]:
+        """How many molecules were averaged over, and the number of times."""
+        return {"molecules": self.molecules, "rows": len(self)}
 
     @property
     def columns(self) -> dict[str, Floats]:
@@ -109,7 +115,7 @@ class Probe:
     def of(cls, vector: ArrayLike | None, tensor: ArrayLike | None) -> Probe:
         """From a vector and a symmetric tensor in principal axes, of any size; of the tensor its anisotropic part counts."""
         if vector is None and tensor is None:
-            raise ValueError("a vector or a tensor fixed in the molecule is wanted, or both")
+            raise ValueError("expected a vector or a tensor fixed in the molecule, or both; got neither")
         unit, axes, beta = np.array([1.0, 0.0, 0.0]), np.eye(3), np.array([2.0, -1.0, -1.0]) / np.sqrt(6.0)
         if vector is not None:
             unit = np.asarray(vector, dtype=np.float64)
@@ -131,9 +137,9 @@ def thermal_momenta(moments: ArrayLike, kt: float, size: int, *, rng: np.random.
     """
     inertia = np.asarray(moments, dtype=np.float64)
     if inertia.shape != (3,):
-        raise ValueError(f"the three moments of one kind of molecule are wanted; got shape {inertia.shape}")
+        raise ValueError(f"expected the three moments of one kind of molecule; got shape {inertia.shape}")
     if not kt > 0.0 or not np.isfinite(kt):
-        raise ValueError(f"kT = {kt}: a finite energy above 0 is wanted")
+        raise ValueError(f"kT = {kt}: expected a finite energy above 0")
     turns = rotating_axes(inertia)
     return np.asarray(rng.standard_normal((size, 3)) * np.sqrt(np.where(turns, inertia * kt, 0.0)))
 
@@ -150,7 +156,7 @@ def thermal_ensemble(
     momentum = thermal_momenta(moments, kt, size, rng=rng)
     attitude = uniform(size, rng=rng)
     if mass is not None and not mass > 0.0:
-        raise ValueError(f"mass {mass}: a number above 0 is wanted")
+        raise ValueError(f"mass {mass}: expected a number above 0")
     velocity = None if mass is None else rng.standard_normal((size, 3)) * np.sqrt(kt / mass)
     return Ensemble(np.asarray(moments, dtype=np.float64), kt, momentum, attitude, mass, velocity)
 
@@ -205,14 +211,14 @@ def stepped_gas_correlations(
     executor: ThreadPoolExecutor | None = None,
     progress: Callable[[int], object] | None = None,
 ) -> Correlations:
-    """The same at times 0, interval, ... (count of them), by `steps` steps of the splitting of `many.py` each.
+    """The same at times 0, interval, ... (count of them), by `steps` steps of the splitting of `strang.py` each.
 
     The error of an attitude grows as step² times the time; with the same `rng` the molecules are the same as in
     `free_gas_correlations`, so that the difference of both is the error of stepping alone.
     """
     inertia, probe = checked_moments(moments), Probe.of(vector, tensor)
     if count < 1 or steps < 1:
-        raise ValueError(f"{count} times with {steps} steps between them: whole numbers of 1 or more are wanted")
+        raise ValueError(f"{count} times with {steps} steps between them: expected whole numbers of 1 or more")
     grid = _checked_times(interval * np.arange(count))
     rates, turn = rates_and_axes(inertia)
     vector_there, axes_there = rotate(turn[0], probe.vector), np.ascontiguousarray(rotate(turn[0], probe.axes))
@@ -238,9 +244,9 @@ def _averaged(
     executor: ThreadPoolExecutor | None,
     progress: Callable[[int], object] | None,
 ) -> Correlations:
-    """Means and standard errors over all pieces, summed in their order whoever made them."""
+    """Means and standard errors over all pieces, summed in their order, whichever thread made them."""
     if molecules < 2:
-        raise ValueError(f"{molecules} molecules: two or more are wanted, for a mean with an error")
+        raise ValueError(f"{molecules} molecules: expected two or more, for a mean with an error")
     sizes = [min(PIECE, molecules - start) for start in range(0, molecules, PIECE)]
     sources = rng.spawn(len(sizes))
     results = map(piece, sizes, sources) if executor is None else executor.map(piece, sizes, sources)
@@ -267,7 +273,7 @@ def _error(mean: Floats, square: Floats, n: int) -> Floats:
 def _checked_times(times: ArrayLike) -> Floats:
     grid = np.ascontiguousarray(times, dtype=np.float64)
     if grid.ndim != 1 or not grid.size or not np.isfinite(grid).all():
-        raise ValueError(f"times of shape {grid.shape}: finite numbers (n,) are wanted")
+        raise ValueError(f"times of shape {grid.shape}: expected finite numbers (n,)")
     return grid
 
 

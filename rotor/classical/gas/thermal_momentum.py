@@ -1,7 +1,7 @@
-"""How fast heat spins a body, and how a molecule is thrown so that its intermediate axis shows.
+"""Thermal angular momentum of a body, and a start near its intermediate axis.
 
 In a classical canonical ensemble the three components of L in principal axes are independent normal deviates of
-variance I_i kT: the Hamiltonian is Σ L_i²/2I_i, and the measure of phase space, d³L times that of orientations, knows
+variance I_i kT: the Hamiltonian is Σ L_i²/2I_i, and the measure of phase space, d³L times that of orientations, has
 no other weight (Landau and Lifshitz, Statistical Physics, section 51). A linear rotor has no L along its axis.
 """
 
@@ -50,7 +50,7 @@ def off_intermediate_axis(moments: ArrayLike, momentum: float, tilt_rad: float) 
     """
     moments = checked_moments(moments)
     if moments.shape != (3,):
-        raise ValueError(f"the three moments of one body are wanted; got shape {moments.shape}")
+        raise ValueError(f"expected the three moments of one body; got shape {moments.shape}")
     between = np.argsort(moments, kind="stable")[1]
     aside = np.where(moments > 0.0, 1.0, 0.0)
     aside[between] = 0.0

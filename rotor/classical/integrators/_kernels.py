@@ -1,7 +1,7 @@
 """Compiled free steps of very many tops: blocks of 128 bodies side by side, written so that they vectorise.
 
 A block is six runs of 128 numbers in one array: the quaternion w, x, y, z that takes the body to a frame whose third
-axis is L, and the rates of two turns. The offsets between the runs are constants of the program, so the compiler knows
+axis is L, and the rates of two turns. The offsets between the runs are constants of the program, so the compiler sees
 that they do not overlap and handles four or eight bodies with one instruction; sine and cosine are polynomials for the
 same reason. A step is some sixty multiplications and additions; L itself is written nowhere, it is R^T (0, 0, |L|).
 """
@@ -15,9 +15,13 @@ import numpy as np
 from numba import njit
 
 from rotor.arrays import Floats
+from rotor.classical._kernels import symmetric_steps
+from rotor.geometry._kernels import conjugate, half_third_row, matrix, product, to_third
 
+ONE = (1.0,)  # fractions of a step of order 2
 LANES = 128
 RUNS = 6
+FINITE = {"contract", "nnan", "ninf", "nsz"}  # products with the zeros of a quaternion are left out
 WIDEST_TURN = 0.5  # rad per step: half of it is the largest argument of the polynomials below
 
 
@@ -30,35 +34,18 @@ def _sine_cosine(x: Any) -> Any:
     return x - x * y * s, 1.0 - y * c
 
 
-@njit(cache=True, fastmath={"contract"}, error_model="numpy")
-def _two_turns(row: Floats, inner: float, outer: float) -> None:
-    """The turn about body axis 2 by inner x rate x L2, then that about axis 1: q becomes q exp(½ angle e)."""
+@njit(cache=True, fastmath=FINITE, error_model="numpy")
+def block_turns(row: Floats, inner: float, outer: float) -> None:
+    """The inner turn of a block, about axis 2 of its frame, then the outer one, about axis 1: q becomes q exp(½ angle e).
+
+    With L along the third axis of the space frame, L2 = 2 |L| (yz + wx) and L1 = 2 |L| (xz - wy).
+    """
     for i in range(LANES):
-        w, x, y, z = row[i], row[LANES + i], row[2 * LANES + i], row[3 * LANES + i]
-        s, c = _sine_cosine(inner * row[4 * LANES + i] * (y * z + w * x))  # L2 = 2|L| (yz + wx)
-        w, x, y, z = c * w - s * y, c * x - s * z, c * y + s * w, c * z + s * x
-        s, c = _sine_cosine(outer * row[5 * LANES + i] * (x * z - w * y))  # L1 = 2|L| (xz - wy)
-        row[i], row[LANES + i], row[2 * LANES + i], row[3 * LANES + i] = (
-            c * w - s * x,
-            c * x + s * w,
-            c * y + s * z,
-            c * z - s * y,
-        )
-
-
-@njit(cache=True, inline="always")
-def _product(p: Any, q: Any) -> Any:
-    return (
-        p[0] * q[0] - p[1] * q[1] - p[2] * q[2] - p[3] * q[3],
-        p[0] * q[1] + p[1] * q[0] + p[2] * q[3] - p[3] * q[2],
-        p[0] * q[2] - p[1] * q[3] + p[2] * q[0] + p[3] * q[1],
-        p[0] * q[3] + p[1] * q[2] - p[2] * q[1] + p[3] * q[0],
-    )
-
-
-@njit(cache=True, inline="always")
-def _conjugate(q: Any) -> Any:
-    return q[0], -q[1], -q[2], -q[3]
+        q = row[i], row[LANES + i], row[2 * LANES + i], row[3 * LANES + i]
+        s, c = _sine_cosine(inner * row[4 * LANES + i] * half_third_row(q)[1])
+        q = product(q, (c, 0.0, s, 0.0))
+        s, c = _sine_cosine(outer * row[5 * LANES + i] * half_third_row(q)[0])
+        row[i], row[LANES + i], row[2 * LANES + i], row[3 * LANES + i] = product(q, (c, s, 0.0, 0.0))
 
 
 @njit(cache=True, inline="always")
@@ -71,13 +58,9 @@ def _length(v: Any) -> Any:
 
 
 @njit(cache=True, inline="always")
-def _to_third(v: Any, size: float) -> Any:
-    """A rotation that takes v of length `size` to the third axis; by way of a half turn about the second if v is down."""
-    x, y, z = (v[0] / size, v[1] / size, v[2] / size) if size > 0.0 else (0.0, 0.0, 1.0)
-    half = math.sqrt(0.5 * (1.0 + abs(z)))
-    if z >= 0.0:
-        return half, 0.5 * y / half, -0.5 * x / half, 0.0
-    return -0.5 * x / half, 0.0, half, 0.5 * y / half
+def _upright(v: Any, size: float) -> Any:
+    """A rotation that takes v of length `size` to the third axis."""
+    return to_third((v[0] / size, v[1] / size, v[2] / size) if size > 0.0 else (0.0, 0.0, 1.0))
 
 
 @njit(cache=True, nogil=True, fastmath={"contract"}, error_model="numpy")
@@ -94,21 +77,20 @@ def advance_blocks(blocks: Any, step: float, steps: int, rates: Floats, axes: Fl
         for i in range(count):
             body = begin + i
             size[i] = _length(momentum[body])
-            tilt = _to_third(momentum[body], size[i])
-            row[i], row[LANES + i], row[2 * LANES + i], row[3 * LANES + i] = _product(tilt, _conjugate(axes[body]))
+            tilt = _upright(momentum[body], size[i])
+            row[i], row[LANES + i], row[2 * LANES + i], row[3 * LANES + i] = product(tilt, conjugate(axes[body]))
             row[4 * LANES + i], row[5 * LANES + i] = size[i] * rates[body, 0], size[i] * rates[body, 1]
             half = 0.5 * size[i] * rates[body, 2] * step * steps
             about_l = (math.cos(half), 0.0, 0.0, math.sin(half))
-            left[i] = _product(_product(attitude[body], _conjugate(tilt)), about_l)
-        _two_turns(row, 0.0, 0.5 * step)
-        for _ in range(steps - 1):
-            _two_turns(row, step, step)
-        _two_turns(row, step, 0.5 * step)
+            left[i] = product(product(attitude[body], conjugate(tilt)), about_l)
+        symmetric_steps(block_turns, row, ONE, step, steps)
         for i in range(count):
             body = begin + i
-            q = _product((row[i], row[LANES + i], row[2 * LANES + i], row[3 * LANES + i]), axes[body])
-            w, x, y, z = q
-            new_momentum[body, 0] = 2.0 * size[i] * (x * z - w * y)
-            new_momentum[body, 1] = 2.0 * size[i] * (y * z + w * x)
-            new_momentum[body, 2] = size[i] * ((w * w - x * x) + (z * z - y * y))
-            new_attitude[body] = _product(left[i], q)
+            q = product((row[i], row[LANES + i], row[2 * LANES + i], row[3 * LANES + i]), axes[body])
+            l1, l2, l3 = matrix(q)[2]
+            new_momentum[body, 0], new_momentum[body, 1], new_momentum[body, 2] = (
+                size[i] * l1,
+                size[i] * l2,
+                size[i] * l3,
+            )
+            new_attitude[body] = product(left[i], q)

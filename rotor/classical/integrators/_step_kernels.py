@@ -17,58 +17,23 @@ import numpy as np
 from numba import njit
 
 from rotor.arrays import Floats
+from rotor.classical._kernels import halves, remainders, symmetric_steps, two_product, two_square, two_sum
+from rotor.geometry._kernels import cross, exponential, product
 
 NEWTON_SWEEPS = 40
-SPLITTER = 134217729.0  # 2^27 + 1
 
 
 @njit(cache=True, inline="always")
 def _add(row: Any, lost: Any, i: int, increment: float) -> None:
-    old = row[i]
-    y = increment + lost[i]
-    s = old + y
-    b = s - old
-    lost[i] = (old - (s - b)) + (y - b)
-    row[i] = s
-
-
-@njit(cache=True, inline="always")
-def _halves(x: float) -> Any:
-    """x as the sum of a number of 26 bits and the rest (Veltkamp)."""
-    t = SPLITTER * x
-    high = t - (t - x)
-    return high, x - high
-
-
-@njit(cache=True, inline="always")
-def _product(a: float, b: float) -> Any:
-    """a b as the sum of two doubles (Dekker)."""
-    (ah, al), (bh, bl), p = _halves(a), _halves(b), a * b
-    return p, ((ah * bh - p) + ah * bl + al * bh) + al * bl
-
-
-@njit(cache=True, inline="always")
-def _sum(a: float, b: float) -> Any:
-    """a + b as the sum of two doubles (Knuth)."""
-    s = a + b
-    t = s - a
-    return s, (a - (s - t)) + (b - t)
-
-
-@njit(cache=True, inline="always")
-def _square(x: float) -> Any:
-    """x² as the sum of two doubles."""
-    high, low = _halves(x)
-    p = x * x
-    return p, ((high * high - p) + 2.0 * high * low) + low * low
+    row[i], lost[i] = two_sum(row[i], increment + lost[i])
 
 
 @njit(cache=True, inline="always")
 def _squared_length(x: float, y: float, z: float) -> Any:
     """x² + y² + z² as the sum of two doubles."""
-    (a, al), (b, bl), (c, cl) = _square(x), _square(y), _square(z)
-    s, rest = _sum(a, b)
-    total, more = _sum(s, c)
+    (a, al), (b, bl), (c, cl) = two_square(x), two_square(y), two_square(z)
+    s, rest = two_sum(a, b)
+    total, more = two_sum(s, c)
     return total, (rest + more) + (al + bl + cl)
 
 
@@ -76,7 +41,7 @@ def _squared_length(x: float, y: float, z: float) -> Any:
 def _versed(square: float, square_low: float, cosine: float) -> Any:
     """v + l = 1 - cosine with (1 - v - l)² + sine² = 1, from the sine's square in two doubles and a rounded cosine."""
     v = square / (1.0 + cosine) if cosine > 0.0 else 1.0 - cosine
-    v2, v2_low = _square(v)
+    v2, v2_low = two_square(v)
     rest = ((square - 2.0 * v) + v2) + (v2_low + square_low)
     return v, rest / (2.0 * cosine) if cosine > 0.1 else 0.0
 
@@ -84,8 +49,8 @@ def _versed(square: float, square_low: float, cosine: float) -> Any:
 @njit(cache=True, inline="always")
 def _turn_momentum(row: Any, lost: Any, a: int, b: int, sine: float, cosine: float) -> None:
     """Components a, b of L as seen from a body that turns about the third axis."""
-    square, square_low = _square(sine)
-    v, low = _versed(square, square_low, cosine)
+    sine2, sine2_low = two_square(sine)
+    v, low = _versed(sine2, sine2_low, cosine)
     ma, mb = row[a], row[b]
     lost[a] -= low * ma
     lost[b] -= low * mb
@@ -96,15 +61,15 @@ def _turn_momentum(row: Any, lost: Any, a: int, b: int, sine: float, cosine: flo
 @njit(cache=True, inline="always")
 def _turn_attitude(row: Any, lost: Any, cosine: float, x: float, y: float, z: float) -> None:
     """q (cosine, x, y, z), added as an increment."""
-    square, square_low = _squared_length(x, y, z)
-    v, low = _versed(square, square_low, cosine)
-    qw, qx, qy, qz = row[3], row[4], row[5], row[6]
+    sine2, sine2_low = _squared_length(x, y, z)
+    v, low = _versed(sine2, sine2_low, cosine)
+    change = product((row[3], row[4], row[5], row[6]), (-v, x, y, z))
     for i in range(3, 7):
         lost[i] -= low * row[i]
-    _add(row, lost, 3, -v * qw - qx * x - qy * y - qz * z)
-    _add(row, lost, 4, -v * qx + qw * x + qy * z - qz * y)
-    _add(row, lost, 5, -v * qy + qw * y + qz * x - qx * z)
-    _add(row, lost, 6, -v * qz + qw * z + qx * y - qy * x)
+    _add(row, lost, 3, change[0])
+    _add(row, lost, 4, change[1])
+    _add(row, lost, 5, change[2])
+    _add(row, lost, 6, change[3])
 
 
 @njit(cache=True, inline="always")
@@ -121,7 +86,8 @@ def _turn_about(row: Any, lost: Any, x: float, y: float, z: float) -> None:
     """The body turns by the rotation vector (x, y, z), L staying where it is in the body."""
     half = 0.5 * math.sqrt(x * x + y * y + z * z)
     scale = 0.5 * math.sin(half) / half if half > 0.0 else 0.5
-    _turn_attitude(row, lost, math.cos(half), scale * x, scale * y, scale * z)
+    c, x, y, z = exponential(math.cos(half), scale, (x, y, z))
+    _turn_attitude(row, lost, c, x, y, z)
 
 
 @njit(cache=True, nogil=True)
@@ -140,25 +106,25 @@ def rotations(state: Floats, carry: Floats, inverse: Floats, step: float, fracti
                 _turn(row, lost, 0, 1, 2, 0.5 * h * i0 * row[0])
 
 
+@njit(cache=True, inline="always")
+def _turns(body: Any, inner: float, outer: float) -> None:
+    """The inner turn of one body for a time, then the outer one; body = row, lost, rates and axes of (outer, inner)."""
+    row, lost, (outer_rate, inner_rate), (a, b) = body
+    if inner != 0.0:
+        _turn(row, lost, b, (b + 1) % 3, (b + 2) % 3, inner * inner_rate * row[b])
+    _turn(row, lost, a, (a + 1) % 3, (a + 2) % 3, outer * outer_rate * row[a])
+
+
 @njit(cache=True, nogil=True)
 def symmetric(
     state: Floats, carry: Floats, inverse: Floats, axes: Any, step: float, fractions: Floats, steps: int
 ) -> None:
-    """Strang steps of half an outer turn, an inner turn, half an outer turn; axes (n, 3) of (outer, inner, sphere).
-
-    The flow of the sphere commutes with the turns: it is made at the end, for all steps at once.
-    """
+    """Steps of `strang.py` of each body; axes (n, 3) of (outer, inner, sphere)."""
     for body in range(state.shape[0]):
         row, lost = state[body], carry[body]
         a, b, equal = axes[body, 0], axes[body, 1], inverse[body, axes[body, 2]]
-        outer, inner = inverse[body, a] - equal, inverse[body, b] - equal
-        a1, a2, b1, b2 = (a + 1) % 3, (a + 2) % 3, (b + 1) % 3, (b + 2) % 3
-        for _ in range(steps):
-            for fraction in fractions:
-                h = fraction * step
-                _turn(row, lost, a, a1, a2, 0.5 * h * outer * row[a])
-                _turn(row, lost, b, b1, b2, h * inner * row[b])
-                _turn(row, lost, a, a1, a2, 0.5 * h * outer * row[a])
+        rates = remainders(inverse[body, a], inverse[body, b], equal)
+        symmetric_steps(_turns, (row, lost, rates, (a, b)), fractions, step, steps)
         whole = steps * step * equal
         _turn_about(row, lost, whole * row[0], whole * row[1], whole * row[2])
 
@@ -189,9 +155,9 @@ def _correction(a: Any, f: Any) -> Any:
 @njit(cache=True, inline="always")
 def _residual(m: Any, lost: Any, j: Any, d: Any, x: Any) -> Any:
     """(1 + |x|²) (m + lost) + d (x2 x3, x3 x1, x1 x2) - j x for x of 26 bits: products exact, 1e-16 of the difference."""
-    (s, s_low), square = _sum(x[0] * x[0], x[1] * x[1]), x[2] * x[2]
-    s, s_rest = _sum(s, square)
-    n, n_low = _sum(1.0, s)
+    (s, s_low), square = two_sum(x[0] * x[0], x[1] * x[1]), x[2] * x[2]
+    s, s_rest = two_sum(s, square)
+    n, n_low = two_sum(1.0, s)
     n_low += s_low + s_rest
     return (
         _row_residual(m[0], lost[0], j[0], d[0], n, n_low, x[0], x[1] * x[2]),
@@ -202,8 +168,8 @@ def _residual(m: Any, lost: Any, j: Any, d: Any, x: Any) -> Any:
 
 @njit(cache=True, inline="always")
 def _row_residual(m: float, lost: float, j: float, d: float, n: float, n_low: float, x: float, xx: float) -> Any:
-    (p, p_low), (q, q_low), (r, r_low) = _product(n, m), _product(d, xx), _product(j, x)
-    s, s_low = _sum(p, q)
+    (p, p_low), (q, q_low), (r, r_low) = two_product(n, m), two_product(d, xx), two_product(j, x)
+    s, s_low = two_sum(p, q)
     return (s - r) + (s_low + ((p_low + q_low) - r_low) + (n_low * m + n * lost))
 
 
@@ -233,7 +199,7 @@ def _refined(m: Any, lost: Any, j: Any, d: Any, near: Any) -> Any:
     where its residual f is known to 24 digits, and the rest r solves a r + |r|² m + d (r2 r3, r3 r1, r1 r2) = -f, a the
     slopes at x: the equation is quadratic, there are no further terms.
     """
-    x = (_halves(near[0])[0], _halves(near[1])[0], _halves(near[2])[0])
+    x = (halves(near[0])[0], halves(near[1])[0], halves(near[2])[0])
     a, f = _slopes(m, j, d, x), _residual(m, lost, j, d, x)
     r = _correction(a, f)
     s = r[0] * r[0] + r[1] * r[1] + r[2] * r[2]
@@ -247,18 +213,14 @@ def _refined(m: Any, lost: Any, j: Any, d: Any, near: Any) -> Any:
 def _cayley(row: Any, lost: Any, x: Any) -> None:
     """The body turns by the quaternion (1, x)/√(1 + |x|²), L staying where it is in space."""
     square, square_low = _squared_length(x[0], x[1], x[2])
-    m1, m2, m3 = row[0], row[1], row[2]
-    y1, y2, y3 = x[1] * m3 - x[2] * m2, x[2] * m1 - x[0] * m3, x[0] * m2 - x[1] * m1
+    y = cross(x, (row[0], row[1], row[2]))
+    back = cross(x, y)
     push = 2.0 / (1.0 + square)
-    z1, z2, z3 = x[1] * y3 - x[2] * y2 - y1, x[2] * y1 - x[0] * y3 - y2, x[0] * y2 - x[1] * y1 - y3
-    product, product_low = _product(push, square)
-    low = (((2.0 - push) - product) - product_low - push * square_low) / (1.0 + square)
-    lost[0] += low * z1
-    lost[1] += low * z2
-    lost[2] += low * z3
-    _add(row, lost, 0, push * z1)
-    _add(row, lost, 1, push * z2)
-    _add(row, lost, 2, push * z3)
+    p, p_low = two_product(push, square)
+    low = (((2.0 - push) - p) - p_low - push * square_low) / (1.0 + square)
+    for i in range(3):
+        lost[i] += low * (back[i] - y[i])
+        _add(row, lost, i, push * (back[i] - y[i]))
     scale = 1.0 / math.sqrt(1.0 + square)
     _turn_attitude(row, lost, scale, scale * x[0], scale * x[1], scale * x[2])
 
@@ -267,17 +229,14 @@ def _cayley(row: Any, lost: Any, x: Any) -> None:
 def _nudge(row: Any, lost: Any, x: Any, low: Any) -> None:
     """What x + low turns beyond x: (1, x + low) is (1, x) (1, e) at another length, e = (low - x × low)/(1 + |x|²)."""
     scale = 1.0 / (1.0 + (x[0] * x[0] + x[1] * x[1] + x[2] * x[2]))
-    e1 = scale * (low[0] - x[1] * low[2] + x[2] * low[1])
-    e2 = scale * (low[1] - x[2] * low[0] + x[0] * low[2])
-    e3 = scale * (low[2] - x[0] * low[1] + x[1] * low[0])
-    m1, m2, m3, w, q1, q2, q3 = row
-    lost[0] += 2.0 * (m2 * e3 - m3 * e2)
-    lost[1] += 2.0 * (m3 * e1 - m1 * e3)
-    lost[2] += 2.0 * (m1 * e2 - m2 * e1)
-    lost[3] -= q1 * e1 + q2 * e2 + q3 * e3
-    lost[4] += w * e1 + q2 * e3 - q3 * e2
-    lost[5] += w * e2 + q3 * e1 - q1 * e3
-    lost[6] += w * e3 + q1 * e2 - q2 * e1
+    t = cross(x, low)
+    e = (scale * (low[0] - t[0]), scale * (low[1] - t[1]), scale * (low[2] - t[2]))
+    of_momentum = cross((row[0], row[1], row[2]), e)
+    of_attitude = product((row[3], row[4], row[5], row[6]), (0.0, e[0], e[1], e[2]))
+    for i in range(3):
+        lost[i] += 2.0 * of_momentum[i]
+    for i in range(4):
+        lost[3 + i] += of_attitude[i]
 
 
 @njit(cache=True, nogil=True)
@@ -319,14 +278,13 @@ def turn_uniformly(state: Floats, carry: Floats, vectors: Floats) -> None:
         if angle == 0.0:
             continue
         sine = math.sin(angle)
-        square, square_low = _square(sine)
-        v, _ = _versed(square, square_low, math.cos(angle))
-        x, y, z = x / angle, y / angle, z / angle
-        m1, m2, m3 = row[0], row[1], row[2]
-        u1, u2, u3 = m2 * z - m3 * y, m3 * x - m1 * z, m1 * y - m2 * x
-        _add(row, lost, 0, sine * u1 + v * (u2 * z - u3 * y))
-        _add(row, lost, 1, sine * u2 + v * (u3 * x - u1 * z))
-        _add(row, lost, 2, sine * u3 + v * (u1 * y - u2 * x))
+        sine2, sine2_low = two_square(sine)
+        v, _ = _versed(sine2, sine2_low, math.cos(angle))
+        n = (x / angle, y / angle, z / angle)
+        across = cross((row[0], row[1], row[2]), n)
+        inward = cross(across, n)
+        for i in range(3):
+            _add(row, lost, i, sine * across[i] + v * inward[i])
 
 
 @njit(cache=True, nogil=True)

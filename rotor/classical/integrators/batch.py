@@ -11,10 +11,10 @@ axis 1, neighbouring halves merged: two turns a step. Axis 1 is that of the larg
 h²(2 r1 r2² + r1² r2)/24 in magnitude, r the rates of the remainders, thirty times less in the median than that of turns
 about three axes, and zero for spheres, symmetric tops and linear rotors. These are the steps of order 2 of
 `SymmetricTopSplitting`, without compensated sums. L is not stepped: in space it stays as it is, and the body sees it
-through the attitude, so L in space is kept by construction; |L| in the body is as good as |q|², which is never
+through the attitude, so L in space is conserved by construction; |L| in the body is as good as |q|², which is never
 renormalised and wanders by rounding, about 1e-16 √steps; rates rounded to double cost up to 2e-16 of the angle turned, far
 below the error of the step. The energy stays bounded. Where the exact state at a few times
-is wanted, `free.free_motion` is cheaper still.
+is needed, `free.free_motion` is cheaper still.
 
 Sources: the split into flows of rotations is that of `splitting.py`; that |L|² is a Casimir of the bracket of Euler's
 equations: J. E. Marsden and T. S. Ratiu, Introduction to Mechanics and Symmetry, chapter 15.
@@ -35,7 +35,7 @@ from rotor.classical.system import acting_inverse
 from rotor.geometry.rotations import from_matrix, normalised
 
 
-def advance(
+def propagate(
     moments: ArrayLike,
     momentum: ArrayLike,
     attitude: ArrayLike,
@@ -49,7 +49,7 @@ def advance(
     negative. The two turns of a step, (1/I_i - 1/I3) |L| step, may not be wider than ½ rad for any body. Threads of
     `executor` share the bodies (the compiled loop releases the interpreter lock).
 
-    >>> momentum, attitude = advance([0.6, 0.8, 1.0], np.array([[1.8, 0.4, -0.9]]), [1, 0, 0, 0], 0.01, 1000)
+    >>> momentum, attitude = propagate([0.6, 0.8, 1.0], np.array([[1.8, 0.4, -0.9]]), [1, 0, 0, 0], 0.01, 1000)
     >>> momentum[0].round(4).tolist()  # exact: 1.76596, -0.69546, 0.77955
     [1.766, -0.6955, 0.7796]
     """

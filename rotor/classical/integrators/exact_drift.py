@@ -1,6 +1,6 @@
 """The exact free motion between kicks of the torques.
 
-Order: free motion is exact at any time, without steps; with torques 2, or 4, 6, 8 by composition. Keeps: |L| and L in
+Order: free motion is exact at any time, without steps; with torques 2, or 4, 6, 8 by composition. Conserves: |L| and L in
 space between kicks, the free energy, the symplectic form, time reversal. Cost: with torques each drift prepares the
 closed form anew for the momentum that the kick left, about 20 ms for up to some hundred bodies; it pays only where
 torques are so weak that steps are many periods long.

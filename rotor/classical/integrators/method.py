@@ -1,6 +1,6 @@
-"""Motions of rigid bodies under effects, step by step: the face that every integrator shows, and how to choose one.
+"""Motions of rigid bodies under effects, step by step: the interface of every integrator, and how to choose one.
 
-| method | order | keeps | for |
+| method | order | conserves | for |
 |---|---|---|---|
 | `ExactDrift` | free: exact; with torques 2 to 8 | symplectic, L in space | free motion at any time; weak torques |
 | `MoserVeselov` | free: 2 to 8, or exact; with torques 2 to 8 | L in space, free energy | free motion by steps |
@@ -86,9 +86,8 @@ def integrate(
     q0 = np.broadcast_to(attitude0, (*shape, 4)).reshape(-1, 4)
     momentum, attitude, steps = method.states(system, m0, q0, times)
     _check_finite(momentum, times, method)
-    omega = np.stack([system.omega(float(t), m) for t, m in zip(times, momentum, strict=True)])
-    triples = zip(times, momentum, attitude, strict=True)
-    energy = np.stack([system.energy(float(t), m, q) for t, m, q in triples])
+    rows = [(float(t), m, q) for t, m, q in zip(times, momentum, attitude, strict=True)]
+    omega, energy = np.stack([system.omega(*row) for row in rows]), np.stack([system.energy(*row) for row in rows])
     momentum, attitude, omega, energy = (_bodies_first(a, shape) for a in (momentum, attitude, omega, energy))
     return Motion(times, momentum, attitude, omega, energy, steps)
 
@@ -124,6 +123,10 @@ class KickDrift(Method):
             raise ValueError(
                 f"{type(self).__name__} kicks with torques of attitude and time; a torque that depends on angular "
                 "velocity (drag, feedback) needs LieRungeKutta"
+            )
+        if system.added:
+            raise ValueError(
+                f"{type(self).__name__} drifts with moments along fixed axes; added inertia (rolling) needs LieRungeKutta"
             )
         state = rows(momentum, attitude)
         carry, out, taken = np.zeros_like(state), [state.copy()], 0

@@ -1,8 +1,8 @@
 """Splitting of the free Hamiltonian into flows that are rotations: three axes, or a sphere and two axes.
 
-Order: 2, and 4, 6, 8 by composition (`compositions.py`). Keeps: the symplectic form, |L| and L in space, the length of
+Order: 2, and 4, 6, 8 by composition (`compositions.py`). Conserves: the symplectic form, |L| and L in space, the length of
 the quaternion, time reversal; the energy to the order of the step, without drift. Cost of one step of order 2 of one
-body on one core, with compensated sums: about 0.2 µs; without them, in blocks of bodies (`many.py`), 0.002 µs.
+body on one core, with compensated sums: about 0.2 µs; without them, in blocks of bodies (`batch.py`), 0.002 µs.
 Order 4, 6, 8 cost 5, 9, 17 times as much.
 
 Sources: J. Touma and J. Wisdom, Astron. J. 107, 1189 (1994); S. Reich, Fields Inst. Commun. 10, 181 (1996);
@@ -49,7 +49,7 @@ class SymmetricTopSplitting(Composed):
     """The sphere of the intermediate moment, and a turn for what each of the other two axes has beyond it.
 
     H = L²/2I_m + ½ (1/I_a - 1/I_m) L_a² + ½ (1/I_b - 1/I_m) L_b²; the sphere's flow commutes with the others (see
-    `many.py`), so that with the larger remainder it is a symmetric top, solved exactly, and the smaller is alone in the
+    `strang.py`), so that with the larger remainder it is a symmetric top, solved exactly, and the smaller is alone in the
     error. Exact for spheres, linear rotors and symmetric tops.
 
     >>> from rotor.classical.integrators.method import integrate

@@ -6,7 +6,7 @@ import math
 import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from rotor.checks import require_positive
@@ -15,6 +15,7 @@ from rotor.cli.shared.output import note
 
 if TYPE_CHECKING:
     from rotor.molecules.molecule import Molecule
+    from rotor.tops.spin_constants import SpinConstants
     from rotor.tops.top import Top
 
 T = TypeVar("T")
@@ -42,6 +43,12 @@ class Input:
     dipole_abc: str | None = option(None, metavar="A,B,C", help="Dipole in principal axes (D).")
     spin_weights: str | None = option(
         None, metavar="LIST", help='Nuclear-spin weights: "ee=1,eo=3,oe=3,oo=1", "even=1,odd=3".'
+    )
+    spin_constants: str | None = option(
+        None, metavar="TEXT", help='Constants of spins: "chi_aa(14N)=-4.22 chi_bb-cc(14N)=1.1 MHz" (MHz).'
+    )
+    spins: str | None = option(
+        None, metavar="LIST", help='Sizes and order of the spins: "S=1/2 14N=1"; isotopes have their own.'
     )
     calculator: str | None = option(
         None, metavar="NAME", help="Refine the geometry with an ASE calculator of that name, such as xtb or psi4."
@@ -108,6 +115,17 @@ def temperatures(name: str, text: str) -> list[float]:
     if not all(0 < t < float("inf") for t in found):
         raise ValueError(f"{name}: {text!r}: temperatures are above 0 K")
     return found
+
+
+def whole_range(name: str, text: str) -> tuple[int, int]:
+    """First and last of a range of whole numbers, `2:5` or `3`."""
+    parts = [part.strip() for part in text.split(":")]
+    if len(parts) > 2 or not all(part.isdecimal() for part in parts):
+        raise ValueError(f"{name}: {text!r}: expected a whole number or a range of them, such as 2:5")
+    first, last = int(parts[0]), int(parts[-1])
+    if first > last:
+        raise ValueError(f"{name}: {text!r}: expected a range that rises, but {first} is above {last}")
+    return first, last
 
 
 def times(name: str, text: str | None, unit: str) -> tuple[float, ...] | None:
@@ -184,10 +202,20 @@ def read_top(given: Input) -> Top:
     if given.spin_weights is not None:
         table = weights("--spin-weights", given.spin_weights)
         top = parsed("--spin-weights", given.spin_weights, lambda _: top.with_weights(table, "given (--spin-weights)"))
+    if given.spin_constants is not None:
+        top = replace(top, spin_constants=_spin_constants(given.spin_constants, given.spins))
+    elif given.spins is not None:
+        raise ValueError("--spins: says how large the spins of --spin-constants are; give those too")
     _refuse_weights_of_another_kind(top)
     for text in top.notes:
         note(text)
     return top
+
+
+def _spin_constants(text: str, spins: str | None) -> SpinConstants:
+    from rotor.tops.spin_constants import SpinConstants
+
+    return parsed("--spin-constants", text, lambda value: SpinConstants.parse(value, spins, "given (--spin-constants)"))
 
 
 def _refuse_contradictions(given: Input) -> None:

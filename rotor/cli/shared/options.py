@@ -14,9 +14,10 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable, Sequence
 from dataclasses import MISSING, Field, field, fields, is_dataclass
-from typing import Any, get_type_hints
+from typing import Any, get_args, get_type_hints
 
 import typer
+import typer.core
 
 Command = Callable[..., None]
 
@@ -71,16 +72,18 @@ def grouped(**omitted: Sequence[str]) -> Callable[[Command], Command]:
             for name, group in groups.items()
         }
 
+        types = {name: get_type_hints(group) for name, group in groups.items()}
+
         def flat(context: typer.Context, **values: Any) -> None:
             made = {
-                name: group(**{one.name: values[one.name] for one in chosen[name]}) for name, group in groups.items()
+                name: group(**{one.name: _value(one, types[name][one.name], values[one.name]) for one in chosen[name]})
+                for name, group in groups.items()
             }
             command(context, **made)
 
         parameters = [inspect.Parameter("context", inspect.Parameter.KEYWORD_ONLY, annotation=typer.Context)]
-        for name, group in groups.items():
-            types = get_type_hints(group)
-            parameters += [_parameter(one, types[one.name]) for one in chosen[name]]
+        for name in groups:
+            parameters += [_parameter(one, types[name][one.name]) for one in chosen[name]]
         flat.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
         flat.__annotations__ = {one.name: one.annotation for one in parameters}
         flat.__doc__ = command.__doc__
@@ -94,3 +97,35 @@ def _parameter(one: Field[Any], kind: Any) -> inspect.Parameter:
     return inspect.Parameter(
         one.name, inspect.Parameter.KEYWORD_ONLY, default=one.metadata["parameter"], annotation=kind
     )
+
+
+def _value(one: Field[Any], kind: Any, given: Any) -> Any:
+    """The value of a field from what stands on the command line: text, whole or decimal number, truth, or texts."""
+    kinds = get_args(kind) or (kind,)
+    if given is None or isinstance(given, bool):
+        return given
+    if list[str] in kinds:
+        return list(given) or None
+    for number, name in ((int, "a whole number"), (float, "a number")):
+        if number in kinds:
+            try:
+                return number(given)
+            except ValueError:
+                raise ValueError(f"{name_of(one)}: {given!r}: expected {name}") from None
+    return given
+
+
+class PlainCommand(typer.core.TyperCommand):
+    """A command that passes texts on as they are; `grouped` makes numbers of them.
+
+    Typer's own conversion loads pydantic, which takes as long as numpy.
+    """
+
+    def __init__(self, *arguments: Any, **settings: Any) -> None:
+        super().__init__(*arguments, **settings)
+        for parameter in self.params:
+            parameter.process_value = _unchanged  # type: ignore[method-assign, assignment]
+
+
+def _unchanged(context: Any, value: Any) -> Any:
+    return value

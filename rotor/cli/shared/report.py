@@ -32,6 +32,16 @@ def describe(top: Top, text: str, command: str) -> dict[str, Any]:
     return {**begin(command, text), **top_facts(top)}
 
 
+def model_facts(content: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """What the model has and what it leaves out, largest first, from the keys of `rotor.quantum.limits.limit_facts`."""
+    from rotor.quantum.limits import Limit
+
+    present = [f"{one['name']} {one['size_mhz']:.2g} MHz" for one in content["effects"] if one["present"]]
+    facts = [("effects", f"at J = {content['sizes_at_j']}: " + ", ".join(present))]
+    limits = [Limit(**one).sentence for one in content["limits"]]
+    return facts + [("left out" if not i else "", sentence) for i, sentence in enumerate(limits)]
+
+
 def heading(top: Top) -> str:
     """Name, formula and kind in one line."""
     names = ", ".join(dict.fromkeys(filter(None, (top.name, formula_of(top))))) or "constants"

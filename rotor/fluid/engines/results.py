@@ -34,7 +34,7 @@ def run_engine(name: str, atoms: Any, settings: Settings, **options: Any) -> Eng
     atoms: an ase.Atoms box. options: of the engine, see `rotor.fluid.engines.openmm.frames` and
     `rotor.fluid.engines.lammps.frames`.
 
-    Raises ValueError for what the engine cannot be handed, ModuleNotFoundError where it is not installed, OSError where it
+    Raises ValueError for what the engine cannot represent, ModuleNotFoundError where it is not installed, OSError where it
     does not load, RuntimeError where it stops on its way.
     """
     scene = scene_of(atoms, settings)

@@ -1,7 +1,7 @@
 """Compiled forces between molecules: sites placed from atoms, pairs summed eight at a time, forces carried to the atoms.
 
 A molecule's neighbours are first gathered into one flat array of runs of LANES numbers (x y z and the force of each of
-their sites, side by side). The distance between the runs is a constant of the program, so the compiler knows that they
+their sites, side by side). The distance between the runs is a constant of the program, so the compiler sees that they
 do not overlap and handles eight neighbours with one instruction; a cutoff is a mask there, never a branch. Each pair is
 met once (Newton's third law), and a thread writes to its own array of forces.
 """
@@ -81,7 +81,7 @@ def carry_to_atoms(
     counts: Integers,
     out: Floats,
 ) -> None:
-    """Forces on sites as forces on the real atoms, by the weights that place the sites: force and torque are kept."""
+    """Forces on sites as forces on the real atoms, by the weights that place the sites: force and torque are conserved."""
     out[:] = 0.0
     for m in range(len(kinds)):
         kind = kinds[m]
@@ -288,7 +288,7 @@ def _add_virial(arms: Floats, rows: Floats, sites: int, n: int, totals: Floats) 
 
 @njit(cache=True, error_model="numpy")
 def _gather(rows: Floats, local: Floats, base: Integers, arms: Floats, count: int, n: int, padded: int) -> None:
-    """Sites of the neighbours, seen from the centre of the molecule in hand; forces 0; the lanes to `padded` far away."""
+    """Sites of the neighbours, seen from the centre of the present molecule; forces 0; the lanes to `padded` far away."""
     for s in range(count):
         row = rows[s * RUNS * LANES : (s + 1) * RUNS * LANES]
         step = np.uint64(3 * s)

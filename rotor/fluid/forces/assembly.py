@@ -116,14 +116,14 @@ class Assembly:
                     found = np.linalg.norm(sites_angstrom[first + s] - sites_angstrom[first + t], axis=1)
                     self._refuse_distance(kind, s, t, found, float(np.linalg.norm(real[s] - real[t])))
 
-    def _refuse_distance(self, kind: int, s: int, t: int, found: Floats, wanted: float) -> None:
-        wrong = np.flatnonzero(~(np.abs(found - wanted) <= GEOMETRY_ANGSTROM))
+    def _refuse_distance(self, kind: int, s: int, t: int, found: Floats, expected: float) -> None:
+        wrong = np.flatnonzero(~(np.abs(found - expected) <= GEOMETRY_ANGSTROM))
         if len(wrong):
             molecule = int(np.flatnonzero(self.kinds == kind)[wrong[0]])
             atoms = self.first_atom[molecule] + t, self.first_atom[molecule] + s
             raise ValueError(
                 f"molecule {molecule}: atoms {atoms[0]} and {atoms[1]} are {found[wrong[0]]:.4g} Å apart, in model "
-                f"{self.models[kind].name} {wanted:.4g} Å; the atoms of a molecule stand together, in the model's shape"
+                f"{self.models[kind].name} {expected:.4g} Å; give the atoms of a molecule one after another, in the model's shape"
             )
 
 
@@ -177,7 +177,7 @@ def assemble(atoms: Any, models: tuple[RigidModel, ...]) -> Assembly:
     if len({model.symbols for model in models}) != len(models):
         raise ValueError(f"two of the models have the same atoms: {_spelled(models)}")
     if not len(atoms):
-        raise ValueError("a box without atoms has no energy; at least one molecule is wanted")
+        raise ValueError("a box without atoms has no energy; at least one molecule is expected")
     symbols, labels = atoms.get_chemical_symbols(), atoms.arrays.get("molecule")
     kinds = np.array(_by_symbols(symbols, models) if labels is None else _by_label(symbols, labels, models))
     sizes = np.array([(len(model.symbols), len(model.sites)) for model in models])[kinds]

@@ -1,4 +1,4 @@
-"""Ewald's sum for charges in a cell with right angles: wave vectors, weights, and α and cutoffs from a wanted accuracy.
+"""Ewald's sum for charges in a cell with right angles: wave vectors, weights, and α and cutoffs from a given accuracy.
 
 E = k_e [ ½ Σ' q q erfc(αr)/r + (2π/V) Σ_k≠0 exp(-k²/4α²)/k² |S(k)|² - α/√π Σ q² - Σ_inside q q erf(αr)/r ], the
 surrounding a conductor. M. P. Allen, D. J. Tildesley, Computer Simulation of Liquids, 2nd ed. (2017), ch. 6; errors: J. Kolafa,
@@ -33,7 +33,7 @@ class EwaldParameters:
     def __post_init__(self) -> None:
         for name in ("alpha_per_angstrom", "k_cut_per_angstrom"):
             if not (math.isfinite(getattr(self, name)) and getattr(self, name) > 0):
-                raise ValueError(f"{name} = {getattr(self, name)}: a number above 0 is wanted")
+                raise ValueError(f"{name} = {getattr(self, name)}: expected a number above 0")
 
 
 def real_space_error(alpha: float, cutoff: float, charges_squared: float, count: int, volume: float) -> float:
@@ -70,11 +70,11 @@ def parameters_for(
     (0.332, 1.99)
     """
     if not 1e-14 < tolerance < 1:
-        raise ValueError(f"tolerance = {tolerance}: a relative error of forces between 1e-14 and 1 is wanted")
-    wanted = tolerance * COULOMB_EV_ANGSTROM
+        raise ValueError(f"tolerance = {tolerance}: expected a relative error of forces between 1e-14 and 1")
+    expected = tolerance * COULOMB_EV_ANGSTROM
     numbers = (float(np.sum(charges_e**2)), len(charges_e), float(np.prod(lengths_angstrom)))
-    alpha = _least(lambda a: real_space_error(a, cutoff_angstrom, *numbers) > wanted, 1e-3, 7.0 / cutoff_angstrom)
-    k_cut = _least(lambda k: fourier_error(alpha, k, *numbers) > wanted, 1e-3, 20 * alpha)
+    alpha = _least(lambda a: real_space_error(a, cutoff_angstrom, *numbers) > expected, 1e-3, 7.0 / cutoff_angstrom)
+    k_cut = _least(lambda k: fourier_error(alpha, k, *numbers) > expected, 1e-3, 20 * alpha)
     return EwaldParameters(alpha, k_cut)
 
 
@@ -103,8 +103,8 @@ def wave_vectors(parameters: EwaldParameters, lengths_angstrom: Floats) -> WaveV
     used = 0
     for nx in range(most[0] + 1):
         for ny in range(-most[1] if nx else 0, most[1] + 1):
-            room = k_cut**2 - (nx * turn[0]) ** 2 - (ny * turn[1]) ** 2
-            high = int(math.sqrt(room) / turn[2]) if room >= 0 else -1
+            rest = k_cut**2 - (nx * turn[0]) ** 2 - (ny * turn[1]) ** 2
+            high = int(math.sqrt(rest) / turn[2]) if rest >= 0 else -1
             low = -high if (nx, ny) != (0, 0) else 1
             if high < low:
                 continue

@@ -67,7 +67,7 @@ def reaction_field(cutoff_angstrom: float, dielectric: float) -> Floats:
 
     The shift c makes the energy 0 at the cutoff, and with a conductor outside (ε = ∞: k = 1/2r_c³, c = 3/2r_c) the force too.
     Pairs inside a molecule feel no field: for rigid molecules that is a constant. I. G. Tironi et al., J. Chem. Phys. 102, 5451
-    (1995), without salt; the form of OpenMM's CutoffPeriodic (there ε = 78.3 unless told).
+    (1995), without salt; the form of OpenMM's CutoffPeriodic (there ε = 78.3 by default).
 
     >>> reaction_field(2.0, math.inf).tolist()
     [4.0, 0.0625, 0.75]

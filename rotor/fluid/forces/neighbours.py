@@ -1,4 +1,4 @@
-"""Sites of all molecules and who is near whom, kept up from one set of positions to the next."""
+"""Sites of all molecules and lists of their neighbours, updated from one set of positions to the next."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ class Neighbours:
         """Place all sites; make the list anew where it is too old."""
         if not np.isfinite(positions_angstrom).all():
             atom = int(np.flatnonzero(~np.isfinite(positions_angstrom).all(axis=1))[0])
-            raise ValueError(f"position of atom {atom} is {positions_angstrom[atom]}: finite numbers are wanted")
+            raise ValueError(f"position of atom {atom} is {positions_angstrom[atom]}: expected finite numbers")
         if not len(self.starts) or self._place(positions_angstrom, fresh=False) > (0.5 * self.skin_angstrom) ** 2:
             self._place(positions_angstrom, fresh=True)
             self.assembly.check_geometry(self.sites)

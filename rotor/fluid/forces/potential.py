@@ -62,7 +62,7 @@ class RigidPotential(Calculator):
     the reaction field, inf a conductor. switch_width_angstrom: of the Lennard-Jones switch, 0 cuts hard. damping_per_angstrom:
     of shifted forces. ewald: α and k_cut; without it they follow from `tolerance` (`rotor.fluid.forces.ewald.parameters_for`).
     long_range_correction: dispersion beyond the cutoff. skin_angstrom: of the lists. threads: results are the same bit for bit
-    for equal threads and equal history; `reset()` forgets the lists, so that a run can be taken up again bit for bit.
+    for equal threads and equal history; `reset()` discards the lists, so that a run can be continued bit for bit.
 
     Molecules may be broken by the cell's edges. Cells have right angles; directions without pbc are open.
 
@@ -102,13 +102,13 @@ class RigidPotential(Calculator):
     def _check(self) -> None:
         for name in ("cutoff_angstrom", "damping_per_angstrom", "skin_angstrom", "dielectric", "threads"):
             if not getattr(self, name) > 0:
-                raise ValueError(f"{name} = {getattr(self, name)}: a number above 0 is wanted")
+                raise ValueError(f"{name} = {getattr(self, name)}: expected a number above 0")
         if self.electrostatics not in ELECTROSTATICS:
             raise ValueError(f"{self.electrostatics!r}: charges are treated by one of {', '.join(ELECTROSTATICS)}")
         if math.isinf(self.cutoff_angstrom) and self.electrostatics != "reaction-field":
             raise ValueError("a cutoff of inf is for open boxes with the reaction field (which is then none)")
         if not 0 <= self.switch_width_angstrom < self.cutoff_angstrom:
-            raise ValueError(f"switch_width_angstrom = {self.switch_width_angstrom}: 0 up to the cutoff is wanted")
+            raise ValueError(f"switch_width_angstrom = {self.switch_width_angstrom}: expected 0 up to the cutoff")
 
     def reset(self) -> None:
         """Forget results, lists and what was made for this box: the next forces are those of a new calculator, bit for bit."""
@@ -342,7 +342,7 @@ def right_angled(atoms: Any) -> Floats:
     askew = max(abs(cell[c][d]) for c in range(3) for d in range(3) if c != d)
     if any(repeats) and not askew <= 1e-10 * max(1.0, *edges):
         raise ValueError(
-            f"angles of the cell are {np.round(atoms.cell.angles(), 4).tolist()} degrees; right angles along x, y, z are wanted"
+            f"angles of the cell are {np.round(atoms.cell.angles(), 4).tolist()} degrees; expected right angles along x, y, z"
         )
     if any(repeat and not edge > 0 for repeat, edge in zip(repeats, edges, strict=True)):
         raise ValueError(f"edges of the cell are {edges} Å; directions that repeat (pbc) need one above 0")

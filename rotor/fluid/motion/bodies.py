@@ -39,7 +39,7 @@ class Bodies:
     order (atoms,), starts (n + 1,): atoms of body b are order[starts[b]:starts[b + 1]]. sites: (atoms, 3), places in
     principal axes of the body, Å. masses: (atoms,) u. mass: (n,) u. moments: (n, 3) u Å², 0 about the axis of a linear
     molecule, all 0 for an atom. species: (n,) index into names. notes: molecules whose count of
-    degrees hangs on the rule for linear ones.
+    degrees depends on the rule for linear ones.
     """
 
     order: Ints
@@ -202,7 +202,7 @@ def atom_masses(atoms: Atoms) -> Floats:
 def whole(places: Floats, atoms: Atoms) -> Floats:
     """Molecules of one species (k, m, 3) put together across the cell's edges, each about its first atom.
 
-    Each atom is taken in the image nearest to a neighbour already placed; who is whose neighbour is seen in the first
+    Each atom is taken in the image nearest to a neighbour already placed; neighbours are those of the first
     molecule. Molecules that were whole stay where they are.
     """
     from ase.geometry import find_mic
@@ -249,7 +249,7 @@ def _labels(atoms: Atoms, molecules: ArrayLike | Sequence[Sequence[int]] | None)
     items = list(molecules)  # type: ignore[arg-type]
     if all(np.ndim(item) == 0 for item in items):
         if len(items) != len(atoms):
-            raise ValueError(f"{len(items)} labels of molecules for {len(atoms)} atoms; one for each atom is wanted")
+            raise ValueError(f"{len(items)} labels of molecules for {len(atoms)} atoms; expected one for each atom")
         return np.asarray(items)
     labels = np.full(len(atoms), -1)
     for number, members in enumerate(items):
@@ -288,7 +288,7 @@ def _species(atoms: Atoms, masses: Floats, order: Ints, starts: Ints) -> list[tu
 
 @dataclass(frozen=True)
 class _Shape:
-    """Sites (m, 3) in principal axes, moments (3,), masses (m,), and what is to be said of the moments."""
+    """Sites (m, 3) in principal axes, moments (3,), masses (m,), and notes on the moments."""
 
     sites: Floats
     moments: Floats

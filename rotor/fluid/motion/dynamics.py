@@ -1,7 +1,7 @@
 """Rigid molecules moved by the forces of any ASE calculator: an ASE dynamics for `attach`, loggers and trajectories.
 
 A step kicks with half the force and torque, drifts freely, and kicks again (T. F. Miller et al., J. Chem. Phys. 116, 8649
-(2002), with the core's drift): order 2, symplectic, reversible; total momentum is kept to round-off. A thermostat acts in
+(2002), with the core's drift): order 2, symplectic, reversible; total momentum is conserved to round-off. A thermostat acts in
 the middle of the drift. This module imports ASE when it is imported; the rest of the package does so only on use.
 """
 
@@ -83,7 +83,7 @@ class RigidDynamics(MolecularDynamics):
         **kwargs: Any,
     ) -> None:
         if not (np.isfinite(timestep) and timestep != 0.0):
-            raise ValueError(f"timestep {timestep}: a time other than 0 is wanted, in ASE's unit (2 * ase.units.fs)")
+            raise ValueError(f"timestep {timestep}: expected a time other than 0, in ASE's unit (2 * ase.units.fs)")
         self.bodies, pose = bodies_of(atoms, molecules, shapes, tolerance_angstrom)
         self.thermostat, self._tolerance = thermostat, tolerance_angstrom
         self._flows = Flows(self.bodies)
@@ -164,13 +164,13 @@ class RigidDynamics(MolecularDynamics):
         return energy + (self.thermostat.energy() if self.thermostat is not None else 0.0)
 
     def refresh(self) -> None:
-        """Let the calculator forget everything, so that what follows depends on the present state alone."""
+        """Discard the calculator's results, so that what follows depends on the present state alone."""
         if hasattr(self.atoms.calc, "reset"):
             self.atoms.calc.reset()
         self._wrench = None
 
     def restore(self, state: State, nsteps: int) -> None:
-        """Continue from a state kept earlier."""
+        """Continue from a saved state."""
         self.state, self.nsteps = state, nsteps
         self._write_positions()
         self.write_momenta()
@@ -186,12 +186,12 @@ class RigidDynamics(MolecularDynamics):
         self.atoms.arrays["positions"][...] = self._positions
 
     def write_momenta(self) -> None:
-        """Bring the state's momenta to the atoms, after someone changed them in `state`."""
+        """Bring the state's momenta to the atoms, after a change in `state`."""
         self._momenta = self.bodies.momenta(self.state.momentum, self.state.angular, self.state.attitude)
         self.atoms.arrays["momenta"][...] = self._momenta
 
     def _notice_changes(self) -> None:
-        """Take over positions or momenta that someone else has set on the atoms since the last step."""
+        """Take over positions or momenta that were set on the atoms since the last step."""
         moved = not np.array_equal(self.atoms.arrays["positions"], self._positions)
         pushed = not np.array_equal(self.atoms.arrays["momenta"], self._momenta)
         if not (moved or pushed):

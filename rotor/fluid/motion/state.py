@@ -22,7 +22,7 @@ class State:
     """n bodies in motion; the arrays are changed in place by the flows.
 
     centres, momentum: (n, 3), in space. spin: (n, 7), angular momentum in principal axes and attitude. carry: (n, 7), what
-    rounding has kept back of spin (`rotor.classical.integrators._step_kernels`).
+    rounding has left out of spin (`rotor.classical.integrators._step_kernels`).
     """
 
     centres: Floats

@@ -26,6 +26,7 @@ import numpy as np
 
 from rotor import units
 from rotor.arrays import Floats
+from rotor.classical.euler import kinetic_energy as rotational_energy
 from rotor.fluid.motion.bodies import Bodies
 from rotor.statistics.degrees_of_freedom import Degrees
 
@@ -72,7 +73,7 @@ def kinetic_energy(bodies: Bodies, momentum: Floats, angular: Floats) -> Kinetic
     """
     return Kinetic(
         0.5 * float(np.sum(momentum * momentum / bodies.mass[:, None])),
-        0.5 * float(np.sum(angular * angular * bodies.inverse_moments)),
+        float(np.sum(rotational_energy(angular, angular * bodies.inverse_moments))),
     )
 
 

@@ -33,7 +33,7 @@ class Thermostat(ABC):
 
     def __init__(self, temperature_k: float) -> None:
         if not (math.isfinite(temperature_k) and temperature_k > 0.0):
-            raise ValueError(f"a thermostat's temperature of {temperature_k} K: a number above 0 is wanted")
+            raise ValueError(f"a thermostat's temperature of {temperature_k} K: expected a number above 0")
         self.temperature_k = temperature_k
         self.kt = temperature_k * units.EV_PER_K
 
@@ -64,9 +64,9 @@ class Langevin(Thermostat):
         p → e^(-γt) p + √(m kT (1 - e^(-2γt))) ξ,    L_i → e^(-γt) L_i + √(I_i kT (1 - e^(-2γt))) ξ_i
 
     (the Ornstein-Uhlenbeck part of R. L. Davidchack, T. E. Ouldridge, M. V. Tretyakov, J. Chem. Phys. 142, 144114 (2015),
-    with one friction for all). It keeps no total: all 3N degrees of translation are there.
+    with one friction for all). It conserves no total: all 3N degrees of translation are there.
 
-    friction: 1/(ASE's unit of time): `1e-3 / ase.units.fs` is 1/ps. rng: of the noise; its state is kept for restarts.
+    friction: 1/(ASE's unit of time): `1e-3 / ase.units.fs` is 1/ps. rng: of the noise; its state is saved for restarts.
     """
 
     keeps_momentum = False
@@ -74,7 +74,7 @@ class Langevin(Thermostat):
     def __init__(self, temperature_k: float, friction: float, rng: np.random.Generator) -> None:
         super().__init__(temperature_k)
         if not (math.isfinite(friction) and friction > 0.0):
-            raise ValueError(f"a friction of {friction}: a number above 0 is wanted, in 1/(ASE's unit of time)")
+            raise ValueError(f"a friction of {friction}: expected a number above 0, in 1/(ASE's unit of time)")
         self.friction, self._rng, self._heat = friction, rng, 0.0
 
     def start(self, bodies: Bodies, degrees: Degrees) -> None:
@@ -151,7 +151,7 @@ class _Chain:
 
 
 class NoseHoover(Thermostat):
-    """Chains that scale momenta so that the kinetic energy keeps the canonical spread; deterministic.
+    """Chains that scale momenta so that the kinetic energy has the canonical distribution; deterministic.
 
     The chain counts exactly the degrees that move: three fewer where the total momentum is zero and stays so.
 
@@ -164,9 +164,9 @@ class NoseHoover(Thermostat):
     def __init__(self, temperature_k: float, relaxation: float, links: int = 3, separate: bool = False) -> None:
         super().__init__(temperature_k)
         if not (math.isfinite(relaxation) and relaxation > 0.0):
-            raise ValueError(f"a relaxation time of {relaxation}: a number above 0 is wanted, in ASE's unit of time")
+            raise ValueError(f"a relaxation time of {relaxation}: expected a number above 0, in ASE's unit of time")
         if links < 1:
-            raise ValueError(f"a chain of {links} links: at least 1 is wanted")
+            raise ValueError(f"a chain of {links} links: expected at least 1")
         self.relaxation, self.links, self.separate = relaxation, links, separate
 
     def start(self, bodies: Bodies, degrees: Degrees) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import gzip
 import os
-import zlib
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any, NamedTuple
@@ -13,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.formats.atomic_write import open_atomic
+from rotor.formats.packed import load
 from rotor.formats.spcat.catalogue import DTYPES, Catalogue, Layout
 from rotor.formats.spcat.fields import BLANK
 from rotor.formats.spcat.line import Record, error_cap, read_record, spell_record, width_of
@@ -131,7 +131,7 @@ def format_chunks(catalogue: Catalogue) -> Iterator[bytes]:
     for start in range(0, len(catalogue), _CHUNK):
         stop = min(start + _CHUNK, len(catalogue))
         rows = buffer[: stop - start]
-        columns = catalogue.columns(start, stop)
+        columns = catalogue.rows(start, stop)
         plain = _plain_rows(rows, columns, layout, fill)
         _wide_rows(rows, columns, layout, fill, plain)
         plain[spelled[(spelled >= start) & (spelled < stop)] - start] = False
@@ -179,22 +179,6 @@ def read_cat(source: str | os.PathLike[str] | bytes) -> Catalogue:
     layout = replace(_layout_of(text, lines), beginning=beginning)
     columns, known = _read_plain(text, lines, layout)
     return _assembled(text, name, lines, layout, columns, known)
-
-
-def load(source: str | os.PathLike[str] | bytes) -> tuple[bytes, str]:
-    """The bytes of a file, unpacked where they are gzip's, and what to call it in a message."""
-    if isinstance(source, bytes):
-        text, name = source, "the text given"
-    else:
-        name = os.fspath(source)
-        with open(source, "rb") as handle:
-            text = handle.read()
-    if text[:2] == b"\x1f\x8b":
-        try:
-            text = gzip.decompress(text)
-        except (EOFError, OSError, zlib.error) as error:
-            raise ValueError(f"{name}: a gzip file that is damaged or cut off ({error})") from None
-    return text, name
 
 
 class _Lines(NamedTuple):

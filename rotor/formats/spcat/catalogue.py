@@ -12,6 +12,9 @@ from numpy.typing import NDArray
 from rotor.formats.spcat.fields import BLANK
 from rotor.formats.spcat.line import Record
 from rotor.formats.spcat.rows import Columns
+from rotor.table import Table
+
+MAX_TAG = 999_999
 
 
 @dataclass(frozen=True)
@@ -46,8 +49,8 @@ DTYPES: dict[str, type[np.generic]] = dict.fromkeys(Columns._fields, np.float64)
 }
 
 
-@dataclass(frozen=True, eq=False)
-class Catalogue:
+@dataclass(frozen=True, eq=False, repr=False)
+class Catalogue(Table):
     """Lines of a catalogue as columns of equal length n.
 
     frequency_mhz, error_mhz (n,): FREQ and ERR as the file has them: MHz, but cm⁻¹ both where the error is negative
@@ -95,14 +98,63 @@ class Catalogue:
         columns = {name: getattr(self, name)[index] for name in DTYPES}
         return Catalogue(**columns, layout=replace(self.layout, spelling=spelling))
 
-    def columns(self, start: int, stop: int) -> Columns:
+    def rows(self, start: int, stop: int) -> Columns:
         """The numbers of lines `start` to `stop`."""
         return Columns._make(getattr(self, name)[start:stop] for name in DTYPES)
+
+    @property
+    def columns(self) -> dict[str, NDArray[Any]]:
+        """Every column by its name with unit, the quantum numbers last, one column each: q1_upper, ..., q6_lower."""
+        out = {name: getattr(self, name) for name in DTYPES if not name.startswith("quanta")}
+        for side, quanta in (("upper", self.quanta_upper), ("lower", self.quanta_lower)):
+            out |= {f"q{i}_{side}": column for i, column in enumerate(quanta.T, 1) if (column != BLANK).any()}
+        return out
 
     def record(self, index: int) -> Record:
         """The numbers of one line."""
         values = [getattr(self, name)[index] for name in DTYPES]
         return Record._make(tuple(value.tolist()) if value.ndim else value.item() for value in values)
+
+
+def catalogue_of(
+    numbers: Mapping[str, NDArray[Any]],
+    quanta_upper: NDArray[np.int16],
+    quanta_lower: NDArray[np.int16],
+    qnfmt: NDArray[np.int32] | int,
+    tag: int = 0,
+    *,
+    linear: bool = False,
+) -> Catalogue:
+    """The catalogue of predicted lines.
+
+    Parameters
+    ----------
+    numbers : frequency_mhz, lgint, energy_lower_cm, g_upper, each (n,), and error_mhz where one is known, else 0
+    quanta_upper, quanta_lower : (n, 6) or wider
+    qnfmt : one for all, or of every line, (n,)
+    tag : of the species
+    linear : whether Q rises as that of a linear molecule does, DR = 2
+
+    Raises
+    ------
+    ValueError
+        For a tag that has no place in its six digits.
+    """
+    if not 0 <= tag <= MAX_TAG:
+        raise ValueError(f"tag {tag}: a catalogue's tag has at most six digits")
+    n = len(quanta_upper)
+    return Catalogue(
+        frequency_mhz=numbers["frequency_mhz"],
+        error_mhz=numbers["error_mhz"] if "error_mhz" in numbers else np.zeros(n),
+        lgint=numbers["lgint"],
+        dr=np.full(n, 2 if linear else 3, dtype=np.int16),
+        energy_lower_cm=numbers["energy_lower_cm"],
+        g_upper=np.asarray(numbers["g_upper"]).astype(np.int32),
+        tag=np.full(n, tag, dtype=np.int32),
+        qnfmt=np.broadcast_to(np.asarray(qnfmt, dtype=np.int32), n),
+        quanta_upper=quanta_upper,
+        quanta_lower=quanta_lower,
+    )
 
 
 def _column(name: str, values: Any, dtype: type[np.generic]) -> NDArray[Any]:

@@ -17,9 +17,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from rotor.formats.spcat.par import Options, Parameter, ParameterFile
 from rotor.tops.constants import RIGID, Constants
-from rotor.tops.operators import axes_of, powers_of_spelled
+from rotor.tops.operators import axes_of, powers_of_spelled, spelled_term
 
 NOT_YET = "is read but not computed yet"
 
@@ -170,8 +173,7 @@ def constants_of(file: ParameterFile, *, errors: bool = False) -> Constants:
     kind = _kind(options, rigid, values)
     reduction = _reduction(options, values) if kind == "asymmetric" else None
 
-    names = {item.code: item for item in _vocabulary(kind, reduction)}
-    _refuse_unnamed(values, names, kind, reduction)
+    names = _names_of(values, kind, reduction)
     named: dict[str, Any] = _rigid_constants(options, rigid, kind)
     named |= {names[code].name: names[code].sign * value for code, value in values.items()}
 
@@ -186,6 +188,31 @@ def constants_of(file: ParameterFile, *, errors: bool = False) -> Constants:
     )
 
 
+def constants_and_matrix(file: ParameterFile) -> tuple[Constants, NDArray[np.float64]]:
+    """The constants of a file, and M (constants, parameters) with constants = M @ values of the parameters.
+
+    >>> from rotor.formats.spcat.par import read_par
+    >>> file = read_par(b"x\\n 2 1 1\\ns -1 1 0 20\\n 1000 4.0 1\\n 100 5.0 1\\n")
+    >>> constants, matrix = constants_and_matrix(file)
+    >>> constants.values["A"], matrix.tolist()
+    (9.0, [[1.0, 1.0], [0.0, 1.0]])
+    """
+    constants = constants_of(file)
+    options, names = file.options[0], list(constants.values)
+    of_code: dict[int, dict[str, float]] = {}
+    for code in {_whole_code(parameter) for parameter in file.parameters}:
+        if code in _RIGID:
+            of_code[code] = _rigid_constants(options, {code: 1.0}, constants.kind)
+        else:
+            named = _names_of([code], constants.kind, constants.reduction)[code]
+            of_code[code] = {named.name: float(named.sign)}
+    matrix = np.zeros((len(names), len(file.parameters)))
+    for column, parameter in enumerate(file.parameters):
+        for name, factor in of_code[_whole_code(parameter)].items():
+            matrix[names.index(constants.own_name(name)), column] += factor
+    return constants, matrix
+
+
 def _summed(parameters: Iterable[Parameter]) -> tuple[dict[int, float], dict[int, float | None]]:
     """Values by code, those of one code added, and errors of those that are one parameter."""
     values: dict[int, float] = {}
@@ -197,11 +224,22 @@ def _summed(parameters: Iterable[Parameter]) -> tuple[dict[int, float], dict[int
     return values, spreads
 
 
-def _refuse_unnamed(values: Iterable[int], names: Iterable[int], kind: str, reduction: str | None) -> None:
-    unnamed = [code for code in values if code not in set(names)]
-    if unnamed:
+def _names_of(codes: Iterable[int], kind: str, reduction: str | None) -> dict[int, Named]:
+    """What the codes of distortion are called: by published names, else spelled out, such as J8Jpm2 for 40400."""
+    names = {item.code: item for item in _vocabulary(kind, reduction)}
+    for code in codes:
+        if code not in names:
+            names[code] = Named(_spelled_code(code, kind, reduction), code, 1)
+    return names
+
+
+def _spelled_code(code: int, kind: str, reduction: str | None) -> str:
+    d = split_code(code)
+    n = d.typ - 3 if d.typ > 3 else 0
+    if (d.typ and not n) or (n and kind != "asymmetric") or (d.ksq and kind in ("linear", "spherical")):
         whose = f"the {reduction}-reduction" if reduction else f"a top of kind {kind}"
-        raise ValueError(f"parameter {unnamed[0]}: no constant of {whose} has this operator; it {NOT_YET}")
+        raise ValueError(f"parameter {code}: no constant of {whose} has this operator; it {NOT_YET}")
+    return spelled_term(d.nsq, d.ksq, n)
 
 
 _RIGID = (10000, 20000, 30000, 100, 1000, 40000)

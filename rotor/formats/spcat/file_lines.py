@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from rotor import units
 from rotor.arrays import Floats, Ints
-from rotor.formats.spcat.catalogue import Catalogue
+from rotor.formats.spcat.catalogue import Catalogue, catalogue_of
 from rotor.formats.spcat.egy import LevelList
 from rotor.formats.spcat.fields import BLANK
 from rotor.formats.spcat.file_model import Group
@@ -34,6 +34,7 @@ class Format:
     states: bool
     spins: int
     most: int = 6
+    i_tot: bool = False
 
     @property
     def before_spins(self) -> int:
@@ -56,8 +57,10 @@ class Format:
         >>> Format(3, True, 1).qnfmt((2,)), Format(3, False, 2).qnfmt((3, 3)), Format(1, False, 0).qnfmt(())
         (1405, 325, 101)
         """
-        code = 1000 * self.states + 100 * self.before_spins + self.width
+        code = 1000 * self.states + 100 * self.before_spins + self.width + 2000 * (self.i_tot and not self.aggregate)
         odd = np.cumsum(spins) % 2 if spins else np.zeros(0, dtype=np.int64)
+        if self.i_tot and len(odd) > 1:
+            odd[-2] = 0
         total = int(odd[-1]) if len(odd) else 0
         if self.aggregate:
             return code + 4000 + 10 * total
@@ -74,7 +77,14 @@ def format_of(file: ParameterFile, groups: list[Group]) -> Format:
     linear = all(state.linear for group in groups for state in group.states)
     rotation = 3 if first.spind > 0 else 1 if linear else 2
     spins = max(len(group.spins) for group in groups)
-    return Format(rotation, abs(first.nvib) > 1, spins, 10 if file.header.nline < 0 else 6)
+    i_tot = any(state.i_tot for group in groups for state in group.states)
+    found = Format(rotation, abs(first.nvib) > 1, spins, 10 if file.header.nline < 0 else 6, i_tot)
+    if i_tot and found.aggregate:
+        raise ValueError(
+            f"more than {found.most} quantum numbers with a total spin of equivalent nuclei, numbered patterns of them: that is read "
+            "but not computed yet; a negative NLINE gives each number a column of its own"
+        )
+    return found
 
 
 def quanta_of(group: Group, levels: Levels, form: Format, negative: bool = False) -> Ints:
@@ -213,18 +223,13 @@ def as_catalogue(lines: list[tuple[GroupLines, int]], form: Format, tag: int, dr
         quanta[name] = table
     with np.errstate(divide="ignore"):
         lgint = np.log10(joined["intensity"][order])
-    return Catalogue(
-        frequency_mhz=joined["frequency_mhz"][order],
-        error_mhz=np.zeros(len(order)),
-        lgint=lgint,
-        dr=np.full(len(order), dr, dtype=np.int16),
-        energy_lower_cm=joined["energy_lower_mhz"][order] / units.MHZ_PER_CM,
-        g_upper=joined["g_upper"][order].astype(np.int32),
-        tag=np.full(len(order), tag, dtype=np.int32),
-        qnfmt=qnfmt[order].astype(np.int32),
-        quanta_upper=quanta["upper"],
-        quanta_lower=quanta["lower"],
-    )
+    numbers = {
+        "frequency_mhz": joined["frequency_mhz"][order],
+        "lgint": lgint,
+        "energy_lower_cm": joined["energy_lower_mhz"][order] / units.MHZ_PER_CM,
+        "g_upper": joined["g_upper"][order],
+    }
+    return catalogue_of(numbers, quanta["upper"], quanta["lower"], qnfmt[order].astype(np.int32), tag, linear=dr == 2)
 
 
 def as_level_list(solved: list[tuple[Group, Levels]], form: Format) -> LevelList:

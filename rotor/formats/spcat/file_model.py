@@ -10,6 +10,7 @@ from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rotor.arrays import Ints
 from rotor.formats.spcat.file_effect import CodedLine, FileEffect, Vector, coded_lines
@@ -48,12 +49,22 @@ class Group:
         """
         if self.spins:
             every = range(max(twice_f[0], sum(self.spins) % 2), twice_f[1] + 1, 2)
-            levels = levels_of_f(self.top, (self.effect,), every, None, executor)
+            exist = None if self.top.kind in ("prolate", "oblate", "linear") else self._exist
+            levels = levels_of_f(self.top, (self.effect,), every, None, executor, exist)
         else:
             levels = solve_levels(
                 self.top, twice_f[1] // 2, jmin=twice_f[0] // 2, effects=(self.effect,), executor=executor
             )
         return replace(levels, weight=self._weights(levels))
+
+    def _exist(self, labels: Ints) -> NDArray[np.bool_]:
+        """Which labels v, Ka, Kc, N, ..., F belong to levels of a weight."""
+        v, ka, kc = labels[:, 0], labels[:, 1], labels[:, 2]
+        found = np.zeros(len(labels), dtype=bool)
+        for place, state in enumerate(self.states):
+            i_tot = labels[:, -2] // 2 if state.i_tot else 0
+            found |= (v == place) & (state.weights(ka, kc, kc if self.oblate else ka, i_tot) > 0)
+        return found
 
     def _weights(self, levels: Levels) -> Ints:
         n, quanta = levels.rotational, levels.quanta
@@ -61,7 +72,8 @@ class Group:
         total = np.zeros(len(levels), dtype=np.int64)
         for place, state in enumerate(self.states):
             for ka, kc, k, alike in _components(levels, n, self.oblate):
-                total += np.where((v == place) & alike, np.maximum(state.weights(n, ka, kc, k), 0), 0)
+                own = state.weights(ka, kc, k, quanta.get("i_tot", 0))
+                total += np.where((v == place) & alike, np.maximum(own, 0), 0)
         return total
 
 
@@ -128,7 +140,7 @@ def _group(
 ) -> Group:
     numbers = tuple(state.number for state in states)
     spins = states[0].spins
-    if any(state.spins != spins for state in states):
+    if any((state.spins, state.i_tot) != (spins, states[0].i_tot) for state in states):
         raise ValueError(f"states {numbers} are connected and have different spins: that is read but not computed yet")
     here = {v: place for place, v in enumerate(numbers)}
     moments = {(here[b], here[a]): mu for (a, b), mu in dipoles.items() if a in here and b in here}
@@ -138,7 +150,10 @@ def _group(
     )
     kind = _kind(states, usable, oblate, symmetric)
     limits = {} if kind in ("linear", "prolate", "oblate") else _limits(states, as_spcat)
-    coupled = tuple(Spin(f"I{place}", twice) for place, twice in enumerate(spins, 1))
+    paired = len(spins) - 1 if states[0].i_tot else len(spins) + 1  # the first of two equivalent ones
+    coupled = tuple(
+        Spin(f"I{place}", twice, total="I_tot" if place >= paired else "") for place, twice in enumerate(spins, 1)
+    )
     effect = FileEffect(usable, numbers, coupled, moments, limits)
     top = Top(_STANDS_FOR[kind, oblate], dipole_abc_debye=moments.get((0, 0), (0.0, 0.0, 0.0)), name=title)
     return Group(tuple(states), top, effect, oblate)

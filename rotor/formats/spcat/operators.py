@@ -5,6 +5,7 @@
 | TYP 0; 1, 2, 3; 3 + n | 1; Na², Nb², Nc²; N₊^2n + N₋^2n |
 | TYP 20, 40, 60 | Na, Nb, Nc, between states with the factor i |
 | TYP 21, 41, 61 | NbNc + NcNb, NaNc + NcNa, NaNb + NbNa |
+| TYP 20 + n, 40 + n, 60 + n, 11 + n | tensors of rank L made of N alone, see `_tensor_of_n`; of odd L between states with the factor i |
 | I1 | one N is replaced by that spin: Σ c_ij ½{φ_pi, N_j} S_p; TYP 20, 40, 60: φ_a·S, between states |
 | I1 = I2 | two N are: (Ia² - I²/3)/(2I(2I-1)), ... |
 | I1 ≠ I2 | I1·I2 with TYP 0, else the traceless tensor I1a I2a - I1·I2/3, ... |
@@ -16,7 +17,9 @@ own levels.) Any other code is refused with its meaning.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from math import sqrt
 
 from rotor.formats.spcat.codes import Digits
 from rotor.quantum.effects.interactions import with_powers
@@ -34,8 +37,6 @@ REFUSED = {
     "commutator": "a commutator of a spin term with Nz²",
     "own": "the energy of one K",
     "series": "a constant of an Euler or Fourier series",
-    "x": "an operator of odd order with ΔK = 2, 4, ... that keeps the species",
-    "high": "an operator of third or higher order outside orthorhombic symmetry",
     "szsz": "N_z S_z together with another operator",
 }
 
@@ -70,8 +71,8 @@ def operator_of(digits: Digits, axes: str) -> CodedOperator:
         spins, typ, ns = (1,), "abc".index(axes[2]) + 1, ns - 5
     if spins or ns:
         return _with_spins(digits._replace(typ=typ, ns=ns), spins, axes)
-    if typ in ODD or typ in CROSS:
-        return CodedOperator(of_j=_of_j(digits, axes), odd=typ in ODD)
+    if 12 <= typ < 80:
+        return CodedOperator(of_j=_of_j(digits, axes), odd=order_of(typ) % 2 == 1)
     return CodedOperator(plain=_plain(digits, axes))
 
 
@@ -82,8 +83,6 @@ def _refuse(d: Digits) -> None:
         "commutator": d.i1 == 0 and d.i2 > 0,
         "own": 80 <= d.typ < 90,
         "series": d.typ >= 90,
-        "x": 12 <= d.typ < 20,
-        "high": 20 <= d.typ < 80 and d.typ not in ODD and d.typ not in CROSS,
         "szsz": d.ns > 4 and (d.typ != 0 or d.i1 > 0 or d.i2 > 0),
     }
     for reason, applies in found.items():
@@ -104,16 +103,48 @@ def _plain(d: Digits, axes: str) -> Operators:
     return {(p + 1, q, 0): 0.5, (p, q + 1, 0): -0.5, (p, q, 1): 0.25 if place == 0 else -0.25}
 
 
+def order_of(typ: int) -> int:
+    """L, the rank of the tensor of TYP 11 + n (2n + 1), and of 20 + n, 40 + n, 60 + n (n + 1).
+
+    >>> order_of(12), order_of(21), order_of(62)
+    (3, 2, 3)
+    """
+    return 2 * (typ - 11) + 1 if typ < 20 else typ % 20 + 1
+
+
 def _of_j(d: Digits, axes: str) -> OperatorOfJ:
-    powers = ParameterName("", d.nsq, d.ksq)
+    """With half anticommutators of the powers, and the factor i of what is odd under time reversal."""
+    powers, odd = ParameterName("", d.nsq, d.ksq), order_of(d.typ) % 2
 
     def operator(j: int, representation: str) -> JOperator:
-        of = components(j, representation)
-        if d.typ in ODD:
-            return with_powers(1j * of[ODD[d.typ]], powers)
-        return with_powers(anticommutator(of[CROSS[d.typ][0]], of[CROSS[d.typ][1]]), powers)
+        found = _tensor_of_n(d.typ, components(j, representation), axes[2])
+        return with_powers((1j if odd else 1.0) * found, powers)
 
     return operator
+
+
+def _tensor_of_n(typ: int, of: Mapping[str, JOperator], z: str) -> JOperator:
+    """The Hermitian operator of TYP 12 to 79, from Na, Nb, Nc.
+
+    With X, Y, Z = Nc, Nb, Na (prolate) or Na, Nb, Nc (oblate), E = (X + iY)^K and {A, B} = AB + BA,
+
+        K = L:      ½ (E + E†), or (E - E†)/2i
+        K = L - 1:  ¼ √(2L) {Z, E + E†}, or {Z, E - E†}/i in its place;  Z where L = 1
+
+    the tensor T^L_K(N) normalised as N^L times the spherical harmonic C^L_K, over the C^L_L of its stretched component. Which of the two
+    follows from the species: the one along X has X, {Y, Z}, ..., along Y Y, {X, Z}, ..., along Z Z, {X, Y}, ...
+    """
+    x, y = ("c", "b") if z == "a" else ("a", "b")
+    order, ladder = order_of(typ), of[x] + 1j * of[y]
+    along = "" if typ < 20 else {x: "x", y: "y", z: "z"}["abc"[typ // 20 - 1]]
+    k = order - (order % 2 if along in ("z", "") else 1 - order % 2)
+    if k == 0:
+        return of[z]
+    raised = ladder**k
+    lowered = (of[x] - 1j * of[y]) ** k
+    cosine = along == ("x" if k == order else "y") or (along == "z" and k < order)
+    pair = raised + lowered if cosine else -1j * (raised - lowered)
+    return 0.5 * pair if k == order else 0.25 * sqrt(2 * order) * anticommutator(of[z], pair)
 
 
 def plain_of_j(operators: Operators) -> OperatorOfJ:
@@ -133,7 +164,7 @@ def _with_spins(d: Digits, spins: tuple[int, ...], axes: str) -> CodedOperator:
     powered = CodedOperator(spins=spins, n2=d.nsq, nz2=d.ksq, ns=d.ns)
     if not spins:
         plain = _plain(d._replace(nsq=0, ksq=0), axes)
-        if d.typ in ODD or d.typ in CROSS:
+        if d.typ >= 12:
             raise ValueError(f"N·S times an operator outside orthorhombic symmetry {NOT_YET}")
         return replace(powered, rotor=Scalar(tuple(plain.items())))
     if len(spins) == 2 and d.typ == 0:
@@ -163,4 +194,4 @@ def _matrix(typ: int, axes: str) -> Matrix:
         return tuple(tuple(2 * value for value in row) for row in plain)  # type: ignore[return-value]
     if typ in CROSS:
         return matrix_of(CROSS[typ])
-    raise ValueError(f"a spin term with ΔK = {2 * (typ - 3)} {NOT_YET}")
+    raise ValueError(f"a spin term of TYP {typ}, of more than second order, {NOT_YET}")

@@ -21,7 +21,10 @@ _DOUBLED = 2
 
 @dataclass(frozen=True)
 class StateOptions:
-    """Of one state: doubled spins in the order of coupling, range of K, axis and weights, weight of E levels, l, I_tot basis."""
+    """Of one state: doubled spins in the order of coupling, range of K, axis and weights, weight of E levels, l.
+
+    i_tot: the last two spins are coupled to a total first.
+    """
 
     number: int
     spins: tuple[int, ...]
@@ -39,12 +42,13 @@ class StateOptions:
         """Whether K = 0 alone is in the basis."""
         return self.kmin == self.kmax == 0
 
-    def weights(self, n: Ints, ka: Ints, kc: Ints, k: Ints) -> Ints:
+    def weights(self, ka: Ints, kc: Ints, k: Ints, i_tot: Ints | int = 0) -> Ints:
         """Nuclear-spin weight of one component of levels, as the file has it; zero or less where a level does not exist.
 
-        n, ka, kc: (n,) labels, k: K along the axis of the basis.
+        ka, kc: (n,) labels, k: K along the axis of the basis, i_tot: the total spin, where it is odd the two weights change places.
         """
-        even = {1: ka % 2 == 0, 2: (ka + kc) % 2 == 0, 3: kc % 2 == 0}.get(self.iax, (ka + kc) % 2 == 0)
+        odd = {1: ka % 2, 2: (ka + kc) % 2, 3: kc % 2}.get(self.iax, (ka + kc) % 2)
+        even = (odd + i_tot) % 2 == 0
         weight = np.where(even, self.plus, self.minus)
         fold = _FOLDS.get(self.iax)
         return np.where((k - self.l_code) % fold != 0, self.e_weight, weight) if fold else weight
@@ -92,14 +96,19 @@ def _state(v: int, line: Options, first: Options, swapped: bool) -> StateOptions
         )
     if code:
         raise ValueError(f"EWT = {line.ewt} of state {v}: l-doubled states are read but not computed yet")
-    if line.iax < 0:
+    spins = doubled_spins(line.spind)
+    if line.iax < 0 and iax in _FOLDS:
         raise ValueError(
-            f"IAX = {line.iax} of state {v}: the basis of a total spin of equivalent nuclei is read but not computed yet"
+            f"IAX = {line.iax} of state {v}: a total spin of {_FOLDS[iax]} equivalent nuclei is read but not computed yet"
+        )
+    if line.iax < 0 and len(spins) > 1 and spins[-1] != spins[-2]:
+        raise ValueError(
+            f"IAX = {line.iax} of state {v} couples the last two spins to a total; they are of two sizes in SPIND = {line.spind}"
         )
     kmax = line.knmax if 0 <= line.knmax <= 359 else 359
     plus, minus = (line.wtmn, line.wtpl) if swapped else (line.wtpl, line.wtmn)
     return StateOptions(
-        v, doubled_spins(line.spind), line.knmin, max(kmax, line.knmin), iax, plus, minus, weight, code, line.iax < 0
+        v, spins, line.knmin, max(kmax, line.knmin), iax, plus, minus, weight, code, line.iax < 0 and len(spins) > 1
     )
 
 

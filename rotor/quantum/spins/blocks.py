@@ -13,17 +13,18 @@ first, and among the levels of one sub-block Ka rises with energy.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.levels import Levels, weights_of_levels
-from rotor.quantum.spins.coupling import coefficients, n_dot_s, patterns
+from rotor.quantum.spins.coupling import coefficients, n_dot_s, patterns, recoupling
 from rotor.quantum.spins.operators import AxialState
 from rotor.quantum.spins.rotor import (
     Channel,
@@ -40,10 +41,13 @@ if TYPE_CHECKING:
     from rotor.tops.top import Top
 
 
-class SpinPart(NamedTuple):
-    """The states of the solved block `number` with every pattern of its N, pattern by pattern.
+Exist = Callable[[Ints], NDArray[np.bool_]]
 
-    patterns: the rows of these patterns among those of the F, which are in the order of N.
+
+class SpinPart(NamedTuple):
+    """The states of the solved block `number` with every pattern of its N and class, pattern by pattern.
+
+    patterns: the rows of these patterns among those of the F, which are in the order of N, then of the class.
     """
 
     number: int
@@ -87,12 +91,15 @@ class SpinBlock:
 
 
 class Plan(NamedTuple):
-    """Solved rotation, operators of every channel by pairs of blocks (i ≥ k), and which blocks are connected."""
+    """Solved rotation, operators of every channel by pairs of blocks (i ≥ k), and which blocks are connected.
+
+    families: members (block, class), the class 1 of functions that change sign with the exchange of two equivalent spins.
+    """
 
     shared: Shared
     blocks: list[RotorBlock]
     operators: dict[tuple[int, int], dict[Channel, Floats]]
-    families: list[list[int]]
+    families: list[list[tuple[int, int]]]
 
 
 def plan_of(top: Top, effects: tuple[QuantumEffect, ...], nmin: int, nmax: int, executor: Executor | None) -> Plan:
@@ -104,7 +111,8 @@ def plan_of(top: Top, effects: tuple[QuantumEffect, ...], nmin: int, nmax: int, 
     for i, k in _near(blocks):
         if found := operators_between(blocks[i], blocks[k], channels, representation):
             operators[i, k] = found
-    return Plan(Shared(scheme, representation), blocks, operators, _families(len(blocks), operators))
+    families = _families(len(blocks), operators, 2 if scheme.paired else 1)
+    return Plan(Shared(scheme, representation), blocks, operators, families)
 
 
 def _near(blocks: list[RotorBlock]) -> Iterator[tuple[int, int]]:
@@ -128,9 +136,11 @@ def operators_between(
     return {channel: operator for channel, operator in found.items() if operator is not None}
 
 
-def _families(count: int, pairs: Iterable[tuple[int, int]]) -> list[list[int]]:
-    """Blocks that pairs connect, each family in rising order."""
-    above = list(range(count))
+def _families(
+    count: int, operators: dict[tuple[int, int], dict[Channel, Floats]], classes: int
+) -> list[list[tuple[int, int]]]:
+    """Blocks and classes that operators connect, each family in rising order."""
+    above = list(range(count * classes))
 
     def root(i: int) -> int:
         while above[i] != i:
@@ -138,36 +148,39 @@ def _families(count: int, pairs: Iterable[tuple[int, int]]) -> list[list[int]]:
             i = above[i]
         return i
 
-    for i, k in pairs:
-        low, high = sorted((root(i), root(k)))
-        above[high] = low
-    members: dict[int, list[int]] = {}
-    for i in range(count):
-        members.setdefault(root(i), []).append(i)
+    for (i, k), found in operators.items():
+        for changed in {int(channel.exchange < 0) for channel in found}:
+            for own in range(classes):
+                low, high = sorted((root(i * classes + own), root(k * classes + (own ^ changed))))
+                above[high] = low
+    members: dict[int, list[tuple[int, int]]] = {}
+    for i in range(count * classes):
+        members.setdefault(root(i), []).append(divmod(i, classes))
     return list(members.values())
 
 
-def solve_f(plan: Plan, twice_f: int) -> list[SpinBlock]:
-    """The blocks of one F."""
-    every = patterns(plan.shared.scheme.twice, twice_f)
-    found, first = np.unique(every[:, 0], return_index=True)
+def solve_f(plan: Plan, twice_f: int, exist: Exist | None = None) -> list[SpinBlock]:
+    """The blocks of one F, those left out in which no level exists by `exist` (see `levels_of_f`)."""
+    scheme = plan.shared.scheme
+    every = scheme.patterns(twice_f)
+    where, first = np.unique(np.column_stack([every[:, 0] // 2, scheme.classes(every)]), axis=0, return_index=True)
     stops = [*first[1:].tolist(), len(every)]
-    by_n = {n // 2: slice(a, b) for n, a, b in zip(found.tolist(), first.tolist(), stops, strict=True)}
+    rows = {tuple(own): slice(a, b) for own, a, b in zip(where.tolist(), first.tolist(), stops, strict=True)}
     acting = {channel for operators in plan.operators.values() for channel in operators}
-    known = {channel: coefficients_of(plan.shared.scheme, channel, every) for channel in acting}
+    known = {channel: coefficients_of(scheme, channel, every) for channel in acting}
     out = []
     for family in plan.families:
-        members = [i for i in family if plan.blocks[i].n in by_n]
-        if members:
-            out.append(_solved(plan, twice_f, every, _parts(plan, members, by_n), known))
+        members = [(i, rows[place]) for i, own in family if (place := (plan.blocks[i].n, own)) in rows]
+        parts = _parts(plan, members)
+        if members and (exist is None or exist(np.concatenate(_names(parts, every))).any()):
+            out.append(_solved(plan, twice_f, every, parts, known))
     return out
 
 
-def _parts(plan: Plan, members: list[int], by_n: dict[int, slice]) -> tuple[SpinPart, ...]:
+def _parts(plan: Plan, members: list[tuple[int, slice]]) -> tuple[SpinPart, ...]:
     parts, start = [], 0
-    for i in members:
+    for i, rows in members:
         block = plan.blocks[i]
-        rows = by_n[block.n]
         stop = start + (rows.stop - rows.start) * len(block.energies_mhz)
         parts.append(SpinPart(i, block, rows, slice(start, stop)))
         start = stop
@@ -199,7 +212,7 @@ def product(left: Floats, right: Floats) -> Floats:
 
 def coefficients_of(scheme: Scheme, channel: Channel, every: Ints) -> Floats:
     """c(p', p) of a channel between all patterns of an F, with its powers of N·S."""
-    found = coefficients(scheme.twice, channel.acting, channel.rank, every, every)
+    found = _of_exchange(scheme, channel, every) if scheme.paired else _one_by_one(scheme, channel, every)
     if not channel.ns:
         return found
     n = every[:, 0] / 2.0
@@ -207,10 +220,26 @@ def coefficients_of(scheme: Scheme, channel: Channel, every: Ints) -> Floats:
     return np.asarray(found * (of_each[:, None] + of_each) / 2)
 
 
+def _one_by_one(scheme: Scheme, channel: Channel, every: Ints) -> Floats:
+    return coefficients(scheme.twice, channel.acting, channel.rank, every, every)
+
+
+def _of_exchange(scheme: Scheme, channel: Channel, every: Ints) -> Floats:
+    """Half the sum or the difference of the coefficients with two equivalent spins exchanged, over patterns with their total."""
+    plain = patterns(scheme.twice, int(every[0, -1]))
+    found = _one_by_one(scheme, channel, plain)
+    b = len(scheme.spins) - 1
+    turned = tuple(sorted({b: b - 1, b - 1: b}.get(place, place) for place in channel.acting))
+    if turned != channel.acting:
+        found = (found + channel.exchange * _one_by_one(scheme, channel._replace(acting=turned), plain)) / 2
+    turn = recoupling(scheme.twice, plain, every)
+    return np.asarray(turn.T @ found @ turn)
+
+
 def _labels(parts: tuple[SpinPart, ...], every: Ints, vectors: Floats) -> tuple[Ints, Floats]:
     """Names (n, 3 + pattern) of the states of a block, energies rising, and the shares of the sub-blocks that give them."""
     shares: list[Floats] = []
-    names: list[Ints] = []
+    names = _names(parts, every)
     for part in parts:
         states = len(part.rotor.energies_mhz)
         rows = vectors[part.place].reshape(part.repeats, states, -1)
@@ -219,13 +248,21 @@ def _labels(parts: tuple[SpinPart, ...], every: Ints, vectors: Floats) -> tuple[
                 rows if len(part.rotor.parts) == 1 else np.einsum("kr,prn->pkn", part.rotor.vectors[own.place], rows)
             )
             shares += list((inside**2).sum(axis=1))
-            of_k = np.column_stack([np.full(len(own.names), own.v), own.names])
-            names += [np.column_stack([of_k, np.tile(pattern, (len(of_k), 1))]) for pattern in every[part.patterns]]
     table = np.array(shares)
     of_state = assigned(table, np.array([len(own) for own in names]))
     labels = np.empty((vectors.shape[1], names[0].shape[1]), dtype=np.int64)
     labels[np.argsort(of_state, kind="stable")] = np.concatenate(names)
     return labels, np.asarray(table[of_state, np.arange(len(of_state))])
+
+
+def _names(parts: tuple[SpinPart, ...], every: Ints) -> list[Ints]:
+    """v, Ka, Kc and the pattern of the levels that each sub-block names, (number of them, 3 + pattern)."""
+    found = []
+    for part in parts:
+        for own in part.rotor.parts:
+            of_k = np.column_stack([np.full(len(own.names), own.v), own.names])
+            found += [np.column_stack([of_k, np.tile(pattern, (len(of_k), 1))]) for pattern in every[part.patterns]]
+    return found
 
 
 def assigned(shares: Floats, capacity: Ints) -> Ints:
@@ -251,13 +288,17 @@ def levels_of_f(
     every_f: Sequence[int],
     n_range: tuple[int, int] | None = None,
     executor: Executor | None = None,
+    exist: Exist | None = None,
 ) -> Levels:
-    """The levels of all F (doubled) in `every_f`, those whose label has N within `n_range`, if that is given."""
+    """The levels of all F (doubled) in `every_f`, those whose label has N within `n_range`, if that is given.
+
+    exist: which of levels (n, columns as `SpinBlock.labels`) there are; blocks that hold none of them are not solved.
+    """
     total = scheme_of(top, effects).total
     lowest = min(max(0, (f - total) // 2) for f in every_f)
     highest = max((f + total) // 2 for f in every_f)
     plan = plan_of(top, effects, lowest, highest, executor)
-    solved = [block for f in every_f for block in solve_f(plan, f)]
+    solved = [block for f in every_f for block in solve_f(plan, f, exist)]
     if n_range:
         solved = [_within(block, n_range) for block in solved]
     blocks = tuple(_placed(solved))
@@ -282,6 +323,8 @@ def _placed(blocks: Iterable[SpinBlock]) -> Iterator[SpinBlock]:
 def _table(
     top: Top, effects: tuple[QuantumEffect, ...], shared: Shared, blocks: tuple[SpinBlock, ...], jmax: int
 ) -> Levels:
+    if not blocks:
+        raise ValueError("no level with these spins exists in the range of F")
     labels = np.concatenate([block.labels for block in blocks])
     axial = isinstance(blocks[0].parts[0].rotor.parts[0].basis, AxialState)
     quanta = {"v": labels[:, 0]} if any(effect.states(top) for effect in effects) else {}

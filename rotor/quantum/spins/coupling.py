@@ -7,6 +7,8 @@ A coupling pattern is (N, J1, ..., F), stored doubled. A scalar operator T^K(N) 
 whose coefficient c is a product over the steps of the chain, each with one symbol (A. R. Edmonds, Angular Momentum in Quantum
 Mechanics, 1957): with T^K alone, (7.1.7); where a spin closes the scalar product, (7.1.6); where T^L and a first spin
 make a tensor that a second spin closes, (7.1.5). Reduced elements are defined as there and in `tensors`.
+
+Two equivalent spins, the last ones, may be coupled to a total first, I_a + I_b = I_tot, F' + I_tot = F: patterns (N, ..., F', I_tot, F).
 """
 
 from __future__ import annotations
@@ -30,6 +32,36 @@ def patterns(spins: tuple[int, ...], f: int) -> Ints:
         found = [(j, *rest) for rest in found for j in range(abs(rest[0] - spin), rest[0] + spin + 1, 2)]
     whole = sorted(pattern for pattern in found if pattern[0] % 2 == 0)
     return np.array(whole, dtype=np.int64).reshape(-1, 1 + len(spins))
+
+
+def patterns_of_total(spins: tuple[int, ...], f: int) -> Ints:
+    """All patterns of one F whose last two spins are coupled to a total, (number, 1 + spins), doubled; by N, then those with
+    I_a + I_b - I_tot even, then odd.
+
+    >>> patterns_of_total((1, 1), 2).tolist()  # I = 1/2 twice, F = 1
+    [[0, 2, 2], [2, 2, 2], [2, 0, 2], [4, 2, 2]]
+    """
+    *others, a, b = spins
+    found = []
+    for total in range(abs(a - b), a + b + 1, 2):
+        for pattern in patterns((*others, total), f).tolist():
+            found.append((pattern[0], (a + b - total) // 2 % 2, *pattern[1:-1], total, pattern[-1]))
+    table = np.array(sorted(found), dtype=np.int64).reshape(-1, 2 + len(spins))
+    return np.delete(table, 1, axis=1)
+
+
+def recoupling(spins: tuple[int, ...], one_by_one: Ints, total: Ints) -> Floats:
+    """⟨((F' I_a)F'' I_b)F|(F' (I_a I_b)I_tot)F⟩ between both kinds of patterns of one F, (one by one, total): Edmonds (6.1.5).
+
+    (-1)^(F'+I_a+I_b+F) √((2F''+1)(2I_tot+1)) {F' I_a F''; I_b F I_tot}
+    """
+    a, b = spins[-2:]
+    left, right = one_by_one[:, None, :], total[None, :, :]
+    alike = (left[..., :-2] == right[..., :-2]).all(axis=-1) & (left[..., -1] == right[..., -1])
+    first, between, of_pair, f = left[..., -3], left[..., -2], right[..., -2], left[..., -1]
+    root = np.sqrt((between + 1.0) * (of_pair + 1.0))
+    symbol = six_j(first / 2, a / 2, between / 2, b / 2, f / 2, of_pair / 2)
+    return np.where(alike, _sign(first + a + b + f) * root * symbol, 0.0)
 
 
 def reduced_spin(spin: int, rank: int) -> float:

@@ -20,9 +20,10 @@ from rotor.quantum.j_operators import JOperator, between_blocks
 from rotor.quantum.levels import Levels
 from rotor.quantum.reduced import Tensors, rank_of, tensor_between
 from rotor.quantum.spins.blocks import Shared, SpinBlock, SpinPart, coefficients_of, operators_between, product
-from rotor.quantum.spins.coupling import tensor_coefficients
+from rotor.quantum.spins.coupling import patterns, recoupling, tensor_coefficients
 from rotor.quantum.spins.operators import AxialState, Scalar, tensor_elements
 from rotor.quantum.spins.rotor import Channel, RotorBlock, channels_of
+from rotor.quantum.spins.scheme import Scheme
 
 if TYPE_CHECKING:
     from rotor.quantum.effect import QuantumEffect
@@ -85,9 +86,17 @@ def _coefficients(up: SpinBlock, low: SpinBlock, rank: int) -> Floats:
     """t(p', p) between all patterns of two F."""
     shared, key = low.shared, ("tensor", rank, up.twice_f, low.twice_f)
     if key not in shared.cache:
-        shared.cache[key] = tensor_coefficients(shared.scheme.twice, rank, up.patterns, low.patterns)
+        shared.cache[key] = _tensor_coefficients(shared.scheme, rank, up.patterns, low.patterns)
     found: Floats = shared.cache[key]
     return found
+
+
+def _tensor_coefficients(scheme: Scheme, rank: int, bra: Ints, ket: Ints) -> Floats:
+    if not scheme.paired:
+        return tensor_coefficients(scheme.twice, rank, bra, ket)
+    plain = [patterns(scheme.twice, int(own[0, -1])) for own in (bra, ket)]
+    left, right = (recoupling(scheme.twice, one, own) for one, own in zip(plain, (bra, ket), strict=True))
+    return np.asarray(left.T @ tensor_coefficients(scheme.twice, rank, *plain) @ right)
 
 
 def derivatives(top: Top, levels: Levels, names: Sequence[str], rows: Ints) -> Floats:

@@ -216,16 +216,17 @@ class SpinTerm:
 
 
 def summed(weighted: Iterable[tuple[float, Rotor]]) -> list[tuple[float, Rotor]]:
-    """Operators times numbers, those of one form that differ in their components alone added to one."""
-    out: list[tuple[float, Rotor]] = []
+    """Operators times numbers, those of one form that differ in their components alone added to one; what adds up to 0 left out."""
+    scalars: dict[Scalar, float] = {}
     sums: dict[tuple[type, int], Floats] = {}
     for value, rotor in weighted:
         if isinstance(rotor, Scalar):
-            out.append((value, rotor))
+            scalars[rotor] = scalars.get(rotor, 0.0) + value
         else:
             key = (type(rotor), rotor.rank)
             sums[key] = sums.get(key, 0.0) + value * np.array(rotor.components)
-    return out + [(1.0, form(_nested(total))) for (form, _), total in sums.items()]
+    out: list[tuple[float, Rotor]] = [(value, rotor) for rotor, value in scalars.items() if value]
+    return out + [(1.0, form(_nested(total))) for (form, _), total in sums.items() if total.any()]
 
 
 def _nested(array: Floats) -> tuple:  # type: ignore[type-arg]

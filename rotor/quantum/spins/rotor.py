@@ -46,12 +46,16 @@ class RotorBlock(NamedTuple):
 
 
 class Channel(NamedTuple):
-    """Places of the spins that act, the rank, and the powers of N·S1 and, with it, of N²."""
+    """Places of the spins that act, the rank, and the powers of N·S1 and, with it, of N².
+
+    exchange: of two equivalent spins, 1: half the sum of the operator and of that with both exchanged, -1: half the difference.
+    """
 
     acting: tuple[int, ...]
     rank: int
     ns: int = 0
     n2: int = 0
+    exchange: int = 0
 
 
 @dataclass(frozen=True)
@@ -126,12 +130,27 @@ def channels_of(terms: Terms, scheme: Scheme) -> Channels:
     for value, term in terms:
         acting = tuple(sorted(scheme.place(name) for name in term.spins))
         channel = Channel(acting, term.rotor.rank, term.ns, term.n2 if term.ns else 0)
-        key = (channel, term.bra, term.ket, 0 if term.ns else term.n2, term.nz2)
-        groups.setdefault(key, []).append((value, term.rotor))
+        for part, sign in _by_exchange(channel, scheme):
+            key = (part, term.bra, term.ket, 0 if term.ns else term.n2, term.nz2)
+            groups.setdefault(key, []).append((sign * value, term.rotor))
     found: Channels = {}
     for (channel, *where), members in groups.items():
         found.setdefault(channel, []).extend(Piece(value, rotor, *where) for value, rotor in summed(members))
     return found
+
+
+def _by_exchange(channel: Channel, scheme: Scheme) -> list[tuple[Channel, float]]:
+    """A channel as parts that keep or change the symmetry of two equivalent spins: ½(A + B) ± ½(A - B)."""
+    if not scheme.paired:
+        return [(channel, 1.0)]
+    if channel.ns and len(scheme.spins) == 2:
+        raise ValueError("powers of N·S1 are those of a spin that is coupled before the equivalent ones")
+    b = len(scheme.spins) - 1
+    a = b - 1
+    if set(channel.acting) >= {a, b} or not set(channel.acting) & {a, b}:
+        return [(channel._replace(exchange=1), 1.0)]
+    of_a = channel._replace(acting=tuple(sorted(a if place == b else place for place in channel.acting)))
+    return [(of_a._replace(exchange=1), 1.0), (of_a._replace(exchange=-1), -1.0 if b in channel.acting else 1.0)]
 
 
 def contracted(up: RotorBlock, low: RotorBlock, pieces: Sequence[Piece], representation: str) -> Floats | None:

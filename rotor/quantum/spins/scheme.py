@@ -7,6 +7,11 @@ from dataclasses import dataclass, field
 from itertools import accumulate
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from rotor.arrays import Ints
+from rotor.quantum.spins.coupling import patterns, patterns_of_total
+
 if TYPE_CHECKING:
     from rotor.quantum.effect import QuantumEffect
     from rotor.tops.top import Top
@@ -16,12 +21,14 @@ if TYPE_CHECKING:
 class Spin:
     """One spin: its name, as parameters have it, twice its size (2I, a whole number), and whether it is an electron's.
 
-    Spins are coupled in the order in which effects first name them, electrons' before nuclei's.
+    Spins are coupled in the order in which effects first name them, electrons' before nuclei's. total: the two nuclei that have
+    one name here, such as "I", are equivalent: they are coupled to a total spin first, and last to the rest.
     """
 
     name: str
     twice: int
     electron: bool = False
+    total: str = ""
 
     def __post_init__(self) -> None:
         if self.twice < 1 or self.twice != int(self.twice):
@@ -30,21 +37,45 @@ class Spin:
 
 @dataclass(frozen=True)
 class Scheme:
-    """Which spins are coupled, and what the angular momenta on the way to F are called."""
+    """Which spins are coupled, and what the angular momenta on the way to F are called.
+
+    paired: whether the last two are coupled to a total spin first.
+    """
 
     spins: tuple[Spin, ...]
     twice: tuple[int, ...] = field(init=False)
+    paired: bool = field(init=False, default=False)
 
     def __post_init__(self) -> None:
         names = [spin.name for spin in self.spins]
         if len(set(names)) < len(names):
             raise ValueError(f"spins {', '.join(names)}: every spin has a name of its own")
         object.__setattr__(self, "twice", tuple(spin.twice for spin in self.spins))
+        together = [spin.total for spin in self.spins if spin.total]
+        pair = self.spins[-2:]
+        if together and (
+            len(together) != 2 or len({(s.total, s.twice, s.electron) for s in pair}) > 1 or pair[0].electron
+        ):
+            raise ValueError(
+                "spins that are coupled to a total are two nuclei of one size, and the last ones: "
+                f"{', '.join(spin.name for spin in self.spins)}"
+            )
+        object.__setattr__(self, "paired", bool(together))
 
     @property
     def total(self) -> int:
         """Twice the sum of all spins."""
         return sum(self.twice)
+
+    def patterns(self, twice_f: int) -> Ints:
+        """The coupling patterns of one F, doubled: N, ..., F."""
+        return patterns_of_total(self.twice, twice_f) if self.paired else patterns(self.twice, twice_f)
+
+    def classes(self, every: Ints) -> Ints:
+        """Of patterns, 1 where two equivalent spins have a function that changes sign with their exchange, else 0."""
+        if not self.paired:
+            return np.zeros(len(every), dtype=np.int64)
+        return np.asarray((self.twice[-1] + self.twice[-2] - every[:, -2]) // 2 % 2)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -55,12 +86,14 @@ class Scheme:
         """
         electrons = [f"j{i + 1}" if i else "j" for i, spin in enumerate(self.spins) if spin.electron]
         nuclei = len(self.spins) - len(electrons)
-        return (*electrons, *(f"f{i + 1}" for i in range(nuclei - 1)), *(["f"] if nuclei else []))
+        sums = [*electrons, *(f"f{i + 1}" for i in range(nuclei - 1)), *(["f"] if nuclei else [])]
+        return tuple([*sums[:-2], "i_tot", "f"] if self.paired else sums)
 
     @property
     def half(self) -> tuple[bool, ...]:
         """Which of them are half-integers."""
-        return tuple(bool(total % 2) for total in accumulate(self.twice))
+        halves = [bool(total % 2) for total in accumulate(self.twice)]
+        return tuple([*halves[:-2], False, halves[-1]] if self.paired else halves)
 
     def place(self, name: str) -> int:
         """The place of a spin by its name."""

@@ -1,0 +1,154 @@
+"""The notebooks of examples/: each is its percent script, executed, with its pictures inside.
+
+    python docs/make_notebooks.py                  # all of them
+    python docs/make_notebooks.py 04 12            # those whose names begin so
+    python docs/make_notebooks.py --check          # compare and execute, write nothing
+
+The script is the source. `agrees` says whether a notebook has the cells of its script, `executed` runs one and fails on an
+error, on a warning and on a notebook without a picture. A script with `# long: SECONDS` in its first lines may take so long,
+and is executed by the slow tests only; all others have 20 s of processor time. Needs the extra `docs` (jupytext, nbclient, ipykernel).
+"""
+
+from __future__ import annotations
+
+import argparse
+import base64
+import os
+import re
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
+PYTHON3 = {"name": "python3", "display_name": "Python 3", "language": "python"}
+SECONDS = 20.0  # of one notebook, where its script names no other limit
+MOST_BYTES = 400_000
+
+
+def scripts() -> list[Path]:
+    """The percent scripts, in the order of their numbers."""
+    return sorted(EXAMPLES.glob("[0-9][0-9]_*.py"))
+
+
+def seconds_allowed(script: Path) -> float:
+    """What the line `# long: SECONDS` of a script says, else 20 s."""
+    head = "".join(script.read_text(encoding="utf-8").splitlines(keepends=True)[:5])
+    marked = re.search(r"^# long: (\d+)$", head, re.MULTILINE)
+    return float(marked.group(1)) if marked else SECONDS
+
+
+def notebook_of(script: Path) -> Any:
+    """The cells of a percent script as a notebook without outputs; ids and metadata do not change between runs."""
+    import jupytext
+
+    notebook = jupytext.read(script, fmt="py:percent")
+    notebook.metadata = {"kernelspec": PYTHON3, "language_info": {"name": "python"}}
+    for number, cell in enumerate(notebook.cells):
+        cell["id"] = f"cell-{number}"
+        cell["metadata"] = {}
+    return notebook
+
+
+def cells(notebook: Any) -> list[tuple[str, str]]:
+    """What has to agree between a script and its notebook."""
+    return [(cell["cell_type"], cell["source"].rstrip()) for cell in notebook.cells]
+
+
+def agrees(script: Path) -> bool:
+    """Whether the notebook beside a script has the same cells."""
+    import nbformat
+
+    written = script.with_suffix(".ipynb")
+    return written.exists() and cells(nbformat.read(written, as_version=4)) == cells(notebook_of(script))
+
+
+def executed(script: Path, patience: float = 10.0) -> tuple[Any, float]:
+    """The notebook of a script after a run in examples/, and the processor seconds that it took, start of the kernel included.
+
+    patience: factor on the seconds allowed to a cell, for a busy machine. Raises nbclient's CellExecutionError for an error
+    in a cell, ValueError for a warning on standard error and for a notebook without a picture.
+    """
+    from nbclient import NotebookClient
+    from traitlets.config import Config
+
+    os.environ.setdefault("PYDEVD_DISABLE_FILE_VALIDATION", "1")
+    notebook, start = notebook_of(script), _spent_by_children()
+    limit = int(patience * max(seconds_allowed(script), SECONDS))
+    place = {"metadata": {"path": str(EXAMPLES)}}
+    with tempfile.TemporaryDirectory() as sockets:
+        ipc = (
+            {"transport": "ipc", "ip": f"{sockets}/kernel"} if os.name == "posix" else {}
+        )  # files instead of open ports
+        config = Config({"KernelManager": ipc})
+        NotebookClient(notebook, timeout=limit, kernel_name="python3", resources=place, config=config).execute()
+    for cell in notebook.cells:
+        cell["metadata"] = {}  # times of execution
+    if spoken := on_standard_error(notebook):
+        raise ValueError(f"{script.name}: a notebook writes nothing to standard error; this one: {spoken[:300]}")
+    if not pictures(notebook):
+        raise ValueError(f"{script.name}: a notebook has a picture; end a cell with the figure, or draw it with pyplot")
+    return notebook, _spent_by_children() - start
+
+
+def _spent_by_children() -> float:
+    spent = os.times()  # on Windows 0
+    return spent.children_user + spent.children_system
+
+
+def _outputs(notebook: Any) -> list[Any]:
+    return [output for cell in notebook.cells if cell["cell_type"] == "code" for output in cell["outputs"]]
+
+
+def on_standard_error(notebook: Any) -> str:
+    """Everything that the cells wrote there."""
+    return "".join(one["text"] for one in _outputs(notebook) if one.get("name") == "stderr")
+
+
+def pictures(notebook: Any) -> list[bytes]:
+    """The PNG files in the outputs of a notebook, in order."""
+    shown = [output.get("data", {}).get("image/png") for output in _outputs(notebook)]
+    return [base64.b64decode(png) for png in shown if png]
+
+
+def write(script: Path, notebook: Any) -> int:
+    """Write a notebook beside its script; its size in bytes. ValueError where it is larger than a repository should hold."""
+    import nbformat
+
+    text = nbformat.writes(notebook)
+    if len(text.encode()) > MOST_BYTES:
+        raise ValueError(f"{script.name}: {len(text)} bytes; at most {MOST_BYTES}: draw fewer or smaller pictures")
+    script.with_suffix(".ipynb").write_text(text + "\n", encoding="utf-8")
+    return len(text)
+
+
+def main() -> int:
+    """Make or check the notebooks; 1 where one is wrong or late."""
+    parser = argparse.ArgumentParser(description="notebooks from the percent scripts of examples/")
+    parser.add_argument("names", nargs="*", help="beginnings of names; all scripts where none is given")
+    parser.add_argument("--check", action="store_true", help="compare and execute, write nothing")
+    parser.add_argument("--pictures", type=Path, help="write the pictures into this folder too, to look at them")
+    arguments = parser.parse_args()
+    wrong = 0
+    for script in scripts():
+        if arguments.names and not script.name.startswith(tuple(arguments.names)):
+            continue
+        notebook, seconds = executed(script)
+        late = seconds > seconds_allowed(script)
+        differs = arguments.check and not agrees(script)
+        size = 0 if arguments.check else write(script, notebook)
+        verdict = ", too long" * late + ", differs from its notebook: run docs/make_notebooks.py" * differs
+        print(
+            f"{script.stem}: {seconds:.1f} s, {len(pictures(notebook))} pictures, {size // 1000} kB{verdict}",
+            flush=True,
+        )
+        wrong |= late or differs
+        if arguments.pictures:
+            arguments.pictures.mkdir(parents=True, exist_ok=True)
+            for number, png in enumerate(pictures(notebook), start=1):
+                (arguments.pictures / f"{script.stem}_{number}.png").write_bytes(png)
+    return int(wrong)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

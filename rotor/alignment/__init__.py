@@ -1,0 +1,1 @@
+"""Rotational wave packets: molecules aligned and oriented by pulses of light."""

@@ -1,0 +1,45 @@
+"""The compiled loop of the splitting: kicks and drifts of all columns of a block, and snapshots on the way."""
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def kick_and_drift(
+    states: NDArray[np.complex128],
+    drifts: NDArray[np.complex128],
+    which: NDArray[np.int64],
+    phases: NDArray[np.complex128],
+    marks: NDArray[np.bool_],
+    snapshots: NDArray[np.complex128],
+) -> None:
+    """`states` (n, m) in place: for every stage i the phases[i] (n,) of a kick and the drift drifts[which[i]].
+
+    After the stages with `marks` the states are copied into `snapshots`. One column goes through plain loops, which are faster
+    there than a call of BLAS; more go through zgemm.
+    """
+    size, columns = states.shape
+    moved = np.empty_like(states)
+    taken = 0
+    for stage in range(len(which)):
+        for i in range(size):
+            phase = phases[stage, i]
+            for c in range(columns):
+                states[i, c] *= phase
+        drift = drifts[which[stage]]
+        if columns == 1:
+            for i in range(size):
+                real = 0.0
+                imag = 0.0
+                for k in range(size):
+                    a, b = drift[i, k], states[k, 0]
+                    real += a.real * b.real - a.imag * b.imag
+                    imag += a.real * b.imag + a.imag * b.real
+                moved[i, 0] = real + 1j * imag
+        else:
+            np.dot(drift, states, moved)
+        states[:, :] = moved
+        if marks[stage]:
+            snapshots[taken] = states
+            taken += 1

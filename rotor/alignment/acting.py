@@ -1,0 +1,91 @@
+"""What pulses act on, and how far they carry a top: polarizability or dipole, the J that is reached, the period of revivals."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rotor.alignment.pulse import RAD_PER_PS_MHZ, Kick, Pulse
+from rotor.alignment.timeline import Channel, Window
+from rotor.arrays import Floats
+from rotor.quantum.field_blocks import Contraction
+
+if TYPE_CHECKING:
+    from rotor.tops.top import Top
+
+
+def acted_on(top: Top, acts_on: str) -> Floats:
+    """What a channel acts on: the polarizability without its mean (3, 3) in Å³, or the dipole (3,) in D.
+
+    Raises ValueError where it is not known or does nothing.
+    """
+    name = top.name or "this top"
+    if top.kind == "spherical":
+        raise ValueError(
+            f"{name} is a spherical top: its polarizability is isotropic and it has no dipole, so no pulse turns it"
+        )
+    if acts_on == "dipole":
+        dipole = np.array(top.dipole_abc_debye if top.dipole_abc_debye is not None else (0.0, 0.0, 0.0))
+        if not dipole.any():
+            raise ValueError(f"{name} has no dipole that is known and not 0; a field that acts on it needs one")
+        return dipole
+    if top.polarizability_abc_angstrom3 is None:
+        raise ValueError(f"the polarizability of {name} is not known: give one, in principal axes (Å³)")
+    tensor = np.array(top.polarizability_abc_angstrom3)
+    tensor = tensor - np.eye(3) * np.trace(tensor) / 3
+    if not np.abs(tensor).max() > 0:
+        raise ValueError(f"the polarizability of {name} is isotropic: no light turns it")
+    return np.asarray(tensor)
+
+
+def contraction_of(top: Top, channel: Channel) -> Contraction:
+    body, space = acted_on(top, channel.acts_on), np.array(channel.space)
+    return Contraction(body, space - np.eye(3) * np.trace(space) / 3 if space.ndim == 2 else space)
+
+
+def contractions_of(top: Top, windows: Sequence[Window]) -> tuple[tuple[Contraction, ...], ...]:
+    return tuple(tuple(contraction_of(top, channel) for channel in window.channels) for window in windows)
+
+
+def guessed_jmax(top: Top, pulses: Sequence[Pulse], highest: int, tolerance: float) -> int:
+    """J that a gas reaches from J = `highest`: J + min(P, √(J² + U0/B) - J) for each pulse, P = ∫U0 dt/ħ, U0 the well; and a tail."""
+    smallest = RAD_PER_PS_MHZ * min(x for x in top.rotational_constants_mhz if math.isfinite(x))
+    reached = float(highest)
+    for pulse in pulses:
+        size = _spread(acted_on(top, pulse.acts_on))
+        if isinstance(pulse, Kick):
+            reached += size * pulse.area
+            continue
+        strength, area = _peak_and_area(pulse)
+        reached += min(size * area, math.sqrt(reached**2 + size * strength / smallest) - reached)
+    return int(reached + max(6.0, 6 - 1.5 * math.log10(tolerance) - highest / 5))
+
+
+def _spread(body: Floats) -> float:
+    """Largest difference of energies that orientation makes, for strength 1."""
+    if body.ndim == 1:
+        return 2 * float(np.linalg.norm(body))
+    values = np.linalg.eigvalsh(body)
+    return float(values[-1] - values[0])
+
+
+def _peak_and_area(pulse: Pulse) -> tuple[float, float]:
+    first, last = pulse.window_ps
+    times = np.linspace(first, last, 1001)
+    strength = np.abs(pulse.strength(times))
+    return float(strength.max()), float(strength.sum() * (times[1] - times[0]))
+
+
+def revival_period_ps(top: Top) -> float:
+    """1/(2Bc), after which a rigid linear or symmetric top is as it was (B the constant across its axis).
+
+    >>> from rotor.tops.top import Top
+    >>> round(revival_period_ps(Top.from_constants("B=6081.492 MHz")), 3)  # OCS
+    82.217
+    """
+    a, b, _ = top.rotational_constants_mhz
+    across = a if top.kind == "oblate" else b
+    return 1e6 / (2 * across)

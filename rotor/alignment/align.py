@@ -1,0 +1,296 @@
+"""Alignment and orientation of a gas by pulses: from a top, pulses and a temperature to cosines against time.
+
+    trace = align(top, [GaussianPulse(1e13, 0.05)], np.linspace(-0.2, 164, 4001), temperature_k=10)
+
+How each stretch of time is treated follows from what acts in it: nothing, exact phases and a sum of harmonics; a kick, one phase
+in the eigenvectors of its operator; one operator, a splitting of order 4 or 6; several, a Magnus method. The number of steps and J max
+follow from the tolerance, which is that of the cosines: the block M = 0 is carried with steps and with half of them until both agree.
+The result says what it found: step error, population at the highest J, population left out, norm.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rotor.alignment import observables as observe
+from rotor.alignment import propagate
+from rotor.alignment.acting import contractions_of, guessed_jmax
+from rotor.alignment.carry import EDGE, Outcome, Plan, Problem, Task, run, tasks_of
+from rotor.alignment.ensemble import Ensemble, ground_level, one_level, thermal
+from rotor.alignment.observables import Harmonics
+from rotor.alignment.pulse import RAD_PER_PS_MHZ, Pulse
+from rotor.alignment.steps import Pilot, pilot_of
+from rotor.alignment.timeline import timeline
+from rotor.arrays import Floats
+from rotor.quantum.field_blocks import FieldSpace, FreeLevels
+from rotor.table import Table
+
+if TYPE_CHECKING:
+    from rotor.tops.top import Top
+
+DEFAULT_TOLERANCE = 1e-6
+HIGHEST_J = 600
+
+
+@dataclass(frozen=True)
+class AlignmentTrace(Table):
+    """Cosines against time, and how they were found.
+
+    t_ps: (t,). cosines: by name (t,). ensemble: what the gas was like at first. levels, populations: of the free top after the last
+    pulse, one row for each level, over all M. jmax: of the basis. states: initial states (level, M) that were propagated. steps: of
+    each window. step_error: by halving the steps, in the cosines. edge_population: largest population of the two highest J.
+    norm_error: largest departure of the norm from 1. harmonics: of each cosine after the last pulse.
+    """
+
+    top: Top
+    pulses: tuple[Pulse, ...]
+    t_ps: Floats
+    cosines: dict[str, Floats]
+    ensemble: Ensemble
+    levels: FreeLevels = field(repr=False)
+    populations: Floats = field(repr=False)
+    jmax: int
+    states: int
+    method: str
+    steps: tuple[int, ...]
+    step_error: float
+    edge_population: float
+    norm_error: float
+    tolerance: float
+    harmonics: dict[str, Harmonics] = field(repr=False)
+
+    @property
+    def columns(self) -> dict[str, Floats]:
+        """t_ps and every cosine."""
+        return {"t_ps": self.t_ps, **self.cosines}
+
+    @property
+    def provenance(self) -> dict[str, Any]:
+        """Top, pulses, ensemble and what was found about accuracy."""
+        top = self.top
+        return {
+            "constants_mhz": dict(top.constants.values),
+            "dipole_abc_debye": top.dipole_abc_debye,
+            "polarizability_abc_angstrom3": top.polarizability_abc_angstrom3,
+            "polarizability_source": top.polarizability_source or None,
+            "pulses": [repr(pulse) for pulse in self.pulses],
+            "temperature_k": self.ensemble.temperature_k or None,
+            "state": dict(self.ensemble.chosen) if self.ensemble.chosen is not None else None,
+            "m": self.ensemble.m,
+            "states": self.states,
+            "left_out": self.ensemble.left_out,
+            "jmax": self.jmax,
+            "method": self.method,
+            "steps": list(self.steps),
+            "tolerance": self.tolerance,
+            "step_error": self.step_error,
+            "edge_population": self.edge_population,
+            "norm_error": self.norm_error,
+        }
+
+    @cached_property
+    def permanent(self) -> dict[str, float]:
+        """The mean over time of each cosine after the last pulse."""
+        return {name: one.constant for name, one in self.harmonics.items()}
+
+    @property
+    def error_estimate(self) -> float:
+        """Of the cosines: steps, leakage and what the ensemble leaves out."""
+        return self.step_error + self.edge_population + 0.2 * self.ensemble.left_out
+
+
+def align(
+    top: Top,
+    pulses: Sequence[Pulse] | Pulse,
+    times_ps: ArrayLike,
+    *,
+    temperature_k: float = 0.0,
+    state: Mapping[str, int] | None = None,
+    m: int | None = None,
+    observables: Sequence[str] = ("cos2theta",),
+    tolerance: float = DEFAULT_TOLERANCE,
+    jmax: int | None = None,
+    executor: Executor | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> AlignmentTrace:
+    """Cosines of a gas of tops under pulses.
+
+    Parameters
+    ----------
+    top : Top
+        With `polarizability_abc_angstrom3` for light, `dipole_abc_debye` for fields that act on the dipole.
+    pulses : sequence of Pulse
+        Any polarizations and directions; M stays good, and the work small, where all are symmetric about Z (linear along Z,
+        circular in the XY plane).
+    times_ps : (t,) rising
+        They may begin before the first pulse; the last pulse must have ended by the last of them.
+    temperature_k : float
+        Of the gas; 0 is its lowest level.
+    state, m : optional
+        One level instead, by quantum numbers such as {"j": 0}, and one of its M.
+    observables : names
+        cos2theta, costheta, cos2theta_2d, cos2_aZ, ...; see `rotor.alignment.observables.observable`.
+    tolerance : float
+        Of the cosines: steps, J max and the populations left out follow from it.
+    jmax : int, optional
+        Of the basis; by default what the tolerance needs.
+    executor : Executor, optional
+        Blocks (M and symmetry) are spread over it.
+    progress : callable, optional
+        Called with the number of blocks done and of all.
+
+    Returns
+    -------
+    AlignmentTrace
+
+    Raises
+    ------
+    ValueError
+        No polarizability or dipole that the pulses act on; a pulse that ends after the last time; a given J max that is too small for
+        the tolerance.
+
+    Notes
+    -----
+    Neglected: what light does beyond the polarizability (hyperpolarizability, ionisation), averaging over the optical cycle (below
+    1e-7 at 800 nm), centrifugal change of the tensors, nuclear hyperfine coupling, the profile of the focus.
+    """
+    pulses = (pulses,) if isinstance(pulses, Pulse) else tuple(pulses)
+    times = _checked_times(times_ps, pulses)
+    _check_tolerance(tolerance)
+    ensemble = _ensemble(top, temperature_k, state, m, tolerance)
+    wanted = tuple(observe.observable(name, top) for name in observables)
+    windows = timeline(pulses)
+    problem = Problem(top, pulses, windows, times, ensemble, wanted, tolerance, contractions_of(top, windows))
+    given = jmax
+    jmax = guessed_jmax(top, pulses, ensemble.jmax, tolerance) if given is None else given
+    if jmax < ensemble.jmax + EDGE:
+        raise ValueError(
+            f"J max {jmax}: the ensemble itself has J up to {ensemble.jmax}; give at least {ensemble.jmax + EDGE}"
+        )
+    while True:
+        pilot = pilot_of(problem, jmax)
+        if pilot.edge <= 0.3 * tolerance:
+            trace = _carried(problem, jmax, pilot, executor, progress)
+            if trace.edge_population <= tolerance:
+                return trace
+            pilot = replace(pilot, edge=trace.edge_population)
+        if given is not None:
+            raise ValueError(
+                f"J max {jmax} is too small for a tolerance of {tolerance:g}: the two highest J hold {pilot.edge:.2g} of the "
+                "population; give a higher J max, or none and it is chosen"
+            )
+        jmax = int(1.15 * jmax) + 4
+        if jmax > HIGHEST_J:
+            raise ValueError(f"the pulses need J beyond {HIGHEST_J}; lower the intensity or the temperature")
+
+
+def _checked_times(times_ps: ArrayLike, pulses: Sequence[Pulse]) -> Floats:
+    times = np.array(times_ps, dtype=np.float64)
+    if times.ndim != 1 or not len(times) or not np.isfinite(times).all() or (np.diff(times) <= 0).any():
+        raise ValueError("times must be a list of finite numbers of ps that rise")
+    if not pulses:
+        raise ValueError("no pulse: give at least one")
+    end = max(pulse.window_ps[1] for pulse in pulses)
+    if times[-1] < end:
+        raise ValueError(
+            f"the times end at {times[-1]:g} ps, before the last pulse does ({end:g} ps): a pulse is longer than the times; let them "
+            "go on, or shorten it"
+        )
+    return times
+
+
+def _check_tolerance(tolerance: float) -> None:
+    if not 1e-12 <= tolerance <= 0.1:
+        raise ValueError(f"tolerance {tolerance:g} of a cosine: a number from 1e-12 to 0.1 is expected")
+
+
+def _ensemble(
+    top: Top, temperature_k: float, state: Mapping[str, int] | None, m: int | None, tolerance: float
+) -> Ensemble:
+    if state is not None:
+        if temperature_k:
+            raise ValueError("give a temperature or a state, not both")
+        return one_level(top, state, m)
+    if m is not None:
+        raise ValueError(f"M = {m} belongs to one state: give the state too")
+    return thermal(top, temperature_k, tolerance) if temperature_k else ground_level(top)
+
+
+def _carried(
+    problem: Problem, jmax: int, pilot: Pilot, executor: Executor | None, progress: Callable[[int, int], None] | None
+) -> AlignmentTrace:
+    """All blocks, and the trace that they make together."""
+    space = problem.space(jmax)
+    before = bool(problem.free_times(-1).any())
+    tasks = list(tasks_of(problem, space, pilot.plan, before))
+    found = pilot.outcome_of(tasks)
+    if found is not None:
+        return _trace(problem, space, tasks, [found], pilot, before)
+    outcomes = []
+    for done, outcome in enumerate(executor.map(run, tasks) if executor else map(run, tasks), 1):
+        outcomes.append(outcome)
+        if progress:
+            progress(done, len(tasks))
+    return _trace(problem, space, tasks, outcomes, pilot, before)
+
+
+def _trace(
+    problem: Problem, space: FieldSpace, tasks: list[Task], outcomes: list[Outcome], pilot: Pilot, before: bool
+) -> AlignmentTrace:
+    energies = RAD_PER_PS_MHZ * space.levels.energy_mhz
+    populations = np.zeros(len(space.levels))
+    for task, outcome in zip(tasks, outcomes, strict=True):
+        np.add.at(populations, task.rows, outcome.populations)
+    cosines, last = {}, {}
+    for place, one in enumerate(problem.wanted):
+        cosines[one.name], last[one.name] = _signal(problem, energies, outcomes, place, before)
+    return AlignmentTrace(
+        top=problem.top,
+        pulses=problem.pulses,
+        t_ps=problem.times,
+        cosines=cosines,
+        ensemble=problem.ensemble,
+        levels=space.levels,
+        populations=populations,
+        jmax=space.jmax,
+        states=sum(len(task.columns) for task in tasks),
+        method=_method(pilot.plan),
+        steps=pilot.steps,
+        step_error=pilot.error,
+        edge_population=float(sum(outcome.edge for outcome in outcomes).max(initial=0.0)),  # type: ignore[union-attr]
+        norm_error=max((outcome.norm_error for outcome in outcomes), default=0.0),
+        tolerance=problem.tolerance,
+        harmonics=last,
+    )
+
+
+def _method(plan: Plan) -> str:
+    names = {float: "kick", propagate.KickPlan: "splitting", propagate.Grid: "magnus"}
+    return ", ".join(sorted({names[type(passage)] for passage in plan.passages}))
+
+
+def _signal(
+    problem: Problem, energies: Floats, outcomes: list[Outcome], place: int, before: bool
+) -> tuple[Floats, Harmonics]:
+    """One cosine at all times, and its harmonics after the last window."""
+    remainder = problem.ensemble.left_out * problem.wanted[place].isotropic
+    out = np.full(len(problem.times), np.nan)
+    stretches = range(-1 if before else 0, len(problem.windows))
+    found = Harmonics(remainder, np.zeros(0, dtype=np.complex128), np.zeros(0))
+    for index, after in enumerate(stretches):
+        found = observe.harmonics([outcome.free[index][place] for outcome in outcomes], energies, remainder)
+        here = problem.free_times(after)
+        start = problem.windows[after].stop_ps if after >= 0 else problem.windows[0].start_ps
+        out[here] = found.at(problem.times[here] - start)
+    for index, window in enumerate(problem.windows):
+        here = problem.times_in(window)
+        if here.any():
+            out[here] = remainder + sum(outcome.samples[index][place] for outcome in outcomes)
+    return out, found

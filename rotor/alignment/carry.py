@@ -1,0 +1,240 @@
+"""One block of states carried through all windows of the pulses: what has to be known of it, and what comes out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor.alignment import observables as observe
+from rotor.alignment import propagate
+from rotor.alignment.ensemble import Ensemble
+from rotor.alignment.observables import Coherences, Observable
+from rotor.alignment.pulse import RAD_PER_PS_MHZ, Pulse
+from rotor.alignment.timeline import Window
+from rotor.arrays import Floats, Ints
+from rotor.quantum.field_blocks import AxialBlock, Contraction, FieldBlock, FieldSpace, field_space
+
+if TYPE_CHECKING:
+    from rotor.tops.top import Top
+
+Complexes = NDArray[np.complex128]
+
+EDGE = 2  # the highest values of J, whose population is the leakage
+
+
+@dataclass(frozen=True)
+class Problem:
+    """What is asked for, the same for every block."""
+
+    top: Top
+    pulses: tuple[Pulse, ...]
+    windows: tuple[Window, ...]
+    times: Floats
+    ensemble: Ensemble
+    wanted: tuple[Observable, ...]
+    tolerance: float
+    contractions: tuple[tuple[Contraction, ...], ...]
+
+    def space(self, jmax: int) -> FieldSpace:
+        """The states up to J max and their blocks."""
+        return field_space(self.top, jmax, [one for of_window in self.contractions for one in of_window])
+
+    def m_values(self, space: FieldSpace) -> Sequence[int]:
+        """|M| of the blocks to be carried; 0 stands for all where M is mixed."""
+        if not space.m_is_good:
+            return (0,)
+        return range(self.ensemble.jmax + 1) if self.ensemble.m is None else (self.ensemble.m,)
+
+    def free_times(self, after: int) -> NDArray[np.bool_]:
+        """Which times lie between window `after` (-1: before the first) and the next."""
+        start = self.windows[after].stop_ps if after >= 0 else -np.inf
+        stop = self.windows[after + 1].start_ps if after + 1 < len(self.windows) else np.inf
+        return (self.times > start if after >= 0 and self.windows[after].is_kick else self.times >= start) & (
+            self.times <= stop
+        )
+
+    def times_in(self, window: Window) -> NDArray[np.bool_]:
+        """Which times lie inside a window."""
+        return (self.times > window.start_ps) & (self.times < window.stop_ps)
+
+
+@dataclass(frozen=True)
+class Plan:
+    """How each window is passed: kicks of a splitting, the grid of a Magnus method, or the area of a kick."""
+
+    windows: tuple[Window, ...]
+    passages: tuple[propagate.KickPlan | propagate.Grid | float, ...]
+
+
+@dataclass(frozen=True)
+class Task:
+    """One block: energies (n,) in rad/ps, operators by window, cosines, rows, initial columns with weights, edge states."""
+
+    energies: Floats
+    operators: tuple[tuple[NDArray[Any], ...], ...]
+    cosines: tuple[NDArray[Any], ...]
+    rows: Ints
+    columns: Ints
+    weights: Floats
+    edge: NDArray[np.bool_]
+    plan: Plan
+    before: bool
+    gradients: tuple[GradientOf | None, ...] | None = None
+
+
+@dataclass(frozen=True)
+class GradientOf:
+    """W = scale (x^rank - shift) of x = cosθ, and B in rad/ps across the figure axis: what B (dW/dθ)² follows from."""
+
+    rank: int
+    scale: float
+    across: float
+
+    def at(self, values: Floats) -> Floats:
+        """B (dW/dθ)² at eigenvalues of W (n,)."""
+        if self.rank == 1:
+            return self.across * (self.scale**2 - values**2)
+        squares = values / self.scale + 1 / 3
+        return np.asarray(4 * self.across * self.scale**2 * squares * (1 - squares))
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Of a block: coherences by free stretch and cosine, samples by window and cosine, final populations, edge, norm."""
+
+    free: tuple[tuple[Coherences, ...], ...]
+    samples: tuple[Floats, ...]
+    populations: Floats
+    edge: Floats
+    norm_error: float
+
+
+def run(task: Task) -> Outcome:
+    """Carry one block through all windows."""
+    states = np.zeros((len(task.energies), len(task.columns)), dtype=np.complex128)
+    states[task.columns, np.arange(len(task.columns))] = 1.0
+    free, samples, edges = [], [], []
+    if task.before:
+        free.append(_all_coherences(task, states))
+    now = task.plan.windows[0].start_ps
+    known: dict[int, propagate.Decomposed] = {}
+    for window, passage, operators in zip(task.plan.windows, task.plan.passages, task.operators, strict=True):
+        states = np.exp(-1j * task.energies * (window.start_ps - now))[:, None] * states
+        states, leaked, found = _through(task, window, passage, operators, states, known)
+        now = window.stop_ps
+        samples.append(found)
+        free.append(_all_coherences(task, states))
+        edges.append(float(task.weights @ leaked))
+    here = np.abs(states) ** 2
+    norm = float(np.abs(here.sum(axis=0) - 1).max(initial=0.0))
+    return Outcome(tuple(free), tuple(samples), here @ task.weights, np.array(edges), norm)
+
+
+def _all_coherences(task: Task, states: Complexes) -> tuple[Coherences, ...]:
+    return tuple(observe.coherences(states, task.weights, matrix, task.rows) for matrix in task.cosines)
+
+
+def _through(
+    task: Task,
+    window: Window,
+    passage: propagate.KickPlan | propagate.Grid | float,
+    operators: tuple[NDArray[Any], ...],
+    states: Complexes,
+    known: dict[int, propagate.Decomposed],
+) -> tuple[Complexes, Floats, Floats]:
+    """States after a window, each one's largest population at the edge, and the cosines (cosines, samples) inside."""
+    snapshots = _Snapshots(task)
+    if isinstance(passage, propagate.Grid):
+        states, leaked = propagate.magnus_through(
+            window, passage, task.energies, operators, states, task.edge, snapshots
+        )
+        return states, leaked, snapshots.cosines
+    operator = known.get(id(operators[0]))
+    if operator is None:
+        operator = known[id(operators[0])] = _decomposed(task, window, operators[0])
+    if isinstance(passage, propagate.KickPlan):
+        states, leaked = propagate.split_through(passage, task.energies, operator, states, task.edge, snapshots)
+    else:
+        states = propagate.kick_through(passage, operator, states)
+        leaked = (np.abs(states[task.edge]) ** 2).sum(axis=0)
+    return states, leaked, snapshots.cosines
+
+
+def _decomposed(task: Task, window: Window, matrix: NDArray[Any]) -> propagate.Decomposed:
+    found = propagate.decompose(matrix)
+    gradient = task.gradients[task.plan.windows.index(window)] if task.gradients is not None else None
+    return found if gradient is None else replace(found, gradient=gradient.at(found.values))
+
+
+class _Snapshots(list[Complexes]):
+    """Takes states at sampled times and turns them into cosines, so that they do not fill the memory."""
+
+    def __init__(self, task: Task) -> None:
+        super().__init__()
+        self._task, self._made = task, [np.zeros((len(task.cosines), 0))]
+
+    def append(self, states: Complexes) -> None:
+        """Of states (times, n, m) only the cosines stay."""
+        self._made.append(
+            np.array([observe.expectation(states, self._task.weights, one) for one in self._task.cosines])
+        )
+
+    @property
+    def cosines(self) -> Floats:
+        """(cosines, samples)."""
+        return np.concatenate(self._made, axis=1)
+
+
+def task_of(problem: Problem, block: FieldBlock, plan: Plan, before: bool) -> Task | None:
+    """What has to be done for a block; None where nothing in it is populated."""
+    population = problem.ensemble.populations(block.levels)[block.rows] * block.copies
+    if problem.ensemble.m is not None:
+        population = population * (block.abs_m == problem.ensemble.m) / (2 if problem.ensemble.m else 1)
+    columns = np.flatnonzero(population)
+    if not len(columns):
+        return None
+    made: dict[int, NDArray[Any]] = {}
+    operators = tuple(tuple(_made(block, one, made) for one in of_window) for of_window in problem.contractions)
+    return Task(
+        energies=RAD_PER_PS_MHZ * block.energies_mhz,
+        operators=operators,
+        cosines=tuple(one.matrix(block) for one in problem.wanted),
+        rows=block.rows,
+        columns=columns,
+        weights=population[columns],
+        edge=block.j > block.levels.j.max() - EDGE,
+        plan=plan,
+        before=before,
+        gradients=tuple(_gradient(problem.top, one[0]) for one in problem.contractions)
+        if isinstance(block, AxialBlock)
+        else None,
+    )
+
+
+def _gradient(top: Top, contraction: Contraction) -> GradientOf:
+    """Of a contraction of an axial top; its tensors have no trace."""
+    axis = 2 if top.kind == "oblate" else 0
+    a, b, _ = top.rotational_constants_mhz
+    body, space = contraction.body, contraction.space
+    scale = body[axis] * space[2] if contraction.rank == 1 else 2.25 * body[axis, axis] * space[2, 2]
+    return GradientOf(contraction.rank, float(scale), RAD_PER_PS_MHZ * (a if top.kind == "oblate" else b))
+
+
+def _made(block: FieldBlock, contraction: Contraction, made: dict[int, NDArray[Any]]) -> NDArray[Any]:
+    """The matrix of a contraction, made once for all windows that share it."""
+    key = hash((contraction.body.tobytes(), contraction.space.tobytes()))
+    if key not in made:
+        made[key] = block.matrix(contraction)
+    return made[key]
+
+
+def tasks_of(problem: Problem, space: FieldSpace, plan: Plan, before: bool) -> Iterator[Task]:
+    for m in problem.m_values(space):
+        for block in space.blocks(m):
+            task = task_of(problem, block, plan, before)
+            if task is not None:
+                yield task

@@ -1,0 +1,175 @@
+"""The classical gas of the same top under the same pulses: bodies drawn at the temperature, moved by the Euler core.
+
+Units: ps, rad/ps for energies and ħ for angular momenta, so that I = ħ/(4π B) is 1/(2B) with B in rad/ps. While a pulse acts the
+bodies are stepped with its torque; between pulses their motion is exact. What the classical gas has not is revivals: it
+dephases once, as the quantum one does at first, and keeps the mean that the pulse left.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rotor import units
+from rotor.alignment.acting import acted_on
+from rotor.alignment.observables import figure_axis
+from rotor.alignment.pulse import RAD_PER_PS_MHZ, Kick, Pulse
+from rotor.alignment.timeline import Channel, Window, timeline
+from rotor.arrays import Floats, Ints
+from rotor.classical.effect import Torque
+from rotor.classical.effects.dipole_in_field import PulsedDipole, PulsedPolarizability
+from rotor.classical.free.free_motion import free_motion
+from rotor.classical.gas.ensembles import thermal_momenta
+from rotor.classical.integrators.method import integrate
+from rotor.classical.integrators.splitting import SymmetricTopSplitting
+from rotor.geometry.rotations import rotate, uniform
+
+if TYPE_CHECKING:
+    from rotor.tops.top import Top
+
+STEPS_PER_WINDOW = 400
+PIECE = 5000  # bodies moved together
+
+
+def classical_trace(
+    top: Top,
+    pulses: Sequence[Pulse],
+    times_ps: ArrayLike,
+    *,
+    temperature_k: float,
+    molecules: int = 10_000,
+    observables: Sequence[str] = ("cos2theta",),
+    rng: np.random.Generator,
+) -> dict[str, Floats]:
+    """Cosines (t,) by name of a classical gas under pulses.
+
+    Parameters
+    ----------
+    top : Top
+        With what the pulses act on.
+    pulses : sequence of Pulse
+        As `rotor.alignment.align.align` takes them.
+    times_ps : (t,) rising
+    temperature_k : float
+        Of the gas; 0 for bodies at rest.
+    molecules : int
+        How many bodies; the cosines scatter by about 0.3/√molecules.
+    observables : names
+        costheta, cos2theta, cos2theta_2d, cos_aZ, cos2_aZ, ...
+    rng : Generator
+        The one source of randomness.
+
+    Returns
+    -------
+    dict of (t,) arrays
+
+    Raises
+    ------
+    ValueError
+        For what the quantum calculation refuses, and less than one molecule.
+    """
+    times = np.asarray(times_ps, dtype=np.float64)
+    if molecules < 1:
+        raise ValueError(f"{molecules} molecules: 1 or more are expected")
+    moments = moments_of(top)
+    momentum = np.zeros((molecules, 3))
+    if temperature_k:
+        momentum = thermal_momenta(moments, RAD_PER_PS_MHZ * units.MHZ_PER_K * temperature_k, molecules, rng=rng)
+    attitude = uniform(molecules, rng=rng)
+    measures = [_measure(name, top) for name in observables]
+    out = np.zeros((len(measures), len(times)))
+    for first in range(0, molecules, PIECE):
+        part = slice(first, first + PIECE)
+        out += _summed(top, timeline(pulses), times, moments, momentum[part], attitude[part], measures)
+    return dict(zip(observables, out / molecules, strict=True))
+
+
+def moments_of(top: Top) -> Floats:
+    """Principal moments along a, b, c in ħ² per rad/ps·ħ, 1/(2B); 0 for the axis of a linear top."""
+    return np.array([0.0 if math.isinf(x) else 1 / (2 * RAD_PER_PS_MHZ * x) for x in top.rotational_constants_mhz])
+
+
+Measure = Callable[[Floats], Floats]  # attitudes (n, 4) -> values (n,)
+
+
+def _measure(name: str, top: Top) -> Measure:
+    body, space = figure_axis(top), 2
+    if name.startswith(("cos_", "cos2_")):
+        body, space = "abc".index(name[-2]), "XYZ".index(name[-1])
+    axis = np.eye(3)[body]
+    if name.startswith("cos2theta_2d"):
+        return lambda attitude: np.abs(rotate(attitude, axis)[..., space])
+    power = 2 if name.startswith("cos2") else 1
+    return lambda attitude: rotate(attitude, axis)[..., space] ** power
+
+
+def _summed(
+    top: Top,
+    windows: Sequence[Window],
+    times: Floats,
+    moments: Floats,
+    momentum: Floats,
+    attitude: Floats,
+    measures: Sequence[Measure],
+) -> Floats:
+    """Sums of the measures over some bodies, (measures, t)."""
+    out = np.zeros((len(measures), len(times)))
+    now = min(float(times[0]), windows[0].start_ps)
+    for window in (*windows, None):
+        stop = window.start_ps if window is not None else float(times[-1])
+        here = np.flatnonzero((times >= now) & (times <= stop)) if window is None else _between(times, now, stop)
+        motion = free_motion(moments, momentum, attitude)
+        for place in here.tolist():
+            out[:, place] = [measure(motion.at(times[place] - now)[1]).sum() for measure in measures]
+        if window is None:
+            return out
+        momentum, attitude = motion.at(window.start_ps - now)
+        momentum, attitude = _through(top, window, times, moments, momentum, attitude, measures, out)
+        momentum = np.where(moments > 0, momentum, 0.0)  # a linear top has none about its axis, but for round-off
+        now = window.stop_ps
+    return out
+
+
+def _between(times: Floats, first: float, last: float) -> Ints:
+    return np.flatnonzero((times >= first) & (times <= last))
+
+
+def _through(
+    top: Top,
+    window: Window,
+    times: Floats,
+    moments: Floats,
+    momentum: Floats,
+    attitude: Floats,
+    measures: Sequence[Measure],
+    out: Floats,
+) -> tuple[Floats, Floats]:
+    """The bodies after a window; the measures at the times inside it are written into `out`."""
+    if window.is_kick:
+        kick = window.channels[0].pulses[0]
+        area = kick.area if isinstance(kick, Kick) else 0.0
+        push = _torque(top, window.channels[0], lambda _: area)
+        return momentum + push.torque(0.0, attitude, np.zeros_like(momentum)), attitude
+    inside = np.flatnonzero((times > window.start_ps) & (times < window.stop_ps))
+    listed = np.concatenate([[window.start_ps], times[inside], [window.stop_ps]])
+    effects = [_torque(top, channel, _history(channel)) for channel in window.channels]
+    method = SymmetricTopSplitting((window.stop_ps - window.start_ps) / STEPS_PER_WINDOW)
+    motion = integrate(method, moments, momentum, listed, attitude, effects)
+    for place, turned in zip(inside.tolist(), np.moveaxis(motion.attitude, 1, 0)[1:-1], strict=True):
+        out[:, place] = [measure(turned).sum() for measure in measures]
+    return motion.momentum[:, -1], motion.attitude[:, -1]
+
+
+def _history(channel: Channel) -> Callable[[float], float]:
+    return lambda time: float(channel.strength(np.array([time]))[0])
+
+
+def _torque(top: Top, channel: Channel, history: Callable[[float], float]) -> Torque:
+    body = acted_on(top, channel.acts_on)
+    if channel.acts_on == "dipole":
+        return PulsedDipole(body, channel.space, history)
+    return PulsedPolarizability(body, channel.space, history)

@@ -1,0 +1,133 @@
+"""Which states a gas is in before a pulse: all (level, M) at a temperature with their spin weights, or one chosen level.
+
+Levels are taken in order of the population of one state until what is left out is below a cut. What is left out is not scaled
+away: it stays isotropic (cos²θ = 1/3), so that a cut ε moves the cosines by about 0.2 ε.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rotor import units
+from rotor.arrays import Floats
+from rotor.quantum.field_blocks import FreeLevels
+
+if TYPE_CHECKING:
+    from rotor.tops.top import Top
+
+MOST_J = 400
+
+
+@dataclass(frozen=True)
+class Ensemble:
+    """What a gas is like at first.
+
+    temperature_k: 0 for one level alone. ground_mhz: lowest level that exists. q: Σ g (2J+1) exp(-E/kT). least: population of one
+    state below which it is left out. left_out: population of all those. jmax: the highest J that is populated. chosen: quantum
+    numbers of the one level, None for a gas; m: its M, None for all of them alike.
+    """
+
+    temperature_k: float
+    ground_mhz: float
+    q: float
+    least: float
+    left_out: float
+    jmax: int
+    chosen: Mapping[str, int] | None = None
+    m: int | None = None
+
+    def populations(self, levels: FreeLevels) -> Floats:
+        """Population of one state |level, M⟩ of each level (n,), zero for what is left out."""
+        if self.chosen is not None:
+            return self._of_one(levels)
+        kelvin = (levels.energy_mhz - self.ground_mhz) / units.MHZ_PER_K
+        population = levels.weight * np.exp(-np.maximum(kelvin / self.temperature_k, -1.0)) / self.q
+        return np.where((population >= self.least) & (levels.j <= self.jmax), population, 0.0)
+
+    def _of_one(self, levels: FreeLevels) -> Floats:
+        here = np.ones(len(levels), dtype=bool)
+        for name, value in (self.chosen or {}).items():
+            column = levels.j if name == "j" else np.abs(levels.quanta[name]) if name == "k" else levels.quanta[name]
+            here &= column == value
+        states = here.sum() * (1 if self.m is not None else 2 * int(levels.j[here][0]) + 1)
+        return np.where(here, 1.0 / states, 0.0)
+
+
+def one_level(top: Top, state: Mapping[str, int], m: int | None = None) -> Ensemble:
+    """The ensemble of one level, named by its quantum numbers (j; j, k; j, ka, kc), with one |M| or all M alike.
+
+    Raises ValueError for names that do not fit, a level that does not exist and an M above J.
+    """
+    from rotor.quantum.solve import solve_levels
+
+    j = int(state.get("j", -1))
+    if not 0 <= j <= MOST_J:
+        raise ValueError(f"state {dict(state)}: J from 0 to {MOST_J} is expected among its quantum numbers")
+    levels = solve_levels(top, j)
+    row = levels.find(**dict(state))
+    if levels.weight[row] == 0:
+        raise ValueError(f"state {dict(state)}: its nuclear-spin weight is 0, so that it does not exist")
+    if m is not None and not 0 <= m <= j:
+        raise ValueError(f"M = {m} of J = {j}: from 0 to J is expected (M and -M are alike)")
+    return Ensemble(0.0, float(levels.energy_mhz[row]), 1.0, 0.0, 0.0, j, dict(state), m)
+
+
+def ground_level(top: Top) -> Ensemble:
+    """The ensemble of the lowest level that exists, all its M alike: a gas at 0 K."""
+    from rotor.quantum.solve import solve_levels
+
+    levels = solve_levels(top, 4)
+    there = np.flatnonzero(levels.weight > 0)
+    row = int(there[np.argmin(levels.energy_mhz[there])])
+    return one_level(top, {name: int(column[row]) for name, column in levels.quanta.items()})
+
+
+def thermal(top: Top, temperature_k: float, cut: float) -> Ensemble:
+    """The ensemble at a temperature with populations left out below `cut` in all.
+
+    Raises ValueError for a temperature not above 0 K and one that would populate J above 400.
+    """
+    if not (math.isfinite(temperature_k) and temperature_k > 0):
+        raise ValueError(
+            f"temperature {temperature_k} K: a finite temperature above 0 K is expected (0 means one level)"
+        )
+    levels = _levels_for(top, temperature_k, cut)
+    there = levels.weight > 0
+    ground = float(levels.energy_mhz[there].min())
+    factor = levels.weight * np.exp(-(levels.energy_mhz - ground) / (units.MHZ_PER_K * temperature_k))
+    factor[~there] = 0.0
+    whole = (2 * levels.j + 1) * factor
+    order = np.argsort(-factor, kind="stable")
+    share = np.cumsum(whole[order]) / whole.sum()
+    last = min(int(np.searchsorted(share, 1.0 - cut)), int(there.sum()) - 1)
+    least = float(factor[order[last]] / whole.sum()) * (1 - 1e-9)
+    kept = factor / whole.sum() >= least
+    return Ensemble(
+        temperature_k,
+        ground,
+        float(whole.sum()),
+        least,
+        float(whole[~kept].sum() / whole.sum()),
+        int(levels.j[kept].max()),
+    )
+
+
+def _levels_for(top: Top, temperature_k: float, cut: float) -> FreeLevels:
+    """Levels up to the J whose population is far below the cut."""
+    from rotor.quantum.solve import solve_levels
+
+    least = min(x for x in top.rotational_constants_mhz if math.isfinite(x))
+    reach = temperature_k * units.MHZ_PER_K * (math.log(1 / cut) + 12) / least
+    jmax = int(math.sqrt(reach)) + 3
+    if jmax > 2 * MOST_J:
+        raise ValueError(
+            f"{temperature_k:g} K populates J up to about {jmax}: states up to J = {2 * MOST_J} are propagated; take the classical "
+            "ensemble, a lower temperature or a larger tolerance"
+        )
+    solved = solve_levels(top, jmax, vectors=False)
+    return FreeLevels(solved.rotational, solved.energy_mhz, {}, solved.weight.astype(np.float64))

@@ -1,0 +1,236 @@
+"""What is measured of a wave packet: cosines, as matrices over a block, and as sums of harmonics while nothing acts.
+
+Between pulses every expectation value is a sum of lines,
+
+    ⟨O⟩(t) = Σ_i ρ_ii O_ii + 2 Re Σ_{i<j} ρ_ij* O_ij exp(i (E_i - E_j) (t - t0)/ħ),
+
+with the coherences of all initial states of a gas added up once. The lines of all M fall on the same pairs of levels, so a trace costs
+the same for one state as for a gas. On even times the sum is a product of two small matrices.
+
+cos²θ_2D, what a detector sees of the axis in a plane through Z, is cos²θ/(cos²θ + sin²θ sin²φ). It is no tensor of finite rank; its
+mean over φ, which is all that counts where the gas is symmetric about Z, is |cosθ|, whose matrix is made by quadrature.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor.arrays import Floats, Ints
+from rotor.quantum.direction_cosines import cosine_bands
+from rotor.quantum.field_blocks import AxialBlock, Contraction, FieldBlock
+
+if TYPE_CHECKING:
+    from rotor.tops.top import Top
+
+Complexes = NDArray[np.complex128]
+
+_SPACE = "XYZ"
+_EVEN_WITHIN = 1e-9  # of a step: times that differ less from an even grid are on it
+_CHUNK = 1 << 21
+
+
+@dataclass(frozen=True)
+class Observable:
+    """A cosine to be followed: the name of its column, the contraction, None for |cosθ|, and its value in an isotropic gas."""
+
+    name: str
+    contraction: Contraction | None
+    isotropic: float
+
+    def matrix(self, block: FieldBlock) -> NDArray[Any]:
+        """Over the states of a block (n, n)."""
+        if self.contraction is not None:
+            return block.matrix(self.contraction)
+        if not isinstance(block, AxialBlock):
+            raise ValueError(
+                f"{self.name} is made for linear and symmetric tops in a field with the symmetry of Z; use cos2theta"
+            )
+        return absolute_cosine(block)
+
+
+def figure_axis(top: Top) -> int:
+    """The axis whose angle with Z is θ: a (0), or c (2) of an oblate top; of an asymmetric top that of the largest polarizability.
+
+    Without one it is that of the largest part of the dipole.
+    """
+    if top.kind != "asymmetric":
+        return 2 if top.kind == "oblate" else 0
+    if top.polarizability_abc_angstrom3 is not None:
+        return int(np.argmax(np.diag(np.array(top.polarizability_abc_angstrom3))))
+    return int(np.argmax(np.abs(top.dipole_abc_debye or (1.0, 0.0, 0.0))))
+
+
+def observable(name: str, top: Top) -> Observable:
+    """A cosine by name: cos2theta, costheta, cos2theta_2d of the figure axis, or cos2_aX ... cos2_cZ, cos_aX ... cos_cZ.
+
+    Raises ValueError for any other name.
+
+    >>> from rotor.tops.top import Top
+    >>> observable("cos2theta", Top.from_constants("B=6000 MHz")).isotropic
+    0.3333333333333333
+    """
+    axis, space = figure_axis(top), 2
+    kind = name
+    for power in ("cos2_", "cos_"):
+        if name.startswith(power) and len(name) == len(power) + 2 and name[-2] in "abc" and name[-1] in _SPACE:
+            axis, space, kind = "abc".index(name[-2]), _SPACE.index(name[-1]), power
+    along, fixed = np.eye(3)[axis], np.eye(3)[space]
+    if kind in ("cos2theta", "cos2_"):
+        return Observable(name, Contraction(np.outer(along, along), np.outer(fixed, fixed)), 1 / 3)
+    if kind in ("costheta", "cos_"):
+        return Observable(name, Contraction(along, fixed), 0.0)
+    if kind == "cos2theta_2d":
+        return Observable(name, None, 0.5)
+    raise ValueError(
+        f"observable {name!r}: known are cos2theta, costheta, cos2theta_2d, cos2_aX to cos2_cZ (squares) and cos_aX to cos_cZ"
+    )
+
+
+# |cosθ| by quadrature
+
+
+def absolute_cosine(block: AxialBlock) -> Floats:
+    """⟨J' k M| |cosθ| |J k M⟩ over a block (n, n), exact but for round-off.
+
+    Gauss-Legendre points on each half of -1 < cosθ < 1, where the integrand is a polynomial.
+
+    >>> from rotor.quantum.field_blocks import field_space
+    >>> from rotor.tops.top import Top
+    >>> z2 = Contraction(np.diag([1.0, 0, 0]), np.diag([0, 0, 1.0]))
+    >>> block = field_space(Top.from_constants("B=6000 MHz"), 2, [z2]).blocks(0)[0]
+    >>> absolute_cosine(block).round(6).tolist()  # 1/2, √5/8; √5/8, 5/8
+    [[0.5, 0.279508], [0.279508, 0.625]]
+    """
+    j = block.j
+    points, weights = _half_points(int(j[-1]) + 2)
+    x = np.concatenate([-points, points])
+    functions = symmetric_top_functions(int(j[-1]), block.k, block.m, x)[j - max(abs(block.k), abs(block.m))]
+    return np.asarray((functions * (np.abs(x) * np.concatenate([weights, weights]))) @ functions.T)
+
+
+@lru_cache(maxsize=8)
+def _half_points(count: int) -> tuple[Floats, Floats]:
+    x, w = np.polynomial.legendre.leggauss(count)
+    return (x + 1) / 2, w / 2
+
+
+def symmetric_top_functions(jmax: int, k: int, m: int, x: Floats) -> Floats:
+    """√(J+½) d^J_Mk as functions of x = cosθ, normalised over -1 < x < 1, for J = max(|k|, |M|) ... jmax, (J, points).
+
+    The lowest is N (1+x)^|k+M|/2 (1-x)^|k-M|/2; the others follow from x f_J = Σ ⟨J'|cosθ|J⟩ f_J', upwards, which is stable.
+    """
+    from scipy.special import gammaln
+
+    first = max(abs(k), abs(m))
+    plus, minus = abs(k + m), abs(k - m)
+    log_norm = gammaln(plus + minus + 2) - gammaln(plus + 1) - gammaln(minus + 1) - (plus + minus + 1) * np.log(2.0)
+    with np.errstate(divide="ignore"):
+        lowest = np.exp(0.5 * (log_norm + plus * np.log1p(x) + minus * np.log1p(-x)))
+    out = np.zeros((jmax - first + 1, len(x)))
+    out[0] = lowest
+    diagonal, beside = cosine_bands(np.arange(first, jmax + 1), k, m)
+    for n in range(jmax - first):
+        before = beside[n - 1] * out[n - 1] if n else 0.0
+        out[n + 1] = ((x - diagonal[n]) * out[n] - before) / beside[n]
+    return out
+
+
+# Sums of harmonics
+
+
+@dataclass(frozen=True)
+class Harmonics:
+    """A signal constant + 2 Re Σ amplitude exp(i ω t), t from the time of the coherences; amplitudes and ω (n,), rad/ps."""
+
+    constant: float
+    amplitudes: Complexes
+    omegas: Floats
+
+    def at(self, times_ps: Floats) -> Floats:
+        """The signal at times (t,)."""
+        if not len(self.omegas):
+            return np.full(len(times_ps), self.constant)
+        return self.constant + 2 * harmonic_sum(self.amplitudes, self.omegas, times_ps)
+
+
+def harmonic_sum(amplitudes: Complexes, omegas: Floats, times: Floats) -> Floats:
+    """Re Σ amplitude exp(i ω t) at times (t,).
+
+    Even times t0 + (p s + q) dt are split into p and q, so that only 2√t exponentials are made for each line.
+    """
+    count = len(times)
+    step = (times[-1] - times[0]) / (count - 1) if count > 8 else 0.0
+    if step == 0 or np.abs(times - times[0] - step * np.arange(count)).max() > _EVEN_WITHIN * abs(step):
+        return _plain_sum(amplitudes, omegas, times)
+    side = int(np.ceil(np.sqrt(count)))
+    total = np.zeros((-(-count // side), side))
+    chunk = max(1, _CHUNK // (2 * side))
+    for first in range(0, len(omegas), chunk):
+        w = omegas[first : first + chunk]
+        coarse = np.exp(1j * np.multiply.outer(times[0] + side * step * np.arange(len(total)), w))
+        fine = np.exp(1j * np.multiply.outer(w, step * np.arange(side)))
+        total += ((coarse * amplitudes[first : first + chunk]) @ fine).real
+    return np.asarray(total.ravel()[:count])
+
+
+def _plain_sum(amplitudes: Complexes, omegas: Floats, times: Floats) -> Floats:
+    out = np.zeros(len(times))
+    chunk = max(1, _CHUNK // max(len(omegas), 1))
+    for first in range(0, len(times), chunk):
+        t = times[first : first + chunk]
+        out[first : first + chunk] = (np.exp(1j * np.multiply.outer(t, omegas)) @ amplitudes).real
+    return out
+
+
+@dataclass(frozen=True)
+class Coherences:
+    """The lines of one observable in one block: rows (n,) of both levels, amplitudes (n,) and the constant part."""
+
+    first: Ints
+    second: Ints
+    amplitudes: Complexes
+    constant: float
+
+
+def coherences(states: Complexes, weights: Floats, matrix: Any, rows: Ints) -> Coherences:
+    """Of states in columns (n, m) over the free states with weights (m,); rows (n,) of their levels; matrix dense or sparse."""
+    weighted = states.conj() * weights
+    if isinstance(matrix, np.ndarray):
+        i, j = np.nonzero(np.triu(matrix, 1))
+        product = (weighted @ states.T) * matrix  # Σ w c_i* c_j O_ij
+        return Coherences(rows[i], rows[j], product[i, j], float(np.trace(product).real))
+    upper = matrix.tocoo()
+    (i, j), values = upper.coords, upper.data
+    above = i < j
+    i, j, values = i[above], j[above], values[above]
+    amplitudes = np.einsum("lm,lm->l", weighted[i], states[j]) * values
+    constant = float((matrix.diagonal() @ (np.abs(states) ** 2)) @ weights)
+    return Coherences(rows[i], rows[j], amplitudes, constant)
+
+
+def harmonics(pieces: Sequence[Coherences], energies: Floats, remainder: float) -> Harmonics:
+    """All blocks together: lines between the same levels added; energies (levels,) in rad/ps; remainder: of what is left out."""
+    constant = remainder + sum(piece.constant for piece in pieces)
+    if not pieces:
+        return Harmonics(constant, np.zeros(0, dtype=np.complex128), np.zeros(0))
+    size = len(energies)
+    key = np.concatenate([piece.first * size + piece.second for piece in pieces])
+    amplitude = np.concatenate([piece.amplitudes for piece in pieces])
+    pairs, place = np.unique(key, return_inverse=True)
+    total = np.bincount(place, amplitude.real, len(pairs)) + 1j * np.bincount(place, amplitude.imag, len(pairs))
+    return Harmonics(constant, total, energies[pairs // size] - energies[pairs % size])
+
+
+def expectation(states: Complexes, weights: Floats, matrix: Any) -> Floats:
+    """Σ_m w_m ⟨m|O|m⟩ of snapshots (s, n, m), (s,); matrix dense or sparse."""
+    if isinstance(matrix, np.ndarray):
+        moved = matrix @ states
+    else:
+        moved = np.array([matrix @ one for one in states])
+    return np.asarray(np.einsum("snm,snm,m->s", states.conj(), moved, weights, optimize=True).real)

@@ -1,0 +1,178 @@
+"""A request for the alignment of a gas by pulses, and what answers it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rotor.alignment.acting import acted_on, revival_period_ps
+from rotor.alignment.align import DEFAULT_TOLERANCE, AlignmentTrace, align
+from rotor.alignment.pulse import Pulse
+from rotor.arrays import Floats
+from rotor.checks import require_between, require_whole
+from rotor.table import Table
+from rotor.tops.facts import top_facts
+
+if TYPE_CHECKING:
+    from rotor.tops.top import Top
+
+LONGEST_PS = 100.0  # after the pulses, of a top without revivals, where no last time is given
+DEFAULT_POINTS = 2001
+
+
+@dataclass(frozen=True)
+class AlignRequest:
+    """Cosines against time to compute; every field is checked when the request is made.
+
+    top: with what the pulses act on. pulses: one or more. temperature_k: of the gas, 0 for its lowest level. state: one level
+    instead, by quantum numbers; m: its |M|, None for all. from_ps, until_ps: first and last time; None: where the pulses begin, and one
+    revival after they end. points: how many times. observables: names of cosines. tolerance: of them. jmax: None: what the
+    tolerance needs. classical_molecules: of a classical gas beside the quantum one, 0 for none; seed: of its start.
+    """
+
+    top: Top
+    pulses: tuple[Pulse, ...]
+    temperature_k: float = 1.0
+    state: Mapping[str, int] | None = None
+    m: int | None = None
+    from_ps: float | None = None
+    until_ps: float | None = None
+    points: int = DEFAULT_POINTS
+    observables: tuple[str, ...] = ("cos2theta",)
+    tolerance: float = DEFAULT_TOLERANCE
+    jmax: int | None = None
+    classical_molecules: int = 0
+    seed: int = 1
+
+    def __post_init__(self) -> None:
+        if not self.pulses:
+            raise ValueError("no pulse: give at least one")
+        if not (np.isfinite(self.temperature_k) and self.temperature_k >= 0):
+            raise ValueError(f"temperature_k: {self.temperature_k}: expected a finite number of 0 or more")
+        require_whole("points", self.points, 2)
+        require_whole("jmax", self.jmax, 2)
+        require_whole("classical_molecules", self.classical_molecules, 0)
+        require_whole("seed", self.seed, 0)
+        require_between("tolerance", self.tolerance, 1e-12, 0.1)
+        for pulse in self.pulses:
+            acted_on(self.top, pulse.acts_on)
+        first, last = self.ends_ps
+        if not first < last:
+            raise ValueError(f"until_ps: {last:g} ps is not after the first time, {first:g} ps")
+        end = max(pulse.window_ps[1] for pulse in self.pulses)
+        if last < end:
+            raise ValueError(f"until_ps: {last:g} ps is before the pulses have ended, at {end:g} ps; give a later time")
+
+    @property
+    def ends_ps(self) -> tuple[float, float]:
+        """The first and the last time."""
+        begins = min(pulse.window_ps[0] for pulse in self.pulses)
+        ends = max(pulse.window_ps[1] for pulse in self.pulses)
+        long = LONGEST_PS if self.top.kind == "asymmetric" else revival_period_ps(self.top)
+        first = begins if self.from_ps is None else self.from_ps
+        return first, ends + long if self.until_ps is None else self.until_ps
+
+    @property
+    def times_ps(self) -> Floats:
+        """All times (points,)."""
+        return np.linspace(*self.ends_ps, self.points)
+
+
+@dataclass(frozen=True)
+class AlignmentTable(Table):
+    """Quantum cosines against time, and those of a classical gas in columns with the suffix _classical."""
+
+    trace: AlignmentTrace
+    classical: Mapping[str, Floats]
+
+    @property
+    def columns(self) -> dict[str, Floats]:
+        """t_ps, every cosine, and those of the classical gas."""
+        return {**self.trace.columns, **{f"{name}_classical": values for name, values in self.classical.items()}}
+
+    @property
+    def provenance(self) -> dict[str, Any]:
+        """That of the quantum calculation."""
+        return self.trace.provenance
+
+
+@dataclass(frozen=True)
+class AlignAnswer:
+    """The cosines that a request asked for."""
+
+    request: AlignRequest
+    trace: AlignmentTrace
+    classical: Mapping[str, Floats]
+
+    @property
+    def table(self) -> AlignmentTable:
+        """All cosines as a table."""
+        return AlignmentTable(self.trace, self.classical)
+
+    def facts(self) -> dict[str, Any]:
+        """Everything about the answer but its table, by the keys of docs/command_line.md."""
+        trace, cosines = self.trace, {name: values for name, values in self.table.columns.items() if name != "t_ps"}
+        return {
+            **top_facts(trace.top),
+            **trace.provenance,
+            "windows_ps": [list(pulse.window_ps) for pulse in trace.pulses],
+            "populated_jmax": trace.ensemble.jmax,
+            "error_estimate": trace.error_estimate,
+            "permanent": trace.permanent,
+            "extremes": [_extremes(name, trace.t_ps, values) for name, values in cosines.items()],
+            "classical_molecules": self.request.classical_molecules,
+            "times": len(trace.t_ps),
+        }
+
+
+def _extremes(name: str, times: Floats, values: Floats) -> dict[str, Any]:
+    high, low = int(np.argmax(values)), int(np.argmin(values))
+    return {
+        "name": name,
+        "max": float(values[high]),
+        "max_at_ps": float(times[high]),
+        "min": float(values[low]),
+        "min_at_ps": float(times[low]),
+    }
+
+
+def answer_align(request: AlignRequest, executor: Executor | None = None) -> AlignAnswer:
+    """The cosines of a request. executor: blocks of states are spread over it.
+
+    >>> from rotor.alignment.pulse import GaussianPulse
+    >>> from rotor.tops.top import Top
+    >>> rod = Top.from_constants("B=6 GHz", polarizability_abc_angstrom3=((8, 0, 0), (0, 4, 0), (0, 0, 4)))
+    >>> answer = answer_align(AlignRequest(rod, (GaussianPulse(1e13, 0.05),), temperature_k=0, tolerance=1e-4, points=101))
+    >>> round(float(answer.table.columns["cos2theta"].max()), 2)
+    0.88
+    """
+    trace = align(
+        request.top,
+        request.pulses,
+        request.times_ps,
+        temperature_k=0.0 if request.state is not None else request.temperature_k,
+        state=request.state,
+        m=request.m,
+        tolerance=request.tolerance,
+        jmax=request.jmax,
+        observables=request.observables,
+        executor=executor,
+    )
+    classical: dict[str, Floats] = {}
+    if request.classical_molecules:
+        from rotor.alignment.classical import classical_trace
+
+        classical = classical_trace(
+            request.top,
+            request.pulses,
+            request.times_ps,
+            temperature_k=request.temperature_k,
+            molecules=request.classical_molecules,
+            observables=request.observables,
+            rng=np.random.default_rng(request.seed),
+        )
+    return AlignAnswer(request, trace, classical)

@@ -1,0 +1,156 @@
+"""How many steps, and of which method, a tolerance needs: found on one block with runs whose steps are doubled."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rotor.alignment import observables as observe
+from rotor.alignment import propagate
+from rotor.alignment.carry import Outcome, Plan, Problem, Task, run, task_of
+from rotor.alignment.pulse import RAD_PER_PS_MHZ, Kick
+from rotor.quantum.field_blocks import FieldSpace
+
+FIRST_STEPS = 4
+LARGEST_SPLIT = 700  # states of a block whose operator is still diagonalised
+MOST_STEPS = 200_000
+PILOT_COLUMNS = 64
+PILOT_TIMES = 256
+
+
+@dataclass(frozen=True)
+class Pilot:
+    """What the block M = 0 has shown: the plan, its steps, their error, and the population at the highest J."""
+
+    plan: Plan
+    steps: tuple[int, ...]
+    error: float
+    edge: float
+    task: Task | None = None
+    outcome: Outcome | None = None
+
+    def outcome_of(self, tasks: Sequence[Task]) -> Outcome | None:
+        """What was found already, where the pilot has carried all there is."""
+        whole = len(tasks) == 1 and self.task is not None and len(self.task.columns) == len(tasks[0].columns)
+        return self.outcome if whole else None
+
+
+def plan_of(problem: Problem, steps: Sequence[int], rule: str | None, factor: int = 1) -> Plan:
+    """Passages with about so many steps a window, `factor` times as many; a Magnus method where `rule` is None."""
+    out: list[propagate.KickPlan | propagate.Grid | float] = []
+    for window, count in zip(problem.windows, steps, strict=True):
+        if window.is_kick:
+            kick = window.channels[0].pulses[0]
+            out.append(kick.area if isinstance(kick, Kick) else 0.0)
+            continue
+        grid = propagate.grid_of(window, (window.stop_ps - window.start_ps) / count, problem.times).refined(factor)
+        splits = rule is not None and len(window.channels) == 1
+        out.append(propagate.kick_plan(window, grid, propagate.splitting(rule)) if splits and rule else grid)
+    return Plan(problem.windows, tuple(out))
+
+
+def pilot_of(problem: Problem, jmax: int) -> Pilot:
+    """Steps that are fine enough for the tolerance, found on the block M = 0 that holds most of the gas."""
+    space = problem.space(jmax)
+    task, whole = _pilot_task(problem, space)
+    if task is None or all(window.is_kick for window in problem.windows):
+        plan = plan_of(problem, [1] * len(problem.windows), "nystrom 4")
+        outcome = None if task is None else run(replace(task, plan=plan))
+        edge = _relative_edge(outcome, task) if outcome and task else 0.0
+        return Pilot(plan, (0,) * len(problem.windows), 0.0, edge, task if whole else None, outcome)
+    if len(task.rows) > LARGEST_SPLIT or all(len(window.channels) > 1 for window in problem.windows):
+        return _refined(problem, space, task, None)
+    if whole:
+        return _refined(problem, space, task, "nystrom 4" if problem.tolerance >= 1e-10 else "nystrom 6", 16)
+    rules = propagate.SPLITTINGS if task.gradients is not None else propagate.SPLITTINGS[1:]
+    best = _refined(problem, space, task, rules[0])
+    for rule in rules[1:]:
+        best = _refined(problem, space, task, rule, below=best)
+    return best
+
+
+def _refined(
+    problem: Problem,
+    space: FieldSpace,
+    task: Task,
+    rule: str | None,
+    first: int = FIRST_STEPS,
+    below: Pilot | None = None,
+) -> Pilot:
+    """About the fewest steps of a method whose error is below half the tolerance; `below` where that would cost more.
+
+    The number of steps is doubled; the difference between a run and the next is taken as the error of the first. Of the number that
+    is enough and its half, between which the answer lies, the place is taken where log(error) on a straight line meets the goal.
+    """
+    goal, before, factor = 0.5 * problem.tolerance, 0.0, 1
+    counts = [first] * len(problem.windows)
+    plan = plan_of(problem, counts, rule)
+    outcome = run(replace(task, plan=plan))
+    while sum(_steps_of(plan)) <= MOST_STEPS:
+        finer = plan_of(problem, counts, rule, 2 * factor)
+        check = run(replace(task, plan=finer))
+        error = _difference(problem, space, task, outcome, check)
+        if error <= goal:
+            edge, mine = _relative_edge(check, task), Pilot(plan, _steps_of(plan), error, 0.0, task, outcome)
+            if before > error > 0:
+                steps = 0.5 * 2 ** (math.log(before / goal) / math.log(before / error)) * sum(_steps_of(plan))
+                fewer = plan_of(problem, [math.ceil(steps / len(counts))] * len(counts), rule)
+                if steps <= sum(_steps_of(fewer)) and _cost(fewer) < _cost(plan):
+                    mine = Pilot(fewer, _steps_of(fewer), goal, 0.0)
+            mine = replace(mine, edge=edge)
+            return mine if below is None or _cost(mine.plan) < _cost(below.plan) else below
+        before, factor, plan, outcome = error, 2 * factor, finer, check
+        if below is not None and _cost(plan) > 2 * _cost(below.plan):
+            return below
+    raise ValueError(
+        f"more than {MOST_STEPS} steps would be needed for a tolerance of {problem.tolerance:g}; give a larger one"
+    )
+
+
+def _steps_of(plan: Plan) -> tuple[int, ...]:
+    totals = []
+    for passage in plan.passages:
+        totals.append(0 if isinstance(passage, float) else passage.steps_taken)
+    return tuple(totals)
+
+
+def _cost(plan: Plan) -> int:
+    """Drifts or exponentials in all windows."""
+    return sum(0 if isinstance(one, float) else one.stages for one in plan.passages)
+
+
+def _pilot_task(problem: Problem, space: FieldSpace) -> tuple[Task | None, bool]:
+    """The populated block of lowest M with the largest population, with a few of its columns; and whether that is all there is."""
+    m = problem.m_values(space)[0]
+    plan = plan_of(problem, [1] * len(problem.windows), "nystrom 4")
+    before = bool(problem.free_times(-1).any())
+    tasks = [task for block in space.blocks(m) if (task := task_of(problem, block, plan, before)) is not None]
+    if not tasks:
+        return None, False
+    task = max(tasks, key=lambda one: float(one.weights.sum()))
+    whole = len(tasks) == 1 and (len(problem.m_values(space)) == 1)
+    if len(task.columns) > PILOT_COLUMNS:
+        chosen = np.unique(np.linspace(0, len(task.columns) - 1, PILOT_COLUMNS).astype(int))
+        return replace(task, columns=task.columns[chosen], weights=task.weights[chosen]), False
+    return task, whole
+
+
+def _relative_edge(outcome: Outcome, task: Task) -> float:
+    return float(outcome.edge.max(initial=0.0) / task.weights.sum())
+
+
+def _difference(problem: Problem, space: FieldSpace, task: Task, first: Outcome, second: Outcome) -> float:
+    """Largest difference of the cosines of two runs of one block, of the population in it."""
+    energies = RAD_PER_PS_MHZ * space.levels.energy_mhz
+    period = max(float(problem.times[-1]) - problem.windows[-1].stop_ps, 0.0)
+    times = np.linspace(0.0, period, PILOT_TIMES)
+    worst = 0.0
+    for place in range(len(problem.wanted)):
+        signals = [observe.harmonics([one.free[-1][place]], energies, 0.0).at(times) for one in (first, second)]
+        worst = max(worst, float(np.abs(signals[0] - signals[1]).max()))
+        pairs = zip(first.samples, second.samples, strict=True)
+        worst = max([worst, *(float(np.abs(a[place] - b[place]).max(initial=0.0)) for a, b in pairs)])
+    return worst / float(task.weights.sum())

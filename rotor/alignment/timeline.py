@@ -1,0 +1,103 @@
+"""Pulses put in order: windows of time in which something acts, kicks, and the free stretches between them.
+
+Windows that overlap become one; a kick cuts the window in which it falls. Inside a window, pulses with one polarization act
+through one operator and add up. Nothing is integrated outside the windows: there the phases of free rotation are exact, and no
+solver can step over a pulse that it never sees.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rotor.alignment.pulse import Kick, Pulse
+from rotor.arrays import Floats
+
+SAME_AXIS = 1e-12  # of 1: how much polarization tensors may differ and still be the same
+
+
+@dataclass(frozen=True)
+class Channel:
+    """Pulses that act through one operator: on the polarizability or the dipole, with one space tensor."""
+
+    acts_on: str
+    space: Floats
+    pulses: tuple[Pulse, ...]
+
+    def strength(self, times_ps: Floats) -> Floats:
+        """Sum over the pulses, each zero outside its own window; rad/ps for 1 Å³ or 1 D."""
+        total = np.zeros(len(times_ps))
+        for pulse in self.pulses:
+            first, last = pulse.window_ps
+            inside = (times_ps >= first) & (times_ps <= last)
+            total[inside] += pulse.strength(times_ps[inside])
+        return total
+
+
+@dataclass(frozen=True)
+class Window:
+    """From `start_ps` to `stop_ps` the channels act; breaks are times inside at which they are not smooth."""
+
+    start_ps: float
+    stop_ps: float
+    channels: tuple[Channel, ...]
+    breaks_ps: tuple[float, ...] = ()
+
+    @property
+    def is_kick(self) -> bool:
+        """Whether it has no duration."""
+        return self.start_ps == self.stop_ps
+
+
+def channels_of(pulses: Sequence[Pulse]) -> tuple[Channel, ...]:
+    """Pulses grouped by the operator through which they act."""
+    out: list[Channel] = []
+    for pulse in pulses:
+        space = pulse.space_tensor
+        for place, one in enumerate(out):
+            if one.acts_on == pulse.acts_on and np.abs(one.space - space).max() <= SAME_AXIS:
+                out[place] = Channel(one.acts_on, one.space, (*one.pulses, pulse))
+                break
+        else:
+            out.append(Channel(pulse.acts_on, space, (pulse,)))
+    return tuple(out)
+
+
+def timeline(pulses: Sequence[Pulse]) -> tuple[Window, ...]:
+    """The windows of pulses in order of time.
+
+    >>> from rotor.alignment.pulse import GaussianPulse
+    >>> [window.start_ps for window in timeline([GaussianPulse(1e12, 1.0, 20.0), GaussianPulse(1e12, 1.0)])]
+    [-3.5, 16.5]
+    """
+    lasting = sorted((one for one in pulses if not isinstance(one, Kick)), key=lambda one: one.window_ps)
+    kicks = sorted((one for one in pulses if isinstance(one, Kick)), key=lambda one: one.time_ps)
+    merged: list[list[Pulse]] = []
+    end = -np.inf
+    for pulse in lasting:
+        first, last = pulse.window_ps
+        if first < end:
+            merged[-1].append(pulse)
+        else:
+            merged.append([pulse])
+        end = max(end, last)
+
+    windows = [piece for group in merged for piece in _cut(group, [kick.time_ps for kick in kicks])]
+    windows += [Window(kick.time_ps, kick.time_ps, channels_of([kick])) for kick in kicks]
+    return tuple(sorted(windows, key=lambda one: (one.start_ps, one.stop_ps)))
+
+
+def _cut(group: Sequence[Pulse], kicks: Sequence[float]) -> list[Window]:
+    """One window of pulses that overlap, cut at the kicks inside it."""
+    start, stop = min(one.window_ps[0] for one in group), max(one.window_ps[1] for one in group)
+    edges = {time for one in group for time in (*one.window_ps, *one.breaks_ps)}
+    times = [start, *sorted({time for time in kicks if start < time < stop}), stop]
+    out = []
+    for first, last in itertools.pairwise(times):
+        here = [one for one in group if one.window_ps[0] < last and one.window_ps[1] > first]
+        breaks = tuple(sorted(time for time in edges if first < time < last))
+        out.append(Window(first, last, channels_of(here), breaks))
+    return out

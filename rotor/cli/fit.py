@@ -1,0 +1,543 @@
+"""`rotor fit`: measured lines back to constants, SPFIT's input or a line list with start constants."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from rotor.checks import require_whole
+from rotor.cli.shared import inputs
+from rotor.cli.shared.inputs import json_option
+from rotor.cli.shared.options import argument, file_option, grouped, option
+from rotor.cli.shared.output import (
+    ComputationError,
+    Files,
+    Table,
+    Writer,
+    deliver,
+    json_text,
+    note,
+    show_facts,
+    show_table,
+    write_text,
+)
+
+if TYPE_CHECKING:
+    from rotor.fit.assignment import Assignments
+    from rotor.fit.choose import Suggestion, Trial
+    from rotor.fit.fit import Fit, FitOptions
+    from rotor.formats.spcat.fit_input import SpfitInput
+    from rotor.statistics.least_squares import Iteration
+    from rotor.tops.constants import Constants
+
+EXAMPLES = """\b
+Examples:
+  rotor fit case.par --out fitted
+  rotor fit lines.csv --start constants.toml --free A,B,C,DeltaJ --out fitted
+  rotor fit c060503.cat.gz --constants "B=6081 D=0.001 H=0 MHz" --free B,D,H
+  rotor fit lines.lin --start water --free A,B,C --try DeltaJ,DeltaJK,DeltaK
+  rotor fit lines.csv --start constants.toml --free A,B,C --prior DeltaK=0.02 --tie "deltaK=0.5*deltaJ" --plot rest.png"""
+
+_WORTH_MEASURING = 1e-2  # S μ² of a line with μ = 1 D, below which it is not suggested
+
+
+@dataclass(frozen=True)
+class Request:
+    """What is to be fitted, from either kind of input."""
+
+    lines: Assignments
+    constants: Constants | None
+    parameters: Any
+    options: FitOptions
+    title: str
+    start: str = ""
+    spfit: SpfitInput | None = None
+    notes: list[str] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class Options:
+    """What is read, what is fitted and how, and what is written."""
+
+    source: str = argument(..., help="case.par (with case.lin), or lines: .lin, .csv, .cat.")
+    lin: str | None = option(None, metavar="FILE", help="Lines of case.par, where they are not case.lin.")
+    start: str | None = option(
+        None, metavar="SOURCE", help="Constants to start from: a file (.toml, .var, ...) or a name."
+    )
+    constants: str | None = option(None, metavar="TEXT", help='Constants to start from: "A=9.2 B=3 C=2.5 GHz" (MHz).')
+    free: str | None = option(
+        None, metavar="LIST", help="Constants to fit: A,B,C,DeltaJ; those of --start that have an error if left out."
+    )
+    tie: list[str] | None = option(
+        None, metavar="TEXT", help='A constant that follows a free one: "DeltaK=2.5*DeltaJ", "C=B-300"; repeatable.'
+    )
+    prior: list[str] | None = option(
+        None, metavar="X=ERROR", help="A-priori standard error of a free constant (MHz); repeatable."
+    )
+    more: str | None = option(None, "--merge", metavar="FILE", help="More lines (.lin, .csv, .cat) of the same kind.")
+    reject: float | None = option(
+        None, metavar="X", help="Lines more than X errors off do not count; they are reported."
+    )
+    loss: str = option("squares", metavar="NAME", help="squares, or huber or cauchy: lines far off weigh less.")
+    default_error: str | None = option(None, metavar="X", help="Error of lines whose file gives 0 (MHz).")
+    poor_rms: float = option(10.0, metavar="X", help="Weighted rms above which the fit has failed.")
+    iterations: int | None = option(None, metavar="N", help="Most iterations; 100, or NITR of a .par file.")
+    try_: str | None = option(None, "--try", metavar="LIST", help="Try each of these constants more, or less.")
+    choose: str | None = option(None, metavar="LIST", help="Build the model up from these constants, one at a time.")
+    suggest: str | None = option(None, metavar="NAME", help="Which unmeasured line would best fix this constant.")
+    bootstrap: int = option(0, metavar="N", help="Errors from N samples of the lines beside the others.")
+    seed: int = option(0, metavar="N", help="Of the bootstrap.")
+    out: str | None = option(None, metavar="STEM", help="Write STEM.fit (report), .toml, .par and .var.")
+    table: str | None = file_option(".txt", ".md", ".tex", help="Table for a publication.")
+    save_lines: str | None = file_option(".lin", ".csv", help="The assigned lines, merged.")
+    plot: str | None = file_option(".png", ".pdf", ".svg", help="Residuals against frequency, J and K.")
+    json: str | None = json_option()
+
+
+@grouped()
+def command(context: typer.Context, given: Options) -> None:
+    """Constants from measured lines, with errors, correlations and what the lines leave open; exit code 1 unless converged."""
+    require_whole("--bootstrap", given.bootstrap, 0)
+    require_whole("--iterations", given.iterations, 1)
+    files = _files(given)
+    request = _with_more(read_request(given), given.more)
+    options = _options(request.options, given)
+    source = given.source
+    _refuse_overwriting(files, [source, given.lin, given.start, given.more, str(Path(source).with_suffix(".lin"))])
+
+    steps: list[Trial] = []
+    if given.choose is not None:
+        fit, steps = _chosen(request, options, _names(given.choose))
+    else:
+        fit = _fitted(request, options)
+    for text in request.notes:
+        note(text)
+    if fit.constants is None and "--out .toml" in files.paths:
+        del files.paths["--out .toml"]
+        note("spins or several states: no .toml is written, the .par and .var have everything")
+    trials = _trials(fit, options, given.try_)
+    suggestions = _suggestions(fit, given.suggest)
+    spread = _bootstrap(fit, options, given.bootstrap, given.seed)
+    if not fit.converged and fit.minimum.status != "interrupted":
+        for name in ("--out .toml", "--out .par", "--out .var"):
+            files.paths.pop(name, None)
+    content = record(request, fit, context.obj, steps, trials, suggestions, spread)
+    content["files"] = files.names
+    writers = _writers(request, fit, content, source)
+    deliver(files, writers, lambda: json_text(content), lambda: _show(request, fit, steps, trials, suggestions, spread))
+    if not fit.converged:
+        raise ComputationError(f"not converged: {fit.reason}")
+
+
+def _files(given: Options) -> Files:
+    files = Files.of(given)
+    if given.out is not None:
+        for suffix in (".fit", ".toml", ".par", ".var"):
+            files.ask(f"--out {suffix}", given.out + suffix, (suffix,))
+    return files
+
+
+def _refuse_overwriting(files: Files, read: Sequence[str | None]) -> None:
+    """What was read is not written over."""
+    here = {Path(path).resolve() for path in read if path and Path(path).exists()}
+    for name, path in files.paths.items():
+        if path.resolve() in here:
+            raise ValueError(f"{name.split()[0]}: {path} is an input; write the result under another name")
+
+
+def _names(text: str) -> list[str]:
+    names = [name.strip() for name in text.split(",")]
+    if not all(names):
+        raise ValueError(f"{text!r}: names parted by commas are needed, such as A,B,C,DeltaJ")
+    return names
+
+
+# What comes in
+
+
+def read_request(given: Options) -> Request:
+    """The fit that the options mean."""
+    if given.source.lower().endswith(".par"):
+        others = {
+            "--start": given.start, "--constants": given.constants, "--free": given.free, "--tie": given.tie,
+            "--prior": given.prior,
+        }  # fmt: skip
+        unused = [name for name, value in others.items() if value]
+        if unused:
+            raise ValueError(f"{', '.join(unused)}: a .par file says itself what is free and where the fit starts")
+        return _of_spfit(given.source, given.lin)
+    if given.lin is not None:
+        raise ValueError("--lin goes with a .par file; give the lines as the source otherwise")
+    return _of_lines(given)
+
+
+def _of_spfit(source: str, lin: str | None) -> Request:
+    from rotor.formats.spcat.fit_input import read_fit
+
+    asked = read_fit(source, lin)
+    title = " ".join(asked.file.title.split()) or Path(source).stem
+    return Request(
+        asked.lines, asked.constants, asked.parameters, asked.options, title, source, asked, list(asked.notes)
+    )
+
+
+def _of_lines(given: Options) -> Request:
+    from rotor.fit.fit import FitOptions
+    from rotor.fit.parameters import parameters, with_names
+    from rotor.formats.assigned_lines import QUANTA, read_assigned_lines
+
+    if (given.start is None) == (given.constants is None):
+        raise ValueError("either --start or --constants says where the fit starts; give one of them")
+    top = inputs.read_top(inputs.Input(given.start, given.constants))
+    lines, notes = read_assigned_lines(given.source, QUANTA[top.kind])
+    names = _names(given.free) if given.free is not None else list(top.constants.uncertainties)
+    if not names:
+        raise ValueError("--free: name the constants to fit, such as A,B,C,DeltaJ; those of the start have no errors")
+    begin = with_names(top.constants, names)
+    priors = dict(_prior(text) for text in given.prior or [])
+    made = parameters(begin, names, ties=given.tie or [], priors_mhz=priors)
+    title = " ".join(top.name.split()) or Path(given.source).name
+    return Request(lines, begin, made, FitOptions(), title, given.start or "", None, notes)
+
+
+def _prior(text: str) -> tuple[str, float]:
+    name, equals, value = (part.strip() for part in text.partition("="))
+    if not (name and equals and value):
+        raise ValueError(f"--prior {text!r}: name=error is needed, such as DeltaK=0.02")
+    return name, inputs.quantity("--prior", value, "MHz")
+
+
+def _with_more(request: Request, path: str | None) -> Request:
+    if path is None:
+        return request
+    from rotor.fit.assignment import merged
+    from rotor.formats.assigned_lines import read_assigned_lines
+
+    more, notes = read_assigned_lines(path, request.lines.names)
+    both, found = merged(request.lines, more)
+    return replace(request, lines=both, notes=[*request.notes, *notes, *found])
+
+
+def _options(options: FitOptions, given: Options) -> FitOptions:
+    changes: dict[str, Any] = {"loss": given.loss, "poor_rms": given.poor_rms}
+    if given.reject is not None:
+        changes["reject_above"] = given.reject
+    if given.iterations is not None:
+        changes["most_iterations"] = given.iterations
+    if given.default_error is not None:
+        changes["default_error_mhz"] = inputs.positive("--default-error", given.default_error, "MHz")
+    return replace(options, **changes)
+
+
+# What is done
+
+
+def _fitted(request: Request, options: FitOptions) -> Fit:
+    from rotor.fit.fit import fit_lines
+
+    model = request.spfit.model if request.spfit else None
+    return fit_lines(request.lines, request.constants, request.parameters, options, model=model, progress=_progress())
+
+
+def _progress() -> Any:
+    """Iterations on standard error, where that is a terminal."""
+    if not sys.stderr.isatty():
+        return None
+
+    def show(one: Iteration) -> None:
+        taken = "" if one.taken else " refused"
+        print(
+            f"iteration {one.number}: weighted rms {one.rms_before:.6g} -> {one.rms_after:.6g}{taken}", file=sys.stderr
+        )
+
+    return show
+
+
+def _chosen(request: Request, options: FitOptions, candidates: Sequence[str]) -> tuple[Fit, list[Trial]]:
+    from rotor.fit.choose import choose_constants
+    from rotor.fit.fit import fit_lines
+    from rotor.fit.parameters import parameters
+
+    if request.spfit is not None:
+        raise ValueError("--choose: start from a line list and constants, whose free ones are the base of the model")
+    assert request.constants is not None  # a list of lines has constants to start from
+    fit, steps = choose_constants(request.lines, request.constants, request.parameters.names, candidates, options)
+    return fit_lines(request.lines, fit.named, parameters(fit.named, fit.parameters.names), options), steps
+
+
+def _trials(fit: Fit, options: FitOptions, text: str | None) -> list[Trial]:
+    from rotor.fit.choose import try_constants
+
+    return try_constants(fit, _names(text), options) if text is not None else []
+
+
+def _suggestions(fit: Fit, name: str | None) -> list[Suggestion]:
+    """The best twenty of all lines that the dipole's selection rules allow for J up to the highest measured."""
+    if name is None:
+        return []
+    import numpy as np
+
+    from rotor.fit.choose import suggest_lines
+
+    upper, lower = _unmeasured(fit)
+    error = float(np.median(fit.lines.error_mhz[fit.used]))
+    return suggest_lines(fit, fit.named.own_name(name), upper, lower, error_mhz=error)[:20]
+
+
+def _unmeasured(fit: Fit) -> tuple[Any, Any]:
+    """Labels of lines of the kinds, frequencies and J that were measured, without those that are measured."""
+    import numpy as np
+
+    from rotor.spectra.lines import line_list
+    from rotor.tops.top import Top
+
+    measured = fit.lines
+    top = Top.from_constants(fit.named, dipole_abc_debye=_components(fit))
+    jmax = int(max(measured.upper[:, 0].max(), measured.lower[:, 0].max()))
+    seen_mhz = (float(measured.frequency_mhz.min()) * 0.99, float(measured.frequency_mhz.max()) * 1.01)
+    lines = line_list(top, jmax=jmax, min_lgint=None, q=1.0, range_mhz=seen_mhz)
+    strong = lines.strength_debye2 > _WORTH_MEASURING
+    labels = np.stack([lines.levels.quanta[name] for name in measured.names], axis=1)
+    upper, lower = labels[lines.upper[strong]], labels[lines.lower[strong]]
+    known = {(*u, *low) for u, low in zip(measured.upper.tolist(), measured.lower.tolist(), strict=True)}
+    new = np.array([(*u, *low) not in known for u, low in zip(upper.tolist(), lower.tolist(), strict=True)], dtype=bool)
+    return upper[new], lower[new]
+
+
+def _components(fit: Fit) -> tuple[float, float, float]:
+    """1 D along each axis whose lines occur among those measured, by the parities of Ka and Kc."""
+    kind = fit.named.kind
+    if kind != "asymmetric":
+        return (0.0, 0.0, 1.0) if kind == "oblate" else (1.0, 0.0, 0.0)
+    change = (fit.lines.upper[:, 1:] - fit.lines.lower[:, 1:]) % 2
+    kinds = {(0, 1): 0, (1, 1): 1, (1, 0): 2}
+    found = {kinds.get((int(ka), int(kc)), 0) for ka, kc in change}
+    a, b, c = (float(axis in found) for axis in range(3))
+    return a, b, c
+
+
+def _bootstrap(fit: Fit, options: FitOptions, samples: int, seed: int) -> list[float]:
+    if not samples:
+        return []
+    import numpy as np
+
+    from rotor.fit.choose import bootstrap
+
+    return [float(x) for x in bootstrap(fit, samples, np.random.default_rng(seed), options)[1]]
+
+
+# What goes out
+
+
+def record(
+    request: Request,
+    fit: Fit,
+    command_line: str,
+    steps: Sequence[Trial],
+    trials: Sequence[Trial],
+    suggestions: Sequence[Suggestion],
+    spread: Sequence[float],
+) -> dict[str, Any]:
+    """Everything about a fit, by the keys of docs/command_line.md."""
+    import rotor
+
+    statistics = fit.statistics
+    return {
+        "rotor_version": rotor.__version__,
+        "command": command_line,
+        "title": request.title,
+        "converged": fit.converged,
+        "reason": fit.reason,
+        "line_count": len(fit.lines),
+        "lines_used": int(fit.used.sum()),
+        "frequencies": len(fit.groups),
+        "weighted_rms": fit.weighted_rms,
+        "reduced_chi": fit.reduced_chi,
+        "rms_mhz": fit.rms_mhz(),
+        "rms_cm": fit.rms_mhz(wavenumber=True),
+        "degrees_of_freedom": fit.degrees_of_freedom,
+        "condition": statistics.condition,
+        "iterations": len(fit.minimum.iterations),
+        **_constants_record(fit.constants),
+        "parameters": [
+            {"name": n, "value": v, "error": e, "scaled_error": s, "start": b}
+            for n, v, e, s, b in zip(
+                fit.parameters.names, fit.values, fit.errors, fit.scaled_errors, fit.parameters.start, strict=True
+            )
+        ],
+        "bootstrap_errors": list(spread) or None,
+        "correlations": statistics.correlations,
+        "undetermined": [one.text for one in statistics.undetermined],
+        "changed_states": list(fit.changed_states),
+        "notes": [*request.notes, *fit.notes],
+        "chosen": [_trial_record(one) for one in steps],
+        "trials": [_trial_record(one) for one in trials],
+        "suggestions": [vars(one) for one in suggestions],
+        "lines": _line_records(fit),
+    }
+
+
+def _constants_record(constants: Constants | None) -> dict[str, Any]:
+    names = ("kind", "reduction", "representation", "constants_mhz", "uncertainties_mhz")
+    if constants is None:
+        return dict.fromkeys(names)
+    values = (
+        constants.kind,
+        constants.reduction,
+        constants.representation,
+        dict(constants.values),
+        dict(constants.uncertainties),
+    )
+    return dict(zip(names, values, strict=True))
+
+
+def _trial_record(trial: Trial) -> dict[str, Any]:
+    return {
+        "name": trial.name,
+        "added": trial.added,
+        "f": trial.f_ratio,
+        "chance": trial.chance,
+        "aicc": trial.aicc,
+        "aicc_before": trial.aicc_before,
+        "cross_validated_rms": trial.cross_validated,
+        "weighted_rms": trial.fit.weighted_rms,
+        "better": trial.better,
+    }
+
+
+def _line_records(fit: Fit) -> list[dict[str, Any]]:
+    lines = fit.lines
+    leverage = dict(zip(fit.groups.tolist(), fit.statistics.leverages.tolist(), strict=False))
+    return [
+        {
+            "upper": lines.upper[i],
+            "lower": lines.lower[i],
+            "frequency_mhz": lines.frequency_mhz[i],
+            "error_mhz": lines.error_mhz[i],
+            "calculated_mhz": fit.calculated_mhz[i],
+            "difference_mhz": fit.difference_mhz[i],
+            "calculated_error_mhz": fit.calculated_errors_mhz[i],
+            "blend": lines.blend[i],
+            "used": bool(fit.used[i]),
+            "leverage": leverage.get(i),
+        }
+        for i in range(len(lines))
+    ]
+
+
+def _writers(request: Request, fit: Fit, content: dict[str, Any], source: str) -> dict[str, Writer]:
+    from rotor.fit.publication import publication_table
+    from rotor.fit.report import report_text
+    from rotor.formats.assigned_lines import write_assigned_lines
+
+    def picture(path: Path) -> None:
+        from rotor.plots.fit import plot_fit
+
+        plot_fit(fit, path, title=request.title, provenance={"command": content["command"]})
+
+    form = {".txt": "text", ".md": "markdown", ".tex": "latex"}
+    return {
+        "--out .fit": lambda path: write_text(path, report_text(fit, request.title, notes=request.notes)),
+        "--out .toml": lambda path: _write_toml(request, fit, source, path),
+        "--out .par": lambda path: _write_par(request, fit, path, variances=False),
+        "--out .var": lambda path: _write_par(request, fit, path, variances=True),
+        "--table": lambda path: write_text(path, publication_table(fit, form[path.suffix.lower()])),
+        "--save-lines": lambda path: write_assigned_lines(fit.lines, path),
+        "--plot": picture,
+    }
+
+
+def _write_toml(request: Request, fit: Fit, source: str, path: Path) -> None:
+    """The constants with errors and correlations in the file of the start, or in a new one."""
+    from rotor.formats.molecule_file import MoleculeFile, read_molecule_file
+    from rotor.formats.molecule_writer import write_molecule_file
+
+    origin = (
+        f"fitted by rotor to {int(fit.used.sum())} lines of {Path(source).name}, weighted by their errors; weighted rms "
+        f"{fit.weighted_rms:.4g}; errors from the stated errors of the lines"
+    )
+    own = request.start.lower().endswith(".toml") and Path(request.start).exists()
+    file = read_molecule_file(request.start) if own else MoleculeFile(request.title or path.stem)
+    covariance = None if fit.statistics.undetermined else fit.covariance
+    made = replace(file, constants=fit.named, covariance=covariance, sources={**file.sources, "constants": origin})
+    write_molecule_file(made, path)
+
+
+def _write_par(request: Request, fit: Fit, path: Path, *, variances: bool) -> None:
+    from rotor.formats.spcat.fit_input import fitted_file, named_file
+    from rotor.formats.spcat.par import write_par
+
+    if request.spfit is not None:
+        write_par(fitted_file(request.spfit, fit, variances=variances), path)
+    else:
+        write_par(named_file(fit, request.title, variances=variances), path)
+
+
+def _show(
+    request: Request,
+    fit: Fit,
+    steps: Sequence[Trial],
+    trials: Sequence[Trial],
+    suggestions: Sequence[Suggestion],
+    spread: Sequence[float],
+) -> None:
+    from rotor.fit.report import far_off, statistics_text, status_text
+
+    print(f"{request.title}: {status_text(fit)}")
+    show_table(_parameter_table(fit, spread))
+    print("\n".join(statistics_text(fit)))
+    for text in fit.notes:
+        note(text)
+    for what, some in (("chosen, in this order", steps), ("tried", trials)):
+        if some:
+            show_table(_trial_table(what, some))
+    if suggestions:
+        show_table(_suggestion_table(fit, suggestions))
+    if not far_off(fit):
+        show_facts([("lines", "none is more than 3 errors off")])
+
+
+def _parameter_table(fit: Fit, spread: Sequence[float]) -> Table:
+    from rotor.fit.publication import value_text
+
+    columns = ["parameter", "value (MHz)", "error", "from scatter", *(["bootstrap"] if spread else [])]
+    rows = []
+    for i, name in enumerate(fit.parameters.names):
+        error = float(fit.errors[i])
+        text = (
+            value_text(float(fit.values[i]), error) if error < float("inf") else f"{fit.values[i]!r} (not determined)"
+        )
+        numbers = [f"{error:.3g}", f"{float(fit.scaled_errors[i]):.3g}", *([f"{spread[i]:.3g}"] if spread else [])]
+        rows.append([name, text, *numbers])
+    return Table("", columns, rows, frozenset({"parameter"}))
+
+
+def _trial_table(title: str, trials: Sequence[Trial]) -> Table:
+    columns = ["constant", "step", "F", "by chance", "AICc", "from", "left-one-out rms", "weighted rms", "better"]
+    rows = [
+        [
+            one.name, "added" if one.added else "left out", f"{one.f_ratio:.3g}", f"{one.chance:.2g}", f"{one.aicc:.1f}",
+            f"{one.aicc_before:.1f}", f"{one.cross_validated:.4g}", f"{one.fit.weighted_rms:.4g}", "yes" if one.better else "no",
+        ]
+        for one in trials
+    ]  # fmt: skip
+    return Table(title, columns, rows, frozenset({"constant", "step"}))
+
+
+def _suggestion_table(fit: Fit, suggestions: Sequence[Suggestion]) -> Table:
+    columns = ["upper - lower", "frequency (MHz)", "error", "error of the constant, after/before"]
+    rows = [
+        [
+            f"{' '.join(map(str, one.upper))} - {' '.join(map(str, one.lower))}",
+            f"{one.frequency_mhz:.4f}",
+            f"{one.error_mhz:.4f}",
+            f"{one.error_ratio:.4f}",
+        ]
+        for one in suggestions
+    ]
+    return Table("lines that would help most", columns, rows, frozenset({"upper - lower"}))

@@ -1,0 +1,195 @@
+"""`rotor stark`: levels of a molecule in a static electric field."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from rotor.cli.raman import with_polarizability
+from rotor.cli.shared import inputs
+from rotor.cli.shared.inputs import Input, json_option, parsed, positive, quantity
+from rotor.cli.shared.options import file_option, grouped, option
+from rotor.cli.shared.output import (
+    Files,
+    Table,
+    Writer,
+    deliver,
+    json_with_rows,
+    show_facts,
+    show_table,
+)
+
+if TYPE_CHECKING:
+    from rotor.quantum.field_map import FieldMap
+    from rotor.quantum.stark_request import StarkAnswer
+    from rotor.tops.top import Top
+
+EXAMPLES = """\b
+Examples:
+  rotor stark OCS --field 0:200kV/cm --states "J<=2" --plot ocs.png --csv ocs.csv
+  rotor stark indole --field 0:200kV/cm --states "J<=2" --plot indole.png
+  rotor stark --constants "A=5655.2654 B=1546.8759 C=1214.4040 MHz" --dipole-abc 4.5152,0,0 --field 0,100kV/cm
+  rotor stark OCS --field 0:50kV/cm:101 --intensity "1e11 W/cm2" --states "J<=1\""""
+
+NAMES = {
+    "fields_kv_per_cm": "--field", "j_highest": "--states", "m_values": "--m", "intensity_w_per_cm2": "--intensity",
+    "jmax": "--jmax", "tolerance_mhz": "--tolerance", "diabatic_gap_mhz": "--diabatic-gap",
+}  # fmt: skip  # field of the request -> option
+POINTS = 201
+SHOWN = 24
+
+
+@dataclass(frozen=True)
+class Options:
+    """What is computed."""
+
+    field: str = option(
+        "0:100kV/cm", metavar="GRID", help="Fields: start:stop[:count], of 201 by default, or a comma list (kV/cm)."
+    )
+    states: str = option("J<=2", metavar="TEXT", help="Levels up to this J of the free molecule.")
+    m: str | None = option(None, "--m", metavar="LIST", help="|M| of the states: 0,1; by default 0 to the highest J.")
+    intensity: str = option("0", metavar="I", help="Of a laser along the field, far from resonance (W/cm2).")
+    diabatic_gap: str | None = option(
+        None, metavar="GAP", help="Also labels that pass near crossings with a smaller gap (MHz)."
+    )
+    polarizability: str | None = option(
+        None, metavar="LIST", help="In principal axes: aa,bb,cc[,ab,ac,bc] or parallel,perpendicular (Å³)."
+    )
+    jmax: int | None = option(None, metavar="N", help="Highest J of the basis; by default what the tolerance needs.")
+    tolerance: str = option("1e-4", metavar="E", help="Of the energies (MHz).")
+
+
+@dataclass(frozen=True)
+class Outputs:
+    """Files to write."""
+
+    csv: str | None = file_option(".csv", help="Write the map as CSV.")
+    parquet: str | None = file_option(".parquet", help="Write the map as Parquet.")
+    plot: str | None = file_option(".png", ".pdf", ".svg", help="Draw the map (.png, .pdf, .svg).")
+    json: str | None = json_option()
+
+
+@grouped(given=("spin_weights", "calculator", "hessian", "spin_constants", "spins"))
+def command(context: typer.Context, given: Input, options: Options, outputs: Outputs) -> None:
+    """Levels in a static electric field: energies, labels, effective dipoles and cosines of every M."""
+    from rotor.quantum.stark_request import StarkRequest, answer_stark
+
+    settings = _settings(options)
+    files = Files.of(outputs)
+    if "--plot" in files.paths and len(settings["fields_kv_per_cm"]) < 2:
+        raise ValueError("--plot: a picture of a map needs two fields or more; give --field a range")
+    top = _acted_on(inputs.read_top(given), options, settings["intensity_w_per_cm2"])
+    with inputs.fields_as_options(**NAMES):
+        answer = answer_stark(StarkRequest(top, **settings))
+
+    content = _content(answer, given, context.obj)
+    content["files"] = files.names
+    text = lambda: json_with_rows(answer.states, "states", content)  # noqa: E731
+    deliver(files, _writers(top, answer.states, content), text, lambda: _show(top, answer.states, content))
+
+
+def _settings(options: Options) -> dict[str, Any]:
+    """Fields of the request from the texts of the options."""
+    gap = options.diabatic_gap
+    return {
+        "fields_kv_per_cm": parsed("--field", options.field, _fields),
+        "j_highest": parsed("--states", options.states, _highest_j),
+        "m_values": None if options.m is None else parsed("--m", options.m, _m_values),
+        "intensity_w_per_cm2": quantity("--intensity", options.intensity, "W/cm2"),
+        "jmax": options.jmax,
+        "tolerance_mhz": positive("--tolerance", options.tolerance, "MHz"),
+        "diabatic_gap_mhz": None if gap is None else positive("--diabatic-gap", gap, "MHz"),
+    }
+
+
+def _acted_on(top: Top, options: Options, intensity_w_per_cm2: float) -> Top:
+    """The top with the dipole and, where light acts, the polarizability."""
+    top = inputs.with_some_dipole(top)
+    if options.polarizability is not None or intensity_w_per_cm2:
+        top = with_polarizability(top, options.polarizability)
+    return top
+
+
+def _fields(text: str) -> tuple[float, ...]:
+    from rotor.units import parse_grid
+
+    return tuple(parse_grid(f"{text}:{POINTS}" if text.count(":") == 1 else text, "kV/cm").tolist())
+
+
+def _highest_j(text: str) -> int:
+    number = text.replace(" ", "").upper().removeprefix("J<=").removeprefix("J≤")
+    if not number.isdecimal():
+        raise ValueError(f"{text!r}: expected J<=2, or the number alone")
+    return int(number)
+
+
+def _m_values(text: str) -> tuple[int, ...]:
+    parts = [part.strip() for part in text.split(",")]
+    if not all(part.isdecimal() for part in parts):
+        raise ValueError(f"{text!r}: expected whole numbers of 0 or more between commas, such as 0,1")
+    return tuple(int(part) for part in parts)
+
+
+def _content(answer: StarkAnswer, given: Input, command: str) -> dict[str, Any]:
+    """What is printed and more, by the keys of docs/command_line.md."""
+    from rotor.cli.shared.report import begin
+
+    return {**begin(command, given.text), **answer.facts()}
+
+
+def _writers(top: Top, states: FieldMap, content: dict[str, Any]) -> dict[str, Writer]:
+    provenance = {"command": content["command"], "input": content["input"], "dipole_abc_debye": top.dipole_abc_debye}
+
+    def table(path: Path) -> None:
+        import rotor
+
+        rotor.write(states, path, settings=provenance)
+
+    def draw(path: Path) -> None:
+        from rotor.plots.stark import plot_stark
+
+        plot_stark(states, path, title=top.name or "in a static field", provenance={"command": provenance["command"]})
+
+    return {"--csv": table, "--parquet": table, "--plot": draw}
+
+
+def _show(top: Top, states: FieldMap, content: dict[str, Any]) -> None:
+    from rotor.cli.shared.report import heading
+
+    print(heading(top))
+    show_facts(_facts(top, content))
+    print()
+    curves, first, last = states.curves(), states.fields[0], states.fields[-1]
+    rows = []
+    for rows_of in curves[:SHOWN]:
+        at, end = rows_of.start, rows_of.stop - 1
+        numbers = (states.energy_mhz[at], states.energy_mhz[end], states.slope[end], states.cosines["costheta"][end])
+        rows.append([str(states.label[at]), str(states.m[at]), *(f"{value:.6f}" for value in numbers)])
+    names = (
+        "state",
+        "|M|",
+        f"E at {first:g} kV/cm (MHz)",
+        f"E at {last:g} kV/cm (MHz)",
+        "μ_eff there (D)",
+        "⟨cosθ⟩ there",
+    )
+    title = f"{len(rows)} of {len(curves)} states" if len(rows) < len(curves) else "all states"
+    show_table(Table(f"{title}, by M and block", names, rows, frozenset({"state"})))
+
+
+def _facts(top: Top, content: dict[str, Any]) -> list[tuple[str, str]]:
+    from rotor.cli.shared import report
+
+    first, last, count = content["field_kv_per_cm"]
+    facts = [
+        ("constants", report.with_source(report.constants_text(top), top.source)),
+        ("dipole", report.with_source(report.vector_text(top.dipole_abc_debye), top.dipole_source)),
+        ("field", f"{first:g} to {last:g} kV/cm along Z, {count} values"),
+    ]
+    if content["intensity_w_per_cm2"]:
+        facts.append(("laser", f"{content['intensity_w_per_cm2']:g} W/cm² along Z"))
+    accuracy = f"J max {content['jmax']}; energies move by {content['accuracy_mhz']:.1e} MHz with a higher one"
+    return [*facts, ("accuracy", f"{accuracy}, edge population {content['edge_population']:.1e}")]

@@ -1,0 +1,195 @@
+"""Measured lines with the states they are assigned to: frequencies, errors, shares in blends."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rotor.arrays import Floats, Ints
+from rotor.table import Table
+from rotor.units import MHZ_PER_CM
+
+
+@dataclass(frozen=True, eq=False)
+class Assignments(Table):
+    """Assigned lines as columns of equal length n.
+
+    names : quantum numbers of a state, such as ("j", "ka", "kc"). upper, lower (n, k) : labels of the two states
+    frequency_mhz, error_mhz (n,) : measured. A line of wavenumbers stands in MHz and marked in `wavenumber` (n,)
+    weight (n,) : share within its blend. blend (n,) : lines of one number are one measured frequency, the mean of their
+    calculated ones by weight; a line alone has a number of its own
+    source : where the lines are from. comments : by line, what was written beside it
+    """
+
+    names: tuple[str, ...]
+    upper: Ints
+    lower: Ints
+    frequency_mhz: Floats
+    error_mhz: Floats
+    weight: Floats
+    blend: Ints
+    wavenumber: NDArray[np.bool_]
+    source: str = ""
+    comments: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        n, k = len(self.frequency_mhz), len(self.names)
+        shapes = {
+            "upper": (n, k),
+            "lower": (n, k),
+            "error_mhz": (n,),
+            "weight": (n,),
+            "blend": (n,),
+            "wavenumber": (n,),
+        }
+        for name, shape in shapes.items():
+            if np.shape(getattr(self, name)) != shape:
+                raise ValueError(f"{name} has shape {np.shape(getattr(self, name))}; {shape} is needed for {n} lines")
+        _refuse_numbers(self)
+
+    def __len__(self) -> int:
+        return len(self.frequency_mhz)
+
+    @property
+    def columns(self) -> dict[str, NDArray[Any]]:
+        """Labels as j_upper, ka_upper, ..., then frequency_mhz, error_mhz, weight, blend."""
+        labels = {
+            f"{name}_{side}": getattr(self, side)[:, i]
+            for side in ("upper", "lower")
+            for i, name in enumerate(self.names)
+        }
+        return {**labels, **{name: getattr(self, name) for name in ("frequency_mhz", "error_mhz", "weight", "blend")}}
+
+    def take(self, index: NDArray[Any]) -> Assignments:
+        """The lines that a mask or an array of positions picks."""
+        picked = np.arange(len(self))[index]
+        fields = ("upper", "lower", "frequency_mhz", "error_mhz", "weight", "blend", "wavenumber")
+        changes: dict[str, Any] = {name: getattr(self, name)[picked] for name in fields}
+        if self.comments:
+            changes["comments"] = tuple(self.comments[i] for i in picked.tolist())
+        return replace(self, **changes)
+
+    def text(self, line: int) -> str:
+        """The labels of one line as `3 1 2 - 2 1 1`."""
+        return " - ".join(" ".join(map(str, side[line].tolist())) for side in (self.upper, self.lower))
+
+
+def _refuse_numbers(lines: Assignments) -> None:
+    for name in ("frequency_mhz", "error_mhz", "weight"):
+        values = getattr(lines, name)
+        bad = ~np.isfinite(values) | ((values < 0) if name != "frequency_mhz" else False)
+        if bad.any():
+            first = int(np.argmax(bad))
+            raise ValueError(
+                f"line {first + 1}, {lines.text(first)}: {name} is {values[first]!r}; a finite number"
+                f"{' of 0 or more' if name != 'frequency_mhz' else ''} is needed"
+            )
+
+
+def assignments(
+    names: Sequence[str],
+    upper: ArrayLike,
+    lower: ArrayLike,
+    frequency_mhz: ArrayLike,
+    error_mhz: ArrayLike,
+    *,
+    weight: ArrayLike = 1.0,
+    blend: ArrayLike | None = None,
+    wavenumber: ArrayLike = False,
+    source: str = "",
+    comments: Sequence[str] = (),
+) -> Assignments:
+    """Assigned lines from labels (n, k) and numbers (n,), or one number for all.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Quantum numbers in the columns of the labels.
+    upper, lower : (n, k) arrays
+    frequency_mhz, error_mhz : (n,) arrays, MHz
+    weight : (n,) array
+        Shares in blends.
+    blend : (n,) array, optional
+        Which lines are one measured frequency; each its own where it is left out.
+    wavenumber : (n,) array of bool
+        Which lines were measured in cm⁻¹.
+    source, comments : where from; what was written beside each line
+
+    Raises
+    ------
+    ValueError
+        For arrays that do not fit each other, and numbers that are not finite or below 0.
+
+    >>> lines = assignments(("j",), [[1], [2]], [[0], [1]], [115271.2018, 230538.0], 0.0005)
+    >>> len(lines), lines.text(1), lines.blend.tolist()
+    (2, '2 - 1', [0, 1])
+    """
+    frequency = np.asarray(frequency_mhz, dtype=float).reshape(-1)
+    n = len(frequency)
+    labels = [np.asarray(side, dtype=np.int64).reshape(n, -1) if n else np.zeros((0, len(names)), np.int64)
+              for side in (upper, lower)]  # fmt: skip
+    groups = np.arange(n) if blend is None else np.unique(np.asarray(blend), return_inverse=True)[1].reshape(-1)
+    return Assignments(
+        tuple(names), labels[0], labels[1], frequency,
+        np.broadcast_to(np.asarray(error_mhz, dtype=float), (n,)).copy(),
+        np.broadcast_to(np.asarray(weight, dtype=float), (n,)).copy(),
+        groups.astype(np.int64),
+        np.broadcast_to(np.asarray(wavenumber, dtype=bool), (n,)).copy(),
+        source, tuple(comments),
+    )  # fmt: skip
+
+
+def merged(first: Assignments, second: Assignments, *, same_within_mhz: float = 0.0) -> tuple[Assignments, list[str]]:
+    """Two sets of assigned lines as one, and what was found in both.
+
+    A line of the same labels in both stays once, as in `first`, where the frequencies agree within `same_within_mhz`; where
+    they do not both stay and a note says so. Blends stay blends. Raises ValueError for other quantum numbers.
+    """
+    if first.names != second.names:
+        raise ValueError(f"lines by {', '.join(first.names)} and by {', '.join(second.names)} cannot be merged")
+    here = {_key(first, i): i for i in range(len(first))}
+    chosen, notes = [], list[str]()
+    for i in range(len(second)):
+        twin = here.get(_key(second, i))
+        if twin is None:
+            chosen.append(i)
+            continue
+        apart = abs(first.frequency_mhz[twin] - second.frequency_mhz[i])
+        if apart <= same_within_mhz:
+            notes.append(f"{second.text(i)}: in both, once in the result")
+        else:
+            notes.append(f"{second.text(i)}: in both, {apart:.4f} MHz apart; both stay")
+            chosen.append(i)
+    more = second.take(np.array(chosen, dtype=np.int64))
+    shift = int(first.blend.max(initial=-1)) + 1
+    fields = ("upper", "lower", "frequency_mhz", "error_mhz", "weight", "wavenumber")
+    joined: dict[str, Any] = {name: np.concatenate([getattr(first, name), getattr(more, name)]) for name in fields}
+    comments = [text for one in (first, more) for text in (one.comments or ("",) * len(one))]
+    source = " and ".join(dict.fromkeys(filter(None, (first.source, second.source))))
+    blend = np.concatenate([first.blend, more.blend + shift])
+    return Assignments(first.names, **joined, blend=blend, source=source, comments=tuple(comments)), notes
+
+
+def _key(lines: Assignments, i: int) -> tuple[int, ...]:
+    return (*lines.upper[i].tolist(), *lines.lower[i].tolist())
+
+
+def duplicates(lines: Assignments) -> list[tuple[int, int]]:
+    """Pairs of lines with the same labels, by position; a line measured twice is no mistake, but must be known."""
+    seen: dict[tuple[int, ...], int] = {}
+    out = []
+    for i in range(len(lines)):
+        key = _key(lines, i)
+        if key in seen:
+            out.append((seen[key], i))
+        seen.setdefault(key, i)
+    return out
+
+
+def mhz_per_unit(lines: Assignments) -> Floats:
+    """What one unit of each line is in MHz, (n,): 1, or 29979.2458 for a wavenumber."""
+    return np.where(lines.wavenumber, MHZ_PER_CM, 1.0)

@@ -1,0 +1,390 @@
+"""Which constants the lines call for, which unmeasured line would help most, and errors by resampling.
+
+Adding one constant to a fit with χ²₀ leaves χ²₁ with f₁ degrees of freedom; F = (χ²₀ - χ²₁)/(χ²₁/f₁) follows Fisher's
+distribution with 1 and f₁ where the constant is not needed. Beside it stand Akaike's criterion with its correction for small
+samples (N. Sugiura, Commun. Stat. A7, 13 (1978)),
+
+    AICc = n ln(χ²/n) + 2k + 2k(k + 1)/(n - k - 1),
+
+and the rms of the residuals that leaving each line out in turn would give, r_i/(1 - h_i), to first order in the leverages h
+(D. M. Allen, Technometrics 16, 125 (1974)). A constant is taken when all three say so.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from rotor.arrays import Floats, Ints
+from rotor.fit.assignment import Assignments
+from rotor.fit.fit import Fit, FitOptions, fit_lines
+from rotor.fit.parameters import Parameters, parameters, with_names
+from rotor.quantum.labelled import LevelModel, level_model
+from rotor.tops.constants import Constants
+from rotor.tops.operators import distortion_terms, powers_of_spelled
+
+CHANCE = 0.01  # of an F so large by accident, above which a constant is not taken
+_MOST_STEPS = 40
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """A fit with one constant more or less.
+
+    name, added : which, and whether it was added (else left out). fit : what came out. f_ratio, chance : F and the probability of
+    one so large where the constant is not needed. aicc, cross_validated : of the model tried; those of the model it was tried
+    against stand in `aicc_before` and `cross_validated_before`
+    """
+
+    name: str
+    added: bool
+    fit: Fit
+    f_ratio: float
+    chance: float
+    aicc: float
+    cross_validated: float
+    aicc_before: float
+    cross_validated_before: float
+
+    @property
+    def better(self) -> bool:
+        """Whether all three signs speak for the model tried."""
+        if self.added:
+            needed = self.chance < CHANCE and self.aicc < self.aicc_before
+            return self.fit.converged and needed and self.cross_validated < self.cross_validated_before
+        return self.fit.converged and self.chance >= CHANCE and self.aicc <= self.aicc_before
+
+    @property
+    def error_ratio(self) -> float:
+        """|constant|/standard error in the larger model; nan where it is not in the model tried."""
+        if not self.added:
+            return float("nan")
+        i = self.fit.parameters.names.index(self.name)
+        return float(abs(self.fit.values[i]) / self.fit.errors[i])
+
+
+def chi_squared(fit: Fit) -> float:
+    """Σ of squared weighted residuals, a-priori values included."""
+    return float(fit.residuals @ fit.residuals)
+
+
+def aicc(fit: Fit) -> float:
+    """Akaike's criterion, corrected for small samples; infinite where the lines are too few for it."""
+    n, k = len(fit.residuals), fit.statistics.rank + 1  # the scale of the errors counts
+    if n - k - 1 <= 0:
+        return math.inf
+    return n * math.log(chi_squared(fit) / n) + 2 * k + 2 * k * (k + 1) / (n - k - 1)
+
+
+def cross_validated_rms(fit: Fit) -> float:
+    """Weighted rms of each line against the fit without it, to first order; infinite where a line stands alone."""
+    left = 1.0 - fit.statistics.leverages[: len(fit.groups)]
+    if (left < 1e-9).any():
+        return math.inf
+    parts = fit.residuals[: len(fit.groups)] / left
+    return float(np.sqrt(parts @ parts / len(parts)))
+
+
+def try_constants(fit: Fit, candidates: Sequence[str], options: FitOptions | None = None) -> list[Trial]:
+    """The fit again with each candidate added (from 0) where it is not free, and left out (at 0) where it is.
+
+    Parameters
+    ----------
+    fit : Fit
+        In plain constants (see `rotor.fit.parameters.parameters`).
+    candidates : sequence of str
+    options : FitOptions, optional
+
+    Returns
+    -------
+    list of Trial
+        By F, the largest of those added first; A, B and C are never left out.
+
+    Raises
+    ------
+    ValueError
+        For a name that the kind of top or the reduction does not have.
+    """
+    constants = with_names(_set_of(fit), [name for name in candidates if name not in fit.parameters.names])
+    out = []
+    for name in candidates:
+        own = constants.own_name(name)
+        if own in fit.parameters.names:
+            if own not in ("A", "B", "C"):
+                out.append(_without(fit, own, options))
+        else:
+            out.append(_with(fit, constants, own, options))
+    return sorted([trial for trial in out if trial], key=lambda one: (not one.added, -one.f_ratio))
+
+
+def _set_of(fit: Fit) -> Constants:
+    return fit.named
+
+
+def _with(fit: Fit, constants: Constants, name: str, options: FitOptions | None) -> Trial | None:
+    free = [*fit.parameters.names, name]
+    values: dict[str, Any] = {k: v for k, v in constants.values.items() if k in fit.named.values or k == name}
+    own = Constants(
+        kind=constants.kind, reduction=constants.reduction, representation=constants.representation,
+**values,
+    )  # fmt: skip
+    try:
+        found = fit_lines(fit.lines, own, _same_priors(fit, parameters(own, free)), options)
+    except ValueError:  # more constants than lines
+        return None
+    ratio, chance = f_test(fit, found)
+    return _trial(name, True, fit, found, ratio, chance)
+
+
+def _without(fit: Fit, name: str, options: FitOptions | None) -> Trial | None:
+    own = fit.named.replace(**{name: 0.0})
+    free = [other for other in fit.parameters.names if other != name]
+    try:
+        found = fit_lines(fit.lines, own, _same_priors(fit, parameters(own, free)), options)
+    except ValueError:
+        return None
+    ratio, chance = f_test(found, fit)
+    return _trial(name, False, fit, found, ratio, chance)
+
+
+def _same_priors(fit: Fit, made: Parameters) -> Parameters:
+    known = dict(zip(fit.parameters.names, fit.parameters.prior.tolist(), strict=True))
+    start = dict(zip(fit.parameters.names, fit.parameters.start.tolist(), strict=True))
+    prior = np.array([known.get(name, np.inf) for name in made.names])
+    at = np.array([start[n] if np.isfinite(p) else s for n, p, s in zip(made.names, prior, made.start, strict=True)])
+    return replace(made, prior=prior, start=at)
+
+
+def _trial(name: str, added: bool, before: Fit, found: Fit, ratio: float, chance: float) -> Trial:
+    return Trial(
+        name,
+        added,
+        found,
+        ratio,
+        chance,
+        aicc(found),
+        cross_validated_rms(found),
+        aicc(before),
+        cross_validated_rms(before),
+    )
+
+
+def f_test(smaller: Fit, larger: Fit) -> tuple[float, float]:
+    """F of the constants that the larger model has more, and the probability of one so large by chance."""
+    from scipy.special import fdtrc
+
+    more = larger.statistics.rank - smaller.statistics.rank
+    free = larger.degrees_of_freedom
+    if more < 1 or free < 1:
+        return 0.0, 1.0
+    ratio = (chi_squared(smaller) - chi_squared(larger)) / more / (chi_squared(larger) / free)
+    return float(ratio), float(fdtrc(more, free, max(ratio, 0.0)))
+
+
+def choose_constants(
+    lines: Assignments,
+    constants: Constants,
+    base: Sequence[str],
+    candidates: Sequence[str],
+    options: FitOptions | None = None,
+    *,
+    progress: Callable[[Trial], None] | None = None,
+) -> tuple[Fit, list[Trial]]:
+    """A model built up order by order in J, then freed of what it does not need.
+
+    Of the candidates of one order that all three signs speak for, the one with the largest F is taken, until none is left; where
+    none helps alone, pairs of one order are tried, because such constants often make sense together only. Then the next order
+    follows. At the end constants that the whole model does not need are left out one by one, highest order first.
+
+    Parameters
+    ----------
+    lines : Assignments
+    constants : Constants
+        Where the fit starts; candidates start from 0 unless they are in it.
+    base : sequence of str
+        Constants that are always free.
+    candidates : sequence of str
+    options : FitOptions, optional
+    progress : callable, optional
+        Called with every step taken.
+
+    Returns
+    -------
+    (Fit, list of Trial)
+        The last fit, and the steps that were taken.
+    """
+    start = with_names(constants, base)
+    fit = fit_lines(lines, start, parameters(start, base), _patient(options))
+    fixed, taken = tuple(fit.parameters.names), list[Trial]()
+    names = dict.fromkeys(start.own_name(name) for name in candidates)
+    orders = {name: order_of(name, start) for name in names if name not in fixed}
+
+    def take(trial: Trial) -> Fit:
+        taken.append(trial)
+        if progress:
+            progress(trial)
+        return trial.fit
+
+    before = -1
+    while (
+        len(taken) > before
+    ):  # once more while something was taken: a higher order may have made a lower one significant
+        before = len(taken)
+        for order in sorted(set(orders.values())):
+            while len(taken) < _MOST_STEPS:
+                left = [name for name, own in orders.items() if own == order and name not in fit.parameters.names]
+                trials = [one for one in try_constants(fit, left, _patient(options)) if one.added]
+                best = next((one for one in trials if one.better), None) or _best_pair(fit, left, options)
+                if best is None:
+                    break
+                fit = take(best)
+    while True:
+        spare = [name for name in fit.parameters.names if name not in fixed]
+        needless = [one for one in try_constants(fit, spare, _patient(options)) if not one.added and one.better]
+        if not needless:
+            return fit, taken
+        fit = take(min(needless, key=lambda one: (-orders[one.name], one.f_ratio)))
+
+
+def order_of(name: str, constants: Constants) -> int:
+    """The highest power of J in a constant's operator: 2 for A, 4 for DeltaJ, 6 for PhiK.
+
+    >>> order_of("PhiK", Constants(A=9.0, B=3.0, C=2.0, reduction="A"))
+    6
+    """
+    if name in ("A", "B", "C"):
+        return 2
+    spelled = powers_of_spelled(name)
+    terms = {spelled: 1.0} if spelled else distortion_terms(constants.kind, constants.reduction)[name]
+    return max(2 * (p + q + n) for p, q, n in terms)
+
+
+def _patient(options: FitOptions | None) -> FitOptions:
+    """A model on its way may be far from the lines: only the last one is judged by its rms."""
+    return replace(options or FitOptions(), poor_rms=1e12)
+
+
+def _best_pair(fit: Fit, left: Sequence[str], options: FitOptions | None) -> Trial | None:
+    """Two constants together, judged as one step."""
+    found = []
+    for one, other in itertools.combinations(left, 2):
+        constants = with_names(fit.named, [one, other])
+        try:
+            both = fit_lines(
+                fit.lines, constants, _same_priors(fit, parameters(constants, [*fit.parameters.names, one, other])),
+                _patient(options),
+            )  # fmt: skip
+        except ValueError:
+            continue
+        ratio, chance = f_test(fit, both)
+        trial = _trial(other, True, fit, both, ratio, chance)
+        if trial.better:
+            found.append(trial)
+    return max(found, key=lambda trial: trial.f_ratio, default=None)
+
+
+@dataclass(frozen=True)
+class Suggestion:
+    """An unmeasured line: its labels, where it is predicted with which error, and the error of the constant after it, over now."""
+
+    upper: tuple[int, ...]
+    lower: tuple[int, ...]
+    frequency_mhz: float
+    error_mhz: float
+    error_ratio: float
+
+
+def suggest_lines(
+    fit: Fit,
+    name: str,
+    upper: Ints,
+    lower: Ints,
+    *,
+    error_mhz: float,
+    model: Callable[[Ints], LevelModel] | None = None,
+) -> list[Suggestion]:
+    """How much each line, if it were measured, would reduce the standard error of one parameter; the best first.
+
+    A line with the derivatives d by the parameters and the error σ takes (C d)_j²/(σ² + dᵀ C d) from the variance C_jj.
+
+    Parameters
+    ----------
+    fit : Fit
+    name : str
+        The parameter.
+    upper, lower : (m, k) arrays
+        Labels of the lines to choose from.
+    error_mhz : float
+        With which it would be measured.
+    model : callable, optional
+        As in `fit_lines`.
+
+    Returns
+    -------
+    list of Suggestion
+
+    Raises
+    ------
+    ValueError
+        For an unknown parameter, or one that the lines do not determine (any line in which it counts would).
+    """
+    if name not in fit.parameters.names:
+        raise ValueError(f"{name} is not among the free parameters {', '.join(fit.parameters.names)}")
+    column = fit.parameters.names.index(name)
+    if not np.isfinite(fit.errors).all():
+        raise ValueError("some parameters are not determined by the lines; hold them before asking for the next line")
+    labels, places = np.unique(np.concatenate([upper, lower]), axis=0, return_inverse=True)
+    places = places.reshape(-1)
+    made = model(labels) if model else level_model(fit.named, labels)
+    energies, slopes = made.levels(fit.parameters.constants_of(fit.values))
+    slopes = slopes @ fit.parameters.matrix
+    up, low = places[: len(upper)], places[len(upper) :]
+    rows = slopes[up] - slopes[low]
+    covariance = fit.statistics.covariance
+    spread = np.einsum("ij,jk,ik->i", rows, covariance, rows)
+    gained = (rows @ covariance[:, column]) ** 2 / (error_mhz**2 + spread)
+    ratio = np.sqrt(np.maximum(1 - gained / covariance[column, column], 0.0))
+    frequency = energies[up] - energies[low]
+    return [
+        Suggestion(
+            tuple(np.asarray(upper)[i].tolist()), tuple(np.asarray(lower)[i].tolist()), float(frequency[i]),
+            float(np.sqrt(spread[i])), float(ratio[i]),
+        )
+        for i in np.argsort(ratio, kind="stable").tolist()
+    ]  # fmt: skip
+
+
+def bootstrap(
+    fit: Fit, samples: int, rng: np.random.Generator, options: FitOptions | None = None
+) -> tuple[Floats, Floats]:
+    """Parameters (samples, n) of fits to lines drawn anew with replacement, and their standard deviations (n,).
+
+    Measured frequencies are drawn, blends as one. It needs no assumption about the errors but that the lines are independent;
+    where few lines fix a constant it comes out too large or infinite. Samples that determine fewer constants are drawn again,
+    at most ten times as many. Raises ValueError where that is not enough.
+    """
+    groups = fit.lines.blend[fit.groups]
+    members = {int(b): np.flatnonzero((fit.lines.blend == b) & fit.used) for b in groups}
+    at = fit.parameters.moved(fit.values)
+    out: list[Floats] = []
+    for _ in range(10 * samples):
+        if len(out) == samples:
+            break
+        drawn = rng.choice(groups, size=len(groups))
+        rows = np.concatenate([members[int(b)] for b in drawn])
+        blend = np.repeat(np.arange(len(drawn)), [len(members[int(b)]) for b in drawn])
+        lines = replace(fit.lines.take(rows), blend=blend, comments=())
+        one = fit_lines(lines, fit.named, at, _patient(options))
+        if one.statistics.rank == fit.statistics.rank:
+            out.append(one.values)
+    if len(out) < samples:
+        raise ValueError(
+            f"only {len(out)} of {10 * samples} samples determine all constants; too few lines for a bootstrap"
+        )
+    found = np.array(out)
+    return found, np.asarray(found.std(axis=0, ddof=1))

@@ -1,0 +1,136 @@
+"""The report of a fit: every line with what was calculated, every parameter with its errors, and how far to trust both."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from rotor.fit.fit import Fit
+from rotor.fit.publication import value_text
+
+FAR_OFF = 3.0  # errors beyond which a line is listed among those that are far off
+_CORRELATED = 0.95  # correlation from which a pair is listed
+
+
+def report_text(fit: Fit, title: str = "", *, notes: Sequence[str] = ()) -> str:
+    """The whole report, in the order of SPFIT's .fit: parameters at the start, lines, parameters at the end, statistics."""
+    parts = [
+        [title or "fit of rotational constants", status_text(fit), ""],
+        ["PARAMETERS AT THE START (MHz), A-PRIORI ERRORS", *_start(fit), ""],
+        ["LINES", *_lines(fit), ""],
+        [
+            "PARAMETERS (MHz): value(error), error from stated line errors, error from the scatter, change",
+            *_end(fit),
+            "",
+        ],
+        ["STATISTICS", *statistics_text(fit), ""],
+        ["SEARCH: weighted rms before and after each step, damping", *_search(fit), ""],
+        ["CORRELATIONS", *_correlations(fit), ""],
+    ]
+    said = [*notes, *fit.notes]
+    if said:
+        parts.append(["NOTES", *(f"- {text}" for text in said), ""])
+    return "\n".join(line for part in parts for line in part).rstrip() + "\n"
+
+
+def status_text(fit: Fit) -> str:
+    """One line: converged or not, and why."""
+    return f"{'CONVERGED' if fit.converged else 'NOT CONVERGED'}: {fit.reason}"
+
+
+def statistics_text(fit: Fit) -> list[str]:
+    """What there is to say about the fit as a whole, a line each."""
+    rms, infrared = fit.rms_mhz(), fit.rms_mhz(wavenumber=True)
+    condition = fit.statistics.condition
+    out = [
+        f"lines {len(fit.lines)}, of which {int(fit.used.sum())} count in {len(fit.groups)} measured frequencies",
+        f"free parameters {len(fit.parameters.names)}, degrees of freedom {fit.degrees_of_freedom}",
+        f"weighted rms {fit.weighted_rms:.5f}; sqrt(chi2/degrees of freedom) {fit.reduced_chi:.5f}",
+        *([f"rms of lines in MHz {rms:.6f} MHz"] if math.isfinite(rms) else []),
+        *([f"rms of lines in cm-1 {infrared:.6f} cm-1"] if math.isfinite(infrared) else []),
+        f"condition number of the column-scaled Jacobian {condition:.3e}",
+    ]
+    out += [f"not determined by these lines: {one.text} (left at the start)" for one in fit.statistics.undetermined]
+    out += [f"far off, {text}" for text in far_off(fit)]
+    return out + [f"decisive, {text}" for text in decisive(fit)]
+
+
+def far_off(fit: Fit, errors: float = FAR_OFF) -> list[str]:
+    """Lines that count and are further off than so many errors, worst first."""
+    parts = np.abs(fit.residuals[: len(fit.groups)])
+    order = [int(i) for i in np.argsort(-parts) if parts[i] > errors]
+    return [
+        f"line {fit.groups[i] + 1}, {fit.lines.text(int(fit.groups[i]))}: {fit.residuals[i]:+.1f} errors"
+        for i in order[:20]
+    ]
+
+
+def decisive(fit: Fit, leverage: float = 0.9) -> list[str]:
+    """Lines without which a combination of parameters would not be determined: leverage near 1."""
+    leverages = fit.statistics.leverages[: len(fit.groups)]
+    return [
+        f"line {fit.groups[i] + 1}, {fit.lines.text(int(fit.groups[i]))}: leverage {leverages[i]:.3f}; nothing checks it"
+        for i in np.argsort(-leverages)[:10].tolist()
+        if leverages[i] > leverage
+    ]
+
+
+def _start(fit: Fit) -> list[str]:
+    rows = zip(fit.parameters.names, fit.parameters.start.tolist(), fit.parameters.prior.tolist(), strict=True)
+    return [f"{i:5d}  {name:<16}{value:24.15E}  {prior:12.4E}" for i, (name, value, prior) in enumerate(rows, 1)]
+
+
+def _lines(fit: Fit) -> list[str]:
+    lines, width = fit.lines, max((len(fit.lines.text(i)) for i in range(len(fit.lines))), default=0)
+    head = f"{'':>6} {'upper - lower':<{width}} {'observed':>16} {'calculated':>16} {'obs-calc':>12} {'error':>10}"
+    out = [f"{head} {'est.error':>10} {'/error':>8}  MHz, lines in cm-1 marked c"]
+    blended = np.bincount(lines.blend[fit.used], minlength=int(lines.blend.max(initial=0)) + 1) > 1
+    leverages = dict(zip(fit.groups.tolist(), fit.statistics.leverages.tolist(), strict=False))
+    for i in range(len(lines)):
+        mark = "c" if lines.wavenumber[i] else " "
+        unit = 29979.2458 if lines.wavenumber[i] else 1.0
+        error = lines.error_mhz[i]
+        difference = fit.difference_mhz[i]
+        ratio = f"{difference / error:8.2f}" if error > 0 else f"{'-':>8}"
+        text = (
+            f"{i + 1:5d}: {lines.text(i):<{width}} {lines.frequency_mhz[i] / unit:16.5f} {fit.calculated_mhz[i] / unit:16.5f} "
+            f"{difference / unit:12.5f} {error / unit:10.5f} {fit.calculated_errors_mhz[i] / unit:10.5f} {ratio} {mark}"
+        )
+        if blended[lines.blend[i]] and fit.used[i]:
+            text += f" blend, mean {fit.blended_mhz[i] / unit:.5f}, weight {lines.weight[i]:g}"
+        if i in fit.left_out:
+            text += f" DOES NOT COUNT: {fit.left_out[i]}"
+        elif leverages.get(i, 0.0) > 0.9:
+            text += f" leverage {leverages[i]:.2f}"
+        out.append(text.rstrip())
+    return out
+
+
+def _end(fit: Fit) -> list[str]:
+    errors, scaled = fit.errors, fit.scaled_errors
+    out = []
+    for i, name in enumerate(fit.parameters.names):
+        value, error = float(fit.values[i]), float(errors[i])
+        shown = value_text(value, error) if math.isfinite(error) else f"{value!r} (not determined)"
+        change = value - float(fit.parameters.start[i])
+        out.append(f"{i + 1:5d}  {name:<16}{shown:>28}  {error:12.4E}  {float(scaled[i]):12.4E}  {change:12.4E}")
+    return out
+
+
+def _search(fit: Fit) -> list[str]:
+    return [
+        f"{one.number:5d}  {one.rms_before:14.6f} {one.rms_after:14.6f}  {one.damping:8.1e}{'' if one.taken else '  refused'}"
+        for one in fit.minimum.iterations
+    ] or ["    0  the start was the minimum"]
+
+
+def _correlations(fit: Fit) -> list[str]:
+    matrix, names = fit.statistics.correlations, fit.parameters.names
+    out = []
+    for i, row in enumerate(matrix):
+        numbers = " ".join(f"{value:9.6f}" if np.isfinite(value) else "        -" for value in row[: i + 1])
+        out.append(f"{i + 1:5d}  {names[i]:<16}{numbers}")
+    strong = np.argwhere(np.tril(np.abs(np.nan_to_num(matrix)), -1) > _CORRELATED)
+    return out + [f"strong: {names[i]} and {names[j]} {matrix[i, j]:+.5f}" for i, j in strong.tolist()]

@@ -1,0 +1,221 @@
+"""Assigned lines from .lin, .csv and .cat files, and back.
+
+A .csv has a column for each quantum number of both states (`j_upper`, `ka_upper`, `kc_upper`, `j_lower`, ...), a frequency
+(`frequency_mhz`, `frequency_ghz` or `wavenumber_cm`), its error (`error_mhz`, `error_khz`, `error_ghz` or `error_cm`), and, where
+needed, `weight`, `blend` (one text or number for the lines of one measured frequency) and `comment`. Of a catalogue the lines
+measured in a laboratory are taken (a negative tag); those of one frequency and error are one blend by intensity.
+"""
+
+from __future__ import annotations
+
+import csv
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from rotor.fit.assignment import Assignments, assignments
+from rotor.formats.atomic_write import open_atomic
+from rotor.formats.spcat.fields import BLANK
+from rotor.formats.spcat.lin import line_list, read_lin, write_lin
+from rotor.units import MHZ_PER_CM
+
+SUFFIXES = (".lin", ".csv", ".cat", ".cat.gz")
+QUANTA = {
+    "linear": ("j",),
+    "spherical": ("j",),
+    "prolate": ("j", "k"),
+    "oblate": ("j", "k"),
+    "asymmetric": ("j", "ka", "kc"),
+}
+_FREQUENCY = {"frequency_mhz": 1.0, "frequency_ghz": 1e3, "wavenumber_cm": MHZ_PER_CM}
+_ERROR = {"error_mhz": 1.0, "error_khz": 1e-3, "error_ghz": 1e3, "error_cm": MHZ_PER_CM}
+
+
+def read_assigned_lines(path: str | os.PathLike[str], names: Sequence[str]) -> tuple[Assignments, list[str]]:
+    """The assigned lines of a file, and what must be known of how they were read.
+
+    Parameters
+    ----------
+    path : path
+        .lin, .csv, .cat or .cat.gz.
+    names : sequence of str
+        The quantum numbers that label a state, such as ("j", "ka", "kc").
+
+    Returns
+    -------
+    (Assignments, list of str)
+
+    Raises
+    ------
+    ValueError
+        For another suffix, no lines, columns or quantum numbers that do not fit, with file and line.
+    """
+    text = os.fspath(path).lower()
+    if not text.endswith(SUFFIXES):
+        raise ValueError(f"{path}: assigned lines are read from {', '.join(SUFFIXES)}")
+    if text.endswith(".lin"):
+        found, notes = _of_lin(path, names)
+    elif text.endswith(".csv"):
+        found, notes = _of_csv(path, names), []
+    else:
+        found, notes = _of_catalogue(path, names)
+    if not len(found):
+        raise ValueError(f"{path}: no lines in it" + ("" if text.endswith((".lin", ".csv")) else " that are measured"))
+    return found, notes
+
+
+def _of_lin(path: str | os.PathLike[str], names: Sequence[str]) -> tuple[Assignments, list[str]]:
+    lines = read_lin(path)
+    blends = lines.blends()
+    used = blends >= 0
+    notes = [] if used.all() else [f"{int((~used).sum())} lines that give the width of a blend do not count"]
+    for i in np.flatnonzero(used).tolist():
+        count = len(lines.measured(i).quanta) // 2
+        if count != len(names):
+            raise ValueError(
+                f"{path}, line {i + 1} of the list: {count} quantum numbers for each state; {len(names)} are needed "
+                f"({', '.join(names)})"
+            )
+    upper, lower = (side[used][:, : len(names)] for side in lines.states())
+    return assignments(
+        names, upper, lower, lines.frequency_mhz[used], lines.error_mhz[used], weight=lines.weight[used],
+        blend=blends[used], wavenumber=(lines.error < 0)[used], source=Path(path).name,
+    ), notes  # fmt: skip
+
+
+def _of_csv(path: str | os.PathLike[str], names: Sequence[str]) -> Assignments:
+    with open(path, encoding="utf-8-sig", newline="") as handle:
+        reader = csv.DictReader(row for row in handle if row.strip() and not row.lstrip().startswith("#"))
+        columns = [name.strip() for name in reader.fieldnames or ()]
+        reader.fieldnames = columns
+        rows = list(reader)
+    labels = [f"{name}_{side}" for side in ("upper", "lower") for name in names]
+    known = {*labels, *_FREQUENCY, *_ERROR, "weight", "blend", "comment"}
+    _refuse_columns(path, columns, labels, known)
+    unit = next(name for name in _FREQUENCY if name in columns)
+    error = next((name for name in _ERROR if name in columns), None)
+    numbers = [[_whole(path, i, name, row) for name in labels] for i, row in enumerate(rows, 1)]
+    quanta = np.array(numbers, dtype=np.int64).reshape(len(rows), len(labels))
+    frequency = np.array([_real(path, i, unit, row) for i, row in enumerate(rows, 1)]) * _FREQUENCY[unit]
+    errors = [_real(path, i, error, row, 0.0) if error else 0.0 for i, row in enumerate(rows, 1)]
+    return assignments(
+        names, quanta[:, : len(names)], quanta[:, len(names) :], frequency,
+        np.array(errors) * (_ERROR[error] if error else 1.0),
+        weight=np.array([_real(path, i, "weight", row, 1.0) for i, row in enumerate(rows, 1)]),
+        blend=_blends([(row.get("blend") or "").strip() for row in rows]),
+        wavenumber=unit == "wavenumber_cm",
+        source=Path(path).name,
+        comments=[(row.get("comment") or "").strip() for row in rows] if "comment" in columns else (),
+    )  # fmt: skip
+
+
+def _refuse_columns(
+    path: str | os.PathLike[str], columns: Sequence[str], labels: Sequence[str], known: set[str]
+) -> None:
+    missing = [name for name in labels if name not in columns]
+    strange = [name for name in columns if name not in known]
+    if missing or strange:
+        what = f"no column {', '.join(missing)}" if missing else f"unknown column {', '.join(map(repr, strange))}"
+        raise ValueError(
+            f"{path}: {what}; columns are {', '.join(labels)}, a frequency, an error, weight, blend, comment"
+        )
+    if len([name for name in _FREQUENCY if name in columns]) != 1:
+        raise ValueError(f"{path}: one column of {', '.join(_FREQUENCY)} is needed")
+
+
+def _real(path: object, line: int, name: str, row: Mapping[str, str], default: float | None = None) -> float:
+    text = (row.get(name) or "").strip().replace("−", "-")
+    if not text and default is not None:
+        return default
+    try:
+        return float(text)
+    except ValueError:
+        raise ValueError(f"{path}, line {line} of the table: {name} reads {text!r}; a number is needed") from None
+
+
+def _whole(path: object, line: int, name: str, row: Mapping[str, str]) -> int:
+    value = _real(path, line, name, row)
+    if not float(value).is_integer():
+        raise ValueError(f"{path}, line {line} of the table: {name} = {value:g}; a quantum number is whole")
+    return int(value)
+
+
+def _blends(texts: Sequence[str]) -> list[int]:
+    """Numbers of blends: lines with one text are one, a line without any is alone."""
+    places: dict[str, int] = {}
+    return [places.setdefault(text or f"\0{i}", len(places)) for i, text in enumerate(texts)]
+
+
+def _of_catalogue(path: str | os.PathLike[str], names: Sequence[str]) -> tuple[Assignments, list[str]]:
+    from rotor.formats.spcat.cat import read_cat
+    from rotor.formats.spcat.compare import in_mhz
+
+    catalogue = read_cat(path)
+    measured = catalogue.take(catalogue.tag < 0)
+    width = len(names)
+    beyond = np.concatenate([measured.quanta_upper[:, width:], measured.quanta_lower[:, width:]], axis=1)
+    ground = ((beyond == 0) | (beyond == BLANK)).all(axis=1)
+    notes = []
+    if not ground.all():
+        notes.append(f"{int((~ground).sum())} measured lines of other states, or with spins, are left aside")
+    measured = measured.take(ground)
+    frequency, error = in_mhz(measured)
+    upper, lower = (np.abs(side[:, :width].astype(np.int64)) for side in (measured.quanta_upper, measured.quanta_lower))
+    first = _first_of_each(upper, lower, frequency)
+    groups = [(round(float(f), 6), round(float(e), 6)) for f, e in zip(frequency, error, strict=True)]
+    order = {key: i for i, key in enumerate(dict.fromkeys(groups))}
+    return assignments(
+        names, upper[first], lower[first], frequency[first], error[first],
+        weight=10.0 ** (measured.lgint[first] - measured.lgint.max(initial=0.0)) if len(measured) else 1.0,
+        blend=np.array([order[key] for key in groups], dtype=np.int64)[first], source=Path(path).name,
+    ), notes  # fmt: skip
+
+
+def _first_of_each(upper: np.ndarray, lower: np.ndarray, frequency: np.ndarray) -> np.ndarray:
+    """Positions of lines without the repetitions of a K doublet, which has one label and one frequency."""
+    keys = [(*u, *low, f) for u, low, f in zip(upper.tolist(), lower.tolist(), frequency.tolist(), strict=True)]
+    seen = {key: i for i, key in reversed([*enumerate(keys)])}
+    return np.array(sorted(seen.values()), dtype=np.int64)
+
+
+def write_assigned_lines(lines: Assignments, path: str | os.PathLike[str]) -> None:
+    """Write assigned lines as .lin or .csv; an existing file is replaced at the end or not at all.
+
+    In a .lin a blend is lines of one frequency behind each other, so that the lines of a blend are put together; wavenumbers
+    stand with a negative error.
+    """
+    text = os.fspath(path).lower()
+    if text.endswith(".lin"):
+        return write_lin(_as_lin(lines), path)
+    if not text.endswith(".csv"):
+        raise ValueError(f"{path}: assigned lines are written as .lin or .csv")
+    labels = [f"{name}_{side}" for side in ("upper", "lower") for name in lines.names]
+    wave = bool(lines.wavenumber.all()) and len(lines) > 0
+    unit = MHZ_PER_CM if wave else 1.0
+    heads = [
+        *labels,
+        "wavenumber_cm" if wave else "frequency_mhz",
+        "error_cm" if wave else "error_mhz",
+        "weight",
+        "blend",
+    ]
+    with open_atomic(path, "w", encoding="utf-8", newline="") as handle:
+        writer = csv.writer(handle, lineterminator="\n")
+        writer.writerow([*heads, *(["comment"] if lines.comments else [])])
+        for i in range(len(lines)):
+            numbers = [lines.frequency_mhz[i] / unit, lines.error_mhz[i] / unit, lines.weight[i]]
+            row = [*lines.upper[i].tolist(), *lines.lower[i].tolist(), *map(float, numbers), int(lines.blend[i])]
+            writer.writerow([*row, *([lines.comments[i]] if lines.comments else [])])
+    return None
+
+
+def _as_lin(lines: Assignments):  # type: ignore[no-untyped-def]
+    from dataclasses import replace
+
+    ordered = lines.take(np.argsort(lines.blend, kind="stable"))
+    made = line_list(ordered.upper, ordered.lower, ordered.frequency_mhz, ordered.error_mhz, ordered.weight)
+    unit = np.where(ordered.wavenumber, 1 / MHZ_PER_CM, 1.0)
+    sign = np.where(ordered.wavenumber, -1.0, 1.0)
+    return replace(made, frequency=ordered.frequency_mhz * unit, error=sign * ordered.error_mhz * unit)

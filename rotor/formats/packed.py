@@ -1,0 +1,63 @@
+"""Files packed with gzip or not, read with a bound: a small file cannot fill the memory."""
+
+from __future__ import annotations
+
+import gzip
+import io
+import os
+import zlib
+from pathlib import Path
+
+MOST_BYTES = 1 << 32  # of an unpacked file
+HARMLESS_BYTES = 1 << 27  # that may be unpacked whatever the file's own size
+MOST_TIMES = 100  # the packed size beyond that: lines of numbers shrink to a fifth, at best to a twentieth
+_GZIP = b"\x1f\x8b"
+_PIECE = 1 << 22
+
+
+def load(source: str | os.PathLike[str] | bytes) -> tuple[bytes, str]:
+    """The bytes of a file or the bytes given, unpacked where they are gzip's, and what to call it in a message.
+
+    Raises ValueError for a packed file that is damaged, or grows to more than 4 GB or a hundred times its size.
+    """
+    if isinstance(source, bytes):
+        text, name = source, "the text given"
+    else:
+        name = os.fspath(source)
+        with open(source, "rb") as handle:
+            text = handle.read()
+    return (unpacked(text, name) if text[:2] == _GZIP else text), name
+
+
+def unpacked(packed: bytes, name: str) -> bytes:
+    """What gzip packed, of one or more members; `name` is what messages call the file."""
+    most = max(HARMLESS_BYTES, min(MOST_BYTES, MOST_TIMES * len(packed)))
+    pieces, size = [], 0
+    try:
+        with gzip.GzipFile(fileobj=io.BytesIO(packed)) as file:
+            while piece := file.read(_PIECE):
+                pieces.append(piece)
+                size += len(piece)
+                if size > most:
+                    break
+    except (EOFError, OSError, zlib.error) as error:
+        raise ValueError(f"{name}: a gzip file that is damaged or cut off ({error})") from None
+    if size > most:
+        raise ValueError(
+            f"{name}: unpacks to more than {most / 1e6:.0f} MB from {len(packed) / 1e6:.3g} MB, more than text of numbers "
+            "does; unpack it with gzip if it is meant"
+        )
+    return b"".join(pieces)
+
+
+def first_bytes(path: Path, count: int) -> bytes:
+    """The first bytes of a file, unpacked where it is gzip's; as many as there are where they are fewer."""
+    with open(path, "rb") as handle:
+        text = handle.read(count)
+        if text[:2] != _GZIP:
+            return text
+        packed = text + handle.read(1 << 16)
+    try:
+        return zlib.decompressobj(wbits=31).decompress(packed, count)
+    except zlib.error:  # damaged: the reader says so
+        return b""

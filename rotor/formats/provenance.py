@@ -1,0 +1,37 @@
+"""What a file says of where its content is from: the record, and the file beside those formats that have no place for it."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Mapping
+from typing import Any
+
+from rotor.formats.atomic_write import open_atomic
+from rotor.table import Table
+from rotor.version import version
+
+
+def record_of(table: Table, settings: Mapping[str, Any] | None = None) -> dict[str, Any]:
+    """The program with its version, what the table itself knows, and the settings, as JSON can hold them.
+
+    Numbers that are not finite are None.
+    """
+    known = {name: _finite(value) for name, value in table.provenance.items()}
+    return {"program": "rotor", "version": version()} | known | dict(settings or {})
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, tuple | list):
+        return [_finite(item) for item in value]
+    return {name: _finite(item) for name, item in value.items()} if isinstance(value, Mapping) else value
+
+
+def write_beside(path: str | os.PathLike[str], record: Mapping[str, Any]) -> None:
+    """Write the record of a file whose format has no place for it, as `path` + ".provenance.json"."""
+    with open_atomic(f"{os.fspath(path)}.provenance.json", "w", encoding="utf-8") as handle:
+        json.dump(record, handle, indent=1, ensure_ascii=False)
+        handle.write("\n")

@@ -1,0 +1,144 @@
+"""Every file format, registered once: its suffixes, what reads it, and what writes it for each type of thing.
+
+`rotor.read` and `rotor.write` look here and nowhere else. Readers, writers and types are named by text ("module:name"), so
+that nothing is imported before it is used. A writer that is registered for a class serves its subclasses.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+LINES = "rotor.spectra.lines:Lines"
+TABLE = "rotor.table:Table"
+MOTION = "rotor.classical.integrators.method:Motion"
+CATALOGUE = "rotor.formats.spcat.catalogue:Catalogue"
+LEVELS = "rotor.quantum.request:SelectedLevels"
+HITRAN = "rotor.formats.hitran:HitranLines"
+
+Writer = Callable[[Any, str | os.PathLike[str], Mapping[str, Any]], None]
+
+
+@dataclass(frozen=True)
+class Format:
+    """One format of files.
+
+    name: what messages call it. suffixes: how its files' names end, in lower case. reader: "module:function" of a path, which
+    returns a top, a catalogue or another table. writers: by type, "module:function" of (thing, path, settings), settings being
+    what the provenance shall say besides. recognises: "module:function" of a path, for suffixes that several formats have.
+    """
+
+    name: str
+    suffixes: tuple[str, ...]
+    reader: str | None = None
+    writers: Mapping[str, str] = field(default_factory=dict)
+    recognises: str | None = None
+
+
+FORMATS = (
+    Format(
+        "catalogue of 80 columns",
+        (".cat", ".cat.gz"),
+        "rotor.formats.spcat.cat:read_cat",
+        {
+            LINES: "rotor.formats.line_tables:write_catalogue",
+            CATALOGUE: "rotor.formats.line_tables:write_read_catalogue",
+        },
+    ),
+    Format(
+        "records of HITRAN",
+        (".hitran", ".hitran.gz"),
+        "rotor.formats.hitran:read_hitran",
+        {LINES: "rotor.formats.line_tables:write_hitran_lines", HITRAN: "rotor.formats.line_tables:write_records"},
+    ),
+    Format(
+        "records of HITRAN",
+        (".par", ".par.gz"),
+        "rotor.formats.hitran:read_hitran",
+        recognises="rotor.formats.hitran:is_hitran_file",
+    ),
+    Format("input of SPFIT and SPCAT", (".par", ".var", ".int"), "rotor.formats.read_write:read_spcat_top"),
+    Format("measured lines of SPFIT", (".lin", ".lin.gz"), "rotor.formats.spcat.lin:read_lin"),
+    Format("levels of SPCAT", (".egy.gz",), "rotor.formats.spcat.egy:read_egy"),
+    Format(
+        "levels of SPCAT",
+        (".egy",),
+        "rotor.formats.spcat.egy:read_egy",
+        {LEVELS: "rotor.formats.spcat.level_list:write_level_list"},
+    ),
+    Format(
+        "data of LAMDA",
+        (".dat",),
+        "rotor.formats.lamda:refuse_lamda",
+        recognises="rotor.formats.lamda:is_lamda_file",
+    ),
+    Format("molecule file", (".toml",), "rotor.formats.read_write:read_top_file"),
+    Format(
+        "comma-separated values",
+        (".csv",),
+        writers={TABLE: "rotor.formats.tables:write_csv", MOTION: "rotor.formats.tables:write_motion"},
+    ),
+    Format(
+        "Parquet",
+        (".parquet",),
+        writers={TABLE: "rotor.formats.tables:write_parquet", MOTION: "rotor.formats.tables:write_motion"},
+    ),
+    Format(
+        "JSON",
+        (".json",),
+        writers={
+            LINES: "rotor.formats.line_tables:write_lines_json",
+            TABLE: "rotor.formats.tables:write_json",
+            MOTION: "rotor.formats.tables:write_motion",
+        },
+    ),
+)
+
+
+def loaded(name: str) -> Any:
+    """The object that "module:name" names."""
+    module, _, attribute = name.partition(":")
+    return getattr(import_module(module), attribute)
+
+
+def reader_of(path: Path) -> Callable[[Path], Any] | None:
+    """What reads the file of this name; None where no format here has its suffix."""
+    for one in FORMATS:
+        fits = one.reader and path.name.lower().endswith(one.suffixes)
+        if fits and (one.recognises is None or loaded(one.recognises)(path)):
+            reader: Callable[[Path], Any] = loaded(str(one.reader))
+            return reader
+    return None
+
+
+def writer_of(thing: Any, path: str | os.PathLike[str]) -> Writer:
+    """What writes a thing into a file of this name.
+
+    Raises ValueError, with the suffixes that there are for such a thing, where no format has the suffix.
+    """
+    name, types = Path(path).name.lower(), [_name_of(cls) for cls in type(thing).__mro__]
+    for one in FORMATS:
+        writers = [one.writers[known] for known in types if known in one.writers]
+        if writers and name.endswith(one.suffixes):
+            writer: Writer = loaded(writers[0])
+            return writer
+    known = suffixes_for(type(thing))
+    if not known:
+        raise ValueError(f"{os.fspath(path)}: there is no format for a {type(thing).__name__}")
+    raise ValueError(
+        f"{os.fspath(path)}: a {type(thing).__name__} can be written as {', '.join(known[:-1])} or {known[-1]}; the suffix names the format"
+    )
+
+
+def suffixes_for(kind: type) -> list[str]:
+    """The suffixes of the files into which things of a class can be written."""
+    types = {_name_of(cls) for cls in kind.__mro__}
+    return [suffix for one in FORMATS if types & {*one.writers} for suffix in one.suffixes]
+
+
+def _name_of(cls: type) -> str:
+    return f"{cls.__module__}:{cls.__qualname__}"

@@ -1,0 +1,290 @@
+"""SPFIT's input, .par and .lin, as a fit: assigned lines, constants, free parameters as its codes say, and its options.
+
+A parameter of the file is what its code multiplies: A - B where SPFIT's user wrote 1000, -D_J for 200. The constants follow
+linearly, so that the fit reports the same numbers as the field's program does. Every field of line 2 is honoured, or refused
+by its name.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from rotor.arrays import Floats, Ints
+from rotor.fit.assignment import Assignments, assignments
+from rotor.fit.fit import Fit, FitOptions
+from rotor.fit.parameters import Parameters
+from rotor.formats.assigned_lines import QUANTA
+from rotor.formats.spcat.codes import HELD_BELOW, constants_and_matrix
+from rotor.formats.spcat.file_lines import format_of
+from rotor.formats.spcat.fit_states import FileLevels, groups_for_fit, line_names, names_of_quanta
+from rotor.formats.spcat.lin import LineList, line_list, read_lin
+from rotor.formats.spcat.model import parameter_file
+from rotor.formats.spcat.par import Header, Parameter, ParameterFile, read_par
+from rotor.formats.spcat.predict_states import is_plain
+from rotor.quantum.labelled import LevelModel
+from rotor.tops.constants import Constants
+from rotor.tops.top import Top
+
+FREE_ABOVE = 1e30  # an a-priori error so large is none
+
+
+@dataclass(frozen=True, eq=False)
+class SpfitInput:
+    """What a pair of .par and .lin files asks for.
+
+    constants : of a file with one state and no spins, else None, and `model` has the levels
+    columns : of each parameter of the file the free one that it follows, -1 for one that is held; ratios : times what
+    notes : what is done otherwise than the field's program does it
+    """
+
+    file: ParameterFile
+    lines: Assignments
+    constants: Constants | None
+    parameters: Parameters
+    options: FitOptions
+    columns: tuple[int, ...]
+    ratios: tuple[float, ...]
+    notes: tuple[str, ...]
+    model: Callable[[Ints], LevelModel] | None = None
+
+
+def read_fit(par: str | os.PathLike[str], lin: str | os.PathLike[str] | None = None) -> SpfitInput:
+    """The fit that a .par file asks for, with the .lin file of the same name unless another is given.
+
+    Raises ValueError, with file, line or the name of the option, for what cannot be read or is not supported.
+    """
+    beside = Path(lin) if lin is not None else Path(par).with_suffix(".lin")
+    if not beside.exists():
+        raise ValueError(
+            f"{beside}: there are no measured lines beside {Path(par).name}; SPFIT's lines stand in a .lin file"
+        )
+    return spfit_input(read_par(par), read_lin(beside), Path(beside).name)
+
+
+def spfit_input(file: ParameterFile, lines: LineList, source: str = "") -> SpfitInput:
+    """The same from files that have been read."""
+    _refuse_options(file.header)
+    held, ties = _roles(file.parameters)
+    columns, ratios, free = _columns(file.parameters, held, ties)
+    spread = np.zeros((len(file.parameters), len(free)))
+    for row, (column, ratio) in enumerate(zip(columns, ratios, strict=True)):
+        if column >= 0:
+            spread[row, column] = ratio
+    model, constants, kmax = None, None, None
+    if is_plain(file, None):
+        constants, matrix = constants_and_matrix(file)
+        names, quanta, kmax = tuple(constants.values), QUANTA[constants.kind], _kmax(file, constants)
+    else:
+        matrix, names = np.eye(len(file.parameters)), line_names(file)
+        quanta = names_of_quanta(format_of(file, groups_for_fit(file)))
+        needed = [name for name, column in zip(names, columns, strict=True) if column >= 0]
+        model = partial(FileLevels.of, file, needed=needed)
+    values = np.array([p.value for p in file.parameters])
+    parameters = Parameters(
+        names=_distinct([file.parameters[i].label or str(file.parameters[i].code) for i in free]),
+        start=values[list(free)],
+        prior=np.array([_prior(file.parameters[i]) for i in free]),
+        constant_names=names,
+        base=matrix @ np.where(np.array(columns) < 0, values, 0.0),
+        matrix=matrix @ spread,
+    )
+    assigned, notes = _assigned(lines, quanta, file.header, source)
+    options = FitOptions(reject_above=file.header.errtst, most_iterations=max(abs(file.header.nitr), 1), kmax=kmax)
+    notes += _notes(file, options, model is None, assigned)
+    return SpfitInput(file, assigned, constants, parameters, options, columns, ratios, tuple(notes), model)
+
+
+def _refuse_options(header: Header) -> None:
+    if header.nxpar:
+        raise ValueError(
+            f"NXPAR = {header.nxpar}: parameters that special lines leave out are not supported; set it to 0"
+        )
+    if not header.errtst > 0:
+        raise ValueError(f"ERRTST = {header.errtst:g}: the largest |obs - calc|/error of a line that counts is above 0")
+    if not header.cal > 0:
+        raise ValueError(f"CAL = {header.cal:g}: the factor of wavenumbers is above 0")
+
+
+def _roles(parameters: Sequence[Parameter]) -> tuple[list[bool], list[bool]]:
+    """Which parameters are held (an a-priori error below 1e-30), and which keep their ratio to the one before."""
+    if parameters and parameters[0].constrained:
+        raise ValueError(f"parameter -{parameters[0].code}: the first one has none before it to keep a ratio to")
+    ties = [p.constrained for p in parameters]
+    held = [
+        not tied and p.error is not None and abs(p.error) < HELD_BELOW for p, tied in zip(parameters, ties, strict=True)
+    ]
+    return held, ties
+
+
+def _columns(
+    parameters: Sequence[Parameter], held: Sequence[bool], ties: Sequence[bool]
+) -> tuple[tuple[int, ...], tuple[float, ...], list[int]]:
+    columns, ratios, free = list[int](), list[float](), list[int]()
+    leader = -1
+    for i, parameter in enumerate(parameters):
+        if not ties[i]:
+            leader = i
+            if not held[i]:
+                free.append(i)
+        value = parameters[leader].value
+        if ties[i] and not value:
+            raise ValueError(f"parameter -{parameter.code}: no ratio to {parameters[leader].code}, which is 0")
+        columns.append(-1 if held[leader] else len(free) - 1)
+        ratios.append(parameter.value / value if ties[i] else 1.0)
+    return tuple(columns), tuple(ratios), free
+
+
+def _prior(parameter: Parameter) -> float:
+    error = abs(parameter.error) if parameter.error else np.inf
+    return error if error < FREE_ABOVE else np.inf
+
+
+def _distinct(names: Sequence[str]) -> tuple[str, ...]:
+    """Names with a number behind those that stand twice."""
+    return tuple(
+        f"{name} ({1 + list(names[:i]).count(name)})" if list(names).count(name) > 1 else name
+        for i, name in enumerate(names)
+    )
+
+
+def _kmax(file: ParameterFile, constants: Constants) -> int | None:
+    return file.options[0].knmax if constants.kind == "asymmetric" else None
+
+
+def _assigned(lines: LineList, names: Sequence[str], header: Header, source: str) -> tuple[Assignments, list[str]]:
+    """Lines up to NLINE, wavenumbers times CAL, blends as the file marks them."""
+    notes = []
+    blends = lines.blends()
+    used = np.arange(len(lines)) < abs(header.nline)
+    if not used.all():
+        notes.append(f"NLINE = {abs(header.nline)}: {len(lines) - int(used.sum())} lines behind it do not count")
+    widths = used & (blends < 0)
+    if widths.any():
+        notes.append(f"{int(widths.sum())} lines that give the width of a blend do not count")
+    used &= blends >= 0
+    upper, lower = lines.states()
+    _refuse_width(lines, names, used)
+    wavenumber = lines.error < 0
+    frequency = lines.frequency_mhz * np.where(wavenumber, header.cal, 1.0)
+    k = len(names)
+    return assignments(
+        names, upper[used][:, :k], lower[used][:, :k], frequency[used], lines.error_mhz[used],
+        weight=lines.weight[used], blend=blends[used], wavenumber=wavenumber[used], source=source,
+    ), notes  # fmt: skip
+
+
+def _refuse_width(lines: LineList, names: Sequence[str], used: np.ndarray) -> None:
+    """ValueError for a line with fewer or more quantum numbers than the top has."""
+    for i in np.flatnonzero(used).tolist():
+        count = len(lines.measured(i).quanta) // 2
+        if count != len(names):
+            raise ValueError(
+                f"line {i + 1} of the line list has {count} quantum numbers for each state; these constants have "
+                f"{len(names)} ({', '.join(names)})"
+            )
+
+
+def _notes(file: ParameterFile, options: FitOptions, plain: bool, lines: Assignments) -> list[str]:
+    notes = []
+    if file.header.npar > len(file.parameters):
+        notes.append(
+            f"NPAR = {file.header.npar}, but {len(file.parameters)} parameters stand in the file: those are used"
+        )
+    if file.header.thresh:
+        notes.append("THRESH, the first damping, is chosen by the search itself; the result does not depend on it")
+    highest = int(max(lines.upper[:, 0].max(initial=0), lines.lower[:, 0].max(initial=0)))
+    if options.kmax is not None and options.kmax < highest:
+        notes.append(f"KNMAX = {options.kmax} is below the highest J, {highest}: the basis is cut there, as SPFIT does")
+    if plain and options.kmax is not None and file.options[0].diag not in (0, 3):
+        notes.append(f"DIAG = {file.options[0].diag}: levels are labelled by the order of energy in each Wang block")
+    return notes
+
+
+def error_factor(fit: Fit, header: Header) -> float:
+    """What SPFIT multiplies parameter errors by: FRAC, or, where it is below 0, -FRAC times √(χ²/degrees of freedom)."""
+    return header.frac if header.frac >= 0 else -header.frac * fit.reduced_chi
+
+
+def fitted_file(asked: SpfitInput, fit: Fit, *, variances: bool) -> ParameterFile:
+    """The .par file after the fit (a-priori errors as they were), or the .var file (estimated errors and V of C = D V Vᵀ D)."""
+    errors = fit.errors * error_factor(fit, asked.file.header)
+    made = []
+    for parameter, column, ratio in zip(asked.file.parameters, asked.columns, asked.ratios, strict=True):
+        value = parameter.value if column < 0 else float(fit.values[column]) * ratio
+        error = parameter.error
+        if variances and column >= 0 and not parameter.constrained:
+            error = float(errors[column])
+        made.append(replace(parameter, value=value, error=error))
+    rest = correlation_text(fit) if variances else ""
+    return replace(asked.file, parameters=tuple(made), rest=rest)
+
+
+def named_file(fit: Fit, title: str, *, variances: bool) -> ParameterFile:
+    """The .par or .var file of a fit in named constants.
+
+    SPFIT's parameters are not always the constants (A - B of a symmetric top): their errors and correlations are carried over.
+    Raises ValueError where a fitted combination of constants has no parameter of its own there (a tie between constants).
+    """
+    top = Top.from_constants(fit.named, name=title)
+    highest = int(max(fit.lines.upper[:, 0].max(), fit.lines.lower[:, 0].max()))
+    file = parameter_file(top, kmax=min(max(highest, 1), 359))
+    _, matrix = constants_and_matrix(file)
+    back = np.linalg.pinv(matrix) @ fit.parameters.matrix  # SPFIT's parameters by the free ones
+    back[np.abs(back) < 1e-9] = 0.0
+    covariance = back @ np.where(np.isfinite(fit.statistics.covariance), fit.statistics.covariance, 0.0) @ back.T
+    errors = np.sqrt(np.diag(covariance))
+    moved = np.atleast_1d(back.any(axis=1))
+    parameters = tuple(
+        replace(p, error=(float(errors[i]) if variances else 1e36) if moved[i] else 1e-37)
+        for i, p in enumerate(file.parameters)
+    )
+    rows = np.flatnonzero(moved)
+    if len(rows) != len(fit.parameters.names):
+        raise ValueError(
+            "tied constants have no parameters of their own in SPFIT's files; write the .toml file instead"
+        )
+    rest = _packed(covariance[np.ix_(rows, rows)] / np.outer(errors[rows], errors[rows])) if variances else ""
+    header = replace(file.header, npar=len(parameters), nline=len(fit.lines), nitr=100)
+    return replace(file, header=header, parameters=parameters, rest=rest)
+
+
+def correlation_text(fit: Fit) -> str:
+    """What stands at the end of a .var file: the correlations C = V Vᵀ, V upper triangular, column by column, eight in a line.
+
+    The sign of a column has no bearing on C.
+    """
+    correlations = np.nan_to_num(fit.statistics.correlations)
+    np.fill_diagonal(correlations, 1.0)
+    return _packed(correlations)
+
+
+def _packed(correlations: Floats) -> str:
+    factor = _lower_factor(correlations[::-1, ::-1])[::-1, ::-1]
+    values = [factor[i, j] for j in range(len(factor)) for i in range(j + 1)]
+    rows = [values[i : i + 8] for i in range(0, len(values), 8)]
+    return "".join("".join(f"{value:10.7f}" for value in row) + "\n" for row in rows)
+
+
+def _lower_factor(correlations: Floats) -> Floats:
+    """L with L Lᵀ = C; round-off below zero is lifted."""
+    lift = 0.0
+    for _ in range(20):
+        try:
+            return np.asarray(np.linalg.cholesky(correlations + lift * np.eye(len(correlations))))
+        except np.linalg.LinAlgError:
+            lift = max(10 * lift, 1e-15)
+    raise ValueError("the correlation matrix is not positive; some combination of the parameters is not determined")
+
+
+def written_lines(lines: Assignments) -> LineList:
+    """Assigned lines as a .lin file has them; wavenumbers stand as such."""
+    made = line_list(lines.upper, lines.lower, lines.frequency_mhz, lines.error_mhz, lines.weight)
+    unit = np.where(lines.wavenumber, 1 / 29979.2458, 1.0)
+    sign = np.where(lines.wavenumber, -1.0, 1.0)
+    return replace(made, frequency=lines.frequency_mhz * unit, error=sign * lines.error_mhz * unit)

@@ -1,0 +1,168 @@
+"""Levels of SPFIT's files with spins or several states, for parameters that change: the model behind such a fit.
+
+Every parameter line of the file is one constant, by the name that `file_effect` gives it. States that are connected are solved
+together, F by F, and only those F in which a line has a level. A level is found by the quantum numbers that the file prints for it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rotor.arrays import Floats, Ints
+from rotor.formats.spcat.file_lines import Format, format_of, quanta_of
+from rotor.formats.spcat.file_model import Group, groups_of
+from rotor.formats.spcat.int_file import IntensityFile, Request
+from rotor.formats.spcat.par import ParameterFile
+from rotor.quantum.derivatives import level_derivatives
+from rotor.quantum.labelled import LevelModel
+from rotor.quantum.levels import Levels
+from rotor.quantum.solve import solve_levels
+from rotor.quantum.spins.blocks import levels_of_f
+
+_NO_REQUEST = IntensityFile("", Request(), ())
+_AT_ZERO = 1e-30  # MHz: a free parameter that starts at 0 must not be left out of the Hamiltonian
+CLEAR = 0.6  # share of the function that names a level below which its label is doubtful
+
+
+def groups_for_fit(file: ParameterFile) -> list[Group]:
+    """The groups of connected states with every parameter line in, those of value 0 too; K limited as SPFIT does."""
+    nonzero = tuple(replace(p, value=p.value or _AT_ZERO) for p in file.parameters)
+    return groups_of(replace(file, parameters=nonzero), _NO_REQUEST, as_spcat=True)
+
+
+def names_of_quanta(form: Format) -> tuple[str, ...]:
+    """Names of the columns of quantum numbers in a .lin file: n, (k | ka, kc), (v), and those of spins.
+
+    >>> names_of_quanta(Format(3, True, 1)), names_of_quanta(Format(1, False, 2))
+    (('n', 'ka', 'kc', 'v', 'f'), ('n', 'f1', 'f'))
+    """
+    rotation = {1: ("n",), 2: ("n", "k"), 3: ("n", "ka", "kc")}[form.rotation]
+    spins = [f"f{i}" for i in range(1, form.spins)] + ["f"] if form.spins else []
+    if form.aggregate:
+        spins = ["pattern", "f"]
+    names = (*rotation, *(["v"] if form.states else []), *spins)
+    return names if spins else ("j", *names[1:])
+
+
+@dataclass(frozen=True)
+class _Solved:
+    """A group with the labels that lie in it: their places among all, the doubled F or J to solve, internal quantum numbers."""
+
+    group: Group
+    rows: Ints
+    angular: tuple[int, ...]
+    quanta: dict[str, Ints]
+    names: tuple[str, ...]  # of the parameters that the group has
+
+
+@dataclass(frozen=True)
+class FileLevels(LevelModel):
+    """Energies of the labelled levels of a file; names: its parameter lines as code#place. needed: which have derivatives."""
+
+    names: tuple[str, ...]
+    count: int
+    solved: tuple[_Solved, ...]
+    needed: frozenset[str]
+
+    @classmethod
+    def of(cls, file: ParameterFile, labels: Ints, needed: Iterable[str]) -> FileLevels:
+        """The model for labels as the file prints them.
+
+        Raises ValueError for labels that no level has, with the first of them, and for what does not compute.
+        """
+        groups = groups_for_fit(file)
+        form = format_of(file, groups)
+        parts = [_with_labels(group, form, labels) for group in groups]
+        found = np.concatenate([part.rows for part in parts]) if parts else np.zeros(0, np.int64)
+        lost = np.setdiff1d(np.arange(len(labels)), found)
+        if len(lost):
+            first = " ".join(map(str, labels[lost[0]].tolist()))
+            raise ValueError(f"there is no level {first} ({', '.join(names_of_quanta(form))}) in this model")
+        return cls(line_names(file), len(labels), tuple(part for part in parts if len(part.rows)), frozenset(needed))
+
+    def levels(self, values_mhz: Floats) -> tuple[Floats, Floats]:
+        """See `LevelModel`."""
+        energies, slopes = np.empty(self.count), np.zeros((self.count, len(self.names)))
+        column = {name: place for place, name in enumerate(self.names)}
+        for part in self.solved:
+            levels, rows = self._solve(part, values_mhz)
+            energies[part.rows] = levels.energy_mhz[rows]
+            names = [name for name in part.names if name in self.needed]
+            derived = level_derivatives(part.group.top, levels, names, rows)
+            columns = np.array([column[name] for name in names], dtype=np.int64)
+            slopes[np.ix_(part.rows, columns)] = derived
+        return energies, slopes
+
+    def doubtful(self, values_mhz: Floats) -> Ints:
+        """Labels, by position, whose level is named by a function that has less than 0.6 of it."""
+        out = []
+        for part in self.solved:
+            levels, rows = self._solve(part, values_mhz)
+            if levels.mixing is not None:
+                out.append(part.rows[levels.mixing[rows] < CLEAR])
+        return np.sort(np.concatenate(out)) if out else np.zeros(0, dtype=np.int64)
+
+    def _solve(self, part: _Solved, values_mhz: Floats) -> tuple[Levels, Ints]:
+        value = dict(zip(self.names, values_mhz.tolist(), strict=True))
+        lines = tuple(line._replace(value=value[line.name]) for line in part.group.effect.lines)
+        group = replace(part.group, effect=replace(part.group.effect, lines=lines))
+        levels = _levels(group, part.angular)
+        rows = levels.rows_of(**part.quanta)
+        if (rows < 0).any():
+            raise ValueError("a labelled level is no longer there with these constants")
+        return levels, rows
+
+
+def line_names(file: ParameterFile) -> tuple[str, ...]:
+    """The parameter lines as `file_effect.coded_lines` names them."""
+    return tuple(f"{parameter.code}#{place}" for place, parameter in enumerate(file.parameters, 1))
+
+
+def _levels(group: Group, angular: Sequence[int]) -> Levels:
+    """The levels of the doubled F, or J, that are listed."""
+    if group.spins:
+        return levels_of_f(group.top, (group.effect,), angular, None, None)
+    j = [value // 2 for value in angular]
+    return solve_levels(group.top, max(j), jmin=min(j), effects=(group.effect,))
+
+
+def _with_labels(group: Group, form: Format, labels: Ints) -> _Solved:
+    """Which labels lie in the group, found in its levels by the quantum numbers that the file prints."""
+    here = _of_group(group, form, labels)
+    names = tuple(group.effect.parameters(group.top))
+    if not len(here):
+        return _Solved(group, here, (), {}, names)
+    total = labels[here, -1] if form.spins else labels[here, 0]
+    half = sum(group.spins) % 2
+    angular = tuple(sorted({2 * int(f) - half for f in total}))
+    if min(angular) < 0:
+        raise ValueError(f"F or J below 0 in the labels {labels[here[int(np.argmin(total))]].tolist()}")
+    levels = _levels(group, angular)
+    rows_by_label: dict[tuple[int, ...], int] = {}
+    for negative in (True, False):
+        for row, label in enumerate(map(tuple, quanta_of(group, levels, form, negative).tolist())):
+            rows_by_label.setdefault(label, row)
+    asked = [tuple(label) for label in labels[here].tolist()]
+    rows = np.array([_row(rows_by_label, label, form) for label in asked])
+    found = rows >= 0
+    quanta = {name: np.asarray(column)[rows[found]] for name, column in levels.quanta.items()}
+    return _Solved(group, here[found], angular, quanta, names)
+
+
+def _of_group(group: Group, form: Format, labels: Ints) -> Ints:
+    """Positions of the labels whose state is one of the group's."""
+    if not form.states:
+        return np.arange(len(labels))
+    numbers = [state.number for state in group.states]
+    return np.flatnonzero(np.isin(labels[:, form.rotation], numbers))
+
+
+def _row(rows: dict[tuple[int, ...], int], label: tuple[int, ...], form: Format) -> int:
+    """The row of a label, else of the one with the other sign of K, -1 where there is none."""
+    if label in rows or form.rotation != 2:
+        return rows.get(label, -1)
+    turned = (label[0], -label[1], *label[2:])
+    return rows.get(turned, -1)

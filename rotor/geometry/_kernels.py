@@ -1,0 +1,47 @@
+"""Compiled forms of the quaternion algebra, for the kernels of other modules, and how a plain function is compiled.
+
+The source of each is the plain function of `quaternions.py`; nothing is written a second time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from types import FunctionType
+from typing import Any
+
+from numba import njit
+
+from rotor.geometry import quaternions
+
+
+def inlined(function: Callable[..., Any], **callees: Any) -> Any:
+    """The compiled form of a plain function, inlined where it is called and optimised as its caller is.
+
+    `callees` are compiled forms of the plain functions that it calls, by the names that it calls them by.
+    """
+    plain: Any = function
+    copy = FunctionType(plain.__code__, {**plain.__globals__, **callees}, plain.__name__, plain.__defaults__)
+    copy.__module__, copy.__qualname__ = plain.__module__, plain.__qualname__
+    return njit(inline="always")(copy)
+
+
+cross = inlined(quaternions.cross)
+product = inlined(quaternions.product)
+conjugate = inlined(quaternions.conjugate)
+turned = inlined(quaternions.turned, cross=cross)
+half_third_row = inlined(quaternions.half_third_row)
+matrix = inlined(quaternions.matrix, half_third_row=half_third_row)
+to_third = inlined(quaternions.to_third)
+exponential = inlined(quaternions.exponential)
+
+
+@njit(inline="always")
+def vector_at(array: Any, i: int) -> Any:
+    """Row i of an array (n, 3) as a tuple."""
+    return array[i, 0], array[i, 1], array[i, 2]
+
+
+@njit(inline="always")
+def quaternion_at(array: Any, i: int) -> Any:
+    """Row i of an array (n, 4) as a tuple."""
+    return array[i, 0], array[i, 1], array[i, 2], array[i, 3]

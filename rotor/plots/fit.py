@@ -1,0 +1,64 @@
+"""Residuals of a fit against frequency, J and Ka (or K), in units of the line errors."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from rotor.fit.fit import Fit
+from rotor.plots.picture import BLUE, GREY, ORANGE, checked_suffix, new_figure, save, styled
+
+_HEADINGS = {
+    "j": "J of the upper state",
+    "ka": "Ka of the upper state",
+    "k": "K of the upper state",
+    "n": "N of the upper state",
+    "f": "F of the upper state (rounded up)",
+}
+
+
+def plot_fit(
+    fit: Fit, path: str | os.PathLike[str], *, title: str = "", provenance: Mapping[str, Any] | None = None
+) -> None:
+    """Draw (obs - calc)/error of every line into a .png, .pdf or .svg file; lines that do not count are crosses.
+
+    Raises ValueError for another suffix.
+    """
+    checked_suffix(path)
+    panels = [("frequency", fit.lines.frequency_mhz / 1e3)]
+    panels += [
+        (_HEADINGS[name], fit.lines.upper[:, i].astype(float))
+        for i, name in enumerate(fit.lines.names)
+        if name in _HEADINGS
+    ]
+    with styled():
+        figure = new_figure((7.2, 1.6 * len(panels) + 0.6))
+        for place, (heading, x) in enumerate(panels, 1):
+            axes = figure.add_subplot(len(panels), 1, place)
+            _draw(axes, fit, x)
+            axes.set_xlabel("frequency (GHz)" if heading == "frequency" else heading)
+        status = "" if fit.converged else ", NOT CONVERGED"
+        heading = (
+            f"{title or fit.lines.source}: weighted rms {fit.weighted_rms:.3g}, {len(fit.groups)} frequencies{status}"
+        )
+        figure.axes[0].set_title(heading.replace("$", r"\$"), loc="left")
+        names = fit.constants.text() if fit.constants else fit.parameters.names
+        facts = {"constants": names, "weighted_rms": fit.weighted_rms, "converged": fit.converged}
+        save(figure, path, heading, {**(provenance or {}), **facts})
+
+
+def _draw(axes: Any, fit: Fit, x: np.ndarray[Any, Any]) -> None:
+    error = np.where(fit.lines.error_mhz > 0, fit.lines.error_mhz, np.nan)
+    y = fit.difference_mhz / error
+    used = fit.used
+    axes.axhspan(-1, 1, color=GREY, alpha=0.12, linewidth=0)
+    axes.axhline(0.0, color=GREY, linewidth=0.7)
+    axes.plot(x[used], y[used], "o", markersize=2.6, color=BLUE, alpha=0.8, markeredgewidth=0)
+    axes.plot(x[~used], y[~used], "x", markersize=4.0, color=ORANGE)
+    seen = np.abs(y[used][np.isfinite(y[used])])
+    limit = max(3.5, 1.1 * float(seen.max(initial=0.0)))
+    axes.set_ylim(-limit, limit)
+    axes.set_ylabel("(obs - calc)/error")

@@ -1,0 +1,128 @@
+"""A term diagram: energy levels as steps above their K, each ladder of K in a column of its own."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor.arrays import Floats, Ints
+from rotor.plots.picture import (
+    BLUE,
+    GREY,
+    MOST_VECTOR_STICKS,
+    ORANGE,
+    checked_suffix,
+    name_of_top,
+    new_figure,
+    save,
+    styled,
+)
+from rotor.quantum.quanta import heading, state_text
+from rotor.quantum.request import SelectedLevels
+from rotor.tops.top import Top
+
+UNITS = {"MHz": "energy_mhz", "cm-1": "energy_cm", "K": "energy_k"}
+SIZE_INCHES = (7.2, 5.4)
+HALF_WIDTH = 0.36  # of a step, in columns
+MOST_LABELS = 160
+
+
+def plot_levels(
+    table: SelectedLevels,
+    top: Top,
+    path: str | os.PathLike[str],
+    *,
+    unit: str = "cm-1",
+    title: str | None = None,
+    provenance: Mapping[str, Any] | None = None,
+) -> None:
+    """Draw a term diagram into a .png, .pdf or .svg file.
+
+    Parameters
+    ----------
+    table : SelectedLevels
+        The levels; those of an asymmetric top stand in columns of Ka (Kc where it is nearer to oblate), of a symmetric one in
+        columns of |K|, of all others in columns of J.
+    top : Top
+        Its name and kind.
+    path : path
+        Its suffix chooses the format.
+    unit : "MHz", "cm-1" or "K"
+        Of the energies, from the lowest level that exists.
+    title : str, optional
+        Instead of name and formula.
+    provenance : mapping, optional
+        What the metadata of the file shall say besides the version.
+
+    Raises
+    ------
+    ValueError
+        A suffix that is no picture, an unknown unit, or no levels.
+    """
+    checked_suffix(path)
+    if unit not in UNITS:
+        raise ValueError(f"unit {unit!r}: expected one of {', '.join(UNITS)}")
+    if not len(table):
+        raise ValueError("there is no level to draw; widen the range of J or K, or raise the limit of energy")
+
+    name, column = ladders(table, top)
+    energy = np.asarray(getattr(table, UNITS[unit]))
+    with styled():
+        figure = new_figure(SIZE_INCHES)
+        axes = figure.add_subplot()
+        _draw(axes, column, energy, table.levels.weight[table.rows] > 0)
+        axes.set_xlabel({"Ka": "$K_a$", "Kc": "$K_c$"}.get(name, f"${name}$"))
+        axes.set_ylabel(f"Energy ({unit.replace('cm-1', 'cm⁻¹')})")
+        axes.set_title(title if title is not None else name_of_top(top), loc="left")
+        _label(figure, axes, table, column, energy)
+        save(figure, path, title or name_of_top(top), provenance or {})
+
+
+def ladders(table: SelectedLevels, top: Top) -> tuple[str, Ints]:
+    """The quantum number that the columns of a diagram stand for, as its heading, and its value for every level."""
+    quanta, rows = table.levels.quanta, table.rows
+    if "k" in quanta:
+        return "|K|", np.abs(quanta["k"][rows])
+    if "kc" in quanta:
+        oblate = top.kind == "oblate" or (top.kind == "asymmetric" and (top.kappa or 0.0) > 0)
+        name = "kc" if oblate else "ka"
+        return heading(name), np.asarray(quanta[name][rows])
+    name = "n" if "n" in quanta else "j"
+    return heading(name), np.asarray(quanta[name][rows])
+
+
+def _draw(axes: Any, column: Ints, energy: Floats, exists: NDArray[np.bool_]) -> None:
+    """Steps; those of levels without a state of the nuclear spins dashed."""
+    many = len(energy) > MOST_VECTOR_STICKS
+    for chosen, style, colour in ((exists, "-", BLUE), (~exists, ":", ORANGE)):
+        if chosen.any():
+            left, right = column[chosen] - HALF_WIDTH, column[chosen] + HALF_WIDTH
+            axes.hlines(energy[chosen], left, right, colors=colour, linestyles=style, linewidth=1.1, rasterized=many)
+    first, last = int(column.min()), int(column.max())
+    axes.set_xlim(first - 0.6, last + 0.8)
+    axes.set_xticks(range(first, last + 1, max(1, (last - first) // 12)))
+    margin = 0.04 * float(energy.max() - energy.min()) or 0.04 * float(abs(energy).max()) or 1.0
+    axes.set_ylim(float(energy.min()) - margin, float(energy.max()) + margin)
+
+
+def _label(figure: Any, axes: Any, table: SelectedLevels, column: Ints, energy: Floats) -> None:
+    """The quantum numbers of each level right of its step, from the lowest up, wherever no other label stands."""
+    if len(table) > 20 * MOST_LABELS:
+        return
+    figure.canvas.draw()  # places the axes, so that sizes in pixels are known
+    last: dict[int, float] = {}
+    pixels = axes.transData.transform(np.stack([column, energy], axis=1))[:, 1]
+    height = 5.8 * figure.dpi / 72.0  # of a label: capitals of 6 points
+    labelled = 0
+    for row in np.argsort(energy, kind="stable").tolist():
+        ladder = int(column[row])
+        if labelled == MOST_LABELS or pixels[row] - last.get(ladder, -np.inf) < height:
+            continue
+        last[ladder] = float(pixels[row])
+        labelled += 1
+        text = state_text(table.levels.quanta, int(table.rows[row]), table.levels.halves)
+        axes.text(ladder + HALF_WIDTH + 0.03, energy[row], text, fontsize=6, color=GREY, va="center", clip_on=True)

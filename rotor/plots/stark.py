@@ -1,0 +1,127 @@
+"""A picture of levels in a field: energy against field, a colour for each |M|, and the effective dipoles below."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from rotor.plots.picture import DPI, STYLE
+from rotor.quantum.field_map import FieldMap
+from rotor.units import MHZ_PER_CM
+from rotor.version import version
+
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")  # Okabe and Ito
+SIZE_INCHES = (7.2, 6.4)
+MOST_LABELS = 16
+
+
+def plot_stark(
+    field_map: FieldMap,
+    path: str | os.PathLike[str],
+    *,
+    title: str = "",
+    unit: str = "kV/cm",
+    provenance: Mapping[str, Any] | None = None,
+) -> None:
+    """Draw a map of levels in a field into a .png, .pdf or .svg file.
+
+    Parameters
+    ----------
+    field_map : FieldMap
+        Of two fields or more.
+    path : path
+        Its suffix chooses the format.
+    title : str
+        Above the picture.
+    unit : str
+        Of the field.
+    provenance : mapping, optional
+        Further facts for the metadata.
+
+    Raises
+    ------
+    ValueError
+        For a map of one field, and for a suffix that is no picture.
+    """
+    suffix = os.path.splitext(os.fspath(path))[1].lower()
+    if suffix not in (".png", ".pdf", ".svg"):
+        raise ValueError(f"{os.fspath(path)}: a picture is .png, .pdf or .svg; the suffix names the format")
+    if len(field_map.fields) < 2:
+        raise ValueError("a picture of a map needs two fields or more")
+
+    import matplotlib as mpl
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=SIZE_INCHES, dpi=DPI, layout="constrained")
+        FigureCanvasAgg(figure)
+        above, below = figure.subplots(2, 1, sharex=True, height_ratios=(3, 1.4))
+        _energies(above, field_map)
+        _slopes(below, field_map, unit)
+        above.set_title(title, loc="left")
+        figure.savefig(path, dpi=DPI, metadata=_metadata(suffix, field_map, title, provenance or {}))
+
+
+def _energies(axes: Any, field_map: FieldMap) -> None:
+    seen: set[int] = set()
+    ends: list[tuple[float, str]] = []
+    for rows in field_map.curves():
+        m = int(field_map.m[rows.start])
+        energies = field_map.energy_mhz[rows] / MHZ_PER_CM
+        label = None if m in seen else ("M mixed" if m < 0 else f"|M| = {m}")
+        axes.plot(field_map.field[rows], energies, color=_colour(m), linewidth=0.9, label=label)
+        seen.add(m)
+        ends.append((float(energies[0]), str(field_map.label[rows.start])))
+    _labels(axes, field_map, ends)
+    axes.set_ylabel("E/hc (cm⁻¹)")
+    if seen != {-1}:
+        axes.legend(frameon=False, fontsize=8, loc="upper left", ncols=len(seen))
+
+
+def _colour(m: int) -> str:
+    return COLOURS[m % len(COLOURS)] if m >= 0 else COLOURS[0]
+
+
+def _labels(axes: Any, field_map: FieldMap, ends: list[tuple[float, str]]) -> None:
+    """Names of the free levels at the left, those that would stand on each other left out."""
+    low, high = axes.get_ylim()
+    last = -np.inf
+    for energy, label in sorted(set(ends)):
+        if energy - last > (high - low) / 40:
+            axes.annotate(
+                label,
+                (field_map.fields[0], energy),
+                (-4, 0),
+                textcoords="offset points",
+                ha="right",
+                va="center",
+                fontsize=7,
+            )
+            last = energy
+    axes.tick_params(axis="y", pad=38)
+
+
+def _slopes(axes: Any, field_map: FieldMap, unit: str) -> None:
+    for rows in field_map.curves():
+        axes.plot(
+            field_map.field[rows], field_map.slope[rows], color=_colour(int(field_map.m[rows.start])), linewidth=0.8
+        )
+    axes.axhline(0.0, color="#555555", linewidth=0.6, linestyle=":")
+    axes.set_xlabel(f"field ({unit})")
+    name = "μ_eff (D)" if field_map.slope_name == "mu_eff_debye" else field_map.slope_name
+    axes.set_ylabel(name)
+
+
+def _metadata(suffix: str, field_map: FieldMap, title: str, more: Mapping[str, Any]) -> dict[str, Any]:
+    """Provenance by the keys that each format has; no date, so that the same picture is the same file."""
+    description = "; ".join(f"{name}: {value}" for name, value in {**more, **field_map.provenance}.items())
+    program = f"rotor {version()}"
+    if suffix == ".png":
+        return {"Software": program, "Title": title, "Description": description}
+    if suffix == ".pdf":
+        return {"Creator": program, "Title": title, "Subject": description, "CreationDate": None}
+    return {"Creator": program, "Title": title, "Description": description, "Date": None}

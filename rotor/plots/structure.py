@@ -1,0 +1,102 @@
+"""A picture of a molecule in its principal axes: atoms, bonds with their lengths, and the errors of the positions."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from rotor.molecules.molecule import Molecule
+from rotor.plots.picture import GREY, checked_suffix, formula_text, new_figure, save, styled
+from rotor.structure.coordinates import bonded
+from rotor.structure.substitution import Value
+
+_MARGIN = 0.9  # Å around the atoms
+
+
+def plot_structure(
+    molecule: Molecule,
+    path: str | os.PathLike[str],
+    *,
+    values: Sequence[Value] = (),
+    title: str = "",
+    provenance: Mapping[str, Any] | None = None,
+) -> None:
+    """Draw a molecule, in its principal axes, into a .png, .pdf or .svg file.
+
+    Parameters
+    ----------
+    molecule : Molecule
+        In the frame of a, b, c; atoms are drawn along the two axes across which it spreads most.
+    path : path
+    values : sequence of Value
+        Bond lengths to write at the bonds, with errors.
+    title : str
+    provenance : mapping, optional
+        What the metadata of the file shall say.
+
+    Raises
+    ------
+    ValueError
+        For a suffix that is no picture.
+    """
+    checked_suffix(path)
+    x = molecule.positions_angstrom
+    spread = np.ptp(x, axis=0)
+    across, up, depth = np.argsort(-spread, kind="stable")
+    width, height = max(spread[across] + 2 * _MARGIN, 2.5), max(spread[up] + 2 * _MARGIN, 2.0)
+    scale = min(7.2 / width, 6.0 / height, 1.5)
+    with styled():
+        figure = new_figure((width * scale, height * scale + 0.5))
+        axes = figure.add_subplot()
+        _draw_bonds(axes, molecule, values, int(across), int(up), scale)
+        _draw_atoms(axes, molecule, int(across), int(up), int(depth), scale)
+        middle = (x.max(axis=0) + x.min(axis=0)) / 2
+        axes.set_xlim(middle[across] - width / 2, middle[across] + width / 2)
+        axes.set_ylim(middle[up] - height / 2, middle[up] + height / 2)
+        axes.set_aspect("equal")
+        axes.set_xlabel(f"{'abc'[across]} (Å)")
+        axes.set_ylabel(f"{'abc'[up]} (Å)")
+        axes.set_title(title or formula_text(molecule.formula), loc="left")
+        places = np.round(x, 6).tolist()
+        atoms = [[symbol, *place] for symbol, place in zip(molecule.symbols, places, strict=True)]
+        save(figure, path, title, {**(provenance or {}), "atoms": atoms})
+
+
+def _draw_bonds(axes: Any, molecule: Molecule, values: Sequence[Value], across: int, up: int, scale: float) -> None:
+    from rotor.fit.publication import value_text
+    from rotor.structure.coordinates import named
+
+    x = molecule.positions_angstrom
+    written: dict[tuple[int, ...], str] = {}
+    for value in values:
+        if len(value.atoms) == 2:
+            text = value_text(round(value.value, 6), value.error) if np.isfinite(value.error) else f"{value.value:.4f}"
+            for atoms in named(molecule, value.name, value.atoms).alike:
+                written.setdefault(tuple(sorted(atoms)), text)
+    for i, j in bonded(molecule):
+        ends = x[[i - 1, j - 1]][:, [across, up]]
+        axes.plot(ends[:, 0], ends[:, 1], color=GREY, linewidth=2.5, solid_capstyle="round", zorder=1)
+        if (i, j) in written:
+            along = ends[1] - ends[0]
+            normal = np.array([-along[1], along[0]]) / (np.linalg.norm(along) or 1.0)
+            place = ends.mean(axis=0) + 0.22 * normal * (1 if normal[1] >= 0 else -1)
+            axes.text(*place, written[i, j], ha="center", va="center", fontsize=7.0, zorder=4)
+
+
+def _draw_atoms(axes: Any, molecule: Molecule, across: int, up: int, depth: int, scale: float) -> None:
+    from ase.data import atomic_numbers, covalent_radii
+    from ase.data.colors import jmol_colors
+    from matplotlib.patches import Circle
+
+    x = molecule.positions_angstrom
+    for atom in np.argsort(x[:, depth], kind="stable").tolist():
+        number = atomic_numbers[molecule.symbols[atom]]
+        colour = 0.75 * np.asarray(jmol_colors[number]) + 0.25
+        place = (x[atom, across], x[atom, up])
+        axes.add_patch(
+            Circle(place, 0.42 * covalent_radii[number], facecolor=colour, edgecolor=GREY, linewidth=0.8, zorder=2)
+        )
+        axes.text(*place, f"{molecule.symbols[atom]}{atom + 1}", ha="center", va="center", fontsize=7.0, zorder=3)

@@ -1,0 +1,96 @@
+"""Diabatic labels of levels in a field: neighbours that nearly cross exchange their names where the gap is below a threshold.
+
+Where two neighbouring levels of one block come closest, their gap has a minimum, and the slopes dE/dx, which the theorem of Hellmann
+and Feynman gives without differences, exchange. A minimum inside an interval of fields shows in the slopes at its ends: the gap
+falls at the first and rises at the second. Intervals are halved until the cubic through energies and slopes at their ends predicts
+their middle, so that no crossing, however narrow, is stepped over; what is found then does not depend on the grid asked for. A
+minimum is located by minimising the gap; below the threshold the two labels are exchanged for all fields beyond, one for one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from rotor.arrays import Floats, Ints
+
+Solve = Callable[[Floats], tuple[Floats, Floats]]  # fields (f,) -> energies and slopes dE/dx (f, states)
+
+PREDICTED = 0.1  # of the threshold: how well the cubic must predict the middle of an interval
+DEEPEST = 24  # halvings of an interval
+
+
+def diabatic_ranks(solve: Solve, fields: Floats, count: int, gap_mhz: float) -> Ints:
+    """The adiabatic rank (fields, count) at the first field whose name each state has at each field.
+
+    gap_mhz: crossings with a smallest gap below it are passed diabatically.
+    """
+    if not gap_mhz > 0:
+        raise ValueError(f"diabatic gap {gap_mhz} MHz: a number above 0 is expected")
+    swaps = sorted(crossings(solve, fields, gap_mhz))
+    names = np.arange(count)
+    out = np.empty((len(fields), count), dtype=np.int64)
+    done = 0
+    for place, x in enumerate(fields.tolist()):
+        while done < len(swaps) and swaps[done][0] <= x:
+            lower = swaps[done][1]
+            names[[lower, lower + 1]] = names[[lower + 1, lower]]
+            done += 1
+        out[place] = names
+    return out
+
+
+def crossings(solve: Solve, fields: Floats, gap_mhz: float) -> list[tuple[float, int]]:
+    """(field, rank of the lower state) of every near crossing with a gap below `gap_mhz`."""
+    x, energies, slopes = _resolved(solve, fields, gap_mhz)
+    gaps, changes = np.diff(energies, axis=1), np.diff(slopes, axis=1)
+    out = []
+    for left, lower in zip(*np.nonzero((changes[:-1] < 0) & (changes[1:] > 0)), strict=True):
+        at, gap = _closest(solve, float(x[left]), float(x[left + 1]), int(lower))
+        if min(gap, gaps[left, lower], gaps[left + 1, lower]) < gap_mhz:
+            out.append((at, int(lower)))
+    return out
+
+
+def _resolved(solve: Solve, fields: Floats, gap_mhz: float) -> tuple[Floats, Floats, Floats]:
+    """Fields with energies and slopes, close enough for a cubic to predict each middle where levels are near each other."""
+    x, (energies, slopes) = fields, solve(fields)
+    fresh = np.ones(len(x) - 1, dtype=bool)
+    for _ in range(DEEPEST):
+        where = np.flatnonzero(fresh & _may_cross(x, energies, slopes, gap_mhz))
+        if not len(where):
+            break
+        middle = (x[where] + x[where + 1]) / 2
+        step = (x[where + 1] - x[where])[:, None]
+        predicted = (energies[where] + energies[where + 1]) / 2 + step * (slopes[where] - slopes[where + 1]) / 8
+        found, found_slopes = solve(middle)
+        wrong = (np.abs(predicted - found) > PREDICTED * gap_mhz).any(axis=1)
+        order = np.argsort(np.concatenate([x, middle]), kind="stable")
+        is_new = np.zeros(len(x) - 1, dtype=bool)
+        is_new[where[wrong]] = True
+        fresh = np.repeat(is_new, np.where(np.isin(np.arange(len(x) - 1), where), 2, 1))
+        x = np.concatenate([x, middle])[order]
+        energies, slopes = np.concatenate([energies, found])[order], np.concatenate([slopes, found_slopes])[order]
+    return x, energies, slopes
+
+
+def _may_cross(x: Floats, energies: Floats, slopes: Floats, gap_mhz: float) -> Floats:
+    """Intervals in which some neighbours can come within the threshold: the gap less what the steeper of the slopes takes away."""
+    step = np.diff(x)[:, None]
+    gaps, changes = np.diff(energies, axis=1), np.abs(np.diff(slopes, axis=1))
+    spread = np.abs(np.diff(slopes, axis=0))
+    steepest = np.maximum(changes[:-1], changes[1:]) + spread[:, :-1] + spread[:, 1:]
+    return np.asarray((np.minimum(gaps[:-1], gaps[1:]) - step * steepest < gap_mhz).any(axis=1))
+
+
+def _closest(solve: Solve, first: float, last: float, lower: int) -> tuple[float, float]:
+    """Where between two fields the gap above state `lower` is smallest, and the gap."""
+    from scipy.optimize import minimize_scalar
+
+    def gap(x: float) -> float:
+        energies = solve(np.array([x]))[0][0]
+        return float(energies[lower + 1] - energies[lower])
+
+    found = minimize_scalar(gap, bounds=(first, last), method="bounded", options={"xatol": 1e-6 * (last - first)})
+    return float(found.x), float(found.fun)

@@ -1,0 +1,73 @@
+"""The effects of a top's own spins, from its named constants."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from rotor.quantum.effect import QuantumEffect
+from rotor.quantum.effects.hyperfine import NuclearQuadrupole
+from rotor.quantum.effects.spin_effect import SpinEffect, parse_name
+from rotor.quantum.effects.spin_rotation import SpinRotation
+from rotor.quantum.effects.spin_spin import SpinSpin
+from rotor.quantum.effects.watson import SEMI_RIGID
+from rotor.quantum.spins import Spin
+
+if TYPE_CHECKING:
+    from rotor.tops.top import Top
+
+_KINDS: tuple[type[SpinEffect], ...] = (NuclearQuadrupole, SpinRotation, SpinSpin)
+
+
+def spin_effects(top: Top) -> tuple[QuantumEffect, ...]:
+    """Quadrupole, spin-rotation and spin-spin coupling of a top with constants of spins; none without them.
+
+    Raises ValueError for a name that no effect knows, and for like nuclei whose exchange the spin weights count already.
+
+    >>> from rotor.tops.spin_constants import SpinConstants
+    >>> from rotor.tops.top import Top
+    >>> top = Top.from_constants("B=44316 MHz", spin_constants=SpinConstants.parse("chi_aa(14N)=-4.7 MHz"))
+    >>> [effect.name for effect in spin_effects(top)]
+    ['nuclear quadrupole']
+    """
+    constants = top.spin_constants
+    if constants is None:
+        return ()
+    _refuse_like_nuclei(top)
+    spins = tuple(Spin(name, twice, name.startswith("S")) for name, twice in constants.twice.items())
+    values: dict[type[SpinEffect], dict[str, float]] = {}
+    for name, value in constants.values.items():
+        symbol = parse_name(name).symbol
+        kind = next((kind for kind in _KINDS if symbol in kind.symbols), None)
+        if kind is None:
+            known = ", ".join(one for kind in _KINDS for one in kind.symbols)
+            raise ValueError(f"{name}: known constants of spins are {known}")
+        values.setdefault(kind, {})[name] = value
+    return tuple(kind(values[kind], spins) for kind in _KINDS if kind in values)
+
+
+def _refuse_like_nuclei(top: Top) -> None:
+    """Nuclei that are coupled one by one must not be in the spin weights too."""
+    assert top.spin_constants is not None
+    labels = [name.partition("_")[0] for name in top.spin_constants.twice]
+    like = [label for label in dict.fromkeys(labels) if labels.count(label) > 1]
+    if like and top.spin_weights.rule != "none":
+        raise ValueError(
+            f"spins of several {like[0]}: the spin weights of {top.name or 'this top'} count their exchange already; give the "
+            "weights without them, or an .int and .var file with equivalent nuclei"
+        )
+
+
+def effects_of(top: Top, hyperfine: bool) -> tuple[QuantumEffect, ...]:
+    """The semi-rigid Hamiltonian of a top, and with `hyperfine` its spins.
+
+    Raises ValueError where spins are asked for and the top has no constants of any.
+    """
+    if not hyperfine:
+        return SEMI_RIGID
+    found = spin_effects(top)
+    if not found:
+        raise ValueError(
+            f"hyperfine structure of {top.name or 'this top'}: no constants of spins are known; give them, such as "
+            "chi_aa(14N)=-4.2 MHz"
+        )
+    return (*SEMI_RIGID, *found)

@@ -1,0 +1,208 @@
+"""A static electric field along Z, and the non-resonant light of a laser along Z beside it.
+
+    H = H0 - μ_Z E - (2π I/c) (α'_ZZ),          μE/h = 503.4117 MHz for 1 D and 1 kV/cm
+
+The dipole points from minus to plus, so that a positive field lowers the state whose dipole points along +Z. M is good; ±M coincide.
+To second order a linear top has W = (μ²E²/2hB) [J(J+1) - 3M²]/[J(J+1)(2J-1)(2J+3)], and -μ²E²/6hB for J = 0; a symmetric one has
+-μE KM/[J(J+1)] to first order (C. H. Townes and A. L. Schawlow, Microwave Spectroscopy, 1955, chapter 10). Nothing of that is used
+here: the matrices are solved.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rotor import units
+from rotor.quantum.effect import QuantumEffect
+from rotor.quantum.field_blocks import Contraction, FieldBlock, field_space
+from rotor.quantum.field_map import (
+    BlockProblem,
+    FieldMap,
+    MapRequest,
+    checked_fields,
+    checked_tolerance_mhz,
+    field_map,
+)
+
+if TYPE_CHECKING:
+    from rotor.tops.top import Top
+
+HIGHEST_KV_PER_CM = 1e5  # 1 V/Å is 1e5 kV/cm: molecules are ionised
+HIGHEST_W_PER_CM2 = 1e17
+DEFAULT_TOLERANCE_MHZ = 1e-6
+Z = (0.0, 0.0, 1.0)
+# 2π I/(c h) in MHz for 1 Å³ and 1 W/cm²
+MHZ_ANGSTROM3_W_PER_CM2 = 2 * math.pi * 1e-30 * 1e4 / (units.SPEED_OF_LIGHT_M_PER_S * units.PLANCK_J_S) * 1e-6
+
+
+@dataclass(frozen=True)
+class Stark(QuantumEffect):
+    """The field as an effect: its size for the list of what a calculation leaves out, and what it conserves.
+
+    >>> from rotor.tops.top import Top
+    >>> round(Stark(1.0).size_mhz(Top.from_constants("B=6081.5 MHz", dipole_abc_debye=(0.7, 0, 0)), 0), 1)
+    3.4
+    """
+
+    name: ClassVar[str] = "static electric field"
+    conserved: ClassVar[frozenset[str]] = frozenset({"m"})
+
+    field_kv_per_cm: float = 1.0
+
+    def parameters(self, top: Top) -> dict[str, float]:
+        """No constant of the free top: energies in a field have M, and are those of `stark_map`."""
+        return {}
+
+    def size_mhz(self, top: Top, j: int) -> float:
+        """Second order at J = 0, first order (K = M = J) where ±K coincide."""
+        first = (
+            units.MHZ_PER_DEBYE_KV_PER_CM
+            * abs(self.field_kv_per_cm)
+            * float(np.linalg.norm(top.dipole_abc_debye or (0.0,)))
+        )
+        b = min(x for x in top.rotational_constants_mhz if math.isfinite(x))
+        if top.kind in ("prolate", "oblate") and j:
+            return first * j / (j + 1)
+        return min(first**2 / (6 * b), first)
+
+
+def stark_map(
+    top: Top,
+    fields_kv_per_cm: ArrayLike,
+    *,
+    j_highest: int = 2,
+    m_values: Sequence[int] | None = None,
+    intensity_w_per_cm2: float = 0.0,
+    jmax: int | None = None,
+    tolerance_mhz: float = DEFAULT_TOLERANCE_MHZ,
+    diabatic_gap_mhz: float | None = None,
+    executor: Executor | None = None,
+) -> FieldMap:
+    """Energies, effective dipoles and cosines of a top against a static field along Z.
+
+    Parameters
+    ----------
+    top : Top
+        With `dipole_abc_debye`, and `polarizability_abc_angstrom3` where light acts.
+    fields_kv_per_cm : (n,)
+        Each once, in rising order.
+    j_highest : int
+        States that belong to free levels up to this J.
+    m_values : sequence of int, optional
+        |M|; by default 0 ... `j_highest`.
+    intensity_w_per_cm2 : float
+        Of a laser far from resonance, polarized along Z, at every field.
+    jmax : int, optional
+        Of the basis; by default chosen.
+    tolerance_mhz : float
+        Of energies, by raising J max.
+    diabatic_gap_mhz : float, optional
+        Near crossings with a smaller gap are passed diabatically in the column `diabatic_label`.
+    executor : Executor, optional
+        Blocks are spread over it.
+
+    Returns
+    -------
+    FieldMap
+        Columns field_kv_per_cm, m, rank, energy_mhz, label, mu_eff_debye, costheta, cos2theta, block, edge_population, copies.
+
+    Raises
+    ------
+    ValueError
+        No dipole (and no light), fields beyond 1e5 kV/cm, a negative intensity, an M above J, a given J max that is too small.
+
+    Notes
+    -----
+    Neglected: the polarizability in the static field (0.5 Δα E², below 1e-3 of the dipole's part), hyperfine coupling.
+    """
+    fields = checked_fields(fields_kv_per_cm, "kV/cm", HIGHEST_KV_PER_CM)
+    dipole, light = acting(top, intensity_w_per_cm2)
+    names = {"costheta": _orientation(top), "cos2theta": _alignment(top)}
+    request = MapRequest(
+        space=partial(field_space, top, contractions=tuple(one for one in (dipole, light) if one is not None)),
+        problem=partial(_problem, dipole, light, intensity_w_per_cm2, names),
+        fields=fields,
+        j_highest=checked_j(j_highest),
+        m_values=checked_m(m_values, j_highest),
+        tolerance_mhz=checked_tolerance_mhz(tolerance_mhz),
+        field_name="field_kv_per_cm",
+        slope_name="mu_eff_debye",
+        slope_unit_mhz=units.MHZ_PER_DEBYE_KV_PER_CM,
+        diabatic_gap_mhz=diabatic_gap_mhz,
+    )
+    return field_map(request, jmax, executor)
+
+
+def checked_j(j_highest: int) -> int:
+    """A J from 0 to 100, or ValueError."""
+    if not 0 <= j_highest <= 100:
+        raise ValueError(f"states up to J = {j_highest}: a whole number from 0 to 100 is expected")
+    return int(j_highest)
+
+
+def checked_m(m_values: Sequence[int] | None, j_highest: int) -> tuple[int, ...]:
+    """|M| from 0 to J, each once, all of them for None; ValueError for others."""
+    values = tuple(range(j_highest + 1)) if m_values is None else tuple(sorted({int(m) for m in m_values}))
+    if not values or not all(0 <= m <= j_highest for m in values):
+        raise ValueError(
+            f"M of {list(values)}: whole numbers from 0 to J = {j_highest} are expected (M and -M coincide)"
+        )
+    return values
+
+
+def acting(top: Top, intensity_w_per_cm2: float) -> tuple[Contraction, Contraction | None]:
+    """Dipole and light as contractions with Z; ValueError where they are not known or nothing acts."""
+    name = top.name or "this top"
+    if not 0 <= intensity_w_per_cm2 <= HIGHEST_W_PER_CM2:
+        raise ValueError(
+            f"intensity {intensity_w_per_cm2:g} W/cm²: a number from 0 to {HIGHEST_W_PER_CM2:g} is expected"
+        )
+    if top.kind == "spherical":
+        raise ValueError(
+            f"{name} is a spherical top: it has no dipole and no anisotropy, so that a field does not split its levels"
+        )
+    dipole = top.dipole_abc_debye
+    if dipole is None and not intensity_w_per_cm2:
+        raise ValueError(f"the dipole of {name} is not known: give one, in principal axes (D)")
+    if not np.any(dipole or (0.0,)) and not intensity_w_per_cm2:
+        raise ValueError(f"{name} has no dipole: a static field does not move its levels to first or second order")
+    light = None
+    if intensity_w_per_cm2:
+        if top.polarizability_abc_angstrom3 is None:
+            raise ValueError(f"the polarizability of {name} is not known: give one, in principal axes (Å³)")
+        light = Contraction(top.polarizability_abc_angstrom3, np.outer(Z, Z))
+    return Contraction(dipole or (0.0, 0.0, 0.0), Z), light
+
+
+def figure_axis(top: Top) -> int:
+    """The axis whose angle with Z is θ: that of a linear or symmetric top, else the one nearest to the dipole."""
+    if top.kind != "asymmetric":
+        return 2 if top.kind == "oblate" else 0
+    return int(np.argmax(np.abs(top.dipole_abc_debye or (1.0, 0.0, 0.0))))
+
+
+def _orientation(top: Top) -> Contraction:
+    return Contraction(np.eye(3)[figure_axis(top)], Z)
+
+
+def _alignment(top: Top) -> Contraction:
+    axis = np.eye(3)[figure_axis(top)]
+    return Contraction(np.outer(axis, axis), np.outer(Z, Z))
+
+
+def _problem(
+    dipole: Contraction, light: Contraction | None, intensity: float, names: dict[str, Contraction], block: FieldBlock
+) -> BlockProblem:
+    fixed = np.diag(block.energies_mhz)
+    if light is not None:
+        fixed = fixed - MHZ_ANGSTROM3_W_PER_CM2 * intensity * block.matrix(light)
+    slope = -units.MHZ_PER_DEBYE_KV_PER_CM * block.matrix(dipole)
+    return BlockProblem(fixed, slope, {name: block.matrix(one) for name, one in names.items()})

@@ -1,0 +1,355 @@
+"""Chosen levels and their derivatives for constants that change: what a fit asks for, again and again.
+
+A model is made once for the labels that occur. Linear, spherical and symmetric tops have E = Σ c x(label): the derivatives are
+a constant matrix. An asymmetric top is solved in those Wang blocks alone in which a label lies; a block is a sum of unit
+matrices ½[Jz^2q, J₊^2n + J₋^2n]₊ X^p made once, for all blocks side by side, so that new constants cost one LAPACK call a block
+and
+
+    ∂E_i/∂c = ⟨i|∂H/∂c|i⟩ = Σ_d (2 - δ_d0) Σ_K v_K v_K+2d U_d(K)
+
+over the diagonals d of each unit matrix U, all states of many blocks at once. A label is (J, block, rank in the order of energy),
+so that it never changes its state by accident; `overlaps` says where a state has become another.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from rotor.arrays import Floats, Ints
+from rotor.quantum.basis import WangBlock, ka_kc, wang_blocks
+from rotor.quantum.effects.watson import operators_by_name
+from rotor.tops.constants import Constants
+from rotor.tops.operators import Powers
+
+_MOST_PADDED = 1 << 22  # matrix elements of blocks that are worked on together: 32 MB
+
+
+class LevelModel(ABC):
+    """Energies of labelled levels as a function of constants.
+
+    names : the constants, in the order in which values are given and derivatives come
+    """
+
+    names: tuple[str, ...]
+
+    @abstractmethod
+    def levels(self, values_mhz: Floats) -> tuple[Floats, Floats]:
+        """Energies (levels,) in MHz and their derivatives (levels, names) at constants (names,) in MHz."""
+
+    def overlaps(self, before_mhz: Floats, after_mhz: Floats) -> Floats:
+        """|⟨before|after⟩|² (levels,) of each labelled state at two sets of constants; 1 where vectors do not depend on them."""
+        return np.ones(len(self.levels(after_mhz)[0]))
+
+
+def level_model(constants: Constants, labels: Ints, *, kmax: int | None = None) -> LevelModel:
+    """The model for the labels (levels, 1 to 3): J; J, K; or J, Ka, Kc, after the kind of the constants.
+
+    Parameters
+    ----------
+    constants : Constants
+        Whose names, kind, reduction and representation count; the values are given to `levels`.
+    labels : (levels, k) array
+        Quantum numbers; K of a symmetric top may have a sign, which has no bearing on its energy.
+    kmax : int, optional
+        Basis states of an asymmetric top with K above it are left out, as SPFIT's KNMAX does.
+
+    Returns
+    -------
+    LevelModel
+
+    Raises
+    ------
+    ValueError
+        For labels that no level has, with the first of them, and for tetrahedral splittings of a spherical top.
+    """
+    labels = np.atleast_2d(np.asarray(labels, dtype=np.int64))
+    width = {"linear": 1, "spherical": 1, "prolate": 2, "oblate": 2}.get(constants.kind, 3)
+    if labels.shape[1] != width:
+        what = {1: "J", 2: "J, K", 3: "J, Ka, Kc"}[width]
+        raise ValueError(f"{labels.shape[1]} quantum numbers for each state; a {constants.kind} top has {what}")
+    _refuse_labels(constants.kind, labels)
+    if constants.kind == "asymmetric":
+        return WangBlocks.of(constants, labels, kmax)
+    if "Dt" in constants.values:
+        raise ValueError(
+            "D_t splits the levels of a spherical top, which J alone does not label; it cannot be fitted here"
+        )
+    return ClosedForm.of(constants, labels)
+
+
+def _refuse_labels(kind: str, labels: Ints) -> None:
+    bad = labels[:, 0] < 0
+    rule = "J is 0 or more"
+    if kind in ("prolate", "oblate"):
+        bad, rule = bad | (np.abs(labels[:, 1]) > labels[:, 0]), "|K| is at most J"
+    if kind == "asymmetric":
+        j, ka, kc = labels.T
+        bad = bad | (ka < 0) | (kc < 0) | ((ka + kc != j) & (ka + kc != j + 1)) | (ka > j) | (kc > j)
+        rule = "Ka and Kc run from 0 to J and add up to J or J + 1"
+    if bad.any():
+        raise ValueError(f"there is no level {' '.join(map(str, labels[np.argmax(bad)].tolist()))}: {rule}")
+
+
+@dataclass(frozen=True)
+class ClosedForm(LevelModel):
+    """E = slopes @ values: linear, spherical and symmetric tops."""
+
+    names: tuple[str, ...]
+    slopes: Floats
+
+    @classmethod
+    def of(cls, constants: Constants, labels: Ints) -> ClosedForm:
+        """Σ c X^p K^2q of every named constant."""
+        by_name = operators_by_name(constants)
+        x = (labels[:, 0] * (labels[:, 0] + 1)).astype(float)
+        k = labels[:, 1].astype(float) if labels.shape[1] > 1 else np.zeros(len(labels))
+        columns = [
+            sum((factor * x**p * k ** (2 * q) for (p, q, _), factor in terms.items()), np.zeros(len(labels)))
+            for terms in by_name.values()
+        ]
+        return cls(tuple(by_name), np.stack(columns, axis=1))
+
+    def levels(self, values_mhz: Floats) -> tuple[Floats, Floats]:
+        """See `LevelModel`."""
+        return self.slopes @ values_mhz, self.slopes
+
+
+@dataclass(frozen=True)
+class _Chunk:
+    """Blocks of like size side by side: unit diagonals units[d] (blocks, size, terms) and what fills their places.
+
+    sizes (blocks,); x (blocks,): J(J+1); rows: labels that lie in these blocks, block and rank: where each is
+    """
+
+    units: tuple[Floats, ...]
+    sizes: list[int]
+    x: Floats
+    rows: Ints
+    block: Ints
+    rank: Ints
+
+
+@dataclass(frozen=True)
+class WangBlocks(LevelModel):
+    """An asymmetric top, the blocks that occur.
+
+    terms: unique (q, n) but for (0, 0); powers: p, (q, n) as a place in `terms` or -1, of every column of factors (terms of the
+    Hamiltonian, names)
+    """
+
+    names: tuple[str, ...]
+    count: int
+    powers: tuple[tuple[int, int], ...]
+    factors: Floats
+    chunks: tuple[_Chunk, ...] = field(repr=False)
+    j: Ints = field(repr=False)
+
+    @classmethod
+    def of(cls, constants: Constants, labels: Ints, kmax: int | None) -> WangBlocks:
+        """The model for labels (J, Ka, Kc) of a set of constants."""
+        by_name = operators_by_name(constants)
+        hamiltonian = sorted({powers for terms in by_name.values() for powers in terms})
+        units = sorted({(q, n) for _, q, n in hamiltonian if q or n})
+        factors = np.array([[terms.get(powers, 0.0) for terms in by_name.values()] for powers in hamiltonian])
+        places = tuple((p, units.index((q, n)) if q or n else -1) for p, q, n in hamiltonian)
+        chunks = tuple(_chunks(_occurring(labels, str(constants.representation), kmax), units))
+        return cls(tuple(by_name), len(labels), places, factors, chunks, labels[:, 0])
+
+    def levels(self, values_mhz: Floats) -> tuple[Floats, Floats]:
+        """See `LevelModel`. Raises ValueError where a block is not finite or LAPACK does not converge."""
+        coefficients = self.factors @ values_mhz
+        energies, slopes = np.empty(self.count), np.empty((self.count, len(self.names)))
+        places = [place for _, place in self.powers]  # that of a scalar is -1, the column of ones
+        for chunk in self.chunks:
+            weights = self._weights(coefficients, chunk.x)
+            bands = [np.einsum("bkt,bt->bk", unit, weights) for unit in chunk.units]
+            solved, vectors = _diagonalised(bands, chunk.sizes)
+            energies[chunk.rows] = solved[chunk.block, chunk.rank]
+            expected = np.column_stack([_expectations(chunk, vectors), np.ones(len(chunk.rows))])
+            powers = np.stack([chunk.x**p for p, _ in self.powers], axis=1)[chunk.block]
+            slopes[chunk.rows] = (expected[:, places] * powers) @ self.factors
+        for (p, place), coefficient in zip(self.powers, coefficients.tolist(), strict=True):
+            if place < 0:
+                energies += coefficient * (self.j * (self.j + 1.0)) ** p
+        return energies, slopes
+
+    def overlaps(self, before_mhz: Floats, after_mhz: Floats) -> Floats:
+        """See `LevelModel`."""
+        out = np.empty(self.count)
+        for chunk in self.chunks:
+            both = []
+            for values in (before_mhz, after_mhz):
+                weights = self._weights(self.factors @ values, chunk.x)
+                bands = [np.einsum("bkt,bt->bk", unit, weights) for unit in chunk.units]
+                both.append(_diagonalised(bands, chunk.sizes)[1][chunk.block, :, chunk.rank])
+            out[chunk.rows] = np.einsum("lk,lk->l", *both) ** 2
+        return out
+
+    def _weights(self, coefficients: Floats, x: Floats) -> Floats:
+        """Σ_p c X^p of every unit matrix, (blocks, units)."""
+        count = 1 + max((place for _, place in self.powers), default=-1)
+        out = np.zeros((len(x), count))
+        for (p, place), coefficient in zip(self.powers, coefficients.tolist(), strict=True):
+            if place >= 0:
+                out[:, place] += coefficient * x**p
+        return out
+
+
+@dataclass(frozen=True)
+class _Occurring:
+    """A block in which labels lie, cut at the highest K, with the places of the labels and their ranks."""
+
+    basis: WangBlock
+    size: int
+    rows: list[int]
+    ranks: list[int]
+
+
+def _occurring(labels: Ints, representation: str, kmax: int | None) -> list[_Occurring]:
+    """The blocks in order of size; ValueError for a label that the cut at `kmax` leaves without a state."""
+    found: dict[tuple[int, str], _Occurring] = {}
+    by_j: dict[int, dict[str, WangBlock]] = {}
+    for row, (j, ka, kc) in enumerate(labels.tolist()):
+        species = "eo"[ka % 2] + "eo"[kc % 2]
+        if j not in by_j:
+            by_j[j] = {block.species: block for block in wang_blocks(j, representation)}
+        basis = by_j[j][species]
+        rank = (ka - int(ka_kc(j, species, 1)[0][0])) // 2
+        if (j, species) not in found:
+            found[j, species] = _Occurring(basis, _cut(basis, kmax), [], [])
+        one = found[j, species]
+        if rank >= one.size:
+            raise ValueError(f"level {j} {ka} {kc} is not among the states with K up to {kmax}; raise KNMAX")
+        one.rows.append(row)
+        one.ranks.append(rank)
+    return sorted(found.values(), key=lambda one: one.size)
+
+
+def _cut(basis: WangBlock, kmax: int | None) -> int:
+    return basis.size if kmax is None else min(basis.size, max(0, (kmax - basis.first_k) // 2 + 1))
+
+
+def _chunks(blocks: Sequence[_Occurring], units: Sequence[tuple[int, int]]) -> list[_Chunk]:
+    """Blocks in order of size, cut into pieces of bounded memory and of sizes within a factor of two."""
+    out, start = [], 0
+    while start < len(blocks):
+        stop = start
+        while (
+            stop < len(blocks)
+            and (stop - start + 1) * blocks[stop].size ** 2 <= _MOST_PADDED
+            and blocks[stop].size <= max(2 * blocks[start].size, 8)
+        ):
+            stop += 1
+        stop = max(stop, start + 1)
+        out.append(_chunk(blocks[start:stop], units))
+        start = stop
+    return out
+
+
+def _chunk(blocks: Sequence[_Occurring], units: Sequence[tuple[int, int]]) -> _Chunk:
+    size = blocks[-1].size
+    return _Chunk(
+        units=_unit_diagonals(blocks, size, units),
+        sizes=[one.size for one in blocks],
+        x=np.array([one.basis.j * (one.basis.j + 1.0) for one in blocks]),
+        rows=np.array([row for one in blocks for row in one.rows]),
+        block=np.array([b for b, one in enumerate(blocks) for _ in one.rows]),
+        rank=np.array([rank for one in blocks for rank in one.ranks]),
+    )
+
+
+def _unit_diagonals(blocks: Sequence[_Occurring], size: int, units: Sequence[tuple[int, int]]) -> tuple[Floats, ...]:
+    """Diagonal d of ½[Jz^2q, J₊^2n + J₋^2n]₊ at (block, state, (q, n)), state i with i + d; zero beyond a block.
+
+    As in `rotor.quantum.effects.watson`: ⟨K+2n|..|K⟩ on diagonal n, √2 more where K = 0, and ⟨2n-K|..|-K⟩ with the sign of the
+    block on diagonal n - K.
+    """
+    order = max((n for _, n in units), default=0)
+    j = np.array([one.basis.j for one in blocks], dtype=float)[:, None]
+    first = np.array([one.basis.first_k for one in blocks])[:, None]
+    sign = np.array([one.basis.sign for one in blocks], dtype=float)[:, None]
+    sizes = np.array([one.size for one in blocks])[:, None]
+    index = np.arange(size)[None, :]
+    k = (first + 2 * index).astype(float)
+
+    out = tuple(np.zeros((len(blocks), size, len(units))) for _ in range(order + 1))
+    for place, (q, n) in enumerate(units):
+        inside = index + n < sizes
+        element = _element(j, k, q, n) * np.where((k == 0) & (n > 0), np.sqrt(2.0), 1.0)
+        out[n][:, :, place] += np.where(inside, element, 0.0)
+        for low in range(1, n + 1):
+            here = (k == low) & (index + n - low < sizes) & (index < sizes)
+            folded = sign * _element(j, np.full_like(k, -low), q, n)
+            out[n - low][:, :, place] += np.where(here, folded, 0.0)
+    return out
+
+
+def _element(j: Floats, k: Floats, q: int, n: int) -> Floats:
+    """⟨K+2n|½[Jz^2q, J₊^2n + J₋^2n]₊|K⟩, K^2q for n = 0."""
+    if n == 0:
+        return np.asarray(k ** (2 * q) + 0.0 * j)
+    squared = np.ones_like(j * k)
+    for i in range(2 * n):
+        squared = squared * np.maximum((j - k - i) * (j + k + i + 1), 0.0)
+    return np.asarray(0.5 * ((k + 2 * n) ** (2 * q) + k ** (2 * q)) * np.sqrt(squared))
+
+
+def _diagonalised(bands: Sequence[Floats], sizes: Sequence[int]) -> tuple[Floats, Floats]:
+    """Eigenvalues (blocks, size), rising, and eigenvectors (blocks, size, size) in columns, padded with zeros."""
+    if not all(np.isfinite(band).all() for band in bands):
+        raise ValueError("a block of the Hamiltonian is not finite with these constants")
+    count, size = bands[0].shape
+    energies, vectors = np.zeros((count, size)), np.zeros((count, size, size))
+    if len(bands) <= 2:
+        _tridiagonal(bands, sizes, energies, vectors)
+    else:
+        _banded(bands, sizes, energies, vectors)
+    return energies, vectors
+
+
+def _tridiagonal(bands: Sequence[Floats], sizes: Sequence[int], energies: Floats, vectors: Floats) -> None:
+    from scipy.linalg.lapack import dstevd
+
+    diagonal, beside = bands[0], bands[1] if len(bands) == 2 else np.zeros_like(bands[0])
+    for b, n in enumerate(sizes):
+        if n == 1:
+            energies[b, 0], vectors[b, 0, 0] = diagonal[b, 0], 1.0
+            continue
+        found, states, info = dstevd(diagonal[b, :n], beside[b, : n - 1])
+        if info:
+            raise ValueError(f"LAPACK dstevd did not converge on a block of size {n} (info = {info})")
+        energies[b, :n] = found
+        vectors[b, :n, :n] = states
+
+
+def _banded(bands: Sequence[Floats], sizes: Sequence[int], energies: Floats, vectors: Floats) -> None:
+    """Blocks of one size at a time, by LAPACK's dense routine."""
+    unlike = np.asarray(sizes)
+    for n in np.unique(unlike).tolist():
+        chosen = np.flatnonzero(unlike == n)
+        matrices = np.zeros((len(chosen), n, n))
+        for d, band in enumerate(bands[:n]):
+            places = np.arange(n - d)
+            matrices[:, places + d, places] = band[chosen, : n - d]  # eigh reads the lower triangle
+        found, states = np.linalg.eigh(matrices)
+        energies[chosen, :n] = found
+        vectors[chosen, :n, :n] = states
+
+
+def _expectations(chunk: _Chunk, vectors: Floats) -> Floats:
+    """⟨unit⟩ (labels, units) of the labelled states."""
+    total = np.matmul((vectors**2).transpose(0, 2, 1), chunk.units[0])
+    for d, unit in enumerate(chunk.units[1:], 1):
+        if d < vectors.shape[1]:
+            products = 2.0 * vectors[:, :-d, :] * vectors[:, d:, :]
+            total += np.matmul(products.transpose(0, 2, 1), unit[:, :-d])
+    return np.asarray(total[chunk.block, chunk.rank])
+
+
+def powers_of(constants: Constants) -> dict[str, dict[Powers, float]]:
+    """The terms of every named constant, for those who need ∂H/∂c itself."""
+    return operators_by_name(constants)

@@ -1,0 +1,88 @@
+"""A request for levels in a static electric field, and what answers it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from rotor.checks import require_positive, require_whole
+from rotor.quantum.effects.stark import DEFAULT_TOLERANCE_MHZ, acting, checked_j, checked_m, stark_map
+from rotor.quantum.field_map import FieldMap
+from rotor.tops.facts import top_facts
+
+if TYPE_CHECKING:
+    from rotor.tops.top import Top
+
+
+@dataclass(frozen=True)
+class StarkRequest:
+    """A map of levels in a field to compute; every field is checked when the request is made.
+
+    top: with its dipole. fields_kv_per_cm: of any order. j_highest: free levels up to this J are followed. m_values: |M|; None: all.
+    intensity_w_per_cm2: of a laser along the field. jmax: of the basis; None: what tolerance_mhz needs. diabatic_gap_mhz: None: no
+    diabatic labels.
+    """
+
+    top: Top
+    fields_kv_per_cm: tuple[float, ...]
+    j_highest: int = 2
+    m_values: tuple[int, ...] | None = None
+    intensity_w_per_cm2: float = 0.0
+    jmax: int | None = None
+    tolerance_mhz: float = DEFAULT_TOLERANCE_MHZ
+    diabatic_gap_mhz: float | None = None
+
+    def __post_init__(self) -> None:
+        checked_j(self.j_highest)
+        checked_m(self.m_values, self.j_highest)
+        require_whole("jmax", self.jmax, 2)
+        require_positive("tolerance_mhz", self.tolerance_mhz)
+        if self.diabatic_gap_mhz is not None:
+            require_positive("diabatic_gap_mhz", self.diabatic_gap_mhz)
+        acting(self.top, self.intensity_w_per_cm2)
+
+
+@dataclass(frozen=True)
+class StarkAnswer:
+    """The map that a request asked for."""
+
+    request: StarkRequest
+    states: FieldMap
+
+    def facts(self) -> Mapping[str, Any]:
+        """Everything about the answer but its table of states, by the keys of docs/command_line.md."""
+        fields, request = self.states.fields, self.request
+        return {
+            **top_facts(request.top),
+            "field_kv_per_cm": [float(fields[0]), float(fields[-1]), len(fields)],
+            "intensity_w_per_cm2": request.intensity_w_per_cm2,
+            "j_highest": request.j_highest,
+            "diabatic_gap_mhz": request.diabatic_gap_mhz,
+            "tolerance_mhz": request.tolerance_mhz,
+            **self.states.provenance,
+            "curves": len(self.states.curves()),
+        }
+
+
+def answer_stark(request: StarkRequest, executor: Executor | None = None) -> StarkAnswer:
+    """The map of a request. executor: blocks of states are spread over it.
+
+    >>> from rotor.tops.top import Top
+    >>> rod = Top.from_constants("B=6000 MHz", dipole_abc_debye=(0.7, 0, 0))
+    >>> answer_stark(StarkRequest(rod, (0.0, 1.0), j_highest=0)).states.energy_mhz.round(3).tolist()  # -μ²E²/6B
+    [0.0, -3.449]
+    """
+    states = stark_map(
+        request.top,
+        request.fields_kv_per_cm,
+        j_highest=request.j_highest,
+        m_values=request.m_values,
+        intensity_w_per_cm2=request.intensity_w_per_cm2,
+        jmax=request.jmax,
+        tolerance_mhz=request.tolerance_mhz,
+        diabatic_gap_mhz=request.diabatic_gap_mhz,
+        executor=executor,
+    )
+    return StarkAnswer(request, states)

@@ -1,0 +1,264 @@
+"""Nonlinear least squares by Levenberg and Marquardt, in scaled variables, which says how it ended.
+
+Of residuals r(p) = (observed - calculated)/σ and the Jacobian J = ∂(calculated/σ)/∂p the step δ minimises
+
+    |J δ - r|² + λ |D δ|²,       D the norms of the columns of J,
+
+(K. Levenberg, Q. Appl. Math. 2, 164 (1944); D. W. Marquardt, J. SIAM 11, 431 (1963); J. J. Moré, Lect. Notes Math. 630,
+105 (1978) for D). In the variables D p every column has the length 1, so that constants of 1e5 and of 1e-13 MHz stand
+side by side; the step comes from a QR and the singular values of R, never from JᵀJ, whose condition is squared. λ begins
+with 0: where the model is nearly linear, Gauss and Newton need a handful of steps.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from rotor.arrays import Floats
+
+Evaluate = Callable[[Floats], tuple[Floats, Floats]]  # p (n,) -> r (m,), J (m, n)
+Progress = Callable[["Iteration"], None]
+
+CONVERGED, STALLED, EXHAUSTED, INTERRUPTED = "converged", "stalled", "too many iterations", "interrupted"
+FIRST_DAMPING, MOST_DAMPING = 1e-4, 1e12  # λ where D p has columns of length 1
+ROUND_OFF = 1e-13  # singular values below this part of the largest carry no information
+
+
+@dataclass(frozen=True)
+class Iteration:
+    """One step that was tried: its number, weighted rms before and after, λ, and whether it was taken.
+
+    predicted : the decrease of χ² that the linear model expects of the step
+    """
+
+    number: int
+    rms_before: float
+    rms_after: float
+    damping: float
+    predicted: float
+    taken: bool
+
+
+@dataclass(frozen=True)
+class Minimum:
+    """Where a search ended.
+
+    parameters (n,), residuals (m,), jacobian (m, n) : at the best point found, which is what a search that did not end
+        well leaves too
+    status : "converged", "stalled", "too many iterations" or "interrupted"; reason : the same in a sentence with numbers
+    gradient : largest |cosine| between the residuals and a column of the Jacobian, 0 at a minimum
+    distance : length of the undamped step in standard errors, √(δᵀ JᵀJ δ), 0 at a minimum
+    """
+
+    parameters: Floats
+    residuals: Floats
+    jacobian: Floats
+    status: str
+    reason: str
+    gradient: float
+    distance: float
+    iterations: tuple[Iteration, ...] = field(default=(), repr=False)
+
+    @property
+    def converged(self) -> bool:
+        """Whether the search ended at a minimum."""
+        return self.status == CONVERGED
+
+    @property
+    def rms(self) -> float:
+        """√(Σ r²/m), the weighted rms."""
+        return _rms(self.residuals)
+
+
+def minimise(
+    evaluate: Evaluate,
+    start: Floats,
+    *,
+    tolerance: float = 1e-4,
+    most_iterations: int = 100,
+    progress: Progress | None = None,
+) -> Minimum:
+    """The parameters that make Σ r² least, from a start.
+
+    Parameters
+    ----------
+    evaluate : callable
+        p (n,) to weighted residuals (m,) and the Jacobian (m, n) of what is calculated. Where p is out of bounds it raises
+        ValueError or returns numbers that are not finite: the step is then shortened.
+    start : (n,) array
+    tolerance : float
+        The search has converged when the full step would move the parameters by less than this many standard errors,
+        times the weighted rms where that is above 1.
+    most_iterations : int
+        Evaluations after the first.
+    progress : callable, optional
+        Called with every `Iteration`. A KeyboardInterrupt, there or in `evaluate`, ends the search with the best point.
+
+    Returns
+    -------
+    Minimum
+
+    Raises
+    ------
+    ValueError
+        When the start itself cannot be evaluated.
+
+    Notes
+    -----
+    Neglected: second derivatives of the model (Gauss and Newton); a minimum may be a local one.
+
+    >>> x = np.arange(5.0)
+    >>> def decay(p):
+    ...     return np.exp(-0.5 * x) - np.exp(-p[0] * x), (-x * np.exp(-p[0] * x))[:, None]
+    >>> found = minimise(decay, np.array([2.0]))
+    >>> found.status, round(float(found.parameters[0]), 3)
+    ('converged', 0.5)
+    """
+    point = np.array(start, dtype=float)
+    state = _State.at(point, *_evaluated(evaluate, point))
+    scale, damping, taken = state.norms, 0.0, list[Iteration]()
+    try:
+        while True:
+            scale = np.maximum(scale, state.norms)
+            linear = _Linear.of(state, scale)
+            if linear.distance <= tolerance * max(1.0, state.rms):
+                return state.ended(CONVERGED, linear, taken)
+            if len(taken) >= most_iterations:
+                return state.ended(EXHAUSTED, linear, taken)
+
+            step, predicted = linear.step(damping)
+            trial = _tried(evaluate, state.parameters + step)
+            after = trial.rms if trial else math.inf
+            gain = (state.rms**2 - after**2) * len(state.residuals) / predicted if predicted > 0 else -1.0
+            good = math.isfinite(after) and gain > 1e-4
+            taken.append(Iteration(len(taken) + 1, state.rms, after, damping, predicted, good))
+            if good and trial:
+                state = trial
+            if progress:
+                progress(taken[-1])
+            if good:
+                damping = _relaxed(damping, gain)
+                continue
+            damping = max(10.0 * damping, FIRST_DAMPING)
+            if damping > MOST_DAMPING:
+                return state.ended(_without_decrease(linear, state, tolerance), linear, taken)
+    except KeyboardInterrupt:
+        return state.ended(INTERRUPTED, _Linear.of(state, scale), taken)
+
+
+def _relaxed(damping: float, gain: float) -> float:
+    """λ after a step that was taken: less where the linear model foretold its gain, more where it did not."""
+    if gain < 0.25:
+        return max(4.0 * damping, FIRST_DAMPING)
+    if gain > 0.75:
+        damping /= 10.0
+    return damping if damping >= FIRST_DAMPING else 0.0
+
+
+def _without_decrease(linear: _Linear, state: _State, tolerance: float) -> str:
+    """No step decreases χ²: round-off has been reached if what is left to gain is small, else the search has stalled."""
+    return CONVERGED if linear.distance < 100 * tolerance * max(1.0, state.rms) else STALLED
+
+
+def _evaluated(evaluate: Evaluate, point: Floats) -> tuple[Floats, Floats]:
+    residuals, jacobian = evaluate(point)
+    if not (np.isfinite(residuals).all() and np.isfinite(jacobian).all()):
+        raise ValueError("the model is not finite at the start; give other start values")
+    if jacobian.shape != (len(residuals), len(point)):
+        raise ValueError(f"a Jacobian of shape {jacobian.shape}; ({len(residuals)}, {len(point)}) is needed")
+    return residuals, jacobian
+
+
+def _tried(evaluate: Evaluate, point: Floats) -> _State | None:
+    try:
+        return _State.at(point, *_evaluated(evaluate, point))
+    except ValueError:  # out of the bounds of the model: the step is too long
+        return None
+
+
+def _rms(residuals: Floats) -> float:
+    return float(np.sqrt(residuals @ residuals / len(residuals))) if len(residuals) else 0.0
+
+
+@dataclass(frozen=True)
+class _State:
+    """A point with residuals and Jacobian, and the triangle R of the QR of (J, r), from which all else follows."""
+
+    parameters: Floats
+    residuals: Floats
+    jacobian: Floats
+    triangle: Floats
+
+    @classmethod
+    def at(cls, parameters: Floats, residuals: Floats, jacobian: Floats) -> _State:
+        stacked = np.empty((len(residuals), len(parameters) + 1), order="F")
+        stacked[:, :-1], stacked[:, -1] = jacobian, residuals
+        return cls(parameters, residuals, jacobian, _triangle(stacked))
+
+    @property
+    def norms(self) -> Floats:
+        """Lengths (n,) of the columns of the Jacobian."""
+        return np.asarray(np.sqrt(np.einsum("ij,ij->j", self.triangle[:, :-1], self.triangle[:, :-1])))
+
+    @property
+    def rms(self) -> float:
+        return _rms(self.residuals)
+
+    def ended(self, status: str, linear: _Linear, iterations: list[Iteration]) -> Minimum:
+        count = len(iterations)
+        reasons = {
+            CONVERGED: f"converged after {count} iterations: the next step would be {linear.distance:.1e} standard errors",
+            STALLED: f"no step decreases the residuals, although {linear.distance:.1e} standard errors seem to be left",
+            EXHAUSTED: f"{count} iterations were not enough: the next step would be {linear.distance:.1e} standard errors",
+            INTERRUPTED: f"interrupted after {count} iterations: the next step would be {linear.distance:.1e} standard errors",
+        }
+        return Minimum(
+            self.parameters, self.residuals, self.jacobian, status, reasons[status], linear.gradient, linear.distance,
+            tuple(iterations),
+        )  # fmt: skip
+
+
+def _triangle(stacked: Floats) -> Floats:
+    """R of the QR of (m, n), or the matrix itself where it has fewer rows than columns."""
+    if len(stacked) <= stacked.shape[1]:
+        return stacked
+    return np.asarray(np.linalg.qr(stacked, mode="r"))
+
+
+@dataclass(frozen=True)
+class _Linear:
+    """The linear model at a point, D p its variables: singular values s, z = Uᵀ r, and D⁻¹ V."""
+
+    s: Floats
+    z: Floats
+    back: Floats
+    gradient: float
+
+    @classmethod
+    def of(cls, state: _State, scale: Floats) -> _Linear:
+        safe = np.where(scale > 0, scale, 1.0)
+        columns: Floats = state.triangle[:, :-1]
+        last: Floats = state.triangle[:, -1]
+        u, s, vt = np.linalg.svd(columns / safe, full_matrices=False)
+        s = np.where(s > ROUND_OFF * s.max(initial=0.0), s, 0.0)
+        size = float(np.linalg.norm(last)) or 1.0
+        norms = np.where(state.norms > 0, state.norms, 1.0)
+        gradient = np.abs(columns.T @ last) / (norms * size)
+        return cls(s, u.T @ last, vt.T / safe[:, None], float(gradient.max(initial=0.0)))
+
+    @property
+    def distance(self) -> float:
+        """√(δᵀ JᵀJ δ) of the undamped step."""
+        return float(np.linalg.norm(self.z[self.s > 0]))
+
+    def step(self, damping: float) -> tuple[Floats, float]:
+        """The step δ and the decrease of χ² that it promises, |r|² - |r - J δ|²."""
+        used = self.s > 0
+        factor = np.where(used, self.s / np.where(used, self.s**2 + damping, 1.0), 0.0)
+        along = factor * self.z
+        promised = 2 * (self.s * along) @ self.z - (self.s * along) @ (self.s * along)
+        return self.back @ along, float(promised)

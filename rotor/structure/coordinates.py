@@ -1,0 +1,242 @@
+"""Bonds and angles by name, and moves of the atoms that keep the symmetry of a molecule.
+
+A structure is refined along totally symmetric displacements u (an orthonormal basis S of those Cartesian displacements that
+every operation leaves alike, translations and rotations taken out), so that x = x₀ + S u retains its point group whatever is
+fitted. Named coordinates q(x) are set by Newton's method, S δu = S (B S)⁺ (q_wanted - q(x)), B the matrix of Wilson; what the
+names leave open moves as little as it can (the pseudo-inverse).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor.arrays import Floats
+from rotor.molecules.internal_coordinates import Coordinate, bend, stretch, torsion, wilson_b
+from rotor.molecules.molecule import Molecule
+from rotor.molecules.symmetry.operations import symmetrised
+from rotor.molecules.symmetry.point_group import symmetry_of
+
+Atoms = tuple[int, ...]  # counted from 1
+
+UNITS = {2: "Å", 3: "°", 4: "°"}
+BOND_WITHIN = 1.25  # of the sum of covalent radii: two atoms nearer than that are bonded
+_STRAIGHT = 1e-6  # radian from 180° within which an angle has no derivative
+
+
+@dataclass(frozen=True)
+class Named:
+    """An internal coordinate: a name, the atoms from 1 (2: distance, 3: angle, 4: dihedral angle), and those like it.
+
+    alike : the tuples of atoms that symmetry makes equal to it, itself first
+    """
+
+    name: str
+    atoms: Atoms
+    alike: tuple[Atoms, ...]
+
+    @property
+    def unit(self) -> str:
+        """Å or °."""
+        return UNITS[len(self.atoms)]
+
+    @property
+    def factor(self) -> float:
+        """From Å or radian to the unit that is printed."""
+        return 1.0 if len(self.atoms) == 2 else 180.0 / np.pi
+
+    def value(self, positions: Floats) -> float:
+        """Å or degrees."""
+        return float(np.real(_function(self.atoms)(positions))) * self.factor
+
+    def gradient(self, positions: Floats) -> Floats:
+        """∂/∂x (3n,) of the coordinate, the mean over those like it, in Å or radian per Å."""
+        return np.asarray(wilson_b([_function(atoms) for atoms in self.alike], positions).mean(axis=0))
+
+
+def _function(atoms: Atoms) -> Coordinate:
+    places = [atom - 1 for atom in atoms]
+    if len(places) == 2:
+        return stretch(*places)
+    return bend(*places) if len(places) == 3 else torsion(*places)
+
+
+def permutations(molecule: Molecule) -> list[NDArray[np.int64]]:
+    """The permutations of atoms under all operations of the nuclei, masses apart: isotopes count as alike."""
+    symmetry = symmetry_of(_without_isotopes(molecule))
+    return [one.permutation for one in (*symmetry.rotations, *symmetry.improper)]
+
+
+def _without_isotopes(molecule: Molecule) -> Molecule:
+    return Molecule(molecule.symbols, molecule.positions_angstrom, electronic=molecule.electronic)
+
+
+def named(molecule: Molecule, name: str, atoms: Sequence[int]) -> Named:
+    """A coordinate of a molecule with those that symmetry makes equal to it.
+
+    Raises ValueError for other than 2, 3 or 4 different atoms, atoms that are not there, and a straight angle, which has no
+    derivative: leave it out, symmetry or the geometry fixes it.
+    """
+    chosen, count = tuple(int(atom) for atom in atoms), len(molecule.symbols)
+    if len(chosen) not in UNITS or len(set(chosen)) < len(chosen):
+        raise ValueError(
+            f"{name} = {list(atoms)}: 2 (distance), 3 (angle) or 4 (dihedral angle) different atoms are needed"
+        )
+    if not all(1 <= atom <= count for atom in chosen):
+        raise ValueError(f"{name} = {list(atoms)}: the molecule has atoms 1 to {count}")
+    found = Named(name, chosen, (chosen,))
+    if len(chosen) == 3 and abs(found.value(molecule.positions_angstrom) - 180.0) < np.degrees(_STRAIGHT):
+        raise ValueError(f"{name} = {list(atoms)}: a straight angle cannot be fitted; leave it out, it stays straight")
+    images = dict.fromkeys(_one_way(tuple(int(p[atom - 1]) + 1 for atom in chosen)) for p in permutations(molecule))
+    if len(chosen) == 4:  # a reflection turns the sign of a dihedral angle: such images are no equals
+        value = found.value(molecule.positions_angstrom)
+        images = {
+            image: None
+            for image in images
+            if abs(Named("", image, (image,)).value(molecule.positions_angstrom) - value) < 1e-3
+        }
+    return Named(name, chosen, tuple(dict.fromkeys((_one_way(chosen), *images))))
+
+
+def _one_way(atoms: Atoms) -> Atoms:
+    """A coordinate read forwards and backwards is one."""
+    return min(atoms, atoms[::-1])
+
+
+def symmetric_geometry(molecule: Molecule) -> Molecule:
+    """The molecule with its nuclei exactly where its symmetry has them; isotopes, centre and frame stay.
+
+    >>> tilted = Molecule(("O", "C", "S"), [[0, 1e-4, 1.16], [0, 0, 0], [0, 0, -1.56]])
+    >>> float(np.abs(symmetric_geometry(tilted).positions_angstrom[:, 0]).max())
+    0.0
+    """
+    plain = _without_isotopes(molecule)
+    symmetry, centre = symmetry_of(plain), plain.centre_of_mass_angstrom
+    points = plain.positions_angstrom - centre
+    if symmetry.linear:
+        axis = symmetry.axes_abc[0]
+        permutation = symmetry.rotations[-1].permutation
+        along = points @ axis
+        if (permutation != np.arange(len(along))).any():
+            along = (along - along[permutation]) / 2
+        ideal = np.outer(along, axis)
+    else:
+        ideal, _ = symmetrised(points, [*symmetry.rotations, *symmetry.improper])
+    return replace(molecule, positions_angstrom=ideal + centre)
+
+
+def symmetric_displacements(molecule: Molecule) -> Floats:
+    """S (3n, k): an orthonormal basis of the totally symmetric displacements that change the shape.
+
+    >>> water = Molecule(("O", "H", "H"), [[0, 0, 0.1173], [0, 0.7572, -0.4692], [0, -0.7572, -0.4692]])
+    >>> symmetric_displacements(water).shape     # the two coordinates of C2v water: one bond, one angle
+    (9, 2)
+    """
+    plain = _without_isotopes(molecule)
+    symmetry = symmetry_of(plain)
+    positions = plain.positions_angstrom - plain.centre_of_mass_angstrom
+    n = len(positions)
+    if symmetry.linear:
+        project = _along_axis(positions, symmetry.rotations[-1].permutation)
+    else:
+        operations = (*symmetry.rotations, *symmetry.improper)
+        project = np.mean([_acting(one.matrix, one.permutation) for one in operations], axis=0)
+    rigid = np.linalg.qr(_rigid_motions(positions))[0] if n > 1 else np.zeros((3 * n, 0))
+    rigid = project @ rigid @ rigid.T
+    values, vectors = np.linalg.eigh((project + project.T) / 2 - (rigid + rigid.T) / 2)
+    return np.asarray(vectors[:, values > 0.5])
+
+
+def _acting(matrix: Floats, permutation: NDArray[np.int64]) -> Floats:
+    """The operation on displacements (3n, 3n): atom i goes to the place of atom permutation[i]."""
+    n = len(permutation)
+    out = np.zeros((3 * n, 3 * n))
+    for i, image in enumerate(permutation.tolist()):
+        out[3 * image : 3 * image + 3, 3 * i : 3 * i + 3] = matrix
+    return out
+
+
+def _along_axis(positions: Floats, reversal: NDArray[np.int64]) -> Floats:
+    """The projector on displacements along the axis of a linear molecule, even under its half turn if it has one."""
+    axis = np.linalg.svd(positions)[2][0]
+    along = np.kron(np.eye(len(positions)), np.outer(axis, axis))
+    turned = _acting(-np.outer(axis, axis), reversal)
+    same = bool((reversal == np.arange(len(reversal))).all())
+    return np.asarray(along if same else (along + turned) / 2, dtype=np.float64)
+
+
+def _rigid_motions(positions: Floats) -> Floats:
+    """Translations and rotations as columns (3n, 5 or 6)."""
+    shifts = np.tile(np.eye(3), (len(positions), 1))
+    turns = np.stack([np.cross(axis, positions).ravel() for axis in np.eye(3)], axis=1)
+    both = np.column_stack([shifts, turns])
+    u, s, _ = np.linalg.svd(both, full_matrices=False)
+    return np.asarray(u[:, s > 1e-8 * s[0]])
+
+
+def moved_to(positions: Floats, space: Floats, coordinates: Sequence[Named], targets: Floats) -> Floats:
+    """Positions (n, 3) at which the coordinates have the target values (Å, degrees), reached along `space` (3n, k).
+
+    Raises ValueError where they cannot all be had (coordinates that contradict each other, or a step that does not settle).
+    """
+    x = positions.copy()
+    factors = np.array([one.factor for one in coordinates])
+    missing = np.inf
+    for _ in range(50):
+        off = (targets - np.array([one.value(x) for one in coordinates])) / factors
+        missing = float(np.abs(off).max(initial=0.0))
+        if missing < 1e-12:
+            return x
+        b = np.array([one.gradient(x) for one in coordinates]) @ space
+        x = x + (space @ np.linalg.lstsq(b, off, rcond=1e-9)[0]).reshape(x.shape)
+    if missing < 1e-9:
+        return x
+    names = ", ".join(one.name for one in coordinates)
+    raise ValueError(f"{names}: no symmetric geometry has these values; {missing:.1e} Å or radian are left")
+
+
+def bonded(molecule: Molecule) -> list[Atoms]:
+    """Pairs of atoms, from 1, nearer than 1.25 times the sum of their covalent radii (ASE's, of Cordero et al. 2008)."""
+    from ase.data import atomic_numbers, covalent_radii
+
+    radii = np.array([covalent_radii[atomic_numbers[symbol]] for symbol in molecule.symbols])
+    x = molecule.positions_angstrom
+    apart = np.linalg.norm(x[:, None] - x[None], axis=2)
+    near = apart < BOND_WITHIN * (radii[:, None] + radii[None])
+    return [(int(i) + 1, int(j) + 1) for i, j in np.argwhere(np.triu(near, 1))]
+
+
+def bonds_and_angles(molecule: Molecule) -> list[Named]:
+    """Every bond and every angle between bonds that is not straight, one of each kind that symmetry makes equal."""
+    pairs = bonded(molecule)
+    found = [(f"r({_label(molecule, pair)})", pair) for pair in pairs]
+    near: dict[int, list[int]] = {}
+    for i, j in pairs:
+        near.setdefault(i, []).append(j)
+        near.setdefault(j, []).append(i)
+    for apex, ends in sorted(near.items()):
+        for one, other in ((a, b) for k, a in enumerate(sorted(ends)) for b in sorted(ends)[k + 1 :]):
+            found.append((f"a({_label(molecule, (one, apex, other))})", (one, apex, other)))
+    return _distinct(molecule, found)
+
+
+def _label(molecule: Molecule, atoms: Atoms) -> str:
+    return "-".join(f"{molecule.symbols[atom - 1]}{atom}" for atom in atoms)
+
+
+def _distinct(molecule: Molecule, found: Sequence[tuple[str, Atoms]]) -> list[Named]:
+    seen: set[Atoms] = set()
+    out = []
+    for name, atoms in found:
+        if _one_way(atoms) in seen:
+            continue
+        try:
+            one = named(molecule, name, atoms)
+        except ValueError:  # a straight angle
+            continue
+        seen.update(one.alike)
+        out.append(one)
+    return out

@@ -1,0 +1,29 @@
+"""What spins that are coupled one by one do to a partition function: they multiply it.
+
+    Q = Σ_rot e^(-E/kT) Σ_F (2F+1) e^(-δ_F/kT) = Π(2I+1) Q_rot [1 + O((δ/kT)²)]
+
+The first order in the shifts δ vanishes for traceless couplings, since the mean of δ over all F of a rotational level, with weights
+2F+1, is zero. At 1 K a coupling of 100 MHz leaves (δ/kT)²/2 = 1e-5.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import prod
+from typing import TYPE_CHECKING
+
+from rotor.quantum.effect import QuantumEffect
+
+if TYPE_CHECKING:
+    from rotor.tops.top import Top
+
+
+def without_spins(top: Top, effects: Sequence[QuantumEffect]) -> tuple[tuple[QuantumEffect, ...], int]:
+    """The effects that need no spin, and Π(2I+1) over the nuclear spins that the others couple.
+
+    With an unpaired electron nothing is left out: its couplings are too large for this, and the factor is 1.
+    """
+    spins = {spin.name: spin for effect in effects for spin in effect.spins(top)}
+    if any(spin.electron for spin in spins.values()):
+        return tuple(effects), 1
+    return tuple(effect for effect in effects if not effect.spins(top)), prod(spin.twice + 1 for spin in spins.values())

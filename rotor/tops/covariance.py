@@ -1,0 +1,95 @@
+"""The covariance of rotational constants, as a fit leaves it and as errors of levels and lines need it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rotor.arrays import Floats
+from rotor.tops.constants import Constants
+
+_NEGATIVE = 1e-4  # a correlation matrix printed with few digits has eigenvalues below zero by so much
+
+
+@dataclass(frozen=True, eq=False)
+class Covariance:
+    """Covariance of some constants of a set.
+
+    names: which. matrix_mhz2: (n, n), symmetric, MHz². Constants that are not named are taken as exact.
+    Raises ValueError for names given twice, a matrix of another shape, and one that is no covariance.
+    """
+
+    names: tuple[str, ...]
+    matrix_mhz2: Floats
+
+    def __post_init__(self) -> None:
+        matrix = np.asarray(self.matrix_mhz2, dtype=np.float64)
+        _refuse_impossible(self.names, matrix)
+        object.__setattr__(self, "matrix_mhz2", matrix)
+
+    @classmethod
+    def of_uncertainties(cls, constants: Constants) -> Covariance | None:
+        """Uncorrelated constants with the uncertainties they carry; None where they carry none.
+
+        Published constants are correlated, which is not printed as often as it should be: errors of lines from
+        uncertainties alone are mostly too large.
+        """
+        if not constants.uncertainties:
+            return None
+        return cls(tuple(constants.uncertainties), np.diag([s**2 for s in constants.uncertainties.values()]))
+
+    @classmethod
+    def of_correlations(cls, names: Sequence[str], uncertainties_mhz: ArrayLike, correlations: ArrayLike) -> Covariance:
+        """From standard deviations (n,) in MHz and their correlation coefficients (n, n).
+
+        >>> Covariance.of_correlations(["B", "D"], [0.1, 0.01], [[1, 0.5], [0.5, 1]]).matrix_mhz2.round(6).tolist()
+        [[0.01, 0.0005], [0.0005, 0.0001]]
+        """
+        sigma = np.asarray(uncertainties_mhz, dtype=np.float64)
+        matrix = np.asarray(correlations, dtype=np.float64)
+        if sigma.shape != (len(names),) or matrix.shape != (len(names), len(names)):
+            raise ValueError(
+                f"{len(names)} constants with uncertainties of shape {sigma.shape} and correlations of shape "
+                f"{matrix.shape}; ({len(names)},) and ({len(names)}, {len(names)}) are needed"
+            )
+        if not np.allclose(np.diag(matrix), 1.0):
+            raise ValueError("a correlation matrix has 1 on its diagonal; is this a covariance?")
+        return cls(tuple(names), matrix * np.outer(sigma, sigma))
+
+    @property
+    def correlations(self) -> Floats:
+        """Correlation coefficients (n, n); 0 beside a constant that is exact."""
+        sigma = np.sqrt(np.diag(self.matrix_mhz2))
+        safe = np.where(sigma > 0, sigma, 1.0)
+        matrix = self.matrix_mhz2 / np.outer(safe, safe)
+        np.fill_diagonal(matrix, 1.0)
+        return np.asarray(matrix)
+
+    @property
+    def factor(self) -> Floats:
+        """F with C = F Fᵀ, (n, n), in MHz."""
+        sigma = np.sqrt(np.diag(self.matrix_mhz2))
+        safe = np.where(sigma > 0, sigma, 1.0)
+        values, vectors = np.linalg.eigh(self.matrix_mhz2 / np.outer(safe, safe))
+        return np.asarray(sigma[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)))
+
+
+def _refuse_impossible(names: Sequence[str], matrix: Floats) -> None:
+    if len(set(names)) != len(names):
+        raise ValueError(f"covariance of {', '.join(names)}: a name stands twice")
+    if matrix.shape != (len(names), len(names)):
+        raise ValueError(
+            f"covariance of {len(names)} constants of shape {matrix.shape}: a square of that size is needed"
+        )
+    variances = np.diag(matrix)
+    if not np.isfinite(matrix).all() or (variances < 0).any():
+        raise ValueError("covariance: finite numbers are needed, and variances of 0 or more")
+    sigma = np.sqrt(variances)
+    scale = np.outer(np.where(sigma > 0, sigma, 1.0), np.where(sigma > 0, sigma, 1.0))
+    if not np.allclose(matrix / scale, matrix.T / scale, rtol=0, atol=1e-9):
+        raise ValueError("covariance: a covariance is symmetric, this matrix is not")
+    if len(names) and np.linalg.eigvalsh(matrix / scale).min() < -_NEGATIVE:
+        raise ValueError("covariance: some combination of the constants has a negative variance; check the matrix")

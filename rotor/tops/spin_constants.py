@@ -1,0 +1,118 @@
+"""Constants of nuclear and electron spins of a top, by name, with the spins they belong to.
+
+    chi_aa(14N) = -4.22 MHz      quadrupole coupling along a      C_bb(14N), eps_aa(S), T_aa(S,14N), b_F(S,14N), ...
+
+Names are those of `rotor.quantum.effects`: hyperfine, spin_rotation, spin_spin. A spin is called after its isotope (14N; 35Cl_1 and
+35Cl_2 where there are several), which also says how large it is; any other name, such as S, must come with its spin.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+from rotor.molecules.nuclei import isotope
+from rotor.units import parse_quantity
+
+_ITEM = re.compile(
+    r"(?P<name>[A-Za-z][\w-]*\([^()]*\))\s*=\s*(?P<number>[-+−]?[\d.]+(?:[eEdD][-+]?\d+)?)\s*(?P<unit>[A-Za-z][\w-]*(?![\w(]))?"
+)
+_ISOTOPE = re.compile(r"(\d+[A-Z][a-z]?|D|T)(?:_\w+)?")
+
+
+@dataclass(frozen=True, eq=False)
+class SpinConstants:
+    """Values in MHz by name, the spins in the order in which they are coupled, and where the values are from.
+
+    twice: twice every spin, by its name. ValueError for a spin that is none, and for constants of a spin that is not listed.
+    """
+
+    values: Mapping[str, float]
+    twice: Mapping[str, int]
+    source: str = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "values", MappingProxyType(dict(self.values)))
+        object.__setattr__(self, "twice", MappingProxyType(dict(self.twice)))
+        for name, twice in self.twice.items():
+            if twice < 1:
+                raise ValueError(
+                    f"spin {name}: expected 1/2, 1, 3/2, ..., found {twice}/2; a nucleus without spin splits nothing"
+                )
+        for name in self.values:
+            for spin in spins_of(name):
+                if spin not in self.twice:
+                    raise ValueError(f"{name}: spin {spin} is not among {', '.join(self.twice) or 'none'}")
+
+    @classmethod
+    def parse(cls, text: str, spins: str | None = None, source: str = "") -> SpinConstants:
+        """From text such as "chi_aa(14N)=-4.22 chi_bb-cc(14N)=1.1 MHz" and, where a name is no isotope, "S=1/2 14N=1".
+
+        An item keeps its own unit; a unit at the end serves every item that carries none; without any, numbers are MHz.
+
+        >>> constants = SpinConstants.parse("chi_aa(14N)=-4.22408 MHz")
+        >>> dict(constants.values), dict(constants.twice)
+        ({'chi_aa(14N)': -4.22408}, {'14N': 2})
+        """
+        items = list(_ITEM.finditer(text))
+        rest = _ITEM.sub("", text).replace(",", " ").strip()
+        if not items or rest:
+            raise ValueError(
+                f"{text!r}: expected constants such as chi_aa(14N)=-4.22 MHz"
+                + (f"; {rest!r} is none" if rest and items else "")
+            )
+        shared = items[-1]["unit"] or "MHz"
+        values: dict[str, float] = {}
+        for item in items:
+            name = re.sub(r"\s+", "", item["name"])
+            if name in values:
+                raise ValueError(f"{text!r}: {name} is given twice; leave one out")
+            values[name] = parse_quantity(f"{item['number']} {item['unit'] or shared}", "MHz")
+        given = parse_spins(spins) if spins else {}
+        return cls(values, given | {s: twice_of(s) for s in _named(values) if s not in given}, source)
+
+
+def _named(values: Mapping[str, float]) -> list[str]:
+    return list(dict.fromkeys(spin for name in values for spin in spins_of(name)))
+
+
+def spins_of(name: str) -> tuple[str, ...]:
+    """The spins that a constant belongs to.
+
+    >>> spins_of("T_aa(S,14N)")
+    ('S', '14N')
+    """
+    inside = name.partition("(")[2].partition(")")[0]
+    return tuple(part.strip() for part in inside.split(",") if part.strip())
+
+
+def twice_of(spin: str) -> int:
+    """Twice the spin of the nucleus that a spin is called after.
+
+    >>> twice_of("14N"), twice_of("35Cl_2"), twice_of("D")
+    (2, 3, 2)
+    """
+    match = _ISOTOPE.fullmatch(spin)
+    if not match:
+        raise ValueError(
+            f"spin {spin}: is not called after an isotope (14N, 35Cl_1); say how large it is, such as {spin}=1/2"
+        )
+    return round(2 * isotope(match[1]).spin)
+
+
+def parse_spins(text: str) -> dict[str, int]:
+    """Twice the spins by name from "S=1/2 14N=1", in that order.
+
+    >>> parse_spins("S=1/2, 14N=1")
+    {'S': 1, '14N': 2}
+    """
+    found: dict[str, int] = {}
+    for part in text.replace(",", " ").split():
+        name, equals, value = part.partition("=")
+        number, slash, half = value.partition("/")
+        if not (equals and name and number.isdigit() and (half == "2" or not slash)):
+            raise ValueError(f"{text!r}: expected spins such as S=1/2 14N=1; {part!r} is none")
+        found[name] = int(number) if slash else 2 * int(number)
+    return found

@@ -1,0 +1,150 @@
+"""`rotor levels` and its files keep their contract: docs/command_line.md."""
+
+from __future__ import annotations
+
+import csv
+import gzip
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import rotor
+from rotor.cli.shared.output import plain, rows_of
+from rotor.formats.spcat.egy import read_egy
+from rotor.formats.spcat.int_file import read_int
+from rotor.formats.spcat.level_list import level_list
+from rotor.formats.spcat.model import top_of
+from rotor.formats.spcat.par import read_par
+from rotor.plots.levels import ladders, plot_levels
+from rotor.quantum.request import LevelsRequest, answer_levels
+
+KEYS = {
+    "jmin", "jmax", "kmin", "kmax", "max_energy_mhz", "quantum_numbers", "level_count", "ground_mhz", "levels", "files",
+}  # fmt: skip
+
+
+def test_the_same_request_gives_the_same_answer(call):
+    arguments = ("--j", "1:6", "--k", "1:2", "--max-energy", "200cm-1", "--json", "-")
+    told = json.loads(call("levels", "H2CO", *arguments)[1])
+    request = LevelsRequest(rotor.read("H2CO"), jmin=1, jmax=6, kmin=1, kmax=2, max_energy_mhz=200 * 29979.2458)
+    answer = answer_levels(request)
+    facts = plain({**answer.facts(), "levels": rows_of(answer.table)})
+    assert {key: told[key] for key in facts} == facts
+    assert len(told["levels"]) == told["level_count"] > 10
+
+
+def test_the_contract(call):
+    told = json.loads(call("levels", "water", "--json", "-")[1])
+    info = json.loads(call("info", "water", "--json", "-")[1])
+    assert set(told) == KEYS | set(info) - {"partition_function"}
+    assert set(told["levels"][0]) == {
+        "j", "ka", "kc", "energy_mhz", "energy_cm", "energy_k", "weight", "degeneracy",
+    }  # fmt: skip
+    assert told["jmax"] == 10
+
+
+@pytest.mark.parametrize(("unit", "energy"), [("MHz", "12.0000"), ("cm-1", "0.000400"), ("K", "0.000576")])
+def test_the_table_is_in_the_unit_asked_for(call, unit, energy):
+    """2B of B = 6 MHz; 6 MHz are 2.0e-4 cm⁻¹ and 2.88e-4 K."""
+    _, out, _ = call("levels", "--constants", "B=6 MHz", "--jmax", "1", "--unit", unit)
+    table = out.split("in order of energy\n")[1].splitlines()
+    assert table[0].split() == ["J", "E", f"({unit})", "spin", "weight", "g"]
+    assert table[2].split() == ["1", energy, "1", "3"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("--j", "5:2"), "--j: '5:2': expected a range that rises, but 5 is above 2"),
+        (("--j", "x"), "--j: 'x': expected a whole number or a range of them, such as 2:5"),
+        (("--j", "1:2", "--jmax", "3"), "--j and --jmax: give one of them"),
+        (("--unit", "eV"), "--unit: 'eV': expected one of MHz, cm-1, K"),
+        (("--max-energy", "0"), "--max-energy: 0: expected a finite number above 0"),
+        (("--max-energy", "5kg"), "--max-energy: '5kg': unit 'kg' does not measure the same thing as 'MHz'"),
+        (("--egy", "a.txt"), "--egy a.txt: the name must end in .egy"),
+    ],
+)
+def test_mistakes_are_one_line(call, folder, arguments, said):
+    code, out, err = call("levels", "water", *arguments, "--csv", "a.csv")
+    assert (code, out) == (2, "")
+    assert err.startswith(f"error: {said}")
+    assert err.count("\n") == 1
+    assert not list(folder.iterdir())
+
+
+def test_k_of_a_linear_top_is_refused(call):
+    code, _, err = call("levels", "CO", "--k", "1:2")
+    assert (code, err) == (2, "error: --k: the levels of a linear top have no K; give J alone\n")
+
+
+def test_files(call, folder):
+    assert call("levels", "CH3CN", "--jmax", "4", "--csv", "a.csv", "--egy", "a.egy", "--plot", "a.png")[0] == 0
+    with open(folder / "a.csv", newline="") as handle:
+        rows = list(csv.DictReader(handle))
+    table = answer_levels(LevelsRequest(rotor.read("CH3CN"), jmax=4)).table
+    assert [float(row["energy_cm"]) for row in rows] == table.energy_cm.tolist()
+    assert len(read_egy(folder / "a.egy")) == len(rows) == 15  # J + 1 values of |K| for each J
+    assert (folder / "a.png").read_bytes().startswith(b"\x89PNG")
+    assert json.loads((folder / "a.csv.provenance.json").read_text())["command"].startswith("rotor levels CH3CN")
+
+
+def test_irreps_have_no_place_in_an_egy_file(call, folder):
+    code, _, err = call("levels", "--constants", "B=5.24 cm-1, Dt=1e-6 cm-1", "--egy", "a.egy")
+    assert code in (1, 2)
+    assert err.count("\n") == 1
+    assert not list(folder.iterdir())
+
+
+@pytest.mark.oracle
+@pytest.mark.parametrize("case", ["abc_rigid_j20_all", "so2", "h2co"])
+def test_blocks_and_energies_are_those_of_spcat(shared: Path, case):
+    """Every level of the reference's list with the same block, rank, degeneracy and energy."""
+    folder = shared / "reference" / "spcat" / case
+    reference = read_egy(gzip.decompress((folder / f"{case}.egy.gz").read_bytes()))
+    top = top_of(read_par(folder / f"{case}.var"), read_int(folder / f"{case}.int"))
+    ours = level_list(answer_levels(LevelsRequest(top, jmax=20)).table)
+    places = {tuple(row): i for i, row in enumerate(ours.quanta.tolist())}
+    rows = [i for i in range(len(reference)) if reference.quanta[i, 0] <= 20]
+    mine = np.array([places[tuple(reference.quanta[i].tolist())] for i in rows])
+    assert len(rows) > 200
+    if case != "so2":  # where SPCAT counts only the species that exist
+        assert (ours.block[mine] == reference.block[rows]).all()
+    assert (ours.rank[mine] == reference.rank[rows]).all()
+    assert (
+        np.abs(ours.energy_cm[mine] - reference.energy_cm[rows]).max() < 1.5e-6
+    )  # half a digit of print and 1e-6 of it
+    ratio = reference.degeneracy[rows] / ours.degeneracy[mine]
+    assert len(set(ratio.tolist())) == 1  # our weights are reduced by their common divisor
+
+
+def test_columns_of_the_diagram():
+    for source, name, count in (("CH3CN", "|K|", 5), ("water", "Ka", 5), ("CO", "J", 5), ("CH4", "J", 5)):
+        top = rotor.read(source)
+        table = answer_levels(LevelsRequest(top, jmax=4)).table
+        assert ladders(table, top)[0] == name
+        assert len(set(ladders(table, top)[1].tolist())) == count
+    oblate = rotor.Top.from_constants("A=10 B=9 C=4 MHz")  # κ = 0.67
+    assert ladders(answer_levels(LevelsRequest(oblate, jmax=4)).table, oblate)[0] == "Kc"
+
+
+def test_labels_of_the_diagram_do_not_overlap(tmp_path, monkeypatch):
+    from matplotlib.figure import Figure
+
+    drawn = []
+    save = Figure.savefig
+    monkeypatch.setattr(Figure, "savefig", lambda self, *a, **k: (drawn.append(self), save(self, *a, **k))[1])
+    top = rotor.read("H2CO")
+    plot_levels(answer_levels(LevelsRequest(top, jmax=10)).table, top, tmp_path / "a.png", unit="K")
+    figure = drawn[0]
+    figure.canvas.draw()
+    axes = figure.axes[0]
+    boxes = [text.get_window_extent() for text in axes.texts]
+    assert len(boxes) > 30
+    assert not any(
+        a.y0 + 1 < b.y1 - 1 and b.y0 + 1 < a.y1 - 1 and abs(a.x0 - b.x0) < 1
+        for i, a in enumerate(boxes)
+        for b in boxes[:i]
+    )  # a pixel
+    assert axes.get_ylabel() == "Energy (K)"

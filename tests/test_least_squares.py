@@ -1,0 +1,124 @@
+"""The search and the statistics of least squares against closed forms and plain linear algebra."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rotor.statistics.least_squares import minimise
+from rotor.statistics.regression import regression
+
+
+def straight_line(rng, scales):
+    """A linear problem with columns of very different size: design, data of unit error, exact parameters."""
+    design = rng.normal(size=(40, len(scales))) * scales
+    exact = rng.normal(size=len(scales)) / scales
+    return design, design @ exact + rng.normal(size=40), exact
+
+
+def linear(design, data):
+    return lambda p: (data - design @ p, design)
+
+
+@given(seed=st.integers(0, 2**31), decades=st.integers(0, 15))
+def test_a_linear_problem_takes_one_step_whatever_the_units(seed, decades):
+    rng = np.random.default_rng(seed)
+    design, data, _ = straight_line(rng, np.array([1.0, 10.0**decades, 10.0**-decades]))
+    found = minimise(linear(design, data), np.zeros(3))
+    scaled = design / np.linalg.norm(design, axis=0)
+    expected = np.linalg.lstsq(scaled, data)[0] / np.linalg.norm(design, axis=0)
+    assert found.converged
+    assert len(found.iterations) == 1
+    assert found.parameters == pytest.approx(expected, rel=1e-8)  # round-off times the condition of random columns
+
+
+def rosenbrock(p):
+    r = np.array([10 * (0 - (p[1] - p[0] ** 2)), 0 - (1 - p[0])])
+    return r, np.array([[-20 * p[0], 10.0], [-1.0, 0.0]])
+
+
+def test_a_curved_valley_is_followed_to_its_end():
+    found = minimise(rosenbrock, np.array([-1.2, 1.0]))
+    assert found.converged
+    assert found.parameters == pytest.approx(
+        [1.0, 1.0], abs=1e-3
+    )  # tolerance 1e-4 of the standard errors, 1 and 2 here
+
+
+def test_it_does_not_say_that_it_has_converged_when_it_has_not():
+    cut = minimise(rosenbrock, np.array([-1.2, 1.0]), most_iterations=3)
+    assert not cut.converged
+    assert cut.status == "too many iterations"
+    assert "3 iterations were not enough" in cut.reason
+
+    def downhill_forever(p):  # the Jacobian has the wrong sign: every step leads up
+        r, j = rosenbrock(p)
+        return r, -j
+
+    stalled = minimise(downhill_forever, np.array([-1.2, 1.0]))
+    assert stalled.status == "stalled"
+
+
+def test_an_interrupt_leaves_the_best_point():
+    def stop(iteration):
+        if iteration.taken and iteration.number > 1:
+            raise KeyboardInterrupt
+
+    found = minimise(rosenbrock, np.array([-1.2, 1.0]), progress=stop)
+    start = np.sum(rosenbrock(np.array([-1.2, 1.0]))[0] ** 2)
+    assert found.status == "interrupted"
+    assert np.sum(found.residuals**2) < start
+
+
+def test_a_step_out_of_bounds_is_shortened():
+    def logarithm(p):
+        if p[0] <= 0:
+            raise ValueError("the logarithm of nothing")
+        return np.array([-2.0 - np.log(p[0])]), np.array([[1 / p[0]]])
+
+    found = minimise(logarithm, np.array([1.0]))
+    assert found.converged
+    assert found.parameters[0] == pytest.approx(np.exp(-2.0), rel=1e-4)  # the tolerance of the search
+
+
+def test_covariance_leverages_and_dfbetas_are_those_of_the_normal_equations():
+    rng = np.random.default_rng(1)
+    design, data, _ = straight_line(rng, np.array([1.0, 50.0, 1e-3]))
+    found = regression(design, ["a", "b", "c"])
+    assert found.covariance == pytest.approx(np.linalg.inv(design.T @ design), rel=1e-9)  # a well-conditioned design
+    hat = design @ np.linalg.inv(design.T @ design) @ design.T
+    assert found.leverages == pytest.approx(np.diag(hat), abs=1e-12)  # round-off
+    solution = np.linalg.lstsq(design, data)[0]
+    moved = found.dfbetas(data - design @ solution)
+    for left_out in (0, 7, 39):
+        rest = np.arange(40) != left_out
+        without = np.linalg.lstsq(design[rest], data[rest])[0]
+        spread = np.sqrt(np.sum((data[rest] - design[rest] @ without) ** 2) / (39 - 3))
+        assert moved[left_out] == pytest.approx((solution - without) / (spread * found.errors), rel=1e-8)  # round-off
+
+
+def test_standard_errors_are_the_scatter_of_repeated_fits():
+    rng = np.random.default_rng(3)
+    design = rng.normal(size=(30, 2)) * [1.0, 1e4]
+    errors = regression(design, ["a", "b"]).errors
+    found = np.array([np.linalg.lstsq(design, rng.normal(size=30))[0] for _ in range(4000)])
+    assert found.std(axis=0) / errors == pytest.approx(1.0, abs=0.045)  # four standard errors of a σ from 4000 samples
+
+
+def test_what_is_not_determined_is_named():
+    rng = np.random.default_rng(2)
+    design = rng.normal(size=(20, 4))
+    design[:, 1] = 0.0
+    design[:, 3] = -3.0 * design[:, 2]
+    found = regression(design, ["A", "DK", "B", "C"])
+    assert {one.text for one in found.undetermined} == {"DK", "C + 1 B"}
+    assert np.isfinite(found.errors).tolist() == [True, False, False, False]
+    assert found.condition == np.inf
+    assert found.rank == 2
+
+
+def test_a_column_of_round_off_is_no_information():
+    design = np.column_stack([np.ones(5), 1e-9 * np.array([1.0, -1, 1, -1, 1])])
+    assert np.isfinite(regression(design, ["B", "A"]).errors).all()
+    blind = regression(design, ["B", "A"], np.array([0.0, 1e-8]))
+    assert [one.text for one in blind.undetermined] == ["A"]

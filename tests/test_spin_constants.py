@@ -1,0 +1,142 @@
+"""Constants of spins by name, in text, in a top, and in a spectrum."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rotor.cli import run
+from rotor.quantum.effects.of_top import effects_of, spin_effects
+from rotor.spectra.lines import line_list
+from rotor.thermo import partition_function
+from rotor.thermo.spin_factor import without_spins
+from rotor.tops.spin_constants import SpinConstants, parse_spins, spins_of, twice_of
+from rotor.tops.spin_weights import SpinWeights
+from rotor.tops.top import Top
+
+CHI = -4.7
+NITRILE = Top.from_constants(
+    "B=44315.975 D=0.0872 MHz",
+    dipole_abc_debye=(2.985, 0, 0),
+    spin_constants=SpinConstants.parse(f"chi_aa(14N)={CHI} MHz"),
+)
+
+
+def test_text_becomes_values_and_spins():
+    constants = SpinConstants.parse(
+        "chi_aa(35Cl_1)=-57.1 chi_aa(35Cl_2)=33.5 MHz C_bb(D)=1.2e-3MHz".replace(" MHz C", " C")
+    )
+    assert dict(constants.twice) == {"35Cl_1": 3, "35Cl_2": 3, "D": 2}
+    assert constants.values["chi_aa(35Cl_2)"] == 33.5
+    mixed = SpinConstants.parse("eps_aa(S)=500kHz b_F(S,14N)=12.5 MHz", "S=1/2 14N=1")
+    assert dict(mixed.values) == {"eps_aa(S)": 0.5, "b_F(S,14N)": 12.5}
+    assert list(mixed.twice.items()) == [("S", 1), ("14N", 2)]
+    assert spins_of("b_F(S,14N)") == ("S", "14N")
+    assert (twice_of("2H"), parse_spins("I=3/2")) == (2, {"I": 3})
+
+
+@pytest.mark.parametrize(
+    ("text", "spins", "says"),
+    [
+        ("chi_aa=5 MHz", None, "expected constants such as"),
+        ("chi_aa(14N)=5 rubbish", None, "unit|expected"),
+        ("chi_aa(14N)=5 chi_aa(14N)=6", None, "given twice"),
+        ("chi_aa(X)=5", None, "say how large it is"),
+        ("chi_aa(12C)=5", None, "splits nothing"),
+        ("chi_aa(14N)=5", "14N=0.3", "expected spins such as"),
+        ("chi_aa(14N)=5 GHK", None, "GHK"),
+    ],
+)
+def test_impossible_text_is_refused(text, spins, says):
+    with pytest.raises(ValueError, match=says):
+        SpinConstants.parse(text, spins)
+
+
+def test_first_order_pattern_of_a_linear_molecule():
+    """J = 1: F = 0, 1, 2 at eQq (½, -¼, 1/20) from the centre to first order (Casimir's function of I = 1)."""
+    lines = line_list(NITRILE, jmax=1, temperature_k=30.0, effects=effects_of(NITRILE, True), min_lgint=None)
+    centre = 2 * 44315.975 - 4 * 0.0872
+    assert "f" not in lines.levels.halves
+    upper = lines.levels.quanta["f"][lines.upper]
+    at_n1 = np.abs(lines.frequency_mhz - centre) < 100
+    found = dict(zip(upper[at_n1].tolist(), (lines.frequency_mhz - centre)[at_n1], strict=True))
+    assert set(found) == {0, 1, 2}
+    for f, shift in found.items():
+        assert shift == pytest.approx(_casimir(f), abs=2e-3), f  # second order is about χ²/B
+
+
+def _casimir(f: int) -> float:
+    """eQq Y(J=1, I=1, F) with E = -eQq Y, Y = [¾C(C+1) - I(I+1)J(J+1)]/[2(2J-1)(2J+3)I(2I-1)]."""
+    c = f * (f + 1) - 4
+    return -CHI * (0.75 * c * (c + 1) - 4) / (2 * 1 * 5 * 1 * 1)
+
+
+def test_strengths_and_q_of_a_pattern_add_up_to_the_line_without_spins():
+    with_spins = line_list(NITRILE, jmax=3, temperature_k=30.0, effects=effects_of(NITRILE, True), min_lgint=None)
+    plain = line_list(NITRILE, jmax=3, temperature_k=30.0, min_lgint=None)
+    assert with_spins.q == pytest.approx(3 * plain.q, rel=1e-12)
+    n = with_spins.levels.quanta["n"]
+    allowed = np.abs(n[with_spins.upper] - n[with_spins.lower]) == 1
+    for row in range(len(plain)):
+        near = allowed & (np.abs(with_spins.frequency_mhz - plain.frequency_mhz[row]) < 20)
+        assert with_spins.strength_debye2[near].sum() == pytest.approx(
+            3 * plain.strength_debye2[row], rel=1e-6
+        )  # χ²/B²
+        assert with_spins.intensity_nm2_mhz[near].sum() == pytest.approx(plain.intensity_nm2_mhz[row], rel=1e-4)  # δ/kT
+
+
+def test_the_factor_of_spins_is_that_of_the_sum_over_all_levels():
+    effects = effects_of(NITRILE, True)
+    rest, factor = without_spins(NITRILE, effects)
+    assert (len(rest), factor) == (2, 3)
+    from rotor.quantum.solve import solve_levels
+
+    levels = solve_levels(NITRILE, 30, effects=effects)
+    kelvin = levels.energy_mhz * 4.799243073e-5
+    inside = levels.quanta["n"] <= 29
+    by_hand = float((levels.degeneracy * np.exp(-kelvin / 20.0))[inside].sum())
+    assert partition_function(NITRILE, 20.0, effects=effects).q == pytest.approx(by_hand, rel=1e-6)
+
+
+def test_like_nuclei_in_the_weights_are_refused():
+    chlorines = SpinConstants.parse("chi_aa(35Cl_1)=-57 chi_aa(35Cl_2)=-57 MHz")
+    weights = SpinWeights.from_mapping({"ee": 3, "eo": 5, "oe": 5, "oo": 3})
+    top = Top.from_constants("A=9 B=3 C=2 GHz", spin_weights=weights, spin_constants=chlorines)
+    with pytest.raises(ValueError, match="count their exchange already"):
+        spin_effects(top)
+
+
+def test_names_that_no_effect_knows_are_refused():
+    top = Top.from_constants("B=9 GHz", spin_constants=SpinConstants.parse("magic(14N)=1"))
+    with pytest.raises(ValueError, match="known constants of spins are chi_aa"):
+        spin_effects(top)
+    with pytest.raises(ValueError, match="no constants of spins are known"):
+        effects_of(Top.from_constants("B=9 GHz"), True)
+
+
+COMMAND = ["spectrum", "--constants", "B=44315.975 MHz", "--dipole-abc", "2.985,0,0", "--jmax", "2"]
+
+
+def test_command_splits_lines(capsys):
+    assert run([*COMMAND, "--spin-constants", "chi_aa(14N)=-4.709 MHz"]) == 0
+    assert "states: N F" in capsys.readouterr().out
+    assert run([*COMMAND, "--spin-constants", "chi_aa(14N)=-4.709 MHz", "--no-hyperfine"]) == 0
+    assert "states: J)" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("more", "says"),
+    [
+        (["--hyperfine"], "no constants of spins are known"),
+        (["--spins", "14N=1"], "give those too"),
+        (["--spin-constants", "chi_aa(14N)=x"], "--spin-constants"),
+        (["--spin-constants", "chi_zz(14N)=1"], "known constants of spins|form"),
+    ],
+)
+def test_command_refuses(more, says, capsys):
+    import re
+
+    assert run([*COMMAND, *more]) == 2
+    error = capsys.readouterr().err
+    assert re.search(says, error)
+    assert error.count("\n") == 1
