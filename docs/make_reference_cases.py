@@ -77,7 +77,8 @@ def q_row_of(case: str, folder: Path, ours: Prediction) -> str:
         return f"| {case} | {t:g} | {ours.q:g} | - | - | - | no sum: {str(error).split(';')[0]} |\n"
     change = math.log10(ours.q / summed.q)
     reason = "same levels to the digits given" if abs(change) < 5e-5 else f"the file's is summed to J = {fend}"
-    return f"| {case} | {t:g} | {ours.q:g} | {summed.q:.4f} | {summed.jmax} | {change:.4f} | {reason} |\n"
+    last = "none: expanded" if summed.jmax is None else summed.jmax
+    return f"| {case} | {t:g} | {ours.q:g} | {summed.q:.4f} | {last} | {change:.4f} | {reason} |\n"
 
 
 def page(shared: Path) -> str:

@@ -21,7 +21,8 @@ ROOT = Path(__file__).resolve().parents[1]
 WATER_XYZ = "3\nwater\nO 0 0 0\nH 0.75695 0 0.585882\nH -0.75695 0 0.585882\n"
 RIGID = "A=835840.288 B=435351.717 C=278138.7 MHz"
 INFO = """
-    rotor_version command input name formula mass_u kind kind_decision point_group symmetry_number constants_mhz uncertainties_mhz reduction
+    rotor_version command input name formula mass_u kind kind_decision point_group symmetry_number near_point_group
+    near_displacement_angstrom constants_mhz uncertainties_mhz reduction
     representation rotational_constants_mhz rotational_constants_cm kappa moments_u_angstrom2 planar_moments_u_angstrom2
     inertial_defect_u_angstrom2 frame dipole_abc_debye dipole_source
     polarizability_abc_angstrom3 polarizability_source spin_weights spin_weights_source spin_constants_mhz spins spin_constants_source
@@ -55,7 +56,7 @@ def test_water_has_its_lines(call):
     lines = rotor.line_list(top)
     for name, beginning in (
         ("constants", "A 835852.4057, B 435264.025, C 278212.2207 MHz, and "),
-        ("dipole", "μa 0, μb 1.8546, μc 0 D; T. R. Dyke"),
+        ("dipole", "μa 0, μb 1.8507, μc 0 D; from the intensities of 25 lines of c018003"),
         ("spin weights", "ee 1, eo 3, oe 3, oo 1; "),
         ("temperature", "300 K"),
         ("Q", f"{lines.q:.6g}, summed from levels to J = "),
@@ -99,7 +100,7 @@ def test_info_of_water(call):
     assert rows["A"][:2] == ["835852.4057", "0.26"]
     q = rotor.partition_function(rotor.read("water"), 300.0)
     assert rows["300"][0] == f"{q.q:.6g}"
-    assert "the geometry is asymmetric by Ia/Ic = 0.347" in re.sub(r"\s+", " ", out)
+    assert "the geometry is asymmetric by Ia/Ic = 0.348" in re.sub(r"\s+", " ", out)
     assert len([row for row in out.splitlines() if re.match(r" *(100|300) ", row)]) == 2
 
 
@@ -161,12 +162,38 @@ def test_isotope_and_weights_by_hand(call):
     assert "the ratio of those calculated from its geometry" in err
     assert json.loads(out)["mass_u"] == pytest.approx(19.016841, abs=1e-6)  # H + D + 16O of AME2020, printed to 1e-6
     code, out, _ = call(
-        "spectrum", "--constants", "B=1 cm-1", "--dipole-abc", "1,0,0", "--spin-weights", "even=6,odd=2", "--json", "-"
-    )
+        "spectrum", "--constants", "A=30 B=20 C=10 GHz", "--dipole-abc", "0,1,0", "--spin-weights", "ee=2,eo=6,oe=6,oo=2",
+        "--jmax", "1", "--json", "-"
+    )  # fmt: skip
     content = json.loads(out)
     assert code == 0
-    assert content["spin_weights"] == {"even": 3, "odd": 1}
-    assert [line["g_upper"] for line in content["lines"][:3]] == [3, 15, 7]
+    assert content["spin_weights"] == {"ee": 1, "eo": 3, "oe": 3, "oo": 1}
+    assert [line["g_upper"] for line in content["lines"]] == [9, 3]  # 1(10)-1(01) at A - C, 1(11)-0(00) at A + C
+
+
+def test_a_forbidden_dipole_is_one_line(call):
+    code, out, err = call("spectrum", "water", "--dipole-abc", "1.8,0,0")
+    assert (code, out) == (2, "")
+    assert err == (
+        "error: --dipole-abc: dipole μa = 1.8 D: a molecule of C2v has none along a; symmetry allows μb alone\n"
+    )
+
+
+def test_a_near_symmetry_is_shown_and_can_be_taken(call, folder):
+    from ase.build import molecule
+
+    molecule("C60").write(folder / "C60.xyz")
+    code, out, err = call("info", "C60.xyz")
+    assert code == 0
+    near = "Ci, rotational symmetry number 1; near Ih: nuclei are up to 0.0047 Å off it (--symmetry-tolerance takes it)"
+    assert near in " ".join(out.split())
+    assert "near Ih" in err
+    code, out, err = call("info", "C60.xyz", "--symmetry-tolerance", "0.005", "--json", "-")
+    content = json.loads(out)
+    assert (content["point_group"], content["symmetry_number"], content["kind"]) == ("Ih", 60, "spherical")
+    assert content["near_point_group"] is None
+    assert call("info", "C60.xyz", "--symmetry-tolerance", "5 nm")[0] == 2
+    assert call("info", "water", "--symmetry-tolerance", "0.005")[0] == 2
 
 
 def test_q_and_vibrational_factor(call):
@@ -392,7 +419,7 @@ def test_no_answer_is_another_exit_code(call, folder):
         "spectrum", "--constants", "B=1 MHz", "--dipole-abc", "1,0,0", "--temperature", "3000", "--csv", "a.csv"
     )
     assert (code, out) == (1, "")
-    assert err.startswith("error: Q(3000 K) needs levels beyond")
+    assert err.startswith("error: lines above 10^-12 nm² MHz at 3000 K reach to J = 29481, more than 600; give J max")
     assert call("spectrum", "CH4", "--plot", "a.png")[0] == 1
     assert not list(folder.iterdir())
 

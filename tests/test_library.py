@@ -138,9 +138,11 @@ def test_molecules_as_json(capsys, home):
     water = by_name["water"]  # still there under its other names
     assert (water["kind"], water["point_group"], water["symmetry_number"]) == ("asymmetric", "C2v", 2)
     assert water["kappa"] == pytest.approx(-0.437, abs=5e-4)  # of A, B, C: three digits
-    assert water["dipole_abc_debye"] == [0.0, 1.8546, 0.0]
+    assert water["dipole_abc_debye"] == [0.0, 1.8507, 0.0]
     assert water["spin_weights"] == {"ee": 1, "eo": 3, "oe": 3, "oo": 1}
     assert water["catalogue"]["tag"] == "c018003"
+    assert water["serves"] == {"j_max": 20, "k_max": 20, "max_ghz": 4870.0, "error_mhz": 0.56}
+    assert (water["levels"], water["unverified"]) == (634, ["polarizability"])
     assert set(water["sources"]) >= {"geometry", "constants", "dipole", "spin_weights"}
     assert by_name["benzene"]["symmetry_number"] == 12
     assert by_name["carbon monoxide"]["kappa"] is None
@@ -149,15 +151,25 @@ def test_molecules_as_json(capsys, home):
 def test_molecules_as_a_table_and_one_of_them(capsys):
     assert run(["molecules"]) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert lines[0].split() == ["name", "also", "kind", "κ", "μa", "μb", "μc", "lines", "rms/MHz", "from"]
+    heading = "name also kind κ μa μb μc J ≤ K ≤ within/MHz unverified from"
+    assert lines[0].split() == heading.split()
     assert len(lines) == len(list(OURS.glob("*.toml"))) + 1
     (row,) = [line for line in lines if line.startswith("HDO")]
-    assert row.split()[1:9] == ["semiheavy", "water", "asymmetric", "-0.684", "0.6591", "1.73", "73", "0.14"]
+    assert row.split()[1:9] == ["semiheavy", "water", "asymmetric", "-0.684", "0.6567", "1.737", "10", "10"]
+    (row,) = [line for line in lines if line.startswith("O3 ")]
+    assert "constants, dipole" in row
 
     assert run(["molecules", "ozone"]) == 0
     told = capsys.readouterr().out
     assert "point group        C2v, symmetry number 2" in told
     assert "spin weights from" in told
+    plainly = " ".join(told.split())
+    assert "unverified constants, dipole" in plainly
+    assert "constants from unverified: ground state; NIST CCCBDB release 22" in plainly
+    assert run(["info", "ozone"]) == 0
+    assert "constants from   unverified: ground state; NIST CCCBDB" in capsys.readouterr().out
+    assert run(["info", "CH3Cl"]) == 0
+    assert "A, DK unverified; B, DJ, DJK, HJK, HKJ fitted here" in capsys.readouterr().out
 
 
 def test_molecules_that_are_not_there_are_refused(capsys, tmp_path):

@@ -109,7 +109,17 @@ def test_a_byte_order_mark_is_skipped_and_other_encodings_are_told(tmp_path):
 
 
 def same(one: MoleculeFile, other: MoleculeFile) -> None:
-    for key in ("name", "names", "constants", "dipole_abc_debye", "spin_weights", "sources", "catalogue"):
+    for key in (
+        "name",
+        "names",
+        "constants",
+        "dipole_abc_debye",
+        "spin_weights",
+        "sources",
+        "catalogue",
+        "serves",
+        "unverified",
+    ):
         assert getattr(one, key) == getattr(other, key), key
     assert (one.geometry_kind, one.vibrational_difference) == (other.geometry_kind, other.vibrational_difference)
     assert (one.molecule is None) == (other.molecule is None)
@@ -118,6 +128,10 @@ def same(one: MoleculeFile, other: MoleculeFile) -> None:
         assert one.molecule.charge == other.molecule.charge
         assert one.molecule.electronic == other.molecule.electronic
         assert np.array_equal(one.molecule.positions_angstrom, other.molecule.positions_angstrom)
+    assert (one.levels is None) == (other.levels is None)
+    if one.levels is not None:
+        assert one.levels.columns.keys() == other.levels.columns.keys()
+        assert all((column == other.levels.columns[name]).all() for name, column in one.levels.columns.items())
 
 
 @pytest.mark.parametrize("path", LIBRARY, ids=lambda path: path.stem)
@@ -125,6 +139,61 @@ def test_library_survives_writing_and_reading(path: Path, tmp_path: Path):
     molecule = read_molecule_file(path)
     write_molecule_file(molecule, tmp_path / "copy.toml")
     same(read_molecule_file(tmp_path / "copy.toml"), molecule)
+
+
+def test_levels_are_written_beside_and_never_lost(tmp_path: Path):
+    water = read_molecule_file(next(path for path in LIBRARY if path.stem == "H2O"))
+    with pytest.raises(ValueError, match="level energies stand in a file of their own"):
+        molecule_file_text(water)
+    write_molecule_file(water, tmp_path / "w.toml")
+    assert {path.name for path in tmp_path.iterdir()} == {"w.toml", "w_levels.csv"}
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("energy_mhz,error_mhz\n1,2\n", "expected the columns j"),
+        ("j,energy_mhz,error_mhz\n1,x,2\n", "line 2: energy_mhz is no number: '1,x,2'"),
+        ("# c\nj,energy_mhz,error_mhz\n1,2,3\n1,2\n", "line 4: error_mhz is no number"),
+        ("j,energy_mhz,error_mhz\n1,2,3\n1,2,3\n", "the level j = 1 is twice in the table"),
+        ("j,energy_mhz,error_mhz\n-1,2,3\n", "whole numbers of 0 or more"),
+        ("j,energy_mhz,error_mhz\n1,inf,3\n", "expected finite numbers"),
+        ("j,energy_mhz,error_mhz\n", "one length above 0"),
+    ],
+)
+def test_a_wrong_level_table_says_where(tmp_path: Path, text: str, said: str):
+    (tmp_path / "l.csv").write_text(text, encoding="utf-8")
+    (tmp_path / "m.toml").write_text("[constants]\nB = 5\n[levels]\nfile = 'l.csv'\n", encoding="utf-8")
+    with pytest.raises(ValueError, match=r"l\.csv") as caught:
+        read_molecule_file(tmp_path / "m.toml")
+    assert said in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("[constants]\nB = 5\n[levels]\nfile = 'none.csv'", "level energies cannot be read"),
+        ("[constants]\nB = 5\n[levels]\nsource = 'x'", "expected file = the name of a .csv"),
+        ("[constants]\nB = 5\n[serves]\nk_max = 3", "expected j_max; found k_max"),
+        ("[constants]\nB = 5\nunverified = 1", "unverified is true or false, not 1"),
+    ],
+)
+def test_tables_of_levels_and_of_lines_served_are_checked(tmp_path: Path, text: str, said: str):
+    (tmp_path / "m.toml").write_text(text, encoding="utf-8")
+    with pytest.raises(ValueError, match=r"m\.toml|none\.csv") as caught:
+        read_molecule_file(tmp_path / "m.toml")
+    assert said in str(caught.value)
+
+
+def test_marks_of_unverified_numbers_are_read_and_shown():
+    text = "[constants]\nsource = 'a'\nB = 5\nD = { value = 1e-6, unverified = true }\n[dipole]\nsource = 'b'\nunverified = true\na = 1\n"
+    file = parse_molecule_file(text)
+    assert file.unverified == {"constants.D", "dipole"}
+    assert (file.cited("constants"), file.cited("dipole"), file.cited("geometry")) == (
+        "D unverified; a",
+        "unverified: b",
+        "",
+    )
 
 
 def test_hard_text_survives_writing_and_reading():

@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 from rotor.molecules.molecule import Molecule
+from rotor.molecules.readers.ground_state import dipole_lines, is_excited, printed_dipole
+from rotor.molecules.readers.programs import Output, program_of
 from rotor.molecules.readers.quantum_chemistry import read_output
 from rotor.molecules.readers.read import read_molecule
 from rotor.units import BOHR_RADIUS_ANGSTROM, DEBYE_PER_E_ANGSTROM, MHZ_PER_CM, ROTATIONAL_MHZ_U_ANGSTROM2
@@ -195,7 +197,7 @@ def test_dipole_of_an_orca_ion_refers_to_the_origin_that_is_printed(tmp_path):
 
 
 def test_tensors_of_another_geometry_than_the_last_are_left_out(tmp_path):
-    step = table("Standard orientation:", WATER * 1.01)
+    step = table("Standard orientation:", WATER * 1.002)  # 2e-3 Å: more than a tensor may be off, constants by 0.4 %
     ending = " Normal termination"
     text = gaussian(polar=False).replace(ending, step + ending)
     molecule = read_output(written(tmp_path, text))
@@ -301,3 +303,91 @@ def test_reader_hands_outputs_over_and_tells_what_cclib_would_add(tmp_path, monk
 def test_a_log_of_no_program_stays_with_ase(tmp_path):
     with pytest.raises(ValueError, match="no structure in it"):
         read_molecule(written(tmp_path, "nothing to see\n"))
+
+
+# What the output says of itself
+
+
+def test_coordinates_in_another_unit_are_refused(tmp_path):
+    """A trajectory of Gaussian prints its geometries in bohr; read as Å they give constants 3.57 times too small."""
+    text = gaussian(standard=WATER / BOHR_RADIUS_ANGSTROM, inputs=None, polar=False)
+    with pytest.raises(
+        ValueError, match=r"printed constants .* MHz, from the geometry .* 257.\d% apart: its coordinates are in bohr"
+    ):
+        read_output(written(tmp_path, text))
+    with pytest.raises(ValueError, match=r"0.6% apart: it is another geometry, or in another unit; give an xyz file"):
+        read_output(written(tmp_path, gaussian(standard=WATER * 1.003, inputs=None, polar=False)))
+
+
+def test_constants_printed_with_few_digits_are_no_alarm(tmp_path):
+    """Psi4 prints five decimals of cm⁻¹: of a heavy molecule that is three digits, and they need agree to no more."""
+    heavy = WATER * 30
+    a, b, c = constants_mhz(heavy) / MHZ_PER_CM
+    assert c < 0.011
+    a0, b0, c0 = constants_mhz(WATER) / MHZ_PER_CM
+    old = f"A = {a0:11.5f}  B = {b0:11.5f}  C = {c0:11.5f} [cm^-1]"
+    text = psi4(heavy)
+    assert old in text
+    rounded = text.replace(old, f"A = {a:11.5f}  B = {b:11.5f}  C = {c:11.5f} [cm^-1]")
+    assert read_output(written(tmp_path, rounded, "water.out")).notes == ()
+    off = text.replace(old, f"A = {a:11.5f}  B = {b:11.5f}  C = {c * 1.003:11.5f} [cm^-1]")
+    (note,) = read_output(written(tmp_path, off, "water.out")).notes
+    assert "is the geometry the last one?" in note
+
+
+def test_average_masses_of_a_heavy_isotope_mixture_are_no_other_geometry(tmp_path):
+    """ORCA's averages move the constants of Cl2 by 1.4 %, which is no reason to refuse."""
+    averages = constants_mhz(WATER, (15.999 * 1.02, 1.008, 1.008))  # printed constants 2 % off by nothing but geometry
+    with pytest.raises(ValueError, match="another geometry"):
+        read_output(written(tmp_path, gaussian(ghz=" ".join(f"{x * 1.02 / 1e3:.7f}" for x in averages), polar=False)))
+    used = constants_mhz(WATER, (15.999, 1.008, 1.008))
+    (note,) = read_output(written(tmp_path, gaussian(ghz=" ".join(f"{x / 1e3:.7f}" for x in used), polar=False))).notes
+    assert "they agree with the masses that Gaussian used" in note
+
+
+EXCITED = """ The electronic state is 1-A1.
+ Alpha  occ. eigenvalues --  -20.55000  -1.34000  -0.70000  -0.57000  -0.50000
+ Alpha virt. eigenvalues --    0.20000   0.30000
+ Excitation energies and oscillator strengths:
+
+ Excited State   1:      Singlet-B1     8.6 eV  144.0 nm  f=0.0200
+            Population analysis using the CI density.
+ Dipole moment (field-independent basis, Debye):
+    X=                0.0000    Y=                0.0000    Z=                0.0540  Tot=                0.0540
+"""
+
+
+def test_the_dipole_of_an_excited_density_is_not_taken(tmp_path):
+    """CIS after SCF: the dipole of the ground state is there too, and is the one; alone, it is left out."""
+    ending = " Normal termination"
+    both = gaussian(polar=False).replace(ending, EXCITED + ending)
+    molecule = read_output(written(tmp_path, both))
+    assert molecule.dipole_debye == pytest.approx(DIPOLE, abs=1e-4)  # as printed
+    alone = gaussian(polar=False)
+    start = alone.index(" Dipole moment (field")
+    alone = alone[:start] + EXCITED + alone[alone.index(ending) :]
+    molecule = read_output(written(tmp_path, alone))
+    assert molecule.dipole_debye is None
+    assert "is of an excited density, and none is of the ground state: left out" in molecule.notes[0]
+    ground = gaussian(polar=False).replace(ending, EXCITED.replace("CI density", "MP2 density") + ending)
+    assert read_output(written(tmp_path, ground)).dipole_debye == pytest.approx([0, 0, 0.054], abs=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("block", "excited"),
+    [
+        ("DIPOLE MOMENT\n---\n\nMethod             : SCF\nType of density    : Electron Density", False),
+        ("DIPOLE MOMENT\n---\n\nMethod             : CIS\nType of density    : Electron Density", True),
+        ("DIPOLE MOMENT\n---\n\nMethod             : MP2\nType of density    : Electron Density", False),
+        ("TD-DFT relaxed density of state 1\n\nDIPOLE MOMENT\n---\n   X   Y   Z", True),
+        ("SCF density\n\nDIPOLE MOMENT\n---\n   X   Y   Z", False),
+    ],
+)
+def test_orca_says_which_method_a_dipole_is_of(block, excited):
+    text = f"   O   R   C   A\n{block}\nTotal Dipole Moment    :   0.1  0.2  0.3\n"
+    output = Output("x.out", tuple(text.splitlines()), program_of(text))
+    (start,) = dipole_lines(output)
+    assert is_excited(output, start) is excited
+    assert printed_dipole(output, start) == pytest.approx(
+        np.array([0.1, 0.2, 0.3]) * DEBYE_PER_AU, rel=1e-12
+    )  # round-off

@@ -3,14 +3,25 @@
 from __future__ import annotations
 
 import math
+import time
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import rotor
 from rotor import units
+from rotor.molecules.nuclei import data_folder
 from rotor.quantum.solve import solve_levels
-from rotor.thermo import classical_partition_function, partition_function, partition_functions
+from rotor.thermo import (
+    classical_limit,
+    classical_partition_function,
+    level_sums,
+    partition_function,
+    partition_functions,
+    vibrational_partition_function,
+)
+from rotor.thermo.trusted_levels import trusted_energies_mhz
 from rotor.tops.constants import Constants
 from rotor.tops.top import Top
 
@@ -54,19 +65,136 @@ def test_levels_count_from_the_lowest_that_exists():
     assert partition_function(top, 0.5).q == pytest.approx(3.0, rel=1e-6)
 
 
-def test_diverging_distortion_is_said():
-    quartic_water = Constants(
-        A=835840.288, B=435351.717, C=278138.7, DeltaJ=37.59422, DeltaJK=-172.91276, DeltaK=973.29052,
-        deltaJ=15.210402, deltaK=41.05025,
-    )  # fmt: skip
-    with pytest.raises(ValueError, match="beyond their reach"):
-        partition_function(Top(quartic_water), 1000.0, 1e-9)
+QUARTIC_WATER = Constants(
+    A=835840.288, B=435351.717, C=278138.7, DeltaJ=37.59422, DeltaJK=-172.91276, DeltaK=973.29052,
+    deltaJ=15.210402, deltaK=41.05025,
+)  # fmt: skip
+
+
+def test_levels_that_distortion_does_not_serve_are_counted_with_their_error():
+    """Quartic water at 1000 K: within the stated error of the sum with all its constants; at 10,000 K there is no answer."""
+    found = partition_function(Top(QUARTIC_WATER), 1000.0, 1e-9)
+    better = partition_function(Top(rotor.read("water").constants), 1000.0)
+    assert 1e-9 < found.relative_error < 0.05
+    # what the series leaves out of trusted levels (DeltaK K⁴ is 9 % of A K² at Ka = 9) is no part of the error
+    assert found.q == pytest.approx(better.q, rel=found.relative_error + 0.02)
+    assert f"relative error about {found.relative_error:.0e}" in found.source
+    with pytest.raises(ValueError, match=r"Q\(10000 K\): the levels that count lie beyond the reach"):
+        partition_function(Top(QUARTIC_WATER), [300.0, 10_000.0])
+
+
+def test_a_diving_series_does_not_stop_the_sum():
+    """Ketene at 300 K: P_KKJ J² K⁸ turns the levels of J >= 75 upside down; a sum of better ones is met."""
+    constants = rotor.read("CH2CO").constants
+    kept = {name: value for name, value in constants.values.items() if name not in ("PKKJ", "PK", "LKKJ", "LK", "LJK")}
+    tame = Top(Constants(reduction="S", representation="Ir", **kept), spin_weights=rotor.read("CH2CO").spin_weights)
+    found = partition_function(rotor.read("CH2CO"), 300.0)
+    assert found.relative_error < 1e-4
+    assert found.q == pytest.approx(partition_function(tame, 300.0).q, rel=2e-4)  # what octic terms move of K <= 12
+
+
+def test_a_rigid_top_is_trusted_however_asymmetric():
+    top = Top.from_constants("A=64 B=8 C=0.5 MHz")
+    levels = solve_levels(top, 12)
+    energies, lowest = trusted_energies_mhz(top, levels)
+    assert (energies == levels.energy_mhz).all()
+    assert (lowest == levels.energy_mhz).all()
+    bent = Top.from_constants(Constants(A=64.0, B=8.0, C=0.5, DeltaJ=1e-9))  # rigid to nine digits
+    assert np.allclose(trusted_energies_mhz(bent, solve_levels(bent, 12))[0], levels.energy_mhz, rtol=1e-6, atol=1e-6)
+
+
+TOPS = {
+    "linear": ("B=3 GHz", None),
+    "linear, ortho and para": ("B=3 GHz D=1e-7 GHz", {"even": 1, "odd": 3}),
+    "with distortion": ("B=3 GHz D=3e-6 GHz H=3e-12 GHz", None),
+    "prolate": ("A=150 B=4 GHz", {"0": 2, "1": 1, "2": 1}),
+    "oblate": ("B=5 C=2.6 GHz DJ=1e-6 GHz DJK=-2e-6 GHz DK=1e-6 GHz", None),
+    "six-fold": ("B=5.7 C=2.85 GHz", {"0even": 7, "0odd": 13, "1": 11, "2": 9, "3": 14, "4": 9, "5": 11}),
+    "asymmetric": ("A=9 B=6 C=3.6 GHz", {"ee": 1, "eo": 3, "oe": 3, "oo": 1}),
+    "asymmetric with distortion": ("A=9 B=3 C=2.5 GHz DeltaJ=1e-6 DeltaJK=-5e-6 DeltaK=4e-5 deltaJ=2e-7 deltaK=1e-6 GHz", None),
+    "spherical": ("B=4 GHz kind", {"A": 5, "E": 2, "F": 3}),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", TOPS)
+def test_the_expansion_is_within_its_error_of_the_sum(name):
+    """Q, U and C_v of the classical limit with corrections against the sum over levels, each within the error stated."""
+    text, weights = TOPS[name]
+    if name == "spherical":
+        top = Top.from_constants(Constants(B=4000.0, D=1e-3, kind="spherical"), spin_weights=weights)
+    else:
+        top = Top.from_constants(text, spin_weights=weights)
+    limit, temperatures = classical_limit(top), np.array([8.0, 20.0, 50.0, 100.0])
+    sums = level_sums(top, [top.spin_weights], temperatures, 1e-13)[0]  # too much for the expansion: summed
+    assert (sums.jmax > 0).all()
+    below = sums.ground_k / temperatures
+    q, energy, cv = limit.corrected(temperatures)
+    found = [q * np.exp(below), energy - below, cv]
+    exact = [sums.q, sums.energy_over_rt, sums.cv_over_r]
+    off = np.abs(np.array(found) / np.array(exact) - 1)
+    assert (off < limit.errors(temperatures) + 1e-11).all(), (off, limit.errors(temperatures))  # round-off of the sums
+    assert limit.errors(temperatures)[0, -1] < 1e-2  # and it says something
+
+
+def test_a_long_sum_is_replaced_where_that_is_as_good():
+    """A = 430, B = 57, C = 55 MHz at 300 K: J = 9000 or the expansion, which knows Q to 1e-12 and takes no time."""
+    top = Top.from_constants("A=430 B=57 C=55 MHz")
+    start = time.perf_counter()
+    found = partition_function(top, 300.0)
+    assert time.perf_counter() - start < 1.0  # 0.01 s; 39 s before
+    assert found.jmax is None
+    assert found.source == "classical with corrections, relative error below 1e-06"
+    theta = np.array(top.rotational_constants_mhz) / units.MHZ_PER_K
+    assert found.q == pytest.approx(math.sqrt(math.pi * 300.0**3 / np.prod(theta)), rel=1e-5)  # a/T is 2e-6
+    start = time.perf_counter()
+    heavy = partition_function(Top.from_constants("A=0.03 B=0.025 C=0.02 MHz"), [5.0, 300.0])  # ten thousand atoms
+    assert time.perf_counter() - start < 1.0
+    assert heavy.jmax.tolist() == [-1, -1]
+
+
+def test_a_long_sum_reports_its_progress():
+    seen = []
+    top = Top.from_constants("A=9 B=3 C=2.5 GHz DeltaJ=1e-4 GHz")  # too much distortion for the expansion
+    partition_functions(top, [20.0], progress=lambda j, last: seen.append((j, last)))
+    assert [j for j, _ in seen] == sorted(j for j, _ in seen)
+    assert len(seen) > 2
+    assert seen[-1][0] <= seen[-1][1] <= 1000
 
 
 def test_many_temperatures_at_once():
+    """A list or an array gives arrays; never the first temperature alone."""
     top = Top.from_constants("A=10 B=6 C=4 GHz")
-    together = partition_functions(top, [10.0, 100.0])
-    assert [f.q for f in together] == [partition_function(top, t).q for t in (10.0, 100.0)]
+    one_by_one = [partition_function(top, t).q for t in (10.0, 100.0)]
+    for grid in ([10.0, 100.0], (10, 100), np.array([10.0, 100.0])):
+        together = partition_function(top, grid)
+        assert together.q.tolist() == one_by_one
+        assert together.temperature_k.tolist() == [10.0, 100.0]
+        assert together.relative_error.shape == together.jmax.shape == (2,)
+    assert [f.q for f in partition_functions(top, [10.0, 100.0])] == one_by_one
+    assert together.to_pandas()["q"].tolist() == one_by_one
+    assert isinstance(partition_function(top, 10).q, float)
+    assert classical_partition_function(top, np.array([10.0, 100.0])).tolist() == [
+        classical_partition_function(top, t) for t in (10.0, 100.0)
+    ]
+    co2 = ([667.4, 1388.2, 2349.1], [2, 1, 1])
+    for harmonic in (True, False):
+        both = vibrational_partition_function(*co2, [300.0, 600.0], harmonic=harmonic)
+        assert both.tolist() == [vibrational_partition_function(*co2, t, harmonic=harmonic) for t in (300.0, 600.0)]
+    with pytest.raises(ValueError, match=r"temperature 0\.0 K"):
+        partition_function(top, [10.0, 0.0])
+    with pytest.raises(ValueError, match=r"temperature -1\.0 K"):
+        vibrational_partition_function(*co2, [300.0, -1.0])
+
+
+@pytest.mark.parametrize("name", sorted(path.stem for path in (data_folder() / "molecules").glob("*.toml")))
+def test_every_molecule_of_the_library_has_a_partition_function(name):
+    """At 10, 100 and 300 K, to 1e-3 or better, and near the classical limit at 300 K."""
+    top = rotor.read(name)
+    found = partition_function(top, [10.0, 100.0, 300.0])
+    assert (np.diff(found.q) > 0).all()
+    assert (found.relative_error < 1e-3).all()
+    if name != "H2":  # Θ = 85 K
+        assert found.q[-1] == pytest.approx(classical_partition_function(top, 300.0), rel=0.05)  # Θ/3T of HCl, 2DkT/B²
 
 
 @pytest.mark.parametrize("temperature", [0.0, -1.0, math.nan])

@@ -69,7 +69,7 @@ def test_hydrogen_is_the_sum_over_its_levels_in_150_digits(species, parity):
         ln_q, mean, cv = plain_functions(*hydrogen_levels(parity), t)
         # round-off of some 20 terms, and of E/kT = 34 of ortho's lowest level at 5 K; truncation where H2's series ends
         within = 2e-14 + 2 * found.relative_error[i]
-        assert found.relative_error[i] < (1e-13 if t < 900 else 1e-10)
+        assert found.relative_error[i] < (1e-13 if t < 900 else 1e-5)
         assert math.log(found.q_rot[i]) == pytest.approx(ln_q, rel=0, abs=within * max(1, abs(ln_q)))
         assert found.energy_j_per_mol[i] == pytest.approx(GAS_CONSTANT * t * mean, rel=within, abs=0)
         assert found.cv_over_r[i] == pytest.approx(cv, rel=50 * within, abs=0)  # a difference of squares
@@ -357,20 +357,14 @@ def test_weights_of_the_split_levels_of_methane():
 
 
 def test_distortion_beyond_its_reach():
-    """Water's polynomial serves to some J: at 1200 K the sum ends there with its error said, at 2000 K it is refused."""
+    """Water's polynomial serves to some J: beyond, the error grows with temperature, and at last there is no answer."""
     top = rotor.read("water")
-    found = thermodynamic_functions(top, [1000.0, 1200.0])
-    assert 1e-8 < found.relative_error[1] < 1e-4
-    with pytest.raises(ValueError, match=r"Q\(2000 K\): the sum over levels grows again .* beyond their reach"):
-        thermodynamic_functions(top, [300.0, 2000.0])
-    with pytest.raises(ValueError, match="beyond their reach"):
-        level_sums(top, [top.spin_weights], [1200.0], 1e-8)
-
-
-def test_a_top_too_heavy_for_a_sum_is_refused_at_once():
-    """Ten thousand atoms at 300 K: J = 50,000 would be needed, which no one should wait for."""
-    with pytest.raises(ValueError, match=r"Q\(300 K\) needs levels beyond J = 3999; use the classical limit"):
-        level_sums(top := Top.from_constants("A=0.03 B=0.025 C=0.02 MHz"), [top.spin_weights], [5.0, 300.0])
+    found = thermodynamic_functions(top, [300.0, 1000.0, 1200.0])
+    assert found.relative_error[0] < 1e-5 < found.relative_error[1] < found.relative_error[2] < 0.1
+    with pytest.raises(ValueError, match=r"Q\(5000 K\): the levels that count lie .* can be had up to 300 K"):
+        thermodynamic_functions(top, [300.0, 5000.0])
+    with pytest.raises(ValueError, match="beyond the reach of the distortion constants"):
+        level_sums(top, [top.spin_weights], [1200.0], 1e-8, at_worst=1e-8)
 
 
 def test_corrected_limit_is_consistent_and_ends_where_it_must():

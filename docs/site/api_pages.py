@@ -82,7 +82,9 @@ def _public(parent: Any) -> list[Any]:
 
 def _member(member: Any, fence: int) -> str:
     """One entry: a directive of Sphinx's Python domain with the docstring, and the members of a class, inside it."""
-    kind = {"class": "class", "function": "method" if member.parent.is_class else "function"}.get(member.kind.value, "attribute")
+    kind = {"class": "class", "function": "method" if member.parent.is_class else "function"}.get(
+        member.kind.value, "attribute"
+    )
     name = f"{member.parent.name}.{member.name}" if member.parent.is_class else member.name
     if "property" in member.labels or kind == "attribute":
         kind, signature = ("property" if "property" in member.labels else "attribute" if "." in name else "data"), ""

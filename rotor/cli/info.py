@@ -13,7 +13,7 @@ from rotor.checks import require_whole
 from rotor.cli.shared import inputs
 from rotor.cli.shared.inputs import Input, json_option
 from rotor.cli.shared.options import grouped, option
-from rotor.cli.shared.output import Files, Table, deliver, json_text, show_facts, show_table
+from rotor.cli.shared.output import Files, Table, deliver, json_text, show_facts, show_table, sum_progress
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
@@ -57,7 +57,7 @@ def command(context: typer.Context, given: Input, options: Options) -> None:
 
     content = describe(top, given.text, context.obj)
     content |= limit_facts(top, populated_j(top, ROOM_K), SEMI_RIGID)
-    content["partition_function"] = partition_table(top, temperatures)
+    content["partition_function"] = partition_table(top, temperatures, sum_progress())
     if options.conformers is not None:
         content["conformers"] = conformer_table(given.source, options.conformers)
     deliver(files, {}, lambda: json_text(content), lambda: _show(top, content))
@@ -107,7 +107,9 @@ def _facts(top: Top, content: dict[str, Any]) -> list[tuple[str, str]]:
         facts.append(("kind", _kind_text(content["kind"], content["kind_decision"])))
     if top.symmetry is not None:
         number = content["symmetry_number"]
-        facts.append(("point group", f"{content['point_group']}, rotational symmetry number {number}"))
+        facts.append(
+            ("point group", f"{content['point_group']}, rotational symmetry number {number}{_near_text(content)}")
+        )
     if top.constants.representation:
         facts.append(("reduction", report.form_text(top.constants)))
     dipole = report.vector_text(top.dipole_abc_debye)
@@ -120,6 +122,13 @@ def _facts(top: Top, content: dict[str, Any]) -> list[tuple[str, str]]:
         ("inertial defect", f"{content['inertial_defect_u_angstrom2']:.6g} u Å²"),
     ]
     return facts
+
+
+def _near_text(content: dict[str, Any]) -> str:
+    if content["near_point_group"] is None:
+        return ""
+    off = content["near_displacement_angstrom"]
+    return f"; near {content['near_point_group']}: nuclei are up to {off:.2g} Å off it (--symmetry-tolerance takes it)"
 
 
 def _kind_text(kind: str, decision: dict[str, Any]) -> str:
@@ -170,7 +179,8 @@ def _q_table(content: dict[str, Any]) -> Table:
     rows = []
     for row in content["partition_function"]:
         known = row["q"] is not None
-        summed = [f"{row['q']:.6g}", f"{row['jmax']}", f"{row['relative_error']:.0e}"] if known else ["-", "-", "-"]
+        last = "-" if row["jmax"] is None else f"{row['jmax']}"  # where the classical limit was as good as a sum
+        summed = [f"{row['q']:.6g}", last, f"{row['relative_error']:.0e}"] if known else ["-", "-", "-"]
         remark = "" if known else _reason(row["source"])
         rows.append([f"{row['temperature_k']:g}", summed[0], f"{row['classical']:.6g}", *summed[1:], remark])
     columns = ["T (K)", "Q", "Q classical", "J max", "error", "remark"]

@@ -43,7 +43,11 @@ def _show(records: list[dict[str, Any]], alone: bool) -> None:
     if alone:
         show_facts(_facts(records[0]))
     else:
-        show_table(Table("", _COLUMNS, [_row(one) for one in records], frozenset({"name", "also", "kind", "from"})))
+        show_table(
+            Table(
+                "", _COLUMNS, [_row(one) for one in records], frozenset({"name", "also", "kind", "unverified", "from"})
+            )
+        )
 
 
 def _paths(name: str | None) -> list[Path]:
@@ -77,6 +81,9 @@ def record(path: Path) -> dict[str, Any]:
         "geometry_kind": file.geometry_kind,
         "vibrational_difference": file.vibrational_difference,
         "catalogue": dict(vars(file.catalogue)) if file.catalogue else None,
+        "serves": dict(vars(file.serves)) if file.serves else None,
+        "levels": len(file.levels) if file.levels else 0,
+        "unverified": sorted(file.unverified),
         "sources": dict(file.sources),
         "file": str(path),
         "own": _is_own(path),
@@ -89,13 +96,13 @@ def _is_own(path: Path) -> bool:
     return path.parent != data_folder() / "molecules"
 
 
-_COLUMNS = ("name", "also", "kind", "κ", "μa", "μb", "μc", "lines", "rms/MHz", "from")
+_COLUMNS = ("name", "also", "kind", "κ", "μa", "μb", "μc", "J ≤", "K ≤", "within/MHz", "unverified", "from")
 
 
 def _row(one: dict[str, Any]) -> list[str]:
-    """One molecule: measured lines met, and the first words of where its constants are from."""
+    """One molecule: which lines it serves and how well, what is unverified, and where its constants are from."""
     dipole = one["dipole_abc_debye"] or [None] * 3
-    seen = one["catalogue"] or {"lines": None, "rms_mhz": None}
+    serves = one["serves"] or {"j_max": None, "k_max": None, "error_mhz": None}
     source = ("own: " if one["own"] else "") + one["sources"].get(
         "constants", one["sources"].get("geometry", "not said")
     )
@@ -105,9 +112,15 @@ def _row(one: dict[str, Any]) -> list[str]:
         _cut(one["name"], WIDEST_NAME) if one["name"] != stem else "",
         one["kind"],
         *(_number(one["kappa"], ".3f"), *(_number(x or None, ".4g") for x in dipole)),
-        *(_number(seen["lines"], "d"), _number(seen["rms_mhz"], "g")),
+        *(_number(serves["j_max"], "d"), _number(serves["k_max"], "d"), _number(serves["error_mhz"], "g")),
+        ", ".join(name.replace("_", " ") for name in _tables_first(one["unverified"])),
         _cut(source, 60),
     ]
+
+
+def _tables_first(unverified: list[str]) -> list[str]:
+    """Names of tables, and of constants alone where their table is not unverified as a whole."""
+    return [name for name in unverified if name.partition(".")[0] == name or name.partition(".")[0] not in unverified]
 
 
 def _number(value: float | None, form: str) -> str:
@@ -128,4 +141,25 @@ def _facts(one: dict[str, Any]) -> list[tuple[str, str]]:
         ),
         ("file", one["file"]),
     ]
-    return facts + [(f"{table.replace('_', ' ')} from", source) for table, source in one["sources"].items()]
+    if (serves := one["serves"]) is not None:
+        facts.append(("serves", _serves_text(serves)))
+    if one["levels"]:
+        facts.append(("level table", f"{one['levels']} energies, which count instead of those of the constants"))
+    if one["unverified"]:
+        facts.append(("unverified", ", ".join(one["unverified"])))
+    marks = dict.fromkeys(one["unverified"], "unverified: ")
+    rows = one["sources"].items()
+    return facts + [(f"{table.replace('_', ' ')} from", marks.get(table, "") + source) for table, source in rows]
+
+
+def _serves_text(serves: dict[str, Any]) -> str:
+    limits = [f"J ≤ {serves['j_max']}"]
+    limits += [f"K ≤ {serves['k_max']}"] if serves["k_max"] is not None else []
+    limits += [f"up to {serves['max_ghz']:g} GHz"] if serves["max_ghz"] is not None else []
+    error = serves["error_mhz"]
+    known = (
+        "no catalogue was compared"
+        if error is None
+        else f"measured lines within {error:g} MHz and three of their errors"
+    )
+    return f"{', '.join(limits)}: {known}"

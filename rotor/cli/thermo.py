@@ -14,7 +14,17 @@ from rotor.cli.shared import gas_layer, inputs
 from rotor.cli.shared.gas_layer import Vibration
 from rotor.cli.shared.inputs import Input, json_option
 from rotor.cli.shared.options import file_option, grouped, option
-from rotor.cli.shared.output import Files, Table, Writer, answering, deliver, json_with_rows, show_facts, show_table
+from rotor.cli.shared.output import (
+    Files,
+    Table,
+    Writer,
+    answering,
+    deliver,
+    json_with_rows,
+    show_facts,
+    show_table,
+    sum_progress,
+)
 
 if TYPE_CHECKING:
     from rotor.thermo import ThermoFunctions
@@ -66,7 +76,7 @@ def command(context: typer.Context, given: Input, options: Options, vibration: V
     with inputs.fields_as_options(**NAMES):
         request = ThermoRequest(inputs.read_top(given), **settings)
     with answering():
-        answer = answer_thermo(request)
+        answer = answer_thermo(request, sum_progress())
         content = _content(answer, given, context.obj)
     content["files"] = files.names
     text = lambda: json_with_rows(answer.functions, "functions", content)  # noqa: E731
@@ -138,7 +148,7 @@ def _facts(functions: ThermoFunctions, content: dict[str, Any]) -> list[tuple[st
     corrections = content["classical_corrections"]
     series = " ".join(
         f"{'-' if value < 0 else '+'} {abs(value):.6g}{unit}"
-        for value, unit in zip(corrections.values(), ("/T", "/T²", " T"), strict=True)
+        for value, unit in zip(corrections.values(), ("/T", "/T²", " T", " T²"), strict=True)
         if value
     )
     return [
@@ -151,9 +161,13 @@ def _facts(functions: ThermoFunctions, content: dict[str, Any]) -> list[tuple[st
             f"good to {content['classical_tolerance']:.0%} of C_v above {content['classical_above_k']:.4g} K (rigid top, equilibrium)",
         ),
         ("corrected", f"classical Q times exp of the logarithm of 1 {series}, to that order"),
-        ("sums", f"to J = {content['jmax']} at most, Q, U and C_v to {content['relative_error']:.0e} of themselves"),
+        ("sums", f"{_summed_to(content['jmax'])}, Q, U and C_v to {content['relative_error']:.0e} of themselves"),
         ("vibration", content["vibrations"] or "left out: no states given"),
     ]
+
+
+def _summed_to(jmax: int) -> str:
+    return f"to J = {jmax} at most" if jmax >= 0 else "none: classical with corrections"
 
 
 def _species_text(functions: ThermoFunctions, content: dict[str, Any]) -> str:

@@ -4,20 +4,31 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 from rotor.formats.atomic_write import open_atomic
+from rotor.formats.level_table import write_level_table
 from rotor.formats.molecule_file import MoleculeFile
 
 
 def write_molecule_file(molecule: MoleculeFile, path: str | os.PathLike[str]) -> None:
-    """Writes a molecule file, beside and renamed: the path holds the whole file or what it held before."""
+    """Writes a molecule file, beside and renamed: the path holds the whole file or what it held before.
+
+    Level energies, where there are some, go to a file of their own beside it, `NAME_levels.csv`.
+    """
+    levels_file = f"{Path(path).stem}_levels.csv" if molecule.levels is not None else ""
+    text = molecule_file_text(molecule, levels_file)
+    if molecule.levels is not None:
+        write_level_table(molecule.levels, Path(path).with_name(levels_file))
     with open_atomic(path, "w", encoding="utf-8", newline="\n") as handle:
-        handle.write(molecule_file_text(molecule))
+        handle.write(text)
 
 
-def molecule_file_text(molecule: MoleculeFile) -> str:
+def molecule_file_text(molecule: MoleculeFile, levels_file: str = "") -> str:
     """The TOML text of a molecule; constants in MHz, dipole in D, polarizability in Å³, positions in Å.
+
+    levels_file: where its level energies stand, which the text only names. Raises ValueError where they have no file.
 
     >>> from rotor.tops.constants import Constants
     >>> print(molecule_file_text(MoleculeFile("hydrogen chloride", constants=Constants(B=312989.0))))
@@ -30,7 +41,7 @@ def molecule_file_text(molecule: MoleculeFile) -> str:
     <BLANKLINE>
     """
     head = {"name": molecule.name, "names": list(molecule.names)}
-    tables = {
+    tables: dict[str, Mapping[str, Any]] = {
         "geometry": _geometry(molecule),
         "constants": _constants(molecule),
         "covariance": _covariance(molecule),
@@ -38,12 +49,19 @@ def molecule_file_text(molecule: MoleculeFile) -> str:
         "polarizability": _polarizability(molecule),
         "spin_weights": molecule.spin_weights.to_mapping(),
         "catalogue": _catalogue(molecule),
+        "serves": vars(molecule.serves) if molecule.serves else {},
     }
+    if molecule.levels is not None:
+        if not levels_file:
+            raise ValueError(
+                f"{molecule.name}: level energies stand in a file of their own; name it, or leave them out"
+            )
+        tables["levels"] = {"file": levels_file}
     parts = ["\n".join(_lines(head))]
     for name, table in tables.items():
         if table:
-            source = molecule.sources.get(name)
-            parts.append("\n".join([f"[{name}]", *_lines({"source": source, **table})]))
+            marks = {"source": molecule.sources.get(name), "unverified": True if name in molecule.unverified else None}
+            parts.append("\n".join([f"[{name}]", *_lines({**marks, **table})]))
     return "\n\n".join(parts) + "\n"
 
 
@@ -68,6 +86,7 @@ def _constants(molecule: MoleculeFile) -> dict[str, Any]:
     numbers: dict[str, Any] = {}
     for name, value in constants.values.items():
         extra = {"uncertainty": constants.uncertainties.get(name), "source": constants.sources.get(name)}
+        extra["unverified"] = True if f"constants.{name}" in molecule.unverified else None
         extra = {key: thing for key, thing in extra.items() if thing is not None}
         numbers[name] = {"value": value, **extra} if extra else value
     return {
@@ -119,6 +138,8 @@ def _value(value: Any) -> str:
     """A TOML value; a list of lists has a line for each."""
     if isinstance(value, str):
         return _quoted(value)
+    if isinstance(value, bool):
+        return "true" if value else "false"
     if isinstance(value, Mapping):
         return "{ " + ", ".join(f"{_key(key)} = {_value(item)}" for key, item in value.items()) + " }"
     if isinstance(value, list):

@@ -159,12 +159,13 @@ def _top_as_written(file: MoleculeFile) -> Top:
         dipole_abc_debye=file.dipole_abc_debye,
         spin_weights=file.spin_weights,
         name=file.name,
-        source=file.sources.get("constants", ""),
-        dipole_source=file.sources.get("dipole", ""),
-        weights_source=file.sources.get("spin_weights", ""),
+        source=file.cited("constants"),
+        dipole_source=file.cited("dipole"),
+        weights_source=file.cited("spin_weights"),
         polarizability_abc_angstrom3=file.polarizability_abc_angstrom3,
-        polarizability_source=file.sources.get("polarizability", ""),
+        polarizability_source=file.cited("polarizability"),
         independent_errors=len(file.constants.uncertainties) < 2,
+        level_table=file.levels,
         covariance=file.covariance,
     )
 

@@ -25,7 +25,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
@@ -194,7 +194,7 @@ def compare_bands(ours: Spectrum, theirs: Spectrum) -> BandComparison:
 def rigid(top: Top) -> Top:
     """The same top without distortion constants: the one that a classical gas of rigid bodies can be compared with."""
     named: dict[str, Any] = {name: top.constants[name] for name in "ABC" if name in top.constants.values}
-    return replace(top, constants=Constants(**named, kind=top.kind), source=f"{top.source}, distortion left out")
+    return top.with_constants(Constants(**named, kind=top.kind), f"{top.source}, distortion left out")
 
 
 def lines_area(lines: Lines) -> float:

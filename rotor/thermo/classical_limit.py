@@ -1,11 +1,11 @@
-"""The classical limit of rotation, its first quantum corrections, and the temperature where it parts from the quantum sum.
+"""The classical limit of rotation with its first quantum corrections, and how large the next ones are.
 
 Classically, with ⟨g_I⟩ the spin weight averaged over many levels (G. Herzberg, Molecular Spectra and Molecular Structure
 II, eqs. V,18 and V,27; ⟨g_I⟩ is the number of nuclear-spin functions over the symmetry number),
 
     Q = ⟨g_I⟩ kT/hB  (linear),      Q = ⟨g_I⟩ √(π (kT/h)³ / ABC)  (all others),
 
-multiplied by 1 + a/T + b/T² + d T + ... The quantum corrections a and b are the first two terms of the expansion in ħ²: of
+multiplied by 1 + a/T + b/T² + d T + e T² + ... The quantum corrections a and b are the first two terms of the expansion in ħ²: of
 a linear molecule (H. P. Mulholland, Proc. Camb. Phil. Soc. 24 (1928) 280)
 
     a = Θ/3,    b = Θ²/15;
@@ -18,8 +18,14 @@ the different terms that exchanging A, B, C makes,
 which for a spherical top are B/4 and (B/4)²/2. d T is the quartic centrifugal distortion to first order, -⟨H_d⟩/kT, with
 H_d a polynomial of classical angular momenta whose components have variances kT/2A, kT/2B, kT/2C (linear: 2D k/B² T).
 
-The logarithm is what is cut off: the corrected Q is the classical one times exp[a/T + (b - a²/2)/T² + d T]. To the order
+The logarithm is what is cut off: the corrected Q is the classical one times exp[a/T + (b - a²/2)/T² + d T + e T²], with
+e T² = -⟨H_6⟩/kT + [⟨H_4²⟩ - ⟨H_4⟩²]/2(kT)², sextic distortion to first order and quartic to second. To the order
 that is known that is the same, no spurious terms get into the heat capacity, and a spherical top's e^(B/4kT) is all of it.
+
+What comes next, and how it is bounded here: (1) the terms in T⁻³, of the size of those before multiplied and of (Θ_b/T)³/100
+(a linear molecule has 0.0028); (2) distortion in T³, f T³, the next cumulants of H_4, H_6 and H_8; (3) products of quantum
+and distortion terms, such as a d, which no power of T removes; (4) what spin weights that repeat after n levels leave of the
+sum over their classes, exp(-π² T/n²Θ) by Poisson's summation, Θ the largest.
 """
 
 from __future__ import annotations
@@ -27,17 +33,16 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from itertools import permutations, product
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, overload
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from rotor import units
 from rotor.arrays import Floats
 from rotor.quantum.effects.watson import centrifugal_operators
 from rotor.quantum.spherical_top import scalar_and_tensor
-from rotor.thermo.level_sums import level_sums
-from rotor.tops.operators import AXIAL_REPRESENTATION, REPRESENTATIONS
+from rotor.tops.operators import AXIAL_REPRESENTATION, REPRESENTATIONS, Operators
 from rotor.tops.spin_weights import SpinWeights
 
 if TYPE_CHECKING:
@@ -45,15 +50,23 @@ if TYPE_CHECKING:
 
 
 SERIES_LIMIT = 0.5  # of the quantum corrections and of dT, above which the corrected limit is not given
-# exact for polynomials of fifth order in a normal deviate: nodes and weights of Gauss and Hermite
-_NODES = ((-math.sqrt(3.0), 1 / 6), (0.0, 2 / 3), (math.sqrt(3.0), 1 / 6))
+_NODES = (
+    7  # of Gauss and Hermite, exact for polynomials of 13th order in a normal deviate; the cube of a quartic has 12
+)
+_PERIODS = {
+    "none": 1,
+    "J": 2,
+    "KaKc": 2,
+    "irrep": 5,
+}  # after how many levels spin weights repeat; of "K" its own modulus
 
 
 @dataclass(frozen=True)
 class ClassicalLimit:
-    """The classical limit of a top: q = mean_weight · scale · T^(n/2), to be multiplied by 1 + a/T + b/T² + d T.
+    """The classical limit of a top: q = mean_weight · scale · T^(n/2), to be multiplied by 1 + a/T + b/T² + d T + e T².
 
-    degrees: n, 2 for a linear molecule, else 3. scale: in K^(-n/2). a, b, d: in K, K², 1/K; see the module.
+    degrees: n, 2 for a linear molecule, else 3. scale: in K^(-n/2). a, b, d, e, f: in K, K², 1/K, 1/K², 1/K³; see
+    the module. theta_k: the largest finite and the middle rotational temperature. period: of the spin weights.
     """
 
     degrees: int
@@ -62,6 +75,10 @@ class ClassicalLimit:
     a: float
     b: float
     d: float
+    e: float = 0.0
+    f: float = 0.0
+    theta_k: tuple[float, float] = (0.0, 0.0)
+    period: int = 1
 
     def q(self, temperatures_k: ArrayLike) -> Floats:
         """Q in the classical limit, (n,)."""
@@ -71,14 +88,43 @@ class ClassicalLimit:
     def corrected(self, temperatures_k: ArrayLike) -> tuple[Floats, Floats, Floats]:
         """Q, U/RT and C_v/R with the corrections, (n,) each; NaN where one of these is more than half of 1.
 
-        With c = b - a²/2: ln(Q/Q_cl) = a/T + c/T² + dT, U/RT = n/2 - a/T - 2c/T² + dT, C_v/R = n/2 + 2c/T² + 2dT.
+        With c = b - a²/2: ln(Q/Q_cl) = a/T + c/T² + dT + eT², U/RT = n/2 - a/T - 2c/T² + dT + 2eT²,
+        C_v/R = n/2 + 2c/T² + 2dT + 6eT².
         """
         t = np.asarray(temperatures_k, dtype=np.float64)
-        first, second, distortion = self.a / t, (self.b - self.a**2 / 2) / t**2, self.d * t
-        valid = np.max(np.abs([first + second, distortion]), axis=0) < SERIES_LIMIT
+        first, second = self.a / t, (self.b - self.a**2 / 2) / t**2
+        fourth, sixth = self.d * t, self.e * t**2
+        valid = np.max(np.abs([first + second, fourth, sixth]), axis=0) < SERIES_LIMIT
         half = np.where(valid, self.degrees / 2, np.nan)
-        ln_f = np.where(valid, first + second + distortion, np.nan)
-        return self.q(t) * np.exp(ln_f), half - first - 2 * second + distortion, half + 2 * second + 2 * distortion
+        ln_f = np.where(valid, first + second + fourth + sixth, np.nan)
+        energy = half - first - 2 * second + fourth + 2 * sixth
+        return self.q(t) * np.exp(ln_f), energy, half + 2 * second + 2 * fourth + 6 * sixth
+
+    def errors(self, temperatures_k: ArrayLike) -> Floats:
+        """Estimated relative errors (3, n) of the corrected Q, U/RT and C_v/R: the next terms, see the module.
+
+        A term of ln Q in Tᵐ is one of U/RT times m, and of C_v/R times m(m + 1).
+
+        >>> from rotor.tops.top import Top
+        >>> limit = classical_limit(Top.from_constants("B=1 GHz"))
+        >>> bool(limit.errors([300.0])[0, 0] < 1e-12)
+        True
+        """
+        t = np.asarray(temperatures_k, dtype=np.float64)
+        first, second = np.abs(self.a / t), np.abs((self.b - self.a**2 / 2) / t**2)
+        high, middle = self.theta_k
+        cubic = first**3 + first * second + (middle / t) ** 3 / 100
+        cubed, mixed = np.abs(self.f) * t**3, 4 * first * np.abs(self.d * t)
+        exponent = math.pi**2 * t / (self.period**2 * max(high, 1e-300))
+        repeats = 10 * np.sqrt(1 + t / max(high, 1e-300)) * np.exp(-np.minimum(exponent, 700.0))
+        absolute = np.array(
+            [
+                cubic + cubed + mixed + repeats,
+                3 * cubic + 3 * cubed + mixed + exponent * repeats,
+                6 * cubic + 12 * cubed + 2 * mixed + exponent**2 * repeats,
+            ]
+        )
+        return np.asarray(absolute / np.array([1.0, self.degrees / 2, self.degrees / 2])[:, None])
 
 
 def classical_limit(top: Top, weights: SpinWeights | None = None) -> ClassicalLimit:
@@ -89,12 +135,13 @@ def classical_limit(top: Top, weights: SpinWeights | None = None) -> ClassicalLi
     >>> round(3 * limit.a, 4), round(float(limit.q([300.0])[0]), 2)  # Θ in K
     (2.7661, 108.46)
     """
-    mean = (weights or top.spin_weights).mean
+    of = weights or top.spin_weights
     a, b, c = rotational_temperatures_k(top)
+    period = max(int(name) for name in of.classes if name.isdecimal()) + 1 if of.rule == "K" else _PERIODS[of.rule]
     if top.kind == "linear":
-        return ClassicalLimit(2, mean, 1 / b, b / 3, b**2 / 15, _distortion(top))
+        return ClassicalLimit(2, of.mean, 1 / b, b / 3, b**2 / 15, *_distortion(top), (b, b), period)
     scale = math.sqrt(math.pi / (a * b * c))
-    return ClassicalLimit(3, mean, scale, *_stripp_kirkwood(a, b, c), _distortion(top))
+    return ClassicalLimit(3, of.mean, scale, *_stripp_kirkwood(a, b, c), *_distortion(top), (a, b), period)
 
 
 def rotational_temperatures_k(top: Top) -> tuple[float, float, float]:
@@ -108,18 +155,28 @@ def rotational_temperatures_k(top: Top) -> tuple[float, float, float]:
     return a, b, c
 
 
-def classical_partition_function(top: Top, temperature_k: float) -> float:
+@overload
+def classical_partition_function(top: Top, temperature_k: float) -> float: ...
+
+
+@overload
+def classical_partition_function(top: Top, temperature_k: ArrayLike) -> float | Floats: ...
+
+
+def classical_partition_function(top: Top, temperature_k: ArrayLike) -> float | Floats:
     """Q in the classical limit, with the mean spin weight; about 1 % low for water at 300 K, worse when colder.
+
+    A number for a number, an array of the same shape for an array.
 
     >>> from rotor.tops.top import Top
     >>> round(classical_partition_function(Top.from_constants("B=57635.968 MHz"), 300.0), 2)
     108.46
     """
-    kt_mhz = temperature_k * units.MHZ_PER_K
+    kt_mhz = np.asarray(temperature_k, dtype=np.float64) * units.MHZ_PER_K
     a, b, c = top.rotational_constants_mhz
-    if top.kind == "linear":
-        return top.spin_weights.mean * kt_mhz / b
-    return top.spin_weights.mean * math.sqrt(math.pi * kt_mhz**3 / (a * b * c))
+    mean = top.spin_weights.mean
+    q = mean * kt_mhz / b if top.kind == "linear" else mean * np.sqrt(math.pi * kt_mhz**3 / (a * b * c))
+    return np.asarray(q) if kt_mhz.ndim else float(q)
 
 
 def _stripp_kirkwood(a: float, b: float, c: float) -> tuple[float, float]:
@@ -131,19 +188,30 @@ def _stripp_kirkwood(a: float, b: float, c: float) -> tuple[float, float]:
     return first / 12, second / 480
 
 
-def _distortion(top: Top) -> float:
-    """-⟨H_d⟩/kT per T, in 1/K, by quadrature over the normal distribution of the angular momentum."""
+def _distortion(top: Top) -> tuple[float, float, float]:
+    """d, e, f in 1/K, 1/K², 1/K³: cumulants of H_d over the normal distribution of the angular momentum at kT/h = 1 MHz."""
     operators = centrifugal_operators(top.constants)
-    if top.kind == "spherical":  # the tensor of fourth rank is 0 on average
-        operators, _ = scalar_and_tensor(operators)
-    quartic = {powers: c for powers, c in operators.items() if sum(powers) == 2}
-    variances = _variances(top)
-    total = 0.0
-    for nodes in product(_NODES, repeat=3):
-        x, y, z = (math.sqrt(v) * node for v, (node, _) in zip(variances, nodes, strict=True))
-        energy = sum(c * _classical_operator(powers, x, y, z) for powers, c in quartic.items())
-        total += math.prod(weight for _, weight in nodes) * energy
-    return -total * units.MHZ_PER_K  # at kT of 1 MHz ⟨H_d⟩/kT is `total`, and grows as T
+    if not operators:
+        return 0.0, 0.0, 0.0
+    first = operators  # of a spherical top the tensor of fourth rank is 0 on average
+    if top.kind == "spherical":
+        first, _ = scalar_and_tensor(operators)
+    nodes, shares = np.polynomial.hermite_e.hermegauss(_NODES)
+    weight = np.array([math.prod(p) for p in product((shares / shares.sum()).tolist(), repeat=3)])
+    points = np.array(list(product(nodes.tolist(), repeat=3))).T * np.sqrt(_variances(top))[:, None]
+    h4, h6 = (_classical_energy(operators, order, *points) for order in (2, 3))
+    means = [weight @ _classical_energy(first, order, *points) for order in (2, 3, 4)]
+    h4, h6 = h4 - weight @ h4, h6 - weight @ h6
+    second = weight @ h4**2 / 2 - means[1]
+    third = weight @ (h4 * h6) - weight @ h4**3 / 6 - means[2]
+    kelvin = units.MHZ_PER_K  # ⟨H_4⟩/kT grows as T, ⟨H_6⟩/kT as T², ⟨H_8⟩/kT as T³
+    return float(-means[0] * kelvin), float(second * kelvin**2), float(third * kelvin**3)
+
+
+def _classical_energy(operators: Operators, order: int, x: Floats, y: Floats, z: Floats) -> Floats:
+    """The terms of one order in J², (points,) in MHz."""
+    terms = [c * _classical_operator(powers, x, y, z) for powers, c in operators.items() if sum(powers) == order]
+    return np.sum(terms, axis=0) if terms else np.zeros(len(x))
 
 
 def _variances(top: Top) -> tuple[float, float, float]:
@@ -154,49 +222,8 @@ def _variances(top: Top) -> tuple[float, float, float]:
     return x, y, z
 
 
-def _classical_operator(powers: tuple[int, int, int], x: float, y: float, z: float) -> float:
-    """J^2p Jz^2q (J₊^2n + J₋^2n), and 1 for the last where n = 0, of a classical angular momentum."""
+def _classical_operator(powers: tuple[int, int, int], x: Floats, y: Floats, z: Floats) -> Floats:
+    """J^2p Jz^2q (J₊^2n + J₋^2n), and 1 for the last where n = 0, of classical angular momenta."""
     p, q, n = powers
     raised = 2 * ((x + 1j * y) ** (2 * n)).real if n else 1.0
-    return float((x * x + y * y + z * z) ** p * z ** (2 * q) * raised)
-
-
-def classical_above_k(top: Top, tolerance: float = 0.01) -> float:
-    """The highest temperature at which C_v of the rigid quantum top differs from its classical value by `tolerance` of it.
-
-    Above it the classical n R/2 is good to that; distortion, which both could have, is left out of both. The spin weights
-    count, all species in equilibrium. Looked for at 40 temperatures a decade from 0.01 to 10 times the largest finite Θ,
-    higher where it differs there, and then bisected to 1e-6. A linear molecule of Θ, its C_v/R being 1 + (Θ/T)²/45 + ..., parts at 1.93 Θ.
-
-    >>> from rotor.tops.top import Top
-    >>> round(classical_above_k(Top.from_constants("B=20836.619 MHz")), 2)  # Θ = 1 K
-    1.93
-    """
-    if not 0 < tolerance < 1:
-        raise ValueError(f"tolerance {tolerance}: expected a part of the classical heat capacity, between 0 and 1")
-    rigid, theta = _rigid(top), max(t for t in rotational_temperatures_k(top) if math.isfinite(t))
-    classical = classical_limit(rigid).degrees / 2
-
-    def beyond(temperatures: Floats) -> NDArray[np.bool_]:
-        sums = level_sums(rigid, [rigid.spin_weights], temperatures, tolerance * 1e-4)[0]
-        return np.asarray(np.abs(sums.cv_over_r / classical - 1) > tolerance)
-
-    grid = theta * np.logspace(-2, 1, 121)
-    apart = beyond(grid)
-    while apart[-20:].any():  # half a decade without a difference is the end
-        higher = grid[-1] * np.logspace(0.025, 0.5, 20)
-        grid, apart = np.append(grid, higher), np.append(apart, beyond(higher))
-    last = np.flatnonzero(apart)[-1]
-    low, high = float(grid[last]), float(grid[last + 1])
-    while high - low > 1e-6 * low:
-        middle = (high + low) / 2
-        low, high = (middle, high) if beyond(np.array([middle]))[0] else (low, middle)
-    return low
-
-
-def _rigid(top: Top) -> Top:
-    """The same top without distortion."""
-    from rotor.tops.top import Top, constants_of_moments
-
-    constants = constants_of_moments(top.moments_u_angstrom2, top.kind)
-    return Top.from_constants(constants, spin_weights=top.spin_weights)
+    return np.asarray((x * x + y * y + z * z) ** p * z ** (2 * q) * raised)

@@ -29,7 +29,7 @@ from rotor import units
 from rotor.arrays import Floats
 from rotor.table import Table
 from rotor.thermo.classical_limit import classical_limit
-from rotor.thermo.level_sums import LevelSums, checked_temperatures, level_sums, lowest_level_k
+from rotor.thermo.level_sums import LevelSums, Progress, checked_temperatures, level_sums, lowest_level_k
 from rotor.thermo.species import implied_symmetry_number, spin_species
 from rotor.thermo.vibration import VibrationalStates, vibrational_functions
 from rotor.tops.spin_weights import SpinWeights
@@ -38,7 +38,6 @@ if TYPE_CHECKING:
     from rotor.tops.top import Top
 
 
-AT_WORST = 1e-4  # truncation error up to which sums that end where the distortion constants do are taken
 GAS_CONSTANT = units.BOLTZMANN_J_PER_K * units.AVOGADRO_PER_MOL  # J/(mol K), exact
 
 
@@ -66,8 +65,9 @@ class ThermoFunctions(Table):
     many rotations and how many nuclear-spin functions the classical q = spin_factor/symmetry_number · ... counts; the second
     is of weights divided by their common divisor. q_rot, energy_j_per_mol, entropy_j_per_mol_k, cv_over_r: the quantum
     sum. q_rot_classical, cv_over_r_classical: the classical limit. q_rot_corrected, cv_over_r_corrected: that with its
-    first quantum corrections and the quartic distortion, NaN where these are large. jmax, relative_error: of the sums; the
-    largest of Q, U and C_v. vibrations, q_vib, cv_vib_over_r: where vibrational states are given. gas: with translation.
+    first quantum corrections and distortion, NaN where these are large. jmax, relative_error: of the sums (-1 where the
+    classical limit with corrections was taken); the largest error of Q, U and C_v. vibrations, q_vib, cv_vib_over_r: where
+    vibrational states are given. gas: with translation.
     """
 
     top: Top
@@ -145,6 +145,7 @@ def thermodynamic_functions(
     vibrations: VibrationalStates | None = None,
     pressure_bar: float | None = None,
     relative_error: float = 1e-6,
+    progress: Progress | None = None,
 ) -> ThermoFunctions:
     """Partition function, energy, entropy and heat capacity of a top at many temperatures, quantum and classical.
 
@@ -156,8 +157,9 @@ def thermodynamic_functions(
         "ortho", or a class of the spin weights such as "E"; see `species_names`.
     vibrations : vibrational states; none: vibration is left out.
     pressure_bar : of an ideal gas, whose functions are then given too; the top must have a mass.
-    relative_error : of Q, U and C_v from truncating the sums; up to 1e-4 where the distortion constants allow no better,
-        as `ThermoFunctions.relative_error` tells.
+    relative_error : of Q, U and C_v, asked; larger, up to 10 %, where levels count that the distortion constants do not
+        serve: `ThermoFunctions.relative_error` says what was reached.
+    progress : called as `progress(j, last)` as a long sum goes on.
 
     Returns
     -------
@@ -174,7 +176,9 @@ def thermodynamic_functions(
     [0.3088, 1.0001]
     """
     parts, fractions = _parts(top, species)
-    rotation = _rotation(top, species, parts, fractions, checked_temperatures(temperatures_k), relative_error)
+    temperatures = checked_temperatures(temperatures_k)
+    sums = level_sums(top, list(parts.values()), temperatures, relative_error, progress=progress)
+    rotation = _rotation(top, species, parts, fractions, sums)
     return _with_gas(_with_vibration(rotation, vibrations), pressure_bar)
 
 
@@ -198,12 +202,10 @@ def _rotation(
     species: str,
     parts: dict[str, SpinWeights],
     fractions: dict[str, float],
-    temperatures: Floats,
-    relative_error: float,
+    sums: list[LevelSums],
 ) -> ThermoFunctions:
     """The functions of rotation alone."""
-    ground_k = lowest_level_k(top, [top.spin_weights])[0]
-    sums = level_sums(top, list(parts.values()), temperatures, relative_error, at_worst=AT_WORST)
+    ground_k, temperatures = lowest_level_k(top, [top.spin_weights])[0], sums[0].temperatures_k
     shares = np.array(list(fractions.values()) or [1.0])
     ln_q, mean, cv = _mixed(sums, ground_k, shares)
 

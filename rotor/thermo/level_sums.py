@@ -7,14 +7,19 @@ With x = E/kT, E from the lowest level that exists, and g = g_I (2J+1),
 (J. E. Mayer and M. Goeppert Mayer, Statistical Mechanics, Wiley 1940, chapter 6). What is left out beyond the last J is
 estimated by a series that falls at least as fast as a geometric one: the same terms with every level weighing as much as
 the heaviest class of nuclear spin does, which are smooth in J whatever the spin weights leave out.
+
+Levels that the distortion constants do not serve count with energies of simpler constants, see `trusted_levels`, and what
+the sum would gain if these were as low as they might be is added to the error.
+
+Where the classical limit with its corrections is as good as what was asked, and the sum would be long, no level is solved.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -25,7 +30,8 @@ from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.levels import weights_of_levels
 from rotor.quantum.solve import solve_levels
-from rotor.thermo.spin_factor import without_spins
+from rotor.thermo.classical_limit import classical_limit
+from rotor.thermo.trusted_levels import trusted_energies_mhz
 from rotor.tops.spin_weights import SpinWeights
 
 if TYPE_CHECKING:
@@ -33,21 +39,16 @@ if TYPE_CHECKING:
 
 
 STRIDE = 8  # J are solved by so many at a time
+LONG_SUM = 60  # J above which the classical limit with corrections is taken where it is as good as what was asked
+MOST_J = {"asymmetric": 1000}  # the longest sum, of other kinds J 4000: both take some seconds
 JMAX_LIMIT = 4000
+AT_WORST = 0.1  # estimated relative error above which a sum is refused
 LOWEST_X, HIGHEST_X = -300.0, 1e4  # levels that do not exist may lie below the lowest that does; e³⁰⁰ is enough
 ENDLESS = 1e150  # stands for a tail that is not known because the terms still grow
+NOT_SUMMED = -1  # stands for J max where the classical limit was taken
 DIMENSIONS = {"A": 1, "E": 2, "F": 3, "G": 4, "H": 5}
 
-
-@dataclass(frozen=True)
-class PartitionFunction:
-    """Q at one temperature: the sum, the J it was summed to, its estimated relative truncation error, how it came."""
-
-    temperature_k: float
-    q: float
-    jmax: int | None
-    relative_error: float
-    source: str
+Progress = Callable[[int, int], object]
 
 
 @dataclass(frozen=True)
@@ -55,8 +56,8 @@ class LevelSums:
     """What the levels of one set of spin weights sum to at n temperatures.
 
     ground_k: energy of its lowest level over k, from the Hamiltonian's zero, in K. q: (n,), from that level. energy_over_rt,
-    cv_over_r: (n,), from that level. jmax: (n,), the last J that was added. error_q, error_energy, error_cv: (n,), estimated
-    truncation errors, relative.
+    cv_over_r: (n,), from that level. jmax: (n,), the last J that was added, -1 where the classical limit was taken.
+    error_q, error_energy, error_cv: (n,), estimated relative errors, of truncation and of levels that are not trusted.
     """
 
     temperatures_k: Floats
@@ -79,35 +80,6 @@ def checked_temperatures(temperatures_k: ArrayLike) -> Floats:
     return temperatures
 
 
-def partition_function(
-    top: Top, temperature_k: float, relative_error: float = 1e-6, effects: Sequence[QuantumEffect] = SEMI_RIGID
-) -> PartitionFunction:
-    """Q(T) summed over levels until the tail is below `relative_error` of it.
-
-    The tail is estimated by the ratio of the last two J, which falls with J. Raises ValueError for a temperature not
-    above 0 K, and where the terms rise again before they have died away: then the distortion constants are used beyond
-    their reach, and no sum would mean anything.
-    """
-    return partition_functions(top, [temperature_k], relative_error, effects)[0]
-
-
-def partition_functions(
-    top: Top,
-    temperatures_k: Iterable[float],
-    relative_error: float = 1e-6,
-    effects: Sequence[QuantumEffect] = SEMI_RIGID,
-) -> list[PartitionFunction]:
-    """Q at several temperatures from one set of levels; see `partition_function`."""
-    temperatures = checked_temperatures(list(temperatures_k))
-    spinless, factor = without_spins(top, effects)
-    sums = level_sums(top, [top.spin_weights], temperatures, relative_error, energies=False, effects=spinless)[0]
-    rows = zip(
-        temperatures.tolist(), (factor * sums.q).tolist(), sums.jmax.tolist(), sums.error_q.tolist(), strict=True
-    )
-    source = "summed from levels to J = {}, relative error below {:g}"
-    return [PartitionFunction(t, q, j, error, source.format(j, relative_error)) for t, q, j, error in rows]
-
-
 def level_sums(
     top: Top,
     weights: Sequence[SpinWeights],
@@ -115,15 +87,40 @@ def level_sums(
     relative_error: float = 1e-8,
     *,
     energies: bool = True,
-    at_worst: float = 0.0,
+    at_worst: float = AT_WORST,
+    progress: Progress | None = None,
     effects: Sequence[QuantumEffect] = SEMI_RIGID,
 ) -> list[LevelSums]:
     """Q, U/RT and C_v/R of a top's levels for each of several sets of spin weights, from levels solved once.
 
-    The sum at each temperature goes on until the estimated truncation error of Q, and with `energies` those of U and C_v
-    too, are below `relative_error`. Where the terms grow again before that, or a level falls below the lowest, since the
-    distortion constants are used beyond their reach, it ends where the error was least, as an asymptotic series does;
-    ValueError where that is above `at_worst`. The errors say what was reached.
+    Parameters
+    ----------
+    top : Top
+    weights : sequence of SpinWeights
+    temperatures_k : array_like
+        (n,), above 0 K.
+    relative_error : float
+        Asked of Q, and with `energies` of U and C_v too. The sum at each temperature goes on until its tail is below it;
+        where a sum would need more than J = 60 and the classical limit with corrections is as good, that is taken.
+    energies : bool
+        Whether U and C_v count for the error.
+    at_worst : float
+        Estimated error up to which a sum is given at all.
+    progress : callable, optional
+        Called as `progress(j, last)` whenever more levels are solved, with the J that the sum is expected to end at.
+    effects : sequence of QuantumEffect
+        What the Hamiltonian consists of. With others than the semi-rigid ones every level is solved and trusted.
+
+    Returns
+    -------
+    list of LevelSums
+        One for each set of weights. Their errors say what was reached, which is less than what was asked where the
+        distortion constants do not serve the levels that count.
+
+    Raises
+    ------
+    ValueError
+        A temperature not above 0 K; an error above `at_worst`.
 
     >>> from rotor.tops.top import Top
     >>> top = Top.from_constants("B=60 GHz")
@@ -131,13 +128,31 @@ def level_sums(
     >>> round(float(sums.q[0]), 4), round(float(sums.cv_over_r[0]), 6)  # T/Θ + 1/3 + ..., 1 + (Θ/T)²/45 + ...
     (104.5171, 1.000002)
     """
-    temperatures = checked_temperatures(temperatures_k)
-    least_k = min(top.rotational_constants_mhz) / units.MHZ_PER_K
-    enough = -0.5 * math.log(max(relative_error, at_worst))  # half of what x of the last J must be, about
-    if least_k * JMAX_LIMIT**2 < enough * temperatures.max():
-        raise _endless(temperatures.max())
-    ladder = _Ladder(top, tuple(weights), tuple(effects))
-    return [_summed(ladder, s, temperatures, relative_error, energies, at_worst) for s in range(len(weights))]
+    temperatures, kinds = checked_temperatures(temperatures_k), 3 if energies else 1
+    ladder = _Ladder(top, tuple(weights), tuple(effects), progress)
+    longest = MOST_J.get(top.kind, JMAX_LIMIT)
+    expected = _last_j(top, temperatures, relative_error)
+    found = []
+    for s, one in enumerate(weights):
+        errors = classical_limit(top, one).errors(temperatures)[:kinds].max(axis=0)
+        classical = (expected > LONG_SUM) & (errors <= relative_error)
+        classical |= (expected > longest) & (errors <= at_worst)
+        classical &= ladder.semi_rigid
+        parts = np.zeros((7, len(temperatures)))
+        parts[:, classical] = _expanded(ladder, s, temperatures[classical])
+        if not classical.all():
+            hottest = expected[~classical].max()
+            ladder.last = int(min(hottest, longest))
+            enough = (relative_error, 2 * at_worst)
+            parts[:, ~classical] = _summed(ladder, s, temperatures[~classical], enough, kinds)
+        found.append(_as_sums(temperatures, ladder.ground[s][0], parts))
+        _refuse_inexact(found[-1], kinds, at_worst)
+    return found
+
+
+def _as_sums(temperatures: Floats, ground_k: float, parts: Floats) -> LevelSums:
+    q, energy, cv, jmax, error_q, error_energy, error_cv = parts
+    return LevelSums(temperatures, ground_k, q, energy, cv, jmax.astype(np.int64), error_q, error_energy, error_cv)
 
 
 def lowest_level_k(top: Top, weights: Sequence[SpinWeights]) -> list[float]:
@@ -145,19 +160,56 @@ def lowest_level_k(top: Top, weights: Sequence[SpinWeights]) -> list[float]:
     return [energy for energy, _ in _Ladder(top, tuple(weights)).ground]
 
 
+def _last_j(top: Top, temperatures: Floats, relative_error: float) -> Floats:
+    """The J that a sum will end at, about: where J² Θ of the smallest constant over T is ln(1/error) and some."""
+    least_k = min(top.rotational_constants_mhz) / units.MHZ_PER_K
+    return np.sqrt((3.0 - math.log(min(relative_error, 0.1))) * temperatures / least_k)
+
+
+def _refuse_inexact(sums: LevelSums, kinds: int, at_worst: float) -> None:
+    """ValueError for the first temperature where the error is too large for the sum to mean anything."""
+    worst = np.max([sums.error_q, sums.error_energy, sums.error_cv][:kinds], axis=0)
+    for t, error in zip(sums.temperatures_k[worst > at_worst].tolist(), worst[worst > at_worst].tolist(), strict=True):
+        good = sums.temperatures_k[worst <= at_worst]
+        others = f"; of those asked for the sum can be had up to {good.max():g} K" if len(good) else ""
+        error = f"{error:.1e} of it" if error < 1 else "all of it"
+        raise ValueError(
+            f"Q({t:g} K): the levels that count lie beyond the reach of the distortion constants or of a sum (estimated "
+            f"error {error}, above {at_worst:g}); lower the temperature, or give Q{others}"
+        )
+
+
+class Shell(NamedTuple):
+    """The levels of one J: energies (n,) in K, degeneracies (n,) without spin and (sets, n) with.
+
+    lower: energies (n,) in K that untrusted levels might have; None where all are trusted.
+    """
+
+    kelvin: Floats
+    plain: Floats
+    spin: Floats
+    lower: Floats | None
+
+
 class _Ladder:
-    """Levels J by J, solved when first asked for: energies in K, degeneracies without spin, and with each set of weights."""
+    """Levels J by J, solved when first asked for."""
 
     def __init__(
-        self, top: Top, weights: tuple[SpinWeights, ...], effects: tuple[QuantumEffect, ...] = SEMI_RIGID
+        self,
+        top: Top,
+        weights: tuple[SpinWeights, ...],
+        effects: tuple[QuantumEffect, ...] = SEMI_RIGID,
+        progress: Progress | None = None,
     ) -> None:
-        self._top, self._weights, self._effects = top, weights, effects
-        self._by_j: list[tuple[Floats, Floats, Floats]] = []
+        self.top, self.weights, self._effects, self._progress = top, weights, effects, progress
+        self.semi_rigid = effects == SEMI_RIGID
+        self._by_j: list[Shell] = []
+        self.last = 0
         self.heaviest = [heaviest_component(one) for one in weights]
         self.ground = [self._lowest(s) for s in range(len(weights))]
 
-    def at(self, j: int) -> tuple[Floats, Floats, Floats]:
-        """Energies (n,), degeneracies (n,) and those with spin weights (sets, n) of one J."""
+    def at(self, j: int) -> Shell:
+        """The levels of one J."""
         while len(self._by_j) <= j:
             self._solve_more()
         return self._by_j[j]
@@ -165,20 +217,27 @@ class _Ladder:
     def _solve_more(self) -> None:
         first = len(self._by_j)
         last = first + max(STRIDE, first // 8) - 1
-        levels = solve_levels(self._top, last, jmin=first, effects=self._effects, vectors=False)
-        kelvin = levels.energy_mhz / units.MHZ_PER_K
+        if self._progress is not None:
+            self._progress(first, max(self.last, first))
+        levels = solve_levels(self.top, last, jmin=first, effects=self._effects, vectors=False)
         plain = levels.states.astype(np.float64)
-        spin = np.array([levels.multiplicity * weights_of_levels(levels, one) for one in self._weights], dtype=float)
+        spin = np.array([levels.multiplicity * weights_of_levels(levels, one) for one in self.weights], dtype=float)
+        energies = lower = levels.energy_mhz
+        if self.semi_rigid:
+            energies, lower = trusted_energies_mhz(self.top, levels)
         rotational = levels.rotational
         for j in range(first, last + 1):
             here = rotational == j
-            self._by_j.append((kelvin[here], plain[here], spin[:, here]))
+            kelvin, low = energies[here] / units.MHZ_PER_K, lower[here] / units.MHZ_PER_K
+            self._by_j.append(Shell(kelvin, plain[here], spin[:, here], low if (low < kelvin).any() else None))
 
     def _lowest(self, s: int) -> tuple[float, int]:
         """Energy in K and J of the lowest level that exists, among those of the J solved by then."""
         while True:
             self._solve_more()
-            found = [(e[g[s] > 0].min(), j) for j, (e, _, g) in enumerate(self._by_j) if (g[s] > 0).any()]
+            found = [
+                (one.kelvin[one.spin[s] > 0].min(), j) for j, one in enumerate(self._by_j) if (one.spin[s] > 0).any()
+            ]
             if found:
                 energy, j = min(found)
                 return float(energy), j
@@ -191,51 +250,61 @@ def heaviest_component(weights: SpinWeights) -> float:
     return float(max(weights.values))
 
 
-def _summed(
-    ladder: _Ladder, s: int, temperatures: Floats, relative_error: float, energies: bool, at_worst: float
-) -> LevelSums:
-    """The sums for one set of weights; each temperature leaves the loop at the J where its tail is small enough."""
-    (ground, ground_j), kinds = ladder.ground[s], 3 if energies else 1
-    sums, tails, best = np.zeros((3, len(temperatures))), _Tails(temperatures), _Best(len(temperatures))
-    going = np.arange(len(temperatures))
-    for j in range(JMAX_LIMIT):
-        kelvin, plain, spin = ladder.at(j)
-        x = np.clip((kelvin - ground) / temperatures[going, None], LOWEST_X, HIGHEST_X)
-        terms = np.exp(-x) * np.array([np.ones_like(x), x, x * x])
-        sums[:, going] += terms @ spin[s]
-        tail = tails.after(going, ladder.heaviest[s] * (np.abs(terms) @ plain))
+def _expanded(ladder: _Ladder, s: int, temperatures: Floats) -> Floats:
+    """Rows Q, U/RT, C_v/R, J max and three errors (7, n) of the classical limit with its corrections, from the ground level."""
+    limit = classical_limit(ladder.top, ladder.weights[s])
+    q, energy, cv = limit.corrected(temperatures)
+    below = ladder.ground[s][0] / temperatures
+    unsummed = np.full(len(temperatures), float(NOT_SUMMED))
+    return np.array([q * np.exp(below), energy - below, cv, unsummed, *limit.errors(temperatures)])
+
+
+def _summed(ladder: _Ladder, s: int, temperatures: Floats, enough: tuple[float, float], kinds: int) -> Floats:
+    """The same rows of the sum; each temperature leaves the loop at the J where its tail is small enough.
+
+    enough: the relative error asked for, and that of untrusted levels from which on there is no hope.
+    """
+    longest = MOST_J.get(ladder.top.kind, JMAX_LIMIT)
+    ground, ground_j = ladder.ground[s]
+    n = len(temperatures)
+    moments, doubts, tails = np.zeros((3, n)), np.zeros((3, n)), np.zeros((3, n))
+    before, jmax, going = np.zeros((3, n)), np.full(n, longest), np.arange(n)
+    for j in range(longest + 1):
+        shell, t = ladder.at(j), temperatures[going, None]
+        terms = _terms((shell.kelvin - ground) / t)
+        moments[:, going] += terms @ shell.spin[s]
+        if shell.lower is not None:
+            doubts[:, going] += np.abs(_terms((shell.lower - ground) / t) - terms) @ shell.spin[s]
+        smooth = ladder.heaviest[s] * (np.abs(terms) @ shell.plain)
+        tails[:, going], before[:, going] = _tail(smooth, before[:, going]), smooth
         if j < max(3, ground_j + 2):
             continue
-        beyond = bool(
-            (kelvin[spin[s] > 0] < ground).any()
-        )  # below the lowest level that exists: no energy of a molecule
-        errors = relative_errors(sums[:, going], tail)
-        best.take(going, j, sums[:, going], errors, errors[:kinds].max(axis=0))
-        going = going[best.worst[going] >= relative_error]
-        grown = tails.grows[going] | beyond
-        reached = temperatures[best.worst <= max(relative_error, at_worst)]
-        way_out = "lower the temperature" + ("" if energies else " or give Q") + _up_to(reached)
-        what = (
-            f"the levels of J = {j} fall below the lowest" if beyond else f"the sum over levels grows again at J = {j}"
-        )
-        tails.refuse(going[grown & (best.worst[going] > at_worst)], what, sums[0], way_out)
-        going = going[~grown]
+        errors = relative_errors(moments[:, going], tails[:, going])[:kinds]
+        done = errors.max(axis=0) < enough[0]
+        done |= doubts[0, going] > enough[1] * moments[0, going]
+        jmax[going[done]] = j
+        going = going[~done]
         if not len(going):
-            return best.as_sums(temperatures, ground)
-    raise _endless(temperatures[going].max())
+            break
+    mean, square = moments[1] / moments[0], moments[2] / moments[0]
+    return np.array([moments[0], mean, square - mean**2, jmax, *relative_errors(moments, tails + doubts)])
 
 
-def _endless(hottest: float) -> ValueError:
-    return ValueError(f"Q({hottest:g} K) needs levels beyond J = {JMAX_LIMIT - 1}; use the classical limit")
+def _terms(x: Floats) -> Floats:
+    """e⁻ˣ, x e⁻ˣ and x² e⁻ˣ of energies over kT, stacked."""
+    x = np.clip(x, LOWEST_X, HIGHEST_X)
+    return np.asarray(np.exp(-x) * np.array([np.ones_like(x), x, x * x]))
 
 
-def _up_to(reached: Floats) -> str:
-    """Of the temperatures asked for those that can be had, if there are any."""
-    return f"; of those asked for the sum can be had up to {reached.max():g} K" if len(reached) else ""
+def _tail(terms: Floats, before: Floats) -> Floats:
+    """What follows the last of terms that fall at least as fast as a geometric series, t r/(1 - r); endless while they grow."""
+    falls = terms < before
+    tail = terms * (terms / np.where(falls, before - terms, 1.0))
+    return np.where(terms == 0, 0.0, np.where(falls, tail, ENDLESS))
 
 
 def relative_errors(moments: Floats, tails: Floats) -> Floats:
-    """Relative truncation errors (3, n) of Q, U and C_v, from moments of x and the tails left out of them, (3, n).
+    """Relative errors (3, n) of Q, U and C_v, from moments of x and what may be missing of them, (3, n).
 
     To first order in the tails t: δ⟨x⟩ ≤ (t₁ + ⟨x⟩ t₀)/Q and δC ≤ (t₂ + 2⟨x⟩ t₁ + |2⟨x⟩² - ⟨x²⟩| t₀)/Q. Nothing left out of
     nothing is no error.
@@ -248,54 +317,3 @@ def relative_errors(moments: Floats, tails: Floats) -> Floats:
     ratio = np.full_like(absolute, np.inf)
     np.divide(absolute, values, out=ratio, where=values > 0)
     return np.where(absolute == 0, 0.0, ratio)
-
-
-class _Tails:
-    """The part of each sum beyond the last J, by the ratio of the last two terms, t r/(1 - r), for every temperature."""
-
-    def __init__(self, temperatures: Floats) -> None:
-        n = len(temperatures)
-        self._temperatures = temperatures
-        self._last = np.zeros((3, n))
-        self._highest, self._lowest = np.zeros(n), np.full(n, np.inf)  # of the terms of Q, and since the highest
-        self.grows = np.zeros(n, dtype=bool)
-
-    def after(self, going: Ints, terms: Floats) -> Floats:
-        """The tails (3, n) once the terms (3, n) of one more J are added; endless while they grow."""
-        before, highest, lowest = self._last[:, going], self._highest[going], self._lowest[going]
-        self.grows[going] = (terms[0] > 2 * lowest) & (lowest < highest / 2)  # has fallen, and grows again
-        self._lowest[going] = np.where(terms[0] >= highest, terms[0], np.minimum(lowest, terms[0]))
-        self._highest[going] = np.maximum(highest, terms[0])
-        self._last[:, going] = terms
-        falls = terms < before
-        tail = terms * (terms / np.where(falls, before - terms, 1.0))
-        return np.where(terms == 0, 0.0, np.where(falls, tail, ENDLESS))
-
-    def refuse(self, grown: Ints, what: str, totals: Floats, way_out: str) -> None:
-        """ValueError for the first of the temperatures where the sum has lost its meaning, if there is one."""
-        if len(grown):
-            share = self._last[0, grown[0]] / totals[grown[0]]
-            raise ValueError(
-                f"Q({self._temperatures[grown[0]]:g} K): {what}; the distortion "
-                f"constants are used beyond their reach (tail {share:.1e} of Q there); {way_out}"
-            )
-
-
-class _Best:
-    """Of the sums up to each J those with the least error, for every temperature."""
-
-    def __init__(self, n: int) -> None:
-        self.worst = np.full(n, np.inf)
-        self._moments, self._errors, self._jmax = np.zeros((3, n)), np.zeros((3, n)), np.zeros(n, dtype=np.int64)
-
-    def take(self, going: Ints, j: int, moments: Floats, errors: Floats, worst: Floats) -> None:
-        """Keep what is better than before: moments and errors (3, m), and the largest error that counts (m,)."""
-        better = worst <= self.worst[going]
-        these = going[better]
-        self.worst[these], self._jmax[these] = worst[better], j
-        self._moments[:, these], self._errors[:, these] = moments[:, better], errors[:, better]
-
-    def as_sums(self, temperatures: Floats, ground_k: float) -> LevelSums:
-        q, first, second = self._moments
-        mean = first / q
-        return LevelSums(temperatures, ground_k, q, mean, second / q - mean**2, self._jmax, *self._errors)

@@ -9,13 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 from rotor.checks import require_positive
 from rotor.thermo.classical_limit import (
-    classical_above_k,
     classical_limit,
     classical_partition_function,
     rotational_temperatures_k,
 )
+from rotor.thermo.classical_onset import classical_above_k
 from rotor.thermo.functions import ThermoFunctions, species_names, thermodynamic_functions
-from rotor.thermo.level_sums import PartitionFunction, partition_function, partition_functions
+from rotor.thermo.level_sums import Progress
+from rotor.thermo.partition import PartitionFunction, partition_function, partition_functions
 from rotor.thermo.vibration import VibrationalStates
 from rotor.tops.facts import top_facts
 
@@ -82,7 +83,7 @@ class ThermoAnswer:
             "rotational_temperatures_k": rotational_temperatures_k(top),
             "classical_above_k": self.classical_above_k,
             "classical_tolerance": CLASSICAL_TOLERANCE,
-            "classical_corrections": {"a_k": limit.a, "b_k2": limit.b, "d_per_k": limit.d},
+            "classical_corrections": {"a_k": limit.a, "b_k2": limit.b, "d_per_k": limit.d, "e_per_k2": limit.e},
             "species": functions.species,
             "species_known": species_names(top),
             "fractions": dict(functions.fractions),
@@ -95,8 +96,8 @@ class ThermoAnswer:
         }
 
 
-def answer_thermo(request: ThermoRequest) -> ThermoAnswer:
-    """The functions of a request; ValueError where a sum over levels gives no answer.
+def answer_thermo(request: ThermoRequest, progress: Progress | None = None) -> ThermoAnswer:
+    """The functions of a request; ValueError where a sum over levels gives no answer. progress: see `level_sums`.
 
     >>> from rotor.tops.top import Top
     >>> answer = answer_thermo(ThermoRequest(Top.from_constants("B=10 cm-1"), (300.0,)))
@@ -110,6 +111,7 @@ def answer_thermo(request: ThermoRequest) -> ThermoAnswer:
         vibrations=request.vibrations,
         pressure_bar=request.pressure_bar,
         relative_error=request.relative_error,
+        progress=progress,
     )
     return ThermoAnswer(request, functions)
 
@@ -126,7 +128,9 @@ def partition_facts(top: Top, partition: PartitionFunction) -> dict[str, Any]:
     }
 
 
-def partition_table(top: Top, temperatures_k: Sequence[float]) -> list[dict[str, Any]]:
+def partition_table(
+    top: Top, temperatures_k: Sequence[float], progress: Progress | None = None
+) -> list[dict[str, Any]]:
     """Q summed and classical at each temperature; where there is no sum, `q` is None and `source` says why.
 
     >>> from rotor.tops.top import Top
@@ -134,7 +138,7 @@ def partition_table(top: Top, temperatures_k: Sequence[float]) -> list[dict[str,
     [3.97, 108.79]
     """
     try:
-        return [partition_facts(top, one) for one in partition_functions(top, temperatures_k)]
+        return [partition_facts(top, one) for one in partition_functions(top, temperatures_k, progress=progress)]
     except ValueError:  # one of them is out of reach: each for itself
         return [_partition_row(top, temperature) for temperature in temperatures_k]
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass
+from typing import overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -70,8 +71,14 @@ class VibrationalStates:
         )
         return f"{'fundamentals, harmonic,' if self.harmonic else 'states'} {', '.join(energies)} cm-1"
 
-    def factor(self, temperature_k: float) -> float:
-        """The factor of Q at a temperature; see `vibrational_partition_function`."""
+    @overload
+    def factor(self, temperature_k: float) -> float: ...
+
+    @overload
+    def factor(self, temperature_k: ArrayLike) -> float | Floats: ...
+
+    def factor(self, temperature_k: ArrayLike) -> float | Floats:
+        """The factor of Q at one temperature or an array of them; see `vibrational_partition_function`."""
         return vibrational_partition_function(
             self.energies_cm, self.degeneracies, temperature_k, harmonic=self.harmonic
         )
@@ -82,24 +89,40 @@ _ENERGY = re.compile(
 )
 
 
+@overload
 def vibrational_partition_function(
     energies_cm: ArrayLike, degeneracies: ArrayLike, temperature_k: float, *, harmonic: bool = False
-) -> float:
+) -> float: ...
+
+
+@overload
+def vibrational_partition_function(
+    energies_cm: ArrayLike, degeneracies: ArrayLike, temperature_k: ArrayLike, *, harmonic: bool = False
+) -> float | Floats: ...
+
+
+def vibrational_partition_function(
+    energies_cm: ArrayLike, degeneracies: ArrayLike, temperature_k: ArrayLike, *, harmonic: bool = False
+) -> float | Floats:
     """Q of vibration, the ground state counted as 1: Σ g exp(-E/kT) over the states listed, or of harmonic oscillators.
 
     With `harmonic` the energies are fundamentals and Q = Π (1 - exp(-E/kT))^-g, all overtones among it (G. Herzberg,
     Molecular Spectra and Molecular Structure II, eqs. V,20 and V,21; anharmonicity and what splits overtones neglected).
-    energies_cm, degeneracies: (n,). Raises ValueError for a temperature not above 0 K or energies not above 0.
+    energies_cm, degeneracies: (n,). A number for one temperature, an array of the same shape for an array. Raises ValueError
+    for a temperature not above 0 K or energies not above 0.
 
     >>> round(vibrational_partition_function([667.4, 1388.2, 2349.1], [2, 1, 1], 300.0, harmonic=True), 4)  # CO2
     1.0881
     """
-    if not (math.isfinite(temperature_k) and temperature_k > 0):
-        raise ValueError(f"temperature {temperature_k} K: a temperature is above 0 K")
+    temperatures = np.asarray(temperature_k, dtype=np.float64)
+    for t in temperatures.ravel().tolist():
+        if not (math.isfinite(t) and t > 0):
+            raise ValueError(f"temperature {t} K: a temperature is above 0 K")
     given = VibrationalStates(tuple(np.ravel(energies_cm).tolist()), tuple(np.ravel(degeneracies).tolist()))
-    occupied = np.exp(-np.array(given.energies_cm) * units.MHZ_PER_CM / (temperature_k * units.MHZ_PER_K))
-    g = np.array(given.degeneracies)
-    return float(np.prod((1 - occupied) ** -g.astype(float))) if harmonic else float(1 + g @ occupied)
+    occupied = np.exp(-np.array(given.energies_cm) * units.MHZ_PER_CM / (temperatures[..., None] * units.MHZ_PER_K))
+    g = np.array(given.degeneracies, dtype=np.float64)
+    q = np.prod((1 - occupied) ** -g, axis=-1) if harmonic else 1 + occupied @ g
+    return np.asarray(q) if temperatures.ndim else float(q)
 
 
 def vibrational_functions(states: VibrationalStates, temperatures_k: ArrayLike) -> tuple[Floats, Floats, Floats]:

@@ -186,4 +186,4 @@ def semirigid_top(field: ForceField, *, reduction: str = "S", representation: st
     if is_planar(top):
         defect = inertial_defect_u_angstrom2(field)
         notes += (f"A, B, C are those of the rigid minimum; vibration makes an inertial defect of {defect:.4f} u Å²",)
-    return replace(top, constants=constants, notes=notes)
+    return replace(top.with_constants(constants), notes=notes)

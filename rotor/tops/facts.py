@@ -22,7 +22,7 @@ def top_facts(top: Top) -> dict[str, Any]:
     ('asymmetric', -0.333333, None)
     """
     constants, abc = top.constants, top.rotational_constants_mhz
-    frame = top.frame
+    frame, near = top.frame, top.symmetry.near if top.symmetry else None
     return {
         "name": top.name or None,
         "formula": formula_of(top),
@@ -31,6 +31,8 @@ def top_facts(top: Top) -> dict[str, Any]:
         "kind_decision": _decision(top.kind_of_top) if top.kind_of_top else None,
         "point_group": top.symmetry.point_group if top.symmetry else None,
         "symmetry_number": top.symmetry.symmetry_number if top.symmetry else None,
+        "near_point_group": near.point_group if near else None,
+        "near_displacement_angstrom": near.displacement_angstrom if near else None,
         "constants_mhz": dict(constants.values),
         "uncertainties_mhz": dict(constants.uncertainties),
         "reduction": constants.reduction,

@@ -10,6 +10,7 @@ import itertools
 import math
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -17,7 +18,7 @@ from rotor.arrays import Floats
 from rotor.geometry.inertia import PrincipalFrame
 from rotor.tops.constants import Constants
 from rotor.tops.operators import distortion_terms, powers_of_spelled
-from rotor.tops.top import Top
+from rotor.tops.top import Top, symmetric_tensor
 
 TURNED_TOO_FAR_DEGREES = 5.0  # beyond it distortion constants are not carried over
 
@@ -132,12 +133,13 @@ def _in_order(values: Floats, turned: Top) -> tuple[Floats, Top]:
     change = axes @ turned.frame.axes.T
     frame = PrincipalFrame(turned.frame.moments[order], axes, turned.frame.centre)
     note = "the scaled constants have another order than the calculated ones: the axes are named by the scaled ones"
-    annotated = replace(turned, frame=frame, notes=(*turned.notes, note))
-    if turned.dipole_abc_debye is not None:
-        annotated = annotated.with_dipole(change @ np.array(turned.dipole_abc_debye), turned.dipole_source)
-    if turned.polarizability_abc_angstrom3 is not None:
-        tensor = change @ np.array(turned.polarizability_abc_angstrom3) @ change.T
-        annotated = annotated.with_polarizability(tensor, turned.polarizability_source)
+    dipole, tensor = turned.dipole_abc_debye, turned.polarizability_abc_angstrom3
+    moved: dict[str, Any] = {"frame": frame, "notes": (*turned.notes, note)}
+    if dipole is not None:
+        moved["dipole_abc_debye"] = tuple((change @ np.array(dipole)).tolist())
+    if tensor is not None:
+        moved["polarizability_abc_angstrom3"] = symmetric_tensor(change @ np.array(tensor) @ change.T)
+    annotated = replace(turned, **moved)
     return values[order], annotated
 
 

@@ -14,15 +14,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rotor.arrays import Floats
 from rotor.molecules.molecule import Molecule
 from rotor.molecules.nuclei import isotope, natural_isotopes
-from rotor.molecules.symmetry.point_group import symmetry_of
+from rotor.molecules.symmetry.point_group import Symmetry, symmetry_of
+from rotor.tops.allowed import invariant_vector
 from rotor.tops.isotopic_scaling import carried_over, matched_axes, turned_degrees
 from rotor.tops.top import Top
 
 Changes = Mapping[int | str, str] | str
 
 MOST_ARRANGEMENTS = 20_000  # of isotopes on the atoms, equivalent ones counted each
+_DIPOLE_ERROR = 0.02  # of the whole: what symmetry of the bare geometry forbids below it is the error of the components
 _DOUBTFUL_OVERLAP = 0.6  # cos² below which it is doubtful which axis is which
 
 
@@ -149,12 +152,21 @@ def _geometry(parent: Top) -> Molecule:
 # Which there are
 
 
-def _permutations(molecule: Molecule) -> list[NDArray[np.int64]]:
-    """The permutations of atoms that the operations of the bare geometry make, all isotopes alike."""
-    alike = replace(molecule, mass_numbers=_abundant(molecule))
-    symmetry = symmetry_of(alike)
+def _bare_symmetry(molecule: Molecule) -> Symmetry:
+    """The symmetry of the geometry, all isotopes alike."""
+    return symmetry_of(replace(molecule, mass_numbers=_abundant(molecule)))
+
+
+def _permutations(symmetry: Symmetry) -> list[NDArray[np.int64]]:
+    """The permutations of atoms that the operations make."""
     distinct = {tuple(one.permutation.tolist()) for one in (*symmetry.rotations, *symmetry.improper)}
     return [np.array(permutation) for permutation in sorted(distinct)]
+
+
+def _of_bare_symmetry(dipole: Floats, symmetry: Symmetry) -> Floats:
+    """A dipole as the bare geometry has it: charges do not know isotopes, components measured of one of them have errors."""
+    part = invariant_vector(dipole, symmetry)
+    return part if np.linalg.norm(dipole - part) < _DIPOLE_ERROR * np.linalg.norm(dipole) else dipole
 
 
 def _abundant(molecule: Molecule) -> tuple[int, ...]:
@@ -213,9 +225,10 @@ class _Ancestor:
 
     def __init__(self, parent: Top) -> None:
         molecule, dipole = _geometry(parent), parent.dipole_abc_debye
-        self.permutations = _permutations(molecule)
+        symmetry = _bare_symmetry(molecule)
+        self.permutations = _permutations(symmetry)
         if dipole is not None and parent.frame is not None:
-            vector = np.array(dipole) @ parent.frame.axes
+            vector = _of_bare_symmetry(np.array(dipole) @ parent.frame.axes, symmetry)
             molecule = replace(molecule, dipole_debye=vector, dipole_source=parent.dipole_source)
         if parent.polarizability_abc_angstrom3 is not None and parent.frame is not None:
             axes = parent.frame.axes

@@ -16,9 +16,17 @@ from numpy.typing import ArrayLike
 from rotor import units
 from rotor.arrays import Floats
 from rotor.geometry.inertia import EQUAL_MOMENTS, LINEAR_BELOW, Body, PrincipalFrame, point_masses, principal_frame
+from rotor.tops.allowed import (
+    allowed_dipole,
+    allowed_polarizability,
+    invariant_vector,
+    refuse_forbidden_dipole,
+    refuse_forbidden_polarizability,
+)
 from rotor.tops.constants import Constants
 from rotor.tops.covariance import Covariance
 from rotor.tops.kind import KindOfTop, kind_from_moments, kind_with_symmetry
+from rotor.tops.level_table import LevelTable
 from rotor.tops.operators import KINDS
 from rotor.tops.spin_constants import SpinConstants
 from rotor.tops.spin_weights import SpinWeights
@@ -30,32 +38,9 @@ if TYPE_CHECKING:
 Vector = tuple[float, float, float]
 Tensor = tuple[Vector, Vector, Vector]
 
+NOISE_ANGSTROM = 0.01  # displacements below it may be noise of a geometry: a symmetry that they spoil is named
 SYMMETRIC_WITHIN = 1e-3  # of the shortest distance between nuclei: displacements that symmetry may overlook
 NO_WEIGHTS = SpinWeights()
-
-
-def allowed_dipole(dipole: ArrayLike, symmetry: Symmetry) -> Floats:
-    """The part of a dipole that every operation leaves alike, where the rest is below 0.001 D; else the whole."""
-    vector = np.asarray(dipole, dtype=float)
-    operations = [operation.matrix for operation in (*symmetry.rotations, *symmetry.improper)]
-    part = np.mean([matrix @ vector for matrix in operations], axis=0)
-    if symmetry.rotation_group == "C∞":  # no operation but the identity is listed
-        part = symmetry.axes_abc[0] * (symmetry.axes_abc[0] @ vector)
-    return part if np.linalg.norm(vector - part) < 1e-3 else vector
-
-
-def allowed_polarizability(tensor: ArrayLike, symmetry: Symmetry) -> Floats:
-    """The part of a (3, 3) tensor that every operation leaves alike, where the rest is below 0.001 of it; else the whole."""
-    whole = np.asarray(tensor, dtype=float)
-    if symmetry.linear:
-        along = symmetry.axes_abc[0]
-        parallel = along @ whole @ along
-        across = (np.trace(whole) - parallel) / 2
-        part = across * np.eye(3) + (parallel - across) * np.outer(along, along)
-    else:
-        operations = [operation.matrix for operation in (*symmetry.rotations, *symmetry.improper)]
-        part = np.mean([matrix @ whole @ matrix.T for matrix in operations], axis=0)
-    return part if np.linalg.norm(whole - part) < 1e-3 * np.linalg.norm(whole) else whole
 
 
 @dataclass(frozen=True)
@@ -67,8 +52,12 @@ class Top:
     nuclear-spin weights. mass_u: for Doppler widths. frame: principal frame of a geometry, None without one.
     kind_of_top: how the kind was decided. molecule, symmetry: of a geometry. source: where the constants are from.
     independent_errors: whether the uncertainties of the constants may count as uncorrelated; not those of a fit whose
-    correlations are unknown. covariance: of the constants, where it is known. notes: limits of the data. spin_constants: of nuclear and
-    electron spins, None where none are known.
+    correlations are unknown. covariance: of the constants, where it is known. notes: limits of the data. spin_constants: of
+    nuclear and electron spins, None where none are known. level_table: energies that count instead of those of the
+    constants where it has them; it belongs to these constants alone (`with_constants` leaves it out). symmetry_checked:
+    False takes a dipole that spin weights forbid as it is, as SPCAT does.
+
+    Raises ValueError for a dipole or a polarizability that the symmetry of the nuclei, or of the spin weights, forbids.
     """
 
     constants: Constants
@@ -89,6 +78,18 @@ class Top:
     polarizability_source: str = ""
     covariance: Covariance | None = None
     spin_constants: SpinConstants | None = None
+
+    level_table: LevelTable | None = None
+    symmetry_checked: bool = True
+
+    def __post_init__(self) -> None:
+        if not self.symmetry_checked:
+            return
+        if self.dipole_abc_debye is not None:
+            refuse_forbidden_dipole(self.dipole_abc_debye, self.symmetry, self.frame, self.spin_weights)
+        if self.polarizability_abc_angstrom3 is not None:
+            tensor = self.polarizability_abc_angstrom3
+            refuse_forbidden_polarizability(tensor, self.symmetry, self.frame, self.spin_weights)
 
     @property
     def provenance(self) -> dict[str, Any]:
@@ -139,12 +140,11 @@ class Top:
 
         The symmetry of the nuclei decides the kind where it can (C3v is a symmetric top), the moments where it cannot.
         Nuclear-spin weights follow from it and from `molecule.electronic`, inversion doublets unresolved;
-        `symmetry_within` is its tolerance, relative to the shortest distance. Dipole components that symmetry forbids
-        and that are below 0.001 D are round-off or noise, and left out; so is what symmetry forbids of a polarizability
-        and is below 0.001 of it.
+        `symmetry_within` is its tolerance, relative to the shortest distance. What symmetry forbids of a dipole or a
+        polarizability is left out where it is noise (`rotor.tops.allowed`).
 
-        Raises ValueError for a single atom. Neglected: everything that vibration and centrifugal distortion do, about
-        0.3 to 1 % between an equilibrium geometry and measured constants.
+        Raises ValueError for a single atom, and for a dipole or polarizability that symmetry forbids. Neglected: everything
+        that vibration and centrifugal distortion do, about 0.3 to 1 % between an equilibrium geometry and measured constants.
 
         >>> from rotor.molecules.molecule import Molecule
         >>> top = Top.from_molecule(Molecule(("C", "O"), [[0, 0, 0], [0, 0, 1.128323]]))
@@ -178,7 +178,7 @@ class Top:
             source=molecule.source,
             dipole_source=molecule.dipole_source,
             weights_source=f"from the permutations of nuclei in {symmetry.point_group}{_electrons(molecule, weights)}",
-            notes=tuple(molecule.notes),
+            notes=(*molecule.notes, *_near_notes(symmetry)),
             polarizability_abc_angstrom3=None
             if tensor is None
             else _tensor_in_frame(frame, allowed_polarizability(tensor, symmetry)),
@@ -227,6 +227,30 @@ class Top:
         a, b, c = self.moments_u_angstrom2
         return c - a - b
 
+    def with_symmetry_within(self, displacement_angstrom: float) -> Top:
+        """The same geometry with the symmetry that its nuclei miss by up to so much: kind, spin weights and axes follow.
+
+        A nucleus that is off by so much has images twice as far from each other. Raises ValueError for a top without geometry
+        or with constants of its own, and for a displacement of more than a tenth of the shortest distance between nuclei.
+        """
+        if self.molecule is None or self.kind_of_top is None or self.source != self.molecule.source:
+            raise ValueError(
+                f"{self.name or 'this top'} has constants of its own; the tolerance is for geometries alone"
+            )
+        from rotor.molecules.symmetry.operations import shortest_distance
+
+        shortest = shortest_distance(self.molecule.positions_angstrom)
+        if not 0 < displacement_angstrom <= 0.1 * shortest:
+            raise ValueError(
+                f"{displacement_angstrom:g} Å: expected a displacement above 0 and up to {0.1 * shortest:.3g} Å, a tenth of "
+                "the shortest distance between nuclei"
+            )
+        return Top.from_molecule(self.molecule, symmetry_within=2.1 * displacement_angstrom / shortest)
+
+    def with_constants(self, constants: Constants, source: str = "") -> Top:
+        """The same top with other constants, and without the covariance and the level energies of its own."""
+        return replace(self, constants=constants, source=source or self.source, covariance=None, level_table=None)
+
     def with_dipole(self, dipole_abc_debye: ArrayLike, source: str) -> Top:
         """The same top with another dipole in principal axes."""
         return replace(self, dipole_abc_debye=_three(dipole_abc_debye), dipole_source=source)
@@ -240,12 +264,23 @@ class Top:
         """The same top with a dipole in the frame of its geometry, of which what symmetry forbids is left out."""
         if self.frame is None or self.symmetry is None:
             raise ValueError(f"{self.name or 'this top'} has no geometry whose frame a dipole could be in")
-        allowed = allowed_dipole(dipole_debye, self.symmetry)
+        allowed = invariant_vector(np.asarray(dipole_debye, dtype=float), self.symmetry)
         return replace(self, dipole_abc_debye=_in_frame(self.frame, allowed), dipole_source=source)
 
     def with_weights(self, weights: dict[str, int], source: str) -> Top:
         """The same top with other spin weights."""
         return replace(self, spin_weights=SpinWeights.from_mapping(weights), weights_source=source)
+
+
+def _near_notes(symmetry: Symmetry) -> list[str]:
+    """What is to be said where nuclei miss a higher symmetry by so little that noise may be the reason."""
+    near = symmetry.near
+    if near is None or near.displacement_angstrom > NOISE_ANGSTROM:
+        return []
+    return [
+        f"taken as {symmetry.point_group} though near {near.point_group}: nuclei are up to {near.displacement_angstrom:.2g} Å "
+        "off it; spin weights and kind would be others (symmetry tolerance)"
+    ]
 
 
 def _electrons(molecule: Molecule, weights: SpinWeights) -> str:

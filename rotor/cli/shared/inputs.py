@@ -59,6 +59,9 @@ class Input:
         help="Quartic distortion from a Hessian at the geometry (hartree/bohr², rows or lower triangle), or, with the "
         "word 'calculator', from one that --calculator makes.",
     )
+    symmetry_tolerance: str | None = option(
+        None, metavar="DISTANCE", help="How far nuclei may be off the symmetry that is taken, such as 0.005 (Å)."
+    )
 
     @property
     def isotopes(self) -> str | None:
@@ -191,9 +194,11 @@ def read_top(given: Input) -> Top:
     _refuse_contradictions(given)
     top = _from_constants(given) if given.constants is not None else _from_source(given)
     if given.dipole_abc is not None:
-        top = top.with_dipole(vector("--dipole-abc", given.dipole_abc), "given in principal axes (--dipole-abc)")
+        abc, said = vector("--dipole-abc", given.dipole_abc), "given in principal axes (--dipole-abc)"
+        top = parsed("--dipole-abc", given.dipole_abc, lambda _: top.with_dipole(abc, said))
     if given.dipole is not None:
-        top = _with_dipole_of_input(top, vector("--dipole", given.dipole))
+        xyz = vector("--dipole", given.dipole)
+        top = parsed("--dipole", given.dipole, lambda _: _with_dipole_of_input(top, xyz))
     if given.spin_weights is not None:
         table = weights("--spin-weights", given.spin_weights)
         top = parsed("--spin-weights", given.spin_weights, lambda _: top.with_weights(table, "given (--spin-weights)"))
@@ -225,6 +230,8 @@ def _refuse_contradictions(given: Input) -> None:
         raise ValueError("--isotope: bare constants have no atoms; give the constants of the isotopologue itself")
     if given.calculator is not None and given.constants is not None:
         raise ValueError("--calculator: bare constants have no geometry to refine; give a molecule")
+    if given.symmetry_tolerance is not None and given.constants is not None:
+        raise ValueError("--symmetry-tolerance: bare constants have no nuclei; give a geometry")
     if given.hessian is not None and given.constants is not None:
         raise ValueError("--hessian: bare constants have no geometry that it belongs to; give a molecule")
 
@@ -240,11 +247,14 @@ def _from_constants(given: Input) -> Top:
 def _from_source(given: Input) -> Top:
     import rotor
 
-    top = rotor.read(given.source, isotopes=given.isotopes)
+    top: Top = rotor.read(given.source, isotopes=given.isotopes)
     if not isinstance(top, rotor.Top):
         raise ValueError(f"{given.source}: holds a {type(top).__name__.lower()}, not a molecule or constants")
     if given.calculator is not None:
         top = parsed("--calculator", given.calculator, lambda name: _refined(top, name))
+    if given.symmetry_tolerance is not None:
+        reach = positive("--symmetry-tolerance", given.symmetry_tolerance, "Å")
+        top = parsed("--symmetry-tolerance", given.symmetry_tolerance, lambda _: top.with_symmetry_within(reach))
     if given.hessian is None:
         return top
     return parsed("--hessian", given.hessian, lambda path: _semirigid(top, path, given.calculator))
@@ -278,7 +288,7 @@ def _geometry(top: Top) -> Molecule:
 
 def _with_dipole_of_input(top: Top, dipole_debye: tuple[float, float, float]) -> Top:
     if top.frame is None:
-        raise ValueError("--dipole is in the frame of a geometry, and there is none here; use --dipole-abc")
+        raise ValueError("this is in the frame of a geometry, and there is none here; use --dipole-abc")
     return top.with_dipole((top.frame.axes @ dipole_debye).tolist(), "given in the frame of the input (--dipole)")
 
 

@@ -8,6 +8,7 @@ import os
 import shutil
 import sys
 import tempfile
+import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
@@ -37,6 +38,19 @@ def answering() -> Iterator[None]:
         raise ComputationError(
             "not enough memory for so many lines; a lower J max, a range or a higher cut needs less"
         ) from error
+
+
+def sum_progress() -> Callable[[int, int], None] | None:
+    """A line on a terminal, rewritten as a sum over levels goes on, for sums that take longer than two seconds; else None."""
+    if not sys.stderr.isatty():
+        return None
+    start = time.monotonic()
+
+    def show(j: int, last: int) -> None:
+        if time.monotonic() - start > 2.0:
+            print(f"\rlevels solved to J = {j} of about {last} ", end="", file=sys.stderr, flush=True)
+
+    return show
 
 
 def note(text: str) -> None:

@@ -130,7 +130,10 @@ def top_of(parameters: ParameterFile, intensities: IntensityFile | None = None) 
     if dipole and (constants.kind, oblate_basis) in (("prolate", True), ("oblate", False)):
         dipole = dipole[::-1]
     weights = weights_of(parameters.options[0])
-    return Top.from_constants(constants, dipole_abc_debye=dipole, spin_weights=weights, name=parameters.title)
+    name = parameters.title
+    return Top.from_constants(
+        constants, dipole_abc_debye=dipole, spin_weights=weights, name=name, symmetry_checked=False
+    )
 
 
 def parameter_file(top: Top, kmax: int) -> ParameterFile:

@@ -21,6 +21,7 @@ from rotor.geometry.superposition import Superposition, superpose
 from rotor.molecules.molecule import Molecule
 from rotor.molecules.nuclei import isotope, isotope_of_mass
 from rotor.molecules.readers.cfour_orca import read_plain, reads_itself, unread
+from rotor.molecules.readers.ground_state import dipole_lines, is_excited, printed_dipole
 from rotor.molecules.readers.programs import (
     Output,
     coordinates_angstrom,
@@ -33,6 +34,7 @@ from rotor.molecules.readers.programs import (
 from rotor.units import BOHR_RADIUS_ANGSTROM, DEBYE_PER_E_ANGSTROM, ROTATIONAL_MHZ_U_ANGSTROM2
 
 CONSTANTS_AGREE = 1e-4  # relative; printed constants have 6 to 8 digits, coordinates 6 decimals
+OTHER_GEOMETRY = 5e-3  # relative difference of constants from which on the geometry read is not the one of the output
 SAME_GEOMETRY_ANGSTROM = 1e-3  # rmsd: a tensor printed for a geometry further from the last one is not its tensor
 SAME_DIPOLE_DEBYE = 2e-3  # Gaussian prints its dipole to 1e-4 D and, in a second place, in atomic units
 WITHOUT_CCLIB = "cclib is not installed; install the extra with it: pip install 'molrotor[qc]'"
@@ -52,13 +54,14 @@ def read_output(path: Path | str) -> Molecule:
         Positions in Å; dipole in D and static polarizability in Å³ where printed, turned with the rotation that
         superposes the last geometry printed before the tensor on the one returned. Isotopes are those of the masses
         printed, else the most abundant. `notes` says where A, B, C of the geometry and those printed differ by more
-        than 1e-4, and which tensor was left out and why.
+        than 1e-4, and which tensor was left out and why. A dipole of an excited density is never taken.
 
     Raises
     ------
     ValueError
         No cclib, which CFOUR and ORCA 6 do without; an output of no program that it knows; asterisks, a `D` exponent
-        where the program prints none, or a file that was cut, with the line.
+        where the program prints none, or a file that was cut, with the line; printed constants that are more than
+        0.5 % away from those of the geometry that was read.
 
     The dipole of an ion is moved from the program's origin to the centre of mass. Vibrational corrections are
     neglected. Reader: N. M. O'Boyle, A. L. Tenderholt, K. M. Langner, J. Comput. Chem. 29, 839 (2008).
@@ -205,14 +208,26 @@ def _axes_at(
 
 
 def _with_dipole(molecule: Molecule, data: Any, output: Output) -> Molecule:
-    """The dipole, D: turned to the axes of the geometry, and of an ion moved to the centre of mass."""
-    start = output.last(output.program.dipole)
-    if start is None or len(getattr(data, "moments", ())) < 2:
+    """The dipole of the ground state, D: turned to the axes of the geometry, and of an ion moved to the centre of mass."""
+    starts = dipole_lines(output)
+    if not starts or len(getattr(data, "moments", ())) < 2:
         return molecule
+    start, printed = starts[-1], np.asarray(data.moments[1], dtype=np.float64)
+    if is_excited(output, start):
+        ground = [
+            (i, dipole)
+            for i in starts
+            if not is_excited(output, i) and (dipole := printed_dipole(output, i)) is not None
+        ]
+        if not ground:
+            return _noted(
+                molecule, output, start, "dipole", "is of an excited density, and none is of the ground state"
+            )
+        start, printed = ground[-1]
     fit = _axes_at(output, start, molecule.positions_angstrom)
     if fit is None:
         return _noted(molecule, output, start, "dipole", "is for another geometry than the last one")
-    dipole = fit.rotation @ np.asarray(data.moments[1], dtype=np.float64)
+    dipole = fit.rotation @ printed
     if molecule.charge:
         origin = _moment_origin(data, output)
         if origin is None:
@@ -283,32 +298,51 @@ def _noted(molecule: Molecule, output: Output, start: int, tensor: str, why: str
 
 
 def _disagreement(molecule: Molecule, data: Any, output: Output) -> tuple[str, ...]:
-    """A note where the printed rotational constants are not those of the geometry."""
-    printed = _printed_constants(output)
+    """A note where the printed rotational constants are not those of the geometry; ValueError where they are of another."""
+    printed, digits = _printed_constants(output)
     if not len(printed):
         return ()
     here = _constants_mhz(molecule.masses_u, molecule.positions_angstrom)
     apart = _apart(printed, here)
-    if apart < CONSTANTS_AGREE:
+    if apart < max(CONSTANTS_AGREE, digits):
         return ()
-    masses = _printed_masses(data)
-    cause = "is the geometry the last one?"
-    if masses is not None and _apart(printed, _constants_mhz(masses, molecule.positions_angstrom)) < CONSTANTS_AGREE:
-        cause = f"they agree with the masses that {output.program.name} used, which are not those of the isotopes"
     texts = ["/".join(f"{value:.3f}" for value in some) for some in (printed, here[-len(printed) :])]
-    return (
-        f"{output.where}: printed constants {texts[0]} MHz, from the geometry {texts[1]}, {apart:.1e} apart: {cause}",
-    )
+    differ = f"{output.where}: printed constants {texts[0]} MHz, from the geometry {texts[1]}"
+    others = [
+        _apart(printed, _constants_mhz(masses, molecule.positions_angstrom)) for masses in _other_masses(molecule, data)
+    ]
+    if min(others) < max(CONSTANTS_AGREE, digits):
+        used = f"they agree with the masses that {output.program.name} used, which are not those of the isotopes"
+        return (f"{differ}, {apart:.1e} apart: {used}",)
+    if min(apart, *others) > OTHER_GEOMETRY:
+        bohr = _apart(printed, _constants_mhz(molecule.masses_u, molecule.positions_angstrom * BOHR_RADIUS_ANGSTROM))
+        cause = "its coordinates are in bohr" if bohr < OTHER_GEOMETRY else "it is another geometry, or in another unit"
+        raise ValueError(f"{differ}, {apart:.1%} apart: {cause}; give an xyz file of the geometry that is meant")
+    return (f"{differ}, {apart:.1e} apart: is the geometry the last one?",)
 
 
-def _printed_constants(output: Output) -> Floats:
-    """The last rotational constants printed, MHz, large to small; without the infinite or zero A of a linear molecule."""
+def _other_masses(molecule: Molecule, data: Any) -> list[Floats]:
+    """Masses that a program may have used: those printed, and averages over isotopes."""
+    from ase.data import atomic_masses
+
+    printed = _printed_masses(data)
+    averages = np.array([atomic_masses[one.element_number] for one in molecule.nuclei])
+    return [averages] if printed is None else [averages, printed]
+
+
+def _printed_constants(output: Output) -> tuple[Floats, float]:
+    """The last rotational constants printed, MHz, large to small, without the infinite or zero A of a linear molecule.
+
+    And what half of the last digit of the smallest is of it.
+    """
     pairs = zip(output.lines, (*output.lines[1:], ""), strict=True)
     found = [match[1].strip() or below for line, below in pairs if (match := re.search(output.program.constants, line))]
     if not found:
-        return np.zeros(0)
-    values = [float(word) for word in re.findall(r"\d+\.\d+", found[-1])]
-    return np.sort([value * output.program.constants_mhz for value in values if value > 0])[::-1]
+        return np.zeros(0), 0.0
+    words = [word for word in re.findall(r"\d+\.\d+", found[-1]) if float(word) > 0]
+    values = [float(word) * output.program.constants_mhz for word in words]
+    digits = [0.5 * 10.0 ** -len(word.partition(".")[2]) / float(word) for word in words]
+    return np.sort(values)[::-1], max(digits, default=0.0)
 
 
 def _constants_mhz(masses_u: Floats, positions_angstrom: Floats) -> Floats:

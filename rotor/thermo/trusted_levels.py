@@ -1,0 +1,129 @@
+"""Which levels of an effective Hamiltonian are energies of a molecule, and what stands for the others in a sum.
+
+Distortion constants serve up to some J and K; beyond, their polynomial bends down and makes levels that no molecule has.
+A level is not trusted whose energy is less than 0.6 or more than 2 of the rigid one; of a J with one that is too low, whose
+label has passed to others, no level is. For these stand the levels of the same top with quartic distortion alone, and where
+they fail by the same rule, rigid ones with quartic distortion to first order; how far distortion might bring them down
+further is taken as its quartic part once more. Rigid levels are solved only where their estimate, A Ka² + C Kc² +
+B (J(J+1) - Ka² - Kc²), is missed.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor.arrays import Floats
+from rotor.quantum.effects.watson import centrifugal_operators, operators_by_name
+from rotor.quantum.levels import Levels
+from rotor.quantum.solve import solve_levels
+from rotor.quantum.spherical_top import scalar_and_tensor
+from rotor.tops.constants import Constants
+from rotor.tops.operators import REPRESENTATIONS
+
+if TYPE_CHECKING:
+    from rotor.tops.top import Top
+
+TRUSTED = (0.6, 2.0)  # energy over the rigid estimate, outside which a level is not trusted
+LOWEST = 0.4  # of the rigid estimate: distortion lowers no level further
+
+
+def rigid_energies_mhz(top: Top, levels: Levels) -> Floats:
+    """A Ka² + B (J(J+1) - Ka² - Kc²) + C Kc² of every level in MHz; exact for a symmetric top without distortion.
+
+    >>> from rotor.tops.top import Top
+    >>> top = Top.from_constants("A=9 B=3 MHz")
+    >>> from rotor.quantum.solve import solve_levels
+    >>> levels = solve_levels(top, 20)
+    >>> bool(np.allclose(rigid_energies_mhz(top, levels), levels.energy_mhz))
+    True
+    """
+    a, b, c = top.rotational_constants_mhz
+    along_a, along_c = _squared_labels(top, levels)
+    finite = a if np.isfinite(a) else 0.0  # of a linear top, which has no K
+    return np.asarray(b * _j_squared(levels) + (finite - b) * along_a + (c - b) * along_c)
+
+
+def _j_squared(levels: Levels) -> Floats:
+    return np.asarray(levels.rotational * (levels.rotational + 1.0))
+
+
+def _squared_labels(top: Top, levels: Levels) -> tuple[Floats, Floats]:
+    """Ka² and Kc² of every level, (n,) each; 0 for what a kind of top has not."""
+    quanta, none = levels.quanta, np.zeros(len(levels))
+    if "kc" in quanta:
+        return quanta["ka"] ** 2.0, quanta["kc"] ** 2.0
+    if "k" not in quanta:
+        return none, none
+    k2 = quanta["k"] ** 2.0
+    return (none, k2) if top.kind == "oblate" else (k2, none)
+
+
+def trusted_energies_mhz(top: Top, levels: Levels) -> tuple[Floats, Floats]:
+    """Energies (n,) with those that are not trusted replaced, and the lowest that these might be, (n,), both in MHz."""
+    energy, rigid = levels.energy_mhz, rigid_energies_mhz(top, levels)
+    if not centrifugal_operators(top.constants) or not _untrusted(levels, energy, rigid).any():
+        return energy, energy
+    rigid, quartic = _simpler_mhz(top, levels, rigid)
+    wrong = _untrusted(levels, energy, rigid)
+    failed = _untrusted(levels, quartic, rigid)
+    first, size = _first_order_quartic_mhz(top, levels)
+    estimate = np.clip(np.where(failed, rigid + first, quartic), TRUSTED[0] * rigid, TRUSTED[1] * rigid)
+    lowest = np.maximum(estimate - np.where(failed, size, np.abs(quartic - rigid)), LOWEST * rigid)
+    return np.where(wrong, estimate, energy), np.where(wrong, lowest, energy)
+
+
+def _untrusted(levels: Levels, energy: Floats, rigid: Floats) -> NDArray[np.bool_]:
+    low, high = energy < TRUSTED[0] * rigid, energy > TRUSTED[1] * rigid
+    return np.asarray(high | np.isin(levels.rotational, levels.rotational[low]))
+
+
+def _simpler_mhz(top: Top, levels: Levels, rigid: Floats) -> tuple[Floats, Floats]:
+    """Energies (n,) in MHz of the rigid top and of the one with quartic distortion, in the order of the levels."""
+    if top.kind != "asymmetric":
+        return rigid, rigid + _first_order_quartic_mhz(top, levels)[0]
+    plain, quartic = (_energies_like(top.with_constants(_truncated(top, order)), levels) for order in (1, 2))
+    return plain, quartic
+
+
+def _truncated(top: Top, order: int) -> Constants:
+    """The constants of terms up to J^2·order."""
+    constants = top.constants
+    of = operators_by_name(constants)
+    values: dict[str, Any] = {k: v for k, v in constants.values.items() if all(sum(p) <= order for p in of[k])}
+    reduction = constants.reduction if order > 1 else None
+    return Constants(kind=constants.kind, reduction=reduction, representation=constants.representation, **values)
+
+
+def _energies_like(top: Top, levels: Levels) -> Floats:
+    """Energies of a top in the order of the levels of another, by their labels."""
+    j = levels.rotational
+    found = solve_levels(top, int(j.max()), jmin=int(j.min()), vectors=False)
+    return np.asarray(found.energy_mhz[found.rows_of(**{name: levels.quanta[name] for name in ("j", "ka", "kc")})])
+
+
+def _first_order_quartic_mhz(top: Top, levels: Levels) -> tuple[Floats, Floats]:
+    """The diagonal quartic terms (n,) in MHz with K² of the label for Jz², and the sum of the sizes of all of them."""
+    squared = _j_squared(levels)
+    k2 = _k_squared(top, levels, squared)
+    operators = centrifugal_operators(top.constants)
+    if top.kind == "spherical":
+        operators, _ = scalar_and_tensor(operators)
+    value, size = np.zeros(len(k2)), np.zeros(len(k2))
+    for (p, q, n), c in operators.items():
+        if p + q + n == 2:
+            term = c * squared ** (p + n) * k2**q  # an element of J₊² is J(J+1) at most
+            value += np.zeros(len(k2)) if n else term
+            size += np.abs(term)
+    return value, size
+
+
+def _k_squared(top: Top, levels: Levels, squared: Floats) -> Floats:
+    """K² along the z of the representation, from the labels."""
+    along_a, along_c = _squared_labels(top, levels)
+    if top.kind != "asymmetric":
+        return np.asarray(along_a + along_c)
+    z = REPRESENTATIONS[str(top.constants.representation)][2]
+    return np.asarray({"a": along_a, "c": along_c}.get(z, np.maximum(squared - along_a - along_c, 0.0)))

@@ -1,0 +1,87 @@
+"""Level energies as a table, for molecules whose distortion series does not converge: water, D2O, HDO.
+
+A table belongs to one set of constants and one isotopologue: where either changes, it no longer holds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor.arrays import Floats, Ints
+from rotor.table import Table
+
+
+@dataclass(frozen=True, eq=False)
+class LevelTable(Table):
+    """Energies of labelled levels.
+
+    quanta : columns (n,) of whole numbers by name, `j`, `ka`, `kc` of an asymmetric top, in the order in which they label
+    energy_mhz : (n,), E/h in MHz from the level J = 0
+    error_mhz : (n,), one standard deviation in MHz
+    source : where the energies are from
+
+    Raises ValueError for columns of different length, a level that is there twice, and energies that are not finite.
+
+    >>> table = LevelTable({"j": np.array([0, 1]), "ka": np.array([0, 0]), "kc": np.array([0, 1])}, np.array([0.0, 9.0]), np.ones(2))
+    >>> table.rows_of({"j": np.array([1, 2]), "ka": np.array([0, 0]), "kc": np.array([1, 2])}).tolist()
+    [1, -1]
+    """
+
+    quanta: Mapping[str, Ints]
+    energy_mhz: Floats
+    error_mhz: Floats
+    source: str = ""
+    _sorted: tuple[Ints, Ints, Ints] = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        lengths = {name: len(column) for name, column in self.columns.items()}
+        if len(set(lengths.values())) != 1 or not len(self.energy_mhz):
+            raise ValueError(f"columns of a level table have one length above 0; found {lengths}")
+        for name in ("energy_mhz", "error_mhz"):
+            if not np.isfinite(getattr(self, name)).all():
+                raise ValueError(f"{name} of a level table: expected finite numbers")
+        stacked = np.stack([np.asarray(column, dtype=np.int64) for column in self.quanta.values()])
+        if stacked.min() < 0:
+            raise ValueError("quantum numbers of a level table: expected whole numbers of 0 or more")
+        sizes = stacked.max(axis=1) + 1
+        keys = np.asarray(np.ravel_multi_index(tuple(stacked), tuple(sizes.tolist())))
+        order = np.argsort(keys)
+        twice = np.flatnonzero(np.diff(keys[order]) == 0)
+        if len(twice):
+            label = ", ".join(f"{name} = {column[order[twice[0]]]}" for name, column in self.quanta.items())
+            raise ValueError(f"the level {label} is twice in the table; remove one")
+        object.__setattr__(self, "_sorted", (order, keys[order], sizes))
+
+    def __len__(self) -> int:
+        return len(self.energy_mhz)
+
+    @property
+    def columns(self) -> dict[str, NDArray[np.generic]]:
+        """Quantum numbers, energy and error by name."""
+        return dict(self.quanta) | {"energy_mhz": self.energy_mhz, "error_mhz": self.error_mhz}
+
+    def rows_of(self, quanta: Mapping[str, Ints]) -> Ints:
+        """The row (m,) of each labelled level, -1 where the table has none; labels by the names that the table has."""
+        order, keys, sizes = self._sorted
+        wanted = np.stack([np.asarray(quanta[name], dtype=np.int64) for name in self.quanta])
+        inside = ((wanted >= 0) & (wanted < sizes[:, None])).all(axis=0)
+        key = np.ravel_multi_index(tuple(np.where(inside, wanted, 0)), tuple(sizes.tolist()))
+        place = np.minimum(np.searchsorted(keys, key), len(keys) - 1)
+        return np.where(inside & (keys[place] == key), order[place], -1)
+
+
+def tabulated_energies(
+    table: LevelTable, quanta: Mapping[str, Ints], energy_mhz: Floats
+) -> tuple[Floats, NDArray[np.bool_]]:
+    """Energies (n,) in MHz of solved levels, those that the table has replaced, and which these are, (n,).
+
+    quanta, energy_mhz: labels by name and energies (n,) of the solved levels, counted from the Hamiltonian's zero, the level J = 0.
+    A level that the table has not keeps the energy of the distortion series.
+    """
+    rows = table.rows_of(quanta)
+    known = rows >= 0
+    return np.where(known, table.energy_mhz[rows], energy_mhz), known
