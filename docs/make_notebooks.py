@@ -5,8 +5,8 @@
     python docs/make_notebooks.py --check          # compare and execute, write nothing
 
 The script is the source. `agrees` says whether a notebook has the cells of its script, `executed` runs one and fails on an
-error, on a warning and on a notebook without a picture. A script with `# long: SECONDS` in its first lines may take so long,
-and is executed by the slow tests only; all others have 20 s of processor time. Needs the extra `docs` (jupytext, nbclient, ipykernel).
+error, on a warning and on a notebook without a picture. A script with `# long: SECONDS` in its first lines may take so long;
+all others have 20 s of processor time. Needs the extra `docs` (jupytext, nbclient, ipykernel).
 """
 
 from __future__ import annotations

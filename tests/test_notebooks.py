@@ -64,13 +64,9 @@ def test_the_notebook_is_its_script_executed(script):
     assert "ipykernel_" not in text
 
 
-def _marked(script: Path) -> object:
-    long = MAKE.seconds_allowed(script) > MAKE.SECONDS
-    return pytest.param(script, marks=[pytest.mark.slow] if long else [], id=script.stem)
-
-
 @needs_extra
-@pytest.mark.parametrize("script", [_marked(script) for script in SCRIPTS])
+@pytest.mark.slow
+@pytest.mark.parametrize("script", SCRIPTS, **named)
 def test_the_notebook_runs(script):
     notebook, seconds = MAKE.executed(script)
     assert MAKE.pictures(notebook)
