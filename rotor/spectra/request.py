@@ -55,7 +55,7 @@ class SpectrumRequest:
     frequency. q: partition function instead of the summed one. vibrational_factor: multiplies Q; vibrations: states whose
     factor does so instead. covariance: of the constants, for the errors of frequencies. profile: sticks, gaussian, lorentzian
     or voigt; None: gaussian where there is a width or a layer, else sticks. fwhm_mhz: full width at half maximum; None:
-    Doppler's. layer: of gas, for optical depths. effects: what the Hamiltonian consists of.
+    Doppler's. layer: of gas, for optical depths. untrusted: as in `line_list`. effects: what the Hamiltonian consists of.
     """
 
     top: Top
@@ -70,6 +70,7 @@ class SpectrumRequest:
     profile: str | None = None
     fwhm_mhz: float | None = None
     layer: GasLayer | None = None
+    untrusted: bool = False
     effects: tuple[QuantumEffect, ...] = SEMI_RIGID
 
     def __post_init__(self) -> None:
@@ -226,6 +227,7 @@ def answer_spectrum(request: SpectrumRequest, executor: Executor | None = None) 
         vibrational_factor=request.vibrational_factor,
         vibrations=request.vibrations,
         covariance=request.covariance,
+        untrusted=request.untrusted,
         effects=request.effects,
         executor=executor,
     )
