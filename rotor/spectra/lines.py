@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -42,6 +41,8 @@ from rotor.thermo.trusted_levels import are_trusted
 from rotor.tops.covariance import Covariance
 
 if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
     from rotor.tops.top import Top
 
 

@@ -6,7 +6,6 @@ The command line and scene files fill a `SpectrumRequest`; `answer_spectrum` is 
 from __future__ import annotations
 
 import math
-from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -20,14 +19,15 @@ from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.limits import limit_facts, populated_j
 from rotor.spectra.intensity import USUAL_CUT
 from rotor.spectra.lines import DEFAULT_MIN_LGINT, Lines, line_list
-from rotor.spectra.opacity import column_density_per_cm2, line_optical_depth, optical_depth
-from rotor.spectra.spectrum import Spectrum, resolving_grid
 from rotor.thermo import VibrationalStates
 from rotor.thermo.request import partition_facts
 from rotor.tops.covariance import Covariance
 from rotor.tops.facts import top_facts
 
 if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
+    from rotor.spectra.spectrum import Spectrum
     from rotor.tops.top import Top
 
 PROFILES = ("sticks", "gaussian", "lorentzian", "voigt")
@@ -128,6 +128,8 @@ class SpectrumAnswer:
         layer = self.request.layer
         if layer is None:
             return None
+        from rotor.spectra.opacity import column_density_per_cm2
+
         return column_density_per_cm2(layer.pressure_bar, layer.path_cm, self.lines.temperature_k)
 
     @cached_property
@@ -136,6 +138,8 @@ class SpectrumAnswer:
         layer = self.request.layer
         if layer is None:
             return None
+        from rotor.spectra.opacity import line_optical_depth
+
         shape: dict[str, Any] = {"profile": self.request.shape, "fwhm_mhz": self.request.fwhm_mhz}
         return line_optical_depth(self.lines, layer.pressure_bar, layer.path_cm, **shape)
 
@@ -144,6 +148,9 @@ class SpectrumAnswer:
         """The lines with their shape on a grid that resolves each: a cross section, or the optical depth of the layer."""
         if self.request.shape == "sticks":
             raise ValueError("profile: sticks have no profile; choose gaussian, lorentzian or voigt")
+        from rotor.spectra.opacity import optical_depth
+        from rotor.spectra.spectrum import Spectrum, resolving_grid
+
         first, last = self.request.range_mhz
         shape: dict[str, Any] = {"profile": self.request.shape, "fwhm_mhz": self.request.fwhm_mhz}
         grid = resolving_grid(self.lines, range_mhz=(first, last) if math.isfinite(last) else None, **shape)

@@ -14,7 +14,6 @@ first, and among the levels of one sub-block Ka rises with energy.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import Executor
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -38,6 +37,8 @@ from rotor.quantum.spins.rotor import (
 from rotor.quantum.spins.scheme import Scheme, scheme_of
 
 if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
     from rotor.tops.top import Top
 
 
