@@ -38,8 +38,12 @@ def prepare(folder: Path) -> None:
     (folder / "api").mkdir()
     for page in sorted(DOCS.glob("*.md")):
         text = page.read_text(encoding="utf-8")
-        (folder / page.name).write_text(on_the_site(_shared_part(text) if page.stem == "command_line" else text), encoding="utf-8")
-    (folder / "conventions.md").write_text(on_the_site((ROOT / "CONVENTIONS.md").read_text(encoding="utf-8")), encoding="utf-8")
+        (folder / page.name).write_text(
+            on_the_site(_shared_part(text) if page.stem == "command_line" else text), encoding="utf-8"
+        )
+    (folder / "conventions.md").write_text(
+        on_the_site((ROOT / "CONVENTIONS.md").read_text(encoding="utf-8")), encoding="utf-8"
+    )
     shutil.copytree(DOCS / "pictures", folder / "pictures")
     for notebook in sorted((ROOT / "examples").glob("[0-9][0-9]_*.ipynb")):
         shutil.copy(notebook, folder / "notebooks")
@@ -94,7 +98,9 @@ def verb_page(verb: str) -> str:
     text = (DOCS / "command_line.md").read_text(encoding="utf-8")
     found = re.search(rf"^## rotor {verb}\n(.*?)(?=^## |\Z)", text, re.MULTILINE | re.DOTALL)
     if not found:
-        raise ValueError(f"docs/command_line.md has no part '## rotor {verb}': write it, since the command has that verb")
+        raise ValueError(
+            f"docs/command_line.md has no part '## rotor {verb}': write it, since the command has that verb"
+        )
     body = re.sub("^###", "##", found.group(1), flags=re.MULTILINE)
     return f"# rotor {verb}\n{body}\n## Help\n\n```text\n{_help(verb)}```\n"
 
@@ -122,7 +128,9 @@ def write_reference(folder: Path) -> None:
     (folder / "index.md").write_text(public_page(package), encoding="utf-8")
     logging.getLogger("griffe").removeHandler(complaints)
     if complaints.texts:
-        raise ValueError("docstrings that cannot be read; correct their numpy-style sections:\n" + "\n".join(complaints.texts))
+        raise ValueError(
+            "docstrings that cannot be read; correct their numpy-style sections:\n" + "\n".join(complaints.texts)
+        )
 
 
 def public_page(package: Any) -> str:

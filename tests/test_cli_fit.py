@@ -44,13 +44,22 @@ def write_lines(path: Path, noise: float = 0.003, seed: int = 5) -> None:
 def test_spfits_files_are_fitted_and_written(call, folder):
     (folder / "co.par").write_text(PAR)
     write_lines(folder / "co.lin")
-    code, out, err = call("fit", "co.par", "--out", "new", "--plot", "rest.png", "--table", "t.tex", "--json", "co.json")
+    code, out, err = call(
+        "fit", "co.par", "--out", "new", "--plot", "rest.png", "--table", "t.tex", "--json", "co.json"
+    )
     assert code == 0, err
     assert "CO: CONVERGED" in out
     content = json.loads((folder / "co.json").read_text(encoding="utf-8"))
     for name, true, error in (("B", 57635.96804, 3e-4), ("D", 0.1835053, 3e-6)):
         assert content["constants_mhz"][name] == pytest.approx(true, abs=error)  # about five of its standard errors
-    assert {path.name for path in folder.iterdir()} >= {"new.fit", "new.toml", "new.par", "new.var", "rest.png", "t.tex"}
+    assert {path.name for path in folder.iterdir()} >= {
+        "new.fit",
+        "new.toml",
+        "new.par",
+        "new.var",
+        "rest.png",
+        "t.tex",
+    }
     variances, again = read_par(folder / "new.var"), read_par(folder / "new.par")
     assert variances.parameters[0].error == pytest.approx(content["parameters"][0]["error"], rel=1e-8)  # digits printed
     assert again.parameters[1].error == 1e35
@@ -68,7 +77,9 @@ def test_the_covariance_reaches_the_errors_of_predicted_lines(call, folder):
     assert abs(file.covariance.correlations[1, 2]) > 0.9
     top = rotor.read(str(folder / "new.toml")).with_dipole((0.11, 0, 0), "a test")
     lines = rotor.line_list(top, jmax=30, min_lgint=None)
-    alone = math.sqrt(sum((s * d) ** 2 for s, d in zip(file.constants.uncertainties.values(), (60, -4 * 30**3, 0), strict=True)))
+    alone = math.sqrt(
+        sum((s * d) ** 2 for s, d in zip(file.constants.uncertainties.values(), (60, -4 * 30**3, 0), strict=True))
+    )
     high = lines.error_mhz[lines.levels.quanta["j"][lines.upper] == 30][0]
     assert 0 < high < alone
 
@@ -77,7 +88,9 @@ def test_not_converged_is_exit_code_1_with_the_reason_and_no_constants_written(c
     write_lines(folder / "co.csv")
     code, out, err = call("fit", "co.csv", "--constants", "B=57000 D=0.17 MHz", "--free", "B", "--out", "new")
     assert code == 1
-    assert err.splitlines()[-1].startswith("error: not converged: a minimum was reached, but it does not describe the lines")
+    assert err.splitlines()[-1].startswith(
+        "error: not converged: a minimum was reached, but it does not describe the lines"
+    )
     assert "NOT CONVERGED" in out
     assert [path.name for path in sorted(folder.glob("new*"))] == ["new.fit"]
     assert "NOT CONVERGED" in (folder / "new.fit").read_text(encoding="utf-8")
@@ -141,7 +154,9 @@ def test_spfits_options_are_honoured_or_refused_by_name(call, folder):
     call("fit", "co.par", "--json", "tied.json")
     content = json.loads((folder / "tied.json").read_text(encoding="utf-8"))
     assert [one["name"] for one in content["parameters"]] == ["B", "-D"]
-    assert content["constants_mhz"]["H"] / content["constants_mhz"]["D"] == pytest.approx(1.6e-7 / 0.17, rel=1e-12)  # the ratio of the file
+    assert content["constants_mhz"]["H"] / content["constants_mhz"]["D"] == pytest.approx(
+        1.6e-7 / 0.17, rel=1e-12
+    )  # the ratio of the file
 
 
 def test_trying_choosing_suggesting_and_resampling(call, folder):

@@ -79,9 +79,7 @@ def point_masses(masses: ArrayLike, positions: ArrayLike) -> Body:
     """
     m, r = np.asarray(masses, dtype=float), np.asarray(positions, dtype=float)
     if m.ndim != 1 or r.shape != (len(m), 3) or not len(m):
-        raise ValueError(
-            f"masses of shape {m.shape} and positions of shape {r.shape}: expected (n,) and (n, 3), n > 0"
-        )
+        raise ValueError(f"masses of shape {m.shape} and positions of shape {r.shape}: expected (n,) and (n, 3), n > 0")
     if not (np.isfinite(m).all() and (m > 0).all() and np.isfinite(r).all()):
         raise ValueError("masses must be finite and above 0, positions finite")
     centre = m @ r / m.sum()
