@@ -64,24 +64,18 @@ def test_the_notebook_is_its_script_executed(script):
     assert "ipykernel_" not in text
 
 
-def _run(script: Path) -> None:
+def _marked(script: Path) -> object:
+    long = MAKE.seconds_allowed(script) > MAKE.SECONDS
+    return pytest.param(script, marks=[pytest.mark.slow] if long else [], id=script.stem)
+
+
+@needs_extra
+@pytest.mark.parametrize("script", [_marked(script) for script in SCRIPTS])
+def test_the_notebook_runs(script):
     notebook, seconds = MAKE.executed(script)
     assert MAKE.pictures(notebook)
     # twice: processors differ, and the figure that counts is that of docs/make_notebooks.py on a quiet machine
     assert seconds < 2 * MAKE.seconds_allowed(script)
-
-
-@needs_extra
-@pytest.mark.parametrize("script", [one for one in SCRIPTS if MAKE.seconds_allowed(one) <= MAKE.SECONDS], **named)
-def test_the_notebook_runs(script):
-    _run(script)
-
-
-@needs_extra
-@pytest.mark.slow
-@pytest.mark.parametrize("script", [one for one in SCRIPTS if MAKE.seconds_allowed(one) > MAKE.SECONDS], **named)
-def test_the_long_notebook_runs(script):
-    _run(script)
 
 
 CELLS = {
