@@ -37,8 +37,8 @@ REASONS = """
 Where the share is not near 1:
 
 - **H2O**: the Watson series does not converge for water. The 29 constants, through tenth order, were fitted to the lines with
-  J ≤ 10, Ka ≤ 5, whose errors are 0.15 MHz at the median; what truncation leaves is about 0.8 MHz rms. Beyond that range the
-  polynomial means nothing: the catalogue itself uses an Euler series.
+  J ≤ 10, Ka ≤ 5. Energies up to J = 20 are those of a table, data/levels/H2O.csv, made from the catalogue's own lines and
+  energies; the constants give the states, and the energies of the levels that the table has not.
 - **H2CO**: the constants are those of the CDMS fit of 2006. The catalogue is of a later fit with more and
   higher lines; L_KKJ and L_K, which the later lines fix, are not in the set, so that the lines with J ≥ 16 or Ka = 9, at
   0.03 MHz and less, are missed by more than 3 σ while those with J ≤ 10 are met.

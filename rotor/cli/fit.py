@@ -464,7 +464,14 @@ def _write_toml(request: Request, fit: Fit, source: str, path: Path) -> None:
     own = request.start.lower().endswith(".toml") and Path(request.start).exists()
     file = read_molecule_file(request.start) if own else MoleculeFile(request.title or path.stem)
     covariance = None if fit.statistics.undetermined else fit.covariance
-    made = replace(file, constants=fit.named, covariance=covariance, sources={**file.sources, "constants": origin})
+    made = replace(
+        file,
+        constants=fit.named,
+        covariance=covariance,
+        levels=None,
+        serves=None,
+        sources={**file.sources, "constants": origin},
+    )
     write_molecule_file(made, path)
 
 

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator, Sequence
-from concurrent.futures import Executor
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -28,10 +28,13 @@ from rotor.quantum.effect import QuantumEffect, k_limits_of
 from rotor.quantum.effects.watson import SEMI_RIGID, JMatrix, block_bands, scalar_energy
 from rotor.quantum.levels import Levels, SolvedBlock, weights_of_levels
 from rotor.quantum.spherical_top import DIMENSION, is_cubic, scalar_and_tensor, tensor_eigenvalues
+from rotor.tops.level_table import LevelTable, tabulated_energies
 from rotor.tops.operators import AXIAL_REPRESENTATION, Operators
 from rotor.tops.spin_weights import SpinWeights
 
 if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
     from rotor.tops.top import Top
 
 SMALL = 100  # rows of a tridiagonal block up to which scipy.linalg, 0.2 s to load, is not loaded for it
@@ -83,7 +86,8 @@ def solve_levels(
 
     Notes
     -----
-    Energies are true eigenvalues of the effective Hamiltonian. Neglected is what the effects do not contain.
+    Energies are true eigenvalues of the effective Hamiltonian; a semi-rigid top with a level table has those of the table
+    for the levels in it, with the eigenvectors of the Hamiltonian. Neglected is what the effects do not contain.
 
     >>> from rotor.tops.top import Top
     >>> levels = solve_levels(Top.from_constants("A=10 B=6 C=4 MHz"), 1)
@@ -97,7 +101,21 @@ def solve_levels(
         from rotor.quantum.spins import spin_levels
 
         return spin_levels(top, effects, jmin, jmax, executor)
-    return solve_rotation(top, effects, jmin, jmax, vectors, executor)
+    found = solve_rotation(top, effects, jmin, jmax, vectors, executor)
+    if top.level_table is None or effects != SEMI_RIGID:
+        return found
+    return with_tabulated_energies(found, top.level_table)
+
+
+def with_tabulated_energies(levels: Levels, table: LevelTable) -> Levels:
+    """The same levels, and the same states, with the energies of a table where it has the level."""
+    energy, _ = tabulated_energies(table, levels.quanta, levels.energy_mhz)
+    blocks = tuple(
+        replace(block, energies_mhz=energy[block.start : block.start + block.basis.size])
+        for block in levels.blocks
+        if isinstance(block, SolvedBlock)
+    )
+    return replace(levels, energy_mhz=energy, blocks=blocks)
 
 
 def solve_rotation(
