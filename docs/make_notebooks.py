@@ -24,6 +24,7 @@ EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
 PYTHON3 = {"name": "python3", "display_name": "Python 3", "language": "python"}
 SECONDS = 20.0  # of one notebook, where its script names no other limit
 MOST_BYTES = 400_000
+DRAWN = "--InlineBackend.print_figure_kwargs={'dpi': 90, 'bbox_inches': 'tight'}"  # small files, all pictures alike
 
 
 def scripts() -> list[Path]:
@@ -80,7 +81,9 @@ def executed(script: Path, patience: float = 10.0) -> tuple[Any, float]:
         # files instead of open ports, where there are such
         ipc = {"transport": "ipc", "ip": f"{sockets}/kernel"} if os.name == "posix" else {}
         config = Config({"KernelManager": ipc})
-        client = NotebookClient(notebook, timeout=limit, kernel_name="python3", resources=place, config=config)
+        client = NotebookClient(
+            notebook, timeout=limit, kernel_name="python3", resources=place, config=config, extra_arguments=[DRAWN]
+        )
         client.execute(env=os.environ | {"MPLBACKEND": "module://matplotlib_inline.backend_inline"})
     for cell in notebook.cells:
         cell["metadata"] = {}  # times of execution

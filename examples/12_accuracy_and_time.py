@@ -20,7 +20,6 @@ from rotor.geometry.rotations import distance
 from rotor.units import EV_PER_K
 
 # %matplotlib inline
-plt.rcParams["figure.dpi"] = 80
 
 
 def timed(work, repeats=3):
@@ -57,12 +56,12 @@ for color, (name, counts) in zip(
     rigid = rotor.Top(
         rotor.Constants(**dict(zip("ABC", top.constants.rigid, strict=True))), spin_weights=top.spin_weights
     )
-    everything = rotor.solve_levels(rigid, 200)
+    everything = rotor.solve_levels(rigid, 180)
     kelvin = (everything.energy_mhz - everything.ground_mhz) / (rotor.units.MHZ_PER_K * 300)
     population = everything.degeneracy * np.exp(-kelvin)
     lost, spent = [], []
     for jmax in counts:
-        levels, milliseconds = timed(lambda top=rigid, jmax=jmax: rotor.solve_levels(top, jmax))
+        levels, milliseconds = timed(lambda top=rigid, jmax=jmax: rotor.solve_levels(top, jmax), 1)
         above = everything.quanta["j"] > levels.jmax
         lost.append(population[above].sum() / population.sum())
         spent.append(milliseconds)
