@@ -87,7 +87,10 @@ def test_constants_alone_are_a_molecule_file():
         ("[geometry]\nsource = 'x'", "atoms = None: expected a list"),
         ("[geometry]\natoms = [['O', 0, 0]]", "atom 1 = .*expected .*in Å"),
         ("[geometry]\natoms = [['O', 0, 0, 0], ['Xx', 0, 0, 1]]", r"\[geometry\], atoms: atom 2"),
-        ("[geometry]\nkind = 'r9'\natoms = [['O', 0, 0, 0], ['C', 0, 0, 1]]", "kind = 'r9': expected one of r0, rs, re"),
+        (
+            "[geometry]\nkind = 'r9'\natoms = [['O', 0, 0, 0], ['C', 0, 0, 1]]",
+            "kind = 'r9': expected one of r0, rs, re",
+        ),
         (
             "[geometry]\nelectronic = 'g'\natoms = [['O', 0, 0, 0], ['C', 0, 0, 1]]",
             "electronic = 'g': expected one of even, odd",
