@@ -58,8 +58,10 @@ def answer(of: Callable[[], object]) -> str:
     try:
         of()
     except ValueError as error:
-        return "no: " + str(error).partition(": ")[2].removesuffix(" is read but not computed yet") if ": " in str(error) else (
-            "no: " + str(error).removesuffix(" is read but not computed yet")
+        return (
+            "no: " + str(error).partition(": ")[2].removesuffix(" is read but not computed yet")
+            if ": " in str(error)
+            else ("no: " + str(error).removesuffix(" is read but not computed yet"))
         )
     return "yes"
 
