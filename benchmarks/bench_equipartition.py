@@ -95,15 +95,15 @@ def miscounted(part: KineticDegrees, factor: float) -> KineticDegrees:
     return KineticDegrees(part.energies, counts)
 
 
-def told(title: str, verdict: Equipartition) -> dict[str, object]:
-    """Print a verdict, and what of it is kept."""
+def verdict_record(title: str, verdict: Equipartition) -> dict[str, object]:
+    """Print a verdict, and what of it is stored."""
     print(f"{title}: {verdict}", flush=True)
-    kept = asdict(verdict)
-    kept["degrees"] = [
+    record = asdict(verdict)
+    record["degrees"] = [
         {k: row[k] for k in ("name", "mean", "mean_spread", "effective", "sigma", "p_value", "ks_p_value")}
-        for row in kept["degrees"]
+        for row in record["degrees"]
     ]
-    return {"title": title, "sentence": str(verdict), **kept}
+    return {"title": title, "sentence": str(verdict), **record}
 
 
 def main() -> None:
@@ -115,14 +115,18 @@ def main() -> None:
     parts, results = {}, []
     for seed, fluid in enumerate(FLUIDS):
         parts[fluid.model] = frames_of(fluid, options.molecules, options.frames, seed)
-        results.append(told(fluid.model, equipartition(parts[fluid.model], 1.0, confidence=CONFIDENCE)))
-    results.append(told("all fluids as one family", equipartition(family(parts), 1.0, confidence=CONFIDENCE)))
+        results.append(verdict_record(fluid.model, equipartition(parts[fluid.model], 1.0, confidence=CONFIDENCE)))
+    results.append(verdict_record("all fluids as one family", equipartition(family(parts), 1.0, confidence=CONFIDENCE)))
     for name in ("trappe-n2", "trappe-co2"):
         bent = equipartition(miscounted(parts[name], 1.5), 1.0, confidence=CONFIDENCE)
-        results.append(told(f"planted: {name} counted with three rotations", bent))
+        results.append(verdict_record(f"planted: {name} counted with three rotations", bent))
     long = frames_of(FLUIDS[0], options.molecules, options.frames, 9, stretch=2.0, on_step=True)
-    results.append(told("planted: spce at 4 fs, momenta on the step", equipartition(long, 1.0, confidence=CONFIDENCE)))
-    results.append(told("the same without a temperature given", equipartition(long, None, confidence=CONFIDENCE)))
+    results.append(
+        verdict_record("planted: spce at 4 fs, momenta on the step", equipartition(long, 1.0, confidence=CONFIDENCE))
+    )
+    results.append(
+        verdict_record("the same without a temperature given", equipartition(long, None, confidence=CONFIDENCE))
+    )
     if options.json:
         options.json.write_text(json.dumps(results, indent=1, default=float) + "\n", encoding="utf-8")
 

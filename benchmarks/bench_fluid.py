@@ -6,8 +6,8 @@
 speed: 1000 SPC/E molecules, cutoff 9 Å, 2 fs. drift: 216 molecules, steps from 0.25 to 6 fs, the same time each: rms of the
 total energy about its line, and the line's slope. ase: TIP3P with FixBondLengths as ASE has it (27 molecules in its own test
 of it; here 216), 1 fs. Rates are per second of processor time of the one thread, so that other work beside counts less;
-the best of a few pieces, which take turns. Engines that are not installed are left out and told. Figures that the file has
-from other parts are kept.
+the best of a few pieces, which take turns. Engines that are not installed are left out and listed. Figures that the file has
+from other parts stay.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from ase.io import read, write
 
 from rotor.fluid.analysis import drift_per_ns
 from rotor.fluid.engines import lammps, openmm
-from rotor.fluid.engines.engine_input import scene_of
+from rotor.fluid.engines.engine_input import engine_input_of
 from rotor.fluid.engines.pair_tables import Form
 from rotor.fluid.forces.models import model_of
 from rotor.fluid.initial_box import lattice_box, relax
@@ -86,7 +86,7 @@ def ours(atoms: Atoms, settings: Settings, steps: int) -> Iterator[float]:
 
 def by_openmm(atoms: Atoms, settings: Settings, steps: int) -> Iterator[float]:
     """Seconds of pieces of a run, the barostat that measures pressure left out."""
-    run = openmm.session(scene_of(atoms, settings), settings, accuracy=5e-4, platform="CPU")
+    run = openmm.session(engine_input_of(atoms, settings), settings, accuracy=5e-4, platform="CPU")
     stepper = run.context.getIntegrator()
     while True:
         begin = time.process_time()
@@ -99,10 +99,10 @@ def by_lammps(
     atoms: Atoms, settings: Settings, steps: int, change: Callable[[str], str], arguments: list[str]
 ) -> Iterator[float]:
     """Seconds of pieces of a run in its own process, which waits for its turn; change: of the input file."""
-    scene = scene_of(atoms, settings)
+    engine_input = engine_input_of(atoms, settings)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        lammps.write_files(folder, scene, settings, Form(), accuracy=1e-4)
+        lammps.write_files(folder, engine_input, settings, Form(), accuracy=1e-4)
         text = change((folder / "in.box").read_text(encoding="ascii"))
         (folder / "in.box").write_text(text, encoding="ascii")
         if "angle_style" in text:
@@ -228,7 +228,7 @@ def our_energies(atoms: Atoms, settings: Settings) -> tuple[float, np.ndarray, n
 
 def openmm_energies(atoms: Atoms, settings: Settings) -> tuple[float, np.ndarray, np.ndarray]:
     """The same by OpenMM, its velocities put back onto the step."""
-    run = openmm.session(scene_of(atoms, settings), settings, platform="CPU")
+    run = openmm.session(engine_input_of(atoms, settings), settings, platform="CPU")
     stepper = run.context.getIntegrator()
 
     def energy() -> float:
@@ -253,7 +253,7 @@ def _followed(
 def lammps_energies(atoms: Atoms, settings: Settings) -> tuple[float, np.ndarray, np.ndarray]:
     """The same by LAMMPS (time of the wall: another process)."""
     begin = time.perf_counter()
-    frames = list(lammps.frames(scene_of(atoms, settings), settings))
+    frames = list(lammps.frames(engine_input_of(atoms, settings), settings))
     energies = np.array([frame.potential_ev + frame.motion.kinetic().total_ev for frame in frames])
     return time.perf_counter() - begin, settings.step_fs / 1000 * settings.every * np.arange(len(energies)), energies
 
@@ -342,18 +342,18 @@ def main() -> None:
     parser.add_argument("--json", type=Path)
     parser.add_argument("--picture", type=Path)
     given = parser.parse_args()
-    kept = json.loads(given.json.read_text(encoding="utf-8")) if given.json and given.json.exists() else {}
+    stored = json.loads(given.json.read_text(encoding="utf-8")) if given.json and given.json.exists() else {}
     parts = {
         "speed": lambda: speed(given.boxes),
         "drift": lambda: drift(given.boxes, given.ps),
         "ase": lambda: by_ase(given.boxes, given.ase_steps),
     }
     for part in given.parts:
-        kept[part] = parts[part]()
+        stored[part] = parts[part]()
     if given.json:
-        given.json.write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
-    if given.picture and "drift" in kept:
-        draw(kept["drift"], given.picture)
+        given.json.write_text(json.dumps(stored, indent=1) + "\n", encoding="utf-8")
+    if given.picture and "drift" in stored:
+        draw(stored["drift"], given.picture)
 
 
 if __name__ == "__main__":

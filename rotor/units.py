@@ -44,7 +44,7 @@ ROTATIONAL_MHZ_U_ANGSTROM2 = PLANCK_J_S / (8 * math.pi**2 * ATOMIC_MASS_KG * 1e-
 
 _FREQUENCY = {"Hz": 1e-6, "kHz": 1e-3, "MHz": 1.0, "GHz": 1e3, "THz": 1e6, "cm-1": MHZ_PER_CM, "K": MHZ_PER_K}
 _KINDS: dict[str, dict[str, float]] = {
-    "temperature": {"mK": 1e-3, "K": 1.0},  # first, so that K wanted is a temperature, K given also an energy
+    "temperature": {"mK": 1e-3, "K": 1.0},  # first, so that K asked for is a temperature, K given also an energy
     "frequency": _FREQUENCY,
     "length": {
         "pm": 0.01,
@@ -81,20 +81,20 @@ def _kind_of(unit: str) -> str:
     return next(kind for kind, table in _KINDS.items() if unit in table)
 
 
-def _factor(unit: str, wanted: str, text: str) -> float:
+def _factor(unit: str, expected: str, text: str) -> float:
     unit = _ALIASES.get(unit, unit)
-    table = _KINDS[_kind_of(wanted)]
-    if not wanted:
-        raise ValueError(f"{text!r}: plain numbers are wanted here, without the unit {unit!r}")
+    table = _KINDS[_kind_of(expected)]
+    if not expected:
+        raise ValueError(f"{text!r}: expected plain numbers here, without the unit {unit!r}")
     if unit not in table:
         known = any(unit in other for other in _KINDS.values())
         what = "does not measure the same thing as" if known else "is not a known unit; the default is"
-        raise ValueError(f"{text!r}: unit {unit!r} {what} {wanted!r}; use one of {', '.join(table)}")
-    return table[unit] / table[wanted]
+        raise ValueError(f"{text!r}: unit {unit!r} {what} {expected!r}; use one of {', '.join(table)}")
+    return table[unit] / table[expected]
 
 
-def _factor_or_one(unit: str | None, wanted: str, text: str) -> float:
-    return _factor(unit, wanted, text) if unit else 1.0
+def _factor_or_one(unit: str | None, expected: str, text: str) -> float:
+    return _factor(unit, expected, text) if unit else 1.0
 
 
 def _number(text: str) -> tuple[float, str | None]:
@@ -148,7 +148,7 @@ def parse_range(text: str, unit: str) -> tuple[float, float]:
     """
     first, last, count = _bounds(text, unit)
     if count is not None:
-        raise ValueError(f"{text!r}: a plain range start:stop is wanted here, without a count")
+        raise ValueError(f"{text!r}: expected a plain range start:stop here, without a count")
     return first, last
 
 

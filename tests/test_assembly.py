@@ -100,8 +100,8 @@ def test_a_changed_box_is_seen() -> None:
     calc = RigidPotential("spce,argon", cutoff_angstrom=5.0)
     first, second = plain.box_of({"spce": 8}, 20.0), plain.box_of({"spce": 7, "argon": 3}, 20.0)
     for atoms in (first, second, first):
-        wanted = RigidPotential("spce,argon", cutoff_angstrom=5.0).evaluate(atoms).energy_ev
-        assert calc.evaluate(atoms).energy_ev == wanted
+        expected = RigidPotential("spce,argon", cutoff_angstrom=5.0).evaluate(atoms).energy_ev
+        assert calc.evaluate(atoms).energy_ev == expected
     second.set_array("molecule", np.zeros(len(second), dtype=int))
     calc.evaluate(first)
     with pytest.raises(ValueError, match="molecule 0 "):

@@ -101,14 +101,14 @@ def numbers_to_print(rng: np.random.Generator) -> np.ndarray:
 def test_rounding_is_that_of_printf(decimals):
     values = numbers_to_print(np.random.default_rng(decimals))
     values = values[np.abs(values) < 10.0 ** (11 - decimals)]
-    wanted = "".join(f"{v:13.{decimals}f}" for v in values.tolist()).encode()
+    expected = "".join(f"{v:13.{decimals}f}" for v in values.tolist()).encode()
     out = np.empty((len(values), 13), dtype=np.uint8)
     assert rows._put_decimal(out, values, decimals).all()
-    assert out.tobytes() == wanted
+    assert out.tobytes() == expected
     compiled = np.empty_like(out)
     for i, value in enumerate(values):
         assert _kernels._put_decimal(compiled[i], 0, 13, value, decimals, 10.0**decimals)
-    assert compiled.tobytes() == wanted
+    assert compiled.tobytes() == expected
 
 
 def random_catalogue(n: int, rng: np.random.Generator) -> Catalogue:

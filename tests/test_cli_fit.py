@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
+import runpy
 from pathlib import Path
 
 import numpy as np
@@ -273,3 +274,31 @@ def test_the_options_and_keys_are_in_the_documents(call, folder):
             assert f"`{option}" in section or option == "--help", (verb, option)
         for key in json.loads((folder / f"{verb}.json").read_text(encoding="utf-8")):
             assert f"`{key}`" in section, (verb, key)
+
+
+SAMPLES = Path(__file__).parent / "oracles" / "fits"
+
+
+@pytest.mark.parametrize("script", ["07_fit", "08_structure"])
+def test_the_examples_assert_what_they_claim(script, monkeypatch):
+    monkeypatch.chdir(SAMPLES.parents[2])
+    runpy.run_path(str(SAMPLES.parents[2] / "examples" / f"{script}.py"))
+
+
+def test_pictures_of_a_fit_and_of_a_molecule_are_the_same_file_each_time(call, folder):
+    (folder / "ocs.toml").write_text(FAMILY)
+    write_lines(folder / "co.csv")
+    for name in ("one", "two"):
+        call("fit", "co.csv", "--constants", CO, "--free", "B,D", "--plot", f"fit_{name}.svg")
+        call("structure", "ocs.toml", "--plot", f"molecule_{name}.svg")
+    for kind in ("fit", "molecule"):
+        one, two = ((folder / f"{kind}_{name}.svg").read_text() for name in ("one", "two"))
+        assert one.replace("one.svg", "two.svg") == two  # the command in the metadata apart
+        assert "(obs - calc)/error" in one or "1.15" in one
+
+
+def test_the_family_of_samples_gives_the_published_structure(call, folder):
+    code, out, err = call("structure", str(SAMPLES / "ocs.toml"), "--method", "rs", "--json", "-")
+    assert code == 0, err
+    values = {one["name"]: one["value"] for one in json.loads(out)["rs"]["values"]}
+    assert values == pytest.approx({"CO": 1.16054, "CS": 1.55967}, abs=1e-5)  # digits as published

@@ -74,8 +74,8 @@ def test_error_estimates_fall_as_kolafa_and_perram_say() -> None:
         q / math.sqrt(648 * 9.0 * 18.7**3), rel=1e-12
     )  # formula
     shells = 2.0 * 18.7 / (2 * math.pi)
-    wanted = q / 3 / 18.7 / math.sqrt(math.pi * shells * 648)
-    assert fourier_error(1 / 3, 2.0, *args) == pytest.approx(wanted, rel=1e-12)  # formula
+    expected = q / 3 / 18.7 / math.sqrt(math.pi * shells * 648)
+    assert fourier_error(1 / 3, 2.0, *args) == pytest.approx(expected, rel=1e-12)  # formula
 
 
 def test_wave_vectors_are_half_of_all_in_a_flat_cell() -> None:

@@ -1,4 +1,4 @@
-"""The same box in three engines: what is handed over, energies and forces, degrees of freedom, what is refused."""
+"""The same box in three engines: what is passed on, energies and forces, degrees of freedom, what is refused."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from ase import Atoms
 
 from rotor import units
 from rotor.fluid.engines import lammps, openmm
-from rotor.fluid.engines.engine_input import Frame, Scene, point_velocities, rigid_motion, scene_of
-from rotor.fluid.engines.equimomental import carriers_of
+from rotor.fluid.engines.engine_input import EngineInput, Frame, engine_input_of, point_velocities, rigid_motion
+from rotor.fluid.engines.equimomental import equimomental_points
 from rotor.fluid.engines.lammps_input import data_file, ensemble_commands, input_file, table_file
 from rotor.fluid.engines.pair_tables import Form, pair_energy
 from rotor.fluid.engines.results import engine_frames, record_of, run_engine
@@ -75,7 +75,7 @@ def test_carriers_have_the_mass_the_moments_and_independent_constraints(name: st
     masses = np.random.default_rng(1).uniform(1, 20, len(model.symbols))
     if name != "bent":  # equal atoms have equal masses
         masses = np.array([{"O": 16.0, "H": 1.0, "N": 14.0, "C": 12.0, "Ar": 40.0}[s] for s in model.symbols])
-    plan = carriers_of(model, masses)
+    plan = equimomental_points(model, masses)
     mine, real = (
         point_masses(m, x) for m, x in ((plan.masses, plan.places), (masses, model.positions_angstrom[: len(masses)]))
     )
@@ -95,21 +95,21 @@ def test_carriers_have_the_mass_the_moments_and_independent_constraints(name: st
 
 
 def test_own_atoms_carry_water_and_no_collinear_molecule() -> None:
-    assert carriers_of(model_of("spce"), np.array([16.0, 1, 1])).own
-    assert carriers_of(model_of("tip4p"), np.array([16.0, 1, 1])).own
-    assert not carriers_of(model_of("trappe-co2"), np.array([12.0, 16, 16])).own
-    assert not carriers_of(model_of("spce"), np.array([16.0, 1, 2])).own  # HDO: no isosceles triangle of masses
+    assert equimomental_points(model_of("spce"), np.array([16.0, 1, 1])).own
+    assert equimomental_points(model_of("tip4p"), np.array([16.0, 1, 1])).own
+    assert not equimomental_points(model_of("trappe-co2"), np.array([12.0, 16, 16])).own
+    assert not equimomental_points(model_of("spce"), np.array([16.0, 1, 2])).own  # HDO: no isosceles triangle of masses
 
 
 def test_rigid_motion_and_velocities_are_inverse_and_kicks_give_the_half_step_energies() -> None:
-    scene = scene_of(box("trappe-co2", 20, 0.8), settings_for("trappe-co2"))
+    engine_input = engine_input_of(box("trappe-co2", 20, 0.8), settings_for("trappe-co2"))
     rng = np.random.default_rng(2)
-    owners, masses, places = scene.molecule_of_site, scene.site_masses, scene.site_positions
+    owners, masses, places = engine_input.molecule_of_site, engine_input.site_masses, engine_input.site_positions
     forces = rng.normal(size=places.shape)
-    motion = rigid_motion(owners, masses, places, scene.site_velocities, forces)
+    motion = rigid_motion(owners, masses, places, engine_input.site_velocities, forces)
     back = point_velocities(motion, owners, masses, places)
-    assert np.allclose(back, scene.site_velocities, atol=1e-12)  # velocities are 0.03: round-off
-    direct = 0.5 * float(np.sum(masses[:, None] * scene.site_velocities**2))
+    assert np.allclose(back, engine_input.site_velocities, atol=1e-12)  # velocities are 0.03: round-off
+    direct = 0.5 * float(np.sum(masses[:, None] * engine_input.site_velocities**2))
     assert motion.kinetic().total_ev == pytest.approx(direct, rel=1e-12)  # König's theorem
     h = 0.3
     half = [motion.kicked(s * h / 2).kinetic() for s in (1, -1)]
@@ -124,15 +124,15 @@ def test_a_scene_has_whole_molecules_isotopologues_and_momentum_at_rest() -> Non
     masses[3:6] = [15.9949, 2.0141, 2.0141]
     atoms.set_masses(masses)
     atoms.wrap()
-    scene = scene_of(atoms, settings_for("spce"))
-    assert [len(one.masses) for one in scene.species] == [3, 3]
-    assert np.bincount(scene.kinds).tolist() == [63, 1]
-    lengths = np.linalg.norm(np.diff(scene.site_positions.reshape(64, 3, 3)[:, [1, 0, 2]], axis=1), axis=-1)
+    engine_input = engine_input_of(atoms, settings_for("spce"))
+    assert [len(one.masses) for one in engine_input.species] == [3, 3]
+    assert np.bincount(engine_input.kinds).tolist() == [63, 1]
+    lengths = np.linalg.norm(np.diff(engine_input.site_positions.reshape(64, 3, 3)[:, [1, 0, 2]], axis=1), axis=-1)
     assert np.allclose(lengths, 1.0, atol=1e-9)  # 1 Å, laid by a fit
-    total = masses @ scene.site_velocities
+    total = masses @ engine_input.site_velocities
     assert np.abs(total).max() < 1e-10  # sums of 192 terms of size 1
-    assert scene.degrees.total == 6 * 64 - 3
-    assert scene_of(atoms, settings_for("spce", ensemble="langevin")).degrees.total == 6 * 64
+    assert engine_input.degrees.total == 6 * 64 - 3
+    assert engine_input_of(atoms, settings_for("spce", ensemble="langevin")).degrees.total == 6 * 64
 
 
 @pytest.mark.parametrize(("edit", "told"), [
@@ -144,7 +144,7 @@ def test_boxes_that_engines_are_not_handed(edit, told: str) -> None:
     atoms = WATER.copy()
     edit(atoms)
     with pytest.raises(ValueError, match=told):
-        scene_of(atoms, settings_for("spce"))
+        engine_input_of(atoms, settings_for("spce"))
 
 
 @pytest.mark.parametrize("electrostatics", ["reaction-field", "shifted"])
@@ -162,50 +162,54 @@ def test_table_of_pairs_has_forces_that_are_slopes_and_ends_at_zero(electrostati
 
 def test_files_for_lammps_hold_the_scene() -> None:
     settings = settings_for("tip4p", ensemble="langevin", temperature_k=300.0, friction_per_ps=4.0, seed=9)
-    scene = scene_of(box("tip4p", 64, 0.9), settings)
-    text = data_file(scene)
+    engine_input = engine_input_of(box("tip4p", 64, 0.9), settings)
+    text = data_file(engine_input)
     head, rest = text.split("Masses", 1)
     assert all(count in head for count in ("256 atoms", "3 atom types", "192 bonds"))
     rows = [line.split() for line in rest.split("Atoms # full")[1].split("Velocities")[0].splitlines() if line.strip()]
     table = np.array(rows, dtype=float)
-    assert np.array_equal(table[:, 4:], scene.site_positions)  # 17 digits give the double back
+    assert np.array_equal(table[:, 4:], engine_input.site_positions)  # 17 digits give the double back
     assert np.array_equal(table[:4, 3], [site.charge_e for site in model_of("tip4p").sites])
     speeds = np.array(
         [line.split()[1:] for line in rest.split("Velocities")[1].split("Bonds")[0].split("\n")[2:-2]], float
     )
-    assert np.allclose(speeds * units.ASE_TIME_PS, scene.site_velocities, rtol=1e-15, atol=0)  # one rounding
-    commands = input_file(scene, settings, Form())
+    assert np.allclose(speeds * units.ASE_TIME_PS, engine_input.site_velocities, rtol=1e-15, atol=0)  # one rounding
+    commands = input_file(engine_input, settings, Form())
     assert "rigid/nve/small molecule langevin 300 300 0.25 9" in commands
     assert "pair_coeff 2 3 pairs.table PAIR_2_3 6" in commands
-    assert table_file(scene, settings, Form()).count("PAIR_") == 6
+    assert table_file(engine_input, settings, Form()).count("PAIR_") == 6
 
 
 def test_lammps_commands_for_mixtures() -> None:
     water, argon = WATER.copy(), Atoms("Ar", [[0.2, 0.2, 0.2]])
     settings = settings_for("spce,argon")
-    scene = scene_of(water + argon, settings)
-    assert ensemble_commands(scene, settings) == [
+    engine_input = engine_input_of(water + argon, settings)
+    assert ensemble_commands(engine_input, settings) == [
         "group bodies type 1 2",
         "fix move bodies rigid/nve/small molecule",
         "group single type 3",
         "fix move_single single nve",
     ]
     with pytest.raises(ValueError, match=r"translations would be too warm by N/\(N - 1\); take langevin, or OpenMM"):
-        ensemble_commands(scene, replace(settings, ensemble="nose-hoover"))
-    lines = ensemble_commands(scene, replace(settings, ensemble="langevin"))
+        ensemble_commands(engine_input, replace(settings, ensemble="nose-hoover"))
+    lines = ensemble_commands(engine_input, replace(settings, ensemble="langevin"))
     assert [line.split()[3] for line in lines if line.startswith("fix")] == ["rigid/nve/small", "nve", "langevin"]
 
 
 def test_a_record_counts_degrees_and_mixes_thermometers() -> None:
     settings = settings_for("trappe-n2", step_fs=4.0, steps=4)
-    scene = scene_of(box("trappe-n2", 50, 0.5), settings)
-    zero = np.zeros_like(scene.site_positions)
+    engine_input = engine_input_of(box("trappe-n2", 50, 0.5), settings)
+    zero = np.zeros_like(engine_input.site_positions)
     forces = np.random.default_rng(3).normal(size=zero.shape)
     motion = rigid_motion(
-        scene.molecule_of_site, scene.site_masses, scene.site_positions, scene.site_velocities, forces
+        engine_input.molecule_of_site,
+        engine_input.site_masses,
+        engine_input.site_positions,
+        engine_input.site_velocities,
+        forces,
     )
     frames = [Frame(0, zero, motion, -1.0), Frame(4, zero, motion, -1.0, half=True)]
-    record = record_of(frames, scene, settings)
+    record = record_of(frames, engine_input, settings)
     h = 4e-3 / units.ASE_TIME_PS
     full = motion.kinetic()
     extra = motion.correction(h).times(1 / 12)
@@ -235,10 +239,10 @@ def test_lammps_that_does_not_load_says_why(monkeypatch: pytest.MonkeyPatch, tmp
         lammps.check()
 
 
-def ours(atoms: Atoms, settings: Settings, scene: Scene, form: Form, tolerance: float = 1e-7):
-    """Energy, the size of its terms, and the motion with forces, of our calculator at the places of a scene."""
+def ours(atoms: Atoms, settings: Settings, engine_input: EngineInput, form: Form, tolerance: float = 1e-7):
+    """Energy, the size of its terms, and the motion with forces, of our calculator at the places of a box."""
     placed = atoms.copy()
-    placed.positions = scene.site_positions[scene.real]
+    placed.positions = engine_input.site_positions[engine_input.real]
     placed.calc = RigidPotential(
         settings.model,
         cutoff_angstrom=settings.cutoff_angstrom,
@@ -247,10 +251,14 @@ def ours(atoms: Atoms, settings: Settings, scene: Scene, form: Form, tolerance: 
         switch_width_angstrom=form.switch_angstrom,
         tolerance=tolerance,
     )
-    forces = np.zeros_like(scene.site_positions)
-    forces[scene.real] = placed.get_forces()
+    forces = np.zeros_like(engine_input.site_positions)
+    forces[engine_input.real] = placed.get_forces()
     motion = rigid_motion(
-        scene.molecule_of_site, scene.site_masses, scene.site_positions, scene.site_velocities, forces
+        engine_input.molecule_of_site,
+        engine_input.site_masses,
+        engine_input.site_positions,
+        engine_input.site_velocities,
+        forces,
     )
     size = sum(abs(term) for term in placed.calc.terms_ev.values())
     return placed.get_potential_energy(), size, motion
@@ -286,9 +294,9 @@ def test_openmm_has_our_energy_force_and_torque(
 ) -> None:
     atoms = box(name, n, density)
     settings = settings_for(name, electrostatics=electrostatics)
-    scene = scene_of(atoms, settings)
-    energy, terms, motion = ours(atoms, settings, scene, form)
-    frame = next(openmm.frames(scene, settings, form, accuracy=1e-7, platform="Reference"))
+    engine_input = engine_input_of(atoms, settings)
+    energy, terms, motion = ours(atoms, settings, engine_input, form)
+    frame = next(openmm.frames(engine_input, settings, form, accuracy=1e-7, platform="Reference"))
     # double precision; places are held to 1e-7 by constraints, PME and our sum are asked for 1e-7
     assert_same(energy, terms, motion, frame, 1e-6)
 
@@ -302,9 +310,9 @@ def test_lammps_has_our_energy_force_and_torque(
 ) -> None:
     atoms = box(name, n, density)
     settings = settings_for(name, electrostatics=electrostatics)
-    scene = scene_of(atoms, settings)
-    energy, terms, motion = ours(atoms, settings, scene, form)
-    frame = next(iter(list(lammps.frames(scene, settings, form, accuracy=1e-8, kspace="ewald"))))
+    engine_input = engine_input_of(atoms, settings)
+    energy, terms, motion = ours(atoms, settings, engine_input, form)
+    frame = next(iter(list(lammps.frames(engine_input, settings, form, accuracy=1e-8, kspace="ewald"))))
     # its constants have 8 digits, its table is a spline through 20000 points, its sum is asked for 1e-8, ours for 1e-7
     assert_same(energy, terms, motion, frame, 1e-6)
 
@@ -312,15 +320,15 @@ def test_lammps_has_our_energy_force_and_torque(
 @HAS["lammps"]
 def test_lammps_has_our_shifted_charges() -> None:
     settings = settings_for("spce", electrostatics="shifted")
-    scene = scene_of(WATER, settings)
-    energy, terms, motion = ours(WATER, settings, scene, Form())
-    frame = next(iter(list(lammps.frames(scene, settings))))
+    engine_input = engine_input_of(WATER, settings)
+    energy, terms, motion = ours(WATER, settings, engine_input, Form())
+    frame = next(iter(list(lammps.frames(engine_input, settings))))
     assert_same(energy, terms, motion, frame, 1e-6)  # constants of 8 digits, a spline
 
 
 @HAS["openmm"]
 def test_openmm_is_not_handed_shifted_charges() -> None:
-    with pytest.raises(ValueError, match="OpenMM is handed reaction-field or ewald"):
+    with pytest.raises(ValueError, match="expected reaction-field or ewald for OpenMM"):
         run_engine("openmm", WATER, settings_for("spce", electrostatics="shifted"))
 
 
@@ -381,14 +389,14 @@ def test_langevin_in_an_engine_heats_translations_and_rotations_alike(engine: st
 @HAS["lammps"]
 def test_lammps_runs_on_two_cores_and_tells_its_errors(monkeypatch: pytest.MonkeyPatch) -> None:
     settings = settings_for("spce", steps=4, every=2)
-    scene = scene_of(WATER, settings)
-    one, two = (list(engine_frames("lammps", scene, settings, cores=cores)) for cores in (1, 2))
+    engine_input = engine_input_of(WATER, settings)
+    one, two = (list(engine_frames("lammps", engine_input, settings, cores=cores)) for cores in (1, 2))
     for a, b in zip(one, two, strict=True):
         assert a.potential_ev == pytest.approx(b.potential_ev, rel=1e-10)  # sums in another order
         assert np.allclose(a.positions, b.positions, atol=1e-9)  # the same
     monkeypatch.setattr("rotor.fluid.engines.lammps.input_file", lambda *a, **k: "units metal\nnonsense 1\n")
     with pytest.raises(RuntimeError, match="LAMMPS stopped: ERROR: Unknown command: nonsense"):
-        list(engine_frames("lammps", scene, settings))
+        list(engine_frames("lammps", engine_input, settings))
 
 
 @pytest.mark.slow
@@ -397,15 +405,15 @@ def test_lammps_runs_on_two_cores_and_tells_its_errors(monkeypatch: pytest.Monke
 def test_reference_boxes_have_one_energy(engine: str, number: int, shared: Path) -> None:
     atoms = nist(shared / "reference" / "nist_spce" / f"spce_sample_config_periodic{number}.txt.gz")
     settings = replace(Settings(), electrostatics="ewald", steps=0)
-    scene = scene_of(atoms, settings)
-    energy, terms, motion = ours(atoms, settings, scene, Form())
+    engine_input = engine_input_of(atoms, settings)
+    energy, terms, motion = ours(atoms, settings, engine_input, Form())
     options = {"accuracy": 1e-7} | ({"platform": "Reference"} if engine == "openmm" else {"kspace": "ewald"})
-    frame = next(iter(list(engine_frames(engine, scene, settings, **options))))
+    frame = next(iter(list(engine_frames(engine, engine_input, settings, **options))))
     assert_same(energy, terms, motion, frame, 1e-6)  # as above
 
 
-def test_a_scene_of_molecules_on_top_of_each_other_is_refused() -> None:
+def test_an_input_of_molecules_on_top_of_each_other_is_refused() -> None:
     atoms = box("spce", 64, 0.9)
     atoms.positions[3:6] = atoms.positions[:3] + 0.05
     with pytest.raises(ValueError, match=r"molecule 0 .* and molecule 1 .* on top of each other"):
-        scene_of(atoms, settings_for("spce"))
+        engine_input_of(atoms, settings_for("spce"))

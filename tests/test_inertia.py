@@ -16,8 +16,8 @@ def test_plate_with_a_given_tensor():
     alpha = 0.37
     frame = principal_frame(Body(1.0, np.zeros(3), alpha * np.array([[5.0, -2, 0], [-2, 8, 0], [0, 0, 13]])))
     assert frame.moments == pytest.approx(alpha * np.array([4, 9, 13]), rel=1e-14)
-    for axis, wanted in zip(frame.axes, ([2, 1, 0], [1, -2, 0], [0, 0, 1]), strict=True):
-        assert abs(axis @ np.array(wanted) / np.linalg.norm(wanted)) == pytest.approx(1, abs=1e-14)
+    for axis, expected in zip(frame.axes, ([2, 1, 0], [1, -2, 0], [0, 0, 1]), strict=True):
+        assert abs(axis @ np.array(expected) / np.linalg.norm(expected)) == pytest.approx(1, abs=1e-14)
     assert np.linalg.det(frame.axes) == pytest.approx(1)
 
 

@@ -122,3 +122,13 @@ def test_a_column_of_round_off_is_no_information():
     assert np.isfinite(regression(design, ["B", "A"]).errors).all()
     blind = regression(design, ["B", "A"], np.array([0.0, 1e-8]))
     assert [one.text for one in blind.undetermined] == ["A"]
+
+
+def test_a_parameter_whose_column_is_round_off_is_not_moved():
+    rng = np.random.default_rng(5)
+    design = np.column_stack([np.ones(30), 1e-14 * rng.normal(size=30)])
+    data = 3.0 + rng.normal(size=30)
+    found = minimise(linear(design, data), np.array([0.0, 7.0]), floor=np.array([0.0, 1e-10]))
+    assert found.converged
+    assert found.parameters[1] == 7.0
+    assert found.parameters[0] == pytest.approx(data.mean(), rel=1e-12)  # round-off

@@ -122,9 +122,9 @@ def test_cut_and_range_only_leave_out():
     top = Top.from_constants(ABC, dipole_abc_debye=(1.2, 1.9, 0.4))
     everything = line_list(top, jmax=20, min_lgint=None)
     cut = line_list(top, jmax=20, min_lgint=-8.0, range_mhz=(1e4, 2e5))
-    wanted = (everything.lgint >= -8.0) & (everything.frequency_mhz >= 1e4) & (everything.frequency_mhz <= 2e5)
-    assert len(cut) == wanted.sum()
-    assert np.allclose(cut.frequency_mhz, everything.frequency_mhz[wanted], rtol=0)
+    expected = (everything.lgint >= -8.0) & (everything.frequency_mhz >= 1e4) & (everything.frequency_mhz <= 2e5)
+    assert len(cut) == expected.sum()
+    assert np.allclose(cut.frequency_mhz, everything.frequency_mhz[expected], rtol=0)
     assert (np.diff(cut.frequency_mhz) >= 0).all()
 
 

@@ -35,7 +35,7 @@ def turn(vector):
         (("O", "Q"), [[0, 0, 0], [0, 0, 1]], "atom 2: 'Q' is not an element"),
         (("O", "99H"), [[0, 0, 0], [0, 0, 1]], "atom 2: isotope 99H"),
         (("O", "H", "H"), [[0, 0, 0], [0, 1, 0], [0, 1, 0.05]], r"atoms 2 \(H\) and 3 \(H\) are 0.05 Å apart"),
-        (("O", "H"), [[0, 0, 0]], r"shape \(1, 3\); \(2, 3\) is wanted"),
+        (("O", "H"), [[0, 0, 0]], r"shape \(1, 3\); expected \(2, 3\)"),
         (("O", "H"), [["a", 0, 0], [0, 0, 1]], "numbers in an array"),
     ],
 )
@@ -51,7 +51,7 @@ def test_bad_geometries_are_refused(symbols, positions, message):
         ({"dipole_debye": [0, 0, np.nan]}, "dipole_debye: .* not finite"),
         ({"polarizability_angstrom3": [[1, 2, 0], [0, 1, 0], [0, 0, 1]]}, "not symmetric"),
         ({"charge": 0.5}, "whole number"),
-        ({"charge": "plus"}, "a number is wanted"),
+        ({"charge": "plus"}, "expected a number"),
         ({"mass_numbers": (16, 1)}, "3 symbols but 2 mass numbers"),
         ({"mass_numbers": (16, 1, 0)}, "atom 3: isotope 0H"),
     ],

@@ -85,7 +85,7 @@ def test_constants_alone_are_a_molecule_file():
         ("[constants]\nB = 5\n[catalogue]\nlines = 3", "tag is missing"),
         ("[constants]\nB = 5\n[catalogue]\ntag = 'c1'\nlines = 3.5", "lines = 3.5: a whole number"),
         ("[geometry]\nsource = 'x'", "atoms = None: a list"),
-        ("[geometry]\natoms = [['O', 0, 0]]", "atom 1 = .*in Å is wanted"),
+        ("[geometry]\natoms = [['O', 0, 0]]", "atom 1 = .*expected .*in Å"),
         ("[geometry]\natoms = [['O', 0, 0, 0], ['Xx', 0, 0, 1]]", r"\[geometry\], atoms: atom 2"),
         ("[geometry]\nkind = 'r9'\natoms = [['O', 0, 0, 0], ['C', 0, 0, 1]]", "kind = 'r9': one of r0, rs, re"),
         (
@@ -235,8 +235,8 @@ def test_axial_polarizability_of_an_oblate_top_stands_along_c():
 @pytest.mark.parametrize(
     ("numbers", "said"),
     [
-        ("mean = 2.0", "mean and anisotropy"), ("aa = 1.0\nbb = 2.0", "aa, bb and cc are wanted"),
-        ("aa = 1.0\nbb = 2.0\ncc = 1.0\nmean = 2.0", "aa, bb and cc are wanted"), ("mean = '2 D'\nanisotropy = 0.0", "unit 'D'"),
+        ("mean = 2.0", "mean and anisotropy"), ("aa = 1.0\nbb = 2.0", "expected aa, bb and cc"),
+        ("aa = 1.0\nbb = 2.0\ncc = 1.0\nmean = 2.0", "expected aa, bb and cc"), ("mean = '2 D'\nanisotropy = 0.0", "unit 'D'"),
         ("alpha = 1.0", "unknown key 'alpha'"),
     ],
 )  # fmt: skip

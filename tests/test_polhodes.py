@@ -31,13 +31,13 @@ moments_of_a_body = st.permutations((0, 1, 2)).flatmap(
 @given(moments_of_a_body, st.floats(0.02, 0.98))
 def test_polhodes_lie_on_sphere_and_ellipsoid(moments, fraction):
     inverse = 1.0 / moments
-    wanted = inverse.min() + fraction * np.ptp(inverse)
+    expected = inverse.min() + fraction * np.ptp(inverse)
     if np.ptp(moments) < 1e-3:
         return
-    curves = polhode(moments, wanted)
+    curves = polhode(moments, expected)
     assert np.allclose(np.linalg.norm(curves, axis=-1), 1.0, rtol=0, atol=1e-7)  # √ of a cancellation where s_a = 0
-    assert np.allclose(level(moments, curves), wanted, rtol=1e-12)  # round-off
-    around = centre_axis(moments, wanted)
+    assert np.allclose(level(moments, curves), expected, rtol=1e-12)  # round-off
+    around = centre_axis(moments, expected)
     assert (curves[0, :, around] >= 0).all()
     assert np.allclose(curves[0, :, around], -curves[1, :, around])
 

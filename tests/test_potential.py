@@ -60,16 +60,16 @@ def test_a_mixture_agrees_with_the_plain_form(method: str, width: float) -> None
     dispersion, charges, forces, _ = plain.pair_terms(
         sites, edges, 7.5, width, (method, alpha if method == "ewald" else METHODS[method])
     )
-    wanted = {"dispersion": dispersion}
+    expected = {"dispersion": dispersion}
     if method == "ewald":
-        wanted["real_space"] = charges
-        wanted["fourier"], more = plain.fourier_terms(sites, edges, alpha, k_cut)
-        wanted["self"] = -plain.COULOMB_EV_ANGSTROM * alpha / math.sqrt(math.pi) * np.sum(sites.charge**2)
-        wanted["intramolecular"] = plain.inside_terms(sites, alpha)
+        expected["real_space"] = charges
+        expected["fourier"], more = plain.fourier_terms(sites, edges, alpha, k_cut)
+        expected["self"] = -plain.COULOMB_EV_ANGSTROM * alpha / math.sqrt(math.pi) * np.sum(sites.charge**2)
+        expected["intramolecular"] = plain.inside_terms(sites, alpha)
         forces = forces + more
     else:
-        wanted[method.replace("-", "_")] = charges
-    for name, value in wanted.items():
+        expected[method.replace("-", "_")] = charges
+    for name, value in expected.items():
         assert found.terms_ev[name] == pytest.approx(value, rel=1e-12, abs=0), name  # a few hundred roundings
     on_atoms = sites.weights.T @ forces
     if method == "ewald":  # the plain form leaves out the forces inside molecules: compare total force and torque
@@ -129,7 +129,7 @@ def test_pressure_is_minus_the_slope_with_volume(name: str, method: str) -> None
     molecules = atoms.positions.reshape(-1, size, 3)
     centres = np.average(molecules, axis=1, weights=atoms.get_masses()[:size])
     h = 1e-5
-    for axes, wanted in ((slice(0, 3), stress[:3].sum()), (slice(1, 2), stress[1])):
+    for axes, expected in ((slice(0, 3), stress[:3].sum()), (slice(1, 2), stress[1])):
         energies = []
         for step in (h, -h):
             factor = np.ones(3)
@@ -139,7 +139,7 @@ def test_pressure_is_minus_the_slope_with_volume(name: str, method: str) -> None
             moved.positions = (molecules + (centres * (factor - 1))[:, None]).reshape(-1, 3)
             energies.append(calc.evaluate(moved).energy_ev)
         slope = (energies[0] - energies[1]) / (2 * h * atoms.get_volume())
-        assert wanted == pytest.approx(slope, rel=2e-5)  # h² and what Ewald's sum leaves out, 1e-7
+        assert expected == pytest.approx(slope, rel=2e-5)  # h² and what Ewald's sum leaves out, 1e-7
 
 
 def test_energy_and_force_go_smoothly_to_nothing_at_the_cutoff() -> None:
@@ -199,9 +199,9 @@ def test_an_open_pair_has_coulomb_and_lennard_jones_and_nothing_else() -> None:
     d = np.linalg.norm(sites.places[:3, None] - sites.places[None, 3:], axis=-1)
     qq = plain.COULOMB_EV_ANGSTROM * sites.charge[:3, None] * sites.charge[None, 3:]
     six = (model.sites[0].sigma_angstrom / d[0, 0]) ** 6
-    wanted = np.sum(qq / d) + 4 * model.sites[0].epsilon_ev * (six**2 - six)
+    expected = np.sum(qq / d) + 4 * model.sites[0].epsilon_ev * (six**2 - six)
     assert RigidPotential("spce", cutoff_angstrom=math.inf).evaluate(atoms).energy_ev == pytest.approx(
-        wanted, rel=1e-13
+        expected, rel=1e-13
     )
 
 
@@ -263,8 +263,8 @@ def test_ase_gets_what_is_asked_for_and_nothing_is_reckoned_twice() -> None:
     atoms.get_forces()
     assert (len(asked), calc.rebuilds) == (2, 1)  # lists outlive a small move
     atoms.set_cell([16.1] * 3)
-    wanted = RigidPotential("spce", cutoff_angstrom=7.0).evaluate(atoms).energy_ev
-    assert atoms.get_potential_energy() == wanted
+    expected = RigidPotential("spce", cutoff_angstrom=7.0).evaluate(atoms).energy_ev
+    assert atoms.get_potential_energy() == expected
     atoms.pbc = False
     with pytest.raises(PropertyNotImplementedError, match="repeats in all"):
         atoms.get_stress()
@@ -322,11 +322,11 @@ def test_nist_water_to_all_printed_digits(number: int, shared: Path) -> None:
 @pytest.mark.oracle
 def test_nist_water_notices_a_moved_molecule_and_another_alpha(shared: Path) -> None:
     atoms = sample(1, shared)
-    wanted = printed(list(SAMPLES[1][:6]))
-    changed = [a != b for a, b in zip(printed(terms_k(atoms, factor=1.001)), wanted, strict=True)]
+    expected = printed(list(SAMPLES[1][:6]))
+    changed = [a != b for a, b in zip(printed(terms_k(atoms, factor=1.001)), expected, strict=True)]
     assert changed == [False, False, True, True, True, True]
     atoms.positions[30:33] += 0.01
-    changed = [a != b for a, b in zip(printed(terms_k(atoms)), wanted, strict=True)]
+    changed = [a != b for a, b in zip(printed(terms_k(atoms)), expected, strict=True)]
     assert changed == [True, False, True, True, False, False]
 
 

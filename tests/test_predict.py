@@ -73,8 +73,8 @@ def test_energies_count_from_zero_where_the_lowest_level_does_not_exist():
     assert lower == pytest.approx(9e4, rel=1e-12)  # B + C, round-off
     kt, f = 5 * 20836.619, odd.catalogue.frequency_mhz[line]
     s = odd.lines.strength_debye2[line]
-    wanted = 4.16231e-5 * f * s * np.exp(-lower / kt) * -np.expm1(-f / kt) / 7
-    assert 10 ** odd.catalogue.lgint[line] == pytest.approx(wanted, rel=1e-6, abs=0)  # kB/h to 8 digits
+    expected = 4.16231e-5 * f * s * np.exp(-lower / kt) * -np.expm1(-f / kt) / 7
+    assert 10 ** odd.catalogue.lgint[line] == pytest.approx(expected, rel=1e-6, abs=0)  # kB/h to 8 digits
 
 
 def test_k_doublets_are_parted_as_the_program_parts_them():
@@ -147,8 +147,10 @@ def test_var_comes_before_par_and_one_of_them_must_be_there(tmp_path):
 
 def read_or_refuse(parameters: bytes, request: bytes):
     try:
-        par, wanted = read_par(parameters), read_int(request)
-        return None if wanted.request.fend > 30 else predict(par, wanted)  # a larger list says no more, and takes long
+        par, expected = read_par(parameters), read_int(request)
+        return (
+            None if expected.request.fend > 30 else predict(par, expected)
+        )  # a larger list says no more, and takes long
     except ValueError as refusal:
         return str(refusal)
 

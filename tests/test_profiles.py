@@ -51,8 +51,8 @@ def test_voigt_is_the_convolution(offset, gauss, lorentz):
 def test_voigt_is_the_faddeeva_function(offset, gauss, lorentz):
     sigma = gauss / math.sqrt(8 * math.log(2))
     z = (offset + 0.5j * lorentz) / (sigma * math.sqrt(2))
-    wanted = wofz(z).real / (sigma * math.sqrt(2 * math.pi))
-    assert float(profiles.voigt(offset, gauss, lorentz)) == pytest.approx(wanted, rel=1e-10)  # wofz: 1e-13
+    expected = wofz(z).real / (sigma * math.sqrt(2 * math.pi))
+    assert float(profiles.voigt(offset, gauss, lorentz)) == pytest.approx(expected, rel=1e-10)  # wofz: 1e-13
 
 
 def test_voigt_of_no_width_is_the_other_shape():

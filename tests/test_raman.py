@@ -46,8 +46,8 @@ def test_linear_positions_and_strengths():
     assert stokes.shift_cm == pytest.approx(
         (4 * 2 - 6e-5) * at - 8e-5 * at**3, abs=1e-9
     )  # (4B - 6D)(J+3/2) - 8D(J+3/2)³
-    wanted = [(2 * n + 1) * placzek_teller_linear(n) * 0.7**2 for n in range(29)]
-    assert stokes.strength_angstrom6 == pytest.approx(wanted, rel=1e-13)  # round-off
+    expected = [(2 * n + 1) * placzek_teller_linear(n) * 0.7**2 for n in range(29)]
+    assert stokes.strength_angstrom6 == pytest.approx(expected, rel=1e-13)  # round-off
     anti = lines.where(lines.shift_mhz < 0)
     assert sorted(-anti.shift_mhz) == pytest.approx(stokes.shift_mhz, rel=1e-14)
 
@@ -107,8 +107,8 @@ def test_a_tensor_that_is_not_axial_changes_k():
             across = (tensor[1, 1] - tensor[2, 2]) ** 2 / 4 + tensor[1, 2] ** 2
             elastic += 2 * 1.5 * across * coupling(j, j, 2, 2, -1) ** 2
         around = found.strength_angstrom6[(found.lower == row) | (found.upper == row)].sum()
-        wanted = (2 * j + 1) * levels.components[row] * anisotropy_squared(tensor)
-        assert elastic + around == pytest.approx(wanted, rel=1e-12)  # round-off
+        expected = (2 * j + 1) * levels.components[row] * anisotropy_squared(tensor)
+        assert elastic + around == pytest.approx(expected, rel=1e-12)  # round-off
 
 
 # Asymmetric tops
@@ -174,8 +174,8 @@ def test_sum_over_final_states(values, tensor):
         for i in range(block.basis.size):
             row = block.start + i
             around = found.strength_angstrom6[(found.lower == row) | (found.upper == row)].sum()
-            wanted = (2 * block.basis.j + 1) * gamma2
-            assert elastic[i] + around == pytest.approx(wanted, rel=1e-10, abs=1e-12 + 1e-14 * wanted)  # round-off
+            expected = (2 * block.basis.j + 1) * gamma2
+            assert elastic[i] + around == pytest.approx(expected, rel=1e-10, abs=1e-12 + 1e-14 * expected)  # round-off
 
 
 def test_strengths_do_not_depend_on_the_representation():
@@ -311,8 +311,8 @@ def test_stokes_and_anti_stokes_show_the_temperature():
         stokes.initial.tolist(), stokes.final.tolist(), stokes.cross_section_cm2_per_sr, stokes.shift_cm, strict=True
     ):
         if (i, f) in pairs:
-            wanted = math.exp(1.438776877 * shift / 250.0) * ((laser - shift) / (laser + shift)) ** 4
-            assert s / pairs[i, f] == pytest.approx(wanted, rel=1e-7)  # digits of hc/k
+            expected = math.exp(1.438776877 * shift / 250.0) * ((laser - shift) / (laser + shift)) ** 4
+            assert s / pairs[i, f] == pytest.approx(expected, rel=1e-7)  # digits of hc/k
 
 
 def test_accidental_symmetric_tops_keep_the_weight_of_k_zero():

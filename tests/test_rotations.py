@@ -127,10 +127,10 @@ def test_at_the_pole_chi_is_zero_and_phi_carries_the_turn():
     assert (down.phi, down.theta, down.chi) == (pytest.approx(-0.4, abs=EPS), np.pi, 0.0)  # phi - chi = -0.4
 
 
-def test_corrupted_matrix_is_refused_then_mended():
+def test_corrupted_matrix_is_refused_and_its_nearest_rotation_found():
     truth = rot.to_matrix(rot.exp([0.3, -1.1, 2.0]))
     noise = 1e-3 * np.random.default_rng(2).standard_normal((3, 3))
-    with pytest.raises(ValueError, match=r"nearest_rotation\(\) mends it"):
+    with pytest.raises(ValueError, match=r"nearest_rotation\(\) gives the nearest"):
         rot.from_matrix(truth + noise)
     mended = rot.nearest_rotation(truth + noise)
     assert mended.distance_from_input == pytest.approx(np.linalg.norm(truth + noise - mended.rotation), rel=1e-12)

@@ -288,7 +288,7 @@ def test_best_turn_is_of_the_handedness_asked_for_in_a_plane():
     ("kinds", "mass", "positions", "message"),
     [
         ("", [], np.zeros((0, 3)), "n of 1 or more"),
-        ("HH", [1, 1], [[0, 0, 0]], "are wanted"),
+        ("HH", [1, 1], [[0, 0, 0]], "expected "),
         ("HH", [1, 0], [[0, 0, 0], [0, 0, 1]], "above 0"),
         ("HH", [1, 1], [[0, 0, 0], [0, 0, np.nan]], "finite"),
         ("HH", [1, 1], [[0, 0, 0], [0, 0, 1e-9]], "nearer than"),

@@ -208,8 +208,8 @@ def test_antisymmetric_parts_are_i_times_a_vector():
     matrix = np.random.default_rng(5).normal(size=(3, 3))
     vector = [matrix[1, 2] - matrix[2, 1], matrix[2, 0] - matrix[0, 2], matrix[0, 1] - matrix[1, 0]]
     for representation in REPRESENTATIONS:
-        wanted = 1j / np.sqrt(2) * spherical_components(vector, 1, representation)
-        assert np.allclose(spherical_components(matrix, 1, representation), wanted, atol=1e-15)  # round-off
+        expected = 1j / np.sqrt(2) * spherical_components(vector, 1, representation)
+        assert np.allclose(spherical_components(matrix, 1, representation), expected, atol=1e-15)  # round-off
     with pytest.raises(ValueError, match="real Cartesian components"):
         body_tensor(matrix, 1, "Ir")
 
@@ -237,8 +237,8 @@ def test_couplings_squared_add_up(j, rise, rank, q):
     """Σ_k c² = (2J+1)(2J'+1)/(2K+1) wherever there is one."""
     j_up, k = j + rise, np.arange(-j, j + 1)
     there = abs(rise) <= rank <= j + j_up and j_up >= 0 and abs(q) <= rank
-    wanted = (2 * j + 1) * (2 * j_up + 1) / (2 * rank + 1) if there else 0.0
-    assert np.sum(coupling(j, j_up, rank, q, k) ** 2) == pytest.approx(wanted, rel=1e-12)  # round-off of 400 terms
+    expected = (2 * j + 1) * (2 * j_up + 1) / (2 * rank + 1) if there else 0.0
+    assert np.sum(coupling(j, j_up, rank, q, k) ** 2) == pytest.approx(expected, rel=1e-12)  # round-off of 400 terms
 
 
 @pytest.mark.parametrize("rank", [1, 2, 3, 4])
@@ -351,8 +351,8 @@ def test_species_choose_the_component(representation):
         assert acting == SPECIES[change]
         for g, h in ((0, 0), (1, 1), (0, 1), (0, 2), (1, 2)):
             tensor = body_tensor(np.outer(EYE[g], EYE[h]), 2, representation)
-            wanted = {0: "ee"}.get(g - h) or {(0, 1): "oe", (0, 2): "oo", (1, 2): "eo"}[g, h]
-            assert bool(bands_between(up, low, tensor)) == (change == wanted)
+            expected = {0: "ee"}.get(g - h) or {(0, 1): "oe", (0, 2): "oo", (1, 2): "eo"}[g, h]
+            assert bool(bands_between(up, low, tensor)) == (change == expected)
 
 
 # Solved states
@@ -385,8 +385,8 @@ def test_dipole_strengths_are_those_of_full_matrices(representation):
     for up, low in connected_pairs(levels.blocks, body_tensor(dipole, 1, representation)):
         strengths = amplitudes(up, low, body_tensor(dipole, 1, representation)) ** 2
         i, k = (rank[block.start : block.start + block.basis.size] for block in (up, low))
-        wanted = slow[low.basis.j, up.basis.j][np.ix_(i, k)]
-        assert np.allclose(strengths, wanted, atol=1e-10)  # near-degenerate vectors of the full matrix
+        expected = slow[low.basis.j, up.basis.j][np.ix_(i, k)]
+        assert np.allclose(strengths, expected, atol=1e-10)  # near-degenerate vectors of the full matrix
         total += strengths.sum()
     everything = sum(m.sum() if j != j_up else m.sum() / 2 for (j, j_up), m in slow.items())
     assert total == pytest.approx(everything, rel=1e-12)  # nothing is missing
@@ -406,8 +406,8 @@ def test_strengths_from_one_level_add_up(rank, representation):
         sums[low.start : low.start + low.basis.size] += strength.sum(axis=0)
         if up is not low:
             sums[up.start : up.start + up.basis.size] += strength.sum(axis=1)
-    wanted = (2 * j + 1) * np.sum(np.abs(tensor.components) ** 2)
-    assert np.allclose(sums[levels.quanta["j"] == j], wanted, rtol=1e-12)  # round-off of some hundred terms
+    expected = (2 * j + 1) * np.sum(np.abs(tensor.components) ** 2)
+    assert np.allclose(sums[levels.quanta["j"] == j], expected, rtol=1e-12)  # round-off of some hundred terms
 
 
 @pytest.mark.parametrize("rank", [1, 2])

@@ -228,7 +228,7 @@ MISTAKES = [
     (("water", "--times", "10:0:5"), "the range must rise"),
     (("water", "--times", "now"), "--times: 'now' is not a number"),
     (("water", "--times", "0:1GHz:5"), "does not measure the same thing as 'ps'"),
-    ((*BODY[1:], "--times", "0:1ps:5"), "plain numbers are wanted here, without the unit 'ps'"),
+    ((*BODY[1:], "--times", "0:1ps:5"), "expected plain numbers here, without the unit 'ps'"),
     (("water", "--times", "0:1:99999999999"), "at most 10000000 times"),
     (("water", "--times", "1e999"), "larger than a floating-point number"),
     (("water", "--times", "1", "--gif", "a.gif"), "--gif a.gif: a film needs two different times"),

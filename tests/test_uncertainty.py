@@ -132,7 +132,7 @@ def test_what_is_no_covariance(names, matrix, says):
 def test_correlations_are_checked():
     with pytest.raises(ValueError, match="1 on its diagonal"):
         Covariance.of_correlations(["B"], [0.1], [[0.01]])
-    with pytest.raises(ValueError, match="are needed"):
+    with pytest.raises(ValueError, match="expected"):
         Covariance.of_correlations(["B", "D"], [0.1], np.eye(2))
 
 

@@ -75,10 +75,10 @@ def test_intensities_of_a_catalogue_are_met_with_vibration_alone(shared):
     counted = line_list(top, jmax=40, vibrations=VibrationalStates.parse(HCN_STATES))
     j = cat.quanta_upper[:, 0].astype(int)
     few = (j >= 1) & (j <= 22)  # the lines that the constants were held against
-    for lines, wanted in ((plain, 0.0288), (counted, 0.0)):
+    for lines, expected in ((plain, 0.0288), (counted, 0.0)):
         ours = dict(zip(lines.levels.quanta["j"][lines.upper].tolist(), lines.lgint.tolist(), strict=True))
         off = np.array([ours[k] for k in j[few].tolist()]) - cat.lgint[few]
-        assert np.median(off) == pytest.approx(wanted, abs=5e-4)  # four decimals of LGINT, states left out
+        assert np.median(off) == pytest.approx(expected, abs=5e-4)  # four decimals of LGINT, states left out
         assert np.ptp(off) < 2e-3  # the dipole's dependence on J, and four decimals
 
 
@@ -110,8 +110,8 @@ def test_texts(text, energies, degeneracies):
 
 @pytest.mark.parametrize(
     ("text", "said"),
-    [("", "are wanted"), ("667,,1388", "are wanted"), ("-5", "are wanted"), ("0", "above 0 cm-1"), ("667x0", "above 0 for each"),
-     ("667 D", "unit 'D'"), ("667x1.5", "are wanted"), ("667 1388", "are wanted"), ("1e999", "not a finite number")],
+    [("", "expected "), ("667,,1388", "expected "), ("-5", "expected "), ("0", "above 0 cm-1"), ("667x0", "above 0 for each"),
+     ("667 D", "unit 'D'"), ("667x1.5", "expected "), ("667 1388", "expected "), ("1e999", "not a finite number")],
 )  # fmt: skip
 def test_texts_that_mean_nothing(text, said):
     with pytest.raises(ValueError, match=said):

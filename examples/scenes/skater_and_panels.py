@@ -19,7 +19,7 @@ assert np.isclose(skater.energy[-1] / skater.energy[0], 2.5, rtol=1e-14)
 
 # %% [markdown]
 # A coning satellite, I = (50, 50, 70) kg m², unfolds panels in mirror pairs until (80, 80, 130). In a symmetric body
-# L3 and the transverse |L| are each kept, so the cone angle atan(|L_t| / L3) is the same before and after, while the
+# L3 and the transverse |L| are each conserved, so the cone angle atan(|L_t| / L3) is the same before and after, while the
 # spin falls by 70/130; L in space does not move.
 
 # %%

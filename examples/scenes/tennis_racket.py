@@ -1,6 +1,6 @@
 # %% [markdown]
 # # The tennis racket
-# A body thrown to spin about its intermediate axis turns over, again and again, each half period. The half period
+# A body that spins about its intermediate axis turns over, again and again, each half period. The half period
 # follows from the exact motion; a stepped motion finds the same.
 #
 # Moments 0.3, 0.35, 0.4 kg m², ω = (0.1, 15, 0.1) rad/s: the period of the momentum is 12.3349458 s.

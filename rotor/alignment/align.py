@@ -273,7 +273,7 @@ def _trace(
 
 def _method(plan: Plan) -> str:
     names = {float: "kick", propagate.KickPlan: "splitting", propagate.Grid: "magnus"}
-    return ", ".join(sorted({names[type(passage)] for passage in plan.passages}))
+    return ", ".join(sorted({names.get(type(passage), "kick") for passage in plan.passages}))
 
 
 def _signal(

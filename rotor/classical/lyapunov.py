@@ -80,9 +80,24 @@ def body_flow(
     effects: Sequence[ClassicalEffect] = (),
     attitude0: ArrayLike = IDENTITY,
 ) -> Flow:
-    """The flow of one body under effects: y = L (3,), or (L, q) (7,) where a torque depends on the attitude.
+    """The flow of one body under effects.
 
-    The quaternion's length adds one exponent that is zero.
+    Parameters
+    ----------
+    moments : (3,) array
+        Principal moments.
+    momentum0 : (3,) array
+        Angular momentum in body axes at the start.
+    effects : sequence of ClassicalEffect
+        As of `rotor.classical.integrators.method.integrate`.
+    attitude0 : (4,) array
+        Body to space at the start.
+
+    Returns
+    -------
+    Flow
+        Of y = L (3,), or (L, q) (7,) where a torque depends on the attitude; the quaternion's length then adds one exponent that
+        is zero.
 
     >>> body_flow([1.0, 2.0, 4.0], [1.0, 1.0, 0.0]).rate(0.0, np.array([[1.0, 1.0, 0.0]])).tolist()
     [[0.0, 0.0, -0.5]]
@@ -242,10 +257,26 @@ def orbit(flow: Flow, times: ArrayLike, tolerance: float = 1e-10) -> Floats:
 def poincare_section(
     flow: Flow, surface: Callable[[float, Floats], float], time: float, transient: float = 0.0, tolerance: float = 1e-10
 ) -> tuple[Floats, Floats]:
-    """Times (p,) and states (p, d) at which the orbit of flow.start crosses surface(t, y) = 0 upwards before `time`.
+    """Times and states at which an orbit crosses a surface upwards.
 
-    Crossings before `transient` are left out. For a periodic drive take surface = sin(frequency t / 2 + phase), which
-    gives the stroboscopic map of every second period.
+    Parameters
+    ----------
+    flow : Flow
+        The orbit is that of flow.start, from time 0.
+    surface : callable
+        surface(t, y) = 0 is crossed from below. For a periodic drive take sin(angular_frequency t / 2 + phase), which gives
+        the stroboscopic map of every second period.
+    time : float
+        Length of the orbit.
+    transient : float
+        Crossings before it are left out.
+    tolerance : float
+        Of the integration (DOP853), relative and absolute.
+
+    Returns
+    -------
+    (p,) array, (p, d) array
+        Times and states of the crossings.
 
     >>> circle = Flow(lambda t, y: np.stack([y[:, 1], -y[:, 0]], axis=-1), np.array([1.0, 0.0]))
     >>> times, states = poincare_section(circle, lambda t, y: y[0], time=12.0)

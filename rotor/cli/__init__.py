@@ -69,8 +69,8 @@ def _application(verbs: Sequence[str] = VERBS) -> typer.Typer:
     return app
 
 
-def _print_version(wanted: bool) -> None:
-    if wanted:
+def _print_version(expected: bool) -> None:
+    if expected:
         import rotor
 
         print(f"rotor {rotor.__version__}")

@@ -50,6 +50,9 @@ class Options:
     compare: str | None = option(
         None, metavar="OTHER", help="Another .cat, an .int, or a molecule to predict: what differs in OTHER."
     )
+    as_spcat: bool = option(
+        False, "--as-spcat", help="OTHER, an .int, is predicted with its KNMAX as SPCAT takes it, see rotor spectrum."
+    )
     top_lines: int = option(20, "--top", metavar="N", help="How many lines are shown.")
 
 
@@ -78,7 +81,7 @@ def command(context: typer.Context, options: Options, outputs: Outputs) -> None:
     content = summary(lines, file, context.obj)
     found = None
     if compare is not None:
-        found = compared(lines, compare, range_, min_lgint)
+        found = compared(lines, compare, range_, min_lgint, options.as_spcat)
         content["compared"] = comparison_record(found, compare, top_lines)
     content["files"] = files.names
     content["lines"] = [_record(lines, row) for row in range(len(lines))]
@@ -108,8 +111,8 @@ def filtered(lines: Catalogue, range_: str | None, min_lgint: str | None) -> Cat
         first, last = inputs.parsed("--range", range_, lambda text: parse_range(text, "MHz"))
     least = inputs.cut("--min-lgint", min_lgint) if min_lgint is not None else None
     frequency, _ = in_mhz(lines)
-    kept = (frequency >= first) & (frequency <= last) & (lines.lgint >= (-np.inf if least is None else least))
-    return lines.take(kept)
+    chosen = (frequency >= first) & (frequency <= last) & (lines.lgint >= (-np.inf if least is None else least))
+    return lines.take(chosen)
 
 
 def summary(lines: Catalogue, file: str, command: str) -> dict[str, Any]:
@@ -131,7 +134,9 @@ def summary(lines: Catalogue, file: str, command: str) -> dict[str, Any]:
     }
 
 
-def compared(lines: Catalogue, other: str, range_: str | None, min_lgint: str | None) -> Comparison:
+def compared(
+    lines: Catalogue, other: str, range_: str | None, min_lgint: str | None, as_spcat: bool = False
+) -> Comparison:
     """The lines beside those of another catalogue, of an .int file, or predicted for a molecule to the same J."""
     from rotor.formats.spcat.compare import compare
 
@@ -140,7 +145,7 @@ def compared(lines: Catalogue, other: str, range_: str | None, min_lgint: str | 
     elif other.lower().endswith(".int"):
         from rotor.formats.spcat.predict import predict_file
 
-        prediction = predict_file(other)
+        prediction = predict_file(other, as_spcat=as_spcat)
         for text in prediction.notes:
             note(text)
         theirs = prediction.catalogue

@@ -93,7 +93,7 @@ def _tell(parent: Top, family: Sequence[Isotopologue]) -> None:
 def _substitution(text: str) -> tuple[str, str]:
     element, equals, name = (part.strip() for part in text.partition("="))
     if not (element.isalpha() and equals and name):
-        raise ValueError(f"{text!r}: an element and its isotope are wanted, such as O=18O")
+        raise ValueError(f"{text!r}: expected an element and its isotope, such as O=18O")
     return element, name
 
 

@@ -69,6 +69,9 @@ class Options:
         "--hyperfine/--no-hyperfine",
         help="Split lines by the spins of nuclei; by default where --spin-constants are given.",
     )
+    as_spcat: bool = option(
+        False, "--as-spcat", help="Of an .int file: K above KNMAX is left out of the basis, as SPCAT leaves it out."
+    )
     top_lines: int = option(20, "--top", metavar="N", help="How many of the strongest lines are shown.")
     tag: int = option(0, metavar="N", help="Tag of the species in --cat.")
 
@@ -96,7 +99,7 @@ def command(
     settings = {**_settings(options), "vibrations": gas_layer.vibrations_of(vibration), **shape}
     _refuse_profile_without_file(settings, files)
 
-    prediction = spcat.prediction_of(context, str(given.source)) if spcat.is_request(given.source) else None
+    prediction = spcat.prediction_asked(context, given.source, options.as_spcat)
     with inputs.fields_as_options(**NAMES):
         if prediction is not None:
             answer, tag = spcat.answer_of(prediction, shape), prediction.request.tag

@@ -435,7 +435,12 @@ def _by_stages(search: _Search, first: Minimum, progress: Progress | None) -> Mi
 
 def _minimised(search: _Search, start: Floats, progress: Progress | None, limit: int) -> Minimum:
     return minimise(
-        search.evaluate, start, tolerance=search.options.tolerance, most_iterations=limit, progress=progress
+        search.evaluate,
+        start,
+        tolerance=search.options.tolerance,
+        most_iterations=limit,
+        floor=_round_off(search, search.lines_of(start)[2]),
+        progress=progress,
     )
 
 

@@ -45,7 +45,21 @@ class PairDistribution(Table):
 def pair_distribution(path: ArrayLike, edges: ArrayLike, r_max: float, bins: int = 200) -> PairDistribution:
     """g(r) of one kind of points: pairs found in a shell over pairs expected of an ideal gas, n (n - 1)/V times its volume.
 
-    With this norm an ideal gas has g = 1 for any n. r_max: at most half of the shortest edge.
+    Parameters
+    ----------
+    path : (frames, n, 3) array
+        Positions.
+    edges : (3,) array
+        Of the periodic cell.
+    r_max : float
+        Largest distance, at most half of the shortest edge.
+    bins : int
+        Number of shells.
+
+    Returns
+    -------
+    PairDistribution
+        With this norm an ideal gas has g = 1 for any n.
 
     >>> crystal = np.array([[[i, j, k] for i in range(4) for j in range(4) for k in range(4)]], dtype=float)
     >>> shells = pair_distribution(crystal, [4.0, 4.0, 4.0], 1.2, 12)
@@ -110,8 +124,21 @@ def diffusion(
 ) -> Diffusion:
     """Coefficient of self-diffusion from Einstein's relation, ⟨Δr²⟩ = 6 D t, as the slope within a window of times.
 
-    error: of the mean over `blocks` successive parts of the path, each of which must be longer than the window. What all
-    points drift together is taken out first.
+    Parameters
+    ----------
+    path : (frames, n, 3) array
+        Unwrapped positions, Å.
+    interval_ps : float
+        Between frames.
+    window_ps : (float, float)
+        First and last time of the slope.
+    blocks : int
+        Successive parts of the path, each longer than the window, whose mean and standard error are returned.
+
+    Returns
+    -------
+    Diffusion
+        D and its error. The drift of all points together is taken out first.
     """
     points = _path(path)
     points = points - points.mean(axis=1, keepdims=True)
@@ -136,8 +163,22 @@ def yeh_hummer_correction(
 ) -> Diffusion:
     """D with the drag of the periodic images taken out, D + ξ kT/(6π η L) of a cubic cell (Yeh and Hummer 2004, eq. 12).
 
-    viscosity_pa_s: of the model itself, which hardly depends on the box; of SPC/E at 298 K 0.729e-3 (M. A. González and
-    J. L. F. Abascal, J. Chem. Phys. 132, 096101 (2010)).
+    Parameters
+    ----------
+    found : Diffusion
+        In the periodic cell.
+    temperature_k : float
+        Temperature.
+    viscosity_pa_s : float
+        Of the model itself, which hardly depends on the box; of SPC/E at 298 K 0.729e-3 (M. A. González and J. L. F. Abascal,
+        J. Chem. Phys. 132, 096101 (2010)).
+    edge_angstrom : float
+        Of the cell.
+
+    Returns
+    -------
+    Diffusion
+        With the correction beside.
 
     >>> found = Diffusion(2.5e-9, 0.0)
     >>> round(yeh_hummer_correction(found, 298.15, 0.729e-3, 18.64).corrected * 1e9, 3)

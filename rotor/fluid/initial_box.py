@@ -25,10 +25,23 @@ RELAXING_K = 300.0  # of the speeds that relaxing molecules may reach
 
 
 def lattice_box(model: RigidModel, molecules: int, density_g_cm3: float, rng: np.random.Generator) -> Atoms:
-    """A cubic periodic box of molecules on a simple cubic lattice, turned at random, labelled in arrays["molecule"].
+    """A cubic periodic box of molecules on a simple cubic lattice, turned at random.
 
-    The smallest lattice with enough sites is used, some left empty at random; the edge follows from the density and the
-    masses of the most abundant isotopes. Neighbours may stand too close: `relax` the box before anything is measured.
+    Parameters
+    ----------
+    model : RigidModel
+        Of the molecules.
+    molecules : int
+        How many; the smallest lattice with enough sites is used, some left empty at random.
+    density_g_cm3 : float
+        Gives the edge, with the masses of the most abundant isotopes.
+    rng : numpy.random.Generator
+        Source of the random numbers.
+
+    Returns
+    -------
+    ase.Atoms
+        Labelled in arrays["molecule"]. Neighbours may stand too close: `relax` the box before anything is measured.
 
     >>> from rotor.fluid.forces.models import model_of
     >>> box = lattice_box(model_of("spce"), 216, 0.997, np.random.default_rng(1))
@@ -132,10 +145,24 @@ def relax(atoms: Atoms, steps: int = RELAXING_STEPS, **how: Any) -> None:
 def thermal_momenta(
     bodies: Bodies, temperature_k: float, rng: np.random.Generator, removed: int = 0
 ) -> tuple[Floats, Floats]:
-    """Momenta (n, 3) and angular momenta (n, 3) in body axes drawn from the canonical ensemble, in ASE's units.
+    """Momenta of rigid molecules drawn from the canonical ensemble, in ASE's units.
 
-    p_i and L_i are normal with variances m kT and I_i kT (`rotor.classical.gas.ensembles`). removed: 3 takes the total momentum
-    out, each body giving the share of its mass; what remains is the canonical ensemble of 3 degrees fewer, not rescaled.
+    Parameters
+    ----------
+    bodies : Bodies
+        The molecules.
+    temperature_k : float
+        Temperature.
+    rng : numpy.random.Generator
+        Source of the random numbers.
+    removed : int
+        3 takes the total momentum out, each body giving the share of its mass; what remains is the canonical ensemble of 3
+        degrees fewer, not rescaled.
+
+    Returns
+    -------
+    (n, 3) array, (n, 3) array
+        p in space and L in body axes, normal with variances m kT and I_i kT (`rotor.classical.gas.ensembles`).
     """
     from rotor.classical.gas import ensembles
 
@@ -154,7 +181,21 @@ def at_rest(bodies: Bodies, momentum: Floats) -> Floats:
 
 
 def heat(atoms: Atoms, bodies: Bodies, attitude: Floats, temperature_k: float, rng: np.random.Generator) -> None:
-    """Give the atoms thermal momenta of rigid molecules, the total momentum removed, in place."""
+    """Give the atoms thermal momenta of rigid molecules, the total momentum removed, in place.
+
+    Parameters
+    ----------
+    atoms : ase.Atoms
+        Whose momenta are set.
+    bodies : Bodies
+        Its molecules.
+    attitude : (n, 4) array
+        Of the bodies.
+    temperature_k : float
+        Temperature.
+    rng : numpy.random.Generator
+        Source of the random numbers.
+    """
     momentum, angular = thermal_momenta(bodies, temperature_k, rng, removed=3)
     atoms.set_masses(bodies.masses)
     atoms.set_momenta(bodies.momenta(momentum, angular, attitude))

@@ -143,7 +143,7 @@ def dynamics_of(atoms: Atoms, settings: Settings, begin: bool = True) -> RigidDy
         check_apart(atoms, bodies)
         if not atoms.get_momenta().any():
             heat(atoms, bodies, pose.attitude, settings.temperature_k, velocities)
-        elif thermostat is None or thermostat.keeps_momentum:
+        elif thermostat is None or thermostat.conserves_momentum:
             momentum, angular = bodies.wrench(atoms.get_momenta(), pose.attitude)
             atoms.set_momenta(bodies.momenta(at_rest(bodies, momentum), angular, pose.attitude))
     else:

@@ -1,4 +1,4 @@
-"""Results are written beside and renamed: whoever opens the path finds the whole file, the old one, or none."""
+"""Results are written beside and renamed: a reader of the path finds the whole file, the old one, or none."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     """A path in the same folder to write to; renamed to `path` when the block ends, removed when it fails.
 
     A link is followed, so that the file it names is replaced and the link stays. What is no regular file (a pipe,
-    a device such as /dev/null) cannot be renamed over and is handed out as it is.
+    a device such as /dev/null) cannot be renamed over and is used as it is.
 
     Raises FileNotFoundError when the folder does not exist, IsADirectoryError when `path` is a folder.
 

@@ -143,7 +143,7 @@ def _constants(
         raise ValueError(f"{place}, lines = {one['lines']!r}: the fit has not converged: {fit.reason}")
     fits[label] = fit
     source = f"fitted to {int(fit.used.sum())} measured lines of {Path(one['lines']).name}, weighted rms {fit.weighted_rms:.3g}"
-    return _rigid(fit.constants.values), _rigid(fit.constants.uncertainties), source
+    return _rigid(fit.named.values), _rigid(fit.named.uncertainties), source
 
 
 def _fitted(path: Path, start: Constants, options: FitOptions | None) -> Fit:

@@ -203,7 +203,7 @@ def _spell(part: _Field, value: Any) -> str:
         text = _ISOTOPOLOGUES[value - 1] if 1 <= value <= len(_ISOTOPOLOGUES) else str(value).rjust(width + 1)
     else:
         text = f"{value:{width}{part.form}}"
-        if len(text) > width:  # as Fortran does: the zero before the point makes room
+        if len(text) > width:  # as Fortran does: the zero before the point is left out
             text = text.replace("-0.", "-.", 1) if text.startswith("-0.") else text.removeprefix("0")
     if len(text) != width or "\n" in text or (part.form not in (None, "d", "iso") and not np.isfinite(value)):
         raise ValueError(
@@ -223,9 +223,9 @@ def format_hitran(lines: HitranLines) -> bytes:
     """The text of the records; each line as it was read, as long as it says the same."""
     texts = []
     for index in range(len(lines)):
-        record, kept = lines.record(index), lines.texts.get(index)
-        same = kept is not None and _record(Line(kept, index + 1, "kept text")) == record
-        texts.append(kept if same and kept is not None else format_record(record))
+        record, stored = lines.record(index), lines.texts.get(index)
+        same = stored is not None and _record(Line(stored, index + 1, "stored text")) == record
+        texts.append(stored if same and stored is not None else format_record(record))
     return encode(texts)
 
 

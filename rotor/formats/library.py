@@ -105,7 +105,7 @@ def _read_index(folder: Path, files: Stamp) -> dict[str, Path]:
 def _names_in(path: Path) -> tuple[str, ...]:
     """`name` and `names` of a file, from what stands before its first table; none where that cannot be understood.
 
-    Such a file is found by its own name alone: whoever asks for it is told what is wrong, and nobody else is disturbed.
+    Such a file is found by its own name alone: a request for it gets the error, and other requests are not disturbed.
     """
     head, _, _ = path.read_bytes().partition(b"\n[")
     try:

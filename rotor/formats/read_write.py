@@ -128,7 +128,7 @@ def _read_standard_input(isotopes: Isotopes | None) -> Top:
 
     text = decode(sys.stdin.buffer.read(), "standard input")
     if not text.strip():
-        raise ValueError("standard input is empty; a geometry (xyz, sdf) or a TOML of constants is wanted")
+        raise ValueError("standard input is empty; expected a geometry (xyz, sdf) or a TOML of constants")
     if any(line.strip().startswith("[constants]") for line in text.splitlines()):
         return top_of_file(parse_molecule_file(text, "standard input"), isotopes)
     return _with_isotopes(Top.from_molecule(parse_molecule(text, "standard input")), isotopes)

@@ -97,7 +97,7 @@ def stream_lines(
 ) -> StreamedList:
     """The lines of `rotor.line_list`, rising in frequency, written to a .parquet or .cat file without being in memory.
 
-    Pieces are kept in the folder `path` + ".pieces" until the file is whole, then removed. A run that was cut off leaves
+    Pieces stand in the folder `path` + ".pieces" until the file is whole, then removed. A run that was cut off leaves
     them; the same call goes on from there.
 
     jmax ... vibrational_factor: as in `rotor.line_list`. tag: of a .cat. memory_mb: what the sort may take beside the
@@ -112,7 +112,7 @@ def stream_lines(
     if target.suffix.lower() not in (".parquet", ".cat"):
         raise ValueError(f"{path}: a streamed list is written as .parquet or .cat; the suffix names the format")
     if piece_lines < 1 or memory_mb < 100:
-        raise ValueError(f"piece_lines = {piece_lines}, memory_mb = {memory_mb}: at least 1 line and 100 MB are wanted")
+        raise ValueError(f"piece_lines = {piece_lines}, memory_mb = {memory_mb}: expected at least 1 line and 100 MB")
     _refuse_forks(executor)
     start = line_list(
         top,
@@ -152,7 +152,7 @@ def _plan(start: Lines, jmax: int | None, least: float, range_mhz: tuple[float, 
     if jmax is None:
         jmax = jmax_for_cut(top, dipole, start.temperature_k, q.q, least)
     if jmax < 1:
-        raise ValueError(f"J max = {jmax}: 1 or more is wanted, J = 0 alone has no line")
+        raise ValueError(f"J max = {jmax}: expected 1 or more, J = 0 alone has no line")
     effects = start.levels.effects
     ground = solve_levels(
         top, 3, effects=effects, vectors=False

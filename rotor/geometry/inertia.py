@@ -131,10 +131,25 @@ def principal_frame(
 ) -> PrincipalFrame:
     """Principal moments and the right-handed axes a, b, c with I_a ≤ I_b ≤ I_c.
 
-    With the masses and positions that make the body the frame is unique: of all frames that the tensor allows, the
-    one is taken whose odd moments Σ m a³, Σ m b³, Σ m c³, Σ m a b², ... come first in order of size. Frames that this
-    does not distinguish are alike by symmetry. Where moments coincide within `equal`, candidates inside the degenerate
-    space point at the masses with the largest m ρ². Moments below round-off are returned as 0, never negative.
+    Parameters
+    ----------
+    body : Body
+        Mass, centre and tensor.
+    masses, positions : (n,) array, (n, 3) array, optional
+        The point masses that make the body; with them the frame is unique.
+    equal : float
+        Relative difference below which two moments count as equal.
+
+    Returns
+    -------
+    PrincipalFrame
+        Moments below round-off are 0, never negative.
+
+    Notes
+    -----
+    Of all frames that the tensor allows, the one is taken whose odd moments Σ m a³, Σ m b³, Σ m c³, Σ m a b², ... come first in
+    order of size. Frames that this does not distinguish are alike by symmetry. Where moments coincide within `equal`, candidates
+    inside the degenerate space point at the masses with the largest m ρ².
 
     >>> frame = principal_frame(Body(1.0, np.zeros(3), np.array([[5.0, -2, 0], [-2, 8, 0], [0, 0, 13]])))
     >>> [round(float(m), 12) for m in frame.moments], np.round(frame.axes[0] * 5**0.5, 12).tolist()

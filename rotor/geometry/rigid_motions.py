@@ -21,7 +21,19 @@ TERMS = 10  # x²⁰/23! is below 1e-22 at x = 1
 
 
 def compose(q1: ArrayLike, position1: ArrayLike, q2: ArrayLike, position2: ArrayLike) -> tuple[Floats, Floats]:
-    """The pose of applying pose 2 first, then pose 1: (q1 q2, q1 p2 q1* + p1).
+    """The pose of applying pose 2 first, then pose 1.
+
+    Parameters
+    ----------
+    q1, q2 : (..., 4) array
+        Attitudes.
+    position1, position2 : (..., 3) array
+        Positions.
+
+    Returns
+    -------
+    (..., 4) array, (..., 3) array
+        q1 q2 and q1 p2 q1* + p1.
 
     >>> compose([1, 0, 0, 0], [1, 0, 0], [1, 0, 0, 0], [0, 2, 0])[1].tolist()
     [1.0, 2.0, 0.0]

@@ -74,7 +74,7 @@ class ForceField:
         hessian = np.array(self.hessian_ev_per_angstrom2, dtype=np.float64)
         if hessian.shape != (size, size) or not np.isfinite(hessian).all():
             raise ValueError(
-                f"Hessian of shape {hessian.shape}: {size} x {size} finite numbers are wanted for {self.molecule.formula}"
+                f"Hessian of shape {hessian.shape}: expected {size} x {size} finite numbers for {self.molecule.formula}"
             )
         lopsided = float(np.abs(hessian - hessian.T).max())
         if lopsided > LOPSIDED * float(np.abs(hessian).max()):
@@ -175,7 +175,7 @@ def read_hessian(path: str | os.PathLike[str], molecule: Molecule, *, unit: str 
     """
     unit = _UNIT_NAMES.get(unit, unit)
     if unit not in EV_PER_ANGSTROM2:
-        raise ValueError(f"unit {unit!r} of a Hessian: one of {', '.join(EV_PER_ANGSTROM2)} is wanted")
+        raise ValueError(f"unit {unit!r} of a Hessian: expected one of {', '.join(EV_PER_ANGSTROM2)}")
     numbers: list[float] = []
     for count, line in enumerate(Path(path).read_text(encoding="utf-8-sig").splitlines(), start=1):
         if not line.lstrip().startswith("#"):

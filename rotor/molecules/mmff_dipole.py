@@ -1,4 +1,4 @@
-"""A dipole estimated from the partial charges of MMFF94, for a molecule whose dipole nobody measured.
+"""A dipole estimated from the partial charges of MMFF94, for a molecule whose dipole was not measured.
 
 μ = s Σ q_i (r_i - R), with R the centre of mass: it decides which kinds of lines a spectrum has (a, b or c type) and
 their rough strength, no more. The charges are made for liquids, where molecules polarise each other, and give dipoles

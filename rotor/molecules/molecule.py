@@ -41,7 +41,7 @@ class Molecule:
     polarizability_source : where the polarizability is from
     name, source : what it is called, where the geometry is from
     uncertainty : typical relative error of the rotational constants that follow from the geometry. None: not known
-    notes : what a user must be told
+    notes : what a user must know
 
     Raises ValueError for no atoms, positions that are not n triples of finite numbers, a symbol or mass number that
     is no isotope, two atoms nearer than 0.1 Å, an unknown electronic state, or a dipole or tensor of the wrong shape.
@@ -78,12 +78,10 @@ class Molecule:
         _refuse_lopsided(self.polarizability_angstrom3)
         charge = float(_checked(self.charge, (), "charge"))
         if not charge.is_integer():
-            raise ValueError(f"charge {charge:g}: a whole number of elementary charges is wanted")
+            raise ValueError(f"charge {charge:g}: expected a whole number of elementary charges")
 
         if self.electronic not in ELECTRONIC:
-            raise ValueError(
-                f"electronic {self.electronic!r}: 'even' (a closed shell) or 'odd' (such as Σg-) is wanted"
-            )
+            raise ValueError(f"electronic {self.electronic!r}: expected 'even' (a closed shell) or 'odd' (such as Σg-)")
 
         object.__setattr__(self, "symbols", tuple(one.symbol for one in nuclei))
         object.__setattr__(self, "mass_numbers", tuple(one.mass_number for one in nuclei))
@@ -172,7 +170,7 @@ class Molecule:
         """
         r = _checked(rotation, (3, 3), "rotation")
         if not np.allclose(r @ r.T, np.eye(3), atol=1e-6) or np.linalg.det(r) < 0:
-            raise ValueError(f"rotation {r.tolist()} is not a proper rotation: R Rᵀ = 1 and det R = 1 are wanted")
+            raise ValueError(f"rotation {r.tolist()} is not a proper rotation: expected R Rᵀ = 1 and det R = 1")
         shift = _checked(shift_angstrom, (3,), "shift_angstrom")
         dipole, alpha = self.dipole_debye, self.polarizability_angstrom3
         return replace(
@@ -184,7 +182,7 @@ class Molecule:
 
 
 def _nuclei(symbols: Iterable[str], mass_numbers: Iterable[int]) -> tuple[Isotope, ...]:
-    """Isotopes of the atoms; mistakes are told with the 1-based number of the atom."""
+    """Isotopes of the atoms; messages have the 1-based number of the atom."""
     names = (symbols,) if isinstance(symbols, str) else tuple(symbols)
     numbers: tuple[int | None, ...] = tuple(mass_numbers) or (None,) * len(names)
     if not names:
@@ -205,10 +203,10 @@ def _checked(values: ArrayLike, shape: tuple[int, ...], what: str) -> Floats:
     try:
         array = np.array(values, dtype=np.float64)
     except (TypeError, ValueError):
-        kind = f"numbers in an array of shape {shape} are" if shape else "a number is"
-        raise ValueError(f"{what}: {kind} wanted, not {values!r:.80}") from None
+        kind = f"numbers in an array of shape {shape}" if shape else "a number"
+        raise ValueError(f"{what}: expected {kind}, not {values!r:.80}") from None
     if array.shape != shape:
-        raise ValueError(f"{what} has shape {array.shape}; {shape} is wanted")
+        raise ValueError(f"{what} has shape {array.shape}; expected {shape}")
     if not np.isfinite(array).all():
         where = f", atom {np.argwhere(~np.isfinite(array))[0][0] + 1}" if what == "positions_angstrom" else ""
         raise ValueError(f"{what}{where}: a number that is not finite; every one must be")

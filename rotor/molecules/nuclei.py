@@ -110,15 +110,15 @@ def isotope(symbol: str, mass_number: int | None = None) -> Isotope:
     element, own_number = _split(symbol)
     if own_number is not None and mass_number not in (None, own_number):
         raise ValueError(f"isotope {symbol!r} with mass number {mass_number}: the two differ; give one of them")
-    wanted = own_number if own_number is not None else mass_number
+    expected = own_number if own_number is not None else mass_number
     isotopes = _table()[element]
-    if wanted is None:
+    if expected is None:
         return max(isotopes.values(), key=lambda one: (one.abundance, one.half_life_s))
-    if wanted not in isotopes:
-        near = sorted(isotopes, key=lambda number: (abs(number - wanted), number))[:3]
+    if expected not in isotopes:
+        near = sorted(isotopes, key=lambda number: (abs(number - expected), number))[:3]
         names = ", ".join(f"{number}{element}" for number in sorted(near))
-        raise ValueError(f"isotope {wanted}{element} is not in data/isotopes.csv; near it are {names}")
-    return isotopes[wanted]
+        raise ValueError(f"isotope {expected}{element} is not in data/isotopes.csv; near it are {names}")
+    return isotopes[expected]
 
 
 def _split(name: str) -> tuple[str, int | None]:

@@ -89,7 +89,7 @@ def refine(
     if not converged:
         raise ValueError(
             f"{name} did not bring {molecule.formula} to a minimum in {most_steps} steps: a force of {left:.3g} eV/Å is "
-            f"left, {most_force_ev_per_angstrom:g} is wanted; start nearer, or allow more steps or a larger force"
+            f"left, expected at most {most_force_ev_per_angstrom:g}; start nearer, or allow more steps or a larger force"
         )
     note = f"geometry refined with {name} by BFGS in {search.get_number_of_steps()} steps; largest force left {left:.2g} eV/Å"
     return _refined(molecule, atoms, name, note)

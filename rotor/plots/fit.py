@@ -20,15 +20,9 @@ _HEADINGS = {
 }
 
 
-def plot_fit(
-    fit: Fit, path: str | os.PathLike[str], *, title: str = "", provenance: Mapping[str, Any] | None = None
-) -> None:
-    """Draw (obs - calc)/error of every line into a .png, .pdf or .svg file; lines that do not count are crosses.
-
-    Raises ValueError for another suffix.
-    """
-    checked_suffix(path)
-    panels = [("frequency", fit.lines.frequency_mhz / 1e3)]
+def fit_figure(fit: Fit, title: str = "") -> Any:
+    """A matplotlib figure of (obs - calc)/error of every line; lines that do not count are crosses."""
+    panels = [("frequency (GHz)", fit.lines.frequency_mhz / 1e3)]
     panels += [
         (_HEADINGS[name], fit.lines.upper[:, i].astype(float))
         for i, name in enumerate(fit.lines.names)
@@ -39,15 +33,27 @@ def plot_fit(
         for place, (heading, x) in enumerate(panels, 1):
             axes = figure.add_subplot(len(panels), 1, place)
             _draw(axes, fit, x)
-            axes.set_xlabel("frequency (GHz)" if heading == "frequency" else heading)
-        status = "" if fit.converged else ", NOT CONVERGED"
-        heading = (
-            f"{title or fit.lines.source}: weighted rms {fit.weighted_rms:.3g}, {len(fit.groups)} frequencies{status}"
-        )
-        figure.axes[0].set_title(heading.replace("$", r"\$"), loc="left")
-        names = fit.constants.text() if fit.constants else fit.parameters.names
-        facts = {"constants": names, "weighted_rms": fit.weighted_rms, "converged": fit.converged}
-        save(figure, path, heading, {**(provenance or {}), **facts})
+            axes.set_xlabel(heading)
+        figure.axes[0].set_title(_title(fit, title).replace("$", r"\$"), loc="left")
+    return figure
+
+
+def _title(fit: Fit, title: str) -> str:
+    status = "" if fit.converged else ", NOT CONVERGED"
+    return f"{title or fit.lines.source}: weighted rms {fit.weighted_rms:.3g}, {len(fit.groups)} frequencies{status}"
+
+
+def plot_fit(
+    fit: Fit, path: str | os.PathLike[str], *, title: str = "", provenance: Mapping[str, Any] | None = None
+) -> None:
+    """Draw `fit_figure` into a .png, .pdf or .svg file, with the provenance in its metadata.
+
+    Raises ValueError for another suffix.
+    """
+    checked_suffix(path)
+    names = fit.constants.text() if fit.constants else fit.parameters.names
+    facts = {"constants": names, "weighted_rms": fit.weighted_rms, "converged": fit.converged}
+    save(fit_figure(fit, title), path, _title(fit, title), {**(provenance or {}), **facts})
 
 
 def _draw(axes: Any, fit: Fit, x: np.ndarray[Any, Any]) -> None:

@@ -142,8 +142,8 @@ def _draw_direction(axes: Any, view: Any, path: Floats) -> None:
     if steps.max() < 1e-9:
         return
     travelled = np.concatenate([[0.0], np.cumsum(steps)])
-    wanted = min(0.45, 0.4 * travelled[-1])
-    here = int(np.clip(np.searchsorted(travelled, wanted), 1, len(path) - 1))
+    expected = min(0.45, 0.4 * travelled[-1])
+    here = int(np.clip(np.searchsorted(travelled, expected), 1, len(path) - 1))
     if view.depth(path[here]) > 0.0:
         axes.annotate(
             "", view.flat(path[here]), view.flat(path[here - 1]), zorder=8,

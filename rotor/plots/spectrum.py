@@ -20,7 +20,7 @@ from rotor.spectra.spectrum import Spectrum, line_widths
 VISIBLE = 4e-3  # lines below this part of the strongest do not stretch the axis of frequency
 TALL = 1e-2  # and below this they cannot be seen on a linear axis
 MOST_DECADES = 8
-MOST_VERTICES = 20_000  # of a curve; more cannot be told apart on paper
+MOST_VERTICES = 20_000  # of a curve; more cannot be distinguished on paper
 
 
 @dataclass(frozen=True)
@@ -62,6 +62,8 @@ def plot_spectrum(
     provenance : mapping, optional
         What the metadata of the file shall say besides version, constants and settings.
 
+    Notes
+    -----
     The axis of intensity is logarithmic where fewer than ten lines would be seen on a linear one. Raises ValueError for
     a suffix that is no picture and for a spectrum without lines or with nothing in the range.
     """
@@ -128,7 +130,7 @@ def _draw(axes: Any, thing: Lines | Spectrum, x: _Axis) -> None:
 
 
 def _thinned(x: Floats, y: Floats) -> tuple[Floats, Floats]:
-    """The lowest and highest point of every strip, where a curve has more points than can be told apart."""
+    """The lowest and highest point of every strip, where a curve has more points than can be distinguished."""
     if len(x) <= MOST_VERTICES:
         return x, y
     strips = np.linspace(x[0], x[-1], MOST_VERTICES // 4)
@@ -138,7 +140,7 @@ def _thinned(x: Floats, y: Floats) -> tuple[Floats, Floats]:
 
 
 def _scale(axes: Any, thing: Lines | Spectrum, lines: Lines | None, heights: Floats, x: _Axis) -> None:
-    """Limits of both axes, with room for names above the lines."""
+    """Limits of both axes, with space for names above the lines."""
     axes.set_xlim(x.first / x.mhz, x.last / x.mhz)
     shown = np.zeros(0) if lines is None else lines.intensity_nm2_mhz[x.inside(lines.frequency_mhz)]
     tallest = _tallest(thing, x)
@@ -193,7 +195,7 @@ def _title(thing: Lines | Spectrum, lines: Lines | None) -> str:
 def _name_lines(
     figure: Any, axes: Any, thing: Lines | Spectrum, lines: Lines, heights: Floats, x: _Axis, most: int
 ) -> None:
-    """Name the strongest lines from the strongest down, upright above them, wherever there is room."""
+    """Name the strongest lines from the strongest down, upright above them, wherever there is space."""
     figure.canvas.draw()  # places the axes, so that sizes in pixels are known
     rows = np.flatnonzero(x.inside(lines.frequency_mhz) & _stands_out(thing, lines, heights))
     rows = rows[np.argsort(-lines.intensity_nm2_mhz[rows], kind="stable")][: 15 * most]
@@ -232,9 +234,9 @@ def _drawn_points(axes: Any, thing: Lines | Spectrum, x: _Axis) -> Floats:
     return np.asarray(axes.transData.transform(points[points[:, 1] > 0]))
 
 
-def _fits(box: Any, room: Any, taken: Sequence[Any], drawn: Floats) -> bool:
+def _fits(box: Any, frame: Any, taken: Sequence[Any], drawn: Floats) -> bool:
     """Whether a name lies inside the axes, on no other name and on nothing that is drawn."""
-    inside = box.x0 >= room.x0 and box.x1 <= room.x1 and box.y1 <= room.y1
+    inside = box.x0 >= frame.x0 and box.x1 <= frame.x1 and box.y1 <= frame.y1
     crossed = (drawn[:, 0] > box.x0) & (drawn[:, 0] < box.x1) & (drawn[:, 1] > box.y0)
     return bool(inside and not crossed.any() and not any(box.overlaps(other) for other in taken))
 
@@ -254,7 +256,7 @@ def _label(axes: Any, lines: Lines, row: int, height: float, x: _Axis) -> Any:
         fontsize=7,
         color=GREY,
     )
-    name.set_in_layout(False)  # names go where the axes leave room, and not the other way round
+    name.set_in_layout(False)  # names go where the axes leave space; they do not move the axes
     return name
 
 

@@ -16,6 +16,32 @@ from rotor.structure.substitution import Value
 _MARGIN = 0.9  # Å around the atoms
 
 
+def structure_figure(molecule: Molecule, *, values: Sequence[Value] = (), title: str = "") -> Any:
+    """A matplotlib figure of a molecule in its principal axes.
+
+    molecule : in the frame of a, b, c; atoms are drawn along the two axes across which it spreads most. values : bond lengths to
+    write at the bonds, with errors.
+    """
+    x = molecule.positions_angstrom
+    spread = np.ptp(x, axis=0)
+    across, up, depth = np.argsort(-spread, kind="stable").tolist()
+    width, height = max(spread[across] + 2 * _MARGIN, 2.5), max(spread[up] + 2 * _MARGIN, 2.0)
+    scale = min(7.2 / width, 6.0 / height, 1.5)
+    with styled():
+        figure = new_figure((width * scale, height * scale + 0.5))
+        axes = figure.add_subplot()
+        _draw_bonds(axes, molecule, values, across, up)
+        _draw_atoms(axes, molecule, across, up, depth)
+        middle = (x.max(axis=0) + x.min(axis=0)) / 2
+        axes.set_xlim(middle[across] - width / 2, middle[across] + width / 2)
+        axes.set_ylim(middle[up] - height / 2, middle[up] + height / 2)
+        axes.set_aspect("equal")
+        axes.set_xlabel(f"{'abc'[across]} (Å)")
+        axes.set_ylabel(f"{'abc'[up]} (Å)")
+        axes.set_title(title or formula_text(molecule.formula), loc="left")
+    return figure
+
+
 def plot_structure(
     molecule: Molecule,
     path: str | os.PathLike[str],
@@ -24,48 +50,18 @@ def plot_structure(
     title: str = "",
     provenance: Mapping[str, Any] | None = None,
 ) -> None:
-    """Draw a molecule, in its principal axes, into a .png, .pdf or .svg file.
+    """Draw `structure_figure` into a .png, .pdf or .svg file, with the provenance in its metadata.
 
-    Parameters
-    ----------
-    molecule : Molecule
-        In the frame of a, b, c; atoms are drawn along the two axes across which it spreads most.
-    path : path
-    values : sequence of Value
-        Bond lengths to write at the bonds, with errors.
-    title : str
-    provenance : mapping, optional
-        What the metadata of the file shall say.
-
-    Raises
-    ------
-    ValueError
-        For a suffix that is no picture.
+    Raises ValueError for a suffix that is no picture.
     """
     checked_suffix(path)
-    x = molecule.positions_angstrom
-    spread = np.ptp(x, axis=0)
-    across, up, depth = np.argsort(-spread, kind="stable")
-    width, height = max(spread[across] + 2 * _MARGIN, 2.5), max(spread[up] + 2 * _MARGIN, 2.0)
-    scale = min(7.2 / width, 6.0 / height, 1.5)
-    with styled():
-        figure = new_figure((width * scale, height * scale + 0.5))
-        axes = figure.add_subplot()
-        _draw_bonds(axes, molecule, values, int(across), int(up), scale)
-        _draw_atoms(axes, molecule, int(across), int(up), int(depth), scale)
-        middle = (x.max(axis=0) + x.min(axis=0)) / 2
-        axes.set_xlim(middle[across] - width / 2, middle[across] + width / 2)
-        axes.set_ylim(middle[up] - height / 2, middle[up] + height / 2)
-        axes.set_aspect("equal")
-        axes.set_xlabel(f"{'abc'[across]} (Å)")
-        axes.set_ylabel(f"{'abc'[up]} (Å)")
-        axes.set_title(title or formula_text(molecule.formula), loc="left")
-        places = np.round(x, 6).tolist()
-        atoms = [[symbol, *place] for symbol, place in zip(molecule.symbols, places, strict=True)]
-        save(figure, path, title, {**(provenance or {}), "atoms": atoms})
+    places = np.round(molecule.positions_angstrom, 6).tolist()
+    atoms = [[symbol, *place] for symbol, place in zip(molecule.symbols, places, strict=True)]
+    figure = structure_figure(molecule, values=values, title=title)
+    save(figure, path, title, {**(provenance or {}), "atoms": atoms})
 
 
-def _draw_bonds(axes: Any, molecule: Molecule, values: Sequence[Value], across: int, up: int, scale: float) -> None:
+def _draw_bonds(axes: Any, molecule: Molecule, values: Sequence[Value], across: int, up: int) -> None:
     from rotor.fit.publication import value_text
     from rotor.structure.coordinates import named
 
@@ -86,7 +82,7 @@ def _draw_bonds(axes: Any, molecule: Molecule, values: Sequence[Value], across: 
             axes.text(*place, written[i, j], ha="center", va="center", fontsize=7.0, zorder=4)
 
 
-def _draw_atoms(axes: Any, molecule: Molecule, across: int, up: int, depth: int, scale: float) -> None:
+def _draw_atoms(axes: Any, molecule: Molecule, across: int, up: int, depth: int) -> None:
     from ase.data import atomic_numbers, covalent_radii
     from ase.data.colors import jmol_colors
     from matplotlib.patches import Circle

@@ -253,15 +253,22 @@ def _solved(j: int, parts: tuple[Part, ...], matrix: Floats, zero: float, repres
     if not np.isfinite(matrix).all():
         raise ValueError("a block of the Hamiltonian overflows: J max is too high for these constants")
     energies, vectors = np.linalg.eigh(matrix)
+    labels, mixing = names_of_states(parts, matrix, vectors, representation)
+    return CoupledBlock(j, parts, energies + zero, vectors, labels, mixing)
+
+
+def names_of_states(
+    parts: tuple[Part, ...], matrix: Floats, vectors: Floats, representation: str
+) -> tuple[Ints, Floats]:
+    """v, Ka, Kc (n, 3) of the states of a coupled block, and their overlaps (n,) with the functions that name them."""
     names, functions = [], []
     for part in parts:
         ka, kc = names_of(part.basis, representation)
         names.append(np.stack([np.full_like(ka, part.v), ka, kc], axis=1))
         functions.append(np.linalg.eigh(matrix[part.place, part.place]).eigenvectors.T @ vectors[part.place])
     overlaps = np.concatenate(functions) ** 2
-    of_state = one_to_one(overlaps) if len(parts) > 1 else np.arange(len(energies))
-    labels = np.concatenate(names)[of_state]
-    return CoupledBlock(j, parts, energies + zero, vectors, labels, overlaps[of_state, np.arange(len(energies))])
+    of_state = one_to_one(overlaps) if len(parts) > 1 else np.arange(vectors.shape[1])
+    return np.concatenate(names)[of_state], overlaps[of_state, np.arange(vectors.shape[1])]
 
 
 def one_to_one(overlaps: Floats) -> Ints:

@@ -19,6 +19,7 @@ from rotor.tops.operators import Operators
 
 if TYPE_CHECKING:
     from rotor.quantum.j_operators import JOperator
+    from rotor.quantum.moments import Moment
     from rotor.quantum.spins import Spin, SpinTerm
     from rotor.quantum.states import Coupling, State
     from rotor.tops.top import Top
@@ -83,6 +84,10 @@ class QuantumEffect(ABC):
     def k_limits(self, top: Top) -> dict[int, tuple[int, int]]:
         """The least and the largest K of states v whose basis does not have all of them, such as K = 1 of a Π state."""
         return {}
+
+    def other_moments(self, top: Top) -> tuple[Moment, ...]:
+        """Moments that make lines besides plain dipoles, such as those of a spin."""
+        return ()
 
     def dipoles(self, top: Top) -> dict[tuple[int, int], tuple[float, float, float]]:
         """(μa, μb, μc) in debye by pairs of states (v', v): of the effect's states, and between states."""

@@ -32,7 +32,7 @@ FIRST_BASIS = 64
 DENSE = 48  # blocks up to this size are solved whole, all fields at once
 HIGHEST_J = 300
 FIRST_ANCHORS = 5  # fields solved in full at first, of many
-SPANNED = 101  # fields that the basis for diabatic labels holds
+SPANNED = 101  # fields at which a basis for many is tested while it is made
 BUFFER = 4  # further states in the basis of a map
 DEPENDENT = 1e-7  # of the largest singular value: directions of a basis below it are left out
 STEP_J = 6
@@ -310,11 +310,11 @@ def reduced_basis(
     fixed: Matrix, slope: Matrix, fields: Floats, count: int, tolerance_mhz: float
 ) -> tuple[Floats, Matrix]:
     """The lowest states at many fields from full solutions at a few: energies (fields, count), vectors (fields, n, count)."""
-    basis = spanning(fixed, slope, fields, count, tolerance_mhz)
+    basis = spanning(fixed, slope, fields[:: len(fields) // SPANNED + 1], count, tolerance_mhz)
     if basis is None:
         return _each(fixed, slope, fields, count)
-    energies, vectors, _ = _in_basis(basis, (fixed @ basis, slope @ basis), fields, count)
-    return energies, vectors
+    energies, vectors, error = _in_basis(basis, (fixed @ basis, slope @ basis), fields, count)
+    return (energies, vectors) if error.max() <= tolerance_mhz else _each(fixed, slope, fields, count)
 
 
 def spanning(fixed: Matrix, slope: Matrix, fields: Floats, count: int, tolerance_mhz: float) -> Matrix | None:

@@ -114,8 +114,8 @@ def components(j: int, representation: str) -> dict[str, JOperator]:
     True
     """
     up, down = raising(j), lowering(j)
-    handed = -1.0 if representation.endswith("l") else 1.0
-    along_x, along_y = 0.5 * (up + down), handed * 0.5j * (up - down)
+    sense = -1.0 if representation.endswith("l") else 1.0
+    along_x, along_y = 0.5 * (up + down), sense * 0.5j * (up - down)
     return dict(zip(axes_of(representation), (along_x, along_y, j_z(j)), strict=True))
 
 

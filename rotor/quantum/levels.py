@@ -161,15 +161,15 @@ class Levels(Table):
                 f"quantum numbers {', '.join(quanta)}: these levels are labelled by {', '.join(self.quanta)}"
             )
         codes, rows, scales = self._index
-        wanted = np.zeros(np.shape(next(iter(quanta.values()))), dtype=np.int64)
-        inside = np.ones(wanted.shape, dtype=bool)
+        expected = np.zeros(np.shape(next(iter(quanta.values()))), dtype=np.int64)
+        inside = np.ones(expected.shape, dtype=bool)
         for name, (values, scale) in zip(self.quanta, scales, strict=True):
             place = np.searchsorted(values, np.asarray(quanta[name]))
             place = np.minimum(place, len(values) - 1)
             inside &= values[place] == np.asarray(quanta[name])
-            wanted += place * scale
-        place = np.minimum(np.searchsorted(codes, wanted), max(len(codes) - 1, 0))
-        found = inside & (codes[place] == wanted) if len(codes) else np.zeros(wanted.shape, dtype=bool)
+            expected += place * scale
+        place = np.minimum(np.searchsorted(codes, expected), max(len(codes) - 1, 0))
+        found = inside & (codes[place] == expected) if len(codes) else np.zeros(expected.shape, dtype=bool)
         return np.where(found, rows[place] if len(codes) else -1, -1)
 
     @cached_property

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 GRADIENT_MHZ_PER_BARN = (
     234.964778  # eQV/h of a field gradient V of one atomic unit; CODATA 2022, checked in tests/test_limits.py
 )
-VIBRATION_CM = 500.0  # a wavenumber of vibration, for distortion that nobody has computed
+VIBRATION_CM = 500.0  # a wavenumber of vibration, for distortion that was not computed
 CH_ANGSTROM, NEIGHBOUR_ANGSTROM = 1.3, 1.7  # bonds of hydrogen to carbon or nitrogen, and of nitrogen to heavier atoms
 OFF_AXIS = 0.05  # sine of the angle from which an atom is off the axis of a methyl group
 FLAT_DEGREES = 355.0  # sum of the three angles at a nitrogen that is not pyramidal

@@ -6,7 +6,7 @@ of odd rank i times real, their squares summed over all M the line strengths.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -66,7 +66,13 @@ def connected_pairs(blocks: Iterable[AnyBlock], tensors: Tensors) -> Iterator[tu
     if isinstance(blocks[0], SolvedBlock):
         yield from of_wang.connected_pairs(blocks, tensors[0, 0])
         return
-    rank = rank_of(tensors)
+    yield from pairs_where(blocks, rank_of(tensors), lambda up, low: _connects(up, low, tensors))
+
+
+def pairs_where(
+    blocks: Iterable[AnyBlock], rank: int, connects: Callable[[AnyBlock, AnyBlock], bool]
+) -> Iterator[tuple[AnyBlock, AnyBlock]]:
+    """The pairs (up, low) that a test connects, of those whose total angular momenta differ by `rank` at most."""
     by_total: dict[int, list[AnyBlock]] = {}
     for block in blocks:
         by_total.setdefault(twice_total(block), []).append(block)
@@ -74,7 +80,7 @@ def connected_pairs(blocks: Iterable[AnyBlock], tensors: Tensors) -> Iterator[tu
         above = [block for rise in range(1, rank + 1) for block in by_total.get(twice + 2 * rise, [])]
         for i, low in enumerate(lows):
             for up in lows[i:] + above:
-                if _connects(up, low, tensors):
+                if connects(up, low):
                     yield up, low
 
 

@@ -69,7 +69,7 @@ class Conversion:
 
 
 def to_reduction(constants: Constants, reduction: str, covariance: Covariance | None = None) -> Conversion:
-    """The same top in Watson's A- or S-reduction, axes kept.
+    """The same top in Watson's A- or S-reduction, axes unchanged.
 
     covariance : of the constants; by default their uncertainties, uncorrelated. It is carried over to first order.
 
@@ -84,7 +84,7 @@ def to_reduction(constants: Constants, reduction: str, covariance: Covariance | 
 
 
 def to_representation(constants: Constants, representation: str, covariance: Covariance | None = None) -> Conversion:
-    """The same top in the axes of another representation, reduction kept.
+    """The same top in the axes of another representation, reduction unchanged.
 
     Exact for a rigid top, whose A, B, C stay; else, and for errors, see `to_reduction`.
 
@@ -159,7 +159,7 @@ def _refuse(constants: Constants, reduction: str | None, representation: str) ->
     if higher:
         raise ValueError(
             f"constants with {', '.join(higher)}: the conversion is of first order in quartic constants and would "
-            "spoil these; leave them out knowingly with .replace(name=None), or fit again in the reduction wanted"
+            "spoil these; leave them out knowingly with .replace(name=None), or fit again in the reduction asked for"
         )
 
 
@@ -179,13 +179,13 @@ def _exchange_axes(operators: Operators, old: str, new: str) -> Operators:
 
 def _turn(operators: Operators, reduction: str) -> float:
     """s that takes the sixth quartic term away: J₊⁴ + J₋⁴ for A, ½[Jz², J₊² + J₋²]₊ for S."""
-    unwanted, rate = ((0, 0, 2), -4 * operators[0, 0, 1]) if reduction == "A" else ((0, 1, 1), 8 * operators[0, 1, 0])
-    if operators[unwanted] == 0:
+    removed, rate = ((0, 0, 2), -4 * operators[0, 0, 1]) if reduction == "A" else ((0, 1, 1), 8 * operators[0, 1, 0])
+    if operators[removed] == 0:
         return 0.0
     if rate == 0:
         equal = "Bx = By" if reduction == "A" else "Bz = ½(Bx + By)"
         raise ValueError(f"no {reduction}-reduction in these axes: {equal}; choose the other one, or other axes")
-    return -operators[unwanted] / rate
+    return -operators[removed] / rate
 
 
 def _turned(operators: Operators, s: float) -> Operators:
@@ -220,7 +220,7 @@ def _labelled(
     note: str,
     covariance: Covariance | None = None,
 ) -> Constants:
-    """The new set, in which every constant's source says that it was converted; without a covariance errors are kept."""
+    """The new set, in which every constant's source says that it was converted; without a covariance errors stay."""
     sources = dict.fromkeys(values, f"converted: {note}")
     sources |= {name: f"{sources[name]}; {old}" for name, old in constants.sources.items() if name in values}
     errors = dict(constants.uncertainties)

@@ -9,7 +9,7 @@ the irreps A1, A2, B1, B2 of D4, by the signs e^{iπK/2} under C4z and s(-1)^J u
     A1 → A1,    A2 → B1,    E → A1 + B1,    F1 → A2 + E,    F2 → B2 + E
 
 (Bunker and Jensen, Molecular Symmetry and Spectroscopy, table B-2). F1 and F2 are thus blocks of their own. A1 and A2 are
-told from E by a threefold turn, whose matrix in such a block has the eigenvalue χ(C3)/dimension: 1 for A, -½ for E. Levels
+distinguished from E by a threefold turn, whose matrix in such a block has the eigenvalue χ(C3)/dimension: 1 for A, -½ for E. Levels
 of one cluster, closer than round-off at high J, are therefore labelled rightly too.
 """
 

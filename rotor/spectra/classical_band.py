@@ -124,7 +124,7 @@ def band_times(top: Top, temperature_k: float, fwhm_mhz: float) -> Floats:
     if not (math.isfinite(temperature_k) and temperature_k > 0):
         raise ValueError(f"temperature {temperature_k} K: a temperature is above 0 K")
     if not (math.isfinite(fwhm_mhz) and fwhm_mhz > 0):
-        raise ValueError(f"full width at half maximum {fwhm_mhz} MHz: a finite number above 0 is wanted")
+        raise ValueError(f"full width at half maximum {fwhm_mhz} MHz: expected a finite number above 0")
     start = short_time(top.moments_u_angstrom2, units.EV_PER_K * temperature_k, _dipole(top))
     edge_mhz = REACH * math.sqrt(start.m2) / (2.0 * math.pi) / (units.ASE_TIME_PS * HZ_PER_MHZ_PS)
     end = 2.0 * math.sqrt(-math.log(WINDOW_END) * math.log(2.0)) / (math.pi * WINDOW_SHARE * fwhm_mhz) / HZ_PER_MHZ_PS
@@ -152,12 +152,12 @@ def band_from_correlation(
     if correction not in get_args(Correction):
         raise ValueError(f"correction {correction!r} is none of {', '.join(get_args(Correction))}")
     if times.ndim != 1 or times.shape != c1.shape or len(times) < 8 or times[0] != 0 or not _even(times):
-        raise ValueError(f"times of shape {times.shape} for C1 of {c1.shape}: even ones from 0, 8 or more, are wanted")
+        raise ValueError(f"times of shape {times.shape} for C1 of {c1.shape}: expected even ones from 0, 8 or more")
     window = _window(times, WINDOW_SHARE * fwhm_mhz)
     if window[-1] > 2 * WINDOW_END:
-        wanted = times[-1] * math.sqrt(math.log(WINDOW_END) / math.log(window[-1]))
+        expected = times[-1] * math.sqrt(math.log(WINDOW_END) / math.log(window[-1]))
         raise ValueError(
-            f"C1 up to {times[-1]:g} ps is too short for a width of {fwhm_mhz:g} MHz; {wanted:.3g} ps would do"
+            f"C1 up to {times[-1]:g} ps is too short for a width of {fwhm_mhz:g} MHz; {expected:.3g} ps would do"
         )
 
     kt_mhz = temperature_k * units.MHZ_PER_K

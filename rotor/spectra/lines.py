@@ -89,7 +89,7 @@ class Lines(TransitionTable):
 
     @cached_property
     def warnings(self) -> tuple[str, ...]:
-        """What a user must be told about the levels behind the lines and about their errors."""
+        """Limits of the levels behind the lines and of the errors of frequencies."""
         known = set(self.covariance_used.names) if self.covariance_used else set()
         exact = [name for name in self.top.constants.values if name not in known]
         partly = f"errors of frequencies take {', '.join(exact)} as exact: their uncertainty is not known"
@@ -280,7 +280,8 @@ def line_list(
 
     levels = solve_levels(top, jmax, effects=effects, executor=executor)
     cut = intensity_cut(levels, temperature_k, given.q, least) if given else None
-    found = all_transitions(levels, dipoles_by_state(top, dipole, levels.effects), range_mhz, cut)
+    others = [moment for effect in levels.effects for moment in effect.other_moments(top)]
+    found = all_transitions(levels, dipoles_by_state(top, dipole, levels.effects), range_mhz, cut, others)
     lines = Lines(
         top=top,
         levels=levels,
@@ -331,7 +332,7 @@ def partition_of(
     named = f"a vibrational factor of {vibrational_factor:.6g}" + (f" ({vibrations.text})" if vibrations else "")
     for name, value in (("Q", q), ("vibrational factor", vibrational_factor)):
         if value is not None and not (math.isfinite(value) and value > 0):
-            raise ValueError(f"{name} = {value}: a finite number above 0 is wanted")
+            raise ValueError(f"{name} = {value}: expected a finite number above 0")
     if q is not None:
         source = "given" if vibrational_factor == 1.0 else f"given, times {named}"
         return PartitionFunction(temperature_k, q * vibrational_factor, None, math.nan, source)

@@ -36,7 +36,7 @@ def column_density_per_cm2(pressure_bar: float, path_cm: float, temperature_k: f
         ("pressure", pressure_bar, "bar"), ("path", path_cm, "cm"), ("temperature", temperature_k, "K"),
     ):  # fmt: skip
         if not (math.isfinite(value) and value > 0):
-            raise ValueError(f"{name} {value} {unit}: a finite number above 0 is wanted")
+            raise ValueError(f"{name} {value} {unit}: expected a finite number above 0")
     per_m3 = pressure_bar * PASCAL_PER_BAR / (units.BOLTZMANN_J_PER_K * temperature_k)
     return per_m3 * 1e-6 * path_cm
 

@@ -125,7 +125,7 @@ class RamanLines(TransitionTable):
 
     @cached_property
     def warnings(self) -> tuple[str, ...]:
-        """What a user must be told about the levels behind the lines."""
+        """Limits of the levels behind the lines."""
         return warnings_of(self.top, self.levels)
 
     def where(self, chosen: NDArray[Any] | slice) -> RamanLines:
@@ -225,9 +225,9 @@ def _refuse_nonsense(temperature_k: float, laser_nm: float, min_relative: float 
     if not (math.isfinite(temperature_k) and temperature_k > 0):
         raise ValueError(f"temperature {temperature_k} K: a temperature is above 0 K")
     if not (math.isfinite(laser_nm) and laser_nm > 0):
-        raise ValueError(f"laser wavelength {laser_nm} nm: a finite number above 0 is wanted")
+        raise ValueError(f"laser wavelength {laser_nm} nm: expected a finite number above 0")
     if min_relative is not None and not 0 < min_relative < 1:
-        raise ValueError(f"cut {min_relative} of the strongest line: a number between 0 and 1 is wanted, or None")
+        raise ValueError(f"cut {min_relative} of the strongest line: expected a number between 0 and 1, or None")
 
 
 def _both_ways(

@@ -139,7 +139,7 @@ def resolving_grid(
     width, reach = shape.fwhm(), shape.reach(_fraction(profile, outside))
     first, last = _ends(lines, reach) if range_mhz is None else range_mhz
     if not 0 <= first < last < float("inf"):
-        raise ValueError(f"range from {first} to {last} MHz: two rising, finite frequencies are wanted")
+        raise ValueError(f"range from {first} to {last} MHz: expected two rising, finite frequencies")
     near = (lines.frequency_mhz > first - reach) & (lines.frequency_mhz < last + reach)
     arm = _arm(float((reach / width).max(initial=1.0)))
     points = near.sum() * len(arm)
@@ -221,19 +221,19 @@ def _shape(lines: Lines, profile: str, fwhm_mhz: float | None) -> _Shape:
     if profile not in OUTSIDE:
         raise ValueError(f"profile {profile!r} is none of {', '.join(OUTSIDE)}")
     if fwhm_mhz is not None and not 0 < fwhm_mhz < float("inf"):
-        raise ValueError(f"full width at half maximum {fwhm_mhz} MHz: a finite number above 0 is wanted")
+        raise ValueError(f"full width at half maximum {fwhm_mhz} MHz: expected a finite number above 0")
     given = None if fwhm_mhz is None else np.full(len(lines), float(fwhm_mhz))
     if profile == "gaussian":
         return _Shape(_doppler(lines) if given is None else given, None)
     if given is None:
-        raise ValueError(f"profile {profile!r}: the width of the Lorentzian is wanted, fwhm_mhz")
+        raise ValueError(f"profile {profile!r}: expected the width of the Lorentzian, fwhm_mhz")
     return _Shape(_doppler(lines) if profile == "voigt" else None, given)
 
 
 def _fraction(profile: str, outside: float | None) -> float:
     fraction = OUTSIDE[profile] if outside is None else outside
     if not 0 < fraction < 1:
-        raise ValueError(f"outside = {outside}: a fraction of the area between 0 and 1 is wanted")
+        raise ValueError(f"outside = {outside}: expected a fraction of the area between 0 and 1")
     return fraction
 
 
@@ -246,7 +246,7 @@ def _doppler(lines: Lines) -> Floats:
 def _rising(grid_mhz: ArrayLike) -> Floats:
     grid = np.asarray(grid_mhz, dtype=float)
     if grid.ndim != 1 or not len(grid) or not np.isfinite(grid).all() or not (np.diff(grid) > 0).all():
-        raise ValueError(f"a grid of shape {grid.shape}: rising, finite frequencies (n,) are wanted")
+        raise ValueError(f"a grid of shape {grid.shape}: expected rising, finite frequencies (n,)")
     return grid
 
 

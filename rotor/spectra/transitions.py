@@ -5,15 +5,17 @@ Nothing weak is left out here but what an `IntensityCut` or a range of frequenci
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Indices
 from rotor.quantum.levels import Block, Levels
-from rotor.quantum.reduced import Tensors, amplitudes, connected_pairs
+from rotor.quantum.moments import Moment
+from rotor.quantum.reduced import amplitudes, connected_pairs, pairs_where
 from rotor.quantum.tensors import body_tensor
 from rotor.spectra.intensity import IntensityCut
 from rotor.tops.operators import FIGURE_AXIS
@@ -22,6 +24,7 @@ EVERYTHING = (0.0, float("inf"))
 LONG_LIST = 1_000_000  # lines above which the compiled loop is loaded
 
 Vector = tuple[float, float, float]
+Amplitudes = Callable[[Any, Any], Floats]  # of a pair of blocks, (n_up, n_low)
 Pair = tuple[Block, Block]  # two blocks with an allowed transition, the one of higher or equal J first
 
 
@@ -40,23 +43,38 @@ def all_transitions(
     dipoles_abc: Vector | Mapping[tuple[int, int], Vector],
     range_mhz: tuple[float, float] = EVERYTHING,
     cut: IntensityCut | None = None,
+    moments: Sequence[Moment] = (),
 ) -> Transitions:
     """Every transition between `levels` that is allowed, in the range and above the cut, in no particular order.
 
-    dipoles_abc: components of μ along a, b, c in debye; of several states by pairs (v', v), each pair once.
+    dipoles_abc: components of μ along a, b, c in debye; of several states by pairs (v', v), each pair once. moments: others, of
+    levels that were solved with spins.
     """
     dipoles = dipoles_abc if isinstance(dipoles_abc, Mapping) else {(0, 0): dipoles_abc}
     if levels.representation is None:
         return _joined(list(_closed_form(levels, dipoles[0, 0], range_mhz, cut)))
 
-    tensors = {states: body_tensor(mu, 1, levels.representation) for states, mu in dipoles.items()}
     blocks, some_without = _blocks_with_weight(levels)
-    pairs = list(connected_pairs(blocks, tensors))
+    pairs, between = _acting(levels, blocks, dipoles, moments)
     if cut is None and range_mhz == EVERYTHING and not any(up is low for up, low in pairs):
-        found = _every_pair(pairs, tensors)
+        found = _every_pair(pairs, between)
     else:
-        found = _joined(list(_chosen(pairs, tensors, range_mhz, cut)))
+        found = _joined(list(_chosen(pairs, between, range_mhz, cut)))
     return _rows(found, levels.weight[found.lower] > 0) if some_without else found
+
+
+def _acting(
+    levels: Levels, blocks: list[Block], dipoles: Mapping[tuple[int, int], Vector], moments: Sequence[Moment]
+) -> tuple[list[Pair], Amplitudes]:
+    """Pairs of blocks that the moments connect, and the function that gives their amplitudes."""
+    if moments:
+        from rotor.quantum.spins.moments import moments_of
+
+        found = moments_of(levels, dict(dipoles), moments)
+        return list(pairs_where(blocks, 1, found.connected)), found.amplitudes
+    representation = str(levels.representation)
+    tensors = {states: body_tensor(mu, 1, representation) for states, mu in dipoles.items()}
+    return list(connected_pairs(blocks, tensors)), lambda up, low: amplitudes(up, low, tensors)
 
 
 def _blocks_with_weight(levels: Levels) -> tuple[list[Block], bool]:
@@ -81,7 +99,7 @@ def _joined(pieces: list[Transitions]) -> Transitions:
     )
 
 
-def _every_pair(pairs: list[Pair], dipoles: Tensors) -> Transitions:
+def _every_pair(pairs: list[Pair], between: Amplitudes) -> Transitions:
     """All lines of all pairs, written straight into columns of their final length."""
     sizes = [len(up.energies_mhz) * len(low.energies_mhz) for up, low in pairs]
     total = sum(sizes)
@@ -93,7 +111,7 @@ def _every_pair(pairs: list[Pair], dipoles: Tensors) -> Transitions:
         here = slice(at, at + size)
         at += size
         fill(
-            up.energies_mhz, low.energies_mhz, amplitudes(up, low, dipoles), up.start, low.start,
+            up.energies_mhz, low.energies_mhz, between(up, low), up.start, low.start,
             out.frequency_mhz[here], out.strength_debye2[here], out.upper[here], out.lower[here],
         )  # fmt: skip
     return out
@@ -127,12 +145,12 @@ def _fill_pair(
 
 
 def _chosen(
-    pairs: list[Pair], dipoles: Tensors, range_mhz: tuple[float, float], cut: IntensityCut | None
+    pairs: list[Pair], between: Amplitudes, range_mhz: tuple[float, float], cut: IntensityCut | None
 ) -> Iterator[Transitions]:
     choose = _choice_of(sum(len(up.energies_mhz) * len(low.energies_mhz) for up, low in pairs))
     for up, low in pairs:
         energies = (up.energies_mhz, low.energies_mhz)
-        strength = amplitudes(up, low, dipoles) ** 2
+        strength = between(up, low) ** 2
         i, k = choose(*energies, strength, range_mhz, cut, up.start, low.start)
         if up is low:  # both ways round stand in the matrix
             i, k = i[i > k], k[i > k]

@@ -137,12 +137,30 @@ def kinetic_degrees(
     momentum_removed: bool = False,
     linear_below: float = LINEAR_BELOW,
 ) -> KineticDegrees:
-    """Energies by degree of N rigid bodies, at one moment or along a trajectory, in any coherent units.
+    """Energies by degree of freedom of N rigid bodies, at one moment or along a trajectory, in any coherent units.
 
-    masses: (N,), velocities of centres of mass: (N, 3) or (frames, N, 3). moments: (N, 3), momenta: angular momenta in
-    principal axes, (N, 3) or (frames, N, 3). Either pair may be left out. species: N names, to test each kind by itself.
-    momentum_removed: the total momentum is held at zero; a species of mass fraction w then has n - w degrees along each
-    direction. Raises ValueError for energy about an axis that carries no degree of freedom.
+    Parameters
+    ----------
+    masses, velocities : (N,) array, (N, 3) or (frames, N, 3) array, optional
+        Of the centres of mass.
+    moments, momenta : (N, 3) array, (N, 3) or (frames, N, 3) array, optional
+        Principal moments, and angular momenta in principal axes. Either pair may be left out.
+    species : sequence of str, optional
+        N names, to test each kind by itself.
+    momentum_removed : bool
+        The total momentum is held at zero; a species of mass fraction w then has n - w degrees along each direction.
+    linear_below : float
+        Ratio of a moment to the body's largest below which an axis carries no degree of freedom.
+
+    Returns
+    -------
+    KineticDegrees
+        Energies and counts by name.
+
+    Raises
+    ------
+    ValueError
+        Energy about an axis that carries no degree of freedom; shapes that do not fit.
 
     >>> gas = kinetic_degrees(moments=[[0.0, 2.0, 2.0]] * 2, momenta=[[0.0, 1.0, 2.0], [0.0, 2.0, 0.0]])
     >>> {name: energies.tolist() for name, energies in gas.energies.items()}, gas.total

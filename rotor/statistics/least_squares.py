@@ -80,6 +80,7 @@ def minimise(
     *,
     tolerance: float = 1e-4,
     most_iterations: int = 100,
+    floor: Floats | None = None,
     progress: Progress | None = None,
 ) -> Minimum:
     """The parameters that make Σ r² least, from a start.
@@ -95,6 +96,8 @@ def minimise(
         times the weighted rms where that is above 1.
     most_iterations : int
         Evaluations after the first.
+    floor : (n,) array, optional
+        Norms below which a column of the Jacobian is what round-off leaves of numbers that cancel: the parameter is not moved.
     progress : callable, optional
         Called with every `Iteration`. A KeyboardInterrupt, there or in `evaluate`, ends the search with the best point.
 
@@ -119,12 +122,13 @@ def minimise(
     ('converged', 0.5)
     """
     point = np.array(start, dtype=float)
+    blind = np.zeros(len(point)) if floor is None else floor
     state = _State.at(point, *_evaluated(evaluate, point))
     scale, damping, taken = state.norms, 0.0, list[Iteration]()
     try:
         while True:
             scale = np.maximum(scale, state.norms)
-            linear = _Linear.of(state, scale)
+            linear = _Linear.of(state, scale, blind)
             if linear.distance <= tolerance * max(1.0, state.rms):
                 return state.ended(CONVERGED, linear, taken)
             if len(taken) >= most_iterations:
@@ -147,7 +151,7 @@ def minimise(
             if damping > MOST_DAMPING:
                 return state.ended(_without_decrease(linear, state, tolerance), linear, taken)
     except KeyboardInterrupt:
-        return state.ended(INTERRUPTED, _Linear.of(state, scale), taken)
+        return state.ended(INTERRUPTED, _Linear.of(state, scale, blind), taken)
 
 
 def _relaxed(damping: float, gain: float) -> float:
@@ -239,9 +243,9 @@ class _Linear:
     gradient: float
 
     @classmethod
-    def of(cls, state: _State, scale: Floats) -> _Linear:
+    def of(cls, state: _State, scale: Floats, blind: Floats) -> _Linear:
         safe = np.where(scale > 0, scale, 1.0)
-        columns: Floats = state.triangle[:, :-1]
+        columns: Floats = np.where(state.norms > blind, state.triangle[:, :-1], 0.0)
         last: Floats = state.triangle[:, -1]
         u, s, vt = np.linalg.svd(columns / safe, full_matrices=False)
         s = np.where(s > ROUND_OFF * s.max(initial=0.0), s, 0.0)

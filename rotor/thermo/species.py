@@ -58,8 +58,8 @@ def _value(weights: SpinWeights, name: str) -> int:
 
 
 def _only(weights: SpinWeights, names: tuple[str, ...]) -> SpinWeights:
-    kept = (value if name in names else 0 for name, value in zip(weights.classes, weights.values, strict=True))
-    return replace(weights, values=tuple(kept))
+    remaining = (value if name in names else 0 for name, value in zip(weights.classes, weights.values, strict=True))
+    return replace(weights, values=tuple(remaining))
 
 
 def implied_symmetry_number(weights: SpinWeights) -> int:

@@ -37,7 +37,7 @@ class VibrationalStates:
         degeneracies = tuple(self.degeneracies) or (1,) * len(energies)
         if not energies or not all(math.isfinite(e) and e > 0 for e in energies):
             raise ValueError(
-                f"vibrational energies {list(energies)}: finite ones above 0 cm-1 are wanted (not the ground state)"
+                f"vibrational energies {list(energies)}: expected finite ones above 0 cm-1 (not the ground state)"
             )
         if len(degeneracies) != len(energies) or not all(int(g) == g and g > 0 for g in degeneracies):
             raise ValueError(
@@ -56,7 +56,7 @@ class VibrationalStates:
         items = [_ENERGY.fullmatch(item) for item in text.split(",")]
         if not all(items):
             raise ValueError(
-                f"{text!r}: energies such as '667.4x2, 1388, 2349 cm-1' are wanted, x and a degeneracy after each"
+                f"{text!r}: expected energies such as '667.4x2, 1388, 2349 cm-1', x and a degeneracy after each"
             )
         unit = next((item["unit"] for item in reversed(items) if item and item["unit"]), "cm-1")
         mhz = [units.parse_quantity(f"{item['energy']} {item['unit'] or unit}", "MHz") for item in items if item]

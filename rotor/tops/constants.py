@@ -49,7 +49,7 @@ class Constants:
     uncertainties, sources : mapping by name
         One standard deviation in MHz; where the number was published.
     terms : mapping {(p, q, n): value in MHz}
-        Terms J^2p ½[Jz^2q, J₊^2n + J₋^2n]₊ that no published name stands for; they are kept under names such as
+        Terms J^2p ½[Jz^2q, J₊^2n + J₋^2n]₊ that no published name stands for; they are stored under names such as
         `J4Jz2Jpm6`, which text and files may use as well.
     **values_mhz
         The constants: float in MHz or text with a unit. A, B, C with A >= B >= C > 0; distortion constants of the

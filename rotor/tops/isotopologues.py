@@ -93,19 +93,19 @@ def isotopologues(parent: Top, *, min_abundance: float = 1e-4) -> tuple[Isotopol
     H[2H]O 0.000289 2
     """
     if not 0 < min_abundance <= 1:
-        raise ValueError(f"least abundance {min_abundance:g}: a fraction above 0 and up to 1 is wanted")
+        raise ValueError(f"least abundance {min_abundance:g}: expected a fraction above 0 and up to 1")
     ancestor = _Ancestor(parent)
     molecule, permutations = ancestor.molecule, ancestor.permutations
     found: dict[tuple[int, ...], tuple[float, int]] = {}
     for numbers, abundance in _placements(molecule, min_abundance / len(permutations)):
         alike = {tuple(image) for image in _images(numbers, permutations)}
         found[max(alike, key=lambda image: _earliest(molecule, image))] = (abundance * len(alike), len(alike))
-    kept = {numbers: one for numbers, one in found.items() if one[0] >= min_abundance}
-    if not kept:
+    common = {numbers: one for numbers, one in found.items() if one[0] >= min_abundance}
+    if not common:
         raise ValueError(
             f"no isotopologue of {molecule.formula} has an abundance of {min_abundance:g}; lower the limit"
         )
-    ordered = sorted(kept, key=lambda numbers: -kept[numbers][0])
+    ordered = sorted(common, key=lambda numbers: -common[numbers][0])
     return tuple(ancestor.isotopologue(numbers) for numbers in ordered)
 
 

@@ -86,7 +86,7 @@ _SPELLED = re.compile(r"(?=J)(?:J(?P<p>[1-9]\d*))?(?:Jz(?P<q>[1-9]\d*))?(?:Jpm(?
 
 
 def distortion_terms(kind: str, reduction: str | None) -> dict[str, Operators]:
-    """Every published name of distortion for a kind of top, and what it stands for; S where no reduction is told.
+    """Every published name of distortion for a kind of top, and what it stands for; S where no reduction is given.
 
     >>> distortion_terms("asymmetric", "A")["deltaK"]
     {(0, 1, 1): -1.0}

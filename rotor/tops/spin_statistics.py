@@ -56,6 +56,8 @@ def weights_of(
     inversion : None leaves inversion doublets unresolved; `"symmetric"` or `"antisymmetric"` gives the weights of the
         one state of a molecule that inverts through the plane of its a and b axes, such as NH3.
 
+    Examples
+    --------
     >>> water = Molecule(("O", "H", "H"), [[0, 0, 0.1173], [0, 0.7572, -0.4692], [0, -0.7572, -0.4692]])
     >>> weights_of(water).to_mapping()
     {'ee': 1, 'eo': 3, 'oe': 3, 'oo': 1}
@@ -67,7 +69,7 @@ def weights_of(
     if inversion is None:
         return spin_weights(symmetry_of(molecule, tolerance), spins, electronic)
     if inversion not in STATES:
-        raise ValueError(f"inversion {inversion!r}: None, 'symmetric' or 'antisymmetric' is wanted")
+        raise ValueError(f"inversion {inversion!r}: expected None, 'symmetric' or 'antisymmetric'")
     if electronic != "even":
         raise ValueError("inversion is for a totally symmetric electronic state: leave `electronic` at 'even'")
     kinds = list(zip(molecule.symbols, molecule.mass_numbers, strict=True))
@@ -118,9 +120,9 @@ def spin_characters(
     """f(R) of each of `symmetry.rotations`: spin character times sign of fermions times electronic character."""
     n = len(symmetry.rotations[0].permutation)
     if len(spins) != n:
-        raise ValueError(f"{len(spins)} spins for {n} nuclei: one each is wanted")
+        raise ValueError(f"{len(spins)} spins for {n} nuclei: expected one each")
     if any(not spin >= 0 or 2 * spin != int(2 * spin) for spin in spins):
-        raise ValueError(f"spins {list(spins)[:8]}: multiples of 1/2 from 0 up are wanted")
+        raise ValueError(f"spins {list(spins)[:8]}: expected multiples of 1/2 from 0 up")
     signs = _electronic_characters(symmetry, electronic)
     return tuple(
         sign * math.prod(_of_cycle(spin, length) ** count for spin, length, count in cycles(one.permutation, spins))
@@ -186,8 +188,8 @@ def inverting_symmetry(
         raise ValueError("nuclei meet in the plane of the a and b axes: the molecule does not invert through it")
 
     flat = find_symmetry(kinds, masses_u, flat_points, tolerance)
-    kept = {one.permutation.tobytes() for one in rigid.rotations}
-    return flat, tuple(1 if one.permutation.tobytes() in kept else -1 for one in flat.rotations)
+    rigid_ones = {one.permutation.tobytes() for one in rigid.rotations}
+    return flat, tuple(1 if one.permutation.tobytes() in rigid_ones else -1 for one in flat.rotations)
 
 
 def _of_cycle(spin: float, length: int) -> int:
@@ -206,12 +208,12 @@ def _electronic_characters(symmetry: Symmetry, electronic: str | Sequence[int]) 
     if isinstance(electronic, str):
         raise ValueError(
             f"electronic {electronic!r} with the rotations {symmetry.rotation_group}: 'even', 'odd' for C2 and D∞, or "
-            f"{len(rotations)} characters +1 and -1 are wanted"
+            f"expected {len(rotations)} characters +1 and -1"
         )
     if len(electronic) != len(rotations) or not _is_representation(rotations, electronic):
         raise ValueError(
-            f"electronic {list(electronic)}: {len(rotations)} characters +1 and -1 that multiply like the rotations "
-            f"of {symmetry.rotation_group} are wanted"
+            f"electronic {list(electronic)}: expected {len(rotations)} characters +1 and -1 that multiply like the rotations "
+            f"of {symmetry.rotation_group}"
         )
     return tuple(int(sign) for sign in electronic)
 

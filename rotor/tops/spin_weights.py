@@ -1,7 +1,7 @@
 """Nuclear-spin weights of rotational levels: which rule they follow and what each class weighs.
 
 Four rules cover every rigid molecule: parity of (Ka, Kc) for asymmetric tops, K modulo n for symmetric tops,
-parity of J for linear ones, and the irreducible representation for spherical tops. Weights are kept reduced by
+parity of J for linear ones, and the irreducible representation for spherical tops. Weights are stored reduced by
 their common divisor, in levels and in Q alike.
 """
 
@@ -51,7 +51,7 @@ class SpinWeights:
         rule, classes = _rule_of(set(names))
         values = [names[name] for name in classes]
         if any(int(v) != v or v < 0 for v in values) or not any(values):
-            raise ValueError(f"spin weights {weights}: whole numbers of 0 or more, not all 0, are wanted")
+            raise ValueError(f"spin weights {weights}: expected whole numbers of 0 or more, not all 0")
         divisor = reduce(gcd, (int(v) for v in values))
         return cls(rule, classes, tuple(int(v) // divisor for v in values))
 

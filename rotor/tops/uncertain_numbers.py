@@ -67,7 +67,7 @@ def _items(text: str) -> list[re.Match[str]]:
     if strange or not items:
         what = f"cannot read {strange!r}" if strange else "no constant in it"
         raise ValueError(
-            f"{text!r}: {what}; write name=number, with the uncertainty in the last digits and a unit if wanted, "
+            f"{text!r}: {what}; write name=number, with the uncertainty in the last digits and a unit if expected, "
             "such as 'A=9.2(1) B=3 C=2.5 GHz'"
         )
     return items
@@ -104,5 +104,5 @@ def write_number(value: float, spread: float | None, unit: str) -> str:
         return f"{number:f}{bracket}"
 
 
-def _reads_back(number: Decimal, step: Decimal, factor: Decimal, wanted: float) -> bool:
-    return float(number.quantize(step) * factor) == wanted
+def _reads_back(number: Decimal, step: Decimal, factor: Decimal, expected: float) -> bool:
+    return float(number.quantize(step) * factor) == expected

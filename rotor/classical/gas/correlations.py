@@ -42,9 +42,28 @@ class ShortTime:
 def short_time(
     moments: ArrayLike, kt: float, vector: ArrayLike = (1.0, 0.0, 0.0), tensor: ArrayLike | None = None
 ) -> ShortTime:
-    """C1 and C2 at short times; the tensor is by default that of the vector itself, u uᵀ.
+    """C1 and C2 at short times: M2, M4 of a vector and N2 of a tensor.
 
-    M4 = <|ü|²> with ü = ω̇ x u + ω x (ω x u), Euler's equations for ω̇, and <ω_i²> = kT/I_i.
+    Parameters
+    ----------
+    moments : (3,) array
+        Principal moments, one may be zero.
+    kt : float
+        Temperature as an energy.
+    vector : (3,) array
+        In principal axes, of any length.
+    tensor : (3, 3) array, optional
+        Symmetric, in principal axes; by default that of the vector itself, u uᵀ.
+
+    Returns
+    -------
+    ShortTime
+        M2, N2 in 1/time², M4 in 1/time⁴, coherent units.
+
+    Notes
+    -----
+    M4 = <|ü|²> with ü = ω̇ x u + ω x (ω x u), Euler's equations for ω̇, and <ω_i²> = kT/I_i (Gordon 1964, head of the module).
+    Classical mechanics of a rigid, free molecule.
 
     >>> start = short_time([0.0, 2.0, 2.0], 3.0)  # linear: 2 kT/I, 8 (kT/I)², 6 kT/I
     >>> start.m2, start.m4, round(start.n2, 12)
@@ -91,8 +110,24 @@ def spherical_curves(times: ArrayLike, moment: float, kt: float) -> tuple[Floats
 
 
 def symmetric_curves(times: ArrayLike, moment: float, moment_of_axis: float, kt: float) -> tuple[Floats, Floats]:
-    """C1 and C2 of the figure axis of a symmetric top with moments (moment, moment, moment_of_axis), none of them 0.
+    """C1 and C2 of the figure axis of a symmetric top.
 
+    Parameters
+    ----------
+    times : (...) array
+        Coherent units with the others.
+    moment, moment_of_axis : float
+        The top has moments (moment, moment, moment_of_axis), none of them 0.
+    kt : float
+        Temperature as an energy.
+
+    Returns
+    -------
+    (...) array, (...) array
+        C1 and C2.
+
+    Notes
+    -----
     The axis precesses about L at |L|/moment, at an angle of cosine μ. Of weight a^(-3/2), a(μ) = (1 - μ²)/I + μ²/I_z,
 
         C1 = <μ² + (1 - μ²) g(s)>,    C2 = <P2(μ)² + 3 μ² (1 - μ²) g(s) + ¾ (1 - μ²)² g(2s)>,    s = t √(kT/a)/I ,

@@ -128,9 +128,23 @@ class Probe:
 
 
 def thermal_momenta(moments: ArrayLike, kt: float, size: int, *, rng: np.random.Generator) -> Floats:
-    """Angular momenta (size, 3) in principal axes, of temperature kT; 0 about an axis without a degree of freedom.
+    """Angular momenta in principal axes of a gas at a temperature; 0 about an axis without a degree of freedom.
 
-    moments: (3,), in any order; an atom has three of 0. Units: any coherent ones, L in √(moment x energy).
+    Parameters
+    ----------
+    moments : (3,) array
+        In any order; an atom has three of 0.
+    kt : float
+        Temperature as an energy.
+    size : int
+        Number of molecules.
+    rng : numpy.random.Generator
+        Source of the random numbers.
+
+    Returns
+    -------
+    (size, 3) array
+        L in √(moment x energy), any coherent units; L_i is normal of variance I_i kT.
 
     >>> thermal_momenta([0.0, 2.0, 2.0], 1.5, 1000, rng=np.random.default_rng(3)).std(axis=0).round(1)
     array([0. , 1.7, 1.8])
@@ -148,6 +162,29 @@ def thermal_ensemble(
     moments: ArrayLike, kt: float, size: int, *, rng: np.random.Generator, mass: float | None = None
 ) -> Ensemble:
     """`size` molecules in thermal equilibrium: momenta, orientations, and velocities where there is a mass.
+
+    Parameters
+    ----------
+    moments : (3,) array
+        Principal moments of the molecule.
+    kt : float
+        Temperature as an energy.
+    size : int
+        Number of molecules.
+    rng : numpy.random.Generator
+        Source of the random numbers.
+    mass : float, optional
+        Of one molecule; without it there are no velocities.
+
+    Returns
+    -------
+    Ensemble
+        The molecules at one moment.
+
+    Raises
+    ------
+    ValueError
+        Moments, kT or a mass that cannot be.
 
     >>> gas = thermal_ensemble([0.6, 1.3, 1.9], 0.0258, 1000, rng=np.random.default_rng(1), mass=18.0)
     >>> sorted(gas.kinetic.counts)
@@ -173,12 +210,45 @@ def free_gas_correlations(
     executor: ThreadPoolExecutor | None = None,
     progress: Callable[[int], object] | None = None,
 ) -> Correlations:
-    """C1 of a vector and C2 of a tensor in a free gas at `times` (n,), by the exact motion.
+    """C1 of a vector and C2 of a tensor in a free gas, by the exact motion of every molecule.
 
-    moments (3,), kt, times: any coherent units; vector (3,), tensor (3, 3): in principal axes, any size. Only the rotation
-    between time 0 and t matters, so all molecules start upright. They come in pieces of 10,000, each with random numbers
-    of its own (`rng.spawn`): memory stays bounded, and the answer does not depend on the threads of `executor`. progress: is
-    told how many molecules are done. 0.09 µs per molecule and time on one core, and 13 µs per molecule.
+    Parameters
+    ----------
+    moments : (3,) array
+        Principal moments of the molecule.
+    kt : float
+        Temperature as an energy.
+    times : (n,) array
+        Any coherent units with the others.
+    vector : (3,) array, optional
+        Fixed in the molecule, in principal axes, of any length.
+    tensor : (3, 3) array, optional
+        Symmetric, in principal axes; only its anisotropic part counts. A vector, a tensor or both are given.
+    molecules : int
+        How many; the statistical error falls with the square root.
+    rng : numpy.random.Generator
+        Source of the random numbers.
+    executor : ThreadPoolExecutor, optional
+        Its threads share the molecules.
+    progress : callable, optional
+        Called with the number of molecules of each piece that is done.
+
+    Returns
+    -------
+    Correlations
+        C1 and C2 with standard errors.
+
+    Raises
+    ------
+    ValueError
+        Neither vector nor tensor; an isotropic tensor; fewer than two molecules.
+
+    Notes
+    -----
+    Only the rotation between time 0 and t matters, so all molecules start upright. They come in pieces of 10,000, each with
+    random numbers of its own (`rng.spawn`): memory stays bounded, and the answer does not depend on the threads. 0.09 µs per
+    molecule and time on one core, and 13 µs per molecule. Neglected: what molecules do to each other, centrifugal distortion,
+    quantum mechanics.
 
     >>> gas = free_gas_correlations([0, 1, 1], 1.0, [0.0, 1.0], vector=[1, 0, 0], molecules=2000, rng=np.random.default_rng(5))
     >>> [round(float(x), 2) for x in gas.c1]  # 1 - √2 D(1/√2) = 0.275
@@ -211,8 +281,31 @@ def stepped_gas_correlations(
     executor: ThreadPoolExecutor | None = None,
     progress: Callable[[int], object] | None = None,
 ) -> Correlations:
-    """The same at times 0, interval, ... (count of them), by `steps` steps of the splitting of `strang.py` each.
+    """The same at times 0, interval, ... by steps of the splitting of `strang.py`.
 
+    Parameters
+    ----------
+    moments, kt, vector, tensor, molecules, rng, executor, progress
+        As of `free_gas_correlations`.
+    interval : float
+        Between two times.
+    count : int
+        Number of times.
+    steps : int
+        Of the splitting, from one time to the next.
+
+    Returns
+    -------
+    Correlations
+        C1 and C2 with standard errors.
+
+    Raises
+    ------
+    ValueError
+        As `free_gas_correlations`; a step that turns a molecule by more than ½ rad.
+
+    Notes
+    -----
     The error of an attitude grows as step² times the time; with the same `rng` the molecules are the same as in
     `free_gas_correlations`, so that the difference of both is the error of stepping alone.
     """

@@ -43,11 +43,36 @@ def propagate(
     steps: int,
     executor: ThreadPoolExecutor | None = None,
 ) -> tuple[Floats, Floats]:
-    """Momentum (n, 3) and attitude (n, 4) of n free tops after `steps` steps of length `step`.
+    """Momentum and attitude of n free tops after `steps` steps of length `step`.
 
-    moments (n, 3) or (3,), momentum (n, 3) in body axes, attitude (n, 4) or (4,); coherent units; `step` may be
-    negative. The two turns of a step, (1/I_i - 1/I3) |L| step, may not be wider than ½ rad for any body. Threads of
-    `executor` share the bodies (the compiled loop releases the interpreter lock).
+    Parameters
+    ----------
+    moments : (n, 3) or (3,) array
+        Principal moments.
+    momentum : (n, 3) array
+        In body axes.
+    attitude : (n, 4) or (4,) array
+        Body to space.
+    step : float
+        May be negative. The two turns of a step, (1/I_i - 1/I3) |L| step, may not be wider than ½ rad for any body.
+    steps : int
+        Number of steps.
+    executor : ThreadPoolExecutor, optional
+        Its threads share the bodies (the compiled loop releases the interpreter lock).
+
+    Returns
+    -------
+    (n, 3) array, (n, 4) array
+        Momentum in body axes and attitude, coherent units.
+
+    Raises
+    ------
+    ValueError
+        Shapes that do not fit; a step that is too long.
+
+    Notes
+    -----
+    Order 2 in the step, bounded error of the energy; see the head of this module.
 
     >>> momentum, attitude = propagate([0.6, 0.8, 1.0], np.array([[1.8, 0.4, -0.9]]), [1, 0, 0, 0], 0.01, 1000)
     >>> momentum[0].round(4).tolist()  # exact: 1.76596, -0.69546, 0.77955

@@ -52,7 +52,22 @@ class Method(ABC):
 
     @abstractmethod
     def states(self, system: System, momentum: Floats, attitude: Floats, times: Floats) -> tuple[Floats, Floats, int]:
-        """Momentum (t, n, 3), attitude (t, n, 4) of n bodies and the count of steps; the start is at times[0]."""
+        """The states of n bodies at all times.
+
+        Parameters
+        ----------
+        system : System
+            Moments and effects.
+        momentum, attitude : (n, 3) array, (n, 4) array
+            The start, at times[0].
+        times : (t,) array
+            Rising or falling.
+
+        Returns
+        -------
+        (t, n, 3) array, (t, n, 4) array, int
+            Momentum, attitude, and how many steps were taken.
+        """
 
 
 def integrate(
@@ -63,13 +78,33 @@ def integrate(
     attitude0: ArrayLike = IDENTITY,
     effects: Sequence[ClassicalEffect] = (),
 ) -> Motion:
-    """The motion of bodies with principal moments (..., 3) under a list of effects, at `times` (t,).
+    """The motion of bodies under a list of effects.
 
-    momentum0 (..., 3) in body axes and attitude0 (..., 4) are the state at times[0]; times may run forward or back.
-    Any coherent units. Effects act on every body. An effect is added by naming it in the list; the empty list is free
-    motion and costs what free motion costs.
+    Parameters
+    ----------
+    method : Method
+        How to step; the table at the head of this module says which serves what.
+    moments : (..., 3) array
+        Principal moments.
+    momentum0 : (..., 3) array
+        Angular momentum in body axes at times[0].
+    times : (t,) array
+        At which the motion is returned; they may run forward or back. Any coherent units.
+    attitude0 : (..., 4) array
+        Body to space, at times[0].
+    effects : sequence of ClassicalEffect
+        They act on every body. An effect is added by naming it in the list; the empty list is free motion and costs what
+        free motion costs.
 
-    Raises ValueError for a method that cannot serve an effect, with the one that can.
+    Returns
+    -------
+    Motion
+        Momentum, attitude, angular velocity and energy at the times.
+
+    Raises
+    ------
+    ValueError
+        A method that cannot serve an effect, with the one that can; a motion that does not stay finite.
 
     >>> from rotor.classical.integrators.splitting import RotationSplitting
     >>> motion = integrate(RotationSplitting(step=0.01, order=4), [0.6, 0.8, 1.0], [1.8, 0.4, -0.9], [0.0, 10.0])
@@ -113,7 +148,21 @@ class KickDrift(Method):
 
     @abstractmethod
     def drift(self, moments: Floats, state: Floats, carry: Floats, step: float, steps: int, whole: bool) -> None:
-        """`steps` steps of free motion of rows (n, 7), in place: of full order if `whole`, else one base step each."""
+        """Free motion of rows (n, 7), in place.
+
+        Parameters
+        ----------
+        moments : (n, 3) array
+            Principal moments during the drift.
+        state, carry : (n, 7) array
+            Momentum and attitude, and what rounding has left out of them.
+        step : float
+            Length of a step.
+        steps : int
+            Number of steps.
+        whole : bool
+            Whether the steps are of the full order of the method; otherwise base steps, for the parts of a composition.
+        """
 
     def states(self, system: System, momentum: Floats, attitude: Floats, times: Floats) -> tuple[Floats, Floats, int]:
         """Steps of equal length from each time to the next, the longest that do not exceed `step`."""

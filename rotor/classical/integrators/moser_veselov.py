@@ -82,10 +82,22 @@ class MoserVeselov(KickDrift):
 
 
 def modified_moments(moments: Floats, momentum: Floats, step: float, order: int) -> Floats:
-    """Moments J (n, 3) for which the map has `order` 2, 4, 6 or 8 at the invariants of L (n, 3).
+    """Moments for which the map has the order asked for at the invariants of the motion.
 
-    1/J_i = S/I_i + D with S = 1 + Σ S_ab N^a H^b, D = Σ D_ab N^a H^b, N = (h|L|)²/2, H = h² energy, summed to
-    a + b = order/2 - 1 (Hairer and Vilmart 2006).
+    Parameters
+    ----------
+    moments, momentum : (n, 3) array
+        Principal moments, none of them zero, and angular momentum in body axes.
+    step : float
+        Length of a step.
+    order : int
+        2, 4, 6 or 8.
+
+    Returns
+    -------
+    (n, 3) array
+        J with 1/J_i = S/I_i + D, S = 1 + Σ S_ab N^a H^b, D = Σ D_ab N^a H^b, N = (h|L|)²/2, H = h² energy, summed to
+        a + b = order/2 - 1 (Hairer and Vilmart 2006).
     """
     n, h = 0.5 * step**2 * np.sum(momentum**2, axis=-1), step**2 * kinetic_energy(momentum, momentum / moments)
     s, d = np.ones_like(n), np.zeros_like(n)

@@ -42,6 +42,8 @@ def symmetric_steps(turns: Any, state: Any, fractions: Any, step: Any, steps: An
     step, steps : float, int
         Length and number of the steps.
 
+    Examples
+    --------
     >>> symmetric_steps(lambda state, inner, outer: print(inner, outer), None, [1.0], 0.5, 2)
     0.0 0.25
     0.5 0.5

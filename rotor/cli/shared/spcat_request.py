@@ -27,6 +27,9 @@ FIELDS = {
     "dipole_abc": "the dipoles",
     "isotope": "the constants",
     "spin_weights": "WTPL and WTMN",
+    "spin_constants": "the constants",
+    "spins": "SPIND",
+    "hyperfine": "SPIND",
     "constants": "the constants",
     "calculator": "the constants",
 }
@@ -37,7 +40,18 @@ def is_request(source: str | None) -> bool:
     return source is not None and source.lower().endswith(".int")
 
 
-def prediction_of(context: typer.Context, source: str) -> Prediction:
+def prediction_asked(context: typer.Context, source: str | None, as_spcat: bool) -> Prediction | None:
+    """The prediction of an .int file, None for any other source."""
+    if is_request(source):
+        return prediction_of(context, str(source), as_spcat)
+    if as_spcat:
+        raise ValueError(
+            "--as-spcat: what SPCAT leaves out of its basis stands in an .int and a .var file; give the .int"
+        )
+    return None
+
+
+def prediction_of(context: typer.Context, source: str, as_spcat: bool) -> Prediction:
     """The prediction of an .int file; its notes go to standard error. Options that the files answer themselves are refused."""
     for name, field in FIELDS.items():
         given = context.get_parameter_source(name)
@@ -48,7 +62,7 @@ def prediction_of(context: typer.Context, source: str) -> Prediction:
             )
     from rotor.formats.spcat.predict import predict_file
 
-    prediction = predict_file(source)
+    prediction = predict_file(source, as_spcat=as_spcat)
     for text in prediction.notes:
         note(text)
     return prediction

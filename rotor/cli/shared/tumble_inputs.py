@@ -25,7 +25,7 @@ class Options:
     """The body and how it starts."""
 
     moments: str | None = option(
-        None, metavar="I1,I2,I3", help="Principal moments instead of a molecule (any coherent units); order is kept."
+        None, metavar="I1,I2,I3", help="Principal moments instead of a molecule (any coherent units); in any order."
     )
     angular_momentum: str | None = option(
         None, metavar="L1,L2,L3", help="At time 0, in principal axes (ħ for a molecule; by default the thermal mean)."

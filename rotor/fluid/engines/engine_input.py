@@ -32,7 +32,7 @@ class Species:
 
 
 @dataclass(frozen=True)
-class Scene:
+class EngineInput:
     """Rigid molecules in a rectangular periodic cell.
 
     species: the kinds there are. kinds: (molecules,) which each molecule is. site_positions, site_velocities: (sites, 3) of
@@ -122,10 +122,21 @@ class Motion:
 
 
 def rigid_motion(owners: Ints, masses: Floats, positions: Floats, velocities: Floats, forces: Floats) -> Motion:
-    """The rigid motion of points (n, 3) with masses (n,), point i of molecule owners[i] (rising from 0).
+    """The rigid motion of points that belong to molecules.
 
-    P = Σ m v, L = Σ m (r - R) x v, I = Σ m (d² 1 - d dᵀ), F = Σ f, N = Σ (r - R) x f: what internal forces of constraint
-    do drops out.
+    Parameters
+    ----------
+    owners : (n,) array
+        Molecule of each point, rising from 0.
+    masses : (n,) array
+        u.
+    positions, velocities, forces : (n, 3) array
+        In space.
+
+    Returns
+    -------
+    Motion
+        P = Σ m v, L = Σ m (r - R) x v, I = Σ m (d² 1 - d dᵀ), F = Σ f, N = Σ (r - R) x f; internal forces of constraint drop out.
     """
     mass = np.bincount(owners, masses).astype(np.float64)
     lever = positions - centres(owners, masses, positions)[owners]
@@ -153,7 +164,24 @@ def _sums(owners: Ints, rows: Floats) -> Floats:
 
 
 def point_velocities(motion: Motion, owners: Ints, masses: Floats, positions: Floats) -> Floats:
-    """Velocities V + ω x d of points that move with their molecules."""
+    """Velocities V + ω x d of points that move with their molecules.
+
+    Parameters
+    ----------
+    motion : Motion
+        Of the molecules.
+    owners : (n,) array
+        Molecule of each point, rising from 0.
+    masses : (n,) array
+        Of the points, u.
+    positions : (n, 3) array
+        Of the points, Å.
+
+    Returns
+    -------
+    (n, 3) array
+        Å √(eV/u).
+    """
     omega = np.einsum("nij,nj->ni", motion.inverse, motion.angular_momentum)
     lever = positions - centres(owners, masses, positions)[owners]
     return np.asarray((motion.momentum / motion.mass[:, None])[owners] + np.cross(omega[owners], lever))
@@ -177,8 +205,8 @@ class Frame:
     half: bool = False
 
 
-def scene_of(atoms: Any, settings: Settings) -> Scene:
-    """The scene of an ASE box: each molecule replaced by its model, laid onto its atoms.
+def engine_input_of(atoms: Any, settings: Settings) -> EngineInput:
+    """The input of an engine from an ASE box: each molecule replaced by its model, laid onto its atoms.
 
     Velocities are the rigid part of those of the box; a box without any gets thermal ones at the temperature of the settings,
     the total momentum taken out. Raises ValueError for a cell that is not rectangular and periodic, a cutoff beyond half of
@@ -203,7 +231,7 @@ def scene_of(atoms: Any, settings: Settings) -> Scene:
     removed = 0 if settings.ensemble == "langevin" else 3
     motion = _starting_motion(atoms, bodies, pose, settings, removed)
     places, speeds = _sites(bodies, pose, own_axes, *motion)
-    return Scene(species, bodies.species, places, speeds, edges, bodies.degrees(removed))
+    return EngineInput(species, bodies.species, places, speeds, edges, bodies.degrees(removed))
 
 
 def _edges(atoms: Any, cutoff_angstrom: float) -> Floats:

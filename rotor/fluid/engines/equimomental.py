@@ -23,7 +23,7 @@ _SPACE = np.array([[1.0, 1, 1], [1.0, -1, -1], [-1.0, 1, -1], [-1.0, -1, 1]])
 
 
 @dataclass(frozen=True)
-class Carriers:
+class EquimomentalPoints:
     """Points (c, 3) with masses (c,), in the model's own axes, that move as the molecule does.
 
     own: whether they are the first c sites of the model themselves, the real atoms. rank: 0 a point, 1 a line, 2 a plane,
@@ -47,7 +47,7 @@ class Carriers:
         return np.asarray(weights)
 
 
-def carriers_of(model: RigidModel, masses: Floats) -> Carriers:
+def equimomental_points(model: RigidModel, masses: Floats) -> EquimomentalPoints:
     """The points that carry a model whose real atoms have these masses.
 
     Its own atoms where their distances are independent (an atom, a diatomic, an isosceles triangle such as water),
@@ -55,7 +55,7 @@ def carriers_of(model: RigidModel, masses: Floats) -> Carriers:
     corners of a triangle or tetrahedron stretched along the principal axes.
 
     >>> from rotor.fluid.forces.models import model_of
-    >>> carriers_of(model_of("spce"), np.array([15.9949, 1.0078, 1.0078])).own
+    >>> equimomental_points(model_of("spce"), np.array([15.9949, 1.0078, 1.0078])).own
     True
     """
     places = model.positions_angstrom[: len(masses)]
@@ -65,10 +65,10 @@ def carriers_of(model: RigidModel, masses: Floats) -> Carriers:
     radii, axes = np.sqrt(np.maximum(values[::-1], 0.0)), axes[:, ::-1]
     rank = int(np.sum(radii > 1e-6 * max(radii[0], 1e-300))) if radii[0] > 1e-9 else 0
     if _independent(places, masses, rank) and _reached(model, len(masses), body.centre, axes, rank):
-        return Carriers(places, masses, True, rank)
+        return EquimomentalPoints(places, masses, True, rank)
     corners = {0: np.zeros((1, 3)), 1: _LINE, 2: _PLANE, 3: _SPACE}[rank]
     stretched = body.centre + (corners * radii) @ axes.T
-    return Carriers(stretched, np.full(len(corners), body.mass / len(corners)), False, rank)
+    return EquimomentalPoints(stretched, np.full(len(corners), body.mass / len(corners)), False, rank)
 
 
 def _independent(places: Floats, masses: Floats, rank: int) -> bool:

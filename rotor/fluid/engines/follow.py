@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rotor.fluid.checkpoint import TextFile, csv_line, trajectory_file
-from rotor.fluid.engines.engine_input import Frame, Scene, point_velocities, scene_of
+from rotor.fluid.engines.engine_input import EngineInput, Frame, engine_input_of, point_velocities
 from rotor.fluid.engines.results import engine_frames, row_of
 from rotor.fluid.record import FluidRecord
 from rotor.fluid.run import COLUMNS, Outputs, RunStopped, ns_per_day, progress_bar
@@ -57,10 +57,10 @@ def follow_engine(
         raise ValueError(
             f"frames_every {frames_every}: with {engine} expected a multiple of the {settings.every} steps between rows"
         )
-    scene = scene_of(atoms, settings)
+    engine_input = engine_input_of(atoms, settings)
     try:
-        frames = engine_frames(engine, scene, settings, **{THREAD_OPTIONS[engine]: threads})
-        return _follow(frames, scene, atoms, settings, outputs, on_start)
+        frames = engine_frames(engine, engine_input, settings, **{THREAD_OPTIONS[engine]: threads})
+        return _follow(frames, engine_input, atoms, settings, outputs, on_start)
     except ModuleNotFoundError as error:
         raise ValueError(str(error)) from error
     except RuntimeError as error:
@@ -69,7 +69,7 @@ def follow_engine(
 
 def _follow(
     frames: Iterator[Frame],
-    scene: Scene,
+    engine_input: EngineInput,
     atoms: Atoms,
     settings: Settings,
     outputs: Outputs,
@@ -82,11 +82,11 @@ def _follow(
         on_start()
         csv, trajectories = _opened(stack, outputs)
         for frame in itertools.chain([first], frames):
-            rows.append(row_of(frame, scene, settings))
+            rows.append(row_of(frame, engine_input, settings))
             if csv is not None:
                 csv.add(csv_line(rows[-1]))
             if trajectories and frame.step % (outputs.frames_every or settings.every) == 0:
-                placed = _placed(frame, scene, atoms)
+                placed = _placed(frame, engine_input, atoms)
                 for file in trajectories:
                     file.add(placed, rows[-1][0])
             shown(frame.step, settings.steps, ns_per_day(settings, frame.step, time.perf_counter() - started))
@@ -103,9 +103,9 @@ def _opened(stack: ExitStack, outputs: Outputs) -> tuple[Any, list[Any]]:
     return csv, trajectories
 
 
-def _placed(frame: Frame, scene: Scene, atoms: Atoms) -> Atoms:
+def _placed(frame: Frame, engine_input: EngineInput, atoms: Atoms) -> Atoms:
     """The box at a frame, with the velocities of its rigid motion."""
-    masses, owners = scene.site_masses[scene.real], scene.molecule_of_site[scene.real]
+    masses, owners = engine_input.site_masses[engine_input.real], engine_input.molecule_of_site[engine_input.real]
     placed: Atoms = atoms.copy()
     placed.set_masses(masses)
     placed.positions = frame.positions

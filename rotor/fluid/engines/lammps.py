@@ -19,7 +19,7 @@ import numpy as np
 
 from rotor import units
 from rotor.arrays import Floats
-from rotor.fluid.engines.engine_input import Frame, Scene, rigid_motion
+from rotor.fluid.engines.engine_input import EngineInput, Frame, rigid_motion
 from rotor.fluid.engines.lammps_input import data_file, input_file, table_file
 from rotor.fluid.engines.pair_tables import Form, tail_of
 from rotor.fluid.settings import Settings
@@ -61,18 +61,40 @@ def environment() -> dict[str, str]:
 
 
 def write_files(
-    folder: Path, scene: Scene, settings: Settings, form: Form, *, accuracy: float = 1e-5, kspace: str = "pppm"
+    folder: Path,
+    engine_input: EngineInput,
+    settings: Settings,
+    form: Form,
+    *,
+    accuracy: float = 1e-5,
+    kspace: str = "pppm",
 ) -> None:
-    """All that LAMMPS reads."""
-    (folder / "data.box").write_text(data_file(scene), encoding="ascii")
+    """Write all that LAMMPS reads into a folder.
+
+    Parameters
+    ----------
+    folder : Path
+        Where.
+    engine_input : EngineInput
+        Molecules and cell.
+    settings : Settings
+        Of the run.
+    form : Form
+        Of the charges under a cutoff.
+    accuracy : float
+        Of the forces of Ewald's sum, relative.
+    kspace : str
+        LAMMPS' name of the solver.
+    """
+    (folder / "data.box").write_text(data_file(engine_input), encoding="ascii")
     if settings.electrostatics != "ewald":
-        (folder / "pairs.table").write_text(table_file(scene, settings, form), encoding="ascii")
-    text = input_file(scene, settings, form, accuracy=accuracy, kspace=kspace)
+        (folder / "pairs.table").write_text(table_file(engine_input, settings, form), encoding="ascii")
+    text = input_file(engine_input, settings, form, accuracy=accuracy, kspace=kspace)
     (folder / "in.box").write_text(text, encoding="ascii")
 
 
 def frames(
-    scene: Scene,
+    engine_input: EngineInput,
     settings: Settings,
     form: Form | None = None,
     *,
@@ -80,12 +102,33 @@ def frames(
     kspace: str = "pppm",
     cores: int = 1,
 ) -> Iterator[Frame]:
-    """Run, and give a frame at step 0 and after every `settings.every` steps; with cores above 1 under mpiexec."""
+    """Run LAMMPS, and give a frame at step 0 and after every `settings.every` steps.
+
+    Parameters
+    ----------
+    engine_input : EngineInput
+        Molecules and cell.
+    settings : Settings
+        Of the run.
+    form : Form, optional
+        Of the charges under a cutoff; by default that of the settings.
+    accuracy : float
+        Of the forces of Ewald's sum, relative.
+    kspace : str
+        LAMMPS' name of the solver.
+    cores : int
+        Above 1 under mpiexec.
+
+    Returns
+    -------
+    iterator of Frame
+        As they come.
+    """
     form = form or Form()
     check()
     with tempfile.TemporaryDirectory(prefix="rotor-lammps-") as name:
         folder = Path(name)
-        write_files(folder, scene, settings, form, accuracy=accuracy, kspace=kspace)
+        write_files(folder, engine_input, settings, form, accuracy=accuracy, kspace=kspace)
         with open(folder / "errors", "w+", encoding="utf-8") as errors:
             process = subprocess.Popen(
                 [*_launcher(cores), *RUN, name, str(settings.steps), str(settings.every)],
@@ -95,7 +138,7 @@ def frames(
             )
             assert process.stdout is not None
             try:
-                yield from _read(process.stdout, scene, tail_of(scene, settings, form))
+                yield from _read(process.stdout, engine_input, tail_of(engine_input, settings, form))
             finally:
                 process.stdout.close()
                 if process.poll() is None and sys.exc_info()[0] is not None:
@@ -121,7 +164,7 @@ def _last_word(folder: Path, errors: IO[str]) -> str:
     return message[0].strip()
 
 
-def _read(stream: IO[bytes], scene: Scene, tail: tuple[float, float]) -> Iterator[Frame]:
+def _read(stream: IO[bytes], engine_input: EngineInput, tail: tuple[float, float]) -> Iterator[Frame]:
     """Frames out of the bytes that `_lammps_run` writes, the dispersion beyond the cutoff added.
 
     Step 0 has no pressure: LAMMPS does not have the forces that keep bodies rigid before the first step.
@@ -134,10 +177,10 @@ def _read(stream: IO[bytes], scene: Scene, tail: tuple[float, float]) -> Iterato
         step, potential, pressure, bath = numbers[:4].tolist()
         positions, velocities, forces = numbers[4:].reshape(3, n, 3)
         motion = rigid_motion(
-            scene.molecule_of_site, scene.site_masses, positions, velocities * units.ASE_TIME_PS, forces
+            engine_input.molecule_of_site, engine_input.site_masses, positions, velocities * units.ASE_TIME_PS, forces
         )
         pressure += tail[1] * EV_PER_ANGSTROM3_BAR if step else float("nan")
-        yield Frame(int(step), positions[scene.real], motion, potential + tail[0], bath, pressure)
+        yield Frame(int(step), positions[engine_input.real], motion, potential + tail[0], bath, pressure)
 
 
 def _doubles(stream: IO[bytes], count: int) -> Floats | None:

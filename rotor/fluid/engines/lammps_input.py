@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from rotor import units
 from rotor.arrays import Floats, Ints
-from rotor.fluid.engines.engine_input import Scene
+from rotor.fluid.engines.engine_input import EngineInput
 from rotor.fluid.engines.pair_tables import Form, pair_energy
 from rotor.fluid.forces.interactions import mixed
 from rotor.fluid.forces.models import Site
@@ -37,11 +37,11 @@ class SiteTypes:
     of_species: tuple[Ints, ...]
 
 
-def site_types(scene: Scene) -> SiteTypes:
-    """The types of a scene."""
+def site_types(engine_input: EngineInput) -> SiteTypes:
+    """The site types of an engine's input."""
     known: dict[tuple[float, ...], int] = {}
     sites, masses, of_species = [], [], []
-    for one in scene.species:
+    for one in engine_input.species:
         numbers = []
         for k, site in enumerate(one.model.sites):
             mass = float(one.masses[k]) if k < len(one.masses) else MASSLESS_U
@@ -55,14 +55,14 @@ def site_types(scene: Scene) -> SiteTypes:
     return SiteTypes(tuple(sites), np.array(masses), tuple(of_species))
 
 
-def data_file(scene: Scene) -> str:
-    """Atoms, velocities and bonds of a scene (`read_data`, atom_style full)."""
-    known = site_types(scene)
-    within = np.arange(len(scene.site_masses)) - scene.first_sites[scene.molecule_of_site]
-    types = np.concatenate([known.of_species[k] for k in scene.kinds])
+def data_file(engine_input: EngineInput) -> str:
+    """Atoms, velocities and bonds of a box (`read_data`, atom_style full)."""
+    known = site_types(engine_input)
+    within = np.arange(len(engine_input.site_masses)) - engine_input.first_sites[engine_input.molecule_of_site]
+    types = np.concatenate([known.of_species[k] for k in engine_input.kinds])
     charges = np.array([site.charge_e for site in known.sites])[types - 1]
     bonded = np.flatnonzero(within)
-    most = int(scene.sites_of_kinds.max())
+    most = int(engine_input.sites_of_kinds.max())
     lines = ["a box of rigid molecules", "", f"{len(types)} atoms", f"{len(known.sites)} atom types"]
     if len(bonded):
         lines += [
@@ -71,13 +71,13 @@ def data_file(scene: Scene) -> str:
             f"{most} extra bond per atom",
             f"{most} extra special per atom",
         ]
-    lines += ["", *(f"0 {edge:.17g} {axis}lo {axis}hi" for edge, axis in zip(scene.edges, "xyz", strict=True))]
+    lines += ["", *(f"0 {edge:.17g} {axis}lo {axis}hi" for edge, axis in zip(engine_input.edges, "xyz", strict=True))]
     lines += _section("Masses", [(m,) for m in known.masses])
-    columns = zip(scene.molecule_of_site + 1, types, charges, *scene.site_positions.T, strict=True)
+    columns = zip(engine_input.molecule_of_site + 1, types, charges, *engine_input.site_positions.T, strict=True)
     lines += _section("Atoms # full", columns)
-    lines += _section("Velocities", scene.site_velocities / units.ASE_TIME_PS)
+    lines += _section("Velocities", engine_input.site_velocities / units.ASE_TIME_PS)
     if len(bonded):
-        first = scene.first_sites[scene.molecule_of_site[bonded]]
+        first = engine_input.first_sites[engine_input.molecule_of_site[bonded]]
         lines += _section("Bonds", [(1, int(i) + 1, int(j) + 1) for i, j in zip(first, bonded, strict=True)])
     return "\n".join(lines) + "\n"
 
@@ -88,17 +88,17 @@ def _section(name: str, rows: Iterable[Iterable[float]]) -> list[str]:
     return ["", name, "", *(f"{k} " + " ".join(f"{value:.17g}" for value in row) for k, row in numbered)]
 
 
-def _pairs(scene: Scene) -> list[tuple[int, int, tuple[Site, Site]]]:
+def _pairs(engine_input: EngineInput) -> list[tuple[int, int, tuple[Site, Site]]]:
     """All pairs of types with their sites."""
-    sites = site_types(scene).sites
+    sites = site_types(engine_input).sites
     return [(i + 1, j + 1, (sites[i], sites[j])) for i in range(len(sites)) for j in range(i, len(sites))]
 
 
-def table_file(scene: Scene, settings: Settings, form: Form) -> str:
+def table_file(engine_input: EngineInput, settings: Settings, form: Form) -> str:
     """The table of every pair of types (`pair_style table`), equal steps in r²."""
     r = np.sqrt(np.linspace(TABLE_FROM_ANGSTROM**2, settings.cutoff_angstrom**2, TABLE_POINTS))
     parts = []
-    for i, j, sites in _pairs(scene):
+    for i, j, sites in _pairs(engine_input):
         energy, force = pair_energy(r, sites, settings, form)
         rows = _section(f"PAIR_{i}_{j}", zip(r, energy, force, strict=True))
         rows[2] = f"N {TABLE_POINTS} RSQ {r[0]:.17g} {r[-1]:.17g}\n"
@@ -106,10 +106,29 @@ def table_file(scene: Scene, settings: Settings, form: Form) -> str:
     return "\n".join(parts) + "\n"
 
 
-def pair_commands(scene: Scene, settings: Settings, form: Form, accuracy: float, kspace: str) -> list[str]:
-    """The pair style with its coefficients."""
-    pairs, cutoff = _pairs(scene), settings.cutoff_angstrom
-    charged = any(site.charge_e for one in scene.species for site in one.model.sites)
+def pair_commands(engine_input: EngineInput, settings: Settings, form: Form, accuracy: float, kspace: str) -> list[str]:
+    """The pair style with its coefficients.
+
+    Parameters
+    ----------
+    engine_input : EngineInput
+        Molecules and cell.
+    settings : Settings
+        Of the run.
+    form : Form
+        Of the charges under a cutoff.
+    accuracy : float
+        Of the forces of Ewald's sum, relative.
+    kspace : str
+        LAMMPS' name of the solver.
+
+    Returns
+    -------
+    list of str
+        Commands.
+    """
+    pairs, cutoff = _pairs(engine_input), settings.cutoff_angstrom
+    charged = any(site.charge_e for one in engine_input.species for site in one.model.sites)
     if charged and settings.electrostatics != "ewald":
         style = [f"pair_style table spline {TABLE_POINTS}"]
         return style + [f"pair_coeff {i} {j} pairs.table PAIR_{i}_{j} {cutoff:.17g}" for i, j, _ in pairs]
@@ -131,40 +150,61 @@ def _depth(sites: tuple[Site, Site]) -> str:
     return f"{epsilon:.17g} {sigma or 1.0:.17g}"
 
 
-def ensemble_commands(scene: Scene, settings: Settings) -> list[str]:
+def ensemble_commands(engine_input: EngineInput, settings: Settings) -> list[str]:
     """Fixes that move the bodies, and the single atoms where there are some."""
     if settings.ensemble == "nose-hoover":
         raise ValueError(
             "nose-hoover: LAMMPS' chains for rigid bodies hold translations and rotations apart and count the total momentum, "
             "which stays at 0: translations would be too warm by N/(N - 1); take langevin, or OpenMM"
         )
-    single, bodies = scene.sites_of_kinds == 1, scene.sites_of_kinds > 1
+    single, bodies = engine_input.sites_of_kinds == 1, engine_input.sites_of_kinds > 1
     bath = f"{settings.temperature_k:.17g} {settings.temperature_k:.17g} {1 / settings.friction_per_ps:.17g}"
     noise = settings.ensemble == "langevin"
     commands = []
     if bodies.any():
-        commands += [f"group bodies type {_types(scene, bodies)}", "fix move bodies rigid/nve/small molecule"]
+        commands += [f"group bodies type {_types(engine_input, bodies)}", "fix move bodies rigid/nve/small molecule"]
         commands[-1] += f" langevin {bath} {settings.seed}" if noise else ""
     if single.any():
-        commands += [f"group single type {_types(scene, single)}", "fix move_single single nve"]
+        commands += [f"group single type {_types(engine_input, single)}", "fix move_single single nve"]
         commands += [f"fix bath single langevin {bath} {settings.seed + 1}"] if noise else []
     return commands
 
 
-def _types(scene: Scene, chosen: NDArray[np.bool_]) -> str:
+def _types(engine_input: EngineInput, chosen: NDArray[np.bool_]) -> str:
     """Types of the chosen species."""
-    numbers = np.concatenate([site_types(scene).of_species[k] for k in np.flatnonzero(chosen)])
+    numbers = np.concatenate([site_types(engine_input).of_species[k] for k in np.flatnonzero(chosen)])
     return " ".join(map(str, np.unique(numbers)))
 
 
-def input_file(scene: Scene, settings: Settings, form: Form, *, accuracy: float = 1e-5, kspace: str = "pppm") -> str:
-    """The commands before the run; files data.box and pairs.table stand beside."""
-    bonded = bool(np.any(scene.sites_of_kinds > 1))
+def input_file(
+    engine_input: EngineInput, settings: Settings, form: Form, *, accuracy: float = 1e-5, kspace: str = "pppm"
+) -> str:
+    """The commands before the run; they read the files data.box and pairs.table beside them.
+
+    Parameters
+    ----------
+    engine_input : EngineInput
+        Molecules and cell.
+    settings : Settings
+        Of the run.
+    form : Form
+        Of the charges under a cutoff.
+    accuracy : float
+        Of the forces of Ewald's sum, relative.
+    kspace : str
+        LAMMPS' name of the solver.
+
+    Returns
+    -------
+    str
+        Text of the file.
+    """
+    bonded = bool(np.any(engine_input.sites_of_kinds > 1))
     lines = ["units metal", "atom_style full", "boundary p p p"]
     lines += ["bond_style zero nocoeff", "special_bonds lj/coul 0 0 0"] if bonded else []
     lines += ["read_data data.box", *(["bond_coeff *"] if bonded else [])]
-    lines += pair_commands(scene, settings, form, accuracy, kspace)
+    lines += pair_commands(engine_input, settings, form, accuracy, kspace)
     lines += ["neighbor 1.5 bin", "neigh_modify delay 0 every 1 check yes", f"timestep {settings.step_fs / 1000:.17g}"]
-    lines += ensemble_commands(scene, settings)
+    lines += ensemble_commands(engine_input, settings)
     lines += [f"thermo {settings.every}", "thermo_style custom step pe press ecouple", "thermo_modify norm no"]
     return "\n".join(lines) + "\n"

@@ -15,8 +15,8 @@ import numpy as np
 
 from rotor import units
 from rotor.arrays import Floats, Ints
-from rotor.fluid.engines.engine_input import Frame, Motion, Scene, point_velocities, rigid_motion
-from rotor.fluid.engines.equimomental import Carriers, carriers_of
+from rotor.fluid.engines.engine_input import EngineInput, Frame, Motion, point_velocities, rigid_motion
+from rotor.fluid.engines.equimomental import EquimomentalPoints, equimomental_points
 from rotor.fluid.engines.pair_tables import Form, tail_of
 from rotor.fluid.settings import Settings
 from rotor.units import EV_PER_ANGSTROM3_BAR
@@ -28,16 +28,16 @@ NM_PER_PS = 0.1 / units.ASE_TIME_PS  # 1 Å √(eV/u) in nm/ps
 
 @dataclass(frozen=True)
 class OpenMMSystem:
-    """A scene as OpenMM has it.
+    """A box as OpenMM has it.
 
     system: openmm.System. barostat: a part of it that changes nothing and measures the pressure.
-    carriers: (c,) its particles with mass. owners: (c,) their molecules. masses: (c,). atoms:
+    massive: (c,) its particles with mass. owners: (c,) their molecules. masses: (c,). atoms:
     (atoms,) its particles that are the real atoms. positions: (particles, 3) Å.
     """
 
     system: Any
     barostat: Any
-    carriers: Ints
+    massive: Ints
     owners: Ints
     masses: Floats
     atoms: Ints
@@ -55,23 +55,40 @@ def load() -> Any:
     return openmm
 
 
-def build_system(scene: Scene, settings: Settings, form: Form, accuracy: float) -> OpenMMSystem:
-    """The system of a scene: masses, constraints, virtual sites, Lennard-Jones and charges."""
+def build_system(engine_input: EngineInput, settings: Settings, form: Form, accuracy: float) -> OpenMMSystem:
+    """The system of a box: masses, constraints, virtual sites, Lennard-Jones and charges.
+
+    Parameters
+    ----------
+    engine_input : EngineInput
+        Molecules and cell.
+    settings : Settings
+        Of the run.
+    form : Form
+        Of the charges under a cutoff.
+    accuracy : float
+        Of the forces of Ewald's sum (PME), relative.
+
+    Returns
+    -------
+    OpenMMSystem
+        The system, and which of its particles are what.
+    """
     mm = load()
     system = mm.System()
-    a, b, c = scene.edges / 10
+    a, b, c = engine_input.edges / 10
     system.setDefaultPeriodicBoxVectors(mm.Vec3(a, 0, 0), mm.Vec3(0, b, 0), mm.Vec3(0, 0, c))
     force = nonbonded(mm, settings, form, accuracy)
-    plans = [carriers_of(one.model, one.masses) for one in scene.species]
-    carriers: list[int] = []
+    plans = [equimomental_points(one.model, one.masses) for one in engine_input.species]
+    massive: list[int] = []
     owners: list[int] = []
     atoms: list[int] = []
     positions: list[Floats] = []
-    for molecule, kind in enumerate(scene.kinds):
-        plan, model, first = plans[kind], scene.species[kind].model, system.getNumParticles()
-        here = scene.site_positions[scene.first_sites[molecule] :][: len(model.sites)]
+    for molecule, kind in enumerate(engine_input.kinds):
+        plan, model, first = plans[kind], engine_input.species[kind].model, system.getNumParticles()
+        here = engine_input.site_positions[engine_input.first_sites[molecule] :][: len(model.sites)]
         site_at = _add_molecule(mm, system, force, plan, model)
-        carriers += range(first, first + len(plan.masses))
+        massive += range(first, first + len(plan.masses))
         owners += [molecule] * len(plan.masses)
         atoms += range(site_at, site_at + len(model.symbols))
         if not plan.own:
@@ -82,14 +99,36 @@ def build_system(scene: Scene, settings: Settings, form: Form, accuracy: float) 
     system.addForce(barostat)
     if settings.ensemble == "nose-hoover":
         system.addForce(mm.CMMotionRemover())  # its chain then counts three degrees fewer, as we do
-    masses = np.concatenate([plans[k].masses for k in scene.kinds])
+    masses = np.concatenate([plans[k].masses for k in engine_input.kinds])
     return OpenMMSystem(
-        system, barostat, np.array(carriers), np.array(owners), masses, np.array(atoms), np.concatenate(positions)
+        system, barostat, np.array(massive), np.array(owners), masses, np.array(atoms), np.concatenate(positions)
     )
 
 
 def nonbonded(mm: Any, settings: Settings, form: Form, accuracy: float) -> Any:
-    """The pair force without its particles."""
+    """The pair force without its particles.
+
+    Parameters
+    ----------
+    mm : module
+        openmm.
+    settings : Settings
+        Of the run.
+    form : Form
+        Of the charges under a cutoff.
+    accuracy : float
+        Of the forces of Ewald's sum (PME), relative.
+
+    Returns
+    -------
+    openmm.Force
+        NonbondedForce.
+
+    Raises
+    ------
+    ValueError
+        Electrostatics that OpenMM does not have.
+    """
     force = mm.NonbondedForce()
     force.setCutoffDistance(settings.cutoff_angstrom / 10)
     if settings.electrostatics == "reaction-field":
@@ -109,7 +148,7 @@ def nonbonded(mm: Any, settings: Settings, form: Form, accuracy: float) -> Any:
     return force
 
 
-def _add_molecule(mm: Any, system: Any, force: Any, plan: Carriers, model: Any) -> int:
+def _add_molecule(mm: Any, system: Any, force: Any, plan: EquimomentalPoints, model: Any) -> int:
     """Particles, constraints and exclusions of one molecule; where its sites begin."""
     first = int(system.getNumParticles())
     for mass in plan.masses:
@@ -132,8 +171,8 @@ def _add_molecule(mm: Any, system: Any, force: Any, plan: Carriers, model: Any) 
     return site_at
 
 
-def _virtual_site(mm: Any, plan: Carriers, first: int, place: Floats) -> Any:
-    """A site without mass that follows the carriers."""
+def _virtual_site(mm: Any, plan: EquimomentalPoints, first: int, place: Floats) -> Any:
+    """A site without mass that follows the points with mass."""
     points = list(range(first, first + len(plan.places)))
     if plan.rank == 3:
         x, y = plan.places[1] - plan.places[0], plan.places[2] - plan.places[0]
@@ -148,8 +187,8 @@ def _virtual_site(mm: Any, plan: Carriers, first: int, place: Floats) -> Any:
     return kind(*points, *weights)
 
 
-def _laid(plan: Carriers, sites: Floats, here: Floats) -> Floats:
-    """Where the carriers are in the box, from where the sites (model's axes, box) are."""
+def _laid(plan: EquimomentalPoints, sites: Floats, here: Floats) -> Floats:
+    """Where the points with mass are in the box, from where the sites (model's axes, box) are."""
     from rotor.geometry.superposition import superpose
 
     return superpose(sites, here).apply(plan.places)
@@ -171,7 +210,7 @@ def integrator(mm: Any, settings: Settings) -> Any:
 
 @dataclass(frozen=True)
 class Session:
-    """A scene on an OpenMM context, ready to step."""
+    """A box in an OpenMM context, ready to step."""
 
     context: Any
     build_system: OpenMMSystem
@@ -191,20 +230,20 @@ class Session:
         positions = np.asarray(got.getPositions(asNumpy=True)._value) * 10
         velocities = np.asarray(got.getVelocities(asNumpy=True)._value) / NM_PER_PS
         forces = np.asarray(got.getForces(asNumpy=True)._value) / (10 * KJ_PER_EV)
-        at = mine.carriers
+        at = mine.massive
         motion = rigid_motion(mine.owners, mine.masses, positions[at], velocities[at], forces[at])
         return positions, motion, got.getPotentialEnergy()._value / KJ_PER_EV
 
     def start(self, velocities: Floats) -> None:
-        """Set velocities (carriers, 3) of the first step; a leapfrog is given those half a step before."""
+        """Set velocities (massive, 3) of the first step; a leapfrog is given those half a step before."""
         mine = self.build_system
         full = np.zeros_like(mine.positions)
-        full[mine.carriers] = velocities
+        full[mine.massive] = velocities
         self.context.setVelocities(full * NM_PER_PS)
         if self.settings.ensemble == "nve":
             positions, motion, _ = self.state()
             before = motion.kicked(-0.5 * self.step_classical)
-            full[mine.carriers] = point_velocities(before, mine.owners, mine.masses, positions[mine.carriers])
+            full[mine.massive] = point_velocities(before, mine.owners, mine.masses, positions[mine.massive])
             self.context.setVelocities(full * NM_PER_PS)
 
     def frame(self, step: int) -> Frame:
@@ -231,7 +270,7 @@ class Session:
 
 
 def session(
-    scene: Scene,
+    engine_input: EngineInput,
     settings: Settings,
     form: Form | None = None,
     *,
@@ -239,19 +278,36 @@ def session(
     platform: str | None = None,
     threads: int = 1,
 ) -> Session:
-    """A context with the scene in it, its molecules moving as the scene says.
+    """A context with the box in it, its molecules moving as given.
 
-    accuracy: of the forces of Ewald's sum (PME), relative. platform: "Reference" (double precision), "CPU", "CUDA", ...;
-    None: the fastest that this machine has. threads: of the platform CPU.
+    Parameters
+    ----------
+    engine_input : EngineInput
+        Molecules and cell.
+    settings : Settings
+        Of the run.
+    form : Form, optional
+        Of the charges under a cutoff; by default that of the settings.
+    accuracy : float
+        Of the forces of Ewald's sum (PME), relative.
+    platform : str, optional
+        "Reference" (double precision), "CPU", "CUDA", ...; by default the fastest that this machine has.
+    threads : int
+        Of the platform CPU.
+
+    Returns
+    -------
+    Session
+        Ready to step.
     """
     mm, form = load(), form or Form()
-    mine = build_system(scene, settings, form, accuracy)
+    mine = build_system(engine_input, settings, form, accuracy)
     context = _context(mm, mine.system, integrator(mm, settings), platform, threads)
     context.setPositions(mine.positions / 10)
     context.applyConstraints(1e-7)
     context.computeVirtualSites()
-    ready = Session(context, mine, settings, tail_of(scene, settings, form), float(np.prod(scene.edges)))
-    ready.start(point_velocities(scene.motion(), mine.owners, mine.masses, mine.positions[mine.carriers]))
+    ready = Session(context, mine, settings, tail_of(engine_input, settings, form), float(np.prod(engine_input.edges)))
+    ready.start(point_velocities(engine_input.motion(), mine.owners, mine.masses, mine.positions[mine.massive]))
     return ready
 
 
@@ -266,11 +322,11 @@ def _context(mm: Any, system: Any, made: Any, platform: str | None, threads: int
     return mm.Context(system, made, mm.Platform.getPlatformByName(platform))
 
 
-def frames(scene: Scene, settings: Settings, form: Form | None = None, **options: Any) -> Iterator[Frame]:
+def frames(engine_input: EngineInput, settings: Settings, form: Form | None = None, **options: Any) -> Iterator[Frame]:
     """Run, and give a frame at step 0 and after every `settings.every` steps; options as of `session`."""
     mm = load()
     try:
-        run = session(scene, settings, form, **options)
+        run = session(engine_input, settings, form, **options)
         stepper = run.context.getIntegrator()
         yield run.frame(0)
         for step in range(settings.every, settings.steps + 1, settings.every):

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rotor.arrays import Floats
-from rotor.fluid.engines.engine_input import Scene
+from rotor.fluid.engines.engine_input import EngineInput
 from rotor.fluid.forces.ewald import COULOMB_EV_ANGSTROM
 from rotor.fluid.forces.interactions import mixed, reaction_field, screened, switched, tail
 from rotor.fluid.forces.models import Site
@@ -30,10 +30,26 @@ class Form:
 def pair_energy(
     r: Floats, sites: tuple[Site, Site], settings: Settings, form: Form, charges: bool = True
 ) -> tuple[Floats, Floats]:
-    """Energy (eV) and force (eV/Å) of two sites at distances r (n,) up to the cutoff.
+    """Energy and force of two sites at distances up to the cutoff.
 
-    S 4ε [(σ/r)¹² - (σ/r)⁶] + q₁q₂/4πε₀ f(r) with the switch S and the form f of charges under a cutoff, as in
-    `rotor.fluid.forces.interactions`. charges: False leaves the second term to a sum over the lattice.
+    Parameters
+    ----------
+    r : (n,) array
+        Distances, Å.
+    sites : (Site, Site)
+        The two sites.
+    settings : Settings
+        Cutoff and electrostatics.
+    form : Form
+        Of the charges under a cutoff.
+    charges : bool
+        False leaves the second term to a sum over the lattice.
+
+    Returns
+    -------
+    (n,) array, (n,) array
+        S 4ε [(σ/r)¹² - (σ/r)⁶] + q₁q₂/4πε₀ f(r) in eV, with the switch S and the form f of charges under a cutoff as in
+        `rotor.fluid.forces.interactions`, and minus its slope in eV/Å.
     """
     one, other = sites
     sigma, epsilon = mixed((one.sigma_angstrom, other.sigma_angstrom), (one.epsilon_ev, other.epsilon_ev))
@@ -62,10 +78,10 @@ def _charges(r: Floats, settings: Settings, form: Form) -> tuple[Floats, Floats]
     return damped - c + b * (r - cutoff), damped / r + slope * np.exp(-((alpha * r) ** 2)) / r - b
 
 
-def tail_of(scene: Scene, settings: Settings, form: Form) -> tuple[float, float]:
+def tail_of(engine_input: EngineInput, settings: Settings, form: Form) -> tuple[float, float]:
     """Energy (eV) and pressure (eV/Å³) of the dispersion beyond the cutoff, the fluid taken as even there."""
-    counts = np.bincount(scene.kinds, minlength=len(scene.species))
-    models = tuple(one.model for one in scene.species)
+    counts = np.bincount(engine_input.kinds, minlength=len(engine_input.species))
+    models = tuple(one.model for one in engine_input.species)
     energy, pressure = tail(models, counts, settings.cutoff_angstrom, form.switch_angstrom)
-    volume = float(np.prod(scene.edges))
+    volume = float(np.prod(engine_input.edges))
     return energy / volume, pressure / volume**2

@@ -11,7 +11,7 @@ import numpy as np
 
 from rotor import units
 from rotor.arrays import Floats
-from rotor.fluid.engines.engine_input import Frame, Scene, scene_of
+from rotor.fluid.engines.engine_input import EngineInput, Frame, engine_input_of
 from rotor.fluid.motion.thermometers import THERMOMETERS, temperatures
 from rotor.fluid.record import FluidRecord
 from rotor.fluid.settings import Settings
@@ -23,13 +23,13 @@ ENGINES = ("openmm", "lammps")
 class EngineRun:
     """What an engine has made of a box: the table, and the real atoms' places (frames, atoms, 3), molecules whole."""
 
-    scene: Scene
+    engine_input: EngineInput
     record: FluidRecord
     positions_angstrom: Floats
 
 
 def run_engine(name: str, atoms: Any, settings: Settings, **options: Any) -> EngineRun:
-    """Hand a box to the engine of that name, run it, read it back.
+    """Run a box by the engine of that name and read it back.
 
     atoms: an ase.Atoms box. options: of the engine, see `rotor.fluid.engines.openmm.frames` and
     `rotor.fluid.engines.lammps.frames`.
@@ -37,17 +37,19 @@ def run_engine(name: str, atoms: Any, settings: Settings, **options: Any) -> Eng
     Raises ValueError for what the engine cannot represent, ModuleNotFoundError where it is not installed, OSError where it
     does not load, RuntimeError where it stops on its way.
     """
-    scene = scene_of(atoms, settings)
-    seen = list(engine_frames(name, scene, settings, **options))
-    return EngineRun(scene, record_of(seen, scene, settings), np.stack([frame.positions for frame in seen]))
+    engine_input = engine_input_of(atoms, settings)
+    seen = list(engine_frames(name, engine_input, settings, **options))
+    return EngineRun(
+        engine_input, record_of(seen, engine_input, settings), np.stack([frame.positions for frame in seen])
+    )
 
 
-def engine_frames(name: str, scene: Scene, settings: Settings, **options: Any) -> Iterator[Frame]:
+def engine_frames(name: str, engine_input: EngineInput, settings: Settings, **options: Any) -> Iterator[Frame]:
     """The frames of an engine by its name, each checked to be finite."""
     if name not in ENGINES:
         raise ValueError(f"{name!r} is no engine; there are {', '.join(ENGINES)}")
     engine = importlib.import_module(f"rotor.fluid.engines.{name}")
-    for frame in engine.frames(scene, settings, **options):
+    for frame in engine.frames(engine_input, settings, **options):
         if not (np.isfinite(frame.potential_ev) and np.isfinite(frame.positions).all()):
             raise RuntimeError(
                 f"{name}: energy or positions are not finite at step {frame.step}: molecules on top of each other, or a "
@@ -56,13 +58,13 @@ def engine_frames(name: str, scene: Scene, settings: Settings, **options: Any) -
         yield frame
 
 
-def record_of(frames: Iterable[Frame], scene: Scene, settings: Settings) -> FluidRecord:
+def record_of(frames: Iterable[Frame], engine_input: EngineInput, settings: Settings) -> FluidRecord:
     """The table of frames."""
-    rows = np.array([row_of(frame, scene, settings) for frame in frames], dtype=np.float64)
+    rows = np.array([row_of(frame, engine_input, settings) for frame in frames], dtype=np.float64)
     return FluidRecord(*rows.reshape(-1, len(fields(FluidRecord))).T)
 
 
-def row_of(frame: Frame, scene: Scene, settings: Settings) -> list[float]:
+def row_of(frame: Frame, engine_input: EngineInput, settings: Settings) -> list[float]:
     """A row of the table.
 
     Energies of motion are those of the thermometer without an error of order h² (`rotor.fluid.motion.thermometers`): mixed from
@@ -74,7 +76,7 @@ def row_of(frame: Frame, scene: Scene, settings: Settings) -> list[float]:
     if not frame.half:
         h = settings.step_fs / 1000 / units.ASE_TIME_PS
         kinetic = stored + frame.motion.correction(h).times(THERMOMETERS["mixed"])
-    heat = temperatures(kinetic, scene.degrees)
+    heat = temperatures(kinetic, engine_input.degrees)
     return [
         frame.step * settings.step_fs / 1000,
         frame.potential_ev,

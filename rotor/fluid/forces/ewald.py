@@ -37,13 +37,51 @@ class EwaldParameters:
 
 
 def real_space_error(alpha: float, cutoff: float, charges_squared: float, count: int, volume: float) -> float:
-    """Root mean square error of a force from pairs beyond the cutoff, in eV/Å: 2 Q² exp(-α² r_c²)/√(N r_c V), Q² = k_e Σ q²."""
+    """Root mean square error of a force from pairs beyond the cutoff, 2 Q² exp(-α² r_c²)/√(N r_c V), Q² = k_e Σ q².
+
+    Parameters
+    ----------
+    alpha : float
+        1/Å.
+    cutoff : float
+        r_c, Å.
+    charges_squared : float
+        Σ q², e².
+    count : int
+        Number of charges N.
+    volume : float
+        V, Å³.
+
+    Returns
+    -------
+    float
+        eV/Å.
+    """
     q = COULOMB_EV_ANGSTROM * charges_squared
     return 2 * q * math.exp(-((alpha * cutoff) ** 2)) / math.sqrt(count * cutoff * volume)
 
 
 def fourier_error(alpha: float, k_cut: float, charges_squared: float, count: int, volume: float) -> float:
-    """That of wave vectors beyond k_cut, eV/Å: 2 Q² α/L √(1/(π n N)) exp(-k_c²/4α²), n = k_c L/2π, L = ∛V."""
+    """That of wave vectors beyond k_c, 2 Q² α/L √(1/(π n N)) exp(-k_c²/4α²), n = k_c L/2π, L = ∛V.
+
+    Parameters
+    ----------
+    alpha : float
+        1/Å.
+    k_cut : float
+        k_c, 1/Å.
+    charges_squared : float
+        Σ q², e².
+    count : int
+        Number of charges N.
+    volume : float
+        V, Å³.
+
+    Returns
+    -------
+    float
+        eV/Å.
+    """
     q, edge = COULOMB_EV_ANGSTROM * charges_squared, volume ** (1 / 3)
     shells = k_cut * edge / (2 * math.pi)
     return float(2 * q * alpha / edge / math.sqrt(math.pi * shells * count) * math.exp(-(k_cut**2) / (4 * alpha**2)))
@@ -60,9 +98,23 @@ def _least(fails: Callable[[float], bool], low: float, high: float) -> float:
 def parameters_for(
     tolerance: float, cutoff_angstrom: float, charges_e: Floats, lengths_angstrom: Floats
 ) -> EwaldParameters:
-    """α and k_cut for which each half of the sum has this error.
+    """α and k_cut for which each half of Ewald's sum has a given error.
 
-    tolerance is the root mean square error of a force over that between two unit charges 1 Å apart (14.4 eV/Å).
+    Parameters
+    ----------
+    tolerance : float
+        Root mean square error of a force over that between two unit charges 1 Å apart (14.4 eV/Å).
+    cutoff_angstrom : float
+        In real space.
+    charges_e : (n,) array
+        All charges.
+    lengths_angstrom : (3,) array
+        Edges of the cell.
+
+    Returns
+    -------
+    EwaldParameters
+        α, k_cut.
 
     >>> box = np.array([31.0, 31.0, 31.0])
     >>> found = parameters_for(1e-5, 9.0, np.tile([-0.8476, 0.4238, 0.4238], 1000), box)

@@ -55,15 +55,36 @@ class Evaluation:
 
 
 class RigidPotential(Calculator):
-    """Lennard-Jones and charges between rigid molecules.
+    """Lennard-Jones and charges between rigid molecules: an ASE calculator.
 
-    models: names of `rotor.fluid.forces.models.MODELS` (several joined by commas for a mixture), or models of one's own.
-    cutoff_angstrom: by sites; inf where nothing repeats. electrostatics: reaction-field, ewald or shifted. dielectric: outside
-    the reaction field, inf a conductor. switch_width_angstrom: of the Lennard-Jones switch, 0 cuts hard. damping_per_angstrom:
-    of shifted forces. ewald: α and k_cut; without it they follow from `tolerance` (`rotor.fluid.forces.ewald.parameters_for`).
-    long_range_correction: dispersion beyond the cutoff. skin_angstrom: of the lists. threads: results are the same bit for bit
-    for equal threads and equal history; `reset()` discards the lists, so that a run can be continued bit for bit.
+    Parameters
+    ----------
+    models : str, RigidModel or sequence of them
+        Names of `rotor.fluid.forces.models.MODELS` (several joined by commas for a mixture), or other models.
+    cutoff_angstrom : float
+        By sites; inf where nothing repeats.
+    electrostatics : str
+        reaction-field, ewald or shifted.
+    dielectric : float
+        Outside the reaction field, inf a conductor.
+    switch_width_angstrom : float
+        Of the Lennard-Jones switch, 0 cuts hard.
+    damping_per_angstrom : float
+        Of shifted forces.
+    ewald : EwaldParameters, optional
+        α and k_cut; without it they follow from `tolerance` (`rotor.fluid.forces.ewald.parameters_for`).
+    tolerance : float
+        Relative error of the forces of Ewald's sum.
+    long_range_correction : bool
+        Whether the dispersion beyond the cutoff is added.
+    skin_angstrom : float
+        Of the lists of neighbours.
+    threads : int
+        Results are the same bit for bit for equal threads and equal history; `reset()` discards the lists, so that a run can be
+        continued bit for bit.
 
+    Notes
+    -----
     Molecules may be broken by the cell's edges. Cells have right angles; directions without pbc are open.
 
     >>> from ase import Atoms

@@ -54,6 +54,8 @@ class RigidDynamics(MolecularDynamics):
     trajectory, logfile, loginterval
         As of every ASE dynamics; the log's temperatures are those of rigid bodies.
 
+    Examples
+    --------
     >>> from ase import units
     >>> from ase.build import molecule
     >>> from ase.calculators.lj import LennardJones
@@ -87,8 +89,8 @@ class RigidDynamics(MolecularDynamics):
         self.bodies, pose = bodies_of(atoms, molecules, shapes, tolerance_angstrom)
         self.thermostat, self._tolerance = thermostat, tolerance_angstrom
         self._flows = Flows(self.bodies)
-        keeps_momentum = thermostat is None or thermostat.keeps_momentum
-        self.degrees: Degrees = self.bodies.degrees((3 if keeps_momentum else 0) if removed is None else removed)
+        conserves_momentum = thermostat is None or thermostat.conserves_momentum
+        self.degrees: Degrees = self.bodies.degrees((3 if conserves_momentum else 0) if removed is None else removed)
         atoms.set_masses(self.bodies.masses)
         with warnings.catch_warnings():
             warnings.filterwarnings("ignore", "Zero mass encountered")  # a site without mass belongs to its body

@@ -29,7 +29,7 @@ ROUNDS = 2  # of Yoshida's three sub-steps within one act of a chain
 class Thermostat(ABC):
     """What changes momenta in the middle of a step so that the ensemble is canonical at `temperature_k`."""
 
-    keeps_momentum: bool
+    conserves_momentum: bool
 
     def __init__(self, temperature_k: float) -> None:
         if not (math.isfinite(temperature_k) and temperature_k > 0.0):
@@ -69,7 +69,7 @@ class Langevin(Thermostat):
     friction: 1/(ASE's unit of time): `1e-3 / ase.units.fs` is 1/ps. rng: of the noise; its state is saved for restarts.
     """
 
-    keeps_momentum = False
+    conserves_momentum = False
 
     def __init__(self, temperature_k: float, friction: float, rng: np.random.Generator) -> None:
         super().__init__(temperature_k)
@@ -153,13 +153,23 @@ class _Chain:
 class NoseHoover(Thermostat):
     """Chains that scale momenta so that the kinetic energy has the canonical distribution; deterministic.
 
-    The chain counts exactly the degrees that move: three fewer where the total momentum is zero and stays so.
+    Parameters
+    ----------
+    temperature_k : float
+        Temperature.
+    relaxation : float
+        Time constant τ in ASE's unit of time.
+    links : int
+        Of a chain.
+    separate : bool
+        One chain for translations and one for rotations, else one for both.
 
-    relaxation: time constant τ in ASE's unit of time. links: of a chain. separate: one chain for translations and one for
-    rotations, else one for both.
+    Notes
+    -----
+    The chain counts exactly the degrees that move: three fewer where the total momentum is zero and stays so.
     """
 
-    keeps_momentum = True
+    conserves_momentum = True
 
     def __init__(self, temperature_k: float, relaxation: float, links: int = 3, separate: bool = False) -> None:
         super().__init__(temperature_k)

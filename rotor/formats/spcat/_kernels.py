@@ -19,18 +19,18 @@ _SPACE, _MINUS, _POINT, _ZERO = np.uint8(32), np.uint8(45), np.uint8(46), np.uin
 
 
 def compiled(function: _Function) -> _Function:
-    """The function compiled, the machine code kept on disk; compiled anew each time where no folder can be written."""
-    kept: Any
+    """The function compiled, the machine code stored on disk; compiled anew each time where no folder can be written."""
+    compiled: Any
     try:
-        kept = numba.njit(cache=True, nogil=True)(function)
+        compiled = numba.njit(cache=True, nogil=True)(function)
     except RuntimeError:  # numba found neither its own cache folder nor the user's writable
-        kept = numba.njit(nogil=True)(function)
-    return cast("_Function", kept)
+        compiled = numba.njit(nogil=True)(function)
+    return cast("_Function", compiled)
 
 
 @compiled
 def _put_digits(row: Text, start: int, stop: int, left: Any, negative: Any) -> Any:
-    """A whole number with its sign, right-justified in row[start:stop]; false where it needs more room."""
+    """A whole number with its sign, right-justified in row[start:stop]; false where it needs more space."""
     at = stop
     while left >= 100 and at - 2 >= start:
         pair = left % 100
@@ -139,10 +139,10 @@ def _fill(
 def put_rows(out: Text, columns: Columns, decimals: tuple[int, int, int, int]) -> Mask:
     """Fill `out` with the lines of `columns` and tell which fit, as `rows.put_rows` does."""
     if out.shape[1] < QUANTA + 4 * columns.quanta_upper.shape[1]:
-        raise ValueError(f"rows of {out.shape[1]} characters have no room for {columns.quanta_upper.shape[1]} quanta")
+        raise ValueError(f"rows of {out.shape[1]} characters cannot hold {columns.quanta_upper.shape[1]} quanta")
     plain = np.zeros(len(out), dtype=np.bool_)
     scales = tuple(10.0**d for d in decimals)
     contiguous = tuple(np.ascontiguousarray(column) for column in columns)
-    # the tables are handed over: a table compiled in would outlive a change of rows.py in numba's cache
+    # the tables are arguments: a table compiled in would outlive a change of rows.py in numba's cache
     _fill(out, plain, contiguous, decimals, scales, degeneracy_table(), quantum_table(), QUANTUM_RANGE[0], BLANK)
     return plain

@@ -89,12 +89,12 @@ def _wide_rows(rows: Text, columns: Columns, layout: Layout, fill: Callable[...,
 
 
 def _odd_line(catalogue: Catalogue, index: int) -> bytes:
-    """A line that is kept as it was spelled, or whose numbers need a form of their own."""
+    """A line that stays as it was spelled, or whose numbers need a form of their own."""
     record, layout = _within_format(catalogue.record(index), index), catalogue.layout
-    kept = layout.spelling.get(index)
-    if kept is not None and _record_of(kept) == record:
-        ends = kept.endswith(b"\n") or index == len(catalogue) - 1
-        return kept if ends else kept + layout.newline
+    stored = layout.spelling.get(index)
+    if stored is not None and _record_of(stored) == record:
+        ends = stored.endswith(b"\n") or index == len(catalogue) - 1
+        return stored if ends else stored + layout.newline
     try:
         text = spell_record(record, layout.decimals)
     except ValueError as error:
@@ -104,17 +104,17 @@ def _odd_line(catalogue: Catalogue, index: int) -> bytes:
 
 
 def _record_of(text: bytes) -> Record:
-    """The record of a kept spelling, which may begin with blank lines."""
+    """The record of a stored spelling, which may begin with blank lines."""
     return read_record(next(line for line in text.split(b"\n") if line.strip()).rstrip(b"\r").decode("ascii"))
 
 
 def _within_format(record: Record, index: int) -> Record:
-    """The record with as many columns of quantum numbers as its QNFMT has room for."""
+    """The record with as many columns of quantum numbers as its QNFMT can hold."""
     width = width_of(record.qnfmt)
     states = [(*state, *(BLANK,) * width) for state in record[-2:]]
     if any(q != BLANK for state in states for q in state[width:]):
         raise ValueError(
-            f"line {index + 1} cannot be written: QNFMT {record.qnfmt} has room for {width} quantum numbers a state, "
+            f"line {index + 1} cannot be written: QNFMT {record.qnfmt} can hold {width} quantum numbers a state, "
             "more are given; its last digit says how many"
         )
     return record._replace(quanta_upper=states[0][:width], quanta_lower=states[1][:width])
@@ -123,9 +123,9 @@ def _within_format(record: Record, index: int) -> Record:
 def format_chunks(catalogue: Catalogue) -> Iterator[bytes]:
     """The text of a catalogue in pieces of some thousand lines, for lists larger than memory should hold twice."""
     layout, width, fill = catalogue.layout, catalogue.quanta_upper.shape[1], _row_form(len(catalogue))
-    room = max(_length(layout, width), QUANTA + 4 * width) + len(layout.newline)
+    space = max(_length(layout, width), QUANTA + 4 * width) + len(layout.newline)
     end = _length(layout, width) + len(layout.newline)
-    buffer = np.empty((min(_CHUNK, len(catalogue)), room), dtype=np.uint8)
+    buffer = np.empty((min(_CHUNK, len(catalogue)), space), dtype=np.uint8)
     spelled = np.fromiter(layout.spelling, dtype=np.int64, count=len(layout.spelling))
     yield layout.beginning
     for start in range(0, len(catalogue), _CHUNK):
@@ -287,11 +287,11 @@ def _assembled(text: bytes, name: str, lines: _Lines, layout: Layout, columns: C
             records[number] = _careful_record(line, f"{name}, line {number + 1}")
     columns = _with_records(columns, records)
 
-    kept = known.copy()
-    kept[list(records)] = True
-    numbers, stops = np.flatnonzero(kept), lines.stops[kept]
+    stored = known.copy()
+    stored[list(records)] = True
+    numbers, stops = np.flatnonzero(stored), lines.stops[stored]
     begins = np.concatenate(([len(layout.beginning)], stops[:-1]))[: len(stops)]
-    odd = ~known[kept] | (begins < lines.starts[kept])
+    odd = ~known[stored] | (begins < lines.starts[stored])
     spelling = {i: text[begins[i] : stops[i]] for i in np.flatnonzero(odd).tolist()}
     ending = text[stops[-1] if len(stops) else len(layout.beginning) :]
     whole = columns if len(numbers) == len(known) else Columns._make(column[numbers] for column in columns)
@@ -302,7 +302,7 @@ def _careful_record(line: bytes, where: str) -> Record:
     body = line.removesuffix(b"\n").removesuffix(b"\r")
     strange = next((i for i, c in enumerate(body) if not 32 <= c < 127), None)
     if strange is not None:
-        raise ValueError(f"{where}, column {strange + 1}: byte {body[strange]:#04x}; plain ASCII, no tab, is wanted")
+        raise ValueError(f"{where}, column {strange + 1}: byte {body[strange]:#04x}; expected plain ASCII, no tab")
     try:
         return read_record(body.decode("ascii"))
     except ValueError as error:

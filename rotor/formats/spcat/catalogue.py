@@ -93,8 +93,8 @@ class Catalogue(Table):
     def take(self, index: NDArray[Any] | slice) -> Catalogue:
         """The lines that a slice, a mask or an array of positions picks, in that order, with their spelling."""
         picked = np.arange(len(self))[index]
-        kept = self.layout.spelling
-        spelling = {i: kept[old] for i, old in enumerate(picked.tolist()) if old in kept} if kept else kept
+        spelled = self.layout.spelling
+        spelling = {i: spelled[old] for i, old in enumerate(picked.tolist()) if old in spelled} if spelled else spelled
         columns = {name: getattr(self, name)[index] for name in DTYPES}
         return Catalogue(**columns, layout=replace(self.layout, spelling=spelling))
 
@@ -162,12 +162,12 @@ def _column(name: str, values: Any, dtype: type[np.generic]) -> NDArray[Any]:
     given = np.asarray(values)
     axes = 2 if name.startswith("quanta") else 1
     if given.ndim != axes:
-        raise ValueError(f"{name} has shape {given.shape}; shape {'(n, 6)' if axes == 2 else '(n,)'} is wanted")
+        raise ValueError(f"{name} has shape {given.shape}; expected shape {'(n, 6)' if axes == 2 else '(n,)'}")
     if given.dtype == dtype:
         return given
     with np.errstate(invalid="ignore"):
         column = given.astype(dtype)
     if np.issubdtype(dtype, np.integer) and not np.array_equal(column, given):
         wrong = given[column != given].flat[0]
-        raise ValueError(f"{name} holds {wrong!r}; whole numbers that fit {np.dtype(dtype).name} are wanted")
+        raise ValueError(f"{name} holds {wrong!r}; expected whole numbers that fit {np.dtype(dtype).name}")
     return column

@@ -161,7 +161,7 @@ def _single_state(options: tuple[Options, ...]) -> Options:
 def constants_of(file: ParameterFile, *, errors: bool = False) -> Constants:
     """The named constants of a .par or .var file with one vibrational state and no spin.
 
-    Values of one code are added, as the field's program does. The reduction is told by the operators; where they
+    Values of one code are added, as the field's program does. The reduction follows from the operators; where they
     fit both, by the letter of the option line. With `errors` the errors of a .var file become uncertainties, of
     those constants that are one parameter and were not held (an error below 1e-30 holds one).
 

@@ -85,10 +85,10 @@ def _count(catalogue: Catalogue) -> int:
 def _ground(catalogue: Catalogue, width: int) -> Catalogue:
     """The lines whose quantum numbers beyond `width` are zero or blank, frequencies and errors in MHz."""
     beyond = np.concatenate([catalogue.quanta_upper[:, width:], catalogue.quanta_lower[:, width:]], axis=1)
-    kept = catalogue.take(((beyond == 0) | (beyond == BLANK)).all(axis=1))
-    frequency, error = in_mhz(kept)
-    plain = replace(kept.layout, decimals=(4, 4, 4, 4), spelling={})
-    return replace(kept, frequency_mhz=frequency, error_mhz=error, layout=plain)
+    chosen = catalogue.take(((beyond == 0) | (beyond == BLANK)).all(axis=1))
+    frequency, error = in_mhz(chosen)
+    plain = replace(chosen.layout, decimals=(4, 4, 4, 4), spelling={})
+    return replace(chosen, frequency_mhz=frequency, error_mhz=error, layout=plain)
 
 
 def _labels(catalogue: Catalogue, width: int) -> NDArray[np.int64]:

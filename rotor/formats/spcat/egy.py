@@ -73,7 +73,7 @@ def read_egy(source: str | os.PathLike[str] | bytes) -> LevelList:
     """The levels in an .egy file, packed or not, or in the bytes of one.
 
     A line without the colon before its quantum numbers is none of a level; it must be of a table of derivatives or
-    of a vector, which are kept, not read. Raises ValueError with file, line, column and the rule that is broken.
+    of a vector, which are preserved, not read. Raises ValueError with file, line, column and the rule that is broken.
     """
     levels: list[Level] = []
     texts: dict[int, str] = {}
@@ -148,9 +148,11 @@ def format_egy(levels: LevelList) -> bytes:
     """The text of a level list; each line as it was read, as long as it says the same."""
     texts = []
     for index in range(len(levels)):
-        level, kept = levels.level(index), levels.texts.get(index, "")
-        last = kept.rstrip("\r\n").rpartition("\n")[2]
-        texts.append(kept if kept and read_level(Line(last, index, "kept text")) == level else format_level(level))
+        level, stored = levels.level(index), levels.texts.get(index, "")
+        last = stored.rstrip("\r\n").rpartition("\n")[2]
+        texts.append(
+            stored if stored and read_level(Line(last, index, "stored text")) == level else format_level(level)
+        )
     return encode([*texts, levels.rest])
 
 

@@ -93,7 +93,7 @@ def read_decimal(text: str) -> float:
     """The number in a fixed field; blanks may stand around it, `D` exponents are those of Fortran."""
     match = _FIXED.match(text)
     if not match:
-        raise ValueError("a number such as '12.3456' is wanted, without a blank inside")
+        raise ValueError("expected a number such as '12.3456', without a blank inside")
     value = float(match[1].replace("d", "e").replace("D", "e"))
     if not math.isfinite(value):
         raise ValueError("the number is too large")
@@ -104,5 +104,5 @@ def read_whole(text: str) -> int:
     """The whole number in a fixed field; blanks may stand around it."""
     match = _WHOLE.match(text)
     if not match:
-        raise ValueError("a whole number is wanted, without a blank inside")
+        raise ValueError("expected a whole number, without a blank inside")
     return int(match[1])

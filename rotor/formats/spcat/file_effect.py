@@ -14,6 +14,7 @@ from rotor.formats.spcat.codes import AXES, split_code
 from rotor.formats.spcat.operators import CodedOperator, operator_of, plain_of_j
 from rotor.formats.spcat.par import Parameter
 from rotor.quantum.effect import QuantumEffect
+from rotor.quantum.moments import Moment
 from rotor.quantum.spins import Spin
 from rotor.quantum.spins.operators import EVERY_STATE, SpinTerm
 from rotor.quantum.states import Coupling, State
@@ -69,7 +70,7 @@ class FileEffect(QuantumEffect):
     """What the parameter lines of a file add up to for some of its states, which are numbered here from 0.
 
     lines: with the file's numbers of states. numbers: the states taken, in their order here. coupled: the spins by place. moments:
-    dipoles in debye by pairs of numbers here. limits: least and largest K of states, by number here.
+    dipoles in debye by pairs of numbers here. limits: least and largest K of states, by number here. others: moments of other kinds.
     """
 
     name: ClassVar[str] = ""
@@ -80,6 +81,7 @@ class FileEffect(QuantumEffect):
     coupled: tuple[Spin, ...]
     moments: dict[tuple[int, int], Vector]
     limits: dict[int, tuple[int, int]]
+    others: tuple[Moment, ...] = ()
 
     @cached_property
     def _own(self) -> tuple[tuple[CodedLine, tuple[int, int] | None], ...]:
@@ -145,6 +147,10 @@ class FileEffect(QuantumEffect):
     def dipoles(self, top: Top) -> dict[tuple[int, int], Vector]:
         """The dipoles of the .int file."""
         return dict(self.moments)
+
+    def other_moments(self, top: Top) -> tuple[Moment, ...]:
+        """The moments of other kinds of the .int file."""
+        return self.others
 
     def k_limits(self, top: Top) -> dict[int, tuple[int, int]]:
         """KNMIN and KNMAX where they leave K out."""

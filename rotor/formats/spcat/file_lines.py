@@ -28,7 +28,7 @@ from rotor.spectra.transitions import Transitions, all_transitions
 
 @dataclass(frozen=True)
 class Format:
-    """How a file's levels are called: columns of rotation (1, 2 or 3), whether v is told, spins at most, columns at most."""
+    """How a file's levels are called: columns of rotation (1, 2 or 3), whether v is listed, spins at most, columns at most."""
 
     rotation: int
     states: bool
@@ -158,10 +158,10 @@ _COLUMNS = ("frequency_mhz", "intensity", "energy_lower_mhz", "g_upper", "upper"
 
 def transitions_of(group: Group, levels: Levels) -> Transitions:
     """The transitions between levels of a group that exist."""
-    if not group.effect.moments:
+    if not (group.effect.moments or group.effect.others):
         none = np.zeros(0, dtype=np.int32)
         return Transitions(np.zeros(0), np.zeros(0), none, none)
-    found = all_transitions(levels, dict(group.effect.moments))
+    found = all_transitions(levels, dict(group.effect.moments), moments=group.effect.others)
     exists = (levels.weight[found.lower] > 0) & (levels.weight[found.upper] > 0)
     if exists.all():
         return found
@@ -188,9 +188,9 @@ def lines_of(group: Group, levels: Levels, found: Transitions, form: Format, req
     energy, kt = levels.energy_mhz[found.lower], request.temperature_k * units.MHZ_PER_K
     below = np.exp(-energy / kt) * -np.expm1(-found.frequency_mhz / kt)
     intensity = LGINT_NM2_MHZ / q * found.frequency_mhz * found.strength_debye2 / count * weight * below
-    kept = np.flatnonzero(within(request, found.frequency_mhz, intensity))
-    up, low = found.upper[kept], found.lower[kept]
-    columns = (found.frequency_mhz[kept], intensity[kept], energy[kept], levels.multiplicity[up] * weight[kept])
+    chosen = np.flatnonzero(within(request, found.frequency_mhz, intensity))
+    up, low = found.upper[chosen], found.lower[chosen]
+    columns = (found.frequency_mhz[chosen], intensity[chosen], energy[chosen], levels.multiplicity[up] * weight[chosen])
     pair = levels.components[up], levels.components[low]
     count = np.maximum(*pair)
     plus, minus = (quanta_of(group, levels, form, negative) for negative in (False, True))

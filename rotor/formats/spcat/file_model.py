@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,7 @@ from rotor.formats.spcat.int_file import Dipole, IntensityFile
 from rotor.formats.spcat.par import ParameterFile
 from rotor.formats.spcat.states import StateOptions, states_of
 from rotor.quantum.levels import Levels
+from rotor.quantum.moments import DEBYE_PER_BOHR_MAGNETON, Moment
 from rotor.quantum.solve import solve_levels
 from rotor.quantum.spins import Spin
 from rotor.quantum.spins.blocks import levels_of_f
@@ -47,7 +49,7 @@ class Group:
 
         The zero weights of levels that do not exist stay in the table.
         """
-        if self.spins:
+        if self.spins or self.effect.others:
             every = range(max(twice_f[0], sum(self.spins) % 2), twice_f[1] + 1, 2)
             exist = None if self.top.kind in ("prolate", "oblate", "linear") else self._exist
             levels = levels_of_f(self.top, (self.effect,), every, None, executor, exist)
@@ -97,11 +99,11 @@ def groups_of(file: ParameterFile, intensities: IntensityFile, *, as_spcat: bool
     first = file.options[0]
     oblate, symmetric = first.nvib < 0, first.spind < 0
     lines = coded_lines(file.parameters, len(states), oblate)
-    dipoles = dipoles_of(intensities.dipoles, len(states))
-    pairs = [line.states for line in lines if line.states] + list(dipoles)
+    dipoles, others = dipoles_of(intensities.dipoles, len(states))
+    pairs = [line.states for line in lines if line.states] + list(dipoles) + [code.states for _, code in others]
     _refuse_missing_spins(lines, states)
     return [
-        _group([states[v] for v in numbers], lines, dipoles, oblate, symmetric, as_spcat, file.title)
+        _group([states[v] for v in numbers], lines, (dipoles, others), oblate, symmetric, as_spcat, file.title)
         for numbers in _connected(len(states), pairs)
     ]
 
@@ -132,7 +134,7 @@ def _refuse_missing_spins(lines: list[CodedLine], states: tuple[StateOptions, ..
 def _group(
     states: list[StateOptions],
     lines: list[CodedLine],
-    dipoles: Dipoles,
+    light: tuple[Dipoles, list[tuple[Dipole, DipoleCode]]],
     oblate: bool,
     symmetric: bool,
     as_spcat: bool,
@@ -143,7 +145,12 @@ def _group(
     if any((state.spins, state.i_tot) != (spins, states[0].i_tot) for state in states):
         raise ValueError(f"states {numbers} are connected and have different spins: that is read but not computed yet")
     here = {v: place for place, v in enumerate(numbers)}
-    moments = {(here[b], here[a]): mu for (a, b), mu in dipoles.items() if a in here and b in here}
+    moments = {(here[b], here[a]): mu for (a, b), mu in light[0].items() if a in here and b in here}
+    others = tuple(
+        moment_of(dipole, code, (here[code.states[1]], here[code.states[0]]), len(spins))
+        for dipole, code in light[1]
+        if set(code.states) <= set(here)
+    )
     own = tuple(line for line in lines if line.states is None or set(line.states) <= set(here))
     usable = tuple(
         line for line in own if max((*line.operator.spins, 1 if line.operator.ns else 0), default=0) <= len(spins)
@@ -154,7 +161,7 @@ def _group(
     coupled = tuple(
         Spin(f"I{place}", twice, total="I_tot" if place >= paired else "") for place, twice in enumerate(spins, 1)
     )
-    effect = FileEffect(usable, numbers, coupled, moments, limits)
+    effect = FileEffect(usable, numbers, coupled, moments, limits, others)
     top = Top(_STANDS_FOR[kind, oblate], dipole_abc_debye=moments.get((0, 0), (0.0, 0.0, 0.0)), name=title)
     return Group(tuple(states), top, effect, oblate)
 
@@ -197,22 +204,80 @@ def _limits(states: list[StateOptions], as_spcat: bool) -> dict[int, tuple[int, 
     return found
 
 
-def dipoles_of(dipoles: Iterable[Dipole], states: int) -> Dipoles:
-    """(μa, μb, μc) in D by pairs of states, lower first; lines of one code are added.
+class DipoleCode(NamedTuple):
+    """The fields of a dipole's code, FC TYP I1 V2 V1 SYM: TYP with FC as its second digit, the states lower first."""
 
-    Raises ValueError for a dipole of another kind than a plain component along a, b or c.
+    typ: int
+    spin: int
+    states: tuple[int, int]
+    axis: int
+
+
+def split_dipole(code: int, states: int) -> DipoleCode:
+    """The fields of a code in a file with so many states.
+
+    >>> split_dipole(50001, 1), split_dipole(113, 2)
+    (DipoleCode(typ=5, spin=0, states=(0, 0), axis=1), DipoleCode(typ=0, spin=0, states=(1, 1), axis=3))
     """
-    found: dict[tuple[int, int], list[float]] = {}
     step = 10 ** (1 if states <= 9 else 2 if states <= 99 else 3)
+    rest, axis = divmod(abs(code), 10)
+    rest, v1 = divmod(rest, step)
+    rest, v2 = divmod(rest, step)
+    rest, spin = divmod(rest, 10)
+    second, typ = divmod(rest, 10)
+    low, high = sorted((v1, v2))
+    return DipoleCode(typ + 10 * second, spin, (low, high), axis)
+
+
+def dipoles_of(dipoles: Iterable[Dipole], states: int) -> tuple[Dipoles, list[tuple[Dipole, DipoleCode]]]:
+    """(μa, μb, μc) in D by pairs of states, lower first, lines of one code added; and the lines of other kinds."""
+    found: dict[tuple[int, int], list[float]] = {}
+    others = []
     for dipole in dipoles:
-        rest, axis = divmod(dipole.code, 10)
-        rest, v1 = divmod(rest, step)
-        kind, v2 = divmod(rest, step)
-        if kind or axis not in (1, 2, 3):
-            raise ValueError(
-                f"dipole {dipole.code}: a moment other than a component along a, b or c (1, 2, 3) is read but not computed yet"
-            )
-        low, high = sorted((v1, v2))
-        if high < states:
-            found.setdefault((low, high), [0.0, 0.0, 0.0])[axis - 1] += dipole.value
-    return {pair: (mu[0], mu[1], mu[2]) for pair, mu in found.items()}
+        code = split_dipole(dipole.code, states)
+        if code.states[1] >= states:
+            continue
+        if code.typ or code.spin or code.axis not in (1, 2, 3):
+            others.append((dipole, code))
+        else:
+            found.setdefault(code.states, [0.0, 0.0, 0.0])[code.axis - 1] += dipole.value
+    return {pair: (mu[0], mu[1], mu[2]) for pair, mu in found.items()}, others
+
+
+_POWERS = {3: "J", 4: "K", 5: "[J]", 9: "JJ", 10: "[[J]]"}  # TYP of electric moments
+NOT_YET = "is read but not computed yet"
+
+
+def moment_of(dipole: Dipole, code: DipoleCode, states: tuple[int, int], spins: int) -> Moment:
+    """A line of another kind than a plain component; states: as numbered in its group.
+
+    | TYP, I1, SYM | moment |
+    |---|---|
+    | 3, 4, 5, 9, 10; 0; 1, 2, 3 | {N², φ}/2, {Nz², φ}/2, [N², φ]/2, {N⁴, φ}/2, [N², [N², φ]]/4, in D |
+    | 0; 0 or a spin; 0 | N, or that spin, in Bohr magnetons |
+    | 1; a spin; 0 | S ½(3 Nz² - N²), in Bohr magnetons, as the program computes it (documented: φ_z S_z - ½ φ_x S_x - ½ φ_y S_y) |
+
+    Raises ValueError, with what it stands for, for any other.
+    """
+    if code.spin > spins:
+        raise ValueError(f"dipole {dipole.code}: spin {code.spin} is not among the {spins} that SPIND names")
+    if code.axis == 0 and code.states[0] == code.states[1]:
+        magnetons = dipole.value * DEBYE_PER_BOHR_MAGNETON
+        spin = f"I{code.spin}" if code.spin else ""
+        if code.typ == 0:
+            return Moment(magnetons, states, spin=spin)
+        if code.typ == 1 and spin:
+            return Moment(magnetons, states, powers="3K-J", spin=spin)
+    if code.axis in (1, 2, 3) and code.spin == 0 and code.typ in _POWERS:
+        along = (float(code.axis == 1), float(code.axis == 2), float(code.axis == 3))
+        return Moment(dipole.value, states, along, _POWERS[code.typ])
+    raise ValueError(f"dipole {dipole.code}: {_meaning(code)} {NOT_YET}")
+
+
+def _meaning(code: DipoleCode) -> str:
+    kinds = {1: "a moment of second order", 2: "a moment of second order", 6: "a moment of third order"}
+    kinds |= {7: "a moment times a cosine of internal rotation", 8: "a moment times a sine of internal rotation"}
+    what = kinds.get(code.typ, f"a moment of TYP {code.typ}")
+    if code.typ in (0, *_POWERS):
+        what = "a magnetic moment between two states" if code.axis == 0 else "a moment along an axis"
+    return what + (f" that acts on spin {code.spin}" if code.spin else "")

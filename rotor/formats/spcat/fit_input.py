@@ -83,8 +83,7 @@ def spfit_input(file: ParameterFile, lines: LineList, source: str = "") -> Spfit
     else:
         matrix, names = np.eye(len(file.parameters)), line_names(file)
         quanta = names_of_quanta(format_of(file, groups_for_fit(file)))
-        needed = [name for name, column in zip(names, columns, strict=True) if column >= 0]
-        model = partial(FileLevels.of, file, needed=needed)
+        model = partial(FileLevels.of, file)
     values = np.array([p.value for p in file.parameters])
     parameters = Parameters(
         names=_distinct([file.parameters[i].label or str(file.parameters[i].code) for i in free]),

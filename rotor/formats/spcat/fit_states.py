@@ -6,7 +6,7 @@ together, F by F, and only those F in which a line has a level. A level is found
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,15 +16,15 @@ from rotor.formats.spcat.file_lines import Format, format_of, quanta_of
 from rotor.formats.spcat.file_model import Group, groups_of
 from rotor.formats.spcat.int_file import IntensityFile, Request
 from rotor.formats.spcat.par import ParameterFile
-from rotor.quantum.derivatives import level_derivatives
+from rotor.quantum.effect_units import unit_levels
 from rotor.quantum.labelled import LevelModel
 from rotor.quantum.levels import Levels
-from rotor.quantum.solve import solve_levels
+from rotor.quantum.solve import solve_rotation
 from rotor.quantum.spins.blocks import levels_of_f
+from rotor.quantum.unit_blocks import UnitBlocks
 
 _NO_REQUEST = IntensityFile("", Request(), ())
 _AT_ZERO = 1e-30  # MHz: a free parameter that starts at 0 must not be left out of the Hamiltonian
-CLEAR = 0.6  # share of the function that names a level below which its label is doubtful
 
 
 def groups_for_fit(file: ParameterFile) -> list[Group]:
@@ -41,6 +41,8 @@ def names_of_quanta(form: Format) -> tuple[str, ...]:
     """
     rotation = {1: ("n",), 2: ("n", "k"), 3: ("n", "ka", "kc")}[form.rotation]
     spins = [f"f{i}" for i in range(1, form.spins)] + ["f"] if form.spins else []
+    if form.i_tot and len(spins) > 1:
+        spins[-2] = "i_tot"
     if form.aggregate:
         spins = ["pattern", "f"]
     names = (*rotation, *(["v"] if form.states else []), *spins)
@@ -49,71 +51,46 @@ def names_of_quanta(form: Format) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class _Solved:
-    """A group with the labels that lie in it: their places among all, the doubled F or J to solve, internal quantum numbers."""
+    """A group with the labels that lie in it: their places among all, the parameters that it has, and its blocks."""
 
-    group: Group
     rows: Ints
-    angular: tuple[int, ...]
-    quanta: dict[str, Ints]
-    names: tuple[str, ...]  # of the parameters that the group has
+    columns: Ints
+    blocks: UnitBlocks
 
 
 @dataclass(frozen=True)
 class FileLevels(LevelModel):
-    """Energies of the labelled levels of a file; names: its parameter lines as code#place. needed: which have derivatives."""
+    """Energies of the labelled levels of a file; names: its parameter lines as code#place."""
 
     names: tuple[str, ...]
     count: int
     solved: tuple[_Solved, ...]
-    needed: frozenset[str]
 
     @classmethod
-    def of(cls, file: ParameterFile, labels: Ints, needed: Iterable[str]) -> FileLevels:
+    def of(cls, file: ParameterFile, labels: Ints) -> FileLevels:
         """The model for labels as the file prints them.
 
         Raises ValueError for labels that no level has, with the first of them, and for what does not compute.
         """
         groups = groups_for_fit(file)
-        form = format_of(file, groups)
-        parts = [_with_labels(group, form, labels) for group in groups]
+        form, names = format_of(file, groups), line_names(file)
+        values = np.array([p.value for p in file.parameters])
+        parts = [part for group in groups if (part := _with_labels(group, form, labels, names, values))]
         found = np.concatenate([part.rows for part in parts]) if parts else np.zeros(0, np.int64)
         lost = np.setdiff1d(np.arange(len(labels)), found)
         if len(lost):
-            first = " ".join(map(str, labels[lost[0]].tolist()))
+            first = " ".join(map(str, labels[int(lost[0])].tolist()))
             raise ValueError(f"there is no level {first} ({', '.join(names_of_quanta(form))}) in this model")
-        return cls(line_names(file), len(labels), tuple(part for part in parts if len(part.rows)), frozenset(needed))
+        return cls(names, len(labels), tuple(parts))
 
     def levels(self, values_mhz: Floats) -> tuple[Floats, Floats]:
         """See `LevelModel`."""
         energies, slopes = np.empty(self.count), np.zeros((self.count, len(self.names)))
-        column = {name: place for place, name in enumerate(self.names)}
         for part in self.solved:
-            levels, rows = self._solve(part, values_mhz)
-            energies[part.rows] = levels.energy_mhz[rows]
-            names = [name for name in part.names if name in self.needed]
-            derived = level_derivatives(part.group.top, levels, names, rows)
-            columns = np.array([column[name] for name in names], dtype=np.int64)
-            slopes[np.ix_(part.rows, columns)] = derived
+            found, derived = part.blocks.levels(values_mhz[part.columns])
+            energies[part.rows] = found
+            slopes[part.rows[:, None], part.columns] = derived
         return energies, slopes
-
-    def doubtful(self, values_mhz: Floats) -> Ints:
-        """Labels, by position, whose level is named by a function that has less than 0.6 of it."""
-        out = []
-        for part in self.solved:
-            levels, rows = self._solve(part, values_mhz)
-            if levels.mixing is not None:
-                out.append(part.rows[levels.mixing[rows] < CLEAR])
-        return np.sort(np.concatenate(out)) if out else np.zeros(0, dtype=np.int64)
-
-    def _solve(self, part: _Solved, values_mhz: Floats) -> tuple[Levels, Ints]:
-        value = dict(zip(self.names, values_mhz.tolist(), strict=True))
-        lines = tuple(line._replace(value=value[line.name]) for line in part.group.effect.lines)
-        group = replace(part.group, effect=replace(part.group.effect, lines=lines))
-        levels = _levels(group, part.angular)
-        rows = levels.rows_of(**part.quanta)
-        if (rows < 0).any():
-            raise ValueError("a labelled level is no longer there with these constants")
-        return levels, rows
 
 
 def line_names(file: ParameterFile) -> tuple[str, ...]:
@@ -122,19 +99,18 @@ def line_names(file: ParameterFile) -> tuple[str, ...]:
 
 
 def _levels(group: Group, angular: Sequence[int]) -> Levels:
-    """The levels of the doubled F, or J, that are listed."""
+    """The levels of the doubled F, or J, that are listed, in blocks."""
     if group.spins:
         return levels_of_f(group.top, (group.effect,), angular, None, None)
     j = [value // 2 for value in angular]
-    return solve_levels(group.top, max(j), jmin=min(j), effects=(group.effect,))
+    return solve_rotation(group.top, (group.effect,), min(j), max(j), in_blocks=True)
 
 
-def _with_labels(group: Group, form: Format, labels: Ints) -> _Solved:
-    """Which labels lie in the group, found in its levels by the quantum numbers that the file prints."""
+def _with_labels(group: Group, form: Format, labels: Ints, names: Sequence[str], values: Floats) -> _Solved | None:
+    """The labels that lie in the group, found in its levels by the quantum numbers that the file prints; None without any."""
     here = _of_group(group, form, labels)
-    names = tuple(group.effect.parameters(group.top))
     if not len(here):
-        return _Solved(group, here, (), {}, names)
+        return None
     total = labels[here, -1] if form.spins else labels[here, 0]
     half = sum(group.spins) % 2
     angular = tuple(sorted({2 * int(f) - half for f in total}))
@@ -145,11 +121,14 @@ def _with_labels(group: Group, form: Format, labels: Ints) -> _Solved:
     for negative in (True, False):
         for row, label in enumerate(map(tuple, quanta_of(group, levels, form, negative).tolist())):
             rows_by_label.setdefault(label, row)
-    asked = [tuple(label) for label in labels[here].tolist()]
-    rows = np.array([_row(rows_by_label, label, form) for label in asked])
+    rows = np.array([_row(rows_by_label, tuple(label), form) for label in labels[here].tolist()])
     found = rows >= 0
-    quanta = {name: np.asarray(column)[rows[found]] for name, column in levels.quanta.items()}
-    return _Solved(group, here[found], angular, quanta, names)
+    if not found.any():
+        return None
+    own = tuple(group.effect.parameters(group.top))
+    columns = np.array([names.index(name) for name in own])
+    blocks = unit_levels(group.top, levels, rows[found], own, np.where(values == 0, _AT_ZERO, values)[columns])
+    return _Solved(here[found], columns, blocks)
 
 
 def _of_group(group: Group, form: Format, labels: Ints) -> Ints:

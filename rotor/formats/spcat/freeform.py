@@ -124,7 +124,7 @@ def whole(line: Line, words: Sequence[Word], index: int, name: str, default: int
             raise line.error(word.column, f"{name} is missing")
         return default
     if not _WHOLE.match(word.text) or len(word.text) > 30:
-        raise line.error(word.column, f"{name} = {word.text}: a whole number is wanted")
+        raise line.error(word.column, f"{name} = {word.text}: expected a whole number")
     return int(word.text.split(".")[0])
 
 

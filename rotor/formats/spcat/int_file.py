@@ -14,7 +14,7 @@ from rotor.formats.spcat.freeform import Line, encode, number, read_lines, read_
 class Request:
     """Line 2 of an .int file.
 
-    flags: digits for output wanted, 1000 and more when constants are in cm⁻¹. tag: the species. qrot: partition
+    flags: digits for the output asked for, 1000 and more when constants are in cm⁻¹. tag: the species. qrot: partition
     function at temperature_k. fbgn, fend: range of F, rounded up, not of N. str0, str1: a line is left out when its
     LGINT is below log10(10^str0 + (ν/300 GHz)² 10^str1). fqlim_ghz: highest frequency. maxv: highest state.
     """
@@ -69,7 +69,7 @@ def read_int(source: str | os.PathLike[str] | bytes) -> IntensityFile:
     if len(lines) < 2:
         name = lines[0].file if lines else "the text given"
         raise ValueError(
-            f"{name}: {len(lines)} lines; a title, a line FLAGS TAG QROT FBGN FEND ... and dipoles are wanted"
+            f"{name}: {len(lines)} lines; expected a title, a line FLAGS TAG QROT FBGN FEND ... and dipoles"
         )
     end = next((i for i, line in enumerate(lines) if i >= 2 and line.blank), len(lines))
     dipoles = tuple(_dipole(line) for line in lines[2:end])
@@ -103,13 +103,13 @@ def format_int(file: IntensityFile) -> bytes:
     """The text of an .int file; each line as it was read, as long as it says the same."""
     if "\n" in file.title or "\r" in file.title:
         raise ValueError(f"{file.title!r}: a title is one line")
-    kept = file.title_text and _title(Line(file.title_text, 1, "")) == file.title
-    pieces = [file.title_text if kept else file.title + "\n"]
+    stored = file.title_text and _title(Line(file.title_text, 1, "")) == file.title
+    pieces = [file.title_text if stored else file.title + "\n"]
     request = file.request
-    same = request.text and _request(Line(request.text, 2, "kept text")) == request
+    same = request.text and _request(Line(request.text, 2, "stored text")) == request
     pieces.append(request.text if same else _request_text(request))
     for dipole in file.dipoles:
-        same = dipole.text and _dipole(Line(dipole.text, 3, "kept text")) == dipole
+        same = dipole.text and _dipole(Line(dipole.text, 3, "stored text")) == dipole
         pieces.append(dipole.text if same else f"{'-' if dipole.grouped else ''}{dipole.code} {dipole.value!r}\n")
     return encode([*pieces, file.rest])
 

@@ -48,7 +48,7 @@ class LineList:
         n = len(self.frequency)
         shapes = {name: np.shape(getattr(self, name)) for name in ("quanta", "frequency", "error", "weight")}
         if shapes != {"quanta": (n, QUANTA_FIELDS), "frequency": (n,), "error": (n,), "weight": (n,)}:
-            raise ValueError(f"columns of shapes {shapes}; quanta (n, {QUANTA_FIELDS}) and the others (n,) are wanted")
+            raise ValueError(f"columns of shapes {shapes}; expected quanta (n, {QUANTA_FIELDS}) and the others (n,)")
 
     def __len__(self) -> int:
         return len(self.frequency)
@@ -105,7 +105,7 @@ class LineList:
 def read_lin(source: str | os.PathLike[str] | bytes) -> LineList:
     """The lines in a .lin file, or in the bytes of one.
 
-    As in the field's program a blank line ends the list, unless it stands at the beginning; text behind it is kept.
+    As in the field's program a blank line ends the list, unless it stands at the beginning; text behind it is preserved.
     Raises ValueError with file, line, column and the rule that is broken; nothing is skipped in silence.
     """
     lines = read_lines(source)
@@ -146,7 +146,7 @@ def _quanta(line: Line, text: str) -> tuple[int, ...]:
             raise line.error(column, f"quantum number reads {part!r}; {error}") from None
     if not quanta or len(quanta) % 2:
         raise line.error(
-            3 * len(quanta), f"{len(quanta)} quantum numbers; as many for the upper state as for the lower are wanted"
+            3 * len(quanta), f"{len(quanta)} quantum numbers; expected as many for the upper state as for the lower"
         )
     return tuple(quanta)
 
@@ -157,9 +157,9 @@ def format_lin(lines: LineList) -> bytes:
 
 
 def _line_text(lines: LineList, index: int) -> str:
-    measured, kept = lines.measured(index), lines.texts.get(index, "")
-    if kept and read_measured(Line(kept.rstrip("\r\n").rpartition("\n")[2], index, "kept text")) == measured:
-        return kept
+    measured, stored = lines.measured(index), lines.texts.get(index, "")
+    if stored and read_measured(Line(stored.rstrip("\r\n").rpartition("\n")[2], index, "stored text")) == measured:
+        return stored
     wrong = next((q for q in measured.quanta if not -99 <= q <= 999), None)
     if wrong is not None or not measured.quanta or len(measured.quanta) % 2:
         raise ValueError(

@@ -58,7 +58,7 @@ def error_cap(decimals: int) -> float:
 def read_record(text: str) -> Record:
     """The numbers of a line without its end.
 
-    Raises ValueError that names the column, the field and the rule; whoever calls adds file and line.
+    Raises ValueError that names the column, the field and the rule; the caller adds file and line.
     """
     if len(text) < QUANTA:
         raise ValueError(

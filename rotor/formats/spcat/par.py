@@ -95,7 +95,7 @@ def read_par(source: str | os.PathLike[str] | bytes) -> ParameterFile:
     lines = read_lines(source)
     if len(lines) < 3:
         name = lines[0].file if lines else "the text given"
-        raise ValueError(f"{name}: {len(lines)} lines; a title, limits, options and parameters are wanted")
+        raise ValueError(f"{name}: {len(lines)} lines; expected a title, limits, options and parameters")
     header = _header(lines[1])
     options = [_options(lines[2])]
     while options[-1].vsym < 0:
@@ -173,7 +173,7 @@ def _defaults(file: ParameterFile, at: int) -> Options:
 def _kept(thing: Any, read: Any) -> str:
     """The text a thing was read from if reading it gives the thing, otherwise nothing."""
     text: str = thing.text
-    return text if text and read(Line(text, 0, "kept text")) == thing else ""
+    return text if text and read(Line(text, 0, "stored text")) == thing else ""
 
 
 def _line(text: str) -> str:
@@ -189,7 +189,7 @@ def _header_text(h: Header) -> str:
 
 def _options_text(options: Options) -> str:
     if not re.fullmatch("[A-Za-z]", options.chr):
-        raise ValueError(f"CHR is {options.chr!r}; one letter is wanted")
+        raise ValueError(f"CHR is {options.chr!r}; expected one letter")
     return options.chr + "".join(f" {getattr(options, name):4d}" for name in _OPTIONS) + "\n"
 
 

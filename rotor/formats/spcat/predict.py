@@ -88,8 +88,8 @@ def predict(
     >>> from rotor.formats.spcat.int_file import read_int
     >>> from rotor.formats.spcat.par import read_par
     >>> file = read_par(b"OCS\\n 1 0 0 0\\nl -1 1 0 0\\n 100 6081.492 0\\n")
-    >>> wanted = read_int(b"OCS\\n 0 60503 1028.6 0 3 -9 -9 99 300\\n 1 0.71519\\n")
-    >>> predict(file, wanted).catalogue.frequency_mhz.round(3).tolist()
+    >>> expected = read_int(b"OCS\\n 0 60503 1028.6 0 3 -9 -9 99 300\\n 1 0.71519\\n")
+    >>> predict(file, expected).catalogue.frequency_mhz.round(3).tolist()
     [12162.984, 24325.968, 36488.952]
     """
     options, request = parameters.options[0], intensities.request
@@ -107,7 +107,7 @@ def predict(
     top = top_of(parameters, intensities)
     common = common_weight(options)
     q = summed_q(top, options, request.temperature_k).q if own_q else request.qrot
-    lines = _wanted_lines(top, request, q / common)
+    lines = _lines_asked_for(top, request, q / common)
     return Prediction(
         catalogue=_as_the_program_lists(lines, options, common, request.tag),
         lines=lines,
@@ -129,7 +129,7 @@ def _ground_mhz(top: Top) -> float:
     return solve_levels(top, 3, vectors=False).ground_mhz
 
 
-def _wanted_lines(top: Top, request: Request, q_reduced: float) -> Lines:
+def _lines_asked_for(top: Top, request: Request, q_reduced: float) -> Lines:
     """The lines within the request's limits. `Lines` counts energies from the lowest level, QROT from zero."""
     t = request.temperature_k
     above_zero = _ground_mhz(top) / units.MHZ_PER_K / t if math.isfinite(t) and t > 0 else 0.0

@@ -134,8 +134,8 @@ def _lines(
         range_mhz=(LEAST_MHZ, request.fqlim_ghz * 1e3),
         given_partition=PartitionFunction(t, q * above, None, math.nan, "given"),
     )
-    kept = within(request, lines.frequency_mhz, lines.intensity_nm2_mhz / levels.components[lines.lower])
-    return lines.where(kept).sorted()
+    chosen = within(request, lines.frequency_mhz, lines.intensity_nm2_mhz / levels.components[lines.lower])
+    return lines.where(chosen).sorted()
 
 
 def _joined(tables: list[tuple[Group, Levels]], form: Format) -> Levels:

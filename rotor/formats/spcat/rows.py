@@ -70,7 +70,7 @@ def round_decimal(values: NDArray[np.float64], decimals: int) -> tuple[NDArray[n
 
 
 def _put_digits(out: Text, magnitude: NDArray[np.int64], negative: Mask) -> Mask:
-    """Whole numbers with their sign, right-justified; false where they need more room than `out` has."""
+    """Whole numbers with their sign, right-justified; false where they need more space than `out` has."""
     left, sign = magnitude, negative
     for column in range(out.shape[1] - 1, -1, -1):
         left, digit = np.divmod(left, 10)
@@ -152,7 +152,7 @@ def _take_number(digits: Text, characters: Text, field: slice, decimals: int | N
 def take_rows(text: Text, width: int, decimals: tuple[int, int, int, int]) -> Columns:
     """The numbers of lines `text` (n, 55 + 4 width at least), taken to be as `put_rows` writes them.
 
-    Nothing is checked here: whoever calls puts the numbers into rows again and compares the characters.
+    Nothing is checked here: the caller puts the numbers into rows again and compares the characters.
     """
     head = np.ascontiguousarray(text[:, :QUANTA].T)
     digits = head - _ZERO

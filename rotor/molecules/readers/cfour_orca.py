@@ -27,7 +27,7 @@ class Read:
     atomnos: list[int]
     atomcoords: list[Floats]
     charge: int
-    moments: list[Floats] = field(default_factory=list)  # a point of reference, which nobody looks at, and the dipole
+    moments: list[Floats] = field(default_factory=list)  # a point of reference, which is not used, and the dipole
     polarizabilities: list[Floats] = field(default_factory=list)
     atommasses: Floats = field(default_factory=lambda: np.zeros(0))
 
@@ -59,7 +59,7 @@ def read_plain(output: Output) -> Read:
 
 
 def unread(output: Output) -> tuple[str, ...]:
-    """Notes on what such an output holds and nobody reads."""
+    """Notes on what such an output holds and is not read."""
     if output.program.name == "CFOUR" and any("polarizabilit" in line.lower() for line in output.lines):
         return (f"{output.where}: CFOUR's polarizability was not taken: how it is printed is not known here",)
     return ()
@@ -95,7 +95,7 @@ def _three(output: Output, i: int, pattern: str) -> Floats:
     try:
         return np.array([float(word) for word in (found.groups() if found else [""])])
     except ValueError:
-        raise output.refuse(i, "three numbers of a dipole are wanted here") from None
+        raise output.refuse(i, "expected three numbers of a dipole here") from None
 
 
 def _polarizability(output: Output) -> Floats | None:

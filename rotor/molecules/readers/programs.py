@@ -110,7 +110,7 @@ def refuse_unreadable(output: Output) -> None:
     for i, may_have_d in _used_lines(output):
         line = output.lines[i]
         if "**" in line:
-            raise output.refuse(i, "asterisks stand where a number did not fit; print it with more room")
+            raise output.refuse(i, "asterisks stand where a number did not fit; print it with more digits")
         if not may_have_d and re.search(r"\d[dD][+-]?\d", line):
             raise output.refuse(i, f"a D exponent where {output.program.name} prints none; write E, or run it again")
 

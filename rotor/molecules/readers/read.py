@@ -94,7 +94,7 @@ def _read_file(path: Path) -> Molecule:
 
 
 def parse_molecule(text: str, where: str) -> Molecule:
-    """The molecule in xyz or sdf text, told apart by the line `M  END` or the version on the fourth line."""
+    """The molecule in xyz or sdf text, distinguished by the line `M  END` or the version on the fourth line."""
     head = text.splitlines()[:4]
     if "M  END" in text or (len(head) == 4 and head[3].rstrip().endswith(("V2000", "V3000"))):
         return parse_sdf(text, where)

@@ -106,12 +106,12 @@ def conformers(text: str, count: int = CONFORMERS) -> tuple[Conformer, ...]:
     [0.0, 3.3]
     """
     if count < 1:
-        raise ValueError(f"{count} conformers: 1 or more are wanted")
+        raise ValueError(f"{count} conformers: expected 1 or more")
     mol = _parsed(text)
     energies, field = _optimised(mol, text, count)
     typical, doubts = _trust(mol, field)
     lowest = min(energies)
-    kept: list[Conformer] = []
+    distinct: list[Conformer] = []
     for place in sorted(range(len(energies)), key=lambda i: energies[i]):
         energy = (energies[place] - lowest) * KJ_PER_KCAL
         if not np.isfinite(energy):  # its optimisation did not converge
@@ -119,9 +119,9 @@ def conformers(text: str, count: int = CONFORMERS) -> tuple[Conformer, ...]:
         molecule = from_rdkit(mol, conformer=place, name=text)
         source = f"SMILES {text}: {field} geometry, of {len(energies)} conformers" if field else "one atom"
         one = Conformer(replace(molecule, source=source, uncertainty=typical, notes=(*doubts, *molecule.notes)), energy)
-        if not any(_same_conformer(one, other) for other in kept):
-            kept.append(one)
-    return tuple(kept)
+        if not any(_same_conformer(one, other) for other in distinct):
+            distinct.append(one)
+    return tuple(distinct)
 
 
 def _same_conformer(one: Conformer, other: Conformer) -> bool:
@@ -140,7 +140,7 @@ def _planar_moments(molecule: Molecule) -> Floats:
 def from_rdkit(mol: Any, conformer: int = -1, name: str = "") -> Molecule:
     """A molecule from an `rdkit.Chem.Mol` that has hydrogens and a conformer in 3D.
 
-    Isotope labels and formal charges are kept; the dipole is estimated from MMFF94 charges where there are any.
+    Isotope labels and formal charges are preserved; the dipole is estimated from MMFF94 charges where there are any.
     Raises ValueError without a conformer, with a flat drawing for one, or with hydrogens left implicit.
     """
     from rdkit import rdBase
@@ -161,7 +161,7 @@ def from_rdkit(mol: Any, conformer: int = -1, name: str = "") -> Molecule:
 
 
 def parse_sdf(text: str, where: str = "sdf text") -> Molecule:
-    """The molecule in the text of a mol or sdf file; isotope labels are kept.
+    """The molecule in the text of a mol or sdf file; isotope labels are preserved.
 
     Raises ValueError for text that RDKit does not read, with its reason, for several molecules, a flat drawing, or
     hydrogens left out.
@@ -171,7 +171,7 @@ def parse_sdf(text: str, where: str = "sdf text") -> Molecule:
     lines = text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
     blocks = [block for block in re.split(r"^\$\$\$\$.*$", lines, flags=re.M) if block.strip()]
     if len(blocks) != 1:
-        raise ValueError(f"{where}: {len(blocks)} molecules; a file with one is wanted")
+        raise ValueError(f"{where}: {len(blocks)} molecules; expected a file with one")
     if "M  END" not in blocks[0]:
         raise ValueError(f"{where}: the line 'M  END' is missing; the file was cut or is no mol or sdf file")
     _refuse_bad_coordinates(blocks[0], where)

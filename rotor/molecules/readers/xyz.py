@@ -58,7 +58,7 @@ def parse_xyz(text: str, where: str = "xyz text") -> Molecule:
     Returns
     -------
     Molecule
-        Further columns are not kept and a note says so; likewise a periodic cell.
+        Further columns are not read and a note says so; likewise a periodic cell.
 
     Raises
     ------
@@ -201,5 +201,5 @@ def _number(word: str, where: str) -> float:
     elif "," in word:
         hint = "write a decimal point and separate columns by blanks"
     else:
-        hint = "a finite number in Å such as -0.7572 is wanted"
+        hint = "expected a finite number in Å such as -0.7572"
     raise ValueError(f"{where}: {word!r:.40} is not a number; {hint}")

@@ -174,8 +174,8 @@ def _candidates(labels: Ints, points: Floats, base: tuple[int, int], reach: floa
     if len(firsts) * len(seconds) > 20 * MOST_CANDIDATES:
         raise ValueError(_too_many(len(firsts) * len(seconds), reach))
     apart = np.linalg.norm(points[firsts][:, None] - points[seconds][None], axis=2)
-    wanted = float(np.linalg.norm(points[base[0]] - points[base[1]]))
-    pairs = np.argwhere(np.abs(apart - wanted) <= 2 * reach)
+    expected = float(np.linalg.norm(points[base[0]] - points[base[1]]))
+    pairs = np.argwhere(np.abs(apart - expected) <= 2 * reach)
     if len(pairs) > MOST_CANDIDATES:
         raise ValueError(_too_many(len(pairs), reach))
 
@@ -241,11 +241,11 @@ def closed_group(operations: Iterable[Operation], base: tuple[int, int], reach: 
     Where a limit cuts through a group (one element just within, its product just without) the limit is lowered
     until the set closes; the identity alone always does.
     """
-    kept = sorted((o for o in operations if o.mismatch_angstrom <= reach), key=lambda o: o.mismatch_angstrom)
-    while not _is_closed(kept, base):
-        worst = kept[-1].mismatch_angstrom
-        kept = [o for o in kept if o.mismatch_angstrom < worst]
-    return kept
+    remaining = sorted((o for o in operations if o.mismatch_angstrom <= reach), key=lambda o: o.mismatch_angstrom)
+    while not _is_closed(remaining, base):
+        worst = remaining[-1].mismatch_angstrom
+        remaining = [o for o in remaining if o.mismatch_angstrom < worst]
+    return remaining
 
 
 def _is_closed(operations: list[Operation], base: tuple[int, int]) -> bool:

@@ -94,7 +94,7 @@ class Symmetry:
 
 
 def symmetry_of(molecule: Molecule, tolerance: float = TOLERANCE) -> Symmetry:
-    """The symmetry of a molecule's nuclei, isotopes told apart; see `find_symmetry`.
+    """The symmetry of a molecule's nuclei, isotopes distinguished; see `find_symmetry`.
 
     >>> water = Molecule(("O", "H", "H"), [[0, 0, 0.1173], [0, 0.7572, -0.4692], [0, -0.7572, -0.4692]])
     >>> symmetry_of(water).point_group, symmetry_of(water.with_isotopes("2=2H")).point_group
@@ -137,7 +137,7 @@ def find_symmetry(
     """
     labels, masses, points = _checked(kinds, masses_u, positions_angstrom)
     if not 0 < tolerance <= NEAR:
-        raise ValueError(f"tolerance {tolerance}: a part of the shortest distance, above 0 and up to {NEAR}, is wanted")
+        raise ValueError(f"tolerance {tolerance}: expected a part of the shortest distance, above 0 and up to {NEAR}")
     if len(points) == 1:
         return _of_atom(tolerance)
 
@@ -167,8 +167,8 @@ def _checked(kinds: Sequence[Hashable], masses_u: ArrayLike, positions: ArrayLik
     n = len(kinds)
     if not n or masses.shape != (n,) or points.shape != (n, 3):
         raise ValueError(
-            f"{n} kinds, masses of shape {masses.shape}, positions of shape {points.shape}: n, (n,) and (n, 3) are "
-            "wanted, n of 1 or more"
+            f"{n} kinds, masses of shape {masses.shape}, positions of shape {points.shape}: expected n, (n,) and "
+            "(n, 3), n of 1 or more"
         )
     if not (np.isfinite(masses).all() and (masses > 0).all() and np.isfinite(points).all()):
         raise ValueError("masses must be finite and above 0, positions finite")

@@ -134,7 +134,7 @@ SEMI_RIGID: tuple[QuantumEffect, ...] = (Rigid(), Centrifugal())
 
 
 def scalar_energy(operators: Operators, j: int) -> float:
-    """The part that is one number for the whole of J, Σ c X^p, kept out of the matrices for the sake of digits."""
+    """The part that is one number for the whole of J, Σ c X^p, left out of the matrices for the sake of digits."""
     x = j * (j + 1)
     return float(sum(c * x**p for (p, q, n), c in operators.items() if q == n == 0))
 

@@ -200,7 +200,7 @@ def _solved(
     if not np.isfinite(matrix).all():
         raise ValueError("a block of the Hamiltonian overflows: N max is too high for these constants")
     energies, vectors = np.linalg.eigh(matrix)  # reads the lower triangle
-    labels, mixing = _labels(parts, every, vectors)
+    labels, mixing = labels_of(parts, every, vectors)
     return SpinBlock(twice_f, every, parts, energies + zero, vectors, labels, mixing, plan.shared)
 
 
@@ -236,7 +236,7 @@ def _of_exchange(scheme: Scheme, channel: Channel, every: Ints) -> Floats:
     return np.asarray(turn.T @ found @ turn)
 
 
-def _labels(parts: tuple[SpinPart, ...], every: Ints, vectors: Floats) -> tuple[Ints, Floats]:
+def labels_of(parts: tuple[SpinPart, ...], every: Ints, vectors: Floats) -> tuple[Ints, Floats]:
     """Names (n, 3 + pattern) of the states of a block, energies rising, and the shares of the sub-blocks that give them."""
     shares: list[Floats] = []
     names = _names(parts, every)
@@ -307,9 +307,9 @@ def levels_of_f(
 
 def _within(block: SpinBlock, n_range: tuple[int, int]) -> SpinBlock:
     n = block.labels[:, 3] // 2
-    kept = (n >= n_range[0]) & (n <= n_range[1])
-    cut = {name: getattr(block, name)[kept] for name in ("energies_mhz", "labels", "mixing")}
-    return replace(block, vectors=block.vectors[:, kept], **cut)
+    chosen = (n >= n_range[0]) & (n <= n_range[1])
+    cut = {name: getattr(block, name)[chosen] for name in ("energies_mhz", "labels", "mixing")}
+    return replace(block, vectors=block.vectors[:, chosen], **cut)
 
 
 def _placed(blocks: Iterable[SpinBlock]) -> Iterator[SpinBlock]:

@@ -158,6 +158,25 @@ def tensor_coefficients(spins: tuple[int, ...], rank: int, bra: Ints, ket: Ints)
     return total
 
 
+def moment_coefficients(spins: tuple[int, ...], rank: int, acting: int | None, bra: Ints, ket: Ints) -> Floats:
+    """⟨p'‖V‖p⟩ over ⟨N'‖T^L‖N⟩ of a vector V: T^1 itself (acting None), S of one spin (L = 0), or Σ_q T²_pq S_q (L = 2).
+
+    T^0 is given as a plain matrix, not as a reduced one.
+    """
+    if acting is None:
+        return tensor_coefficients(spins, rank, bra, ket)
+    left, right = bra[:, None, :], ket[None, :, :]
+    alike = left[..., 0] == right[..., 0]
+    total = np.where(alike, np.sqrt(left[..., 0] + 1.0), 0.0) if rank == 0 else np.full(alike.shape, _RECOUPLED[2])
+    for place, spin in enumerate(spins):
+        pair = left[..., place : place + 2], right[..., place : place + 2]
+        if place == acting:
+            total = total * opened(*pair, spin, rank) * reduced_spin(spin, 1)
+        else:
+            total = total * passed_on(*pair, spin, rank if place < acting else 1)
+    return np.asarray(total)
+
+
 def n_dot_s(pattern: Ints, spin: int) -> Floats:
     """N·S of the first spin, (n,): ½[J(J+1) - N(N+1) - S(S+1)]."""
     n, j = pattern[:, 0], pattern[:, 1]

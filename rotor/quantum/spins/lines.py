@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     from rotor.quantum.effect import QuantumEffect
     from rotor.tops.top import Top
 
+ROUND_OFF = 1e-13  # of sums of products of a few coefficients of size 1
+
 
 def amplitudes(up: SpinBlock, low: SpinBlock, tensors: Tensors) -> Floats:
     """Real reduced elements between all states of two blocks, (n_up, n_low); their squares are line strengths."""
@@ -55,9 +57,11 @@ def _acting(up: SpinBlock, low: SpinBlock, tensors: Tensors, rank: int) -> list[
         return []
     held, known = low.shared.cache.setdefault(id(tensors), (tensors, {}))
     del held  # the cache holds the tensors, so that their id stays theirs
-    found = []
+    found, t = [], _coefficients(up, low, rank)
     for target in up.parts:
         for source in low.parts:
+            if not t[target.patterns, source.patterns].any():
+                continue
             if abs(target.rotor.n - source.rotor.n) <= rank:
                 key = (target.number, source.number)
                 if key not in known:
@@ -96,7 +100,8 @@ def _tensor_coefficients(scheme: Scheme, rank: int, bra: Ints, ket: Ints) -> Flo
         return tensor_coefficients(scheme.twice, rank, bra, ket)
     plain = [patterns(scheme.twice, int(own[0, -1])) for own in (bra, ket)]
     left, right = (recoupling(scheme.twice, one, own) for one, own in zip(plain, (bra, ket), strict=True))
-    return np.asarray(left.T @ tensor_coefficients(scheme.twice, rank, *plain) @ right)
+    found = left.T @ tensor_coefficients(scheme.twice, rank, *plain) @ right
+    return np.where(np.abs(found) > ROUND_OFF, found, 0.0)
 
 
 def derivatives(top: Top, levels: Levels, names: Sequence[str], rows: Ints) -> Floats:
@@ -106,13 +111,13 @@ def derivatives(top: Top, levels: Levels, names: Sequence[str], rows: Ints) -> F
         raise ValueError("these levels have no vectors; solve them with their spins anew")
     shared = levels.blocks[0].shared
     for column, name in enumerate(names):
-        of_name = _Derivative(top, levels.effects, name, shared)
+        of_name = ParameterOperator(top, levels.effects, name, shared)
         for block in levels.blocks:
             out[block.start : block.start + len(block.energies_mhz), column] = of_name.expectations(block)
     return np.asarray(out[rows])
 
 
-class _Derivative:
+class ParameterOperator:
     """∂H/∂c of one parameter over the parts of spin blocks, each element of the rotation computed once."""
 
     def __init__(self, top: Top, effects: Sequence[QuantumEffect], name: str, shared: Shared) -> None:
@@ -127,7 +132,7 @@ class _Derivative:
         known: dict[Channel, Floats] = {}
         for a, up in enumerate(block.parts):
             for low in block.parts[: a + 1]:
-                for channel, element in self._elements(up, low).items():
+                for channel, element in self.elements(up, low).items():
                     if channel not in known:
                         known[channel] = coefficients_of(self._shared.scheme, channel, block.patterns)
                     matrix = product(known[channel][up.patterns, low.patterns], element)
@@ -135,7 +140,8 @@ class _Derivative:
                     total += (2.0 if low is not up else 1.0) * np.einsum("in,in->n", bra, matrix @ ket)
         return total
 
-    def _elements(self, up: SpinPart, low: SpinPart) -> dict[Channel, Floats]:
+    def elements(self, up: SpinPart, low: SpinPart) -> dict[Channel, Floats]:
+        """Elements between the states of the rotation of two parts, by channel."""
         key = (up.number, low.number)
         if key not in self._known:
             found = operators_between(up.rotor, low.rotor, self._channels, self._shared.representation)

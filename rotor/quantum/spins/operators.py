@@ -204,8 +204,8 @@ class SpinTerm:
     ket: int = EVERY_STATE
 
     def __post_init__(self) -> None:
-        wanted = {0: (0,), 1: (1,), 2: (0, 2)}.get(len(self.spins), ())
-        if self.rotor.rank not in wanted or (len(set(self.spins)) < len(self.spins) and self.rotor.rank != 2):
+        expected = {0: (0,), 1: (1,), 2: (0, 2)}.get(len(self.spins), ())
+        if self.rotor.rank not in expected or (len(set(self.spins)) < len(self.spins) and self.rotor.rank != 2):
             raise ValueError(
                 f"{self.name}: {len(self.spins)} spins {self.spins} cannot close an operator of rank {self.rotor.rank}"
             )

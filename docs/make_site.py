@@ -1,0 +1,166 @@
+"""The documentation site: docs/*.md, one page a verb, the executed notebooks and the reference of the API.
+
+    python docs/make_site.py [FOLDER]        # build/site unless a folder is given; a warning is an error
+
+The pages are brought together in a folder of their own (MyST Markdown), then Sphinx makes HTML of them. Nothing is fetched. Needs
+the extra `docs`.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import logging
+import re
+import shutil
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+DOCS = Path(__file__).resolve().parent
+ROOT = DOCS.parent
+sys.path.insert(0, str(DOCS / "site"))
+
+CONTENTS = {
+    "Start": ["quick_start", "coming_from", "limitations", "conventions"],
+    "Notebooks": ["notebooks/*"],
+    "Command line": ["command_line", "rotor_*"],
+    "Subjects": [],  # all pages of docs/ that no other part names
+    "Data and checks": ["library", "measured_lines", "reference_cases", "spin_weights"],
+    "API": ["api/index", "api/rotor*"],
+}
+
+
+def prepare(folder: Path) -> None:
+    """Write all pages, pictures and notebooks of the site into an empty folder."""
+    (folder / "notebooks").mkdir(parents=True)
+    (folder / "api").mkdir()
+    for page in sorted(DOCS.glob("*.md")):
+        text = page.read_text(encoding="utf-8")
+        (folder / page.name).write_text(
+            on_the_site(_shared_part(text) if page.stem == "command_line" else text), encoding="utf-8"
+        )
+    (folder / "conventions.md").write_text(
+        on_the_site((ROOT / "CONVENTIONS.md").read_text(encoding="utf-8")), encoding="utf-8"
+    )
+    shutil.copytree(DOCS / "pictures", folder / "pictures")
+    for notebook in sorted((ROOT / "examples").glob("[0-9][0-9]_*.ipynb")):
+        shutil.copy(notebook, folder / "notebooks")
+    for verb in verbs():
+        (folder / f"rotor_{verb}.md").write_text(on_the_site(verb_page(verb)), encoding="utf-8")
+    write_reference(folder / "api")
+    with (folder / "index.md").open("a", encoding="utf-8") as index:
+        index.write(contents(folder))
+
+
+def on_the_site(text: str) -> str:
+    """Links that lead out of docs/ turned to where their target stands on the site."""
+    text = re.sub(r"\]\((?:\.\./)?examples/(\d\d_\w+)\.py\)", r"](notebooks/\1.ipynb)", text)
+    text = re.sub(r"\]\(command_line\.md#rotor-(\w+)\)", r"](rotor_\1.md)", text)
+    text = re.sub(r"\]\((?:\.\./)?CONVENTIONS\.md\)", "](conventions.md)", text)
+    return re.sub(r"\]\(docs/", "](", text)
+
+
+def contents(folder: Path) -> str:
+    """The table of contents: hidden lists that Sphinx shows beside every page."""
+    named = {page for pages in CONTENTS.values() for page in pages} | {"index"}
+    subjects = [page.stem for page in sorted(DOCS.glob("*.md")) if page.stem not in named]
+    parts = []
+    for title, pages in CONTENTS.items():
+        entries = "\n".join(pages or subjects)
+        parts.append(f"\n```{{toctree}}\n:hidden:\n:glob:\n:caption: {title}\n\n{entries}\n```\n")
+    return "".join(parts)
+
+
+# ---- one page a verb
+
+
+def verbs() -> list[str]:
+    """The verbs of the command, in the order of its help."""
+    import typer
+
+    from rotor import cli
+
+    return list(typer.main.get_command(cli._application()).commands)
+
+
+def _shared_part(text: str) -> str:
+    """docs/command_line.md without the parts that have pages of their own."""
+    first, *others = re.split(r"(?=^## )", text, flags=re.MULTILINE)
+    shared = "".join(part for part in others if not part.startswith("## rotor "))
+    verb_list = "\n".join(f"- [rotor {verb}](rotor_{verb}.md)" for verb in verbs())
+    return f"{first}{shared}\n## The verbs\n\n{verb_list}\n"
+
+
+def verb_page(verb: str) -> str:
+    """The part of docs/command_line.md about a verb, then its help as the command prints it."""
+    text = (DOCS / "command_line.md").read_text(encoding="utf-8")
+    found = re.search(rf"^## rotor {verb}\n(.*?)(?=^## |\Z)", text, re.MULTILINE | re.DOTALL)
+    if not found:
+        raise ValueError(
+            f"docs/command_line.md has no part '## rotor {verb}': write it, since the command has that verb"
+        )
+    body = re.sub("^###", "##", found.group(1), flags=re.MULTILINE)
+    return f"# rotor {verb}\n{body}\n## Help\n\n```text\n{_help(verb)}```\n"
+
+
+def _help(verb: str) -> str:
+    from rotor import cli
+
+    with contextlib.redirect_stdout(io.StringIO()) as printed:
+        cli.run([verb, "--help"])
+    return printed.getvalue()
+
+
+# ---- the reference of the API
+
+
+def write_reference(folder: Path) -> None:
+    """One page a folder of the package, and the page of the public names."""
+    import api_pages
+
+    complaints = api_pages.Complaints()
+    logging.getLogger("griffe").addHandler(complaints)
+    package = api_pages.load(ROOT)
+    for name in api_pages.packages(ROOT):
+        (folder / f"{name}.md").write_text(api_pages.package_page(package, name, ROOT), encoding="utf-8")
+    (folder / "index.md").write_text(public_page(package), encoding="utf-8")
+    logging.getLogger("griffe").removeHandler(complaints)
+    if complaints.texts:
+        raise ValueError(
+            "docstrings that cannot be read; correct their numpy-style sections:\n" + "\n".join(complaints.texts)
+        )
+
+
+def public_page(package: Any) -> str:
+    """The names that `import rotor` gives, each leading to its entry."""
+    import api_pages
+
+    import rotor
+
+    known, rows = api_pages.documented(package, ROOT), []
+    for name in sorted(set(rotor.__all__) - {"__version__"}):
+        thing = getattr(rotor, name)
+        place = f"{thing.__module__}.{thing.__qualname__}"
+        if place not in known:
+            raise ValueError(f"rotor.{name} is {place}, which has no entry in the reference: its module must be public")
+        summary = (thing.__doc__ or "").strip().splitlines()[0].replace("|", "\\|")
+        rows.append(f"| {{py:obj}}`rotor.{name} <{place}>` | {summary} |")
+    table = "\n".join(["| name | what it is |", "|---|---|", *rows])
+    return f"# API\n\nThe public names of the package:\n\n{table}\n\nThe other pages of this part have all modules, folder by folder.\n"
+
+
+def build(out: Path) -> int:
+    """Make the site in `out`; the exit code of Sphinx, whose warnings are errors."""
+    from sphinx.cmd.build import build_main
+
+    with tempfile.TemporaryDirectory() as work:
+        source = Path(work) / "source"
+        prepare(source)
+        options = ["-W", "--keep-going", "-q", "-c", str(DOCS / "site"), "-d", f"{work}/doctrees"]
+        return build_main([*options, str(source), str(out)])
+
+
+if __name__ == "__main__":
+    sys.exit(build(Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT / "build" / "site"))

@@ -1,0 +1,101 @@
+# %% [markdown]
+# # From isotopologues to a structure
+#
+# Moments of inertia of isotopologues hold the places of the atoms. OCS, from measured lines to bond lengths, with no number typed in
+# between; then what vibration does to them, and symmetry. Every claim is asserted.
+
+# %%
+from pathlib import Path
+
+import numpy as np
+
+import rotor
+from rotor.formats.family_file import read_family
+from rotor.molecules.molecule import Molecule
+from rotor.plots.structure import structure_figure
+from rotor.structure.coordinates import named, symmetric_displacements
+from rotor.structure.family import family
+from rotor.structure.least_squares import fit_structure
+from rotor.structure.substitution import substitution_structure
+from rotor.tops.top import Top
+
+# %matplotlib inline
+
+folders = (folder / "tests/oracles/fits" for folder in (Path.cwd(), *Path.cwd().parents))
+samples = next(folder for folder in folders if folder.is_dir())
+
+# %% [markdown]
+# ## OCS
+#
+# The family file names a list of measured lines for each isotopologue (CDMS); B of each is fitted on the way.
+
+# %%
+file = read_family(samples / "ocs.toml")
+for one in file.family.species:
+    print(f"{one.name:6s} B = {one.constants_mhz['B']:.6f}({one.errors_mhz['B']:.0e}) MHz, {one.source}")
+
+# %% [markdown]
+# Each atom replaced says where it is (Kraitchman): the substitution structure r_s, with Costain's error for vibration.
+
+# %%
+rs = substitution_structure(file.family, coordinates=file.coordinates)
+values = {value.name: value for value in rs.values}
+for value in rs.values:
+    print(f"r_s({value.name}) = {value.value:.5f} ± {value.error:.4f} Å")
+assert abs(values["CO"].value - 1.16054) < 1e-5  # published
+assert abs(values["CS"].value - 1.55967) < 1e-5
+
+# %% [markdown]
+# All moments at once: r_0 leaves vibration where it is; r_m lets each moment have a part c √I of vibration.
+
+# %%
+fits = {method: fit_structure(file.family, method, coordinates=file.coordinates) for method in ("r0", "rm1")}
+for method, found in fits.items():
+    lengths = ", ".join(f"{value.name} {value.value:.4f} ± {value.error:.4f}" for value in found.values)
+    print(f"{method}: {lengths} Å; rms {found.rms_u_angstrom2:.1e} u Å², {found.degrees_of_freedom} degrees of freedom")
+assert fits["rm1"].values[0].value < values["CO"].value  # r_m is nearer to equilibrium, 1.156 Å, than r_s
+
+# %%
+structure_figure(fits["rm1"].molecule, values=fits["rm1"].values, title="OCS, r_m(1)")
+
+# %% [markdown]
+# ## Symmetry
+#
+# Formaldehyde: twelve Cartesian coordinates, three totally symmetric changes of shape. Its exact moments give its exact geometry back,
+# from a start that is 2 % off, though D on one side turns the axes and breaks the symmetry of that isotopologue.
+
+# %%
+truth = rotor.read("H2CO").molecule
+measured = []
+for isotopes in ("", "1=18O", "2=13C", "3=2H", "H=2H"):
+    changed = truth.with_isotopes(isotopes) if isotopes else truth
+    constants = dict(zip("ABC", Top.from_molecule(changed).rotational_constants_mhz, strict=True))
+    measured.append((changed.formula, isotopes, constants, {}))
+start = Molecule(truth.symbols, truth.positions_angstrom * 1.02)
+formaldehyde = family(start, measured, name="H2CO")
+coordinates = [named(start, "CO", [1, 2]), named(start, "CH", [2, 3]), named(start, "HCO", [1, 2, 3])]
+found = fit_structure(formaldehyde, "r0", coordinates=coordinates, leave_out="c")
+for value, one in zip(found.values, coordinates, strict=False):
+    print(f"{value.name}: {value.value:.6f} {value.unit}, true {one.value(truth.positions_angstrom):.6f}")
+    assert abs(value.value - one.value(truth.positions_angstrom)) < 1e-4
+assert symmetric_displacements(start).shape == (12, 3)
+assert len(coordinates[1].alike) == 2  # both C-H bonds are one coordinate
+
+# %%
+structure_figure(found.molecule, values=found.values, title="H2CO")
+
+# %% [markdown]
+# ## What cannot be seen
+#
+# An atom near an axis hardly moves it: with vibration its square may come out negative. It is reported, not hidden.
+
+# %%
+shifted = [
+    (name, isotopes, {k: v * (1 + 1e-4 * ("18O" in name)) for k, v in c.items()}, e)
+    for name, isotopes, c, e in measured
+]
+doubtful = substitution_structure(family(start, shifted))
+for note in doubtful.notes:
+    print(note)
+assert any("imaginary" in note for note in doubtful.notes)
+assert np.isfinite(doubtful.positions_angstrom).all()

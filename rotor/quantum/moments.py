@@ -1,0 +1,38 @@
+"""Moments that make lines besides the dipole of a state: dipoles that depend on the rotation, and magnetic moments.
+
+    electric    Σ_i μ_i φ_pi, with half anticommutators or commutators of N² and Nz² (Herman-Wallis corrections)
+    magnetic    g μB N_p, g μB S_p of one spin, or g μB Σ_ij c_ij φ_pi S_j (j along the molecule), c symmetric and traceless
+
+p is a direction in space, i and j are a, b, c. Electric and magnetic moments do not interfere in a level of good parity: their
+strengths are added.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+DEBYE_PER_BOHR_MAGNETON = 0.009274  # as SPCAT has it; 9.2740101e-3 by CODATA 2018
+
+Vector = tuple[float, float, float]
+Matrix = tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]
+
+
+class Moment(NamedTuple):
+    """One moment between two states v', v, or of one.
+
+    value_debye: what it is multiplied with. along_abc: μ of an electric moment, None of a magnetic one. powers: of an electric one, ""
+    none, "J" ½{N², }, "JJ" ½{N⁴, }, "K" ½{Nz², }, "[J]" ½[N², ], "[[J]]" ¼[N², [N², ]]; of a magnetic one "3K-J" ½(3Nz² - N²).
+    spin: of a magnetic moment, the spin's name, "" the rotation. tensor: c of a magnetic moment that is not isotropic.
+    """
+
+    value_debye: float
+    states: tuple[int, int] = (0, 0)
+    along_abc: Vector | None = None
+    powers: str = ""
+    spin: str = ""
+    tensor: Matrix | None = None
+
+    @property
+    def electric(self) -> bool:
+        """Whether it is a part of the electric dipole."""
+        return self.along_abc is not None

@@ -1,0 +1,164 @@
+"""Lines of levels with spins by moments of every kind (`rotor.quantum.moments`): elements between F blocks, and which they connect.
+
+An electric moment touches no spin. A magnetic one of a spin S has T^0 or T² of the rotation in place of a vector: with L its rank,
+
+    ⟨p'‖[T^L x S]^1‖p⟩ = m(p', p) ⟨N'‖T^L‖N⟩,     Σ_q T²_pq S_q = -√(5/3) [T² x S]^1_p
+
+(A. R. Edmonds, Angular Momentum in Quantum Mechanics, 1957, eq. 7.1.5; the factor as in `coupling`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from math import sqrt
+from typing import Any
+
+import numpy as np
+
+from rotor.arrays import Floats
+from rotor.quantum.levels import Levels
+from rotor.quantum.moments import Moment
+from rotor.quantum.spins.blocks import SpinBlock, SpinPart, product
+from rotor.quantum.spins.coupling import moment_coefficients, patterns, recoupling
+from rotor.quantum.spins.operators import AxialState, tensor_elements
+from rotor.quantum.spins.rotor import RotorBlock, RotorPart
+from rotor.quantum.spins.scheme import Scheme
+from rotor.quantum.tensors import BodyTensor, body_tensor
+
+
+@dataclass(frozen=True)
+class SpinMoments:
+    """The moments of a calculation with the coupling scheme and representation of its levels."""
+
+    moments: tuple[Moment, ...]
+    scheme: Scheme
+    representation: str
+    _known: dict[Any, Any] = field(default_factory=dict, repr=False, compare=False)
+
+    def amplitudes(self, up: SpinBlock, low: SpinBlock) -> Floats:
+        """The square roots of line strengths between all states of two blocks, (n_up, n_low)."""
+        electric, magnetic = (self._sum(up, low, kind) for kind in (True, False))
+        return np.asarray(np.hypot(electric, magnetic))
+
+    def connected(self, up: SpinBlock, low: SpinBlock) -> bool:
+        """Whether one of the moments has an element between two blocks."""
+        if not abs(up.twice_f - low.twice_f) <= 2 <= up.twice_f + low.twice_f:
+            return False
+        return any(
+            self._element(place, target, source) is not None
+            for place in range(len(self.moments))
+            for target in up.parts
+            for source in low.parts
+        )
+
+    def _sum(self, up: SpinBlock, low: SpinBlock, electric: bool) -> Floats:
+        moved = np.zeros((up.vectors.shape[0], low.vectors.shape[1]))
+        for place, moment in enumerate(self.moments):
+            if moment.electric == electric:
+                t = self._coefficients(moment, up.twice_f, low.twice_f)
+                for target in up.parts:
+                    for source in low.parts:
+                        element = self._element(place, target, source)
+                        if element is not None:
+                            own = product(t[target.patterns, source.patterns], element)
+                            moved[target.place] += own @ low.vectors[source.place]
+        return np.asarray(up.vectors.T @ moved)
+
+    def _coefficients(self, moment: Moment, up: int, low: int) -> Floats:
+        """m(p', p) between all patterns of two F."""
+        rank, acting = self._rank(moment), self.scheme.place(moment.spin) if moment.spin else None
+        key = (rank, acting, up, low)
+        if key not in self._known:
+            self._known[key] = _coefficients(self.scheme, rank, acting, up, low)
+        found: Floats = self._known[key]
+        return found
+
+    def _rank(self, moment: Moment) -> int:
+        return 1 if not moment.spin else 0 if moment.tensor is None else 2
+
+    def _element(self, place: int, target: SpinPart, source: SpinPart) -> Floats | None:
+        """The element of the rotation, over both signs of K of axial states."""
+        key = (place, target.number, source.number)
+        if key not in self._known:
+            self._known[key] = self._of_blocks(self.moments[place], target.rotor, source.rotor)
+        found: Floats | None = self._known[key]
+        return found
+
+    def _of_blocks(self, moment: Moment, up: RotorBlock, low: RotorBlock) -> Floats | None:
+        total: Floats | None = None
+        for left in up.parts:
+            for right in low.parts:
+                if (left.v, right.v) not in (moment.states, moment.states[::-1]):
+                    continue
+                found = self._between(moment, left, right)
+                if found is not None and found.any():
+                    moved = up.vectors[left.place].T @ (moment.value_debye * found) @ low.vectors[right.place]
+                    total = moved if total is None else total + moved
+        first, second = up.parts[0].basis, low.parts[0].basis
+        if total is not None and isinstance(first, AxialState) and (first.axial_k or second.k[0]):
+            return np.asarray(sqrt(2.0) * total)
+        return total
+
+    def _between(self, moment: Moment, left: RotorPart, right: RotorPart) -> Floats | None:
+        up, low = left.basis, right.basis
+        if moment.electric:
+            found = tensor_elements(up, low, self._tensor(moment.along_abc, 1))
+            return None if found is None else found * _factor(moment.powers, left, right)
+        if moment.tensor is not None:
+            return tensor_elements(up, low, self._tensor(moment.tensor, 2))
+        if up != low:
+            return None
+        n = low.j
+        diagonal = np.full(low.size, 1.0 if moment.spin else sqrt(n * (n + 1.0) * (2 * n + 1)))
+        if moment.powers == "3K-J":
+            diagonal *= (3.0 * low.k.astype(float) ** 2 - n * (n + 1.0)) / 2
+        return np.diag(diagonal)
+
+    def _tensor(self, components: Any, rank: int) -> BodyTensor:
+        key = (rank, components)
+        if key not in self._known:
+            self._known[key] = body_tensor(components, rank, self.representation)
+        found: BodyTensor = self._known[key]
+        return found
+
+
+def moments_of(
+    levels: Levels, dipoles: dict[tuple[int, int], tuple[float, float, float]], moments: Sequence[Moment]
+) -> SpinMoments:
+    """Dipoles by pairs of states and other moments, for levels that were solved with spins.
+
+    Raises ValueError for other levels.
+    """
+    if not levels.blocks or not isinstance(levels.blocks[0], SpinBlock):
+        raise ValueError("moments besides plain dipoles need levels that were solved with spins")
+    shared = levels.blocks[0].shared
+    return SpinMoments(with_dipoles(dipoles, moments), shared.scheme, shared.representation)
+
+
+def with_dipoles(
+    dipoles: dict[tuple[int, int], tuple[float, float, float]], moments: Sequence[Moment]
+) -> tuple[Moment, ...]:
+    """Plain dipoles by pairs of states as moments, before the others."""
+    plain = [Moment(1.0, states, along) for states, along in dipoles.items() if any(along)]
+    return (*plain, *(moment for moment in moments if moment.value_debye))
+
+
+def _factor(powers: str, left: RotorPart, right: RotorPart) -> Floats:
+    """What powers of N² and Nz² multiply an element with. A commutator changes its sign with the order: the lower F is the bra."""
+    m, n = left.basis.j * (left.basis.j + 1.0), right.basis.j * (right.basis.j + 1.0)
+    if powers == "K":
+        k, other = left.basis.k.astype(float) ** 2, right.basis.k.astype(float) ** 2
+        return np.asarray((k[:, None] + other) / 2)
+    return np.array(
+        {"": 1.0, "J": (m + n) / 2, "JJ": (m**2 + n**2) / 2, "[J]": (n - m) / 2, "[[J]]": (m - n) ** 2 / 4}[powers]
+    )
+
+
+def _coefficients(scheme: Scheme, rank: int, acting: int | None, up: int, low: int) -> Floats:
+    bra, ket = patterns(scheme.twice, up), patterns(scheme.twice, low)
+    found = moment_coefficients(scheme.twice, rank, acting, bra, ket)
+    if not scheme.paired:
+        return found
+    left, right = (recoupling(scheme.twice, one, scheme.patterns(f)) for one, f in ((bra, up), (ket, low)))
+    return np.asarray(left.T @ found @ right)

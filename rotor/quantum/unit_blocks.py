@@ -1,0 +1,142 @@
+"""Blocks of a Hamiltonian that is linear in its parameters, H_b = Σ c_i O_i,b: made once, solved again and again.
+
+The unit matrices O_i,b over the functions of a block are taken as their elements that are not zero, the same places for all
+parameters, so that new constants cost one product of a matrix and a vector a block, one diagonalisation, and
+
+    ∂E_n/∂c_i = ⟨n|O_i|n⟩ = Σ_(r,c) O_i(r, c) v_r v_c
+
+another product for the states that have a label. A state is named by the sub-block (a Wang block of one state v, and one pattern of
+coupling) that has most of it, and within a sub-block by the order of energy. As long as those shares point to the same sub-blocks as
+at the start, state n stays state n; where they do not, the names are made anew.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rotor.arrays import Floats, Ints
+
+Namer = Callable[[Floats, Floats, Floats], Ints]  # matrix, energies, vectors -> names (n, columns) of the states
+
+
+@dataclass(frozen=True)
+class UnitBlock:
+    """One block: size, places (row, column, row ≥ column) of elements, their factors (elements, columns), which parameters.
+
+    sub_blocks (functions,) : the number of the sub-block of each function. namer : names of all states, where they must be made
+    """
+
+    size: int
+    rows: Ints
+    columns: Ints
+    factors: Floats
+    parameters: Ints
+    sub_blocks: Ints
+    namer: Namer
+
+    def matrix(self, values_mhz: Floats) -> Floats:
+        """H (size, size), lower triangle."""
+        out = np.zeros((self.size, self.size))
+        out[self.rows, self.columns] = self.factors @ values_mhz[self.parameters]
+        return out
+
+    def slopes(self, vectors: Floats) -> Floats:
+        """⟨n|O_i|n⟩ (states, parameters of the block) of states in columns."""
+        twice = np.where(self.rows == self.columns, 1.0, 2.0)
+        weights = vectors[self.rows] * vectors[self.columns] * twice[:, None]
+        return np.asarray(weights.T @ self.factors)
+
+
+def unit_block(units: dict[int, Floats], sub_blocks: Ints, namer: Namer) -> UnitBlock:
+    """From the dense unit matrix of every parameter, by its number, that acts in the block."""
+    parameters = np.array(sorted(units), dtype=np.int64)
+    size = len(sub_blocks)
+    stacked = np.stack([units[i] for i in parameters.tolist()]) if len(parameters) else np.zeros((0, size, size))
+    rows, columns = np.nonzero(np.tril((stacked != 0).any(axis=0) | np.eye(size, dtype=bool)))
+    return UnitBlock(size, rows, columns, stacked[:, rows, columns].T.copy(), parameters, sub_blocks, namer)
+
+
+@dataclass
+class _Tracked:
+    """Labels in a block: their places among all, the states that have them, and the sub-blocks of all states at that time."""
+
+    block: UnitBlock
+    rows: Ints
+    names: Ints
+    states: Ints
+    leading: Ints
+
+
+class UnitBlocks:
+    """Blocks with the labels that lie in them; `levels` gives energies and derivatives, in the order of the labels."""
+
+    def __init__(
+        self,
+        blocks: Sequence[UnitBlock],
+        count: int,
+        find: Callable[[int, Ints], tuple[Ints, Ints]],
+        values_mhz: Floats,
+    ) -> None:
+        """Labels are looked for in the blocks solved at `values_mhz`.
+
+        count : labels. find : number of a block and names (n, columns) of its states to places of labels in it, and which states
+        """
+        self.count = count
+        self._tracked: list[_Tracked] = []
+        for number, block in enumerate(blocks):
+            matrix, energies, vectors = _solved(block, values_mhz)
+            names = block.namer(matrix, energies, vectors)
+            rows, states = find(number, names)
+            if len(rows):
+                leading = _leading(block, vectors)
+                self._tracked.append(_Tracked(block, rows, names[states], states, leading))
+
+    @property
+    def found(self) -> Ints:
+        """Places of the labels that were found."""
+        return np.concatenate([one.rows for one in self._tracked]) if self._tracked else np.zeros(0, dtype=np.int64)
+
+    def levels(self, values_mhz: Floats) -> tuple[Floats, Floats]:
+        """Energies (count,) and derivatives (count, parameters); nan for labels that are not in these blocks."""
+        energies = np.full(self.count, np.nan)
+        slopes = np.zeros((self.count, len(values_mhz)))
+        for one in self._tracked:
+            matrix, solved, vectors = _solved(one.block, values_mhz)
+            states = self._states(one, matrix, solved, vectors)
+            energies[one.rows] = solved[states]
+            slopes[one.rows[:, None], one.block.parameters] = one.block.slopes(vectors[:, states])
+        return energies, slopes
+
+    def _states(self, one: _Tracked, matrix: Floats, energies: Floats, vectors: Floats) -> Ints:
+        """The states that have the labels now; names are made anew only where a state is mostly in another sub-block."""
+        leading = _leading(one.block, vectors)
+        if (leading == one.leading).all():
+            return one.states
+        names = {tuple(name): state for state, name in enumerate(one.block.namer(matrix, energies, vectors).tolist())}
+        found = [names.get(tuple(name), -1) for name in one.names.tolist()]
+        if min(found) < 0:
+            raise ValueError("a labelled level has no state of its name with these constants")
+        return np.array(found)
+
+
+def _solved(block: UnitBlock, values_mhz: Floats) -> tuple[Floats, Floats, Floats]:
+    """Matrix, energies and vectors; a number is taken off the diagonal for the sake of digits, and added to the energies."""
+    matrix = block.matrix(values_mhz)
+    if not np.isfinite(matrix).all():
+        raise ValueError("a block of the Hamiltonian is not finite with these constants")
+    zero = float(matrix[0, 0])
+    matrix[np.diag_indices(block.size)] -= zero
+    energies, vectors = np.linalg.eigh(matrix)
+    return matrix, energies + zero, vectors
+
+
+def _leading(block: UnitBlock, vectors: Floats) -> Ints:
+    """The sub-block with the largest share of each state, (n,)."""
+    count = int(block.sub_blocks.max(initial=0)) + 1
+    if count == 1:
+        return np.zeros(block.size, dtype=np.int64)
+    member = (block.sub_blocks[None, :] == np.arange(count)[:, None]).astype(float)
+    return np.asarray((member @ vectors**2).argmax(axis=0))

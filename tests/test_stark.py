@@ -1,0 +1,274 @@
+"""Stark maps: reference files, formulas of perturbation theory, pendular states, labels, bad input."""
+
+from __future__ import annotations
+
+import gzip
+import itertools
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.special import obl_cv
+
+from rotor.quantum.effects.stark import MHZ_ANGSTROM3_W_PER_CM2, Stark, stark_map
+from rotor.quantum.field_blocks import Contraction, field_space
+from rotor.quantum.field_map import reduced_basis, solve_fields
+from rotor.tops.top import Top
+from rotor.units import MHZ_PER_DEBYE_KV_PER_CM, PLANCK_J_S
+
+OCS = Top.from_constants("B=6081.492475 D=1.301777e-3 MHz", dipole_abc_debye=(0.71519, 0, 0))
+CH3CN = Top.from_constants("A=158099 B=9198.899167 DJ=3.807576e-3 DJK=0.177407 MHz", dipole_abc_debye=(3.92197, 0, 0))
+H2CO = Top.from_constants("A=281970.56 B=38833.987 C=34004.244 MHz", dipole_abc_debye=(2.3317, 0, 0))
+BENZONITRILE = Top.from_constants(
+    "A=5655.2654 B=1546.875864 C=1214.40399 DeltaJ=45.6e-6 DeltaJK=938.1e-6 DeltaK=500e-6 deltaJ=10.95e-6 deltaK=628e-6 MHz",
+    dipole_abc_debye=(4.5152, 0, 0),
+)
+
+
+def table(shared: Path, name: str) -> np.ndarray:
+    with gzip.open(shared / "reference" / "fields" / f"{name}.csv.gz") as handle:
+        return np.genfromtxt(handle, delimiter=",", comments="#", skip_header=1)
+
+
+# Reference files
+
+
+@pytest.mark.oracle
+def test_ocs_to_a_hertz(shared):
+    """To the accuracy of the file, 1e-6 MHz."""
+    reference = table(shared, "stark_ocs")
+    found = stark_map(OCS, reference[:, 0], j_highest=5)
+    names = ["J0M0", "J1M0", "J2M0", "J3M0", "J1M1", "J2M1", "J3M1", "J4M1", "J2M2", "J3M2", "J4M2", "J5M2"]
+    for column, name in enumerate(names, 1):
+        rows = found.curve(name[1], int(name[3]))
+        assert np.abs(found.energy_mhz[rows] - reference[:, column]).max() < 1e-6
+
+
+@pytest.mark.oracle
+def test_ch3cn(shared):
+    """To 2e-6 MHz, the accuracy of the file; signs of K and M there are those of the other sign of the field here or there."""
+    reference = table(shared, "stark_ch3cn")
+    found = stark_map(CH3CN, reference[:, 0], j_highest=6, m_values=(0, 1, 2))
+    for m in range(3):
+        for k in range(-3, 4):
+            first = 1 + 4 * ((k + 3) + 7 * m)
+            curves = [
+                c for c in found.curves() if found.m[c.start] == m and found.block[c.start] == f"k={k if m else abs(k)}"
+            ]
+            ours = np.array([found.energy_mhz[c] for c in curves[:4]]).T
+            assert np.abs(ours - reference[:, first : first + 4]).max() < 2e-6, (k, m)
+
+
+@pytest.mark.oracle
+def test_h2co(shared):
+    """The lowest 16 states of M = 0, 1, 2 to 1e-5 MHz, the accuracy of the file, from the ground state without field."""
+    reference = table(shared, "stark_H2CO_Jmax15")
+    found = stark_map(H2CO, reference[::5, 0], j_highest=9, m_values=(0, 1, 2), tolerance_mhz=1e-4)
+    for m in range(3):
+        curves = [found.energy_mhz[c] for c in found.curves() if found.m[c.start] == m]
+        lowest = np.sort(np.array(curves), axis=0)[:16].T
+        assert np.abs(lowest - reference[::5, 1 + 16 * m : 17 + 16 * m]).max() < 1e-5
+
+
+def test_benzonitrile_ground_state_at_100_kv_per_cm():
+    """-1.34489847e-22 J: the test of CMIstark (the same constants, J ≤ 15)."""
+    found = stark_map(BENZONITRILE, [100.0], j_highest=0, jmax=15)
+    joule = found.energy_mhz[0] * 1e6 * PLANCK_J_S
+    assert joule == pytest.approx(-1.34489847e-22, rel=3e-8)  # its constants are of an older CODATA, 1.4e-8 apart
+
+
+# Formulas
+
+
+def test_without_field_levels_are_those_of_the_free_top():
+    found = stark_map(H2CO, [0.0], j_highest=2, tolerance_mhz=1e-3)
+    space = field_space(H2CO, 2, [Contraction(H2CO.dipole_abc_debye, [0, 0, 1])])
+    labels = {space.levels.label(row): energy for row, energy in enumerate(space.levels.energy_mhz)}
+    assert [found.energy_mhz[i] for i in range(len(found))] == pytest.approx(
+        [labels[str(name)] for name in found.label], abs=1e-6
+    )  # round-off of 1e6 MHz
+    assert np.abs(found.slope).max() < 1e-6  # no dipole without a field
+
+
+@pytest.mark.parametrize(
+    ("j", "m", "coefficient"),
+    [
+        (0, 0, -3.55245003), (1, 0, 2.13147002), (1, 1, -1.06573501), (2, 0, 0.50749286), (2, 1, 0.25374643), (2, 2, -0.50749286),
+        (3, 0, 0.23683000), (3, 1, 0.17762250), (3, 2, 0.0), (3, 3, -0.29603750),
+    ],
+)  # fmt: skip
+def test_second_order_coefficients_of_ocs(j, m, coefficient):
+    """W/E² = (μ²/2hB) [J(J+1) - 3M²]/[J(J+1)(2J-1)(2J+3)], in MHz/(kV/cm)², for the rigid top."""
+    rigid = Top.from_constants("B=6081.492475 MHz", dipole_abc_debye=(0.71519, 0, 0))
+    found = stark_map(rigid, [0.0, 0.05], j_highest=3, tolerance_mhz=1e-9)
+    rows = found.curve(str(j), m)
+    energies = found.energy_mhz[rows]
+    assert (energies[1] - energies[0]) / 0.0025 == pytest.approx(coefficient, abs=5e-6)  # fourth order: 2e-6
+
+
+@given(k=st.integers(-3, 3), m=st.integers(1, 3))
+@settings(max_examples=12, deadline=None)
+def test_first_order_of_a_symmetric_top(k, m):
+    """dW/dE = -μ KM/[J(J+1)]; the slope of (K, M) and that of (-K, M) are opposite."""
+    found = stark_map(CH3CN, [0.0], j_highest=3, m_values=(m,))
+    for rows in found.curves():
+        j, state_k = (int(part) for part in found.label[rows.start].split())
+        if state_k == k and j >= m:
+            assert found.slope[rows.start] == pytest.approx(3.92197 * k * m / (j * (j + 1)) if j else 0.0, abs=1e-6)
+
+
+@pytest.mark.parametrize("omega", [1.0, 50.0, 500.0])
+def test_pendular_energies_are_spheroidal_characteristic_values(omega):
+    """H/B = J² - Δω cos²θ: obl_cv(M, J, √Δω); a laser without a static field."""
+    intensity = omega * 6000.0 / (MHZ_ANGSTROM3_W_PER_CM2 * 4.0)
+    top = Top.from_constants("B=6000 MHz", dipole_abc_debye=(0.0, 0, 0)).with_polarizability(
+        np.diag([4.0, 0, 0]), "test"
+    )
+    found = stark_map(top, [0.0], j_highest=2, intensity_w_per_cm2=intensity, tolerance_mhz=1e-7)
+    for rows in found.curves():
+        j, m = int(found.label[rows.start]), int(found.m[rows.start])
+        assert found.energy_mhz[rows.start] / 6000.0 == pytest.approx(obl_cv(m, j, np.sqrt(omega)), abs=1e-10)
+
+
+@pytest.mark.oracle
+def test_pendular_cosines(shared):
+    """Alignment and orientation to 1e-10 (the files: 1e-12)."""
+    for row in table(shared, "pendular_alignment"):
+        omega, j, m, energy, cosine = row[0], int(row[1]), int(row[2]), row[3], row[4]
+        intensity = omega * 6000.0 / (MHZ_ANGSTROM3_W_PER_CM2 * 4.0)
+        top = Top.from_constants("B=6000 MHz").with_polarizability(np.diag([4.0, 0, 0]), "test")
+        found = stark_map(top, [0.0], j_highest=j, m_values=(m,), intensity_w_per_cm2=intensity)
+        place = found.curve(str(j), m).start
+        assert found.energy_mhz[place] / 6000 == pytest.approx(energy, abs=1e-9)  # 1e-6 MHz asked for
+        assert found.cosines["cos2theta"][place] == pytest.approx(
+            cosine, abs=1e-7
+        )  # a vector is as good as √ of the energy
+    for omega, j, m, energy, cosine in table(shared, "pendular_orientation"):
+        field = omega * 6000.0 / MHZ_PER_DEBYE_KV_PER_CM
+        top = Top.from_constants("B=6000 MHz", dipole_abc_debye=(1.0, 0, 0))
+        found = stark_map(top, [field], j_highest=int(j), m_values=(int(m),))
+        place = found.curve(str(int(j)), int(m)).start
+        assert found.energy_mhz[place] / 6000 == pytest.approx(energy, abs=1e-9)  # 1e-6 MHz asked for
+        assert found.cosines["costheta"][place] == pytest.approx(cosine, abs=1e-7)  # as above
+
+
+def test_effective_dipole_is_minus_the_slope_of_the_energy():
+    fields = np.array([49.99, 50.0, 50.01])
+    found = stark_map(BENZONITRILE, fields, j_highest=1, tolerance_mhz=1e-6)
+    for rows in found.curves():
+        slope = (found.energy_mhz[rows][2] - found.energy_mhz[rows][0]) / 0.02
+        assert -slope / MHZ_PER_DEBYE_KV_PER_CM == pytest.approx(
+            found.slope[rows][1], abs=2e-6
+        )  # third derivative, round-off
+
+
+# J max and bases
+
+
+def test_j_max_follows_from_the_tolerance():
+    coarse, fine = (stark_map(OCS, [300.0], j_highest=1, tolerance_mhz=t) for t in (1.0, 1e-8))
+    assert coarse.jmax < fine.jmax
+    assert np.abs(coarse.energy_mhz - fine.energy_mhz).max() < 1.0  # what was asked for
+    assert fine.edge_population.max() < 1e-12  # leakage that goes with 1e-8 MHz
+
+
+def test_a_j_max_too_small_is_refused():
+    with pytest.raises(ValueError, match="J max 6 is too small"):
+        stark_map(OCS, [500.0], j_highest=2, jmax=6)
+
+
+def test_the_reduced_basis_gives_the_energies_of_the_full_matrix():
+    rng = np.random.default_rng(7)
+    fixed = np.diag(np.sort(rng.uniform(0, 1e6, 200)))
+    slope = rng.normal(size=(200, 200))
+    slope = slope + slope.T
+    fields = np.linspace(0, 300, 61)
+    reduced, _ = reduced_basis(fixed, slope, fields, 8, 1e-4)
+    whole, _ = solve_fields(fixed, slope, fields, 8, False)
+    assert np.abs(reduced - whole).max() < 1e-4  # the tolerance
+
+
+# Labels
+
+
+def nearly_c2v(mu_b: float) -> Top:
+    return Top.from_constants("A=5655.2654 B=1546.875864 C=1214.40399 MHz", dipole_abc_debye=(4.5152, mu_b, 0))
+
+
+def test_adiabatic_labels_do_not_depend_on_the_grid():
+    """76 to 2401 fields: at those that all grids have, each label has one energy."""
+    found = [
+        stark_map(nearly_c2v(0.05), np.linspace(0, 150, n), j_highest=2, m_values=(1,), tolerance_mhz=1e-3)
+        for n in (76, 601, 2401)
+    ]
+    for rows in zip(*(one.curves() for one in found), strict=True):
+        assert len({str(one.label[r.start]) for one, r in zip(found, rows, strict=True)}) == 1
+        sampled = [one.energy_mhz[r][:: (len(one.fields) - 1) // 75] for one, r in zip(found, rows, strict=True)]
+        assert np.ptp(sampled, axis=0).max() < 2e-3  # the tolerance, twice
+
+
+def test_labels_by_overlap_would_depend_on_the_grid():
+    """Why they are not used: following the largest overlap from field to field gives other names on another grid."""
+    space = field_space(nearly_c2v(0.05), 15, [Contraction((4.5152, 0.05, 0), [0, 0, 1])])
+    block = space.blocks(1)[0]
+    slope = -MHZ_PER_DEBYE_KV_PER_CM * block.matrix(Contraction((4.5152, 0.05, 0), [0, 0, 1]))
+    names = []
+    for count in (76, 301):
+        _, vectors = solve_fields(np.diag(block.energies_mhz), slope, np.linspace(0, 150, count), 40, True)
+        order = np.arange(40)
+        for before, after in itertools.pairwise(vectors):
+            order = order[np.argmax(np.abs(before.T @ after), axis=0)]
+        names.append(order)
+    assert (names[0] != names[1]).any()
+
+
+def test_diabatic_labels_converge_and_tend_to_those_of_the_symmetric_molecule():
+    """With μ_b = 1e-4 D the crossings of C2v species are avoided by below 5 MHz, and its true gaps are above."""
+
+    def ends(found, column: str) -> dict:
+        names = getattr(found, column)
+        return {(str(names[r.stop - 1]), int(found.m[r.start])): found.energy_mhz[r][-1] for r in found.curves()}
+
+    settings = {"j_highest": 2, "m_values": (1,), "tolerance_mhz": 1e-3, "diabatic_gap_mhz": 5.0}
+    symmetric = ends(stark_map(nearly_c2v(0.0), np.linspace(0, 100, 11), **settings), "diabatic_label")
+    coarse, fine = (stark_map(nearly_c2v(1e-4), np.linspace(0, 100, n), **settings) for n in (11, 41))
+    for found in (coarse, fine):
+        named = ends(found, "diabatic_label")
+        assert {key: named[key] for key in symmetric} == pytest.approx(
+            symmetric, abs=5e-3
+        )  # μ_b to second order: 1e-3 MHz
+    assert (
+        max(abs(ends(fine, "label")[key] - symmetric[key]) for key in symmetric) > 1e3
+    )  # adiabatic ones do cross over
+
+
+# Bad input
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"fields_kv_per_cm": [1e7]}, "no molecule holds together"),
+        ({"fields_kv_per_cm": [np.nan]}, "finite"),
+        ({"fields_kv_per_cm": []}, "finite"),
+        ({"j_highest": -1}, "J = -1"),
+        ({"m_values": (3,)}, "M of"),
+        ({"intensity_w_per_cm2": -1.0}, "intensity -1"),
+        ({"intensity_w_per_cm2": 1e10}, "polarizability"),
+        ({"tolerance_mhz": 0.0}, "tolerance"),
+        ({"diabatic_gap_mhz": -1.0}, "diabatic gap"),
+        ({"top": Top.from_constants("B=6000 MHz")}, "dipole"),
+        ({"top": Top.from_constants("B=6000 MHz", dipole_abc_debye=(0, 0, 0))}, "no dipole"),
+    ],
+)
+def test_bad_input(change, message):
+    arguments = {"top": OCS, "fields_kv_per_cm": [0.0, 10.0], "j_highest": 1, **change}
+    with pytest.raises(ValueError, match=message):
+        stark_map(arguments.pop("top"), arguments.pop("fields_kv_per_cm"), **arguments)
+
+
+def test_the_effect_knows_its_size():
+    assert Stark(1.0).size_mhz(OCS, 0) == pytest.approx(3.5524, rel=1e-4)  # μ²E²/6B
+    assert Stark(1.0).size_mhz(CH3CN, 1) == pytest.approx(987.18, rel=1e-4)  # μE/2
