@@ -77,11 +77,11 @@ def executed(script: Path, patience: float = 10.0) -> tuple[Any, float]:
     limit = int(patience * max(seconds_allowed(script), SECONDS))
     place = {"metadata": {"path": str(EXAMPLES)}}
     with tempfile.TemporaryDirectory() as sockets:
-        ipc = (
-            {"transport": "ipc", "ip": f"{sockets}/kernel"} if os.name == "posix" else {}
-        )  # files instead of open ports
+        # files instead of open ports, where there are such
+        ipc = {"transport": "ipc", "ip": f"{sockets}/kernel"} if os.name == "posix" else {}
         config = Config({"KernelManager": ipc})
-        NotebookClient(notebook, timeout=limit, kernel_name="python3", resources=place, config=config).execute()
+        client = NotebookClient(notebook, timeout=limit, kernel_name="python3", resources=place, config=config)
+        client.execute(env=os.environ | {"MPLBACKEND": "module://matplotlib_inline.backend_inline"})
     for cell in notebook.cells:
         cell["metadata"] = {}  # times of execution
     if spoken := on_standard_error(notebook):

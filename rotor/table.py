@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from typing import Any
@@ -71,6 +70,8 @@ class Table(ABC):
 
     def _repr_html_(self) -> str:
         """The same for notebooks."""
+        import html
+
         heads, lines = self._shown()
         rows = ["".join(f"<td>{html.escape(text)}</td>" for text in line) for line in lines]
         head = "".join(f"<th>{html.escape(name)}</th>" for name in heads)

@@ -1,14 +1,10 @@
-"""The version of the package that is installed."""
+"""The version of the package; the distribution takes it from here."""
 
 from __future__ import annotations
 
-from importlib.metadata import PackageNotFoundError
-from importlib.metadata import version as version_of
+VERSION = "0.1.0"
 
 
 def version() -> str:
-    """The version of the installed distribution, "0+source" where a source tree is run that was never installed."""
-    try:
-        return version_of("molrotor")
-    except PackageNotFoundError:
-        return "0+source"
+    """The version of the package."""
+    return VERSION

@@ -254,7 +254,7 @@ def test_more_than_six_quantum_numbers():
 def test_quantum_numbers_without_room_are_refused():
     wide = read_cat(LINE[:51] + b" 308" + b" 1 2 3 4 5 6 7 8" * 2 + b"\n")
     columns = {name: getattr(wide, name) for name in DTYPES}
-    with pytest.raises(ValueError, match="line 1 cannot be written: QNFMT 303 has room for 6"):
+    with pytest.raises(ValueError, match="line 1 cannot be written: QNFMT 303 can hold 6"):
         format_lines(Catalogue(**{**columns, "qnfmt": np.array([303])}))
 
 

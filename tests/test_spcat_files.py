@@ -116,12 +116,12 @@ def test_options_left_out_have_defaults():
         (b"t\nx\na 1\n", r"line 2, column 1: 'x' is no number"),
         (b"t\n\na 1\n", r"line 2, column 1: NPAR is missing"),
         (b"t\n-1\na 1\n", r"line 2, column 1: NPAR is -1"),
-        (b"t\n1.5\na 1\n", r"NPAR = 1.5: a whole number"),
+        (b"t\n1.5\na 1\n", r"NPAR = 1.5: expected a whole number"),
         (b"t\n1\na 1 1 0 20 0 1 one\n", r"line 3, column 16: 'one' is no number"),
         (b"t\n1\na 1 1 0 20 0 1 1 1 -1\n", "line 3, .*another option line"),
         (b"t\n1\na 1\n100 5..5\n", r"line 4, column 5: '5..5' is no number"),
         (b"t\n1\na 1\n100 B=5\n", r"line 4, column 5: 'B=5' is no number"),
-        (b"t\n1\na 1\n1.5e4 5\n", r"line 4, column 1: the parameter code = 1.5e4: a whole number"),
+        (b"t\n1\na 1\n1.5e4 5\n", r"line 4, column 1: the parameter code = 1.5e4: expected a whole number"),
         (b"t\n1\na 1\n100 1e999\n", r"line 4, column 5: .*too large"),
     ],
 )
@@ -186,7 +186,7 @@ def test_a_new_intensity_file_reads_back(tmp_path):
     [
         (b"title\n", "1 lines"),
         (b"t\n0 1 x\n", r"line 2, column 5: 'x' is no number"),
-        (b"t\n0 1.5\n", "TAG = 1.5: a whole number"),
+        (b"t\n0 1.5\n", "TAG = 1.5: expected a whole number"),
         (b"t\n0 1\n1\n", r"line 3, column 2: the dipole's value is missing"),
         (b"t\n0 1\n1 mu\n", r"line 3, column 3: 'mu' is no number"),
     ],

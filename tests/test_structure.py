@@ -371,3 +371,18 @@ def test_published_substitution_structures(shared):
     for name, share in _EXCEPTIONS.items():
         good, all_ = met[name]
         assert good / all_ >= share, name
+
+
+@pytest.mark.parametrize("method", ["r0", "rm1", "rm2"])
+def test_derivatives_of_moments_are_those_of_differences(method):
+    from rotor.structure.least_squares import _Problem
+
+    water = rotor.read("H2O").molecule
+    hydrogen = 1 + water.symbols.index("H")
+    together = rigid_family(water, ["", f"{hydrogen}=2H", "H=2H", "O=18O"])
+    problem = _Problem.of(together, method, (), (), "equal", ())
+    at = np.concatenate([[0.01, -0.02], np.full(problem.count - 2, 0.3)])
+    _, jacobian = problem.model(at)
+    for i, step in enumerate(1e-5 * np.eye(problem.count)):
+        difference = (problem.model(at + step)[0] - problem.model(at - step)[0]) / 2e-5
+        assert jacobian[:, i] == pytest.approx(difference, abs=1e-7)  # third derivatives and round-off at this step

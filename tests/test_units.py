@@ -30,6 +30,7 @@ def test_constants():
     assert codata("vacuum electric permittivity") == units.VACUUM_PERMITTIVITY_F_PER_M
     assert codata("Bohr radius") * 1e10 == pytest.approx(units.BOHR_RADIUS_ANGSTROM, rel=1e-12)
     assert codata("Hartree energy in eV") == pytest.approx(units.HARTREE_EV, rel=1e-12)
+    assert codata("nuclear magneton in MHz/T") == pytest.approx(units.NUCLEAR_MAGNETON_MHZ_PER_T, rel=1e-10)
     assert codata("kelvin-hertz relationship") * 1e-6 == pytest.approx(units.MHZ_PER_K, rel=1e-9)
     assert pytest.approx(505379.00844, abs=5e-6) == units.ROTATIONAL_MHZ_U_ANGSTROM2
     assert pytest.approx(4.80320, abs=5e-6) == units.DEBYE_PER_E_ANGSTROM

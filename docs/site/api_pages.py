@@ -33,7 +33,10 @@ def load(root: Path) -> Any:
     """The package as griffe reads it, without running it."""
     import griffe
 
-    return griffe.load("rotor", search_paths=[str(root)], docstring_parser="numpy", allow_inspection=False)
+    extensions = griffe.load_extensions()  # those built in: fields of dataclasses are parameters
+    return griffe.load(
+        "rotor", search_paths=[str(root)], docstring_parser="numpy", extensions=extensions, allow_inspection=False
+    )
 
 
 class Complaints(logging.Handler):
@@ -116,10 +119,13 @@ def _signature(member: Any) -> str:
 
 
 def _spelled(annotation: Any) -> str:
-    """An annotation with full names, so that each leads to one entry; Sphinx shows the last part."""
+    """An annotation with full names of what rotor defines, so that each leads to one entry; Sphinx shows the last part."""
     if isinstance(annotation, str):
         return annotation
-    return "".join(part if isinstance(part, str) else part.canonical_path for part in annotation.iterate(flat=True))
+    path = getattr(annotation, "canonical_path", "")
+    if type(annotation).__name__ in ("ExprName", "ExprAttribute"):
+        return path if path.startswith("rotor.") else str(annotation)
+    return "".join(_spelled(part) for part in annotation.iterate(flat=False))
 
 
 def _text(member: Any) -> str:

@@ -177,7 +177,7 @@ def align(
     while True:
         pilot = pilot_of(problem, jmax)
         if pilot.edge <= 0.3 * tolerance:
-            trace = _carried(problem, jmax, pilot, executor, progress)
+            trace = _carried(problem, pilot, executor, progress)
             if trace.edge_population <= tolerance:
                 return trace
             pilot = replace(pilot, edge=trace.edge_population)
@@ -224,15 +224,13 @@ def _ensemble(
 
 
 def _carried(
-    problem: Problem, jmax: int, pilot: Pilot, executor: Executor | None, progress: Callable[[int, int], None] | None
+    problem: Problem, pilot: Pilot, executor: Executor | None, progress: Callable[[int, int], None] | None
 ) -> AlignmentTrace:
     """All blocks, and the trace that they make together."""
-    space = problem.space(jmax)
-    before = bool(problem.free_times(-1).any())
+    space, before = pilot.space, bool(problem.free_times(-1).any())
+    if pilot.whole and pilot.task is not None and pilot.outcome is not None:
+        return _trace(problem, space, [pilot.task], [pilot.outcome], pilot, before)
     tasks = list(tasks_of(problem, space, pilot.plan, before))
-    found = pilot.outcome_of(tasks)
-    if found is not None:
-        return _trace(problem, space, tasks, [found], pilot, before)
     outcomes = []
     for done, outcome in enumerate(executor.map(run, tasks) if executor else map(run, tasks), 1):
         outcomes.append(outcome)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -84,6 +84,7 @@ class Task:
     plan: Plan
     before: bool
     gradients: tuple[GradientOf | None, ...] | None = None
+    known: dict[Any, Any] = field(default_factory=dict)  # decomposed operators and patterns of cosines, once made
 
 
 @dataclass(frozen=True)
@@ -121,10 +122,9 @@ def run(task: Task) -> Outcome:
     if task.before:
         free.append(_all_coherences(task, states))
     now = task.plan.windows[0].start_ps
-    known: dict[int, propagate.Decomposed] = {}
     for window, passage, operators in zip(task.plan.windows, task.plan.passages, task.operators, strict=True):
         states = np.exp(-1j * task.energies * (window.start_ps - now))[:, None] * states
-        states, leaked, found = _through(task, window, passage, operators, states, known)
+        states, leaked, found = _through(task, window, passage, operators, states)
         now = window.stop_ps
         samples.append(found)
         free.append(_all_coherences(task, states))
@@ -135,7 +135,9 @@ def run(task: Task) -> Outcome:
 
 
 def _all_coherences(task: Task, states: Complexes) -> tuple[Coherences, ...]:
-    return tuple(observe.coherences(states, task.weights, matrix, task.rows) for matrix in task.cosines)
+    if "patterns" not in task.known:
+        task.known["patterns"] = [observe.pattern(matrix, task.rows) for matrix in task.cosines]
+    return observe.coherences(states, task.weights, task.known["patterns"])
 
 
 def _through(
@@ -144,7 +146,6 @@ def _through(
     passage: propagate.KickPlan | propagate.Grid | float,
     operators: tuple[NDArray[Any], ...],
     states: Complexes,
-    known: dict[int, propagate.Decomposed],
 ) -> tuple[Complexes, Floats, Floats]:
     """States after a window, each one's largest population at the edge, and the cosines (cosines, samples) inside."""
     snapshots = _Snapshots(task)
@@ -153,9 +154,9 @@ def _through(
             window, passage, task.energies, operators, states, task.edge, snapshots
         )
         return states, leaked, snapshots.cosines
-    operator = known.get(id(operators[0]))
+    operator = task.known.get(id(operators[0]))
     if operator is None:
-        operator = known[id(operators[0])] = _decomposed(task, window, operators[0])
+        operator = task.known[id(operators[0])] = _decomposed(task, window, operators[0])
     if isinstance(passage, propagate.KickPlan):
         states, leaked = propagate.split_through(passage, task.energies, operator, states, task.edge, snapshots)
     else:

@@ -119,19 +119,43 @@ def _summed(
     """Sums of the measures over some bodies, (measures, t)."""
     out = np.zeros((len(measures), len(times)))
     now = min(float(times[0]), windows[0].start_ps)
-    for window in (*windows, None):
-        stop = window.start_ps if window is not None else float(times[-1])
-        here = np.flatnonzero((times >= now) & (times <= stop)) if window is None else _between(times, now, stop)
-        motion = free_motion(moments, momentum, attitude)
-        for place in here.tolist():
-            out[:, place] = [measure(motion.at(times[place] - now)[1]).sum() for measure in measures]
-        if window is None:
-            return out
-        momentum, attitude = motion.at(window.start_ps - now)
+    for window in windows:
+        here = _between(times, now, window.start_ps)
+        listed = np.append(times[here], window.start_ps) - now
+        momentum, attitude = _freely(moments, momentum, attitude, listed, measures, out, here)
         momentum, attitude = _through(top, window, times, moments, momentum, attitude, measures, out)
         momentum = np.where(moments > 0, momentum, 0.0)  # a linear top has none about its axis, but for round-off
         now = window.stop_ps
+    here = _between(times, now, np.inf)
+    _freely(moments, momentum, attitude, times[here] - now, measures, out, here)
     return out
+
+
+def _freely(
+    moments: Floats,
+    momentum: Floats,
+    attitude: Floats,
+    later: Floats,
+    measures: Sequence[Measure],
+    out: Floats,
+    places: Ints,
+) -> tuple[Floats, Floats]:
+    """The bodies at the last of the times `later`; the measures at the first of them are written into `out` at `places`.
+
+    Both ways are exact: symmetric tops are turned from each time to the next, others follow from elliptic functions.
+    """
+    axial = len(np.unique(moments)) < 3
+    motion = None if axial else free_motion(moments, momentum, attitude)
+    now = 0.0
+    for number, time in enumerate(later.tolist()):
+        if motion is not None:
+            momentum, attitude = motion.at(time)
+        elif time > now:
+            moved = integrate(SymmetricTopSplitting(time - now), moments, momentum, [now, time], attitude)
+            momentum, attitude, now = moved.momentum[:, -1], moved.attitude[:, -1], time
+        if number < len(places):
+            out[:, places[number]] = [measure(attitude).sum() for measure in measures]
+    return momentum, attitude
 
 
 def _between(times: Floats, first: float, last: float) -> Ints:

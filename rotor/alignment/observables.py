@@ -16,7 +16,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -198,20 +198,42 @@ class Coherences:
     constant: float
 
 
-def coherences(states: Complexes, weights: Floats, matrix: Any, rows: Ints) -> Coherences:
-    """Of states in columns (n, m) over the free states with weights (m,); rows (n,) of their levels; matrix dense or sparse."""
-    weighted = states.conj() * weights
+class Pattern(NamedTuple):
+    """Where above its diagonal a matrix is not zero: places and rows of the levels (n,) each, the elements, and the diagonal."""
+
+    i: Ints
+    j: Ints
+    first: Ints
+    second: Ints
+    elements: NDArray[Any]
+    diagonal: Floats
+
+
+def pattern(matrix: Any, rows: Ints) -> Pattern:
+    """Of a matrix over states of the levels `rows`, dense or sparse."""
     if isinstance(matrix, np.ndarray):
-        i, j = np.nonzero(np.triu(matrix, 1))
-        product = (weighted @ states.T) * matrix  # Σ w c_i* c_j O_ij
-        return Coherences(rows[i], rows[j], product[i, j], float(np.trace(product).real))
-    upper = matrix.tocoo()
-    (i, j), values = upper.coords, upper.data
+        i, j = np.nonzero(matrix)
+        above = i < j
+        i, j = i[above], j[above]
+        return Pattern(i, j, rows[i], rows[j], matrix[i, j], np.diag(matrix).real)
+    entries = matrix.tocoo()
+    (i, j), values = entries.coords, entries.data
     above = i < j
-    i, j, values = i[above], j[above], values[above]
-    amplitudes = np.einsum("lm,lm->l", weighted[i], states[j]) * values
-    constant = float((matrix.diagonal() @ (np.abs(states) ** 2)) @ weights)
-    return Coherences(rows[i], rows[j], amplitudes, constant)
+    i, j = i[above].astype(np.int64), j[above].astype(np.int64)
+    return Pattern(i, j, rows[i], rows[j], values[above], np.asarray(matrix.diagonal()))
+
+
+def coherences(states: Complexes, weights: Floats, patterns: Sequence[Pattern]) -> tuple[Coherences, ...]:
+    """Of states in columns (n, m) over the free states with weights (m,), for each observable."""
+    weighted = states.conj() * weights
+    few = len(states) * 8 > sum(len(one.i) for one in patterns)
+    density = None if few else weighted @ states.T  # Σ w c_i* c_j
+    population = (weighted * states).real.sum(axis=1)
+    out = []
+    for one in patterns:
+        pairs = density[one.i, one.j] if density is not None else (weighted[one.i] * states[one.j]).sum(axis=1)
+        out.append(Coherences(one.first, one.second, pairs * one.elements, float(population @ one.diagonal)))
+    return tuple(out)
 
 
 def harmonics(pieces: Sequence[Coherences], energies: Floats, remainder: float) -> Harmonics:

@@ -162,7 +162,10 @@ def kick_plan(window: Window, grid: Grid, rule: Splitting) -> KickPlan:
     areas = _merged(strength * rule.kicks * steps[:, None])
     gradients = _merged(strength**2 * rule.gradients * steps[:, None] ** 3) if rule.gradients.any() else None
 
-    durations, which = np.unique(np.round(np.multiply.outer(steps, rule.drifts), 13), return_inverse=True)
+    lengths, kind = np.unique(np.round(grid.steps, 13), return_inverse=True)
+    shares, share = np.unique(rule.drifts, return_inverse=True)
+    durations = np.multiply.outer(lengths, shares).ravel()
+    which = np.add.outer(np.repeat(kind.ravel(), grid.counts) * len(shares), share.ravel()).ravel()
     last = np.cumsum(grid.counts) * stages - 1
     piece = max(1, len(steps) // CHECKS) * stages
     looked = np.union1d(last[grid.sampled], np.arange(piece - 1, len(areas) - 1, piece))

@@ -29,13 +29,10 @@ class Pilot:
     steps: tuple[int, ...]
     error: float
     edge: float
+    space: FieldSpace
     task: Task | None = None
     outcome: Outcome | None = None
-
-    def outcome_of(self, tasks: Sequence[Task]) -> Outcome | None:
-        """What was found already, where the pilot has carried all there is."""
-        whole = len(tasks) == 1 and self.task is not None and len(self.task.columns) == len(tasks[0].columns)
-        return self.outcome if whole else None
+    whole: bool = False  # whether task and outcome are all there is
 
 
 def plan_of(problem: Problem, steps: Sequence[int], rule: str | None, factor: int = 1) -> Plan:
@@ -60,11 +57,12 @@ def pilot_of(problem: Problem, jmax: int) -> Pilot:
         plan = plan_of(problem, [1] * len(problem.windows), "nystrom 4")
         outcome = None if task is None else run(replace(task, plan=plan))
         edge = _relative_edge(outcome, task) if outcome and task else 0.0
-        return Pilot(plan, (0,) * len(problem.windows), 0.0, edge, task if whole else None, outcome)
+        return Pilot(plan, (0,) * len(problem.windows), 0.0, edge, space, task, outcome, whole)
     if len(task.rows) > LARGEST_SPLIT or all(len(window.channels) > 1 for window in problem.windows):
-        return _refined(problem, space, task, None)
+        return replace(_refined(problem, space, task, None), whole=whole)
     if whole:
-        return _refined(problem, space, task, "nystrom 4" if problem.tolerance >= 1e-10 else "nystrom 6", 16)
+        rule = "nystrom 4" if problem.tolerance >= 1e-10 else "nystrom 6"
+        return replace(_refined(problem, space, task, rule, 16), whole=True)
     rules = propagate.SPLITTINGS if task.gradients is not None else propagate.SPLITTINGS[1:]
     best = _refined(problem, space, task, rules[0])
     for rule in rules[1:]:
@@ -94,12 +92,12 @@ def _refined(
         check = run(replace(task, plan=finer))
         error = _difference(problem, space, task, outcome, check)
         if error <= goal:
-            edge, mine = _relative_edge(check, task), Pilot(plan, _steps_of(plan), error, 0.0, task, outcome)
+            edge, mine = _relative_edge(check, task), Pilot(plan, _steps_of(plan), error, 0.0, space, task, outcome)
             if before > error > 0:
                 steps = 0.5 * 2 ** (math.log(before / goal) / math.log(before / error)) * sum(_steps_of(plan))
                 fewer = plan_of(problem, [math.ceil(steps / len(counts))] * len(counts), rule)
                 if steps <= sum(_steps_of(fewer)) and _cost(fewer) < _cost(plan):
-                    mine = Pilot(fewer, _steps_of(fewer), goal, 0.0)
+                    mine = Pilot(fewer, _steps_of(fewer), goal, 0.0, space, task)
             mine = replace(mine, edge=edge)
             return mine if below is None or _cost(mine.plan) < _cost(below.plan) else below
         before, factor, plan, outcome = error, 2 * factor, finer, check

@@ -15,7 +15,7 @@ from typing import cast
 
 import typer
 
-from rotor.cli.shared.options import PlainCommand
+from rotor.cli.shared.options import PlainCommand, PlainGroup
 from rotor.cli.shared.output import ComputationError
 
 VERBS = (
@@ -49,6 +49,7 @@ Examples:
 def _application(verbs: Sequence[str] = VERBS) -> typer.Typer:
     """The command with some of its verbs."""
     app = typer.Typer(
+        cls=PlainGroup,
         add_completion=False,
         pretty_exceptions_enable=False,
         rich_markup_mode=None,
@@ -80,7 +81,7 @@ def _print_version(expected: bool) -> None:
 def run(arguments: Sequence[str] | None = None) -> int:
     """Carry out a command and return its exit code; a mistake of the user is one line on standard error."""
     arguments = sys.argv[1:] if arguments is None else list(arguments)
-    verbs = arguments[:1] if arguments[:1] and arguments[0] in VERBS else VERBS  # what is not asked for is not loaded
+    verbs = arguments[:1] if {*arguments[:1]} & {*VERBS} else VERBS  # what is not asked for is not loaded
     command = typer.main.get_command(_application(verbs))
     provenance = shlex.join(["rotor", *arguments])
     try:

@@ -163,7 +163,7 @@ def predicted(lines: Catalogue, source: str) -> Catalogue:
     if not len(lines):
         raise ComputationError("--compare: no lines are left to compare")
     highest = int(max(lines.quanta_upper[:, 0].max(), lines.quanta_lower[:, 0].max()))
-    made = rotor.line_list(top, jmax=highest, min_lgint=float(lines.lgint.min()) - 1.0)
+    made = rotor.line_list(top, jmax=highest, min_lgint=float(lines.lgint.min()) - 1.0, untrusted=True)
     note(f"{source}: predicted at {made.temperature_k:g} K with Q = {made.q:.6g}, J up to {highest}")
     return catalogue(made)
 

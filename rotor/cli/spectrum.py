@@ -64,6 +64,7 @@ class Options:
     vibrational_factor: float = option(1.0, metavar="X", help="Multiplies Q.")
     profile: str | None = option(None, metavar="NAME", help="sticks, gaussian, lorentzian or voigt.")
     fwhm: str | None = option(None, metavar="W", help="Full width at half maximum (MHz); by default Doppler's.")
+    untrusted: bool = option(False, "--untrusted", help="List lines of levels beyond the reach of the constants too.")
     hyperfine: bool | None = option(
         None,
         "--hyperfine/--no-hyperfine",
@@ -132,6 +133,7 @@ def _settings(options: Options) -> dict[str, Any]:
         "jmax": options.jmax,
         "min_lgint": inputs.cut("--min-lgint", options.min_lgint),
         "q": options.q,
+        "untrusted": options.untrusted,
         "vibrational_factor": options.vibrational_factor,
     }
     if options.range_ is not None:

@@ -12,9 +12,7 @@ from typing import Any
 from rotor.formats.library import library_file, names
 from rotor.formats.molecule_file import MoleculeFile, parse_molecule_file, read_molecule_file
 from rotor.formats.registry import reader_of, writer_of
-from rotor.molecules.readers.read import g2_names, read_molecule
 from rotor.tops.constants import Constants
-from rotor.tops.isotopologues import isotopologue
 from rotor.tops.top import Top
 
 Isotopes = Mapping[int | str, str] | str
@@ -58,13 +56,25 @@ def read(source: Any, *, isotopes: Isotopes | None = None) -> Any:
         return _read_path(source, isotopes)
     if source == "-":
         return _read_standard_input(isotopes)
-    return _with_isotopes(Top.from_molecule(read_molecule(source)), isotopes)
+    return _with_isotopes(_top_of_geometry(source), isotopes)
+
+
+def _top_of_geometry(source: Any) -> Top:
+    from rotor.molecules.readers.read import read_molecule
+
+    return Top.from_molecule(read_molecule(source))
+
+
+def _g2_names() -> tuple[str, ...]:
+    from rotor.molecules.readers.read import g2_names
+
+    return g2_names()
 
 
 def _meaning(word: str) -> Path | str:
     """The path that a bare word names: a file that exists, else a file of the library; else the word itself."""
     known, path = library_file(word), Path(word)
-    if path.exists() and (known or word in g2_names()):
+    if path.exists() and (known or word in _g2_names()):
         what = "a molecule of the library" if known else "a molecule of ASE's g2 set"
         raise ValueError(
             f"{word!r} is ambiguous: it is a path here and {what}; write '{os.path.join('.', word)}' for the path, "
@@ -72,8 +82,8 @@ def _meaning(word: str) -> Path | str:
         )
     if path.exists() or _looks_like_a_path(word):
         return path
-    if known is None and word not in g2_names():
-        near = difflib.get_close_matches(word, [*names(), *g2_names()], n=3)
+    if known is None and word not in _g2_names():
+        near = difflib.get_close_matches(word, [*names(), *_g2_names()], n=3)
         meant = f"did you mean {', '.join(near)}? " if near else ""
         raise ValueError(
             f"{word!r} is no file here, no molecule of the library ('rotor molecules' lists it) and none of ASE's g2 set; "
@@ -94,7 +104,7 @@ def _read_path(path: Path, isotopes: Isotopes | None) -> Any:
     if path.stat().st_size == 0:
         raise ValueError(f"{path}: the file is empty")
     reader = reader_of(path)
-    found = reader(path) if reader else Top.from_molecule(read_molecule(path))
+    found = reader(path) if reader else _top_of_geometry(path)
     if isinstance(found, Top):
         return _with_isotopes(found, isotopes)
     if isotopes:
@@ -135,7 +145,11 @@ def _read_standard_input(isotopes: Isotopes | None) -> Top:
 
 
 def _with_isotopes(top: Top, isotopes: Isotopes | None) -> Top:
-    return isotopologue(top, isotopes).top if isotopes else top
+    if not isotopes:
+        return top
+    from rotor.tops.isotopologues import isotopologue
+
+    return isotopologue(top, isotopes).top
 
 
 def read_top_file(path: Path) -> Top:

@@ -34,6 +34,7 @@ from rotor.spectra.intensity import intensity_cut, jmax_for_cut
 from rotor.spectra.lines import DEFAULT_MIN_LGINT, Lines, dipoles_by_state, line_list
 from rotor.spectra.transitions import all_transitions
 from rotor.thermo import PartitionFunction
+from rotor.thermo.trusted_levels import are_trusted
 from rotor.tops.top import Top
 from rotor.version import version
 
@@ -241,6 +242,8 @@ def _make_piece(plan: _Plan, first: int, last: int) -> None:
     dipoles = dipoles_by_state(plan.top, plan.dipole_abc, plan.effects)
     found = all_transitions(levels, dipoles, plan.range_mhz, cut)
     own = np.minimum(rotational[found.upper], rotational[found.lower]) <= last
+    trusted = are_trusted(plan.top, levels)
+    own &= trusted[found.upper] & trusted[found.lower]
     lines = Lines(
         plan.top,
         levels,

@@ -4,7 +4,6 @@ Masses are those of isotopes (AME2020), never averages over the natural mixture:
 number means its most abundant isotope, or the longest-lived one where nature has none.
 """
 
-import csv
 import difflib
 import re
 from collections.abc import Sequence
@@ -60,25 +59,34 @@ def data_folder() -> Path:
 
 
 @cache
-def _table() -> dict[str, dict[int, Isotope]]:
-    """Every isotope by symbol and mass number."""
-    with (data_folder() / "isotopes.csv").open(encoding="utf-8", newline="") as file:
-        rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
-    table: dict[str, dict[int, Isotope]] = {}
-    for row in rows:
-        one = Isotope(
-            symbol=row["symbol"],
-            element_number=int(row["element_number"]),
-            mass_number=int(row["mass_number"]),
-            mass_u=float(row["mass_u"]),
-            abundance=float(row["abundance"]),
-            half_life_s=float(row["half_life_s"]),
-            spin=float(row["spin"]),
-            g_factor=float(row["g_factor"]) if row["g_factor"] else None,
-            quadrupole_barn=float(row["quadrupole_barn"]) if row["quadrupole_barn"] else None,
+def _lines() -> dict[str, list[str]]:
+    """The lines of the table by symbol; numbers are made of those that are asked for."""
+    text = (data_folder() / "isotopes.csv").read_text(encoding="utf-8")
+    found: dict[str, list[str]] = {}
+    for line in [line for line in text.splitlines() if not line.startswith("#")][1:]:
+        found.setdefault(line.partition(",")[0], []).append(line)
+    return found
+
+
+@cache
+def _isotopes(element: str) -> dict[int, Isotope]:
+    """Every isotope of an element by mass number."""
+    found = {}
+    for line in _lines()[element]:
+        symbol, number, mass_number, *numbers, g_factor, quadrupole = line.split(",")
+        mass_u, abundance, half_life, spin = map(float, numbers)
+        found[int(mass_number)] = Isotope(
+            symbol=symbol,
+            element_number=int(number),
+            mass_number=int(mass_number),
+            mass_u=mass_u,
+            abundance=abundance,
+            half_life_s=half_life,
+            spin=spin,
+            g_factor=float(g_factor) if g_factor else None,
+            quadrupole_barn=float(quadrupole) if quadrupole else None,
         )
-        table.setdefault(one.symbol, {})[one.mass_number] = one
-    return table
+    return found
 
 
 def isotope(symbol: str, mass_number: int | None = None) -> Isotope:
@@ -111,7 +119,7 @@ def isotope(symbol: str, mass_number: int | None = None) -> Isotope:
     if own_number is not None and mass_number not in (None, own_number):
         raise ValueError(f"isotope {symbol!r} with mass number {mass_number}: the two differ; give one of them")
     expected = own_number if own_number is not None else mass_number
-    isotopes = _table()[element]
+    isotopes = _isotopes(element)
     if expected is None:
         return max(isotopes.values(), key=lambda one: (one.abundance, one.half_life_s))
     if expected not in isotopes:
@@ -132,14 +140,14 @@ def _split(name: str) -> tuple[str, int | None]:
         element, number = match[1], int(match[2])
     else:
         element, number = name, None
-    if element not in _table():
+    if element not in _lines():
         raise ValueError(f"{name!r} is not an element or isotope{_near(element)}; write 'C', '13C' or 'D'")
     return element, number
 
 
 def _near(element: str) -> str:
     """A phrase that names the elements most like a wrong symbol; empty where none is."""
-    known = list(_table())
+    known = list(_lines())
     near = [symbol for symbol in known if symbol.lower() == element.lower()]
     near += [symbol for symbol in difflib.get_close_matches(element, known, n=3) if symbol not in near]
     return f" (near it: {', '.join(near)})" if near else ""
@@ -151,8 +159,8 @@ def element_symbol(number: int) -> str:
     >>> element_symbol(6)
     'C'
     """
-    for symbol, isotopes in _table().items():
-        if next(iter(isotopes.values())).element_number == number:
+    for symbol, lines in _lines().items():
+        if lines[0].split(",", 2)[1] == str(number):
             return symbol
     raise ValueError(f"{number} is not the atomic number of an element in data/isotopes.csv; hydrogen is 1, carbon 6")
 
@@ -164,7 +172,7 @@ def natural_isotopes(symbol: str) -> tuple[Isotope, ...]:
     ['16O', '18O', '17O']
     """
     element, _ = _split(symbol)
-    natural = [one for one in _table()[element].values() if one.abundance > 0]
+    natural = [one for one in _isotopes(element).values() if one.abundance > 0]
     return tuple(sorted(natural, key=lambda one: -one.abundance))
 
 
@@ -175,7 +183,7 @@ def isotope_of_mass(symbol: str, mass_u: float, within_u: float = 0.01) -> Isoto
     '37Cl'
     """
     element, _ = _split(symbol)
-    nearest = min(_table()[element].values(), key=lambda one: abs(one.mass_u - mass_u))
+    nearest = min(_isotopes(element).values(), key=lambda one: abs(one.mass_u - mass_u))
     if not abs(nearest.mass_u - mass_u) <= within_u:
         raise ValueError(
             f"a mass of {mass_u:g} u is not that of an isotope of {element}; the nearest is {nearest.label} with "

@@ -132,15 +132,18 @@ def disordered_blocks(top: Top, levels: Levels) -> list[tuple[int, str]]:
     rigid top, where labels are in perfect order.
     """
     out: list[tuple[int, str]] = []
+    of_j: dict[int, JMatrix] = {}
     if hamiltonian(top, levels.effects) == hamiltonian(top, (Rigid(),)):  # a rigid top is in order
         return out
+    operators = rigid_operators(top.constants)
     for block in levels.blocks:
-        if not isinstance(block, SolvedBlock):
+        if not isinstance(block, SolvedBlock) or block.basis.size == 1:
             continue
-        bands = block_bands(JMatrix(rigid_operators(top.constants), block.basis.j), block.basis)
-        rigid = _expectations(bands, block.vectors)
+        j = block.basis.j
+        of_j[j] = of_j[j] if j in of_j else JMatrix(operators, j)
+        rigid = _expectations(block_bands(of_j[j], block.basis), block.vectors)
         if (np.diff(rigid) < -1e-9 * np.abs(rigid).max()).any():
-            out.append((block.basis.j, block.basis.species))
+            out.append((j, block.basis.species))
     return out
 
 

@@ -9,7 +9,6 @@ one, so that the sum of all these overlaps is largest.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from concurrent.futures import Executor
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -25,6 +24,8 @@ from rotor.quantum.states import Coupling, State
 from rotor.tops.operators import Operators
 
 if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
     from rotor.quantum.effect import QuantumEffect
     from rotor.tops.top import Top
 

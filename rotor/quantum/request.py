@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -23,6 +22,8 @@ from rotor.table import Table
 from rotor.tops.facts import top_facts
 
 if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
     from rotor.tops.top import Top
 
 DEFAULT_JMAX = 10

@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator, Sequence
-from concurrent.futures import Executor
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -34,6 +33,8 @@ from rotor.tops.operators import AXIAL_REPRESENTATION, Operators
 from rotor.tops.spin_weights import SpinWeights
 
 if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
     from rotor.tops.top import Top
 
 SMALL = 100  # rows of a tridiagonal block up to which scipy.linalg, 0.2 s to load, is not loaded for it

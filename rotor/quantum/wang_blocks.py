@@ -84,10 +84,15 @@ class WangSpace(FieldSpace):
         for members, colours, real in coloured_components(nodes, edges):
             copies = 2 if m and real else 1
             for sign in (1, -1) if m and not real else (1,):
-                out.append(self._block(sign * m, copies, members, colours, real))
+                out.append(self.block_of(sign * m, copies, members, colours, real))
         return out
 
-    def _block(self, m: int, copies: int, members: list[int], colours: list[int], real: bool) -> WangBlockInField:
+    def solved_of(self, j: int) -> list[SolvedBlock]:
+        """The solved Wang blocks of one J."""
+        return [self.solved[i] for i in self._by_j.get(j, [])]
+
+    def block_of(self, m: int, copies: int, members: list[int], colours: list[int], real: bool) -> WangBlockInField:
+        """A block of the Wang blocks `members`."""
         names = sorted({self.solved[i].basis.species for i in members})
         rows = np.concatenate([np.arange(b.start, b.start + b.basis.size) for b in (self.solved[i] for i in members)])
         return WangBlockInField(m, "+".join(names), copies, tuple(members), tuple(colours), real, rows, self)

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -38,9 +37,12 @@ from rotor.spectra.intensity import (
 )
 from rotor.spectra.transitions import all_transitions
 from rotor.thermo import PartitionFunction, VibrationalStates, partition_function
+from rotor.thermo.trusted_levels import are_trusted
 from rotor.tops.covariance import Covariance
 
 if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
     from rotor.tops.top import Top
 
 
@@ -53,6 +55,7 @@ class Lines(TransitionTable):
 
     frequency_mhz, strength_debye2 (S μ², all components): (n,) float64. upper, lower: (n,) int32, rows of `levels`.
     All other columns are computed when asked for. min_lgint, range_mhz and jmax say where the list was cut.
+    untrusted: how many lines were left out since a level of theirs is beyond the reach of the constants.
     covariance: of the constants; without one, their uncertainties count where the top says that they are independent.
     """
 
@@ -68,6 +71,7 @@ class Lines(TransitionTable):
     given_partition: PartitionFunction | None = None
     covariance: Covariance | None = None
     given_spread: Floats | None = None
+    untrusted: int = 0
 
     def __len__(self) -> int:
         return len(self.frequency_mhz)
@@ -93,7 +97,9 @@ class Lines(TransitionTable):
         known = set(self.covariance_used.names) if self.covariance_used else set()
         exact = [name for name in self.top.constants.values if name not in known]
         partly = f"errors of frequencies take {', '.join(exact)} as exact: their uncertainty is not known"
-        return warnings_of(self.top, self.levels) + ((partly,) if known and exact else ())
+        beyond = f"{self.untrusted} lines of levels beyond the reach of the distortion constants are left out"
+        found = warnings_of(self.top, self.levels) + ((beyond,) if self.untrusted else ())
+        return found + ((partly,) if known and exact else ())
 
     @cached_property
     def spread(self) -> Floats | None:
@@ -247,6 +253,7 @@ def line_list(
     vibrations: VibrationalStates | None = None,
     covariance: Covariance | None = None,
     sort: bool = True,
+    untrusted: bool = False,
     effects: Sequence[QuantumEffect] = SEMI_RIGID,
     executor: Executor | None = None,
 ) -> Lines:
@@ -258,7 +265,9 @@ def line_list(
     divisor. vibrational_factor: multiplies Q. vibrations: states or fundamentals whose factor at this temperature multiplies
     Q instead. covariance: of the constants, for the errors of frequencies;
     by default the uncertainties that the constants carry, uncorrelated, but not those of a fit whose correlations are
-    unknown (the library's): they would make errors many times too large. executor: J are spread over it.
+    unknown (the library's): they would make errors many times too large. untrusted: list lines
+    of levels beyond the reach of the distortion constants too (`rotor.thermo.trusted_levels`); they are left out and counted. effects: what
+    the Hamiltonian consists of. executor: J are spread over it.
 
     Neglected: all but electric dipole, nuclear hyperfine structure, vibrational states, dependence of μ on J.
     Raises ValueError where the top has no known dipole, for a temperature not above 0, and for J max below 0.
@@ -279,12 +288,15 @@ def line_list(
         jmax = jmax_for_cut(top, dipole, temperature_k, given.q if given else 1.0, least)
 
     levels = solve_levels(top, jmax, effects=effects, executor=executor)
-    cut = intensity_cut(levels, temperature_k, given.q, least) if given else None
+    trusted = np.ones(len(levels), dtype=np.bool_) if untrusted else are_trusted(top, levels)
+    ground = float(levels.energy_mhz[trusted & (levels.weight > 0)].min(initial=math.inf))
+    cut = intensity_cut(levels, temperature_k, given.q, least, ground) if given and math.isfinite(ground) else None
     others = [moment for effect in levels.effects for moment in effect.other_moments(top)]
     found = all_transitions(levels, dipoles_by_state(top, dipole, levels.effects), range_mhz, cut, others)
+    inside = trusted[found.upper] & trusted[found.lower]
     lines = Lines(
         top=top,
-        levels=levels,
+        levels=levels if trusted.all() else replace(levels, weight=np.where(trusted, levels.weight, 0)),
         frequency_mhz=found.frequency_mhz,
         strength_debye2=found.strength_debye2,
         upper=found.upper,
@@ -294,7 +306,10 @@ def line_list(
         range_mhz=range_mhz,
         given_partition=given,
         covariance=covariance,
+        untrusted=int(np.count_nonzero(~inside)),
     )
+    if not inside.all():
+        lines = lines.where(inside)
     return lines.sorted() if sort else lines
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from concurrent.futures import Executor
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -25,6 +24,8 @@ from rotor.thermo.request import partition_facts
 from rotor.tops.facts import top_facts
 
 if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
     from rotor.tops.top import Top
 
 

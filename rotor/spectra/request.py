@@ -6,7 +6,6 @@ The command line and scene files fill a `SpectrumRequest`; `answer_spectrum` is 
 from __future__ import annotations
 
 import math
-from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -20,14 +19,15 @@ from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.limits import limit_facts, populated_j
 from rotor.spectra.intensity import USUAL_CUT
 from rotor.spectra.lines import DEFAULT_MIN_LGINT, Lines, line_list
-from rotor.spectra.opacity import column_density_per_cm2, line_optical_depth, optical_depth
-from rotor.spectra.spectrum import Spectrum, resolving_grid
 from rotor.thermo import VibrationalStates
 from rotor.thermo.request import partition_facts
 from rotor.tops.covariance import Covariance
 from rotor.tops.facts import top_facts
 
 if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
+    from rotor.spectra.spectrum import Spectrum
     from rotor.tops.top import Top
 
 PROFILES = ("sticks", "gaussian", "lorentzian", "voigt")
@@ -55,7 +55,7 @@ class SpectrumRequest:
     frequency. q: partition function instead of the summed one. vibrational_factor: multiplies Q; vibrations: states whose
     factor does so instead. covariance: of the constants, for the errors of frequencies. profile: sticks, gaussian, lorentzian
     or voigt; None: gaussian where there is a width or a layer, else sticks. fwhm_mhz: full width at half maximum; None:
-    Doppler's. layer: of gas, for optical depths. effects: what the Hamiltonian consists of.
+    Doppler's. layer: of gas, for optical depths. untrusted: as in `line_list`. effects: what the Hamiltonian consists of.
     """
 
     top: Top
@@ -70,6 +70,7 @@ class SpectrumRequest:
     profile: str | None = None
     fwhm_mhz: float | None = None
     layer: GasLayer | None = None
+    untrusted: bool = False
     effects: tuple[QuantumEffect, ...] = SEMI_RIGID
 
     def __post_init__(self) -> None:
@@ -127,6 +128,8 @@ class SpectrumAnswer:
         layer = self.request.layer
         if layer is None:
             return None
+        from rotor.spectra.opacity import column_density_per_cm2
+
         return column_density_per_cm2(layer.pressure_bar, layer.path_cm, self.lines.temperature_k)
 
     @cached_property
@@ -135,6 +138,8 @@ class SpectrumAnswer:
         layer = self.request.layer
         if layer is None:
             return None
+        from rotor.spectra.opacity import line_optical_depth
+
         shape: dict[str, Any] = {"profile": self.request.shape, "fwhm_mhz": self.request.fwhm_mhz}
         return line_optical_depth(self.lines, layer.pressure_bar, layer.path_cm, **shape)
 
@@ -143,6 +148,9 @@ class SpectrumAnswer:
         """The lines with their shape on a grid that resolves each: a cross section, or the optical depth of the layer."""
         if self.request.shape == "sticks":
             raise ValueError("profile: sticks have no profile; choose gaussian, lorentzian or voigt")
+        from rotor.spectra.opacity import optical_depth
+        from rotor.spectra.spectrum import Spectrum, resolving_grid
+
         first, last = self.request.range_mhz
         shape: dict[str, Any] = {"profile": self.request.shape, "fwhm_mhz": self.request.fwhm_mhz}
         grid = resolving_grid(self.lines, range_mhz=(first, last) if math.isfinite(last) else None, **shape)
@@ -226,6 +234,7 @@ def answer_spectrum(request: SpectrumRequest, executor: Executor | None = None) 
         vibrational_factor=request.vibrational_factor,
         vibrations=request.vibrations,
         covariance=request.covariance,
+        untrusted=request.untrusted,
         effects=request.effects,
         executor=executor,
     )

@@ -75,6 +75,17 @@ def trusted_energies_mhz(top: Top, levels: Levels) -> tuple[Floats, Floats]:
     return np.where(wrong, estimate, energy), np.where(wrong, lowest, energy)
 
 
+def are_trusted(top: Top, levels: Levels) -> NDArray[np.bool_]:
+    """Which levels (n,) are energies of a molecule; all of a rigid top, and of one with spins or further states."""
+    plain = not {"v", "f", "irrep"} & levels.quanta.keys()
+    if not plain or not centrifugal_operators(top.constants):
+        return np.ones(len(levels), dtype=np.bool_)
+    rigid = rigid_energies_mhz(top, levels)
+    if not _untrusted(levels, levels.energy_mhz, rigid).any():
+        return np.ones(len(levels), dtype=np.bool_)
+    return ~_untrusted(levels, levels.energy_mhz, _simpler_mhz(top, levels, rigid)[0])
+
+
 def _untrusted(levels: Levels, energy: Floats, rigid: Floats) -> NDArray[np.bool_]:
     low, high = energy < TRUSTED[0] * rigid, energy > TRUSTED[1] * rigid
     return np.asarray(high | np.isin(levels.rotational, levels.rotational[low]))

@@ -52,8 +52,8 @@ class Covariance:
         matrix = np.asarray(correlations, dtype=np.float64)
         if sigma.shape != (len(names),) or matrix.shape != (len(names), len(names)):
             raise ValueError(
-                f"{len(names)} constants with uncertainties of shape {sigma.shape} and correlations of shape "
-                f"{matrix.shape}; ({len(names)},) and ({len(names)}, {len(names)}) are needed"
+                f"{len(names)} constants: expected uncertainties of shape ({len(names)},) and correlations of shape "
+                f"({len(names)}, {len(names)}), found {sigma.shape} and {matrix.shape}"
             )
         if not np.allclose(np.diag(matrix), 1.0):
             raise ValueError("a correlation matrix has 1 on its diagonal; is this a covariance?")
@@ -82,11 +82,11 @@ def _refuse_impossible(names: Sequence[str], matrix: Floats) -> None:
         raise ValueError(f"covariance of {', '.join(names)}: a name stands twice")
     if matrix.shape != (len(names), len(names)):
         raise ValueError(
-            f"covariance of {len(names)} constants of shape {matrix.shape}: a square of that size is needed"
+            f"covariance of {len(names)} constants: expected a square of that size, found shape {matrix.shape}"
         )
     variances = np.diag(matrix)
     if not np.isfinite(matrix).all() or (variances < 0).any():
-        raise ValueError("covariance: finite numbers are needed, and variances of 0 or more")
+        raise ValueError("covariance: expected finite numbers, and variances of 0 or more")
     sigma = np.sqrt(variances)
     scale = np.outer(np.where(sigma > 0, sigma, 1.0), np.where(sigma > 0, sigma, 1.0))
     if not np.allclose(matrix / scale, matrix.T / scale, rtol=0, atol=1e-9):

@@ -121,11 +121,22 @@ class PlainCommand(typer.core.TyperCommand):
     Typer's own conversion loads pydantic, which takes as long as numpy.
     """
 
-    def __init__(self, *arguments: Any, **settings: Any) -> None:
-        super().__init__(*arguments, **settings)
-        for parameter in self.params:
-            parameter.process_value = _unchanged  # type: ignore[method-assign, assignment]
+    def get_params(self, ctx: Any) -> list[Any]:
+        """The parameters, --help among them."""
+        return [_unconverted(one) for one in super().get_params(ctx)]
 
 
-def _unchanged(context: Any, value: Any) -> Any:
-    return value
+class PlainGroup(typer.core.TyperGroup):
+    """The same for what stands before a verb."""
+
+    def get_params(self, ctx: Any) -> list[Any]:
+        """The parameters, --help among them."""
+        return [_unconverted(one) for one in super().get_params(ctx)]
+
+
+def _unconverted(parameter: Any) -> Any:
+    def process_value(context: Any, value: Any) -> Any:
+        return parameter.callback(context, parameter, value) if parameter.callback else value
+
+    parameter.process_value = process_value
+    return parameter

@@ -27,17 +27,22 @@ from rotor.quantum.spins.operators import is_axial
 from rotor.tops.constants import Constants
 from rotor.tops.top import Top
 
+_EVERY_K = 10**6
 Dipoles = dict[tuple[int, int], Vector]
 
 
 @dataclass(frozen=True)
 class Group:
-    """States that are solved together: their options by number here, the top that stands for their symmetry, the effect."""
+    """States that are solved together: their options by number here, the top that stands for their symmetry, the effect.
+
+    axial_kmax: the largest K of a symmetric top whose K is good.
+    """
 
     states: tuple[StateOptions, ...]
     top: Top
     effect: FileEffect
     oblate: bool
+    axial_kmax: int = _EVERY_K
 
     @property
     def spins(self) -> tuple[int, ...]:
@@ -51,7 +56,7 @@ class Group:
         """
         if self.spins or self.effect.others:
             every = range(max(twice_f[0], sum(self.spins) % 2), twice_f[1] + 1, 2)
-            exist = None if self.top.kind in ("prolate", "oblate", "linear") else self._exist
+            exist = None if self.top.kind == "linear" else self._exist
             levels = levels_of_f(self.top, (self.effect,), every, None, executor, exist)
         else:
             levels = solve_levels(
@@ -62,6 +67,8 @@ class Group:
     def _exist(self, labels: Ints) -> NDArray[np.bool_]:
         """Which labels v, Ka, Kc, N, ..., F belong to levels of a weight."""
         v, ka, kc = labels[:, 0], labels[:, 1], labels[:, 2]
+        if self.top.kind in ("prolate", "oblate"):
+            return np.asarray(ka <= self.axial_kmax)
         found = np.zeros(len(labels), dtype=bool)
         for place, state in enumerate(self.states):
             i_tot = labels[:, -2] // 2 if state.i_tot else 0
@@ -163,7 +170,8 @@ def _group(
     )
     effect = FileEffect(usable, numbers, coupled, moments, limits, others)
     top = Top(_STANDS_FOR[kind, oblate], dipole_abc_debye=moments.get((0, 0), (0.0, 0.0, 0.0)), name=title)
-    return Group(tuple(states), top, effect, oblate)
+    kmax = states[0].kmax if as_spcat and kind in ("prolate", "oblate") else _EVERY_K
+    return Group(tuple(states), top, effect, oblate, kmax)
 
 
 # the symmetry alone counts: the file's own operators are the whole Hamiltonian
@@ -198,8 +206,8 @@ def _kind(states: list[StateOptions], lines: tuple[CodedLine, ...], oblate: bool
 def _limits(states: list[StateOptions], as_spcat: bool) -> dict[int, tuple[int, int]]:
     found = {}
     for place, state in enumerate(states):
-        kmax = state.kmax if as_spcat or state.kmin == state.kmax else 10**6
-        if state.kmin > 0 or kmax < 10**6:
+        kmax = state.kmax if as_spcat or state.kmin == state.kmax else _EVERY_K
+        if state.kmin > 0 or kmax < _EVERY_K:
             found[place] = (state.kmin, kmax)
     return found
 

@@ -138,6 +138,7 @@ def _lines_asked_for(top: Top, request: Request, q_reduced: float) -> Lines:
         temperature_k=t,
         q=q_reduced * math.exp(above_zero),
         jmax=request.fend,
+        untrusted=True,
         min_lgint=request.str0,
         range_mhz=(LEAST_MHZ, request.fqlim_ghz * 1e3),
     )

@@ -5,17 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from rotor.quantum.effect import QuantumEffect
-from rotor.quantum.effects.hyperfine import NuclearQuadrupole
-from rotor.quantum.effects.spin_effect import SpinEffect, parse_name
-from rotor.quantum.effects.spin_rotation import SpinRotation
-from rotor.quantum.effects.spin_spin import SpinSpin
 from rotor.quantum.effects.watson import SEMI_RIGID
-from rotor.quantum.spins import Spin
 
 if TYPE_CHECKING:
+    from rotor.quantum.effects.spin_effect import SpinEffect
+    from rotor.tops.spin_constants import SpinConstants
     from rotor.tops.top import Top
-
-_KINDS: tuple[type[SpinEffect], ...] = (NuclearQuadrupole, SpinRotation, SpinSpin)
 
 
 def spin_effects(top: Top) -> tuple[QuantumEffect, ...]:
@@ -29,20 +24,30 @@ def spin_effects(top: Top) -> tuple[QuantumEffect, ...]:
     >>> [effect.name for effect in spin_effects(top)]
     ['nuclear quadrupole']
     """
-    constants = top.spin_constants
-    if constants is None:
+    if top.spin_constants is None:
         return ()
     _refuse_like_nuclei(top)
+    return _effects(top.spin_constants)
+
+
+def _effects(constants: SpinConstants) -> tuple[QuantumEffect, ...]:
+    from rotor.quantum.effects.hyperfine import NuclearQuadrupole
+    from rotor.quantum.effects.spin_effect import parse_name
+    from rotor.quantum.effects.spin_rotation import SpinRotation
+    from rotor.quantum.effects.spin_spin import SpinSpin
+    from rotor.quantum.spins import Spin
+
+    kinds: tuple[type[SpinEffect], ...] = (NuclearQuadrupole, SpinRotation, SpinSpin)
     spins = tuple(Spin(name, twice, name.startswith("S")) for name, twice in constants.twice.items())
     values: dict[type[SpinEffect], dict[str, float]] = {}
     for name, value in constants.values.items():
         symbol = parse_name(name).symbol
-        kind = next((kind for kind in _KINDS if symbol in kind.symbols), None)
+        kind = next((kind for kind in kinds if symbol in kind.symbols), None)
         if kind is None:
-            known = ", ".join(one for kind in _KINDS for one in kind.symbols)
+            known = ", ".join(one for kind in kinds for one in kind.symbols)
             raise ValueError(f"{name}: known constants of spins are {known}")
         values.setdefault(kind, {})[name] = value
-    return tuple(kind(values[kind], spins) for kind in _KINDS if kind in values)
+    return tuple(kind(values[kind], spins) for kind in kinds if kind in values)
 
 
 def _refuse_like_nuclei(top: Top) -> None:

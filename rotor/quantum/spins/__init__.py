@@ -9,7 +9,6 @@ Levels are solved F by F (`blocks`) over the eigenstates of the rotation (`rotor
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import Executor
 from typing import TYPE_CHECKING
 
 from rotor.arrays import Floats, Ints
@@ -17,6 +16,8 @@ from rotor.quantum.spins.operators import SpinTerm
 from rotor.quantum.spins.scheme import Scheme, Spin, scheme_of
 
 if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
     from rotor.quantum.effect import QuantumEffect
     from rotor.quantum.levels import Levels
     from rotor.quantum.reduced import Tensors

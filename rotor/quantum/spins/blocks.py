@@ -14,7 +14,6 @@ first, and among the levels of one sub-block Ka rises with energy.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import Executor
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -38,6 +37,8 @@ from rotor.quantum.spins.rotor import (
 from rotor.quantum.spins.scheme import Scheme, scheme_of
 
 if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
     from rotor.tops.top import Top
 
 
@@ -172,7 +173,7 @@ def solve_f(plan: Plan, twice_f: int, exist: Exist | None = None) -> list[SpinBl
     for family in plan.families:
         members = [(i, rows[place]) for i, own in family if (place := (plan.blocks[i].n, own)) in rows]
         parts = _parts(plan, members)
-        if members and (exist is None or exist(np.concatenate(_names(parts, every))).any()):
+        if members and (exist is None or exist(_names(parts, every)[0]).any()):
             out.append(_solved(plan, twice_f, every, parts, known))
     return out
 
@@ -238,8 +239,8 @@ def _of_exchange(scheme: Scheme, channel: Channel, every: Ints) -> Floats:
 
 def labels_of(parts: tuple[SpinPart, ...], every: Ints, vectors: Floats) -> tuple[Ints, Floats]:
     """Names (n, 3 + pattern) of the states of a block, energies rising, and the shares of the sub-blocks that give them."""
+    names, sizes = _names(parts, every)
     shares: list[Floats] = []
-    names = _names(parts, every)
     for part in parts:
         states = len(part.rotor.energies_mhz)
         rows = vectors[part.place].reshape(part.repeats, states, -1)
@@ -247,22 +248,27 @@ def labels_of(parts: tuple[SpinPart, ...], every: Ints, vectors: Floats) -> tupl
             inside = (
                 rows if len(part.rotor.parts) == 1 else np.einsum("kr,prn->pkn", part.rotor.vectors[own.place], rows)
             )
-            shares += list((inside**2).sum(axis=1))
-    table = np.array(shares)
-    of_state = assigned(table, np.array([len(own) for own in names]))
-    labels = np.empty((vectors.shape[1], names[0].shape[1]), dtype=np.int64)
-    labels[np.argsort(of_state, kind="stable")] = np.concatenate(names)
+            shares.append(np.einsum("pkn,pkn->pn", inside, inside))
+    table = np.concatenate(shares)
+    of_state = assigned(table, sizes)
+    labels = np.empty_like(names)
+    labels[np.argsort(of_state, kind="stable")] = names
     return labels, np.asarray(table[of_state, np.arange(len(of_state))])
 
 
-def _names(parts: tuple[SpinPart, ...], every: Ints) -> list[Ints]:
-    """v, Ka, Kc and the pattern of the levels that each sub-block names, (number of them, 3 + pattern)."""
-    found = []
+def _names(parts: tuple[SpinPart, ...], every: Ints) -> tuple[Ints, Ints]:
+    """v, Ka, Kc and the pattern of the levels that the sub-blocks name, (functions, 3 + pattern), and how many each names."""
+    found, sizes = [], []
     for part in parts:
+        own_patterns = every[part.patterns]
         for own in part.rotor.parts:
-            of_k = np.column_stack([np.full(len(own.names), own.v), own.names])
-            found += [np.column_stack([of_k, np.tile(pattern, (len(of_k), 1))]) for pattern in every[part.patterns]]
-    return found
+            names = np.empty((len(own_patterns), len(own.names), 3 + every.shape[1]), dtype=np.int64)
+            names[..., 0] = own.v
+            names[..., 1:3] = own.names
+            names[..., 3:] = own_patterns[:, None, :]
+            found.append(names.reshape(-1, names.shape[-1]))
+            sizes += [len(own.names)] * len(own_patterns)
+    return np.concatenate(found), np.array(sizes)
 
 
 def assigned(shares: Floats, capacity: Ints) -> Ints:

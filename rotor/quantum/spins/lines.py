@@ -37,8 +37,18 @@ def amplitudes(up: SpinBlock, low: SpinBlock, tensors: Tensors) -> Floats:
     rank, moved = rank_of(tensors), np.zeros((up.vectors.shape[0], low.vectors.shape[1]))
     t = _coefficients(up, low, rank)
     for target, source, element in _acting(up, low, tensors, rank):
-        moved[target.place] += product(t[target.patterns, source.patterns], element) @ low.vectors[source.place]
+        moved[target.place] += acting_on(low.vectors[source.place], t[target.patterns, source.patterns], element)
     return np.asarray(up.vectors.T @ moved)
+
+
+def acting_on(vectors: Floats, coefficients: Floats, element: Floats) -> Floats:
+    """The Kronecker product of coefficients (p', p) and an element of the rotation (r', r) times columns (p r, n)."""
+    (target, source), (up, low) = coefficients.shape, element.shape
+    if source == 1:
+        moved = element @ vectors
+        return np.asarray(moved * coefficients[0, 0] if target == 1 else np.kron(coefficients, moved))
+    each = np.matmul(element, vectors.reshape(source, low, -1)).reshape(source, -1)
+    return np.asarray((coefficients @ each).reshape(target * up, -1))
 
 
 def connected(up: SpinBlock, low: SpinBlock, tensors: Tensors) -> bool:
@@ -55,20 +65,33 @@ def _acting(up: SpinBlock, low: SpinBlock, tensors: Tensors, rank: int) -> list[
     """Pairs of parts between which the tensors act, with the element of the rotation."""
     if not abs(up.twice_f - low.twice_f) <= 2 * rank <= up.twice_f + low.twice_f:
         return []
-    held, known = low.shared.cache.setdefault(id(tensors), (tensors, {}))
-    del held  # the cache holds the tensors, so that their id stays theirs
-    found, t = [], _coefficients(up, low, rank)
+    _, pairs, known = low.shared.cache.setdefault(
+        id(tensors), (tensors, {}, {})
+    )  # it holds the tensors: their id stays theirs
+    place = (up.start, low.start)
+    if place not in pairs:
+        pairs[place] = list(_parts_between(up, low, tensors, rank, known))
+    acting: list[tuple[SpinPart, SpinPart, Floats]] = pairs[place]
+    return acting
+
+
+def _parts_between(
+    up: SpinBlock, low: SpinBlock, tensors: Tensors, rank: int, known: dict[tuple[int, int], Floats | None]
+) -> Iterator[tuple[SpinPart, SpinPart, Floats]]:
+    t = _coefficients(up, low, rank) if low.shared.scheme.paired else None
     for target in up.parts:
+        n, number = target.rotor.n, target.number
         for source in low.parts:
-            if not t[target.patterns, source.patterns].any():
+            if abs(n - source.rotor.n) > rank or (t is not None and not t[target.patterns, source.patterns].any()):
                 continue
-            if abs(target.rotor.n - source.rotor.n) <= rank:
-                key = (target.number, source.number)
-                if key not in known:
-                    known[key] = _rotor_element(target.rotor, source.rotor, tensors)
-                if known[key] is not None:
-                    found.append((target, source, known[key]))
-    return found
+            key = (number, source.number)
+            element = (
+                known[key]
+                if key in known
+                else known.setdefault(key, _rotor_element(target.rotor, source.rotor, tensors))
+            )
+            if element is not None:
+                yield target, source, element
 
 
 def _rotor_element(up: RotorBlock, low: RotorBlock, tensors: Tensors) -> Floats | None:

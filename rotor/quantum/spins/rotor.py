@@ -7,7 +7,6 @@ contracted matrices Σ_terms c ⟨r'‖X^K‖r⟩ between solved blocks are comp
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from concurrent.futures import Executor
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -23,6 +22,8 @@ from rotor.quantum.spins.operators import EVERY_STATE, AxialState, Basis, Rotor,
 from rotor.quantum.spins.scheme import Scheme
 
 if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
     from rotor.quantum.effect import QuantumEffect
     from rotor.tops.top import Top
 

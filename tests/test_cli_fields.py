@@ -1,0 +1,157 @@
+"""`rotor stark` and `rotor align`: what they print and write, the same request from Python, wrong input."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rotor.alignment.pulse import GaussianPulse
+from rotor.alignment.request import AlignRequest, answer_align
+from rotor.cli.shared.output import plain
+from rotor.formats import read
+from rotor.quantum.stark_request import StarkRequest, answer_stark
+
+BARE = ("--constants", "B=6081.492 MHz", "--anisotropy", "4.04")
+SHORT = ("--pulse", "1e13 W/cm2, 50 fs", "--points", "51", "--temperature", "0", "--tolerance", "1e-4")
+OF_COMMAND = {"rotor_version", "command", "input", "files"}
+
+
+def rows(path: str) -> list[list[str]]:
+    return [line.split(",") for line in Path(path).read_text().splitlines()]
+
+
+def test_stark_writes_what_the_library_computes(call):
+    code, out, err = call(
+        "stark",
+        "OCS",
+        "--field",
+        "0:200kV/cm:5",
+        "--states",
+        "J<=1",
+        "--csv",
+        "a.csv",
+        "--plot",
+        "a.png",
+        "--json",
+        "a.json",
+    )
+    assert (code, err) == (0, "")
+    assert "μ_eff" in out
+    table = rows("a.csv")
+    assert table[0][:6] == ["field_kv_per_cm", "m", "rank", "energy_mhz", "label", "mu_eff_debye"]
+    assert len(table) == 1 + 5 * 3
+    content = json.loads(Path("a.json").read_text())
+    answer = answer_stark(
+        StarkRequest(read("OCS"), tuple(np.linspace(0, 200, 5).tolist()), j_highest=1, tolerance_mhz=1e-4)
+    )
+    assert set(content) - OF_COMMAND == {*answer.facts(), "states"}
+    for key, value in plain(answer.facts()).items():
+        assert content[key] == value, key
+    assert [row["energy_mhz"] for row in content["states"]] == answer.states.energy_mhz.tolist()
+    assert Path("a.png").stat().st_size > 10_000
+    assert json.loads(Path("a.csv.provenance.json").read_text())["jmax"] == answer.states.jmax
+
+
+def test_stark_with_light_labels_and_chosen_m(call):
+    code, out, _ = call(
+        "stark", "OCS", "--field", "0,50", "--states", "1", "--m", "0", "--intensity", "1e11 W/cm2", "--diabatic-gap", "1 MHz",
+        "--json", "-",
+    )  # fmt: skip
+    content = json.loads(out)
+    assert code == 0
+    assert {row["m"] for row in content["states"]} == {0}
+    assert {row["diabatic_label"] for row in content["states"]} == {"0", "1"}
+
+
+def test_align_writes_what_the_library_computes(call):
+    code, _, err = call(
+        "align", "OCS", *SHORT, "--observable", "cos2theta", "--observable", "cos2theta_2d", "--classical", "200",
+        "--csv", "a.csv", "--plot", "a.png", "--json", "a.json",
+    )  # fmt: skip
+    assert (code, err) == (0, "")
+    assert rows("a.csv")[0] == ["t_ps", "cos2theta", "cos2theta_2d", "cos2theta_classical", "cos2theta_2d_classical"]
+    content = json.loads(Path("a.json").read_text())
+    request = AlignRequest(
+        read("OCS"), (GaussianPulse(1e13, 0.05),), temperature_k=0.0, points=51, tolerance=1e-4,
+        observables=("cos2theta", "cos2theta_2d"), classical_molecules=200,
+    )  # fmt: skip
+    answer = answer_align(request)
+    assert set(content) - OF_COMMAND == {*answer.facts(), "trace"}
+    for key, value in plain(answer.facts()).items():
+        assert content[key] == value, key
+    assert [row["cos2theta"] for row in content["trace"]] == answer.table.columns["cos2theta"].tolist()
+    assert Path("a.png").stat().st_size > 10_000
+
+
+def test_align_of_bare_constants(call):
+    """Figures of fields.md for OCS at 1e13 W/cm² and 50 fs: 0.887 at 38.7 ps."""
+    code, out, _ = call("align", *BARE, *SHORT[:2], "--temperature", "0", "--until", "82 ps", "--json", "-")
+    content = json.loads(out)
+    assert code == 0
+    assert content["extremes"][0]["max"] == pytest.approx(0.887, abs=1e-3)  # grid of 41 fs
+    assert content["permanent"]["cos2theta"] == pytest.approx(0.48630, abs=2e-3)  # digits; their mean is over the grid
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        ("--switched", "1e11 W/cm2, 10, 0, 5"),
+        ("--kick", "0.1 J/cm2"),
+        ("--pulse", "5e12 W/cm2, 50 fs", "--polarization", "circular"),
+        ("--pulse", "5e12 W/cm2, 50 fs", "--polarization", "elliptical:0.3"),
+        ("--pulse", "5e12 W/cm2, 50 fs", "--pulse", "5e12 W/cm2, 50 fs, 1 ps"),
+        ("--pulse-table", "pulse.csv"),
+        ("--thz", "500 kV/cm, 1 ps, 0.3 THz", "--dipole-abc", "0.7,0,0"),
+    ],
+)
+def test_every_kind_of_pulse(call, options):
+    Path("pulse.csv").write_text("# measured\nt_ps,intensity_w_per_cm2\n0,0\n0.1,5e12\n0.3,0\n")
+    code, out, err = call("align", *BARE, *options, "--temperature", "0", "--points", "11", "--tolerance", "1e-3")
+    assert (code, err) == (0, "")
+    assert "cos2theta" in out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("align", "OCS"), "no pulse"),
+        (("align", "OCS", "--pulse", "1e13 W/cm2"), "--pulse: '1e13 W/cm2': expected 2 to 3 numbers"),
+        (("align", "OCS", "--pulse", "1e13 MHz, 1 ps"), "--pulse: '1e13 MHz'"),
+        (("align", "OCS", "--pulse", "1e13 W/cm2, 1 MHz"), "--pulse: '1 MHz'"),
+        (("align", "OCS", "--pulse", "-1e13 W/cm2, 1 ps"), "--pulse: intensity"),
+        (
+            ("align", "OCS", "--pulse", "1e13 W/cm2, 10 ps", "--until", "5"),
+            "--until: 5 ps is before the pulses have ended",
+        ),
+        (("align", "OCS", "--pulse", "1e13 W/cm2, 1 ps", "--jmax", "20"), "J max 20 is too small"),
+        (("align", "OCS", "--pulse", "1e13 W/cm2, 1 ps", "--tolerance", "2"), "--tolerance: 2"),
+        (("align", "OCS", "--pulse", "1e13 W/cm2, 1 ps", "--temperature", "-1"), "--temperature: -1"),
+        (("align", "OCS", "--pulse", "1e13 W/cm2, 1 ps", "--polarization", "up"), "--polarization: 'up'"),
+        (("align", "OCS", "--pulse", "1e13 W/cm2, 1 ps", "--state", "1"), "--state: '1'"),
+        (("align", "OCS", "--pulse", "1e13 W/cm2, 1 ps", "--observable", "cosine"), "observable 'cosine'"),
+        (("align", "CCl4", "--pulse", "1e13 W/cm2, 1 ps"), "spherical top"),
+        (
+            ("align", "H2O", "--anisotropy", "3", "--pulse", "1e13 W/cm2, 1 ps"),
+            "--anisotropy: a top of the kind asymmetric",
+        ),
+        (("align", "OCS", "--pulse-table", "missing.csv"), "missing.csv"),
+        (("stark", "OCS", "--field", "1e12V/m"), "no molecule holds together"),
+        (("stark", "OCS", "--field", "0:5:1T"), "--field"),
+        (("stark", "OCS", "--field", "0:100", "--states", "all"), "--states: 'all'"),
+        (("stark", "OCS", "--m", "7"), "M of"),
+        (("stark", "OCS", "--field", "500", "--jmax", "5"), "J max 5 is too small"),
+        (("stark", "OCS", "--field", "5", "--plot", "a.png"), "--plot: a picture of a map needs two fields"),
+        (("stark", "OCS", "--intensity", "-1"), "intensity -1"),
+        (("stark", "N2"), "no dipole"),
+        (("stark", "CCl4"), "spherical top"),
+    ],
+)
+def test_wrong_input_is_one_line_and_code_2(call, arguments, message):
+    code, out, err = call(*arguments)
+    assert (code, out) == (2, "")
+    assert message in err
+    assert len(err.strip().splitlines()) == 1
+    assert not [path for path in Path().iterdir() if path.suffix in (".png", ".csv", ".json")]

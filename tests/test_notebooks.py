@@ -1,0 +1,110 @@
+"""The notebooks: cells as in their scripts, pictures inside, and they run to their end, which means that they assert."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+SUBJECTS = (
+    "molecule_to_spectrum",
+    "isotopologues",
+    "levels",
+    "free_rotation",
+    "equipartition",
+    "classical",
+    "hard_cases",
+    "accuracy",
+)
+
+
+def _tool() -> ModuleType:
+    spec = importlib.util.spec_from_file_location("make_notebooks", ROOT / "docs" / "make_notebooks.py")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+MAKE = _tool()
+SCRIPTS = MAKE.scripts()
+HAVE_EXTRA = all(importlib.util.find_spec(name) for name in ("jupytext", "nbclient", "ipykernel"))
+needs_extra = pytest.mark.skipif(
+    not HAVE_EXTRA and "CI" not in os.environ, reason='needs the extra docs: python -m pip install ".[docs]"'
+)
+named = {"ids": lambda path: path.stem}
+
+
+def test_every_subject_has_its_notebook():
+    names = " ".join(script.stem for script in SCRIPTS)
+    assert not [subject for subject in SUBJECTS if subject not in names]
+
+
+@needs_extra
+@pytest.mark.parametrize("script", SCRIPTS, **named)
+def test_the_notebook_is_its_script_executed(script):
+    import nbformat
+
+    assert MAKE.agrees(script), f"python docs/make_notebooks.py {script.name[:2]}"
+    path = script.with_suffix(".ipynb")
+    notebook = nbformat.read(path, as_version=4)
+    assert MAKE.pictures(notebook)
+    assert all(png.startswith(b"\x89PNG") for png in MAKE.pictures(notebook))
+    assert not MAKE.on_standard_error(notebook)
+    assert all(cell["execution_count"] for cell in notebook.cells if cell["cell_type"] == "code")  # executed
+    assert path.stat().st_size < MAKE.MOST_BYTES
+    text = path.read_text(encoding="utf-8")
+    assert "assert " in text
+    assert str(ROOT) not in text  # no path of a machine
+    assert "ipykernel_" not in text
+
+
+def _marked(script: Path) -> object:
+    long = MAKE.seconds_allowed(script) > MAKE.SECONDS
+    return pytest.param(script, marks=[pytest.mark.slow] if long else [], id=script.stem)
+
+
+@needs_extra
+@pytest.mark.parametrize("script", [_marked(script) for script in SCRIPTS])
+def test_the_notebook_runs(script):
+    notebook, seconds = MAKE.executed(script)
+    assert MAKE.pictures(notebook)
+    # twice: processors differ, and the figure that counts is that of docs/make_notebooks.py on a quiet machine
+    assert seconds < 2 * MAKE.seconds_allowed(script)
+
+
+CELLS = {
+    "an error": ("# %%\nraise RuntimeError('wrong')\n", "RuntimeError"),
+    "no picture": ("# %%\nprint(1)\n", "a notebook has a picture"),
+    "a warning": ("# %%\nimport warnings\nwarnings.warn('mind')\n", "standard error"),
+}
+
+
+@needs_extra
+@pytest.mark.parametrize("what", CELLS)
+def test_a_notebook_with(what, tmp_path):
+    script, reason = tmp_path / "01_short.py", CELLS[what][1]
+    script.write_text(CELLS[what][0], encoding="utf-8")
+    with pytest.raises(Exception, match=reason):
+        MAKE.executed(script)
+
+
+@needs_extra
+def test_a_changed_script_is_noticed_and_long_ones_say_so(tmp_path):
+    script = tmp_path / "01_short.py"
+    script.write_text(
+        "# %% [markdown]\n# # One\n\n# %%\nimport matplotlib.pyplot as plt\n\nplt.plot([1, 2])\n", encoding="utf-8"
+    )
+    assert not MAKE.agrees(script)  # no notebook yet
+    assert MAKE.write(script, MAKE.executed(script)[0]) < MAKE.MOST_BYTES
+    assert MAKE.agrees(script)
+    script.write_text(script.read_text(encoding="utf-8") + "plt.title('more')\n", encoding="utf-8")
+    assert not MAKE.agrees(script)
+    assert MAKE.seconds_allowed(script) == MAKE.SECONDS
+    script.write_text("# %% [markdown]\n# # One\n\n# long: 90\n", encoding="utf-8")
+    assert MAKE.seconds_allowed(script) == 90

@@ -1,0 +1,129 @@
+"""Inputs of every kind that published fits have, against lines of the reference program (tests/oracles/kinds/README.md)."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rotor.formats.spcat.cat import format_lines, read_cat
+from rotor.formats.spcat.catalogue import Catalogue
+from rotor.formats.spcat.file_model import groups_of, moment_of, split_dipole
+from rotor.formats.spcat.int_file import Dipole, IntensityFile, Request, read_int
+from rotor.formats.spcat.operators import operator_of
+from rotor.formats.spcat.par import read_par
+from rotor.formats.spcat.predict import predict
+
+KINDS = Path(__file__).parent / "oracles" / "kinds"
+RANGES = {"h2coh": (6, 10), "o2": (0, 75), "fso3": (0, 9), "oc33s": (0, 22), "co": (0, 99)}  # F that the samples need
+
+
+@cache
+def _predicted(name: str) -> Catalogue:
+    parameters, wanted = (read(KINDS / name / f"{name}{s}") for read, s in ((read_par, ".var"), (read_int, ".int")))
+    first, last = RANGES[name]
+    request = replace(wanted.request, fbgn=first, fend=last)
+    return predict(parameters, replace(wanted, request=request), as_spcat=True).catalogue
+
+
+def _by_label(lines: Catalogue) -> dict[tuple[int, ...], list[int]]:
+    found: dict[tuple[int, ...], list[int]] = defaultdict(list)
+    for row, pair in enumerate(zip(lines.quanta_upper.tolist(), lines.quanta_lower.tolist(), strict=True)):
+        found[*pair[0], *pair[1]].append(row)
+    return found
+
+
+@pytest.mark.parametrize("name", RANGES)
+def test_lines(name):
+    """Frequencies to the digits printed, intensities to 1e-4 of LGINT and half a digit, E″, degeneracies, labels."""
+    ours, reference = _predicted(name), read_cat(KINDS / name / "sample.cat")
+    rows = _by_label(ours)
+    for row, pair in enumerate(zip(reference.quanta_upper.tolist(), reference.quanta_lower.tolist(), strict=True)):
+        near = rows[*pair[0], *pair[1]]
+        assert near, reference.record(row)
+        own = min(near, key=lambda i: abs(ours.frequency_mhz[i] - reference.frequency_mhz[row]))
+        assert abs(ours.frequency_mhz[own] - reference.frequency_mhz[row]) < 5.1e-5, reference.record(row)
+        assert abs(ours.lgint[own] - reference.lgint[row]) < 1.6e-4, reference.record(row)
+        assert abs(ours.energy_lower_cm[own] - reference.energy_lower_cm[row]) < 5.1e-5
+        assert ours.g_upper[own] == reference.g_upper[row]
+    assert len(reference) >= 7
+
+
+def test_ten_quantum_numbers_are_written_and_read():
+    ours = _predicted("h2coh")
+    assert set(ours.qnfmt.tolist()) == {3488}
+    back = read_cat(format_lines(ours))
+    assert np.array_equal(back.quanta_upper[:, :8], ours.quanta_upper[:, :8])
+    assert np.array_equal(back.quanta_lower[:, :8], ours.quanta_lower[:, :8])
+
+
+def _bare_clclo2(factor: float = 1.0):
+    file = read_par(KINDS / "clclo2" / "clclo2.var")
+    scaled = [replace(p, value=p.value * (factor if p.code in (620001, 621001) else 1.0)) for p in file.parameters]
+    return replace(file, parameters=tuple(scaled))
+
+
+# centres of quadrupole patterns that SPFIT computed, in MHz
+CENTRES = {((40, 0, 40), (39, 0, 39)): 223433.75785, ((41, 0, 41), (40, 0, 40)): 228950.18234}
+
+
+@pytest.mark.parametrize(("factor", "off"), [(1.0, 0.0), (-1.0, 7.0)])
+def test_coriolis_terms_of_third_order(factor, off):
+    """620001 and 621001 move these lines by 4 MHz; with the other sign they are 7 MHz off."""
+    (group,) = groups_of(_bare_clclo2(factor), IntensityFile("", Request(), ()), as_spcat=True)
+    levels = group.levels((2 * 39, 2 * 41))
+    for (upper, lower), centre in CENTRES.items():
+        energies = [levels.energy_mhz[levels.find(v=0, j=j, ka=ka, kc=kc)] for j, ka, kc in (upper, lower)]
+        difference = abs(energies[0] - energies[1] - centre)
+        assert difference < 2e-5 if not off else difference > off  # digits printed
+
+
+@pytest.mark.parametrize(
+    ("code", "says"),
+    [
+        (61001, "moment of third order"),
+        (70001, "cosine of internal rotation"),
+        (1001, "acts on spin 1"),
+        (1010, "magnetic moment between two states"),
+        (2000, "spin 2 is not among the 1"),
+    ],
+)
+def test_moments_that_do_not_compute_are_named(code, says):
+    states = 2 if code == 1010 else 1
+    dipole = Dipole(code, 1.0)
+    with pytest.raises(ValueError, match=says):
+        moment_of(dipole, split_dipole(code, states), (0, 0), 1)
+
+
+def test_operators_of_n_are_hermitian_and_obey_time_reversal():
+    """All of TYP 12 to 79: Hermitian (with i where odd), and even ones real, odd ones imaginary, as J of the table of phases."""
+    from rotor.formats.spcat.codes import AXES, split_code
+
+    for axes, representation in ((AXES["Ir"], "Ir"), (AXES["IIIl"], "IIIl")):
+        for typ in (*range(12, 18), *range(20, 28), *range(40, 48), *range(60, 68)):
+            coded = operator_of(split_code(typ * 10000), axes)
+            matrix = coded.of_j(6, representation).matrix
+            sign = -1 if coded.odd else 1
+            np.testing.assert_allclose(matrix, sign * matrix.conj().T, atol=1e-9)  # i times a Hermitian operator
+            k = np.arange(-6, 7)
+            turned = (-1.0) ** (k[:, None] - k) * matrix[::-1, ::-1].conj()
+            np.testing.assert_allclose(matrix, turned, atol=1e-9)  # numbers of up to 1e5
+
+
+def test_low_orders_are_cartesian_products():
+    """TYP 21, 41, 61 are NbNc + NcNb, ...; 20, 40, 60 i times Na, Nb, Nc, in both bases."""
+    from rotor.formats.spcat.codes import AXES, split_code
+    from rotor.quantum.j_operators import anticommutator, components
+
+    for axes, representation in ((AXES["Ir"], "Ir"), (AXES["IIIl"], "IIIl")):
+        of = components(5, representation)
+        for typ, axis in ((20, "a"), (40, "b"), (60, "c")):
+            others = [of[x] for x in "abc" if x != axis]
+            pair = operator_of(split_code((typ + 1) * 10000), axes).of_j(5, representation)
+            np.testing.assert_allclose(pair.matrix, anticommutator(*others).matrix, atol=1e-12)  # sums of two products
+            alone = operator_of(split_code(typ * 10000), axes).of_j(5, representation)
+            np.testing.assert_allclose(alone.matrix, 1j * of[axis].matrix, atol=1e-14)  # round-off

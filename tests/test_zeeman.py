@@ -1,0 +1,75 @@
+"""Zeeman maps: the closed forms of linear and symmetric tops, a full matrix for an asymmetric one, bad input."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from field_matrices import contracted_vectors, rigid, states
+
+from rotor.quantum.effects.zeeman import zeeman_map
+from rotor.tops.top import Top
+from rotor.units import NUCLEAR_MAGNETON_MHZ_PER_T
+
+
+def test_a_linear_top_is_linear_in_the_field():
+    """E = E0 - g μ_N B M, exactly."""
+    top = Top.from_constants("B=6000 D=0.001 MHz")
+    found = zeeman_map(top, [0.0, 2.0], -0.0288, j_highest=2)
+    for rows in found.curves():
+        j, m = int(found.label[rows.start]), int(found.m[rows.start])
+        free = 6000.0 * j * (j + 1) - 0.001 * (j * (j + 1)) ** 2
+        shift = 0.0288 * NUCLEAR_MAGNETON_MHZ_PER_T * 2.0 * m
+        assert found.energy_mhz[rows].tolist() == pytest.approx([free, free + shift], abs=1e-9)  # round-off of 36 GHz
+        assert found.slope[rows.start] == pytest.approx(-0.0288 * m, abs=1e-12)
+
+
+def test_a_symmetric_top_to_first_order():
+    """-μ_N B M [g⊥ + (g∥ - g⊥) K²/(J(J+1))] (Flygare)."""
+    top = Top.from_constants("A=20000 B=9000 MHz")
+    found = zeeman_map(top, [0.0], [0.3, 0.1, 0.1], j_highest=2)
+    for rows in found.curves():
+        j, k = (int(part) for part in found.label[rows.start].split())
+        m = int(found.m[rows.start])
+        first = m * (0.1 + 0.2 * k * k / (j * (j + 1))) if j else 0.0
+        assert found.slope[rows.start] == pytest.approx(first, abs=1e-12)
+
+
+@pytest.mark.parametrize("g", [np.diag([0.6, -0.2, 0.3]), np.array([[0.6, 0.1, 0], [0.1, -0.2, 0], [0, 0, 0.3]])])
+def test_an_asymmetric_top_against_the_full_matrix(g):
+    """All |J k M⟩ up to J = 3 in Iʳ (x, y, z = b, c, a), ½(ΦJ + JΦ) multiplied out; a field strong enough to mix J."""
+    basis = states(3)
+    place = {state: i for i, state in enumerate(basis)}
+    raising = np.zeros((len(basis), len(basis)), dtype=complex)  # Jx - iJy raises k
+    for (j, k, m), i in place.items():
+        if (j, k + 1, m) in place:
+            raising[place[j, k + 1, m], i] = np.sqrt(j * (j + 1) - k * (k + 1))
+    jx, jy = (raising + raising.conj().T) / 2, (raising - raising.conj().T) * 0.5j
+    current = {0: np.diag([float(k) for _, k, _ in basis]), 1: jx, 2: jy}  # along a = z, b = x, c = y
+    total = np.zeros_like(raising)
+    for i in range(3):
+        cosine = contracted_vectors(basis, np.eye(3)[i][[1, 2, 0]], [0, 0, 1])
+        for j in range(3):
+            total = total + g[i, j] * (cosine @ current[j] + current[j] @ cosine) / 2
+    strength = 2.0
+    full = np.linalg.eigvalsh(rigid(basis, 6.0, 4.0, 10.0) - strength * total)
+
+    top = Top.from_constants("A=10 B=6 C=4 MHz")
+    from rotor.quantum.effects.zeeman import _problem, _space
+
+    ours = []
+    space = _space(top, g, 3)
+    for m in range(-3, 4):
+        for block in space.blocks(m):
+            problem = _problem(g, block)
+            matrix = problem.fixed + strength / NUCLEAR_MAGNETON_MHZ_PER_T * problem.slope
+            ours += np.repeat(np.linalg.eigvalsh(matrix), block.copies).tolist()
+    assert np.sort(ours) == pytest.approx(full, abs=1e-6)  # QuTiP's alternating sums
+    with pytest.raises(ValueError, match="beyond 1000"):
+        zeeman_map(top, [1e6], g)
+
+
+def test_bad_g_tensors_are_refused():
+    with pytest.raises(ValueError, match="symmetric about a"):
+        zeeman_map(Top.from_constants("A=10 B=6 MHz"), [1.0], [0.1, 0.2, 0.3])
+    with pytest.raises(ValueError, match="one number, three"):
+        zeeman_map(Top.from_constants("A=10 B=6 C=4 MHz"), [1.0], [[0.1, 0.2]])
