@@ -95,7 +95,9 @@ class TableReader:
             return None
         value = self.content[key]
         if not is_number(value) or (minimum is not None and value < minimum):
-            raise self.error(key, "expected a finite number" + (f" of at least {minimum:g}" if minimum is not None else ""))
+            raise self.error(
+                key, "expected a finite number" + (f" of at least {minimum:g}" if minimum is not None else "")
+            )
         return float(value)
 
     def whole(self, key: str) -> int | None:
