@@ -62,7 +62,7 @@ class TableReader:
     def __init__(self, where: str, name: str, content: Any) -> None:
         self.place = f"{where}, [{name}]" if name else where
         if not isinstance(content, dict):
-            raise ValueError(f"{self.place}: expected a table of key = value, not {content!r}")
+            raise ValueError(f"{self.place}: expected a table of key = value, found {content!r}")
         self.content: Table = content
 
     def refuse_unknown(self, known: Iterable[str]) -> None:
@@ -95,7 +95,9 @@ class TableReader:
             return None
         value = self.content[key]
         if not is_number(value) or (minimum is not None and value < minimum):
-            raise self.error(key, "a finite number" + (f" of at least {minimum:g}" if minimum is not None else ""))
+            raise self.error(
+                key, "expected a finite number" + (f" of at least {minimum:g}" if minimum is not None else "")
+            )
         return float(value)
 
     def whole(self, key: str) -> int | None:
@@ -104,12 +106,12 @@ class TableReader:
             raise self.error(key, "expected a whole number")
         return None if value is None else int(value)
 
-    def quantity(self, key: str, value: Any, unit: str, wanted: str) -> float:
-        """A number in the table's unit, or text with its own, in the unit wanted."""
+    def quantity(self, key: str, value: Any, unit: str, expected: str) -> float:
+        """A number in the table's unit, or text with its own, in the unit expected."""
         if not is_number(value) and not isinstance(value, str):
             raise self.error(key, f"expected a finite number of {unit}, or text with a unit")
         try:
-            return parse_quantity(value if isinstance(value, str) else f"{float(value)!r} {unit}", wanted)
+            return parse_quantity(value if isinstance(value, str) else f"{float(value)!r} {unit}", expected)
         except ValueError as reason:
             raise self.error(key, reason) from None
 
@@ -211,12 +213,12 @@ def covariance_of(table: TableReader | None, constants: Constants | None) -> Cov
     known = constants.uncertainties if constants is not None else {}
     lost = [name for name in names if name not in known]
     if lost or not names:
-        raise table.error("names", f"{', '.join(lost) or 'none'}: constants of the file with an uncertainty are needed")
+        raise table.error("names", f"{', '.join(lost) or 'none'}: expected constants of the file with an uncertainty")
     rows: Any = table.content.get("correlations") or []
     lengths = [len(row) if isinstance(row, list) else 0 for row in rows] if isinstance(rows, list) else []
     if lengths != [*range(1, len(names) + 1)] or not all(is_number(value) for row in rows for value in row):
         raise table.error(
-            "correlations", f"{len(names)} rows of 1 to {len(names)} numbers are needed, the lower triangle"
+            "correlations", f"expected {len(names)} rows of 1 to {len(names)} numbers, the lower triangle"
         )
     matrix = np.zeros((len(names), len(names)))
     for i, row in enumerate(rows):
