@@ -8,6 +8,7 @@ import platform
 import re
 import subprocess
 import sys
+from itertools import pairwise
 from pathlib import Path
 
 STEP = re.compile(r"^== (.*) \((\d+)s\)$", re.MULTILINE)
@@ -23,7 +24,7 @@ def rows(log: str) -> list[tuple[str, int, str]]:
     """
     steps = list(STEP.finditer(log))
     out = []
-    for here, following in zip(steps, steps[1:], strict=False):
+    for here, following in pairwise(steps):
         text = log[here.end() : following.start()]
         counts = [*PYTEST.findall(text), *(f"oracles {found}" for found in ORACLES.findall(text))]
         out.append((here[1], int(following[2]) - int(here[2]), "; ".join(counts)))
