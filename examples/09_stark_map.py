@@ -81,5 +81,7 @@ assert abs(found.cosines["cos2theta"][0] - 0.89984260) < 1e-8
 # %%
 magnetic = zeeman_map(ocs, [0.0, 1.0], -0.03, j_highest=1)
 shift = np.ptp(magnetic.energy_mhz[magnetic.curve("1", 1)])
-print(f"OCS, J = 1, M = 1 in 1 T, with g = -0.03 (a made-up value): {shift * 1e3:.2f} kHz; {shift / MHZ_PER_CM:.2e} cm⁻¹")
+print(
+    f"OCS, J = 1, M = 1 in 1 T, with g = -0.03 (a made-up value): {shift * 1e3:.2f} kHz; {shift / MHZ_PER_CM:.2e} cm⁻¹"
+)
 assert abs(shift - 0.03 * 7.6225932188) < 1e-8
