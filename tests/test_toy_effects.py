@@ -215,3 +215,10 @@ def test_an_odd_power_of_j_is_refused_within_a_state():
 
     with pytest.raises(ValueError, match="not invariant under time reversal"):
         solve_levels(top_in(), 3, effects=(*SEMI_RIGID, Odd(1.0, TILTED)))
+
+
+def test_a_field_is_refused_where_levels_have_no_m():
+    from rotor.quantum.effects.stark import Stark
+
+    with pytest.raises(ValueError, match="labelled by M"):
+        solve_levels(top_in(), 3, effects=(*SEMI_RIGID, Stark(1.0)))

@@ -37,7 +37,7 @@ def level_list(table: SelectedLevels) -> LevelList:
     >>> from rotor.tops.top import Top
     >>> answer = answer_levels(LevelsRequest(Top.from_constants("A=10 B=6 C=4 GHz"), jmin=1, jmax=1))
     >>> format_level(level_list(answer.table).level(0)).split()
-    ['6', '1', '0.533702', '0.000000', '1.000000', '3:', '1', '1', '0']
+    ['6', '1', '0.533703', '0.000000', '1.000000', '3:', '1', '1', '0']
     """
     levels, rows = table.levels, table.rows
     if "irrep" in levels.quanta:
