@@ -83,7 +83,7 @@ residuals.set(xlabel="frequency (GHz)", ylabel="calculated - measured (MHz)")
 assert found.lines == 110
 assert not len(matched.missing)
 assert found.median_mhz < 1.0
-assert np.abs(strength).max() < 0.022  # 5 %: JPL's dipole depends on J and K, ours is one number
+assert np.abs(strength).max() < 0.026  # 6 %: JPL's dipole depends on J and K, ours is one number
 
 # %% [markdown]
 # ## OCS: a linear molecule
