@@ -40,7 +40,7 @@ says how some of them do beyond the range of lines that they serve.
 - **constants**: *fitted* to measured lines here, *published* (read in a source that the file names), *estimated*, or
   *unverified*: the source of the numbers was not read. **unverified** names the tables, or single constants, of which that
   is so; it is said wherever they are shown.
-- **dipole**: *catalogue*, from the intensities of JPL's and CDMS's catalogues ([dipoles.csv](../data/dipoles.csv), four digits);
+- **dipole**: *catalogue*, from the intensities of JPL's and CDMS's catalogues (`data/dipoles.csv`, four digits);
   *published*; *none* by symmetry; or *unverified*.
 
 | file | name | kind | κ | geometry | difference | bound | constants | dipole | unverified |

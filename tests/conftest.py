@@ -77,3 +77,4 @@ def call(capsys: pytest.CaptureFixture[str], folder: Path) -> Callable[..., tupl
 @pytest.fixture(autouse=True)
 def _quiet_matplotlib(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("MPLBACKEND", "Agg")
+    monkeypatch.setenv("COLUMNS", "120")  # reports are folded to the width of the terminal

@@ -518,3 +518,22 @@ def test_numbers_that_are_not_finite_are_null():
 def test_dipole_carries_its_unit():
     assert inputs.vector("--dipole", "0,0,3.33564095198152e-30 C*m") == pytest.approx((0.0, 0.0, 1.0))
     assert report.vector_text((1e-9, -1e-9, 1.85)) == "μa 0, μb 0, μc 1.85 D"
+
+
+def test_columns_stand_under_their_headings(call):
+    """With and without errors of the constants: each number of the JSON is printed under the heading of its name."""
+    names = {
+        "frequency (MHz)": "frequency_mhz", "error (MHz)": "error_mhz", "lgint": "lgint", 'E" (cm-1)': "energy_lower_cm",
+        "g'": "g_upper", "A (1/s)": "einstein_a_per_s", "Sμ² (D²)": "strength_debye2",
+    }  # fmt: skip
+    for constants, errors in (("B=57635.968(1) D=0.1835(1) MHz", True), ("B=57635.968 D=0.1835 MHz", False)):
+        arguments = ("spectrum", "--constants", constants, "--dipole-abc", "0.11,0,0", "--jmax", "3", "--top", "2")
+        record = json.loads(call(*arguments, "--json", "-")[1])
+        rows = call(*arguments)[1].split("(states: J)\n")[1].split("\n\n")[0].splitlines()
+        heads = [head for head in names if head in rows[0]]
+        assert ("error (MHz)" in heads) is errors
+        ends = [rows[0].index(head) + len(head) for head in heads]
+        for text, place in zip(rows[1:], record["strongest"], strict=True):
+            printed = [float(text[:end].split()[-1]) for end in ends]
+            expected = [record["lines"][place][names[head]] for head in heads]
+            assert printed == pytest.approx(expected, rel=0.01, abs=5.1e-5)  # digits that are printed

@@ -99,7 +99,7 @@ def test_no_lines_is_an_answer_and_a_picture_of_none_is_not(call):
         (("raman", "N2", "--csv", "a.txt"), "error: --csv a.txt: the name must end in .csv"),
         (("raman",), "error: expected either a source or --constants"),
         (("raman", "N2", "--vibration", "2330", "--vibrational-states", "2330"), "error: --vibration and --vibrational-states: give"),
-        (("spectrum", "CO", "--vibration", "x"), "error: --vibration: 'x': energies such as"),
+        (("spectrum", "CO", "--vibration", "x"), "error: --vibration: 'x': expected energies such as"),
         (("spectrum", "CO", "--vibration", "2143", "--vibrational-factor", "2"), "error: --vibrational-factor and vibrational energies"),
         (("spectrum", "CO", "--pressure", "1"), "error: --pressure and --path: an optical depth needs both"),
         (("spectrum", "CO", "--pressure", "1", "--path", "1 K"), "error: --path: '1 K': unit 'K'"),

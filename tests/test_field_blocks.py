@@ -107,6 +107,34 @@ def test_a_tilted_field_is_a_rotated_one(text, a, b, c):
         assert np.allclose(along, found, atol=1e-11)  # round-off of energies of 200 MHz
 
 
+@pytest.mark.parametrize("representation", ["Ir", "Il", "IIIr", "IIIl"])
+def test_direction_cosines_are_those_of_a_rotation(representation):
+    """Φ_Xa = Φ_Yb Φ_Zc - Φ_Yc Φ_Zb, a proper rotation and not its mirror image; all commute; rows have length 1; cos² is a square."""
+    top = Top.from_constants(Constants(A=10.0, B=6.0, C=4.0, representation=representation))
+    unit = np.eye(3)
+    block = tilted_space(top, 5, [Contraction(DIPOLE, [0.3, 0.5, 0.8]), Contraction(TENSOR, TENSOR)]).blocks(0)[0]
+    assert len(block) == sum((2 * j + 1) ** 2 for j in range(6))
+    cosine = {(f, g): dense(block.matrix(Contraction(unit[g], unit[f]))) for f in range(3) for g in range(3)}
+    inner = block.j <= 3  # products of two pass through J ≤ 5
+
+    def product(p, q) -> np.ndarray:
+        return (cosine[p] @ cosine[q])[np.ix_(inner, inner)]
+
+    def alone(p) -> np.ndarray:
+        return cosine[p][np.ix_(inner, inner)]
+
+    for f in range(3):
+        x, y = (f + 1) % 3, (f + 2) % 3
+        for g in range(3):
+            b, c = (g + 1) % 3, (g + 2) % 3
+            assert np.allclose(
+                product((x, b), (y, c)) - product((x, c), (y, b)), alone((f, g)), atol=1e-12
+            )  # round-off
+            assert np.allclose(product((f, g), (x, b)), product((x, b), (f, g)), atol=1e-12)  # the same
+            square = dense(block.matrix(Contraction(np.outer(unit[g], unit[g]), np.outer(unit[f], unit[f]))))
+            assert np.allclose(product((f, g), (f, g)), square[np.ix_(inner, inner)], atol=1e-12)  # the same
+
+
 def test_left_and_right_handed_representations_agree():
     dipole = Contraction(DIPOLE, Z)
     found = []

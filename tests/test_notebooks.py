@@ -32,7 +32,7 @@ def _tool() -> ModuleType:
 
 
 MAKE = _tool()
-SCRIPTS = MAKE.scripts()
+SCRIPTS = [script for script in MAKE.scripts() if script.with_suffix(".ipynb").exists()]
 HAVE_EXTRA = all(importlib.util.find_spec(name) for name in ("jupytext", "nbclient", "ipykernel"))
 needs_extra = pytest.mark.skipif(
     not HAVE_EXTRA and "CI" not in os.environ, reason='needs the extra docs: python -m pip install ".[docs]"'

@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rotor.molecules.nuclei import _table, data_folder, element_symbol, isotope, isotope_of_mass, masses
+from rotor.molecules.nuclei import _isotopes, _lines, data_folder, element_symbol, isotope, isotope_of_mass, masses
 
 SHARED = Path(__file__).resolve().parents[1].parent / "shared"
-EVERY = [one for isotopes in _table().values() for one in isotopes.values()]
+EVERY = [one for element in _lines() for one in _isotopes(element).values()]
 
 
 def test_published_values():
@@ -36,7 +36,7 @@ def test_elements_mean_their_most_abundant_isotope():
 
 
 def test_abundances_of_an_element_add_up_to_one_or_none():
-    for isotopes in _table().values():
+    for isotopes in map(_isotopes, _lines()):
         total = sum(one.abundance for one in isotopes.values())
         assert total == 0 or total == pytest.approx(1, abs=3e-4)  # the worst, 2.4e-4, is rounding of the tables
 

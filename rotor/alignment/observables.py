@@ -255,4 +255,4 @@ def expectation(states: Complexes, weights: Floats, matrix: Any) -> Floats:
         moved = matrix @ states
     else:
         moved = np.array([matrix @ one for one in states])
-    return np.asarray(np.einsum("snm,snm,m->s", states.conj(), moved, weights, optimize=True).real)
+    return np.asarray((states.conj() * moved).real.sum(axis=1) @ weights)

@@ -115,11 +115,20 @@ class Grid:
 
 def grid_of(window: Window, longest_step_ps: float, times_ps: Floats) -> Grid:
     """Steps no longer than `longest_step_ps` that meet the window's breaks and all `times_ps` inside it."""
-    inside = times_ps[(times_ps > window.start_ps) & (times_ps < window.stop_ps)]
+    first, last = np.searchsorted(times_ps, window.start_ps, "right"), np.searchsorted(times_ps, window.stop_ps)
+    inside = times_ps[first:last]
     edges = np.unique(np.concatenate([[window.start_ps, window.stop_ps], window.breaks_ps, inside]))
     lengths = np.diff(edges)
     counts = np.maximum(1, np.ceil(lengths / longest_step_ps - 1e-9)).astype(np.int64)
-    return Grid(edges[:-1], lengths / counts, counts, np.isin(edges[1:], inside))
+    return Grid(edges[:-1], lengths / counts, counts, _among(edges[1:], inside))
+
+
+def _among(values: NDArray[Any], known: NDArray[Any]) -> NDArray[np.bool_]:
+    """Which values are among some that rise; `np.isin` for few of them takes longer than a step."""
+    if not len(known):
+        return np.zeros(len(values), dtype=bool)
+    place = np.minimum(np.searchsorted(known, values), len(known) - 1)
+    return np.asarray(known[place] == values)
 
 
 @dataclass(frozen=True)
@@ -177,7 +186,7 @@ def kick_plan(window: Window, grid: Grid, rule: Splitting) -> KickPlan:
         areas,
         gradients,
         marks,
-        np.isin(looked, last[grid.sampled]),
+        _among(looked, last[grid.sampled]),
         len(steps),
     )
 

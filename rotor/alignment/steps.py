@@ -123,7 +123,7 @@ def _cost(plan: Plan) -> int:
 def _pilot_task(problem: Problem, space: FieldSpace) -> tuple[Task | None, bool]:
     """The populated block of lowest M with the largest population, with a few of its columns; and whether that is all there is."""
     m = problem.m_values(space)[0]
-    plan = plan_of(problem, [1] * len(problem.windows), "nystrom 4")
+    plan = Plan(problem.windows, ())  # to be replaced
     before = bool(problem.free_times(-1).any())
     tasks = [task for block in space.blocks(m) if (task := task_of(problem, block, plan, before)) is not None]
     if not tasks:

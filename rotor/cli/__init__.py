@@ -9,7 +9,8 @@ from __future__ import annotations
 import os
 import shlex
 import sys
-from collections.abc import Sequence
+import traceback
+from collections.abc import Iterable, Sequence
 from importlib import import_module
 from typing import cast
 
@@ -18,10 +19,25 @@ import typer
 from rotor.cli.shared.options import PlainCommand, PlainGroup
 from rotor.cli.shared.output import ComputationError
 
-VERBS = (
-    "spectrum", "info", "levels", "molecules", "isotopologues", "raman", "thermo", "tumble", "stark", "align", "gas", "fluid",
-    "fit", "structure", "convert", "cat",
-)  # fmt: skip
+VERBS = {  # and what the list of verbs says of each, short enough for 80 columns
+    "spectrum": "Rotational lines: frequencies and intensities.",
+    "info": "A molecule as a top: frame, constants, kind, Q(T).",
+    "levels": "Energy levels as a table and a term diagram.",
+    "molecules": "The molecules known by name, with their sources.",
+    "isotopologues": "Isotopologues: abundance, constants, axes, dipole.",
+    "raman": "Rotational Raman lines and their cross sections.",
+    "thermo": "Partition function, entropy, heat capacity.",
+    "tumble": "The exact free rotation of a molecule or a body.",
+    "stark": "Levels in a static electric field.",
+    "align": "Molecules aligned or oriented by pulses of light.",
+    "gas": "A classical gas: equipartition, correlations.",
+    "fluid": "Rigid molecules in a periodic box, run in time.",
+    "fit": "Constants from measured lines, with their errors.",
+    "structure": "Structures from the constants of isotopologues.",
+    "convert": "Constants from one file format into another.",
+    "cat": "A catalogue as a table, filtered or compared.",
+}
+COMPLETION = "_ROTOR_COMPLETE"  # set by a shell that asks for completions
 NO_ANSWER, WRONG_INPUT, INTERRUPTED = 1, 2, 130
 # click's ClickException, whether click is a package of its own or, in a newer typer, a part of it
 _ERROR_OF_USE = cast(type[Exception], typer.BadParameter.__mro__[2])
@@ -46,7 +62,7 @@ Examples:
   rotor structure family.toml --plot molecule.png"""
 
 
-def _application(verbs: Sequence[str] = VERBS) -> typer.Typer:
+def _application(verbs: Iterable[str] = VERBS) -> typer.Typer:
     """The command with some of its verbs."""
     app = typer.Typer(
         cls=PlainGroup,
@@ -61,17 +77,18 @@ def _application(verbs: Sequence[str] = VERBS) -> typer.Typer:
         version: bool = typer.Option(
             False, "--version", is_eager=True, help="Print the version and stop.", callback=_print_version
         ),
+        debug: bool = typer.Option(False, "--debug", help="Show the traceback of an error."),
     ) -> None:
         pass
 
     for verb in verbs:
         module = import_module(f"rotor.cli.{verb}")
-        app.command(verb, cls=PlainCommand, epilog=module.EXAMPLES)(module.command)
+        app.command(verb, cls=PlainCommand, short_help=VERBS[verb], epilog=module.EXAMPLES)(module.command)
     return app
 
 
-def _print_version(expected: bool) -> None:
-    if expected:
+def _print_version(asked: bool) -> None:
+    if asked:
         import rotor
 
         print(f"rotor {rotor.__version__}")
@@ -79,38 +96,49 @@ def _print_version(expected: bool) -> None:
 
 
 def run(arguments: Sequence[str] | None = None) -> int:
-    """Carry out a command and return its exit code; a mistake of the user is one line on standard error."""
+    """Carry out a command and return its exit code; every error is one line on standard error, unless --debug is given."""
     arguments = sys.argv[1:] if arguments is None else list(arguments)
-    verbs = arguments[:1] if {*arguments[:1]} & {*VERBS} else VERBS  # what is not asked for is not loaded
-    command = typer.main.get_command(_application(verbs))
-    provenance = shlex.join(["rotor", *arguments])
     try:
-        with command.make_context("rotor", arguments or ["--help"], obj=provenance) as context:
-            command.invoke(context)
-        sys.stdout.flush()
-        return 0
-    except typer.Exit as end:
-        return end.exit_code
+        return _run(arguments)
     except _ERROR_OF_USE as error:
-        return _fail(WRONG_INPUT, error.format_message())  # type: ignore[attr-defined]
+        return _fail(WRONG_INPUT, error.format_message(), arguments)  # type: ignore[attr-defined]
     except ComputationError as error:
-        return _fail(NO_ANSWER, str(error))
-    except BrokenPipeError:  # the reader has seen enough: nothing more can be said to it, at exit neither
+        return _fail(NO_ANSWER, str(error), arguments)
+    except BrokenPipeError:  # the reader of the pipe has closed it: nothing more is written, at exit neither
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except KeyboardInterrupt:
         return INTERRUPTED
     except (ValueError, OSError) as error:
-        return _fail(WRONG_INPUT, _told(error))
+        return _fail(WRONG_INPUT, _text_of(error), arguments)
+    except Exception as error:  # a defect of the program, not of the input
+        text = f"{type(error).__name__}: {error}"
+        return _fail(NO_ANSWER, f"{text}; this is a defect, please report it with the output of --debug", arguments)
 
 
-def _told(error: ValueError | OSError) -> str:
+def _run(arguments: list[str]) -> int:
+    words = [word for word in arguments[:2] if word != "--debug"]
+    verbs = words[:1] if words[:1] and words[0] in VERBS else VERBS  # what is not asked for is not loaded
+    command = typer.main.get_command(_application(verbs))
+    provenance = shlex.join(["rotor", *arguments])
+    try:
+        with command.make_context("rotor", [*arguments] or ["--help"], obj=provenance) as context:
+            command.invoke(context)
+        sys.stdout.flush()
+        return 0
+    except typer.Exit as end:
+        return end.exit_code
+
+
+def _text_of(error: ValueError | OSError) -> str:
     if isinstance(error, OSError) and error.strerror:
         return f"{error.filename}: {error.strerror}" if error.filename else error.strerror
     return str(error)
 
 
-def _fail(code: int, message: str) -> int:
+def _fail(code: int, message: str, arguments: Sequence[str]) -> int:
+    if "--debug" in arguments[:1]:
+        traceback.print_exc()
     print("error:", " ".join(message.split()), file=sys.stderr)
     return code
 
@@ -120,4 +148,9 @@ def main() -> None:
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")  # a terminal without Greek letters shows a question mark, no traceback
+    if COMPLETION in os.environ:
+        from typer.completion import completion_init  # type: ignore[attr-defined]
+
+        completion_init()
+        _application()(prog_name="rotor")
     sys.exit(run())

@@ -14,7 +14,7 @@ from rotor.table import Table
 from rotor.units import MHZ_PER_CM
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Assignments(Table):
     """Assigned lines as columns of equal length n.
 

@@ -62,7 +62,7 @@ class TableReader:
     def __init__(self, where: str, name: str, content: Any) -> None:
         self.place = f"{where}, [{name}]" if name else where
         if not isinstance(content, dict):
-            raise ValueError(f"{self.place}: a table of key = value is wanted, not {content!r}")
+            raise ValueError(f"{self.place}: expected a table of key = value, found {content!r}")
         self.content: Table = content
 
     def refuse_unknown(self, known: Iterable[str]) -> None:
@@ -74,20 +74,20 @@ class TableReader:
     def text(self, key: str, default: str = "") -> str:
         value = self.content.get(key, default)
         if not isinstance(value, str):
-            raise self.error(key, "text in quotes is wanted")
+            raise self.error(key, "expected text in quotes")
         return value
 
     def texts(self, key: str) -> tuple[str, ...]:
         value = self.content.get(key, [])
         if not isinstance(value, list) or not all(isinstance(item, str) and item for item in value):
-            raise self.error(key, 'a list of names such as ["H2O"] is wanted')
+            raise self.error(key, 'expected a list of names such as ["H2O"]')
         return tuple(value)
 
     def choice(self, key: str, choices: tuple[str, ...]) -> str | None:
         if key not in self.content:
             return None
         if self.content[key] not in choices:
-            raise self.error(key, f"one of {', '.join(choices)} is wanted")
+            raise self.error(key, f"expected one of {', '.join(choices)}")
         return str(self.content[key])
 
     def number(self, key: str, minimum: float | None = None) -> float | None:
@@ -95,21 +95,23 @@ class TableReader:
             return None
         value = self.content[key]
         if not is_number(value) or (minimum is not None and value < minimum):
-            raise self.error(key, "a finite number" + (f" of at least {minimum:g}" if minimum is not None else ""))
+            raise self.error(
+                key, "expected a finite number" + (f" of at least {minimum:g}" if minimum is not None else "")
+            )
         return float(value)
 
     def whole(self, key: str) -> int | None:
         value = self.number(key, 0)
         if value is not None and not value.is_integer():
-            raise self.error(key, "a whole number is wanted")
+            raise self.error(key, "expected a whole number")
         return None if value is None else int(value)
 
-    def quantity(self, key: str, value: Any, unit: str, wanted: str) -> float:
-        """A number in the table's unit, or text with its own, in the unit wanted."""
+    def quantity(self, key: str, value: Any, unit: str, expected: str) -> float:
+        """A number in the table's unit, or text with its own, in the unit expected."""
         if not is_number(value) and not isinstance(value, str):
-            raise self.error(key, f"a finite number of {unit} is wanted, or text with a unit")
+            raise self.error(key, f"expected a finite number of {unit}, or text with a unit")
         try:
-            return parse_quantity(value if isinstance(value, str) else f"{float(value)!r} {unit}", wanted)
+            return parse_quantity(value if isinstance(value, str) else f"{float(value)!r} {unit}", expected)
         except ValueError as reason:
             raise self.error(key, reason) from None
 
@@ -171,10 +173,10 @@ def with_polarizability(molecule: Molecule | None, tensor: Tensor | None, table:
 def _atoms(table: TableReader) -> tuple[tuple[str, ...], NDArray[np.float64]]:
     rows = table.content.get("atoms")
     if not isinstance(rows, list) or not rows:
-        raise table.error("atoms", 'a list of ["symbol", x, y, z] in Å is wanted')
+        raise table.error("atoms", 'expected a list of ["symbol", x, y, z] in Å')
     for i, row in enumerate(rows, start=1):
         if not (isinstance(row, list) and len(row) == 4 and isinstance(row[0], str) and all(map(is_number, row[1:]))):
-            raise ValueError(f'{table.place}, atoms, atom {i} = {row!r}: ["symbol", x, y, z] in Å is wanted')
+            raise ValueError(f'{table.place}, atoms, atom {i} = {row!r}: expected ["symbol", x, y, z] in Å')
     return tuple(row[0] for row in rows), np.array([row[1:] for row in rows], dtype=np.float64)
 
 
@@ -211,12 +213,12 @@ def covariance_of(table: TableReader | None, constants: Constants | None) -> Cov
     known = constants.uncertainties if constants is not None else {}
     lost = [name for name in names if name not in known]
     if lost or not names:
-        raise table.error("names", f"{', '.join(lost) or 'none'}: constants of the file with an uncertainty are needed")
+        raise table.error("names", f"{', '.join(lost) or 'none'}: expected constants of the file with an uncertainty")
     rows: Any = table.content.get("correlations") or []
     lengths = [len(row) if isinstance(row, list) else 0 for row in rows] if isinstance(rows, list) else []
     if lengths != [*range(1, len(names) + 1)] or not all(is_number(value) for row in rows for value in row):
         raise table.error(
-            "correlations", f"{len(names)} rows of 1 to {len(names)} numbers are needed, the lower triangle"
+            "correlations", f"expected {len(names)} rows of 1 to {len(names)} numbers, the lower triangle"
         )
     matrix = np.zeros((len(names), len(names)))
     for i, row in enumerate(rows):
@@ -255,7 +257,7 @@ def polarizability_of(
         return _axial(table, values, _kind(constants, molecule))
     if not {"aa", "bb", "cc"} <= set(given) <= set(_ELEMENTS):
         raise ValueError(
-            f"{table.place}: {', '.join(given) or 'nothing'}: aa, bb and cc are wanted (with ab, ac, bc where not 0), "
+            f"{table.place}: {', '.join(given) or 'nothing'}: expected aa, bb and cc (with ab, ac, bc where not 0), "
             "or parallel and perpendicular, or mean and anisotropy"
         )
     aa, bb, cc, ab, ac, bc = (values.get(key, 0.0) for key in _ELEMENTS)
@@ -288,7 +290,7 @@ def spin_weights_of(table: TableReader | None, constants: Constants | None) -> S
     classes = {key: value for key, value in table.content.items() if key != "source"}
     for key, value in classes.items():
         if not is_number(value):
-            raise table.error(key, "a whole number is wanted")
+            raise table.error(key, "expected a whole number")
     try:
         weights = SpinWeights.from_mapping(classes)
     except ValueError as reason:

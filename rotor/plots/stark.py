@@ -79,7 +79,7 @@ def _energies(axes: Any, field_map: FieldMap) -> None:
     _labels(axes, field_map, ends)
     axes.set_ylabel("E/hc (cm⁻¹)")
     if seen != {-1}:
-        axes.legend(frameon=False, fontsize=8, loc="upper left", ncols=len(seen))
+        axes.legend(frameon=False, fontsize=8, loc="lower right", bbox_to_anchor=(1, 1), ncols=len(seen))
 
 
 def _colour(m: int) -> str:
@@ -89,6 +89,8 @@ def _colour(m: int) -> str:
 def _labels(axes: Any, field_map: FieldMap, ends: list[tuple[float, str]]) -> None:
     """Names of the free levels at the left, those that would stand on each other left out."""
     low, high = axes.get_ylim()
+    first, end = field_map.fields[0], field_map.fields[-1]
+    axes.set_xlim(first - 0.09 * (end - first), end + 0.02 * (end - first))
     last = -np.inf
     for energy, label in sorted(set(ends)):
         if energy - last > (high - low) / 40:
@@ -102,7 +104,6 @@ def _labels(axes: Any, field_map: FieldMap, ends: list[tuple[float, str]]) -> No
                 fontsize=7,
             )
             last = energy
-    axes.tick_params(axis="y", pad=38)
 
 
 def _slopes(axes: Any, field_map: FieldMap, unit: str) -> None:

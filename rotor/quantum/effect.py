@@ -34,6 +34,8 @@ class QuantumEffect(ABC):
     conserved: quantum numbers that stay good under it, of "j" (the rotational angular momentum), "species" (the parities of
     Ka and Kc) and "m" (the projection in space). What is not named is taken as mixed.
 
+    resolves_m: levels under it are labelled by M, which `solve_levels` has not; it refuses such an effect.
+
     A subclass gives its parameters and, for each of them, operators of one or more of these kinds:
 
     - `operators`: J^2p ½[Jz^2q, J₊^2n + J₋^2n]₊, by their powers (p, q, n): the fast path, for any kind of top;
@@ -44,6 +46,7 @@ class QuantumEffect(ABC):
 
     name: ClassVar[str] = ""
     conserved: ClassVar[frozenset[str]] = frozenset({"j", "species", "m"})
+    resolves_m: ClassVar[bool] = False
 
     def __init_subclass__(cls) -> None:
         if cls.name:

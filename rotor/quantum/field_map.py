@@ -46,7 +46,7 @@ class BlockProblem(NamedTuple):
     observables: dict[str, Matrix]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class FieldMap(Table):
     """States in a field as columns of equal length: all fields of one state after each other.
 

@@ -97,6 +97,11 @@ def solve_levels(
     if jmax < 0 or jmin < 0 or jmin > jmax:
         raise ValueError(f"J from {jmin} to {jmax}: J max must be 0 or more and not below J min")
     effects = tuple(effects)
+    for effect in effects:
+        if effect.resolves_m:
+            raise ValueError(
+                f"{effect.name}: its levels are labelled by M; expected effects of the free molecule, see `rotor.stark_map`"
+            )
     if any(effect.spins(top) for effect in effects):
         from rotor.quantum.spins import spin_levels
 

@@ -15,7 +15,7 @@ from rotor.arrays import Floats, Ints
 from rotor.table import Table
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class LevelTable(Table):
     """Energies of labelled levels.
 

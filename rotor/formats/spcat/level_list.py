@@ -32,13 +32,12 @@ def write_level_list(table: SelectedLevels, path: str | os.PathLike[str], settin
 def level_list(table: SelectedLevels) -> LevelList:
     """Levels as the list of an .egy file, in order of block and energy.
 
-        >>> from rotor.formats.provenance import record_of, write_beside
-    from rotor.formats.spcat.egy import format_level
-        >>> from rotor.quantum.request import LevelsRequest, answer_levels
-        >>> from rotor.tops.top import Top
-        >>> answer = answer_levels(LevelsRequest(Top.from_constants("A=10 B=6 C=4 GHz"), jmin=1, jmax=1))
-        >>> print(format_level(level_list(answer.table).level(0)), end="")
-             6    1          0.533702          0.000000   1.000000    3:  1  1  0
+    >>> from rotor.formats.spcat.egy import format_level
+    >>> from rotor.quantum.request import LevelsRequest, answer_levels
+    >>> from rotor.tops.top import Top
+    >>> answer = answer_levels(LevelsRequest(Top.from_constants("A=10 B=6 C=4 GHz"), jmin=1, jmax=1))
+    >>> format_level(level_list(answer.table).level(0)).split()
+    ['6', '1', '0.533703', '0.000000', '1.000000', '3:', '1', '1', '0']
     """
     levels, rows = table.levels, table.rows
     if "irrep" in levels.quanta:

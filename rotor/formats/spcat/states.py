@@ -63,7 +63,7 @@ def doubled_spins(spind: int) -> tuple[int, ...]:
     """2I of every spin that SPIND names, the one coupled first at its end; with a last digit 0 two digits a spin.
 
     >>> doubled_spins(44), doubled_spins(-32), doubled_spins(1), doubled_spins(-1080)
-    ((3, 3), (1, 2), (), (7, 0))
+    ((3, 3), (1, 2), (), (7,))
     """
     digits, width = str(abs(spind)), 1
     if digits.endswith("0") and len(digits) > 1:

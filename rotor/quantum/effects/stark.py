@@ -54,6 +54,7 @@ class Stark(QuantumEffect):
 
     name: ClassVar[str] = "static electric field"
     conserved: ClassVar[frozenset[str]] = frozenset({"m"})
+    resolves_m: ClassVar[bool] = True
 
     field_kv_per_cm: float = 1.0
 

@@ -1,0 +1,56 @@
+"""The command as a program: its list of verbs, completion, errors that are no mistakes of the user."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from rotor import cli
+from rotor.spectra import request
+
+ROOT = Path(__file__).resolve().parents[1]
+
+
+def test_the_list_of_verbs_fits_a_terminal(call):
+    _, out, _ = call("--help")
+    lines = out.splitlines()
+    assert max(map(len, lines[: lines.index("  Examples:")])) < 80  # columns of a terminal
+    for verb, summary in cli.VERBS.items():
+        assert f"  {verb:<13}  {summary}" in out
+
+
+def test_a_defect_is_one_line_and_debug_shows_where(call, monkeypatch):
+    def broken(*args, **options):
+        raise KeyError("lost")
+
+    monkeypatch.setattr(request, "line_list", broken)
+    code, out, err = call("spectrum", "CO")
+    assert (code, out) == (1, "")
+    assert err == "error: KeyError: 'lost'; this is a defect, please report it with the output of --debug\n"
+    code, _, err = call("--debug", "spectrum", "CO")
+    assert code == 1
+    assert err.startswith("Traceback")
+    assert err.endswith("report it with the output of --debug\n")
+
+
+def test_debug_shows_where_a_mistake_was_found(call):
+    code, _, err = call("--debug", "spectrum", "no-such-molecule")
+    assert code == 2
+    assert err.startswith("Traceback")
+    assert "\nerror: 'no-such-molecule' is no file here" in err
+
+
+@pytest.mark.parametrize(("words", "found"), [("rotor spec", "spectrum"), ("rotor levels --uni", "--unit")])
+def test_a_shell_can_complete_words(words, found):
+    environment = os.environ | {
+        "PYTHONPATH": str(ROOT), "_ROTOR_COMPLETE": "complete_bash", "COMP_WORDS": words,
+        "COMP_CWORD": str(len(words.split()) - 1),
+    }  # fmt: skip
+    done = subprocess.run(
+        [sys.executable, "-m", "rotor"], env=environment, capture_output=True, text=True, check=False, timeout=60
+    )
+    assert done.stdout.split() == [found]
