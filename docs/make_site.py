@@ -59,7 +59,8 @@ def on_the_site(text: str) -> str:
     text = re.sub(r"\]\((?:\.\./)?examples/(\d\d_\w+)\.py\)", r"](notebooks/\1.ipynb)", text)
     text = re.sub(r"\]\(command_line\.md#rotor-(\w+)\)", r"](rotor_\1.md)", text)
     text = re.sub(r"\]\((?:\.\./)?CONVENTIONS\.md\)", "](conventions.md)", text)
-    return re.sub(r"\]\(docs/", "](", text)
+    text = re.sub(r"\]\(docs/", "](", text)
+    return re.sub(r"\[([^\]]+)\]\(\.\./[^)]*\)", r"\1", text)  # files that are not on the site: their name remains
 
 
 def contents(folder: Path) -> str:

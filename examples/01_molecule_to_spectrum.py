@@ -56,7 +56,7 @@ assert abs(lines.frequency_mhz[ground] - 556935.988) < 3  # measured; the consta
 #
 # JPL's catalogue c018003 (Pickett et al. 1998) marks the lines that were measured. 110 of them with J ≤ 10 and Ka ≤ 5 are in
 # `tests/oracles/catalogues`. In the picture the calculated spectrum points up, the catalogue down. Below, the differences in
-# frequency and intensity: the line strengths agree within 5 %, since JPL's dipole
+# frequency and intensity: the line strengths agree within 6 %, since JPL's dipole
 # depends on J and K and ours is one number.
 
 # %%

@@ -12,15 +12,9 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 SUBJECTS = (
-    "molecule_to_spectrum",
-    "isotopologues",
-    "levels",
-    "free_rotation",
-    "equipartition",
-    "classical",
-    "hard_cases",
-    "accuracy",
-)
+    "molecule_to_spectrum", "isotopologues", "levels", "free_rotation", "equipartition", "classical", "fit", "structure",
+    "stark", "alignment", "hard_cases", "accuracy",
+)  # fmt: skip
 
 
 def _tool() -> ModuleType:
@@ -32,7 +26,7 @@ def _tool() -> ModuleType:
 
 
 MAKE = _tool()
-SCRIPTS = [script for script in MAKE.scripts() if script.with_suffix(".ipynb").exists()]
+SCRIPTS = MAKE.scripts()
 HAVE_EXTRA = all(importlib.util.find_spec(name) for name in ("jupytext", "nbclient", "ipykernel"))
 needs_extra = pytest.mark.skipif(
     not HAVE_EXTRA and "CI" not in os.environ, reason='needs the extra docs: python -m pip install ".[docs]"'

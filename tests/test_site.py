@@ -75,6 +75,7 @@ def test_a_session_of_a_docstring_is_code_and_symbols_are_text():
 def test_links_stay_on_the_site(pages):
     assert SITE.on_the_site("[a](../examples/04_free_rotation.py)") == "[a](notebooks/04_free_rotation.ipynb)"
     assert SITE.on_the_site("[a](command_line.md#rotor-fluid)") == "[a](rotor_fluid.md)"
+    assert SITE.on_the_site("see [`data/levels/`](../data/levels).") == "see `data/levels/`."
     for page in pages.glob("*.md"):
         for target in re.findall(r"\]\(([^)#\s]+)", page.read_text(encoding="utf-8")):
             assert target.startswith("http") or (page.parent / target).exists(), f"{page.name}: {target}"

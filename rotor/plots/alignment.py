@@ -11,12 +11,28 @@ import numpy as np
 from rotor.alignment.align import AlignmentTrace
 from rotor.alignment.pulse import Kick
 from rotor.arrays import Floats
-from rotor.plots.picture import DPI, STYLE
+from rotor.plots.picture import DPI, checked_suffix, new_figure, styled
 from rotor.plots.stark import COLOURS
 from rotor.version import version
 
 SIZE_INCHES = (7.2, 4.6)
 NAMES = {"cos2theta": "⟨cos²θ⟩", "costheta": "⟨cosθ⟩", "cos2theta_2d": "⟨cos²θ₂D⟩"}
+
+
+def alignment_figure(trace: AlignmentTrace, *, classical: Mapping[str, Floats] | None = None, title: str = "") -> Any:
+    """A matplotlib figure of cosines against time, of two times or more; `classical` are those of a gas, by the same names.
+
+    Raises ValueError for a trace of one time.
+    """
+    if len(trace.t_ps) < 2:
+        raise ValueError("a picture of a trace needs two times or more")
+    with styled():
+        figure = new_figure(SIZE_INCHES)
+        above, below = figure.subplots(2, 1, sharex=True, height_ratios=(1, 5))
+        _pulses(above, trace)
+        _cosines(below, trace, classical or {})
+        above.set_title(title, loc="left")
+    return figure
 
 
 def plot_alignment(
@@ -27,7 +43,7 @@ def plot_alignment(
     title: str = "",
     provenance: Mapping[str, Any] | None = None,
 ) -> None:
-    """Draw cosines against time into a .png, .pdf or .svg file.
+    """Draw `alignment_figure` into a .png, .pdf or .svg file.
 
     Parameters
     ----------
@@ -47,23 +63,9 @@ def plot_alignment(
     ValueError
         For a trace of one time, and for a suffix that is no picture.
     """
-    suffix = os.path.splitext(os.fspath(path))[1].lower()
-    if suffix not in (".png", ".pdf", ".svg"):
-        raise ValueError(f"{os.fspath(path)}: a picture is .png, .pdf or .svg; the suffix names the format")
-    if len(trace.t_ps) < 2:
-        raise ValueError("a picture of a trace needs two times or more")
-
-    import matplotlib as mpl
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=SIZE_INCHES, dpi=DPI, layout="constrained")
-        FigureCanvasAgg(figure)
-        above, below = figure.subplots(2, 1, sharex=True, height_ratios=(1, 5))
-        _pulses(above, trace)
-        _cosines(below, trace, classical or {})
-        above.set_title(title, loc="left")
+    suffix = checked_suffix(path)
+    figure = alignment_figure(trace, classical=classical, title=title)
+    with styled():
         figure.savefig(path, dpi=DPI, metadata=_metadata(suffix, trace, title, provenance or {}))
 
 

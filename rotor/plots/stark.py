@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from rotor.plots.picture import DPI, STYLE
+from rotor.plots.picture import DPI, checked_suffix, new_figure, styled
 from rotor.quantum.field_map import FieldMap
 from rotor.units import MHZ_PER_CM
 from rotor.version import version
@@ -16,6 +16,22 @@ from rotor.version import version
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")  # Okabe and Ito
 SIZE_INCHES = (7.2, 6.4)
 MOST_LABELS = 16
+
+
+def stark_figure(field_map: FieldMap, title: str = "", unit: str = "kV/cm") -> Any:
+    """A matplotlib figure of a map of levels in a field, of two fields or more; `unit` is that of the field.
+
+    Raises ValueError for a map of one field.
+    """
+    if len(field_map.fields) < 2:
+        raise ValueError("a picture of a map needs two fields or more")
+    with styled():
+        figure = new_figure(SIZE_INCHES)
+        above, below = figure.subplots(2, 1, sharex=True, height_ratios=(3, 1.4))
+        _energies(above, field_map)
+        _slopes(below, field_map, unit)
+        above.set_title(title, loc="left")
+    return figure
 
 
 def plot_stark(
@@ -26,7 +42,7 @@ def plot_stark(
     unit: str = "kV/cm",
     provenance: Mapping[str, Any] | None = None,
 ) -> None:
-    """Draw a map of levels in a field into a .png, .pdf or .svg file.
+    """Draw `stark_figure` into a .png, .pdf or .svg file.
 
     Parameters
     ----------
@@ -46,23 +62,9 @@ def plot_stark(
     ValueError
         For a map of one field, and for a suffix that is no picture.
     """
-    suffix = os.path.splitext(os.fspath(path))[1].lower()
-    if suffix not in (".png", ".pdf", ".svg"):
-        raise ValueError(f"{os.fspath(path)}: a picture is .png, .pdf or .svg; the suffix names the format")
-    if len(field_map.fields) < 2:
-        raise ValueError("a picture of a map needs two fields or more")
-
-    import matplotlib as mpl
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=SIZE_INCHES, dpi=DPI, layout="constrained")
-        FigureCanvasAgg(figure)
-        above, below = figure.subplots(2, 1, sharex=True, height_ratios=(3, 1.4))
-        _energies(above, field_map)
-        _slopes(below, field_map, unit)
-        above.set_title(title, loc="left")
+    suffix = checked_suffix(path)
+    figure = stark_figure(field_map, title, unit)
+    with styled():
         figure.savefig(path, dpi=DPI, metadata=_metadata(suffix, field_map, title, provenance or {}))
 
 

@@ -14,6 +14,7 @@ from rotor.structure.coordinates import bonded
 from rotor.structure.substitution import Value
 
 _MARGIN = 0.9  # Å around the atoms
+SMALLEST_ERROR = 1e-6  # of a label: what is fitted to exact constants has errors of round-off, which are not written
 
 
 def structure_figure(molecule: Molecule, *, values: Sequence[Value] = (), title: str = "") -> Any:
@@ -69,7 +70,8 @@ def _draw_bonds(axes: Any, molecule: Molecule, values: Sequence[Value], across: 
     written: dict[tuple[int, ...], str] = {}
     for value in values:
         if len(value.atoms) == 2:
-            text = value_text(round(value.value, 6), value.error) if np.isfinite(value.error) else f"{value.value:.4f}"
+            seen = np.isfinite(value.error) and value.error > SMALLEST_ERROR
+            text = value_text(round(value.value, 6), value.error) if seen else f"{value.value:.4f}"
             for atoms in named(molecule, value.name, value.atoms).alike:
                 written.setdefault(tuple(sorted(atoms)), text)
     for i, j in bonded(molecule):
