@@ -4,10 +4,14 @@
     top = rotor.read("water")
     lines = rotor.line_list(top, temperature_k=300, jmax=20)
     rotor.write(lines, "water.cat")
+    rotor.plot(lines)
 
-The public names stand below. They are loaded when first used, so that `import rotor` does no work.
+Functions of a top take whatever `rotor.read` takes instead: `rotor.line_list("water")`. The public names stand below. They
+are loaded when first used, so that `import rotor` does no work.
 """
 
+from collections.abc import Callable
+from functools import cache, wraps
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -30,6 +34,7 @@ if TYPE_CHECKING:
     from rotor.formats.streamed_lines import stream_lines as stream_lines
     from rotor.molecules.molecule import Molecule as Molecule
     from rotor.molecules.optimise import refine as refine
+    from rotor.plots.show import plot as plot
     from rotor.quantum.effects.stark import stark_map as stark_map
     from rotor.quantum.levels import Levels as Levels
     from rotor.quantum.request import LevelsRequest as LevelsRequest
@@ -93,6 +98,7 @@ _MODULES = {
     "free_motion": "rotor.classical.free.free_motion",
     "line_list": "rotor.spectra.lines",
     "partition_function": "rotor.thermo",
+    "plot": "rotor.plots.show",
     "raman_lines": "rotor.spectra.raman",
     "read": "rotor.formats",
     "refine": "rotor.molecules.optimise",
@@ -104,6 +110,13 @@ _MODULES = {
     "write": "rotor.formats",
 }
 
+_OF_TOPS = frozenset(
+    {
+        "align", "line_list", "partition_function", "raman_lines", "solve_levels", "stark_map", "stream_lines",
+        "thermal_tumble", "thermodynamic_functions",
+    }
+)  # fmt: skip  # functions whose first argument is a top
+
 __all__ = [*sorted(_MODULES), "__version__"]
 
 
@@ -111,8 +124,26 @@ def __getattr__(name: str) -> Any:
     if name == "__version__":
         return version()
     if name in _MODULES:
-        return getattr(import_module(_MODULES[name]), name)
+        found = getattr(import_module(_MODULES[name]), name)
+        return _taking_words(found) if name in _OF_TOPS else found
     raise AttributeError(f"module 'rotor' has no attribute {name!r}")
+
+
+@cache
+def _taking_words(function: Callable[..., Any]) -> Callable[..., Any]:
+    """The function of a top, given a top or whatever `read` makes one of."""
+
+    @wraps(function)
+    def call(top: Any, *args: Any, **options: Any) -> Any:
+        from rotor.formats import read
+        from rotor.tops.top import Top
+
+        found = top if isinstance(top, Top) else read(top)
+        if not isinstance(found, Top):
+            raise ValueError(f"{top}: holds a {type(found).__name__}, not a molecule or constants")
+        return function(found, *args, **options)
+
+    return call
 
 
 def __dir__() -> list[str]:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import typer
 
 from rotor.checks import require_whole
-from rotor.cli.shared import gas_layer, inputs
+from rotor.cli.shared import gas_layer, inputs, plot_options
 from rotor.cli.shared import spcat_request as spcat
 from rotor.cli.shared.gas_layer import Layer, Vibration
 from rotor.cli.shared.inputs import Input, json_option
@@ -27,6 +27,7 @@ from rotor.cli.shared.output import (
     show_facts,
     show_table,
 )
+from rotor.cli.shared.plot_options import PlotOptions
 
 if TYPE_CHECKING:
     from rotor.formats.spcat.predict import Prediction
@@ -91,12 +92,19 @@ class Outputs:
 
 @grouped()
 def command(
-    context: typer.Context, given: Input, options: Options, vibration: Vibration, layer: Layer, outputs: Outputs
+    context: typer.Context,
+    given: Input,
+    options: Options,
+    vibration: Vibration,
+    layer: Layer,
+    outputs: Outputs,
+    picture: PlotOptions,
 ) -> None:
     """Rotational lines: frequencies, intensities, and what they were made from."""
     require_whole("--top", options.top_lines, 0)
     require_whole("--tag", options.tag, 0, 999_999)
     files, shape = Files.of(outputs), _shape(options, layer)
+    drawn = plot_options.settings_of(picture, files)
     settings = {**_settings(options), "vibrations": gas_layer.vibrations_of(vibration), **shape}
     _refuse_profile_without_file(settings, files)
 
@@ -115,7 +123,7 @@ def command(
         content = _content(answer, given, context.obj, options.top_lines)
     content["files"] = files.names
 
-    writers = _writers(answer, content, tag)
+    writers = _writers(answer, content, tag, drawn)
     if prediction is not None:
         writers["--cat"] = _program_catalogue(prediction, content)
     deliver(files, writers, lambda: json_with_rows(answer.lines, "lines", content), lambda: _show(answer, content))
@@ -204,7 +212,7 @@ def _content(answer: SpectrumAnswer, given: Input, command: str, shown: int) -> 
     return {**begin(command, given.text), **answer.facts(), "strongest": answer.strongest(shown)}
 
 
-def _writers(answer: SpectrumAnswer, content: dict[str, Any], tag: int) -> dict[str, Writer]:
+def _writers(answer: SpectrumAnswer, content: dict[str, Any], tag: int, drawn: dict[str, Any]) -> dict[str, Writer]:
     """How each option's file is written, with the provenance that its format can hold."""
     import rotor
 
@@ -218,15 +226,15 @@ def _writers(answer: SpectrumAnswer, content: dict[str, Any], tag: int) -> dict[
         "--csv": table,
         "--parquet": table,
         "--profile-csv": lambda path: rotor.write(answer.spectrum, path, settings={"command": record["command"]}),
-        "--plot": lambda path: _draw(answer, path, record),
+        "--plot": lambda path: _draw(answer, path, record, drawn),
     }
 
 
-def _draw(answer: SpectrumAnswer, path: Path, record: dict[str, Any]) -> None:
+def _draw(answer: SpectrumAnswer, path: Path, record: dict[str, Any], drawn: dict[str, Any]) -> None:
     from rotor.plots.spectrum import plot_spectrum
 
     thing = answer.lines if answer.request.shape == "sticks" else answer.spectrum
-    plot_spectrum(thing, path, provenance={"command": record["command"]})
+    plot_spectrum(thing, path, provenance={"command": record["command"]}, **drawn)
 
 
 def _show(answer: SpectrumAnswer, content: dict[str, Any]) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from typing import Any
 
 import numpy as np
 
@@ -19,6 +20,11 @@ def plot_catalogue(lines: Catalogue, path: str | os.PathLike[str], *, title: str
     Measured lines (a negative tag) stand out. title: above the picture. command: written into the file's metadata.
     """
     checked_suffix(path)
+    save(catalogue_figure(lines, title=title), path, title, {"command": command})
+
+
+def catalogue_figure(lines: Catalogue, *, title: str = "") -> Any:
+    """A matplotlib figure of log10 of the intensity against frequency, measured lines in a colour of their own."""
     frequency, _ = in_mhz(lines)
     bottom = float(lines.lgint.min()) - 0.3
     with styled():
@@ -34,4 +40,4 @@ def plot_catalogue(lines: Catalogue, path: str | os.PathLike[str], *, title: str
         axes.set(xlabel="Frequency (GHz)", ylabel="log₁₀ intensity (nm² MHz)", title=title)
         axes.set_ylim(bottom=bottom)
         figure.legend(loc="outside lower right", ncols=2, frameon=False)
-        save(figure, path, title, {"command": command})
+    return figure

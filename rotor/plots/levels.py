@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
+from rotor.checks import require_one_of
 from rotor.plots.picture import (
     BLUE,
     GREY,
@@ -64,11 +65,16 @@ def plot_levels(
         A suffix that is no picture, an unknown unit, or no levels.
     """
     checked_suffix(path)
-    if unit not in UNITS:
-        raise ValueError(f"unit {unit!r}: expected one of {', '.join(UNITS)}")
+    save(levels_figure(table, top, unit=unit, title=title), path, title or name_of_top(top), provenance or {})
+
+
+def levels_figure(
+    table: SelectedLevels, top: Top | None = None, *, unit: str = "cm-1", title: str | None = None
+) -> Any:
+    """A matplotlib figure of a term diagram; see `plot_levels`. top: None: an asymmetric top stands in columns of Ka."""
+    require_one_of("unit", unit, UNITS)
     if not len(table):
         raise ValueError("there is no level to draw; widen the range of J or K, or raise the limit of energy")
-
     name, column = ladders(table, top)
     energy = np.asarray(getattr(table, UNITS[unit]))
     with styled():
@@ -77,18 +83,20 @@ def plot_levels(
         _draw(axes, column, energy, table.levels.weight[table.rows] > 0)
         axes.set_xlabel({"Ka": "$K_a$", "Kc": "$K_c$"}.get(name, f"${name}$"))
         axes.set_ylabel(f"Energy ({unit.replace('cm-1', 'cm⁻¹')})")
-        axes.set_title(title if title is not None else name_of_top(top), loc="left")
+        heading_text = f"{table.levels.kind} top" if top is None else name_of_top(top)
+        axes.set_title(title if title is not None else heading_text, loc="left")
         _label(figure, axes, table, column, energy)
-        save(figure, path, title or name_of_top(top), provenance or {})
+    return figure
 
 
-def ladders(table: SelectedLevels, top: Top) -> tuple[str, Ints]:
+def ladders(table: SelectedLevels, top: Top | None) -> tuple[str, Ints]:
     """The quantum number that the columns of a diagram stand for, as its heading, and its value for every level."""
     quanta, rows = table.levels.quanta, table.rows
     if "k" in quanta:
         return "|K|", np.abs(quanta["k"][rows])
     if "kc" in quanta:
-        oblate = top.kind == "oblate" or (top.kind == "asymmetric" and (top.kappa or 0.0) > 0)
+        kappa = top.kappa if top is not None else None
+        oblate = table.levels.kind == "oblate" or (table.levels.kind == "asymmetric" and (kappa or 0.0) > 0)
         name = "kc" if oblate else "ka"
         return heading(name), np.asarray(quanta[name][rows])
     name = "n" if "n" in quanta else "j"

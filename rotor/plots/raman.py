@@ -27,6 +27,11 @@ def plot_raman(
     picture and for no lines.
     """
     checked_suffix(path)
+    save(raman_figure(lines, title), path, title or _title(lines), {**(provenance or {}), **_facts(lines)})
+
+
+def raman_figure(lines: RamanLines, title: str | None = None) -> Any:
+    """A matplotlib figure of Raman lines as sticks at their shifts; ValueError for no lines."""
     if not len(lines):
         raise ValueError(f"there is no Raman line to draw for {lines.top.name or 'this top'}")
     with styled():
@@ -34,7 +39,7 @@ def plot_raman(
         axes = figure.add_subplot()
         _draw(axes, lines)
         axes.set_title(title if title is not None else _title(lines), loc="left")
-        save(figure, path, title or _title(lines), {**(provenance or {}), **_facts(lines)})
+    return figure
 
 
 def _draw(axes: Any, lines: RamanLines) -> None:

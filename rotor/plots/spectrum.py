@@ -12,11 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats
+from rotor.checks import require_one_of
 from rotor.plots.picture import BLUE, GREY, MOST_VECTOR_STICKS, checked_suffix, name_of_top, new_figure, save, styled
 from rotor.quantum.quanta import state_text
 from rotor.spectra.lines import Lines
 from rotor.spectra.spectrum import Spectrum, line_widths
+from rotor.units import MHZ_PER_CM
 
+UNITS = {"MHz": 1.0, "GHz": 1e3, "THz": 1e6, "cm-1": MHZ_PER_CM}  # of the frequency axis
 VISIBLE = 4e-3  # lines below this part of the strongest do not stretch the axis of frequency
 TALL = 1e-2  # and below this they cannot be seen on a linear axis
 MOST_DECADES = 8
@@ -43,43 +46,77 @@ def plot_spectrum(
     range_mhz: tuple[float, float] | None = None,
     title: str | None = None,
     labels: int = 12,
+    unit: str | None = None,
+    log: bool | None = None,
     provenance: Mapping[str, Any] | None = None,
 ) -> None:
     """Draw lines as sticks, or a spectrum as a curve, into a .png, .pdf or .svg file.
 
     Parameters
     ----------
-    thing : Lines or Spectrum
-        Sticks are integrated absorption in nm² MHz, a curve is the cross section in nm².
+    thing, range_mhz, title, labels, unit, log :
+        As in `spectrum_figure`.
     path : path
         Its suffix chooses the format.
+    provenance : mapping, optional
+        What the metadata of the file shall hold besides version, constants and settings.
+
+    Raises
+    ------
+    ValueError
+        A suffix that is no picture, a spectrum without lines or with nothing in the range, an unknown unit.
+    """
+    checked_suffix(path)
+    figure = spectrum_figure(thing, range_mhz=range_mhz, title=title, labels=labels, unit=unit, log=log)
+    lines = thing if isinstance(thing, Lines) else thing.lines
+    save(figure, path, title or _title(thing, lines), {**(provenance or {}), **_facts(thing, lines)})
+
+
+def spectrum_figure(
+    thing: Lines | Spectrum,
+    *,
+    range_mhz: tuple[float, float] | None = None,
+    title: str | None = None,
+    labels: int = 12,
+    unit: str | None = None,
+    log: bool | None = None,
+) -> Any:
+    """A matplotlib figure of lines as sticks, or of a spectrum as a curve.
+
+    Parameters
+    ----------
+    thing : Lines or Spectrum
+        Sticks are integrated absorption in nm² MHz, a curve is the cross section in nm².
     range_mhz : (2,), optional
         The frequencies shown; else the range the lines were asked for, else where lines are above 0.4 % of the strongest.
     title : str, optional
         Instead of name, formula and temperature.
     labels : int
-        The most lines that are named; a name that would lie on another or on a stick is left out.
-    provenance : mapping, optional
-        What the metadata of the file shall say besides version, constants and settings.
+        The most lines that are named: the strongest first, others where their names lie on nothing.
+    unit : "MHz", "GHz", "THz" or "cm-1", optional
+        Of the frequency axis; else the one that gives numbers below 2000.
+    log : bool, optional
+        Whether the axis of intensity is logarithmic; else it is where fewer than ten lines would be seen on a linear one.
 
-    Notes
-    -----
-    The axis of intensity is logarithmic where fewer than ten lines would be seen on a linear one. Raises ValueError for
-    a suffix that is no picture and for a spectrum without lines or with nothing in the range.
+    Raises
+    ------
+    ValueError
+        A spectrum without lines or with nothing in the range, an unknown unit.
     """
-    checked_suffix(path)
+    if unit is not None:
+        require_one_of("unit", unit, UNITS)
     lines = thing if isinstance(thing, Lines) else thing.lines
     heights = _heights(thing, lines)
     with styled():
         figure = new_figure()
         axes = figure.add_subplot()
-        x = _frequency_axis(thing, lines, heights, range_mhz)
+        x = _frequency_axis(thing, lines, heights, range_mhz, unit)
         _draw(axes, thing, x)
-        _scale(axes, thing, lines, heights, x)
+        _scale(axes, thing, lines, heights, x, log)
         _inscribe(axes, thing, lines, x, title)
-        if lines is not None:
+        if lines is not None and labels:
             _name_lines(figure, axes, thing, lines, heights, x, labels)
-        save(figure, path, title or _title(thing, lines), {**(provenance or {}), **_facts(thing, lines)})
+    return figure
 
 
 def _heights(thing: Lines | Spectrum, lines: Lines | None) -> Floats:
@@ -92,11 +129,16 @@ def _heights(thing: Lines | Spectrum, lines: Lines | None) -> Floats:
 
 
 def _frequency_axis(
-    thing: Lines | Spectrum, lines: Lines | None, heights: Floats, range_mhz: tuple[float, float] | None
+    thing: Lines | Spectrum,
+    lines: Lines | None,
+    heights: Floats,
+    range_mhz: tuple[float, float] | None,
+    unit: str | None,
 ) -> _Axis:
     first, last = range_mhz or _range_shown(thing, lines, heights)
-    unit, mhz = next(((u, f) for u, f in (("MHz", 1.0), ("GHz", 1e3)) if last < 2e3 * f), ("THz", 1e6))
-    return _Axis(unit, mhz, first, last)
+    if unit is None:
+        unit = next((name for name in ("MHz", "GHz") if last < 2e3 * UNITS[name]), "THz")
+    return _Axis(unit, UNITS[unit], first, last)
 
 
 def _range_shown(thing: Lines | Spectrum, lines: Lines | None, heights: Floats) -> tuple[float, float]:
@@ -139,13 +181,16 @@ def _thinned(x: Floats, y: Floats) -> tuple[Floats, Floats]:
     return np.repeat(x[starts], 2), np.stack([low, high], axis=1).ravel()
 
 
-def _scale(axes: Any, thing: Lines | Spectrum, lines: Lines | None, heights: Floats, x: _Axis) -> None:
+def _scale(
+    axes: Any, thing: Lines | Spectrum, lines: Lines | None, heights: Floats, x: _Axis, log: bool | None
+) -> None:
     """Limits of both axes, with space for names above the lines."""
     axes.set_xlim(x.first / x.mhz, x.last / x.mhz)
     shown = np.zeros(0) if lines is None else lines.intensity_nm2_mhz[x.inside(lines.frequency_mhz)]
     tallest = _tallest(thing, x)
-    if _wants_logarithm(shown[shown > 0]):
-        decades = min(math.log10(shown.max() / shown[shown > 0].min()), MOST_DECADES)
+    if _is_logarithmic(shown[shown > 0]) if log is None else log:
+        positive = shown[shown > 0] if (shown > 0).any() else np.array([tallest * 1e-3, tallest])
+        decades = min(max(math.log10(positive.max() / positive.min()), 1.0), MOST_DECADES)
         axes.set_yscale("log")
         axes.set_ylim(tallest * 10 ** (-1.05 * decades), tallest * 10 ** (0.28 * decades))
     else:
@@ -160,7 +205,7 @@ def _tallest(thing: Lines | Spectrum, x: _Axis) -> float:
     return tallest
 
 
-def _wants_logarithm(heights: Floats) -> bool:
+def _is_logarithmic(heights: Floats) -> bool:
     """Whether fewer than ten lines (or than half, of less than twenty) reach a hundredth of the tallest."""
     if len(heights) < 2:
         return False
@@ -168,7 +213,7 @@ def _wants_logarithm(heights: Floats) -> bool:
 
 
 def _inscribe(axes: Any, thing: Lines | Spectrum, lines: Lines | None, x: _Axis, title: str | None) -> None:
-    axes.set_xlabel(f"Frequency ({x.unit})")
+    axes.set_xlabel("Wavenumber (cm⁻¹)" if x.unit == "cm-1" else f"Frequency ({x.unit})")
     axes.set_ylabel("Integrated absorption (nm² MHz)" if isinstance(thing, Lines) else _ordinate(thing))
     axes.set_title(title if title is not None else _title(thing, lines), loc="left")
     if isinstance(thing, Spectrum) and thing.profile:
@@ -208,11 +253,21 @@ def _name_lines(
         if any(box.x0 - 6 < place[0] < box.x1 + 6 and box.y0 - 40 < place[1] < box.y1 for box in taken):
             continue  # no need to measure a name that cannot fit
         text = _label(axes, lines, row, heights[row], x)
+        if not taken:  # the strongest line is always named, inside the axes even where it stands at their edge
+            _move_inside(text, axes)
         box = text.get_window_extent().padded(2.0)
-        if _fits(box, axes.bbox, taken, drawn):
+        if not taken or _fits(box, axes.bbox, taken, drawn):
             taken.append(box)
         else:
             text.remove()
+
+
+def _move_inside(text: Any, axes: Any) -> None:
+    """Shift a name sideways until it is inside the axes."""
+    box = text.get_window_extent().padded(2.0)
+    beyond = min(box.x0 - axes.bbox.x0, 0.0) + max(box.x1 - axes.bbox.x1, 0.0)
+    across, up = text.get_position()
+    text.set_position((across - beyond * 72.0 / axes.figure.dpi, up))
 
 
 def _stands_out(thing: Lines | Spectrum, lines: Lines, heights: Floats) -> NDArray[np.bool_]:

@@ -7,6 +7,7 @@ A molecule becomes a top here; the quantum and the classical half know tops only
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -111,7 +112,7 @@ class Top:
     @classmethod
     def from_constants(
         cls,
-        constants: Constants | str,
+        constants: Constants | Mapping[str, float | str] | str,
         *,
         dipole_abc_debye: ArrayLike | None = None,
         spin_weights: SpinWeights | dict[str, int] | None = None,
@@ -119,10 +120,14 @@ class Top:
     ) -> Top:
         """A top from named constants, or from their text such as "A=835840.288 B=435351.717 C=278138.7 MHz".
 
+        constants: a mapping has numbers in MHz or texts with a unit by name: `{"A": "9.2 GHz", "B": 3000, "C": 2500}`.
         others: any further field of `Top`. Raises ValueError for unknown names, units or an impossible set.
         """
         if isinstance(constants, str):
             constants = Constants.parse(constants)
+        if not isinstance(constants, Constants):
+            values: dict[str, Any] = {name: units.parse_quantity(value, "MHz") for name, value in constants.items()}
+            constants = Constants(**values)
         if not isinstance(spin_weights, SpinWeights):
             spin_weights = SpinWeights.from_mapping(spin_weights) if spin_weights else SpinWeights()
         return cls(constants, _three(dipole_abc_debye), spin_weights, **others)

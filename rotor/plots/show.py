@@ -1,0 +1,164 @@
+"""`rotor.plot`: a matplotlib figure of whatever the package computes, for notebooks; or a picture in a file."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from functools import singledispatch
+from typing import Any
+
+import numpy as np
+
+from rotor.classical.free.free_motion import FreeMotion
+from rotor.classical.gas.ensembles import Correlations
+from rotor.classical.tumble import PERIODS, TumbleAnswer
+from rotor.formats.spcat.catalogue import Catalogue
+from rotor.plots.picture import save
+from rotor.quantum.levels import Levels
+from rotor.quantum.request import LevelsAnswer, SelectedLevels
+from rotor.spectra.lines import Lines
+from rotor.spectra.raman import RamanLines
+from rotor.spectra.raman_request import RamanAnswer
+from rotor.spectra.request import SpectrumAnswer
+from rotor.spectra.spectrum import Spectrum
+from rotor.statistics.equipartition import Equipartition
+from rotor.thermo.functions import ThermoFunctions
+from rotor.thermo.request import ThermoAnswer
+
+
+def plot(thing: Any, path: str | os.PathLike[str] | None = None, **options: Any) -> Any:
+    """A matplotlib figure of lines, spectra, levels, motions, thermodynamic functions and gases, or of an answer with them.
+
+    Parameters
+    ----------
+    thing : Lines, Spectrum, RamanLines, Levels, FreeMotion, ThermoFunctions, Correlations, Equipartition, Catalogue
+        Or the answer to a request for one of them.
+    path : path, optional
+        A .png, .pdf or .svg file to write.
+    options :
+        Of the picture: those of `spectrum_figure`, `raman_figure`, `levels_figure`, `polhode_figure`, ...
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Shown by a notebook where it is the last thing of a cell.
+
+    Raises
+    ------
+    ValueError
+        A thing that there is no picture of; a suffix that is no picture.
+
+    >>> from rotor.spectra.lines import line_list
+    >>> from rotor.tops.top import Top
+    >>> figure = plot(line_list(Top.from_constants("B=57.6 GHz", dipole_abc_debye=(0.1, 0, 0)), jmax=5))
+    >>> figure.axes[0].get_xlabel()
+    'Frequency (GHz)'
+    """
+    figure = _figure(thing, **options)
+    if path is not None:
+        save(figure, path, type(thing).__name__, {})
+    return figure
+
+
+@singledispatch
+def _figure(thing: Any, **options: Any) -> Any:
+    known = ", ".join(sorted(kind.__name__ for kind in _figure.registry if kind is not object))
+    raise ValueError(f"there is no picture of a {type(thing).__name__}; there are pictures of {known}")
+
+
+@_figure.register(Lines)
+@_figure.register(Spectrum)
+def _(thing: Lines | Spectrum, **options: Any) -> Any:
+    from rotor.plots.spectrum import spectrum_figure
+
+    return spectrum_figure(thing, **options)
+
+
+@_figure.register
+def _(thing: SpectrumAnswer, **options: Any) -> Any:
+    return _figure(thing.lines if thing.request.shape == "sticks" else thing.spectrum, **options)
+
+
+@_figure.register
+def _(thing: RamanLines, **options: Any) -> Any:
+    from rotor.plots.raman import raman_figure
+
+    return raman_figure(thing, **options)
+
+
+@_figure.register
+def _(thing: SelectedLevels, **options: Any) -> Any:
+    from rotor.plots.levels import levels_figure
+
+    return levels_figure(thing, **options)
+
+
+@_figure.register
+def _(thing: Levels, **options: Any) -> Any:
+    return _figure(SelectedLevels(thing, np.arange(len(thing))), **options)
+
+
+@_figure.register
+def _(thing: LevelsAnswer, **options: Any) -> Any:
+    return _figure(thing.table, **({"top": thing.request.top} | options))
+
+
+@_figure.register
+def _(thing: FreeMotion, **options: Any) -> Any:
+    from rotor.plots.polhodes import polhode_figure
+
+    span = PERIODS * float(thing.period) if np.isfinite(thing.period) else 20 * np.pi / float(thing.turning_rate)
+    return polhode_figure(thing, **({"times": [0.0, span]} | options))
+
+
+@_figure.register
+def _(thing: TumbleAnswer, **options: Any) -> Any:
+    units = thing.request.units
+    shown = {
+        "times": thing.table.times / units.time_factor,
+        "axis_names": thing.request.axes,
+        "time_label": f"$t$ ({units.time})" if units.time else "$t$",
+        "time_factor": units.time_factor,
+    }
+    return _figure(thing.motion, **(shown | options))
+
+
+@_figure.register
+def _(thing: ThermoFunctions, **options: Any) -> Any:
+    from rotor.plots.heat_capacity import Panel, heat_capacity_figure
+    from rotor.plots.picture import name_of_top
+
+    label = "quantum" if thing.species == "equilibrium" else f"quantum, {thing.species}"
+    return heat_capacity_figure([Panel(name_of_top(thing.top), {label: thing})], **options)
+
+
+@_figure.register
+def _(thing: Correlations, **options: Any) -> Any:
+    from rotor.plots.gas import correlation_figure
+
+    return correlation_figure({options.pop("title", ""): thing}, **options)
+
+
+@_figure.register
+def _(thing: Equipartition, **options: Any) -> Any:
+    from rotor.plots.gas import equipartition_figure
+
+    return equipartition_figure({options.pop("title", ""): thing}, **options)
+
+
+@_figure.register
+def _(thing: Catalogue, **options: Any) -> Any:
+    from rotor.plots.catalogue import catalogue_figure
+
+    return catalogue_figure(thing, **options)
+
+
+def _passed_on(attribute: str) -> Callable[..., Any]:
+    def figure(thing: Any, **options: Any) -> Any:
+        return _figure(getattr(thing, attribute), **options)
+
+    return figure
+
+
+_figure.register(RamanAnswer, _passed_on("lines"))
+_figure.register(ThermoAnswer, _passed_on("functions"))

@@ -1,0 +1,141 @@
+"""`rotor.plot` draws whatever there is; the public functions take names of molecules; pictures take their options."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+import rotor
+from rotor.classical.tumble import TumbleRequest
+from rotor.plots.spectrum import spectrum_figure
+from rotor.spectra.spectrum import resolving_grid
+
+CO = "B=57635.968 D=0.1835 MHz"
+
+
+@pytest.fixture(scope="module")
+def things() -> dict[str, object]:
+    top, lines = rotor.read("water"), rotor.line_list("CO", jmax=8)
+    gas = rotor.answer_gas(rotor.GasRequest(rotor.read("OCS"), 2000, times_ps=(0.0, 0.1, 0.2)))
+    return {
+        "lines": lines,
+        "spectrum": rotor.Spectrum.from_lines(lines, resolving_grid(lines)),
+        "spectrum answer": rotor.answer_spectrum(rotor.SpectrumRequest(top, jmax=5, fwhm_mhz=500.0)),
+        "Raman lines": rotor.raman_lines("N2"),
+        "levels": rotor.solve_levels("water", 4),
+        "levels answer": rotor.answer_levels(rotor.LevelsRequest(rotor.read("CH3CN"), jmax=4)),
+        "motion": rotor.free_motion([1.0, 2.0, 3.0], [0.1, 2.0, 0.1]),
+        "tumble answer": rotor.answer_tumble(TumbleRequest((1.0, 2.0, 3.0), (0.1, 2.0, 0.1))),
+        "thermodynamic functions": rotor.thermodynamic_functions("CO", np.linspace(5, 300, 30)),
+        "correlations": gas.correlations,
+        "equipartition": gas.test,
+    }
+
+
+KINDS = (
+    "lines", "spectrum", "spectrum answer", "Raman lines", "levels", "levels answer", "motion", "tumble answer",
+    "thermodynamic functions", "correlations", "equipartition",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_figure_of_everything(things, kind, tmp_path):
+    figure = rotor.plot(things[kind], tmp_path / "a.png")
+    assert isinstance(figure, Figure)
+    axes = figure.axes[0]
+    assert axes.get_xlabel() or axes.get_xticklabels() or kind in ("motion", "tumble answer")
+    assert axes.lines or axes.collections or axes.patches
+    assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_what_cannot_be_drawn_is_refused(tmp_path):
+    with pytest.raises(ValueError, match=r"there is no picture of a int; there are pictures of Catalogue, .*Lines"):
+        rotor.plot(3)
+    with pytest.raises(ValueError, match=r"\.png, \.pdf or \.svg"):
+        rotor.plot(rotor.line_list("CO", jmax=3), tmp_path / "a.txt")
+
+
+@pytest.mark.parametrize(
+    ("by_word", "by_top"),
+    [
+        (lambda: rotor.line_list("water", jmax=3).frequency_mhz, lambda t: rotor.line_list(t, jmax=3).frequency_mhz),
+        (lambda: rotor.solve_levels("H2O", 2).energy_mhz, lambda t: rotor.solve_levels(t, 2).energy_mhz),
+        (lambda: rotor.partition_function("water", 100.0).q, lambda t: rotor.partition_function(t, 100.0).q),
+        (lambda: rotor.thermal_tumble("water").angular_momentum, lambda t: rotor.thermal_tumble(t).angular_momentum),
+    ],
+)
+def test_names_of_molecules_are_tops(by_word, by_top):
+    assert np.array_equal(by_word(), by_top(rotor.read("water")))
+
+
+def test_a_catalogue_is_no_top(tmp_path):
+    rotor.write(rotor.line_list("CO", jmax=3), tmp_path / "co.cat")
+    with pytest.raises(ValueError, match="holds a Catalogue, not a molecule or constants"):
+        rotor.line_list(str(tmp_path / "co.cat"))
+
+
+def test_constants_from_a_mapping():
+    top = rotor.Top.from_constants({"A": "9.2 GHz", "B": 3000, "C": 2500.0, "DeltaJ": "1 kHz"})
+    assert dict(top.constants.values) == {"A": 9200.0, "B": 3000.0, "C": 2500.0, "DeltaJ": 1e-3}
+    with pytest.raises(ValueError, match="parsec"):
+        rotor.Top.from_constants({"B": "9 parsec"})
+
+
+@pytest.mark.parametrize(
+    ("unit", "label", "mhz"), [("MHz", "Frequency (MHz)", 1.0), ("cm-1", "Wavenumber (cm⁻¹)", 29979.2458)]
+)
+def test_the_picture_takes_unit_scale_title_and_range(unit, label, mhz):
+    lines = rotor.line_list("CO", jmax=8)
+    axes = spectrum_figure(lines, unit=unit, log=True, title="CO", range_mhz=(1e5, 6e5)).axes[0]
+    assert axes.get_xlabel() == label
+    assert axes.get_xlim() == pytest.approx((1e5 / mhz, 6e5 / mhz), rel=1e-12)
+    assert axes.get_yscale() == "log"
+    assert axes.get_title(loc="left") == "CO"
+    assert spectrum_figure(lines, log=False).axes[0].get_yscale() == "linear"
+
+
+@pytest.mark.parametrize("source", ["CO", "OCS", "water", "CH3CN", "HC3N", "SO2", "H2CO"])
+@pytest.mark.parametrize("edge", [False, True])
+def test_the_strongest_line_is_always_named(source, edge):
+    """Even where it stands at the edge of the range that is shown."""
+    lines = rotor.line_list(source, temperature_k=100.0, jmax=30)
+    strongest = lines.strongest(1)
+    place = float(strongest.frequency_mhz[0])
+    figure = spectrum_figure(lines, range_mhz=(0.3 * place, 1.0001 * place) if edge else None)
+    figure.canvas.draw()
+    axes = figure.axes[0]
+    named = [text.xy[0] for text in axes.texts]
+    assert (
+        min(abs(np.array(named) * {"MHz": 1, "GHz": 1e3, "THz": 1e6}[axes.get_xlabel()[11:14]] - place)) < 1e-6 * place
+    )
+    boxes = [text.get_window_extent() for text in axes.texts]
+    assert all(box.x0 >= axes.bbox.x0 and box.x1 <= axes.bbox.x1 for box in boxes)
+    assert not any(a.overlaps(b) for i, a in enumerate(boxes) for b in boxes[:i])
+
+
+def test_the_command_draws_as_asked(call, folder):
+    options = ("--plot-unit", "cm-1", "--plot-scale", "log", "--plot-title", "a title", "--plot-range", "100:900GHz")
+    assert call("spectrum", "CO", "--plot", "a.svg", *options)[0] == 0
+    text = (folder / "a.svg").read_text(encoding="utf-8")
+    assert "a title" in text
+    assert "Wavenumber" in text
+    assert json.dumps("a title")[1:-1] in text
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("--plot-unit", "GHz"), "--plot-unit: expected with --plot"),
+        (("--plot", "a.png", "--plot-unit", "eV"), "--plot-unit: 'eV': expected one of MHz, GHz, THz, cm-1"),
+        (("--plot", "a.png", "--plot-scale", "square"), "--plot-scale: 'square': expected one of linear, log"),
+        (("--plot", "a.png", "--plot-range", "5"), "--plot-range: '5' is not a range"),
+    ],
+)
+def test_mistakes_of_the_picture(call, folder, arguments, said):
+    code, _, err = call("spectrum", "CO", *arguments)
+    assert code == 2
+    assert err.startswith(f"error: {said}")
+    assert not list(folder.iterdir())
