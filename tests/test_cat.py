@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 from rotor.formats.atomic_write import atomic_path, open_atomic
-from rotor.formats.spcat import _kernels, cat, rows
-from rotor.formats.spcat.cat import COMPILED_FROM, format_lines, read_cat, write_cat
+from rotor.formats.spcat import cat, rows
+from rotor.formats.spcat.cat import format_lines, read_cat, write_cat
 from rotor.formats.spcat.catalogue import DTYPES, Catalogue, Layout
 from rotor.formats.spcat.fields import BLANK, read_degeneracy, read_quantum, spell_degeneracy, spell_quantum
+from rotor.formats.spcat.line import spell_record
 
 SAMPLES = sorted((Path(__file__).parent / "oracles" / "spcat").glob("*.cat"))
 SHARED = Path(__file__).resolve().parents[1].parent / "shared" / "reference"
@@ -105,10 +106,6 @@ def test_rounding_is_that_of_printf(decimals):
     out = np.empty((len(values), 13), dtype=np.uint8)
     assert rows._put_decimal(out, values, decimals).all()
     assert out.tobytes() == expected
-    compiled = np.empty_like(out)
-    for i, value in enumerate(values):
-        assert _kernels._put_decimal(compiled[i], 0, 13, value, decimals, 10.0**decimals)
-    assert compiled.tobytes() == expected
 
 
 def random_catalogue(n: int, rng: np.random.Generator) -> Catalogue:
@@ -129,20 +126,29 @@ def random_catalogue(n: int, rng: np.random.Generator) -> Catalogue:
     )
 
 
-def test_compiled_rows_are_the_plain_rows():
+def test_rows_are_the_lines_spelled_one_by_one():
+    """Against printf's rounding and Python's own justification, `spell_record`; rows that do not fit say so."""
     catalogue = random_catalogue(5000, np.random.default_rng(7))
-    columns = catalogue.rows(0, 5000)
-    plain, compiled = (np.zeros((5000, 81), dtype=np.uint8) for _ in range(2))
-    fits, fits_compiled = (
-        form.put_rows(out, columns, (4, 4, 4, 4)) for form, out in ((rows, plain), (_kernels, compiled))
-    )
-    assert np.array_equal(fits, fits_compiled)
+    text = np.zeros((5000, 81), dtype=np.uint8)
+    fits = rows.put_rows(text, catalogue.rows(0, 5000), (4, 4, 4, 4))
     assert 500 < fits.sum() < 4900  # both kinds are there
-    assert np.array_equal(plain[fits], compiled[fits])
+    for index in np.flatnonzero(fits).tolist():
+        assert text[index].tobytes().decode() == spell_record(catalogue.record(index), (4, 4, 4, 4)).ljust(81)
+
+
+@pytest.mark.parametrize("width", [1, 2, 3, 4, 5, 7, 8])
+def test_whole_numbers_of_either_sign_in_fields_of_any_width(width):
+    edges = [10**n + d for n in range(9) for d in (-1, 0, 1)]
+    values = np.array([sign * value for value in edges for sign in (1, -1)] + [0])
+    out = np.zeros((len(values), width), dtype=np.uint8)
+    fits = rows._put_whole(out, values)
+    expected = [f"{value:{width}d}" for value in values.tolist()]
+    assert fits.tolist() == [len(text) == width for text in expected]
+    assert [text.tobytes().decode() for text in out[fits]] == [text for text in expected if len(text) == width]
 
 
 def test_long_lists_come_out_as_short_ones():
-    catalogue = random_catalogue(COMPILED_FROM + 500, np.random.default_rng(8))
+    catalogue = random_catalogue(20_500, np.random.default_rng(8))
     pieces = [format_lines(catalogue.take(slice(i, i + 5000))) for i in range(0, len(catalogue), 5000)]
     text = format_lines(catalogue)
     assert text == b"".join(pieces)
@@ -339,20 +345,6 @@ def test_short_lists_do_not_load_the_compiler():
         f"format_lines(read_cat({LINE!r} * 100)); sys.exit('numba' in sys.modules)"
     )
     assert subprocess.run([sys.executable, "-c", code], cwd=Path(__file__).parents[1]).returncode == 0
-
-
-def test_without_a_writable_cache_folder_code_is_compiled_all_the_same(monkeypatch):
-    import numba
-
-    njit = numba.njit
-
-    def refusing(*args, **options):
-        if options.get("cache"):
-            raise RuntimeError("cannot cache function: no locator available")
-        return njit(*args, **options)
-
-    monkeypatch.setattr(numba, "njit", refusing)
-    assert _kernels.compiled(lambda x: x + 1)(1) == 2
 
 
 def test_layout_of_new_lists_is_that_of_the_program():

@@ -145,15 +145,41 @@ def test_compiled_and_plain_loops_give_the_same_bits(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    "settings", [{"min_lgint": -7.0}, {"min_lgint": None, "range_mhz": (1e3, 9e4)}, {"range_mhz": (0, 5e5)}]
+    ("constants", "weights", "settings"),
+    [
+        (ABC, None, {"min_lgint": -7.0, "jmax": 40}),
+        (ABC, None, {"min_lgint": -5.5, "jmax": 60, "temperature_k": 20.0}),  # most states of high J reach no line
+        (
+            "A=90 B=5 C=4.8 GHz",
+            {"ee": 1, "eo": 3, "oe": 3, "oo": 1},
+            {"min_lgint": -9.0, "jmax": 35, "temperature_k": 30.0},
+        ),
+        (ABC, None, {"min_lgint": -7.0, "jmax": 40, "range_mhz": (1e4, 2e5)}),
+        (ABC, None, {"min_lgint": None, "jmax": 20, "range_mhz": (1e3, 9e4)}),
+        (
+            "A=9 B=5 C=3 DeltaJ=1e-6 DeltaK=2e-6 GHz",
+            {"ee": 0, "eo": 1, "oe": 1, "oo": 0},
+            {"min_lgint": -6.0, "jmax": 40},
+        ),
+    ],
 )
-def test_compiled_and_plain_choices_are_the_same(monkeypatch, settings):
-    top = Top.from_constants(ABC, dipole_abc_debye=(1.2, 1.9, 0.4))
-    plain = line_list(top, jmax=15, **settings)
-    monkeypatch.setattr(transitions, "LONG_LIST", 0)
-    compiled = line_list(top, jmax=15, **settings)
-    assert np.array_equal(plain.frequency_mhz, compiled.frequency_mhz)
-    assert np.array_equal(plain.upper, compiled.upper)
+def test_a_cut_list_is_the_whole_list_cut(constants, weights, settings):
+    """States that cannot reach the cut are left out before their lines are made: no line may be lost so."""
+    dipole = (0, 1.9, 0) if weights else (1.2, 1.9, 0.4)
+    top = Top.from_constants(constants, dipole_abc_debye=dipole, spin_weights=weights)
+    least, (first, last) = settings.get("min_lgint") or -math.inf, settings.get("range_mhz", (0.0, math.inf))
+    rest = {name: settings[name] for name in ("jmax", "temperature_k") if name in settings}
+    cut = line_list(top, q=1e4, untrusted=True, **settings)
+    whole = line_list(top, q=1e4, min_lgint=None, untrusted=True, **rest)
+    whole = whole[(whole.lgint >= least) & (whole.frequency_mhz >= first) & (whole.frequency_mhz <= last)]
+    assert 0.001 < len(cut) / max(len(line_list(top, q=1e4, min_lgint=None, untrusted=True, **rest)), 1) < 0.99
+    labels = [np.lexsort((lines.lower, lines.upper)) for lines in (cut, whole)]
+    assert np.array_equal(cut.upper[labels[0]], whole.upper[labels[1]])
+    assert np.array_equal(cut.lower[labels[0]], whole.lower[labels[1]])
+    assert np.array_equal(cut.frequency_mhz[labels[0]], whole.frequency_mhz[labels[1]])
+    assert np.allclose(
+        cut.strength_debye2[labels[0]], whole.strength_debye2[labels[1]], rtol=1e-6
+    )  # weak ones by cancellation
 
 
 def test_given_q_and_vibrational_factor():

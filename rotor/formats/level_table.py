@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import os
 
 import numpy as np
@@ -24,6 +23,8 @@ def read_level_table(path: str | os.PathLike[str], source: str = "") -> LevelTab
             lines = [(i, line) for i, line in enumerate(handle, start=1) if not line.startswith("#")]
     except OSError as error:
         raise ValueError(f"{path}: level energies cannot be read: {error.strerror}") from None
+    import csv
+
     rows = list(csv.reader(line for _, line in lines))
     names = rows[0] if rows else []
     quanta = [name for name in names if name in _QUANTA]
@@ -48,6 +49,8 @@ def read_level_table(path: str | os.PathLike[str], source: str = "") -> LevelTab
 def write_level_table(table: LevelTable, path: str | os.PathLike[str]) -> None:
     """Writes a table of level energies, beside and renamed, every number in full."""
     with open_atomic(path, "w", encoding="utf-8", newline="") as handle:
+        import csv
+
         rows = csv.writer(handle, lineterminator="\n")
         rows.writerow(table.columns)
         rows.writerows(zip(*(column.tolist() for column in table.columns.values()), strict=True))

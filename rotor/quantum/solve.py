@@ -343,4 +343,4 @@ def _dense(bands: list[Floats], vectors: bool) -> tuple[Floats, Floats]:
     if not vectors:
         return np.asarray(np.linalg.eigvalsh(matrix), dtype=np.float64), np.zeros((0, 0))
     solved = np.linalg.eigh(matrix)
-    return np.asarray(solved.eigenvalues, dtype=np.float64), np.asarray(solved.eigenvectors, dtype=np.float64)
+    return np.asarray(solved.eigenvalues), np.asfortranarray(solved.eigenvectors)  # a state's components side by side

@@ -339,8 +339,11 @@ def acting_on(vectors: Floats, up: WangBlock, low: WangBlock, tensor: BodyTensor
     """T times columns (low.size, n) over the lower block: columns (up.size, n) over the upper one."""
     states = vectors.T
     moved = np.zeros((states.shape[0], up.size))
-    for source, target, elements in bands_between(up, low, tensor):
-        moved[:, target] += states[:, source] * elements
+    for number, (source, target, elements) in enumerate(bands_between(up, low, tensor)):
+        if number == 0:
+            np.multiply(states[:, source], elements, out=moved[:, target])
+        else:
+            moved[:, target] += states[:, source] * elements
     return moved.T
 
 

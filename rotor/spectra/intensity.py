@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor import units
-from rotor.arrays import Floats
+from rotor.arrays import Floats, Ints
 from rotor.quantum.levels import Levels
 
 if TYPE_CHECKING:
@@ -65,6 +65,20 @@ def population(levels: Levels, temperature_k: float, q: float, ground_mhz: float
     """
     above_k = (levels.energy_mhz - (levels.ground_mhz if ground_mhz is None else ground_mhz)) / units.MHZ_PER_K
     return np.asarray(levels.weight_per_component / q * np.exp(-above_k / temperature_k))
+
+
+def largest(values: Floats, count: int) -> Ints:
+    """Rows of the `count` largest values, the largest first, of equal ones the first.
+
+    >>> largest(np.array([1.0, 3.0, 2.0, 3.0]), 3).tolist()
+    [1, 3, 2]
+    """
+    if 0 < count < len(values):
+        least = np.partition(values, len(values) - count)[len(values) - count]
+        rows = np.flatnonzero(values >= least)
+    else:
+        rows = np.arange(len(values) if count else 0)
+    return np.asarray(rows[np.argsort(-values[rows], kind="stable")][:count])
 
 
 @dataclass(frozen=True)

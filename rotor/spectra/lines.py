@@ -33,6 +33,7 @@ from rotor.spectra.intensity import (
     LGINT_NM2_MHZ,
     intensity_cut,
     jmax_for_cut,
+    largest,
     population,
 )
 from rotor.spectra.transitions import all_transitions
@@ -201,7 +202,7 @@ class Lines(TransitionTable):
 
     def strongest(self, count: int) -> Lines:
         """The `count` most intense lines, strongest first."""
-        return self.where(np.argsort(-self.intensity_nm2_mhz, kind="stable")[:count])
+        return self.where(largest(self.intensity_nm2_mhz, count))
 
     @cached_property
     def columns(self) -> dict[str, NDArray[Any]]:

@@ -11,6 +11,7 @@ from rotor.arrays import Ints
 from rotor.checks import require_between, require_positive, require_whole
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.watson import SEMI_RIGID
+from rotor.spectra.intensity import largest
 from rotor.spectra.raman import (
     DEFAULT_LASER_NM,
     DEFAULT_MIN_RELATIVE,
@@ -70,7 +71,7 @@ class RamanAnswer:
 
     def strongest(self, count: int) -> Ints:
         """Rows of the `count` lines of largest cross section, in order of shift."""
-        return np.sort(np.argsort(-self.lines.cross_section_cm2_per_sr, kind="stable")[:count])
+        return np.sort(largest(self.lines.cross_section_cm2_per_sr, count))
 
     @property
     def jmax_source(self) -> str:

@@ -17,7 +17,7 @@ from rotor.checks import require_one_of, require_positive, require_whole
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.limits import limit_facts, populated_j
-from rotor.spectra.intensity import USUAL_CUT
+from rotor.spectra.intensity import USUAL_CUT, largest
 from rotor.spectra.lines import DEFAULT_MIN_LGINT, Lines, line_list
 from rotor.thermo import VibrationalStates
 from rotor.thermo.request import partition_facts
@@ -160,7 +160,7 @@ class SpectrumAnswer:
 
     def strongest(self, count: int) -> Ints:
         """Rows of the `count` most intense lines, in order of frequency."""
-        return np.sort(np.argsort(-self.lines.intensity_nm2_mhz, kind="stable")[:count])
+        return np.sort(largest(self.lines.intensity_nm2_mhz, count)) if count else np.zeros(0, dtype=np.int64)
 
     @property
     def jmax_source(self) -> str:

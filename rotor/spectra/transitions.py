@@ -5,6 +5,7 @@ Nothing weak is left out here but what an `IntensityCut` or a range of frequenci
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -13,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Indices
-from rotor.quantum.levels import Block, Levels
+from rotor.quantum.levels import Block, Levels, SolvedBlock
 from rotor.quantum.moments import Moment
 from rotor.quantum.reduced import amplitudes, connected_pairs, pairs_where
 from rotor.quantum.tensors import body_tensor
@@ -21,7 +22,8 @@ from rotor.spectra.intensity import IntensityCut
 from rotor.tops.operators import FIGURE_AXIS
 
 EVERYTHING = (0.0, float("inf"))
-LONG_LIST = 1_000_000  # lines above which the compiled loop is loaded
+LONG_LIST = 30_000_000  # lines from which the compiled loop is loaded: the compiler takes 0.6 s, the plain loop 20 ns a line more
+COMPILED = "rotor.spectra._kernels"
 
 Vector = tuple[float, float, float]
 Amplitudes = Callable[[Any, Any], Floats]  # of a pair of blocks, (n_up, n_low)
@@ -59,7 +61,9 @@ def all_transitions(
     if cut is None and range_mhz == EVERYTHING and not any(up is low for up, low in pairs):
         found = _every_pair(pairs, between)
     else:
-        found = _joined(list(_chosen(pairs, between, range_mhz, cut)))
+        bounded = cut is not None and bool(blocks) and isinstance(blocks[0], SolvedBlock)
+        most = sum(mu * mu for mu in dipoles[0, 0]) if bounded else None
+        found = _chosen(levels, pairs, between, most, range_mhz, cut)
     return _rows(found, levels.weight[found.lower] > 0) if some_without else found
 
 
@@ -118,8 +122,8 @@ def _every_pair(pairs: list[Pair], between: Amplitudes) -> Transitions:
 
 
 def _fill_of(total: int) -> Callable[..., None]:
-    """The compiled loop for lists so long that loading the compiler pays."""
-    if total < LONG_LIST:
+    """The compiled loop for lists so long that loading the compiler pays, or where it is loaded already; to the same bits."""
+    if total < LONG_LIST and COMPILED not in sys.modules:
         return _fill_pair
     from rotor.spectra._kernels import fill_pair
 
@@ -145,58 +149,88 @@ def _fill_pair(
 
 
 def _chosen(
-    pairs: list[Pair], between: Amplitudes, range_mhz: tuple[float, float], cut: IntensityCut | None
-) -> Iterator[Transitions]:
-    choose = _choice_of(sum(len(up.energies_mhz) * len(low.energies_mhz) for up, low in pairs))
-    for up, low in pairs:
-        energies = (up.energies_mhz, low.energies_mhz)
-        strength = between(up, low) ** 2
-        i, k = choose(*energies, strength, range_mhz, cut, up.start, low.start)
-        if up is low:  # both ways round stand in the matrix
-            i, k = i[i > k], k[i > k]
+    levels: Levels, pairs: list[Pair], between: Amplitudes, most: float | None, range_mhz: tuple[float, float],
+    cut: IntensityCut | None,
+) -> Transitions:  # fmt: skip
+    """The lines of all pairs in a range and above a cut. most: μ² in D², which bounds strengths between Wang blocks; None: no bound.
 
-        difference = energies[0][i] - energies[1][k]
-        first, second = (i + up.start).astype(np.int32), (k + low.start).astype(np.int32)
-        falls = difference < 0
-        upper, lower = np.where(falls, second, first), np.where(falls, first, second)
-        yield Transitions(np.abs(difference), strength[i, k], upper, lower)
-
-
-def _choice_of(total: int) -> Callable[..., tuple[NDArray[np.int64], NDArray[np.int64]]]:
-    """The compiled choice for lists so long that loading the compiler pays."""
-    if total < LONG_LIST:
-        return _choose
-    from rotor.spectra._kernels import choose
-
-    def compiled(
-        up: Floats,
-        low: Floats,
-        strength: Floats,
-        range_mhz: tuple[float, float],
-        cut: IntensityCut | None,
-        *starts: int,
-    ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        cut = cut or IntensityCut(np.ones(max(starts) + max(len(up), len(low))), 1.0, -np.inf)
-        rows = choose(up, low, strength, *range_mhz, cut.population, cut.kt_mhz, cut.least, *starts)
-        return rows[0], rows[1]
-
-    return compiled
-
-
-def _choose(
-    energies_up: Floats, energies_low: Floats, strength: Floats, range_mhz: tuple[float, float],
-    cut: IntensityCut | None, start_up: int, start_low: int,
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:  # fmt: skip
-    """Rows and columns of the lines between two blocks that are in the range and above the cut."""
-    difference = np.subtract.outer(energies_up, energies_low)
-    frequency = np.abs(difference)
-    keep = (frequency >= range_mhz[0]) & (frequency <= range_mhz[1])
+    With the photon factor, at most 1, left out, a line can only reach the cut where ν S reaches the least over the larger of both
+    populations; what is found so is looked at once more.
+    """
+    needed = np.full(len(levels), -np.inf)  # of ν S, for a line with this lower state
     if cut is not None:
-        of_up = cut.population[start_up : start_up + len(energies_up), None]
-        of_low = cut.population[None, start_low : start_low + len(energies_low)]
-        keep &= cut.keeps(frequency, strength, np.where(difference < 0, of_up, of_low))
-    i, k = np.nonzero(keep)
-    return i, k
+        with np.errstate(divide="ignore"):
+            needed = cut.least / cut.population
+    counts = {} if most is None else _reaching(levels, needed, most)
+    pieces = []
+    for up, low in pairs:
+        for ups, lows in _parts(up, low, counts):
+            amplitude = between(ups, lows)
+            places = np.flatnonzero(_candidates(ups, lows, amplitude, needed, range_mhz))
+            i, k = np.divmod(places, len(lows.energies_mhz))
+            pieces.append((i + ups.start, k + lows.start, amplitude.ravel()[places]))
+    if not pieces:
+        return _joined([])
+
+    first, second, amplitude = (np.concatenate(column) for column in zip(*pieces, strict=True))
+    difference = levels.energy_mhz[first] - levels.energy_mhz[second]
+    falls = difference < 0
+    upper, lower = np.where(falls, second, first).astype(np.int32), np.where(falls, first, second).astype(np.int32)
+    found = Transitions(np.abs(difference), amplitude * amplitude, upper, lower)
+    if cut is None:
+        return found
+    return _rows(found, cut.keeps(found.frequency_mhz, found.strength_debye2, cut.population[lower]))
+
+
+def _candidates(
+    up: Block, low: Block, amplitude: Floats, needed: Floats, range_mhz: tuple[float, float]
+) -> NDArray[np.bool_]:
+    """Which of all states of two blocks make a line in the range that may reach the cut, (n_up, n_low)."""
+    frequency = np.subtract.outer(up.energies_mhz, low.energies_mhz)
+    np.abs(frequency, out=frequency)
+    of_up, of_low = (needed[block.start : block.start + len(block.energies_mhz)] for block in (up, low))
+    keep: NDArray[np.bool_] = frequency * (amplitude * amplitude) >= np.minimum.outer(of_up, of_low)
+    if range_mhz != EVERYTHING:
+        keep &= (frequency >= range_mhz[0]) & (frequency <= range_mhz[1])
+    return np.tril(keep, -1) if up is low else keep  # both ways round stand in the matrix of a block with itself
+
+
+def _reaching(levels: Levels, needed: Floats, most: float) -> dict[int, int]:
+    """How many of the states of each Wang block, from the lowest on, may be the lower state of a line that reaches the cut.
+
+    Over all upper states of one lower state the strengths add up to (2J+1) μ² (the sum rule of direction cosines), so that one is
+    not larger; ν is at most the distance to the highest level of J - 1, J and J + 1.
+    """
+    starts = np.array([block.start for block in levels.blocks])
+    j, sizes = levels.quanta["j"], np.diff(np.append(starts, len(levels)))
+    highest = np.full(j.max() + 3, -np.inf)  # of J - 1, from J = -1 on
+    np.maximum.at(highest, j + 1, levels.energy_mhz)
+    highest = np.maximum(np.maximum(highest[:-2], highest[1:-1]), highest[2:])
+    reaches = (highest[j] - levels.energy_mhz) * (2 * j + 1) * most >= needed
+    last = np.maximum.reduceat(np.where(reaches, np.arange(1, len(levels) + 1), 0), starts)
+    counts = np.clip(last - starts, 0, sizes)
+    return dict(zip(starts.tolist(), counts.tolist(), strict=True))
+
+
+def _parts(up: Block, low: Block, counts: Mapping[int, int]) -> Iterator[tuple[Block, Block]]:
+    """The parts of two blocks between which a line may reach the cut: all with the lowest states of one, or of the other.
+
+    counts: of the lowest states by block, as `_reaching` gives them; blocks that are not in it are taken whole.
+    """
+    all_up, all_low = len(up.energies_mhz), len(low.energies_mhz)
+    of_up, of_low = counts.get(up.start, all_up), counts.get(low.start, all_low)
+    if of_up == all_up or of_low == all_low:
+        yield up, low
+        return
+    if of_low:
+        yield up, _states(low, 0, of_low)
+    if of_up:
+        yield _states(up, 0, of_up), _states(low, of_low, all_low)
+
+
+def _states(block: Any, first: int, last: int) -> Any:
+    """The states `first` to `last` of a Wang block."""
+    return SolvedBlock(block.basis, block.energies_mhz[first:last], block.vectors[:, first:last], block.start + first)
 
 
 def _closed_form(

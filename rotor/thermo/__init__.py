@@ -1,50 +1,68 @@
 """Thermodynamics of rotation: sums over levels, their classical limit, nuclear-spin species, and the ideal gas.
 
 A module for each: `level_sums`, `partition`, `classical_limit`, `classical_onset`, `species`, `vibration` and `functions`,
-which brings them together.
+which brings them together. They are loaded when a name is first used.
 """
 
-from rotor.thermo.classical_limit import (
-    ClassicalLimit,
-    classical_limit,
-    classical_partition_function,
-    rotational_temperatures_k,
-)
-from rotor.thermo.classical_onset import classical_above_k
-from rotor.thermo.functions import (
-    GAS_CONSTANT,
-    IdealGas,
-    ThermoFunctions,
-    species_names,
-    thermodynamic_functions,
-    translational_entropy,
-)
-from rotor.thermo.level_sums import LevelSums, level_sums
-from rotor.thermo.partition import PartitionFunction, PartitionFunctions, partition_function, partition_functions
-from rotor.thermo.species import implied_symmetry_number, spin_species
-from rotor.thermo.vibration import VibrationalStates, vibrational_functions, vibrational_partition_function
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
-__all__ = [
-    "GAS_CONSTANT",
-    "ClassicalLimit",
-    "IdealGas",
-    "LevelSums",
-    "PartitionFunction",
-    "PartitionFunctions",
-    "ThermoFunctions",
-    "VibrationalStates",
-    "classical_above_k",
-    "classical_limit",
-    "classical_partition_function",
-    "implied_symmetry_number",
-    "level_sums",
-    "partition_function",
-    "partition_functions",
-    "rotational_temperatures_k",
-    "species_names",
-    "spin_species",
-    "thermodynamic_functions",
-    "translational_entropy",
-    "vibrational_functions",
-    "vibrational_partition_function",
-]
+from rotor.thermo.classical_limit import classical_limit as classical_limit  # these two have the names of their modules
+from rotor.thermo.level_sums import level_sums as level_sums
+
+if TYPE_CHECKING:
+    from rotor.thermo.classical_limit import ClassicalLimit as ClassicalLimit
+    from rotor.thermo.classical_limit import classical_partition_function as classical_partition_function
+    from rotor.thermo.classical_limit import rotational_temperatures_k as rotational_temperatures_k
+    from rotor.thermo.classical_onset import classical_above_k as classical_above_k
+    from rotor.thermo.functions import GAS_CONSTANT as GAS_CONSTANT
+    from rotor.thermo.functions import IdealGas as IdealGas
+    from rotor.thermo.functions import ThermoFunctions as ThermoFunctions
+    from rotor.thermo.functions import species_names as species_names
+    from rotor.thermo.functions import thermodynamic_functions as thermodynamic_functions
+    from rotor.thermo.functions import translational_entropy as translational_entropy
+    from rotor.thermo.level_sums import LevelSums as LevelSums
+    from rotor.thermo.partition import PartitionFunction as PartitionFunction
+    from rotor.thermo.partition import PartitionFunctions as PartitionFunctions
+    from rotor.thermo.partition import partition_function as partition_function
+    from rotor.thermo.partition import partition_functions as partition_functions
+    from rotor.thermo.species import implied_symmetry_number as implied_symmetry_number
+    from rotor.thermo.species import spin_species as spin_species
+    from rotor.thermo.vibration import VibrationalStates as VibrationalStates
+    from rotor.thermo.vibration import vibrational_functions as vibrational_functions
+    from rotor.thermo.vibration import vibrational_partition_function as vibrational_partition_function
+
+_MODULES = {
+    "ClassicalLimit": "classical_limit",
+    "GAS_CONSTANT": "functions",
+    "IdealGas": "functions",
+    "LevelSums": "level_sums",
+    "PartitionFunction": "partition",
+    "PartitionFunctions": "partition",
+    "ThermoFunctions": "functions",
+    "VibrationalStates": "vibration",
+    "classical_above_k": "classical_onset",
+    "classical_partition_function": "classical_limit",
+    "implied_symmetry_number": "species",
+    "partition_function": "partition",
+    "partition_functions": "partition",
+    "rotational_temperatures_k": "classical_limit",
+    "species_names": "functions",
+    "spin_species": "species",
+    "thermodynamic_functions": "functions",
+    "translational_entropy": "functions",
+    "vibrational_functions": "vibration",
+    "vibrational_partition_function": "vibration",
+}
+
+__all__ = [*sorted((*_MODULES, "classical_limit", "level_sums"))]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _MODULES:
+        raise AttributeError(f"module 'rotor.thermo' has no attribute {name!r}")
+    return getattr(import_module(f"rotor.thermo.{_MODULES[name]}"), name)
+
+
+def __dir__() -> list[str]:
+    return list(__all__)

@@ -196,8 +196,10 @@ def _distortion(top: Top) -> tuple[float, float, float]:
     first = operators  # of a spherical top the tensor of fourth rank is 0 on average
     if top.kind == "spherical":
         first, _ = scalar_and_tensor(operators)
-    nodes, shares = np.polynomial.hermite_e.hermegauss(_NODES)
-    weight = np.array([math.prod(p) for p in product((shares / shares.sum()).tolist(), repeat=3)])
+    nodes, vectors = np.linalg.eigh(
+        np.diag(np.sqrt(np.arange(1.0, _NODES)), -1)
+    )  # Gauss and Hermite, as Golub and Welsch
+    weight = np.array([math.prod(p) for p in product((vectors[0] ** 2).tolist(), repeat=3)])
     points = np.array(list(product(nodes.tolist(), repeat=3))).T * np.sqrt(_variances(top))[:, None]
     h4, h6 = (_classical_energy(operators, order, *points) for order in (2, 3))
     means = [weight @ _classical_energy(first, order, *points) for order in (2, 3, 4)]

@@ -64,6 +64,11 @@ class PartitionFunctions(Table):
         return (self[i] for i in range(len(self)))
 
     @property
+    def provenance(self) -> dict[str, Any]:
+        """How each sum came, in words, and how many there are."""
+        return {"source": list(self.source), "rows": len(self)}
+
+    @property
     def columns(self) -> dict[str, NDArray[Any]]:
         """Temperature, Q, J max and error by name."""
         names = ("temperature_k", "q", "jmax", "relative_error")

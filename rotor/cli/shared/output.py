@@ -7,7 +7,6 @@ import math
 import os
 import shutil
 import sys
-import tempfile
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
@@ -206,6 +205,8 @@ class Files:
 
     def write(self, writers: Mapping[str, Writer]) -> None:
         """Make every file in a folder beside its place by the writer of its option, then rename: all appear, or none."""
+        import tempfile
+
         with ExitStack() as stack:
             moves: list[tuple[Path, Path]] = []
             for option, target in self.paths.items():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import gzip
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -30,19 +30,9 @@ from rotor.formats.spcat.rows import (
     take_rows,
 )
 
-COMPILED_FROM = 20_000  # lines; below, compiled kernels cost more to load than they save
 _CHUNK = 1 << 14  # lines handled at once: about 1 MB of text, which a processor's cache holds
 _BOM = b"\xef\xbb\xbf"
 _BLANKS = b" \t\r\n\x1a"  # a line of these alone is blank; ^Z ended files under DOS
-
-
-def _row_form(lines: int) -> Callable[[Text, Columns, tuple[int, int, int, int]], Mask]:
-    """The function that fills rows of text: compiled for long lists, plain for short ones."""
-    if lines < COMPILED_FROM:
-        return put_rows
-    from rotor.formats.spcat._kernels import put_rows as compiled_rows
-
-    return compiled_rows
 
 
 def _capped(columns: Columns, decimals: tuple[int, int, int, int]) -> Columns:
@@ -55,12 +45,12 @@ def _length(layout: Layout, width: int) -> int:
     return 80 if width == 6 else QUANTA + 4 * width
 
 
-def _plain_rows(text: Text, columns: Columns, layout: Layout, fill: Callable[..., Mask]) -> Mask:
+def _plain_rows(text: Text, columns: Columns, layout: Layout) -> Mask:
     """Fill rows (n, full length and line end); true where a row is the line, nothing but blanks cut off its end."""
     width = columns.quanta_upper.shape[1]
     length = _length(layout, width)
     full = max(length, QUANTA + 4 * width)
-    plain = fill(text[:, :full], _capped(columns, layout.decimals), layout.decimals)
+    plain = put_rows(text[:, :full], _capped(columns, layout.decimals), layout.decimals)
     plain &= (columns.qnfmt >= 0) & (np.maximum(columns.qnfmt % 10, 6) == width)
     if layout.decimals[0] == 4:
         plain &= columns.frequency_mhz < 99999999.0
@@ -70,7 +60,7 @@ def _plain_rows(text: Text, columns: Columns, layout: Layout, fill: Callable[...
     return plain
 
 
-def _wide_rows(rows: Text, columns: Columns, layout: Layout, fill: Callable[..., Mask], plain: Mask) -> None:
+def _wide_rows(rows: Text, columns: Columns, layout: Layout, plain: Mask) -> None:
     """Fill the rows of numbers that need a decimal less, and mark them plain: long lists have many such lines.
 
     The program prints FREQ, ERR and LGINT with three decimals where FREQ is wide; LGINT below -99.9999 has three.
@@ -84,7 +74,7 @@ def _wide_rows(rows: Text, columns: Columns, layout: Layout, fill: Callable[...,
             text = np.empty((len(index), rows.shape[1]), dtype=np.uint8)
             chosen_columns: list[Any] = [column[index] for column in columns]
             part = _capped(Columns(*chosen_columns), layout.decimals)
-            plain[index] = _plain_rows(text, part, replace(layout, decimals=decimals), fill)
+            plain[index] = _plain_rows(text, part, replace(layout, decimals=decimals))
             rows[index] = text
 
 
@@ -122,7 +112,7 @@ def _within_format(record: Record, index: int) -> Record:
 
 def format_chunks(catalogue: Catalogue) -> Iterator[bytes]:
     """The text of a catalogue in pieces of some thousand lines, for lists larger than memory should hold twice."""
-    layout, width, fill = catalogue.layout, catalogue.quanta_upper.shape[1], _row_form(len(catalogue))
+    layout, width = catalogue.layout, catalogue.quanta_upper.shape[1]
     space = max(_length(layout, width), QUANTA + 4 * width) + len(layout.newline)
     end = _length(layout, width) + len(layout.newline)
     buffer = np.empty((min(_CHUNK, len(catalogue)), space), dtype=np.uint8)
@@ -132,8 +122,8 @@ def format_chunks(catalogue: Catalogue) -> Iterator[bytes]:
         stop = min(start + _CHUNK, len(catalogue))
         rows = buffer[: stop - start]
         columns = catalogue.rows(start, stop)
-        plain = _plain_rows(rows, columns, layout, fill)
-        _wide_rows(rows, columns, layout, fill, plain)
+        plain = _plain_rows(rows, columns, layout)
+        _wide_rows(rows, columns, layout, plain)
         plain[spelled[(spelled >= start) & (spelled < stop)] - start] = False
         yield from _with_odd_lines(catalogue, start, rows[:, :end], plain)
     yield layout.ending
@@ -226,14 +216,13 @@ def _read_plain(text: bytes, lines: _Lines, layout: Layout) -> tuple[Columns, Ma
     known = np.zeros(len(lines.starts), dtype=np.bool_)
     width = _width_guess(text, lines)
     parts = []
-    fill = _row_form(len(known))
     for start in range(0, len(known), _CHUNK):
         chunk = slice(start, start + _CHUNK)
         rows, regular = _rows_of(text, lines, chunk)
         padded = np.full((len(rows), max(lines.length, QUANTA + 4 * width) + 2), ord(" "), dtype=np.uint8)
         padded[:, : layout.line_length] = rows[:, : layout.line_length]
         columns = take_rows(padded, width, layout.decimals)
-        plain = _plain_rows(padded, columns, layout, fill)
+        plain = _plain_rows(padded, columns, layout)
         plain &= (padded[:, : lines.length] == rows).all(axis=1) & _quanta_present(columns)
         known[chunk] = regular & plain
         parts.append(columns)

@@ -1,9 +1,10 @@
-"""Catalogue lines as a matrix of characters, whole columns at a time: the plain form of `_kernels`."""
+"""Catalogue lines as a matrix of characters: whole columns at a time, four digits of each number at a time from tables."""
 
 from __future__ import annotations
 
-from functools import cache
-from typing import NamedTuple
+from collections.abc import Callable
+from functools import cache, partial
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,7 +71,7 @@ def round_decimal(values: NDArray[np.float64], decimals: int) -> tuple[NDArray[n
 
 
 def _put_digits(out: Text, magnitude: NDArray[np.int64], negative: Mask) -> Mask:
-    """Whole numbers with their sign, right-justified; false where they need more space than `out` has."""
+    """Whole numbers with their sign, right-justified, digit by digit; false where they need more room than `out` has."""
     left, sign = magnitude, negative
     for column in range(out.shape[1] - 1, -1, -1):
         left, digit = np.divmod(left, 10)
@@ -82,28 +83,103 @@ def _put_digits(out: Text, magnitude: NDArray[np.int64], negative: Mask) -> Mask
     return np.asarray((left == 0) & ~sign)
 
 
+@cache
+def _group_table(size: int, last: bool) -> Text:
+    """Texts of `size` digits, (2 · 10^size, size): first with zeros in front, for numbers that go on before them, then with blanks.
+
+    0 with blanks is written 0 in the last group of a number, else as blanks.
+    """
+    values, units = np.arange(10**size)[:, None], 10 ** np.arange(size - 1, -1, -1)
+    digits = (values // units % 10 + _ZERO).astype(np.uint8)
+    leading = values < units
+    if last:
+        leading[:, -1] = False
+    return np.concatenate([digits, np.where(leading, np.uint8(_BLANK), digits)])
+
+
+def _put_group(out: Text, table: Text, index: NDArray[np.int64]) -> None:
+    """Rows of a table of characters into `out`; four or two characters go as one number."""
+    kind = {4: np.uint32, 2: np.uint16}.get(out.shape[1])
+    if kind is None:
+        out[:] = table[index]
+    else:
+        out.view(kind)[:, 0] = table.view(kind)[:, 0][index]
+
+
+def _put_natural(out: Text, magnitude: NDArray[np.int64]) -> Mask:
+    """Whole numbers without a sign, right-justified, four digits at a time; false where they need more room."""
+    left, stop = magnitude, out.shape[1]
+    while stop > 0:
+        size = min(4, stop)
+        higher = left // 10**size
+        index = left - higher * 10**size + (higher == 0) * 10**size
+        _put_group(out[:, stop - size : stop], _group_table(size, stop == out.shape[1]), index)
+        left, stop = higher, stop - size
+    return np.asarray(left == 0)
+
+
+def _put_signed(out: Text, magnitude: NDArray[np.int64], negative: Mask) -> Mask:
+    """Whole numbers with their sign, right-justified; false where they need more room than `out` has."""
+    fits = _put_natural(out, magnitude)
+    if not negative.any():
+        return fits
+    room = out.shape[1] - 1
+    if room > 4:  # a long field has few negative numbers
+        rows = np.flatnonzero(negative)
+        text = np.empty((len(rows), room + 1), dtype=np.uint8)
+        fits[rows] = _put_digits(text, magnitude[rows], negative[rows])
+        out[rows] = text
+        return fits
+    for digits in range(1, room + 1):  # of a short one the sign stands before the first of few digits
+        least = 10 ** (digits - 1) if digits > 1 else 0
+        out[negative & (magnitude >= least) & (magnitude < 10**digits), room - digits] = _MINUS
+    return np.asarray(fits & ~(negative & (magnitude >= 10**room)))
+
+
 def _put_decimal(out: Text, values: NDArray[np.float64], decimals: int) -> Mask:
     magnitude, fits = round_decimal(values, decimals)
-    whole = magnitude
-    for column in range(out.shape[1] - 1, out.shape[1] - 1 - decimals, -1):
-        whole, digit = np.divmod(whole, 10)
-        out[:, column] = _ZERO + digit
-    point = out.shape[1] - 1 - decimals
-    out[:, point] = _POINT
-    return fits & _put_digits(out[:, :point], whole, np.signbit(values))
+    whole = magnitude // 10**decimals
+    part, stop = magnitude - whole * 10**decimals, out.shape[1]
+    for size in [4] * (decimals // 4) + [decimals % 4] * (decimals % 4 > 0):
+        higher = part // 10**size
+        _put_group(out[:, stop - size : stop], _group_table(size, True), part - higher * 10**size)
+        part, stop = higher, stop - size
+    out[:, stop - 1] = _POINT
+    return fits & _put_signed(out[:, : stop - 1], whole, np.signbit(values))
 
 
 def _put_whole(out: Text, values: NDArray[np.integer]) -> Mask:
     wide = values.astype(np.int64)
-    return _put_digits(out, np.abs(wide), wide < 0)
+    return _put_signed(out, np.abs(wide), wide < 0)
 
 
 def _put_quanta(out: Text, quanta: NDArray[np.int16]) -> Mask:
-    row = quanta.astype(np.int64) - QUANTUM_RANGE[0] + 1
-    row[quanta == BLANK] = 0
-    legal = (row >= 0) & (row < len(quantum_table())) & ((row > 0) | (quanta == BLANK))
-    out[:] = quantum_table()[np.where(legal, row, 0)].reshape(out.shape)
-    return np.asarray(legal.all(axis=1))
+    """Two characters for each of the quantum numbers (n, columns) of a state."""
+    legal = np.ones(len(out), dtype=np.bool_)
+    for column, values in enumerate(quanta.T):
+        index = values.astype(np.int64) - (QUANTUM_RANGE[0] - 1)
+        index[values == BLANK] = 0
+        wrong = (index < 0) | (index >= len(quantum_table())) | ((index == 0) & (values != BLANK))
+        index[wrong] = 0
+        legal &= ~wrong
+        _put_group(out[:, 2 * column : 2 * column + 2], quantum_table(), index)
+    return legal
+
+
+def _put_degeneracy(out: Text, values: NDArray[np.int32]) -> Mask:
+    known = (values >= 0) & (values < len(degeneracy_table()))
+    out[:] = degeneracy_table()[np.where(known, values, 0)]
+    return np.asarray(known)
+
+
+def _put_field(out: Text, values: NDArray[Any], put: Callable[[Text, Any], Mask]) -> Mask | bool:
+    """A column in its field; one that has a single value is spelled once."""
+    if (values[0] != values[-1]).any() or (values != values[0]).any():
+        return put(out, values)
+    once = np.empty((1, out.shape[1]), dtype=np.uint8)
+    fits = bool(put(once, values[:1])[0])
+    out[:] = once
+    return fits
 
 
 def put_rows(out: Text, columns: Columns, decimals: tuple[int, int, int, int]) -> Mask:
@@ -111,20 +187,21 @@ def put_rows(out: Text, columns: Columns, decimals: tuple[int, int, int, int]) -
 
     True for each line whose numbers all fit their fields as they are; what `out` holds elsewhere is undefined.
     """
-    width = 2 * columns.quanta_upper.shape[1]
-    out[:] = _BLANK
-    g_upper = columns.g_upper
-    known = (g_upper >= 0) & (g_upper < len(degeneracy_table()))
-    out[:, DEGENERACY] = degeneracy_table()[np.where(known, g_upper, 0)]
-    plain = known & _put_decimal(out[:, FREQUENCY], columns.frequency_mhz, decimals[0])
-    plain &= _put_decimal(out[:, ERROR], columns.error_mhz, decimals[1])
-    plain &= _put_decimal(out[:, LGINT], columns.lgint, decimals[2])
-    plain &= _put_decimal(out[:, ENERGY], columns.energy_lower_cm, decimals[3])
-    plain &= _put_whole(out[:, DR], columns.dr)
-    plain &= _put_whole(out[:, TAG], columns.tag)
-    plain &= _put_whole(out[:, QNFMT], columns.qnfmt)
-    plain &= _put_quanta(out[:, QUANTA : QUANTA + width], columns.quanta_upper)
-    plain &= _put_quanta(out[:, QUANTA + width : QUANTA + 2 * width], columns.quanta_lower)
+    plain = np.ones(len(out), dtype=np.bool_)
+    if not len(out):
+        return plain
+    numbers = zip((FREQUENCY, ERROR, LGINT, ENERGY), (*columns[:3], columns.energy_lower_cm), decimals, strict=True)
+    for field, values, places in numbers:
+        plain &= _put_field(out[:, field], values, partial(_put_decimal, decimals=places))
+    for field, whole in ((DR, columns.dr), (TAG, columns.tag), (QNFMT, columns.qnfmt)):
+        plain &= _put_field(out[:, field], whole, _put_whole)
+    plain &= _put_field(out[:, DEGENERACY], columns.g_upper, _put_degeneracy)
+    start = QUANTA
+    for quanta in (columns.quanta_upper, columns.quanta_lower):
+        for column in range(quanta.shape[1]):
+            plain &= _put_field(out[:, start : start + 2], quanta[:, column : column + 1], _put_quanta)
+            start += 2
+    out[:, start:] = _BLANK
     return plain
 
 

@@ -149,7 +149,7 @@ def _images(labels: Ints, radii: Floats, one: int, reach: float) -> Ints:
 def _image_counts(labels: Ints, radii: Floats, reach: float) -> Ints:
     """How many points each point can be carried to."""
     counts = np.empty(len(labels), dtype=np.int64)
-    for label in np.unique(labels):
+    for label in sorted(set(labels.tolist())):
         mine = np.flatnonzero(labels == label)
         ordered = np.sort(radii[mine])
         above = np.searchsorted(ordered, radii[mine] + reach, side="right")
@@ -213,7 +213,7 @@ class _Matcher:
         self.layers = labels * (4 * np.linalg.norm(points, axis=1).max())
         self.tree = _neighbours(np.column_stack([points, self.layers]))
         self.within = np.full(len(points), np.inf)
-        for label in np.unique(labels):
+        for label in sorted(set(labels.tolist())):
             mine = labels == label
             if mine.sum() > 1:
                 self.within[mine] = MATCH_WITHIN * shortest_distance(points[mine])

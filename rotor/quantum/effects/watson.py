@@ -179,10 +179,14 @@ def _elements(
     for p, q, c in powers:
         coefficients[-1 - q] += c * x**p
 
-    squares = (k * k).astype(float)
+    squares = np.arange(k[0], k[-1] + 2 * n + 1.0) ** 2
+    values = np.full(len(squares), coefficients[0])
+    for coefficient in coefficients[1:].tolist():
+        values *= squares
+        values += coefficient
     if n == 0:
-        return np.asarray(np.polyval(coefficients, squares))
-    total = 0.5 * (np.polyval(coefficients, squares) + np.polyval(coefficients, (k + 2.0 * n) ** 2))
+        return values
+    total = 0.5 * (values[: len(k)] + values[2 * n :])
     for i in range(2 * n):
         total *= steps[i : i + len(k)]
     return np.asarray(total)
