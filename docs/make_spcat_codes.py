@@ -58,10 +58,10 @@ def answer(of: Callable[[], object]) -> str:
     try:
         of()
     except ValueError as error:
-        return (
-            "no: " + str(error).partition(": ")[2].removesuffix(" is read but not computed yet")
-            if ": " in str(error)
-            else ("no: " + str(error).removesuffix(" is read but not computed yet"))
+        text = str(error)
+        reason = text.partition(": ")[2] or text
+        return "no: " + reason.removesuffix(" is read but not computed yet").replace(
+            " are read but not computed yet", ""
         )
     return "yes"
 
@@ -112,7 +112,7 @@ def option_rows() -> list[str]:
     ]  # fmt: skip
     rows = [f"| {name} | {option_answer(line)} |" for name, line in cases]
     rows.append("| DIAG | labels are those of full projection (1) whatever it says |")
-    return [*rows, "| IXX: ΔN, ΔJ, ... left out | no: every interaction is in |"]
+    return [*rows, "| IXX: elements with ΔN ≠ 0, ΔJ ≠ 0, ... left out | yes |"]
 
 
 def dipole_answer(code: int) -> str:

@@ -15,7 +15,7 @@ from rotor.formats.spcat.operators import CodedOperator, operator_of, plain_of_j
 from rotor.formats.spcat.par import Parameter
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.moments import Moment
-from rotor.quantum.spins import Spin
+from rotor.quantum.spins import Scheme, Spin
 from rotor.quantum.spins.operators import EVERY_STATE, SpinTerm
 from rotor.quantum.states import Coupling, State
 from rotor.tops.operators import Operators
@@ -71,6 +71,7 @@ class FileEffect(QuantumEffect):
 
     lines: with the file's numbers of states. numbers: the states taken, in their order here. coupled: the spins by place. moments:
     dipoles in debye by pairs of numbers here. limits: least and largest K of states, by number here. others: moments of other kinds.
+    ixx: which sums of angular momenta are kept, bit by bit from N on.
     """
 
     name: ClassVar[str] = ""
@@ -82,6 +83,7 @@ class FileEffect(QuantumEffect):
     moments: dict[tuple[int, int], Vector]
     limits: dict[int, tuple[int, int]]
     others: tuple[Moment, ...] = ()
+    ixx: int = 0
 
     @cached_property
     def _own(self) -> tuple[tuple[CodedLine, tuple[int, int] | None], ...]:
@@ -151,6 +153,11 @@ class FileEffect(QuantumEffect):
     def other_moments(self, top: Top) -> tuple[Moment, ...]:
         """The moments of other kinds of the .int file."""
         return self.others
+
+    def kept(self, top: Top) -> frozenset[str]:
+        """The sums that IXX keeps."""
+        sums = ("n", *Scheme(self.coupled).names)
+        return frozenset(name for bit, name in enumerate(sums) if self.ixx >> bit & 1)
 
     def k_limits(self, top: Top) -> dict[int, tuple[int, int]]:
         """KNMIN and KNMAX where they leave K out."""

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from rotor.arrays import Ints
 from rotor.formats.spcat.file_effect import CodedLine, FileEffect, Vector, coded_lines
 from rotor.formats.spcat.int_file import Dipole, IntensityFile
-from rotor.formats.spcat.par import ParameterFile
+from rotor.formats.spcat.par import Options, ParameterFile
 from rotor.formats.spcat.states import StateOptions, states_of
 from rotor.quantum.levels import Levels
 from rotor.quantum.moments import DEBYE_PER_BOHR_MAGNETON, Moment
@@ -104,13 +104,12 @@ def groups_of(file: ParameterFile, intensities: IntensityFile, *, as_spcat: bool
     """
     states = states_of(file)
     first = file.options[0]
-    oblate, symmetric = first.nvib < 0, first.spind < 0
-    lines = coded_lines(file.parameters, len(states), oblate)
+    lines = coded_lines(file.parameters, len(states), first.nvib < 0)
     dipoles, others = dipoles_of(intensities.dipoles, len(states))
     pairs = [line.states for line in lines if line.states] + list(dipoles) + [code.states for _, code in others]
     _refuse_missing_spins(lines, states)
     return [
-        _group([states[v] for v in numbers], lines, (dipoles, others), oblate, symmetric, as_spcat, file.title)
+        _group([states[v] for v in numbers], lines, (dipoles, others), first, as_spcat, file.title)
         for numbers in _connected(len(states), pairs)
     ]
 
@@ -142,11 +141,11 @@ def _group(
     states: list[StateOptions],
     lines: list[CodedLine],
     light: tuple[Dipoles, list[tuple[Dipole, DipoleCode]]],
-    oblate: bool,
-    symmetric: bool,
+    first: Options,
     as_spcat: bool,
     title: str,
 ) -> Group:
+    oblate = first.nvib < 0
     numbers = tuple(state.number for state in states)
     spins = states[0].spins
     if any((state.spins, state.i_tot) != (spins, states[0].i_tot) for state in states):
@@ -162,13 +161,13 @@ def _group(
     usable = tuple(
         line for line in own if max((*line.operator.spins, 1 if line.operator.ns else 0), default=0) <= len(spins)
     )
-    kind = _kind(states, usable, oblate, symmetric)
+    kind = _kind(states, usable, oblate, first.spind < 0)
     limits = {} if kind in ("linear", "prolate", "oblate") else _limits(states, as_spcat)
     paired = len(spins) - 1 if states[0].i_tot else len(spins) + 1  # the first of two equivalent ones
     coupled = tuple(
         Spin(f"I{place}", twice, total="I_tot" if place >= paired else "") for place, twice in enumerate(spins, 1)
     )
-    effect = FileEffect(usable, numbers, coupled, moments, limits, others)
+    effect = FileEffect(usable, numbers, coupled, moments, limits, others, first.ixx)
     top = Top(_STANDS_FOR[kind, oblate], dipole_abc_debye=moments.get((0, 0), (0.0, 0.0, 0.0)), name=title)
     kmax = states[0].kmax if as_spcat and kind in ("prolate", "oblate") else _EVERY_K
     return Group(tuple(states), top, effect, oblate, kmax)
@@ -197,7 +196,7 @@ def _kind(states: list[StateOptions], lines: tuple[CodedLine, ...], oblate: bool
     rotors = [line.operator.rotor for line in lines if line.operator.rotor is not None]
     axis = "c" if oblate else "a"
     good = all(n == 0 for _, _, n in plain) and all(is_axial(rotor, axis) for rotor in rotors)
-    whole = alone and states[0].kmin == 0 and states[0].kmax > 0
+    whole = alone and states[0].kmin == 0 and states[0].kmax > 0 and states[0].plus == states[0].minus
     if symmetric and whole and good and not any(line.operator.of_j for line in lines):
         return "oblate" if oblate else "prolate"
     return "asymmetric"
@@ -286,6 +285,9 @@ def _meaning(code: DipoleCode) -> str:
     kinds = {1: "a moment of second order", 2: "a moment of second order", 6: "a moment of third order"}
     kinds |= {7: "a moment times a cosine of internal rotation", 8: "a moment times a sine of internal rotation"}
     what = kinds.get(code.typ, f"a moment of TYP {code.typ}")
-    if code.typ in (0, *_POWERS):
-        what = "a magnetic moment between two states" if code.axis == 0 else "a moment along an axis"
+    if code.axis == 0 and code.typ in (0, *_POWERS):
+        between = code.states[0] != code.states[1]
+        what = "a magnetic moment between two states" if between else "a magnetic moment with powers of N² or Nz²"
+    elif code.typ in (0, *_POWERS):
+        what = "a moment along an axis"
     return what + (f" that acts on spin {code.spin}" if code.spin else "")
