@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from rotor.arrays import Ints
 from rotor.formats.spcat.file_effect import CodedLine, FileEffect, Vector, coded_lines
 from rotor.formats.spcat.int_file import Dipole, IntensityFile
+from rotor.formats.spcat.l_doubled import Pair, named_by_l, pairs_of
 from rotor.formats.spcat.par import Options, ParameterFile
 from rotor.formats.spcat.states import StateOptions, states_of
 from rotor.quantum.levels import Levels
@@ -62,6 +63,8 @@ class Group:
             levels = solve_levels(
                 self.top, twice_f[1] // 2, jmin=twice_f[0] // 2, effects=(self.effect,), executor=executor
             )
+            if self.effect.pairs:
+                levels = named_by_l(levels, self.effect.pairs, str(levels.representation))
         return replace(levels, weight=self._weights(levels))
 
     def _exist(self, labels: Ints) -> NDArray[np.bool_]:
@@ -104,14 +107,33 @@ def groups_of(file: ParameterFile, intensities: IntensityFile, *, as_spcat: bool
     """
     states = states_of(file)
     first = file.options[0]
-    lines = coded_lines(file.parameters, len(states), first.nvib < 0)
+    doubled = pairs_of(states)
+    members = frozenset(v for pair in doubled for v in pair)
+    lines = coded_lines(file.parameters, len(states), first.nvib < 0, members)
     dipoles, others = dipoles_of(intensities.dipoles, len(states))
+    dipoles = _of_both_components(dipoles, doubled)
     pairs = [line.states for line in lines if line.states] + list(dipoles) + [code.states for _, code in others]
     _refuse_missing_spins(lines, states)
+    light = (dipoles, others)
     return [
-        _group([states[v] for v in numbers], lines, (dipoles, others), first, as_spcat, file.title)
-        for numbers in _connected(len(states), pairs)
+        _group([states[v] for v in numbers], lines, light, first, as_spcat, file.title, doubled)
+        for numbers in _connected(len(states), [*pairs, *doubled])
     ]
+
+
+def _of_both_components(dipoles: Dipoles, pairs: list[Pair]) -> Dipoles:
+    """Dipoles of l-doubled states: that of the one with K l > 0 is that of both."""
+    firsts, seconds = {pair.first: pair.second for pair in pairs}, {pair.second: pair.first for pair in pairs}
+    found: Dipoles = {}
+    for (low, high), moment in dipoles.items():
+        if low != high and {low, high} & (set(firsts) | set(seconds)):
+            raise ValueError(f"a dipole between states {low} and {high}, of which one is l-doubled, {NOT_YET}")
+        if low in seconds:
+            continue
+        found[low, high] = moment
+        if low in firsts:
+            found[firsts[low], firsts[low]] = moment
+    return found
 
 
 def _connected(count: int, pairs: Iterable[tuple[int, int]]) -> list[list[int]]:
@@ -144,6 +166,7 @@ def _group(
     first: Options,
     as_spcat: bool,
     title: str,
+    doubled: list[Pair],
 ) -> Group:
     oblate = first.nvib < 0
     numbers = tuple(state.number for state in states)
@@ -161,13 +184,15 @@ def _group(
     usable = tuple(
         line for line in own if max((*line.operator.spins, 1 if line.operator.ns else 0), default=0) <= len(spins)
     )
+    pairs = tuple(Pair(here[pair.first], here[pair.second]) for pair in doubled if pair.first in here)
     kind = _kind(states, usable, oblate, first.spind < 0)
     limits = {} if kind in ("linear", "prolate", "oblate") else _limits(states, as_spcat)
     paired = len(spins) - 1 if states[0].i_tot else len(spins) + 1  # the first of two equivalent ones
     coupled = tuple(
         Spin(f"I{place}", twice, total="I_tot" if place >= paired else "") for place, twice in enumerate(spins, 1)
     )
-    effect = FileEffect(usable, numbers, coupled, moments, limits, others, first.ixx)
+    effect = FileEffect(usable, numbers, coupled, moments, limits, others, first.ixx, pairs)
+    _ = effect.couplings(_ANY_TOP) if pairs else ()  # what is not allowed between l-doubled states is said now
     top = Top(_STANDS_FOR[kind, oblate], dipole_abc_debye=moments.get((0, 0), (0.0, 0.0, 0.0)), name=title)
     kmax = states[0].kmax if as_spcat and kind in ("prolate", "oblate") else _EVERY_K
     return Group(tuple(states), top, effect, oblate, kmax)
@@ -180,6 +205,8 @@ _STANDS_FOR = {
     ("asymmetric", False): Constants(A=3.0, B=2.0, C=1.0, representation="Ir"),
     ("asymmetric", True): Constants(A=3.0, B=2.0, C=1.0, representation="IIIl"),
 }  # fmt: skip
+
+_ANY_TOP = Top(Constants(B=1.0))
 
 
 def _kind(states: list[StateOptions], lines: tuple[CodedLine, ...], oblate: bool, symmetric: bool) -> str:

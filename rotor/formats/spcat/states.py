@@ -51,6 +51,11 @@ class StateOptions:
     i_tot: bool
 
     @property
+    def fold(self) -> int:
+        """n of the n-fold axis whose weights the state has, 0 for those of a half turn."""
+        return _FOLDS[self.iax].n if self.iax in _FOLDS else 0
+
+    @property
     def linear(self) -> bool:
         """Whether K = 0 alone is in the basis."""
         return self.kmin == self.kmax == 0
@@ -108,12 +113,11 @@ def states_of(file: ParameterFile) -> tuple[StateOptions, ...]:
 def _state(v: int, line: Options, first: Options, swapped: bool) -> StateOptions:
     factor = 100 if first.ewt >= 0 else 1000
     code, weight = divmod(abs(line.ewt), factor)
-    iax = abs(line.iax)
+    iax, spins = abs(line.iax), doubled_spins(line.spind)
     if iax not in (0, 1, 2, 3, *_FOLDS):
         raise ValueError(f"IAX = {line.iax} of state {v}: expected an axis or fold of weights, 1 to 11")
-    if code:
-        raise ValueError(f"EWT = {line.ewt} of state {v}: l-doubled states are read but not computed yet")
-    spins = doubled_spins(line.spind)
+    if code and spins:
+        raise ValueError(f"EWT = {line.ewt} of state {v}: l-doubled states with spins are read but not computed yet")
     if line.iax < 0 and iax in _FOLDS and _FOLDS[iax].n > 2:
         raise ValueError(
             f"IAX = {line.iax} of state {v}: a total spin of {_FOLDS[iax].n} equivalent nuclei is read but not computed yet"
@@ -125,7 +129,16 @@ def _state(v: int, line: Options, first: Options, swapped: bool) -> StateOptions
     kmax = line.knmax if 0 <= line.knmax <= 359 else 359
     plus, minus = (line.wtmn, line.wtpl) if swapped else (line.wtpl, line.wtmn)
     return StateOptions(
-        v, spins, line.knmin, max(kmax, line.knmin), iax, plus, minus, weight, code, line.iax < 0 and len(spins) > 1
+        v,
+        spins,
+        line.knmin,
+        max(kmax, line.knmin),
+        iax,
+        plus,
+        minus,
+        weight,
+        code % 10,
+        line.iax < 0 and len(spins) > 1,
     )
 
 
