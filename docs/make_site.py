@@ -27,7 +27,7 @@ CONTENTS = {
     "Notebooks": ["notebooks/*"],
     "Command line": ["command_line", "rotor_*"],
     "Subjects": [],  # all pages of docs/ that no other part names
-    "Data and checks": ["library", "measured_lines", "reference_cases", "spin_weights"],
+    "Data and checks": ["library", "measured_lines", "reference_cases", "spcat_codes", "spin_weights"],
     "API": ["api/index", "api/rotor*"],
 }
 

@@ -12,6 +12,7 @@ from pathlib import Path
 from rotor.formats.spcat.codes import AXES, split_code
 from rotor.formats.spcat.file_model import moment_of, split_dipole
 from rotor.formats.spcat.int_file import Dipole
+from rotor.formats.spcat.l_doubled import pairs_of
 from rotor.formats.spcat.operators import operator_of
 from rotor.formats.spcat.par import read_par
 from rotor.formats.spcat.states import states_of
@@ -58,10 +59,10 @@ def answer(of: Callable[[], object]) -> str:
     try:
         of()
     except ValueError as error:
-        return (
-            "no: " + str(error).partition(": ")[2].removesuffix(" is read but not computed yet")
-            if ": " in str(error)
-            else ("no: " + str(error).removesuffix(" is read but not computed yet"))
+        text = str(error)
+        reason = text.partition(": ")[2] or text
+        return "no: " + reason.removesuffix(" is read but not computed yet").replace(
+            " are read but not computed yet", ""
         )
     return "yes"
 
@@ -96,7 +97,7 @@ def other_rows() -> list[str]:
 
 def option_answer(line: str) -> str:
     """Whether an option line is understood."""
-    return answer(lambda: states_of(read_par(f"a case\n 1 0 0 0\n{line}\n 100 1.0 0\n".encode())))
+    return answer(lambda: pairs_of(states_of(read_par(f"a case\n 1 0 0 0\n{line}\n 100 1.0 0\n".encode()))))
 
 
 def option_rows() -> list[str]:
@@ -108,11 +109,12 @@ def option_rows() -> list[str]:
         *((f"IAX {n}", f"a 1 1 0 20 0 {n} 1 1 0 1 0") for n in range(1, 12)),
         *((f"IAX -{n} with two spins of one size: I_tot", f"a 22 1 0 20 0 -{n} 1 1 0 1 0") for n in (1, 2, 3)),
         ("IAX -6: I_tot of three spins", "a 222 1 0 20 0 -6 1 1 0 1 0"),
-        ("EWT1: l-doubled states", "s -1 2 0 20 0 6 1 1 0 101 0"),
+        ("EWT1: l-doubled pairs of E species", "s -1 2 0 20 0 6 1 1 -1 101 0\ns -1 0 0 20 0 6 1 1 -1 101 0\ns -1 1 0 20 0 6 1 1 0 201 0"),
+        ("EWT1: with spins", "s -3 2 0 20 0 6 1 1 -1 101 0\ns -3 1 0 20 0 6 1 1 0 201 0"),
     ]  # fmt: skip
     rows = [f"| {name} | {option_answer(line)} |" for name, line in cases]
     rows.append("| DIAG | labels are those of full projection (1) whatever it says |")
-    return [*rows, "| IXX: ΔN, ΔJ, ... left out | no: every interaction is in |"]
+    return [*rows, "| IXX: elements with ΔN ≠ 0, ΔJ ≠ 0, ... left out | yes |"]
 
 
 def dipole_answer(code: int) -> str:

@@ -25,6 +25,11 @@ def test_the_page_of_measured_lines(shared: Path):
     assert make.page(shared) == make.PAGE.read_text(encoding="utf-8")
 
 
+def test_the_page_of_codes():
+    make = script("make_spcat_codes")
+    assert make.page() == make.TARGET.read_text(encoding="utf-8")
+
+
 @pytest.mark.oracle
 @pytest.mark.slow
 def test_the_page_of_reference_cases(shared: Path):

@@ -84,6 +84,10 @@ class QuantumEffect(ABC):
         """What connects states of different v."""
         return ()
 
+    def kept(self, top: Top) -> frozenset[str]:
+        """Sums of angular momenta (n, j, f1, ...) that are taken for good ones, elements between different values left out."""
+        return frozenset()
+
     def k_limits(self, top: Top) -> dict[int, tuple[int, int]]:
         """The least and the largest K of states v whose basis does not have all of them, such as K = 1 of a Π state."""
         return {}

@@ -11,11 +11,12 @@ from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 from rotor.formats.spcat.codes import AXES, split_code
+from rotor.formats.spcat.l_doubled import Pair, couplings_with_pairs
 from rotor.formats.spcat.operators import CodedOperator, operator_of, plain_of_j
 from rotor.formats.spcat.par import Parameter
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.moments import Moment
-from rotor.quantum.spins import Spin
+from rotor.quantum.spins import Scheme, Spin
 from rotor.quantum.spins.operators import EVERY_STATE, SpinTerm
 from rotor.quantum.states import Coupling, State
 from rotor.tops.operators import Operators
@@ -27,19 +28,25 @@ Vector = tuple[float, float, float]
 
 
 class CodedLine(NamedTuple):
-    """One parameter line: its name, value, operator, and the two states, lower first; None for every state."""
+    """One parameter line: its name, value, operator, and the two states, lower first; None for every state.
+
+    reversed_: the code has V2 > V1.
+    """
 
     name: str
     value: float
     operator: CodedOperator
     states: tuple[int, int] | None
+    reversed_: bool = False
 
 
-def coded_lines(parameters: Iterable[Parameter], states: int, oblate: bool) -> list[CodedLine]:
+def coded_lines(
+    parameters: Iterable[Parameter], states: int, oblate: bool, doubled: frozenset[int] = frozenset()
+) -> list[CodedLine]:
     """The parameter lines of a file with so many states; ValueError, naming the line, for what does not compute.
 
     A parameter of value zero does nothing and is not looked at, nor is one of a state and 9 (99, 999), which SPFIT takes for a
-    place holder.
+    place holder. doubled: states that are l-doubled, within which an odd operator acts with the sign of l.
     """
     wild, axes = 10 ** (1 if states <= 9 else 2 if states <= 99 else 3) - 1, AXES["IIIl" if oblate else "Ir"]
     found: list[CodedLine] = []
@@ -53,14 +60,20 @@ def coded_lines(parameters: Iterable[Parameter], states: int, oblate: bool) -> l
             if states <= high != wild:
                 raise ValueError(f"state {high} does not exist, NVIB = {states} counts from 0")
             operator = operator_of(digits, axes)
-            if operator.odd and low == high:
+            if operator.odd and low == high and low not in doubled:
                 raise ValueError(
                     "time reversal changes the sign of the operator, so that it can connect different states only"
                 )
         except ValueError as error:
             raise ValueError(f"parameter {parameter.code}{label}: {error}") from None
         found.append(
-            CodedLine(f"{parameter.code}#{place}", parameter.value, operator, None if low == wild else (low, high))
+            CodedLine(
+                f"{parameter.code}#{place}",
+                parameter.value,
+                operator,
+                None if low == wild else (low, high),
+                digits.v2 > digits.v1,
+            )
         )
     return found
 
@@ -71,6 +84,7 @@ class FileEffect(QuantumEffect):
 
     lines: with the file's numbers of states. numbers: the states taken, in their order here. coupled: the spins by place. moments:
     dipoles in debye by pairs of numbers here. limits: least and largest K of states, by number here. others: moments of other kinds.
+    ixx: which sums of angular momenta are kept, bit by bit from N on. pairs: l-doubled states, by number here.
     """
 
     name: ClassVar[str] = ""
@@ -82,17 +96,22 @@ class FileEffect(QuantumEffect):
     moments: dict[tuple[int, int], Vector]
     limits: dict[int, tuple[int, int]]
     others: tuple[Moment, ...] = ()
+    ixx: int = 0
+    pairs: tuple[Pair, ...] = ()
 
     @cached_property
     def _own(self) -> tuple[tuple[CodedLine, tuple[int, int] | None], ...]:
         """The lines that concern these states, with the numbers here; None for every state."""
         here = {v: place for place, v in enumerate(self.numbers)}
+        second = {pair.second for pair in self.pairs}
         out: list[tuple[CodedLine, tuple[int, int] | None]] = []
         for line in self.lines:
             if line.states is None:
                 out.append((line, None))
             elif line.states[0] in here and line.states[1] in here:
-                out.append((line, (here[line.states[0]], here[line.states[1]])))
+                states = (here[line.states[0]], here[line.states[1]])
+                if states[0] != states[1] or states[0] not in second:  # the program takes no operator of K l ≤ 0 alone
+                    out.append((line, states))
         return tuple(out)
 
     def parameters(self, top: Top) -> dict[str, float]:
@@ -104,10 +123,11 @@ class FileEffect(QuantumEffect):
         return self._plain(0)
 
     def _plain(self, v: int) -> dict[str, Operators]:
+        named = next((pair.first for pair in self.pairs if pair.second == v), v)  # the state that parameters name
         return {
             line.name: line.operator.plain
             for line, states in self._own
-            if line.operator.plain is not None and states in (None, (v, v))
+            if line.operator.plain is not None and states in (None, (named, named))
         }
 
     def states(self, top: Top) -> tuple[State, ...]:
@@ -121,13 +141,25 @@ class FileEffect(QuantumEffect):
             operator = line.operator
             if operator.rotor is not None:
                 continue
-            if operator.of_j is not None:
+            if self.pairs and states and not set(states).isdisjoint(v for pair in self.pairs for v in pair):
+                found += self._with_pairs(line, states)
+            elif operator.of_j is not None:
                 pairs = [states] if states else [(v, v) for v in range(len(self.numbers))]
                 found += [Coupling(line.name, *pair, operator.of_j) for pair in pairs]
             elif states and states[0] != states[1]:
                 assert operator.plain is not None
                 found.append(Coupling(line.name, *states, plain_of_j(operator.plain)))
         return tuple(found)
+
+    def _with_pairs(self, line: CodedLine, states: tuple[int, int]) -> list[Coupling]:
+        operator = line.operator
+        if operator.plain is not None and states[0] == states[1]:
+            return []  # among the operators of both components
+        of = operator.of_j or plain_of_j(operator.plain or {})
+        try:
+            return couplings_with_pairs(line.name, of, operator.odd, states, line.reversed_, self.pairs)
+        except ValueError as error:
+            raise ValueError(f"parameter {line.name.partition('#')[0]}: {error}") from None
 
     def spins(self, top: Top) -> tuple[Spin, ...]:
         """The spins, in the order of the file."""
@@ -151,6 +183,11 @@ class FileEffect(QuantumEffect):
     def other_moments(self, top: Top) -> tuple[Moment, ...]:
         """The moments of other kinds of the .int file."""
         return self.others
+
+    def kept(self, top: Top) -> frozenset[str]:
+        """The sums that IXX keeps."""
+        sums = ("n", *Scheme(self.coupled).names)
+        return frozenset(name for bit, name in enumerate(sums) if self.ixx >> bit & 1)
 
     def k_limits(self, top: Top) -> dict[int, tuple[int, int]]:
         """KNMIN and KNMAX where they leave K out."""

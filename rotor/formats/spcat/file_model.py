@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from rotor.arrays import Ints
 from rotor.formats.spcat.file_effect import CodedLine, FileEffect, Vector, coded_lines
 from rotor.formats.spcat.int_file import Dipole, IntensityFile
-from rotor.formats.spcat.par import ParameterFile
+from rotor.formats.spcat.l_doubled import Pair, named_by_l, pairs_of
+from rotor.formats.spcat.par import Options, ParameterFile
 from rotor.formats.spcat.states import StateOptions, states_of
 from rotor.quantum.levels import Levels
 from rotor.quantum.moments import DEBYE_PER_BOHR_MAGNETON, Moment
@@ -62,6 +63,8 @@ class Group:
             levels = solve_levels(
                 self.top, twice_f[1] // 2, jmin=twice_f[0] // 2, effects=(self.effect,), executor=executor
             )
+            if self.effect.pairs:
+                levels = named_by_l(levels, self.effect.pairs, str(levels.representation))
         return replace(levels, weight=self._weights(levels))
 
     def _exist(self, labels: Ints) -> NDArray[np.bool_]:
@@ -104,15 +107,33 @@ def groups_of(file: ParameterFile, intensities: IntensityFile, *, as_spcat: bool
     """
     states = states_of(file)
     first = file.options[0]
-    oblate, symmetric = first.nvib < 0, first.spind < 0
-    lines = coded_lines(file.parameters, len(states), oblate)
+    doubled = pairs_of(states)
+    members = frozenset(v for pair in doubled for v in pair)
+    lines = coded_lines(file.parameters, len(states), first.nvib < 0, members)
     dipoles, others = dipoles_of(intensities.dipoles, len(states))
+    dipoles = _of_both_components(dipoles, doubled)
     pairs = [line.states for line in lines if line.states] + list(dipoles) + [code.states for _, code in others]
     _refuse_missing_spins(lines, states)
+    light = (dipoles, others)
     return [
-        _group([states[v] for v in numbers], lines, (dipoles, others), oblate, symmetric, as_spcat, file.title)
-        for numbers in _connected(len(states), pairs)
+        _group([states[v] for v in numbers], lines, light, first, as_spcat, file.title, doubled)
+        for numbers in _connected(len(states), [*pairs, *doubled])
     ]
+
+
+def _of_both_components(dipoles: Dipoles, pairs: list[Pair]) -> Dipoles:
+    """Dipoles of l-doubled states: that of the one with K l > 0 is that of both."""
+    firsts, seconds = {pair.first: pair.second for pair in pairs}, {pair.second: pair.first for pair in pairs}
+    found: Dipoles = {}
+    for (low, high), moment in dipoles.items():
+        if low != high and {low, high} & (set(firsts) | set(seconds)):
+            raise ValueError(f"a dipole between states {low} and {high}, of which one is l-doubled, {NOT_YET}")
+        if low in seconds:
+            continue
+        found[low, high] = moment
+        if low in firsts:
+            found[firsts[low], firsts[low]] = moment
+    return found
 
 
 def _connected(count: int, pairs: Iterable[tuple[int, int]]) -> list[list[int]]:
@@ -142,11 +163,12 @@ def _group(
     states: list[StateOptions],
     lines: list[CodedLine],
     light: tuple[Dipoles, list[tuple[Dipole, DipoleCode]]],
-    oblate: bool,
-    symmetric: bool,
+    first: Options,
     as_spcat: bool,
     title: str,
+    doubled: list[Pair],
 ) -> Group:
+    oblate = first.nvib < 0
     numbers = tuple(state.number for state in states)
     spins = states[0].spins
     if any((state.spins, state.i_tot) != (spins, states[0].i_tot) for state in states):
@@ -162,13 +184,15 @@ def _group(
     usable = tuple(
         line for line in own if max((*line.operator.spins, 1 if line.operator.ns else 0), default=0) <= len(spins)
     )
-    kind = _kind(states, usable, oblate, symmetric)
+    pairs = tuple(Pair(here[pair.first], here[pair.second]) for pair in doubled if pair.first in here)
+    kind = _kind(states, usable, oblate, first.spind < 0)
     limits = {} if kind in ("linear", "prolate", "oblate") else _limits(states, as_spcat)
     paired = len(spins) - 1 if states[0].i_tot else len(spins) + 1  # the first of two equivalent ones
     coupled = tuple(
         Spin(f"I{place}", twice, total="I_tot" if place >= paired else "") for place, twice in enumerate(spins, 1)
     )
-    effect = FileEffect(usable, numbers, coupled, moments, limits, others)
+    effect = FileEffect(usable, numbers, coupled, moments, limits, others, first.ixx, pairs)
+    _ = effect.couplings(_ANY_TOP) if pairs else ()  # what is not allowed between l-doubled states is said now
     top = Top(_STANDS_FOR[kind, oblate], dipole_abc_debye=moments.get((0, 0), (0.0, 0.0, 0.0)), name=title)
     kmax = states[0].kmax if as_spcat and kind in ("prolate", "oblate") else _EVERY_K
     return Group(tuple(states), top, effect, oblate, kmax)
@@ -181,6 +205,8 @@ _STANDS_FOR = {
     ("asymmetric", False): Constants(A=3.0, B=2.0, C=1.0, representation="Ir"),
     ("asymmetric", True): Constants(A=3.0, B=2.0, C=1.0, representation="IIIl"),
 }  # fmt: skip
+
+_ANY_TOP = Top(Constants(B=1.0))
 
 
 def _kind(states: list[StateOptions], lines: tuple[CodedLine, ...], oblate: bool, symmetric: bool) -> str:
@@ -197,7 +223,7 @@ def _kind(states: list[StateOptions], lines: tuple[CodedLine, ...], oblate: bool
     rotors = [line.operator.rotor for line in lines if line.operator.rotor is not None]
     axis = "c" if oblate else "a"
     good = all(n == 0 for _, _, n in plain) and all(is_axial(rotor, axis) for rotor in rotors)
-    whole = alone and states[0].kmin == 0 and states[0].kmax > 0
+    whole = alone and states[0].kmin == 0 and states[0].kmax > 0 and states[0].plus == states[0].minus
     if symmetric and whole and good and not any(line.operator.of_j for line in lines):
         return "oblate" if oblate else "prolate"
     return "asymmetric"
@@ -286,6 +312,9 @@ def _meaning(code: DipoleCode) -> str:
     kinds = {1: "a moment of second order", 2: "a moment of second order", 6: "a moment of third order"}
     kinds |= {7: "a moment times a cosine of internal rotation", 8: "a moment times a sine of internal rotation"}
     what = kinds.get(code.typ, f"a moment of TYP {code.typ}")
-    if code.typ in (0, *_POWERS):
-        what = "a magnetic moment between two states" if code.axis == 0 else "a moment along an axis"
+    if code.axis == 0 and code.typ in (0, *_POWERS):
+        between = code.states[0] != code.states[1]
+        what = "a magnetic moment between two states" if between else "a magnetic moment with powers of N² or Nz²"
+    elif code.typ in (0, *_POWERS):
+        what = "a moment along an axis"
     return what + (f" that acts on spin {code.spin}" if code.spin else "")

@@ -169,7 +169,7 @@ def _with_spins(d: Digits, spins: tuple[int, ...], axes: str) -> CodedOperator:
         return replace(powered, rotor=Scalar(tuple(plain.items())))
     if len(spins) == 2 and d.typ == 0:
         if spins[0] == spins[1]:
-            raise ValueError(f"I·I of one spin is a number; it {NOT_YET}")
+            raise ValueError(f"the square of one spin, a constant, {NOT_YET}")
         return replace(powered, rotor=Scalar())
     if d.typ in ODD:
         if len(spins) == 2:
@@ -194,4 +194,4 @@ def _matrix(typ: int, axes: str) -> Matrix:
         return tuple(tuple(2 * value for value in row) for row in plain)  # type: ignore[return-value]
     if typ in CROSS:
         return matrix_of(CROSS[typ])
-    raise ValueError(f"a spin term of TYP {typ}, of more than second order, {NOT_YET}")
+    raise ValueError(f"a spin term of more than second order {NOT_YET}")

@@ -45,7 +45,9 @@ def is_plain(parameters: ParameterFile, intensities: IntensityFile | None) -> bo
     """Whether a file has one state, no spin and operators of orthorhombic symmetry, so that its constants have names."""
     first = parameters.options[0]
     one = abs(first.nvib) == 1 and len(parameters.options) == 1 and not doubled_spins(first.spind)
-    if not one or first.knmin != 0 or first.iax < 0:
+    if not one or first.knmin != 0 or first.iax not in (0, 1, 2, 3, 6, 9) or first.ixx:
+        return False
+    if first.spind < 0 and first.knmax and first.wtpl != first.wtmn:  # the two levels of one K weigh differently
         return False
     digits = [split_code(parameter.code) for parameter in parameters.parameters]
     orthorhombic = all(

@@ -7,6 +7,7 @@ differs there (H. M. Pickett, documentation of SPFIT and SPCAT, "line 3, option 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,8 +16,20 @@ from rotor.arrays import Ints
 from rotor.formats.spcat.par import Options, ParameterFile
 
 SPECIES = {"ee": "A", "eo": "a", "oo": "b", "oe": "c"}  # of the rotational function, by parities of Ka and Kc
-_FOLDS = {6: 3, 9: 5}  # IAX of tops whose E levels have one weight
-_DOUBLED = 2
+
+
+class Fold(NamedTuple):
+    """K - l modulo n of the levels of a top with an n-fold axis that have weights: A or B species, and those of E species."""
+
+    n: int
+    alone: int
+    paired: tuple[int, ...]
+
+
+_FOLDS = {
+    4: Fold(2, 0, ()), 5: Fold(2, 1, ()), 6: Fold(3, 0, (1, 2)), 7: Fold(4, 0, (1, 3)), 8: Fold(4, 2, ()),
+    9: Fold(5, 0, (1, 2, 3, 4)), 10: Fold(6, 0, (2, 4)), 11: Fold(6, 3, (1, 5)),
+}  # fmt: skip  # by IAX
 
 
 @dataclass(frozen=True)
@@ -38,6 +51,11 @@ class StateOptions:
     i_tot: bool
 
     @property
+    def fold(self) -> int:
+        """n of the n-fold axis whose weights the state has, 0 for those of a half turn."""
+        return _FOLDS[self.iax].n if self.iax in _FOLDS else 0
+
+    @property
     def linear(self) -> bool:
         """Whether K = 0 alone is in the basis."""
         return self.kmin == self.kmax == 0
@@ -51,12 +69,18 @@ class StateOptions:
         even = (odd + i_tot) % 2 == 0
         weight = np.where(even, self.plus, self.minus)
         fold = _FOLDS.get(self.iax)
-        return np.where((k - self.l_code) % fold != 0, self.e_weight, weight) if fold else weight
+        if fold is None:
+            return weight
+        class_of = (k - self.l_code) % fold.n
+        paired = np.where(np.isin(class_of, fold.paired), self.e_weight, 0)
+        return np.where(class_of == fold.alone, weight, paired)
 
     def is_e(self, k: Ints) -> NDArray[np.bool_]:
         """Which levels are of E species, whose K is not signed."""
         fold = _FOLDS.get(self.iax)
-        return (k - self.l_code) % fold != 0 if fold else np.zeros(np.shape(k), dtype=bool)
+        if fold is None or fold.n < 3:
+            return np.zeros(np.shape(k), dtype=bool)
+        return np.asarray((k - self.l_code) % fold.n % (fold.n / 2) != 0)
 
 
 def doubled_spins(spind: int) -> tuple[int, ...]:
@@ -89,17 +113,14 @@ def states_of(file: ParameterFile) -> tuple[StateOptions, ...]:
 def _state(v: int, line: Options, first: Options, swapped: bool) -> StateOptions:
     factor = 100 if first.ewt >= 0 else 1000
     code, weight = divmod(abs(line.ewt), factor)
-    iax = abs(line.iax)
+    iax, spins = abs(line.iax), doubled_spins(line.spind)
     if iax not in (0, 1, 2, 3, *_FOLDS):
+        raise ValueError(f"IAX = {line.iax} of state {v}: expected an axis or fold of weights, 1 to 11")
+    if code and spins:
+        raise ValueError(f"EWT = {line.ewt} of state {v}: l-doubled states with spins are read but not computed yet")
+    if line.iax < 0 and iax in _FOLDS and _FOLDS[iax].n > 2:
         raise ValueError(
-            f"IAX = {line.iax} of state {v}: weights other than by IAX 1, 2, 3, 6 or 9 are read but not computed yet"
-        )
-    if code:
-        raise ValueError(f"EWT = {line.ewt} of state {v}: l-doubled states are read but not computed yet")
-    spins = doubled_spins(line.spind)
-    if line.iax < 0 and iax in _FOLDS:
-        raise ValueError(
-            f"IAX = {line.iax} of state {v}: a total spin of {_FOLDS[iax]} equivalent nuclei is read but not computed yet"
+            f"IAX = {line.iax} of state {v}: a total spin of {_FOLDS[iax].n} equivalent nuclei is read but not computed yet"
         )
     if line.iax < 0 and len(spins) > 1 and spins[-1] != spins[-2]:
         raise ValueError(
@@ -108,7 +129,16 @@ def _state(v: int, line: Options, first: Options, swapped: bool) -> StateOptions
     kmax = line.knmax if 0 <= line.knmax <= 359 else 359
     plus, minus = (line.wtmn, line.wtpl) if swapped else (line.wtpl, line.wtmn)
     return StateOptions(
-        v, spins, line.knmin, max(kmax, line.knmin), iax, plus, minus, weight, code, line.iax < 0 and len(spins) > 1
+        v,
+        spins,
+        line.knmin,
+        max(kmax, line.knmin),
+        iax,
+        plus,
+        minus,
+        weight,
+        code % 10,
+        line.iax < 0 and len(spins) > 1,
     )
 
 

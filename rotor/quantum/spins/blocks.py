@@ -109,20 +109,21 @@ def plan_of(top: Top, effects: tuple[QuantumEffect, ...], nmin: int, nmax: int, 
     blocks, representation = solved_rotor(top, effects, terms, nmin, nmax, executor)
     channels = channels_of(terms, scheme)
     operators = {}
-    for i, k in _near(blocks):
+    reach = 0 if "n" in scheme.kept else 2
+    for i, k in _near(blocks, reach):
         if found := operators_between(blocks[i], blocks[k], channels, representation):
             operators[i, k] = found
     families = _families(len(blocks), operators, 2 if scheme.paired else 1)
     return Plan(Shared(scheme, representation), blocks, operators, families)
 
 
-def _near(blocks: list[RotorBlock]) -> Iterator[tuple[int, int]]:
-    """Pairs (i, k), i ≥ k, whose N differ by 2 at most."""
+def _near(blocks: list[RotorBlock], reach: int) -> Iterator[tuple[int, int]]:
+    """Pairs (i, k), i ≥ k, whose N differ by `reach` at most."""
     by_n: dict[int, list[int]] = {}
     for i, block in enumerate(blocks):
         by_n.setdefault(block.n, []).append(i)
     for i, block in enumerate(blocks):
-        yield from ((i, k) for n in range(block.n - 2, block.n + 1) for k in by_n.get(n, ()) if k <= i)
+        yield from ((i, k) for n in range(block.n - reach, block.n + 1) for k in by_n.get(n, ()) if k <= i)
 
 
 def operators_between(
@@ -214,6 +215,8 @@ def product(left: Floats, right: Floats) -> Floats:
 def coefficients_of(scheme: Scheme, channel: Channel, every: Ints) -> Floats:
     """c(p', p) of a channel between all patterns of an F, with its powers of N·S."""
     found = _of_exchange(scheme, channel, every) if scheme.paired else _one_by_one(scheme, channel, every)
+    for column in scheme.kept_columns:
+        found = np.where(every[:, None, column] == every[None, :, column], found, 0.0)
     if not channel.ns:
         return found
     n = every[:, 0] / 2.0

@@ -216,17 +216,25 @@ class SpinTerm:
 
 
 def summed(weighted: Iterable[tuple[float, Rotor]]) -> list[tuple[float, Rotor]]:
-    """Operators times numbers, those of one form that differ in their components alone added to one; what adds up to 0 left out."""
-    scalars: dict[Scalar, float] = {}
-    sums: dict[tuple[type, int], Floats] = {}
+    """Operators times numbers, those of one form that differ in their components alone added to one.
+
+    What adds up to 0 within the round-off of the sum is left out: it would connect what symmetry keeps apart.
+    """
+    sums: dict[object, list[Floats]] = {}
     for value, rotor in weighted:
-        if isinstance(rotor, Scalar):
-            scalars[rotor] = scalars.get(rotor, 0.0) + value
-        else:
-            key = (type(rotor), rotor.rank)
-            sums[key] = sums.get(key, 0.0) + value * np.array(rotor.components)
-    out: list[tuple[float, Rotor]] = [(value, rotor) for rotor, value in scalars.items() if value]
-    return out + [(1.0, form(_nested(total))) for (form, _), total in sums.items() if total.any()]
+        key: object = rotor if isinstance(rotor, Scalar) else (type(rotor), rotor.rank)
+        components = np.array(1.0 if isinstance(rotor, Scalar) else rotor.components)
+        sums.setdefault(key, []).append(value * components)
+    out: list[tuple[float, Rotor]] = []
+    for key, parts in sums.items():
+        total = np.sum(parts, axis=0)
+        total = np.where(np.abs(total) > _CANCELS * np.abs(parts).sum(axis=0), total, 0.0)
+        if total.any():
+            out.append((float(total), key) if isinstance(key, Scalar) else (1.0, key[0](_nested(total))))  # type: ignore[index]
+    return out
+
+
+_CANCELS = 1e-14  # of the terms of a sum of a few numbers
 
 
 def _nested(array: Floats) -> tuple:  # type: ignore[type-arg]

@@ -39,10 +39,12 @@ class Spin:
 class Scheme:
     """Which spins are coupled, and what the angular momenta on the way to F are called.
 
-    paired: whether the last two are coupled to a total spin first.
+    paired: whether the last two are coupled to a total spin first. kept: names of sums between whose values all elements are left
+    out, as in perturbation theory.
     """
 
     spins: tuple[Spin, ...]
+    kept: frozenset[str] = frozenset()
     twice: tuple[int, ...] = field(init=False)
     paired: bool = field(init=False, default=False)
 
@@ -95,6 +97,11 @@ class Scheme:
         halves = [bool(total % 2) for total in accumulate(self.twice)]
         return tuple([*halves[:-2], False, halves[-1]] if self.paired else halves)
 
+    @property
+    def kept_columns(self) -> list[int]:
+        """Columns of the patterns that are kept."""
+        return [column for column, name in enumerate(("n", *self.names)) if name in self.kept]
+
     def place(self, name: str) -> int:
         """The place of a spin by its name."""
         for place, spin in enumerate(self.spins):
@@ -109,4 +116,5 @@ def scheme_of(top: Top, effects: Sequence[QuantumEffect]) -> Scheme:
     for spin in (spin for effect in effects for spin in effect.spins(top)):
         if found.setdefault(spin.name, spin) != spin:
             raise ValueError(f"spin {spin.name}: given as {found[spin.name].twice}/2 and as {spin.twice}/2")
-    return Scheme(tuple(sorted(found.values(), key=lambda spin: not spin.electron)))
+    kept = frozenset(name for effect in effects for name in effect.kept(top))
+    return Scheme(tuple(sorted(found.values(), key=lambda spin: not spin.electron)), kept)
