@@ -82,7 +82,7 @@ class Outputs:
     json: str | None = json_option()
 
 
-@grouped(given=("dipole", "calculator", "hessian", "spin_constants", "spins"))
+@grouped(given=("dipole", "calculator", "hessian", "spin_constants", "spins", "state_constants"))
 def command(context: typer.Context, given: Input, pulses: Pulses, options: Options, outputs: Outputs) -> None:
     """Molecules aligned or oriented by pulses of light: cosines against time of a rotational wave packet."""
     from rotor.alignment.request import AlignRequest, answer_align

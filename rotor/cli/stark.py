@@ -72,7 +72,7 @@ class Outputs:
     json: str | None = json_option()
 
 
-@grouped(given=("spin_weights", "calculator", "hessian", "spin_constants", "spins"))
+@grouped(given=("spin_weights", "calculator", "hessian", "spin_constants", "spins", "state_constants"))
 def command(context: typer.Context, given: Input, options: Options, outputs: Outputs) -> None:
     """Levels in a static electric field: energies, labels, effective dipoles and cosines of every M."""
     from rotor.quantum.stark_request import StarkRequest, answer_stark

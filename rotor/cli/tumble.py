@@ -41,7 +41,9 @@ class Outputs:
     json: str | None = json_option()
 
 
-@grouped(given=("dipole", "dipole_abc", "spin_weights", "calculator", "hessian", "symmetry_tolerance"))
+@grouped(
+    given=("dipole", "dipole_abc", "spin_weights", "state_constants", "calculator", "hessian", "symmetry_tolerance")
+)
 def command(context: typer.Context, given: Input, options: Options, outputs: Outputs) -> None:
     """Free rotation: the exact motion, what it conserves, which axes are stable."""
     files = Files.of(outputs)

@@ -239,7 +239,7 @@ def _make_piece(plan: _Plan, first: int, last: int) -> None:
     levels = solve_levels(plan.top, top_j, jmin=first, effects=plan.effects)
     rotational = levels.rotational
     cut = intensity_cut(levels, plan.temperature_k, plan.partition.q, plan.min_lgint, plan.ground_mhz)
-    dipoles = dipoles_by_state(plan.top, plan.dipole_abc, plan.effects)
+    dipoles = dipoles_by_state(plan.top, plan.dipole_abc, levels.effects)
     found = all_transitions(levels, dipoles, plan.range_mhz, cut)
     own = np.minimum(rotational[found.upper], rotational[found.lower]) <= last
     trusted = are_trusted(plan.top, levels)

@@ -16,14 +16,14 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum.basis import WangBlock, limited, names_of, wang_blocks
-from rotor.quantum.coupled import coupled_levels, model_of
+from rotor.quantum.coupled import Model, coupled_levels, model_of
 from rotor.quantum.effect import QuantumEffect, k_limits_of
 from rotor.quantum.effects.watson import SEMI_RIGID, JMatrix, block_bands, scalar_energy
 from rotor.quantum.levels import Levels, SolvedBlock, weights_of_levels
@@ -96,7 +96,7 @@ def solve_levels(
     """
     if jmax < 0 or jmin < 0 or jmin > jmax:
         raise ValueError(f"J from {jmin} to {jmax}: J max must be 0 or more and not below J min")
-    effects = tuple(effects)
+    top, effects = _with_states(top, effects)
     for effect in effects:
         if effect.resolves_m:
             raise ValueError(
@@ -107,9 +107,25 @@ def solve_levels(
 
         return spin_levels(top, effects, jmin, jmax, executor)
     found = solve_rotation(top, effects, jmin, jmax, vectors, executor)
-    if top.level_table is None or effects != SEMI_RIGID:
+    if top.level_table is None or not _is_own(top, effects):
         return found
     return with_tabulated_energies(found, top.level_table)
+
+
+def _with_states(top: Top, effects: Sequence[QuantumEffect]) -> tuple[Top, tuple[QuantumEffect, ...]]:
+    if top.states is None:
+        return top, tuple(effects)
+    from rotor.quantum.effects.of_top import with_states
+
+    return with_states(top, effects)
+
+
+def _is_own(top: Top, effects: tuple[QuantumEffect, ...]) -> bool:
+    if top.states is None:
+        return effects == SEMI_RIGID
+    from rotor.quantum.effects.of_top import has_own_hamiltonian
+
+    return has_own_hamiltonian(top, effects)
 
 
 def with_tabulated_energies(levels: Levels, table: LevelTable) -> Levels:
@@ -140,6 +156,8 @@ def solve_rotation(
     if top.kind != "linear":
         representation = representation_of(top)
         model = model_of(top, effects, operators, representation)
+        if _axial_states(top, model) and not in_blocks:
+            return _symmetric_states(top, effects, model, jmin, jmax)
         if len(model.states) > 1 or model.couplings:
             return coupled_levels(top, effects, model, jmin, jmax, executor)
         if top.kind == "asymmetric" or in_blocks or limits or not _closed_form_holds(top.kind, operators):
@@ -240,6 +258,38 @@ def _symmetric(top: Top, effects: tuple[QuantumEffect, ...], operators: Operator
     weight = top.spin_weights.of_symmetric(j, k, oblate=top.kind == "oblate")
     components = np.where(k == 0, 1, 2)
     return Levels(top.kind, None, jmax, energy, {"j": j, "k": k}, 2 * j + 1, components, weight, effects=effects)
+
+
+def _axial_states(top: Top, model: Model) -> bool:
+    """Whether several states of a symmetric top have closed forms: nothing couples them, and K is good in each."""
+    alone = len(model.states) > 1 and not model.couplings and not model.limits
+    return top.kind in ("prolate", "oblate") and alone and all(n == 0 for o in model.states.values() for _, _, n in o)
+
+
+def _symmetric_states(top: Top, effects: tuple[QuantumEffect, ...], model: Model, jmin: int, jmax: int) -> Levels:
+    """The closed forms of every state, each with its own weights, by J, state and K."""
+    weights = {state.v: state.spin_weights for effect in effects for state in effect.states(top)}
+    numbers = sorted(model.states)
+
+    def weighted(v: int) -> Top:
+        return replace(top, spin_weights=weights.get(v) or top.spin_weights, symmetry_checked=False)
+
+    own = [_symmetric(weighted(v), effects, model.states[v], jmin, jmax) for v in numbers]
+    quanta = {"v": np.repeat(numbers, len(own[0]))}
+    quanta |= {name: np.concatenate([one.quanta[name] for one in own]) for name in ("j", "k")}
+    order = np.lexsort((quanta["k"], quanta["v"], quanta["j"]))
+
+    def joined(name: str) -> NDArray[Any]:
+        return np.concatenate([getattr(one, name) for one in own])[order]
+
+    return replace(
+        own[0],
+        energy_mhz=joined("energy_mhz"),
+        quanta={name: column[order] for name, column in quanta.items()},
+        multiplicity=joined("multiplicity"),
+        components=joined("components"),
+        weight=joined("weight"),
+    )
 
 
 def _in_wang_blocks(
