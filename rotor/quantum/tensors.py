@@ -146,6 +146,27 @@ class BodyTensor:
             return None
         return self._halves[real] if abs(up.j - low.j) <= self.rank <= up.j + low.j else None
 
+    def signed_parts(self, up: WangBlock, low: WangBlock) -> tuple[list[int], list[float]]:
+        """The q that act from `low` to `up`, and the part of each T_q, q = -K ... K, with the sign of the phases of both blocks."""
+        key = (up.first_k, up.sign, up.j % 4, low.first_k, low.sign, low.j % 4)
+        if key not in self._signed:
+            self._signed[key] = self._with_sign(up, low)
+        return self._signed[key]
+
+    @cached_property
+    def _signed(self) -> dict[tuple[int, ...], tuple[list[int], list[float]]]:
+        """What `signed_parts` has found: it depends on J modulo 4 only, and a line list asks for thousands of pairs of blocks."""
+        return {}
+
+    def _with_sign(self, up: WangBlock, low: WangBlock) -> tuple[list[int], list[float]]:
+        real, odd = self.is_real_between(up, low), (up.first_k + low.first_k) % 2
+        if (odd, real) not in self._acting:
+            return [], []
+        sign = -1.0 if (phase_exponent(low) - phase_exponent(up) + (not real) - self.rank % 2) % 4 else 1.0
+        parts = [sign * part for part in self._halves[real]]
+        steps = range(-self.rank + (self.rank + odd) % 2, self.rank + 1, 2)
+        return [q for q in steps if parts[self.rank + q] or self.rank > 1], parts
+
 
 def body_tensor(cartesian: ArrayLike, rank: int, representation: str) -> BodyTensor:
     """The part of one rank of a vector (3,) or a matrix (3, 3) along a, b, c, ready to act in a representation.
@@ -280,23 +301,17 @@ def bands_between(up: WangBlock, low: WangBlock, tensor: BodyTensor) -> list[Ban
     ⟨K'‖T‖K⟩ that acts between the blocks. The second term is the first again where K or K' is 0, and else needs
     K + K' ≤ rank.
     """
-    parts = tensor.between(up, low)
-    if parts is None:
+    if not abs(up.j - low.j) <= tensor.rank <= up.j + low.j:
         return []
-    rank = tensor.rank
-    exponent = phase_exponent(low) - phase_exponent(up) + (not tensor.is_real_between(up, low))
-    sign = -1.0 if (exponent - rank % 2) % 4 else 1.0
-
+    rank, (steps, parts) = tensor.rank, tensor.signed_parts(up, low)
     out = []
-    for step in range(-rank + (rank + up.first_k + low.first_k) % 2, rank + 1, 2):
+    for step in steps:
         source, target = _overlap(up, low, step)
-        folded = _folded(up, low, rank, step, parts) if rank > 1 else ()
-        if source.start >= source.stop or not (parts[rank + step] or folded):
+        if source.start >= source.stop:
             continue
-        factors = _wang_coupling(low.j, up.j, rank, step)[low.first_k :: 2]
-        elements = factors[source] * (sign * parts[rank + step])
-        for place, value in folded:
-            elements[place - source.start] += sign * value
+        elements = _wang_coupling(low.j, up.j, rank, step)[low.first_k :: 2][source] * parts[rank + step]
+        for place, value in _folded(up, low, rank, step, parts) if rank > 1 else ():
+            elements[place - source.start] += value
         out.append(Band(source, target, elements))
     return out
 
