@@ -93,7 +93,7 @@ def estimated_quadrupole(molecule: Molecule) -> NuclearQuadrupole | None:
     if not moments:
         return None
     from rotor.quantum.effects.hyperfine import NuclearQuadrupole
-    from rotor.quantum.spins import Spin
+    from rotor.quantum.spins.terms import Spin
 
     values = {
         f"chi_aa({label})": GRADIENT_MHZ_PER_BARN * (one.quadrupole_barn or 0.0) for label, one in moments.items()

@@ -25,7 +25,7 @@ Line strengths: Σ_{M' M p} |⟨J'τ'M'|T^K_p|J τ M⟩|² is the square of the 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, NamedTuple
@@ -39,7 +39,7 @@ from rotor.quantum.wigner import three_j
 from rotor.tops.operators import axes_of as axes_of
 
 if TYPE_CHECKING:
-    from rotor.quantum.levels import SolvedBlock
+    pass
 
 Complexes = NDArray[np.complex128]
 
@@ -362,28 +362,19 @@ def acting_on(vectors: Floats, up: WangBlock, low: WangBlock, tensor: BodyTensor
     return moved.T
 
 
-# Between solved states
+# One for each pair of states
+
+Tensors = Mapping[tuple[int, int], BodyTensor]
 
 
-def amplitudes(up: SolvedBlock, low: SolvedBlock, tensor: BodyTensor) -> Floats:
-    """Real reduced elements between all states of two blocks, (n_up, n_low); their squares are the line strengths.
-
-    An odd rank stands for i times them, in the phases of |J K s)).
-    """
-    return np.asarray(up.vectors.T @ acting_on(low.vectors, up.basis, low.basis, tensor))
+def tensor_between(tensors: Tensors, up: int, low: int) -> BodyTensor | None:
+    """The tensor that acts between two states, None where there is none."""
+    return tensors.get((up, low)) or tensors.get((low, up))
 
 
-def connected_pairs(blocks: Iterable[SolvedBlock], tensor: BodyTensor) -> Iterator[tuple[SolvedBlock, SolvedBlock]]:
-    """Every pair (up, low) that a tensor connects, each once, the higher or equal J first, J rising.
-
-    A block with itself is among them where a tensor has diagonal elements, as those of even rank do.
-    """
-    by_j: dict[int, list[SolvedBlock]] = {}
-    for block in blocks:
-        by_j.setdefault(block.basis.j, []).append(block)
-    for j, lows in by_j.items():
-        above = [block for rise in range(1, tensor.rank + 1) for block in by_j.get(j + rise, [])]
-        for i, low in enumerate(lows):
-            for up in lows[i:] + above:
-                if tensor.between(up.basis, low.basis) is not None:
-                    yield up, low
+def rank_of(tensors: Tensors) -> int:
+    """The rank of the tensors; ValueError where they differ."""
+    ranks = {tensor.rank for tensor in tensors.values()}
+    if len(ranks) != 1:
+        raise ValueError(f"tensors of ranks {sorted(ranks)}: one rank at a time")
+    return ranks.pop()
