@@ -82,7 +82,7 @@ def deflection_table(states: FieldMap) -> DeflectionTable:
     curves = states.curves()
     first = [rows.start for rows in curves]
     names = _unique([f"{states.label[at]} M{states.m[at]}" for at in first])
-    dipoles = np.array([states.slope[rows] for rows in curves])
+    dipoles = np.array([states.slope[rows] for rows in curves]) + 0.0  # no -0.0
     return DeflectionTable(fields, names, dipoles, states.copies[first], states.weight[first], states.free_mhz[first])
 
 

@@ -9,6 +9,7 @@ for (M, M') and (-M, -M'), so that only M, M' ≥ 0 are looked at.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
@@ -63,7 +64,7 @@ def dipole_elements(up: FieldBlock, low: FieldBlock, dipole_abc: Sequence[float]
 
 def _in_space(j_up: int, j_low: int, q: int, m: int) -> float:
     """(-1)^(J'-M') (J' 1 J; -M' q M)."""
-    return float(coupling(j_low, j_up, 1, q, m)) / np.sqrt((2.0 * j_up + 1) * (2 * j_low + 1))
+    return float(coupling(j_low, j_up, 1, q, m)) / math.sqrt((2 * j_up + 1) * (2 * j_low + 1))
 
 
 def _of_axial(up: AxialBlock, low: AxialBlock, dipole: float) -> Floats:

@@ -115,7 +115,8 @@ class FieldLines(Table):
         """Some of the rows; whole pairs of states where `pairs` is to be used."""
         from dataclasses import replace
 
-        return replace(self, **{name: column[chosen] for name, column in self.columns.items()})
+        cut: dict[str, Any] = {name: column[chosen] for name, column in self.columns.items()}
+        return replace(self, **cut)
 
 
 def field_lines(
