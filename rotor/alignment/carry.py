@@ -36,7 +36,7 @@ class Problem:
     windows: tuple[Window, ...]
     times: Floats
     ensemble: Ensemble
-    wanted: tuple[Observable, ...]
+    observables: tuple[Observable, ...]
     tolerance: float
     contractions: tuple[tuple[Contraction, ...], ...]
 
@@ -204,7 +204,7 @@ def task_of(problem: Problem, block: FieldBlock, plan: Plan, before: bool) -> Ta
     return Task(
         energies=RAD_PER_PS_MHZ * block.energies_mhz,
         operators=operators,
-        cosines=tuple(one.matrix(block) for one in problem.wanted),
+        cosines=tuple(one.matrix(block) for one in problem.observables),
         rows=block.rows,
         columns=columns,
         weights=population[columns],

@@ -155,7 +155,12 @@ class FieldBlock(ABC):
 
     @abstractmethod
     def matrix(self, contraction: Contraction) -> NDArray[Any]:
-        """The contraction over the states (n, n), Hermitian."""
+        """The contraction over the states (n, n), Hermitian; large ones of mixed M are sparse."""
+
+    def dense(self, contraction: Contraction) -> NDArray[Any]:
+        """The same, never sparse."""
+        found: Any = self.matrix(contraction)
+        return np.asarray(found if isinstance(found, np.ndarray) else found.toarray())
 
 
 @dataclass(frozen=True)
