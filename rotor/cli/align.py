@@ -176,9 +176,10 @@ def _writers(answer: AlignAnswer, content: dict[str, Any]) -> dict[str, Writer]:
 
     def draw(path: Path) -> None:
         from rotor.plots.alignment import plot_alignment
+        from rotor.plots.picture import name_of_top
 
         trace = answer.trace
-        title = ", ".join(filter(None, (trace.top.name, _ensemble_text(trace))))
+        title = ", ".join(filter(None, (name_of_top(trace.top), _ensemble_text(trace))))
         plot_alignment(
             trace, path, classical=answer.classical, title=title, provenance={"command": provenance["command"]}
         )

@@ -21,7 +21,6 @@ from rotor.cli.shared.output import Files, Table, Writer, deliver, json_text, ro
 if TYPE_CHECKING:
     from rotor.classical.gas.ensembles import Correlations
     from rotor.thermo.classical_gas import GasAnswer, GasRequest
-    from rotor.tops.top import Top
 
 SHOWN = 11  # rows of the correlation functions in the report
 
@@ -142,19 +141,14 @@ def _writers(answer: GasAnswer, content: dict[str, Any]) -> dict[str, Writer]:
 
     def draw(path: Path) -> None:
         from rotor.plots.gas import plot_gas
+        from rotor.plots.picture import name_of_top
 
-        title = f"{_name(answer.request.top)}, {content['temperature_k']:g} K, {content['molecules']:,} molecules"
+        title = f"{name_of_top(answer.request.top)}, {content['temperature_k']:g} K, {content['molecules']:,} molecules"
         plot_gas(
             answer.test, answer.correlations, path, title=title, plateau=content["c1_plateau"], provenance=provenance
         )
 
     return {"--csv": table, "--parquet": table, "--plot": draw}
-
-
-def _name(top: Top) -> str:
-    from rotor.tops.facts import formula_of
-
-    return top.name or formula_of(top) or f"{top.kind} top"
 
 
 def _show(answer: GasAnswer, content: dict[str, Any]) -> None:

@@ -149,9 +149,10 @@ def _writers(top: Top, states: FieldMap, content: dict[str, Any]) -> dict[str, W
         rotor.write(states, path, settings=provenance)
 
     def draw(path: Path) -> None:
+        from rotor.plots.picture import name_of_top
         from rotor.plots.stark import plot_stark
 
-        plot_stark(states, path, title=top.name or "in a static field", provenance={"command": provenance["command"]})
+        plot_stark(states, path, title=name_of_top(top), provenance={"command": provenance["command"]})
 
     return {"--csv": table, "--parquet": table, "--plot": draw}
 

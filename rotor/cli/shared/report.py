@@ -44,7 +44,10 @@ def model_facts(content: Mapping[str, Any]) -> list[tuple[str, str]]:
 
 def heading(top: Top) -> str:
     """Name, formula and kind in one line."""
-    names = ", ".join(dict.fromkeys(filter(None, (top.name, formula_of(top))))) or "constants"
+    from rotor.formats.library import written_formula
+
+    formula = written_formula(top.name, formula_of(top) or "")
+    names = ", ".join(dict.fromkeys(filter(None, (top.name, formula)))) or "constants"
     kappa = f" (κ = {top.kappa:.4f})" if top.kind == "asymmetric" and top.kappa is not None else ""
     return f"{names}: {KINDS[top.kind]}{kappa}"
 
