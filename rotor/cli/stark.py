@@ -21,6 +21,7 @@ from rotor.cli.shared.output import (
     show_facts,
     show_table,
 )
+from rotor.cli.shared.sources import with_sources
 
 if TYPE_CHECKING:
     from rotor.quantum.field_map import FieldMap
@@ -88,7 +89,12 @@ def command(context: typer.Context, given: Input, options: Options, outputs: Out
     content = _content(answer, given, context.obj)
     content["files"] = files.names
     text = lambda: json_with_rows(answer.states, "states", content)  # noqa: E731
-    deliver(files, _writers(top, answer.states, content), text, lambda: _show(top, answer.states, content))
+    deliver(
+        files,
+        _writers(top, answer.states, content),
+        text,
+        with_sources(lambda: _show(top, answer.states, content), top, ("constants", "dipole"), given.sources),
+    )
 
 
 def _settings(options: Options) -> dict[str, Any]:
@@ -186,8 +192,8 @@ def _facts(top: Top, content: dict[str, Any]) -> list[tuple[str, str]]:
 
     first, last, count = content["field_kv_per_cm"]
     facts = [
-        ("constants", report.with_source(report.constants_text(top), top.source)),
-        ("dipole", report.with_source(report.vector_text(top.dipole_abc_debye), top.dipole_source)),
+        ("constants", report.constants_text(top)),
+        ("dipole", report.vector_text(top.dipole_abc_debye)),
         ("field", f"{first:g} to {last:g} kV/cm along Z, {count} values"),
     ]
     if content["intensity_w_per_cm2"]:

@@ -90,11 +90,6 @@ def weights_text(mapping: Mapping[str, int]) -> str:
     return ", ".join(f"{name} {weight}" for name, weight in mapping.items()) or "not given: 1 for every level"
 
 
-def with_source(text: str, source: str | None) -> str:
-    """A fact and where it is from."""
-    return f"{text}; {source}" if source else text
-
-
 def q_text(record: Mapping[str, Any]) -> str:
     """Q and what is known about it."""
     return f"{record['q']:.6g}, {record['source']}; classical limit {record['classical']:.6g}"
