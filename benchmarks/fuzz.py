@@ -250,7 +250,7 @@ def _filled(kind: str, folder: Path, files: dict[str, bytes], rng: random.Random
 
 
 def _changed_words(words: list[str], rng: random.Random) -> list[str]:
-    words = list(words)
+    words = list(words) or ["info"]
     at = rng.randrange(1, len(words)) if len(words) > 1 else 0
     change = rng.randrange(6)
     if change <= 1:

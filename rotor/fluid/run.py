@@ -115,7 +115,7 @@ def run_fluid(
     run = _Run(dynamics, settings, outputs)
     if resume:
         assert outputs.checkpoint is not None
-        run.restore(read_checkpoint(outputs.checkpoint))
+        run.restore_from(outputs.checkpoint)
     dynamics.wrench()  # a state that cannot begin is refused before any file is opened
     with run.files(), progress_bar(settings.steps, progress) as shown:
         on_start()

@@ -64,15 +64,16 @@ def naming(path: str | os.PathLike[str]) -> Iterator[None]:
     """Inside, an OSError of writing names this path, not the unfinished file; a library's own error of a full disk is one too."""
     try:
         yield
-    except OSError as error:
-        if error.errno is None:
-            raise
-        raise OSError(error.errno, os.strerror(error.errno), os.fspath(path)) from error
     except Exception as error:
-        code = next((code for code in FULL if os.strerror(code) in str(error)), None)
+        code = error.errno if isinstance(error, OSError) and error.errno else _code_of_full_disk(str(error))
         if code is None:
             raise
         raise OSError(code, os.strerror(code), os.fspath(path)) from error
+
+
+def _code_of_full_disk(text: str) -> int | None:
+    """The number of the system's error that a library's own text names."""
+    return next((code for code in FULL if os.strerror(code) in text or f'"errno":"{code}"' in text), None)
 
 
 def resolved(path: str | os.PathLike[str]) -> Path:
