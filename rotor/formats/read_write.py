@@ -180,7 +180,7 @@ def _top_as_written(file: MoleculeFile) -> Top:
     geometry = Top.from_molecule(file.molecule) if file.molecule is not None else None
     if file.constants is None:
         assert geometry is not None  # the reader refuses a file with neither
-        return replace(geometry, name=file.name)
+        return replace(geometry, name=file.name, spin_constants=file.spin_constants)
     return replace(
         geometry or Top.from_constants(file.constants),
         constants=file.constants,
@@ -195,6 +195,7 @@ def _top_as_written(file: MoleculeFile) -> Top:
         independent_errors=len(file.constants.uncertainties) < 2,
         level_table=file.levels,
         covariance=file.covariance,
+        spin_constants=replace(file.spin_constants, source=file.cited("spins")) if file.spin_constants else None,
     )
 
 
