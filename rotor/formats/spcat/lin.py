@@ -132,8 +132,9 @@ def read_lin(source: str | os.PathLike[str] | bytes, per_state: int = 0) -> Line
         if not per_state:
             count = _leading(fields[missing])
             raise listed[missing].error(
-                3 * count, f"{count} quantum numbers; expected as many for the upper state as for the lower, "
-                "or other lines, or the constants of a fit, that show how many are missing"
+                3 * count,
+                f"{count} quantum numbers; expected as many for the upper state as for the lower, "
+                "or other lines, or the constants of a fit, that show how many are missing",
             )
     measured = [read_measured(line) for line in listed]
     quanta = np.full((len(measured), QUANTA_FIELDS), BLANK, dtype=np.int16)
@@ -144,7 +145,14 @@ def read_lin(source: str | os.PathLike[str] | bytes, per_state: int = 0) -> Line
     rest = "".join(line.text for line in lines[end if texts else 0 :])
     without_error = frozenset(i for i, line in enumerate(listed) if len(read_words(_plain(line), _WIDTH, 3)[0]) < 2)
     return LineList(
-        quanta, columns[:, 0], columns[:, 1], columns[:, 2], texts, rest, 0 if missing is None else per_state, without_error
+        quanta,
+        columns[:, 0],
+        columns[:, 1],
+        columns[:, 2],
+        texts,
+        rest,
+        0 if missing is None else per_state,
+        without_error,
     )
 
 
