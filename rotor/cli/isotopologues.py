@@ -46,8 +46,10 @@ class Options:
 
 
 @grouped(
-    given=("constants", "isotope", "spin_weights", "state_constants", "calculator", "hessian", "symmetry_tolerance")
-)
+    given=(
+        "sources", "constants", "isotope", "spin_weights", "state_constants", "calculator", "hessian", "symmetry_tolerance",
+    )
+)  # fmt: skip
 def command(context: typer.Context, given: Input, options: Options) -> None:
     """Isotopologues: abundance, constants, kind, axes, dipole and spin weights of each."""
     files = Files.of(options)

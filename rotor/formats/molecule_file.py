@@ -52,6 +52,12 @@
     weights = { 0 = { 0even = 0, 0odd = 4, 1 = 1, 2 = 1 }, 1 = { 0even = 4, 0odd = 0, 1 = 1, 2 = 1 } }
     dipoles = { 0 = [0, 0, 0], 1 = [0, 0, 0], "0,1" = [0, 0, 1.47] }  # (μa, μb, μc) in D; else that of [dipole] in each
 
+    [spins]                             # constants of nuclear and electron spins, see rotor.formats.spin_table
+    source = "..."
+
+    [spins.14N]
+    chi_aa = { value = -4.22324, uncertainty = 0.00108 }
+
     [levels]                            # energies that count instead of those of the constants where the table has them:
     file = "../levels/H2O.csv"          # columns j, ka, kc, energy_mhz, error_mhz
     source = "..."
@@ -76,7 +82,6 @@ number whose source was not read has `unverified = true` beside it, or in its ta
 from __future__ import annotations
 
 import os
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -99,10 +104,13 @@ from rotor.formats.molecule_tables import (
     unverified_in,
     with_polarizability,
 )
+from rotor.formats.spin_table import spins_of_table
+from rotor.formats.toml import parse_toml
 from rotor.molecules.molecule import Molecule
 from rotor.tops.constants import Constants
 from rotor.tops.covariance import Covariance
 from rotor.tops.level_table import LevelTable
+from rotor.tops.spin_constants import SpinConstants
 from rotor.tops.spin_weights import SpinWeights
 from rotor.tops.state_constants import StateConstants
 from rotor.tops.top import Tensor
@@ -118,6 +126,7 @@ _TABLES = (
     "polarizability",
     "spin_weights",
     "states",
+    "spins",
     "levels",
     "catalogue",
     "serves",
@@ -143,6 +152,7 @@ class MoleculeFile:
     unverified : tables, or entries such as "constants.DK", whose numbers were not read in a source
     covariance : of the constants, where the file has their correlations
     states : further states of the top
+    spin_constants : of nuclear and electron spins
     """
 
     name: str
@@ -161,6 +171,7 @@ class MoleculeFile:
     serves: Served | None = None
     unverified: frozenset[str] = frozenset()
     states: StateConstants | None = None
+    spin_constants: SpinConstants | None = None
 
     def cited(self, table: str) -> str:
         """The source of a table, with what in it is unverified said first."""
@@ -192,11 +203,7 @@ def parse_molecule_file(
     >>> parse_molecule_file("constants = { B = 57635.96804, D = 0.1835 }").constants.text()
     'B=57635.96804 D=0.1835 MHz'
     """
-    try:
-        content = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise ValueError(f"{where}: not a TOML file: {error}") from None
-
+    content = parse_toml(text, where)
     refuse_unknown_keys(content, ("name", "names", *_TABLES), where)
     tables = {name: TableReader(where, name, content[name]) for name in _TABLES if name in content}
     if not {"geometry", "constants"} & tables.keys():
@@ -224,4 +231,5 @@ def parse_molecule_file(
         unverified=frozenset().union(*(unverified_in(name, table) for name, table in tables.items())),
         covariance=covariance_of(tables.get("covariance"), constants),
         states=states_of(tables.get("states"), constants),
+        spin_constants=spins_of_table(tables.get("spins"), molecule),
     )
