@@ -69,6 +69,8 @@ def of_species(weights: SpinWeights, species: SpinWeights) -> SpinWeights:
     >>> of_species(state, SpinWeights("K", ("0", "1", "2"), (0, 1, 1))).values
     (0, 0, 1, 1)
     """
+    if species.rule == "none":
+        return weights
     if weights.rule != species.rule:
         raise ValueError(
             f"spin weights of a state by {weights.rule}, and of the molecule by {species.rule}: expected one rule"
