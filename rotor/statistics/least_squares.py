@@ -26,6 +26,7 @@ Progress = Callable[["Iteration"], None]
 CONVERGED, STALLED, EXHAUSTED, INTERRUPTED = "converged", "stalled", "too many iterations", "interrupted"
 FIRST_DAMPING, MOST_DAMPING = 1e-4, 1e12  # λ where D p has columns of length 1
 _FLOOR = 10.0  # times the tolerance, below which a step that does not come nearer says that round-off is reached
+_NOISE = 1e-8  # of χ², below which round-off of the residuals hides whether a step has decreased it: the linear model decides
 ROUND_OFF = 1e-13  # singular values below this part of the largest carry no information
 
 
@@ -141,7 +142,8 @@ def minimise(
             trial = _tried(evaluate, state.parameters + step)
             after = trial.rms if trial else math.inf
             gain = (state.rms**2 - after**2) * len(state.residuals) / predicted if predicted > 0 else -1.0
-            good = math.isfinite(after) and gain > 1e-4
+            small = predicted <= _NOISE * state.rms**2 * len(state.residuals) and after <= (1 + _NOISE) * state.rms
+            good = math.isfinite(after) and (gain > 1e-4 or (small and damping == 0))
             taken.append(Iteration(len(taken) + 1, state.rms, after, damping, predicted, good))
             before = linear.distance if damping == 0 else math.inf
             if good and trial:
