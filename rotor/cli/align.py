@@ -23,6 +23,7 @@ from rotor.cli.shared.output import (
     show_table,
 )
 from rotor.cli.shared.pulse_inputs import Pulses, pulses_of
+from rotor.cli.shared.sources import with_sources
 
 if TYPE_CHECKING:
     from rotor.alignment.align import AlignmentTrace
@@ -103,7 +104,14 @@ def command(context: typer.Context, given: Input, pulses: Pulses, options: Optio
     content = _content(answer, given, context.obj)
     content["files"] = files.names
     text = lambda: json_with_rows(answer.table, "trace", content)  # noqa: E731
-    deliver(files, _writers(answer, content), text, lambda: _show(answer, content))
+    deliver(
+        files,
+        _writers(answer, content),
+        text,
+        with_sources(
+            lambda: _show(answer, content), answer.trace.top, ("constants", "dipole", "polarizability"), given.sources
+        ),
+    )
 
 
 def _settings(options: Options) -> dict[str, Any]:
@@ -179,9 +187,10 @@ def _writers(answer: AlignAnswer, content: dict[str, Any]) -> dict[str, Writer]:
 
     def draw(path: Path) -> None:
         from rotor.plots.alignment import plot_alignment
+        from rotor.plots.picture import name_of_top
 
         trace = answer.trace
-        title = ", ".join(filter(None, (trace.top.name, _ensemble_text(trace))))
+        title = ", ".join(filter(None, (name_of_top(trace.top), _ensemble_text(trace))))
         plot_alignment(
             trace, path, classical=answer.classical, title=title, provenance={"command": provenance["command"]}
         )
@@ -218,11 +227,11 @@ def _facts(trace: AlignmentTrace, content: dict[str, Any]) -> list[tuple[str, st
 
     top = trace.top
     acts_on = {pulse.acts_on for pulse in trace.pulses}
-    facts = [("constants", report.with_source(report.constants_text(top), top.source))]
+    facts = [("constants", report.constants_text(top))]
     if "dipole" in acts_on:
-        facts.append(("dipole", report.with_source(report.vector_text(top.dipole_abc_debye), top.dipole_source)))
+        facts.append(("dipole", report.vector_text(top.dipole_abc_debye)))
     if "polarizability" in acts_on:
-        facts.append(("polarizability", report.with_source(report.tensor_text(top), top.polarizability_source)))
+        facts.append(("polarizability", report.tensor_text(top)))
     accuracy = (
         f"{content['error_estimate']:.1e} estimated: steps {trace.step_error:.1e}, leakage {trace.edge_population:.1e}, "
         f"left out {trace.ensemble.left_out:.1e} of the population"

@@ -21,6 +21,7 @@ from rotor.cli.shared.output import (
     show_facts,
     show_table,
 )
+from rotor.cli.shared.sources import with_sources
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -138,7 +139,8 @@ def command(context: typer.Context, given: Input, options: Options, sample: Samp
     content["files"] = files.names
     text = lambda: json_with_rows(answer.states, "states", content)  # noqa: E731
     writers = {**_writers(top, answer.states, content), **_further_writers(made, content)}
-    deliver(files, writers, text, lambda: _show(top, answer.states, content))
+    show = with_sources(lambda: _show(top, answer.states, content), top, ("constants", "dipole"), given.sources)
+    deliver(files, writers, text, show)
 
 
 def _made(request: FieldRequest, states: FieldMap, files: Files, executor: Executor | None) -> dict[str, tables.Table]:
@@ -272,9 +274,10 @@ def _writers(top: Top, states: FieldMap, content: dict[str, Any]) -> dict[str, W
         rotor.write(states, path, settings=provenance)
 
     def draw(path: Path) -> None:
+        from rotor.plots.picture import name_of_top
         from rotor.plots.stark import plot_stark
 
-        plot_stark(states, path, title=top.name or "in a static field", provenance={"command": provenance["command"]})
+        plot_stark(states, path, title=name_of_top(top), provenance={"command": provenance["command"]})
 
     return {"--csv": table, "--parquet": table, "--plot": draw}
 
@@ -318,8 +321,8 @@ def _facts(top: Top, content: dict[str, Any]) -> list[tuple[str, str]]:
 
     first, last, count = content["field_kv_per_cm"]
     facts = [
-        ("constants", report.with_source(report.constants_text(top), top.source)),
-        ("dipole", report.with_source(report.vector_text(top.dipole_abc_debye), top.dipole_source)),
+        ("constants", report.constants_text(top)),
+        ("dipole", report.vector_text(top.dipole_abc_debye)),
         ("field", f"{first:g} to {last:g} kV/cm {_along(content['field_direction'])}, {count} values"),
     ]
     if content["intensity_w_per_cm2"]:

@@ -66,7 +66,7 @@ def plot_stark(
     suffix = checked_suffix(path)
     figure = stark_figure(field_map, title, unit)
     with styled():
-        figure.savefig(path, dpi=DPI, metadata=_metadata(suffix, field_map, title, provenance or {}))
+        figure.savefig(path, dpi=DPI, metadata=_metadata(suffix, field_map, title.replace("$", ""), provenance or {}))
 
 
 def _energies(axes: Any, field_map: FieldMap) -> None:

@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Floats
 from rotor.quantum.field_blocks import AxialBlock, FieldBlock
-from rotor.quantum.tensors import BodyTensor, amplitudes, body_tensor, coupling
+from rotor.quantum.reduced import wang_amplitudes
+from rotor.quantum.tensors import BodyTensor, body_tensor, coupling
 from rotor.quantum.wang_blocks import WangBlockInField
 
 
@@ -89,6 +90,6 @@ def _of_wang(up: WangBlockInField, low: WangBlockInField, tensor: BodyTensor) ->
                 continue
             factor = _in_space(left.basis.j, right.basis.j, up.m - low.m, low.m)
             phase = 1j ** (low.colours[k] - up.colours[i] + 1)
-            elements = amplitudes(left, right, tensor)
+            elements = wang_amplitudes(left, right, tensor)
             out[rows[i] : rows[i + 1], columns[k] : columns[k + 1]] = phase * factor * elements
     return out

@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike
 
 from rotor import units
 from rotor.quantum.effect import QuantumEffect
-from rotor.quantum.field_blocks import Contraction, FieldBlock, FieldSpace, field_space
+from rotor.quantum.field_blocks import Contraction, FieldBlock, FieldSpace
 from rotor.quantum.field_map import (
     BlockProblem,
     FieldMap,
@@ -32,6 +32,7 @@ from rotor.quantum.field_map import (
     checked_tolerance_mhz,
     field_map,
 )
+from rotor.quantum.field_space import field_space
 from rotor.quantum.spin_fields import spin_field_space
 from rotor.quantum.spins import scheme_of
 
