@@ -128,6 +128,10 @@ class WangSpace(FieldSpace):
                     out.append((up, low, contraction.rank % 2))
         return out
 
+    def connected(self, contraction: Contraction) -> list[tuple[int, int]]:
+        """Pairs (up, low) of solved blocks that the body part of a contraction connects."""
+        return list(self._pairs(contraction))
+
     @cached_property
     def _cache(self) -> dict[Any, Any]:
         return {}
