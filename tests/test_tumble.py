@@ -293,7 +293,9 @@ def test_ordinary_bodies_have_the_inertia_of_their_parts(name):
         body.inertia_kg_m2, np.diag(body.moments_kg_m2), atol=1e-20
     )  # axes x, y, z are principal
     low, middle, high = sorted(body.moments_kg_m2)
-    assert 0 < low < middle < high <= (low + middle) * (1 + 1e-12)  # asymmetric, and possible; equal where flat, to round-off
+    assert (
+        0 < low < middle < high <= (low + middle) * (1 + 1e-12)
+    )  # asymmetric, and possible; equal where flat, to round-off
     assert body.axes[int(np.argsort(body.moments_kg_m2)[1])] == ("bolt" if name == "wing nut" else "across")
 
 
