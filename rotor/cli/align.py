@@ -71,6 +71,7 @@ class Options:
     jmax: int | None = option(None, metavar="N", help="Highest J of the basis; by default what the tolerance needs.")
     classical: int = option(0, metavar="N", help="Also a classical gas of so many molecules under the same pulses.")
     seed: int = option(1, metavar="N", help="Of the classical gas.")
+    workers: int = option(1, metavar="N", help="Processes over which blocks of initial states are spread.")
 
 
 @dataclass(frozen=True)
@@ -87,6 +88,7 @@ class Outputs:
 def command(context: typer.Context, given: Input, pulses: Pulses, options: Options, outputs: Outputs) -> None:
     """Molecules aligned or oriented by pulses of light: cosines against time of a rotational wave packet."""
     from rotor.alignment.request import AlignRequest, answer_align
+    from rotor.cli.shared.workers import working
 
     acting = pulses_of(pulses)
     settings = _settings(options)
@@ -94,7 +96,8 @@ def command(context: typer.Context, given: Input, pulses: Pulses, options: Optio
     top = _with_tensor(inputs.read_top(given), options, acting)
     with inputs.fields_as_options(**NAMES):
         request = AlignRequest(top, acting, **settings)
-        answer = answer_align(request)
+        with working(options.workers, "blocks") as executor:
+            answer = answer_align(request, executor)
     if request.state is not None and request.classical_molecules:
         note("the classical gas is at the temperature of --temperature, not in the level of --state")
 

@@ -97,7 +97,7 @@ def _show(top: Top, content: dict[str, Any], whole_sources: bool) -> None:
     print(report.heading(top))
     show_facts(_facts(top, content))
     others = _conformers_of(content.get("conformers", []))
-    for table in (_constants_table(top), _axes_table(content), _q_table(content), others):
+    for table in (_constants_table(top), _axes_table(content), _nuclei_table(top, content), _q_table(content), others):
         if table:
             print()
             show_table(table)
@@ -179,6 +179,21 @@ def _axes_table(content: dict[str, Any]) -> Table:
     if frame:
         rows.append(["centre of mass (Å)", "", "", *(f"{x + 0.0:.6f}" for x in frame["centre_angstrom"])])
     return Table("", columns, rows, frozenset({"axis"}))
+
+
+def _nuclei_table(top: Top, content: dict[str, Any]) -> Table | None:
+    """Nuclei that split lines, by how much, and the constants that are known."""
+    rows = []
+    for one in content["splitting_nuclei"]:
+        own = top.spin_constants.of(one["nucleus"]) if one["known"] and top.spin_constants else {}
+        constants = ", ".join(f"{name} {value:.6g}" for name, value in own.items())
+        said = constants or "not known; the size is that of a field gradient of one atomic unit"
+        about = "" if one["known"] else "about "
+        rows.append([one["nucleus"], f"{one['spin']:g}", f"{about}{one['splitting_mhz']:.3g}", said])
+    if not rows:
+        return None
+    columns = ("nucleus", "spin", "splits J = 1 by (MHz)", "constants (MHz)")
+    return Table("", columns, rows, frozenset({"nucleus", "constants (MHz)"}))
 
 
 def _reason(source: str) -> str:

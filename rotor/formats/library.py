@@ -132,7 +132,7 @@ def _names_in(path: Path) -> tuple[str, ...]:
     head, _, _ = path.read_bytes().partition(b"\n[")
     try:
         content = tomllib.loads(head.decode("utf-8-sig"))
-    except ValueError:  # no TOML, no UTF-8
+    except (ValueError, RecursionError):  # no TOML, no UTF-8
         return ()
     listed = content.get("names", [])
     found = [content.get("name"), *(listed if isinstance(listed, list) else [])]

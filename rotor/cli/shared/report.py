@@ -34,11 +34,11 @@ def describe(top: Top, text: str, command: str) -> dict[str, Any]:
 
 def model_facts(content: Mapping[str, Any]) -> list[tuple[str, str]]:
     """What the model has and what it leaves out, largest first, from the keys of `rotor.quantum.limits.limit_facts`."""
-    from rotor.quantum.limits import Limit
+    from rotor.quantum.limits import COMPUTE, Limit
 
     present = [f"{one['name']} {one['size_mhz']:.2g} MHz" for one in content["effects"] if one["present"]]
     facts = [("effects", f"at J = {content['sizes_at_j']}: " + ", ".join(present))]
-    limits = [Limit(**one).sentence for one in content["limits"]]
+    limits = [Limit(**one).sentence.replace(COMPUTE, "rotor spectrum --hyperfine") for one in content["limits"]]
     return facts + [("left out" if not i else "", sentence) for i, sentence in enumerate(limits)]
 
 
