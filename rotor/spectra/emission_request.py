@@ -150,7 +150,8 @@ def answer_emission(request: EmissionRequest) -> EmissionAnswer:
     (1, 5.532)
     """
     grid = source_grid(*request.range_mhz, request.source)
-    parts, tables, sums, notes = [], [], [], []
+    parts, tables, sums = [], [], []
+    notes: list[str] = []
     for number, (top, column) in enumerate(zip(request.tops, request.columns_per_cm2, strict=True)):
         source = replace(request.source, column_per_cm2=column)
         lines = _lines_of(top, source, request)
@@ -212,7 +213,12 @@ def _across(depth: float) -> float:
 def _joined(tables: Sequence[EmissionLines]) -> EmissionLines:
     """All lines in one table, rising in the frequency that is observed."""
     order = np.argsort(np.concatenate([table.observed_mhz for table in tables]), kind="stable")
-    names = [name for name in EmissionLines.__dataclass_fields__ if name not in ("upper", "lower")]
-    columns = {name: np.concatenate([getattr(table, name) for table in tables])[order] for name in names}
-    texts = {side: [text for table in tables for text in getattr(table, side)] for side in ("upper", "lower")}
-    return EmissionLines(**columns, **{side: tuple(all_[i] for i in order.tolist()) for side, all_ in texts.items()})
+    columns: dict[str, Any] = {}
+    for name in EmissionLines.__dataclass_fields__:
+        parts = [getattr(table, name) for table in tables]
+        if name in ("upper", "lower"):
+            texts = [text for part in parts for text in part]
+            columns[name] = tuple(texts[i] for i in order.tolist())
+        else:
+            columns[name] = np.concatenate(parts)[order]
+    return EmissionLines(**columns)
