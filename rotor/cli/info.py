@@ -14,7 +14,7 @@ from rotor.cli.shared import inputs
 from rotor.cli.shared.inputs import Input, json_option
 from rotor.cli.shared.options import grouped, option
 from rotor.cli.shared.output import Files, Table, deliver, json_text, show_facts, show_table, sum_progress
-from rotor.cli.shared.sources import with_sources
+from rotor.cli.shared.sources import source_facts
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
@@ -65,9 +65,7 @@ def command(context: typer.Context, given: Input, options: Options) -> None:
         files,
         {},
         lambda: json_text(content),
-        with_sources(
-            lambda: _show(top, content), top, ("constants", "dipole", "polarizability", "spin weights"), given.sources
-        ),
+        lambda: _show(top, content, given.sources),
     )
 
 
@@ -93,7 +91,7 @@ def conformer_table(source: str | None, count: int) -> list[dict[str, Any]]:
     return found
 
 
-def _show(top: Top, content: dict[str, Any]) -> None:
+def _show(top: Top, content: dict[str, Any], whole_sources: bool) -> None:
     from rotor.cli.shared import report
 
     print(report.heading(top))
@@ -105,7 +103,12 @@ def _show(top: Top, content: dict[str, Any]) -> None:
             print()
             show_table(table)
     print()
-    show_facts(report.model_facts(content))
+    show_facts(
+        [
+            *source_facts(top, ("constants", "dipole", "polarizability", "spin weights"), whole_sources),
+            *report.model_facts(content),
+        ]
+    )
 
 
 def _facts(top: Top, content: dict[str, Any]) -> list[tuple[str, str]]:

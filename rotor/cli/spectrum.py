@@ -28,7 +28,7 @@ from rotor.cli.shared.output import (
     show_table,
 )
 from rotor.cli.shared.plot_options import PlotOptions
-from rotor.cli.shared.sources import with_sources
+from rotor.cli.shared.sources import source_facts
 
 if TYPE_CHECKING:
     from rotor.formats.spcat.predict import Prediction
@@ -140,12 +140,7 @@ def command(
         files,
         writers,
         lambda: json_with_rows(answer.lines, "lines", content),
-        with_sources(
-            lambda: _show(answer, content, options.range_),
-            answer.lines.top,
-            ("constants", "dipole", "spin weights"),
-            given.sources,
-        ),
+        lambda: _show(answer, content, options.range_, given.sources),
     )
 
 
@@ -281,7 +276,7 @@ def _draw(answer: SpectrumAnswer, path: Path, record: dict[str, Any], drawn: dic
     plot_spectrum(thing, path, provenance={"command": record["command"]}, **drawn)
 
 
-def _show(answer: SpectrumAnswer, content: dict[str, Any], range_text: str | None) -> None:
+def _show(answer: SpectrumAnswer, content: dict[str, Any], range_text: str | None, whole_sources: bool) -> None:
     from rotor.cli.shared import report
 
     lines = answer.lines
@@ -294,7 +289,9 @@ def _show(answer: SpectrumAnswer, content: dict[str, Any], range_text: str | Non
         print()
         show_table(_lines_table(lines, content["strongest"], content["optical_depth"]))
     print()
-    show_facts(report.model_facts(content))
+    show_facts(
+        [*source_facts(lines.top, ("constants", "dipole", "spin weights"), whole_sources), *report.model_facts(content)]
+    )
 
 
 def _facts(lines: Lines, content: dict[str, Any]) -> list[tuple[str, str]]:
