@@ -42,6 +42,12 @@
     oe = 3
     oo = 1
 
+    [spins]                             # constants of nuclear and electron spins, see rotor.formats.spin_table
+    source = "..."
+
+    [spins.14N]
+    chi_aa = { value = -4.22324, uncertainty = 0.00108 }
+
     [levels]                            # energies that count instead of those of the constants where the table has them:
     file = "../levels/H2O.csv"          # columns j, ka, kc, energy_mhz, error_mhz
     source = "..."
@@ -87,11 +93,13 @@ from rotor.formats.molecule_tables import (
     unverified_in,
     with_polarizability,
 )
+from rotor.formats.spin_table import spins_of_table
 from rotor.formats.toml import parse_toml
 from rotor.molecules.molecule import Molecule
 from rotor.tops.constants import Constants
 from rotor.tops.covariance import Covariance
 from rotor.tops.level_table import LevelTable
+from rotor.tops.spin_constants import SpinConstants
 from rotor.tops.spin_weights import SpinWeights
 from rotor.tops.top import Tensor
 
@@ -105,6 +113,7 @@ _TABLES = (
     "dipole",
     "polarizability",
     "spin_weights",
+    "spins",
     "levels",
     "catalogue",
     "serves",
@@ -129,6 +138,7 @@ class MoleculeFile:
     serves : the lines that the file is good for
     unverified : tables, or entries such as "constants.DK", whose numbers were not read in a source
     covariance : of the constants, where the file has their correlations
+    spin_constants : of nuclear and electron spins
     """
 
     name: str
@@ -146,6 +156,7 @@ class MoleculeFile:
     levels: LevelTable | None = None
     serves: Served | None = None
     unverified: frozenset[str] = frozenset()
+    spin_constants: SpinConstants | None = None
 
     def cited(self, table: str) -> str:
         """The source of a table, with what in it is unverified said first."""
@@ -204,4 +215,5 @@ def parse_molecule_file(
         serves=served_of(tables.get("serves")),
         unverified=frozenset().union(*(unverified_in(name, table) for name, table in tables.items())),
         covariance=covariance_of(tables.get("covariance"), constants),
+        spin_constants=spins_of_table(tables.get("spins"), molecule),
     )

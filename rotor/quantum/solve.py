@@ -25,9 +25,10 @@ from rotor.arrays import Floats, Ints
 from rotor.quantum.basis import WangBlock, limited, names_of, wang_blocks
 from rotor.quantum.coupled import coupled_levels, model_of
 from rotor.quantum.effect import QuantumEffect, k_limits_of
-from rotor.quantum.effects.watson import SEMI_RIGID, JMatrix, block_bands, scalar_energy
+from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.levels import Levels, SolvedBlock, weights_of_levels
 from rotor.quantum.spherical_top import DIMENSION, is_cubic, scalar_and_tensor, tensor_eigenvalues
+from rotor.quantum.wang_matrix import JMatrix, block_bands, scalar_energy
 from rotor.tops.level_table import LevelTable, tabulated_energies
 from rotor.tops.operators import AXIAL_REPRESENTATION, Operators
 from rotor.tops.spin_weights import SpinWeights
