@@ -46,6 +46,12 @@ def test_a_state_that_lacks_a_number_is_refused(tmp_path, upper, lower):
         read_cat(tmp_path / "a.cat")
 
 
+def test_a_file_that_ends_inside_the_lower_state_was_cut(tmp_path):
+    (tmp_path / "a.cat").write_text(line_of("102", " 2 1", " 1 0") + line_of("102", " 2 1", "").rstrip())
+    with pytest.raises(ValueError, match="line 2: the file ends without a lower state"):
+        read_cat(tmp_path / "a.cat")
+
+
 # SPFIT's files
 
 

@@ -50,7 +50,7 @@ def read_output(path: Path | str) -> Molecule:
     Parameters
     ----------
     path : Path or str
-        Output of Gaussian, ORCA, Psi4 or CFOUR; of the other programs that cclib tells apart, the geometry alone.
+        Output of Gaussian, ORCA, Psi4 or CFOUR; of the other programs that cclib distinguishes, the geometry alone.
 
     Returns
     -------
