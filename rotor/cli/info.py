@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 TEMPERATURES_K = (9.375, 18.75, 37.5, 75.0, 150.0, 225.0, 300.0, 500.0, 1000.0)  # those of the catalogues, and two more
 
 MOST_CONFORMERS = 1000
-ROOM_K = 300.0  # at the J most populated there effects are compared
+ROOM_TEMPERATURE_K = 300.0  # at the J most populated there effects are compared
 
 EXAMPLES = """\b
 Examples:
@@ -57,7 +57,7 @@ def command(context: typer.Context, given: Input, options: Options) -> None:
     from rotor.thermo.request import partition_table
 
     content = describe(top, given.text, context.obj)
-    content |= limit_facts(top, populated_j(top, ROOM_K), effects_of(top, hyperfine=False))
+    content |= limit_facts(top, populated_j(top, ROOM_TEMPERATURE_K), effects_of(top, hyperfine=False))
     content["partition_function"] = partition_table(top, temperatures, sum_progress())
     if options.conformers is not None:
         content["conformers"] = conformer_table(given.source, options.conformers)

@@ -222,7 +222,7 @@ def _ranges(plan: _Plan, piece_lines: int) -> Iterator[tuple[int, int]]:
 
 
 def _provenance(plan: _Plan, ranges: list[tuple[int, int]]) -> dict[str, Any]:
-    """The provenance of the list, which also tells pieces of another list from its own."""
+    """The provenance of the list, by which pieces of another list are recognised too."""
     return (
         {"program": "rotor", "version": version()}
         | plan.top.provenance

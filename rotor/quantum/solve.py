@@ -136,7 +136,7 @@ def _refuse_too_many(kind: str, jmin: int, jmax: int) -> None:
     count = jmax + 1 - jmin if kind in ("linear", "spherical") else (jmax + 1) ** 2 - jmin**2
     if count > MOST_LEVELS:
         raise ValueError(
-            f"J max {jmax}: {count:.3g} levels from J = {jmin} on, more than {MOST_LEVELS:.0e}; ask for fewer, in ranges of J"
+            f"J max {jmax}: more than {MOST_LEVELS} levels from J = {jmin} on; ask for fewer, in ranges of J"
         )
 
 

@@ -185,7 +185,7 @@ def _parts_doublets(levels: Levels, options: Options) -> bool:
 def _parted_doublets(merged: Catalogue, fold: int) -> Catalogue:
     """Each line of a K doublet as the two lines that the program prints.
 
-    Where K is a multiple of the fold the two states of a doublet differ in symmetry (A1, A2); the program tells them by
+    Where K is a multiple of the fold the two states of a doublet differ in symmetry (A1, A2); the program distinguishes them by
     the sign of K, and a line with ΔK = 0 joins -K to K. The others (E) are printed twice with one label. Lines with
     ΔK ≠ 0 stay as they are.
     """

@@ -109,7 +109,7 @@ def _plan_of(top: Top, effects: tuple[QuantumEffect, ...], nmin: int, nmax: int,
     blocks, representation = solved_rotor(top, effects, terms, nmin, nmax, executor)
     channels = channels_of(terms, scheme)
     operators = {}
-    reach = 0 if "n" in scheme.kept else 2
+    reach = 0 if "n" in scheme.conserved else 2
     for i, k in _near(blocks, reach):
         if found := operators_between(blocks[i], blocks[k], channels, representation):
             operators[i, k] = found
@@ -230,7 +230,7 @@ def product(left: Floats, right: Floats) -> Floats:
 def coefficients_of(scheme: Scheme, channel: Channel, every: Ints) -> Floats:
     """c(p', p) of a channel between all patterns of an F, with its powers of N·S."""
     found = _of_exchange(scheme, channel, every) if scheme.paired else _one_by_one(scheme, channel, every)
-    for column in scheme.kept_columns:
+    for column in scheme.conserved_columns:
         found = np.where(every[:, None, column] == every[None, :, column], found, 0.0)
     if not channel.ns:
         return found
