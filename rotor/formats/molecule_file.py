@@ -72,7 +72,6 @@ number whose source was not read has `unverified = true` beside it, or in its ta
 from __future__ import annotations
 
 import os
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -95,6 +94,7 @@ from rotor.formats.molecule_tables import (
     with_polarizability,
 )
 from rotor.formats.spin_table import spins_of_table
+from rotor.formats.toml import parse_toml
 from rotor.molecules.molecule import Molecule
 from rotor.tops.constants import Constants
 from rotor.tops.covariance import Covariance
@@ -188,11 +188,7 @@ def parse_molecule_file(
     >>> parse_molecule_file("constants = { B = 57635.96804, D = 0.1835 }").constants.text()
     'B=57635.96804 D=0.1835 MHz'
     """
-    try:
-        content = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise ValueError(f"{where}: not a TOML file: {error}") from None
-
+    content = parse_toml(text, where)
     refuse_unknown_keys(content, ("name", "names", *_TABLES), where)
     tables = {name: TableReader(where, name, content[name]) for name in _TABLES if name in content}
     if not {"geometry", "constants"} & tables.keys():

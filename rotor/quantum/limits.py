@@ -26,6 +26,7 @@ import numpy as np
 
 from rotor import units
 from rotor.arrays import Floats, Ints
+from rotor.molecules.molecule import FEW_ATOMS
 from rotor.quantum.effect import EffectSize, QuantumEffect, effect_sizes
 from rotor.quantum.spins.splittings import Splitting, splitting_nuclei
 
@@ -83,7 +84,7 @@ def _quadrupole(nuclei: Sequence[Splitting]) -> NuclearQuadrupole | None:
     if not nuclei:
         return None
     from rotor.quantum.effects.hyperfine import NuclearQuadrupole
-    from rotor.quantum.spins import Spin
+    from rotor.quantum.spins.terms import Spin
 
     values = {f"chi_aa({one.nucleus})": one.chi_mhz for one in nuclei}
     return NuclearQuadrupole(values, tuple(Spin(one.nucleus, round(2 * one.spin)) for one in nuclei))
@@ -187,10 +188,24 @@ def _of_geometry(top: Top, molecule: Molecule, present: set[str]) -> list[Limit]
 def _neighbours(molecule: Molecule) -> list[Ints]:
     """Atoms bonded to each atom, by distance alone: hydrogen within 1.3 Å, others within 1.7 Å."""
     x = molecule.positions_angstrom
-    apart = np.linalg.norm(x[:, None] - x[None], axis=-1)
     hydrogen = np.array([symbol == "H" for symbol in molecule.symbols])
-    reach = np.where(hydrogen[:, None] | hydrogen[None], CH_ANGSTROM, NEIGHBOUR_ANGSTROM)
-    return [np.flatnonzero((row < limit) & (row > 0)) for row, limit in zip(apart, reach, strict=True)]
+    found: list[list[int]] = [[] for _ in x]
+    for first, second in _pairs_within(x, NEIGHBOUR_ANGSTROM).tolist():
+        reach = CH_ANGSTROM if hydrogen[first] or hydrogen[second] else NEIGHBOUR_ANGSTROM
+        if np.linalg.norm(x[first] - x[second]) < reach:
+            found[first].append(second)
+            found[second].append(first)
+    return [np.array(sorted(near), dtype=np.int64) for near in found]
+
+
+def _pairs_within(x: Floats, reach: float) -> Ints:
+    """Pairs (m, 2) of points nearer than a reach, Å."""
+    if len(x) > FEW_ATOMS:
+        from scipy.spatial import cKDTree
+
+        return np.asarray(cKDTree(x).query_pairs(reach, output_type="ndarray"), dtype=np.int64)
+    apart = np.linalg.norm(x[:, None] - x[None], axis=-1)
+    return np.argwhere(np.triu(apart < reach, k=1))
 
 
 def _internal_rotors(molecule: Molecule) -> int:
@@ -201,10 +216,18 @@ def _internal_rotors(molecule: Molecule) -> int:
         if molecule.symbols[carbon] != "C" or symbols["H"] != 3:
             continue
         hydrogens = [i for i in near.tolist() if molecule.symbols[i] == "H"]
-        rest = [i for i in range(len(x)) if i != carbon and i not in hydrogens]
         axis = x[carbon] - x[hydrogens].mean(axis=0)
-        count += bool(rest) and bool((_sines(x[rest] - x[carbon], axis) > OFF_AXIS).any())
+        count += _any_off_axis(x, [carbon, *hydrogens], axis)
     return count
+
+
+def _any_off_axis(x: Floats, group: list[int], axis: Floats) -> bool:
+    """Whether some atom that is not of the group lies off the axis through its first atom; a thousand atoms at a time."""
+    for start in range(0, len(x), 1000):
+        rest = np.setdiff1d(np.arange(start, min(start + 1000, len(x))), group)
+        if len(rest) and (_sines(x[rest] - x[group[0]], axis) > OFF_AXIS).any():
+            return True
+    return False
 
 
 def _sines(vectors: Floats, axis: Floats) -> Floats:
