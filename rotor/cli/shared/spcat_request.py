@@ -30,6 +30,8 @@ FIELDS = {
     "spin_constants": "the constants",
     "spins": "SPIND",
     "hyperfine": "SPIND",
+    "hyperfine_method": "SPIND",
+    "hyperfine_tolerance": "SPIND",
     "constants": "the constants",
     "calculator": "the constants",
 }

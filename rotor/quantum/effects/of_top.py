@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.watson import SEMI_RIGID
+from rotor.quantum.spins.method import EXACT, TOLERANCE_MHZ, HyperfineMethod
 
 if TYPE_CHECKING:
     from rotor.quantum.effects.spin_effect import SpinEffect
@@ -62,10 +64,24 @@ def _refuse_like_nuclei(top: Top) -> None:
         )
 
 
-def effects_of(top: Top, hyperfine: bool) -> tuple[QuantumEffect, ...]:
+def effects_of(
+    top: Top, hyperfine: bool, method: str = "exact", tolerance_mhz: float = TOLERANCE_MHZ
+) -> tuple[QuantumEffect, ...]:
     """The semi-rigid Hamiltonian of a top, and with `hyperfine` its spins.
 
-    Raises ValueError where spins are asked for and the top has no constants of any.
+    Parameters
+    ----------
+    top : Top
+    hyperfine : bool
+    method : str
+        "exact", "first-order", or "auto", the cheapest that is estimated to keep the tolerance (`rotor.quantum.spins.method`).
+    tolerance_mhz : float
+        By how much lines may differ from exact ones with "auto".
+
+    Raises
+    ------
+    ValueError
+        Where spins are asked for and the top has no constants of any.
     """
     if not hyperfine:
         return SEMI_RIGID
@@ -75,4 +91,11 @@ def effects_of(top: Top, hyperfine: bool) -> tuple[QuantumEffect, ...]:
             f"hyperfine structure of {top.name or 'this top'}: no constants of spins are known; give them, such as "
             "chi_aa(14N)=-4.2 MHz"
         )
-    return (*SEMI_RIGID, *found)
+    return (*SEMI_RIGID, *found, *_method(top, found, method, tolerance_mhz))
+
+
+def _method(top: Top, found: Sequence[QuantumEffect], method: str, tolerance_mhz: float) -> tuple[QuantumEffect, ...]:
+    """The choice of a method where it is not the usual one."""
+    spins = {spin.name: spin for effect in found for spin in effect.spins(top)}
+    asked = HyperfineMethod(method, tolerance_mhz, tuple(spins.values()))
+    return () if method == EXACT else (asked,)
