@@ -24,6 +24,7 @@ from rotor.arrays import Floats, Ints
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.levels import Levels, weights_of_levels
 from rotor.quantum.spins.coupling import coefficients, n_dot_s, patterns, recoupling
+from rotor.quantum.spins.method import FIRST_ORDER, Used, simplified
 from rotor.quantum.spins.operators import AxialState
 from rotor.quantum.spins.rotor import (
     Channel,
@@ -69,6 +70,7 @@ class Shared:
     scheme: Scheme
     representation: str
     cache: dict[Any, Any] = field(default_factory=dict, repr=False, compare=False)
+    used: Used | None = None
 
 
 @dataclass(frozen=True)
@@ -101,6 +103,11 @@ class Plan(NamedTuple):
     blocks: list[RotorBlock]
     operators: dict[tuple[int, int], dict[Channel, Floats]]
     families: list[list[tuple[int, int]]]
+
+    def with_method(self, used: Used, operators: dict[tuple[int, int], dict[Channel, Floats]]) -> Plan:
+        """The same rotation with some of the operators, and what that is called."""
+        families = _families(len(self.blocks), operators, 2 if self.shared.scheme.paired else 1)
+        return Plan(replace(self.shared, used=used), self.blocks, operators, families)
 
 
 def _plan_of(top: Top, effects: tuple[QuantumEffect, ...], nmin: int, nmax: int, executor: Executor | None) -> Plan:
@@ -207,6 +214,10 @@ def _parts(plan: Plan, members: list[tuple[int, slice]]) -> tuple[SpinPart, ...]
 def _solved(
     plan: Plan, twice_f: int, every: Ints, parts: tuple[SpinPart, ...], known: dict[Channel, Floats]
 ) -> SpinBlock:
+    if plan.shared.used is not None and plan.shared.used.method == FIRST_ORDER and len(parts) == 1:
+        energies, vectors = _state_by_state(plan, parts[0], known)
+        labels, mixing = labels_of(parts, every, vectors)
+        return SpinBlock(twice_f, every, parts, energies, vectors, labels, mixing, plan.shared)
     zero = float(parts[0].rotor.energies_mhz[0])  # taken out of the matrix for the sake of digits
     diagonal = [np.tile(part.rotor.energies_mhz - zero, part.repeats) for part in parts]
     matrix = np.diag(np.concatenate(diagonal))
@@ -219,6 +230,21 @@ def _solved(
     energies, vectors = np.linalg.eigh(matrix)  # reads the lower triangle
     labels, mixing = labels_of(parts, every, vectors)
     return SpinBlock(twice_f, every, parts, energies + zero, vectors, labels, mixing, plan.shared)
+
+
+def _state_by_state(plan: Plan, part: SpinPart, known: dict[Channel, Floats]) -> tuple[Floats, Floats]:
+    """Energies, rising, and vectors where every rotational state has only its own patterns: one small matrix each, all at once."""
+    states, repeats = len(part.rotor.energies_mhz), part.repeats
+    matrices = np.zeros((states, repeats, repeats))
+    for channel, operator in plan.operators.get((part.number, part.number), {}).items():
+        matrices += np.diag(operator)[:, None, None] * known[channel][part.patterns, part.patterns]
+    shifts, own = np.linalg.eigh(matrices)
+    energies = (part.rotor.energies_mhz[:, None] + shifts).ravel()
+    vectors = np.zeros((repeats, states, states, repeats))
+    every = np.arange(states)
+    vectors[:, every, every, :] = own.transpose(1, 0, 2)
+    order = np.argsort(energies, kind="stable")
+    return energies[order], vectors.reshape(repeats * states, -1)[:, order]
 
 
 def product(left: Floats, right: Floats) -> Floats:
@@ -340,7 +366,7 @@ def levels_of_f(
     total = scheme_of(top, effects).total
     lowest = min(max(0, (f - total) // 2) for f in every_f)
     highest = max((f + total) // 2 for f in every_f)
-    plan = _plan_of(top, effects, lowest, highest, executor)
+    plan = simplified(_plan_of(top, effects, lowest, highest, executor), effects, every_f)
     solved = [block for f in every_f for block in solve_f(plan, f, exist)]
     if n_range:
         solved = [_within(block, n_range) for block in solved]
