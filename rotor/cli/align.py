@@ -23,6 +23,7 @@ from rotor.cli.shared.output import (
     show_table,
 )
 from rotor.cli.shared.pulse_inputs import Pulses, pulses_of
+from rotor.cli.shared.save_scene import save_scene, save_scene_option
 
 if TYPE_CHECKING:
     from rotor.alignment.align import AlignmentTrace
@@ -80,6 +81,7 @@ class Outputs:
     parquet: str | None = file_option(".parquet", help="Write the cosines as Parquet.")
     plot: str | None = file_option(".png", ".pdf", ".svg", help="Draw the cosines (.png, .pdf, .svg).")
     json: str | None = json_option()
+    save_scene: str | None = save_scene_option()
 
 
 @grouped(given=("dipole", "calculator", "hessian", "spin_constants", "spins"))
@@ -100,7 +102,9 @@ def command(context: typer.Context, given: Input, pulses: Pulses, options: Optio
     content = _content(answer, given, context.obj)
     content["files"] = files.names
     text = lambda: json_with_rows(answer.table, "trace", content)  # noqa: E731
-    deliver(files, _writers(answer, content), text, lambda: _show(answer, content))
+    by_hand = options.polarizability is not None or options.anisotropy is not None
+    saved = save_scene("align", request, outputs, given, by_hand)
+    deliver(files, _writers(answer, content) | saved, text, lambda: _show(answer, content))
 
 
 def _settings(options: Options) -> dict[str, Any]:

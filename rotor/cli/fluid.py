@@ -22,6 +22,7 @@ from rotor.cli.shared.output import (
     show_facts,
     show_table,
 )
+from rotor.cli.shared.save_scene import save_scene, save_scene_option
 
 if TYPE_CHECKING:
     from rotor.fluid.request import FluidAnswer, FluidRequest, NewBox
@@ -77,6 +78,7 @@ class Outputs:
     checkpoint_every: int = option(1000, metavar="N", help="Steps between checkpoints.")
     resume: bool = option(False, "--resume", help="Continue from --checkpoint.")
     json: str | None = json_option()
+    save_scene: str | None = save_scene_option()
 
 
 @grouped()
@@ -92,7 +94,7 @@ def command(context: typer.Context, options: Options, outputs: Outputs) -> None:
     grown = [growing.csv, *growing.trajectories, growing.checkpoint, *files.paths.values()]
     content = start | answer.facts() | {"files": [str(path) for path in grown if path is not None]}
     text = lambda: json_with_rows(answer.record, "record", content)  # noqa: E731
-    deliver(files, {}, text, lambda: _show(content, settings))
+    deliver(files, save_scene("fluid", request, outputs), text, lambda: _show(content, settings))
 
 
 def _settings(options: Options) -> Settings:
@@ -121,6 +123,7 @@ def _files(source: str, outputs: Outputs) -> tuple[RunFiles, Files]:
         growing.ask(f"--trajectory{' ' * number}", path, (".traj", ".xyz", ".extxyz"))
     growing.ask("--checkpoint", outputs.checkpoint, (".npz",))
     last.ask_json(outputs.json)
+    last.ask("--save-scene", outputs.save_scene, (".toml",))
     for name, target in (growing.paths | last.paths).items():
         if target.resolve() == Path(source).resolve():
             raise ValueError(f"{name.strip()} {target}: is the box that is read; write to another file")

@@ -17,6 +17,7 @@ from rotor.cli.shared import inputs
 from rotor.cli.shared.inputs import Input, json_option
 from rotor.cli.shared.options import file_option, grouped, option
 from rotor.cli.shared.output import Files, Table, Writer, deliver, json_text, rows_of, show_facts, show_table
+from rotor.cli.shared.save_scene import save_scene, save_scene_option
 
 if TYPE_CHECKING:
     from rotor.classical.gas.ensembles import Correlations
@@ -57,6 +58,7 @@ class Outputs:
     parquet: str | None = file_option(".parquet", help="Write the correlation functions as Parquet.")
     plot: str | None = file_option(".png", ".pdf", ".svg", help="Draw the test and the functions (.png, .pdf, .svg).")
     json: str | None = json_option()
+    save_scene: str | None = save_scene_option()
 
 
 @grouped(given=("spin_weights", "calculator", "hessian", "symmetry_tolerance"))
@@ -73,7 +75,8 @@ def command(context: typer.Context, given: Input, options: Options, outputs: Out
     answer = _answer(request)
     content = _content(answer, given, context.obj)
     content["files"] = files.names
-    deliver(files, _writers(answer, content), lambda: json_text(content), lambda: _show(answer, content))
+    writers = _writers(answer, content) | save_scene("gas", request, outputs, given)
+    deliver(files, writers, lambda: json_text(content), lambda: _show(answer, content))
 
 
 def _settings(options: Options) -> dict[str, Any]:

@@ -24,6 +24,7 @@ from rotor.cli.shared.output import (
     show_facts,
     show_table,
 )
+from rotor.cli.shared.save_scene import save_scene, save_scene_option
 
 if TYPE_CHECKING:
     from rotor.quantum.request import LevelsAnswer
@@ -65,6 +66,7 @@ class Outputs:
     egy: str | None = file_option(".egy", help="Write all levels as SPCAT's list (.egy).")
     plot: str | None = file_option(".png", ".pdf", ".svg", help="Draw the term diagram (.png, .pdf, .svg).")
     json: str | None = json_option()
+    save_scene: str | None = save_scene_option()
 
 
 @grouped(given=("dipole", "dipole_abc"))
@@ -88,7 +90,8 @@ def command(context: typer.Context, given: Input, options: Options, outputs: Out
 
     content = {**begin(context.obj, given.text), **answer.facts(), "files": files.names}
     text = lambda: json_with_rows(answer.table, "levels", content)  # noqa: E731
-    deliver(files, _writers(answer, content, options.unit), text, lambda: _show(answer, content, options))
+    writers = _writers(answer, content, options.unit) | save_scene("levels", request, outputs, given)
+    deliver(files, writers, text, lambda: _show(answer, content, options))
 
 
 def _settings(options: Options) -> dict[str, Any]:

@@ -21,6 +21,7 @@ from rotor.cli.shared.output import (
     show_facts,
     show_table,
 )
+from rotor.cli.shared.save_scene import save_scene, save_scene_option
 
 if TYPE_CHECKING:
     from rotor.quantum.field_map import FieldMap
@@ -70,6 +71,7 @@ class Outputs:
     parquet: str | None = file_option(".parquet", help="Write the map as Parquet.")
     plot: str | None = file_option(".png", ".pdf", ".svg", help="Draw the map (.png, .pdf, .svg).")
     json: str | None = json_option()
+    save_scene: str | None = save_scene_option()
 
 
 @grouped(given=("spin_weights", "calculator", "hessian", "spin_constants", "spins"))
@@ -88,7 +90,8 @@ def command(context: typer.Context, given: Input, options: Options, outputs: Out
     content = _content(answer, given, context.obj)
     content["files"] = files.names
     text = lambda: json_with_rows(answer.states, "states", content)  # noqa: E731
-    deliver(files, _writers(top, answer.states, content), text, lambda: _show(top, answer.states, content))
+    saved = save_scene("stark", answer.request, outputs, given, options.polarizability is not None)
+    deliver(files, _writers(top, answer.states, content) | saved, text, lambda: _show(top, answer.states, content))
 
 
 def _settings(options: Options) -> dict[str, Any]:

@@ -25,6 +25,7 @@ from rotor.cli.shared.output import (
     show_table,
     sum_progress,
 )
+from rotor.cli.shared.save_scene import save_scene, save_scene_option
 
 if TYPE_CHECKING:
     from rotor.thermo import ThermoFunctions
@@ -64,6 +65,7 @@ class Outputs:
     parquet: str | None = file_option(".parquet", help="Write the table as Parquet.")
     plot: str | None = file_option(".png", ".pdf", ".svg", help="Draw the heat capacity (.png, .pdf, .svg).")
     json: str | None = json_option()
+    save_scene: str | None = save_scene_option()
 
 
 @grouped(given=("dipole", "dipole_abc", "calculator", "hessian"))
@@ -80,7 +82,8 @@ def command(context: typer.Context, given: Input, options: Options, vibration: V
         content = _content(answer, given, context.obj)
     content["files"] = files.names
     text = lambda: json_with_rows(answer.functions, "functions", content)  # noqa: E731
-    deliver(files, _writers(answer, content), text, lambda: _show(answer.functions, content))
+    writers = _writers(answer, content) | save_scene("thermo", request, outputs, given)
+    deliver(files, writers, text, lambda: _show(answer.functions, content))
 
 
 def _settings(options: Options, vibration: Vibration) -> dict[str, Any]:

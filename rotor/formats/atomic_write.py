@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import IO, Any
 
@@ -52,3 +52,24 @@ def open_atomic(path: str | os.PathLike[str], mode: str = "wb", **options: Any) 
     """
     with atomic_path(path) as unfinished, open(unfinished, mode, **options) as handle:
         yield handle
+
+
+def write_together(writers: Mapping[Path, Callable[[Path], object]]) -> None:
+    """Write several files, each by its writer of a path: all appear at the end, with what a writer puts beside them, or none.
+
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     write_together({Path(folder) / "a.txt": lambda path: path.write_text("whole")})
+    ...     (Path(folder) / "a.txt").read_text()
+    'whole'
+    """
+    import tempfile
+
+    with ExitStack() as stack:
+        moves: list[tuple[Path, Path]] = []
+        for target, write in writers.items():
+            beside = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix=".rotor-", dir=target.parent)))
+            write(beside / target.name)
+            moves += [(made, target.parent / made.name) for made in sorted(beside.iterdir())]
+        for made, place in moves:
+            os.replace(made, place.resolve())

@@ -17,7 +17,7 @@ from rotor.molecules.nuclei import isotope
 from rotor.units import parse_quantity
 
 _ITEM = re.compile(
-    r"(?P<name>[A-Za-z][\w-]*\([^()]*\))\s*=\s*(?P<number>[-+−]?[\d.]+(?:[eEdD][-+]?\d+)?)\s*(?P<unit>[A-Za-z][\w-]*(?![\w(]))?"
+    r"(?P<name>[A-Za-z][\w-]*\([^()]*\))\s*=\s*(?P<number>[-+−]?[\d.]+(?:[eEdD][-+]?\d+)?)\s*(?P<unit>[A-Za-z][\w-]*(?![\w(-]))?"
 )
 _ISOTOPE = re.compile(r"(\d+[A-Z][a-z]?|D|T)(?:_\w+)?")
 
