@@ -120,6 +120,7 @@ def test_nothing_of_the_physics_is_loaded_by_a_scene_alone():
     ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert eval(ran.stdout) == [
         "rotor.scenes",
+        "rotor.scenes.effect_sections",
         "rotor.scenes.scene",
         "rotor.scenes.scene_file",
         "rotor.scenes.sections",

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from msgspec import Struct, field
 
+from rotor.scenes.effect_sections import EffectSection
 from rotor.scenes.sections import (
     AlignConditions,
     AlignNumerics,
@@ -43,6 +44,7 @@ from rotor.scenes.sections import (
     ThermoNumerics,
     ThermoObservables,
     TumbleConditions,
+    TumbleNumerics,
     VibrationSection,
     said,
 )
@@ -126,11 +128,13 @@ class ThermoScene(Scene, frozen=True, tag="thermo"):
 
 
 class TumbleScene(Scene, frozen=True, tag="tumble"):
-    """The free rotation of a molecule, or of a body by its moments."""
+    """The free rotation of a molecule; the rotation of a body, free or under effects."""
 
     molecule: Annotated[str | MoleculeSection | None, said("a name, a file, SMILES:..., or a table", "water")] = None
     body: Annotated[BodySection | None, said("instead of a molecule")] = None
+    effects: Annotated[list[EffectSection], said("what acts on a body")] = field(default_factory=list)
     conditions: TumbleConditions = TumbleConditions()
+    numerics: TumbleNumerics = TumbleNumerics()
     outputs: TableOutputs = TableOutputs()
 
 

@@ -80,7 +80,7 @@ def _kind_of(content: Mapping[str, Any], where: str) -> type[Scene]:
 def _refuse_unknown_keys(content: Mapping[str, Any], kind: Any, where: str, place: str) -> None:
     hints = get_type_hints(kind)
     for key, value in content.items():
-        if key in ("shape",) and kind.__struct_config__.tag_field == key:
+        if kind.__struct_config__.tag_field == key:
             continue
         if key not in kind.__struct_fields__:
             of = f"[{place}]" if place else "a scene of this kind"
@@ -96,11 +96,11 @@ def _tables_in(hint: Any, value: Any) -> list[tuple[Any, Mapping[str, Any]]]:
     if isinstance(value, Mapping) and len(structures) == 1:
         return [(structures[0], value)]
     by_tag = {one.__struct_config__.tag: one for one in structures}
-    if isinstance(value, list):
-        return [
-            (by_tag[item["shape"]], item) for item in value if isinstance(item, Mapping) and item.get("shape") in by_tag
-        ]
-    return []
+    if not structures or not isinstance(value, list):
+        return []
+    word = structures[0].__struct_config__.tag_field
+    tables = [item for item in value if isinstance(item, Mapping)]
+    return [(by_tag[item[word]], item) for item in tables if item.get(word) in by_tag]
 
 
 def structures_in(hint: Any) -> list[Any]:

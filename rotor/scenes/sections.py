@@ -178,6 +178,15 @@ class BodySection(Section, frozen=True):
     moments: Annotated[list[float], said("principal moments of inertia, in any order", [0.3, 0.35, 0.4])]
     angular_momentum: Annotated[list[float] | None, said("at time 0 in principal axes", [1.8, 0.4, -0.9])] = None
     angular_velocity: Annotated[list[float] | None, said("instead of the angular momentum", [0.1, 15.0, 0.1])] = None
+    attitude: Annotated[list[float] | None, said("quaternion, body to space, at time 0", [1.0, 0.0, 0.0, 0.0])] = None
+
+
+class TumbleNumerics(Section, frozen=True):
+    """Knobs of a motion under effects; the free motion is exact."""
+
+    tolerance: Annotated[float, said("of a step, relative to |L| and one radian")] = 1e-10
+    step: Annotated[float | None, said("of a splitting, where no torque depends on the angular velocity", 0.01)] = None
+    order: Annotated[int, said("of the splitting: 2, 4, 6 or 8")] = 4
 
 
 class TumbleConditions(Section, frozen=True):

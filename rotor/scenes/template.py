@@ -28,6 +28,11 @@ STARTS: dict[str, dict[str, Any]] = {
     },
 }  # fmt: skip  # what a template has switched on, by dotted name
 
+TAGS = {
+    "pulses": 'shape = "gaussian"  # or switched, kick, table, thz',
+    "effects": 'effect = "constant torque"  # of a body: see docs/scenes.md',
+}
+
 
 def template(kind: str) -> str:
     """A commented scene file of a kind.
@@ -58,17 +63,23 @@ def _lines(structure: Any, kind: str, place: str) -> Iterator[str]:
             continue
         structures = structures_in(hints[one.name])
         if structures:
-            inner.append((one.name, structures[0], one.name == "body"))
+            inner.append((one.name, structures[0], one.name == "body" or (one.name == "effects" and kind == "tumble")))
         else:
             yield _key_line(one, hints[one.name], STARTS[kind].get(f"{place}{one.name}"))
     for name, table, absent in inner:
-        many = name == "pulses"
+        many = name == "pulses" or (name == "effects" and kind == "tumble")
         hash_ = "# " if absent else ""
         yield f"\n{hash_}[[{name}]]" if many else f"\n{hash_}[{name}]"
         if many:
-            yield f'shape = "{STARTS[kind]["pulses.shape"]}"  # or switched, kick, table, thz'
+            yield _in_comment(TAGS[name]) if absent else TAGS[name]
         lines = _lines(table, kind, f"{place}{name}.")
-        yield from ((line if line.startswith("#") else f"# {line}") if absent else line for line in lines)
+        yield from map(_in_comment, lines) if absent else lines
+
+
+def _in_comment(line: str) -> str:
+    """A line of a table that is an example itself."""
+    text = line if "# example:" in line else line.replace("  # ", "  # example: ", 1)
+    return text if text.startswith("#") else f"# {text}"
 
 
 def _key_line(one: Any, hint: Any, start: Any) -> str:
