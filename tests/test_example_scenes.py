@@ -68,9 +68,7 @@ def formamide_hyperfine(result):
     assert np.count_nonzero(near) == 3
     energies = [-0.5 * 1.9598 * y for y in (1.0, -0.5, 0.1)]
     centre = np.average(lines[near], weights=strength[near])
-    assert np.allclose(
-        np.sort(lines[near] - centre), np.sort(energies), atol=2e-3
-    )  # second order in χ²/B
+    assert np.allclose(np.sort(lines[near] - centre), np.sort(energies), atol=2e-3)  # second order in χ²/B
 
 
 def ocs_stark_map(result):

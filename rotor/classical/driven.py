@@ -71,6 +71,7 @@ class DrivenRequest:
         """L (3,) in body axes at the start."""
         if self.angular_momentum is not None:
             return np.array(self.angular_momentum)
+        assert self.angular_velocity is not None  # one of the two is given
         return np.asarray(momentum_of(self.angular_velocity, self.moments, self.effects, self.attitude))
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from concurrent.futures import Executor
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -48,9 +49,7 @@ def _driven(scene: TumbleScene, body: BodySection) -> DrivenRequest:
     times = kind.grid("conditions.times", scene.conditions.times, "")
     if times is None:
         raise ValueError("conditions.times: expected with effects, the start first: such as 0:10:101")
-    effects = tuple(
-        named(f"effects[{number}]", lambda one=one: effect_of(one)) for number, one in enumerate(scene.effects)
-    )
+    effects = tuple(named(f"effects[{number}]", partial(effect_of, one)) for number, one in enumerate(scene.effects))
     names = {name: f"body.{name}" for name in ("moments", "angular_velocity", "angular_momentum", "attitude")}
     with kind.fields(**names, tolerance="numerics.tolerance", times="conditions.times"):
         w, x, y, z = body.attitude or (1.0, 0.0, 0.0, 0.0)
