@@ -67,12 +67,21 @@ _KINDS: dict[str, dict[str, float]] = {
     "fluence": {"J/cm2": 1.0, "mJ/cm2": 1e-3, "J/m2": 1e-4},
     "magnetic field": {"T": 1.0, "mT": 1e-3, "G": 1e-4, "gauss": 1e-4},
     "mass": {"u": 1.0, "amu": 1.0, "Da": 1.0, "kg": 1.0 / ATOMIC_MASS_KG},
+    "moment of inertia": {"kg*m2": 1.0, "g*cm2": 1e-7},
+    "angular velocity": {
+        "rad/s": 1.0,
+        "deg/s": math.pi / 180,
+        "rpm": math.pi / 30,
+        "turns/s": 2 * math.pi,
+        "rad/ps": 1e12,
+    },
     "number": {"": 1.0},
     "pressure": {"Pa": 1e-5, "mbar": 1e-3, "kPa": 1e-2, "bar": 1.0, "Torr": 1.33322368421e-3, "atm": 1.01325},
 }
 _ALIASES = {
     "cm^-1": "cm-1", "cm⁻¹": "cm-1", "1/cm": "cm-1", "μs": "us", "μm": "um", "Debye": "debye", "Angstrom": "angstrom",
     "Å^3": "Å3", "Å³": "Å3", "angstrom^3": "angstrom3",
+    "kg m2": "kg*m2", "kg m^2": "kg*m2", "kg m²": "kg*m2", "g cm2": "g*cm2", "g cm^2": "g*cm2", "g cm²": "g*cm2",
     "W/cm^2": "W/cm2", "W/cm²": "W/cm2", "TW/cm^2": "TW/cm2", "TW/cm²": "TW/cm2", "J/cm^2": "J/cm2", "J/cm²": "J/cm2",
 }  # fmt: skip
 _NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(\S.*?)?\s*$")

@@ -302,7 +302,7 @@ def test_packed_files(tmp_path):
     assert gzip.decompress(path.read_bytes()) == format_lines(catalogue_of())
     assert same(read_cat(path), read_cat(format_lines(catalogue_of())))
     path.write_bytes(path.read_bytes()[:-20])
-    with pytest.raises(ValueError, match=r"a\.cat\.gz: a gzip file that is damaged"):
+    with pytest.raises(ValueError, match=r"a\.cat\.gz: a packed file that is damaged"):
         read_cat(path)
 
 

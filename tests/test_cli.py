@@ -26,7 +26,7 @@ INFO = """
     representation rotational_constants_mhz rotational_constants_cm kappa moments_u_angstrom2 planar_moments_u_angstrom2
     inertial_defect_u_angstrom2 frame dipole_abc_debye dipole_source
     polarizability_abc_angstrom3 polarizability_source spin_weights spin_weights_source spin_constants_mhz spins spin_constants_source
-    partition_function source notes sizes_at_j effects limits
+    partition_function source notes sizes_at_j effects limits splitting_nuclei
 """
 SPECTRUM = """
     temperature_k q jmax jmax_source min_lgint range_mhz line_count profile fwhm_mhz pressure_bar path_cm column_per_cm2 optical_depth
@@ -537,3 +537,41 @@ def test_columns_stand_under_their_headings(call):
             printed = [float(text[:end].split()[-1]) for end in ends]
             expected = [record["lines"][place][names[head]] for head in heads]
             assert printed == pytest.approx(expected, rel=0.01, abs=5.1e-5)  # digits that are printed
+
+
+def test_provenance_is_one_line_at_the_end_and_whole_when_asked_for(call):
+    _, out, _ = call("spectrum", "water", "--top", "1")
+    assert out.splitlines()[-1].startswith(
+        "sources  constants: fitted to c018003 of JPL (Pickett et al. 1998); dipole: from"
+    )
+    assert len(out.splitlines()[1]) < 120  # constants, without where they are from
+    assert "weighted by" not in out
+    _, whole, _ = call("spectrum", "water", "--top", "1", "--sources")
+    assert "weighted by their errors" in " ".join(whole.split())
+    _, unsure, _ = call("spectrum", "C2H2")
+    assert "constants: unverified: ground state" in unsure
+
+
+def test_hitran_records_are_written(call, tmp_path):
+    assert call("spectrum", "CO", "--hitran", "co.hitran", "--hitran-id", "5:1", "--jmax", "20")[0] == 0
+    found = rotor.read(str(tmp_path / "co.hitran"))
+    assert set(found.molecule.tolist()) == {5}
+    lines = rotor.line_list(rotor.read("CO"), temperature_k=296, jmax=20)
+    assert found.wavenumber_cm == pytest.approx(lines.frequency_mhz / 29979.2458, abs=6e-7)  # six decimals
+    for extra in (("--hitran-id", "x"), ("--hitran-id", "5", "--temperature", "300"), ()):
+        code, _, err = call("spectrum", "CO", "--hitran", "b.hitran", *extra)
+        assert code == 2
+        assert err.startswith("error: --hitran")
+
+
+def test_a_forgotten_unit_is_named(call):
+    _, _, err = call("spectrum", "--constants", "A=9.2 B=3 C=2.5", "--dipole-abc", "1,0,0")
+    assert "no unit is given, so the numbers are MHz; for GHz write 'A=9.2 B=3 C=2.5 GHz'" in err
+    _, out, _ = call("spectrum", "OCS", "--range", "2:18")
+    assert "--range 2:18 has no unit, so it is MHz: write 2:18GHz for GHz" in out
+    assert "no unit" not in call("spectrum", "OCS", "--range", "2:3GHz")[1]
+
+
+def test_a_smiles_without_its_prefix_is_recognized(call):
+    code, _, err = call("spectrum", "C=O")
+    assert (code, err) == (2, "error: 'C=O' is no file and no name of a molecule; did you mean 'SMILES:C=O'?\n")

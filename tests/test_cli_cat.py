@@ -150,3 +150,49 @@ def test_every_option_and_key_is_documented(call):
     content = json.loads(call("cat", OCS, "--compare", OCS, "--json", "-")[1])
     for key in (*content, *content["compared"], *content["lines"][0]):
         assert f"`{key}`" in DOCS.split("## rotor cat")[1], key
+
+
+def test_a_prediction_has_the_temperature_and_the_range_of_the_catalogue(call, tmp_path):
+    assert call("spectrum", "OCS", "--temperature", "75", "--range", "100:400GHz", "--cat", "cold.cat")[0] == 0
+    _, out, err = call("cat", "cold.cat", "--compare", "OCS", "--json", "-")
+    found = json.loads(out)["compared"]
+    assert "predicted at 75 K" in err
+    assert (found["temperature_k"], found["temperature_source"]) == (75.0, "cold.cat.provenance.json")
+    assert (found["missing"], found["extra"]) == (0, 0)
+    assert found["lgint"]["largest"] < 1.01e-4  # printed to four decimals
+    (tmp_path / "cold.cat.provenance.json").unlink()
+    _, out, err = call("cat", "cold.cat", "--compare", "OCS", "--json", "-")
+    assert json.loads(out)["compared"]["temperature_k"] == 300.0
+    assert "most like those at 7" in err
+    _, out, err = call("cat", "cold.cat", "--compare", "OCS", "--temperature", "75", "--json", "-")
+    assert json.loads(out)["compared"]["lgint"]["largest"] < 1.01e-4  # as above
+    assert "most like" not in err
+    assert "error: --temperature: expected with --compare" in call("cat", "cold.cat", "--temperature", "75")[2]
+
+
+def test_another_isotope_is_compared(call, tmp_path):
+    assert call("spectrum", "OCS", "--isotope", "S=34S", "--jmax", "5", "--cat", "heavy.cat")[0] == 0
+    _, out, _ = call("cat", "heavy.cat", "--compare", "OCS", "--isotope", "S=34S", "--json", "-")
+    assert json.loads(out)["compared"]["frequency_mhz"]["largest"] < 1.01e-4  # four decimals
+
+
+def test_a_comparison_is_drawn_as_a_mirror_with_differences():
+    from rotor.formats.spcat.compare import compare
+    from rotor.plots.comparison import comparison_figure
+
+    whole = read_cat(OCS)
+    found = compare(whole, read_cat(OCS).take(slice(5, None)))
+    figure = comparison_figure(found, names=("measured.cat", "SO2"))
+    above, below = figure.axes
+    sticks = [np.array(one.get_segments()) for one in above.collections]
+    tips = [segments[:, 1, 1] for segments in sticks]
+    assert [len(t) for t in tips] == [len(whole) - 5, 5, len(whole) - 5]  # matched, only above, matched below
+    assert (tips[0] > 0).all()
+    np.testing.assert_allclose(-tips[2], tips[0])  # the same lines
+    assert np.ptp(below.lines[1].get_ydata()) == 0
+    assert [text.get_text() for text in above.texts] == ["measured.cat", "SO$_{2}$"]
+
+
+def test_the_plot_of_a_comparison_is_written(call, tmp_path):
+    assert call("cat", OCS, "--compare", "OCS", "--plot", "both.svg")[0] == 0
+    assert "difference" in (tmp_path / "both.svg").read_text(encoding="utf-8")

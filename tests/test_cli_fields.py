@@ -13,6 +13,7 @@ from rotor.alignment.request import AlignRequest, answer_align
 from rotor.cli.shared.output import plain
 from rotor.formats import read
 from rotor.quantum.stark_request import StarkRequest, answer_stark
+from rotor.spectra.field_lines import field_lines
 
 BARE = ("--constants", "B=6081.492 MHz", "--anisotropy", "4.04")
 SHORT = ("--pulse", "1e13 W/cm2, 50 fs", "--points", "51", "--temperature", "0", "--tolerance", "1e-4")
@@ -64,6 +65,40 @@ def test_stark_with_light_labels_and_chosen_m(call):
     assert code == 0
     assert {row["m"] for row in content["states"]} == {0}
     assert {row["diabatic_label"] for row in content["states"]} == {"0", "1"}
+
+
+def test_stark_writes_lines_spectra_mixtures_and_tables(call):
+    """Every further file; lines as the library has them, and two processes as one."""
+    code, _, err = call(
+        "stark", "OCS", "--field", "0:5kV/cm:6", "--states", "J<=1", "--light", "perpendicular", "--temperature", "2K",
+        "--line", "1 - 0", "--spread", "0.01", "--linewidth", "0.1MHz", "--range", "12:12.3GHz", "--lines", "l.csv",
+        "--lobes", "l.png", "--spectrum", "s.csv", "--coefficients", "c.csv", "--mixture", "m.csv", "--deflection", "d.csv",
+    )  # fmt: skip
+    assert (code, err) == (0, "")
+    found = field_lines(read("OCS"), np.linspace(0, 5, 6), j_highest=1, light="perpendicular", temperature_k=2.0).lobes(
+        "1", "0"
+    )
+    table = rows("l.csv")
+    assert table[0] == list(found.columns)
+    assert [float(line[1]) for line in table[1:]] == found.frequency_mhz.tolist()
+    assert rows("c.csv")[0][:5] == ["upper", "upper_m", "lower", "lower_m", "c1_mhz_per_kv_per_cm"]
+    assert rows("d.csv")[0] == ["field_kv_per_cm", "mu_eff_debye 0 M0", "mu_eff_debye 1 M0", "mu_eff_debye 1 M1"]
+    assert rows("m.csv")[0][:3] == ["field_kv_per_cm", "energy_mhz", "mu_eff_debye"]
+    spectrum = np.array(rows("s.csv")[1:], dtype=float)
+    strongest = spectrum[np.argmax(spectrum[:, 1]), 0]
+    assert strongest == pytest.approx(found.frequency_mhz[-1], abs=2.5)  # the spread: 2 % of a shift of 62 MHz, twice
+    assert Path("l.png").stat().st_size > 10_000
+
+
+@pytest.mark.slow
+def test_workers_change_no_number(call):
+    found = []
+    for workers in ("1", "2"):
+        arguments = ("H2O", "--field", "0,100", "--states", "J<=1", "--tilt", "30", "--intensity", "1e11 W/cm2")
+        code, out, err = call("stark", *arguments, "--workers", workers, "--json", "-")
+        assert (code, err) == (0, "")
+        found.append(json.loads(out)["states"])
+    assert found[0] == found[1]
 
 
 def test_align_writes_what_the_library_computes(call):
@@ -146,6 +181,17 @@ def test_every_kind_of_pulse(call, options):
         (("stark", "OCS", "--field", "5", "--plot", "a.png"), "--plot: a picture of a map needs two fields"),
         (("stark", "OCS", "--intensity", "-1"), "intensity -1"),
         (("stark", "N2"), "no dipole"),
+        (("stark", "OCS", "--light", "up"), "--light: 'up'"),
+        (("stark", "OCS", "--line", "1"), "--line: '1'"),
+        (("stark", "OCS", "--line", "9 - 8", "--lines", "a.csv"), "no line 9 - 8"),
+        (("stark", "OCS", "--spread", "2"), "--spread: 2"),
+        (("stark", "OCS", "--tilt", "up"), "--tilt: 'up'"),
+        (("stark", "OCS", "--tilt", "20", "--m", "0"), "mixes M"),
+        (("stark", "OCS", "--tilt", "20", "--lines", "a.csv"), "good M"),
+        (("stark", "OCS", "--workers", "0"), "--workers: 0"),
+        (("stark", "OCS", "--field", "0,1", "--coefficients", "a.csv"), "more than 4"),
+        (("stark", "OCS", "--field", "0,1,5", "--deflection", "a.csv"), "evenly"),
+        (("stark", "OCS", "--temperature", "0"), "--temperature"),
         (("stark", "CCl4"), "spherical top"),
     ],
 )

@@ -175,3 +175,15 @@ def test_what_there_is_not_has_no_row(call, folder):
     assert code == 0
     assert "nan" not in out
     assert "one row alone" in out
+
+
+def test_a_run_is_drawn_with_temperatures_and_pair_distribution(call, folder):
+    code, _, err = call(*VAPOUR, "--steps", "10", "--every", "5", "--plot", "run.svg")
+    assert (code, err) == (0, "")
+    text = Path("run.svg").read_text(encoding="utf-8")
+    assert "temperature (K)" in text
+    assert "g(r) of 2 frames" in text
+    assert [path.name for path in folder.iterdir()] == ["run.svg"]  # frames were taken along in a temporary folder
+    assert call(*VAPOUR, "--steps", "5", "--plot", "run.txt")[0] == 2
+    assert call(*VAPOUR, "--steps", "5", "--checkpoint", "c.npz", "--plot", "last.svg")[0] == 0
+    assert "g(r) of 1 frame" in Path("last.svg").read_text(encoding="utf-8")

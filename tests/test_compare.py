@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from oracle_cases import SAMPLES, prediction
 
+from rotor.formats.line_tables import catalogue
 from rotor.formats.spcat.cat import read_cat
 from rotor.formats.spcat.catalogue import Layout
-from rotor.formats.spcat.compare import agreement, compare, in_mhz, with_measured_lines
+from rotor.formats.spcat.compare import agreement, compare, in_mhz, likely_temperature_k, with_measured_lines
 
 ONE = b"  115271.2018  0.0005 -5.0105 2    0.0000  3  28503 101 1           0           \n"
 TWO = b"  230538.0000  0.0005 -4.1197 2    3.8450  5 -28503 101 2           1           \n"
@@ -94,3 +95,50 @@ def test_two_measured_frequencies_of_one_label_are_refused():
     twice = read_cat(TWO + TWO.replace(b"230538.0000", b"230539.0000"))
     with pytest.raises(ValueError, match="have one label"):
         with_measured_lines(read_cat(ONE), twice)
+
+
+SPLIT = (  # J = 1 - 0 of CH3-37Cl (JPL, c052009): F = 5/2, 1/2, 3/2 above F = 3/2, rounded up
+    b"   26164.4901  0.0010 -5.8078 3   -0.0000  8 -52009 213 1 0 2       0 0 2       \n"
+    b"   26179.2202  0.0010 -5.6313 3   -0.0000 12 -52009 213 1 0 3       0 0 2       \n"
+    b"   26190.9981  0.0010 -6.1082 3   -0.0000  4  52009 213 1 0 1       0 0 2       \n"
+)
+WHOLE = b"   26175.5000  0.0010 -5.3300 3    0.0000  6  52009 202 1 0         0 0         \n"
+
+
+def test_components_of_a_spin_are_one_line_beside_a_list_without():
+    found = compare(read_cat(SPLIT), read_cat(WHOLE))
+    assert (len(found.of_ours), len(found.missing), len(found.extra), found.collapsed) == (1, 0, 0, True)
+    weights = 10.0 ** np.array([-5.8078, -5.6313, -6.1082])
+    centre = weights @ [26164.4901, 26179.2202, 26190.9981] / weights.sum()
+    assert found.reference.frequency_mhz[0] == pytest.approx(centre, abs=1e-9)  # round-off of 3e4 MHz
+    assert found.reference.lgint[0] == pytest.approx(np.log10(weights.sum()), abs=1e-12)  # round-off
+    assert found.reference.tag[0] == 52009  # one component was not measured
+    turned = compare(read_cat(WHOLE), read_cat(SPLIT))
+    assert turned.differences("frequency_mhz")[0] == pytest.approx(centre - 26175.5, abs=1e-9)  # round-off
+    assert not compare(read_cat(SPLIT), read_cat(SPLIT)).collapsed
+
+
+@pytest.mark.oracle
+def test_a_catalogue_with_quadrupole_splitting_meets_an_unsplit_prediction(shared):
+    import rotor
+
+    reference = read_cat(shared / "reference" / "library_lines" / "c052009.cat.gz")
+    # round constants that its own lines of low J and K give
+    top = rotor.Top.from_constants("A=156051.5 B=13088.168 DJ=0.01753 DJK=0.1937 MHz", dipole_abc_debye=(1.9, 0, 0))
+    ours = catalogue(rotor.line_list(top, jmax=25, min_lgint=-10.0, untrusted=True))
+    found = compare(reference, ours)
+    assert found.collapsed
+    assert len(found.of_ours) > 200
+    off = found.differences("frequency_mhz") / found.reference.frequency_mhz[found.of_reference]
+    low = np.abs(found.ours.quanta_upper[found.of_ours, 1]) <= 9
+    assert np.abs(off[low]).max() < 3e-5  # of constants without sextic terms: the pairs are the right ones
+
+
+def test_the_temperature_of_intensities_is_found():
+    import rotor
+
+    top = rotor.read("OCS")
+    cold, warm = (catalogue(rotor.line_list(top, temperature_k=t, jmax=40, min_lgint=-20.0)) for t in (75.0, 300.0))
+    assert likely_temperature_k(compare(cold, warm), 300.0) == pytest.approx(75.0, rel=0.011)  # steps of 1 %
+    assert likely_temperature_k(compare(warm, warm), 300.0) == pytest.approx(300.0, rel=0.011)
+    assert np.isnan(likely_temperature_k(compare(cold.take([0]), warm), 300.0))

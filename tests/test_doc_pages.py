@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import sys
 from pathlib import Path
 from types import ModuleType
 
@@ -14,7 +15,7 @@ DOCS = Path(__file__).resolve().parents[1] / "docs"
 
 def script(name: str) -> ModuleType:
     spec = importlib.util.spec_from_file_location(name, DOCS / f"{name}.py")
-    module = importlib.util.module_from_spec(spec)
+    module = sys.modules[name] = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
 
@@ -22,6 +23,12 @@ def script(name: str) -> ModuleType:
 @pytest.mark.oracle
 def test_the_page_of_measured_lines(shared: Path):
     make = script("make_measured_lines")
+    assert make.page(shared) == make.PAGE.read_text(encoding="utf-8")
+
+
+@pytest.mark.oracle
+def test_the_page_of_published_structures(shared: Path):
+    make = script("make_published_structures")
     assert make.page(shared) == make.PAGE.read_text(encoding="utf-8")
 
 

@@ -11,7 +11,8 @@ from scipy.spatial.transform import Rotation
 
 from rotor.alignment.observables import absolute_cosine
 from rotor.quantum.direction_cosines import cosine_bands, cosine_squared_bands
-from rotor.quantum.field_blocks import Contraction, field_space
+from rotor.quantum.field_blocks import Contraction
+from rotor.quantum.field_space import field_space
 from rotor.quantum.tilted_blocks import tilted_space
 from rotor.quantum.wang_blocks import coloured_components
 from rotor.tops.constants import Constants

@@ -11,9 +11,10 @@ import rotor
 from rotor.molecules.nuclei import isotope
 from rotor.quantum.effects.hyperfine import NuclearQuadrupole
 from rotor.quantum.effects.watson import SEMI_RIGID
-from rotor.quantum.limits import GRADIENT_MHZ_PER_BARN, VIBRATION_CM, model_limits, model_sizes, populated_j
+from rotor.quantum.limits import VIBRATION_CM, model_limits, model_sizes, populated_j
 from rotor.quantum.solve import solve_levels
 from rotor.quantum.spins import Spin
+from rotor.quantum.spins.splittings import GRADIENT_MHZ_PER_BARN
 from rotor.units import MHZ_PER_CM
 
 

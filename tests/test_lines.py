@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from rotor import units
+from rotor.quantum.reduced import connected_wang_blocks, wang_amplitudes
 from rotor.quantum.solve import solve_levels
-from rotor.quantum.tensors import amplitudes, body_tensor, connected_pairs
+from rotor.quantum.tensors import body_tensor
 from rotor.spectra import transitions
 from rotor.spectra.intensity import EINSTEIN_PER_MHZ3, INTENSITY_NM2_MHZ
 from rotor.spectra.lines import line_list
@@ -26,8 +27,8 @@ def sum_over_final_states(top: Top, j: int) -> dict[str, np.ndarray]:
     sums = {axis: np.zeros(len(levels)) for axis in "abc"}
     for axis, direction in zip("abc", np.eye(3), strict=True):
         dipole = body_tensor(direction, 1, str(levels.representation))
-        for up, low in connected_pairs(levels.blocks, dipole):
-            strength = amplitudes(up, low, dipole) ** 2
+        for up, low in connected_wang_blocks(levels.blocks, dipole):
+            strength = wang_amplitudes(up, low, dipole) ** 2
             sums[axis][up.start : up.start + up.basis.size] += strength.sum(axis=1)
             sums[axis][low.start : low.start + low.basis.size] += strength.sum(axis=0)
     return {axis: total[levels.quanta["j"] == j] for axis, total in sums.items()}

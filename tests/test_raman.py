@@ -13,8 +13,9 @@ from hypothesis import strategies as st
 from slow_matrix import AXES, watson_matrix
 
 import rotor
+from rotor.quantum.reduced import wang_amplitudes
 from rotor.quantum.solve import solve_levels
-from rotor.quantum.tensors import amplitudes, body_tensor, coupling
+from rotor.quantum.tensors import body_tensor, coupling
 from rotor.spectra.raman import anisotropy_angstrom3, band_cross_section, jmax_for_raman, raman_lines
 from rotor.spectra.raman_strengths import anisotropy_squared, raman_transitions
 from rotor.tops.constants import Constants
@@ -170,7 +171,7 @@ def test_sum_over_final_states(values, tensor):
     gamma2 = anisotropy_squared(alpha)
     polarizability = body_tensor(alpha, 2, levels.representation)
     for block in (block for block in levels.blocks if block.basis.j <= 4):
-        elastic = 1.5 * np.diag(amplitudes(block, block, polarizability)) ** 2
+        elastic = 1.5 * np.diag(wang_amplitudes(block, block, polarizability)) ** 2
         for i in range(block.basis.size):
             row = block.start + i
             around = found.strength_angstrom6[(found.lower == row) | (found.upper == row)].sum()

@@ -13,8 +13,9 @@ from hypothesis import strategies as st
 from scipy.special import obl_cv
 
 from rotor.quantum.effects.stark import MHZ_ANGSTROM3_W_PER_CM2, Stark, stark_map
-from rotor.quantum.field_blocks import Contraction, field_space
-from rotor.quantum.field_map import reduced_basis, solve_fields
+from rotor.quantum.field_blocks import Contraction
+from rotor.quantum.field_solver import reduced_basis, solve_fields
+from rotor.quantum.field_space import field_space
 from rotor.tops.top import Top
 from rotor.units import MHZ_PER_DEBYE_KV_PER_CM, PLANCK_J_S
 
@@ -185,8 +186,8 @@ def test_the_reduced_basis_gives_the_energies_of_the_full_matrix():
     slope = rng.normal(size=(200, 200))
     slope = slope + slope.T
     fields = np.linspace(0, 300, 61)
-    reduced, _ = reduced_basis(fixed, slope, fields, 8, 1e-4)
-    whole, _ = solve_fields(fixed, slope, fields, 8, False)
+    reduced, _ = reduced_basis((fixed, slope), fields, 8, 1e-4)
+    whole, _ = solve_fields((fixed, slope), fields, 8, False)
     assert np.abs(reduced - whole).max() < 1e-4  # the tolerance
 
 
@@ -216,7 +217,7 @@ def test_labels_by_overlap_would_depend_on_the_grid():
     slope = -MHZ_PER_DEBYE_KV_PER_CM * block.matrix(Contraction((4.5152, 0.05, 0), [0, 0, 1]))
     names = []
     for count in (76, 301):
-        _, vectors = solve_fields(np.diag(block.energies_mhz), slope, np.linspace(0, 150, count), 40, True)
+        _, vectors = solve_fields((np.diag(block.energies_mhz), slope), np.linspace(0, 150, count), 40, True)
         order = np.arange(40)
         for before, after in itertools.pairwise(vectors):
             order = order[np.argmax(np.abs(before.T @ after), axis=0)]

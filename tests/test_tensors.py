@@ -15,16 +15,15 @@ from scipy.spatial.transform import Rotation
 from slow_matrix import AXES, watson_matrix
 
 from rotor.quantum.basis import REPRESENTATIONS, WangBlock, wang_blocks
+from rotor.quantum.reduced import connected_wang_blocks, wang_amplitudes
 from rotor.quantum.solve import solve_levels
 from rotor.quantum.tensors import (
     BodyTensor,
     acting_on,
-    amplitudes,
     axes_of,
     bands_between,
     block_elements,
     body_tensor,
-    connected_pairs,
     coupling,
     frame_of,
     phase_exponent,
@@ -382,8 +381,8 @@ def test_dipole_strengths_are_those_of_full_matrices(representation):
     rank = np.concatenate([np.argsort(np.argsort(levels.energy_mhz[levels.quanta["j"] == j])) for j in range(7)])
     slow = slow_dipole_strengths(UNEVEN, representation, dipole, 6)
     total = 0.0
-    for up, low in connected_pairs(levels.blocks, body_tensor(dipole, 1, representation)):
-        strengths = amplitudes(up, low, body_tensor(dipole, 1, representation)) ** 2
+    for up, low in connected_wang_blocks(levels.blocks, body_tensor(dipole, 1, representation)):
+        strengths = wang_amplitudes(up, low, body_tensor(dipole, 1, representation)) ** 2
         i, k = (rank[block.start : block.start + block.basis.size] for block in (up, low))
         expected = slow[low.basis.j, up.basis.j][np.ix_(i, k)]
         assert np.allclose(strengths, expected, atol=1e-10)  # near-degenerate vectors of the full matrix
@@ -401,8 +400,8 @@ def test_strengths_from_one_level_add_up(rank, representation):
         Top(Constants(reduction="A", representation=representation, **UNEVEN)), j + rank, jmin=j - rank
     )
     sums = np.zeros(len(levels))
-    for up, low in connected_pairs(levels.blocks, tensor):
-        strength = amplitudes(up, low, tensor) ** 2
+    for up, low in connected_wang_blocks(levels.blocks, tensor):
+        strength = wang_amplitudes(up, low, tensor) ** 2
         sums[low.start : low.start + low.basis.size] += strength.sum(axis=0)
         if up is not low:
             sums[up.start : up.start + up.basis.size] += strength.sum(axis=1)
@@ -418,9 +417,9 @@ def test_every_representation_gives_the_same_strengths(rank):
         levels = solve_levels(Top(Constants(A=9.0, B=6.0, C=4.0, representation=representation)), 7)
         tensor = body_tensor(cartesian, rank, representation)
         table = np.zeros((len(levels), len(levels)))
-        for up, low in connected_pairs(levels.blocks, tensor):
+        for up, low in connected_wang_blocks(levels.blocks, tensor):
             inside = np.ix_(*(np.arange(b.start, b.start + b.basis.size) for b in (up, low)))
-            table[inside] = amplitudes(up, low, tensor) ** 2
+            table[inside] = wang_amplitudes(up, low, tensor) ** 2
         order = np.lexsort((levels.quanta["kc"], levels.quanta["ka"], levels.quanta["j"]))
         table = table[np.ix_(order, order)]
         found[representation] = np.maximum(table, table.T)

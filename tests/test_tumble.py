@@ -215,7 +215,7 @@ MISTAKES = [
     (("--moments", "1,1", "--angular-momentum", "1,1,1"), "--moments: '1,1': expected three numbers"),
     (("--moments", "0,0,1", "--angular-momentum", "0,1,1"), "two moments are zero"),
     (("--moments", "1,2,x", "--angular-momentum", "1,1,1"), "'x' is not a number"),
-    (("--moments", "1,2,3 kg", "--angular-momentum", "1,1,1"), "without the unit 'kg'"),
+    (("--moments", "1,2,3 kg", "--angular-momentum", "1,1,1"), "unit 'kg' does not measure the same thing as 'kg*m2'"),
     (("--moments", "1,2,3"), "--angular-momentum: expected with --moments"),
     (("--moments", "1,2,3", "--angular-momentum", "0,0,0"), "a body at rest does not tumble"),
     (("--moments", "0,1,1", "--angular-momentum", "1,0,1"), "--angular-momentum: '1,0,1': a linear rotor has no"),
@@ -235,6 +235,14 @@ MISTAKES = [
     (("water", "--csv", "a.txt"), "--csv a.txt: the name must end in .csv"),
     (("water", "--gif", "a.avi"), "--gif a.avi: the name must end in .gif or .mp4"),
     (("atom.xyz",), "is a single atom"),
+    (("--body", "brick"), "--body: 'brick': expected one of book, phone, racket, wing nut"),
+    (("water", "--body", "book"), "a molecule and --body: give one of them"),
+    (("--body", "book", "--moments", "1,2,3"), "--body and --moments: give one of them"),
+    (("book", "--omega", "1,2,3", "--angular-momentum", "1,2,3"), "--omega and --angular-momentum"),
+    (("book", "--omega", "0,0,0"), "--omega: '0,0,0': a body at rest does not tumble"),
+    (("book", "--omega", "1,2,3 kg"), "unit 'kg' does not measure the same thing as 'rad/s'"),
+    (("--moments", "1,2,3", "--omega", "1,2,3 rpm"), "expected plain numbers here, without the unit 'rpm'"),
+    (("water", "--omega", "1,2,3", "--temperature", "3"), "--temperature and --omega"),
 ]
 
 
@@ -274,3 +282,70 @@ def test_code_in_the_documentation_runs():
     blocks = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
     assert len(blocks) == 2
     exec(compile("\n".join(blocks), "docs/classical.md", "exec"), {})
+
+
+@pytest.mark.parametrize("name", ["book", "phone", "racket", "wing nut"])
+def test_ordinary_bodies_have_the_inertia_of_their_parts(name):
+    from rotor.classical.bodies import named_body
+
+    body = named_body(name)
+    np.testing.assert_allclose(
+        body.inertia_kg_m2, np.diag(body.moments_kg_m2), atol=1e-20
+    )  # axes x, y, z are principal
+    low, middle, high = sorted(body.moments_kg_m2)
+    assert (
+        0 < low < middle < high <= (low + middle) * (1 + 1e-12)
+    )  # asymmetric, and possible; equal where flat, to round-off
+    assert body.axes[int(np.argsort(body.moments_kg_m2)[1])] == ("bolt" if name == "wing nut" else "across")
+
+
+def test_parts_of_ordinary_bodies_against_sums_over_points():
+    from rotor.classical.bodies import box, cylinder, hoop, rod
+
+    middles = (np.arange(200) + 0.5) / 200 - 0.5  # the mean of x² over 200 strips is (1 - 1/200²)/12
+    x, y, z = np.meshgrid(*3 * [middles[::4]], indexing="ij")
+    points = np.stack([2 * x, 3 * y, 4 * z], axis=-1).reshape(-1, 3)
+    squares = (points**2).mean(axis=0)
+    np.testing.assert_allclose(
+        box(7.0, (2, 3, 4)).moments_kg_m2, 7 * (squares.sum() - squares), rtol=1e-3
+    )  # 50² strips
+    turn = 2 * np.pi * np.arange(12) / 12
+    ring = np.mean(np.stack([np.cos(turn), np.sin(turn), 0 * turn]) ** 2, axis=1) * 0.3**2
+    np.testing.assert_allclose(
+        hoop(2.0, 0.3, (0, 0, 0)).moments_kg_m2, 2 * (ring.sum() - ring), rtol=1e-12
+    )  # exact sums
+    radii = np.sqrt((np.arange(1000) + 0.5) / 1000) * 0.3  # equal areas
+    across = 5 * (np.mean(radii**2) / 2 + np.mean((0.8 * middles) ** 2))
+    expected = (across, across, 5 * np.mean(radii**2))
+    np.testing.assert_allclose(cylinder(5.0, 0.3, 0.8).moments_kg_m2, expected, rtol=1e-4)  # 200 strips
+    np.testing.assert_allclose(rod(5.0, 0.8, (1, 2, 3)).moments_kg_m2[1], 5 * np.mean((0.8 * middles) ** 2), rtol=1e-4)
+
+
+def test_a_body_is_spun_by_an_angular_velocity_in_si_units(call):
+    _, out, _ = call("tumble", "--moments", "1e-3,2e-3,2.5e-3 kg m2", "--omega", "0,60,3 rpm", "--json", "-")
+    content = json.loads(out)
+    assert content["units"] == {"time": "s", "angular_momentum": "kg m²/s", "energy": "J"}
+    omega = np.array([0, 60, 3]) * np.pi / 30
+    moments = np.array([1e-3, 2e-3, 2.5e-3])
+    np.testing.assert_allclose(content["angular_momentum"], moments * omega, rtol=1e-15)  # round-off
+    assert content["energy"] == pytest.approx(0.5 * moments @ omega**2, rel=1e-14)  # round-off
+    _, plain, _ = call("tumble", "--moments", "1e-3,2e-3,2.5e-3", "--omega", "0,6,3", "--json", "-")
+    assert json.loads(plain)["angular_momentum"] == [0.0, 2e-3 * 6, 2.5e-3 * 3]
+    assert json.loads(plain)["units"]["time"] == ""
+
+
+def test_a_molecule_is_spun_by_an_angular_velocity(call):
+    _, out, _ = call("tumble", "CO", "--omega", "0,10,0", "--json", "-")
+    content = json.loads(out)
+    hbar = 1.054571817e-34 / 1.66053906892e-27 * 1e8  # in u Å²/ps
+    expected = 10 * content["moments"][1] / hbar
+    assert content["angular_momentum"][1] == pytest.approx(expected, rel=1e-9)  # digits of hbar here
+
+
+def test_a_named_body_turns_over_by_itself(call, tmp_path):
+    code, out, err = call("tumble", "racket", "--plot", "r.png")
+    assert (code, err) == (0, "")
+    assert out.startswith("racket: asymmetric top")
+    assert "one turn a second, 0.5 degrees off the intermediate axis, across" in " ".join(out.split())
+    assert (tmp_path / "r.png").exists()
+    assert call("tumble", "--body", "Wing Nut", "--times", "0:1s:3", "--json", "-")[0] == 0

@@ -165,9 +165,9 @@ def align(
     times = _checked_times(times_ps, pulses)
     _check_tolerance(tolerance)
     ensemble = _ensemble(top, temperature_k, state, m, tolerance)
-    wanted = tuple(observe.observable(name, top) for name in observables)
+    followed = tuple(observe.observable(name, top) for name in observables)
     windows = timeline(pulses)
-    problem = Problem(top, pulses, windows, times, ensemble, wanted, tolerance, contractions_of(top, windows))
+    problem = Problem(top, pulses, windows, times, ensemble, followed, tolerance, contractions_of(top, windows))
     given = jmax
     jmax = guessed_jmax(top, pulses, ensemble.jmax, tolerance) if given is None else given
     if jmax < ensemble.jmax + EDGE:
@@ -247,7 +247,7 @@ def _trace(
     for task, outcome in zip(tasks, outcomes, strict=True):
         np.add.at(populations, task.rows, outcome.populations)
     cosines, last = {}, {}
-    for place, one in enumerate(problem.wanted):
+    for place, one in enumerate(problem.observables):
         cosines[one.name], last[one.name] = _signal(problem, energies, outcomes, place, before)
     return AlignmentTrace(
         top=problem.top,
@@ -278,7 +278,7 @@ def _signal(
     problem: Problem, energies: Floats, outcomes: list[Outcome], place: int, before: bool
 ) -> tuple[Floats, Harmonics]:
     """One cosine at all times, and its harmonics after the last window."""
-    remainder = problem.ensemble.left_out * problem.wanted[place].isotropic
+    remainder = problem.ensemble.left_out * problem.observables[place].isotropic
     out = np.full(len(problem.times), np.nan)
     stretches = range(-1 if before else 0, len(problem.windows))
     found = Harmonics(remainder, np.zeros(0, dtype=np.complex128), np.zeros(0))

@@ -16,7 +16,8 @@ from rotor.alignment.observables import Coherences, Observable
 from rotor.alignment.pulse import RAD_PER_PS_MHZ, Pulse
 from rotor.alignment.timeline import Window
 from rotor.arrays import Floats, Ints
-from rotor.quantum.field_blocks import AxialBlock, Contraction, FieldBlock, FieldSpace, field_space
+from rotor.quantum.field_blocks import AxialBlock, Contraction, FieldBlock, FieldSpace
+from rotor.quantum.field_space import field_space
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
@@ -35,7 +36,7 @@ class Problem:
     windows: tuple[Window, ...]
     times: Floats
     ensemble: Ensemble
-    wanted: tuple[Observable, ...]
+    observables: tuple[Observable, ...]
     tolerance: float
     contractions: tuple[tuple[Contraction, ...], ...]
 
@@ -203,7 +204,7 @@ def task_of(problem: Problem, block: FieldBlock, plan: Plan, before: bool) -> Ta
     return Task(
         energies=RAD_PER_PS_MHZ * block.energies_mhz,
         operators=operators,
-        cosines=tuple(one.matrix(block) for one in problem.wanted),
+        cosines=tuple(one.matrix(block) for one in problem.observables),
         rows=block.rows,
         columns=columns,
         weights=population[columns],

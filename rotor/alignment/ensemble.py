@@ -106,14 +106,14 @@ def thermal(top: Top, temperature_k: float, cut: float) -> Ensemble:
     share = np.cumsum(whole[order]) / whole.sum()
     last = min(int(np.searchsorted(share, 1.0 - cut)), int(there.sum()) - 1)
     least = float(factor[order[last]] / whole.sum()) * (1 - 1e-9)
-    kept = factor / whole.sum() >= least
+    populated = factor / whole.sum() >= least
     return Ensemble(
         temperature_k,
         ground,
         float(whole.sum()),
         least,
-        float(whole[~kept].sum() / whole.sum()),
-        int(levels.j[kept].max()),
+        float(whole[~populated].sum() / whole.sum()),
+        int(levels.j[populated].max()),
     )
 
 

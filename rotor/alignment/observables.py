@@ -100,7 +100,7 @@ def absolute_cosine(block: AxialBlock) -> Floats:
 
     Gauss-Legendre points on each half of -1 < cosθ < 1, where the integrand is a polynomial.
 
-    >>> from rotor.quantum.field_blocks import field_space
+    >>> from rotor.quantum.field_space import field_space
     >>> from rotor.tops.top import Top
     >>> z2 = Contraction(np.diag([1.0, 0, 0]), np.diag([0, 0, 1.0]))
     >>> block = field_space(Top.from_constants("B=6000 MHz"), 2, [z2]).blocks(0)[0]

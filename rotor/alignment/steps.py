@@ -146,7 +146,7 @@ def _difference(problem: Problem, space: FieldSpace, task: Task, first: Outcome,
     period = max(float(problem.times[-1]) - problem.windows[-1].stop_ps, 0.0)
     times = np.linspace(0.0, period, PILOT_TIMES)
     worst = 0.0
-    for place in range(len(problem.wanted)):
+    for place in range(len(problem.observables)):
         signals = [observe.harmonics([one.free[-1][place]], energies, 0.0).at(times) for one in (first, second)]
         worst = max(worst, float(np.abs(signals[0] - signals[1]).max()))
         pairs = zip(first.samples, second.samples, strict=True)

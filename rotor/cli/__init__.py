@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import os
 import shlex
+import signal
 import sys
 import traceback
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from importlib import import_module
 from typing import cast
 
@@ -41,7 +43,7 @@ VERBS = {  # and what the list of verbs says of each, short enough for 80 column
 }
 FILES = {"run": "run_scene"}  # of verbs that this module has a function for
 COMPLETION = "_ROTOR_COMPLETE"  # set by a shell that asks for completions
-NO_ANSWER, WRONG_INPUT, INTERRUPTED = 1, 2, 130
+NO_ANSWER, WRONG_INPUT, INTERRUPTED, TERMINATED = 1, 2, 130, 143
 # click's ClickException, whether click is a package of its own or, in a newer typer, a part of it
 _ERROR_OF_USE = cast(type[Exception], typer.BadParameter.__mro__[2])
 
@@ -99,6 +101,14 @@ def _print_version(asked: bool) -> None:
         raise typer.Exit
 
 
+class Terminated(BaseException):
+    """The process was asked to end (SIGTERM, SIGHUP): what is not finished is removed, as after Ctrl-C."""
+
+
+def _terminated(number: int, frame: object) -> None:
+    raise Terminated
+
+
 def run(arguments: Sequence[str] | None = None) -> int:
     """Carry out a command and return its exit code; every error is one line on standard error, unless --debug is given."""
     arguments = sys.argv[1:] if arguments is None else list(arguments)
@@ -109,12 +119,16 @@ def run(arguments: Sequence[str] | None = None) -> int:
     except ComputationError as error:
         return _fail(NO_ANSWER, str(error), arguments)
     except BrokenPipeError:  # the reader of the pipe has closed it: nothing more is written, at exit neither
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _close_output()
         return 0
+    except Terminated:
+        return TERMINATED
     except KeyboardInterrupt:
         return INTERRUPTED
     except (ValueError, OSError) as error:
-        return _fail(WRONG_INPUT, _text_of(error), arguments)
+        return _fail(_code_of(error), _text_of(error), arguments)
+    except MemoryError:
+        return _fail(NO_ANSWER, "not enough memory for this; fewer atoms, levels, lines or times need less", arguments)
     except Exception as error:  # a defect of the program, not of the input
         text = f"{type(error).__name__}: {error}"
         return _fail(NO_ANSWER, f"{text}; this is a defect, please report it with the output of --debug", arguments)
@@ -134,16 +148,33 @@ def _run(arguments: list[str]) -> int:
         return end.exit_code
 
 
+def _code_of(error: ValueError | OSError) -> int:
+    """A disk that is full is no mistake in the input."""
+    from rotor.formats.atomic_write import FULL
+
+    return NO_ANSWER if isinstance(error, OSError) and error.errno in FULL else WRONG_INPUT
+
+
 def _text_of(error: ValueError | OSError) -> str:
-    if isinstance(error, OSError) and error.strerror:
-        return f"{error.filename}: {error.strerror}" if error.filename else error.strerror
-    return str(error)
+    if not isinstance(error, OSError) or not error.strerror:
+        return str(error)
+    if error.filename is None and _code_of(error) == NO_ANSWER:  # every file is named where it is written
+        _close_output()
+        return f"standard output: {error.strerror}"
+    return f"{error.filename}: {error.strerror}" if error.filename else error.strerror
+
+
+def _close_output() -> None:
+    """Nothing more goes to standard output, what is still in its buffer neither."""
+    with suppress(OSError):  # of an output that is no file
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _fail(code: int, message: str, arguments: Sequence[str]) -> int:
     if "--debug" in arguments[:1]:
         traceback.print_exc()
-    print("error:", " ".join(message.split()), file=sys.stderr)
+    with suppress(OSError):  # of a standard error that is full or closed
+        print("error:", " ".join(message.split()), file=sys.stderr)
     return code
 
 
@@ -152,6 +183,10 @@ def main() -> None:
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")  # a terminal without Greek letters shows a question mark, no traceback
+    for name in ("SIGTERM", "SIGHUP"):  # the second is not on Windows, and a process started by nohup goes on
+        number = getattr(signal, name, None)
+        if number is not None and signal.getsignal(number) == signal.SIG_DFL:
+            signal.signal(number, _terminated)
     if COMPLETION in os.environ:
         from typer.completion import completion_init  # type: ignore[attr-defined]
 

@@ -24,6 +24,7 @@ from rotor.cli.shared.output import (
 )
 from rotor.cli.shared.pulse_inputs import Pulses, pulses_of
 from rotor.cli.shared.save_scene import save_scene, save_scene_option
+from rotor.cli.shared.sources import with_sources
 
 if TYPE_CHECKING:
     from rotor.alignment.align import AlignmentTrace
@@ -71,6 +72,7 @@ class Options:
     jmax: int | None = option(None, metavar="N", help="Highest J of the basis; by default what the tolerance needs.")
     classical: int = option(0, metavar="N", help="Also a classical gas of so many molecules under the same pulses.")
     seed: int = option(1, metavar="N", help="Of the classical gas.")
+    workers: int = option(1, metavar="N", help="Processes over which blocks of initial states are spread.")
 
 
 @dataclass(frozen=True)
@@ -88,6 +90,7 @@ class Outputs:
 def command(context: typer.Context, given: Input, pulses: Pulses, options: Options, outputs: Outputs) -> None:
     """Molecules aligned or oriented by pulses of light: cosines against time of a rotational wave packet."""
     from rotor.alignment.request import AlignRequest, answer_align
+    from rotor.cli.shared.workers import working
 
     acting = pulses_of(pulses)
     settings = _settings(options)
@@ -95,7 +98,8 @@ def command(context: typer.Context, given: Input, pulses: Pulses, options: Optio
     top = _with_tensor(inputs.read_top(given), options, acting)
     with inputs.fields_as_options(**NAMES):
         request = AlignRequest(top, acting, **settings)
-        answer = answer_align(request)
+        with working(options.workers, "blocks") as executor:
+            answer = answer_align(request, executor)
     if request.state is not None and request.classical_molecules:
         note("the classical gas is at the temperature of --temperature, not in the level of --state")
 
@@ -104,7 +108,14 @@ def command(context: typer.Context, given: Input, pulses: Pulses, options: Optio
     text = lambda: json_with_rows(answer.table, "trace", content)  # noqa: E731
     by_hand = options.polarizability is not None or options.anisotropy is not None
     saved = save_scene("align", request, outputs, given, by_hand)
-    deliver(files, _writers(answer, content) | saved, text, lambda: _show(answer, content))
+    deliver(
+        files,
+        _writers(answer, content) | saved,
+        text,
+        with_sources(
+            lambda: _show(answer, content), answer.trace.top, ("constants", "dipole", "polarizability"), given.sources
+        ),
+    )
 
 
 def _settings(options: Options) -> dict[str, Any]:
@@ -180,9 +191,10 @@ def _writers(answer: AlignAnswer, content: dict[str, Any]) -> dict[str, Writer]:
 
     def draw(path: Path) -> None:
         from rotor.plots.alignment import plot_alignment
+        from rotor.plots.picture import name_of_top
 
         trace = answer.trace
-        title = ", ".join(filter(None, (trace.top.name, _ensemble_text(trace))))
+        title = ", ".join(filter(None, (name_of_top(trace.top), _ensemble_text(trace))))
         plot_alignment(
             trace, path, classical=answer.classical, title=title, provenance={"command": provenance["command"]}
         )
@@ -219,11 +231,11 @@ def _facts(trace: AlignmentTrace, content: dict[str, Any]) -> list[tuple[str, st
 
     top = trace.top
     acts_on = {pulse.acts_on for pulse in trace.pulses}
-    facts = [("constants", report.with_source(report.constants_text(top), top.source))]
+    facts = [("constants", report.constants_text(top))]
     if "dipole" in acts_on:
-        facts.append(("dipole", report.with_source(report.vector_text(top.dipole_abc_debye), top.dipole_source)))
+        facts.append(("dipole", report.vector_text(top.dipole_abc_debye)))
     if "polarizability" in acts_on:
-        facts.append(("polarizability", report.with_source(report.tensor_text(top), top.polarizability_source)))
+        facts.append(("polarizability", report.tensor_text(top)))
     accuracy = (
         f"{content['error_estimate']:.1e} estimated: steps {trace.step_error:.1e}, leakage {trace.edge_population:.1e}, "
         f"left out {trace.ensemble.left_out:.1e} of the population"

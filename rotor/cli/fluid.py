@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, replace
 from math import isnan
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 import typer
@@ -25,6 +28,7 @@ from rotor.cli.shared.output import (
 from rotor.cli.shared.save_scene import save_scene, save_scene_option
 
 if TYPE_CHECKING:
+    from rotor.arrays import Floats
     from rotor.fluid.request import FluidAnswer, FluidRequest, NewBox
     from rotor.fluid.run import Outputs as RunFiles
     from rotor.fluid.settings import Settings
@@ -35,6 +39,7 @@ Examples:
   rotor fluid water --molecules 216 --ensemble langevin --steps 40000 --trajectory liquid.traj --checkpoint run.npz --resume
   rotor fluid liquid.traj --ensemble nve --steps 50000 --every 10 --csv nve.csv --json -
   rotor fluid liquid.traj --steps 50000 --engine openmm --threads 2 --csv openmm.csv
+  rotor fluid water --molecules 64 --cutoff 6 --ensemble langevin --steps 2000 --plot run.png
   rotor fluid argon --molecules 500 --model argon --density 1.4 --temperature 90 --step 5fs"""
 
 NAMES = {
@@ -77,6 +82,9 @@ class Outputs:
     checkpoint: str | None = file_option(".npz", help="Write what the run needs to continue (.npz).")
     checkpoint_every: int = option(1000, metavar="N", help="Steps between checkpoints.")
     resume: bool = option(False, "--resume", help="Continue from --checkpoint.")
+    plot: str | None = file_option(
+        ".png", ".pdf", ".svg", help="Draw temperatures, energy and g(r) (.png, .pdf, .svg)."
+    )
     json: str | None = json_option()
     save_scene: str | None = save_scene_option()
 
@@ -86,15 +94,63 @@ def command(context: typer.Context, options: Options, outputs: Outputs) -> None:
     """Rigid molecules in a periodic box: a run, its temperatures, energies and pressure."""
     settings = _settings(options)
     growing, files = _files(options.source, outputs)
-    with inputs.fields_as_options(**NAMES):
+    with inputs.fields_as_options(**NAMES), frames_for(growing, files) as (growing, frames):
         request = _request(options, settings)
         answer, start = _answer(request, growing, outputs, {"command": context.obj, "input": options.source})
+        paths = _paths(answer, frames)
     for remark in answer.notes:
         note(remark)
-    grown = [growing.csv, *growing.trajectories, growing.checkpoint, *files.paths.values()]
+    grown = [growing.csv, *(outputs.trajectory or ()), growing.checkpoint, *files.paths.values()]
     content = start | answer.facts() | {"files": [str(path) for path in grown if path is not None]}
     text = lambda: json_with_rows(answer.record, "record", content)  # noqa: E731
-    deliver(files, save_scene("fluid", request, outputs), text, lambda: _show(content, settings))
+    writers = {"--plot": lambda path: _draw(answer, paths, path, str(context.obj))}
+    writers |= save_scene("fluid", request, outputs)
+    deliver(files, writers, text, lambda: _show(content, settings))
+
+
+@contextmanager
+def frames_for(growing: RunFiles, files: Files) -> Iterator[tuple[RunFiles, str | None]]:
+    """The files of a run and the one its frames are read from: where a picture asks for some, and none is written, a temporary.
+
+    A run that can be resumed has no temporary file: its checkpoint would name it. Its last frame alone is drawn.
+    """
+    if "--plot" not in files.paths or growing.trajectories or growing.checkpoint is not None:
+        yield growing, str(growing.trajectories[0]) if growing.trajectories else None
+        return
+    with TemporaryDirectory(prefix="rotor-") as folder:
+        path = str(Path(folder) / "frames.traj")
+        yield replace(growing, trajectories=(path,)), path
+
+
+def _paths(answer: FluidAnswer, frames: str | None) -> Floats:
+    """Centres of mass (frames, n, 3) in the second half of a run, or those at its end."""
+    import numpy as np
+    from ase.io import read
+
+    from rotor.fluid.forces.models import models_of, shapes_of
+    from rotor.fluid.motion.bodies import bodies_of
+
+    shapes = shapes_of(models_of(answer.request.settings.model))
+    taken = read(frames, ":") if frames is not None else [answer.atoms]
+    for atoms in taken:
+        if "molecule" not in atoms.arrays:
+            atoms.arrays["molecule"] = answer.atoms.arrays["molecule"]
+    return np.array([bodies_of(atoms, shapes=shapes)[1].centres for atoms in taken[len(taken) // 2 :]])
+
+
+def _draw(answer: FluidAnswer, paths: Floats, path: Path, command: str) -> None:
+    from rotor.fluid.analysis import pair_distribution
+    from rotor.plots.fluid import plot_fluid
+
+    atoms, settings = answer.atoms, answer.request.settings
+    edges = atoms.cell.lengths()
+    shells = None
+    if atoms.pbc.all() and atoms.cell.orthorhombic and paths.shape[1] > 1:
+        shells = pair_distribution(paths, edges, float(edges.min()) / 2, 120)
+    title = f"{paths.shape[1]} molecules, {settings.model}, {settings.ensemble}, by {answer.request.engine}"
+    if shells is not None:
+        title += f"; g(r) of {len(paths)} frame{'s' if len(paths) > 1 else ''}"
+    plot_fluid(answer.record, shells, paths.shape[1], path, title=title, provenance={"command": command})
 
 
 def _settings(options: Options) -> Settings:
@@ -122,6 +178,7 @@ def _files(source: str, outputs: Outputs) -> tuple[RunFiles, Files]:
     for number, path in enumerate(outputs.trajectory or []):
         growing.ask(f"--trajectory{' ' * number}", path, (".traj", ".xyz", ".extxyz"))
     growing.ask("--checkpoint", outputs.checkpoint, (".npz",))
+    last.ask("--plot", outputs.plot, (".png", ".pdf", ".svg"))
     last.ask_json(outputs.json)
     last.ask("--save-scene", outputs.save_scene, (".toml",))
     for name, target in (growing.paths | last.paths).items():

@@ -18,11 +18,11 @@ from rotor.cli.shared.inputs import Input, json_option
 from rotor.cli.shared.options import file_option, grouped, option
 from rotor.cli.shared.output import Files, Table, Writer, deliver, json_text, rows_of, show_facts, show_table
 from rotor.cli.shared.save_scene import save_scene, save_scene_option
+from rotor.cli.shared.sources import with_sources
 
 if TYPE_CHECKING:
     from rotor.classical.gas.ensembles import Correlations
     from rotor.thermo.classical_gas import GasAnswer, GasRequest
-    from rotor.tops.top import Top
 
 SHOWN = 11  # rows of the correlation functions in the report
 
@@ -75,8 +75,12 @@ def command(context: typer.Context, given: Input, options: Options, outputs: Out
     answer = _answer(request)
     content = _content(answer, given, context.obj)
     content["files"] = files.names
-    writers = _writers(answer, content) | save_scene("gas", request, outputs, given)
-    deliver(files, writers, lambda: json_text(content), lambda: _show(answer, content))
+    deliver(
+        files,
+        _writers(answer, content) | save_scene("gas", request, outputs, given),
+        lambda: json_text(content),
+        with_sources(lambda: _show(answer, content), answer.request.top, ("constants",), given.sources),
+    )
 
 
 def _settings(options: Options) -> dict[str, Any]:
@@ -145,19 +149,14 @@ def _writers(answer: GasAnswer, content: dict[str, Any]) -> dict[str, Writer]:
 
     def draw(path: Path) -> None:
         from rotor.plots.gas import plot_gas
+        from rotor.plots.picture import name_of_top
 
-        title = f"{_name(answer.request.top)}, {content['temperature_k']:g} K, {content['molecules']:,} molecules"
+        title = f"{name_of_top(answer.request.top)}, {content['temperature_k']:g} K, {content['molecules']:,} molecules"
         plot_gas(
             answer.test, answer.correlations, path, title=title, plateau=content["c1_plateau"], provenance=provenance
         )
 
     return {"--csv": table, "--parquet": table, "--plot": draw}
-
-
-def _name(top: Top) -> str:
-    from rotor.tops.facts import formula_of
-
-    return top.name or formula_of(top) or f"{top.kind} top"
 
 
 def _show(answer: GasAnswer, content: dict[str, Any]) -> None:
@@ -174,8 +173,6 @@ def _show(answer: GasAnswer, content: dict[str, Any]) -> None:
 
 
 def _facts(answer: GasAnswer, content: dict[str, Any]) -> list[tuple[str, str]]:
-    from rotor.cli.shared.report import with_source
-
     top, test = answer.request.top, answer.test
     a, b, c = top.rotational_constants_mhz
     rigid = ", ".join(f"{n} {x:.10g}" for n, x in zip("ABC", (a, b, c), strict=True) if math.isfinite(x))
@@ -183,7 +180,7 @@ def _facts(answer: GasAnswer, content: dict[str, Any]) -> list[tuple[str, str]]:
     drawn = f"{content['molecules']} molecules at {content['temperature_k']:g} K, seed {content['seed']}"
     left_out = "" if top.mass_u is not None else "; translations are left out, as the mass is not known"
     facts = [
-        ("rigid top", with_source(f"{rigid} MHz, distortion neglected", top.source)),
+        ("rigid top", f"{rigid} MHz, distortion neglected"),
         ("drawn", f"{drawn}; moved freely for {content['tested_at_ps']:.4g} ps, exactly"),
         ("degrees", f"{count['translation']} translations, {count['rotation']} rotations a molecule{left_out}"),
         ("test", str(test)),

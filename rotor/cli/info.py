@@ -14,6 +14,7 @@ from rotor.cli.shared import inputs
 from rotor.cli.shared.inputs import Input, json_option
 from rotor.cli.shared.options import grouped, option
 from rotor.cli.shared.output import Files, Table, deliver, json_text, show_facts, show_table, sum_progress
+from rotor.cli.shared.sources import with_sources
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
@@ -60,7 +61,14 @@ def command(context: typer.Context, given: Input, options: Options) -> None:
     content["partition_function"] = partition_table(top, temperatures, sum_progress())
     if options.conformers is not None:
         content["conformers"] = conformer_table(given.source, options.conformers)
-    deliver(files, {}, lambda: json_text(content), lambda: _show(top, content))
+    deliver(
+        files,
+        {},
+        lambda: json_text(content),
+        with_sources(
+            lambda: _show(top, content), top, ("constants", "dipole", "polarizability", "spin weights"), given.sources
+        ),
+    )
 
 
 def conformer_table(source: str | None, count: int) -> list[dict[str, Any]]:
@@ -91,7 +99,7 @@ def _show(top: Top, content: dict[str, Any]) -> None:
     print(report.heading(top))
     show_facts(_facts(top, content))
     others = _conformers_of(content.get("conformers", []))
-    for table in (_constants_table(top), _axes_table(content), _q_table(content), others):
+    for table in (_constants_table(top), _axes_table(content), _nuclei_table(top, content), _q_table(content), others):
         if table:
             print()
             show_table(table)
@@ -102,9 +110,7 @@ def _show(top: Top, content: dict[str, Any]) -> None:
 def _facts(top: Top, content: dict[str, Any]) -> list[tuple[str, str]]:
     from rotor.cli.shared import report
 
-    facts = [("constants from", content["source"] or "not said")]
-    if top.kind_of_top:
-        facts.append(("kind", _kind_text(content["kind"], content["kind_decision"])))
+    facts: list[tuple[str, str]] = []
     if top.symmetry is not None:
         number = content["symmetry_number"]
         facts.append(
@@ -115,12 +121,14 @@ def _facts(top: Top, content: dict[str, Any]) -> list[tuple[str, str]]:
     dipole = report.vector_text(top.dipole_abc_debye)
     weights = report.weights_text(content["spin_weights"])
     facts += [
-        ("dipole", report.with_source(dipole, content["dipole_source"])),
-        ("polarizability", report.with_source(report.tensor_text(top), content["polarizability_source"])),
-        ("spin weights", report.with_source(weights, content["spin_weights_source"])),
+        ("dipole", dipole),
+        ("polarizability", report.tensor_text(top)),
+        ("spin weights", weights),
         ("mass", f"{top.mass_u:.6f} u" if top.mass_u else "not known"),
         ("inertial defect", f"{content['inertial_defect_u_angstrom2']:.6g} u Å²"),
     ]
+    if top.kind_of_top:
+        facts.append(("kind", _kind_text(content["kind"], content["kind_decision"])))
     return facts
 
 
@@ -168,6 +176,21 @@ def _axes_table(content: dict[str, Any]) -> Table:
     if frame:
         rows.append(["centre of mass (Å)", "", "", *(f"{x + 0.0:.6f}" for x in frame["centre_angstrom"])])
     return Table("", columns, rows, frozenset({"axis"}))
+
+
+def _nuclei_table(top: Top, content: dict[str, Any]) -> Table | None:
+    """Nuclei that split lines, by how much, and the constants that are known."""
+    rows = []
+    for one in content["splitting_nuclei"]:
+        own = top.spin_constants.of(one["nucleus"]) if one["known"] and top.spin_constants else {}
+        constants = ", ".join(f"{name} {value:.6g}" for name, value in own.items())
+        said = constants or "not known; the size is that of a field gradient of one atomic unit"
+        about = "" if one["known"] else "about "
+        rows.append([one["nucleus"], f"{one['spin']:g}", f"{about}{one['splitting_mhz']:.3g}", said])
+    if not rows:
+        return None
+    columns = ("nucleus", "spin", "splits J = 1 by (MHz)", "constants (MHz)")
+    return Table("", columns, rows, frozenset({"nucleus", "constants (MHz)"}))
 
 
 def _reason(source: str) -> str:

@@ -45,7 +45,7 @@ class Options:
     json: str | None = json_option()
 
 
-@grouped(given=("constants", "isotope", "spin_weights", "calculator", "hessian", "symmetry_tolerance"))
+@grouped(given=("sources", "constants", "isotope", "spin_weights", "calculator", "hessian", "symmetry_tolerance"))
 def command(context: typer.Context, given: Input, options: Options) -> None:
     """Isotopologues: abundance, constants, kind, axes, dipole and spin weights of each."""
     files = Files.of(options)

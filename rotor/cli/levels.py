@@ -25,6 +25,7 @@ from rotor.cli.shared.output import (
     show_table,
 )
 from rotor.cli.shared.save_scene import save_scene, save_scene_option
+from rotor.cli.shared.sources import with_sources
 
 if TYPE_CHECKING:
     from rotor.quantum.request import LevelsAnswer
@@ -90,8 +91,14 @@ def command(context: typer.Context, given: Input, options: Options, outputs: Out
 
     content = {**begin(context.obj, given.text), **answer.facts(), "files": files.names}
     text = lambda: json_with_rows(answer.table, "levels", content)  # noqa: E731
-    writers = _writers(answer, content, options.unit) | save_scene("levels", request, outputs, given)
-    deliver(files, writers, text, lambda: _show(answer, content, options))
+    deliver(
+        files,
+        _writers(answer, content, options.unit) | save_scene("levels", request, outputs, given),
+        text,
+        with_sources(
+            lambda: _show(answer, content, options), answer.request.top, ("constants", "spin weights"), given.sources
+        ),
+    )
 
 
 def _settings(options: Options) -> dict[str, Any]:
@@ -154,8 +161,8 @@ def _facts(answer: LevelsAnswer, content: dict[str, Any]) -> list[tuple[str, str
         asked += f", up to {request.max_energy_mhz:g} MHz"
     ground = f"{content['ground_mhz']:.4f} MHz above the Hamiltonian's zero"
     return [
-        ("constants", report.with_source(report.constants_text(top), top.source)),
-        ("spin weights", report.with_source(weights, top.weights_source)),
+        ("constants", report.constants_text(top)),
+        ("spin weights", weights),
         ("levels", f"{len(answer.table)}: {asked}"),
         ("lowest", f"{ground}: energies count from there"),
     ]

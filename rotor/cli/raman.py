@@ -26,6 +26,7 @@ from rotor.cli.shared.output import (
     show_table,
 )
 from rotor.cli.shared.save_scene import save_scene, save_scene_option
+from rotor.cli.shared.sources import with_sources
 
 if TYPE_CHECKING:
     from rotor.spectra.raman import RamanLines
@@ -90,7 +91,17 @@ def command(context: typer.Context, given: Input, options: Options, vibration: V
     content["files"] = files.names
     text = lambda: json_with_rows(answer.lines, "lines", content)  # noqa: E731
     saved = save_scene("raman", request, outputs, given, options.polarizability is not None)
-    deliver(files, _writers(answer.lines, content) | saved, text, lambda: _show(answer, content))
+    deliver(
+        files,
+        _writers(answer.lines, content) | saved,
+        text,
+        with_sources(
+            lambda: _show(answer, content),
+            answer.lines.top,
+            ("constants", "polarizability", "spin weights"),
+            given.sources,
+        ),
+    )
 
 
 def _settings(options: Options) -> dict[str, Any]:
@@ -182,10 +193,10 @@ def _facts(lines: RamanLines, content: dict[str, Any]) -> list[tuple[str, str]]:
         else f"{content['min_relative']:g} of the strongest"
     )
     return [
-        ("constants", report.with_source(report.constants_text(top), top.source)),
-        ("polarizability", report.with_source(report.tensor_text(top), top.polarizability_source)),
+        ("constants", report.constants_text(top)),
+        ("polarizability", report.tensor_text(top)),
         ("anisotropy", f"{content['anisotropy_angstrom3']:.6g} Å³"),
-        ("spin weights", report.with_source(weights, top.weights_source)),
+        ("spin weights", weights),
         ("temperature", f"{lines.temperature_k:g} K"),
         ("laser", f"{lines.laser_nm:g} nm in vacuum"),
         ("Q", report.q_text(content["q"])),

@@ -29,6 +29,7 @@ from rotor.cli.shared.output import (
 )
 from rotor.cli.shared.plot_options import PlotOptions
 from rotor.cli.shared.save_scene import save_scene, save_scene_option
+from rotor.cli.shared.sources import with_sources
 
 if TYPE_CHECKING:
     from rotor.formats.spcat.predict import Prediction
@@ -56,7 +57,7 @@ NAMES = {
 class Options:
     """What is computed, and how much of it is shown."""
 
-    temperature: str = option("300", metavar="T", help="Temperature (K).")
+    temperature: str | None = option(None, metavar="T", help="Temperature (K); by default 300, with --hitran 296.")
     jmax: int | None = option(None, metavar="N", help="Highest J; by default what the cut needs.")
     min_lgint: str = option("-12", metavar="X", help="Leave out lines with log10(nm² MHz) below; or 'none'.")
     range_: str | None = option(
@@ -84,6 +85,10 @@ class Outputs:
     """Files to write."""
 
     cat: str | None = file_option(".cat", ".cat.gz", help="Write a catalogue of 80 columns (.cat, .cat.gz).")
+    hitran: str | None = file_option(".hitran", help="Write HITRAN records of 160 characters; with --hitran-id.")
+    hitran_id: str | None = option(
+        None, metavar="M:I", help="HITRAN's numbers of molecule and isotopologue, such as 5:1."
+    )
     csv: str | None = file_option(".csv", help="Write all lines as CSV.")
     parquet: str | None = file_option(".parquet", help="Write all lines as Parquet.")
     profile_csv: str | None = file_option(".csv", help="Write the profile on its grid as CSV.")
@@ -107,8 +112,13 @@ def command(
     require_whole("--tag", options.tag, 0, 999_999)
     files, shape = Files.of(outputs), _shape(options, layer)
     drawn = plot_options.settings_of(picture, files)
-    settings = {**_settings(options), "vibrations": gas_layer.vibrations_of(vibration), **shape}
+    settings = {
+        **_settings(options, "296" if outputs.hitran else "300"),
+        "vibrations": gas_layer.vibrations_of(vibration),
+        **shape,
+    }
     _refuse_profile_without_file(settings, files)
+    hitran = _hitran_numbers(outputs, settings["temperature_k"])
 
     prediction = spcat.prediction_asked(context, given.source, options.as_spcat)
     with inputs.fields_as_options(**NAMES):
@@ -118,29 +128,39 @@ def command(
             top = inputs.with_some_dipole(inputs.read_top(given))
             settings |= {"effects": _effects(top, given, options)}
             answer, tag = _answer(top, settings), options.tag
-    _refuse_nothing_to_draw(answer, files)
+    _refuse_nothing_to_draw(answer, files, options.range_)
     for warning in answer.lines.warnings:
         note(warning)
     with answering():
         content = _content(answer, given, context.obj, options.top_lines)
     content["files"] = files.names
 
-    writers = _writers(answer, content, tag, drawn)
+    writers = _writers(answer, content, {"tag": tag, **hitran}, drawn)
     writers |= save_scene("spectrum", answer.request, outputs, given, tag=tag)
     if prediction is not None:
         writers["--cat"] = _program_catalogue(prediction, content)
-    deliver(files, writers, lambda: json_with_rows(answer.lines, "lines", content), lambda: _show(answer, content))
+    deliver(
+        files,
+        writers,
+        lambda: json_with_rows(answer.lines, "lines", content),
+        with_sources(
+            lambda: _show(answer, content, options.range_),
+            answer.lines.top,
+            ("constants", "dipole", "spin weights"),
+            given.sources,
+        ),
+    )
 
 
-def _settings(options: Options) -> dict[str, Any]:
-    """Fields of the request from the texts of the options."""
+def _settings(options: Options, usual_k: str) -> dict[str, Any]:
+    """Fields of the request from the texts of the options; usual_k: the temperature where none is given."""
     from rotor.units import parse_range
 
     def whole_range(text: str) -> tuple[float, float]:
         return parse_range(text, "MHz")
 
     settings: dict[str, Any] = {
-        "temperature_k": inputs.positive("--temperature", options.temperature, "K"),
+        "temperature_k": inputs.positive("--temperature", options.temperature or usual_k, "K"),
         "jmax": options.jmax,
         "min_lgint": inputs.cut("--min-lgint", options.min_lgint),
         "q": options.q,
@@ -173,6 +193,24 @@ def _answer(top: Top, settings: dict[str, Any]) -> SpectrumAnswer:
         return answer_spectrum(request)
 
 
+def _hitran_numbers(outputs: Outputs, temperature_k: float) -> dict[str, int]:
+    """HITRAN's numbers of the molecule and of the isotopologue, which begin its records."""
+    if (outputs.hitran is None) != (outputs.hitran_id is None):
+        raise ValueError(
+            "--hitran and --hitran-id: give both; the second has HITRAN's number of the molecule, such as 5 or 5:1 of CO"
+        )
+    if outputs.hitran is None:
+        return {}
+    words = (outputs.hitran_id or "").split(":")
+    if len(words) > 2 or not all(word.isdecimal() and 0 < int(word) < 100 for word in words):
+        raise ValueError(
+            f"--hitran-id: {outputs.hitran_id!r}: expected HITRAN's number of the molecule, such as 5 or 5:1"
+        )
+    if temperature_k != 296.0:
+        raise ValueError("--hitran: its intensities are those at 296 K; leave --temperature out, or give 296")
+    return {"molecule": int(words[0]), "isotopologue": int(words[1]) if len(words) == 2 else 1}
+
+
 def _refuse_profile_without_file(settings: dict[str, Any], files: Files) -> None:
     """A profile needs a file that it goes to, and a file for the profile needs one."""
     shaped = settings["profile"] not in (None, "sticks") or settings["fwhm_mhz"] is not None
@@ -185,14 +223,17 @@ def _refuse_profile_without_file(settings: dict[str, Any], files: Files) -> None
         raise ValueError(f"a {what} profile was asked for, but no file for it; add --plot or --profile-csv")
 
 
-def _refuse_nothing_to_draw(answer: SpectrumAnswer, files: Files) -> None:
+def _refuse_nothing_to_draw(answer: SpectrumAnswer, files: Files, range_text: str | None) -> None:
     drawn = [name for name in ("--plot", "--profile-csv") if name in files.paths]
     if drawn and answer.why_no_lines:
-        raise ComputationError(f"{drawn[0]}: no lines: {_why_none(answer)}")
+        raise ComputationError(f"{drawn[0]}: no lines: {_why_none(answer, range_text)}")
 
 
-def _why_none(answer: SpectrumAnswer) -> str:
-    return answer.why_no_lines.replace("the range or lower the cut", "--range or lower --min-lgint")
+def _why_none(answer: SpectrumAnswer, range_text: str | None = None) -> str:
+    reason = answer.why_no_lines.replace("the range or lower the cut", "--range or lower --min-lgint")
+    if range_text is None or inputs.has_unit(range_text):
+        return reason
+    return f"{reason}; --range {range_text} has no unit, so it is MHz: write {range_text}GHz for GHz"
 
 
 def _program_catalogue(prediction: Prediction, content: dict[str, Any]) -> Writer:
@@ -215,17 +256,20 @@ def _content(answer: SpectrumAnswer, given: Input, command: str, shown: int) -> 
     return {**begin(command, given.text), **answer.facts(), "strongest": answer.strongest(shown)}
 
 
-def _writers(answer: SpectrumAnswer, content: dict[str, Any], tag: int, drawn: dict[str, Any]) -> dict[str, Writer]:
+def _writers(
+    answer: SpectrumAnswer, content: dict[str, Any], numbers: dict[str, int], drawn: dict[str, Any]
+) -> dict[str, Writer]:
     """How each option's file is written, with the provenance that its format can hold."""
     import rotor
 
-    record = {"command": content["command"], "input": content["input"], "tag": tag}
+    record = {"command": content["command"], "input": content["input"], **numbers}
 
     def table(path: Path) -> None:
         rotor.write(answer.lines, path, settings=record)
 
     return {
         "--cat": table,
+        "--hitran": table,
         "--csv": table,
         "--parquet": table,
         "--profile-csv": lambda path: rotor.write(answer.spectrum, path, settings={"command": record["command"]}),
@@ -240,14 +284,14 @@ def _draw(answer: SpectrumAnswer, path: Path, record: dict[str, Any], drawn: dic
     plot_spectrum(thing, path, provenance={"command": record["command"]}, **drawn)
 
 
-def _show(answer: SpectrumAnswer, content: dict[str, Any]) -> None:
+def _show(answer: SpectrumAnswer, content: dict[str, Any], range_text: str | None) -> None:
     from rotor.cli.shared import report
 
     lines = answer.lines
     print(report.heading(lines.top))
     show_facts(_facts(lines, content))
     if len(lines) == 0:
-        print(f"\nno lines: {_why_none(answer)}")
+        print(f"\nno lines: {_why_none(answer, range_text)}")
         return
     if len(content["strongest"]):
         print()
@@ -264,9 +308,9 @@ def _facts(lines: Lines, content: dict[str, Any]) -> list[tuple[str, str]]:
     weights = report.weights_text(content["spin_weights"])
     dipole = report.vector_text(top.dipole_abc_debye)
     return [
-        ("constants", report.with_source(report.constants_text(top), top.source)),
-        ("dipole", report.with_source(dipole, top.dipole_source)),
-        ("spin weights", report.with_source(weights, top.weights_source)),
+        ("constants", report.constants_text(top)),
+        ("dipole", dipole),
+        ("spin weights", weights),
         ("temperature", f"{lines.temperature_k:g} K"),
         ("Q", report.q_text(content["q"])),
         ("J max", f"{lines.jmax}: {content['jmax_source']}"),

@@ -22,10 +22,15 @@ from rotor.cli.shared.output import (
     show_table,
 )
 from rotor.cli.shared.save_scene import save_scene, save_scene_option
+from rotor.cli.shared.sources import with_sources
 
 if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
+    from rotor import table as tables
     from rotor.quantum.field_map import FieldMap
     from rotor.quantum.stark_request import StarkAnswer
+    from rotor.spectra.field_request import FieldRequest
     from rotor.tops.top import Top
 
 EXAMPLES = """\b
@@ -33,11 +38,16 @@ Examples:
   rotor stark OCS --field 0:200kV/cm --states "J<=2" --plot ocs.png --csv ocs.csv
   rotor stark indole --field 0:200kV/cm --states "J<=2" --plot indole.png
   rotor stark --constants "A=5655.2654 B=1546.8759 C=1214.4040 MHz" --dipole-abc 4.5152,0,0 --field 0,100kV/cm
-  rotor stark OCS --field 0:50kV/cm:101 --intensity "1e11 W/cm2" --states "J<=1\""""
+  rotor stark OCS --field 0:50kV/cm:101 --intensity "1e11 W/cm2" --tilt 45 --states "J<=1"
+  rotor stark OCS --field 0:5kV/cm:21 --states "J<=3" --line "2 - 1" --light perpendicular --lines lobes.csv --coefficients c.csv
+  rotor stark OCS --field 20kV/cm --states "J<=6" --spread 0.005 --linewidth 0.5MHz --range 0:90GHz --spectrum ocs.csv
+  rotor stark indole --field 0:50kV/cm --temperature 1 --mixture indole_1k.csv --deflection mu_eff.csv"""
 
 NAMES = {
     "fields_kv_per_cm": "--field", "j_highest": "--states", "m_values": "--m", "intensity_w_per_cm2": "--intensity",
-    "jmax": "--jmax", "tolerance_mhz": "--tolerance", "diabatic_gap_mhz": "--diabatic-gap",
+    "jmax": "--jmax", "tolerance_mhz": "--tolerance", "diabatic_gap_mhz": "--diabatic-gap", "direction": "--tilt",
+    "temperature_k": "--temperature", "populations": "--populations", "linewidth_mhz": "--linewidth", "range_mhz": "--range",
+    "spread": "--spread", "light": "--light",
 }  # fmt: skip  # field of the request -> option
 POINTS = 201
 SHOWN = 24
@@ -59,8 +69,37 @@ class Options:
     polarizability: str | None = option(
         None, metavar="LIST", help="In principal axes: aa,bb,cc[,ab,ac,bc] or parallel,perpendicular (Å³)."
     )
+    tilt: str = option(
+        "0", metavar="ANGLE", help="Of the field with the light of the laser (degrees); M is mixed then."
+    )
     jmax: int | None = option(None, metavar="N", help="Highest J of the basis; by default what the tolerance needs.")
     tolerance: str = option("1e-4", metavar="E", help="Of the energies (MHz).")
+    workers: int = option(1, metavar="N", help="Processes over which blocks of states are spread.")
+
+
+@dataclass(frozen=True)
+class Sample:
+    """What lines, spectra and mixtures are of."""
+
+    light: str = option(
+        "parallel",
+        metavar="NAME",
+        help="Of --lines: parallel, perpendicular, isotropic, or the angle with the field (degrees).",
+    )
+    temperature: str = option("300", metavar="T", help="Of --lines, --spectrum and --mixture (K).")
+    populations: str = option(
+        "equilibrium",
+        metavar="NAME",
+        help="equilibrium in the field, or adiabatic: those of the free molecule, as in a beam.",
+    )
+    line: str | None = option(None, metavar="TEXT", help="Lines between two free levels alone, such as '1 - 0'.")
+    linewidth: str = option("1", metavar="W", help="Full width at half maximum of the lines of --spectrum (MHz).")
+    range_: str | None = option(
+        None, "--range", metavar="A:B", help="Frequencies of --spectrum (MHz); by default those of the lines."
+    )
+    spread: float = option(
+        0.0, metavar="X", help="Of --spectrum: standard deviation of the field over the sample, a fraction of it."
+    )
 
 
 @dataclass(frozen=True)
@@ -70,28 +109,100 @@ class Outputs:
     csv: str | None = file_option(".csv", help="Write the map as CSV.")
     parquet: str | None = file_option(".parquet", help="Write the map as Parquet.")
     plot: str | None = file_option(".png", ".pdf", ".svg", help="Draw the map (.png, .pdf, .svg).")
+    lines: str | None = file_option(".csv", help="Write the lines in every field, resolved in M, as CSV.")
+    lobes: str | None = file_option(".png", ".pdf", ".svg", help="Draw the lines against the field (.png, .pdf, .svg).")
+    spectrum: str | None = file_option(".csv", help="Write the cross section at the highest field as CSV.")
+    coefficients: str | None = file_option(".csv", help="Write Stark coefficients of the states, or of --line, as CSV.")
+    mixture: str | None = file_option(".csv", help="Write means of the thermal mixture against the field as CSV.")
+    deflection: str | None = file_option(".csv", help="Write effective dipoles, one column for each state, as CSV.")
     json: str | None = json_option()
     save_scene: str | None = save_scene_option()
 
 
 @grouped(given=("spin_weights", "calculator", "hessian", "spin_constants", "spins"))
-def command(context: typer.Context, given: Input, options: Options, outputs: Outputs) -> None:
-    """Levels in a static electric field: energies, labels, effective dipoles and cosines of every M."""
+def command(context: typer.Context, given: Input, options: Options, sample: Sample, outputs: Outputs) -> None:
+    """Levels in a static electric field: energies, labels, effective dipoles and cosines of every M; lines and mixtures."""
+    from rotor.cli.shared.workers import working
     from rotor.quantum.stark_request import StarkRequest, answer_stark
+    from rotor.spectra.field_request import FieldRequest
 
-    settings = _settings(options)
+    settings, of_sample = _settings(options), _sample(sample)
     files = Files.of(outputs)
     if "--plot" in files.paths and len(settings["fields_kv_per_cm"]) < 2:
         raise ValueError("--plot: a picture of a map needs two fields or more; give --field a range")
     top = _acted_on(inputs.read_top(given), options, settings["intensity_w_per_cm2"])
     with inputs.fields_as_options(**NAMES):
-        answer = answer_stark(StarkRequest(top, **settings))
+        request = FieldRequest(StarkRequest(top, **settings), **of_sample)
+        with working(options.workers, "blocks") as executor:
+            answer = answer_stark(request.stark, executor)
+            made = _made(request, answer.states, files, executor)
 
     content = _content(answer, given, context.obj)
     content["files"] = files.names
     text = lambda: json_with_rows(answer.states, "states", content)  # noqa: E731
-    saved = save_scene("stark", answer.request, outputs, given, options.polarizability is not None)
-    deliver(files, _writers(top, answer.states, content) | saved, text, lambda: _show(top, answer.states, content))
+    writers = {**_writers(top, answer.states, content), **_further_writers(made, content)}
+    writers |= save_scene("stark", answer.request, outputs, given, options.polarizability is not None)
+    show = with_sources(lambda: _show(top, answer.states, content), top, ("constants", "dipole"), given.sources)
+    deliver(files, writers, text, show)
+
+
+def _made(request: FieldRequest, states: FieldMap, files: Files, executor: Executor | None) -> dict[str, tables.Table]:
+    """The tables that files were asked for, by the option."""
+    from rotor.spectra.field_request import MAKERS
+
+    asked = {name for name in MAKERS if f"--{name}" in files.paths}
+    asked |= {"lines"} if "--lobes" in files.paths else set()
+    return {name: MAKERS[name](request, states, executor) for name in sorted(asked)}
+
+
+def _further_writers(made: dict[str, tables.Table], content: dict[str, Any]) -> dict[str, Writer]:
+    provenance = {"command": content["command"], "input": content["input"]}
+
+    def writer(table: tables.Table) -> Writer:
+        def write(path: Path) -> None:
+            import rotor
+
+            rotor.write(table, path, settings=provenance)
+
+        return write
+
+    def draw(path: Path) -> None:
+        from rotor.plots.stark import plot_lobes
+
+        plot_lobes(made["lines"], path, title=content["name"] or "", provenance=provenance)  # type: ignore[arg-type]
+
+    return {**{f"--{name}": writer(table) for name, table in made.items()}, "--lobes": draw}
+
+
+def _sample(sample: Sample) -> dict[str, Any]:
+    """Fields of the request from the texts of the options."""
+    from rotor.units import parse_range
+
+    named = sample.light in ("parallel", "perpendicular", "isotropic")
+    range_ = sample.range_
+    return {
+        "light": sample.light if named else parsed("--light", sample.light, _angle),
+        "temperature_k": quantity("--temperature", sample.temperature, "K"),
+        "populations": sample.populations,
+        "line": None if sample.line is None else parsed("--line", sample.line, _line),
+        "linewidth_mhz": positive("--linewidth", sample.linewidth, "MHz"),
+        "range_mhz": None if range_ is None else parsed("--range", range_, lambda text: parse_range(text, "MHz")),
+        "spread": sample.spread,
+    }
+
+
+def _angle(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise ValueError(f"{text!r}: expected parallel, perpendicular, isotropic, or an angle in degrees") from None
+
+
+def _line(text: str) -> tuple[str, str]:
+    parts = [" ".join(part.replace(",", " ").split()) for part in text.split(" - ")]
+    if len(parts) != 2 or not all(parts):
+        raise ValueError(f"{text!r}: expected quantum numbers of two levels, such as '1 - 0' or '2 1 2 - 1 1 1'")
+    return parts[0], parts[1]
 
 
 def _settings(options: Options) -> dict[str, Any]:
@@ -102,6 +213,7 @@ def _settings(options: Options) -> dict[str, Any]:
         "j_highest": parsed("--states", options.states, _highest_j),
         "m_values": None if options.m is None else parsed("--m", options.m, _m_values),
         "intensity_w_per_cm2": quantity("--intensity", options.intensity, "W/cm2"),
+        "direction": parsed("--tilt", options.tilt, _direction),
         "jmax": options.jmax,
         "tolerance_mhz": positive("--tolerance", options.tolerance, "MHz"),
         "diabatic_gap_mhz": None if gap is None else positive("--diabatic-gap", gap, "MHz"),
@@ -120,6 +232,19 @@ def _fields(text: str) -> tuple[float, ...]:
     from rotor.units import parse_grid
 
     return tuple(parse_grid(f"{text}:{POINTS}" if text.count(":") == 1 else text, "kV/cm").tolist())
+
+
+def _direction(text: str) -> tuple[float, float, float]:
+    """The direction of the field at an angle with Z, in the plane of X and Z; exactly Z for 0."""
+    import math
+
+    try:
+        angle = float(text)
+    except ValueError:
+        angle = math.nan
+    if not math.isfinite(angle):
+        raise ValueError(f"{text!r}: expected an angle in degrees")
+    return (math.sin(math.radians(angle)), 0.0, math.cos(math.radians(angle))) if angle else (0.0, 0.0, 1.0)
 
 
 def _highest_j(text: str) -> int:
@@ -152,9 +277,10 @@ def _writers(top: Top, states: FieldMap, content: dict[str, Any]) -> dict[str, W
         rotor.write(states, path, settings=provenance)
 
     def draw(path: Path) -> None:
+        from rotor.plots.picture import name_of_top
         from rotor.plots.stark import plot_stark
 
-        plot_stark(states, path, title=top.name or "in a static field", provenance={"command": provenance["command"]})
+        plot_stark(states, path, title=name_of_top(top), provenance={"command": provenance["command"]})
 
     return {"--csv": table, "--parquet": table, "--plot": draw}
 
@@ -170,7 +296,8 @@ def _show(top: Top, states: FieldMap, content: dict[str, Any]) -> None:
     for rows_of in curves[:SHOWN]:
         at, end = rows_of.start, rows_of.stop - 1
         numbers = (states.energy_mhz[at], states.energy_mhz[end], states.slope[end], states.cosines["costheta"][end])
-        rows.append([str(states.label[at]), str(states.m[at]), *(f"{value:.6f}" for value in numbers)])
+        m = "mixed" if states.m[at] < 0 else str(states.m[at])
+        rows.append([str(states.label[at]), m, *(f"{value:.6f}" for value in numbers)])
     names = (
         "state",
         "|M|",
@@ -183,14 +310,23 @@ def _show(top: Top, states: FieldMap, content: dict[str, Any]) -> None:
     show_table(Table(f"{title}, by M and block", names, rows, frozenset({"state"})))
 
 
+def _along(direction: list[float]) -> str:
+    x, _, z = direction
+    if not x:
+        return "along Z"
+    import math
+
+    return f"at {math.degrees(math.atan2(x, z)):g}° with Z"
+
+
 def _facts(top: Top, content: dict[str, Any]) -> list[tuple[str, str]]:
     from rotor.cli.shared import report
 
     first, last, count = content["field_kv_per_cm"]
     facts = [
-        ("constants", report.with_source(report.constants_text(top), top.source)),
-        ("dipole", report.with_source(report.vector_text(top.dipole_abc_debye), top.dipole_source)),
-        ("field", f"{first:g} to {last:g} kV/cm along Z, {count} values"),
+        ("constants", report.constants_text(top)),
+        ("dipole", report.vector_text(top.dipole_abc_debye)),
+        ("field", f"{first:g} to {last:g} kV/cm {_along(content['field_direction'])}, {count} values"),
     ]
     if content["intensity_w_per_cm2"]:
         facts.append(("laser", f"{content['intensity_w_per_cm2']:g} W/cm² along Z"))

@@ -209,10 +209,11 @@ def _writers(file: FamilyFile, answer: Answer, content: dict[str, Any]) -> dict[
         )
 
     def picture(path: Path) -> None:
+        from rotor.plots.picture import name_text
         from rotor.plots.structure import plot_structure
 
         molecule, values, method = _geometry(file, answer)
-        title = f"{file.family.name}, {method}"
+        title = f"{name_text(file.family.name)}, {method}"
         plot_structure(molecule, path, values=values, title=title, provenance={"command": content["command"]})
 
     return {"--xyz": geometry, "--plot": picture}

@@ -26,6 +26,7 @@ from rotor.cli.shared.output import (
     sum_progress,
 )
 from rotor.cli.shared.save_scene import save_scene, save_scene_option
+from rotor.cli.shared.sources import with_sources
 
 if TYPE_CHECKING:
     from rotor.thermo import ThermoFunctions
@@ -82,8 +83,14 @@ def command(context: typer.Context, given: Input, options: Options, vibration: V
         content = _content(answer, given, context.obj)
     content["files"] = files.names
     text = lambda: json_with_rows(answer.functions, "functions", content)  # noqa: E731
-    writers = _writers(answer, content) | save_scene("thermo", request, outputs, given)
-    deliver(files, writers, text, lambda: _show(answer.functions, content))
+    deliver(
+        files,
+        _writers(answer, content) | save_scene("thermo", request, outputs, given),
+        text,
+        with_sources(
+            lambda: _show(answer.functions, content), answer.functions.top, ("constants", "spin weights"), given.sources
+        ),
+    )
 
 
 def _settings(options: Options, vibration: Vibration) -> dict[str, Any]:
@@ -155,8 +162,8 @@ def _facts(functions: ThermoFunctions, content: dict[str, Any]) -> list[tuple[st
         if value
     )
     return [
-        ("constants", report.with_source(report.constants_text(top), top.source)),
-        ("spin weights", report.with_source(weights, top.weights_source)),
+        ("constants", report.constants_text(top)),
+        ("spin weights", weights),
         ("species", _species_text(functions, content)),
         ("Θ_rot", _theta_text(content["rotational_temperatures_k"])),
         (

@@ -14,6 +14,7 @@ from rotor.cli.shared.inputs import Input, json_option
 from rotor.cli.shared.options import file_option, grouped
 from rotor.cli.shared.output import Files, Table, Writer, deliver, json_with_rows, show_facts, show_table
 from rotor.cli.shared.save_scene import save_scene, save_scene_option
+from rotor.cli.shared.sources import with_sources
 from rotor.cli.shared.tumble_inputs import Options, Start, read_start
 
 if TYPE_CHECKING:
@@ -26,6 +27,9 @@ EXAMPLES = """\b
 Examples:
   rotor tumble water --plot water.png --gif water.gif
   rotor tumble water --times 0:20ps:401 --csv water.csv
+  rotor tumble book --plot book.png
+  rotor tumble --body wing-nut --omega "0.01,0,20 rad/s" --gif nut.gif
+  rotor tumble --moments "0.6,0.8,1.0 kg m2" --omega "0.1,60,0 rpm"
   rotor tumble --moments 0.6,0.8,1.0 --angular-momentum 1.8,0.4,-0.9 --times 0:10:101 --csv out.csv"""
 
 NAMES = {"moments": "--moments", "angular_momentum": "--angular-momentum", "times": "--times"}
@@ -59,9 +63,16 @@ def command(context: typer.Context, given: Input, options: Options, outputs: Out
     answer = answer_tumble(start.request)
     content = _content(start, answer, context.obj)
     content["files"] = files.names
-    writers = _writers(start, answer, content) | save_scene("tumble", start.request, outputs, given)
+    writers = _writers(start, answer, content) | save_scene(
+        "tumble", start.request, outputs, given if start.top is not None else None
+    )
     text = lambda: json_with_rows(answer.table, "motion", content)  # noqa: E731
-    deliver(files, writers, text, lambda: _show(start, answer, content))
+    deliver(
+        files,
+        writers,
+        text,
+        with_sources(lambda: _show(start, answer, content), start.top, ("constants",), given.sources),
+    )
 
 
 def _check_film(path: str | None) -> None:
@@ -102,7 +113,7 @@ def _writers(start: Start, answer: TumbleAnswer, content: dict[str, Any]) -> dic
         inner = table.times / units.time_factor
         plot_polhodes(
             motion, inner, path, axis_names=request.axes, time_label=label, time_factor=units.time_factor,
-            title=_heading(start), provenance=provenance,
+            title=_picture_title(start), provenance=provenance,
         )  # fmt: skip
 
     def film(path: Path) -> None:
@@ -128,7 +139,16 @@ def _heading(start: Start) -> str:
     if start.top is not None:
         return heading(start.top)
     name = KINDS[start.request.kind].replace("linear molecule", "linear body")
+    if start.body is not None:
+        return f"{start.body.name}: {name}"
     return f"moments {_numbers(start.request.moments)}: {name}"
+
+
+def _picture_title(start: Start) -> str:
+    from rotor.cli.shared.report import KINDS
+    from rotor.plots.picture import name_of_top
+
+    return _heading(start) if start.top is None else f"{name_of_top(start.top)}: {KINDS[start.top.kind]}"
 
 
 def _show(start: Start, answer: TumbleAnswer, content: dict[str, Any]) -> None:
@@ -143,11 +163,11 @@ def _show(start: Start, answer: TumbleAnswer, content: dict[str, Any]) -> None:
 def _facts(start: Start, content: dict[str, Any]) -> list[tuple[str, str]]:
     units, facts = start.request.units, []
     if start.top is not None:
-        from rotor.cli.shared.report import with_source
-
         a, b, c = start.top.rotational_constants_mhz
         rigid = ", ".join(f"{n} {x:.10g}" for n, x in zip("ABC", (a, b, c), strict=True) if math.isfinite(x))
-        facts.append(("rigid top", with_source(f"{rigid} MHz, distortion neglected", start.top.source)))
+        facts.append(("rigid top", f"{rigid} MHz, distortion neglected"))
+    if start.body is not None:
+        facts.append(("body", f"{start.body.text}; assumed sizes"))
     size = f"{content['angular_momentum_size']:.8g}{_unit(units.angular_momentum)}"
     vector = f"({_numbers(content['angular_momentum'])})"
     ratio, growth = content["separatrix_ratio"], content["growth_rate"]
@@ -200,7 +220,7 @@ def _axes_table(start: Start, content: dict[str, Any]) -> Table:
     }
     rate, moment = (
         f"rate (rad{_per(start.request.units.time)})",
-        "moment" + (" (u Å²)" if start.top is not None else ""),
+        "moment" + _bracket(start.request.units.moment),
     )
     rows = [
         (a["axis"], f"{a['moment']:.8g}", a["kind"], f"{a['rate']:.8g}", fates[a["kind"]])

@@ -184,8 +184,10 @@ def read_checkpoint(path: str | os.PathLike[str]) -> Checkpoint:
         with open(path, "rb") as handle, np.load(handle, allow_pickle=False) as file:
             arrays = {name: file[name] for name in file.files if name != "about"}
             about = json.loads(str(file["about"]))
-    except (zipfile.BadZipFile, KeyError, ValueError, EOFError) as error:
+    except (zipfile.BadZipFile, KeyError, ValueError, EOFError, TypeError, AttributeError) as error:
         raise ValueError(f"{path}: is no checkpoint of rotor fluid; name the file of --checkpoint") from error
+    if not isinstance(about, dict):
+        raise ValueError(f"{path}: is no checkpoint of rotor fluid; name the file of --checkpoint")
     if about.get("rotor_checkpoint") != VERSION:
         raise ValueError(
             f"{path}: a checkpoint of version {about.get('rotor_checkpoint')}; this program reads {VERSION}"

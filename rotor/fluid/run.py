@@ -115,7 +115,7 @@ def run_fluid(
     run = _Run(dynamics, settings, outputs)
     if resume:
         assert outputs.checkpoint is not None
-        run.restore(read_checkpoint(outputs.checkpoint))
+        run.restore_from(outputs.checkpoint)
     dynamics.wrench()  # a state that cannot begin is refused before any file is opened
     with run.files(), progress_bar(settings.steps, progress) as shown:
         on_start()
@@ -262,6 +262,13 @@ class _Run:
         """All rows as a table."""
         columns = np.array(self.rows, dtype=np.float64).reshape(-1, len(COLUMNS)).T
         return FluidRecord(*columns)
+
+    def restore_from(self, path: str | os.PathLike[str]) -> None:
+        """The state of a checkpoint's file; ValueError where it is none, or one of another box or run."""
+        try:
+            self.restore(read_checkpoint(path))
+        except (KeyError, TypeError, AttributeError) as error:  # its keys and arrays are not those of a checkpoint
+            raise ValueError(f"{path}: is no checkpoint of rotor fluid; name the file of --checkpoint") from error
 
     def restore(self, checkpoint: Checkpoint) -> None:
         """State, thermostat, rows and lengths of files as they were; ValueError for another box or run."""

@@ -18,7 +18,7 @@ import numpy as np
 from rotor.fit.assignment import Assignments, assignments
 from rotor.formats.atomic_write import open_atomic
 from rotor.formats.spcat.fields import BLANK
-from rotor.formats.spcat.lin import line_list, read_lin, write_lin
+from rotor.formats.spcat.lin import line_list, note_of_defaults, read_lin, with_defaults, write_lin
 from rotor.units import MHZ_PER_CM
 
 SUFFIXES = (".lin", ".csv", ".cat", ".cat.gz")
@@ -67,10 +67,12 @@ def read_assigned_lines(path: str | os.PathLike[str], names: Sequence[str]) -> t
 
 
 def _of_lin(path: str | os.PathLike[str], names: Sequence[str]) -> tuple[Assignments, list[str]]:
-    lines = read_lin(path)
+    lines = with_defaults(read_lin(path, len(names)), names)
     blends = lines.blends()
     used = blends >= 0
-    notes = [] if used.all() else [f"{int((~used).sum())} lines that give the width of a blend do not count"]
+    notes = [note_of_defaults(lines)] if lines.defaulted else []
+    if not used.all():
+        notes.append(f"{int((~used).sum())} lines that give the width of a blend do not count")
     for i in np.flatnonzero(used).tolist():
         count = len(lines.measured(i).quanta) // 2
         if count != len(names):

@@ -1,17 +1,26 @@
-"""Results are written beside and renamed: a reader of the path finds the whole file, the old one, or none."""
+"""Results are written beside and renamed: a reader of the path finds the whole file, the old one, or none.
+
+What is not finished stands in a folder `.rotor-...` beside the result, locked as long as its process lives. A process that is
+killed leaves its folder behind; the next one that writes there finds it unlocked and removes it.
+"""
 
 from __future__ import annotations
 
+import errno
 import os
+import shutil
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import IO, Any
+
+PREFIX = ".rotor-"
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)  # the disk, a quota, the largest file allowed, the device
 
 
 @contextmanager
 def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """A path in the same folder to write to; renamed to `path` when the block ends, removed when it fails.
+    """A path to write to, in a folder of its own beside; moved to `path` when the block ends, removed when it fails.
 
     A link is followed, so that the file it names is replaced and the link stays. What is no regular file (a pipe,
     a device such as /dev/null) cannot be renamed over and is used as it is.
@@ -25,23 +34,19 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     ...     [(file.name, file.read_text()) for file in Path(folder).iterdir()]
     [('a.txt', 'whole')]
     """
-    target = Path(path).resolve()
+    target = resolved(path)
     if target.is_dir():
         raise IsADirectoryError(f"{path}: is a folder; give the name of a file to write")
     if not target.parent.is_dir():
         raise FileNotFoundError(f"{path}: there is no folder {target.parent}; make it first")
-    if target.exists() and not target.is_file():
-        yield target
-        return
-
-    import secrets
-
-    unfinished = target.with_name(f".{target.name}.{secrets.token_hex(4)}.part")
-    try:
-        yield unfinished
-        os.replace(unfinished, target)
-    finally:
-        unfinished.unlink(missing_ok=True)
+    with naming(path):
+        if target.exists() and not target.is_file():
+            yield target
+            return
+        with unfinished_folder(target.parent) as folder:
+            unfinished = folder / target.name
+            yield unfinished
+            os.replace(unfinished, target)
 
 
 @contextmanager
@@ -54,6 +59,100 @@ def open_atomic(path: str | os.PathLike[str], mode: str = "wb", **options: Any) 
         yield handle
 
 
+@contextmanager
+def naming(path: str | os.PathLike[str]) -> Iterator[None]:
+    """Inside, an OSError of writing names this path, not the unfinished file; a library's own error of a full disk is one too."""
+    try:
+        yield
+    except Exception as error:
+        code = error.errno if isinstance(error, OSError) and error.errno else _code_of_full_disk(str(error))
+        if code is None:
+            raise
+        raise OSError(code, os.strerror(code), os.fspath(path)) from error
+
+
+def _code_of_full_disk(text: str) -> int | None:
+    """The number of the system's error that a library's own text names."""
+    return next((code for code in FULL if os.strerror(code) in text or f'"errno":"{code}"' in text), None)
+
+
+def resolved(path: str | os.PathLike[str]) -> Path:
+    """The path that links lead to; ValueError where they lead in a circle."""
+    try:
+        os.stat(path)
+    except OSError as error:
+        if error.errno == errno.ELOOP:
+            raise ValueError(
+                f"{os.fspath(path)}: is a link that leads back to itself; remove it or name a file"
+            ) from None
+    return Path(os.path.realpath(path))
+
+
+def place(made: Path, path: Path) -> None:
+    """Move a finished file to its place, through links, into a device or a pipe, and onto another file system."""
+    target = resolved(path)
+    replaces = target.is_file() or not target.exists()
+    if replaces and made.stat().st_dev == target.parent.stat().st_dev:
+        with naming(path):
+            os.replace(made, target)
+        return
+    with atomic_path(path) as unfinished, open(made, "rb") as source, open(unfinished, "wb") as copy:
+        shutil.copyfileobj(source, copy)
+
+
+@contextmanager
+def unfinished_folder(parent: Path) -> Iterator[Path]:
+    """A new folder in `parent`, locked and at the end removed; those of processes that were killed are removed first."""
+    _remove_abandoned(parent)
+    folder, lock = _locked_folder(parent)
+    try:
+        yield folder
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+        if lock is not None:
+            os.close(lock)
+
+
+def _locked_folder(parent: Path) -> tuple[Path, int | None]:
+    """The folder and its lock; made again where another process took it for abandoned before it was locked."""
+    import tempfile
+
+    while True:
+        folder = Path(tempfile.mkdtemp(prefix=PREFIX, dir=parent))
+        lock = _lock(folder)
+        if folder.exists():
+            return folder, lock
+        if lock is not None:
+            os.close(lock)
+
+
+def _lock(folder: Path) -> int | None:
+    """An open descriptor that holds the lock of a folder; None where it is locked, gone, or the system has no such locks."""
+    try:
+        import fcntl
+    except ImportError:  # not on Windows
+        return None
+    handle = None
+    try:
+        handle = os.open(folder, os.O_RDONLY)
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        if handle is not None:
+            os.close(handle)
+        return None
+    return handle
+
+
+def _remove_abandoned(parent: Path) -> None:
+    """Remove the folders of killed processes; one that is in use is locked."""
+    with suppress(OSError):  # a folder that cannot be listed has nothing that can be removed
+        for folder in parent.glob(f"{PREFIX}*"):
+            lock = _lock(folder) if folder.is_dir() and not folder.is_symlink() else None
+            if lock is not None:
+                shutil.rmtree(folder, ignore_errors=True)
+                os.close(lock)
+
+
 def write_together(writers: Mapping[Path, Callable[[Path], object]]) -> None:
     """Write several files, each by its writer of a path: all appear at the end, with what a writer puts beside them, or none.
 
@@ -63,13 +162,12 @@ def write_together(writers: Mapping[Path, Callable[[Path], object]]) -> None:
     ...     (Path(folder) / "a.txt").read_text()
     'whole'
     """
-    import tempfile
-
     with ExitStack() as stack:
         moves: list[tuple[Path, Path]] = []
         for target, write in writers.items():
-            beside = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix=".rotor-", dir=target.parent)))
-            write(beside / target.name)
+            beside = stack.enter_context(unfinished_folder(target.parent))
+            with naming(target):
+                write(beside / target.name)
             moves += [(made, target.parent / made.name) for made in sorted(beside.iterdir())]
-        for made, place in moves:
-            os.replace(made, place.resolve())
+        for made, path in moves:
+            place(made, path)

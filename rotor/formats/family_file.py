@@ -25,7 +25,6 @@ corrections = "B=13.2 MHz"                    # to be added to the constants of 
 from __future__ import annotations
 
 import os
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -36,6 +35,7 @@ import numpy as np
 from rotor.fit.fit import Fit, FitOptions, fit_lines
 from rotor.fit.parameters import parameters
 from rotor.formats.assigned_lines import QUANTA, read_assigned_lines
+from rotor.formats.toml import parse_toml
 from rotor.molecules.molecule import Molecule
 from rotor.structure.coordinates import Named, named
 from rotor.structure.family import Family, family
@@ -63,9 +63,10 @@ def read_family(path: str | os.PathLike[str], options: FitOptions | None = None)
     geometry, constants that are missing, and lines whose fit does not converge.
     """
     try:
-        content = tomllib.loads(Path(path).read_text(encoding="utf-8-sig"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        text = Path(path).read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError as error:
         raise ValueError(f"{path}: not a TOML file: {error}") from None
+    content = parse_toml(text, str(path))
     _refuse_unknown(content, _TABLES, str(path))
     molecule = _molecule(content, str(path))
     species = content.get("isotopologue")

@@ -29,6 +29,8 @@ from rotor.spectra.lines import Lines
 from rotor.table import Table
 
 LENGTH = 160
+MORE = ","  # behind the record, between further parameters (line mixing, other profiles) in tables of HAPI
+MOST_LENGTH = 4096  # of the first line with those
 TEMPERATURE_K = 296.0
 _ISOTOPOLOGUES = "1234567890ABCDEFGHIJKLMNOPQRSTUVWXYZ"  # 0 is the tenth, A the eleventh
 
@@ -137,6 +139,7 @@ def nm2_mhz(intensity_cm_per_molecule: ArrayLike) -> NDArray[np.float64]:
 def read_hitran(source: str | os.PathLike[str] | bytes) -> HitranLines:
     """The records in a file, packed with gzip or not, or in the bytes of one.
 
+    Parameters that HAPI writes behind the 160 characters are not columns; they stay in the text of the line.
     Raises ValueError with file, line, column and the rule that is broken.
     """
     lines = read_lines(source)
@@ -149,7 +152,7 @@ def read_hitran(source: str | os.PathLike[str] | bytes) -> HitranLines:
 
 def is_hitran_file(path: Path) -> bool:
     """Whether the first line of a file, packed with gzip or not, is a record; HITRAN and SPFIT share the suffix .par."""
-    first = first_bytes(path, LENGTH + 2).split(b"\n")[0]
+    first = first_bytes(path, MOST_LENGTH).split(b"\n")[0].removesuffix(b"\r")
     try:
         _record(Line(first.decode("latin-1"), 1, ""))
     except ValueError:
@@ -164,9 +167,11 @@ def _column(part: _Field, values: list[Any]) -> NDArray[Any]:
 
 
 def _record(line: Line) -> dict[str, Any]:
-    if len(line.body) != LENGTH:
+    if len(line.body) != LENGTH and line.body[LENGTH : LENGTH + 1] != MORE:
         raise line.error(
-            min(len(line.body), LENGTH), f"the line has {len(line.body)} characters; a record of HITRAN has {LENGTH}"
+            min(len(line.body), LENGTH),
+            f"the line has {len(line.body)} characters; a record of HITRAN has {LENGTH}, further parameters of HAPI follow a "
+            f"{MORE!r}",
         )
     return {part.name: _read(line, part) for part in _FIELDS}
 

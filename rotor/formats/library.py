@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import difflib
 import os
+import re
 import tomllib
 from functools import lru_cache
 from pathlib import Path
@@ -85,6 +86,27 @@ def library_molecule(name: str) -> MoleculeFile:
     return read_molecule_file(molecule_path(name))
 
 
+def written_formula(name: str, formula: str) -> str:
+    """The formula as the library writes that of a molecule of this name, else as it is, in Hill's order.
+
+    >>> written_formula("cyanoacetylene", "C3HN"), written_formula("", "O2S")
+    ('HC3N', 'O2S')
+    """
+    path = library_file(name) if name else None
+    if path is None:
+        return formula
+    known = [path.stem, *(key for key, of in names().items() if of == path)]
+    return next((one for one in known if _atoms(one) == _atoms(formula)), formula)
+
+
+def _atoms(formula: str) -> dict[str, int]:
+    """How many atoms of each element, or of each isotope that is marked, a formula has."""
+    counts: dict[str, int] = {}
+    for atom, number in re.findall(r"(\[\d+[A-Z][a-z]?\]|[A-Z][a-z]?)(\d*)", formula):
+        counts[atom] = counts.get(atom, 0) + int(number or 1)
+    return counts
+
+
 def _index(folder: Path) -> dict[str, Path]:
     """Names with files of one folder, read anew only when a file has come, gone or changed."""
     with os.scandir(folder) as entries:
@@ -110,7 +132,7 @@ def _names_in(path: Path) -> tuple[str, ...]:
     head, _, _ = path.read_bytes().partition(b"\n[")
     try:
         content = tomllib.loads(head.decode("utf-8-sig"))
-    except ValueError:  # no TOML, no UTF-8
+    except (ValueError, RecursionError):  # no TOML, no UTF-8
         return ()
     listed = content.get("names", [])
     found = [content.get("name"), *(listed if isinstance(listed, list) else [])]

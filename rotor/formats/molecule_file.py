@@ -42,6 +42,12 @@
     oe = 3
     oo = 1
 
+    [spins]                             # constants of nuclear and electron spins, see rotor.formats.spin_table
+    source = "..."
+
+    [spins.14N]
+    chi_aa = { value = -4.22324, uncertainty = 0.00108 }
+
     [levels]                            # energies that count instead of those of the constants where the table has them:
     file = "../levels/H2O.csv"          # columns j, ka, kc, energy_mhz, error_mhz
     source = "..."
@@ -66,7 +72,6 @@ number whose source was not read has `unverified = true` beside it, or in its ta
 from __future__ import annotations
 
 import os
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -88,10 +93,13 @@ from rotor.formats.molecule_tables import (
     unverified_in,
     with_polarizability,
 )
+from rotor.formats.spin_table import spins_of_table
+from rotor.formats.toml import parse_toml
 from rotor.molecules.molecule import Molecule
 from rotor.tops.constants import Constants
 from rotor.tops.covariance import Covariance
 from rotor.tops.level_table import LevelTable
+from rotor.tops.spin_constants import SpinConstants
 from rotor.tops.spin_weights import SpinWeights
 from rotor.tops.top import Tensor
 
@@ -105,6 +113,7 @@ _TABLES = (
     "dipole",
     "polarizability",
     "spin_weights",
+    "spins",
     "levels",
     "catalogue",
     "serves",
@@ -129,6 +138,7 @@ class MoleculeFile:
     serves : the lines that the file is good for
     unverified : tables, or entries such as "constants.DK", whose numbers were not read in a source
     covariance : of the constants, where the file has their correlations
+    spin_constants : of nuclear and electron spins
     """
 
     name: str
@@ -146,6 +156,7 @@ class MoleculeFile:
     levels: LevelTable | None = None
     serves: Served | None = None
     unverified: frozenset[str] = frozenset()
+    spin_constants: SpinConstants | None = None
 
     def cited(self, table: str) -> str:
         """The source of a table, with what in it is unverified said first."""
@@ -177,11 +188,7 @@ def parse_molecule_file(
     >>> parse_molecule_file("constants = { B = 57635.96804, D = 0.1835 }").constants.text()
     'B=57635.96804 D=0.1835 MHz'
     """
-    try:
-        content = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise ValueError(f"{where}: not a TOML file: {error}") from None
-
+    content = parse_toml(text, where)
     refuse_unknown_keys(content, ("name", "names", *_TABLES), where)
     tables = {name: TableReader(where, name, content[name]) for name in _TABLES if name in content}
     if not {"geometry", "constants"} & tables.keys():
@@ -208,4 +215,5 @@ def parse_molecule_file(
         serves=served_of(tables.get("serves")),
         unverified=frozenset().union(*(unverified_in(name, table) for name, table in tables.items())),
         covariance=covariance_of(tables.get("covariance"), constants),
+        spin_constants=spins_of_table(tables.get("spins"), molecule),
     )

@@ -10,6 +10,7 @@ from typing import Any
 from rotor.formats.atomic_write import open_atomic
 from rotor.formats.level_table import write_level_table
 from rotor.formats.molecule_file import MoleculeFile
+from rotor.formats.spin_table import spin_tables
 
 
 def write_molecule_file(molecule: MoleculeFile, path: str | os.PathLike[str]) -> None:
@@ -62,6 +63,9 @@ def molecule_file_text(molecule: MoleculeFile, levels_file: str = "") -> str:
         if table:
             marks = {"source": molecule.sources.get(name), "unverified": True if name in molecule.unverified else None}
             parts.append("\n".join([f"[{name}]", *_lines({**marks, **table})]))
+    for name, table in spin_tables(molecule).items():
+        heading = name if name == "spins" else f"spins.{_key(name)}"
+        parts.append("\n".join([f"[{heading}]", *_lines(table)]))
     return "\n\n".join(parts) + "\n"
 
 

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import bz2
 import gzip
 import io
+import lzma
 import os
 import zlib
+from collections.abc import Iterator
 from pathlib import Path
+from typing import IO, Any
 
 MOST_BYTES = 1 << 32  # of an unpacked file
 HARMLESS_BYTES = 1 << 27  # that may be unpacked whatever the file's own size
@@ -31,23 +35,36 @@ def load(source: str | os.PathLike[str] | bytes) -> tuple[bytes, str]:
 
 def unpacked(packed: bytes, name: str) -> bytes:
     """What gzip packed, of one or more members; `name` is what messages call the file."""
-    most = max(HARMLESS_BYTES, min(MOST_BYTES, MOST_TIMES * len(packed)))
-    pieces, size = [], 0
+    return b"".join(_pieces(gzip.GzipFile(fileobj=io.BytesIO(packed)), len(packed), name))
+
+
+def refuse_bomb(path: Path) -> None:
+    """ValueError for a file of gzip, bzip2 or xz, for ASE to read, that is damaged or unpacks to more than `load` allows."""
+    opened: Any = {".gz": gzip.open, ".bz2": bz2.open, ".xz": lzma.open}.get(path.suffix.lower())
+    if opened is not None:
+        for _ in _pieces(opened(path), path.stat().st_size, os.fspath(path)):
+            pass
+
+
+def _pieces(file: IO[bytes] | gzip.GzipFile, packed_size: int, name: str) -> Iterator[bytes]:
+    """The unpacked content; ValueError where it is damaged or grows beyond the bound."""
+    most, size = max(HARMLESS_BYTES, min(MOST_BYTES, MOST_TIMES * packed_size)), 0
     try:
-        with gzip.GzipFile(fileobj=io.BytesIO(packed)) as file:
+        with file:
             while piece := file.read(_PIECE):
-                pieces.append(piece)
                 size += len(piece)
                 if size > most:
-                    break
-    except (EOFError, OSError, zlib.error) as error:
-        raise ValueError(f"{name}: a gzip file that is damaged or cut off ({error})") from None
-    if size > most:
-        raise ValueError(
-            f"{name}: unpacks to more than {most / 1e6:.0f} MB from {len(packed) / 1e6:.3g} MB, more than text of numbers "
-            "does; unpack it with gzip if it is meant"
-        )
-    return b"".join(pieces)
+                    raise ValueError(_too_large(name, most, packed_size))
+                yield piece
+    except (EOFError, OSError, zlib.error, lzma.LZMAError) as error:
+        raise ValueError(f"{name}: a packed file that is damaged or cut off ({error})") from None
+
+
+def _too_large(name: str, most: int, packed_size: int) -> str:
+    return (
+        f"{name}: unpacks to more than {most / 1e6:.0f} MB from {packed_size / 1e6:.3g} MB, more than text of numbers "
+        "does; unpack it first if it is meant"
+    )
 
 
 def first_bytes(path: Path, count: int) -> bytes:

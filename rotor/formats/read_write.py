@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import os
+import re
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -11,6 +12,7 @@ from typing import Any
 
 from rotor.formats.library import library_file, names
 from rotor.formats.molecule_file import MoleculeFile, parse_molecule_file, read_molecule_file
+from rotor.formats.packed import HARMLESS_BYTES, refuse_bomb
 from rotor.formats.registry import reader_of, writer_of
 from rotor.tops.constants import Constants
 from rotor.tops.top import Top
@@ -83,13 +85,18 @@ def _meaning(word: str) -> Path | str:
     if path.exists() or _looks_like_a_path(word):
         return path
     if known is None and word not in _g2_names():
+        if _SMILES.fullmatch(word):
+            raise ValueError(f"{word!r} is no file and no name of a molecule; did you mean 'SMILES:{word}'?")
         near = difflib.get_close_matches(word, [*names(), *_g2_names()], n=3)
-        meant = f"did you mean {', '.join(near)}? " if near else ""
+        meant = f"did you mean {', '.join(dict.fromkeys(near))}? " if near else ""
         raise ValueError(
             f"{word!r} is no file here, no molecule of the library ('rotor molecules' lists it) and none of ASE's g2 set; "
             f"{meant}a SMILES is written 'SMILES:...'"
         )
     return known or word
+
+
+_SMILES = re.compile(r"(?=.*[=#()\[\]])[A-Za-z0-9@+\-\[\]()=#]+")  # letters with a bond or a branch among them
 
 
 def _looks_like_a_path(word: str) -> bool:
@@ -104,6 +111,8 @@ def _read_path(path: Path, isotopes: Isotopes | None) -> Any:
     if path.stat().st_size == 0:
         raise ValueError(f"{path}: the file is empty")
     reader = reader_of(path)
+    if reader is None:
+        refuse_bomb(path)
     found = reader(path) if reader else _top_of_geometry(path)
     if isinstance(found, Top):
         return _with_isotopes(found, isotopes)
@@ -136,7 +145,12 @@ def _read_standard_input(isotopes: Isotopes | None) -> Top:
     from rotor.molecules.readers.read import parse_molecule
     from rotor.molecules.readers.xyz import decode
 
-    text = decode(sys.stdin.buffer.read(), "standard input")
+    content = sys.stdin.buffer.read(HARMLESS_BYTES + 1)
+    if len(content) > HARMLESS_BYTES:
+        raise ValueError(
+            f"standard input goes on after {HARMLESS_BYTES / 1e6:.0f} MB, more than a molecule has; give a file"
+        )
+    text = decode(content, "standard input")
     if not text.strip():
         raise ValueError("standard input is empty; expected a geometry (xyz, sdf) or a TOML of constants")
     if any(line.strip().startswith("[constants]") for line in text.splitlines()):
@@ -166,7 +180,7 @@ def _top_as_written(file: MoleculeFile) -> Top:
     geometry = Top.from_molecule(file.molecule) if file.molecule is not None else None
     if file.constants is None:
         assert geometry is not None  # the reader refuses a file with neither
-        return replace(geometry, name=file.name)
+        return replace(geometry, name=file.name, spin_constants=file.spin_constants)
     return replace(
         geometry or Top.from_constants(file.constants),
         constants=file.constants,
@@ -181,6 +195,7 @@ def _top_as_written(file: MoleculeFile) -> Top:
         independent_errors=len(file.constants.uncertainties) < 2,
         level_table=file.levels,
         covariance=file.covariance,
+        spin_constants=replace(file.spin_constants, source=file.cited("spins")) if file.spin_constants else None,
     )
 
 

@@ -57,7 +57,7 @@ FORMATS = (
     ),
     Format(
         "records of HITRAN",
-        (".par", ".par.gz"),
+        (".par", ".par.gz", ".data"),
         "rotor.formats.hitran:read_hitran",
         recognises="rotor.formats.hitran:is_hitran_file",
     ),

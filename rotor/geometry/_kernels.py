@@ -9,8 +9,10 @@ from collections.abc import Callable
 from types import FunctionType
 from typing import Any
 
+import numpy as np
 from numba import njit
 
+from rotor.arrays import Floats
 from rotor.geometry import quaternions
 
 
@@ -45,3 +47,12 @@ def vector_at(array: Any, i: int) -> Any:
 def quaternion_at(array: Any, i: int) -> Any:
     """Row i of an array (n, 4) as a tuple."""
     return array[i, 0], array[i, 1], array[i, 2], array[i, 3]
+
+
+@njit(cache=True, nogil=True)
+def upright(directions: Floats) -> Floats:
+    """Rotations (n, 4) that take unit vectors (n, 3) to the third axis."""
+    out = np.empty((directions.shape[0], 4))
+    for i in range(directions.shape[0]):
+        out[i] = to_third(vector_at(directions, i))
+    return out

@@ -184,13 +184,28 @@ def _signed_by_components(axes: Floats) -> Floats:
 def _unique(axes: Floats, moments: Floats, masses: Floats, positions: Floats, equal: float) -> Floats:
     candidates = np.array([_right_handed(frame) for frame in _frames(axes, moments, masses, positions, equal)])
     size = float(np.sqrt(masses @ (positions**2).sum(axis=1) / masses.sum())) or 1.0
-    coordinates = np.einsum("fij,nj->fni", candidates, positions / size)
+    tensors = _moment_tensors(masses / masses.sum(), positions / size)
 
     for powers in _ODD_MOMENTS:
-        values = masses @ np.prod(coordinates ** np.array(powers), axis=2).T / masses.sum()
-        keep = values > values.max() - _SAME
-        candidates, coordinates = candidates[keep], coordinates[keep]
+        values = _moments_along(tensors[sum(powers)], candidates, powers)
+        candidates = candidates[values > values.max() - _SAME]
     return np.asarray(candidates[0])
+
+
+def _moment_tensors(masses: Floats, x: Floats) -> dict[int, Floats]:
+    """Σ m x_i x_j x_k ... of third, fourth and fifth order, (3, 3, 3) and so on: once for all frames, however many masses."""
+    pairs = np.einsum("ni,nj->nij", x, x).reshape(len(x), 9)
+    triples = np.einsum("ni,nj->nij", pairs, masses[:, None] * x).reshape(len(x), 27)
+    return {k: (rest.T @ triples).reshape((3,) * k) for k, rest in ((3, np.ones((len(x), 1))), (4, x), (5, pairs))}
+
+
+def _moments_along(tensor: Floats, frames: Floats, powers: tuple[int, ...]) -> Floats:
+    """Σ m a^i b^j c^k (f,) along the axes of each frame (f, 3, 3)."""
+    values = np.broadcast_to(tensor, (len(frames), *tensor.shape))
+    for axis, power in enumerate(powers):
+        for _ in range(power):
+            values = np.einsum("f...i,fi->f...", values, frames[:, axis])
+    return values
 
 
 def _right_handed(frame: Floats) -> Floats:

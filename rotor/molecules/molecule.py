@@ -14,13 +14,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rotor.arrays import Floats
+from rotor.arrays import Floats, Ints
 from rotor.molecules.nuclei import Isotope, isotope
 from rotor.units import DEBYE_PER_E_ANGSTROM
 
 _UNTURNED = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 ELECTRONIC = ("even", "odd")  # what half turns do to the electronic state
+FEW_ATOMS = 100  # up to which all distances are as quick as a k-d tree
 CLOSEST_ANGSTROM = 0.1  # no two nuclei of a molecule come nearer; H2 has 0.74 Å
 
 
@@ -220,27 +221,32 @@ def _refuse_lopsided(tensor: Floats | None) -> None:
 
 
 def _refuse_coincident(positions: Floats, nuclei: tuple[Isotope, ...]) -> None:
-    """ValueError for the first two atoms nearer than `CLOSEST_ANGSTROM`.
+    """ValueError for the first two atoms nearer than `CLOSEST_ANGSTROM`."""
+    if len(positions) < 2:
+        return
+    apart, nearest = nearest_others(positions)
+    first = int(np.argmin(apart))
+    if apart[first] < CLOSEST_ANGSTROM:
+        first, second = sorted((first, int(nearest[first])))
+        raise ValueError(
+            f"atoms {first + 1} ({nuclei[first].symbol}) and {second + 1} ({nuclei[second].symbol}) are "
+            f"{apart[first]:.3g} Å apart, nearer than {CLOSEST_ANGSTROM} Å: one on top of the other; remove one, "
+            "or check that the positions are in Å"
+        )
 
-    Atoms are sorted along the longest side of the molecule and compared with those next in that order, until all
-    gaps along that side are wide enough; about n^(5/3) comparisons for a drop of n atoms, not n².
-    """
-    side = int(np.argmax(np.ptp(positions, axis=0)))
-    order = np.argsort(positions[:, side], kind="stable")
-    sorted_positions = positions[order]
-    for apart in range(1, len(order)):
-        gaps = sorted_positions[apart:] - sorted_positions[:-apart]
-        if gaps[:, side].min() > CLOSEST_ANGSTROM:
-            return
-        distances = np.linalg.norm(gaps, axis=1)
-        if distances.min() < CLOSEST_ANGSTROM:
-            k = int(np.argmin(distances))
-            first, second = sorted((int(order[k]), int(order[k + apart])))
-            raise ValueError(
-                f"atoms {first + 1} ({nuclei[first].symbol}) and {second + 1} ({nuclei[second].symbol}) are "
-                f"{distances[k]:.3g} Å apart, nearer than {CLOSEST_ANGSTROM} Å: one on top of the other; remove one, "
-                "or check that the positions are in Å"
-            )
+
+def nearest_others(positions: Floats) -> tuple[Floats, Ints]:
+    """Distance (n,) of each point from the nearest other one, and which that is; n ≥ 2."""
+    if len(positions) > FEW_ATOMS:  # n log n; few atoms do not load scipy
+        from scipy.spatial import cKDTree
+
+        distances, indices = cKDTree(positions).query(positions, k=2)
+        own = indices[:, 0] == np.arange(len(positions))  # two points in one place come in either order
+        return distances[:, 1], np.where(own, indices[:, 1], indices[:, 0])
+    distances = np.linalg.norm(positions[:, None] - positions, axis=2)
+    np.fill_diagonal(distances, np.inf)
+    nearest = np.argmin(distances, axis=1)
+    return distances[np.arange(len(positions)), nearest], nearest
 
 
 def _parse_changes(text: str) -> dict[int | str, str]:

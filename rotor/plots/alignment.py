@@ -66,7 +66,7 @@ def plot_alignment(
     suffix = checked_suffix(path)
     figure = alignment_figure(trace, classical=classical, title=title)
     with styled():
-        figure.savefig(path, dpi=DPI, metadata=_metadata(suffix, trace, title, provenance or {}))
+        figure.savefig(path, dpi=DPI, metadata=_metadata(suffix, trace, title.replace("$", ""), provenance or {}))
 
 
 def _pulses(axes: Any, trace: AlignmentTrace) -> None:

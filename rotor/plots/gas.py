@@ -68,7 +68,7 @@ def plot_gas(
         _draw_test(axes[0], test, f"equipartition {verdict}, p = {test.p_value:.2g}")
         if curves is not None:
             _draw_curves(axes[1], curves, "correlation functions", plateau)
-        figure.suptitle(title.replace("$", r"\$"), fontsize=10, x=0.01, ha="left")
+        figure.suptitle(title, fontsize=10, x=0.01, ha="left")
         save(figure, path, title, provenance or {})
 
 

@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from rotor.formats.library import written_formula
 from rotor.tops.top import Top
 from rotor.version import version
 
@@ -95,29 +96,18 @@ def name_of_top(top: Top) -> str:
     >>> name_of_top(read("HC3N")), name_of_top(Top.from_constants("B=1 GHz", name="SO2"))
     ('cyanoacetylene, HC$_{3}$N', 'SO$_{2}$')
     """
-    written = formula_text(_as_written(top.name, top.molecule.formula)) if top.molecule is not None else ""
-    name = formula_text(top.name) if _COMPOSED.fullmatch(top.name) else top.name.replace("$", r"\$")
-    return ", ".join(dict.fromkeys(filter(None, (name, written)))) or f"{top.kind} top"
+    written = formula_text(written_formula(top.name, top.molecule.formula)) if top.molecule is not None else ""
+    return ", ".join(dict.fromkeys(filter(None, (name_text(top.name), written)))) or f"{top.kind} top"
+
+
+def name_text(name: str) -> str:
+    """A name for matplotlib: with subscripts where it is a formula, else as it is.
+
+    >>> name_text("SO2"), name_text("water"), name_text("c064502.cat")
+    ('SO$_{2}$', 'water', 'c064502.cat')
+    """
+    return formula_text(name) if _COMPOSED.fullmatch(name) else name.replace("$", r"\$")
 
 
 _ATOM = r"(?:\[\d+[A-Z][a-z]?\]|[A-Z][a-z]?)"
 _COMPOSED = re.compile(rf"(?=.*\d)(?:{_ATOM}\d*)+")
-
-
-def _as_written(name: str, formula: str) -> str:
-    """The formula as the library writes that of a molecule of this name: HC3N, where Hill's order is C3HN."""
-    from rotor.formats.library import library_file, names
-
-    path = library_file(name) if name else None
-    if path is None:
-        return formula
-    known = [path.stem, *(key for key, of in names().items() if of == path)]
-    return next((one for one in known if _atoms(one) == _atoms(formula)), formula)
-
-
-def _atoms(formula: str) -> dict[str, int]:
-    """How many atoms of each element, or of each isotope that is marked, a formula has."""
-    counts: dict[str, int] = {}
-    for atom, number in re.findall(rf"({_ATOM})(\d*)", formula):
-        counts[atom] = counts.get(atom, 0) + int(number or 1)
-    return counts

@@ -82,7 +82,7 @@ def plot_polhodes(
         motion, times, axis_names=axis_names, time_label=time_label, time_factor=time_factor, title=title
     )
     with _style():
-        figure.savefig(path, dpi=200, metadata=_metadata(suffix, title, provenance or {}))
+        figure.savefig(path, dpi=200, metadata=_metadata(suffix, title.replace("$", ""), provenance or {}))
 
 
 def _metadata(suffix: str, title: str, provenance: Mapping[str, Any]) -> dict[str, Any]:

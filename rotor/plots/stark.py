@@ -10,12 +10,13 @@ import numpy as np
 
 from rotor.plots.picture import DPI, checked_suffix, new_figure, styled
 from rotor.quantum.field_map import FieldMap
+from rotor.spectra.field_lines import FieldLines
 from rotor.units import MHZ_PER_CM
 from rotor.version import version
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")  # Okabe and Ito
 SIZE_INCHES = (7.2, 6.4)
-MOST_LABELS = 16
+LEAST_DRAWN = 1e-4  # of the strongest line
 
 
 def stark_figure(field_map: FieldMap, title: str = "", unit: str = "kV/cm") -> Any:
@@ -65,7 +66,7 @@ def plot_stark(
     suffix = checked_suffix(path)
     figure = stark_figure(field_map, title, unit)
     with styled():
-        figure.savefig(path, dpi=DPI, metadata=_metadata(suffix, field_map, title, provenance or {}))
+        figure.savefig(path, dpi=DPI, metadata=_metadata(suffix, field_map, title.replace("$", ""), provenance or {}))
 
 
 def _energies(axes: Any, field_map: FieldMap) -> None:
@@ -119,7 +120,7 @@ def _slopes(axes: Any, field_map: FieldMap, unit: str) -> None:
     axes.set_ylabel(name)
 
 
-def _metadata(suffix: str, field_map: FieldMap, title: str, more: Mapping[str, Any]) -> dict[str, Any]:
+def _metadata(suffix: str, field_map: FieldMap | FieldLines, title: str, more: Mapping[str, Any]) -> dict[str, Any]:
     """Provenance by the keys that each format has; no date, so that the same picture is the same file."""
     description = "; ".join(f"{name}: {value}" for name, value in {**more, **field_map.provenance}.items())
     program = f"rotor {version()}"
@@ -128,3 +129,67 @@ def _metadata(suffix: str, field_map: FieldMap, title: str, more: Mapping[str, A
     if suffix == ".pdf":
         return {"Creator": program, "Title": title, "Subject": description, "CreationDate": None}
     return {"Creator": program, "Title": title, "Description": description, "Date": None}
+
+
+def lobes_figure(lines: FieldLines, title: str = "") -> Any:
+    """A matplotlib figure of lines in a field: frequency against field, the width of a curve by its intensity.
+
+    Raises ValueError for lines at one field.
+    """
+    if len(lines.fields) < 2:
+        raise ValueError("a picture of lines in a field needs two fields or more")
+    with styled():
+        figure = new_figure(SIZE_INCHES)
+        axes = figure.subplots()
+        strongest = float(lines.intensity_nm2_mhz.max(initial=0.0)) or 1.0
+        seen: set[int] = set()
+        for rows in lines.pairs():
+            m, share = int(lines.lower_m[rows.start]), float(lines.intensity_nm2_mhz[rows].max()) / strongest
+            if share < LEAST_DRAWN:
+                continue
+            label = None if m in seen else f"|M″| = {m}"
+            axes.plot(
+                lines.fields,
+                lines.frequency_mhz[rows],
+                color=_colour(m),
+                linewidth=0.5 + 2 * np.sqrt(share),
+                linestyle="-" if lines.upper_m[rows.start] == m else "--",
+                label=label,
+            )
+            seen.add(m)
+        axes.set_xlabel("field (kV/cm)")
+        axes.set_ylabel("frequency (MHz)")
+        axes.set_title(f"{title}, light {lines.light}: full ΔM = 0, dashed ΔM = ±1".strip(", "), loc="left", fontsize=9)
+        axes.legend(frameon=False, fontsize=8)
+    return figure
+
+
+def plot_lobes(
+    lines: FieldLines,
+    path: str | os.PathLike[str],
+    *,
+    title: str = "",
+    provenance: Mapping[str, Any] | None = None,
+) -> None:
+    """Draw `lobes_figure` into a .png, .pdf or .svg file.
+
+    Parameters
+    ----------
+    lines : FieldLines
+        At two fields or more.
+    path : path
+        Its suffix chooses the format.
+    title : str
+        Above the picture.
+    provenance : mapping, optional
+        Further facts for the metadata.
+
+    Raises
+    ------
+    ValueError
+        For lines at one field, and for a suffix that is no picture.
+    """
+    suffix = checked_suffix(path)
+    figure = lobes_figure(lines, title)
+    with styled():
+        figure.savefig(path, dpi=DPI, metadata=_metadata(suffix, lines, title, provenance or {}))

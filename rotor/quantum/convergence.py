@@ -16,9 +16,10 @@ import numpy as np
 
 from rotor.arrays import Floats
 from rotor.quantum.effect import QuantumEffect
-from rotor.quantum.effects.watson import SEMI_RIGID, JMatrix, Rigid, block_bands, rigid_operators, scalar_energy
+from rotor.quantum.effects.watson import SEMI_RIGID, Rigid, rigid_operators
 from rotor.quantum.levels import Levels, SolvedBlock
 from rotor.quantum.solve import hamiltonian
+from rotor.quantum.wang_matrix import JMatrix, block_bands, scalar_energy
 from rotor.tops.operators import Operators
 
 if TYPE_CHECKING:

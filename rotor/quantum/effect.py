@@ -20,7 +20,7 @@ from rotor.tops.operators import Operators
 if TYPE_CHECKING:
     from rotor.quantum.j_operators import JOperator
     from rotor.quantum.moments import Moment
-    from rotor.quantum.spins import Spin, SpinTerm
+    from rotor.quantum.spins.terms import Spin, SpinTerm
     from rotor.quantum.states import Coupling, State
     from rotor.tops.top import Top
 

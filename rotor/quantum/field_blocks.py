@@ -16,7 +16,6 @@ halves that its reflection separates.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -28,7 +27,7 @@ from rotor.arrays import Floats, Ints
 from rotor.quantum.direction_cosines import cosine_bands, cosine_squared_bands
 
 if TYPE_CHECKING:
-    from rotor.tops.top import Top
+    pass
 
 ROUND_OFF = 1e-9  # of the largest element: what a tensor may miss of being axial
 
@@ -156,7 +155,12 @@ class FieldBlock(ABC):
 
     @abstractmethod
     def matrix(self, contraction: Contraction) -> NDArray[Any]:
-        """The contraction over the states (n, n), Hermitian."""
+        """The contraction over the states (n, n), Hermitian; large ones of mixed M are sparse."""
+
+    def dense(self, contraction: Contraction) -> NDArray[Any]:
+        """The same, never sparse."""
+        found: Any = self.matrix(contraction)
+        return np.asarray(found if isinstance(found, np.ndarray) else found.toarray())
 
 
 @dataclass(frozen=True)
@@ -247,39 +251,3 @@ class AxialSpace(FieldSpace):
     def _rows_by_k(self) -> dict[int, Ints]:
         k = self.levels.quanta.get("k", np.zeros(len(self.levels), dtype=np.int64))
         return {int(value): np.flatnonzero(k == value) for value in np.unique(k)}
-
-
-def field_space(top: Top, jmax: int, contractions: Sequence[Contraction]) -> FieldSpace:
-    """The states of a top up to `jmax` and the blocks that contractions leave apart.
-
-    Raises ValueError for a spherical top.
-    """
-    if not all(one.along_z for one in contractions):
-        from rotor.quantum.tilted_blocks import tilted_space
-
-        return tilted_space(top, jmax, contractions)
-    if top.kind == "spherical":
-        raise ValueError(
-            f"{top.name or 'this top'} is a spherical top: it has neither a dipole nor an anisotropy, and no field of the first "
-            "or second order turns it"
-        )
-    axis = 2 if top.kind == "oblate" else 0
-    if top.kind != "asymmetric" and all(one.axial_about(axis) for one in contractions):
-        return AxialSpace(axial_levels(top, jmax), jmax, axis, any(one.rank == 1 for one in contractions))
-    from rotor.quantum.wang_blocks import wang_space
-
-    return wang_space(top, jmax, contractions)
-
-
-def axial_levels(top: Top, jmax: int) -> FreeLevels:
-    """Levels of a linear or symmetric top, K and -K apart, by K and then by J."""
-    from rotor.quantum.solve import solve_levels
-
-    solved = solve_levels(top, jmax)
-    j, each = solved.rotational, solved.weight_per_component
-    if top.kind == "linear":
-        return FreeLevels(j, solved.energy_mhz, {}, each)
-    k = np.concatenate([solved.quanta["k"], -solved.quanta["k"][solved.quanta["k"] > 0]])
-    row = np.concatenate([np.arange(len(solved)), np.flatnonzero(solved.quanta["k"] > 0)])
-    order = np.lexsort((j[row], k))
-    return FreeLevels(j[row][order], solved.energy_mhz[row][order], {"k": k[order]}, each[row][order])

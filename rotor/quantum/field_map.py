@@ -16,34 +16,49 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum.field_blocks import FieldBlock, FieldSpace
+from rotor.quantum.field_solver import (
+    DENSE,
+    SPANNED,
+    Matrix,
+    Terms,
+    at_fields,
+    derivatives,
+    expectation,
+    solve_fields,
+    spanning,
+)
 from rotor.table import Table
 
-Matrix = NDArray[Any]
+Of = TypeVar("Of")
 
 EDGE = 2  # the highest values of J whose population is leakage
 FIRST_BASIS = 64
-DENSE = 48  # blocks up to this size are solved whole, all fields at once
 HIGHEST_J = 300
-FIRST_ANCHORS = 5  # fields solved in full at first, of many
-SPANNED = 101  # fields at which a basis for many is tested while it is made
-BUFFER = 4  # further states in the basis of a map
-DEPENDENT = 1e-7  # of the largest singular value: directions of a basis below it are left out
 STEP_J = 6
 
 
 class BlockProblem(NamedTuple):
-    """Matrices over a block, all (n, n): what is fixed, in MHz; what the field multiplies, in MHz per unit of field; observables."""
+    """Matrices over a block, all (n, n), of H(x) = fixed + x slope + x² curvature; curvature None where nothing is quadratic.
+
+    fixed: MHz. slope: MHz per unit of field. observables: by name.
+    """
 
     fixed: Matrix
     slope: Matrix
     observables: dict[str, Matrix]
+    curvature: Matrix | None = None
+
+    def terms(self, states: Ints) -> Terms:
+        """The coefficients of H(x) as a polynomial in x, over some of the states."""
+        given = (self.fixed, self.slope) if self.curvature is None else (self.fixed, self.slope, self.curvature)
+        return tuple(one[np.ix_(states, states)] for one in given)
 
 
 @dataclass(frozen=True, repr=False)
@@ -52,8 +67,9 @@ class FieldMap(Table):
 
     field: (n,) in the unit that `field_name` names. m, rank: M, and the order in energy inside its exact block. block: which block.
     energy_mhz: E/h. label: the free level of that rank. slope: -dE/dfield, in `slope_name`. cosines: expectation values by name.
-    edge_population: of the two highest J. copies: states that coincide (M and -M). diabatic_label: or None. free_row: of the level
-    in the free top. jmax: of the basis. accuracy_mhz: by which energies still moved when J max was raised.
+    edge_population: of the two highest J. copies: states that coincide (M and -M). diabatic_label: or None. free_row, free_mhz,
+    weight: of the level in the free top, the spin weight that of one state. jmax: of the basis. accuracy_mhz: by which energies still
+    moved when J max was raised.
     """
 
     field_name: str
@@ -69,6 +85,8 @@ class FieldMap(Table):
     edge_population: Floats
     copies: Ints
     free_row: Ints
+    free_mhz: Floats
+    weight: Floats
     jmax: int
     accuracy_mhz: float
     diabatic_label: NDArray[np.str_] | None = None
@@ -143,6 +161,19 @@ class MapRequest:
     diabatic_gap_mhz: float | None = None
 
 
+class BlockStates(NamedTuple):
+    """The lowest states of one block: free rows (states,) that name them, energies (fields, states), vectors (fields, n, states).
+
+    places: (n,) of the functions of the block over which the vectors are.
+    """
+
+    block: FieldBlock
+    rows: Ints
+    energies: Floats
+    places: Ints
+    vectors: Matrix
+
+
 class _Solved(NamedTuple):
     """Of one block: energies, slopes -dE/dx in MHz, edge populations (fields, states), cosines by name, and the free rows (states,)."""
 
@@ -162,6 +193,12 @@ def field_map(request: MapRequest, jmax: int | None = None, executor: Executor |
 
     Raises ValueError where a given J max is too small for the tolerance, and where J of 300 would not be enough.
     """
+    enough, moved = converged_jmax(request, jmax, executor)
+    return _tabulated(request, enough, moved, executor)
+
+
+def converged_jmax(request: MapRequest, jmax: int | None = None, executor: Executor | None = None) -> tuple[int, float]:
+    """J max of the basis of a map, and by how many MHz energies at the highest field move with a higher one; as `field_map`."""
     given = jmax is not None
     jmax = jmax if jmax is not None else _first_jmax(request)
     if jmax < request.j_highest + EDGE:
@@ -175,7 +212,7 @@ def field_map(request: MapRequest, jmax: int | None = None, executor: Executor |
         after = _energies_at(request, more, ends, executor)
         moved = float(np.abs(after - before).max(initial=0.0))
         if moved <= request.tolerance_mhz:
-            return _tabulated(request, jmax, moved, executor)
+            return jmax, moved
         if given:
             raise ValueError(
                 f"J max {jmax} is too small: with {more} energies at the highest field move by {moved:.3g} MHz, more than "
@@ -191,11 +228,11 @@ def _blocks(request: MapRequest, jmax: int) -> list[FieldBlock]:
     return [block for m in request.m_values for block in space.blocks(m) if (block.j <= request.j_highest).any()]
 
 
-def _jobs(
-    request: MapRequest, jmax: int, fields: Floats, executor: Executor | None, with_vectors: bool
-) -> list[_Solved]:
+def each_block(
+    request: MapRequest, jmax: int, run: Callable[[FieldBlock], Of], executor: Executor | None = None
+) -> list[Of]:
+    """`run` of every block that holds states of the map; an executor spreads the blocks."""
     blocks = _blocks(request, jmax)
-    run = partial(_solve_block, request, fields=fields, with_vectors=with_vectors)
     return list(executor.map(run, blocks) if executor else map(run, blocks))
 
 
@@ -212,7 +249,7 @@ def _first_jmax(request: MapRequest) -> int:
 
 
 def _energies_at(request: MapRequest, jmax: int, fields: Floats, executor: Executor | None) -> Floats:
-    solved = _jobs(request, jmax, fields, executor, False)
+    solved = each_block(request, jmax, partial(block_states, request, fields=fields, with_vectors=False), executor)
     return np.concatenate(
         [one.energies[:, one.block.levels.j[one.rows] <= request.j_highest].ravel() for one in solved]
     )
@@ -235,23 +272,28 @@ def _count(request: MapRequest, block: FieldBlock) -> int:
     return count if request.diabatic_gap_mhz is None else min(len(block), count + count // 2 + 4)
 
 
-def _solve_block(request: MapRequest, block: FieldBlock, fields: Floats, with_vectors: bool) -> _Solved:
-    problem, count = request.problem(block), _count(request, block)
-    order = free_order(block)
-    basis = _enough(problem, order, count, fields, request.tolerance_mhz)
-    fixed, slope = (matrix[np.ix_(basis, basis)] for matrix in (problem.fixed, problem.slope))
-    energies, vectors = solve_fields(fixed, slope, fields, count, with_vectors, request.tolerance_mhz)
-    if not with_vectors:
-        return _Solved(energies, energies, energies, {}, block.rows[order[:count]], block)
-    slopes = -_expectation(slope, vectors)
-    cosines = {name: _expectation(one[np.ix_(basis, basis)], vectors) for name, one in problem.observables.items()}
-    edge = (np.abs(vectors[:, block.j[basis] > block.levels.j.max() - EDGE]) ** 2).sum(axis=1)
-    return _Solved(energies, slopes, edge, cosines, block.rows[order[:count]], block)
+def block_states(request: MapRequest, block: FieldBlock, fields: Floats, with_vectors: bool = True) -> BlockStates:
+    """The states of a block that a map follows, at fields (f,)."""
+    return _states_of(request, block, request.problem(block), fields, with_vectors)
 
 
-def _expectation(matrix: Matrix, vectors: Matrix) -> Floats:
-    """⟨v|O|v⟩ of vectors (fields, n, states), (fields, states)."""
-    return np.asarray(np.einsum("fns,fns->fs", vectors.conj(), matrix @ vectors).real)
+def _states_of(
+    request: MapRequest, block: FieldBlock, problem: BlockProblem, fields: Floats, with_vectors: bool
+) -> BlockStates:
+    count, order = _count(request, block), free_order(block)
+    places = _enough(problem, order, count, fields, request.tolerance_mhz)
+    energies, vectors = solve_fields(problem.terms(places), fields, count, with_vectors, request.tolerance_mhz)
+    return BlockStates(block, block.rows[order[:count]], energies, places, vectors)
+
+
+def _solve_block(request: MapRequest, block: FieldBlock) -> _Solved:
+    problem, fields = request.problem(block), request.fields
+    found = _states_of(request, block, problem, fields, True)
+    vectors, inside = found.vectors, np.ix_(found.places, found.places)
+    slopes = -derivatives(problem.terms(found.places), fields, vectors)
+    cosines = {name: expectation(one[inside], vectors) for name, one in problem.observables.items()}
+    edge = (np.abs(vectors[:, block.j[found.places] > block.levels.j.max() - EDGE]) ** 2).sum(axis=1)
+    return _Solved(found.energies, slopes, edge, cosines, found.rows, block)
 
 
 def _enough(problem: BlockProblem, order: Ints, count: int, fields: Floats, tolerance_mhz: float) -> Ints:
@@ -263,101 +305,15 @@ def _enough(problem: BlockProblem, order: Ints, count: int, fields: Floats, tole
     before = None
     while size < len(order):
         basis = np.sort(order[:size])
-        fixed, slope = (matrix[np.ix_(basis, basis)] for matrix in (problem.fixed, problem.slope))
-        energies = solve_fields(fixed, slope, strongest, count, False)[0]
+        energies = solve_fields(problem.terms(basis), strongest, count, False)[0]
         if before is not None and np.abs(energies - before).max() <= 0.1 * tolerance_mhz:
             return basis
         before, size = energies, int(1.4 * size) + 1
     return np.arange(len(order))
 
 
-def solve_fields(
-    fixed: Matrix, slope: Matrix, fields: Floats, count: int, with_vectors: bool, tolerance_mhz: float = 0.0
-) -> tuple[Floats, Matrix]:
-    """The lowest `count` states of fixed + x slope: energies (fields, count), vectors (fields, n, count).
-
-    Small matrices are solved for all fields at once, large ones one by one or, where many fields are asked for, in a basis of
-    their own eigenvectors at a few fields (`reduced_basis`), to `tolerance_mhz`.
-    """
-    if len(fixed) <= DENSE:
-        stack = fixed + fields[:, None, None] * slope
-        if not with_vectors:
-            return np.asarray(np.linalg.eigvalsh(stack)[:, :count], dtype=np.float64), stack[:, :, :0]
-        solved = np.linalg.eigh(stack)
-        return np.asarray(solved.eigenvalues[:, :count], dtype=np.float64), solved.eigenvectors[:, :, :count]
-    if len(fields) >= 3 * FIRST_ANCHORS and tolerance_mhz > 0 and count + BUFFER < len(fixed) // 4:
-        return reduced_basis(fixed, slope, fields, count, tolerance_mhz)
-    return _each(fixed, slope, fields, count, with_vectors)
-
-
-def _each(fixed: Matrix, slope: Matrix, fields: Floats, count: int, with_vectors: bool = True) -> tuple[Floats, Matrix]:
-    solved = [_lowest(fixed + x * slope, count, with_vectors) for x in fields.tolist()]
-    return np.array([energies for energies, _ in solved]), np.array([vectors for _, vectors in solved])
-
-
-def _lowest(matrix: Matrix, count: int, with_vectors: bool = True) -> tuple[Floats, Matrix]:
-    from scipy.linalg import eigh
-
-    chosen = (0, min(count, len(matrix)) - 1)
-    if with_vectors:
-        energies, vectors = eigh(matrix, subset_by_index=chosen, overwrite_a=True, check_finite=False)
-        return energies, vectors
-    energies = eigh(matrix, subset_by_index=chosen, eigvals_only=True, overwrite_a=True, check_finite=False)
-    return energies, matrix[:, :0]
-
-
-def reduced_basis(
-    fixed: Matrix, slope: Matrix, fields: Floats, count: int, tolerance_mhz: float
-) -> tuple[Floats, Matrix]:
-    """The lowest states at many fields from full solutions at a few: energies (fields, count), vectors (fields, n, count)."""
-    basis = spanning(fixed, slope, fields[:: len(fields) // SPANNED + 1], count, tolerance_mhz)
-    if basis is None:
-        return _each(fixed, slope, fields, count)
-    energies, vectors, error = _in_basis(basis, (fixed @ basis, slope @ basis), fields, count)
-    return (energies, vectors) if error.max() <= tolerance_mhz else _each(fixed, slope, fields, count)
-
-
-def spanning(fixed: Matrix, slope: Matrix, fields: Floats, count: int, tolerance_mhz: float) -> Matrix | None:
-    """A basis (n, r) for the lowest states at all fields; None where it would be as large as half of the matrix.
-
-    The eigenvectors at some fields, a few more than are asked for, span a space that holds those at the fields between. In it
-    the matrices are small. An energy is wrong by |residual|²/gap, the gap reaching to the highest of the further states; the field
-    where that is largest is solved in full and joins, until it is below a tenth of the tolerance everywhere.
-    """
-    anchors = np.unique(np.linspace(0, len(fields) - 1, FIRST_ANCHORS).astype(int)).tolist()
-    found = [_lowest(fixed + fields[place] * slope, count + BUFFER)[1] for place in anchors]
-    while True:
-        basis = _orthonormal(np.concatenate(found, axis=1))
-        if basis.shape[1] > len(fixed) // 2:
-            return None
-        error = _in_basis(basis, (fixed @ basis, slope @ basis), fields, count)[2]
-        error[anchors] = 0.0
-        worst = int(np.argmax(error))
-        if error[worst] <= 0.1 * tolerance_mhz:
-            return basis
-        anchors.append(worst)
-        found.append(_lowest(fixed + fields[worst] * slope, count + BUFFER)[1])
-
-
-def _orthonormal(vectors: Matrix) -> Matrix:
-    """An orthonormal basis (n, r) of what vectors (n, many) span, dependent directions left out."""
-    left, sizes, _ = np.linalg.svd(vectors, full_matrices=False)
-    return np.ascontiguousarray(left[:, sizes > DEPENDENT * sizes[0]])
-
-
-def _in_basis(basis: Matrix, moved: tuple[Matrix, Matrix], fields: Floats, count: int) -> tuple[Floats, Matrix, Floats]:
-    """Energies, vectors and the largest error estimate (fields,) of the lowest states in a basis."""
-    small = [basis.conj().T @ one for one in moved]
-    energies, inside = np.linalg.eigh(small[0] + fields[:, None, None] * small[1])
-    gaps = np.maximum(energies[:, min(count + BUFFER, energies.shape[1]) - 1, None] - energies[:, :count], 1e-9)
-    energies, inside = energies[:, :count], inside[:, :, :count]
-    vectors = basis @ inside
-    residual = moved[0] @ inside + fields[:, None, None] * (moved[1] @ inside) - energies[:, None, :] * vectors
-    return energies, vectors, ((np.abs(residual) ** 2).sum(axis=1) / gaps).max(axis=1)
-
-
 def _tabulated(request: MapRequest, jmax: int, moved: float, executor: Executor | None) -> FieldMap:
-    solved = _jobs(request, jmax, request.fields, executor, True)
+    solved = each_block(request, jmax, partial(_solve_block, request), executor)
     fields, rows = request.fields, []
     named = [None if request.diabatic_gap_mhz is None else _diabatic_ranks(request, one) for one in solved]
     for one, names in zip(solved, named, strict=True):
@@ -383,6 +339,8 @@ def _tabulated(request: MapRequest, jmax: int, moved: float, executor: Executor 
         edge_population=column(lambda one, rank: one.edge[:, rank]),
         copies=column(lambda one, rank: one.block.copies),
         free_row=column(lambda one, rank: one.rows[rank]),
+        free_mhz=column(lambda one, rank: one.block.levels.energy_mhz[one.rows[rank]]),
+        weight=column(lambda one, rank: one.block.levels.weight[one.rows[rank]]),
         jmax=jmax,
         accuracy_mhz=moved,
         diabatic_label=_diabatic_labels(solved, named, rows),
@@ -399,7 +357,7 @@ def _diabatic_ranks(request: MapRequest, one: _Solved) -> Ints:
 
     count, gap = one.energies.shape[1], request.diabatic_gap_mhz or 0.0
     return diabatic_ranks(
-        partial(_energies_and_slopes, *_small(request, one.block, count), count), request.fields, count, gap
+        partial(_energies_and_slopes, _small(request, one.block, count), count), request.fields, count, gap
     )
 
 
@@ -415,24 +373,21 @@ def _diabatic_labels(
     return np.concatenate([of_block[id(one)][:, rank] for one, rank in rows])
 
 
-def _small(request: MapRequest, block: FieldBlock, count: int) -> tuple[Matrix, Matrix]:
-    """Both matrices of a block in a basis for its lowest states at all fields."""
+def _small(request: MapRequest, block: FieldBlock, count: int) -> Terms:
+    """The Hamiltonian of a block in a basis for its lowest states at all fields."""
     problem = request.problem(block)
-    states = _enough(problem, free_order(block), count, request.fields, request.tolerance_mhz)
-    fixed, slope = (matrix[np.ix_(states, states)] for matrix in (problem.fixed, problem.slope))
-    if len(fixed) <= DENSE:
-        return fixed, slope
+    terms = problem.terms(_enough(problem, free_order(block), count, request.fields, request.tolerance_mhz))
+    if len(terms[0]) <= DENSE:
+        return terms
     fields = np.linspace(request.fields[0], request.fields[-1], SPANNED)
-    basis = spanning(fixed, slope, fields, count, request.tolerance_mhz)
-    if basis is None:
-        return fixed, slope
-    return basis.conj().T @ fixed @ basis, basis.conj().T @ slope @ basis
+    basis = spanning(terms, fields, count, request.tolerance_mhz)
+    return terms if basis is None else tuple(basis.conj().T @ one @ basis for one in terms)
 
 
-def _energies_and_slopes(fixed: Matrix, slope: Matrix, count: int, fields: Floats) -> tuple[Floats, Floats]:
+def _energies_and_slopes(terms: Terms, count: int, fields: Floats) -> tuple[Floats, Floats]:
     """Of the lowest states at fields (f,): energies and dE/dx (f, count)."""
-    energies, vectors = np.linalg.eigh(fixed + fields[:, None, None] * slope)
-    return energies[:, :count], _expectation(slope, vectors[:, :, :count])
+    energies, vectors = np.linalg.eigh(at_fields(terms, fields))
+    return energies[:, :count], derivatives(terms, fields, vectors[:, :, :count])
 
 
 def checked_fields(fields: Any, unit: str, highest: float) -> Floats:

@@ -26,17 +26,17 @@ import numpy as np
 
 from rotor import units
 from rotor.arrays import Floats, Ints
+from rotor.molecules.molecule import FEW_ATOMS
 from rotor.quantum.effect import EffectSize, QuantumEffect, effect_sizes
+from rotor.quantum.spins.splittings import Splitting, splitting_nuclei
 
 if TYPE_CHECKING:
     from rotor.molecules.molecule import Molecule
     from rotor.quantum.effects.hyperfine import NuclearQuadrupole
     from rotor.tops.top import Top
 
-GRADIENT_MHZ_PER_BARN = (
-    234.964778  # eQV/h of a field gradient V of one atomic unit; CODATA 2022, checked in tests/test_limits.py
-)
 VIBRATION_CM = 500.0  # a wavenumber of vibration, for distortion that was not computed
+COMPUTE = "its constants are known, add the effects of spins"  # the command line names its option in place of this
 CH_ANGSTROM, NEIGHBOUR_ANGSTROM = 1.3, 1.7  # bonds of hydrogen to carbon or nitrogen, and of nitrogen to heavier atoms
 OFF_AXIS = 0.05  # sine of the angle from which an atom is off the axis of a methyl group
 FLAT_DEGREES = 355.0  # sum of the three angles at a nitrogen that is not pyramidal
@@ -76,29 +76,18 @@ def model_sizes(top: Top, j: int, effects: Sequence[QuantumEffect]) -> list[Effe
 
 def absent_effects(top: Top, effects: Sequence[QuantumEffect]) -> tuple[QuantumEffect, ...]:
     """Effects that the molecule is known to have and the calculation has not, with estimated values."""
-    present = {effect.name for effect in effects}
-    coupling = None if top.molecule is None else estimated_quadrupole(top.molecule)
-    return () if coupling is None or coupling.name in present else (coupling,)
+    coupling = _quadrupole(splitting_nuclei(top))
+    return () if coupling is None or coupling.name in {effect.name for effect in effects} else (coupling,)
 
 
-def estimated_quadrupole(molecule: Molecule) -> NuclearQuadrupole | None:
-    """Quadrupole coupling with a field gradient of one atomic unit at every nucleus that has a moment; None without any.
-
-    >>> from rotor.molecules.molecule import Molecule
-    >>> molecule = Molecule(("H", "C", "N"), [[0, 0, 0], [0, 0, 1.07], [0, 0, 2.22]])
-    >>> {name: round(value, 1) for name, value in estimated_quadrupole(molecule).values.items()}
-    {'chi_aa(14N)': 4.8}
-    """
-    moments = {one.label: one for one in molecule.nuclei if one.spin >= 1 and one.quadrupole_barn}
-    if not moments:
+def _quadrupole(nuclei: Sequence[Splitting]) -> NuclearQuadrupole | None:
+    if not nuclei:
         return None
     from rotor.quantum.effects.hyperfine import NuclearQuadrupole
-    from rotor.quantum.spins import Spin
+    from rotor.quantum.spins.terms import Spin
 
-    values = {
-        f"chi_aa({label})": GRADIENT_MHZ_PER_BARN * (one.quadrupole_barn or 0.0) for label, one in moments.items()
-    }
-    return NuclearQuadrupole(values, tuple(Spin(label, round(2 * one.spin)) for label, one in moments.items()))
+    values = {f"chi_aa({one.nucleus})": one.chi_mhz for one in nuclei}
+    return NuclearQuadrupole(values, tuple(Spin(one.nucleus, round(2 * one.spin)) for one in nuclei))
 
 
 def model_limits(top: Top, j: int, effects: Sequence[QuantumEffect]) -> list[Limit]:
@@ -121,6 +110,7 @@ def limit_facts(top: Top, j: int, effects: Sequence[QuantumEffect]) -> dict[str,
         "sizes_at_j": j,
         "effects": [size._asdict() for size in model_sizes(top, j, effects)],
         "limits": [asdict(limit) for limit in model_limits(top, j, effects)],
+        "splitting_nuclei": [asdict(one) for one in splitting_nuclei(top)],
     }
 
 
@@ -150,17 +140,29 @@ def _largest(top: Top) -> float:
 
 def _of_nuclei(top: Top, j: int, effects: Sequence[QuantumEffect]) -> list[Limit]:
     """Couplings of nuclear spins that no effect of the calculation has."""
-    if top.molecule is None:
-        return []
     found = []
-    for size in effect_sizes(top, j, (), absent_effects(top, effects)):
-        labels = sorted({one.label for one in top.molecule.nuclei if one.spin >= 1 and one.quadrupole_barn})
-        text = f"{', '.join(labels)} split{'s' if len(labels) == 1 else ''} lines of low J; an order of magnitude"
-        found.append(Limit(size.name, size.size_mhz, text))
+    if absent_effects(top, effects):
+        nuclei = splitting_nuclei(top)
+        size = max(one.splitting_mhz if one.known else abs(one.chi_mhz) for one in nuclei)
+        found.append(Limit("nuclear quadrupole", size, _split_text(nuclei)))
+    if top.molecule is None:
+        return found
     magnetic = sorted({one.label for one in top.molecule.nuclei if one.spin > 0})
     if magnetic and not {"spin-rotation", "spin-spin"} & {effect.name for effect in effects}:
         found.append(Limit("magnetic coupling of nuclear spins", None, f"{', '.join(magnetic)}: small splittings"))
     return found
+
+
+def _split_text(nuclei: Sequence[Splitting]) -> str:
+    """Which nuclei split lines, by how much where it is known, and what to do."""
+    known = [f"{one.nucleus} splits J = 1 by {one.splitting_mhz:.3g} MHz" for one in nuclei if one.known]
+    others = sorted({one.nucleus for one in nuclei if not one.known})
+    texts = [f"{', '.join(known)}: {COMPUTE}"] if known else []
+    if others:
+        texts.append(
+            f"{', '.join(others)} split{'s' if len(others) == 1 else ''} lines of low J; an order of magnitude"
+        )
+    return "; ".join(texts)
 
 
 def _of_geometry(top: Top, molecule: Molecule, present: set[str]) -> list[Limit]:
@@ -186,10 +188,24 @@ def _of_geometry(top: Top, molecule: Molecule, present: set[str]) -> list[Limit]
 def _neighbours(molecule: Molecule) -> list[Ints]:
     """Atoms bonded to each atom, by distance alone: hydrogen within 1.3 Å, others within 1.7 Å."""
     x = molecule.positions_angstrom
-    apart = np.linalg.norm(x[:, None] - x[None], axis=-1)
     hydrogen = np.array([symbol == "H" for symbol in molecule.symbols])
-    reach = np.where(hydrogen[:, None] | hydrogen[None], CH_ANGSTROM, NEIGHBOUR_ANGSTROM)
-    return [np.flatnonzero((row < limit) & (row > 0)) for row, limit in zip(apart, reach, strict=True)]
+    found: list[list[int]] = [[] for _ in x]
+    for first, second in _pairs_within(x, NEIGHBOUR_ANGSTROM).tolist():
+        reach = CH_ANGSTROM if hydrogen[first] or hydrogen[second] else NEIGHBOUR_ANGSTROM
+        if np.linalg.norm(x[first] - x[second]) < reach:
+            found[first].append(second)
+            found[second].append(first)
+    return [np.array(sorted(near), dtype=np.int64) for near in found]
+
+
+def _pairs_within(x: Floats, reach: float) -> Ints:
+    """Pairs (m, 2) of points nearer than a reach, Å."""
+    if len(x) > FEW_ATOMS:
+        from scipy.spatial import cKDTree
+
+        return np.asarray(cKDTree(x).query_pairs(reach, output_type="ndarray"), dtype=np.int64)
+    apart = np.linalg.norm(x[:, None] - x[None], axis=-1)
+    return np.argwhere(np.triu(apart < reach, k=1))
 
 
 def _internal_rotors(molecule: Molecule) -> int:
@@ -200,10 +216,18 @@ def _internal_rotors(molecule: Molecule) -> int:
         if molecule.symbols[carbon] != "C" or symbols["H"] != 3:
             continue
         hydrogens = [i for i in near.tolist() if molecule.symbols[i] == "H"]
-        rest = [i for i in range(len(x)) if i != carbon and i not in hydrogens]
         axis = x[carbon] - x[hydrogens].mean(axis=0)
-        count += bool(rest) and bool((_sines(x[rest] - x[carbon], axis) > OFF_AXIS).any())
+        count += _any_off_axis(x, [carbon, *hydrogens], axis)
     return count
+
+
+def _any_off_axis(x: Floats, group: list[int], axis: Floats) -> bool:
+    """Whether some atom that is not of the group lies off the axis through its first atom; a thousand atoms at a time."""
+    for start in range(0, len(x), 1000):
+        rest = np.setdiff1d(np.arange(start, min(start + 1000, len(x))), group)
+        if len(rest) and (_sines(x[rest] - x[group[0]], axis) > OFF_AXIS).any():
+            return True
+    return False
 
 
 def _sines(vectors: Floats, axis: Floats) -> Floats:

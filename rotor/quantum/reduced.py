@@ -6,38 +6,23 @@ of odd rank i times real, their squares summed over all M the line strengths.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
 import numpy as np
 
 from rotor.arrays import Floats
-from rotor.quantum import tensors as of_wang
 from rotor.quantum.coupled import CoupledBlock
 from rotor.quantum.levels import SolvedBlock
-from rotor.quantum.tensors import BodyTensor
+from rotor.quantum.tensors import BodyTensor, Tensors, acting_on, rank_of, tensor_between
 
-Tensors = Mapping[tuple[int, int], BodyTensor]
 AnyBlock = Any  # SolvedBlock, CoupledBlock or SpinBlock
-
-
-def tensor_between(tensors: Tensors, up: int, low: int) -> BodyTensor | None:
-    """The tensor that acts between two states, None where there is none."""
-    return tensors.get((up, low)) or tensors.get((low, up))
-
-
-def rank_of(tensors: Tensors) -> int:
-    """The rank of the tensors; ValueError where they differ."""
-    ranks = {tensor.rank for tensor in tensors.values()}
-    if len(ranks) != 1:
-        raise ValueError(f"tensors of ranks {sorted(ranks)}: one rank at a time")
-    return ranks.pop()
 
 
 def amplitudes(up: AnyBlock, low: AnyBlock, tensors: Tensors) -> Floats:
     """Real reduced elements between all states of two blocks of one kind, (n_up, n_low)."""
     if isinstance(up, SolvedBlock):
-        return of_wang.amplitudes(up, low, tensors[0, 0])
+        return wang_amplitudes(up, low, tensors[0, 0])
     if isinstance(up, CoupledBlock):
         return _of_coupled(up, low, tensors)
     from rotor.quantum.spins import spin_amplitudes
@@ -51,7 +36,7 @@ def _of_coupled(up: CoupledBlock, low: CoupledBlock, tensors: Tensors) -> Floats
         for source in low.parts:
             tensor = tensor_between(tensors, target.v, source.v)
             if tensor is not None:
-                moved[target.place] += of_wang.acting_on(low.vectors[source.place], target.basis, source.basis, tensor)
+                moved[target.place] += acting_on(low.vectors[source.place], target.basis, source.basis, tensor)
     return np.asarray(up.vectors.T @ moved)
 
 
@@ -64,7 +49,7 @@ def connected_pairs(blocks: Iterable[AnyBlock], tensors: Tensors) -> Iterator[tu
     if not blocks:
         return
     if isinstance(blocks[0], SolvedBlock):
-        yield from of_wang.connected_pairs(blocks, tensors[0, 0])
+        yield from connected_wang_blocks(blocks, tensors[0, 0])
         return
     yield from pairs_where(blocks, rank_of(tensors), lambda up, low: _connects(up, low, tensors))
 
@@ -98,3 +83,29 @@ def _connects(up: AnyBlock, low: AnyBlock, tensors: Tensors) -> bool:
         return spin_blocks_connected(up, low, tensors)
     found = ((tensor_between(tensors, p.v, q.v), p, q) for p in up.parts for q in low.parts)
     return any(tensor is not None and tensor.between(p.basis, q.basis) is not None for tensor, p, q in found)
+
+
+def wang_amplitudes(up: SolvedBlock, low: SolvedBlock, tensor: BodyTensor) -> Floats:
+    """Real reduced elements between all states of two blocks, (n_up, n_low); their squares are the line strengths.
+
+    An odd rank stands for i times them, in the phases of |J K s)).
+    """
+    return np.asarray(up.vectors.T @ acting_on(low.vectors, up.basis, low.basis, tensor))
+
+
+def connected_wang_blocks(
+    blocks: Iterable[SolvedBlock], tensor: BodyTensor
+) -> Iterator[tuple[SolvedBlock, SolvedBlock]]:
+    """Every pair (up, low) that a tensor connects, each once, the higher or equal J first, J rising.
+
+    A block with itself is among them where a tensor has diagonal elements, as those of even rank do.
+    """
+    by_j: dict[int, list[SolvedBlock]] = {}
+    for block in blocks:
+        by_j.setdefault(block.basis.j, []).append(block)
+    for j, lows in by_j.items():
+        above = [block for rise in range(1, tensor.rank + 1) for block in by_j.get(j + rise, [])]
+        for i, low in enumerate(lows):
+            for up in lows[i:] + above:
+                if tensor.between(up.basis, low.basis) is not None:
+                    yield up, low

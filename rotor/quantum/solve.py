@@ -25,9 +25,10 @@ from rotor.arrays import Floats, Ints
 from rotor.quantum.basis import WangBlock, limited, names_of, wang_blocks
 from rotor.quantum.coupled import coupled_levels, model_of
 from rotor.quantum.effect import QuantumEffect, k_limits_of
-from rotor.quantum.effects.watson import SEMI_RIGID, JMatrix, block_bands, scalar_energy
+from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.levels import Levels, SolvedBlock, weights_of_levels
 from rotor.quantum.spherical_top import DIMENSION, is_cubic, scalar_and_tensor, tensor_eigenvalues
+from rotor.quantum.wang_matrix import JMatrix, block_bands, scalar_energy
 from rotor.tops.level_table import LevelTable, tabulated_energies
 from rotor.tops.operators import AXIAL_REPRESENTATION, Operators
 from rotor.tops.spin_weights import SpinWeights
@@ -37,6 +38,7 @@ if TYPE_CHECKING:
 
     from rotor.tops.top import Top
 
+MOST_LEVELS = 10_000_000  # in one piece: J up to 3161 of an asymmetric top, minutes and gigabytes
 SMALL = 100  # rows of a tridiagonal block up to which scipy.linalg, 0.2 s to load, is not loaded for it
 
 
@@ -96,6 +98,7 @@ def solve_levels(
     """
     if jmax < 0 or jmin < 0 or jmin > jmax:
         raise ValueError(f"J from {jmin} to {jmax}: J max must be 0 or more and not below J min")
+    _refuse_too_many(top.kind, jmin, jmax)
     effects = tuple(effects)
     for effect in effects:
         if effect.resolves_m:
@@ -110,6 +113,15 @@ def solve_levels(
     if top.level_table is None or effects != SEMI_RIGID:
         return found
     return with_tabulated_energies(found, top.level_table)
+
+
+def _refuse_too_many(kind: str, jmin: int, jmax: int) -> None:
+    """ValueError for a range of J that no machine solves in one piece."""
+    count = jmax + 1 - jmin if kind in ("linear", "spherical") else (jmax + 1) ** 2 - jmin**2
+    if count > MOST_LEVELS:
+        raise ValueError(
+            f"J max {jmax}: {count:.3g} levels from J = {jmin} on, more than {MOST_LEVELS:.0e}; ask for fewer, in ranges of J"
+        )
 
 
 def with_tabulated_energies(levels: Levels, table: LevelTable) -> Levels:

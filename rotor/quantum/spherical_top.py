@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Floats
 from rotor.quantum.basis import WangBlock
-from rotor.quantum.effects.watson import JMatrix, block_bands, scalar_energy
+from rotor.quantum.wang_matrix import JMatrix, block_bands, scalar_energy
 from rotor.tops.operators import CUBIC_TENSOR, Operators
 from rotor.tops.spin_weights import CUBIC_IRREPS
 

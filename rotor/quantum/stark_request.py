@@ -8,7 +8,15 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from rotor.checks import require_positive, require_whole
-from rotor.quantum.effects.stark import DEFAULT_TOLERANCE_MHZ, acting, checked_j, checked_m, stark_map
+from rotor.quantum.effects.stark import (
+    DEFAULT_TOLERANCE_MHZ,
+    Z,
+    acting,
+    checked_direction,
+    checked_j,
+    checked_m,
+    stark_map,
+)
 from rotor.quantum.field_map import FieldMap
 from rotor.tops.facts import top_facts
 
@@ -21,8 +29,8 @@ class StarkRequest:
     """A map of levels in a field to compute; every field is checked when the request is made.
 
     top: with its dipole. fields_kv_per_cm: of any order. j_highest: free levels up to this J are followed. m_values: |M|; None: all.
-    intensity_w_per_cm2: of a laser along the field. jmax: of the basis; None: what tolerance_mhz needs. diabatic_gap_mhz: None: no
-    diabatic labels.
+    intensity_w_per_cm2: of a laser along Z. direction: of the field. jmax: of the basis; None: what tolerance_mhz needs.
+    diabatic_gap_mhz: None: no diabatic labels.
     """
 
     top: Top
@@ -30,6 +38,7 @@ class StarkRequest:
     j_highest: int = 2
     m_values: tuple[int, ...] | None = None
     intensity_w_per_cm2: float = 0.0
+    direction: tuple[float, float, float] = Z
     jmax: int | None = None
     tolerance_mhz: float = DEFAULT_TOLERANCE_MHZ
     diabatic_gap_mhz: float | None = None
@@ -41,7 +50,15 @@ class StarkRequest:
         require_positive("tolerance_mhz", self.tolerance_mhz)
         if self.diabatic_gap_mhz is not None:
             require_positive("diabatic_gap_mhz", self.diabatic_gap_mhz)
+        checked_direction(self.direction)
+        if self.tilted and self.m_values is not None:
+            raise ValueError("m_values: a field at an angle with the light mixes M; leave them out")
         acting(self.top, self.intensity_w_per_cm2)
+
+    @property
+    def tilted(self) -> bool:
+        """Whether the field is at an angle with Z."""
+        return bool(self.direction[0] or self.direction[1])
 
 
 @dataclass(frozen=True)
@@ -58,6 +75,7 @@ class StarkAnswer:
             **top_facts(request.top),
             "field_kv_per_cm": [float(fields[0]), float(fields[-1]), len(fields)],
             "intensity_w_per_cm2": request.intensity_w_per_cm2,
+            "field_direction": list(request.direction),
             "j_highest": request.j_highest,
             "diabatic_gap_mhz": request.diabatic_gap_mhz,
             "tolerance_mhz": request.tolerance_mhz,
@@ -80,6 +98,7 @@ def answer_stark(request: StarkRequest, executor: Executor | None = None) -> Sta
         j_highest=request.j_highest,
         m_values=request.m_values,
         intensity_w_per_cm2=request.intensity_w_per_cm2,
+        direction=request.direction,
         jmax=request.jmax,
         tolerance_mhz=request.tolerance_mhz,
         diabatic_gap_mhz=request.diabatic_gap_mhz,

@@ -25,7 +25,7 @@ Line strengths: Σ_{M' M p} |⟨J'τ'M'|T^K_p|J τ M⟩|² is the square of the 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, NamedTuple
@@ -39,7 +39,7 @@ from rotor.quantum.wigner import three_j
 from rotor.tops.operators import axes_of as axes_of
 
 if TYPE_CHECKING:
-    from rotor.quantum.levels import SolvedBlock
+    pass
 
 Complexes = NDArray[np.complex128]
 
@@ -145,6 +145,27 @@ class BodyTensor:
         if ((up.first_k + low.first_k) % 2, real) not in self._acting:
             return None
         return self._halves[real] if abs(up.j - low.j) <= self.rank <= up.j + low.j else None
+
+    def signed_parts(self, up: WangBlock, low: WangBlock) -> tuple[list[int], list[float]]:
+        """The q that act from `low` to `up`, and the part of each T_q, q = -K ... K, with the sign of the phases of both blocks."""
+        key = (up.first_k, up.sign, up.j % 4, low.first_k, low.sign, low.j % 4)
+        if key not in self._signed:
+            self._signed[key] = self._with_sign(up, low)
+        return self._signed[key]
+
+    @cached_property
+    def _signed(self) -> dict[tuple[int, ...], tuple[list[int], list[float]]]:
+        """What `signed_parts` has found: it depends on J modulo 4 only, and a line list asks for thousands of pairs of blocks."""
+        return {}
+
+    def _with_sign(self, up: WangBlock, low: WangBlock) -> tuple[list[int], list[float]]:
+        real, odd = self.is_real_between(up, low), (up.first_k + low.first_k) % 2
+        if (odd, real) not in self._acting:
+            return [], []
+        sign = -1.0 if (phase_exponent(low) - phase_exponent(up) + (not real) - self.rank % 2) % 4 else 1.0
+        parts = [sign * part for part in self._halves[real]]
+        steps = range(-self.rank + (self.rank + odd) % 2, self.rank + 1, 2)
+        return [q for q in steps if parts[self.rank + q] or self.rank > 1], parts
 
 
 def body_tensor(cartesian: ArrayLike, rank: int, representation: str) -> BodyTensor:
@@ -280,23 +301,17 @@ def bands_between(up: WangBlock, low: WangBlock, tensor: BodyTensor) -> list[Ban
     ⟨K'‖T‖K⟩ that acts between the blocks. The second term is the first again where K or K' is 0, and else needs
     K + K' ≤ rank.
     """
-    parts = tensor.between(up, low)
-    if parts is None:
+    if not abs(up.j - low.j) <= tensor.rank <= up.j + low.j:
         return []
-    rank = tensor.rank
-    exponent = phase_exponent(low) - phase_exponent(up) + (not tensor.is_real_between(up, low))
-    sign = -1.0 if (exponent - rank % 2) % 4 else 1.0
-
+    rank, (steps, parts) = tensor.rank, tensor.signed_parts(up, low)
     out = []
-    for step in range(-rank + (rank + up.first_k + low.first_k) % 2, rank + 1, 2):
+    for step in steps:
         source, target = _overlap(up, low, step)
-        folded = _folded(up, low, rank, step, parts) if rank > 1 else ()
-        if source.start >= source.stop or not (parts[rank + step] or folded):
+        if source.start >= source.stop:
             continue
-        factors = _wang_coupling(low.j, up.j, rank, step)[low.first_k :: 2]
-        elements = factors[source] * (sign * parts[rank + step])
-        for place, value in folded:
-            elements[place - source.start] += sign * value
+        elements = _wang_coupling(low.j, up.j, rank, step)[low.first_k :: 2][source] * parts[rank + step]
+        for place, value in _folded(up, low, rank, step, parts) if rank > 1 else ():
+            elements[place - source.start] += value
         out.append(Band(source, target, elements))
     return out
 
@@ -347,28 +362,19 @@ def acting_on(vectors: Floats, up: WangBlock, low: WangBlock, tensor: BodyTensor
     return moved.T
 
 
-# Between solved states
+# One for each pair of states
+
+Tensors = Mapping[tuple[int, int], BodyTensor]
 
 
-def amplitudes(up: SolvedBlock, low: SolvedBlock, tensor: BodyTensor) -> Floats:
-    """Real reduced elements between all states of two blocks, (n_up, n_low); their squares are the line strengths.
-
-    An odd rank stands for i times them, in the phases of |J K s)).
-    """
-    return np.asarray(up.vectors.T @ acting_on(low.vectors, up.basis, low.basis, tensor))
+def tensor_between(tensors: Tensors, up: int, low: int) -> BodyTensor | None:
+    """The tensor that acts between two states, None where there is none."""
+    return tensors.get((up, low)) or tensors.get((low, up))
 
 
-def connected_pairs(blocks: Iterable[SolvedBlock], tensor: BodyTensor) -> Iterator[tuple[SolvedBlock, SolvedBlock]]:
-    """Every pair (up, low) that a tensor connects, each once, the higher or equal J first, J rising.
-
-    A block with itself is among them where a tensor has diagonal elements, as those of even rank do.
-    """
-    by_j: dict[int, list[SolvedBlock]] = {}
-    for block in blocks:
-        by_j.setdefault(block.basis.j, []).append(block)
-    for j, lows in by_j.items():
-        above = [block for rise in range(1, tensor.rank + 1) for block in by_j.get(j + rise, [])]
-        for i, low in enumerate(lows):
-            for up in lows[i:] + above:
-                if tensor.between(up.basis, low.basis) is not None:
-                    yield up, low
+def rank_of(tensors: Tensors) -> int:
+    """The rank of the tensors; ValueError where they differ."""
+    ranks = {tensor.rank for tensor in tensors.values()}
+    if len(ranks) != 1:
+        raise ValueError(f"tensors of ranks {sorted(ranks)}: one rank at a time")
+    return ranks.pop()

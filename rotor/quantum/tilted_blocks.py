@@ -22,7 +22,8 @@ import numpy as np
 from rotor.arrays import Floats, Ints
 from rotor.quantum.basis import WangBlock, wang_blocks
 from rotor.quantum.field_blocks import Contraction, FieldBlock, FieldSpace, FreeLevels
-from rotor.quantum.tensors import BodyTensor, amplitudes, block_elements, body_tensor
+from rotor.quantum.reduced import wang_amplitudes
+from rotor.quantum.tensors import BodyTensor, block_elements, body_tensor
 from rotor.quantum.wang_blocks import coloured_components
 
 if TYPE_CHECKING:
@@ -187,7 +188,7 @@ class TiltedSpace(FieldSpace):
             of_k, low_k = self.solved[up[0]], self.solved[low[0]]
             of_m, low_m = self._of_m[of_k.basis.j][up[1]], self._of_m[low_k.basis.j][low[1]]
             if (up[0], low[0]) not in known:
-                known[up[0], low[0]] = amplitudes(of_k, low_k, body)
+                known[up[0], low[0]] = wang_amplitudes(of_k, low_k, body)
             root = np.sqrt((2.0 * of_k.basis.j + 1) * (2 * low_k.basis.j + 1))
             out.append((up, low, np.kron(block_elements(of_m, low_m, space) * (sign / root), known[up[0], low[0]])))
         return out

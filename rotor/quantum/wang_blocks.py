@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum.field_blocks import Contraction, FieldBlock, FieldSpace, FreeLevels
-from rotor.quantum.tensors import BodyTensor, amplitudes, body_tensor, coupling
+from rotor.quantum.reduced import wang_amplitudes
+from rotor.quantum.tensors import BodyTensor, body_tensor, coupling
 
 if TYPE_CHECKING:
     from rotor.quantum.levels import SolvedBlock
@@ -164,7 +165,7 @@ class WangSpace(FieldSpace):
             if not factor:
                 continue
             if known is None:
-                known = pairs[up, low] = amplitudes(self.solved[up], self.solved[low], self._tensor(contraction))
+                known = pairs[up, low] = wang_amplitudes(self.solved[up], self.solved[low], self._tensor(contraction))
             out.append((place[up], place[low], size * factor * known))
         return out
 

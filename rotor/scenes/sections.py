@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
+import msgspec
 from msgspec import Meta, Struct, field
 
 Quantity = float | str
@@ -176,6 +177,7 @@ class BodySection(Section, frozen=True):
     """A rigid body instead of a molecule, in any coherent units."""
 
     moments: Annotated[list[float], said("principal moments of inertia, in any order", [0.3, 0.35, 0.4])]
+    units: Annotated[str, said('"SI" (kg m², s, J), or "" for any coherent set')] = ""
     angular_momentum: Annotated[list[float] | None, said("at time 0 in principal axes", [1.8, 0.4, -0.9])] = None
     angular_velocity: Annotated[list[float] | None, said("instead of the angular momentum", [0.1, 15.0, 0.1])] = None
     attitude: Annotated[list[float] | None, said("quaternion, body to space, at time 0", [1.0, 0.0, 0.0, 0.0])] = None
@@ -261,7 +263,8 @@ class StarkConditions(Section, frozen=True):
     """The fields."""
 
     field: Annotated[Grid, said("static electric fields (kV/cm)")] = "0:100kV/cm:201"
-    intensity: Annotated[Quantity, said("of a laser along the field, far from resonance (W/cm2)")] = 0.0
+    direction: Annotated[list[float], said("of the field")] = msgspec.field(default_factory=lambda: [0.0, 0.0, 1.0])
+    intensity: Annotated[Quantity, said("of a laser along Z, far from resonance (W/cm2)")] = 0.0
 
 
 class StarkObservables(Section, frozen=True):

@@ -294,10 +294,10 @@ def line_list(
     cut = intensity_cut(levels, temperature_k, given.q, least, ground) if given and math.isfinite(ground) else None
     others = [moment for effect in levels.effects for moment in effect.other_moments(top)]
     found = all_transitions(levels, dipoles_by_state(top, dipole, levels.effects), range_mhz, cut, others)
-    inside = trusted[found.upper] & trusted[found.lower]
+    inside = None if trusted.all() else trusted[found.upper] & trusted[found.lower]
     lines = Lines(
         top=top,
-        levels=levels if trusted.all() else replace(levels, weight=np.where(trusted, levels.weight, 0)),
+        levels=levels if inside is None else replace(levels, weight=np.where(trusted, levels.weight, 0)),
         frequency_mhz=found.frequency_mhz,
         strength_debye2=found.strength_debye2,
         upper=found.upper,
@@ -307,9 +307,9 @@ def line_list(
         range_mhz=range_mhz,
         given_partition=given,
         covariance=covariance,
-        untrusted=int(np.count_nonzero(~inside)),
+        untrusted=0 if inside is None else int(np.count_nonzero(~inside)),
     )
-    if not inside.all():
+    if inside is not None:
         lines = lines.where(inside)
     return lines.sorted() if sort else lines
 

@@ -18,7 +18,8 @@ from rotor.arrays import Floats, Ints
 from rotor.quantum import reduced
 from rotor.quantum.basis import wang_blocks
 from rotor.quantum.levels import Block, Levels, SolvedBlock
-from rotor.quantum.tensors import amplitudes, body_tensor, connected_pairs, coupling
+from rotor.quantum.reduced import connected_wang_blocks, wang_amplitudes
+from rotor.quantum.tensors import body_tensor, coupling
 from rotor.tops.operators import AXIAL_REPRESENTATION, axes_of
 from rotor.tops.spin_weights import SpinWeights
 
@@ -151,8 +152,8 @@ def _without_axis(levels: Levels, tensor: Floats, spin_weights: SpinWeights, rep
         for basis in wang_blocks(j, representation)
     ]
     pieces = []
-    for up, low in connected_pairs(blocks, anisotropic):
-        strength = 1.5 * amplitudes(up, low, anisotropic) ** 2
+    for up, low in connected_wang_blocks(blocks, anisotropic):
+        strength = 1.5 * wang_amplitudes(up, low, anisotropic) ** 2
         i, k = np.nonzero(_once(up, low))
         first = levels.rows_of(j=np.full(len(k), low.basis.j), k=low.basis.k[k])
         second = levels.rows_of(j=np.full(len(i), up.basis.j), k=up.basis.k[i])

@@ -20,6 +20,7 @@ from rotor.molecules.nuclei import isotope, natural_isotopes
 from rotor.molecules.symmetry.point_group import Symmetry, symmetry_of
 from rotor.tops.allowed import invariant_vector
 from rotor.tops.isotopic_scaling import carried_over, matched_axes, turned_degrees
+from rotor.tops.isotopic_spins import carried_spins
 from rotor.tops.top import Top
 
 Changes = Mapping[int | str, str] | str
@@ -245,10 +246,11 @@ class _Ancestor:
         axes, overlap = matched_axes(self.rigid, turned)
         angle = turned_degrees(self.rigid, turned, axes)
         top = carried_over(self.parent, self.rigid, turned, axes, angle)
-        notes = tuple(dict.fromkeys((*top.notes, *_doubts(self.parent, overlap, angle))))
+        spins, said = carried_spins(self.parent, top, angle)
+        notes = tuple(dict.fromkeys((*top.notes, *_doubts(self.parent, overlap, angle), *said)))
         arrangements = len({tuple(image) for image in _images(numbers, self.permutations)})
         return Isotopologue(
-            top=replace(top, name=_name(self.parent, self.molecule, turned), notes=notes),
+            top=replace(top, name=_name(self.parent, self.molecule, turned), notes=notes, spin_constants=spins),
             substituted={i + 1: name for i, name in enumerate(names) if numbers[i] != usual[i]},
             arrangements=arrangements,
             abundance=arrangements * _abundance(symbols, numbers),

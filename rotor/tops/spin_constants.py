@@ -10,8 +10,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from types import MappingProxyType
+from typing import Any
 
 from rotor.molecules.nuclei import isotope
 from rotor.units import parse_quantity
@@ -26,16 +27,21 @@ _ISOTOPE = re.compile(r"(\d+[A-Z][a-z]?|D|T)(?:_\w+)?")
 class SpinConstants:
     """Values in MHz by name, the spins in the order in which they are coupled, and where the values are from.
 
-    twice: twice every spin, by its name. ValueError for a spin that is none, and for constants of a spin that is not listed.
+    twice: twice every spin, by its name. uncertainties: in MHz, of the constants that have one. sources: of single spins.
+    atoms: the numbers of the nuclei in the geometry, counted from 1, by spin. ValueError for a spin that is none, and for
+    constants of a spin that is not listed.
     """
 
     values: Mapping[str, float]
     twice: Mapping[str, int]
     source: str = ""
+    uncertainties: Mapping[str, float] = field(default_factory=dict)
+    sources: Mapping[str, str] = field(default_factory=dict)
+    atoms: Mapping[str, int] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "values", MappingProxyType(dict(self.values)))
-        object.__setattr__(self, "twice", MappingProxyType(dict(self.twice)))
+        for name in ("values", "twice", "uncertainties", "sources", "atoms"):
+            object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
         for name, twice in self.twice.items():
             if twice < 1:
                 raise ValueError(
@@ -45,6 +51,23 @@ class SpinConstants:
             for spin in spins_of(name):
                 if spin not in self.twice:
                     raise ValueError(f"{name}: spin {spin} is not among {', '.join(self.twice) or 'none'}")
+        for name, error in self.uncertainties.items():
+            if name not in self.values or not error >= 0:
+                raise ValueError(
+                    f"uncertainty {error:g} of {name}: expected a number of at least 0 and a constant that is there"
+                )
+
+    def __reduce__(self) -> tuple[type[SpinConstants], tuple[Any, ...]]:
+        plain = (dict(self.uncertainties), dict(self.sources), dict(self.atoms))
+        return type(self), (dict(self.values), dict(self.twice), self.source, *plain)
+
+    def of(self, spin: str) -> dict[str, float]:
+        """The constants of one spin alone, by name without the spin.
+
+        >>> SpinConstants.parse("chi_aa(14N)=-4.22 C_bb(14N)=1.8kHz T_aa(14N,D)=2kHz").of("14N")
+        {'chi_aa': -4.22, 'C_bb': 0.0018}
+        """
+        return {name.partition("(")[0]: value for name, value in self.values.items() if spins_of(name) == (spin,)}
 
     @classmethod
     def parse(cls, text: str, spins: str | None = None, source: str = "") -> SpinConstants:
@@ -100,6 +123,15 @@ def twice_of(spin: str) -> int:
             f"spin {spin}: is not called after an isotope (14N, 35Cl_1); say how large it is, such as {spin}=1/2"
         )
     return round(2 * isotope(match[1]).spin)
+
+
+def spin_text(twice: int) -> str:
+    """How large a spin is, as text.
+
+    >>> spin_text(3), spin_text(2)
+    ('3/2', '1')
+    """
+    return f"{twice}/2" if twice % 2 else str(twice // 2)
 
 
 def parse_spins(text: str) -> dict[str, int]:

@@ -14,7 +14,7 @@ from numba import njit
 from rotor.arrays import Floats
 from rotor.classical._kernels import two_product, two_sum
 from rotor.classical.free.theta import CIRCULATING, SEPARATRIX, STEADY, Rows
-from rotor.geometry._kernels import product, to_third, vector_at
+from rotor.geometry._kernels import product
 
 
 @njit(cache=True, inline="always")
@@ -127,12 +127,3 @@ def evaluate(rows: Rows, times: Floats, momentum: Floats, attitude: Floats) -> N
             momentum[b, i, axis[1]] = sign[1] * parity * m2
             momentum[b, i, axis[2]] = sign[2] * m3
             _placed(rows.left[b], rows.right[b], w, parity * x, parity * y, z, half_turn, attitude[b, i])
-
-
-@njit(cache=True, nogil=True)
-def upright(directions: Floats) -> Floats:
-    """Rotations (n, 4) that take unit vectors (n, 3) to the third axis."""
-    out = np.empty((directions.shape[0], 4))
-    for i in range(directions.shape[0]):
-        out[i] = to_third(vector_at(directions, i))
-    return out

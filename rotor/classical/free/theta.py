@@ -176,7 +176,7 @@ def moving_rows(moments: Floats, momentum: Floats) -> Rows:
 
 def steady_rows(moments: Floats, momentum: Floats) -> Rows:
     """Rows of bodies (n, 3) whose momentum stays in the body: they turn about L at the rate 2T/|L|."""
-    from rotor.classical.free._kernels import upright
+    from rotor.geometry._kernels import upright
 
     squares = [DoubleDouble.product(m, m) for m in momentum.T]
     divisors = [np.where(j > 0.0, j, 1.0) for j in moments.T]  # where a moment is zero, so is the square above it

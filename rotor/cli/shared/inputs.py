@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
+USUAL_LEAST_MHZ = 100.0  # of the largest constant of a molecule: below it MHz without a unit are pointed out
 MOST_TIMES = 10_000_000
 
 
@@ -62,6 +63,8 @@ class Input:
     symmetry_tolerance: str | None = option(
         None, metavar="DISTANCE", help="How far nuclei may be off the symmetry that is taken, such as 0.005 (Å)."
     )
+
+    sources: bool = option(False, "--sources", help="Print the sources of the numbers in full.")
 
     @property
     def isotopes(self) -> str | None:
@@ -239,9 +242,20 @@ def _refuse_contradictions(given: Input) -> None:
 def _from_constants(given: Input) -> Top:
     from rotor.tops.top import Top
 
-    return parsed(
-        "--constants", given.constants or "", lambda text: Top.from_constants(text, source="given (--constants)")
-    )
+    text = given.constants or ""
+    top = parsed("--constants", text, lambda text: Top.from_constants(text, source="given (--constants)"))
+    if not has_unit(text) and max(top.constants.values.values()) < USUAL_LEAST_MHZ:
+        note(f"--constants: no unit is given, so the numbers are MHz; for GHz write '{text} GHz'")
+    return top
+
+
+def has_unit(text: str) -> bool:
+    """Whether the text of an option has a unit of frequency somewhere.
+
+    >>> has_unit("A=9.2 B=3 C=2.5 GHz"), has_unit("A=9.2(1) B=3"), has_unit("2:18"), has_unit("2GHz:18")
+    (True, False, False, True)
+    """
+    return bool(re.search(r"[\d).]\s*(?:[kMGT]?Hz|cm(?:-1|\^-1|⁻¹)|1/cm|K)(?!\w)", text))
 
 
 def _from_source(given: Input) -> Top:

@@ -102,6 +102,8 @@ def _parameter(one: Field[Any], kind: Any) -> inspect.Parameter:
 def _value(one: Field[Any], kind: Any, given: Any) -> Any:
     """The value of a field from what stands on the command line: text, whole or decimal number, truth, or texts."""
     kinds = get_args(kind) or (kind,)
+    if given is None and kinds == (str,):
+        raise ValueError(f"{one.name.upper()} is missing; --help shows what the command takes")
     if given is None or isinstance(given, bool):
         return given
     if list[str] in kinds:

@@ -193,31 +193,44 @@ class Files:
         target = Path(path)
         if not target.name.lower().endswith(tuple(suffixes)):
             raise ValueError(f"{option} {path}: the name must end in {' or '.join(suffixes)}")
+        end = _resolved(option, target)
         if target.is_dir():
             raise ValueError(f"{option} {path}: is a folder; give the name of a file to write")
         if not target.parent.is_dir():
             raise ValueError(f"{option} {path}: there is no folder {target.parent}; make it first")
         if not os.access(target.parent, os.W_OK):
             raise ValueError(f"{option} {path}: cannot write in {target.parent}: no permission")
-        if any(target.resolve() == other.resolve() for other in self.paths.values()):
+        if any(end == _resolved(option, other) for other in self.paths.values()):
             raise ValueError(f"{option} {path}: another option writes the same file")
         self.paths[option] = target
 
     def write(self, writers: Mapping[str, Writer]) -> None:
         """Make every file in a folder beside its place by the writer of its option, then rename: all appear, or none."""
-        import tempfile
+        from rotor.formats.atomic_write import FULL, naming, place, unfinished_folder
 
         with ExitStack() as stack:
             moves: list[tuple[Path, Path]] = []
             for option, target in self.paths.items():
                 try:
-                    folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix=".rotor-", dir=target.parent)))
+                    folder = stack.enter_context(unfinished_folder(target.parent))
                 except OSError as error:
+                    if error.errno in FULL:
+                        raise OSError(error.errno, error.strerror, str(target)) from error
                     raise ValueError(f"{option} {target}: cannot write in {target.parent}: {error.strerror}") from None
-                writers[option](folder / target.name)
+                with naming(target):
+                    writers[option](folder / target.name)
                 moves += [(made, target.parent / made.name) for made in sorted(folder.iterdir())]
-            for made, place in moves:
-                os.replace(made, place.resolve())
+            for made, path in moves:
+                place(made, path)
+
+
+def _resolved(option: str, path: Path) -> Path:
+    from rotor.formats.atomic_write import resolved
+
+    try:
+        return resolved(path)
+    except ValueError as error:
+        raise ValueError(f"{option} {error}") from None
 
 
 def deliver(files: Files, writers: Mapping[str, Writer], json: Callable[[], str], show: Callable[[], None]) -> None:

@@ -34,17 +34,20 @@ def describe(top: Top, text: str, command: str) -> dict[str, Any]:
 
 def model_facts(content: Mapping[str, Any]) -> list[tuple[str, str]]:
     """What the model has and what it leaves out, largest first, from the keys of `rotor.quantum.limits.limit_facts`."""
-    from rotor.quantum.limits import Limit
+    from rotor.quantum.limits import COMPUTE, Limit
 
     present = [f"{one['name']} {one['size_mhz']:.2g} MHz" for one in content["effects"] if one["present"]]
     facts = [("effects", f"at J = {content['sizes_at_j']}: " + ", ".join(present))]
-    limits = [Limit(**one).sentence for one in content["limits"]]
+    limits = [Limit(**one).sentence.replace(COMPUTE, "rotor spectrum --hyperfine") for one in content["limits"]]
     return facts + [("left out" if not i else "", sentence) for i, sentence in enumerate(limits)]
 
 
 def heading(top: Top) -> str:
     """Name, formula and kind in one line."""
-    names = ", ".join(dict.fromkeys(filter(None, (top.name, formula_of(top))))) or "constants"
+    from rotor.formats.library import written_formula
+
+    formula = written_formula(top.name, formula_of(top) or "")
+    names = ", ".join(dict.fromkeys(filter(None, (top.name, formula)))) or "constants"
     kappa = f" (κ = {top.kappa:.4f})" if top.kind == "asymmetric" and top.kappa is not None else ""
     return f"{names}: {KINDS[top.kind]}{kappa}"
 
@@ -85,11 +88,6 @@ def tensor_text(top: Top) -> str:
 def weights_text(mapping: Mapping[str, int]) -> str:
     """Spin weights as `ee 1, eo 3, oe 3, oo 1`."""
     return ", ".join(f"{name} {weight}" for name, weight in mapping.items()) or "not given: 1 for every level"
-
-
-def with_source(text: str, source: str | None) -> str:
-    """A fact and where it is from."""
-    return f"{text}; {source}" if source else text
 
 
 def q_text(record: Mapping[str, Any]) -> str:

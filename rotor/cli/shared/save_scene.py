@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 from rotor.cli.shared import inputs
 from rotor.cli.shared.inputs import Input
-from rotor.cli.shared.options import file_option
-from rotor.cli.shared.output import Writer
+from rotor.cli.shared.options import file_option, files_asked
+from rotor.cli.shared.output import Writer, note
 
 if TYPE_CHECKING:
     from rotor.scenes.sections import MoleculeSection
@@ -64,12 +64,22 @@ def save_scene(
 
 
 def _outputs(structure: Any, outputs: Any, others: dict[str, Any]) -> Any:
-    """The files of the verb that a scene of its kind writes too; JSON of a verb holds more than a table and is left out."""
+    """The files of the verb that a scene of its kind writes too; JSON of a verb holds more than a table and is left out.
+
+    A note names the files that the scene does not write.
+    """
     names = {"trajectories": "trajectory"}
+    known = {names.get(name, name) for name in structure.__struct_fields__} | {"json", "save_scene"}
+    if left := [option for option, path, _ in files_asked(outputs) if path and _field(option) not in known]:
+        note(f"the scene writes no {', '.join(left)}; its other files are those of this command")
     asked = {
         name: getattr(outputs, names.get(name, name), None) for name in structure.__struct_fields__ if name != "json"
     }
     return structure(**{name: value for name, value in asked.items() if value is not None}, **others)
+
+
+def _field(option: str) -> str:
+    return option.removeprefix("--").replace("-", "_")
 
 
 def _molecule(given: Input, request: Any, folder: Path, polarizability: bool) -> MoleculeSection:

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import gzip
 import os
-from collections.abc import Iterator
+from collections import deque
+from collections.abc import Callable, Iterator
 from dataclasses import replace
-from typing import Any, NamedTuple
+from functools import partial
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +32,10 @@ from rotor.formats.spcat.rows import (
     take_rows,
 )
 
+if TYPE_CHECKING:
+    from concurrent.futures import Future
+
+THREADS_FROM = 100_000  # lines; fewer take a few hundredths of a second
 _CHUNK = 1 << 14  # lines handled at once: about 1 MB of text, which a processor's cache holds
 _BOM = b"\xef\xbb\xbf"
 _BLANKS = b" \t\r\n\x1a"  # a line of these alone is blank; ^Z ended files under DOS
@@ -111,22 +117,47 @@ def _within_format(record: Record, index: int) -> Record:
 
 
 def format_chunks(catalogue: Catalogue) -> Iterator[bytes]:
-    """The text of a catalogue in pieces of some thousand lines, for lists larger than memory should hold twice."""
-    layout, width = catalogue.layout, catalogue.quanta_upper.shape[1]
-    space = max(_length(layout, width), QUANTA + 4 * width) + len(layout.newline)
+    """The text of a catalogue in pieces of some thousand lines, for lists larger than memory should hold twice.
+
+    Whole-array work leaves the interpreter free, so that the pieces of a long list are made on all processors, a few ahead.
+    """
+    spelled = np.fromiter(catalogue.layout.spelling, dtype=np.int64, count=len(catalogue.layout.spelling))
+    text = partial(_chunk, catalogue, spelled)
+    starts = range(0, len(catalogue), _CHUNK)
+    yield catalogue.layout.beginning
+    if len(catalogue) < THREADS_FROM:
+        for start in starts:
+            yield text(start)
+    else:
+        yield from _ahead(text, starts)
+    yield catalogue.layout.ending
+
+
+def _ahead(text: Callable[[int], bytes], starts: range) -> Iterator[bytes]:
+    """text(start) for all starts in their order, by threads that are at most two pieces each ahead."""
+    from concurrent.futures import ThreadPoolExecutor
+
+    threads = os.cpu_count() or 1
+    with ThreadPoolExecutor(threads) as pool:
+        pending: deque[Future[bytes]] = deque()
+        for start in starts:
+            pending.append(pool.submit(text, start))
+            if len(pending) > 2 * threads:
+                yield pending.popleft().result()
+        while pending:
+            yield pending.popleft().result()
+
+
+def _chunk(catalogue: Catalogue, spelled: NDArray[np.int64], start: int) -> bytes:
+    """The text of the lines from `start` on."""
+    layout, width, stop = catalogue.layout, catalogue.quanta_upper.shape[1], min(start + _CHUNK, len(catalogue))
     end = _length(layout, width) + len(layout.newline)
-    buffer = np.empty((min(_CHUNK, len(catalogue)), space), dtype=np.uint8)
-    spelled = np.fromiter(layout.spelling, dtype=np.int64, count=len(layout.spelling))
-    yield layout.beginning
-    for start in range(0, len(catalogue), _CHUNK):
-        stop = min(start + _CHUNK, len(catalogue))
-        rows = buffer[: stop - start]
-        columns = catalogue.rows(start, stop)
-        plain = _plain_rows(rows, columns, layout)
-        _wide_rows(rows, columns, layout, plain)
-        plain[spelled[(spelled >= start) & (spelled < stop)] - start] = False
-        yield from _with_odd_lines(catalogue, start, rows[:, :end], plain)
-    yield layout.ending
+    rows = np.empty((stop - start, max(end, QUANTA + 4 * width + len(layout.newline))), dtype=np.uint8)
+    columns = catalogue.rows(start, stop)
+    plain = _plain_rows(rows, columns, layout)
+    _wide_rows(rows, columns, layout, plain)
+    plain[spelled[(spelled >= start) & (spelled < stop)] - start] = False
+    return b"".join(_with_odd_lines(catalogue, start, rows[:, :end], plain))
 
 
 def _with_odd_lines(catalogue: Catalogue, start: int, rows: Text, plain: Mask) -> Iterator[bytes]:

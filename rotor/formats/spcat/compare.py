@@ -11,12 +11,14 @@ from numpy.typing import NDArray
 from rotor import units
 from rotor.arrays import Floats
 from rotor.formats.spcat.catalogue import DTYPES, Catalogue
+from rotor.formats.spcat.collapse import spin_quanta, without_spins
 from rotor.formats.spcat.fields import BLANK
 
 Rows = NDArray[np.int64]
 
 TWIN_MHZ = 2e-4  # lines of one label closer than this are components of one line: two digits of print
 INFRARED_DECIMALS = 6
+MOST_OF_SLOPE = 2000  # lines from which a temperature is judged, the strongest
 
 
 def in_mhz(catalogue: Catalogue) -> tuple[Floats, Floats]:
@@ -33,6 +35,7 @@ class Comparison:
     reference, ours: the catalogues with components added, in MHz, rising in frequency. of_reference, of_ours: rows of
     the matched lines, (m,) each. missing: rows of `reference` that ours has not, extra: rows of `ours` that the
     reference has not. other_states: lines left out because the other side has no quantum number to tell them by.
+    collapsed: whether components that differ in quantum numbers of spins were added, since one side has more of these.
     """
 
     reference: Catalogue
@@ -42,6 +45,7 @@ class Comparison:
     missing: Rows
     extra: Rows
     other_states: int
+    collapsed: bool = False
 
     def differences(self, column: str) -> Floats:
         """Ours minus the reference in a column of `Catalogue`, (m,)."""
@@ -57,9 +61,13 @@ class Comparison:
 def compare(reference: Catalogue, ours: Catalogue) -> Comparison:
     """Match the lines of two catalogues by their quantum numbers, signs of K dropped.
 
-    Where one side has more quantum numbers than the other (a vibrational state, say), its lines with zeros there are
-    compared and the others counted in `other_states`. Lines of one label are matched in order of frequency.
+    Where one side has more quantum numbers of spins than the other, the components of each line are added on both sides.
+    Where one side has more of the others (a vibrational state, say), its lines with zeros there are compared and the rest
+    counted in `other_states`. Lines of one label are matched in order of frequency.
     """
+    collapsed = bool(len(reference) and len(ours)) and spin_quanta(reference) != spin_quanta(ours)
+    if collapsed:
+        reference, ours = (without_spins(_plain(side)) for side in (reference, ours))
     width = min(_count(reference), _count(ours))
     left, right = (_ground(side, width) for side in (reference, ours))
     others = len(reference) + len(ours) - len(left) - len(right)
@@ -75,7 +83,44 @@ def compare(reference: Catalogue, ours: Catalogue) -> Comparison:
         missing=np.setdiff1d(np.arange(len(left)), at_left),
         extra=np.setdiff1d(np.arange(len(right)), at_right),
         other_states=others,
+        collapsed=collapsed,
     )
+
+
+def within(comparison: Comparison, range_mhz: tuple[float, float], least_lgint: float) -> Comparison:
+    """The comparison without extra lines outside a range of frequencies or weaker than a bound: the other list ends there."""
+    ours, extra = comparison.ours, comparison.extra
+    frequency, lgint = ours.frequency_mhz[extra], ours.lgint[extra]
+    inside = (frequency >= range_mhz[0]) & (frequency <= range_mhz[1]) & (lgint >= least_lgint)
+    return replace(comparison, extra=extra[inside])
+
+
+TEMPERATURES_K = np.geomspace(1.0, 3000.0, 801)  # steps of 1 %
+
+
+def likely_temperature_k(comparison: Comparison, temperature_k: float) -> float:
+    """The temperature at which the intensities of the reference are most alike those of ours, which are at `temperature_k`.
+
+    That of a grid of 1 % at which the median size of the differences of lgint from their median is least; both are those of
+    exp(-E"/kT) (1 - exp(-hν/kT)) times what no temperature changes. nan where fewer than three lines are matched, or all of
+    them start from one energy.
+    """
+    rows = comparison.of_reference[np.argsort(-comparison.reference.lgint[comparison.of_reference])[:MOST_OF_SLOPE]]
+    kept = np.isin(comparison.of_reference, rows)
+    energy = comparison.reference.energy_lower_cm[comparison.of_reference][kept]
+    if len(energy) < 3 or np.ptp(energy) == 0:
+        return float("nan")
+    frequency = comparison.reference.frequency_mhz[comparison.of_reference][kept]
+    off = comparison.differences("lgint")[kept]
+
+    def populated(kelvin: Floats) -> Floats:
+        at = units.MHZ_PER_K * kelvin[:, None]
+        log = -energy * units.MHZ_PER_CM / at + np.log(-np.expm1(-frequency / at))
+        return np.asarray(log / np.log(10.0))
+
+    change = off + populated(TEMPERATURES_K) - populated(np.array([temperature_k]))
+    spread = np.median(np.abs(change - np.median(change, axis=1)[:, None]), axis=1)
+    return float(TEMPERATURES_K[np.argmin(spread)])
 
 
 def _count(catalogue: Catalogue) -> int:
@@ -85,10 +130,14 @@ def _count(catalogue: Catalogue) -> int:
 def _ground(catalogue: Catalogue, width: int) -> Catalogue:
     """The lines whose quantum numbers beyond `width` are zero or blank, frequencies and errors in MHz."""
     beyond = np.concatenate([catalogue.quanta_upper[:, width:], catalogue.quanta_lower[:, width:]], axis=1)
-    chosen = catalogue.take(((beyond == 0) | (beyond == BLANK)).all(axis=1))
-    frequency, error = in_mhz(chosen)
-    plain = replace(chosen.layout, decimals=(4, 4, 4, 4), spelling={})
-    return replace(chosen, frequency_mhz=frequency, error_mhz=error, layout=plain)
+    return _plain(catalogue.take(((beyond == 0) | (beyond == BLANK)).all(axis=1)))
+
+
+def _plain(catalogue: Catalogue) -> Catalogue:
+    """Frequencies and errors in MHz."""
+    frequency, error = in_mhz(catalogue)
+    plain = replace(catalogue.layout, decimals=(4, 4, 4, 4), spelling={})
+    return replace(catalogue, frequency_mhz=frequency, error_mhz=error, layout=plain)
 
 
 def _labels(catalogue: Catalogue, width: int) -> NDArray[np.int64]:

@@ -17,7 +17,8 @@ from rotor.formats.spcat.par import Parameter
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.moments import Moment
 from rotor.quantum.spins import Scheme, Spin
-from rotor.quantum.spins.operators import EVERY_STATE, SpinTerm
+from rotor.quantum.spins.operators import EVERY_STATE
+from rotor.quantum.spins.terms import SpinTerm
 from rotor.quantum.states import Coupling, State
 from rotor.tops.operators import Operators
 

@@ -23,7 +23,7 @@ from rotor.formats.assigned_lines import QUANTA
 from rotor.formats.spcat.codes import HELD_BELOW, constants_and_matrix
 from rotor.formats.spcat.file_lines import format_of
 from rotor.formats.spcat.fit_states import FileLevels, groups_for_fit, line_names, names_of_quanta
-from rotor.formats.spcat.lin import LineList, line_list, read_lin
+from rotor.formats.spcat.lin import LineList, line_list, note_of_defaults, read_lin, with_defaults
 from rotor.formats.spcat.model import parameter_file
 from rotor.formats.spcat.par import Header, Parameter, ParameterFile, read_par
 from rotor.formats.spcat.predict_states import is_plain
@@ -64,7 +64,15 @@ def read_fit(par: str | os.PathLike[str], lin: str | os.PathLike[str] | None = N
         raise ValueError(
             f"{beside}: there are no measured lines beside {Path(par).name}; SPFIT's lines stand in a .lin file"
         )
-    return spfit_input(read_par(par), read_lin(beside), Path(beside).name)
+    file = read_par(par)
+    return spfit_input(file, read_lin(beside, len(_quanta_names(file))), Path(beside).name)
+
+
+def _quanta_names(file: ParameterFile) -> tuple[str, ...]:
+    """The quantum numbers of a state in the .lin file."""
+    if is_plain(file, None):
+        return QUANTA[constants_and_matrix(file)[0].kind]
+    return names_of_quanta(format_of(file, groups_for_fit(file)))
 
 
 def spfit_input(file: ParameterFile, lines: LineList, source: str = "") -> SpfitInput:
@@ -76,13 +84,12 @@ def spfit_input(file: ParameterFile, lines: LineList, source: str = "") -> Spfit
     for row, (column, ratio) in enumerate(zip(columns, ratios, strict=True)):
         if column >= 0:
             spread[row, column] = ratio
-    model, constants, kmax = None, None, None
+    model, constants, kmax, quanta = None, None, None, _quanta_names(file)
     if is_plain(file, None):
         constants, matrix = constants_and_matrix(file)
-        names, quanta, kmax = tuple(constants.values), QUANTA[constants.kind], _kmax(file, constants)
+        names, kmax = tuple(constants.values), _kmax(file, constants)
     else:
         matrix, names = np.eye(len(file.parameters)), line_names(file)
-        quanta = names_of_quanta(format_of(file, groups_for_fit(file)))
         model = partial(FileLevels.of, file)
     values = np.array([p.value for p in file.parameters])
     parameters = Parameters(
@@ -158,7 +165,8 @@ def _kmax(file: ParameterFile, constants: Constants) -> int | None:
 
 def _assigned(lines: LineList, names: Sequence[str], header: Header, source: str) -> tuple[Assignments, list[str]]:
     """Lines up to NLINE, wavenumbers times CAL, blends as the file marks them."""
-    notes = []
+    lines = with_defaults(lines, names)
+    notes = [note_of_defaults(lines)] if lines.defaulted else []
     blends = lines.blends()
     used = np.arange(len(lines)) < abs(header.nline)
     if not used.all():

@@ -57,6 +57,7 @@ _REQUEST = {
     "flags": 0, "tag": 999, "qrot": 1000.0, "fbgn": 0, "fend": 0,
     "str0": -100.0, "str1": -100.0, "fqlim_ghz": 9999.99, "temperature_k": 300.0, "maxv": -1,
 }  # fmt: skip
+MOST_LOG10 = 300  # of an intensity in nm² MHz that a double can hold
 _NAMES = ("FLAGS", "TAG", "QROT", "FBGN", "FEND", "STR0", "STR1", "FQLIM", "TEMP", "MAXV")
 
 
@@ -89,6 +90,11 @@ def _request(line: Line) -> Request:
             values[key] = whole(line, words, index, _NAMES[index], default)
         else:
             values[key] = number(line, words, index, _NAMES[index], default)
+    for key in ("str0", "str1"):
+        if values[key] > MOST_LOG10:
+            raise line.error(
+                0, f"{key.upper()} is {values[key]:g}: expected log10 of an intensity, at most {MOST_LOG10}"
+            )
     return Request(**values, text=line.text)
 
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,6 +17,8 @@ from rotor.units import MHZ_PER_CM
 
 QUANTA_FIELDS = 12
 _WIDTH = 3 * QUANTA_FIELDS
+NO_ERROR_MHZ = 0.01  # of a line that states none, as in SPFIT
+_ROTATION = ("j", "n", "k", "ka", "kc", "v")
 
 
 class Measured(NamedTuple):
@@ -34,7 +36,8 @@ class LineList:
 
     quanta (n, 12): upper state, then at once the lower one; -32768 where blank. frequency, error (n,): as written,
     MHz or, where the error is negative, cm⁻¹. weight (n,): share within a blend. texts: lines as they were read,
-    with the blank lines before them. rest: what follows the last line.
+    with the blank lines before them. rest: what follows the last line. per_state: quantum numbers of each state where some
+    line lacks one, which is -32768 then; 0 where every line has as many as it needs. defaulted: lines without an error.
     """
 
     quanta: NDArray[np.int16]
@@ -43,6 +46,8 @@ class LineList:
     weight: NDArray[np.float64]
     texts: Mapping[int, str] = field(default_factory=dict)
     rest: str = ""
+    per_state: int = 0
+    defaulted: frozenset[int] = frozenset()
 
     def __post_init__(self) -> None:
         n = len(self.frequency)
@@ -66,6 +71,9 @@ class LineList:
     def states(self) -> tuple[NDArray[np.int16], NDArray[np.int16]]:
         """Quantum numbers of the upper and the lower states, two arrays (n, 6), blanks -32768."""
         upper, lower = (np.full((len(self), QUANTA_FIELDS // 2), BLANK, dtype=np.int16) for _ in range(2))
+        if count := self.per_state:
+            upper[:, :count], lower[:, :count] = self.quanta[:, :count], self.quanta[:, count : 2 * count]
+            return upper, lower
         counts = (self.quanta != BLANK).sum(axis=1) // 2
         for count in np.unique(counts).tolist():
             rows = counts == count
@@ -102,52 +110,120 @@ class LineList:
         return Measured(quanta, float(self.frequency[index]), float(self.error[index]), float(self.weight[index]))
 
 
-def read_lin(source: str | os.PathLike[str] | bytes) -> LineList:
+def read_lin(source: str | os.PathLike[str] | bytes, per_state: int = 0) -> LineList:
     """The lines in a .lin file, or in the bytes of one.
 
-    As in the field's program a blank line ends the list, unless it stands at the beginning; text behind it is preserved.
-    Raises ValueError with file, line, column and the rule that is broken; nothing is skipped in silence.
+    As in the field's program a blank line ends the list, unless it stands at the beginning; text behind it is preserved; a
+    missing error is 0.01 MHz, a missing weight 1. per_state: how many quantum numbers a state has, for lines that lack some;
+    unless given, as many as in the other lines. Raises ValueError with file, line, column and the rule that is broken; nothing
+    is skipped in silence.
     """
     lines = read_lines(source)
     first = next((i for i, line in enumerate(lines) if not line.blank), len(lines))
     end = next((i for i, line in enumerate(lines) if i > first and line.blank), len(lines))
-    measured = [read_measured(line) for line in lines[first:end]]
-    texts = {i: line.text for i, line in enumerate(lines[first:end])}
+    listed = lines[first:end]
+    texts = {i: line.text for i, line in enumerate(listed)}
     if texts:
         texts[0] = "".join(line.text for line in lines[:first]) + texts[0]
+    fields = [_fields(line) for line in listed]
+    missing = next((i for i, row in enumerate(fields) if _lacks_some(row, per_state)), None)
+    if missing is not None:
+        per_state = per_state or max((_leading(row) // 2 for row in fields if _leading(row) % 2 == 0), default=0)
+        if not per_state:
+            count = _leading(fields[missing])
+            raise listed[missing].error(
+                3 * count,
+                f"{count} quantum numbers; expected as many for the upper state as for the lower, "
+                "or other lines, or the constants of a fit, that show how many are missing",
+            )
+    measured = [read_measured(line) for line in listed]
     quanta = np.full((len(measured), QUANTA_FIELDS), BLANK, dtype=np.int16)
-    for row, line in zip(quanta, measured, strict=True):
-        row[: len(line.quanta)] = line.quanta
+    for row, found, line in zip(quanta, fields, measured, strict=True):
+        known = line.quanta if missing is None else found[: 2 * per_state]
+        row[: len(known)] = known
     columns = np.array([line[1:] for line in measured], dtype=np.float64).reshape(-1, 3)
     rest = "".join(line.text for line in lines[end if texts else 0 :])
-    return LineList(quanta, columns[:, 0], columns[:, 1], columns[:, 2], texts, rest)
+    without_error = frozenset(i for i, line in enumerate(listed) if len(read_words(_plain(line), _WIDTH, 3)[0]) < 2)
+    return LineList(
+        quanta,
+        columns[:, 0],
+        columns[:, 1],
+        columns[:, 2],
+        texts,
+        rest,
+        0 if missing is None else per_state,
+        without_error,
+    )
+
+
+def with_defaults(lines: LineList, names: Sequence[str]) -> LineList:
+    """The lines with SPFIT's values for quantum numbers that are missing; as they are where none is.
+
+    0 for those of rotation and state; for a sum of angular momenta the sum before it, which is N for the first
+    (`deflin` and `getlin` in H. M. Pickett's program). names: of the quantum numbers of a state, rotation and state first.
+    """
+    if lines.per_state != len(names):
+        return lines
+    rotation = sum(name in _ROTATION for name in names)
+    quanta = lines.quanta.copy()
+    for start in (0, len(names)):
+        for k in range(len(names)):
+            before = 0 if k < rotation else quanta[:, start] if k == rotation else quanta[:, start + k - 1]
+            quanta[:, start + k] = np.where(quanta[:, start + k] == BLANK, before, quanta[:, start + k])
+    changed = np.flatnonzero((quanta != lines.quanta).any(axis=1)).tolist()
+    return replace(lines, quanta=quanta, per_state=0, defaulted=lines.defaulted | set(changed))
+
+
+def note_of_defaults(lines: LineList) -> str:
+    """What a user must know of lines that lack something."""
+    return (
+        f"{len(lines.defaulted)} lines lack quantum numbers or an error: SPFIT's defaults are taken (F as the sum before it, "
+        f"others 0; {NO_ERROR_MHZ} MHz)"
+    )
+
+
+def _plain(line: Line) -> Line:
+    return line._replace(text=line.body.removeprefix("\ufeff"))
 
 
 def read_measured(line: Line) -> Measured:
     """The numbers of one line of the file."""
-    body = line.body.removeprefix("\ufeff")
-    quanta = _quanta(line._replace(text=body), body[:_WIDTH])
-    words, _ = read_words(line._replace(text=body), _WIDTH, 3)
+    plain = _plain(line)
+    fields = _fields(plain)
+    words, _ = read_words(plain, _WIDTH, 3)
     frequency = number(line, words, 0, "the frequency (from column 37 on)")
-    error = number(line, words, 1, "the error of the frequency")
+    error = number(line, words, 1, "the error of the frequency", NO_ERROR_MHZ)
+    quanta = fields[: _leading(fields)]
     return Measured(quanta, frequency, error, number(line, words, 2, "the weight", 1.0))
 
 
-def _quanta(line: Line, text: str) -> tuple[int, ...]:
-    """The quantum numbers up to the first blank field; what stands behind it in the 36 columns is an annotation."""
-    quanta: list[int] = []
-    for column in range(0, min(_WIDTH, len(text)), 3):
+def _leading(fields: tuple[int, ...]) -> int:
+    """Quantum numbers before the first blank field."""
+    return fields.index(BLANK) if BLANK in fields else len(fields)
+
+
+def _lacks_some(fields: tuple[int, ...], per_state: int) -> bool:
+    """Whether a line lacks quantum numbers: an odd count before a blank, or a blank among as many as there should be."""
+    count = _leading(fields)
+    return bool(count % 2) or not count or (count < len(fields) <= 2 * per_state)
+
+
+def _fields(line: Line) -> tuple[int, ...]:
+    """The fields of three columns up to the last quantum number, blank ones among them; an annotation behind a blank ends them."""
+    text, quanta = _plain(line).text[:_WIDTH], list[int]()
+    for column in range(0, len(text), 3):
         part = text[column : column + 3]
         if not part.strip(" "):
-            break
+            quanta.append(BLANK)
+            continue
         try:
             quanta.append(read_whole(part))
         except ValueError as error:
+            if BLANK in quanta:
+                break
             raise line.error(column, f"quantum number reads {part!r}; {error}") from None
-    if not quanta or len(quanta) % 2:
-        raise line.error(
-            3 * len(quanta), f"{len(quanta)} quantum numbers; expected as many for the upper state as for the lower"
-        )
+    while quanta and quanta[-1] == BLANK:
+        quanta.pop()
     return tuple(quanta)
 
 

@@ -68,8 +68,8 @@ def read_record(text: str) -> Record:
     qnfmt = numbers[-1]
     if qnfmt < 0:
         raise ValueError(f"columns 52-55: QNFMT is {qnfmt}; it counts quantum numbers and is not negative")
-    upper = _read_state(text, QUANTA, qnfmt)
-    lower = _read_state(text, QUANTA + 2 * width_of(qnfmt), qnfmt)
+    upper = _read_state(text, QUANTA, qnfmt, may_be_blank=False)
+    lower = _read_state(text, QUANTA + 2 * width_of(qnfmt), qnfmt, may_be_blank=True)
     return Record._make([*numbers, upper, lower])
 
 
@@ -83,9 +83,12 @@ def _read_field(text: str, field: _Field) -> Any:
         raise ValueError(f"columns {field.start + 1}-{field.stop}: {field.name} reads {part!r}; {error}") from None
 
 
-def _read_state(text: str, start: int, qnfmt: int) -> tuple[int, ...]:
-    quanta = []
-    for index in range(width_of(qnfmt)):
+def _read_state(text: str, start: int, qnfmt: int, *, may_be_blank: bool) -> tuple[int, ...]:
+    """The quantum numbers of a state; a lower state that is blank altogether is one that the catalogue does not label."""
+    width, quanta = width_of(qnfmt), []
+    if may_be_blank and not text[start : start + 2 * width].strip(" "):
+        return (fields.BLANK,) * width
+    for index in range(width):
         column = start + 2 * index
         part = text[column : column + 2]
         try:

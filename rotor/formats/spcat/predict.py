@@ -25,9 +25,9 @@ from rotor.formats.spcat.model import FOLD, common_weight, top_of
 from rotor.formats.spcat.par import Options, ParameterFile, read_par
 from rotor.formats.spcat.predict_states import is_plain, predicted
 from rotor.quantum.basis import wang_blocks
-from rotor.quantum.effects.watson import JMatrix, block_bands
 from rotor.quantum.levels import Levels
 from rotor.quantum.solve import hamiltonian, solve_levels
+from rotor.quantum.wang_matrix import JMatrix, block_bands
 from rotor.spectra.lines import Lines, line_list
 from rotor.thermo import PartitionFunction, partition_function
 from rotor.tops.top import Top

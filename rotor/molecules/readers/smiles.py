@@ -31,6 +31,7 @@ KJ_PER_KCAL = 4.184  # exact, the thermochemical calorie
 SAME_KJ_PER_MOL = 0.1  # two conformers nearer than that in energy are one,
 SAME_MOMENTS = 1e-3  # if their planar moments differ by no more than that, relative to the largest
 NEAR_KJ_PER_MOL = 10.0  # four times kT at 300 K: conformers that have a share in a spectrum
+MOST_ATOMS = 200  # hydrogens among them: a quarter of a minute; more take minutes and mostly fail
 _SEED = 20240229  # any number; fixed, so that the same SMILES gives the same geometry
 _MOST_STEPS = 5000
 
@@ -239,10 +240,20 @@ def _parsed(text: str) -> Any:
     if mol is None or not mol.GetNumAtoms():
         place = re.search(r"position (\d+)", log.messages)
         at = f" at character {place[1]}" if place else ""
-        raise ValueError(f"SMILES {text!r} cannot be read{at}: {_reason(log.messages)}; correct it or give an xyz file")
+        raise ValueError(
+            f"SMILES {text!r:.80} cannot be read{at}: {_reason(log.messages)}; correct it or give an xyz file"
+        )
+    if any(atom.GetAtomicNum() == 0 for atom in mol.GetAtoms()):
+        raise ValueError(f"SMILES {text!r:.80}: '*' stands for any atom; write the element")
     if len(Chem.GetMolFrags(mol)) > 1:
-        raise ValueError(f"SMILES {text!r} has several molecules; give one, or their geometry as an xyz file")
-    return Chem.AddHs(mol)
+        raise ValueError(f"SMILES {text!r:.80} has several molecules; give one, or their geometry as an xyz file")
+    whole = Chem.AddHs(mol)
+    if whole.GetNumAtoms() > MOST_ATOMS:
+        raise ValueError(
+            f"SMILES {text!r:.80}: {whole.GetNumAtoms()} atoms with their hydrogens, and conformers are sought of at most "
+            f"{MOST_ATOMS}; give the geometry as an xyz file"
+        )
+    return whole
 
 
 def _optimised(mol: Any, text: str, count: int) -> tuple[list[float], str]:
@@ -257,12 +268,17 @@ def _optimised(mol: Any, text: str, count: int) -> tuple[list[float], str]:
             raise ValueError(f"SMILES {text!r}: no geometry found ({_reason(log.messages)}); give an xyz file")
         if mol.GetNumAtoms() == 1:
             return [0.0], ""
+        optimise: Any
         if rdForceFieldHelpers.MMFFHasAllMoleculeParams(mol):
-            field, results = "MMFF94", rdForceFieldHelpers.MMFFOptimizeMoleculeConfs(mol, maxIters=_MOST_STEPS)
+            field, optimise = "MMFF94", rdForceFieldHelpers.MMFFOptimizeMoleculeConfs
         elif rdForceFieldHelpers.UFFHasAllMoleculeParams(mol):
-            field, results = "UFF", rdForceFieldHelpers.UFFOptimizeMoleculeConfs(mol, maxIters=_MOST_STEPS)
+            field, optimise = "UFF", rdForceFieldHelpers.UFFOptimizeMoleculeConfs
         else:
             raise ValueError(f"SMILES {text!r}: neither MMFF94 nor UFF knows its atoms; give an xyz file")
+        try:
+            results = optimise(mol, maxIters=_MOST_STEPS)
+        except RuntimeError:  # RDKit's own checks, such as of forces that are not finite
+            raise ValueError(f"SMILES {text!r}: {field} fails on its geometry; give an xyz file") from None
     energies = [energy if not unfinished else np.inf for unfinished, energy in results]
     if not np.isfinite(energies).any():
         raise ValueError(f"SMILES {text!r}: {field} did not converge in {_MOST_STEPS} steps; give an xyz file")

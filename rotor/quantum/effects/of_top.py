@@ -35,7 +35,7 @@ def _effects(constants: SpinConstants) -> tuple[QuantumEffect, ...]:
     from rotor.quantum.effects.spin_effect import parse_name
     from rotor.quantum.effects.spin_rotation import SpinRotation
     from rotor.quantum.effects.spin_spin import SpinSpin
-    from rotor.quantum.spins import Spin
+    from rotor.quantum.spins.terms import Spin
 
     kinds: tuple[type[SpinEffect], ...] = (NuclearQuadrupole, SpinRotation, SpinSpin)
     spins = tuple(Spin(name, twice, name.startswith("S")) for name, twice in constants.twice.items())

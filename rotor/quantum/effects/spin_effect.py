@@ -16,8 +16,8 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, ClassVar, NamedTuple, Self
 
 from rotor.quantum.effect import QuantumEffect
-from rotor.quantum.spins import Spin
-from rotor.quantum.spins.operators import EVERY_STATE, Matrix, Rotor, SpinTerm
+from rotor.quantum.spins.operators import EVERY_STATE, Matrix, Rotor
+from rotor.quantum.spins.terms import Spin, SpinTerm
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top

@@ -1,8 +1,9 @@
-"""A static electric field along Z, and the non-resonant light of a laser along Z beside it.
+"""A static electric field, and the non-resonant light of a laser along Z beside it.
 
-    H = H0 - μ_Z E - (2π I/c) (α'_ZZ),          μE/h = 503.4117 MHz for 1 D and 1 kV/cm
+    H = H0 - μ·n E - (2π I/c) (α'_ZZ),          μE/h = 503.4117 MHz for 1 D and 1 kV/cm
 
-The dipole points from minus to plus, so that a positive field lowers the state whose dipole points along +Z. M is good; ±M coincide.
+The dipole points from minus to plus, so that a positive field lowers the state whose dipole points along it. Where the field is along Z
+too, n = Z, M is good and ±M coincide. A field at an angle with the light mixes M: the basis is then that of all M together.
 To second order a linear top has W = (μ²E²/2hB) [J(J+1) - 3M²]/[J(J+1)(2J-1)(2J+3)], and -μ²E²/6hB for J = 0; a symmetric one has
 -μE KM/[J(J+1)] to first order (C. H. Townes and A. L. Schawlow, Microwave Spectroscopy, 1955, chapter 10). Nothing of that is used
 here: the matrices are solved.
@@ -22,7 +23,7 @@ from numpy.typing import ArrayLike
 
 from rotor import units
 from rotor.quantum.effect import QuantumEffect
-from rotor.quantum.field_blocks import Contraction, FieldBlock, field_space
+from rotor.quantum.field_blocks import Contraction, FieldBlock
 from rotor.quantum.field_map import (
     BlockProblem,
     FieldMap,
@@ -31,6 +32,7 @@ from rotor.quantum.field_map import (
     checked_tolerance_mhz,
     field_map,
 )
+from rotor.quantum.field_space import field_space
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
@@ -82,12 +84,13 @@ def stark_map(
     j_highest: int = 2,
     m_values: Sequence[int] | None = None,
     intensity_w_per_cm2: float = 0.0,
+    direction: Sequence[float] = Z,
     jmax: int | None = None,
     tolerance_mhz: float = DEFAULT_TOLERANCE_MHZ,
     diabatic_gap_mhz: float | None = None,
     executor: Executor | None = None,
 ) -> FieldMap:
-    """Energies, effective dipoles and cosines of a top against a static field along Z.
+    """Energies, effective dipoles and cosines of a top against a static field.
 
     Parameters
     ----------
@@ -101,6 +104,8 @@ def stark_map(
         |M|; by default 0 ... `j_highest`.
     intensity_w_per_cm2 : float
         Of a laser far from resonance, polarized along Z, at every field.
+    direction : (3,)
+        Of the static field, any length; at an angle with Z it mixes M, and the column m is -1.
     jmax : int, optional
         Of the basis; by default chosen.
     tolerance_mhz : float
@@ -113,7 +118,8 @@ def stark_map(
     Returns
     -------
     FieldMap
-        Columns field_kv_per_cm, m, rank, energy_mhz, label, mu_eff_debye, costheta, cos2theta, block, edge_population, copies.
+        Columns field_kv_per_cm, m, rank, energy_mhz, label, mu_eff_debye, costheta (with the field), cos2theta (with Z), block,
+        edge_population, copies.
 
     Raises
     ------
@@ -124,22 +130,55 @@ def stark_map(
     -----
     Neglected: the polarizability in the static field (0.5 Δα E², below 1e-3 of the dipole's part), hyperfine coupling.
     """
+    request = map_request(
+        top, fields_kv_per_cm, j_highest, m_values, intensity_w_per_cm2, direction, tolerance_mhz, diabatic_gap_mhz
+    )
+    return field_map(request, jmax, executor)
+
+
+def map_request(
+    top: Top,
+    fields_kv_per_cm: ArrayLike,
+    j_highest: int,
+    m_values: Sequence[int] | None,
+    intensity_w_per_cm2: float,
+    direction: Sequence[float] = Z,
+    tolerance_mhz: float = DEFAULT_TOLERANCE_MHZ,
+    diabatic_gap_mhz: float | None = None,
+) -> MapRequest:
+    """What `stark_map` solves, every argument checked; parameters and errors are those of `stark_map`."""
     fields = checked_fields(fields_kv_per_cm, "kV/cm", HIGHEST_KV_PER_CM)
-    dipole, light = acting(top, intensity_w_per_cm2)
-    names = {"costheta": _orientation(top), "cos2theta": _alignment(top)}
-    request = MapRequest(
-        space=partial(field_space, top, contractions=tuple(one for one in (dipole, light) if one is not None)),
+    unit = checked_direction(direction)
+    dipole, light = acting(top, intensity_w_per_cm2, unit)
+    tilted = not dipole.along_z
+    if tilted and m_values is not None:
+        raise ValueError("a field at an angle with Z mixes M: its states have no M to choose; leave m_values out")
+    names = {"costheta": _orientation(top, unit), "cos2theta": _alignment(top)}
+    contractions = tuple(one for one in (dipole, light) if one is not None)
+    return MapRequest(
+        space=partial(field_space, top, contractions=contractions),
         problem=partial(_problem, dipole, light, intensity_w_per_cm2, names),
         fields=fields,
         j_highest=checked_j(j_highest),
-        m_values=checked_m(m_values, j_highest),
+        m_values=(0,) if tilted else checked_m(m_values, j_highest),
         tolerance_mhz=checked_tolerance_mhz(tolerance_mhz),
         field_name="field_kv_per_cm",
         slope_name="mu_eff_debye",
         slope_unit_mhz=units.MHZ_PER_DEBYE_KV_PER_CM,
         diabatic_gap_mhz=diabatic_gap_mhz,
     )
-    return field_map(request, jmax, executor)
+
+
+def checked_direction(direction: Sequence[float]) -> tuple[float, float, float]:
+    """The unit vector along a direction (3,); ValueError for zero and for numbers that are not finite."""
+    vector = np.asarray(direction, dtype=np.float64)
+    length = float(np.linalg.norm(vector)) if vector.shape == (3,) else math.nan
+    if not (math.isfinite(length) and length > 0):
+        raise ValueError(
+            f"direction {np.asarray(direction).tolist()}: three finite numbers along X, Y, Z are expected, not all 0"
+        )
+    x, y, z = (vector / length).tolist()
+    return x, y, z
 
 
 def checked_j(j_highest: int) -> int:
@@ -159,8 +198,10 @@ def checked_m(m_values: Sequence[int] | None, j_highest: int) -> tuple[int, ...]
     return values
 
 
-def acting(top: Top, intensity_w_per_cm2: float) -> tuple[Contraction, Contraction | None]:
-    """Dipole and light as contractions with Z; ValueError where they are not known or nothing acts."""
+def acting(
+    top: Top, intensity_w_per_cm2: float, direction: tuple[float, float, float] = Z
+) -> tuple[Contraction, Contraction | None]:
+    """The dipole as contraction with the direction of the field, light as one with Z; ValueError where nothing acts."""
     name = top.name or "this top"
     if not 0 <= intensity_w_per_cm2 <= HIGHEST_W_PER_CM2:
         raise ValueError(
@@ -180,7 +221,7 @@ def acting(top: Top, intensity_w_per_cm2: float) -> tuple[Contraction, Contracti
         if top.polarizability_abc_angstrom3 is None:
             raise ValueError(f"the polarizability of {name} is not known: give one, in principal axes (Å³)")
         light = Contraction(top.polarizability_abc_angstrom3, np.outer(Z, Z))
-    return Contraction(dipole or (0.0, 0.0, 0.0), Z), light
+    return Contraction(dipole or (0.0, 0.0, 0.0), direction), light
 
 
 def figure_axis(top: Top) -> int:
@@ -190,8 +231,8 @@ def figure_axis(top: Top) -> int:
     return int(np.argmax(np.abs(top.dipole_abc_debye or (1.0, 0.0, 0.0))))
 
 
-def _orientation(top: Top) -> Contraction:
-    return Contraction(np.eye(3)[figure_axis(top)], Z)
+def _orientation(top: Top, direction: tuple[float, float, float]) -> Contraction:
+    return Contraction(np.eye(3)[figure_axis(top)], direction)
 
 
 def _alignment(top: Top) -> Contraction:
@@ -204,6 +245,6 @@ def _problem(
 ) -> BlockProblem:
     fixed = np.diag(block.energies_mhz)
     if light is not None:
-        fixed = fixed - MHZ_ANGSTROM3_W_PER_CM2 * intensity * block.matrix(light)
-    slope = -units.MHZ_PER_DEBYE_KV_PER_CM * block.matrix(dipole)
-    return BlockProblem(fixed, slope, {name: block.matrix(one) for name, one in names.items()})
+        fixed = fixed - MHZ_ANGSTROM3_W_PER_CM2 * intensity * block.dense(light)
+    slope = -units.MHZ_PER_DEBYE_KV_PER_CM * block.dense(dipole)
+    return BlockProblem(fixed, slope, {name: block.dense(one) for name, one in names.items()})

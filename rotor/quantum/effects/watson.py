@@ -1,12 +1,8 @@
 """The semi-rigid Hamiltonian: rigid and centrifugal terms, A and S reductions, every representation.
 
 Every term of an effective Hamiltonian in one vibrational state is c · ½[Jz^2q, J₊^2n + J₋^2n]₊ · J^2p (n = 0:
-c · J^2p Jz^2q), so a Hamiltonian is a table {(p, q, n): c in MHz}. Its matrix elements are, with X = J(J+1),
-
-    ⟨K|H|K⟩     = Σ c X^p K^2q                                             (n = 0)
-    ⟨K+2n|H|K⟩  = Σ c X^p ½[(K+2n)^2q + K^2q] √∏_{i<2n} (J-K-i)(J+K+i+1)    (n > 0)
-
-with the phases of J∓ (body-fixed) real and positive. Which name stands for which term: `rotor.tops.operators`.
+c · J^2p Jz^2q), so a Hamiltonian is a table {(p, q, n): c in MHz}, whose matrix elements are in `rotor.quantum.wang_matrix`.
+Which name stands for which term: `rotor.tops.operators`.
 """
 
 from __future__ import annotations
@@ -14,10 +10,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import NDArray
-
-from rotor.quantum.basis import WangBlock
 from rotor.quantum.effect import QuantumEffect
 from rotor.tops.operators import Operators, Powers, axes_of, distortion_terms, powers_of_spelled
 
@@ -131,82 +123,3 @@ class Centrifugal(QuantumEffect):
 
 
 SEMI_RIGID: tuple[QuantumEffect, ...] = (Rigid(), Centrifugal())
-
-
-def scalar_energy(operators: Operators, j: int) -> float:
-    """The part that is one number for the whole of J, Σ c X^p, left out of the matrices for the sake of digits."""
-    x = j * (j + 1)
-    return float(sum(c * x**p for (p, q, n), c in operators.items() if q == n == 0))
-
-
-class JMatrix:
-    """Matrix elements of all |J K⟩ of one J, from which its four Wang blocks are cut; the scalar part left out."""
-
-    def __init__(self, operators: Operators, j: int) -> None:
-        self.order = max((n for _, _, n in operators), default=0)
-        self._margin = 2 * self.order  # K starts at -margin, so that folded elements are at hand
-        k = np.arange(-self._margin, j + 1)
-        steps = _ladder_steps(j, np.arange(-self._margin, j + self._margin + 1))
-        with np.errstate(over="ignore", invalid="ignore"):  # said where the block is diagonalised
-            self._elements = [_elements(operators, j, k, n, steps) for n in range(self.order + 1)]
-
-    def element(self, k: NDArray[np.int64], n: int) -> NDArray[np.float64]:
-        """⟨K+2n|H|K⟩ for K from -2 `order` to J; zero where K + 2n is beyond J."""
-        return self._elements[n][self._margin + k]
-
-    def folded(self, low: int, n: int) -> float:
-        """⟨2n - low|H|-low⟩, which connects K = low and K = 2n - low of a Wang block."""
-        return float(self._elements[n][self._margin - low])
-
-    def band(self, block: WangBlock, n: int) -> NDArray[np.float64]:
-        """⟨K+2n|H|K⟩ over the K of a block, size - n of them."""
-        first = self._margin + block.first_k
-        return self._elements[n][first : first + 2 * (block.size - n) : 2].copy()
-
-
-def _ladder_steps(j: int, k: NDArray[np.int64]) -> NDArray[np.float64]:
-    """√(J(J+1) - K(K+1)), what J₊ makes of |J K⟩; zero outside the multiplet."""
-    return np.asarray(np.sqrt(np.maximum((j - k) * (j + k + 1), 0)))
-
-
-def _elements(
-    operators: Operators, j: int, k: NDArray[np.int64], n: int, steps: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """⟨K+2n|H|K⟩ = ½[P((K+2n)²) + P(K²)] times the ladder, P(y) = Σ_q y^q Σ_p c X^p."""
-    x = float(j * (j + 1))
-    powers = [(p, q, c) for (p, q, order), c in operators.items() if order == n and (n or q)]
-    coefficients = np.zeros(1 + max((q for _, q, _ in powers), default=0))
-    for p, q, c in powers:
-        coefficients[-1 - q] += c * x**p
-
-    squares = np.arange(k[0], k[-1] + 2 * n + 1.0) ** 2
-    values = np.full(len(squares), coefficients[0])
-    for coefficient in coefficients[1:].tolist():
-        values *= squares
-        values += coefficient
-    if n == 0:
-        return values
-    total = 0.5 * (values[: len(k)] + values[2 * n :])
-    for i in range(2 * n):
-        total *= steps[i : i + len(k)]
-    return np.asarray(total)
-
-
-def block_bands(multiplet: JMatrix, block: WangBlock) -> list[NDArray[np.float64]]:
-    """Diagonals of the block's matrix, without the scalar part: the n-th has the elements (i+n, i), size - n of them.
-
-    ⟨K' s|H|K s⟩ = ⟨K'|H|K⟩ + s ⟨K'|H|-K⟩, times √2 where one of them is K = 0. The second term is there where
-    K + K' = 2n and folds an operator of high n back to lower diagonals.
-    """
-    bands = [multiplet.band(block, n) for n in range(min(multiplet.order, block.size - 1) + 1)]
-    if block.first_k == 0:
-        for band in bands[1:]:
-            band[0] *= np.sqrt(2)
-
-    last = block.first_k + 2 * (block.size - 1)
-    for n in range(1, multiplet.order + 1):
-        for low in range(max(block.first_k, 2 - block.first_k % 2), n + 1, 2):
-            high = 2 * n - low
-            if high <= last:
-                bands[(high - low) // 2][(low - block.first_k) // 2] += block.sign * multiplet.folded(low, n)
-    return bands

@@ -19,18 +19,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from rotor.arrays import Floats
 from rotor.quantum.direction_cosines import cosine_bands
-from rotor.quantum.field_blocks import (
-    AxialBlock,
-    AxialSpace,
-    Contraction,
-    FieldBlock,
-    FieldSpace,
-    FreeLevels,
-    axial_levels,
-)
+from rotor.quantum.field_blocks import AxialBlock, AxialSpace, Contraction, FieldBlock, FieldSpace, FreeLevels
 from rotor.quantum.field_map import BlockProblem, FieldMap, MapRequest, checked_fields, checked_tolerance_mhz, field_map
+from rotor.quantum.field_space import axial_levels
 from rotor.quantum.j_operators import between_blocks, components
-from rotor.quantum.tensors import BodyTensor, amplitudes, body_tensor
+from rotor.quantum.reduced import wang_amplitudes
+from rotor.quantum.tensors import BodyTensor, body_tensor
 from rotor.quantum.wang_blocks import WangBlockInField, WangSpace, coloured_components, wang_space
 from rotor.units import NUCLEAR_MAGNETON_MHZ_PER_T
 
@@ -224,4 +218,4 @@ def _cosines(space: WangSpace, up: SolvedBlock, low: SolvedBlock, tensor: BodyTe
     factor = float(space.space_factor(up.basis.j, low.basis.j, 1)[abs(m)])
     if m < 0 and (up.basis.j + low.basis.j) % 2 == 0:
         factor = -factor
-    return np.asarray(1j * factor * amplitudes(up, low, tensor))
+    return np.asarray(1j * factor * wang_amplitudes(up, low, tensor))

@@ -12,16 +12,16 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.spins.operators import SpinTerm
-from rotor.quantum.spins.scheme import Scheme, Spin, scheme_of
+from rotor.quantum.spins.scheme import Scheme, scheme_of
+from rotor.quantum.spins.terms import Spin, SpinTerm
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
     from rotor.quantum.effect import QuantumEffect
     from rotor.quantum.levels import Levels
-    from rotor.quantum.reduced import Tensors
     from rotor.quantum.spins.blocks import SpinBlock
+    from rotor.quantum.tensors import Tensors
     from rotor.tops.top import Top
 
 __all__ = [

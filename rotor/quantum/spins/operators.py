@@ -31,8 +31,8 @@ import numpy as np
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum.basis import WangBlock
-from rotor.quantum.effects.watson import JMatrix, block_bands, scalar_energy
 from rotor.quantum.tensors import BodyTensor, block_elements, body_tensor, coupling
+from rotor.quantum.wang_matrix import JMatrix, block_bands, scalar_energy
 from rotor.tops.operators import Operators, Powers
 
 EVERY_STATE = -1  # in place of v: a term that is diagonal in the states, and the same in all of them
@@ -182,37 +182,6 @@ def is_axial(rotor: Rotor, axis: str) -> bool:
         and bool((c == np.diag(np.diag(c))).all())
         and bool(c[across[0], across[0]] == c[across[1], across[1]])
     )
-
-
-@dataclass(frozen=True)
-class SpinTerm:
-    """What a parameter of an effect multiplies, besides `factor`: X^K(N) · W^K of the spins named.
-
-    name: of the parameter. spins: none, one (its vector), one twice (its quadrupole, T²(I, I)/(2I(2I-1))) or two (their product,
-    coupled to the rank of `rotor`). n2, nz2: powers of N² and Nz², ns: power of N·S1. bra, ket: the states v that it connects, h.c.
-    added where they differ; an operator that is odd under time reversal has the factor i there.
-    """
-
-    name: str
-    spins: tuple[str, ...]
-    rotor: Rotor
-    factor: float = 1.0
-    n2: int = 0
-    nz2: int = 0
-    ns: int = 0
-    bra: int = EVERY_STATE
-    ket: int = EVERY_STATE
-
-    def __post_init__(self) -> None:
-        expected = {0: (0,), 1: (1,), 2: (0, 2)}.get(len(self.spins), ())
-        if self.rotor.rank not in expected or (len(set(self.spins)) < len(self.spins) and self.rotor.rank != 2):
-            raise ValueError(
-                f"{self.name}: {len(self.spins)} spins {self.spins} cannot close an operator of rank {self.rotor.rank}"
-            )
-        if self.rotor.odd and self.bra == self.ket:
-            raise ValueError(
-                f"{self.name}: time reversal changes its sign; such an operator connects different states only"
-            )
 
 
 def summed(weighted: Iterable[tuple[float, Rotor]]) -> list[tuple[float, Rotor]]:

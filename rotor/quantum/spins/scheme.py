@@ -11,28 +11,11 @@ import numpy as np
 
 from rotor.arrays import Ints
 from rotor.quantum.spins.coupling import patterns, patterns_of_total
+from rotor.quantum.spins.terms import Spin
 
 if TYPE_CHECKING:
     from rotor.quantum.effect import QuantumEffect
     from rotor.tops.top import Top
-
-
-@dataclass(frozen=True)
-class Spin:
-    """One spin: its name, as parameters have it, twice its size (2I, a whole number), and whether it is an electron's.
-
-    Spins are coupled in the order in which effects first name them, electrons' before nuclei's. total: the two nuclei that have
-    one name here, such as "I", are equivalent: they are coupled to a total spin first, and last to the rest.
-    """
-
-    name: str
-    twice: int
-    electron: bool = False
-    total: str = ""
-
-    def __post_init__(self) -> None:
-        if self.twice < 1 or self.twice != int(self.twice):
-            raise ValueError(f"spin {self.name}: 2I = {self.twice}; twice a spin is a whole number, 1 or more")
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ from rotor.scenes.sections import MoleculeSection, StarkConditions, StarkNumeric
 _NAMES = {
     "fields_kv_per_cm": "conditions.field", "intensity_w_per_cm2": "conditions.intensity", "m_values": "observables.m",
     "j_highest": "observables.jmax", "diabatic_gap_mhz": "observables.diabatic_gap", "jmax": "numerics.jmax",
+    "direction": "conditions.direction",
     "tolerance_mhz": "numerics.tolerance",
 }  # fmt: skip
 
@@ -35,11 +36,19 @@ def request(scene: StarkScene, folder: Where = ".") -> StarkRequest:
             fields or (),
             j_highest=asked.jmax,
             m_values=None if asked.m is None else tuple(asked.m),
+            direction=_direction(acting.direction),
             intensity_w_per_cm2=kind.quantity("conditions.intensity", acting.intensity, "W/cm2"),
             jmax=scene.numerics.jmax,
             tolerance_mhz=kind.quantity("numerics.tolerance", scene.numerics.tolerance, "MHz"),
             diabatic_gap_mhz=gap,
         )
+
+
+def _direction(numbers: list[float]) -> tuple[float, float, float]:
+    if len(numbers) != 3:
+        raise ValueError(f"conditions.direction: {numbers}: expected three numbers")
+    x, y, z = numbers
+    return x, y, z
 
 
 def answer(asked: StarkRequest, scene: StarkScene, out: Where, executor: Executor | None) -> StarkAnswer:
@@ -70,7 +79,9 @@ def saved(asked: StarkRequest, molecule: MoleculeSection | None) -> StarkScene:
     return StarkScene(
         molecule=molecule,
         conditions=StarkConditions(
-            field=list(asked.fields_kv_per_cm), intensity=f"{float(asked.intensity_w_per_cm2)!r} W/cm2"
+            field=list(asked.fields_kv_per_cm),
+            direction=[float(x) for x in asked.direction],
+            intensity=f"{float(asked.intensity_w_per_cm2)!r} W/cm2",
         ),
         observables=StarkObservables(
             jmax=asked.j_highest,

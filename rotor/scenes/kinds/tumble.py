@@ -8,7 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rotor.classical.tumble import Three, TumbleAnswer, TumbleRequest, answer_tumble
+from rotor.classical.tumble import COHERENT, SI, Three, TumbleAnswer, TumbleRequest, answer_tumble
 from rotor.scenes import kind
 from rotor.scenes.kind import Kind, Where, Writer
 from rotor.scenes.molecule import named, top_of
@@ -18,6 +18,8 @@ from rotor.scenes.sections import BodySection, MoleculeSection, TumbleConditions
 if TYPE_CHECKING:
     from rotor.classical.driven import DrivenAnswer, DrivenRequest
     from rotor.table import Table
+
+UNITS = {"": COHERENT, "SI": SI}
 
 
 def request(scene: TumbleScene, folder: Where = ".") -> TumbleRequest | DrivenRequest:
@@ -81,13 +83,15 @@ def _of_body(body: BodySection, start: TumbleConditions) -> TumbleRequest:
         raise ValueError("body.attitude: the table of a free motion begins at 1, 0, 0, 0; leave it out")
     if start.angular_momentum is not None:
         raise ValueError("conditions.angular_momentum: is that of a molecule; of a body it stands in [body]")
-    times = kind.grid("conditions.times", start.times, "")
+    if body.units not in UNITS:
+        raise ValueError(f'body.units: {body.units!r}: expected "SI", or "" for any coherent set')
+    times, units = kind.grid("conditions.times", start.times, ""), UNITS[body.units]
     with kind.fields(moments="body.moments", angular_momentum="body.angular_momentum", times="conditions.times"):
         moments = three(body.moments)
         if body.angular_velocity is not None:
-            return TumbleRequest.of_angular_velocity(moments, three(body.angular_velocity), times=times)
+            return TumbleRequest.of_angular_velocity(moments, three(body.angular_velocity), times=times, units=units)
         assert body.angular_momentum is not None
-        return TumbleRequest(moments, three(body.angular_momentum), times)
+        return TumbleRequest(moments, three(body.angular_momentum), times, units)
 
 
 def answer(
@@ -123,7 +127,9 @@ def saved(asked: TumbleRequest, molecule: MoleculeSection | None) -> TumbleScene
     """The scene of a request."""
     times = None if asked.times is None else list(asked.times)
     if molecule is None:
-        body = BodySection(moments=list(asked.moments), angular_momentum=list(asked.angular_momentum))
+        units = next(name for name, one in UNITS.items() if one == asked.units)
+        momentum = list(asked.angular_momentum)
+        body = BodySection(moments=list(asked.moments), angular_momentum=momentum, units=units)
         return TumbleScene(body=body, conditions=TumbleConditions(times=times))
     conditions = TumbleConditions(angular_momentum=list(asked.angular_momentum), times=times)
     return TumbleScene(molecule=molecule, conditions=conditions)

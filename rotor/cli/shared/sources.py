@@ -1,0 +1,59 @@
+"""Where the numbers of a report are from: one short line with citations, or with --sources the whole of it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rotor.tops.top import Top
+
+LONGEST = 72  # characters of one source in the short line
+_CATALOGUE = re.compile(r"c\d{6} of (?:JPL|CDMS)(?: \([^()]*\d{4}[^()]*\))?")
+_DATED = re.compile(r"^.*?\((?:\d{4}|[^()]*\b\d{4}\b[^()]*)\)")  # as far as the first year in parentheses
+_TABLES = {"constants": "source", "dipole": "dipole_source", "polarizability": "polarizability_source",
+           "spin weights": "weights_source"}  # fmt: skip
+
+
+def short_source(text: str) -> str:
+    """A source as far as its citation, or as its first clause where it cites nothing; what is unverified stays said.
+
+    >>> short_source("fitted here to the 7 lines with J <= 10 of c018003 of JPL (Pickett et al. 1998), weighted by errors")
+    'fitted to c018003 of JPL (Pickett et al. 1998)'
+    >>> short_source("unverified: ground state; NIST CCCBDB release 22 has B = 1.1766 cm-1")
+    'unverified: ground state'
+    """
+    marked = re.match(r"(?:[\w, ]+ )?unverified[:;] ?", text)
+    mark, rest = (marked[0], text[marked.end() :]) if marked else ("", text)
+    if found := _CATALOGUE.search(rest):
+        verb = "fitted to " if "fitted" in rest[: found.start()] else "from "
+        return mark + verb + found[0]
+    dated = _DATED.match(rest)
+    clause = dated[0] if dated else rest.partition(";")[0]
+    if len(clause) > LONGEST:
+        clause = rest.partition(";")[0].partition(":")[0]
+    return mark + (clause if len(clause) <= LONGEST else clause[: LONGEST - 1].rstrip() + "…")
+
+
+def source_facts(top: Top, tables: Sequence[str], whole: bool) -> list[tuple[str, str]]:
+    """The sources of tables of a top (constants, dipole, polarizability, spin weights), one line or all of it."""
+    texts = {table: getattr(top, _TABLES[table]) for table in tables if getattr(top, _TABLES[table])}
+    if whole:
+        return [(f"{table} from", text) for table, text in texts.items()]
+    cited = [f"{table}: {short_source(text)}" for table, text in texts.items() if table != "spin weights"]
+    longer = any(short_source(text) != text for text in texts.values())
+    return [("sources", "; ".join(cited) + (" (--sources: all of it)" if longer else ""))] if cited else []
+
+
+def with_sources(show: Callable[[], None], top: Top | None, tables: Sequence[str], whole: bool) -> Callable[[], None]:
+    """What prints a report and, below it, its sources, where there is a top."""
+    from rotor.cli.shared.output import show_facts
+
+    def show_all() -> None:
+        show()
+        facts = [] if top is None else source_facts(top, tables, whole)
+        if facts:
+            show_facts(facts)
+
+    return show_all

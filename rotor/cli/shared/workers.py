@@ -1,0 +1,82 @@
+"""`--workers`: processes over which a verb spreads its pieces, and the bar on a terminal that says how many are done."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Executor, Future, ProcessPoolExecutor
+from contextlib import contextmanager
+from typing import Any
+
+
+@contextmanager
+def working(workers: int, what: str) -> Iterator[Executor | None]:
+    """An executor with a bar on standard error, or None where there is one worker and no terminal.
+
+    Raises ValueError for fewer than one worker, and for more than 256.
+    """
+    import multiprocessing
+    import sys
+
+    if not 1 <= workers <= 256:
+        raise ValueError(f"--workers: {workers}: a whole number from 1 to 256 is expected")
+    terminal = sys.stderr.isatty()
+    if workers == 1:
+        with progress_bar(what) if terminal else _nothing() as advance:
+            yield _Counted(None, advance) if advance else None
+        return
+    context = multiprocessing.get_context("spawn")
+    with (
+        ProcessPoolExecutor(workers, mp_context=context) as pool,
+        progress_bar(what) if terminal else _nothing() as advance,
+    ):
+        yield _Counted(pool, advance)
+
+
+@contextmanager
+def _nothing() -> Iterator[None]:
+    yield None
+
+
+@contextmanager
+def progress_bar(what: str) -> Iterator[Callable[[int, int], object]]:
+    """What shows on standard error that so many pieces of so many are done."""
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (BarColumn(), MofNCompleteColumn(), TextColumn(what), TimeElapsedColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task(what, total=None)
+        yield lambda done, total: bar.update(task, completed=done, total=total)
+
+
+class _Counted(Executor):
+    """An executor, or this process where it is None, that reports after each piece of a `map` how many are done."""
+
+    def __init__(self, pool: Executor | None, advance: Callable[[int, int], object] | None) -> None:
+        self._pool, self._advance = pool, advance
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        """One call, in the pool or at once."""
+        if self._pool is not None:
+            return self._pool.submit(fn, *args, **kwargs)
+        future: Future[Any] = Future()
+        try:
+            future.set_result(fn(*args, **kwargs))
+        except Exception as error:
+            future.set_exception(error)
+        return future
+
+    def map(
+        self, fn: Callable[..., Any], *iterables: Iterable[Any], timeout: float | None = None, chunksize: int = 1
+    ) -> Iterator[Any]:
+        """`map` of all pieces in order."""
+        pieces = list(zip(*iterables, strict=False))
+        found = (
+            self._pool.map(fn, *zip(*pieces, strict=True), timeout=timeout, chunksize=chunksize)
+            if self._pool is not None and pieces
+            else (fn(*piece) for piece in pieces)
+        )
+        for done, result in enumerate(found, 1):
+            if self._advance is not None:
+                self._advance(done, len(pieces))
+            yield result

@@ -1,0 +1,120 @@
+"""Two lists of lines as a mirror plot: one above the axis, the other below, and under it how far matched lines are apart."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+import numpy as np
+
+from rotor.arrays import Floats, Ints
+from rotor.formats.spcat.catalogue import Catalogue
+from rotor.formats.spcat.compare import Comparison
+from rotor.plots.picture import (
+    BLUE,
+    GREY,
+    MOST_VECTOR_STICKS,
+    ORANGE,
+    checked_suffix,
+    name_text,
+    new_figure,
+    save,
+    styled,
+)
+
+UNPAIRED = ORANGE
+_DIFFERENCES = ((1e-1, 1e3, "kHz"), (1e2, 1.0, "MHz"), (np.inf, 1e-3, "GHz"))  # largest in MHz, factor, name
+
+
+def plot_comparison(
+    found: Comparison, path: str | os.PathLike[str], *, names: tuple[str, str] = ("", ""), command: str = ""
+) -> None:
+    """Draw a comparison into a .png, .pdf or .svg file; command: written into the file's metadata."""
+    checked_suffix(path)
+    save(comparison_figure(found, names=names), path, " and ".join(filter(None, names)), {"command": command})
+
+
+def comparison_figure(found: Comparison, *, names: tuple[str, str] = ("", "")) -> Any:
+    """A matplotlib figure of two lists and the differences of their matched lines.
+
+    Parameters
+    ----------
+    found : Comparison
+        The reference is drawn upwards, the other list downwards, each by log10 of intensity; lines of one list alone in a
+        colour of their own.
+    names : (2,) strings
+        Of the reference and of the other list.
+
+    Raises
+    ------
+    ValueError
+        Without lines on either side.
+    """
+    if not len(found.reference) and not len(found.ours):
+        raise ValueError("neither list has a line to draw; widen the range or lower the cut")
+    with styled():
+        figure = new_figure((7.2, 5.0))
+        above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2.2, 1.0))
+        _draw_mirror(above, found, names)
+        _draw_differences(below, found)
+        below.set_xlabel("Frequency (GHz)")
+        figure.align_ylabels()
+    return figure
+
+
+def _draw_mirror(axes: Any, found: Comparison, names: tuple[str, str]) -> None:
+    both = np.concatenate([found.reference.lgint, found.ours.lgint])
+    bottom = float(np.floor(both[np.isfinite(both)].min())) - 0.3
+    sides = (
+        (found.reference, found.of_reference, found.missing, 1.0, name_text(names[0]) or "first list"),
+        (found.ours, found.of_ours, found.extra, -1.0, name_text(names[1]) or "second list"),
+    )
+    for lines, matched, alone, sign, name in sides:
+        label = f"{name}: {len(matched)} matched" if len(matched) else name
+        _sticks(axes, lines, matched, (sign, bottom, BLUE), label)
+        _sticks(axes, lines, alone, (sign, bottom, UNPAIRED), f"{len(alone)} only in {name}")
+    axes.axhline(0.0, color="black", linewidth=0.7)
+    height = float(both.max()) - bottom
+    axes.set_ylim(-1.2 * height, 1.2 * height)  # space for the names of both lists
+    step = max(1, round(height / 4))
+    ticks = np.arange(np.floor(both.max()), bottom + 0.3 * step, -step)
+    axes.set_yticks(np.concatenate([-(ticks - bottom), ticks - bottom]), [f"{x:.0f}" for x in (*ticks, *ticks)])
+    axes.set_ylabel("log₁₀ intensity (nm² MHz)")
+    for name, place, va in ((names[0], 0.98, "top"), (names[1], 0.02, "bottom")):
+        axes.text(0.005, place, name_text(name), transform=axes.transAxes, va=va, ha="left", color=GREY)
+    axes.figure.legend(loc="outside upper right", ncols=2, frameon=False, fontsize=7)
+
+
+def _sticks(axes: Any, lines: Catalogue, rows: Ints, drawn: tuple[float, float, str], label: str) -> None:
+    """Sticks from the middle, upwards or downwards by the sign; nothing, and no entry of the legend, for no line."""
+    sign, bottom, colour = drawn
+    if not len(rows):
+        return
+    heights = sign * (lines.lgint[rows] - bottom)
+    many = len(rows) > MOST_VECTOR_STICKS
+    axes.vlines(
+        lines.frequency_mhz[rows] / 1e3, 0.0, heights, colors=colour, lw=0.7, label=label, rasterized=many
+    )  # fmt: skip
+
+
+def _draw_differences(axes: Any, found: Comparison) -> None:
+    """Other minus reference of matched lines, with the errors of the reference where it was measured."""
+    axes.axhline(0.0, color=GREY, linewidth=0.7)
+    off = found.differences("frequency_mhz")
+    factor, unit = next((f, name) for most, f, name in _DIFFERENCES if np.abs(off).max(initial=0.0) <= most)
+    ghz = found.reference.frequency_mhz[found.of_reference] / 1e3
+    seen = found.measured
+    errors: Floats = found.reference.error_mhz[found.of_reference]
+    if (~seen).any():
+        axes.plot(
+            ghz[~seen], factor * off[~seen], ".", color=BLUE, markersize=3, rasterized=len(off) > MOST_VECTOR_STICKS
+        )
+    if seen.any():
+        axes.errorbar(
+            ghz[seen], factor * off[seen], factor * errors[seen], fmt=".", color=ORANGE, markersize=3, lw=0.7,
+            label=f"measured ({np.count_nonzero(seen)})",
+        )  # fmt: skip
+        axes.legend(frameon=False, fontsize=7)
+    axes.set_ylabel(f"difference ({unit})")
+    if not len(off):
+        axes.text(0.5, 0.5, "no line is in both", transform=axes.transAxes, ha="center", va="center", color=GREY)

@@ -1,0 +1,91 @@
+"""A picture of a run of a fluid: temperatures and potential energy in time, and the pair distribution of the molecules."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from rotor.fluid.analysis import PairDistribution
+from rotor.fluid.record import FluidRecord
+from rotor.plots.picture import BLUE, GREEN, GREY, ORANGE, checked_suffix, new_figure, save, styled
+from rotor.units import KJ_PER_MOL_EV
+
+
+def plot_fluid(
+    record: FluidRecord,
+    shells: PairDistribution | None,
+    molecules: int,
+    path: str | os.PathLike[str],
+    *,
+    title: str = "",
+    provenance: Mapping[str, Any] | None = None,
+) -> None:
+    """Draw a run into a .png, .pdf or .svg file.
+
+    Parameters
+    ----------
+    record, shells, molecules, title :
+        As in `fluid_figure`.
+    path : path
+    provenance : mapping, optional
+        Written into the metadata of the file.
+
+    Raises
+    ------
+    ValueError
+        A suffix that is no picture.
+    """
+    checked_suffix(path)
+    save(fluid_figure(record, shells, molecules, title=title), path, title, provenance or {})
+
+
+def fluid_figure(record: FluidRecord, shells: PairDistribution | None, molecules: int, *, title: str = "") -> Any:
+    """A matplotlib figure of a run.
+
+    Parameters
+    ----------
+    record : FluidRecord
+    shells : PairDistribution or None
+        g(r) of centres of mass; without it temperatures and energy alone.
+    molecules : int
+        By which the energy is divided.
+    title : str
+    """
+    with styled():
+        figure = new_figure((7.2, 4.2))
+        if shells is None:
+            warm, deep = figure.subplots(2, 1, sharex=True)
+        else:
+            panels = figure.subplot_mosaic([["temperature", "g"], ["energy", "g"]])
+            warm, deep = panels["temperature"], panels["energy"]
+            _draw_shells(panels["g"], shells)
+        _draw_temperatures(warm, record)
+        deep.plot(record.time_ps, record.potential_ev * KJ_PER_MOL_EV / molecules, color=BLUE, linewidth=0.8)
+        deep.set(xlabel="$t$ (ps)", ylabel="potential (kJ/mol)")
+        figure.suptitle(title, fontsize=10, x=0.01, ha="left")
+    return figure
+
+
+def _draw_temperatures(axes: Any, record: FluidRecord) -> None:
+    """Temperature of all degrees, of translation and of rotation where there is one."""
+    curves = (
+        ("translation", record.translation_k, BLUE),
+        ("rotation", record.rotation_k, ORANGE),
+        ("all", record.temperature_k, "black"),
+    )
+    for name, kelvin, colour in curves:
+        if np.isfinite(kelvin).all():
+            axes.plot(record.time_ps, kelvin, color=colour, linewidth=0.8, label=name)
+    axes.set(xlabel="$t$ (ps)", ylabel="temperature (K)")
+    axes.legend(frameon=False, ncols=3, fontsize=7, loc="best")
+
+
+def _draw_shells(axes: Any, shells: PairDistribution) -> None:
+    axes.axhline(1.0, color=GREY, linewidth=0.7)
+    axes.plot(shells.r_angstrom, shells.g, color=GREEN, linewidth=1.2)
+    axes.set(xlabel="$r$ (Å)", ylabel="$g(r)$ of centres of mass")
+    axes.set_xlim(0.0, float(shells.r_angstrom[-1]))
+    axes.set_ylim(bottom=0.0)

@@ -1,0 +1,129 @@
+"""The lowest states of a Hamiltonian that is a polynomial in a field, H(x) = Σ x^n H_n, at many fields.
+
+Small matrices are solved for all fields at once. Large ones are solved in full at a few fields; the eigenvectors there, a few more than
+are asked for, span a small space that holds those at the fields between, and an error estimate says where another field has to be
+solved in full.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor.arrays import Floats
+
+Matrix = NDArray[Any]
+Terms = tuple[Matrix, ...]  # H_n (n, n)
+
+DENSE = 48  # matrices up to this size are solved whole, all fields at once
+FIRST_ANCHORS = 5  # fields solved in full at first, of many
+SPANNED = 101  # fields at which a basis for many is tested while it is made
+BUFFER = 4  # further states in the basis of a map
+DEPENDENT = 1e-7  # of the largest singular value: directions of a basis below it are left out
+
+
+def derivatives(terms: Terms, fields: Floats, vectors: Matrix) -> Floats:
+    """dE/dx = Σ n x^(n-1) ⟨v|H_n|v⟩ (theorem of Hellmann and Feynman), (fields, states)."""
+    each = [n * fields[:, None] ** (n - 1) * expectation(one, vectors) for n, one in enumerate(terms[1:], 1)]
+    return np.asarray(sum(each))
+
+
+def at_fields(terms: Terms, fields: Floats) -> Matrix:
+    """H at fields (f, n, n)."""
+    out = terms[0] + fields[:, None, None] * terms[1]
+    for power, one in enumerate(terms[2:], 2):
+        out += fields[:, None, None] ** power * one
+    return np.asarray(out)
+
+
+def expectation(matrix: Matrix, vectors: Matrix) -> Floats:
+    """⟨v|O|v⟩ of vectors (fields, n, states), (fields, states)."""
+    return np.asarray(np.einsum("fns,fns->fs", vectors.conj(), matrix @ vectors).real)
+
+
+def solve_fields(
+    terms: Terms, fields: Floats, count: int, with_vectors: bool, tolerance_mhz: float = 0.0
+) -> tuple[Floats, Matrix]:
+    """The lowest `count` states of Σ x^n H_n: energies (fields, count), vectors (fields, n, count).
+
+    Small matrices are solved for all fields at once, large ones one by one or, where many fields are asked for, in a basis of
+    their own eigenvectors at a few fields (`reduced_basis`), to `tolerance_mhz`.
+    """
+    size = len(terms[0])
+    if size <= DENSE:
+        stack = at_fields(terms, fields)
+        if not with_vectors:
+            return np.asarray(np.linalg.eigvalsh(stack)[:, :count], dtype=np.float64), stack[:, :, :0]
+        solved = np.linalg.eigh(stack)
+        return np.asarray(solved.eigenvalues[:, :count], dtype=np.float64), solved.eigenvectors[:, :, :count]
+    if len(fields) >= 3 * FIRST_ANCHORS and tolerance_mhz > 0 and count + BUFFER < size // 4:
+        return reduced_basis(terms, fields, count, tolerance_mhz)
+    return _each(terms, fields, count, with_vectors)
+
+
+def _each(terms: Terms, fields: Floats, count: int, with_vectors: bool = True) -> tuple[Floats, Matrix]:
+    solved = [
+        _lowest(at_fields(terms, fields[place : place + 1])[0], count, with_vectors) for place in range(len(fields))
+    ]
+    return np.array([energies for energies, _ in solved]), np.array([vectors for _, vectors in solved])
+
+
+def _lowest(matrix: Matrix, count: int, with_vectors: bool = True) -> tuple[Floats, Matrix]:
+    from scipy.linalg import eigh
+
+    chosen = (0, min(count, len(matrix)) - 1)
+    if with_vectors:
+        energies, vectors = eigh(matrix, subset_by_index=chosen, overwrite_a=True, check_finite=False)
+        return energies, vectors
+    energies = eigh(matrix, subset_by_index=chosen, eigvals_only=True, overwrite_a=True, check_finite=False)
+    return energies, matrix[:, :0]
+
+
+def reduced_basis(terms: Terms, fields: Floats, count: int, tolerance_mhz: float) -> tuple[Floats, Matrix]:
+    """The lowest states at many fields from full solutions at a few: energies (fields, count), vectors (fields, n, count)."""
+    basis = spanning(terms, fields[:: len(fields) // SPANNED + 1], count, tolerance_mhz)
+    if basis is None:
+        return _each(terms, fields, count)
+    energies, vectors, error = _in_basis(basis, tuple(one @ basis for one in terms), fields, count)
+    return (energies, vectors) if error.max() <= tolerance_mhz else _each(terms, fields, count)
+
+
+def spanning(terms: Terms, fields: Floats, count: int, tolerance_mhz: float) -> Matrix | None:
+    """A basis (n, r) for the lowest states at all fields; None where it would be as large as half of the matrix.
+
+    The eigenvectors at some fields, a few more than are asked for, span a space that holds those at the fields between. In it
+    the matrices are small. An energy is wrong by |residual|²/gap, the gap reaching to the highest of the further states; the field
+    where that is largest is solved in full and joins, until it is below a tenth of the tolerance everywhere.
+    """
+    anchors = np.unique(np.linspace(0, len(fields) - 1, FIRST_ANCHORS).astype(int)).tolist()
+    found = [_lowest(at_fields(terms, fields[place : place + 1])[0], count + BUFFER)[1] for place in anchors]
+    while True:
+        basis = _orthonormal(np.concatenate(found, axis=1))
+        if basis.shape[1] > len(terms[0]) // 2:
+            return None
+        error = _in_basis(basis, tuple(one @ basis for one in terms), fields, count)[2]
+        error[anchors] = 0.0
+        worst = int(np.argmax(error))
+        if error[worst] <= 0.1 * tolerance_mhz:
+            return basis
+        anchors.append(worst)
+        found.append(_lowest(at_fields(terms, fields[worst : worst + 1])[0], count + BUFFER)[1])
+
+
+def _orthonormal(vectors: Matrix) -> Matrix:
+    """An orthonormal basis (n, r) of what vectors (n, many) span, dependent directions left out."""
+    left, sizes, _ = np.linalg.svd(vectors, full_matrices=False)
+    return np.ascontiguousarray(left[:, sizes > DEPENDENT * sizes[0]])
+
+
+def _in_basis(basis: Matrix, moved: Terms, fields: Floats, count: int) -> tuple[Floats, Matrix, Floats]:
+    """Energies, vectors and the largest error estimate (fields,) of the lowest states in a basis; moved: H_n times it."""
+    energies, inside = np.linalg.eigh(at_fields(tuple(basis.conj().T @ one for one in moved), fields))
+    gaps = np.maximum(energies[:, min(count + BUFFER, energies.shape[1]) - 1, None] - energies[:, :count], 1e-9)
+    energies, inside = energies[:, :count], inside[:, :, :count]
+    vectors = basis @ inside
+    acted = sum(fields[:, None, None] ** n * (one @ inside) for n, one in enumerate(moved))
+    residual = acted - energies[:, None, :] * vectors
+    return energies, vectors, ((np.abs(residual) ** 2).sum(axis=1) / gaps).max(axis=1)

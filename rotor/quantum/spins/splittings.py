@@ -1,0 +1,88 @@
+"""Nuclei that split lines, and by how much: from known constants, or from a field gradient of one atomic unit.
+
+To first order a level J = 1 with one nucleus of spin I lies at -χ_gg Y(F) with Casimir's function
+
+    Y = [¾ C(C+1) - I(I+1)J(J+1)] / [2(2J-1)(2J+3) I(2I-1)],    C = F(F+1) - I(I+1) - J(J+1)
+
+(W. Gordy and R. L. Cook, Microwave Molecular Spectra, 3rd ed., eq. 9.20), χ_gg along the axis g about which J = 1 does not turn. The
+size that is given is the distance of the outermost components for the largest of the three.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rotor.tops.isotopic_spins import chi_tensor
+
+if TYPE_CHECKING:
+    from rotor.tops.top import Top
+
+GRADIENT_MHZ_PER_BARN = (
+    234.964778  # eQV/h of a field gradient V of one atomic unit; CODATA 2022, checked in tests/test_limits.py
+)
+
+
+@dataclass(frozen=True)
+class Splitting:
+    """One nucleus that splits lines. known: whether its constants are; else they are those of a unit field gradient."""
+
+    nucleus: str
+    spin: float
+    chi_mhz: float
+    splitting_mhz: float
+    known: bool
+
+
+def casimir(twice_spin: int, j: int, twice_f: int) -> float:
+    """Casimir's function Y of a nucleus of spin 1 or more.
+
+    >>> [casimir(2, 1, twice_f) for twice_f in (0, 2, 4)]
+    [0.5, -0.25, 0.05]
+    """
+    spin, f = twice_spin / 2, twice_f / 2
+    c = f * (f + 1) - spin * (spin + 1) - j * (j + 1)
+    above = 0.75 * c * (c + 1) - spin * (spin + 1) * j * (j + 1)
+    return above / (2 * (2 * j - 1) * (2 * j + 3) * spin * (2 * spin - 1))
+
+
+def spread(twice_spin: int) -> float:
+    """The distance of the outermost components of J = 1 in units of χ.
+
+    >>> spread(2), round(spread(3), 12)
+    (0.75, 0.45)
+    """
+    values = [casimir(twice_spin, 1, f) for f in range(abs(twice_spin - 2), twice_spin + 3, 2)]
+    return max(values) - min(values)
+
+
+def splitting_nuclei(top: Top) -> list[Splitting]:
+    """Every nucleus of spin 1 or more whose coupling is known or can be estimated, the largest splitting first."""
+    found, known = [], set()
+    if top.spin_constants is not None:
+        for spin, twice in top.spin_constants.twice.items():
+            chi = {name: value for name, value in top.spin_constants.of(spin).items() if _of_tensor(name)}
+            if chi and twice > 1:
+                diagonal = np.diag(chi_tensor(chi))
+                found.append(_splitting(spin, twice, float(diagonal[np.abs(diagonal).argmax()]), True))
+                known.add(top.spin_constants.atoms.get(spin))
+    if top.molecule is not None:
+        labels: dict[str, Splitting] = {}
+        for atom, one in enumerate(top.molecule.nuclei, start=1):
+            if one.spin >= 1 and one.quadrupole_barn and atom not in known:
+                chi_mhz = GRADIENT_MHZ_PER_BARN * one.quadrupole_barn
+                labels.setdefault(one.label, _splitting(one.label, round(2 * one.spin), chi_mhz, False))
+        found += labels.values()
+    return sorted(found, key=lambda one: -one.splitting_mhz)
+
+
+def _of_tensor(name: str) -> bool:
+    """Whether a constant is an element of χ itself, not of what changes it with J or K."""
+    letters = name.removeprefix("chi_")
+    return name.startswith("chi_") and set(letters) <= set("abc-")
+
+
+def _splitting(nucleus: str, twice: int, chi_mhz: float, known: bool) -> Splitting:
+    return Splitting(nucleus, twice / 2, chi_mhz, abs(chi_mhz) * spread(twice), known)

@@ -1,0 +1,151 @@
+"""A request for what a field does to a spectrum and to a mixture of states, beside the map of its levels, and what answers it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rotor.checks import require_one_of, require_positive
+from rotor.quantum.stark_request import StarkRequest
+from rotor.table import Table
+from rotor.thermo.field_mixture import POPULATIONS, field_mixture
+
+if TYPE_CHECKING:
+    from rotor.quantum.field_map import FieldMap
+    from rotor.spectra.field_lines import FieldLines
+    from rotor.spectra.spectrum import Spectrum
+
+SPECTRUM_POINTS = 4001
+MOST_POINTS = 2_000_000
+FIELDS_OF_SPREAD = 41
+
+
+@dataclass(frozen=True)
+class FieldRequest:
+    """Lines, spectra and mixtures in the fields of a `StarkRequest`; every field is checked when the request is made.
+
+    light: "parallel", "perpendicular", "isotropic" or an angle with the field in degrees. temperature_k, populations: as in
+    `field_lines`. line: labels of two free levels, lines between others are left out; None: all. linewidth_mhz, range_mhz: of the
+    spectrum at the highest field; None: from the first line to the last. spread: standard deviation of the field over the sample, a
+    fraction of the field; 0: the same everywhere.
+    """
+
+    stark: StarkRequest
+    light: str | float = "parallel"
+    temperature_k: float = 300.0
+    populations: str = "equilibrium"
+    line: tuple[str, str] | None = None
+    linewidth_mhz: float = 1.0
+    range_mhz: tuple[float, float] | None = None
+    spread: float = 0.0
+
+    def __post_init__(self) -> None:
+        from rotor.spectra.field_lines import checked_light
+
+        checked_light(self.light)
+        require_positive("temperature_k", self.temperature_k, "K")
+        require_one_of("populations", self.populations, POPULATIONS)
+        require_positive("linewidth_mhz", self.linewidth_mhz, "MHz")
+        if not 0 <= self.spread < 0.25:
+            raise ValueError(f"spread: {self.spread:g} of the field: a number from 0 to 0.25 is expected")
+        if self.range_mhz is not None and not 0 <= self.range_mhz[0] < self.range_mhz[1]:
+            raise ValueError(f"range_mhz: {self.range_mhz}: two frequencies that rise are expected")
+
+
+def lines_of(request: FieldRequest, states: FieldMap, executor: Executor | None = None) -> FieldLines:
+    """The lines in every field of the map."""
+    return _lines_at(request, states.fields, executor)
+
+
+def _lines_at(request: FieldRequest, fields: Any, executor: Executor | None) -> FieldLines:
+    from rotor.spectra.field_lines import field_lines
+
+    stark = request.stark
+    if stark.tilted:
+        raise ValueError("lines need states with a good M: leave out the angle between field and light")
+    found = field_lines(
+        stark.top,
+        fields,
+        j_highest=stark.j_highest,
+        light=request.light,
+        temperature_k=request.temperature_k,
+        populations=request.populations,
+        intensity_w_per_cm2=stark.intensity_w_per_cm2,
+        jmax=stark.jmax,
+        tolerance_mhz=stark.tolerance_mhz,
+        executor=executor,
+    )
+    return found if request.line is None else found.lobes(*request.line)
+
+
+def spectrum_of(request: FieldRequest, states: FieldMap, executor: Executor | None = None) -> Spectrum:
+    """The cross section at the highest field, every line smeared by the spread of the field."""
+    from rotor.spectra.field_spectrum import FieldDistribution, field_spectrum
+
+    mean = float(states.fields[np.argmax(np.abs(states.fields))])
+    deviation = request.spread * abs(mean)
+    width = 4 * deviation or 1e-3 * abs(mean) or 1e-3
+    lines = _lines_at(request, np.linspace(mean - width, mean + width, FIELDS_OF_SPREAD), executor)
+    first, last = request.range_mhz or _around(lines, request.linewidth_mhz)
+    points = max(SPECTRUM_POINTS, int(8 * (last - first) / request.linewidth_mhz) + 1)
+    if points > MOST_POINTS:
+        raise ValueError(
+            f"range_mhz: {first:.6g} to {last:.6g} MHz with lines of {request.linewidth_mhz:g} MHz are {points} points; "
+            f"more than {MOST_POINTS} are not made: give a narrower range or a larger width"
+        )
+    grid = np.linspace(first, last, points)
+    distribution = FieldDistribution.gaussian(mean, deviation) if deviation else mean
+    return field_spectrum(lines, grid, distribution, fwhm_mhz=request.linewidth_mhz)
+
+
+def _around(lines: FieldLines, linewidth_mhz: float) -> tuple[float, float]:
+    """From below the first line that is not weak to above the last."""
+    strong = lines.intensity_nm2_mhz > 1e-3 * lines.intensity_nm2_mhz.max(initial=0.0)
+    frequency = np.abs(lines.frequency_mhz[strong])
+    margin = 20 * linewidth_mhz
+    return max(float(frequency.min()) - margin, 0.0), float(frequency.max()) + margin
+
+
+def coefficients_of(request: FieldRequest, states: FieldMap, executor: Executor | None = None) -> Table:
+    """Stark coefficients of the states, or of the lines between the two levels of `line`."""
+    from rotor.spectra.stark_coefficients import level_coefficients, line_coefficients
+
+    if request.line is None:
+        return level_coefficients(states)
+    return line_coefficients(lines_of(request, states, executor))
+
+
+def mixture_of(request: FieldRequest, states: FieldMap, executor: Executor | None = None) -> Table:
+    """Means of the thermal mixture in every field."""
+    stark = request.stark
+    return field_mixture(
+        stark.top,
+        states.fields,
+        request.temperature_k,
+        populations=request.populations,
+        intensity_w_per_cm2=stark.intensity_w_per_cm2,
+        direction=stark.direction,
+        tolerance_mhz=max(stark.tolerance_mhz, 1e-3),
+        executor=executor,
+    )
+
+
+def deflection_of(request: FieldRequest, states: FieldMap, executor: Executor | None = None) -> Table:
+    """Effective dipoles, one column for each state."""
+    from rotor.quantum.deflection import deflection_table
+
+    return deflection_table(states)
+
+
+Maker = Callable[[FieldRequest, "FieldMap", "Executor | None"], Table]
+MAKERS: Mapping[str, Maker] = {
+    "lines": lines_of,
+    "spectrum": spectrum_of,
+    "coefficients": coefficients_of,
+    "mixture": mixture_of,
+    "deflection": deflection_of,
+}

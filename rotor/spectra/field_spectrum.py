@@ -1,0 +1,169 @@
+"""The spectrum of a sample in a field that is not the same everywhere: every line smeared by the distribution of fields.
+
+A line whose frequency ν(E) and intensity I(E) were computed at a few fields is joined by cubic splines in E. Its spectrum is
+
+    ∫ p(E) I(E) s(ν - ν(E)) dE,
+
+p the density of fields in the sample, s the profile of a line. The integral is a sum over fields so close that ν(E) moves by less than a
+quarter of the width between them.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rotor.arrays import Floats
+from rotor.checks import require_positive
+from rotor.spectra.field_lines import FieldLines
+from rotor.spectra.profiles import gaussian, lorentzian
+from rotor.spectra.spectrum import Spectrum
+
+REACH = 4.0  # standard deviations of a Gaussian distribution that are taken
+LEAST_FIELDS = 33  # of a distribution
+MOST_FIELDS = 200_000  # to which a line is refined
+STEP = 0.25  # of the width between two fields
+
+
+@dataclass(frozen=True)
+class FieldDistribution:
+    """How much of a sample is at which field: a density (n,) over fields (n,) in kV/cm, joined by straight lines, of area 1.
+
+    ValueError for fewer than two fields, fields that do not rise, and a density that is negative or nowhere above 0.
+    """
+
+    fields_kv_per_cm: Floats
+    density: Floats
+
+    def __post_init__(self) -> None:
+        fields = np.array(self.fields_kv_per_cm, dtype=np.float64)
+        density = np.array(self.density, dtype=np.float64)
+        if fields.ndim != 1 or len(fields) < 2 or fields.shape != density.shape:
+            raise ValueError(
+                f"a distribution of fields has two fields or more and a density for each; got {fields.shape}"
+            )
+        if not np.isfinite(fields).all() or (np.diff(fields) <= 0).any():
+            raise ValueError("the fields of a distribution must be finite numbers of kV/cm that rise")
+        area = float(np.trapezoid(density, fields)) if (density >= 0).all() else math.nan
+        if not (math.isfinite(area) and area > 0):
+            raise ValueError("the density of a distribution of fields must be 0 or more, and not 0 everywhere")
+        object.__setattr__(self, "fields_kv_per_cm", fields)
+        object.__setattr__(self, "density", density / area)
+
+    @classmethod
+    def gaussian(cls, mean_kv_per_cm: float, deviation_kv_per_cm: float) -> FieldDistribution:
+        """A normal distribution of a mean and a standard deviation, out to four deviations.
+
+        >>> round(FieldDistribution.gaussian(10.0, 0.1).mean_kv_per_cm, 6)
+        10.0
+        """
+        require_positive("deviation_kv_per_cm", deviation_kv_per_cm, "kV/cm")
+        x = np.linspace(-REACH, REACH, 2 * LEAST_FIELDS + 1)
+        return cls(mean_kv_per_cm + deviation_kv_per_cm * x, np.exp(-x * x / 2))
+
+    @classmethod
+    def uniform(cls, first_kv_per_cm: float, last_kv_per_cm: float) -> FieldDistribution:
+        """The same density from one field to another."""
+        return cls(np.linspace(first_kv_per_cm, last_kv_per_cm, LEAST_FIELDS), np.ones(LEAST_FIELDS))
+
+    @property
+    def mean_kv_per_cm(self) -> float:
+        """The mean field."""
+        return float(np.trapezoid(self.density * self.fields_kv_per_cm, self.fields_kv_per_cm))
+
+    def weights(self, fields_kv_per_cm: Floats) -> Floats:
+        """Share of the sample that each of closely spaced fields (n,) stands for; they add up to 1."""
+        here = np.interp(fields_kv_per_cm, self.fields_kv_per_cm, self.density) * np.gradient(fields_kv_per_cm)
+        return np.asarray(here / here.sum())
+
+
+def field_spectrum(
+    lines: FieldLines,
+    grid_mhz: ArrayLike,
+    distribution: FieldDistribution | float,
+    *,
+    fwhm_mhz: float,
+    profile: str = "gaussian",
+) -> Spectrum:
+    """The absorption cross section of a sample whose field has a distribution.
+
+    Parameters
+    ----------
+    lines : FieldLines
+        At fields that cover the distribution, close enough for cubic splines between them.
+    grid_mhz : (n,)
+        Rising frequencies.
+    distribution : FieldDistribution or float
+        Of the field in kV/cm; a number is one field for all.
+    fwhm_mhz : float
+        Full width at half maximum of every line in one field.
+    profile : str
+        "gaussian" or "lorentzian".
+
+    Returns
+    -------
+    Spectrum
+        In nm².
+
+    Raises
+    ------
+    ValueError
+        A distribution beyond the fields of the lines, fewer than two fields of them, a width not above 0, an unknown profile.
+
+    Notes
+    -----
+    Neglected: motion of molecules through different fields during their absorption.
+    """
+    shapes = {"gaussian": gaussian, "lorentzian": lorentzian}
+    if profile not in shapes:
+        raise ValueError(f"profile {profile!r}: expected one of {', '.join(shapes)}")
+    require_positive("fwhm_mhz", fwhm_mhz, "MHz")
+    grid = np.asarray(grid_mhz, dtype=np.float64)
+    if grid.ndim != 1 or len(grid) < 2 or not np.isfinite(grid).all() or (np.diff(grid) <= 0).any():
+        raise ValueError("the grid must be two or more finite frequencies in MHz that rise")
+    total = np.zeros(len(grid))
+    for frequency, area in _smeared(lines, distribution, fwhm_mhz):
+        _add(total, grid, np.abs(frequency), area, fwhm_mhz, shapes[profile])
+    return Spectrum(grid, total, "nm^2", lines.temperature_k, profile, fwhm_mhz)
+
+
+def _smeared(
+    lines: FieldLines, distribution: FieldDistribution | float, fwhm_mhz: float
+) -> list[tuple[Floats, Floats]]:
+    """Frequencies and areas of every pair of states over the fields of the sample."""
+    from scipy.interpolate import CubicSpline
+
+    fields = lines.fields
+    first, last = (
+        (distribution, distribution)
+        if not isinstance(distribution, FieldDistribution)
+        else (distribution.fields_kv_per_cm[0], distribution.fields_kv_per_cm[-1])
+    )
+    if first < fields[0] or last > fields[-1] or len(fields) < 2:
+        raise ValueError(
+            f"the sample has fields from {first:g} to {last:g} kV/cm, the lines were computed from {fields[0]:g} to {fields[-1]:g}; "
+            "compute them at two fields or more that cover the sample"
+        )
+    out = []
+    for rows in lines.pairs():
+        curves = [CubicSpline(fields, one[rows]) for one in (lines.frequency_mhz, lines.intensity_nm2_mhz)]
+        if not isinstance(distribution, FieldDistribution):
+            out.append((curves[0](np.array([first])), curves[1](np.array([first]))))
+            continue
+        moved = np.ptp(curves[0](distribution.fields_kv_per_cm))
+        count = min(max(LEAST_FIELDS, math.ceil(2 * moved / (STEP * fwhm_mhz))), MOST_FIELDS)
+        here = np.linspace(first, last, count)
+        out.append((curves[0](here), curves[1](here) * distribution.weights(here)))
+    return out
+
+
+def _add(total: Floats, grid: Floats, centres: Floats, areas: Floats, fwhm_mhz: float, shape: object) -> None:
+    """Profiles of many centres, those outside the grid by more than 50 widths left out."""
+    near = (centres > grid[0] - 50 * fwhm_mhz) & (centres < grid[-1] + 50 * fwhm_mhz)
+    assert callable(shape)
+    for start in range(0, int(near.sum()), 256):
+        piece = slice(start, start + 256)
+        total += areas[near][piece] @ shape(grid[None, :] - centres[near][piece][:, None], fwhm_mhz)
