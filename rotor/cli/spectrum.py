@@ -28,6 +28,7 @@ from rotor.cli.shared.output import (
     show_table,
 )
 from rotor.cli.shared.plot_options import PlotOptions
+from rotor.cli.shared.save_scene import save_scene, save_scene_option
 from rotor.cli.shared.sources import source_facts
 
 if TYPE_CHECKING:
@@ -97,6 +98,7 @@ class Outputs:
     profile_csv: str | None = file_option(".csv", help="Write the profile on its grid as CSV.")
     plot: str | None = file_option(".png", ".pdf", ".svg", help="Draw the spectrum (.png, .pdf, .svg).")
     json: str | None = json_option()
+    save_scene: str | None = save_scene_option()
 
 
 @grouped()
@@ -138,6 +140,7 @@ def command(
     content["files"] = files.names
 
     writers = _writers(answer, content, {"tag": tag, **hitran}, drawn)
+    writers |= save_scene("spectrum", answer.request, outputs, given, tag=tag)
     if prediction is not None:
         writers["--cat"] = _program_catalogue(prediction, content)
     deliver(
