@@ -18,7 +18,7 @@ from rotor.arrays import Floats
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.watson import SEMI_RIGID, Rigid, rigid_operators
 from rotor.quantum.levels import Levels, SolvedBlock
-from rotor.quantum.solve import hamiltonian
+from rotor.quantum.rotation import hamiltonian
 from rotor.quantum.wang_matrix import JMatrix, block_bands, scalar_energy
 from rotor.tops.operators import Operators
 

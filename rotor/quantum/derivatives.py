@@ -23,7 +23,7 @@ from rotor.arrays import Floats
 from rotor.quantum.coupled import CoupledBlock, parameter_matrix
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.levels import Levels
-from rotor.quantum.solve import hamiltonian
+from rotor.quantum.rotation import hamiltonian
 from rotor.quantum.spherical_top import scalar_and_tensor, tensor_eigenvalues
 from rotor.tops.operators import Operators, Powers
 

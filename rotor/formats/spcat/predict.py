@@ -26,7 +26,8 @@ from rotor.formats.spcat.par import Options, ParameterFile, read_par
 from rotor.formats.spcat.predict_states import is_plain, predicted
 from rotor.quantum.basis import wang_blocks
 from rotor.quantum.levels import Levels
-from rotor.quantum.solve import hamiltonian, solve_levels
+from rotor.quantum.rotation import hamiltonian
+from rotor.quantum.solve import solve_levels
 from rotor.quantum.wang_matrix import JMatrix, block_bands
 from rotor.spectra.lines import Lines, line_list
 from rotor.thermo import PartitionFunction, partition_function
