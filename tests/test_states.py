@@ -21,7 +21,8 @@ from rotor.quantum.derivatives import level_derivatives
 from rotor.quantum.effects.interactions import InteractingStates
 from rotor.quantum.effects.of_top import effects_of
 from rotor.quantum.effects.watson import SEMI_RIGID
-from rotor.quantum.solve import solve_levels, solve_rotation
+from rotor.quantum.rotation import solve_rotation
+from rotor.quantum.solve import solve_levels
 from rotor.spectra.lines import dipoles_by_state, line_list
 from rotor.spectra.raman import raman_lines
 from rotor.spectra.transitions import all_transitions

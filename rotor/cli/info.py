@@ -14,7 +14,7 @@ from rotor.cli.shared import inputs
 from rotor.cli.shared.inputs import Input, json_option
 from rotor.cli.shared.options import grouped, option
 from rotor.cli.shared.output import Files, Table, deliver, json_text, show_facts, show_table, sum_progress
-from rotor.cli.shared.sources import with_sources
+from rotor.cli.shared.sources import source_facts
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 TEMPERATURES_K = (9.375, 18.75, 37.5, 75.0, 150.0, 225.0, 300.0, 500.0, 1000.0)  # those of the catalogues, and two more
 
 MOST_CONFORMERS = 1000
-ROOM_K = 300.0  # at the J most populated there effects are compared
+ROOM_TEMPERATURE_K = 300.0  # at the J most populated there effects are compared
 
 EXAMPLES = """\b
 Examples:
@@ -57,7 +57,7 @@ def command(context: typer.Context, given: Input, options: Options) -> None:
     from rotor.thermo.request import partition_table
 
     content = describe(top, given.text, context.obj)
-    content |= limit_facts(top, populated_j(top, ROOM_K), effects_of(top, hyperfine=False))
+    content |= limit_facts(top, populated_j(top, ROOM_TEMPERATURE_K), effects_of(top, hyperfine=False))
     content["partition_function"] = partition_table(top, temperatures, sum_progress())
     if options.conformers is not None:
         content["conformers"] = conformer_table(given.source, options.conformers)
@@ -65,9 +65,7 @@ def command(context: typer.Context, given: Input, options: Options) -> None:
         files,
         {},
         lambda: json_text(content),
-        with_sources(
-            lambda: _show(top, content), top, ("constants", "dipole", "polarizability", "spin weights"), given.sources
-        ),
+        lambda: _show(top, content, given.sources),
     )
 
 
@@ -93,7 +91,7 @@ def conformer_table(source: str | None, count: int) -> list[dict[str, Any]]:
     return found
 
 
-def _show(top: Top, content: dict[str, Any]) -> None:
+def _show(top: Top, content: dict[str, Any], whole_sources: bool) -> None:
     from rotor.cli.shared import report
 
     print(report.heading(top))
@@ -105,7 +103,12 @@ def _show(top: Top, content: dict[str, Any]) -> None:
             print()
             show_table(table)
     print()
-    show_facts(report.model_facts(content))
+    show_facts(
+        [
+            *source_facts(top, ("constants", "dipole", "polarizability", "spin weights"), whole_sources),
+            *report.model_facts(content),
+        ]
+    )
 
 
 def _facts(top: Top, content: dict[str, Any]) -> list[tuple[str, str]]:

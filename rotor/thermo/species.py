@@ -36,7 +36,7 @@ def spin_species(weights: SpinWeights) -> dict[str, SpinWeights]:
 
 
 def _groups(weights: SpinWeights) -> list[tuple[str, ...]]:
-    """Classes that one species holds: K and n - K, the two parities that a half turn tells apart, else each by itself."""
+    """Classes that one species holds: K and n - K, the two parities that differ under a half turn, else each by itself."""
     if weights.rule == "K":
         return _by_k(weights)
     if weights.rule == "KaKc":

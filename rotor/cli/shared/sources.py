@@ -26,6 +26,8 @@ def short_source(text: str) -> str:
     """
     marked = re.match(r"(?:[\w, ]+ )?unverified[:;] ?", text)
     mark, rest = (marked[0], text[marked.end() :]) if marked else ("", text)
+    if scaled := re.match(r"scaled from [^(;]+", rest):
+        return mark + scaled[0].rstrip()
     if found := _CATALOGUE.search(rest):
         verb = "fitted to " if "fitted" in rest[: found.start()] else "from "
         return mark + verb + found[0]

@@ -31,6 +31,8 @@ FIELDS = {
     "spins": "SPIND",
     "state_constants": "the constants",
     "hyperfine": "SPIND",
+    "hyperfine_method": "SPIND",
+    "hyperfine_tolerance": "SPIND",
     "constants": "the constants",
     "calculator": "the constants",
 }

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.watson import SEMI_RIGID
+from rotor.quantum.spins.method import EXACT, TOLERANCE_MHZ, HyperfineMethod
 
 if TYPE_CHECKING:
     from rotor.quantum.effects.spin_effect import SpinEffect
@@ -97,10 +98,24 @@ def has_own_hamiltonian(top: Top, effects: Sequence[QuantumEffect]) -> bool:
     return len(effects) == len(SEMI_RIGID) + 1 and len(rest) == 1 and dict(rest[0].parameters(top)) == known
 
 
-def effects_of(top: Top, hyperfine: bool) -> tuple[QuantumEffect, ...]:
+def effects_of(
+    top: Top, hyperfine: bool, method: str = "exact", tolerance_mhz: float = TOLERANCE_MHZ
+) -> tuple[QuantumEffect, ...]:
     """The semi-rigid Hamiltonian of a top in all its states, and with `hyperfine` its spins.
 
-    Raises ValueError where spins are asked for and the top has no constants of any.
+    Parameters
+    ----------
+    top : Top
+    hyperfine : bool
+    method : str
+        "exact", "first-order", or "auto", the cheapest that is estimated to keep the tolerance (`rotor.quantum.spins.method`).
+    tolerance_mhz : float
+        By how much lines may differ from exact ones with "auto".
+
+    Raises
+    ------
+    ValueError
+        Where spins are asked for and the top has no constants of any.
     """
     if not hyperfine:
         return (*SEMI_RIGID, *state_effects(top))
@@ -110,4 +125,11 @@ def effects_of(top: Top, hyperfine: bool) -> tuple[QuantumEffect, ...]:
             f"hyperfine structure of {top.name or 'this top'}: no constants of spins are known; give them, such as "
             "chi_aa(14N)=-4.2 MHz"
         )
-    return (*SEMI_RIGID, *state_effects(top), *found)
+    return (*SEMI_RIGID, *state_effects(top), *found, *_method(top, found, method, tolerance_mhz))
+
+
+def _method(top: Top, found: Sequence[QuantumEffect], method: str, tolerance_mhz: float) -> tuple[QuantumEffect, ...]:
+    """The choice of a method where it is not the usual one."""
+    spins = {spin.name: spin for effect in found for spin in effect.spins(top)}
+    asked = HyperfineMethod(method, tolerance_mhz, tuple(spins.values()))
+    return () if method == EXACT else (asked,)

@@ -200,7 +200,7 @@ def tilted_space(top: Top, jmax: int, contractions: Sequence[Contraction]) -> Ti
     Raises ValueError for a spherical top.
     """
     from rotor.quantum.effects.watson import SEMI_RIGID
-    from rotor.quantum.solve import representation_of, solve_rotation
+    from rotor.quantum.rotation import representation_of, solve_rotation
     from rotor.tops.state_rules import one_state
 
     if top.kind == "spherical":
