@@ -65,6 +65,7 @@ def test_json_has_the_keys_of_the_contract(call):
         "sizes_at_j",
         "effects",
         "limits",
+        "splitting_nuclei",
     }
     assert set(content) == info | KEYS
     assert content["species_known"] == ["equilibrium", "normal", "para", "ortho"]

@@ -107,6 +107,7 @@ def test_json_has_the_keys_of_the_contract(call):
         "sizes_at_j",
         "effects",
         "limits",
+        "splitting_nuclei",
     }
     assert set(json.loads(out)) == info | MOTION_KEYS
 
