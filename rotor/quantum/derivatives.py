@@ -36,14 +36,33 @@ _AT_ONCE = 1 << 22  # coefficients that are gathered at a time: 32 MB
 
 
 def level_derivatives(top: Top, levels: Levels, names: Sequence[str] | None = None, rows: Rows | None = None) -> Floats:
-    """∂E/∂c of levels by named parameters of their effects, (rows, names), MHz per MHz.
+    """∂E/∂c of levels by named parameters of their effects.
 
-    names : parameters, in the order of the columns; all of the levels' effects, in their order, if None
-    rows : indices of the levels; all if None
+    Exact at the parameters that `levels` were solved with (Hellmann and Feynman).
 
-    Exact at the parameters that `levels` were solved with. Raises ValueError for a name that no effect has and
-    for levels of an asymmetric top that were solved without vectors.
+    Parameters
+    ----------
+    top : Top
+        The constants that the levels were solved with.
+    levels : Levels
+        Solved with eigenvectors where the top is asymmetric.
+    names : sequence of str, optional
+        Parameters, in the order of the columns; all of the levels' effects, in their order, by default.
+    rows : (rows,) array of int, optional
+        Indices of the levels; all by default.
 
+    Returns
+    -------
+    (rows, names) array
+        MHz per MHz.
+
+    Raises
+    ------
+    ValueError
+        For a name that no effect has, and for levels of an asymmetric top that were solved without vectors.
+
+    Examples
+    --------
     >>> from rotor.quantum.solve import solve_levels
     >>> from rotor.tops.top import Top
     >>> top = Top.from_constants("A=10 B=6 C=4 MHz")

@@ -146,7 +146,30 @@ def solve_rotation(
 ) -> Levels:
     """Levels of the rotation, and of states v, without spins; see `solve_levels`.
 
-    in_blocks: solve symmetric tops in Wang blocks too, so that the levels have eigenvectors.
+    Parameters
+    ----------
+    top : Top
+        Constants, kind and spin weights.
+    effects : tuple of QuantumEffect
+        What the Hamiltonian consists of.
+    jmin, jmax : int
+        Lowest and highest rotational angular momentum.
+    vectors : bool, optional
+        False leaves the eigenvectors of an asymmetric top out.
+    executor : Executor, optional
+        J are spread over it.
+    in_blocks : bool, optional
+        Solve symmetric tops in Wang blocks too, so that the levels have eigenvectors.
+
+    Returns
+    -------
+    Levels
+        Energies in MHz, true eigenvalues, by the cheapest exact method of the table above.
+
+    Raises
+    ------
+    ValueError
+        For constants that overflow, and as `coupled_levels` does where blocks are connected.
     """
     operators, limits = hamiltonian(top, effects), k_limits_of(top, effects)
     if top.kind != "linear":
@@ -266,7 +289,7 @@ def _in_wang_blocks(
 ) -> Levels:
     representation = representation_of(top)
     pieces = [(operators, j, representation, vectors, limits) for j in range(jmin, jmax + 1)]
-    solved = executor.map(solve_j, *zip(*pieces, strict=True)) if executor else (solve_j(*piece) for piece in pieces)
+    solved = executor.map(_solve_j, *zip(*pieces, strict=True)) if executor else (_solve_j(*piece) for piece in pieces)
     blocks = tuple(_placed(block for of_one_j in solved for block in of_one_j))
 
     labels = [names_of(b.basis, representation) for b in blocks]
@@ -303,7 +326,7 @@ def _placed(solved: Iterator[tuple[WangBlock, Floats, Floats]]) -> Iterator[Solv
         start += basis.size
 
 
-def solve_j(
+def _solve_j(
     operators: Operators, j: int, representation: str, vectors: bool = True, limits: tuple[int, int] | None = None
 ) -> list[tuple[WangBlock, Floats, Floats]]:
     """The Wang blocks of one J solved: (block, energies in MHz, eigenvectors) in the order ee, eo, oe, oo; K within `limits`."""

@@ -103,7 +103,7 @@ class Plan(NamedTuple):
     families: list[list[tuple[int, int]]]
 
 
-def plan_of(top: Top, effects: tuple[QuantumEffect, ...], nmin: int, nmax: int, executor: Executor | None) -> Plan:
+def _plan_of(top: Top, effects: tuple[QuantumEffect, ...], nmin: int, nmax: int, executor: Executor | None) -> Plan:
     """The rotation solved from N = `nmin` to `nmax`, and every channel contracted to it."""
     scheme, terms = scheme_of(top, effects), valued_terms(top, effects)
     blocks, representation = solved_rotor(top, effects, terms, nmin, nmax, executor)
@@ -129,7 +129,22 @@ def _near(blocks: list[RotorBlock], reach: int) -> Iterator[tuple[int, int]]:
 def operators_between(
     up: RotorBlock, low: RotorBlock, channels: Channels, representation: str
 ) -> dict[Channel, Floats]:
-    """Σ c ⟨r'|X|r⟩ of every channel that acts."""
+    """Σ c ⟨r'|X|r⟩ of every channel that acts between two solved blocks of the rotation.
+
+    Parameters
+    ----------
+    up, low : RotorBlock
+        The blocks of r' (rows) and r (columns).
+    channels : dict of Channel to list of Piece
+        Pieces of the Hamiltonian that share their coefficients of coupling.
+    representation : str
+        Which principal axes are x, y, z.
+
+    Returns
+    -------
+    dict of Channel to (n', n) array
+        Contracted matrices in MHz; empty where nothing acts.
+    """
     bases = up.parts[0].basis, low.parts[0].basis
     if isinstance(bases[0], AxialState) and isinstance(bases[1], AxialState) and bases[0].axial_k != bases[1].axial_k:
         return {}
@@ -299,14 +314,33 @@ def levels_of_f(
     executor: Executor | None = None,
     exist: Exist | None = None,
 ) -> Levels:
-    """The levels of all F (doubled) in `every_f`, those whose label has N within `n_range`, if that is given.
+    """The levels of all F in `every_f`, those whose label has N within `n_range`, if that is given.
 
-    exist: which of levels (n, columns as `SpinBlock.labels`) there are; blocks that hold none of them are not solved.
+    Parameters
+    ----------
+    top : Top
+        Constants, kind and spin weights.
+    effects : tuple of QuantumEffect
+        What the Hamiltonian consists of.
+    every_f : sequence of int
+        Total angular momenta, doubled.
+    n_range : (int, int), optional
+        Lowest and highest N of the labels; all by default.
+    executor : Executor, optional
+        The rotation is spread over it by N.
+    exist : callable, optional
+        Which of levels (n, columns as `SpinBlock.labels`) there are, (n,) of bool; blocks with none of them are not
+        solved.
+
+    Returns
+    -------
+    Levels
+        Energies in MHz with eigenvectors and labels.
     """
     total = scheme_of(top, effects).total
     lowest = min(max(0, (f - total) // 2) for f in every_f)
     highest = max((f + total) // 2 for f in every_f)
-    plan = plan_of(top, effects, lowest, highest, executor)
+    plan = _plan_of(top, effects, lowest, highest, executor)
     solved = [block for f in every_f for block in solve_f(plan, f, exist)]
     if n_range:
         solved = [_within(block, n_range) for block in solved]
