@@ -49,8 +49,23 @@ def all_transitions(
 ) -> Transitions:
     """Every transition between `levels` that is allowed, in the range and above the cut, in no particular order.
 
-    dipoles_abc: components of μ along a, b, c in debye; of several states by pairs (v', v), each pair once. moments: others, of
-    levels that were solved with spins.
+    Parameters
+    ----------
+    levels : Levels
+        With eigenvectors where the top is asymmetric.
+    dipoles_abc : (float, float, float) or mapping of (int, int) to it
+        Components of μ along a, b, c in debye; of several states by pairs (v', v), each pair once.
+    range_mhz : (float, float), optional
+        First and last frequency.
+    cut : IntensityCut, optional
+        The least intensity; by default nothing is cut.
+    moments : sequence of Moment, optional
+        Others than dipoles, of levels that were solved with spins.
+
+    Returns
+    -------
+    Transitions
+        Frequencies in MHz, S μ² in D², and rows of both states.
     """
     dipoles = dipoles_abc if isinstance(dipoles_abc, Mapping) else {(0, 0): dipoles_abc}
     if levels.representation is None:
