@@ -120,8 +120,26 @@ class Top:
     ) -> Top:
         """A top from named constants, or from their text such as "A=835840.288 B=435351.717 C=278138.7 MHz".
 
-        constants: a mapping has numbers in MHz or texts with a unit by name: `{"A": "9.2 GHz", "B": 3000, "C": 2500}`.
-        others: any further field of `Top`. Raises ValueError for unknown names, units or an impossible set.
+        Parameters
+        ----------
+        constants : Constants, mapping or str
+            A mapping has numbers in MHz or texts with a unit by name: `{"A": "9.2 GHz", "B": 3000, "C": 2500}`.
+        dipole_abc_debye : (3,) array, optional
+            Along the principal axes.
+        spin_weights : SpinWeights or dict of str to int, optional
+            Nuclear-spin weights; 1 for all by default.
+        **others : object
+            Any further field of `Top`.
+
+        Returns
+        -------
+        Top
+            Without a geometry.
+
+        Raises
+        ------
+        ValueError
+            For unknown names, units or an impossible set.
         """
         if isinstance(constants, str):
             constants = Constants.parse(constants)
@@ -144,13 +162,37 @@ class Top:
         """A rigid top from a geometry: principal axes, A, B, C, kind, dipole and polarizability turned along, spin weights.
 
         The symmetry of the nuclei decides the kind where it can (C3v is a symmetric top), the moments where it cannot.
-        Nuclear-spin weights follow from it and from `molecule.electronic`, inversion doublets unresolved;
-        `symmetry_within` is its tolerance, relative to the shortest distance. What symmetry forbids of a dipole or a
-        polarizability is left out where it is noise (`rotor.tops.allowed`).
+        Nuclear-spin weights follow from it and from `molecule.electronic`, inversion doublets unresolved. What symmetry
+        forbids of a dipole or a polarizability is left out where it is noise (`rotor.tops.allowed`).
 
-        Raises ValueError for a single atom, and for a dipole or polarizability that symmetry forbids. Neglected: everything
-        that vibration and centrifugal distortion do, about 0.3 to 1 % between an equilibrium geometry and measured constants.
+        Parameters
+        ----------
+        molecule : Molecule
+            Two atoms or more.
+        linear_below : float, optional
+            Ratio of the smallest to the largest moment below which the top is linear.
+        equal_within : float, optional
+            Relative difference below which two moments are equal.
+        symmetry_within : float, optional
+            Tolerance of the symmetry, relative to the shortest distance.
 
+        Returns
+        -------
+        Top
+            Constants in MHz, dipole in debye, polarizability in Å³.
+
+        Raises
+        ------
+        ValueError
+            For a single atom, and for a dipole or polarizability that symmetry forbids.
+
+        Notes
+        -----
+        Neglected: everything that vibration and centrifugal distortion do, about 0.3 to 1 % between an equilibrium
+        geometry and measured constants.
+
+        Examples
+        --------
         >>> from rotor.molecules.molecule import Molecule
         >>> top = Top.from_molecule(Molecule(("C", "O"), [[0, 0, 0], [0, 0, 1.128323]]))
         >>> top.kind, round(top.constants["B"], 0)
