@@ -181,10 +181,31 @@ def read_molecule_file(path: str | os.PathLike[str]) -> MoleculeFile:
 def parse_molecule_file(
     text: str, where: str = "molecule file", default_name: str = "", folder: Path | None = None
 ) -> MoleculeFile:
-    """What the text of a molecule file says; `where` names it in errors, `default_name` serves if it gives no name.
+    """What the text of a molecule file says.
 
-    folder: from which the name of a file of levels counts.
+    Parameters
+    ----------
+    text : str
+        TOML, see the head of the module.
+    where : str, optional
+        Names the file in errors.
+    default_name : str, optional
+        Serves where the file gives no name.
+    folder : Path, optional
+        From which the name of a file of levels counts.
 
+    Returns
+    -------
+    MoleculeFile
+        Everything that the file has.
+
+    Raises
+    ------
+    ValueError
+        With file, table and key, for what is unknown, missing or contradictory.
+
+    Examples
+    --------
     >>> parse_molecule_file("constants = { B = 57635.96804, D = 0.1835 }").constants.text()
     'B=57635.96804 D=0.1835 MHz'
     """

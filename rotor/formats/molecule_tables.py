@@ -107,7 +107,29 @@ class TableReader:
         return None if value is None else int(value)
 
     def quantity(self, key: str, value: Any, unit: str, expected: str) -> float:
-        """A number in the table's unit, or text with its own, in the unit expected."""
+        """A number in the table's unit, or text with its own, in the unit expected.
+
+        Parameters
+        ----------
+        key : str
+            Named in the error.
+        value : object
+            What the table has under the key.
+        unit : str
+            Unit of a bare number.
+        expected : str
+            Unit of the result.
+
+        Returns
+        -------
+        float
+            In the unit expected.
+
+        Raises
+        ------
+        ValueError
+            With file, table and key, for what is no finite number or has a unit that does not fit.
+        """
         if not is_number(value) and not isinstance(value, str):
             raise self.error(key, f"expected a finite number of {unit}, or text with a unit")
         try:
@@ -135,6 +157,29 @@ def refuse_unknown_keys(given: Iterable[str], known: Iterable[str], place: str) 
 def geometry(
     table: TableReader | None, name: str, dipole: tuple[float, float, float] | None, dipole_table: TableReader | None
 ) -> Molecule | None:
+    """The molecule of a `[geometry]` table, with the dipole turned into its frame.
+
+    Parameters
+    ----------
+    table : TableReader or None
+        The geometry, where the file has one.
+    name : str
+        Of the molecule.
+    dipole : (float, float, float) or None
+        Debye, along a, b, c.
+    dipole_table : TableReader or None
+        Where the dipole comes from.
+
+    Returns
+    -------
+    Molecule or None
+        None without a table.
+
+    Raises
+    ------
+    ValueError
+        With file, table and key, for what is unknown or cannot be a molecule.
+    """
     if table is None:
         return None
     table.refuse_unknown(("kind", "source", "vibrational_difference", "atoms", "charge", "electronic", "unverified"))
