@@ -141,6 +141,13 @@ def bodies_of(
     tolerance_angstrom : float
         By how much an atom may stand off its place in the shape; the shape's place is used.
 
+    Returns
+    -------
+    bodies : Bodies
+        Masses in u, moments in u Å², shapes in Å.
+    pose : Pose
+        Centres in Å and attitudes, unit quaternions.
+
     Raises
     ------
     ValueError
