@@ -63,7 +63,7 @@ def styled() -> Any:
 
 
 def save(figure: Any, path: str | os.PathLike[str], title: str, facts: Mapping[str, Any]) -> None:
-    """Write a figure with its title and facts, as JSON, in the metadata; no date, so that the same picture is the same file.
+    """Write a figure with its title and facts, as JSON, in the metadata; no date, so that like pictures are like files.
 
     Parameters
     ----------
