@@ -103,8 +103,25 @@ class Plan(NamedTuple):
     families: list[list[tuple[int, int]]]
 
 
-def _plan_of(top: Top, effects: tuple[QuantumEffect, ...], nmin: int, nmax: int, executor: Executor | None) -> Plan:
-    """The rotation solved from N = `nmin` to `nmax`, and every channel contracted to it."""
+def plan_of(top: Top, effects: tuple[QuantumEffect, ...], nmin: int, nmax: int, executor: Executor | None) -> Plan:
+    """The rotation solved from N = `nmin` to `nmax`, and every channel contracted to it.
+
+    Parameters
+    ----------
+    top : Top
+        Constants and kind.
+    effects : tuple of QuantumEffect
+        What the Hamiltonian consists of.
+    nmin, nmax : int
+        Lowest and highest N.
+    executor : Executor or None
+        The rotation is spread over it by N.
+
+    Returns
+    -------
+    Plan
+        Solved blocks, matrices of the channels in MHz, and which blocks are connected.
+    """
     scheme, terms = scheme_of(top, effects), valued_terms(top, effects)
     blocks, representation = solved_rotor(top, effects, terms, nmin, nmax, executor)
     channels = channels_of(terms, scheme)
@@ -340,7 +357,7 @@ def levels_of_f(
     total = scheme_of(top, effects).total
     lowest = min(max(0, (f - total) // 2) for f in every_f)
     highest = max((f + total) // 2 for f in every_f)
-    plan = _plan_of(top, effects, lowest, highest, executor)
+    plan = plan_of(top, effects, lowest, highest, executor)
     solved = [block for f in every_f for block in solve_f(plan, f, exist)]
     if n_range:
         solved = [_within(block, n_range) for block in solved]
