@@ -197,12 +197,8 @@ class Constants:
         ----------
         text : str
             Names and values.
-        reduction : str, optional
-            "A" or "S", for a top with distortion that needs one.
-        representation : str, optional
-            Which principal axes are x, y, z: "Ir", "IIIl", ...
-        kind : str, optional
-            "linear", "prolate", "oblate", "spherical" or "asymmetric"; by default what the names and values say.
+        reduction, representation, kind : str, optional
+            "A" or "S"; which axes are x, y, z ("Ir", ...); kind of top. By default what the names and values say.
 
         Returns
         -------
@@ -214,8 +210,6 @@ class Constants:
         ValueError
             For text that cannot be read, and for a set of constants that contradicts itself.
 
-        Examples
-        --------
         >>> Constants.parse("B=9.2GHz DJ=3.8kHz").values["D"]
         0.0038
         >>> Constants.parse("A=5.17 B=0.25(2) cm-1").uncertainties["B"]
