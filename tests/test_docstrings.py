@@ -73,6 +73,8 @@ def faults(function: ast.FunctionDef | ast.AsyncFunctionDef) -> list[str]:
         entries = described(found["Parameters"])
         out += [f"{name} is not described" for name in names if name not in entries]
         out += [f"{name} is described but not a parameter" for name in entries if name not in names]
+    lists = [name for name in ("Parameters", "Returns", "Raises") if name in found]
+    out += [f"text after {name} without a heading" for name in lists if re.search(r"\n\n(?=\S)", found[name].rstrip())]
     return out
 
 
@@ -97,6 +99,7 @@ def test_sections_of_every_long_signature(folder: str) -> None:
         ("    sign : int", "    signs : int", "signs is described but not a parameter"),
         ("    Returns\n    -------", "", "no section Returns"),
         ("    Parameters\n    ----------", "", "no section Parameters"),
+        ("        The sum.", "        The sum.\n\n    >>> add(1, 2)\n    3", "text after Returns without a heading"),
     ],
 )
 def test_what_is_found(old: str, new: str, fault: str | None) -> None:

@@ -73,7 +73,7 @@ def draw_curve(axes: Any, view: View, curve: Floats, **style: Any) -> None:
         From where the sphere is seen.
     curve : (n, 3) array
         Points on the unit sphere.
-    **style : object
+    style : object
         Of `Axes.plot`: colour, width, label.
     """
     flat, front = view.flat(curve), view.depth(curve) >= 0.0

@@ -210,6 +210,8 @@ class Constants:
         ValueError
             For text that cannot be read, and for a set of constants that contradicts itself.
 
+        Examples
+        --------
         >>> Constants.parse("B=9.2GHz DJ=3.8kHz").values["D"]
         0.0038
         >>> Constants.parse("A=5.17 B=0.25(2) cm-1").uncertainties["B"]

@@ -106,6 +106,8 @@ def integrate(
     ValueError
         A method that cannot serve an effect, with the one that can; a motion that does not stay finite.
 
+    Examples
+    --------
     >>> from rotor.classical.integrators.splitting import RotationSplitting
     >>> motion = integrate(RotationSplitting(step=0.01, order=4), [0.6, 0.8, 1.0], [1.8, 0.4, -0.9], [0.0, 10.0])
     >>> motion.momentum[-1].round(6).tolist()  # exact: 1.765963, -0.695464, 0.77955498

@@ -333,7 +333,7 @@ def frames(engine_input: EngineInput, settings: Settings, form: Form | None = No
         What is run.
     form : Form, optional
         What of the potential is not in `settings`; see `session`.
-    **options : object
+    options : object
         As of `session`.
 
     Returns

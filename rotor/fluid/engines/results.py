@@ -39,7 +39,7 @@ def run_engine(name: str, atoms: Any, settings: Settings, **options: Any) -> Eng
         The box.
     settings : Settings
         What is run.
-    **options : object
+    options : object
         Of the engine, see `rotor.fluid.engines.openmm.frames` and `rotor.fluid.engines.lammps.frames`.
 
     Returns
@@ -76,7 +76,7 @@ def engine_frames(name: str, engine_input: EngineInput, settings: Settings, **op
         The box as engines take it.
     settings : Settings
         What is run.
-    **options : object
+    options : object
         Of the engine.
 
     Returns

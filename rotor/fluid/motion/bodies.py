@@ -153,6 +153,8 @@ def bodies_of(
     ValueError
         An atom in no molecule or in two; a shape that departs from its species; a constraint on the atoms.
 
+    Examples
+    --------
     >>> from ase.build import molecule
     >>> bodies, pose = bodies_of(molecule("H2O"))
     >>> bodies.moments.round(2).tolist(), bodies.degrees().total

@@ -84,6 +84,8 @@ def zeeman_map(
     ValueError
         For a g tensor that does not have the symmetry of a linear or symmetric top, and fields beyond 1000 T.
 
+    Examples
+    --------
     >>> from rotor.tops.top import Top
     >>> found = zeeman_map(Top.from_constants("B=6000 MHz"), [0.0, 1.0], -0.03, j_highest=1)
     >>> rows = found.curve("1", 1)
