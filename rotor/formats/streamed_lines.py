@@ -222,7 +222,7 @@ def _ranges(plan: _Plan, piece_lines: int) -> Iterator[tuple[int, int]]:
 
 
 def _provenance(plan: _Plan, ranges: list[tuple[int, int]]) -> dict[str, Any]:
-    """The provenance of the list, which also tells pieces of another list from its own."""
+    """The provenance of the list, by which pieces of another list are recognised too."""
     return (
         {"program": "rotor", "version": version()}
         | plan.top.provenance
@@ -272,7 +272,7 @@ def _make_piece(plan: _Plan, first: int, last: int) -> None:
     levels = solve_levels(plan.top, top_j, jmin=first, effects=plan.effects)
     rotational = levels.rotational
     cut = intensity_cut(levels, plan.temperature_k, plan.partition.q, plan.min_lgint, plan.ground_mhz)
-    dipoles = dipoles_by_state(plan.top, plan.dipole_abc, plan.effects)
+    dipoles = dipoles_by_state(plan.top, plan.dipole_abc, levels.effects)
     found = all_transitions(levels, dipoles, plan.range_mhz, cut)
     own = np.minimum(rotational[found.upper], rotational[found.lower]) <= last
     trusted = are_trusted(plan.top, levels)

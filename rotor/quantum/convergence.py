@@ -18,13 +18,14 @@ from rotor.arrays import Floats
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.watson import SEMI_RIGID, Rigid, rigid_operators
 from rotor.quantum.levels import Levels, SolvedBlock
-from rotor.quantum.solve import hamiltonian
+from rotor.quantum.rotation import hamiltonian
 from rotor.quantum.wang_matrix import JMatrix, block_bands, scalar_energy
 from rotor.tops.operators import Operators
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
 
+HALF = 0.5 - 1e-6  # two functions that share a level evenly are not mixed by more than half
 RATIO_LIMIT = 0.3  # of successive orders, above which the series is said not to converge
 
 
@@ -133,10 +134,25 @@ def warnings_of(top: Top, levels: Levels) -> tuple[str, ...]:
     """The limits of these levels, in sentences; empty where there are none.
 
     That the distortion series does not converge at the highest J and K of the levels, and from which J on; that in
-    some blocks energies are not in the order of the rigid top any more, so that Ka and Kc only count states. Levels
-    solved without vectors are judged by the first alone.
+    some blocks energies are not in the order of the rigid top any more, so that Ka and Kc only count states; that states or
+    species share levels so evenly that their names say little. Levels solved without vectors are judged by the first alone.
     """
-    return tuple(sentence for sentence in (_divergence(top, levels), _disorder(top, levels)) if sentence)
+    return tuple(text for text in (_divergence(top, levels), _disorder(top, levels), _mixture(levels)) if text)
+
+
+def _mixture(levels: Levels) -> str:
+    """How many levels have less than half of what they are called after."""
+    if levels.mixing is None:
+        return ""
+    mixed = levels.mixing < HALF
+    if not mixed.any():
+        return ""
+    lowest, total = int(np.argmin(levels.mixing)), "N" if "n" in levels.quanta else "J"
+    name, first = levels.labels(np.array([lowest]))[0].strip(), int(levels.rotational[mixed].min())
+    return (
+        f"{int(mixed.sum())} levels from {total} = {first} on are mixed by more than 50 %: what they are called after has less than "
+        f"half of them (least {levels.mixing[lowest]:.0%}: {name})"
+    )
 
 
 def _divergence(top: Top, levels: Levels) -> str:

@@ -199,8 +199,13 @@ def _weights(top: Top, effects: tuple[QuantumEffect, ...], levels: Levels) -> In
 
 
 def _refuse_mixed_weights(levels: Levels) -> None:
-    """States of one block have one symmetry, so that their nuclear-spin weights are one number."""
+    """States of one block have one symmetry, so that their nuclear-spin weights are one number.
+
+    The functions of a Wang block of a symmetric top differ in K, and where nothing connects it to another they do not mix.
+    """
     for block in levels.blocks:
+        if len(block.parts) == 1 and levels.kind in ("prolate", "oblate"):
+            continue
         found = levels.weight[block.start : block.start + len(block.energies_mhz)]
         if len(found) and (found != found[0]).any():
             row = block.start + int(np.argmax(found != found[0]))

@@ -101,7 +101,7 @@ class QuantumEffect(ABC):
         """What connects states of different v."""
         return ()
 
-    def kept(self, top: Top) -> frozenset[str]:
+    def conserved_sums(self, top: Top) -> frozenset[str]:
         """Sums of angular momenta (n, j, f1, ...) that are taken for good ones, elements between different values left out."""
         return frozenset()
 

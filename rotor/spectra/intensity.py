@@ -100,7 +100,8 @@ def population(levels: Levels, temperature_k: float, q: float, ground_mhz: float
         Pure numbers.
     """
     above_k = (levels.energy_mhz - (levels.ground_mhz if ground_mhz is None else ground_mhz)) / units.MHZ_PER_K
-    return np.asarray(levels.weight_per_component / q * np.exp(-above_k / temperature_k))
+    exponent = np.minimum(-above_k / temperature_k, 600.0)  # levels that mean nothing may lie far below the ground
+    return np.asarray(levels.weight_per_component / q * np.exp(exponent))
 
 
 def largest(values: Floats, count: int) -> Ints:

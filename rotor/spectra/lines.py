@@ -38,7 +38,7 @@ from rotor.spectra.intensity import (
 )
 from rotor.spectra.transitions import all_transitions
 from rotor.thermo import PartitionFunction, VibrationalStates, partition_function
-from rotor.thermo.trusted_levels import are_trusted
+from rotor.thermo.trusted_levels import are_trusted, in_level_table
 from rotor.tops.covariance import Covariance
 
 if TYPE_CHECKING:
@@ -99,8 +99,15 @@ class Lines(TransitionTable):
         exact = [name for name in self.top.constants.values if name not in known]
         partly = f"errors of frequencies take {', '.join(exact)} as exact: their uncertainty is not known"
         beyond = f"{self.untrusted} lines of levels beyond the reach of the distortion constants are left out"
-        found = warnings_of(self.top, self.levels) + ((beyond,) if self.untrusted else ())
+        found = () if self._tabulated else warnings_of(self.top, self.levels)
+        found += (beyond,) if self.untrusted else ()
         return found + ((partly,) if known and exact else ())
+
+    @property
+    def _tabulated(self) -> bool:
+        """Whether every line is between levels of the top's table, so that the distortion series does not matter."""
+        known = in_level_table(self.top, self.levels)
+        return known is not None and bool(known[self.upper].all() and known[self.lower].all())
 
     @cached_property
     def spread(self) -> Floats | None:

@@ -2,7 +2,7 @@
 
 A structure is refined along totally symmetric displacements u (an orthonormal basis S of those Cartesian displacements that
 every operation leaves alike, translations and rotations taken out), so that x = x₀ + S u retains its point group whatever is
-fitted. Named coordinates q(x) are set by Newton's method, S δu = S (B S)⁺ (q_wanted - q(x)), B the matrix of Wilson; what the
+fitted. Named coordinates q(x) are set by Newton's method, S δu = S (B S)⁺ (q_asked - q(x)), B the matrix of Wilson; what the
 names leave open moves as little as it can (the pseudo-inverse).
 """
 

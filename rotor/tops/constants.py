@@ -253,7 +253,7 @@ def ray_kappa(a: float, b: float, c: float) -> float:
     if math.isinf(a):
         return -1.0
     if not a >= b >= c or a == c:
-        raise ValueError(f"Ray's κ of A = {a!r}, B = {b!r}, C = {c!r}: it wants A >= B >= C and A > C")
+        raise ValueError(f"Ray's κ of A = {a!r}, B = {b!r}, C = {c!r}: expected A >= B >= C and A > C")
     return (2 * b - a - c) / (a - c)
 
 
@@ -389,7 +389,7 @@ def _kind(values: Mapping[str, float], kind: str | None) -> str:
         "asymmetric": given == "ABC",
     }
     if not fits[kind]:
-        wants = {
+        needed = {
             "linear": "B alone",
             "spherical": "B, or equal A, B, C",
             "prolate": "A and B, or A, B, C with B = C exactly",
@@ -397,7 +397,7 @@ def _kind(values: Mapping[str, float], kind: str | None) -> str:
             "asymmetric": "A, B and C",
         }[kind]
         have = ", ".join(f"{name} = {values[name]!r}" for name in given) or "none of A, B, C"
-        raise ValueError(f"kind {kind!r} wants {wants}, but the constants have {have}")
+        raise ValueError(f"kind {kind!r} needs {needed}, but the constants have {have}")
     return kind
 
 

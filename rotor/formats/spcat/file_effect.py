@@ -106,7 +106,7 @@ class FileEffect(QuantumEffect):
 
     lines: with the file's numbers of states. numbers: the states taken, in their order here. coupled: the spins by place. moments:
     dipoles in debye by pairs of numbers here. limits: least and largest K of states, by number here. others: moments of other kinds.
-    ixx: which sums of angular momenta are kept, bit by bit from N on. pairs: l-doubled states, by number here.
+    ixx: which sums of angular momenta are conserved, bit by bit from N on. pairs: l-doubled states, by number here.
     """
 
     name: ClassVar[str] = ""
@@ -206,8 +206,8 @@ class FileEffect(QuantumEffect):
         """The moments of other kinds of the .int file."""
         return self.others
 
-    def kept(self, top: Top) -> frozenset[str]:
-        """The sums that IXX keeps."""
+    def conserved_sums(self, top: Top) -> frozenset[str]:
+        """The sums that IXX holds for conserved."""
         sums = ("n", *Scheme(self.coupled).names)
         return frozenset(name for bit, name in enumerate(sums) if self.ixx >> bit & 1)
 

@@ -2,7 +2,7 @@
 
 Quantum numbers are N, then nothing, K or Ka Kc, then v where there are several states, then J, F1, ... F, half-integers rounded up.
 Where that makes more than six (ten, where NLINE is negative), one number that counts the coupling patterns stands for all but F.
-QNFMT = 100 Q + 10 H + NQN: Q tells the kind of quanta, H in binary which of the last ones are half-integers.
+QNFMT = 100 Q + 10 H + NQN: Q is the kind of quanta, H in binary which of the last ones are half-integers.
 """
 
 from __future__ import annotations

@@ -22,7 +22,7 @@ from rotor.formats.spcat.states import StateOptions, states_of
 from rotor.quantum.levels import Levels
 from rotor.quantum.moments import DEBYE_PER_BOHR_MAGNETON, Moment
 from rotor.quantum.solve import solve_levels
-from rotor.quantum.spins.blocks import levels_of_f
+from rotor.quantum.spins.levels import levels_of_f
 from rotor.quantum.spins.operators import is_axial
 from rotor.quantum.spins.terms import Spin
 from rotor.tops.constants import Constants

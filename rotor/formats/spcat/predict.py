@@ -26,7 +26,8 @@ from rotor.formats.spcat.par import Options, ParameterFile, read_par
 from rotor.formats.spcat.predict_states import is_plain, predicted
 from rotor.quantum.basis import wang_blocks
 from rotor.quantum.levels import Levels
-from rotor.quantum.solve import hamiltonian, solve_levels
+from rotor.quantum.rotation import hamiltonian
+from rotor.quantum.solve import solve_levels
 from rotor.quantum.wang_matrix import JMatrix, block_bands
 from rotor.spectra.lines import Lines, line_list
 from rotor.thermo import PartitionFunction, partition_function
@@ -185,7 +186,7 @@ def _parts_doublets(levels: Levels, options: Options) -> bool:
 def _parted_doublets(merged: Catalogue, fold: int) -> Catalogue:
     """Each line of a K doublet as the two lines that the program prints.
 
-    Where K is a multiple of the fold the two states of a doublet differ in symmetry (A1, A2); the program tells them by
+    Where K is a multiple of the fold the two states of a doublet differ in symmetry (A1, A2); the program distinguishes them by
     the sign of K, and a line with ΔK = 0 joins -K to K. The others (E) are printed twice with one label. Lines with
     ΔK ≠ 0 stay as they are.
     """

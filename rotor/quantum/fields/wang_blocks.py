@@ -128,6 +128,10 @@ class WangSpace(FieldSpace):
                     out.append((up, low, contraction.rank % 2))
         return out
 
+    def connected(self, contraction: Contraction) -> list[tuple[int, int]]:
+        """Pairs (up, low) of solved blocks that the body part of a contraction connects."""
+        return list(self._pairs(contraction))
+
     @cached_property
     def _cache(self) -> dict[Any, Any]:
         return {}
@@ -231,9 +235,10 @@ def coloured_components(
 def wang_space(top: Top, jmax: int, contractions: Sequence[Contraction]) -> WangSpace:
     """The space of a top whose tensors do not have the axis of a symmetric top."""
     from rotor.quantum.effects.watson import SEMI_RIGID
-    from rotor.quantum.solve import representation_of, solve_rotation
+    from rotor.quantum.rotation import representation_of, solve_rotation
+    from rotor.tops.state_rules import one_state
 
-    levels = solve_rotation(top, SEMI_RIGID, 0, jmax, in_blocks=True)
+    levels = solve_rotation(one_state(top, "levels in a field"), SEMI_RIGID, 0, jmax, in_blocks=True)
     quanta = {name: column for name, column in levels.quanta.items() if name != "j"}
     free = FreeLevels(levels.rotational, levels.energy_mhz, quanta, levels.weight_per_component)
     return WangSpace(free, jmax, representation_of(top), levels.blocks, tuple(contractions))

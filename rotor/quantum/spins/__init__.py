@@ -59,7 +59,7 @@ def spin_levels(
     Levels
         Energies in MHz; half-integer quantum numbers are doubled.
     """
-    from rotor.quantum.spins.blocks import levels_of_f
+    from rotor.quantum.spins.levels import levels_of_f
 
     total = scheme_of(top, effects).total
     first = max(2 * jmin - total, total % 2)

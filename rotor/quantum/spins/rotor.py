@@ -17,9 +17,9 @@ from rotor.quantum.basis import names_of
 from rotor.quantum.coupled import CoupledBlock
 from rotor.quantum.effect import k_limits_of
 from rotor.quantum.levels import SolvedBlock
-from rotor.quantum.solve import hamiltonian, solve_rotation
+from rotor.quantum.rotation import hamiltonian, solve_rotation
 from rotor.quantum.spins.operators import EVERY_STATE, AxialState, Basis, Rotor, is_axial, summed
-from rotor.quantum.spins.scheme import Scheme
+from rotor.quantum.spins.scheme import Scheme, scheme_of
 from rotor.quantum.spins.terms import SpinTerm
 
 if TYPE_CHECKING:
@@ -116,7 +116,8 @@ def _all_axial(top: Top, effects: tuple[QuantumEffect, ...], terms: Terms) -> bo
     axis = "a" if top.kind == "prolate" else "c"
     if k_limits_of(top, effects) or any(n for _, _, n in hamiltonian(top, effects)):
         return False
-    if not all(is_axial(term.rotor, axis) for _, term in terms):
+    channels = channels_of(terms, scheme_of(top, effects))  # C_bb and C_cc are axial together where they are equal
+    if not all(is_axial(piece.rotor, axis) for pieces in channels.values() for piece in pieces):
         return False
     own = (effect.j_operator(top, name, 1, "Ir") for effect in effects for name in effect.parameters(top))
     states = any(effect.states(top) or effect.couplings(top) for effect in effects)
