@@ -135,6 +135,8 @@ class Molecule:
         ValueError
             An atom or element that the molecule does not have, or an isotope of another element.
 
+        Examples
+        --------
         >>> Molecule(("C", "O"), [[0, 0, 0], [0, 0, 1.128]]).with_isotopes("O=18O").mass_numbers
         (12, 18)
         """

@@ -48,6 +48,8 @@ def plot(thing: Any, path: str | os.PathLike[str] | None = None, **options: Any)
     ValueError
         A thing that there is no picture of; a suffix that is no picture.
 
+    Examples
+    --------
     >>> from rotor.spectra.lines import line_list
     >>> from rotor.tops.top import Top
     >>> figure = plot(line_list(Top.from_constants("B=57.6 GHz", dipole_abc_debye=(0.1, 0, 0)), jmax=5))

@@ -98,6 +98,11 @@ def spectrum_figure(
     log : bool, optional
         Whether the axis of intensity is logarithmic; else it is where fewer than ten lines would be seen on a linear one.
 
+    Returns
+    -------
+    matplotlib.figure.Figure
+        One panel.
+
     Raises
     ------
     ValueError

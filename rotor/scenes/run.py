@@ -64,6 +64,8 @@ def run_scene(
     ValueError
         What the scene asks for cannot be: with the key. Nothing is written then.
 
+    Examples
+    --------
     >>> from rotor.scenes.scene import LevelsScene
     >>> len(run_scene(LevelsScene(molecule="CO")).table)
     11

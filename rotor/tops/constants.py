@@ -197,12 +197,8 @@ class Constants:
         ----------
         text : str
             Names and values.
-        reduction : str, optional
-            "A" or "S", for a top with distortion that needs one.
-        representation : str, optional
-            Which principal axes are x, y, z: "Ir", "IIIl", ...
-        kind : str, optional
-            "linear", "prolate", "oblate", "spherical" or "asymmetric"; by default what the names and values say.
+        reduction, representation, kind : str, optional
+            "A" or "S"; which axes are x, y, z ("Ir", ...); kind of top. By default what the names and values say.
 
         Returns
         -------

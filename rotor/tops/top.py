@@ -140,7 +140,7 @@ class Top:
             Along the principal axes.
         spin_weights : SpinWeights or dict of str to int, optional
             Nuclear-spin weights; 1 for all by default.
-        **others : object
+        others : object
             Any further field of `Top`.
 
         Returns

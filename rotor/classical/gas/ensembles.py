@@ -146,6 +146,8 @@ def thermal_momenta(moments: ArrayLike, kt: float, size: int, *, rng: np.random.
     (size, 3) array
         L in √(moment x energy), any coherent units; L_i is normal of variance I_i kT.
 
+    Examples
+    --------
     >>> thermal_momenta([0.0, 2.0, 2.0], 1.5, 1000, rng=np.random.default_rng(3)).std(axis=0).round(1)
     array([0. , 1.7, 1.8])
     """
@@ -186,6 +188,8 @@ def thermal_ensemble(
     ValueError
         Moments, kT or a mass that cannot be.
 
+    Examples
+    --------
     >>> gas = thermal_ensemble([0.6, 1.3, 1.9], 0.0258, 1000, rng=np.random.default_rng(1), mass=18.0)
     >>> sorted(gas.kinetic.counts)
     ['rotation a', 'rotation b', 'rotation c', 'translation x', 'translation y', 'translation z']

@@ -34,7 +34,24 @@ def request(scene: LevelsScene, folder: Where = ".") -> LevelsRequest:
 
 
 def answer(asked: LevelsRequest, scene: LevelsScene, out: Where, executor: Executor | None) -> LevelsAnswer:
-    """The levels."""
+    """The levels.
+
+    Parameters
+    ----------
+    asked : LevelsRequest
+        The scene as the library takes it, checked.
+    scene : LevelsScene
+        Not used.
+    out : path
+        Not used.
+    executor : Executor or None
+        Its workers share the work.
+
+    Returns
+    -------
+    LevelsAnswer
+        Levels with their energies.
+    """
     return answer_levels(asked, executor)
 
 

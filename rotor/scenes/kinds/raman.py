@@ -41,7 +41,24 @@ def request(scene: RamanScene, folder: Where = ".") -> RamanRequest:
 
 
 def answer(asked: RamanRequest, scene: RamanScene, out: Where, executor: Executor | None) -> RamanAnswer:
-    """The lines."""
+    """The lines.
+
+    Parameters
+    ----------
+    asked : RamanRequest
+        The scene as the library takes it, checked.
+    scene : RamanScene
+        Not used.
+    out : path
+        Not used.
+    executor : Executor or None
+        Its workers share the work.
+
+    Returns
+    -------
+    RamanAnswer
+        Raman lines.
+    """
     return answer_raman(asked, executor)
 
 
