@@ -23,7 +23,8 @@ from rotor.formats.spcat.file_lines import LEAST_MHZ
 from rotor.formats.spcat.int_file import IntensityFile, Request, read_int
 from rotor.formats.spcat.model import FOLD, common_weight, top_of
 from rotor.formats.spcat.par import Options, ParameterFile, read_par
-from rotor.formats.spcat.predict_states import is_plain, predicted
+from rotor.formats.spcat.predict_states import predicted
+from rotor.formats.spcat.states import is_plain
 from rotor.quantum.basis import wang_blocks
 from rotor.quantum.levels import Levels
 from rotor.quantum.solve import hamiltonian, solve_levels

@@ -29,7 +29,6 @@ from rotor.formats.spcat.file_lines import (
 from rotor.formats.spcat.file_model import Group, groups_of
 from rotor.formats.spcat.int_file import IntensityFile, Request
 from rotor.formats.spcat.par import ParameterFile
-from rotor.formats.spcat.states import doubled_spins
 from rotor.quantum.levels import Levels
 from rotor.spectra.lines import Lines
 from rotor.spectra.transitions import Transitions
@@ -39,23 +38,6 @@ from rotor.tops.top import Top
 _TAIL = 1e-7  # of Q: what may lie beyond the last F
 _STEP = 8  # F that are added to Q at a time
 _LAST = 2000
-
-
-def is_plain(parameters: ParameterFile, intensities: IntensityFile | None) -> bool:
-    """Whether a file has one state, no spin and operators of orthorhombic symmetry, so that its constants have names."""
-    first = parameters.options[0]
-    one = abs(first.nvib) == 1 and len(parameters.options) == 1 and not doubled_spins(first.spind)
-    if not one or first.knmin != 0 or first.iax not in (0, 1, 2, 3, 6, 9) or first.ixx:
-        return False
-    if first.spind < 0 and first.knmax and first.wtpl != first.wtmn:  # the two levels of one K weigh differently
-        return False
-    digits = [split_code(parameter.code) for parameter in parameters.parameters]
-    orthorhombic = all(
-        not (d.i1 or d.i2 or d.ns) and (d.typ < 12 or d.typ >= 80) and (d.v1, d.v2) in ((0, 0), (9, 9)) for d in digits
-    )
-    energies = any(not any(d[:8]) for d in digits)
-    own = intensities is None or all(dipole.code in (1, 2, 3) for dipole in intensities.dipoles)
-    return orthorhombic and own and not energies
 
 
 def predicted(
