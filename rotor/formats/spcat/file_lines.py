@@ -151,9 +151,10 @@ class GroupLines:
     g_upper: Ints
     upper: Ints
     lower: Ints
+    error_mhz: Floats
 
 
-_COLUMNS = ("frequency_mhz", "intensity", "energy_lower_mhz", "g_upper", "upper", "lower")
+_COLUMNS = ("frequency_mhz", "intensity", "energy_lower_mhz", "g_upper", "upper", "lower", "error_mhz")
 
 
 def transitions_of(group: Group, levels: Levels) -> Transitions:
@@ -181,8 +182,19 @@ def within(request: Request, frequency_mhz: Floats, intensity: Floats) -> NDArra
     return np.asarray(limits & (intensity > least))
 
 
-def lines_of(group: Group, levels: Levels, found: Transitions, form: Format, request: Request, q: float) -> GroupLines:
-    """The lines of a group within the limits of an .int file, with intensities in nm² MHz, those of one component."""
+def lines_of(
+    group: Group,
+    levels: Levels,
+    found: Transitions,
+    form: Format,
+    request: Request,
+    q: float,
+    spread: Floats | None = None,
+) -> GroupLines:
+    """The lines of a group within the limits of an .int file, with intensities in nm² MHz, those of one component.
+
+    spread : (levels, k) in MHz, whose differences have the errors of the lines as their lengths; errors are 0 without
+    """
     count = np.maximum(levels.components[found.upper], levels.components[found.lower])
     weight = (levels.weight // levels.components)[found.lower]
     energy, kt = levels.energy_mhz[found.lower], request.temperature_k * units.MHZ_PER_K
@@ -190,7 +202,9 @@ def lines_of(group: Group, levels: Levels, found: Transitions, form: Format, req
     intensity = LGINT_NM2_MHZ / q * found.frequency_mhz * found.strength_debye2 / count * weight * below
     chosen = np.flatnonzero(within(request, found.frequency_mhz, intensity))
     up, low = found.upper[chosen], found.lower[chosen]
-    columns = (found.frequency_mhz[chosen], intensity[chosen], energy[chosen], levels.multiplicity[up] * weight[chosen])
+    error = np.zeros(len(chosen)) if spread is None else np.linalg.norm(spread[up] - spread[low], axis=1)
+    g_upper = levels.multiplicity[up] * weight[chosen]
+    columns = (found.frequency_mhz[chosen], intensity[chosen], energy[chosen], g_upper, error)
     pair = levels.components[up], levels.components[low]
     count = np.maximum(*pair)
     plus, minus = (quanta_of(group, levels, form, negative) for negative in (False, True))
@@ -206,8 +220,8 @@ def lines_of(group: Group, levels: Levels, found: Transitions, form: Format, req
     ]
     index = np.concatenate([piece[0] for piece in pieces])
     upper, lower = (np.concatenate([piece[i] for piece in pieces]) for i in (1, 2))
-    frequency, strength, energy, g = (column[index] for column in columns)
-    return GroupLines(frequency, strength, energy, g, upper, lower)
+    frequency, strength, energy, g, error = (column[index] for column in columns)
+    return GroupLines(frequency, strength, energy, g, upper, lower, error)
 
 
 def as_catalogue(lines: list[tuple[GroupLines, int]], form: Format, tag: int, dr: int) -> Catalogue:
@@ -225,6 +239,7 @@ def as_catalogue(lines: list[tuple[GroupLines, int]], form: Format, tag: int, dr
         lgint = np.log10(joined["intensity"][order])
     numbers = {
         "frequency_mhz": joined["frequency_mhz"][order],
+        "error_mhz": joined["error_mhz"][order],
         "lgint": lgint,
         "energy_lower_cm": joined["energy_lower_mhz"][order] / units.MHZ_PER_CM,
         "g_upper": joined["g_upper"][order],

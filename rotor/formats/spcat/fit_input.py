@@ -25,11 +25,10 @@ from rotor.formats.spcat.lin import LineList, line_list, note_of_defaults, read_
 from rotor.formats.spcat.model import parameter_file
 from rotor.formats.spcat.par import Header, Parameter, ParameterFile, read_par
 from rotor.formats.spcat.states import is_plain
+from rotor.formats.spcat.variances import FREE_ABOVE
 from rotor.quantum.labelled import LevelModel
 from rotor.tops.constants import Constants
 from rotor.tops.top import Top
-
-FREE_ABOVE = 1e30  # an a-priori error so large is none
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +89,8 @@ def spfit_input(file: ParameterFile, lines: LineList, source: str = "") -> Spfit
         constants, matrix = constants_and_matrix(file)
         names, kmax = tuple(constants.values), _kmax(file, constants)
     else:
-        from rotor.formats.spcat.fit_states import FileLevels, line_names
+        from rotor.formats.spcat.fit_states import FileLevels
+        from rotor.formats.spcat.predict_states import line_names
 
         matrix, names = np.eye(len(file.parameters)), line_names(file)
         model = partial(FileLevels.of, file)

@@ -6,13 +6,14 @@ The other files go through `predict`, with constants by their names.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from rotor import units
-from rotor.arrays import Ints
+from rotor.arrays import Floats, Ints
 from rotor.formats.spcat.catalogue import Catalogue
 from rotor.formats.spcat.codes import constants_of, split_code
 from rotor.formats.spcat.egy import LevelList
@@ -29,6 +30,8 @@ from rotor.formats.spcat.file_lines import (
 from rotor.formats.spcat.file_model import Group, groups_of
 from rotor.formats.spcat.int_file import IntensityFile, Request
 from rotor.formats.spcat.par import ParameterFile
+from rotor.formats.spcat.variances import variance_factor
+from rotor.quantum.derivatives import level_derivatives
 from rotor.quantum.levels import Levels
 from rotor.spectra.lines import Lines
 from rotor.spectra.transitions import Transitions
@@ -50,14 +53,32 @@ def predicted(
     q = summed_q(groups, request.temperature_k).q if own_q else request.qrot
     solved = [(group, group.levels(f_range(group, request))) for group in groups]
     transitions = [transitions_of(group, levels) for group, levels in solved]
+    factor, names = variance_factor(parameters), line_names(parameters)
+    spreads = [level_spreads(group, levels, names, factor) for group, levels in solved]
     pieces = [
-        (lines_of(group, levels, found, form, request, q), form.qnfmt(group.spins))
-        for (group, levels), found in zip(solved, transitions, strict=True)
+        (lines_of(group, levels, found, form, request, q, spread), form.qnfmt(group.spins))
+        for (group, levels), found, spread in zip(solved, transitions, spreads, strict=True)
     ]
     made = as_catalogue(pieces, form, request.tag, 2 if all(s.linear for g in groups for s in g.states) else 3)
     notes = _notes(parameters, groups, request, as_spcat)
     lines = _lines(parameters, solved, transitions, form, request, q)
+    if factor is not None:
+        lines = replace(lines, given_spread=np.concatenate([one for one in spreads if one is not None]))
     return made, lines, q, as_level_list(solved, form), notes
+
+
+def line_names(file: ParameterFile) -> tuple[str, ...]:
+    """The parameter lines as `file_effect.coded_lines` names them."""
+    return tuple(f"{parameter.code}#{place}" for place, parameter in enumerate(file.parameters, 1))
+
+
+def level_spreads(group: Group, levels: Levels, names: Sequence[str], factor: Floats | None) -> Floats | None:
+    """What the covariance of a file's parameters makes of each level, ∂E/∂p F (levels, k) in MHz; None without one."""
+    if factor is None:
+        return None
+    own = tuple(group.effect.parameters(group.top))
+    rows = [names.index(name) for name in own]
+    return np.asarray(level_derivatives(group.top, levels, own) @ factor[rows])
 
 
 def f_range(group: Group, request: Request) -> tuple[int, int]:
