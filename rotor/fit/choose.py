@@ -412,11 +412,38 @@ def suggest_lines(
 def bootstrap(
     fit: Fit, samples: int, rng: np.random.Generator, options: FitOptions | None = None
 ) -> tuple[Floats, Floats]:
-    """Parameters (samples, n) of fits to lines drawn anew with replacement, and their standard deviations (n,).
+    """Parameters of fits to lines drawn anew with replacement, and their standard deviations.
 
-    Measured frequencies are drawn, blends as one. It needs no assumption about the errors but that the lines are independent;
-    where few lines fix a constant it comes out too large or infinite. Samples that determine fewer constants are drawn again,
-    at most ten times as many. Raises ValueError where that is not enough.
+    Measured frequencies are drawn, blends as one. Samples that determine fewer constants are drawn again, at most ten
+    times as many.
+
+    Parameters
+    ----------
+    fit : Fit
+        A finished fit of n parameters; each sample starts from its result.
+    samples : int
+        How many samples.
+    rng : numpy.random.Generator
+        Draws the lines.
+    options : FitOptions, optional
+        Of each fit.
+
+    Returns
+    -------
+    values : (samples, n) array
+        MHz.
+    deviations : (n,) array
+        Standard deviations, MHz.
+
+    Raises
+    ------
+    ValueError
+        Where ten times as many samples are not enough.
+
+    Notes
+    -----
+    It needs no assumption about the errors but that the lines are independent; where few lines fix a constant it comes
+    out too large or infinite.
     """
     groups = fit.lines.blend[fit.groups]
     members = {int(b): np.flatnonzero((fit.lines.blend == b) & fit.used) for b in groups}
