@@ -283,4 +283,4 @@ def _problem(
     if light is not None:
         fixed = fixed - MHZ_ANGSTROM3_W_PER_CM2 * intensity * block.dense(light)
     slope = -units.MHZ_PER_DEBYE_KV_PER_CM * block.dense(dipole)
-    return BlockProblem(fixed, slope, {name: block.dense(one) for name, one in names.items()})
+    return BlockProblem(fixed, slope, {name: partial(block.dense, one) for name, one in names.items()})
