@@ -19,10 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.direction_cosines import cosine_bands
-from rotor.quantum.field_blocks import AxialBlock
+from rotor.quantum.fields.blocks import AxialBlock
+from rotor.quantum.fields.direction_cosines import cosine_bands
+from rotor.quantum.fields.wang_blocks import WangBlockInField
 from rotor.quantum.tensors import frame_of, phase_exponent
-from rotor.quantum.wang_blocks import WangBlockInField
 
 Complexes = NDArray[np.complex128]
 EvenFunction = Callable[[Floats], Floats]
@@ -33,8 +33,8 @@ ROUND_OFF = 1e-9  # imaginary parts of elements, of the largest value of f
 def absolute_cosine(block: AxialBlock) -> Floats:
     """⟨J' k M| |cosθ| |J k M⟩ over a block (n, n) of a linear or symmetric top, θ of its figure axis; exact but for round-off.
 
-    >>> from rotor.quantum.field_blocks import Contraction
-    >>> from rotor.quantum.field_space import field_space
+    >>> from rotor.quantum.fields.blocks import Contraction
+    >>> from rotor.quantum.fields.space import field_space
     >>> from rotor.tops.top import Top
     >>> z2 = Contraction(np.diag([1.0, 0, 0]), np.diag([0, 0, 1.0]))
     >>> block = field_space(Top.from_constants("B=6000 MHz"), 2, [z2]).blocks(0)[0]

@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 
 from rotor.alignment.axis_functions import absolute_cosine, of_asymmetric
 from rotor.arrays import Floats, Ints
-from rotor.quantum.field_blocks import AxialBlock, Contraction, FieldBlock
-from rotor.quantum.wang_blocks import WangBlockInField
+from rotor.quantum.fields.blocks import AxialBlock, Contraction, FieldBlock
+from rotor.quantum.fields.wang_blocks import WangBlockInField
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top

@@ -21,13 +21,13 @@ The spins are coupled in the order in which they stand here.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import TYPE_CHECKING, Any
 
 from rotor.formats.molecule_tables import TableReader
 from rotor.tops.spin_constants import SpinConstants, parse_spins, spin_text, spins_of, twice_of
 
 if TYPE_CHECKING:
-    from rotor.formats.molecule_file import MoleculeFile
     from rotor.molecules.molecule import Molecule
 
 _OF_TABLE = ("unit", "source", "unverified")
@@ -94,17 +94,19 @@ def _own_name(label: str) -> tuple[str, ...]:
     return {"2H": ("D",), "3H": ("T",)}.get(label, ())
 
 
-def spin_tables(molecule: MoleculeFile) -> dict[str, dict[str, Any]]:
-    """The tables that a molecule file is written with, by name: that of all spins, and one for each."""
-    constants = molecule.spin_constants
+def spin_tables(constants: SpinConstants | None, unverified: Collection[str]) -> dict[str, dict[str, Any]]:
+    """The tables that a molecule file is written with, by name: that of all spins, and one for each.
+
+    unverified: names of tables that are marked so.
+    """
     if constants is None:
         return {}
-    marked = {"source": constants.source or None, "unverified": True if "spins" in molecule.unverified else None}
+    marked = {"source": constants.source or None, "unverified": True if "spins" in unverified else None}
     tables: dict[str, dict[str, Any]] = {"spins": {**marked, "unit": "MHz"}}
     for name, twice in constants.twice.items():
         tables[name] = {"spin": None if _is_isotope(name, twice) else spin_text(twice)}
         tables[name] |= {"atom": constants.atoms.get(name), "source": constants.sources.get(name)}
-        tables[name]["unverified"] = True if f"spins.{name}" in molecule.unverified else None
+        tables[name]["unverified"] = True if f"spins.{name}" in unverified else None
     for name, value in constants.values.items():
         key = ",".join(spins_of(name))
         error = constants.uncertainties.get(name)

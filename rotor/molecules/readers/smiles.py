@@ -268,6 +268,7 @@ def _optimised(mol: Any, text: str, count: int) -> tuple[list[float], str]:
             raise ValueError(f"SMILES {text!r}: no geometry found ({_reason(log.messages)}); give an xyz file")
         if mol.GetNumAtoms() == 1:
             return [0.0], ""
+        optimise: Any
         if rdForceFieldHelpers.MMFFHasAllMoleculeParams(mol):
             field, optimise = "MMFF94", rdForceFieldHelpers.MMFFOptimizeMoleculeConfs
         elif rdForceFieldHelpers.UFFHasAllMoleculeParams(mol):

@@ -23,8 +23,8 @@ from numpy.typing import ArrayLike
 
 from rotor import units
 from rotor.quantum.effect import QuantumEffect
-from rotor.quantum.field_blocks import Contraction, FieldBlock, FieldSpace
-from rotor.quantum.field_map import (
+from rotor.quantum.fields.blocks import Contraction, FieldBlock, FieldSpace
+from rotor.quantum.fields.field_map import (
     BlockProblem,
     FieldMap,
     MapRequest,
@@ -32,8 +32,8 @@ from rotor.quantum.field_map import (
     checked_tolerance_mhz,
     field_map,
 )
-from rotor.quantum.field_space import field_space
-from rotor.quantum.spin_fields import spin_field_space
+from rotor.quantum.fields.space import field_space
+from rotor.quantum.fields.spin_blocks import spin_field_space
 from rotor.quantum.spins import scheme_of
 
 if TYPE_CHECKING:

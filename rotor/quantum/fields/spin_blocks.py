@@ -22,13 +22,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.field_blocks import Contraction, FieldBlock, FieldSpace, FreeLevels
+from rotor.quantum.fields.blocks import Contraction, FieldBlock, FieldSpace, FreeLevels
+from rotor.quantum.fields.wang_blocks import coloured_components
 from rotor.quantum.spins import scheme_of, spin_amplitudes, spin_levels
 from rotor.quantum.spins.blocks import SpinBlock, SpinPart, product
 from rotor.quantum.spins.coupling import moment_coefficients, patterns, recoupling
 from rotor.quantum.spins.operators import AxialState, CosinesWithN
 from rotor.quantum.tensors import BodyTensor, body_tensor
-from rotor.quantum.wang_blocks import coloured_components
 from rotor.quantum.wigner import three_j
 
 if TYPE_CHECKING:

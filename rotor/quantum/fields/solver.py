@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats
-from rotor.quantum.field_chains import chain_states, is_chain
+from rotor.quantum.fields.chains import chain_states, is_chain
 
 Matrix = NDArray[Any]
 Terms = tuple[Matrix, ...]  # H_n (n, n)
