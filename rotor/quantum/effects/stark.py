@@ -33,7 +33,7 @@ from rotor.quantum.fields.field_map import (
     field_map,
 )
 from rotor.quantum.fields.space import field_space
-from rotor.quantum.fields.spin_blocks import spin_field_space
+from rotor.quantum.fields.spin_fields import spin_field_space
 from rotor.quantum.spins import scheme_of
 
 if TYPE_CHECKING:
@@ -160,7 +160,37 @@ def map_request(
     diabatic_gap_mhz: float | None = None,
     effects: Sequence[QuantumEffect] = (),
 ) -> MapRequest:
-    """What `stark_map` solves, every argument checked; parameters and errors are those of `stark_map`."""
+    """What `stark_map` solves, every argument checked.
+
+    Parameters
+    ----------
+    top : Top
+        With a dipole, or a polarizability where there is light.
+    fields_kv_per_cm : (f,) array
+        Static fields.
+    j_highest : int
+        States that come from levels up to this J are followed.
+    m_values : sequence of int or None
+        The |M| of the states; None for all.
+    intensity_w_per_cm2 : float
+        Of a laser beam polarised along Z; 0 for none.
+    direction : (3,) sequence, optional
+        Of the static field in space; Z by default.
+    tolerance_mhz : float, optional
+        By how much energies may move when J max is raised.
+    diabatic_gap_mhz : float, optional
+        Crossings with a smaller gap are passed diabatically; by default labels are adiabatic.
+
+    Returns
+    -------
+    MapRequest
+        Blocks, matrices and fields of the map.
+
+    Raises
+    ------
+    ValueError
+        As `stark_map` does, and for `m_values` beside a field at an angle with Z.
+    """
     fields = checked_fields(fields_kv_per_cm, "kV/cm", HIGHEST_KV_PER_CM)
     unit = checked_direction(direction)
     dipole, light = acting(top, intensity_w_per_cm2, unit)

@@ -37,7 +37,7 @@ from rotor.quantum.fields.field_map import (
     field_map,
 )
 from rotor.quantum.fields.space import axial_levels
-from rotor.quantum.fields.spin_blocks import Magnet, SpinFieldBlock, spin_field_space
+from rotor.quantum.fields.spin_fields import Magnet, SpinFieldBlock, spin_field_space
 from rotor.quantum.fields.wang_blocks import WangBlockInField, WangSpace, coloured_components, wang_space
 from rotor.quantum.j_operators import between_blocks, components
 from rotor.quantum.reduced import wang_amplitudes
