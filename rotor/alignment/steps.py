@@ -19,6 +19,8 @@ LARGEST_SPLIT = 700  # states of a block whose operator is still diagonalised
 MOST_STEPS = 200_000
 PILOT_COLUMNS = 64
 PILOT_TIMES = 256
+USUAL_TOLERANCE = 1e-8  # that 16 steps of a short pulse give
+ASYMPTOTIC = 1e-4  # error of a cosine below which it falls as the order of the method says
 
 
 @dataclass(frozen=True)
@@ -62,7 +64,9 @@ def pilot_of(problem: Problem, jmax: int) -> Pilot:
         return replace(_refined(problem, space, task, None), whole=whole)
     if whole:
         rule = "nystrom 4" if problem.tolerance >= 1e-10 else "nystrom 6"
-        return replace(_refined(problem, space, task, rule, 16), whole=True)
+        order = propagate.splitting(rule).order
+        first = max(16, math.ceil(16 * (USUAL_TOLERANCE / problem.tolerance) ** (1 / order)))
+        return replace(_refined(problem, space, task, rule, first, finer_order=order), whole=True)
     rules = propagate.SPLITTINGS if task.gradients is not None else propagate.SPLITTINGS[1:]
     best = _refined(problem, space, task, rules[0])
     for rule in rules[1:]:
@@ -77,11 +81,13 @@ def _refined(
     rule: str | None,
     first: int = FIRST_STEPS,
     below: Pilot | None = None,
+    finer_order: int = 0,
 ) -> Pilot:
     """About the fewest steps of a method whose error is below half the tolerance; `below` where that would cost more.
 
     The number of steps is doubled; the difference between a run and the next is taken as the error of the first. Of the number that
     is enough and its half, between which the answer lies, the place is taken where log(error) on a straight line meets the goal.
+    finer_order: of a method whose finer run serves as the answer, its error taken as the difference over half of what the order gives.
     """
     goal, before, factor = 0.5 * problem.tolerance, 0.0, 1
     counts = [first] * len(problem.windows)
@@ -91,6 +97,9 @@ def _refined(
         finer = _plan_of(problem, counts, rule, 2 * factor)
         check = run(replace(task, plan=finer))
         error = _difference(problem, space, task, outcome, check)
+        if finer_order and error <= ASYMPTOTIC and (left := error / 2 ** (finer_order - 1)) <= goal < error:
+            edge = _relative_edge(check, task)
+            return Pilot(finer, _steps_of(finer), left, edge, space, task, check)
         if error <= goal:
             edge, mine = _relative_edge(check, task), Pilot(plan, _steps_of(plan), error, 0.0, space, task, outcome)
             if before > error > 0:
