@@ -95,7 +95,7 @@ def command(context: typer.Context, options: Options, outputs: Outputs) -> None:
     with inputs.fields_as_options(**NAMES), frames_for(growing, files) as (growing, frames):
         request = _request(options, settings)
         answer, start = _answer(request, growing, outputs, {"command": context.obj, "input": options.source})
-        paths = _paths(answer, frames)
+        paths = _paths(answer, frames) if "--plot" in files.paths else None
     for remark in answer.notes:
         note(remark)
     grown = [growing.csv, *(outputs.trajectory or ()), growing.checkpoint, *files.paths.values()]
@@ -125,20 +125,23 @@ def _paths(answer: FluidAnswer, frames: str | None) -> Floats:
     from ase.io import read
 
     from rotor.fluid.forces.models import models_of, shapes_of
+    from rotor.fluid.initial_box import model_labels
     from rotor.fluid.motion.bodies import bodies_of
 
-    shapes = shapes_of(models_of(answer.request.settings.model))
+    models = models_of(answer.request.settings.model)
+    shapes = shapes_of(models)
     taken = read(frames, ":") if frames is not None else [answer.atoms]
     for atoms in taken:
         if "molecule" not in atoms.arrays:
-            atoms.arrays["molecule"] = answer.atoms.arrays["molecule"]
+            atoms.arrays["molecule"] = model_labels(atoms, models)
     return np.array([bodies_of(atoms, shapes=shapes)[1].centres for atoms in taken[len(taken) // 2 :]])
 
 
-def _draw(answer: FluidAnswer, paths: Floats, path: Path, command: str) -> None:
+def _draw(answer: FluidAnswer, paths: Floats | None, path: Path, command: str) -> None:
     from rotor.fluid.analysis import pair_distribution
     from rotor.plots.fluid import plot_fluid
 
+    assert paths is not None
     atoms, settings = answer.atoms, answer.request.settings
     edges = atoms.cell.lengths()
     shells = None

@@ -20,7 +20,7 @@ from rotor.spectra.emission import Emission, Source, emission, planck_k, source_
 from rotor.spectra.lines import Lines, line_list
 from rotor.spectra.opacity import NM2_IN_CM2
 from rotor.spectra.profiles import gaussian
-from rotor.table import Table
+from rotor.table import Table, TextOf
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
@@ -108,9 +108,11 @@ class EmissionLines(Table):
         }
 
 
-@dataclass(frozen=True)
-class EmissionAnswer:
+@dataclass(frozen=True, repr=False)
+class EmissionAnswer(TextOf):
     """The spectrum of all molecules together, of each, and their lines."""
+
+    shown = "lines"
 
     request: EmissionRequest
     spectrum: Emission

@@ -20,6 +20,7 @@ from rotor.spectra.raman import (
     band_cross_section,
     raman_lines,
 )
+from rotor.table import TextOf
 from rotor.thermo import VibrationalStates
 from rotor.thermo.request import partition_facts
 from rotor.tops.facts import top_facts
@@ -62,9 +63,11 @@ class RamanRequest:
             )
 
 
-@dataclass(frozen=True)
-class RamanAnswer:
+@dataclass(frozen=True, repr=False)
+class RamanAnswer(TextOf):
     """The Raman lines that a request asked for."""
+
+    shown = "lines"
 
     request: RamanRequest
     lines: RamanLines
