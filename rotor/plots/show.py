@@ -18,10 +18,10 @@ from rotor.fluid.request import FluidAnswer
 from rotor.formats.spcat.catalogue import Catalogue
 from rotor.formats.spcat.compare import Comparison
 from rotor.plots.picture import save
-from rotor.quantum.field_map import FieldMap
+from rotor.quantum.fields.field_map import FieldMap
+from rotor.quantum.fields.stark_request import StarkAnswer
 from rotor.quantum.levels import Levels
 from rotor.quantum.request import LevelsAnswer, SelectedLevels
-from rotor.quantum.stark_request import StarkAnswer
 from rotor.spectra.emission_request import EmissionAnswer
 from rotor.spectra.lines import Lines
 from rotor.spectra.raman import RamanLines
