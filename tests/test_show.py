@@ -54,7 +54,12 @@ def test_a_figure_of_everything(things, kind, tmp_path):
     figure = rotor.plot(things[kind], tmp_path / "a.png")
     assert isinstance(figure, Figure)
     axes = figure.axes[0]
-    assert axes.get_xlabel() or axes.get_xticklabels() or kind in ("motion", "tumble answer")
+    assert (
+        axes.get_xlabel()
+        or axes.get_xticklabels()
+        or figure.axes[-1].get_xlabel()
+        or kind in ("motion", "tumble answer")
+    )
     assert axes.lines or axes.collections or axes.patches
     assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG")
 
@@ -81,7 +86,7 @@ def test_tops_molecules_and_constants_are_one_line():
 
 
 def test_what_cannot_be_drawn_is_refused(tmp_path):
-    with pytest.raises(ValueError, match=r"there is no picture of a int; there are pictures of Catalogue, .*Lines"):
+    with pytest.raises(ValueError, match=r"there is no picture of a int; there are pictures of .*Catalogue, .*Lines"):
         rotor.plot(3)
     with pytest.raises(ValueError, match=r"\.png, \.pdf or \.svg"):
         rotor.plot(rotor.line_list("CO", jmax=3), tmp_path / "a.txt")

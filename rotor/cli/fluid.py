@@ -254,8 +254,15 @@ def _claim(content: dict[str, Any], settings: Settings) -> str:
     return "" if content["engine"] == "lammps" and settings.ensemble != "nve" else ": no error of order h²"
 
 
+def _hill(symbols: str) -> str:
+    """A formula in Hill's order: OH2 is H2O."""
+    from ase.formula import Formula
+
+    return str(Formula(symbols).format("hill"))
+
+
 def _show(content: dict[str, Any], settings: Settings) -> None:
-    kinds = ", ".join(f"{kind['count']} {kind['name']}" for kind in content["molecules"])
+    kinds = ", ".join(f"{kind['count']} {_hill(kind['name'])}" for kind in content["molecules"])
     degrees = content["degrees"]
     print(f"{kinds}: {settings.steps} steps of {settings.step_fs:g} fs, {settings.ensemble}, by {content['engine']}")
     rms, drift = content["conserved_rms_ev"], content["conserved_drift_ev_per_ns"]

@@ -189,7 +189,9 @@ def _line_table(number: int, lines: Lines, source: Source) -> EmissionLines:
     contrast = planck_k(observed, source.excitation_k) - planck_k(observed, source.background_k)
     integral = np.array([_across(one) for one in depth]) * source.fwhm_km_s
     upper_cm = lines.energy_lower_cm + lines.frequency_mhz / units.MHZ_PER_CM
-    labels = [tuple(lines.levels.labels(states)) for states in (lines.upper, lines.lower)]
+    labels = [
+        tuple(" ".join(text.split()) for text in lines.levels.labels(states)) for states in (lines.upper, lines.lower)
+    ]
     return EmissionLines(
         molecule=np.full(len(lines), number, dtype=np.int64),
         row=np.arange(len(lines)),
