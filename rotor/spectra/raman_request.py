@@ -11,6 +11,7 @@ from rotor.arrays import Ints
 from rotor.checks import require_between, require_positive, require_whole
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.watson import SEMI_RIGID
+from rotor.quantum.limits import limit_facts, populated_j
 from rotor.spectra.intensity import largest
 from rotor.spectra.raman import (
     DEFAULT_LASER_NM,
@@ -108,6 +109,7 @@ class RamanAnswer(TextOf):
             "jmax_source": self.jmax_source,
             "min_relative": self.request.min_relative,
             "line_count": len(lines),
+            **limit_facts(lines.top, populated_j(lines.top, lines.temperature_k), lines.levels.effects),
         }
 
 
