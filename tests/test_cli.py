@@ -26,11 +26,12 @@ INFO = """
     representation rotational_constants_mhz rotational_constants_cm kappa moments_u_angstrom2 planar_moments_u_angstrom2
     inertial_defect_u_angstrom2 frame dipole_abc_debye dipole_source
     polarizability_abc_angstrom3 polarizability_source spin_weights spin_weights_source spin_constants_mhz spins spin_constants_source
+    states
     partition_function source notes sizes_at_j effects limits splitting_nuclei
 """
 SPECTRUM = """
     temperature_k q jmax jmax_source min_lgint range_mhz line_count profile fwhm_mhz pressure_bar path_cm column_per_cm2 optical_depth
-    strongest lines files
+    hyperfine strongest lines files
 """
 INFO_KEYS = set(INFO.split())
 SPECTRUM_KEYS = (INFO_KEYS - {"partition_function"}) | set(SPECTRUM.split())

@@ -37,7 +37,7 @@ def test_the_unit_of_field_gradients():
     ("source", "name"),
     [
         ("CH3OH", "internal rotation"), ("CH3CHO", "internal rotation"), ("camphor", "internal rotation"),
-        ("NH3", "inversion"), ("SMILES:CN", "inversion"), ("O2", "electron spin"), ("HCN", "nuclear quadrupole"),
+        ("SMILES:CN", "inversion"), ("O2", "electron spin"), ("HCN", "nuclear quadrupole"),
         ("D2O", "nuclear quadrupole"), ("CH3Cl", "nuclear quadrupole"), ("SMILES:CO", "error of the geometry"),
         ("CH3OH", "centrifugal distortion"), ("water", "magnetic coupling of nuclear spins"),
     ],

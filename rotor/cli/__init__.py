@@ -39,7 +39,10 @@ VERBS = {  # and what the list of verbs says of each, short enough for 80 column
     "structure": "Structures from the constants of isotopologues.",
     "convert": "Constants from one file format into another.",
     "cat": "A catalogue as a table, filtered or compared.",
+    "new": "A commented scene file to begin with.",
+    "run": "A scene file run; a sweep goes on where it stopped.",
 }
+FILES = {"run": "run_scene"}  # of verbs that this module has a function for
 COMPLETION = "_ROTOR_COMPLETE"  # set by a shell that asks for completions
 NO_ANSWER, WRONG_INPUT, INTERRUPTED, TERMINATED = 1, 2, 130, 143
 # click's ClickException, whether click is a package of its own or, in a newer typer, a part of it
@@ -63,7 +66,8 @@ Examples:
   rotor gas water --molecules 20000 --seed 7
   rotor fluid water --molecules 216 --csv run.csv
   rotor fit case.par --out fitted
-  rotor structure family.toml --plot molecule.png"""
+  rotor structure family.toml --plot molecule.png
+  rotor new spectrum > s.toml && rotor run s.toml"""
 
 
 def _application(verbs: Iterable[str] = VERBS) -> typer.Typer:
@@ -86,7 +90,7 @@ def _application(verbs: Iterable[str] = VERBS) -> typer.Typer:
         pass
 
     for verb in verbs:
-        module = import_module(f"rotor.cli.{verb}")
+        module = import_module(f"rotor.cli.{FILES.get(verb, verb)}")
         app.command(verb, cls=PlainCommand, short_help=VERBS[verb], epilog=module.EXAMPLES)(module.command)
     return app
 

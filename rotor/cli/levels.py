@@ -24,6 +24,7 @@ from rotor.cli.shared.output import (
     show_facts,
     show_table,
 )
+from rotor.cli.shared.save_scene import save_scene, save_scene_option
 from rotor.cli.shared.sources import source_facts
 
 if TYPE_CHECKING:
@@ -66,6 +67,7 @@ class Outputs:
     egy: str | None = file_option(".egy", help="Write all levels as SPCAT's list (.egy).")
     plot: str | None = file_option(".png", ".pdf", ".svg", help="Draw the term diagram (.png, .pdf, .svg).")
     json: str | None = json_option()
+    save_scene: str | None = save_scene_option()
 
 
 @grouped(given=("dipole", "dipole_abc"))
@@ -91,7 +93,7 @@ def command(context: typer.Context, given: Input, options: Options, outputs: Out
     text = lambda: json_with_rows(answer.table, "levels", content)  # noqa: E731
     deliver(
         files,
-        _writers(answer, content, options.unit),
+        _writers(answer, content, options.unit) | save_scene("levels", request, outputs, given),
         text,
         lambda: _show(answer, content, options, given.sources),
     )

@@ -184,7 +184,7 @@ def _split_text(nuclei: Sequence[Splitting]) -> str:
 
 
 def _of_geometry(top: Top, molecule: Molecule, present: set[str]) -> list[Limit]:
-    """Motions of large amplitude, and unpaired electrons, that the geometry tells of."""
+    """Motions of large amplitude, and unpaired electrons, that the geometry shows."""
     found = []
     if tops := _internal_rotors(molecule):
         what = "a methyl group turns" if len(tops) == 1 else f"{len(tops)} methyl groups turn"
