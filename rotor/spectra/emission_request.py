@@ -23,6 +23,7 @@ from rotor.spectra.profiles import gaussian
 from rotor.table import Table, TextOf
 
 if TYPE_CHECKING:
+    from rotor.quantum.effect import QuantumEffect
     from rotor.tops.top import Top
 
 LEAST_DEPTH = 1e-6  # lines of less are left out
@@ -110,7 +111,7 @@ class EmissionLines(Table):
 
 @dataclass(frozen=True, repr=False)
 class EmissionAnswer(TextOf):
-    """The spectrum of all molecules together, of each, and their lines."""
+    """The spectrum of all molecules together, of each, and their lines; effects: what the Hamiltonian of each consists of."""
 
     shown = "lines"
 
@@ -119,6 +120,7 @@ class EmissionAnswer(TextOf):
     parts: tuple[Emission, ...]
     lines: EmissionLines
     partition_functions: tuple[float, ...]
+    effects: tuple[tuple[QuantumEffect, ...], ...]
     notes: tuple[str, ...]
 
     def facts(self) -> dict[str, Any]:
@@ -152,7 +154,7 @@ def answer_emission(request: EmissionRequest) -> EmissionAnswer:
     (1, 5.532)
     """
     grid = source_grid(*request.range_mhz, request.source)
-    parts, tables, sums = [], [], []
+    parts, tables, sums, effects = [], [], [], []
     notes: list[str] = []
     for number, (top, column) in enumerate(zip(request.tops, request.columns_per_cm2, strict=True)):
         source = replace(request.source, column_per_cm2=column)
@@ -161,11 +163,14 @@ def answer_emission(request: EmissionRequest) -> EmissionAnswer:
         parts.append(emission(lines, source, grid))
         tables.append(_line_table(number, lines, source))
         sums.append(float(lines.q))
+        effects.append(tuple(lines.levels.effects))
     depth = np.sum([part.optical_depth for part in parts], axis=0)
     source = replace(request.source, column_per_cm2=sum(request.columns_per_cm2))
     contrast = source.filling * (planck_k(grid, source.excitation_k) - planck_k(grid, source.background_k))
     total = Emission(grid, depth, contrast * -np.expm1(-depth), source)
-    return EmissionAnswer(request, total, tuple(parts), _joined(tables), tuple(sums), tuple(dict.fromkeys(notes)))
+    return EmissionAnswer(
+        request, total, tuple(parts), _joined(tables), tuple(sums), tuple(effects), tuple(dict.fromkeys(notes))
+    )
 
 
 def _lines_of(top: Top, source: Source, request: EmissionRequest) -> Lines:
