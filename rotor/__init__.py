@@ -42,6 +42,8 @@ if TYPE_CHECKING:
     from rotor.quantum.request import LevelsRequest as LevelsRequest
     from rotor.quantum.request import answer_levels as answer_levels
     from rotor.quantum.solve import solve_levels as solve_levels
+    from rotor.spectra.emission_request import EmissionRequest as EmissionRequest
+    from rotor.spectra.emission_request import answer_emission as answer_emission
     from rotor.spectra.lines import Lines as Lines
     from rotor.spectra.lines import line_list as line_list
     from rotor.spectra.raman import RamanLines as RamanLines
@@ -79,6 +81,7 @@ _MODULES = {
     "RamanLines": "rotor.spectra.raman",
     "RamanRequest": "rotor.spectra.raman_request",
     "Spectrum": "rotor.spectra.spectrum",
+    "EmissionRequest": "rotor.spectra.emission_request",
     "SpectrumRequest": "rotor.spectra.request",
     "StarkRequest": "rotor.quantum.fields.stark_request",
     "ThermoRequest": "rotor.thermo.request",
@@ -91,6 +94,7 @@ _MODULES = {
     "answer_gas": "rotor.thermo.classical_gas",
     "answer_levels": "rotor.quantum.request",
     "answer_raman": "rotor.spectra.raman_request",
+    "answer_emission": "rotor.spectra.emission_request",
     "answer_spectrum": "rotor.spectra.request",
     "answer_stark": "rotor.quantum.fields.stark_request",
     "answer_thermo": "rotor.thermo.request",

@@ -300,8 +300,7 @@ def _show(answer: SpectrumAnswer, content: dict[str, Any], range_text: str | Non
     show_facts(_facts(lines, content))
     if len(lines) == 0:
         print(f"\nno lines: {_why_none(answer, range_text)}")
-        return
-    if len(content["strongest"]):
+    elif len(content["strongest"]):
         print()
         show_table(_lines_table(lines, content["strongest"], content["optical_depth"]))
     print()

@@ -206,7 +206,7 @@ def _draw_right(axes: Any, moments: Floats, times: Floats, path: Floats, names: 
     rank = np.argsort(np.argsort(moments, kind="stable"))
     for axis, name in enumerate(names):
         colour = (SMALL, MIDDLE, LARGE)[rank[axis]]
-        axes.plot(times, path[:, axis], color=colour, linewidth=1.3, label=f"$L_{name}$")
+        axes.plot(times, path[:, axis], color=colour, linewidth=1.3, label=rf"$L_{{\mathrm{{{name}}}}}$")
     axes.set(ylim=(-1.12, 1.12), yticks=(-1, -0.5, 0, 0.5, 1))
     if times[-1] > times[0]:
         axes.set_xlim(times[0], times[-1])

@@ -32,7 +32,7 @@ from rotor.table import Table
 PIECE = 10_000  # molecules that are drawn and moved together
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Ensemble:
     """n molecules of one kind at one moment.
 
@@ -46,6 +46,9 @@ class Ensemble:
     attitude: Floats
     mass: float | None = None
     velocity: Floats | None = None
+
+    def __repr__(self) -> str:
+        return f"Ensemble({len(self)} molecules, moments {', '.join(f'{x:.6g}' for x in self.moments.tolist())})"
 
     def __len__(self) -> int:
         return len(self.momentum)
