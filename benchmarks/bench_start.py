@@ -79,9 +79,15 @@ CASES = (
 MEMORY = {"J ≤ 200 above 1e-12, in memory": ("-12", 0.22), "J ≤ 200 all lines, in memory": ("None", None)}
 
 
+def _environment() -> dict[str, str]:
+    """Of an installation: this package, its modules compiled to bytecode once."""
+    own = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
+    return own | {"PYTHONPATH": str(ROOT), "MPLBACKEND": "Agg"}
+
+
 def run(case: Case, folder: Path) -> float:
     """Seconds of one process, in a folder for what it writes; a first run has a cache of its own."""
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])}
+    environment = _environment()
     with tempfile.TemporaryDirectory() as cache:
         if case.beyond:
             environment["NUMBA_CACHE_DIR"] = cache
@@ -92,7 +98,7 @@ def run(case: Case, folder: Path) -> float:
 
 def in_memory(cut: str) -> float:
     """Seconds of the best of three lists to J = 200 in one process."""
-    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    environment = _environment()
     code = IN_MEMORY.format(cut=cut)
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, check=True, text=True, env=environment)
     return float(done.stdout)
