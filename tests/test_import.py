@@ -90,3 +90,12 @@ def test_a_short_command_loads_nothing_heavy(folder, words):
     """Lists of modules, not seconds: scipy.linalg costs 0.2 s, numba 0.26, polars 0.17 where water costs 0.05."""
     loaded = loaded_after(f"from rotor.cli import run\nassert run({words!r}) == 0")
     assert sorted(loaded & set(NOT_FOR_SHORT_COMMANDS)) == []
+
+
+def test_a_short_motion_compiles_nothing(folder):
+    """Kernels as plain Python give the same report; compiling them takes seconds the first time."""
+    environment = os.environ | {"PYTHONPATH": str(ROOT), "NUMBA_CACHE_DIR": str(folder / "cache")}
+    words = [sys.executable, "-m", "rotor", "tumble", "water", "--times", "0:1:11", "--json", "-"]
+    first = subprocess.run(words, capture_output=True, text=True, check=True, env=environment)
+    assert not (folder / "cache").exists() or not list((folder / "cache").rglob("*.nbi"))
+    assert '"motion"' in first.stdout
