@@ -193,6 +193,29 @@ class Constants:
         The digits in brackets are the uncertainty in the last digits. Each item may carry a unit; a unit at the end,
         after a space, serves every item that carries none; without any, numbers are MHz.
 
+        Parameters
+        ----------
+        text : str
+            Names and values.
+        reduction : str, optional
+            "A" or "S", for a top with distortion that needs one.
+        representation : str, optional
+            Which principal axes are x, y, z: "Ir", "IIIl", ...
+        kind : str, optional
+            "linear", "prolate", "oblate", "spherical" or "asymmetric"; by default what the names and values say.
+
+        Returns
+        -------
+        Constants
+            Values and uncertainties in MHz.
+
+        Raises
+        ------
+        ValueError
+            For text that cannot be read, and for a set of constants that contradicts itself.
+
+        Examples
+        --------
         >>> Constants.parse("B=9.2GHz DJ=3.8kHz").values["D"]
         0.0038
         >>> Constants.parse("A=5.17 B=0.25(2) cm-1").uncertainties["B"]

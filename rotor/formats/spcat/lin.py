@@ -262,8 +262,31 @@ def write_lin(lines: LineList, path: str | os.PathLike[str]) -> None:
 
 
 def line_list(quanta_upper: Any, quanta_lower: Any, frequency_mhz: Any, error_mhz: Any, weight: Any = 1.0) -> LineList:
-    """A line list from quantum numbers (n, k) of both states, k up to 6, frequencies and errors in MHz.
+    """A line list from quantum numbers of both states, frequencies and errors.
 
+    Parameters
+    ----------
+    quanta_upper, quanta_lower : (n, k) arrays of int
+        k up to 6.
+    frequency_mhz : (n,) array
+        Measured.
+    error_mhz : (n,) array or float
+        Not negative.
+    weight : (n,) array or float, optional
+        Shares in blends.
+
+    Returns
+    -------
+    LineList
+        n lines.
+
+    Raises
+    ------
+    ValueError
+        For shapes that do not fit each other, and errors below 0.
+
+    Examples
+    --------
     >>> print(format_lin(line_list([[1]], [[0]], [115271.2018], 0.0005)).decode(), end="")
       1  0                                    115271.2018     0.0005 1.0
     """
