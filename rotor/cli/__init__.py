@@ -18,6 +18,7 @@ from typing import cast
 
 import typer
 
+from rotor.cli.shared import process
 from rotor.cli.shared.options import PlainCommand, PlainGroup
 from rotor.cli.shared.output import ComputationError
 
@@ -182,6 +183,7 @@ def _fail(code: int, message: str, arguments: Sequence[str]) -> int:
 
 def main() -> None:
     """The console script `rotor`."""
+    process.begin()
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")  # a terminal without Greek letters shows a question mark, no traceback
