@@ -143,7 +143,22 @@ def test_the_command_line_says_which_method_was_used(capsys):
     assert run(command) == 0
     assert "hyperfine     exact" in capsys.readouterr().out
     assert run([*command, "--hyperfine-method", "best"]) == 2
-    assert "auto, exact, first-order" in capsys.readouterr().err
+    assert "auto, exact, N-diagonal, first-order" in capsys.readouterr().err
     assert run(["spectrum", "HCONH2", "--hyperfine-method", "auto"]) == 2
     assert "--hyperfine" in capsys.readouterr().err
     assert rotor.read("HCONH2").spin_constants is not None
+
+
+def test_a_picture_names_the_components_inside_its_axes():
+    from rotor.plots.spectrum import spectrum_figure
+
+    top = rotor.read("HCONH2")
+    lines = line_list(top, jmax=2, temperature_k=300.0, effects=effects_of(top, True))
+    figure = spectrum_figure(lines, range_mhz=(21206.0, 21209.0))
+    axes = figure.axes[0]
+    figure.canvas.draw()
+    names = {text.get_text(): text.get_window_extent() for text in axes.texts}
+    assert len(names) == 3
+    assert any("$F = 2 – 1$" in name for name in names)
+    assert all(box.y1 <= axes.bbox.y1 for box in names.values())
+    assert axes.get_xlabel() == "Frequency (MHz)"

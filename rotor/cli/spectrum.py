@@ -73,7 +73,9 @@ class Options:
         help="Split lines by the spins of nuclei; by default where --spin-constants are given.",
     )
     hyperfine_method: str = option(
-        "exact", metavar="NAME", help="exact, first-order, or auto: the cheapest that keeps --hyperfine-tolerance."
+        "exact",
+        metavar="NAME",
+        help="exact, N-diagonal, first-order, or auto: the cheapest that keeps --hyperfine-tolerance.",
     )
     hyperfine_tolerance: str = option("0.1kHz", metavar="D", help="How far auto may be off exact lines (MHz).")
     as_spcat: bool = option(

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from rotor.quantum.spins.terms import Spin
     from rotor.tops.top import Top
 
-METHODS = ("auto", "exact", "first-order")
+METHODS = ("auto", "exact", "N-diagonal", "first-order")
 EXACT, N_DIAGONAL, FIRST_ORDER = "exact", "N-diagonal", "first-order"
 TOLERANCE_MHZ = 1e-4
 
@@ -43,7 +43,7 @@ class Used:
 
 @dataclass(frozen=True)
 class HyperfineMethod(QuantumEffect):
-    """Which method is asked for: "exact", "first-order", or "auto", the cheapest that is estimated to keep a tolerance.
+    """Which method is asked for: "exact", "N-diagonal", "first-order", or "auto", the cheapest that is estimated to keep a tolerance.
 
     coupled: the spins that the other effects couple.
     """
@@ -94,8 +94,8 @@ def simplified(plan: Plan, effects: Sequence[QuantumEffect], every_f: Sequence[i
         return plan.with_method(Used(EXACT, 0.0, asked.tolerance_mhz), plan.operators)
     other_n, same_n = largest_shifts(plan, every_f)
     estimates = {FIRST_ORDER: 2 * (other_n + same_n), N_DIAGONAL: 2 * other_n, EXACT: 0.0}
-    chosen = FIRST_ORDER
-    if asked.method == "auto":
+    chosen = asked.method
+    if chosen == "auto":
         chosen = next(name for name, size in estimates.items() if size <= asked.tolerance_mhz)
     used = Used(chosen, estimates[chosen], asked.tolerance_mhz)
     return plan.with_method(used, _kept(plan, chosen))
