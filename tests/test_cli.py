@@ -31,7 +31,7 @@ INFO = """
 """
 SPECTRUM = """
     temperature_k q jmax jmax_source min_lgint range_mhz line_count profile fwhm_mhz pressure_bar path_cm column_per_cm2 optical_depth
-    hyperfine strongest lines files
+    hyperfine patterns strongest lines files
 """
 INFO_KEYS = set(INFO.split())
 SPECTRUM_KEYS = (INFO_KEYS - {"partition_function"}) | set(SPECTRUM.split())
