@@ -119,12 +119,12 @@ def saved_vibrations(states: VibrationalStates | None) -> VibrationSection:
     return VibrationSection(fundamentals=pairs) if states.harmonic else VibrationSection(states=pairs)
 
 
-def effects_of(top: Top, asked: QuantumEffects) -> tuple[QuantumEffect, ...]:
-    """The Hamiltonian that a scene asks for."""
+def effects_of(top: Top, asked: QuantumEffects, molecule: MoleculeSection) -> tuple[QuantumEffect, ...]:
+    """The Hamiltonian that a scene asks for; spins by default where the scene itself gives their constants."""
     from rotor.quantum.effects.watson import SEMI_RIGID, Rigid
 
     base: tuple[QuantumEffect, ...] = SEMI_RIGID if asked.distortion else (Rigid(),)
-    hyperfine = top.spin_constants is not None if asked.hyperfine is None else asked.hyperfine
+    hyperfine = molecule.spin_constants is not None if asked.hyperfine is None else asked.hyperfine
     if not hyperfine:
         return base
     from rotor.quantum.effects.of_top import effects_of as with_spins

@@ -50,6 +50,7 @@ from rotor.scenes.sections import (
 )
 
 if TYPE_CHECKING:
+    from rotor.scenes.plan import Plan
     from rotor.scenes.run import SceneResult
 
 SCHEMA = 1
@@ -81,6 +82,12 @@ class Scene(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_
         from rotor.scenes.run import run_scene
 
         return run_scene(self, folder=folder, out=out, executor=executor)
+
+    def plan(self, *, folder: str | os.PathLike[str] = ".") -> Plan:
+        """What the scene will do and leave out, see `rotor.scenes.plan.plan_of`."""
+        from rotor.scenes.plan import plan_of
+
+        return plan_of(self, folder)
 
 
 class SpectrumScene(Scene, frozen=True, tag="spectrum"):
