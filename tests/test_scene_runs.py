@@ -316,3 +316,27 @@ def test_a_killed_sweep_goes_on(folder):
     result = run_sweep(scene, record=record)
     assert 0 < result.computed < 40
     assert result.columns["rows"].tolist() == [(j + 1) ** 2 for j in range(20, 60)]
+
+
+HEAVY = ("rotor.fluid", "rotor.alignment", "rotor.classical", "rotor.quantum.effects.stark", "rotor.quantum.spins.blocks", "rotor.spectra",
+         "rotor.thermo.functions", "matplotlib", "ase", "rdkit", "qutip", "numba", "duckdb")  # fmt: skip
+LOADED = {  # of HEAVY, what a kind has a use for
+    "spectrum": {"rotor.spectra"},
+    "levels": set(),
+    "stark": {"rotor.quantum.effects.stark"},
+    "thermo": {"rotor.thermo.functions"},
+    "tumble": {"rotor.classical", "numba"},
+}  # fmt: skip
+MOLECULE = {"tumble": "[body]\nmoments = [1.0, 2.0, 3.0]\nangular_velocity = [1.0, 2.0, 3.0]"}
+
+
+@pytest.mark.parametrize("kind", LOADED)
+def test_modules_of_absent_effects_are_not_imported(kind):
+    text = f'schema = 1\nkind = "{kind}"\n' + MOLECULE.get(kind, 'molecule = "OCS"\n')
+    code = (
+        "import sys\nfrom rotor.scenes.scene_file import parse_scene\n"
+        f"parse_scene({text!r}).run()\n"
+        f"print([name for name in {HEAVY!r} if name in sys.modules])"
+    )
+    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert set(eval(ran.stdout)) <= LOADED[kind]
