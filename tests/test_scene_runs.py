@@ -321,7 +321,7 @@ def test_a_killed_sweep_goes_on(folder):
 HEAVY = ("rotor.fluid", "rotor.alignment", "rotor.classical", "rotor.quantum.effects.stark", "rotor.quantum.spins.blocks", "rotor.spectra",
          "rotor.thermo.functions", "matplotlib", "ase", "rdkit", "qutip", "numba", "duckdb")  # fmt: skip
 LOADED = {  # of HEAVY, what a kind has a use for
-    "spectrum": {"rotor.spectra"},
+    "spectrum": {"rotor.spectra", "rotor.thermo.functions"},
     "levels": set(),
     "stark": {"rotor.quantum.effects.stark"},
     "thermo": {"rotor.thermo.functions"},
