@@ -36,12 +36,12 @@ if TYPE_CHECKING:
     from rotor.molecules.optimise import refine as refine
     from rotor.plots.show import plot as plot
     from rotor.quantum.effects.stark import stark_map as stark_map
+    from rotor.quantum.fields.stark_request import StarkRequest as StarkRequest
+    from rotor.quantum.fields.stark_request import answer_stark as answer_stark
     from rotor.quantum.levels import Levels as Levels
     from rotor.quantum.request import LevelsRequest as LevelsRequest
     from rotor.quantum.request import answer_levels as answer_levels
     from rotor.quantum.solve import solve_levels as solve_levels
-    from rotor.quantum.stark_request import StarkRequest as StarkRequest
-    from rotor.quantum.stark_request import answer_stark as answer_stark
     from rotor.spectra.lines import Lines as Lines
     from rotor.spectra.lines import line_list as line_list
     from rotor.spectra.raman import RamanLines as RamanLines
@@ -80,7 +80,7 @@ _MODULES = {
     "RamanRequest": "rotor.spectra.raman_request",
     "Spectrum": "rotor.spectra.spectrum",
     "SpectrumRequest": "rotor.spectra.request",
-    "StarkRequest": "rotor.quantum.stark_request",
+    "StarkRequest": "rotor.quantum.fields.stark_request",
     "ThermoRequest": "rotor.thermo.request",
     "Top": "rotor.tops.top",
     "TumbleRequest": "rotor.classical.tumble",
@@ -92,7 +92,7 @@ _MODULES = {
     "answer_levels": "rotor.quantum.request",
     "answer_raman": "rotor.spectra.raman_request",
     "answer_spectrum": "rotor.spectra.request",
-    "answer_stark": "rotor.quantum.stark_request",
+    "answer_stark": "rotor.quantum.fields.stark_request",
     "answer_thermo": "rotor.thermo.request",
     "answer_tumble": "rotor.classical.tumble",
     "free_motion": "rotor.classical.free.free_motion",

@@ -26,8 +26,8 @@ from rotor.alignment.pulse import (
     elliptical,
 )
 from rotor.alignment.timeline import timeline
-from rotor.quantum.field_blocks import Contraction
-from rotor.quantum.field_space import field_space
+from rotor.quantum.fields.blocks import Contraction
+from rotor.quantum.fields.space import field_space
 from rotor.tops.top import Top
 
 OCS = Top.from_constants("B=6081.492 MHz").with_polarizability(np.diag([8.04, 4.0, 4.0]), "test")

@@ -12,7 +12,7 @@ from rotor.alignment.pulse import GaussianPulse
 from rotor.alignment.request import AlignRequest, answer_align
 from rotor.cli.shared.output import plain
 from rotor.formats import read
-from rotor.quantum.stark_request import StarkRequest, answer_stark
+from rotor.quantum.fields.stark_request import StarkRequest, answer_stark
 from rotor.spectra.field_lines import field_lines
 
 BARE = ("--constants", "B=6081.492 MHz", "--anisotropy", "4.04")

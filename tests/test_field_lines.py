@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from field_matrices import contracted_vectors, rigid, states
 
-from rotor.quantum.deflection import deflection_table
 from rotor.quantum.effects.stark import stark_map
+from rotor.quantum.fields.deflection import deflection_table
 from rotor.spectra.field_lines import field_lines
 from rotor.spectra.field_spectrum import FieldDistribution, field_spectrum
 from rotor.spectra.lines import line_list

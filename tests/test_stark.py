@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from scipy.special import obl_cv
 
 from rotor.quantum.effects.stark import MHZ_ANGSTROM3_W_PER_CM2, Stark, stark_map
-from rotor.quantum.field_blocks import Contraction
-from rotor.quantum.field_solver import reduced_basis, solve_fields
-from rotor.quantum.field_space import field_space
+from rotor.quantum.fields.blocks import Contraction
+from rotor.quantum.fields.solver import reduced_basis, solve_fields
+from rotor.quantum.fields.space import field_space
 from rotor.tops.top import Top
 from rotor.units import MHZ_PER_DEBYE_KV_PER_CM, PLANCK_J_S
 

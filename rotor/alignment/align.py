@@ -29,7 +29,7 @@ from rotor.alignment.pulse import RAD_PER_PS_MHZ, Pulse
 from rotor.alignment.steps import Pilot, pilot_of
 from rotor.alignment.timeline import timeline
 from rotor.arrays import Floats
-from rotor.quantum.field_blocks import FieldSpace, FreeLevels
+from rotor.quantum.fields.blocks import FieldSpace, FreeLevels
 from rotor.table import Table
 
 if TYPE_CHECKING:

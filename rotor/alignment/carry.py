@@ -16,8 +16,8 @@ from rotor.alignment.observables import Coherences, Observable
 from rotor.alignment.pulse import RAD_PER_PS_MHZ, Pulse
 from rotor.alignment.timeline import Window
 from rotor.arrays import Floats, Ints
-from rotor.quantum.field_blocks import AxialBlock, Contraction, FieldBlock, FieldSpace
-from rotor.quantum.field_space import field_space
+from rotor.quantum.fields.blocks import AxialBlock, Contraction, FieldBlock, FieldSpace
+from rotor.quantum.fields.space import field_space
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top

@@ -15,7 +15,7 @@ import numpy as np
 
 from rotor import units
 from rotor.arrays import Floats
-from rotor.quantum.field_blocks import FreeLevels
+from rotor.quantum.fields.blocks import FreeLevels
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top

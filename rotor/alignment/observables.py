@@ -22,8 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.direction_cosines import cosine_bands
-from rotor.quantum.field_blocks import AxialBlock, Contraction, FieldBlock
+from rotor.quantum.fields.blocks import AxialBlock, Contraction, FieldBlock
+from rotor.quantum.fields.direction_cosines import cosine_bands
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
@@ -100,7 +100,7 @@ def absolute_cosine(block: AxialBlock) -> Floats:
 
     Gauss-Legendre points on each half of -1 < cosθ < 1, where the integrand is a polynomial.
 
-    >>> from rotor.quantum.field_space import field_space
+    >>> from rotor.quantum.fields.space import field_space
     >>> from rotor.tops.top import Top
     >>> z2 = Contraction(np.diag([1.0, 0, 0]), np.diag([0, 0, 1.0]))
     >>> block = field_space(Top.from_constants("B=6000 MHz"), 2, [z2]).blocks(0)[0]

@@ -12,7 +12,7 @@ from rotor.alignment import observables as observe
 from rotor.alignment import propagate
 from rotor.alignment.carry import Outcome, Plan, Problem, Task, run, task_of
 from rotor.alignment.pulse import RAD_PER_PS_MHZ, Kick
-from rotor.quantum.field_blocks import FieldSpace
+from rotor.quantum.fields.blocks import FieldSpace
 
 FIRST_STEPS = 4
 LARGEST_SPLIT = 700  # states of a block whose operator is still diagonalised

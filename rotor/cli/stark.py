@@ -28,8 +28,8 @@ if TYPE_CHECKING:
     from concurrent.futures import Executor
 
     from rotor import table as tables
-    from rotor.quantum.field_map import FieldMap
-    from rotor.quantum.stark_request import StarkAnswer
+    from rotor.quantum.fields.field_map import FieldMap
+    from rotor.quantum.fields.stark_request import StarkAnswer
     from rotor.spectra.field_request import FieldRequest
     from rotor.tops.top import Top
 
@@ -123,7 +123,7 @@ class Outputs:
 def command(context: typer.Context, given: Input, options: Options, sample: Sample, outputs: Outputs) -> None:
     """Levels in a static electric field: energies, labels, effective dipoles and cosines of every M; lines and mixtures."""
     from rotor.cli.shared.workers import working
-    from rotor.quantum.stark_request import StarkRequest, answer_stark
+    from rotor.quantum.fields.stark_request import StarkRequest, answer_stark
     from rotor.spectra.field_request import FieldRequest
 
     settings, of_sample = _settings(options), _sample(sample)

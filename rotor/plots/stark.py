@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from rotor.plots.picture import DPI, checked_suffix, new_figure, styled
-from rotor.quantum.field_map import FieldMap
+from rotor.quantum.fields.field_map import FieldMap
 from rotor.spectra.field_lines import FieldLines
 from rotor.units import MHZ_PER_CM
 from rotor.version import version

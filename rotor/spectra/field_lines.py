@@ -24,8 +24,8 @@ from numpy.typing import ArrayLike, NDArray
 from rotor.arrays import Floats, Ints
 from rotor.checks import require_one_of, require_positive
 from rotor.quantum.effects.stark import map_request
-from rotor.quantum.field_map import BlockStates, block_states, converged_jmax, each_block
-from rotor.quantum.field_transitions import BlockPair, dipole_elements, pairs_of_blocks
+from rotor.quantum.fields.field_map import BlockStates, block_states, converged_jmax, each_block
+from rotor.quantum.fields.transitions import BlockPair, dipole_elements, pairs_of_blocks
 from rotor.spectra.intensity import INTENSITY_NM2_MHZ
 from rotor.table import Table
 from rotor.thermo.field_mixture import POPULATIONS, Populations, populations_in_field

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rotor.checks import require_one_of, require_positive
-from rotor.quantum.stark_request import StarkRequest
+from rotor.quantum.fields.stark_request import StarkRequest
 from rotor.table import Table
 from rotor.thermo.field_mixture import POPULATIONS, field_mixture
 
 if TYPE_CHECKING:
-    from rotor.quantum.field_map import FieldMap
+    from rotor.quantum.fields.field_map import FieldMap
     from rotor.spectra.field_lines import FieldLines
     from rotor.spectra.spectrum import Spectrum
 
@@ -136,7 +136,7 @@ def mixture_of(request: FieldRequest, states: FieldMap, executor: Executor | Non
 
 def deflection_of(request: FieldRequest, states: FieldMap, executor: Executor | None = None) -> Table:
     """Effective dipoles, one column for each state."""
-    from rotor.quantum.deflection import deflection_table
+    from rotor.quantum.fields.deflection import deflection_table
 
     return deflection_table(states)
 

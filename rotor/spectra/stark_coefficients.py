@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.field_map import FieldMap
+from rotor.quantum.fields.field_map import FieldMap
 from rotor.table import Table
 
 if TYPE_CHECKING:

@@ -23,8 +23,8 @@ from numpy.typing import ArrayLike
 
 from rotor import units
 from rotor.quantum.effect import QuantumEffect
-from rotor.quantum.field_blocks import Contraction, FieldBlock
-from rotor.quantum.field_map import (
+from rotor.quantum.fields.blocks import Contraction, FieldBlock
+from rotor.quantum.fields.field_map import (
     BlockProblem,
     FieldMap,
     MapRequest,
@@ -32,7 +32,7 @@ from rotor.quantum.field_map import (
     checked_tolerance_mhz,
     field_map,
 )
-from rotor.quantum.field_space import field_space
+from rotor.quantum.fields.space import field_space
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top

@@ -18,14 +18,21 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rotor.arrays import Floats
-from rotor.quantum.direction_cosines import cosine_bands
-from rotor.quantum.field_blocks import AxialBlock, AxialSpace, Contraction, FieldBlock, FieldSpace, FreeLevels
-from rotor.quantum.field_map import BlockProblem, FieldMap, MapRequest, checked_fields, checked_tolerance_mhz, field_map
-from rotor.quantum.field_space import axial_levels
+from rotor.quantum.fields.blocks import AxialBlock, AxialSpace, Contraction, FieldBlock, FieldSpace, FreeLevels
+from rotor.quantum.fields.direction_cosines import cosine_bands
+from rotor.quantum.fields.field_map import (
+    BlockProblem,
+    FieldMap,
+    MapRequest,
+    checked_fields,
+    checked_tolerance_mhz,
+    field_map,
+)
+from rotor.quantum.fields.space import axial_levels
+from rotor.quantum.fields.wang_blocks import WangBlockInField, WangSpace, coloured_components, wang_space
 from rotor.quantum.j_operators import between_blocks, components
 from rotor.quantum.reduced import wang_amplitudes
 from rotor.quantum.tensors import BodyTensor, body_tensor
-from rotor.quantum.wang_blocks import WangBlockInField, WangSpace, coloured_components, wang_space
 from rotor.units import NUCLEAR_MAGNETON_MHZ_PER_T
 
 if TYPE_CHECKING:

@@ -21,10 +21,10 @@ import numpy as np
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum.basis import WangBlock, wang_blocks
-from rotor.quantum.field_blocks import Contraction, FieldBlock, FieldSpace, FreeLevels
+from rotor.quantum.fields.blocks import Contraction, FieldBlock, FieldSpace, FreeLevels
+from rotor.quantum.fields.wang_blocks import coloured_components
 from rotor.quantum.reduced import wang_amplitudes
 from rotor.quantum.tensors import BodyTensor, block_elements, body_tensor
-from rotor.quantum.wang_blocks import coloured_components
 
 if TYPE_CHECKING:
     from rotor.quantum.levels import SolvedBlock

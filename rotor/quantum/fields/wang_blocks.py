@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.field_blocks import Contraction, FieldBlock, FieldSpace, FreeLevels
+from rotor.quantum.fields.blocks import Contraction, FieldBlock, FieldSpace, FreeLevels
 from rotor.quantum.reduced import wang_amplitudes
 from rotor.quantum.tensors import BodyTensor, body_tensor, coupling
 

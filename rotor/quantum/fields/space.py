@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rotor.quantum.field_blocks import AxialSpace, Contraction, FieldSpace, FreeLevels
+from rotor.quantum.fields.blocks import AxialSpace, Contraction, FieldSpace, FreeLevels
+from rotor.quantum.fields.tilted_blocks import tilted_space
+from rotor.quantum.fields.wang_blocks import wang_space
 from rotor.quantum.solve import solve_levels
-from rotor.quantum.tilted_blocks import tilted_space
-from rotor.quantum.wang_blocks import wang_space
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top

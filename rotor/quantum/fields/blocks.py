@@ -6,7 +6,7 @@ What a field does to a top is a contraction of something fixed in the molecule w
 
 and so are the cosines: cosθ of a body axis g and Z is the contraction of the unit vectors g and Z, cos²θ that of gg and ZZ.
 A `Contraction` holds both as Cartesian arrays; in spherical components it is tr·tr/3 and Σ_p S^K_p* T^K_p with the elements of
-`rotor.quantum.tensors`. Here both are symmetric about Z, so that M is good; `rotor.quantum.tilted_blocks` has the others.
+`rotor.quantum.tensors`. Here both are symmetric about Z, so that M is good; `rotor.quantum.fields.tilted_blocks` has the others.
 
 Blocks are those that the contractions given leave apart, found and not assumed: (M, k) for a molecule with one axis, with J even
 and J odd apart where nothing connects them (M = 0 or k = 0, no dipole); (M, sets of D2 species) for others, and at M = 0 the
@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.direction_cosines import cosine_bands, cosine_squared_bands
+from rotor.quantum.fields.direction_cosines import cosine_bands, cosine_squared_bands
 
 if TYPE_CHECKING:
     pass

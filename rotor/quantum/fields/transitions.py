@@ -18,10 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats
-from rotor.quantum.field_blocks import AxialBlock, FieldBlock
+from rotor.quantum.fields.blocks import AxialBlock, FieldBlock
+from rotor.quantum.fields.wang_blocks import WangBlockInField
 from rotor.quantum.reduced import wang_amplitudes
 from rotor.quantum.tensors import BodyTensor, body_tensor, coupling
-from rotor.quantum.wang_blocks import WangBlockInField
 
 
 class BlockPair(NamedTuple):

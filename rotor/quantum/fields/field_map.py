@@ -6,7 +6,7 @@ until the energies stand still; J max is raised until they do. The population of
 
 Labels. Inside an exact symmetry block levels do not cross, so the state of rank r at any field is named after the free level of
 rank r in that block: adiabatic labels, which no grid of fields can change. Labels by overlap do depend on the grid. Diabatic ones
-swap where two neighbours come closer than a stated gap (`rotor.quantum.diabatic`).
+swap where two neighbours come closer than a stated gap (`rotor.quantum.fields.diabatic`).
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.field_blocks import FieldBlock, FieldSpace
-from rotor.quantum.field_solver import (
+from rotor.quantum.fields.blocks import FieldBlock, FieldSpace
+from rotor.quantum.fields.solver import (
     DENSE,
     SPANNED,
     Matrix,
@@ -353,7 +353,7 @@ def _cosine(name: str, one: _Solved, rank: int) -> Floats:
 
 def _diabatic_ranks(request: MapRequest, one: _Solved) -> Ints:
     """Whose name each state of a block has at each field, (fields, states)."""
-    from rotor.quantum.diabatic import diabatic_ranks
+    from rotor.quantum.fields.diabatic import diabatic_ranks
 
     count, gap = one.energies.shape[1], request.diabatic_gap_mhz or 0.0
     return diabatic_ranks(

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.field_map import FieldMap
+from rotor.quantum.fields.field_map import FieldMap
 from rotor.table import Table
 from rotor.units import MHZ_PER_K
 

@@ -17,7 +17,7 @@ from rotor.quantum.effects.stark import (
     checked_m,
     stark_map,
 )
-from rotor.quantum.field_map import FieldMap
+from rotor.quantum.fields.field_map import FieldMap
 from rotor.tops.facts import top_facts
 
 if TYPE_CHECKING:
