@@ -240,7 +240,7 @@ def _levels(request: Any) -> Plan:
 
 def _stark(request: Any) -> Plan:
     from rotor.quantum.effects.watson import SEMI_RIGID
-    from rotor.quantum.stark_request import answer_stark
+    from rotor.quantum.fields.stark_request import answer_stark
 
     top, fields = request.top, request.fields_kv_per_cm
     ends = tuple(dict.fromkeys((min(fields), max(fields))))

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from concurrent.futures import Executor
 from pathlib import Path
 
-from rotor.quantum.field_map import FieldMap
-from rotor.quantum.stark_request import StarkAnswer, StarkRequest, answer_stark
+from rotor.quantum.fields.field_map import FieldMap
+from rotor.quantum.fields.stark_request import StarkAnswer, StarkRequest, answer_stark
 from rotor.scenes import kind
 from rotor.scenes.kind import Kind, Where, Writer
 from rotor.scenes.molecule import top_of, with_dipole
