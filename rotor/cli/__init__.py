@@ -23,6 +23,7 @@ from rotor.cli.shared.output import ComputationError
 
 VERBS = {  # and what the list of verbs says of each, short enough for 80 columns
     "spectrum": "Rotational lines: frequencies and intensities.",
+    "emission": "Lines as a radio telescope sees them.",
     "info": "A molecule as a top: frame, constants, kind, Q(T).",
     "levels": "Energy levels as a table and a term diagram.",
     "molecules": "The molecules known by name, with their sources.",
@@ -54,6 +55,7 @@ Examples:
   rotor spectrum "SMILES:C=O" --temperature 100
   rotor spectrum my.xyz --dipole 0,0,1.85 --range 0:2000GHz --cat out.cat --plot out.png
   rotor spectrum --constants "A=835840.288 B=435351.717 C=278138.7 MHz" --dipole-abc 0,1.8546,0
+  rotor emission CH3CN HC3N --band ALMA6 --column 1e15,3e14 --width 5 --plot core.png
   rotor info my.sdf
   rotor levels water --jmax 5 --plot terms.png
   rotor isotopologues water

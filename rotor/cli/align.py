@@ -86,7 +86,7 @@ class Outputs:
     save_scene: str | None = save_scene_option()
 
 
-@grouped(given=("dipole", "calculator", "hessian", "spin_constants", "spins"))
+@grouped(given=("dipole", "calculator", "hessian", "spin_constants", "spins", "state_constants"))
 def command(context: typer.Context, given: Input, pulses: Pulses, options: Options, outputs: Outputs) -> None:
     """Molecules aligned or oriented by pulses of light: cosines against time of a rotational wave packet."""
     from rotor.alignment.request import AlignRequest, answer_align

@@ -61,7 +61,7 @@ class Outputs:
     save_scene: str | None = save_scene_option()
 
 
-@grouped(given=("spin_weights", "calculator", "hessian", "symmetry_tolerance"))
+@grouped(given=("spin_weights", "state_constants", "calculator", "hessian", "symmetry_tolerance"))
 def command(context: typer.Context, given: Input, options: Options, outputs: Outputs) -> None:
     """A classical gas of free molecules: equipartition, correlation functions."""
     from rotor.thermo.classical_gas import GasRequest, settling_times_ps

@@ -25,7 +25,7 @@ from rotor.cli.shared.output import (
     show_table,
 )
 from rotor.cli.shared.save_scene import save_scene, save_scene_option
-from rotor.cli.shared.sources import with_sources
+from rotor.cli.shared.sources import source_facts
 
 if TYPE_CHECKING:
     from rotor.quantum.request import LevelsAnswer
@@ -95,9 +95,7 @@ def command(context: typer.Context, given: Input, options: Options, outputs: Out
         files,
         _writers(answer, content, options.unit) | save_scene("levels", request, outputs, given),
         text,
-        with_sources(
-            lambda: _show(answer, content, options), answer.request.top, ("constants", "spin weights"), given.sources
-        ),
+        lambda: _show(answer, content, options, given.sources),
     )
 
 
@@ -137,7 +135,7 @@ def _writers(answer: LevelsAnswer, content: dict[str, Any], unit: str) -> dict[s
     return {"--csv": table, "--parquet": table, "--egy": table, "--plot": draw}
 
 
-def _show(answer: LevelsAnswer, content: dict[str, Any], options: Options) -> None:
+def _show(answer: LevelsAnswer, content: dict[str, Any], options: Options, whole_sources: bool) -> None:
     from rotor.cli.shared import report
 
     print(report.heading(answer.request.top))
@@ -146,7 +144,9 @@ def _show(answer: LevelsAnswer, content: dict[str, Any], options: Options) -> No
         print()
         show_table(_table(answer, options))
     print()
-    show_facts(report.model_facts(content))
+    show_facts(
+        [*source_facts(answer.request.top, ("constants", "spin weights"), whole_sources), *report.model_facts(content)]
+    )
 
 
 def _facts(answer: LevelsAnswer, content: dict[str, Any]) -> list[tuple[str, str]]:

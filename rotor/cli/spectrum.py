@@ -29,7 +29,7 @@ from rotor.cli.shared.output import (
 )
 from rotor.cli.shared.plot_options import PlotOptions
 from rotor.cli.shared.save_scene import save_scene, save_scene_option
-from rotor.cli.shared.sources import with_sources
+from rotor.cli.shared.sources import source_facts
 
 if TYPE_CHECKING:
     from rotor.formats.spcat.predict import Prediction
@@ -73,6 +73,10 @@ class Options:
         "--hyperfine/--no-hyperfine",
         help="Split lines by the spins of nuclei; by default where --spin-constants are given.",
     )
+    hyperfine_method: str = option(
+        "exact", metavar="NAME", help="exact, first-order, or auto: the cheapest that keeps --hyperfine-tolerance."
+    )
+    hyperfine_tolerance: str = option("0.1kHz", metavar="D", help="How far auto may be off exact lines (MHz).")
     as_spcat: bool = option(
         False, "--as-spcat", help="Of an .int file: K above KNMAX is left out of the basis, as SPCAT leaves it out."
     )
@@ -143,12 +147,7 @@ def command(
         files,
         writers,
         lambda: json_with_rows(answer.lines, "lines", content),
-        with_sources(
-            lambda: _show(answer, content, options.range_),
-            answer.lines.top,
-            ("constants", "dipole", "spin weights"),
-            given.sources,
-        ),
+        lambda: _show(answer, content, options.range_, given.sources),
     )
 
 
@@ -182,7 +181,16 @@ def _effects(top: Top, given: Input, options: Options) -> tuple[QuantumEffect, .
     from rotor.quantum.effects.of_top import effects_of
 
     asked = given.spin_constants is not None if options.hyperfine is None else options.hyperfine
-    return inputs.parsed("--hyperfine", "", lambda _: effects_of(top, asked))
+    method, tolerance = (
+        options.hyperfine_method,
+        inputs.positive("--hyperfine-tolerance", options.hyperfine_tolerance, "MHz"),
+    )
+    if method != "exact" and not asked:
+        raise ValueError(
+            f"--hyperfine-method {method}: without --hyperfine or --spin-constants no line is split; add one of them"
+        )
+    with inputs.fields_as_options(hyperfine="--hyperfine-method"):
+        return effects_of(top, asked, method, tolerance)
 
 
 def _answer(top: Top, settings: dict[str, Any]) -> SpectrumAnswer:
@@ -284,7 +292,7 @@ def _draw(answer: SpectrumAnswer, path: Path, record: dict[str, Any], drawn: dic
     plot_spectrum(thing, path, provenance={"command": record["command"]}, **drawn)
 
 
-def _show(answer: SpectrumAnswer, content: dict[str, Any], range_text: str | None) -> None:
+def _show(answer: SpectrumAnswer, content: dict[str, Any], range_text: str | None, whole_sources: bool) -> None:
     from rotor.cli.shared import report
 
     lines = answer.lines
@@ -297,7 +305,9 @@ def _show(answer: SpectrumAnswer, content: dict[str, Any], range_text: str | Non
         print()
         show_table(_lines_table(lines, content["strongest"], content["optical_depth"]))
     print()
-    show_facts(report.model_facts(content))
+    show_facts(
+        [*source_facts(lines.top, ("constants", "dipole", "spin weights"), whole_sources), *report.model_facts(content)]
+    )
 
 
 def _facts(lines: Lines, content: dict[str, Any]) -> list[tuple[str, str]]:
@@ -315,8 +325,23 @@ def _facts(lines: Lines, content: dict[str, Any]) -> list[tuple[str, str]]:
         ("Q", report.q_text(content["q"])),
         ("J max", f"{lines.jmax}: {content['jmax_source']}"),
         ("cut", cut + _range_text(lines.range_mhz)),
+        *_hyperfine_facts(content["hyperfine"]),
         ("lines", _count_text(lines)),
         *_layer_facts(content),
+    ]
+
+
+def _hyperfine_facts(used: dict[str, Any] | None) -> list[tuple[str, str]]:
+    """Which method split the lines, and by how much it may differ from the exact one."""
+    if used is None:
+        return []
+    if used["method"] == "exact":
+        return [("hyperfine", "exact: all N that a tensor connects")]
+    return [
+        (
+            "hyperfine",
+            f"{used['method']}: differs from exact by less than {1000 * used['estimate_mhz']:.2g} kHz, estimated",
+        )
     ]
 
 

@@ -119,7 +119,7 @@ class Outputs:
     save_scene: str | None = save_scene_option()
 
 
-@grouped(given=("spin_weights", "calculator", "hessian", "spin_constants", "spins"))
+@grouped(given=("spin_weights", "calculator", "hessian", "spin_constants", "spins", "state_constants"))
 def command(context: typer.Context, given: Input, options: Options, sample: Sample, outputs: Outputs) -> None:
     """Levels in a static electric field: energies, labels, effective dipoles and cosines of every M; lines and mixtures."""
     from rotor.cli.shared.workers import working

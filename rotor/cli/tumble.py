@@ -47,7 +47,9 @@ class Outputs:
     save_scene: str | None = save_scene_option()
 
 
-@grouped(given=("dipole", "dipole_abc", "spin_weights", "calculator", "hessian", "symmetry_tolerance"))
+@grouped(
+    given=("dipole", "dipole_abc", "spin_weights", "state_constants", "calculator", "hessian", "symmetry_tolerance")
+)
 def command(context: typer.Context, given: Input, options: Options, outputs: Outputs) -> None:
     """Free rotation: the exact motion, what it conserves, which axes are stable."""
     files = Files.of(outputs)

@@ -17,6 +17,7 @@ from rotor.checks import require_one_of, require_positive, require_whole
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.limits import limit_facts, populated_j
+from rotor.quantum.spins.method import hyperfine_facts
 from rotor.spectra.intensity import USUAL_CUT, largest
 from rotor.spectra.lines import DEFAULT_MIN_LGINT, Lines, line_list
 from rotor.thermo import VibrationalStates
@@ -205,6 +206,7 @@ class SpectrumAnswer:
             "path_cm": layer.path_cm if layer else None,
             "column_per_cm2": self.column_per_cm2,
             "optical_depth": self.optical_depth,
+            "hyperfine": hyperfine_facts(lines.top, lines.levels),
             "notes": [*lines.top.notes, *lines.warnings],
             **limit_facts(lines.top, self.typical_j, lines.levels.effects),
         }

@@ -11,6 +11,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from math import hypot
 from types import MappingProxyType
 from typing import Any
 
@@ -40,6 +41,9 @@ class SpinConstants:
     atoms: Mapping[str, int] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        values, errors = without_trace(self.values, self.uncertainties)
+        object.__setattr__(self, "values", values)
+        object.__setattr__(self, "uncertainties", errors)
         for name in ("values", "twice", "uncertainties", "sources", "atoms"):
             object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
         for name, twice in self.twice.items():
@@ -51,6 +55,8 @@ class SpinConstants:
             for spin in spins_of(name):
                 if spin not in self.twice:
                     raise ValueError(f"{name}: spin {spin} is not among {', '.join(self.twice) or 'none'}")
+            if name.startswith("chi_") and any(self.twice[spin] < 2 for spin in spins_of(name)):
+                raise ValueError(f"{name}: a spin of 1/2 has no quadrupole moment; that needs a spin of 1 or more")
         for name, error in self.uncertainties.items():
             if name not in self.values or not error >= 0:
                 raise ValueError(
@@ -95,6 +101,48 @@ class SpinConstants:
             values[name] = parse_quantity(f"{item['number']} {item['unit'] or shared}", "MHz")
         given = parse_spins(spins) if spins else {}
         return cls(values, given | {s: twice_of(s) for s in _named(values) if s not in given}, source)
+
+
+def without_trace(
+    values: Mapping[str, float], errors: Mapping[str, float]
+) -> tuple[dict[str, float], dict[str, float]]:
+    """Two or three diagonal elements of a traceless tensor (chi, T, D) as its aa and bb-cc; other names as they are.
+
+    One alone stays: the other two are minus half of it each. ValueError for three that do not add up to 0, within 1e-3 of the largest
+    (published elements are rounded), and for a difference beside two of them.
+
+    >>> without_trace({"chi_aa(14N)": 2.0, "chi_cc(14N)": -3.5}, {})[0]
+    {'chi_aa(14N)': 2.0, 'chi_bb-cc(14N)': 5.0}
+    """
+    out, left = dict(values), dict(errors)
+    for tensor, spins in dict.fromkeys(
+        (n.partition("_")[0], n.partition("(")[2]) for n in values if n[:2] in ("ch", "T_", "D_")
+    ):
+        names = {letters: f"{tensor}_{letters}({spins}" for letters in ("aa", "bb", "cc")}
+        found = {letters: values[name] for letters, name in names.items() if name in values}
+        if len(found) < 2:
+            continue
+        difference = [n for n in values if n.startswith(f"{tensor}_") and "-" in n and n.endswith(f"({spins}")]
+        trace = sum(found.values()) if len(found) == 3 else 0.0
+        if abs(trace) > 1e-3 * max(map(abs, found.values())):
+            raise ValueError(
+                f"{tensor}({spins}: aa + bb + cc = {trace:g} MHz; the tensor is traceless, check the elements"
+            )
+        if difference:
+            raise ValueError(
+                f"{', '.join(difference)} beside {', '.join(found)}: give aa and a difference, or the elements alone"
+            )
+        aa, bb, cc = (found.get(letters, -sum(found.values())) - trace / 3 for letters in names)
+        spread = {letters: left.pop(name) for letters, name in names.items() if name in left}
+        for name in names.values():
+            out.pop(name, None)
+        out |= {names["aa"]: aa, f"{tensor}_bb-cc({spins}": bb - cc}
+        if len(spread) == len(found):
+            left |= {
+                names["aa"]: spread.get("aa", hypot(*spread.values())),
+                f"{tensor}_bb-cc({spins}": hypot(*spread.values()),
+            }
+    return out, left
 
 
 def _named(values: Mapping[str, float]) -> list[str]:

@@ -29,7 +29,10 @@ FIELDS = {
     "spin_weights": "WTPL and WTMN",
     "spin_constants": "the constants",
     "spins": "SPIND",
+    "state_constants": "the constants",
     "hyperfine": "SPIND",
+    "hyperfine_method": "SPIND",
+    "hyperfine_tolerance": "SPIND",
     "constants": "the constants",
     "calculator": "the constants",
 }

@@ -1,0 +1,71 @@
+"""How spins are treated: exactly, with N as a good quantum number, or to first order: what is asked for, and what was used."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from rotor.checks import require_one_of, require_positive
+from rotor.quantum.effect import QuantumEffect
+
+if TYPE_CHECKING:
+    from rotor.quantum.levels import Levels
+    from rotor.quantum.spins.terms import Spin
+    from rotor.tops.top import Top
+
+METHODS = ("auto", "exact", "first-order")
+EXACT, N_DIAGONAL, FIRST_ORDER = "exact", "N-diagonal", "first-order"
+TOLERANCE_MHZ = 1e-4
+
+
+@dataclass(frozen=True)
+class Used:
+    """The method of a calculation, and by how much its lines may differ from exact ones, in MHz."""
+
+    method: str
+    estimate_mhz: float
+    tolerance_mhz: float
+
+
+@dataclass(frozen=True)
+class HyperfineMethod(QuantumEffect):
+    """Which method is asked for: "exact", "first-order", or "auto", the cheapest that is estimated to keep a tolerance.
+
+    coupled: the spins that the other effects couple.
+    """
+
+    method: str
+    tolerance_mhz: float
+    coupled: tuple[Spin, ...]
+    name: ClassVar[str] = "hyperfine method"
+    conserved: ClassVar[frozenset[str]] = frozenset()
+
+    def __post_init__(self) -> None:
+        require_one_of("hyperfine", self.method, METHODS)
+        require_positive("tolerance_mhz", self.tolerance_mhz)
+
+    def parameters(self, top: Top) -> dict[str, float]:
+        """None: it is a choice."""
+        return {}
+
+    def size_mhz(self, top: Top, j: int) -> float:
+        """None."""
+        return 0.0
+
+    def spins(self, top: Top) -> tuple[Spin, ...]:
+        """Those of the effects that it is about."""
+        return self.coupled
+
+
+def used_method(levels: Levels) -> Used | None:
+    """What was used for levels with spins; None without spins, and where nothing was asked, which means exact."""
+    shared = getattr(levels.blocks[0], "shared", None) if levels.blocks else None
+    found: Used | None = getattr(shared, "used", None)
+    return found
+
+
+def hyperfine_facts(top: Top, levels: Levels) -> dict[str, Any] | None:
+    """Method, estimate and tolerance by the keys of docs/command_line.md; None for levels without spins."""
+    if not any(effect.spins(top) for effect in levels.effects):
+        return None
+    return asdict(used_method(levels) or Used(EXACT, 0.0, TOLERANCE_MHZ))

@@ -1,0 +1,149 @@
+"""Exact, with N as a good quantum number, and first order: what is used, what that neglects, and that the estimate holds."""
+
+from __future__ import annotations
+
+import pickle
+
+import numpy as np
+import pytest
+
+import rotor
+from rotor.quantum.effects.of_top import effects_of
+from rotor.quantum.solve import solve_levels
+from rotor.quantum.spins.method import used_method
+from rotor.quantum.spins.splittings import casimir
+from rotor.spectra.lines import line_list
+from rotor.tops.spin_constants import SpinConstants
+from rotor.tops.top import Top
+
+CHLORIDE = Top.from_constants(
+    "A=9000 B=3000 C=2300 MHz", dipole_abc_debye=(1.0, 0.5, 0.0),
+    spin_constants=SpinConstants.parse("chi_aa(35Cl)=-57 chi_bb-cc(35Cl)=-4 chi_ab(35Cl)=30 C_aa(35Cl)=0.01 MHz"),
+)  # fmt: skip
+TWO = Top.from_constants(
+    "A=40000 B=5000 C=4500 MHz", dipole_abc_debye=(1.0, 0.0, 0.0),
+    spin_constants=SpinConstants.parse("chi_aa(14N)=-4.2 chi_bb-cc(14N)=1.1 chi_aa(D)=0.2 C_iso(D)=0.002 MHz"),
+)  # fmt: skip
+
+
+def energies(top: Top, method: str, jmax: int = 6, tolerance_mhz: float = 1e-4) -> np.ndarray:
+    """Energies by labels, so that methods can be compared."""
+    levels = solve_levels(top, jmax, effects=effects_of(top, True, method, tolerance_mhz))
+    order = np.lexsort([levels.quanta[name] for name in levels.quanta])
+    return np.asarray(levels.energy_mhz[order])
+
+
+def test_first_order_is_casimirs_formula():
+    """One nucleus on a linear molecule: -χ Y(F), without anything of second order."""
+    top = Top.from_constants("B=12000 MHz", spin_constants=SpinConstants.parse("chi_aa(35Cl)=-70 MHz"))
+    levels = solve_levels(top, 4, effects=effects_of(top, True, "first-order"))
+    n, f = levels.quanta["n"], levels.quanta["f"]
+    shifts = levels.energy_mhz - 12000.0 * n * (n + 1)
+    expected = [70 * casimir(3, j, twice) if j else 0.0 for j, twice in zip(n.tolist(), f.tolist(), strict=True)]
+    assert shifts == pytest.approx(expected, abs=1e-9)  # round-off of 240 GHz
+
+
+@pytest.mark.parametrize("top", [CHLORIDE, TWO], ids=["one nucleus", "two nuclei"])
+def test_the_estimate_bounds_the_difference(top):
+    exact, first = energies(top, "exact"), energies(top, "first-order")
+    used = used_method(solve_levels(top, 6, effects=effects_of(top, True, "first-order")))
+    assert used is not None
+    difference = 2 * np.abs(exact - first).max()
+    assert (
+        0.02 * used.estimate_mhz < difference < used.estimate_mhz
+    )  # a bound of second order over all elements of a state
+
+
+def test_auto_takes_the_cheapest_within_the_tolerance():
+    methods = {}
+    for tolerance in (1e-9, 1e-3, 1.0, 100.0):
+        levels = solve_levels(CHLORIDE, 5, effects=effects_of(CHLORIDE, True, "auto", tolerance))
+        used = used_method(levels)
+        assert used is not None
+        assert used.estimate_mhz <= tolerance
+        assert np.abs(energies(CHLORIDE, "auto", 5, tolerance) - energies(CHLORIDE, "exact", 5)).max() <= tolerance
+        methods[tolerance] = used.method
+    assert methods[1e-9] == "exact"
+    assert methods[100.0] == "first-order"
+    assert used_method(solve_levels(CHLORIDE, 2, effects=effects_of(CHLORIDE, True))) is None
+
+
+def test_n_is_good_between_first_order_and_exact():
+    """Close doublets of Ka = 1 that χ_bc joins are far from first order, and N is good all the same."""
+    top = Top.from_constants(
+        "A=90000 B=3000.2 C=2999.8 MHz",
+        spin_constants=SpinConstants.parse("chi_bb-cc(14N)=2 chi_aa(14N)=-4 chi_bc(14N)=2 MHz"),
+    )
+    levels = solve_levels(top, 4, effects=effects_of(top, True, "auto", 0.05))
+    used = used_method(levels)
+    assert used is not None
+    assert used.method == "N-diagonal"
+    assert np.abs(energies(top, "auto", 4, 0.05) - energies(top, "exact", 4)).max() <= 0.05
+
+
+def test_strengths_of_first_order_add_up_to_the_line_without_spins():
+    lines = line_list(TWO, jmax=2, temperature_k=20.0, effects=effects_of(TWO, True, "first-order"), min_lgint=None)
+    plain = line_list(TWO, jmax=2, temperature_k=20.0, min_lgint=None)
+    assert lines.q == pytest.approx(9 * plain.q, rel=1e-12)
+    for row in range(len(plain)):
+        near = np.abs(lines.frequency_mhz - plain.frequency_mhz[row]) < 20
+        assert lines.strength_debye2[near].sum() == pytest.approx(9 * plain.strength_debye2[row], rel=1e-12)
+
+
+def test_a_method_goes_to_other_processes():
+    effects = effects_of(TWO, True, "auto", 1e-3)
+    again = pickle.loads(pickle.dumps(effects))  # what an executor does
+    assert (again[-1].method, again[-1].tolerance_mhz) == ("auto", 1e-3)
+
+
+@pytest.mark.parametrize(
+    ("method", "tolerance", "says"), [("exactly", 1.0, "exactly"), ("auto", -1.0, "tolerance_mhz"), ("auto", 0.0, "tolerance_mhz")]
+)  # fmt: skip
+def test_other_methods_are_refused(method, tolerance, says):
+    with pytest.raises(ValueError, match=says):
+        effects_of(TWO, True, method, tolerance)
+
+
+def test_diagonal_elements_are_taken_together():
+    """Two or three elements are the tensor itself, not sums of axial ones; a trace is refused."""
+    pair = SpinConstants.parse("chi_aa(14N)=1.9543 chi_bb(14N)=1.89665 MHz")
+    assert dict(pair.values) == pytest.approx({"chi_aa(14N)": 1.9543, "chi_bb-cc(14N)": 5.7476}, abs=1e-12)
+    three = SpinConstants.parse("chi_aa(14N)=1.9543 chi_bb(14N)=1.89665 chi_cc(14N)=-3.85095 MHz")
+    assert dict(three.values) == pytest.approx(dict(pair.values), abs=1e-12)
+    with pytest.raises(ValueError, match=r"chi\(14N\): aa \+ bb \+ cc = 1 MHz; the tensor is traceless"):
+        SpinConstants.parse("chi_aa(14N)=2 chi_bb(14N)=2 chi_cc(14N)=-3 MHz")
+    with pytest.raises(ValueError, match="beside aa, bb"):
+        SpinConstants.parse("chi_aa(14N)=2 chi_bb(14N)=2 chi_bb-cc(14N)=-3 MHz")
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("chi_aa(14N)=2 chi_bb(14N)=2 chi_cc(14N)=-3 MHz", "traceless"),
+        ("chi_aa(99N)=2 MHz", "99N"),
+        ("chi_aa(13C)=2 MHz", "a spin of 1 or more"),
+    ],
+)
+def test_the_command_line_refuses_in_one_line(text, says, capsys):
+    from rotor.cli import run
+
+    assert run(["spectrum", "HCN", "--spin-constants", text]) == 2
+    error = capsys.readouterr().err
+    assert says in error
+    assert error.count("\n") == 1
+
+
+def test_the_command_line_says_which_method_was_used(capsys):
+    from rotor.cli import run
+
+    command = ["spectrum", "HCONH2", "--hyperfine", "--jmax", "3"]
+    assert run([*command, "--hyperfine-method", "auto", "--hyperfine-tolerance", "1kHz"]) == 0
+    out = capsys.readouterr().out
+    assert "hyperfine     first-order: differs from exact by less than" in out
+    assert run(command) == 0
+    assert "hyperfine     exact" in capsys.readouterr().out
+    assert run([*command, "--hyperfine-method", "best"]) == 2
+    assert "auto, exact, first-order" in capsys.readouterr().err
+    assert run(["spectrum", "HCONH2", "--hyperfine-method", "auto"]) == 2
+    assert "--hyperfine" in capsys.readouterr().err
+    assert rotor.read("HCONH2").spin_constants is not None
