@@ -90,7 +90,7 @@ def stray_field(top: Top) -> LeftOut | None:
     >>> f"{stray_field(rod).size:.2e}"  # (μE)²/6hB
     '3.45e-06'
     """
-    if not any(top.dipole_abc_debye or ()) or top.kind not in ("linear", "prolate", "oblate"):
+    if not any(top.dipole_abc_debye or ()) or top.kind not in ("linear", "prolate", "oblate") or top.states is not None:
         return None
     energy = math.hypot(*(top.dipole_abc_debye or ())) * units.MHZ_PER_DEBYE_KV_PER_CM * STRAY_KV_PER_CM
     if top.kind == "linear":

@@ -106,7 +106,7 @@ def _extrapolated(call: Callable[[int], Any], work: Callable[[int], float], size
 def _level_parts(top: Top, jmax: int, effects: Sequence[QuantumEffect]) -> list[tuple[str, str]]:
     """Basis, blocks and method of the levels of a top."""
     from rotor.quantum.basis import wang_blocks
-    from rotor.quantum.solve import representation_of
+    from rotor.quantum.rotation import representation_of
 
     spins = [spin for effect in effects for spin in effect.spins(top)]
     if top.kind in ("linear", "spherical", "prolate", "oblate"):
@@ -150,7 +150,8 @@ def allowed_lines(top: Top, jmax: int) -> int:
     2
     """
     from rotor.quantum.basis import wang_blocks
-    from rotor.quantum.solve import representation_of, solve_levels
+    from rotor.quantum.rotation import representation_of
+    from rotor.quantum.solve import solve_levels
 
     dipole = top.dipole_abc_debye or (0.0, 0.0, 0.0)
     if not any(dipole):
@@ -207,7 +208,7 @@ def _spectrum(request: Any) -> Plan:
         effects=_effects(top, j, request.effects),
         good=_good(top, request.effects),
         parts=(("J max", f"{jmax}: {why}"), *_level_parts(top, jmax, request.effects)),
-        counts={"allowed lines without spins, before range and cut": lines},
+        counts={"allowed lines of one state, without spins, before range and cut": lines},
         seconds=seconds,
         memory_mb=lines * BYTES_A_LINE * spins / 1e6,
         left_out=tuple(absent),

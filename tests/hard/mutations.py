@@ -42,13 +42,6 @@ MUTATIONS = (
         "tests/test_top.py::test_linear_in_any_orientation",
     ),
     Mutation(
-        9,
-        "rotor/tops/kind.py",
-        "    if linearity < linear_below:",
-        "    if linearity == 0.0:",
-        "tests/test_top.py::test_near_linear_says_by_which_number",
-    ),
-    Mutation(
         20, "rotor/quantum/levels.py", "self.energy_mhz[self.weight > 0].min()", "self.energy_mhz.min()",
         "tests/test_requests.py::test_levels_count_from_the_lowest_that_exists",
     ),
