@@ -42,6 +42,11 @@ if TYPE_CHECKING:
     from rotor.quantum.request import LevelsRequest as LevelsRequest
     from rotor.quantum.request import answer_levels as answer_levels
     from rotor.quantum.solve import solve_levels as solve_levels
+    from rotor.scenes.plan import plan_of as plan_of
+    from rotor.scenes.run import run_scene as run_scene
+    from rotor.scenes.scene_file import read_scene as read_scene
+    from rotor.scenes.scene_file import write_scene as write_scene
+    from rotor.scenes.sweep import run_sweep as run_sweep
     from rotor.spectra.emission_request import EmissionRequest as EmissionRequest
     from rotor.spectra.emission_request import answer_emission as answer_emission
     from rotor.spectra.lines import Lines as Lines
@@ -103,15 +108,20 @@ _MODULES = {
     "line_list": "rotor.spectra.lines",
     "partition_function": "rotor.thermo",
     "plot": "rotor.plots.show",
+    "plan_of": "rotor.scenes.plan",
     "raman_lines": "rotor.spectra.raman",
     "read": "rotor.formats",
+    "read_scene": "rotor.scenes.scene_file",
     "refine": "rotor.molecules.optimise",
+    "run_scene": "rotor.scenes.run",
+    "run_sweep": "rotor.scenes.sweep",
     "solve_levels": "rotor.quantum.solve",
     "stark_map": "rotor.quantum.effects.stark",
     "stream_lines": "rotor.formats.streamed_lines",
     "thermal_tumble": "rotor.thermo.thermal_tumble",
     "thermodynamic_functions": "rotor.thermo",
     "write": "rotor.formats",
+    "write_scene": "rotor.scenes.scene_file",
 }
 
 _OF_TOPS = frozenset(

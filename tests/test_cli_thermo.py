@@ -66,7 +66,6 @@ def test_json_has_the_keys_of_the_contract(call):
         "splitting_nuclei",
         "effects",
         "limits",
-        "splitting_nuclei",
     }
     assert set(content) == info | KEYS
     assert content["species_known"] == ["equilibrium", "normal", "para", "ortho"]

@@ -108,7 +108,6 @@ def test_json_has_the_keys_of_the_contract(call):
         "splitting_nuclei",
         "effects",
         "limits",
-        "splitting_nuclei",
     }
     assert set(json.loads(out)) == info | MOTION_KEYS
 

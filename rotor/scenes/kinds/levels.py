@@ -29,7 +29,7 @@ def request(scene: LevelsScene, folder: Where = ".") -> LevelsRequest:
             kmin=asked.kmin,
             kmax=asked.kmax,
             max_energy_mhz=highest,
-            effects=kind.effects_of(top, scene.effects),
+            effects=kind.effects_of(top, scene.effects, molecule),
         )
 
 

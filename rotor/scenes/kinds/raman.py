@@ -36,7 +36,7 @@ def request(scene: RamanScene, folder: Where = ".") -> RamanRequest:
             min_relative=kind.cut("observables.min_relative", scene.observables.min_relative),
             q=scene.observables.q,
             vibrations=kind.vibrations(scene.vibration),
-            effects=kind.effects_of(top, scene.effects),
+            effects=kind.effects_of(top, scene.effects, molecule),
         )
 
 

@@ -52,7 +52,7 @@ def request(scene: SpectrumScene, folder: Where = ".") -> SpectrumRequest:
             fwhm_mhz=fwhm,
             layer=_layer(gas),
             untrusted=asked.untrusted,
-            effects=kind.effects_of(top, scene.effects),
+            effects=kind.effects_of(top, scene.effects, molecule),
         )
 
 
