@@ -70,8 +70,8 @@ class SpinConstants:
     def of(self, spin: str) -> dict[str, float]:
         """The constants of one spin alone, by name without the spin.
 
-        >>> SpinConstants.parse("chi_aa(14N)=-4.22 C_bb(14N)=1.8kHz T_aa(14N,D)=2kHz").of("14N")
-        {'chi_aa': -4.22, 'C_bb': 0.0018}
+        >>> SpinConstants.parse("chi_aa(14N)=-4.22MHz C_bb(14N)=2kHz T_aa(14N,D)=2kHz").of("14N")
+        {'chi_aa': -4.22, 'C_bb': 0.002}
         """
         return {name.partition("(")[0]: value for name, value in self.values.items() if spins_of(name) == (spin,)}
 
