@@ -101,6 +101,7 @@ SLOW = (
     "thermo {source} --plot x.pdf --temperature 10:300:3", "align {source} --pulse-table {file} --jmax 5 --until 3",
     "structure {family} --method r0,rm1 --plot x.png", "spectrum {source} --parquet x.parquet --jmax 5",
 )  # fmt: skip
+UNBOUNDED = ("--calculator", "--engine", "--threads", "--steps")  # another program; a run as long as is asked for
 PULSES = ("1e13 W/cm2, 1 ps", "5e12 W/cm2, 0.3 ps", "1e13 W/cm2")
 
 
@@ -275,12 +276,7 @@ def options_of(verb: str) -> list[str]:
     if verb not in _OPTIONS:
         command = typer.main.get_command(_application([verb]))
         found = command.commands[verb].params  # type: ignore[attr-defined]
-        _OPTIONS[verb] = [
-            o
-            for one in found
-            for o in one.opts
-            if o.startswith("--") and o not in ("--calculator", "--engine", "--threads")
-        ]
+        _OPTIONS[verb] = [o for one in found for o in one.opts if o.startswith("--") and o not in UNBOUNDED]
     return _OPTIONS[verb]
 
 

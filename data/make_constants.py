@@ -1,168 +1,203 @@
-"""Fit the constants of D2O, HNCO, N2O, H2CS and HC5N to their catalogues, and print them as lines of a molecule file.
+"""Fit the constants of the library's files to the measured lines of their catalogues anew, and write them with their covariance.
 
-`python data/make_constants.py PATH_TO_SHARED [NAME ...]`, with the folder of reference files.
+`python data/make_constants.py PATH_TO_SHARED [NAME ...]`, with the folder of reference files, rewrites [constants] and [covariance]
+of `data/molecules/NAME.toml` (all of FITS without names). `docs/make_library.py` and `docs/make_measured_lines.py` come after it.
 
-Weighted least squares by Gauss and Newton, derivatives by Hellmann and Feynman, of lines that the catalogue marks as measured
-(a negative tag), none with an error below `least_mhz`, and of its lower energies (cm⁻¹ with four decimals, taken at 0.9 MHz),
-which hold what the lines leave open. Hyperfine components of one line are put together at their mean, weighted by intensity.
+It is the fit of `rotor fit`: weighted least squares, blends as one frequency, of lines that the catalogue marks as measured (a
+negative tag) within the J and K of the file's [catalogue], none with an error below `least_mhz`, from the constants that the file has.
+Where lines leave constants open, level energies of the catalogue count too (cm⁻¹ with four decimals, taken at 0.9 MHz). Standard
+errors are multiplied by the reduced chi where that is above 1.
 """
 
 from __future__ import annotations
 
-import gzip
+import importlib.util
+import re
 import sys
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from rotor import units
+from rotor.fit.assignment import Assignments, assignments, merged
+from rotor.fit.fit import Fit, FitOptions, fit_lines
+from rotor.fit.parameters import parameters
+from rotor.formats.assigned_lines import QUANTA, read_assigned_lines
+from rotor.formats.atomic_write import open_atomic
+from rotor.formats.molecule_file import MoleculeFile, read_molecule_file
 from rotor.formats.spcat.cat import read_cat
-from rotor.formats.spcat.catalogue import Catalogue
-from rotor.quantum.derivatives import level_derivatives
-from rotor.quantum.solve import solve_levels
 from rotor.tops.constants import Constants
-from rotor.tops.top import Top
+from rotor.units import MHZ_PER_CM
 
+MOLECULES = Path(__file__).with_name("molecules")
 ROUNDING_MHZ = 0.9
-SPAN = 1e-12  # of the largest singular value, below which a combination of constants is left where it is
 
 
 @dataclass(frozen=True)
-class Fit:
-    """What to fit: catalogue, where to start, highest J and K, smallest error of a line, whether E″ count, what is held."""
+class Fitted:
+    """What is particular to a fit: smallest error of a line in MHz, highest J and K of level energies that count, a remark."""
 
-    tag: str
-    start: Constants
-    j_max: int
-    k_max: int = 0
-    least_mhz: float = 1e-3
-    energies: bool = True
-    held: tuple[str, ...] = ()
-
-
-S_QUARTIC = ("DJ", "DJK", "DK", "d1", "d2")
-S_SEXTIC = ("HJ", "HJK", "HKJ", "HK", "h1", "h2", "h3")
-S_OCTIC = ("LJ", "LJJK", "LJK", "LKKJ", "LK", "l1", "l2", "l3", "l4")
-
-
-def _s_reduced(a: float, b: float, c: float, names: tuple[str, ...]) -> Constants:
-    return Constants(A=a, B=b, C=c, reduction="S", representation="Ir", **dict.fromkeys(names, 1e-30))
+    least_mhz: float = 0.0
+    energies: tuple[int, int] | None = None
+    note: str = ""
 
 
 FITS = {
-    "D2O": Fit("c020001", _s_reduced(462300.0, 218014.0, 145277.0, S_QUARTIC + S_SEXTIC + S_OCTIC), 12, 6, 0.02),
-    # Quasilinear: Ka = 0 and 1 alone, since D_K K⁴ (some GHz) and what follows turn the levels of Ka > 10 upside down
-    "HNCO": Fit(
-        "c043002",
-        _s_reduced(912711.0, 11071.0, 10910.6, ("DJ", "DJK", "d1", "HJ", "HJK", "h1")),
-        50,
-        1,
-        0.03,
-        energies=False,
-    ),
-    "N2O": Fit("c044004", Constants(B=12561.6338, D=5.28e-3, H=1e-30), 104, energies=False),
-    "H2CS": Fit(
-        "c046509",
-        _s_reduced(
-            291613.3, 17699.0, 16652.5, (*S_QUARTIC, *S_SEXTIC, "LJK", "LKKJ", "LK", "l2")
-        ),
-        60,
-        12,
-    ),
-    "HC5N": Fit("c075503", Constants(B=1331.3327, D=3.01e-5, H=1e-30), 199, energies=False),
+    "OCS": Fitted(), "HC3N": Fitted(), "HC5N": Fitted(1e-3), "N2O": Fitted(1e-3),
+    "HCN": Fitted(note="the quadrupole splitting of 14N is not resolved in them"),
+    "CH3CCH": Fitted(energies=(20, 12)), "CH2CO": Fitted(energies=(20, 9)), "H2CS": Fitted(energies=(20, 12)),
+    "SO2": Fitted(), "c-C2H4O": Fitted(energies=(20, 20)), "CH2OHCHO": Fitted(energies=(20, 15)),
+    "HCONH2": Fitted(energies=(20, 15)), "HCOOH": Fitted(energies=(20, 15)), "HNCO": Fitted(0.03),
+    "H2S": Fitted(0.05, (10, 10)), "D2O": Fitted(0.02, (12, 6)), "HDO": Fitted(0.1, (10, 6)), "H2O": Fitted(0.1),
 }  # fmt: skip
 
 
-def observations(fit: Fit, shared: Path) -> list[tuple[tuple[int, ...], tuple[int, ...] | None, float, float]]:
-    """Upper level, lower level (None: the lowest of all), frequency or energy in MHz, error in MHz."""
-    folders = (shared / "reference" / name for name in ("catalogues", "library_lines"))
-    path = next(folder / f"{fit.tag}.cat.gz" for folder in folders if (folder / f"{fit.tag}.cat.gz").is_file())
-    found = read_cat(gzip.decompress(path.read_bytes()))
-    width = 1 if fit.start.kind == "linear" else 3
-    lines: dict[tuple[tuple[int, ...], tuple[int, ...]], list[int]] = {}
-    for i in np.flatnonzero(_in_range(found, fit, width)).tolist():
-        key = (tuple(found.quanta_upper[i, :width].tolist()), tuple(found.quanta_lower[i, :width].tolist()))
-        lines.setdefault(key, []).append(i)
-    out: list[tuple[tuple[int, ...], tuple[int, ...] | None, float, float]] = []
-    energies: dict[tuple[int, ...], float] = {}
-    for (upper, lower), rows in lines.items():
-        energies.setdefault(lower, float(np.mean(found.energy_lower_cm[rows])) * units.MHZ_PER_CM)
-        rows = [i for i in rows if found.tag[i] < 0]
-        if rows:
-            weight = 10 ** found.lgint[rows]
-            error = max(float(np.min(found.error_mhz[rows])), fit.least_mhz)
-            out.append((upper, lower, float(np.average(found.frequency_mhz[rows], weights=weight)), error))
-    if fit.energies:
-        out += [(level, None, energy, ROUNDING_MHZ) for level, energy in energies.items()]
-    return out
+def observations(name: str, file: MoleculeFile, shared: Path) -> tuple[Assignments, Assignments | None]:
+    """The measured lines of a molecule, and its level energies as lines from the lowest level, None where they do not count."""
+    assert file.catalogue is not None
+    assert file.constants is not None
+    folders = (shared / "reference" / one for one in ("catalogues", "library_lines"))
+    path = next(one for folder in folders if (one := folder / f"{file.catalogue.tag}.cat.gz").is_file())
+    names = QUANTA[file.constants.kind]
+    lines, _ = read_assigned_lines(path, names)
+    lines = lines.take(_inside(lines, file.catalogue.j_max or 10**6, file.catalogue.k_max))
+    errors = np.maximum(lines.error_mhz, FITS[name].least_mhz)
+    lines = assignments(
+        names,
+        lines.upper,
+        lines.lower,
+        lines.frequency_mhz,
+        errors,
+        weight=lines.weight,
+        blend=lines.blend,
+        source=lines.source,
+    )
+    limits = FITS[name].energies
+    return lines, _energies(path, names, *limits) if limits else None
 
 
-def _in_range(found: Catalogue, fit: Fit, width: int) -> np.ndarray:
-    quanta = np.abs(np.stack([found.quanta_upper, found.quanta_lower]))
-    inside = (quanta[..., 0] <= fit.j_max).all(axis=0)
-    return inside & (quanta[..., 1] <= fit.k_max).all(axis=0) if width > 1 else inside
+def _inside(lines: Assignments, j_max: int, k_max: int | None) -> np.ndarray:
+    both = np.abs(np.stack([lines.upper, lines.lower]))
+    inside = (both[..., 0] <= j_max).all(axis=0)
+    return inside & (both[..., 1] <= k_max).all(axis=0) if k_max is not None and both.shape[2] > 1 else inside
 
 
-def fitted(fit: Fit, shared: Path) -> tuple[Constants, list[str]]:
-    """Constants with uncertainties, and what is to be said of the fit."""
-    seen = observations(fit, shared)
-    constants = fit.start
-    names = tuple(name for name in constants.values if name not in fit.held)
-    value, error = (np.array([row[i] for row in seen]) for i in (2, 3))
-    for _ in range(12):
-        top = Top.from_constants(constants)
-        levels = solve_levels(top, fit.j_max)
-        quanta = levels.quanta_of(np.arange(len(levels)))
-        row = {tuple(q): i for i, q in enumerate(quanta.tolist())}
-        slopes = level_derivatives(top, levels, names)
-        up = np.array([row[upper] for upper, *_ in seen])
-        low = np.array([0 if lower is None else row[lower] for _, lower, *_ in seen])
-        off = (value - (levels.energy_mhz[up] - levels.energy_mhz[low])) / error
-        design = (slopes[up] - slopes[low]) / error[:, None]
-        scale = np.linalg.norm(design, axis=0)
-        u, s, vt = np.linalg.svd(design / scale, full_matrices=False)
-        kept = s > SPAN * s[0]
-        step = (vt[kept].T @ ((u[:, kept].T @ off) / s[kept])) / scale
-        spread = np.sqrt(np.sum((vt[kept].T / s[kept]) ** 2, axis=1)) / scale
-        values = dict(constants.values)
-        values |= {name: values[name] + float(d) for name, d in zip(names, step, strict=True)}
-        settings = {
-            "reduction": constants.reduction,
-            "representation": constants.representation,
-            "kind": constants.kind,
-        }
-        constants = Constants(**settings, **values)  # type: ignore[arg-type]
-        if np.all(np.abs(step) < 1e-3 * spread):
-            break
-    return constants, _report(names, constants, spread, seen, off, error)
+def _energies(path: Path, names: tuple[str, ...], j_max: int, k_max: int) -> Assignments:
+    """Lower energies of all lines of the catalogue, each level once, at the mean of what is printed."""
+    found = read_cat(path)
+    width = len(names)
+    beyond = found.quanta_lower[:, width:]
+    labels = np.abs(found.quanta_lower[:, :width].astype(np.int64))
+    chosen = (beyond <= 0).all(axis=1) & (labels[:, 0] <= j_max) & (labels[:, 1] <= k_max)
+    levels, place = np.unique(labels[chosen], axis=0, return_inverse=True)
+    place = place.reshape(-1)
+    mean = np.bincount(place, found.energy_lower_cm[chosen]) / np.bincount(place) * MHZ_PER_CM
+    rows = levels[:, 0] > 0
+    return assignments(names, levels[rows], np.zeros_like(levels[rows]), mean[rows], ROUNDING_MHZ, source="energies")
 
 
-def _report(
-    names: tuple[str, ...],
-    constants: Constants,
-    spread: np.ndarray,
-    seen: list[tuple[tuple[int, ...], tuple[int, ...] | None, float, float]],
-    off: np.ndarray,
-    error: np.ndarray,
-) -> list[str]:
-    """How well the fit does, the lines of a molecule file, and the six worst observations."""
-    lines = np.array([lower is not None for _, lower, *_ in seen])
-    mhz = np.abs(off * error)[lines]
-    chi = float(np.sqrt(np.sum(off[lines] ** 2) / max(lines.sum() - len(names), 1)))
-    of_energies = np.sqrt(np.mean((off * error)[~lines] ** 2)) if (~lines).any() else 0.0
-    said = [
-        f"# {lines.sum()} lines, {(~lines).sum()} energies; reduced chi of the lines {chi:.2g}; rms "
-        f"{np.sqrt(np.mean(mhz**2)):.3g}, median {np.median(mhz):.2g}, worst {mhz.max():.3g} MHz; energies rms {of_energies:.2g} MHz"
+def fitted(name: str, shared: Path, start: Constants | None = None) -> tuple[Fit, float, int]:
+    """The fit, √(χ²/lines) of its lines alone, and how many level energies counted."""
+    file = read_molecule_file(MOLECULES / f"{name}.toml")
+    lines, energies = observations(name, file, shared)
+    assert file.constants is not None
+    start = start or file.constants
+    both = merged(lines, energies)[0] if energies is not None else lines
+    free = parameters(start, list(file.constants.uncertainties))
+    fit = fit_lines(both, start, free, FitOptions())
+    of_lines = fit.residuals[fit.groups < len(lines)]
+    count = max(len(of_lines) - (0 if energies is not None else len(free.names)), 1)
+    return fit, float(np.sqrt(of_lines @ of_lines / count)), 0 if energies is None else len(energies)
+
+
+def rewritten(text: str, name: str, fit: Fit, chi: float, energies: int) -> str:
+    """The text of a molecule's file with the constants, standard errors, correlations and source of a fit."""
+    assert fit.constants is not None
+    scale = max(chi, 1.0)
+    for key, error in fit.constants.uncertainties.items():
+        line = f"{key} = {{ value = {fit.constants[key]:.15g}, uncertainty = {error * scale:.9e} }}"
+        text, count = re.subn(rf"^{re.escape(key)} = \{{.*\}}$", line, text, flags=re.MULTILINE)
+        assert count == 1, key
+    text = re.sub(r"\n\[covariance\]\n[^\[]*\[[^\]]*\]\n[^\[]*\[\n(?: .*\n)*\]\n", "", text)
+    head, _, rest = text.partition("[constants]\n")
+    rest = re.sub(
+        r'source = "(fitted.*)"',
+        lambda old: f'source = "{_source(old[1], name, len(fit.lines) - energies, chi, energies)}"',
+        rest,
+        count=1,
+    )
+    body, _, after = rest.partition("\n\n")
+    return head + "[constants]\n" + body + "\n\n" + _covariance(fit) + "\n" + after
+
+
+def _source(old: str, name: str, lines: int, chi: float, energies: int) -> str:
+    """What the file says of its constants: the catalogue and the range as it said before, the rest of the fit made now."""
+    catalogue = re.search(r"of (c\d+ of \w+ \([^)]*\))", old)
+    span = re.search(r"with (J <= \d+(?:, Ka? <= \d+)?)", old)
+    assert catalogue is not None
+    one = FITS[name]
+    text = f"fitted by data/make_constants.py to the {lines} measured lines of {catalogue[1]}"
+    text += f" with {span[1]}" if span else ""
+    text += ", weighted by their errors" + (f", none below {one.least_mhz:g} MHz" if one.least_mhz else "")
+    if one.energies:
+        text += f", and to {energies} of its level energies (J <= {one.energies[0]}, K <= {one.energies[1]}; cm-1 with 4 decimals, "
+        text += "taken at 0.9 MHz), which hold what the lines leave open"
+    text += f"; reduced chi of the lines {chi:.2g}"
+    return text + (f"; {one.note}" if one.note else "")
+
+
+def _covariance(fit: Fit) -> str:
+    found = fit.covariance
+    rows = [
+        "    [" + ", ".join(f"{value:.15g}" for value in row[: i + 1]) + "],\n"
+        for i, row in enumerate(found.correlations.tolist())
     ]
-    for name, one in zip(names, spread.tolist(), strict=True):
-        digits = max(1, int(np.ceil(np.log10(abs(constants[name]) / (one * 0.01)))))
-        said.append(f"{name} = {{ value = {constants[name]:.{digits}g}, uncertainty = {one * max(chi, 1.0):.2g} }}")
-    worst = np.argsort(-np.abs(off) * lines)[:6]
-    said += [f"# {seen[i][0]} {seen[i][1]} {seen[i][2]:.3f} {off[i] * error[i]:+.3f} ({error[i]:.3f})" for i in worst]
-    return said
+    names = ", ".join(f'"{name}"' for name in found.names)
+    return f"[covariance]\nnames = [{names}]\ncorrelations = [\n{''.join(rows)}]\n"
+
+
+def _write(path: Path, text: str) -> None:
+    with open_atomic(path, "w", encoding="utf-8") as handle:
+        handle.write(text)
+
+
+def _with_measures(path: Path, shared: Path) -> str:
+    """The text of a file with rms of its lines, and by how much a line in the range it serves may be missed, as they are now."""
+    spec = importlib.util.spec_from_file_location("make_library", path.parents[2] / "docs" / "make_library.py")
+    assert spec is not None
+    assert spec.loader is not None
+    library = sys.modules["make_library"] = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(library)
+    file, text = read_molecule_file(path), path.read_text(encoding="utf-8")
+    off = library.residuals(file, library.measured_lines(file, shared))
+    text = re.sub(r"rms_mhz = .*", f"rms_mhz = {np.sqrt(np.mean(off**2)):.3g}", text)
+    missed = float(library.served(file, shared)[1].max())
+    if not missed <= file.serves.error_mhz <= max(1.3 * missed, 1e-3):
+        text = re.sub(r"error_mhz = .*", f"error_mhz = {max(1.1 * missed, 1e-3):.2g}", text)
+    return text
+
+
+def main(shared: Path, names: list[str]) -> None:
+    for name in names or FITS:
+        path = MOLECULES / f"{name}.toml"
+        before = read_molecule_file(path).constants
+        fit, chi, energies = fitted(name, shared)
+        assert before is not None
+        assert fit.constants is not None
+        moved = {
+            key: (fit.constants[key] - before[key]) / (fit.constants.uncertainties[key] * max(chi, 1.0))
+            for key in before.uncertainties
+        }
+        worst = max(moved, key=lambda key: abs(moved[key]))
+        print(
+            f"{name}: {fit.reason}; {len(fit.lines) - energies} lines, {energies} energies, reduced chi {chi:.3g}; "
+            f"{worst} moved by {moved[worst]:+.2g} standard errors"
+        )
+        if not fit.converged or not np.isfinite(fit.errors).all():
+            raise ValueError(f"{name}: not written: {fit.reason}")
+        _write(path, rewritten(path.read_text(encoding="utf-8"), name, fit, chi, energies))
+        _write(path, _with_measures(path, shared))
 
 
 if __name__ == "__main__":
-    for name in sys.argv[2:] or FITS:
-        print(f"# {name}", *fitted(FITS[name], Path(sys.argv[1]))[1], sep="\n")
+    main(Path(sys.argv[1]), sys.argv[2:])

@@ -369,3 +369,23 @@ def test_a_spherical_top_is_refused():
 
     with pytest.raises(ValueError, match="spherical top"):
         align(Top.from_constants(Constants(B=5000.0, kind="spherical")), GaussianPulse(1e12, 1.0), [5.0])
+
+
+def test_planar_cosine_of_an_asymmetric_top_goes_over_into_that_of_a_symmetric_one():
+    """B - C = 1e-4 B and α_bb = α_cc: after 20 ps phases differ by 1e-3."""
+    tensor = np.diag([6.0, 4.0, 4.0])
+    pulse, times = GaussianPulse(5e12, 0.2), np.linspace(-0.8, 20, 60)
+    traces = [
+        align(
+            Top.from_constants(text).with_polarizability(tensor, "test"),
+            pulse,
+            times,
+            temperature_k=1.0,
+            observables=("cos2theta_2d", "cos2theta"),
+            tolerance=1e-4,
+        ).cosines
+        for text in ("A=20000 B=5000 C=4999.5 MHz", "A=20000 B=4999.75 MHz")
+    ]
+    for name in traces[0]:
+        assert np.abs(traces[0][name] - traces[1][name]).max() < 1e-3  # both tolerances and the phases
+    assert traces[0]["cos2theta_2d"].max() > 0.6

@@ -212,7 +212,6 @@ def test_what_has_no_place_in_a_line_is_refused(column, value, words):
         (LINE[:41] + b"a02" + LINE[44:], "columns 42-44: GUP reads 'a02'"),
         (LINE[:55] + b"1 " + LINE[57:], "columns 56-57: quantum number reads '1 '"),
         (LINE[:55] + b"  " + LINE[57:], "columns 56-57: blank, but QNFMT 101 says that 1"),
-        (LINE[:66] + b"\n", "columns 68-69: blank"),
         (LINE[:30] + b"\t" + LINE[31:], "column 31: byte 0x09"),
         (LINE[:30] + b"\xe2\x88\x92" + LINE[33:], "column 31: byte 0xe2"),
     ],

@@ -33,7 +33,7 @@ def test_kind_follows_the_names_and_exact_equality(values, kind):
 def test_given_kind_wins_when_it_fits():
     assert Constants(B=3, kind="spherical").rigid == (3, 3, 3)
     assert Constants(A=5, B=3, C=3, kind="asymmetric", d1=1e-3).kind == "asymmetric"
-    with pytest.raises(ValueError, match="kind 'oblate' wants B and C"):
+    with pytest.raises(ValueError, match="kind 'oblate' needs B and C"):
         Constants(A=5, B=4, C=3, kind="oblate")
     with pytest.raises(ValueError, match="a top is one of linear"):
         Constants(B=3, kind="round")

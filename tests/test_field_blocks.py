@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from rotor.alignment.observables import absolute_cosine
+from rotor.alignment.axis_functions import absolute_cosine, of_asymmetric
 from rotor.quantum.fields.blocks import Contraction
 from rotor.quantum.fields.direction_cosines import cosine_bands, cosine_squared_bands
 from rotor.quantum.fields.space import field_space
@@ -178,3 +178,25 @@ def test_nonsense_is_refused():
         field_space(Top.from_constants(Constants(B=5.0, kind="spherical")), 4, [Contraction(np.eye(3), ZZ)])
     with pytest.raises(ValueError, match="two vectors"):
         Contraction([1, 0, 0], ZZ)
+
+
+# Functions of the angle of an axis
+
+
+@pytest.mark.parametrize("representation", ["Ir", "Il", "IIr", "IIIr", "IIIl"])
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_functions_of_an_axis_over_an_asymmetric_top(representation, axis):
+    """cos²θ by quadrature is the tensor's; |cosθ| squares to it where the sum over states in between is long enough."""
+    top = Top.from_constants(Constants(A=10.0, B=6.0, C=4.0, representation=representation))
+    along = np.eye(3)[axis]
+    square = Contraction(np.outer(along, along), ZZ)
+    space = field_space(top, 14, [Contraction(np.diag([3.0, 2.0, 1.0]), ZZ)])
+    for m in (0, 2):
+        for block in space.blocks(m):
+            exact = block.matrix(square)
+            assert np.abs(of_asymmetric(block, axis, lambda x: x**2) - exact).max() < 1e-12  # round-off
+            absolute = of_asymmetric(block, axis)
+            low = block.j <= 2
+            assert np.allclose(
+                (absolute @ absolute)[np.ix_(low, low)], exact[np.ix_(low, low)], atol=2e-3
+            )  # J^-4 from 14

@@ -58,3 +58,17 @@ def test_every_measured_line_is_where_it_was_measured(shared, name, tag, jmax):
             assert abs(ours[key] - found.frequency_mhz[i]) <= allowed
             compared += 1
     assert compared > 40
+
+
+@pytest.mark.parametrize("name", ["water", "D2O", "HDO"])
+def test_lines_of_a_tabulated_molecule_are_between_tabulated_levels(name):
+    top = rotor.read(name)
+    lines = rotor.line_list(top)
+    assert top.level_table is not None
+    for states in (lines.upper, lines.lower):
+        labels = {label: lines.levels.quanta[label][states] for label in ("j", "ka", "kc")}
+        assert (top.level_table.rows_of(labels) >= 0).all()
+    assert not any("does not converge" in text for text in lines.warnings)
+    assert any("left out" in text for text in lines.warnings) == (lines.untrusted > 0)
+    given = top.with_constants(top.constants)  # without the table
+    assert any("does not converge" in text for text in rotor.line_list(given).warnings)

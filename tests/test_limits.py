@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 
+import numpy as np
 import pytest
 from scipy import constants
 
@@ -36,7 +37,7 @@ def test_the_unit_of_field_gradients():
     ("source", "name"),
     [
         ("CH3OH", "internal rotation"), ("CH3CHO", "internal rotation"), ("camphor", "internal rotation"),
-        ("NH3", "inversion"), ("SMILES:CN", "inversion"), ("O2", "electron spin"), ("HCN", "nuclear quadrupole"),
+        ("SMILES:CN", "inversion"), ("O2", "electron spin"), ("HCN", "nuclear quadrupole"),
         ("D2O", "nuclear quadrupole"), ("CH3Cl", "nuclear quadrupole"), ("SMILES:CO", "error of the geometry"),
         ("CH3OH", "centrifugal distortion"), ("water", "magnetic coupling of nuclear spins"),
     ],
@@ -50,6 +51,7 @@ def test_signs_of_what_is_left_out(source, name):
     [
         ("CH3CN", "internal rotation"), ("CH3CCH", "internal rotation"), ("CH3F", "internal rotation"),
         ("PH3", "inversion"), ("HCONH2", "inversion"), ("water", "nuclear quadrupole"), ("CO", "electron spin"),
+        ("CH3O", "internal rotation"),
         ("water", "centrifugal distortion"), ("CO", "magnetic coupling of nuclear spins"), ("H2CO", "error of the geometry"),
     ],
 )  # fmt: skip
@@ -81,12 +83,35 @@ def test_estimated_couplings_are_of_the_right_order(shared, case, label, quadrup
     assert 0.1 < abs(quadrupole_barn) * GRADIENT_MHZ_PER_BARN / abs(chi) < 10  # an order of magnitude, as the text says
 
 
-def test_largest_first_and_unknown_last():
-    sizes = list(limits("CH3OH").values())
-    known = [size for size in sizes if size is not None]
+@pytest.mark.parametrize("source", ["CH3OH", "CH3CHO", "NO", "NH3"])
+def test_largest_first_and_unknown_spin_before_all(source):
+    found = list(limits(source).items())
+    known = [size for _, size in found if size is not None]
     assert known == sorted(known, reverse=True)
-    assert sizes[: len(known)] == known
-    assert None in sizes
+    assert found[-1] == ("magnetic coupling of nuclear spins", None)
+    assert ("electron spin" in dict(found)) == (source == "NO") == (found[0][1] is None)
+
+
+def test_a_free_methyl_group_bounds_internal_rotation():
+    """F of methanol from moments written out: I_m about the axis through C, and the whole with it."""
+    molecule = rotor.read("CH3OH").molecule
+    x, mass = molecule.positions_angstrom, molecule.masses_u
+    hydrogens = [i for i, s in enumerate(molecule.symbols) if s == "H" and np.linalg.norm(x[i] - x[0]) < 1.3]
+    assert molecule.symbols[0] == "C"
+    axis = x[0] - x[hydrogens].mean(axis=0)
+    axis /= np.linalg.norm(axis)
+    turned = np.cross(axis, x - x[0])  # velocity of each atom as the group turns
+    group = np.zeros(len(x))
+    group[hydrogens] = 1.0
+    centre = mass @ x / mass.sum()
+    tensor = sum(m * (r @ r * np.eye(3) - np.outer(r, r)) for m, r in zip(mass, x - centre, strict=True))
+    own = float(mass * group @ np.sum(np.cross(axis, x - x[hydrogens].mean(axis=0)) ** 2, axis=1))
+    coupling = np.sum((mass * group)[:, None] * np.cross(x - centre, turned), axis=0)  # L of the group at unit speed
+    free = 505379.008 / (own - coupling @ np.linalg.solve(tensor, coupling))
+    (size,) = [limits("CH3OH")["internal rotation"]]
+    assert size == pytest.approx(free, rel=1e-3)  # the group of the geometry is not exactly C3v
+    text = {one.name: one for one in model_limits(rotor.read("CH3OH"), 3, SEMI_RIGID)}["internal rotation"].sentence
+    assert text.startswith("internal rotation: at most about 800000 MHz; a methyl group turns")
 
 
 def test_the_size_of_distortion_is_that_of_a_harmonic_diatomic_molecule():
@@ -102,8 +127,6 @@ def test_the_size_of_distortion_is_that_of_a_harmonic_diatomic_molecule():
 
 def test_the_most_populated_j():
     """The largest of (2J+1)^2 exp(-E/kT) summed by hand over the levels of a spherical top."""
-    import numpy as np
-
     top = rotor.Top.from_constants("A=10 B=10 C=10 GHz")
     levels = solve_levels(top, 80)
     population = levels.degeneracy * np.exp(-levels.energy_mhz / (300.0 * 20836.619))

@@ -102,7 +102,7 @@ def test_thinning_keeps_every_peak():
     x = np.linspace(0.0, 1.0, 1_000_001)
     y = np.zeros(len(x))
     y[[3, 500_000, 999_990]] = [1.0, 2.0, 3.0]
-    thin_x, thin_y = plots._thinned(x, y)
+    thin_x, thin_y = plots.thinned(x, y)
     assert len(thin_x) <= plots.MOST_VERTICES
     for peak, height in ((3e-6, 1.0), (0.5, 2.0), (0.99999, 3.0)):
         assert thin_y[np.abs(thin_x - peak) < 4 / plots.MOST_VERTICES].max() == height

@@ -378,7 +378,7 @@ def test_tables_have_every_column():
     frame = raman_lines(rotor.read("NH3"), jmax=4).to_pandas()
     assert list(frame.columns) == [
         "shift_cm", "cross_section_cm2_per_sr", "wavelength_nm", "energy_initial_cm", "g_initial", "strength_angstrom6",
-        "j_initial", "k_initial", "j_final", "k_final",
+        "v_initial", "j_initial", "k_initial", "v_final", "j_final", "k_final",
     ]  # fmt: skip
     assert (np.diff(frame["shift_cm"]) >= 0).all()
     assert frame["wavelength_nm"].to_numpy() == pytest.approx(

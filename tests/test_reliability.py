@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from rotor.quantum.convergence import RATIO_LIMIT, order_sizes_mhz, series_ratio, warnings_of
-from rotor.quantum.solve import hamiltonian, solve_levels
+from rotor.quantum.rotation import hamiltonian
+from rotor.quantum.solve import solve_levels
 from rotor.spectra.lines import line_list
 from rotor.tops.constants import Constants
 from rotor.tops.top import Top

@@ -136,7 +136,8 @@ def test_known_figures_of_species():
     cold = thermodynamic_functions(h2, [1.0], species="ortho")
     assert cold.energy_j_per_mol[0] == pytest.approx(1417.4, abs=0.1)  # 118.487 cm⁻¹, the first rotational level of H2
     assert cold.entropy_j_per_mol_k[0] == pytest.approx(GAS_CONSTANT * math.log(9), rel=1e-12)  # three J, three spins
-    factors = {"H2": 4, "water": 4, "CH4": 16, "C2H4": 16, "CO2": 1, "CO": 1, "NH3": 4}
+    # of NH3 both inversion states are in Q, so that the factor is that of all three protons, 2³
+    factors = {"H2": 4, "water": 4, "CH4": 16, "C2H4": 16, "CO2": 1, "CO": 1, "NH3": 8}
     for name, factor in factors.items():
         assert thermodynamic_functions(rotor.read(name), [50.0]).spin_factor == pytest.approx(factor, rel=1e-12)
 

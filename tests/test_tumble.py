@@ -300,25 +300,25 @@ def test_ordinary_bodies_have_the_inertia_of_their_parts(name):
 
 
 def test_parts_of_ordinary_bodies_against_sums_over_points():
-    from rotor.classical.bodies import box, cylinder, hoop, rod
+    from rotor.geometry.inertia import box, cylinder, hoop, rod
 
     middles = (np.arange(200) + 0.5) / 200 - 0.5  # the mean of x² over 200 strips is (1 - 1/200²)/12
     x, y, z = np.meshgrid(*3 * [middles[::4]], indexing="ij")
     points = np.stack([2 * x, 3 * y, 4 * z], axis=-1).reshape(-1, 3)
     squares = (points**2).mean(axis=0)
     np.testing.assert_allclose(
-        box(7.0, (2, 3, 4)).moments_kg_m2, 7 * (squares.sum() - squares), rtol=1e-3
+        box(7.0, [2, 3, 4]).tensor.diagonal(), 7 * (squares.sum() - squares), rtol=1e-3
     )  # 50² strips
     turn = 2 * np.pi * np.arange(12) / 12
     ring = np.mean(np.stack([np.cos(turn), np.sin(turn), 0 * turn]) ** 2, axis=1) * 0.3**2
-    np.testing.assert_allclose(
-        hoop(2.0, 0.3, (0, 0, 0)).moments_kg_m2, 2 * (ring.sum() - ring), rtol=1e-12
-    )  # exact sums
+    np.testing.assert_allclose(hoop(2.0, 0.3).tensor.diagonal(), 2 * (ring.sum() - ring), rtol=1e-12)  # exact sums
     radii = np.sqrt((np.arange(1000) + 0.5) / 1000) * 0.3  # equal areas
     across = 5 * (np.mean(radii**2) / 2 + np.mean((0.8 * middles) ** 2))
     expected = (across, across, 5 * np.mean(radii**2))
-    np.testing.assert_allclose(cylinder(5.0, 0.3, 0.8).moments_kg_m2, expected, rtol=1e-4)  # 200 strips
-    np.testing.assert_allclose(rod(5.0, 0.8, (1, 2, 3)).moments_kg_m2[1], 5 * np.mean((0.8 * middles) ** 2), rtol=1e-4)
+    np.testing.assert_allclose(cylinder(5.0, 0.3, 0.8).tensor.diagonal(), expected, rtol=1e-4)  # 200 strips
+    np.testing.assert_allclose(
+        rod(5.0, [1, 2, 3], [1.8, 2, 3]).tensor[1, 1], 5 * np.mean((0.8 * middles) ** 2), rtol=1e-4
+    )
 
 
 def test_a_body_is_spun_by_an_angular_velocity_in_si_units(call):

@@ -16,6 +16,7 @@ import numpy as np
 from rotor import units
 from rotor.arrays import Floats
 from rotor.quantum.fields.blocks import FreeLevels
+from rotor.tops.top import one_state
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
@@ -68,7 +69,7 @@ def one_level(top: Top, state: Mapping[str, int], m: int | None = None) -> Ensem
     j = int(state.get("j", -1))
     if not 0 <= j <= MOST_J:
         raise ValueError(f"state {dict(state)}: J from 0 to {MOST_J} is expected among its quantum numbers")
-    levels = solve_levels(top, j)
+    levels = solve_levels(one_state(top, "alignment"), j)
     row = levels.find(**dict(state))
     if levels.weight[row] == 0:
         raise ValueError(f"state {dict(state)}: its nuclear-spin weight is 0, so that it does not exist")
@@ -81,7 +82,7 @@ def ground_level(top: Top) -> Ensemble:
     """The ensemble of the lowest level that exists, all its M alike: a gas at 0 K."""
     from rotor.quantum.solve import solve_levels
 
-    levels = solve_levels(top, 4)
+    levels = solve_levels(one_state(top, "alignment"), 4)
     there = np.flatnonzero(levels.weight > 0)
     row = int(there[np.argmin(levels.energy_mhz[there])])
     return one_level(top, {name: int(column[row]) for name, column in levels.quanta.items()})
@@ -96,7 +97,7 @@ def thermal(top: Top, temperature_k: float, cut: float) -> Ensemble:
         raise ValueError(
             f"temperature {temperature_k} K: a finite temperature above 0 K is expected (0 means one level)"
         )
-    levels = _levels_for(top, temperature_k, cut)
+    levels = _levels_for(one_state(top, "alignment"), temperature_k, cut)
     there = levels.weight > 0
     ground = float(levels.energy_mhz[there].min())
     factor = levels.weight * np.exp(-(levels.energy_mhz - ground) / (units.MHZ_PER_K * temperature_k))

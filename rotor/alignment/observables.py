@@ -8,22 +8,22 @@ with the coherences of all initial states of a gas added up once. The lines of a
 the same for one state as for a gas. On even times the sum is a product of two small matrices.
 
 cos²θ_2D, what a detector sees of the axis in a plane through Z, is cos²θ/(cos²θ + sin²θ sin²φ). It is no tensor of finite rank; its
-mean over φ, which is all that counts where the gas is symmetric about Z, is |cosθ|, whose matrix is made by quadrature.
+mean over φ, which is all that counts where the gas is symmetric about Z, is |cosθ| (`axis_functions`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rotor.alignment.axis_functions import absolute_cosine, of_asymmetric
 from rotor.arrays import Floats, Ints
 from rotor.quantum.fields.blocks import AxialBlock, Contraction, FieldBlock
-from rotor.quantum.fields.direction_cosines import cosine_bands
+from rotor.quantum.fields.wang_blocks import WangBlockInField
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
@@ -37,21 +37,22 @@ _CHUNK = 1 << 21
 
 @dataclass(frozen=True)
 class Observable:
-    """A cosine to be followed: the name of its column, the contraction, None for |cosθ|, and its value in an isotropic gas."""
+    """A cosine to be followed: the name of its column, the contraction, None for |cosθ| of `axis`, its value in an isotropic gas."""
 
     name: str
     contraction: Contraction | None
     isotropic: float
+    axis: int = 0
 
     def matrix(self, block: FieldBlock) -> NDArray[Any]:
         """Over the states of a block (n, n)."""
         if self.contraction is not None:
             return block.matrix(self.contraction)
-        if not isinstance(block, AxialBlock):
-            raise ValueError(
-                f"{self.name} is made for linear and symmetric tops in a field with the symmetry of Z; use cos2theta"
-            )
-        return absolute_cosine(block)
+        if isinstance(block, AxialBlock):
+            return absolute_cosine(block)
+        if isinstance(block, WangBlockInField):
+            return of_asymmetric(block, self.axis)
+        raise ValueError(f"{self.name} is made for fields with the symmetry of Z; use cos2theta")
 
 
 def figure_axis(top: Top) -> int:
@@ -86,59 +87,10 @@ def observable(name: str, top: Top) -> Observable:
     if kind in ("costheta", "cos_"):
         return Observable(name, Contraction(along, fixed), 0.0)
     if kind == "cos2theta_2d":
-        return Observable(name, None, 0.5)
+        return Observable(name, None, 0.5, axis)
     raise ValueError(
         f"observable {name!r}: known are cos2theta, costheta, cos2theta_2d, cos2_aX to cos2_cZ (squares) and cos_aX to cos_cZ"
     )
-
-
-# |cosθ| by quadrature
-
-
-def absolute_cosine(block: AxialBlock) -> Floats:
-    """⟨J' k M| |cosθ| |J k M⟩ over a block (n, n), exact but for round-off.
-
-    Gauss-Legendre points on each half of -1 < cosθ < 1, where the integrand is a polynomial.
-
-    >>> from rotor.quantum.fields.space import field_space
-    >>> from rotor.tops.top import Top
-    >>> z2 = Contraction(np.diag([1.0, 0, 0]), np.diag([0, 0, 1.0]))
-    >>> block = field_space(Top.from_constants("B=6000 MHz"), 2, [z2]).blocks(0)[0]
-    >>> absolute_cosine(block).round(6).tolist()  # 1/2, √5/8; √5/8, 5/8
-    [[0.5, 0.279508], [0.279508, 0.625]]
-    """
-    j = block.j
-    points, weights = _half_points(int(j[-1]) + 2)
-    x = np.concatenate([-points, points])
-    functions = symmetric_top_functions(int(j[-1]), block.k, block.m, x)[j - max(abs(block.k), abs(block.m))]
-    return np.asarray((functions * (np.abs(x) * np.concatenate([weights, weights]))) @ functions.T)
-
-
-@lru_cache(maxsize=8)
-def _half_points(count: int) -> tuple[Floats, Floats]:
-    x, w = np.polynomial.legendre.leggauss(count)
-    return (x + 1) / 2, w / 2
-
-
-def symmetric_top_functions(jmax: int, k: int, m: int, x: Floats) -> Floats:
-    """√(J+½) d^J_Mk as functions of x = cosθ, normalised over -1 < x < 1, for J = max(|k|, |M|) ... jmax, (J, points).
-
-    The lowest is N (1+x)^|k+M|/2 (1-x)^|k-M|/2; the others follow from x f_J = Σ ⟨J'|cosθ|J⟩ f_J', upwards, which is stable.
-    """
-    from scipy.special import gammaln
-
-    first = max(abs(k), abs(m))
-    plus, minus = abs(k + m), abs(k - m)
-    log_norm = gammaln(plus + minus + 2) - gammaln(plus + 1) - gammaln(minus + 1) - (plus + minus + 1) * np.log(2.0)
-    with np.errstate(divide="ignore"):
-        lowest = np.exp(0.5 * (log_norm + plus * np.log1p(x) + minus * np.log1p(-x)))
-    out = np.zeros((jmax - first + 1, len(x)))
-    out[0] = lowest
-    diagonal, beside = cosine_bands(np.arange(first, jmax + 1), k, m)
-    for n in range(jmax - first):
-        before = beside[n - 1] * out[n - 1] if n else 0.0
-        out[n + 1] = ((x - diagonal[n]) * out[n] - before) / beside[n]
-    return out
 
 
 # Sums of harmonics

@@ -23,6 +23,7 @@ from rotor.cli.shared.output import ComputationError
 
 VERBS = {  # and what the list of verbs says of each, short enough for 80 columns
     "spectrum": "Rotational lines: frequencies and intensities.",
+    "emission": "Lines as a radio telescope sees them.",
     "info": "A molecule as a top: frame, constants, kind, Q(T).",
     "levels": "Energy levels as a table and a term diagram.",
     "molecules": "The molecules known by name, with their sources.",
@@ -38,7 +39,10 @@ VERBS = {  # and what the list of verbs says of each, short enough for 80 column
     "structure": "Structures from the constants of isotopologues.",
     "convert": "Constants from one file format into another.",
     "cat": "A catalogue as a table, filtered or compared.",
+    "new": "A commented scene file to begin with.",
+    "run": "A scene file run; a sweep goes on where it stopped.",
 }
+FILES = {"run": "run_scene"}  # of verbs that this module has a function for
 COMPLETION = "_ROTOR_COMPLETE"  # set by a shell that asks for completions
 NO_ANSWER, WRONG_INPUT, INTERRUPTED, TERMINATED = 1, 2, 130, 143
 # click's ClickException, whether click is a package of its own or, in a newer typer, a part of it
@@ -50,6 +54,7 @@ Examples:
   rotor spectrum "SMILES:C=O" --temperature 100
   rotor spectrum my.xyz --dipole 0,0,1.85 --range 0:2000GHz --cat out.cat --plot out.png
   rotor spectrum --constants "A=835840.288 B=435351.717 C=278138.7 MHz" --dipole-abc 0,1.8546,0
+  rotor emission CH3CN HC3N --band ALMA6 --column 1e15,3e14 --width 5 --plot core.png
   rotor info my.sdf
   rotor levels water --jmax 5 --plot terms.png
   rotor isotopologues water
@@ -61,7 +66,8 @@ Examples:
   rotor gas water --molecules 20000 --seed 7
   rotor fluid water --molecules 216 --csv run.csv
   rotor fit case.par --out fitted
-  rotor structure family.toml --plot molecule.png"""
+  rotor structure family.toml --plot molecule.png
+  rotor new spectrum > s.toml && rotor run s.toml"""
 
 
 def _application(verbs: Iterable[str] = VERBS) -> typer.Typer:
@@ -84,7 +90,7 @@ def _application(verbs: Iterable[str] = VERBS) -> typer.Typer:
         pass
 
     for verb in verbs:
-        module = import_module(f"rotor.cli.{verb}")
+        module = import_module(f"rotor.cli.{FILES.get(verb, verb)}")
         app.command(verb, cls=PlainCommand, short_help=VERBS[verb], epilog=module.EXAMPLES)(module.command)
     return app
 

@@ -23,6 +23,7 @@ from rotor.cli.shared.output import (
     show_table,
 )
 from rotor.cli.shared.pulse_inputs import Pulses, pulses_of
+from rotor.cli.shared.save_scene import save_scene, save_scene_option
 from rotor.cli.shared.sources import with_sources
 
 if TYPE_CHECKING:
@@ -82,9 +83,10 @@ class Outputs:
     parquet: str | None = file_option(".parquet", help="Write the cosines as Parquet.")
     plot: str | None = file_option(".png", ".pdf", ".svg", help="Draw the cosines (.png, .pdf, .svg).")
     json: str | None = json_option()
+    save_scene: str | None = save_scene_option()
 
 
-@grouped(given=("dipole", "calculator", "hessian", "spin_constants", "spins"))
+@grouped(given=("dipole", "calculator", "hessian", "spin_constants", "spins", "state_constants"))
 def command(context: typer.Context, given: Input, pulses: Pulses, options: Options, outputs: Outputs) -> None:
     """Molecules aligned or oriented by pulses of light: cosines against time of a rotational wave packet."""
     from rotor.alignment.request import AlignRequest, answer_align
@@ -104,9 +106,11 @@ def command(context: typer.Context, given: Input, pulses: Pulses, options: Optio
     content = _content(answer, given, context.obj)
     content["files"] = files.names
     text = lambda: json_with_rows(answer.table, "trace", content)  # noqa: E731
+    by_hand = options.polarizability is not None or options.anisotropy is not None
+    saved = save_scene("align", request, outputs, given, by_hand)
     deliver(
         files,
-        _writers(answer, content),
+        _writers(answer, content) | saved,
         text,
         with_sources(
             lambda: _show(answer, content), answer.trace.top, ("constants", "dipole", "polarizability"), given.sources

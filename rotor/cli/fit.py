@@ -89,6 +89,9 @@ class Options:
     iterations: int | None = option(None, metavar="N", help="Most iterations; 100, or NITR of a .par file.")
     try_: str | None = option(None, "--try", metavar="LIST", help="Try each of these constants more, or less.")
     choose: str | None = option(None, metavar="LIST", help="Build the model up from these constants, one at a time.")
+    all_orders: bool = option(
+        False, "--all-orders", help="With --choose: constants of all orders compete from the first step on."
+    )
     suggest: str | None = option(None, metavar="NAME", help="Which unmeasured line would best fix this constant.")
     bootstrap: int = option(0, metavar="N", help="Errors from N samples of the lines beside the others.")
     seed: int = option(0, metavar="N", help="Of the bootstrap.")
@@ -111,8 +114,10 @@ def command(context: typer.Context, given: Options) -> None:
     _refuse_overwriting(files, [source, given.lin, given.start, given.more, str(Path(source).with_suffix(".lin"))])
 
     steps: list[Trial] = []
+    if given.all_orders and given.choose is None:
+        raise ValueError("--all-orders goes with --choose, which names the constants to choose from")
     if given.choose is not None:
-        fit, steps = _chosen(request, options, _names(given.choose))
+        fit, steps = _chosen(request, options, _names(given.choose), not given.all_orders)
     else:
         fit = _fitted(request, options)
     for text in request.notes:
@@ -258,7 +263,9 @@ def _progress() -> Any:
     return show
 
 
-def _chosen(request: Request, options: FitOptions, candidates: Sequence[str]) -> tuple[Fit, list[Trial]]:
+def _chosen(
+    request: Request, options: FitOptions, candidates: Sequence[str], by_order: bool
+) -> tuple[Fit, list[Trial]]:
     from rotor.fit.choose import choose_constants
     from rotor.fit.fit import fit_lines
     from rotor.fit.parameters import parameters
@@ -266,7 +273,9 @@ def _chosen(request: Request, options: FitOptions, candidates: Sequence[str]) ->
     if request.spfit is not None:
         raise ValueError("--choose: start from a line list and constants, whose free ones are the base of the model")
     assert request.constants is not None  # a list of lines has constants to start from
-    fit, steps = choose_constants(request.lines, request.constants, request.parameters.names, candidates, options)
+    fit, steps = choose_constants(
+        request.lines, request.constants, request.parameters.names, candidates, options, by_order=by_order
+    )
     return fit_lines(request.lines, fit.named, parameters(fit.named, fit.parameters.names), options), steps
 
 

@@ -25,6 +25,7 @@ from rotor.cli.shared.output import (
     show_facts,
     show_table,
 )
+from rotor.cli.shared.save_scene import save_scene, save_scene_option
 
 if TYPE_CHECKING:
     from rotor.arrays import Floats
@@ -85,6 +86,7 @@ class Outputs:
         ".png", ".pdf", ".svg", help="Draw temperatures, energy and g(r) (.png, .pdf, .svg)."
     )
     json: str | None = json_option()
+    save_scene: str | None = save_scene_option()
 
 
 @grouped()
@@ -102,6 +104,7 @@ def command(context: typer.Context, options: Options, outputs: Outputs) -> None:
     content = start | answer.facts() | {"files": [str(path) for path in grown if path is not None]}
     text = lambda: json_with_rows(answer.record, "record", content)  # noqa: E731
     writers = {"--plot": lambda path: _draw(answer, paths, path, str(context.obj))}
+    writers |= save_scene("fluid", request, outputs)
     deliver(files, writers, text, lambda: _show(content, settings))
 
 
@@ -177,6 +180,7 @@ def _files(source: str, outputs: Outputs) -> tuple[RunFiles, Files]:
     growing.ask("--checkpoint", outputs.checkpoint, (".npz",))
     last.ask("--plot", outputs.plot, (".png", ".pdf", ".svg"))
     last.ask_json(outputs.json)
+    last.ask("--save-scene", outputs.save_scene, (".toml",))
     for name, target in (growing.paths | last.paths).items():
         if target.resolve() == Path(source).resolve():
             raise ValueError(f"{name.strip()} {target}: is the box that is read; write to another file")

@@ -17,6 +17,7 @@ from rotor.cli.shared import inputs
 from rotor.cli.shared.inputs import Input, json_option
 from rotor.cli.shared.options import file_option, grouped, option
 from rotor.cli.shared.output import Files, Table, Writer, deliver, json_text, rows_of, show_facts, show_table
+from rotor.cli.shared.save_scene import save_scene, save_scene_option
 from rotor.cli.shared.sources import with_sources
 
 if TYPE_CHECKING:
@@ -57,9 +58,10 @@ class Outputs:
     parquet: str | None = file_option(".parquet", help="Write the correlation functions as Parquet.")
     plot: str | None = file_option(".png", ".pdf", ".svg", help="Draw the test and the functions (.png, .pdf, .svg).")
     json: str | None = json_option()
+    save_scene: str | None = save_scene_option()
 
 
-@grouped(given=("spin_weights", "calculator", "hessian", "symmetry_tolerance"))
+@grouped(given=("spin_weights", "state_constants", "calculator", "hessian", "symmetry_tolerance"))
 def command(context: typer.Context, given: Input, options: Options, outputs: Outputs) -> None:
     """A classical gas of free molecules: equipartition, correlation functions."""
     from rotor.thermo.classical_gas import GasRequest, settling_times_ps
@@ -75,7 +77,7 @@ def command(context: typer.Context, given: Input, options: Options, outputs: Out
     content["files"] = files.names
     deliver(
         files,
-        _writers(answer, content),
+        _writers(answer, content) | save_scene("gas", request, outputs, given),
         lambda: json_text(content),
         with_sources(lambda: _show(answer, content), answer.request.top, ("constants",), given.sources),
     )

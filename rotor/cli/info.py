@@ -14,7 +14,7 @@ from rotor.cli.shared import inputs
 from rotor.cli.shared.inputs import Input, json_option
 from rotor.cli.shared.options import grouped, option
 from rotor.cli.shared.output import Files, Table, deliver, json_text, show_facts, show_table, sum_progress
-from rotor.cli.shared.sources import with_sources
+from rotor.cli.shared.sources import source_facts
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 TEMPERATURES_K = (9.375, 18.75, 37.5, 75.0, 150.0, 225.0, 300.0, 500.0, 1000.0)  # those of the catalogues, and two more
 
 MOST_CONFORMERS = 1000
-ROOM_K = 300.0  # at the J most populated there effects are compared
+ROOM_TEMPERATURE_K = 300.0  # at the J most populated there effects are compared
 
 EXAMPLES = """\b
 Examples:
@@ -52,12 +52,12 @@ def command(context: typer.Context, given: Input, options: Options) -> None:
     top = inputs.read_top(given)
 
     from rotor.cli.shared.report import describe
-    from rotor.quantum.effects.watson import SEMI_RIGID
+    from rotor.quantum.effects.of_top import effects_of
     from rotor.quantum.limits import limit_facts, populated_j
     from rotor.thermo.request import partition_table
 
     content = describe(top, given.text, context.obj)
-    content |= limit_facts(top, populated_j(top, ROOM_K), SEMI_RIGID)
+    content |= limit_facts(top, populated_j(top, ROOM_TEMPERATURE_K), effects_of(top, hyperfine=False))
     content["partition_function"] = partition_table(top, temperatures, sum_progress())
     if options.conformers is not None:
         content["conformers"] = conformer_table(given.source, options.conformers)
@@ -65,9 +65,7 @@ def command(context: typer.Context, given: Input, options: Options) -> None:
         files,
         {},
         lambda: json_text(content),
-        with_sources(
-            lambda: _show(top, content), top, ("constants", "dipole", "polarizability", "spin weights"), given.sources
-        ),
+        lambda: _show(top, content, given.sources),
     )
 
 
@@ -93,18 +91,24 @@ def conformer_table(source: str | None, count: int) -> list[dict[str, Any]]:
     return found
 
 
-def _show(top: Top, content: dict[str, Any]) -> None:
+def _show(top: Top, content: dict[str, Any], whole_sources: bool) -> None:
     from rotor.cli.shared import report
 
     print(report.heading(top))
     show_facts(_facts(top, content))
     others = _conformers_of(content.get("conformers", []))
-    for table in (_constants_table(top), _axes_table(content), _nuclei_table(top, content), _q_table(content), others):
+    axes, nuclei, q = _axes_table(content), _nuclei_table(top, content), _q_table(content)
+    for table in (_constants_table(top), _states_table(top), axes, nuclei, q, others):
         if table:
             print()
             show_table(table)
     print()
-    show_facts(report.model_facts(content))
+    show_facts(
+        [
+            *source_facts(top, ("constants", "dipole", "polarizability", "spin weights"), whole_sources),
+            *report.model_facts(content),
+        ]
+    )
 
 
 def _facts(top: Top, content: dict[str, Any]) -> list[tuple[str, str]]:
@@ -124,6 +128,7 @@ def _facts(top: Top, content: dict[str, Any]) -> list[tuple[str, str]]:
         ("dipole", dipole),
         ("polarizability", report.tensor_text(top)),
         ("spin weights", weights),
+        *_states_facts(top),
         ("mass", f"{top.mass_u:.6f} u" if top.mass_u else "not known"),
         ("inertial defect", f"{content['inertial_defect_u_angstrom2']:.6g} u Å²"),
     ]
@@ -163,6 +168,33 @@ def _constants_table(top: Top) -> Table:
         for name, mhz in top.constants.values.items()
     ]
     return Table("", ("constant", "MHz", "± MHz", "cm-1"), rows, frozenset({"constant"}))
+
+
+def _states_facts(top: Top) -> list[tuple[str, str]]:
+    """Names, spin weights and dipoles of several states, and where they are from."""
+    states = top.states
+    if states is None:
+        return []
+    from rotor.cli.shared.report import vector_text, weights_text
+
+    names = [f"{v} ({states.name_of(v)})" if states.names else str(v) for v in range(states.count)]
+    facts = [("states", f"v = {', '.join(names)}")]
+    for v, one in states.weights.items():
+        facts.append(("", f"spin weights of {states.name_of(v)}: {weights_text(one.to_mapping())}"))
+    for (up, low), moment in states.dipoles.items():
+        where = f"in {states.name_of(up)}" if up == low else f"between {states.name_of(low)} and {states.name_of(up)}"
+        facts.append(("", f"dipole {where}: {vector_text(moment)}"))
+    return facts
+
+
+def _states_table(top: Top) -> Table | None:
+    """Constants of further states and what couples them."""
+    if top.states is None:
+        return None
+    from rotor.units import MHZ_PER_CM
+
+    rows = [(name, f"{mhz:.12g}", f"{mhz / MHZ_PER_CM:.10g}") for name, mhz in top.states.values.items()]
+    return Table("", ("of states", "MHz", "cm-1"), rows, frozenset({"of states"}))
 
 
 def _axes_table(content: dict[str, Any]) -> Table:

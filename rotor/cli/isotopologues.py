@@ -45,7 +45,11 @@ class Options:
     json: str | None = json_option()
 
 
-@grouped(given=("sources", "constants", "isotope", "spin_weights", "calculator", "hessian", "symmetry_tolerance"))
+@grouped(
+    given=(
+        "sources", "constants", "isotope", "spin_weights", "state_constants", "calculator", "hessian", "symmetry_tolerance",
+    )
+)  # fmt: skip
 def command(context: typer.Context, given: Input, options: Options) -> None:
     """Isotopologues: abundance, constants, kind, axes, dipole and spin weights of each."""
     files = Files.of(options)

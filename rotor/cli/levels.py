@@ -24,7 +24,8 @@ from rotor.cli.shared.output import (
     show_facts,
     show_table,
 )
-from rotor.cli.shared.sources import with_sources
+from rotor.cli.shared.save_scene import save_scene, save_scene_option
+from rotor.cli.shared.sources import source_facts
 
 if TYPE_CHECKING:
     from rotor.quantum.request import LevelsAnswer
@@ -66,6 +67,7 @@ class Outputs:
     egy: str | None = file_option(".egy", help="Write all levels as SPCAT's list (.egy).")
     plot: str | None = file_option(".png", ".pdf", ".svg", help="Draw the term diagram (.png, .pdf, .svg).")
     json: str | None = json_option()
+    save_scene: str | None = save_scene_option()
 
 
 @grouped(given=("dipole", "dipole_abc"))
@@ -91,11 +93,9 @@ def command(context: typer.Context, given: Input, options: Options, outputs: Out
     text = lambda: json_with_rows(answer.table, "levels", content)  # noqa: E731
     deliver(
         files,
-        _writers(answer, content, options.unit),
+        _writers(answer, content, options.unit) | save_scene("levels", request, outputs, given),
         text,
-        with_sources(
-            lambda: _show(answer, content, options), answer.request.top, ("constants", "spin weights"), given.sources
-        ),
+        lambda: _show(answer, content, options, given.sources),
     )
 
 
@@ -135,7 +135,7 @@ def _writers(answer: LevelsAnswer, content: dict[str, Any], unit: str) -> dict[s
     return {"--csv": table, "--parquet": table, "--egy": table, "--plot": draw}
 
 
-def _show(answer: LevelsAnswer, content: dict[str, Any], options: Options) -> None:
+def _show(answer: LevelsAnswer, content: dict[str, Any], options: Options, whole_sources: bool) -> None:
     from rotor.cli.shared import report
 
     print(report.heading(answer.request.top))
@@ -144,7 +144,9 @@ def _show(answer: LevelsAnswer, content: dict[str, Any], options: Options) -> No
         print()
         show_table(_table(answer, options))
     print()
-    show_facts(report.model_facts(content))
+    show_facts(
+        [*source_facts(answer.request.top, ("constants", "spin weights"), whole_sources), *report.model_facts(content)]
+    )
 
 
 def _facts(answer: LevelsAnswer, content: dict[str, Any]) -> list[tuple[str, str]]:

@@ -25,6 +25,7 @@ from rotor.cli.shared.output import (
     show_facts,
     show_table,
 )
+from rotor.cli.shared.save_scene import save_scene, save_scene_option
 from rotor.cli.shared.sources import with_sources
 
 if TYPE_CHECKING:
@@ -65,6 +66,7 @@ class Outputs:
     parquet: str | None = file_option(".parquet", help="Write all lines as Parquet.")
     plot: str | None = file_option(".png", ".pdf", ".svg", help="Draw the lines (.png, .pdf, .svg).")
     json: str | None = json_option()
+    save_scene: str | None = save_scene_option()
 
 
 @grouped(given=("dipole", "dipole_abc", "calculator", "hessian"))
@@ -88,9 +90,10 @@ def command(context: typer.Context, given: Input, options: Options, vibration: V
 
     content["files"] = files.names
     text = lambda: json_with_rows(answer.lines, "lines", content)  # noqa: E731
+    saved = save_scene("raman", request, outputs, given, options.polarizability is not None)
     deliver(
         files,
-        _writers(answer.lines, content),
+        _writers(answer.lines, content) | saved,
         text,
         with_sources(
             lambda: _show(answer, content),

@@ -28,7 +28,8 @@ from rotor.cli.shared.output import (
     show_table,
 )
 from rotor.cli.shared.plot_options import PlotOptions
-from rotor.cli.shared.sources import with_sources
+from rotor.cli.shared.save_scene import save_scene, save_scene_option
+from rotor.cli.shared.sources import source_facts
 
 if TYPE_CHECKING:
     from rotor.formats.spcat.predict import Prediction
@@ -102,6 +103,7 @@ class Outputs:
     profile_csv: str | None = file_option(".csv", help="Write the profile on its grid as CSV.")
     plot: str | None = file_option(".png", ".pdf", ".svg", help="Draw the spectrum (.png, .pdf, .svg).")
     json: str | None = json_option()
+    save_scene: str | None = save_scene_option()
 
 
 @grouped()
@@ -145,18 +147,14 @@ def command(
     content["files"] = files.names
 
     writers = _writers(answer, content, {"tag": tag, **hitran}, drawn)
+    writers |= save_scene("spectrum", answer.request, outputs, given, tag=tag)
     if prediction is not None:
         writers["--cat"] = _program_catalogue(prediction, content)
     deliver(
         files,
         writers,
         lambda: json_with_rows(answer.lines, "lines", content),
-        with_sources(
-            lambda: _show(answer, content, options.range_),
-            answer.lines.top,
-            ("constants", "dipole", "spin weights"),
-            given.sources,
-        ),
+        lambda: _show(answer, content, options.range_, given.sources),
     )
 
 
@@ -301,7 +299,7 @@ def _draw(answer: SpectrumAnswer, path: Path, record: dict[str, Any], drawn: dic
     plot_spectrum(thing, path, provenance={"command": record["command"]}, **drawn)
 
 
-def _show(answer: SpectrumAnswer, content: dict[str, Any], range_text: str | None) -> None:
+def _show(answer: SpectrumAnswer, content: dict[str, Any], range_text: str | None, whole_sources: bool) -> None:
     from rotor.cli.shared import report
 
     lines = answer.lines
@@ -317,7 +315,9 @@ def _show(answer: SpectrumAnswer, content: dict[str, Any], range_text: str | Non
         print()
         show_table(_lines_table(lines, content["strongest"], content["optical_depth"]))
     print()
-    show_facts(report.model_facts(content))
+    show_facts(
+        [*source_facts(lines.top, ("constants", "dipole", "spin weights"), whole_sources), *report.model_facts(content)]
+    )
 
 
 def _facts(lines: Lines, content: dict[str, Any]) -> list[tuple[str, str]]:

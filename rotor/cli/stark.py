@@ -21,6 +21,7 @@ from rotor.cli.shared.output import (
     show_facts,
     show_table,
 )
+from rotor.cli.shared.save_scene import save_scene, save_scene_option
 from rotor.cli.shared.sources import with_sources
 
 if TYPE_CHECKING:
@@ -115,9 +116,10 @@ class Outputs:
     mixture: str | None = file_option(".csv", help="Write means of the thermal mixture against the field as CSV.")
     deflection: str | None = file_option(".csv", help="Write effective dipoles, one column for each state, as CSV.")
     json: str | None = json_option()
+    save_scene: str | None = save_scene_option()
 
 
-@grouped(given=("spin_weights", "calculator", "hessian", "spin_constants", "spins"))
+@grouped(given=("spin_weights", "calculator", "hessian", "spin_constants", "spins", "state_constants"))
 def command(context: typer.Context, given: Input, options: Options, sample: Sample, outputs: Outputs) -> None:
     """Levels in a static electric field: energies, labels, effective dipoles and cosines of every M; lines and mixtures."""
     from rotor.cli.shared.workers import working
@@ -139,6 +141,7 @@ def command(context: typer.Context, given: Input, options: Options, sample: Samp
     content["files"] = files.names
     text = lambda: json_with_rows(answer.states, "states", content)  # noqa: E731
     writers = {**_writers(top, answer.states, content), **_further_writers(made, content)}
+    writers |= save_scene("stark", answer.request, outputs, given, options.polarizability is not None)
     show = with_sources(lambda: _show(top, answer.states, content), top, ("constants", "dipole"), given.sources)
     deliver(files, writers, text, show)
 

@@ -25,6 +25,7 @@ from rotor.cli.shared.output import (
     show_table,
     sum_progress,
 )
+from rotor.cli.shared.save_scene import save_scene, save_scene_option
 from rotor.cli.shared.sources import with_sources
 
 if TYPE_CHECKING:
@@ -65,6 +66,7 @@ class Outputs:
     parquet: str | None = file_option(".parquet", help="Write the table as Parquet.")
     plot: str | None = file_option(".png", ".pdf", ".svg", help="Draw the heat capacity (.png, .pdf, .svg).")
     json: str | None = json_option()
+    save_scene: str | None = save_scene_option()
 
 
 @grouped(given=("dipole", "dipole_abc", "calculator", "hessian"))
@@ -83,7 +85,7 @@ def command(context: typer.Context, given: Input, options: Options, vibration: V
     text = lambda: json_with_rows(answer.functions, "functions", content)  # noqa: E731
     deliver(
         files,
-        _writers(answer, content),
+        _writers(answer, content) | save_scene("thermo", request, outputs, given),
         text,
         with_sources(
             lambda: _show(answer.functions, content), answer.functions.top, ("constants", "spin weights"), given.sources

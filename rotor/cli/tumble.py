@@ -13,6 +13,7 @@ from rotor.cli.shared import inputs
 from rotor.cli.shared.inputs import Input, json_option
 from rotor.cli.shared.options import file_option, grouped
 from rotor.cli.shared.output import Files, Table, Writer, deliver, json_with_rows, show_facts, show_table
+from rotor.cli.shared.save_scene import save_scene, save_scene_option
 from rotor.cli.shared.sources import with_sources
 from rotor.cli.shared.tumble_inputs import Options, Start, read_start
 
@@ -43,9 +44,12 @@ class Outputs:
     plot: str | None = file_option(".png", ".pdf", ".svg", help="Draw the polhodes (.png, .pdf, .svg).")
     gif: str | None = file_option(".gif", ".mp4", help="Animate the motion (.gif; .mp4 with ffmpeg).")
     json: str | None = json_option()
+    save_scene: str | None = save_scene_option()
 
 
-@grouped(given=("dipole", "dipole_abc", "spin_weights", "calculator", "hessian", "symmetry_tolerance"))
+@grouped(
+    given=("dipole", "dipole_abc", "spin_weights", "state_constants", "calculator", "hessian", "symmetry_tolerance")
+)
 def command(context: typer.Context, given: Input, options: Options, outputs: Outputs) -> None:
     """Free rotation: the exact motion, what it conserves, which axes are stable."""
     files = Files.of(outputs)
@@ -61,7 +65,9 @@ def command(context: typer.Context, given: Input, options: Options, outputs: Out
     answer = answer_tumble(start.request)
     content = _content(start, answer, context.obj)
     content["files"] = files.names
-    writers = _writers(start, answer, content)
+    writers = _writers(start, answer, content) | save_scene(
+        "tumble", start.request, outputs, given if start.top is not None else None
+    )
     text = lambda: json_with_rows(answer.table, "motion", content)  # noqa: E731
     deliver(
         files,

@@ -119,6 +119,11 @@ def assignments(
         Which lines were measured in cm⁻¹.
     source, comments : where from; what was written beside each line
 
+    Returns
+    -------
+    Assignments
+        (n,) lines.
+
     Raises
     ------
     ValueError

@@ -12,7 +12,6 @@ and the rms of the residuals that leaving each line out in turn would give, r_i/
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -22,7 +21,7 @@ import numpy as np
 
 from rotor.arrays import Floats, Ints
 from rotor.fit.assignment import Assignments
-from rotor.fit.fit import Fit, FitOptions, fit_lines
+from rotor.fit.fit import Fit, FitOptions, fit_lines, weighted_derivatives
 from rotor.fit.parameters import Parameters, parameters, with_names
 from rotor.quantum.labelled import LevelModel, level_model
 from rotor.tops.constants import Constants
@@ -30,15 +29,18 @@ from rotor.tops.operators import distortion_terms, powers_of_spelled
 
 CHANCE = 0.01  # of an F so large by accident, above which a constant is not taken
 _MOST_STEPS = 40
+_TRIED = 8  # constants, or pairs, of those that promise most that are fitted at each step
+_MADE_UP = 1e-14  # of the squared length of a column of derivatives: what is left of one that the others make up
 
 
 @dataclass(frozen=True, eq=False)
 class Trial:
     """A fit with one constant more or less.
 
-    name, added : which, and whether it was added (else left out). fit : what came out. f_ratio, chance : F and the probability of
-    one so large where the constant is not needed. aicc, cross_validated : of the model tried; those of the model it was tried
-    against stand in `aicc_before` and `cross_validated_before`
+    name, added : which ("HK with h1" for two together), and whether it was added (else left out). fit : what came out
+    f_ratio, chance : F and the probability of one so large where the constant is not needed
+    aicc, cross_validated : of the model tried; those of the model it was tried against stand in `aicc_before` and
+    `cross_validated_before`
     """
 
     name: str
@@ -64,7 +66,7 @@ class Trial:
         """|constant|/standard error in the larger model; nan where it is not in the model tried."""
         if not self.added:
             return float("nan")
-        i = self.fit.parameters.names.index(self.name)
+        i = self.fit.parameters.names.index(self.name.partition(" with ")[0])
         return float(abs(self.fit.values[i]) / self.fit.errors[i])
 
 
@@ -193,6 +195,7 @@ def choose_constants(
     candidates: Sequence[str],
     options: FitOptions | None = None,
     *,
+    by_order: bool = True,
     progress: Callable[[Trial], None] | None = None,
 ) -> tuple[Fit, list[Trial]]:
     """A model built up order by order in J, then freed of what it does not need.
@@ -210,6 +213,9 @@ def choose_constants(
         Constants that are always free.
     candidates : sequence of str
     options : FitOptions, optional
+    by_order : bool
+        False: candidates of all orders compete from the first step on. Where some states are disturbed it finds constants of high
+        order that a search by order does not reach; compare both by `aicc`.
     progress : callable, optional
         Called with every step taken.
 
@@ -230,25 +236,75 @@ def choose_constants(
             progress(trial)
         return trial.fit
 
+    different = sorted(set(orders.values()))
+    groups = [{order} for order in different] if by_order else [set(different)]
     before = -1
     while (
         len(taken) > before
     ):  # once more while something was taken: a higher order may have made a lower one significant
         before = len(taken)
-        for order in sorted(set(orders.values())):
+        for group in groups:
             while len(taken) < _MOST_STEPS:
-                left = [name for name, own in orders.items() if own == order and name not in fit.parameters.names]
-                trials = [one for one in try_constants(fit, left, _patient(options)) if one.added]
-                best = next((one for one in trials if one.better), None) or _best_pair(fit, left, options)
+                left = [name for name in orders if orders[name] in group and name not in fit.parameters.names]
+                best = _best_added(fit, left, _patient(options))
                 if best is None:
                     break
                 fit = take(best)
     while True:
         spare = [name for name in fit.parameters.names if name not in fixed]
-        needless = [one for one in try_constants(fit, spare, _patient(options)) if not one.added and one.better]
+        needless = [one for one in try_constants(fit, _weakest(fit, spare), _patient(options)) if one.better]
         if not needless:
             return fit, taken
         fit = take(min(needless, key=lambda one: (-orders[one.name], one.f_ratio)))
+
+
+def _best_added(fit: Fit, left: Sequence[str], options: FitOptions) -> Trial | None:
+    """The constant, or where none helps alone the pair, that all three signs speak for, with the largest F.
+
+    Fitted are those few that promise the largest decrease of χ² in the linear model; see `promised`.
+    """
+    if not left:
+        return None
+    alone, pairs = promised(fit, left, options)
+    few = [left[i] for i in np.argsort(-alone, kind="stable")[:_TRIED].tolist()]
+    best = next((one for one in try_constants(fit, few, options) if one.added and one.better), None)
+    if best is not None or len(left) < 2:
+        return best
+    upper = [(i, j) for i in range(len(left)) for j in range(i)]
+    order = sorted(upper, key=lambda one: -pairs[one])[:_TRIED]
+    found = [trial for i, j in order if (trial := _pair(fit, left[j], left[i], options)) and trial.better]
+    return max(found, key=lambda trial: trial.f_ratio, default=None)
+
+
+def promised(fit: Fit, names: Sequence[str], options: FitOptions | None = None) -> tuple[Floats, Floats]:
+    """By how much χ² would fall, to first order, with each constant free (n,), and with each two of them (n, n).
+
+    What is left of the derivatives x by a new constant beside those of the fit, x - J J⁺ x, decreases χ² by (x · r)²/(x · x); two
+    of them by b A⁻¹ b with b = x · r and A their products. A constant that the others make up promises 0.
+    """
+    count = len(fit.groups)
+    own = weighted_derivatives(fit, fit.parameters.names, options)[:count]
+    columns = weighted_derivatives(fit, names, options)[:count]
+    size = np.linalg.norm(columns, axis=0)
+    columns = columns / np.where(size > 0, size, 1.0)
+    basis = np.linalg.qr(own / np.where(np.linalg.norm(own, axis=0) > 0, np.linalg.norm(own, axis=0), 1.0))[0]
+    for _ in range(2):  # once more for the digits that the first time cancels
+        columns = columns - basis @ (basis.T @ columns)
+    products, along = columns.T @ columns, columns.T @ fit.residuals[:count]
+    own_size = np.diag(products).copy()
+    seen = own_size > _MADE_UP
+    alone = np.where(seen, along**2 / np.where(seen, own_size, 1.0), 0.0)
+    determinant = np.outer(own_size, own_size) - products**2
+    both = np.outer(along**2, own_size) + np.outer(own_size, along**2) - 2 * np.outer(along, along) * products
+    apart = determinant > 1e-6 * np.outer(own_size, own_size)
+    apart &= np.outer(seen, seen)
+    return alone, np.where(apart, both / np.where(apart, determinant, 1.0), 0.0)
+
+
+def _weakest(fit: Fit, names: Sequence[str]) -> list[str]:
+    """The few constants that are smallest in units of their standard errors."""
+    ratio = dict(zip(fit.parameters.names, np.abs(fit.values) / fit.errors, strict=True))
+    return sorted(names, key=lambda name: ratio[name])[:_TRIED]
 
 
 def order_of(name: str, constants: Constants) -> int:
@@ -269,23 +325,16 @@ def _patient(options: FitOptions | None) -> FitOptions:
     return replace(options or FitOptions(), poor_rms=1e12)
 
 
-def _best_pair(fit: Fit, left: Sequence[str], options: FitOptions | None) -> Trial | None:
-    """Two constants together, judged as one step."""
-    found = []
-    for one, other in itertools.combinations(left, 2):
-        constants = with_names(fit.named, [one, other])
-        try:
-            both = fit_lines(
-                fit.lines, constants, _same_priors(fit, parameters(constants, [*fit.parameters.names, one, other])),
-                _patient(options),
-            )  # fmt: skip
-        except ValueError:
-            continue
-        ratio, chance = f_test(fit, both)
-        trial = _trial(other, True, fit, both, ratio, chance)
-        if trial.better:
-            found.append(trial)
-    return max(found, key=lambda trial: trial.f_ratio, default=None)
+def _pair(fit: Fit, one: str, other: str, options: FitOptions) -> Trial | None:
+    """Two constants together, judged as one step; None where the lines are too few."""
+    constants = with_names(fit.named, [one, other])
+    try:
+        free = _same_priors(fit, parameters(constants, [*fit.parameters.names, one, other]))
+        both = fit_lines(fit.lines, constants, free, options)
+    except ValueError:
+        return None
+    ratio, chance = f_test(fit, both)
+    return _trial(f"{one} with {other}", True, fit, both, ratio, chance)
 
 
 @dataclass(frozen=True)
@@ -362,11 +411,38 @@ def suggest_lines(
 def bootstrap(
     fit: Fit, samples: int, rng: np.random.Generator, options: FitOptions | None = None
 ) -> tuple[Floats, Floats]:
-    """Parameters (samples, n) of fits to lines drawn anew with replacement, and their standard deviations (n,).
+    """Parameters of fits to lines drawn anew with replacement, and their standard deviations.
 
-    Measured frequencies are drawn, blends as one. It needs no assumption about the errors but that the lines are independent;
-    where few lines fix a constant it comes out too large or infinite. Samples that determine fewer constants are drawn again,
-    at most ten times as many. Raises ValueError where that is not enough.
+    Measured frequencies are drawn, blends as one. Samples that determine fewer constants are drawn again, at most ten
+    times as many.
+
+    Parameters
+    ----------
+    fit : Fit
+        A finished fit of n parameters; each sample starts from its result.
+    samples : int
+        How many samples.
+    rng : numpy.random.Generator
+        Draws the lines.
+    options : FitOptions, optional
+        Of each fit.
+
+    Returns
+    -------
+    values : (samples, n) array
+        MHz.
+    deviations : (n,) array
+        Standard deviations, MHz.
+
+    Raises
+    ------
+    ValueError
+        Where ten times as many samples are not enough.
+
+    Notes
+    -----
+    It needs no assumption about the errors but that the lines are independent; where few lines fix a constant it comes
+    out too large or infinite.
     """
     groups = fit.lines.blend[fit.groups]
     members = {int(b): np.flatnonzero((fit.lines.blend == b) & fit.used) for b in groups}

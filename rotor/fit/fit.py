@@ -9,7 +9,7 @@ that minimum describes the lines: a weighted rms far above 1 is a failure and sa
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
 from rotor.fit.assignment import Assignments, duplicates
-from rotor.fit.parameters import Parameters
+from rotor.fit.parameters import Parameters, with_names
+from rotor.fit.parameters import parameters as parameters_of
 from rotor.quantum.labelled import LevelModel, level_model
 from rotor.statistics.least_squares import EXHAUSTED, INTERRUPTED, Minimum, Progress, minimise
 from rotor.statistics.regression import Regression, regression
@@ -213,11 +214,9 @@ def fit_lines(
     if not len(lines):
         raise ValueError("there are no lines to fit to")
     left_out, sigma = _errors_of(lines, options)
-    labels, places = np.unique(np.concatenate([lines.upper, lines.lower]), axis=0, return_inverse=True)
-    places = places.reshape(-1)
-    upper, lower = places[: len(lines)], places[len(lines) :]
     if model is None and constants is None:
         raise ValueError("either constants or a model of the levels is needed")
+    labels, upper, lower = _labels(lines)
     made = model(labels) if model else level_model(constants, labels, kmax=options.kmax)  # type: ignore[arg-type]
     if made.names != parameters.constant_names:
         raise ValueError(f"parameters for {parameters.constant_names}, but the levels depend on {made.names}")
@@ -229,6 +228,28 @@ def fit_lines(
     search, minimum, rejected = _with_rejection(search, options, progress)
     left_out |= rejected
     return _finished(search, minimum, constants, left_out, labels)
+
+
+def weighted_derivatives(fit: Fit, names: Sequence[str], options: FitOptions | None = None) -> Floats:
+    """Derivatives of the measured frequencies over their errors, (frequencies, names), by any constants at those of a fit.
+
+    names : named constants, free in the fit or not, also those that it does not have (at 0). Raises ValueError for other names.
+    """
+    options = options or FitOptions()
+    constants = with_names(fit.named, [name for name in names if name not in fit.named])
+    free = parameters_of(constants, names)
+    labels, upper, lower = _labels(fit.lines)
+    model = level_model(constants, labels, kmax=options.kmax)
+    _, sigma = _errors_of(fit.lines, options)
+    search = _Search(fit.lines, model, free, options, upper, lower, sigma, fit.used)
+    return search.weighted(free.start)[1]
+
+
+def _labels(lines: Assignments) -> tuple[Ints, Ints, Ints]:
+    """The levels that occur, and for each line the places of its upper and lower one among them."""
+    labels, places = np.unique(np.concatenate([lines.upper, lines.lower]), axis=0, return_inverse=True)
+    places = places.reshape(-1)
+    return labels, places[: len(lines)], places[len(lines) :]
 
 
 def _errors_of(lines: Assignments, options: FitOptions) -> tuple[dict[int, str], Floats]:
@@ -268,7 +289,9 @@ class _Search:
         """Calculated lines (lines,), derivatives by the parameters (lines, n), and of the levels (levels, n)."""
         energies, slopes = self.model.levels(self.parameters.constants_of(values))
         slopes = slopes @ self.parameters.matrix
-        return energies[self.upper] - energies[self.lower], slopes[self.upper] - slopes[self.lower], slopes
+        derivatives = slopes[self.upper]
+        derivatives -= slopes[self.lower]
+        return energies[self.upper] - energies[self.lower], derivatives, slopes
 
     @property
     def grouping(self) -> _Grouping:
@@ -283,7 +306,8 @@ class _Search:
         group = self.group
         sigma = self.sigma[group.first]
         residuals = (self.lines.frequency_mhz[group.first] - group.mean(calculated)) / sigma
-        rows = group.mean(jacobian) / sigma[:, None]
+        rows = group.mean(jacobian)
+        rows /= sigma[:, None]
         known = np.flatnonzero(np.isfinite(self.parameters.prior))
         if not len(known):
             return residuals, rows
@@ -333,7 +357,8 @@ def robust(residuals: Floats, loss: str) -> tuple[Floats, Floats]:
 class _Grouping:
     """The measured frequencies that count: for each the position of its first line; order, starts, shares: how blends add.
 
-    plain : no blend among them, so that lines are taken as they are
+    plain : no blend among them; blended, members, bounds : which of them are blends, the places of their lines in `order`, and where
+    each begins among these
     """
 
     first: Ints
@@ -341,6 +366,9 @@ class _Grouping:
     starts: Ints
     shares: Floats
     plain: bool
+    blended: Ints
+    members: Ints
+    bounds: Ints
 
     @classmethod
     def of(cls, lines: Assignments, used: NDArray[np.bool_]) -> _Grouping:
@@ -350,17 +378,22 @@ class _Grouping:
         starts = np.flatnonzero(np.concatenate(([True], np.diff(blend) != 0))) if len(order) else np.zeros(0, np.int64)
         weights = np.where(lines.weight[order] > 0, lines.weight[order], 0.0)
         totals = np.add.reduceat(weights, starts) if len(starts) else np.zeros(0)
-        each = np.repeat(np.arange(len(starts)), np.diff(np.append(starts, len(order))))
-        equal = 1.0 / np.bincount(each, minlength=len(starts))[each] if len(order) else weights
+        counts = np.diff(np.append(starts, len(order)))
+        each = np.repeat(np.arange(len(starts)), counts)
+        equal = 1.0 / counts[each] if len(order) else weights
         shares = np.where(totals[each] > 0, weights / np.where(totals[each] > 0, totals[each], 1.0), equal)
-        return cls(order[starts], order, starts, shares, len(starts) == len(order))
+        blended = np.flatnonzero(counts > 1)
+        bounds = np.concatenate([[0], np.cumsum(counts[blended])[:-1]]).astype(np.int64)
+        members = np.flatnonzero(np.isin(each, blended))
+        return cls(order[starts], order, starts, shares, len(blended) == 0, blended, members, bounds)
 
     def mean(self, values: Floats) -> Floats:
         """The weighted mean over each blend of values (lines, ...)."""
-        if self.plain:
-            return np.asarray(values[self.order])
-        shares = self.shares.reshape(-1, *[1] * (values.ndim - 1))
-        return np.asarray(np.add.reduceat(values[self.order] * shares, self.starts, axis=0))
+        out = values[self.first]
+        if not self.plain:
+            shares = self.shares[self.members].reshape(-1, *[1] * (values.ndim - 1))
+            out[self.blended] = np.add.reduceat(values[self.order[self.members]] * shares, self.bounds, axis=0)
+        return out
 
     def spread_back(self, means: Floats, values: Floats) -> Floats:
         """Values (lines,) with those of a blend replaced by its mean."""

@@ -73,6 +73,11 @@ def parameters(
     priors_mhz : mapping, optional
         A-priori standard errors of free constants, which then are drawn to their start.
 
+    Returns
+    -------
+    Parameters
+        Start values and a-priori errors (free,) in MHz, and how the constants follow from them.
+
     Raises
     ------
     ValueError

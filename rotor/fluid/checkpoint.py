@@ -108,7 +108,7 @@ class AseTrajectory:
             beside.unlink(missing_ok=True)
             message = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
             raise ValueError(
-                f"{path}: cannot be continued ({message}); the checkpoint wants its first {length} frames"
+                f"{path}: cannot be continued ({message}); the checkpoint needs its first {length} frames"
             ) from error
         os.replace(beside, self.path)
 

@@ -3,7 +3,8 @@
 A .csv has a column for each quantum number of both states (`j_upper`, `ka_upper`, `kc_upper`, `j_lower`, ...), a frequency
 (`frequency_mhz`, `frequency_ghz` or `wavenumber_cm`), its error (`error_mhz`, `error_khz`, `error_ghz` or `error_cm`), and, where
 needed, `weight`, `blend` (one text or number for the lines of one measured frequency) and `comment`. Of a catalogue the lines
-measured in a laboratory are taken (a negative tag); those of one frequency and error are one blend by intensity.
+measured in a laboratory are taken (a negative tag); those of one frequency and error are one blend by intensity, and components of
+spins, where the file has them, are put together at their mean by intensity.
 """
 
 from __future__ import annotations
@@ -29,6 +30,7 @@ QUANTA = {
     "oblate": ("j", "k"),
     "asymmetric": ("j", "ka", "kc"),
 }
+_WITH_STATES = 10  # QNFMT // 100 from which a vibrational quantum number is among those of a state
 _FREQUENCY = {"frequency_mhz": 1.0, "frequency_ghz": 1e3, "wavenumber_cm": MHZ_PER_CM}
 _ERROR = {"error_mhz": 1.0, "error_khz": 1e-3, "error_ghz": 1e3, "error_cm": MHZ_PER_CM}
 
@@ -158,21 +160,44 @@ def _of_catalogue(path: str | os.PathLike[str], names: Sequence[str]) -> tuple[A
     measured = catalogue.take(catalogue.tag < 0)
     width = len(names)
     beyond = np.concatenate([measured.quanta_upper[:, width:], measured.quanta_lower[:, width:]], axis=1)
-    ground = ((beyond == 0) | (beyond == BLANK)).all(axis=1)
+    split = (measured.qnfmt // 100 < _WITH_STATES) & (measured.qnfmt % 10 > width)
+    ground = ((beyond == 0) | (beyond == BLANK)).all(axis=1) | split
     notes = []
     if not ground.all():
         notes.append(f"{int((~ground).sum())} measured lines of other states, or with spins, are left aside")
-    measured = measured.take(ground)
+    measured, split = measured.take(ground), split[ground]
     frequency, error = in_mhz(measured)
     upper, lower = (np.abs(side[:, :width].astype(np.int64)) for side in (measured.quanta_upper, measured.quanta_lower))
+    weight = 10.0 ** (measured.lgint - measured.lgint.max(initial=0.0)) if len(measured) else np.zeros(0)
     first = _first_of_each(upper, lower, frequency)
+    if split.all() and len(split):
+        first, frequency, error = _centres(upper, lower, frequency, error, weight)
+        notes.append(
+            f"{len(split)} components of spins are put together by rotational line, at their mean by intensity: "
+            f"{len(first)} lines"
+        )
     groups = [(round(float(f), 6), round(float(e), 6)) for f, e in zip(frequency, error, strict=True)]
     order = {key: i for i, key in enumerate(dict.fromkeys(groups))}
     return assignments(
         names, upper[first], lower[first], frequency[first], error[first],
-        weight=10.0 ** (measured.lgint[first] - measured.lgint.max(initial=0.0)) if len(measured) else 1.0,
+        weight=weight[first] if len(measured) else 1.0,
         blend=np.array([order[key] for key in groups], dtype=np.int64)[first], source=Path(path).name,
     ), notes  # fmt: skip
+
+
+def _centres(
+    upper: np.ndarray, lower: np.ndarray, frequency: np.ndarray, error: np.ndarray, weight: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Position of the first component of each rotational line, and all frequencies and errors with the line's in their place.
+
+    The mean by intensity over all components is the line without spins, to first order; the error is the smallest of them.
+    """
+    _, first, line = np.unique(np.concatenate([upper, lower], axis=1), axis=0, return_index=True, return_inverse=True)
+    line = line.reshape(-1)
+    means = np.bincount(line, weight * frequency) / np.bincount(line, weight)
+    least = np.full(len(first), np.inf)
+    np.minimum.at(least, line, error)
+    return np.sort(first), means[line], least[line]
 
 
 def _first_of_each(upper: np.ndarray, lower: np.ndarray, frequency: np.ndarray) -> np.ndarray:

@@ -9,8 +9,8 @@ from __future__ import annotations
 import errno
 import os
 import shutil
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import IO, Any
 
@@ -151,3 +151,23 @@ def _remove_abandoned(parent: Path) -> None:
             if lock is not None:
                 shutil.rmtree(folder, ignore_errors=True)
                 os.close(lock)
+
+
+def write_together(writers: Mapping[Path, Callable[[Path], object]]) -> None:
+    """Write several files, each by its writer of a path: all appear at the end, with what a writer puts beside them, or none.
+
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     write_together({Path(folder) / "a.txt": lambda path: path.write_text("whole")})
+    ...     (Path(folder) / "a.txt").read_text()
+    'whole'
+    """
+    with ExitStack() as stack:
+        moves: list[tuple[Path, Path]] = []
+        for target, write in writers.items():
+            beside = stack.enter_context(unfinished_folder(target.parent))
+            with naming(target):
+                write(beside / target.name)
+            moves += [(made, target.parent / made.name) for made in sorted(beside.iterdir())]
+        for made, path in moves:
+            place(made, path)

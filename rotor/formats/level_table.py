@@ -10,7 +10,7 @@ from rotor.formats.atomic_write import open_atomic
 from rotor.tops.level_table import LevelTable
 
 _NUMBERS = ("energy_mhz", "error_mhz")
-_QUANTA = ("j", "ka", "kc", "k")
+_QUANTA = ("v", "j", "ka", "kc", "k")
 
 
 def read_level_table(path: str | os.PathLike[str], source: str = "") -> LevelTable:
@@ -30,7 +30,7 @@ def read_level_table(path: str | os.PathLike[str], source: str = "") -> LevelTab
     quanta = [name for name in names if name in _QUANTA]
     if not quanta or not set(_NUMBERS) <= set(names):
         raise ValueError(
-            f"{path}: expected the columns j (ka, kc), energy_mhz, error_mhz; found {', '.join(names) or 'none'}"
+            f"{path}: expected the columns j (v, k, ka, kc), energy_mhz, error_mhz; found {', '.join(names) or 'none'}"
         )
     columns: dict[str, list[float]] = {name: [] for name in (*quanta, *_NUMBERS)}
     for (number, _), row in zip(lines[1:], rows[1:], strict=True):

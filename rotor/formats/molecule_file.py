@@ -42,6 +42,16 @@
     oe = 3
     oo = 1
 
+    [states]                            # further states, such as those of an inversion: E and constants with the number of the
+    source = "..."                      # state in brackets, what couples them (G_c[0,1], W[0,1], ...); state 0 is that of
+    unit = "MHz"                        # [constants]
+    names = ["0+", "0-"]
+    "E[1]" = 23785.9
+    "B[1]" = 298041.5
+    symmetry = "C2v"                    # which couplings may stand together; Cs(ab) with the plane, C2(b) with the axis
+    weights = { 0 = { 0even = 0, 0odd = 4, 1 = 1, 2 = 1 }, 1 = { 0even = 4, 0odd = 0, 1 = 1, 2 = 1 } }
+    dipoles = { 0 = [0, 0, 0], 1 = [0, 0, 0], "0,1" = [0, 0, 1.47] }  # (μa, μb, μc) in D; else that of [dipole] in each
+
     [spins]                             # constants of nuclear and electron spins, see rotor.formats.spin_table
     source = "..."
 
@@ -90,6 +100,7 @@ from rotor.formats.molecule_tables import (
     refuse_unknown_keys,
     served_of,
     spin_weights_of,
+    states_of,
     unverified_in,
     with_polarizability,
 )
@@ -101,6 +112,7 @@ from rotor.tops.covariance import Covariance
 from rotor.tops.level_table import LevelTable
 from rotor.tops.spin_constants import SpinConstants
 from rotor.tops.spin_weights import SpinWeights
+from rotor.tops.state_constants import StateConstants
 from rotor.tops.top import Tensor
 
 __all__ = ["GEOMETRY_KINDS", "MeasuredLines", "MoleculeFile", "Served", "parse_molecule_file", "read_molecule_file"]
@@ -113,6 +125,7 @@ _TABLES = (
     "dipole",
     "polarizability",
     "spin_weights",
+    "states",
     "spins",
     "levels",
     "catalogue",
@@ -138,6 +151,7 @@ class MoleculeFile:
     serves : the lines that the file is good for
     unverified : tables, or entries such as "constants.DK", whose numbers were not read in a source
     covariance : of the constants, where the file has their correlations
+    states : further states of the top
     spin_constants : of nuclear and electron spins
     """
 
@@ -156,6 +170,7 @@ class MoleculeFile:
     levels: LevelTable | None = None
     serves: Served | None = None
     unverified: frozenset[str] = frozenset()
+    states: StateConstants | None = None
     spin_constants: SpinConstants | None = None
 
     def cited(self, table: str) -> str:
@@ -181,10 +196,31 @@ def read_molecule_file(path: str | os.PathLike[str]) -> MoleculeFile:
 def parse_molecule_file(
     text: str, where: str = "molecule file", default_name: str = "", folder: Path | None = None
 ) -> MoleculeFile:
-    """What the text of a molecule file says; `where` names it in errors, `default_name` serves if it gives no name.
+    """What the text of a molecule file says.
 
-    folder: from which the name of a file of levels counts.
+    Parameters
+    ----------
+    text : str
+        TOML, see the head of the module.
+    where : str, optional
+        Names the file in errors.
+    default_name : str, optional
+        Serves where the file gives no name.
+    folder : Path, optional
+        From which the name of a file of levels counts.
 
+    Returns
+    -------
+    MoleculeFile
+        Everything that the file has.
+
+    Raises
+    ------
+    ValueError
+        With file, table and key, for what is unknown, missing or contradictory.
+
+    Examples
+    --------
     >>> parse_molecule_file("constants = { B = 57635.96804, D = 0.1835 }").constants.text()
     'B=57635.96804 D=0.1835 MHz'
     """
@@ -215,5 +251,6 @@ def parse_molecule_file(
         serves=served_of(tables.get("serves")),
         unverified=frozenset().union(*(unverified_in(name, table) for name, table in tables.items())),
         covariance=covariance_of(tables.get("covariance"), constants),
+        states=states_of(tables.get("states"), constants),
         spin_constants=spins_of_table(tables.get("spins"), molecule),
     )

@@ -20,6 +20,7 @@ from rotor.tops.covariance import Covariance
 from rotor.tops.kind import kind_from_moments
 from rotor.tops.level_table import LevelTable
 from rotor.tops.spin_weights import SpinWeights
+from rotor.tops.state_constants import StateConstants
 from rotor.tops.top import Tensor
 from rotor.units import parse_quantity
 
@@ -107,7 +108,29 @@ class TableReader:
         return None if value is None else int(value)
 
     def quantity(self, key: str, value: Any, unit: str, expected: str) -> float:
-        """A number in the table's unit, or text with its own, in the unit expected."""
+        """A number in the table's unit, or text with its own, in the unit expected.
+
+        Parameters
+        ----------
+        key : str
+            Named in the error.
+        value : object
+            What the table has under the key.
+        unit : str
+            Unit of a bare number.
+        expected : str
+            Unit of the result.
+
+        Returns
+        -------
+        float
+            In the unit expected.
+
+        Raises
+        ------
+        ValueError
+            With file, table and key, for what is no finite number or has a unit that does not fit.
+        """
         if not is_number(value) and not isinstance(value, str):
             raise self.error(key, f"expected a finite number of {unit}, or text with a unit")
         try:
@@ -135,6 +158,29 @@ def refuse_unknown_keys(given: Iterable[str], known: Iterable[str], place: str) 
 def geometry(
     table: TableReader | None, name: str, dipole: tuple[float, float, float] | None, dipole_table: TableReader | None
 ) -> Molecule | None:
+    """The molecule of a `[geometry]` table, with the dipole turned into its frame.
+
+    Parameters
+    ----------
+    table : TableReader or None
+        The geometry, where the file has one.
+    name : str
+        Of the molecule.
+    dipole : (float, float, float) or None
+        Debye, along a, b, c.
+    dipole_table : TableReader or None
+        Where the dipole comes from.
+
+    Returns
+    -------
+    Molecule or None
+        None without a table.
+
+    Raises
+    ------
+    ValueError
+        With file, table and key, for what is unknown or cannot be a molecule.
+    """
     if table is None:
         return None
     table.refuse_unknown(("kind", "source", "vibrational_difference", "atoms", "charge", "electronic", "unverified"))
@@ -299,6 +345,54 @@ def spin_weights_of(table: TableReader | None, constants: Constants | None) -> S
         raise ValueError(
             f"{table.place}: classes {', '.join(weights.classes)} go by {weights.rule}, but the constants are of kind "
             f"{constants.kind!r}, whose weights go by {_RULES[constants.kind]}"
+        )
+    return weights
+
+
+def states_of(table: TableReader | None, constants: Constants | None) -> StateConstants | None:
+    """Further states of a top: constants with the state in brackets, their names, weights and dipoles."""
+    if table is None:
+        return None
+    if constants is None:
+        raise ValueError(f"{table.place}: states beyond the one of [constants], which is missing")
+    known = ("source", "unverified", "unit", "names", "symmetry", "weights", "dipoles")
+    unit, values = table.text("unit", "MHz"), {}
+    for key, value in table.content.items():
+        if key not in known:
+            values[key] = table.quantity(key, value, unit, "MHz")
+    weights = {_state(table, v): _weights_of_state(table, one, constants) for v, one in _part(table, "weights").items()}
+    dipoles = {}
+    for pair, moment in _part(table, "dipoles").items():
+        a, b = sorted(_state(table, part) for part in (pair.split(",") * 2)[:2])
+        if not (isinstance(moment, list) and len(moment) == 3 and all(is_number(x) for x in moment)):
+            raise table.error("dipoles", f"state {pair}: expected three numbers, along a, b, c in D")
+        dipoles[b, a] = (float(moment[0]), float(moment[1]), float(moment[2]))
+    try:
+        return StateConstants(
+            values, table.texts("names"), weights, dipoles, table.text("source"), table.text("symmetry")
+        )
+    except ValueError as reason:
+        raise ValueError(f"{table.place}: {reason}") from None
+
+
+def _part(table: TableReader, key: str) -> Table:
+    value = table.content.get(key, {})
+    if not isinstance(value, dict):
+        raise table.error(key, "expected a table, with the numbers of states as keys")
+    return value
+
+
+def _state(table: TableReader, text: str) -> int:
+    if not text.strip().isdigit():
+        raise ValueError(f"{table.place}: state {text!r}: expected a number, 0 for the top's own state")
+    return int(text)
+
+
+def _weights_of_state(table: TableReader, classes: Any, constants: Constants) -> SpinWeights:
+    weights = spin_weights_of(TableReader(f"{table.place}", "weights", classes), constants)
+    if weights.to_mapping() != classes:
+        raise ValueError(
+            f"{table.place}, weights = {classes}: expected numbers without a common divisor, as those of state 0 have"
         )
     return weights
 

@@ -11,6 +11,7 @@ from rotor.formats.atomic_write import open_atomic
 from rotor.formats.level_table import write_level_table
 from rotor.formats.molecule_file import MoleculeFile
 from rotor.formats.spin_table import spin_tables
+from rotor.tops.state_constants import StateConstants
 
 
 def write_molecule_file(molecule: MoleculeFile, path: str | os.PathLike[str]) -> None:
@@ -49,6 +50,7 @@ def molecule_file_text(molecule: MoleculeFile, levels_file: str = "") -> str:
         "dipole": _dipole(molecule),
         "polarizability": _polarizability(molecule),
         "spin_weights": molecule.spin_weights.to_mapping(),
+        "states": _states(molecule.states),
         "catalogue": _catalogue(molecule),
         "serves": vars(molecule.serves) if molecule.serves else {},
     }
@@ -67,6 +69,15 @@ def molecule_file_text(molecule: MoleculeFile, levels_file: str = "") -> str:
         heading = name if name == "spins" else f"spins.{_key(name)}"
         parts.append("\n".join([f"[{heading}]", *_lines(table)]))
     return "\n\n".join(parts) + "\n"
+
+
+def _states(states: StateConstants | None) -> dict[str, Any]:
+    if states is None:
+        return {}
+    weights = {str(v): one.to_mapping() for v, one in states.weights.items()}
+    dipoles = {",".join(map(str, sorted(set(pair)))): list(moment) for pair, moment in states.dipoles.items()}
+    more = {"names": list(states.names), "symmetry": states.symmetry, "weights": weights, "dipoles": dipoles}
+    return {"unit": "MHz", **states.values, **{key: value for key, value in more.items() if value}}
 
 
 def _geometry(molecule: MoleculeFile) -> dict[str, Any]:

@@ -194,6 +194,7 @@ def _top_as_written(file: MoleculeFile) -> Top:
         polarizability_source=file.cited("polarizability"),
         independent_errors=len(file.constants.uncertainties) < 2,
         level_table=file.levels,
+        states=file.states,
         covariance=file.covariance,
         spin_constants=replace(file.spin_constants, source=file.cited("spins")) if file.spin_constants else None,
     )

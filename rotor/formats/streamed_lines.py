@@ -101,13 +101,46 @@ def stream_lines(
     Pieces stand in the folder `path` + ".pieces" until the file is whole, then removed. A run that was cut off leaves
     them; the same call goes on from there.
 
-    jmax ... vibrational_factor: as in `rotor.line_list`. tag: of a .cat. memory_mb: what the sort may take beside the
-    program itself. piece_lines: transitions of a piece; one J is never parted, and with all three dipole components it
-    has about 4.5 J². executor: pieces are spread over it, a process pool for instance, whose processes must be spawned:
-    a forked copy of a program with threads may never answer.
+    Parameters
+    ----------
+    top : Top
+        With a dipole in debye.
+    path : path
+        The suffix names the format.
+    jmax : int, optional
+        The highest J; by default the one beyond which no line can reach `min_lgint`.
+    temperature_k : float, optional
+        For intensities.
+    min_lgint : float or None, optional
+        log10 of nm² MHz below which lines are left out.
+    range_mhz : (float, float), optional
+        First and last frequency.
+    q : float, optional
+        Partition function to use instead of the summed one.
+    vibrational_factor : float, optional
+        Multiplies Q.
+    tag : int, optional
+        Of a .cat.
+    memory_mb : int, optional
+        What the sort may take beside the program itself.
+    piece_lines : int, optional
+        Transitions of a piece; one J is never parted, and with all three dipole components it has about 4.5 J².
+    effects : sequence of QuantumEffect, optional
+        What the Hamiltonian consists of.
+    executor : Executor, optional
+        Pieces are spread over it, a process pool for instance, whose processes must be spawned: a forked copy of a
+        program with threads may never answer.
 
-    Raises ValueError for another suffix, for a pool that forks, for what `line_list` refuses, and where the folder holds
-    pieces of another list.
+    Returns
+    -------
+    StreamedList
+        The file, its number of lines, and how many pieces were made and found.
+
+    Raises
+    ------
+    ValueError
+        For another suffix, for a pool that forks, for what `line_list` refuses, and where the folder holds pieces of
+        another list.
     """
     target = Path(path)
     if target.suffix.lower() not in (".parquet", ".cat"):
@@ -189,7 +222,7 @@ def _ranges(plan: _Plan, piece_lines: int) -> Iterator[tuple[int, int]]:
 
 
 def _provenance(plan: _Plan, ranges: list[tuple[int, int]]) -> dict[str, Any]:
-    """The provenance of the list, which also tells pieces of another list from its own."""
+    """The provenance of the list, by which pieces of another list are recognised too."""
     return (
         {"program": "rotor", "version": version()}
         | plan.top.provenance
@@ -239,7 +272,7 @@ def _make_piece(plan: _Plan, first: int, last: int) -> None:
     levels = solve_levels(plan.top, top_j, jmin=first, effects=plan.effects)
     rotational = levels.rotational
     cut = intensity_cut(levels, plan.temperature_k, plan.partition.q, plan.min_lgint, plan.ground_mhz)
-    dipoles = dipoles_by_state(plan.top, plan.dipole_abc, plan.effects)
+    dipoles = dipoles_by_state(plan.top, plan.dipole_abc, levels.effects)
     found = all_transitions(levels, dipoles, plan.range_mhz, cut)
     own = np.minimum(rotational[found.upper], rotational[found.lower]) <= last
     trusted = are_trusted(plan.top, levels)

@@ -53,7 +53,19 @@ def write_parquet(table: Table, path: str | os.PathLike[str], settings: Settings
 
 
 def write_json(table: Table, path: str | os.PathLike[str], settings: Settings, key: str = "rows") -> None:
-    """Write a table as JSON: `provenance`, and under `key` a record for each row."""
+    """Write a table as JSON: `provenance`, and under `key` a record for each row.
+
+    Parameters
+    ----------
+    table : Table
+        Columns by name.
+    path : path
+        The file; it is replaced when it is whole.
+    settings : mapping
+        Of the command or call that made the table; part of the provenance.
+    key : str, optional
+        Under which the rows stand.
+    """
     columns = dict(table.columns)
     rows = [dict(zip(columns, row, strict=True)) for row in _rows(columns)]
     with open_atomic(path, "w", encoding="utf-8") as handle:

@@ -105,6 +105,27 @@ def rectangle(mass: float, width: float, height: float) -> Body:
     return Body(mass, np.zeros(3), mass / 12 * np.diag([height**2, width**2, width**2 + height**2]))
 
 
+def box(mass: float, edges: ArrayLike) -> Body:
+    """A uniform box, its edges along x, y, z, centred on the origin: m/12 (b² + c²), ...
+
+    >>> box(12.0, [1.0, 2.0, 3.0]).tensor.diagonal().tolist()
+    [13.0, 10.0, 5.0]
+    """
+    squares = np.asarray(edges, dtype=float) ** 2
+    return Body(mass, np.zeros(3), mass / 12 * np.diag(squares.sum() - squares))
+
+
+def cylinder(mass: float, radius: float, height: float) -> Body:
+    """A solid cylinder along z, centred on the origin: m/12 (3 r² + h²) across, m r²/2 along."""
+    across = mass / 12 * (3 * radius**2 + height**2)
+    return Body(mass, np.zeros(3), np.diag([across, across, mass * radius**2 / 2]))
+
+
+def hoop(mass: float, radius: float) -> Body:
+    """A thin hoop in the xy plane, centred on the origin: m r²/2 across, m r² along z."""
+    return Body(mass, np.zeros(3), mass * radius**2 * np.diag([0.5, 0.5, 1.0]))
+
+
 def cone(mass: float, radius: float, height: float) -> Body:
     """A solid cone, base in the plane z = 0, apex at z = height: 3/10 m r² and 3/80 m (4 r² + h²)."""
     across = 3 / 80 * mass * (4 * radius**2 + height**2)

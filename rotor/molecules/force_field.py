@@ -135,10 +135,32 @@ def force_field_from_calculator(
 ) -> ForceField:
     """The force field of a molecule at its minimum by any ASE calculator: central differences of the forces.
 
-    F_ij = -[f_j(x_i + h) - f_j(x_i - h)] / 2h, with an error of the order h² times the fourth derivative; 6n calls.
+    F_ij = -[f_j(x_i + h) - f_j(x_i - h)] / 2h, 6n calls.
 
-    Raises ValueError where the forces at the geometry exceed `most_force_ev_per_angstrom`: refine it first
-    (`rotor.refine`).
+    Parameters
+    ----------
+    molecule : Molecule
+        At its minimum, n atoms.
+    calculator : ase.calculators.calculator.Calculator
+        Gives the forces.
+    step_angstrom : float, optional
+        h.
+    most_force_ev_per_angstrom : float, optional
+        The largest component of a force that is taken for zero at the minimum.
+
+    Returns
+    -------
+    ForceField
+        Hessian (3n, 3n) in eV/Å².
+
+    Raises
+    ------
+    ValueError
+        Where the forces at the geometry exceed `most_force_ev_per_angstrom`: refine it first (`rotor.refine`).
+
+    Notes
+    -----
+    Neglected: an error of the order h² times the fourth derivative.
     """
     from rotor.molecules.optimise import ase_atoms
 
@@ -210,10 +232,33 @@ def force_field_from_internal(
 ) -> ForceField:
     """The force field of published force constants in internal coordinates, F_x = Bᵀ F B at the minimum.
 
-    coordinates : m functions of the positions (n, 3), from `rotor.molecules.internal_coordinates`. constants_mdyn_angstrom : (m, m)
-    array; between stretches mdyn/Å, between angles mdyn Å, between both mdyn. Source: Wilson, Decius and Cross (1955),
-    § 4-2; B is exact to round-off.
+    Parameters
+    ----------
+    molecule : Molecule
+        At its minimum, n atoms.
+    coordinates : sequence of callable
+        m functions of the positions (n, 3), from `rotor.molecules.internal_coordinates`.
+    constants_mdyn_angstrom : (m, m) array
+        Between stretches mdyn/Å, between angles mdyn Å, between both mdyn.
+    source : str, optional
+        Where the constants come from.
 
+    Returns
+    -------
+    ForceField
+        Hessian (3n, 3n) in eV/Å².
+
+    Raises
+    ------
+    ValueError
+        For constants whose shape does not fit the coordinates.
+
+    Notes
+    -----
+    Source: Wilson, Decius and Cross (1955), § 4-2; B is exact to round-off.
+
+    Examples
+    --------
     >>> from rotor.molecules.internal_coordinates import stretch
     >>> co = Molecule(("C", "O"), [[0, 0, 0], [0, 0, 1.1282]])
     >>> field = force_field_from_internal(co, [stretch(0, 1)], [[19.019]])

@@ -34,7 +34,20 @@ def bend(i: int, apex: int, k: int) -> Coordinate:
 
 
 def linear_bend(i: int, apex: int, k: int, across: ArrayLike) -> Coordinate:
-    """The bend of a straight angle in the plane of the bond and the fixed vector `across` (3,), radian."""
+    """The bend of a straight angle in the plane of the bond and a fixed vector.
+
+    Parameters
+    ----------
+    i, apex, k : int
+        Atoms, counted from 0; the angle is at `apex`.
+    across : (3,) array
+        Direction across the bond, any length.
+
+    Returns
+    -------
+    callable
+        Positions (n, 3) in Å to radian.
+    """
     direction = np.asarray(across, dtype=float)
 
     def angle(x: NDArray[Any]) -> Any:
@@ -44,7 +57,18 @@ def linear_bend(i: int, apex: int, k: int, across: ArrayLike) -> Coordinate:
 
 
 def out_of_plane(end: int, apex: int, j: int, k: int) -> Coordinate:
-    """The angle of the bond apex-end with the plane of apex, j and k, radian."""
+    """The angle of the bond apex-end with the plane of apex, j and k.
+
+    Parameters
+    ----------
+    end, apex, j, k : int
+        Atoms, counted from 0.
+
+    Returns
+    -------
+    callable
+        Positions (n, 3) in Å to radian.
+    """
 
     def angle(x: NDArray[Any]) -> Any:
         normal = _unit(np.cross(x[j] - x[apex], x[k] - x[apex]))
@@ -54,7 +78,18 @@ def out_of_plane(end: int, apex: int, j: int, k: int) -> Coordinate:
 
 
 def torsion(i: int, j: int, k: int, m: int) -> Coordinate:
-    """The dihedral angle of i-j-k-m near its present value, radian."""
+    """The dihedral angle of i-j-k-m near its present value.
+
+    Parameters
+    ----------
+    i, j, k, m : int
+        Atoms along the chain, counted from 0.
+
+    Returns
+    -------
+    callable
+        Positions (n, 3) in Å to radian, right but for a constant.
+    """
 
     def angle(x: NDArray[Any]) -> Any:
         axis = _unit(x[k] - x[j])

@@ -23,7 +23,7 @@ _MASS_LAST = re.compile(r"([A-Za-z]{1,2})-?(\d+)")
 class Isotope:
     """One nucleus, as the tables give it.
 
-    symbol : of the element, `"H"` for deuterium too (`label` tells them apart)
+    symbol : of the element, `"H"` for deuterium too (`label` distinguishes them)
     element_number, mass_number : protons, nucleons
     mass_u : mass of the neutral atom in u (AME2020)
     abundance : fraction of the natural element, 0 to 1

@@ -164,7 +164,7 @@ def _range_shown(thing: Lines | Spectrum, lines: Lines | None, heights: Floats) 
 def _draw(axes: Any, thing: Lines | Spectrum, x: _Axis) -> None:
     if isinstance(thing, Spectrum):
         shown = x.inside(thing.frequency_mhz)
-        axes.plot(*_thinned(thing.frequency_mhz[shown] / x.mhz, thing.intensity[shown]), color=BLUE, linewidth=0.8)
+        axes.plot(*thinned(thing.frequency_mhz[shown] / x.mhz, thing.intensity[shown]), color=BLUE, linewidth=0.8)
         return
     shown = x.inside(thing.frequency_mhz)
     many = int(shown.sum()) > MOST_VECTOR_STICKS
@@ -173,7 +173,7 @@ def _draw(axes: Any, thing: Lines | Spectrum, x: _Axis) -> None:
     axes.vlines(frequencies, 0.0, heights, color=BLUE, linewidth=width, rasterized=many)
 
 
-def _thinned(x: Floats, y: Floats) -> tuple[Floats, Floats]:
+def thinned(x: Floats, y: Floats) -> tuple[Floats, Floats]:
     """The lowest and highest point of every strip, where a curve has more points than can be distinguished."""
     if len(x) <= MOST_VERTICES:
         return x, y

@@ -18,21 +18,47 @@ from rotor.arrays import Floats
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.watson import SEMI_RIGID, Rigid, rigid_operators
 from rotor.quantum.levels import Levels, SolvedBlock
-from rotor.quantum.solve import hamiltonian
+from rotor.quantum.rotation import hamiltonian
 from rotor.quantum.wang_matrix import JMatrix, block_bands, scalar_energy
 from rotor.tops.operators import Operators
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
 
+HALF = 0.5 - 1e-6  # two functions that share a level evenly are not mixed by more than half
 RATIO_LIMIT = 0.3  # of successive orders, above which the series is said not to converge
 
 
 def order_sizes_mhz(
     top: Top, j: int, kmax: int | None = None, effects: Sequence[QuantumEffect] = SEMI_RIGID
 ) -> dict[int, float]:
-    """How large every order of the Hamiltonian is for one J and |K| up to `kmax` (J, if None), {power of J: MHz}.
+    """How large every order of the Hamiltonian is for one J and |K| up to `kmax`.
 
+    The size of an order is the largest sum of absolute values of a row of its matrix, which bounds its eigenvalues
+    (Gershgorin).
+
+    Parameters
+    ----------
+    top : Top
+        The constants and the kind of top.
+    j : int
+        Rotational angular momentum J.
+    kmax : int, optional
+        The highest |K| of the rows; J by default.
+    effects : sequence of QuantumEffect, optional
+        What the Hamiltonian consists of.
+
+    Returns
+    -------
+    dict of int to float
+        {power of J: size in MHz}, in rising order of the powers.
+
+    Notes
+    -----
+    D_t of a spherical top is counted as an order of four as a whole, although its expansion has terms of J² too.
+
+    Examples
+    --------
     >>> from rotor.tops.top import Top
     >>> order_sizes_mhz(Top.from_constants("B=6000 D=0.01 MHz"), 10)
     {2: 660000.0, 4: 121.0}
@@ -64,8 +90,30 @@ def _row_bound(operators: Operators, j: int, kmax: int) -> float:
 def series_ratio(top: Top, jmax: int, kmax: int | None = None, effects: Sequence[QuantumEffect] = SEMI_RIGID) -> float:
     """The largest ratio of one order of the Hamiltonian to the order before it, at J = `jmax` and |K| ≤ `kmax`.
 
-    Orders without a constant are passed over; 0 for a rigid top. Above 0.3 the series is not to be trusted.
+    Above 0.3 the series is not to be trusted.
 
+    Parameters
+    ----------
+    top : Top
+        The constants and the kind of top.
+    jmax : int
+        The J at which the orders are compared.
+    kmax : int, optional
+        The highest |K| of the rows; `jmax` by default.
+    effects : sequence of QuantumEffect, optional
+        What the Hamiltonian consists of.
+
+    Returns
+    -------
+    float
+        The ratio, a pure number; 0 for a rigid top.
+
+    Notes
+    -----
+    Orders without a constant are passed over.
+
+    Examples
+    --------
     >>> from rotor.tops.top import Top
     >>> round(series_ratio(Top.from_constants("A=835840 B=435352 C=278139 DeltaK=973 MHz"), 20), 2)
     0.45
@@ -86,10 +134,25 @@ def warnings_of(top: Top, levels: Levels) -> tuple[str, ...]:
     """The limits of these levels, in sentences; empty where there are none.
 
     That the distortion series does not converge at the highest J and K of the levels, and from which J on; that in
-    some blocks energies are not in the order of the rigid top any more, so that Ka and Kc only count states. Levels
-    solved without vectors are judged by the first alone.
+    some blocks energies are not in the order of the rigid top any more, so that Ka and Kc only count states; that states or
+    species share levels so evenly that their names say little. Levels solved without vectors are judged by the first alone.
     """
-    return tuple(sentence for sentence in (_divergence(top, levels), _disorder(top, levels)) if sentence)
+    return tuple(text for text in (_divergence(top, levels), _disorder(top, levels), _mixture(levels)) if text)
+
+
+def _mixture(levels: Levels) -> str:
+    """How many levels have less than half of what they are called after."""
+    if levels.mixing is None:
+        return ""
+    mixed = levels.mixing < HALF
+    if not mixed.any():
+        return ""
+    lowest, total = int(np.argmin(levels.mixing)), "N" if "n" in levels.quanta else "J"
+    name, first = levels.labels(np.array([lowest]))[0].strip(), int(levels.rotational[mixed].min())
+    return (
+        f"{int(mixed.sum())} levels from {total} = {first} on are mixed by more than 50 %: what they are called after has less than "
+        f"half of them (least {levels.mixing[lowest]:.0%}: {name})"
+    )
 
 
 def _divergence(top: Top, levels: Levels) -> str:

@@ -73,7 +73,29 @@ class Model:
 
 
 def model_of(top: Top, effects: tuple[QuantumEffect, ...], operators: Operators, representation: str) -> Model:
-    """The states and couplings that the effects bring, beside the operators of the top's own state."""
+    """The states and couplings that the effects bring, beside the operators of the top's own state.
+
+    Parameters
+    ----------
+    top : Top
+        Gives the values of the parameters.
+    effects : tuple of QuantumEffect
+        What the Hamiltonian consists of.
+    operators : Operators
+        Coefficients in MHz of the top's own state v = 0, by powers (p, q, n).
+    representation : str
+        Which principal axes are x, y, z: "Ir", "IIIl", ...
+
+    Returns
+    -------
+    Model
+        Operators by state, couplings with their values in MHz, and limits of K.
+
+    Raises
+    ------
+    ValueError
+        For a coupling to a state that no effect defines, and for two effects that define the same state.
+    """
     states, couplings = {0: operators}, []
     for effect in effects:
         values = effect.parameters(top)
@@ -113,7 +135,33 @@ def extra_states(top: Top, effects: tuple[QuantumEffect, ...]) -> list[State]:
 def coupled_levels(
     top: Top, effects: tuple[QuantumEffect, ...], model: Model, jmin: int, jmax: int, executor: Executor | None = None
 ) -> Levels:
-    """All levels of a coupled calculation from J = `jmin` to `jmax`, by quantum numbers j, ka, kc and, of several states, v."""
+    """All levels of a coupled calculation from J = `jmin` to `jmax`, by quantum numbers j, ka, kc and, of several states, v.
+
+    Parameters
+    ----------
+    top : Top
+        Kind, spin weights and constants.
+    effects : tuple of QuantumEffect
+        What the Hamiltonian consists of; the levels remember it.
+    model : Model
+        States and couplings, from `model_of`.
+    jmin, jmax : int
+        Lowest and highest rotational angular momentum.
+    executor : Executor, optional
+        J are spread over it.
+
+    Returns
+    -------
+    Levels
+        Energies in MHz with eigenvectors, labels and mixing: the squared overlap of each state with the function that
+        names it.
+
+    Raises
+    ------
+    ValueError
+        For a Hamiltonian that overflows, a coupling that is not invariant under time reversal, and states that mix
+        levels of different spin weight.
+    """
     every_j = range(jmin, jmax + 1)
     pieces = [(model, j) for j in every_j]
     solved = (
@@ -151,8 +199,13 @@ def _weights(top: Top, effects: tuple[QuantumEffect, ...], levels: Levels) -> In
 
 
 def _refuse_mixed_weights(levels: Levels) -> None:
-    """States of one block have one symmetry, so that their nuclear-spin weights are one number."""
+    """States of one block have one symmetry, so that their nuclear-spin weights are one number.
+
+    The functions of a Wang block of a symmetric top differ in K, and where nothing connects it to another they do not mix.
+    """
     for block in levels.blocks:
+        if len(block.parts) == 1 and levels.kind in ("prolate", "oblate"):
+            continue
         found = levels.weight[block.start : block.start + len(block.energies_mhz)]
         if len(found) and (found != found[0]).any():
             row = block.start + int(np.argmax(found != found[0]))
@@ -261,7 +314,29 @@ def _solved(j: int, parts: tuple[Part, ...], matrix: Floats, zero: float, repres
 def names_of_states(
     parts: tuple[Part, ...], matrix: Floats, vectors: Floats, representation: str
 ) -> tuple[Ints, Floats]:
-    """v, Ka, Kc (n, 3) of the states of a coupled block, and their overlaps (n,) with the functions that name them."""
+    """Labels of the states of a coupled block, and their overlaps with the functions that name them.
+
+    A function is a state of one part, solved by itself; names are given one to one so that the sum of the overlaps is
+    largest.
+
+    Parameters
+    ----------
+    parts : tuple of Part
+        The state v and the Wang block of each range of functions.
+    matrix : (n, n) array
+        The Hamiltonian of the block, MHz.
+    vectors : (n, n) array
+        Its eigenvectors in columns.
+    representation : str
+        Which principal axes are x, y, z.
+
+    Returns
+    -------
+    labels : (n, 3) array
+        v, Ka, Kc of every state.
+    overlaps : (n,) array
+        Squared overlaps, from 0 to 1.
+    """
     names, functions = [], []
     for part in parts:
         ka, kc = names_of(part.basis, representation)
@@ -288,10 +363,28 @@ def one_to_one(overlaps: Floats) -> Ints:
 def parameter_matrix(
     top: Top, effects: tuple[QuantumEffect, ...], representation: str, block: CoupledBlock, name: str
 ) -> Floats:
-    """∂H/∂c of one parameter over the functions of a coupled block, (n, n).
+    """∂H/∂c of one parameter over the functions of a coupled block.
 
-    A parameter enters through operators of the top's own state, through other operators of J, and through the couplings of
-    its name.
+    A parameter enters through operators of the top's own state, through other operators of J, and through the couplings
+    of its name.
+
+    Parameters
+    ----------
+    top : Top
+        Gives the effects their operators.
+    effects : tuple of QuantumEffect
+        What the Hamiltonian consists of.
+    representation : str
+        Which principal axes are x, y, z.
+    block : CoupledBlock
+        Its J and its parts.
+    name : str
+        The parameter.
+
+    Returns
+    -------
+    (n, n) array
+        MHz per MHz; zero where the parameter does not act.
     """
     out = np.zeros((len(block.energies_mhz),) * 2)
     for effect in effects:

@@ -23,7 +23,7 @@ from rotor.arrays import Floats
 from rotor.quantum.coupled import CoupledBlock, parameter_matrix
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.levels import Levels
-from rotor.quantum.solve import hamiltonian
+from rotor.quantum.rotation import hamiltonian
 from rotor.quantum.spherical_top import scalar_and_tensor, tensor_eigenvalues
 from rotor.tops.operators import Operators, Powers
 
@@ -36,14 +36,33 @@ _AT_ONCE = 1 << 22  # coefficients that are gathered at a time: 32 MB
 
 
 def level_derivatives(top: Top, levels: Levels, names: Sequence[str] | None = None, rows: Rows | None = None) -> Floats:
-    """∂E/∂c of levels by named parameters of their effects, (rows, names), MHz per MHz.
+    """∂E/∂c of levels by named parameters of their effects.
 
-    names : parameters, in the order of the columns; all of the levels' effects, in their order, if None
-    rows : indices of the levels; all if None
+    Exact at the parameters that `levels` were solved with (Hellmann and Feynman).
 
-    Exact at the parameters that `levels` were solved with. Raises ValueError for a name that no effect has and
-    for levels of an asymmetric top that were solved without vectors.
+    Parameters
+    ----------
+    top : Top
+        The constants that the levels were solved with.
+    levels : Levels
+        Solved with eigenvectors where the top is asymmetric.
+    names : sequence of str, optional
+        Parameters, in the order of the columns; all of the levels' effects, in their order, by default.
+    rows : (rows,) array of int, optional
+        Indices of the levels; all by default.
 
+    Returns
+    -------
+    (rows, names) array
+        MHz per MHz.
+
+    Raises
+    ------
+    ValueError
+        For a name that no effect has, and for levels of an asymmetric top that were solved without vectors.
+
+    Examples
+    --------
     >>> from rotor.quantum.solve import solve_levels
     >>> from rotor.tops.top import Top
     >>> top = Top.from_constants("A=10 B=6 C=4 MHz")
@@ -65,12 +84,30 @@ def level_derivatives(top: Top, levels: Levels, names: Sequence[str] | None = No
         return _of_spherical(top, levels, names, rows)
     if any(isinstance(block, CoupledBlock) for block in levels.blocks):
         return _of_coupled(top, levels, names, rows)
-    terms = sorted({powers for name in names for powers in by_name[name]})
+    if "v" in levels.quanta:
+        return _of_states(top, levels, names, rows)
+    return _of_terms(levels, [by_name[name] for name in names], rows)
+
+
+def _of_terms(levels: Levels, operators: Sequence[Operators], rows: Rows) -> Floats:
+    """Σ factor ⟨term⟩ of each of several sums of terms, (rows, sums)."""
+    terms = sorted({powers for one in operators for powers in one})
     if not terms:
-        return np.zeros((len(rows), len(names)))
+        return np.zeros((len(rows), len(operators)))
     expectations = term_expectations(levels, terms, rows)
-    factors = np.array([[by_name[name].get(powers, 0.0) for name in names] for powers in terms])
+    factors = np.array([[one.get(powers, 0.0) for one in operators] for powers in terms])
     return np.asarray(expectations @ factors)
+
+
+def _of_states(top: Top, levels: Levels, names: Sequence[str], rows: Rows) -> Floats:
+    """Of states that nothing connects, in closed form: each parameter acts in the state that it belongs to."""
+    terms = {0: parameter_operators(top, levels.effects)}
+    terms |= {state.v: state.terms for effect in levels.effects for state in effect.states(top)}
+    out, v = np.zeros((len(rows), len(names))), levels.quanta["v"][rows]
+    for number, by_name in terms.items():
+        here = v == number
+        out[here] = _of_terms(levels, [by_name.get(name, {}) for name in names], rows[here])
+    return out
 
 
 def parameter_operators(top: Top, effects: Sequence[QuantumEffect]) -> dict[str, Operators]:

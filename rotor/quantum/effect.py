@@ -65,7 +65,24 @@ class QuantumEffect(ABC):
         return {}
 
     def j_operator(self, top: Top, name: str, j: int, representation: str) -> JOperator | None:
-        """∂H/∂c of one parameter for one J in |J k⟩ of a representation; None where `operators` has all of it."""
+        """∂H/∂c of one parameter for one J in |J k⟩ of a representation.
+
+        Parameters
+        ----------
+        top : Top
+            The top that the effect acts on.
+        name : str
+            The parameter.
+        j : int
+            Rotational angular momentum J.
+        representation : str
+            Which principal axes are x, y, z.
+
+        Returns
+        -------
+        JOperator or None
+            None where `operators` has all of it.
+        """
         return None
 
     def spins(self, top: Top) -> tuple[Spin, ...]:
@@ -84,7 +101,7 @@ class QuantumEffect(ABC):
         """What connects states of different v."""
         return ()
 
-    def kept(self, top: Top) -> frozenset[str]:
+    def conserved_sums(self, top: Top) -> frozenset[str]:
         """Sums of angular momenta (n, j, f1, ...) that are taken for good ones, elements between different values left out."""
         return frozenset()
 
@@ -116,6 +133,24 @@ def effect_sizes(
 
     The one source of sizes: `rotor info`, the limitations shown with a spectrum and plans use it.
 
+    Parameters
+    ----------
+    top : Top
+        The constants.
+    j : int
+        Rotational angular momentum J.
+    present : sequence of QuantumEffect
+        Effects of the calculation.
+    absent : iterable of QuantumEffect, optional
+        Effects that it leaves out.
+
+    Returns
+    -------
+    list of EffectSize
+        Those above 0, each with name, size in MHz, and whether it is present.
+
+    Examples
+    --------
     >>> from rotor.quantum.effects.watson import SEMI_RIGID
     >>> from rotor.tops.top import Top
     >>> [(s.name, round(s.size_mhz, 6)) for s in effect_sizes(Top.from_constants("B=6000 D=0.001 MHz"), 10, SEMI_RIGID)]

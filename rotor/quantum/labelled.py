@@ -122,7 +122,8 @@ class ClosedForm(LevelModel):
 class _Chunk:
     """Blocks of like size side by side: unit diagonals units[d] (blocks, size, terms) and what fills their places.
 
-    sizes (blocks,); x (blocks,): J(J+1); rows: labels that lie in these blocks, block and rank: where each is
+    sizes (blocks,); x (blocks,): J(J+1); rows: labels that lie in these blocks, block and rank: where each is; powers (labels, terms
+    of the Hamiltonian): X^p
     """
 
     units: tuple[Floats, ...]
@@ -131,6 +132,7 @@ class _Chunk:
     rows: Ints
     block: Ints
     rank: Ints
+    powers: Floats
 
 
 @dataclass(frozen=True)
@@ -156,7 +158,9 @@ class WangBlocks(LevelModel):
         units = sorted({(q, n) for _, q, n in hamiltonian if q or n})
         factors = np.array([[terms.get(powers, 0.0) for terms in by_name.values()] for powers in hamiltonian])
         places = tuple((p, units.index((q, n)) if q or n else -1) for p, q, n in hamiltonian)
-        chunks = tuple(_chunks(_occurring(labels, str(constants.representation), kmax), units))
+        chunks = tuple(
+            _chunks(_occurring(labels, str(constants.representation), kmax), units, [p for p, _, _ in hamiltonian])
+        )
         return cls(tuple(by_name), len(labels), places, factors, chunks, labels[:, 0])
 
     def levels(self, values_mhz: Floats) -> tuple[Floats, Floats]:
@@ -169,12 +173,12 @@ class WangBlocks(LevelModel):
             bands = [np.einsum("bkt,bt->bk", unit, weights) for unit in chunk.units]
             solved, vectors = _diagonalised(bands, chunk.sizes)
             energies[chunk.rows] = solved[chunk.block, chunk.rank]
-            expected = np.column_stack([_expectations(chunk, vectors), np.ones(len(chunk.rows))])
-            powers = np.stack([chunk.x**p for p, _ in self.powers], axis=1)[chunk.block]
-            slopes[chunk.rows] = (expected[:, places] * powers) @ self.factors
-        for (p, place), coefficient in zip(self.powers, coefficients.tolist(), strict=True):
-            if place < 0:
-                energies += coefficient * (self.j * (self.j + 1.0)) ** p
+            expected = np.ones((len(chunk.rows), chunk.units[0].shape[2] + 1))
+            expected[:, :-1] = _expectations(chunk, vectors)
+            slopes[chunk.rows] = (expected[:, places] * chunk.powers) @ self.factors
+        alone = [i for i, place in enumerate(places) if place < 0]
+        for chunk in self.chunks:
+            energies[chunk.rows] += chunk.powers[:, alone] @ coefficients[alone]
         return energies, slopes
 
     def overlaps(self, before_mhz: Floats, after_mhz: Floats) -> Floats:
@@ -233,7 +237,7 @@ def _cut(basis: WangBlock, kmax: int | None) -> int:
     return basis.size if kmax is None else min(basis.size, max(0, (kmax - basis.first_k) // 2 + 1))
 
 
-def _chunks(blocks: Sequence[_Occurring], units: Sequence[tuple[int, int]]) -> list[_Chunk]:
+def _chunks(blocks: Sequence[_Occurring], units: Sequence[tuple[int, int]], powers: Sequence[int]) -> list[_Chunk]:
     """Blocks in order of size, cut into pieces of bounded memory and of sizes within a factor of two."""
     out, start = [], 0
     while start < len(blocks):
@@ -245,20 +249,23 @@ def _chunks(blocks: Sequence[_Occurring], units: Sequence[tuple[int, int]]) -> l
         ):
             stop += 1
         stop = max(stop, start + 1)
-        out.append(_chunk(blocks[start:stop], units))
+        out.append(_chunk(blocks[start:stop], units, powers))
         start = stop
     return out
 
 
-def _chunk(blocks: Sequence[_Occurring], units: Sequence[tuple[int, int]]) -> _Chunk:
+def _chunk(blocks: Sequence[_Occurring], units: Sequence[tuple[int, int]], powers: Sequence[int]) -> _Chunk:
     size = blocks[-1].size
+    x = np.array([one.basis.j * (one.basis.j + 1.0) for one in blocks])
+    block = np.array([b for b, one in enumerate(blocks) for _ in one.rows])
     return _Chunk(
         units=_unit_diagonals(blocks, size, units),
         sizes=[one.size for one in blocks],
-        x=np.array([one.basis.j * (one.basis.j + 1.0) for one in blocks]),
+        x=x,
         rows=np.array([row for one in blocks for row in one.rows]),
-        block=np.array([b for b, one in enumerate(blocks) for _ in one.rows]),
+        block=block,
         rank=np.array([rank for one in blocks for rank in one.ranks]),
+        powers=np.stack([x**p for p in powers], axis=1)[block],
     )
 
 

@@ -232,16 +232,16 @@ def weights_of_levels(levels: Levels, weights: SpinWeights) -> Ints:
 
 
 def _of_asymmetric(levels: Levels, weights: SpinWeights) -> Ints:
-    """By parities of (Ka, Kc); a symmetric top whose ±K are split has weights by K, one component each."""
+    """By parities of (Ka, Kc); a symmetric top whose ±K are split has weights by K, one component each.
+
+    Of a pair with K a multiple of n, 0even and 0odd go by the parity of the other label, which is J where K = 0: a half turn about
+    an axis across the main one tells the two components of the pair apart.
+    """
     ka, kc = levels.quanta["ka"], levels.quanta["kc"]
     if levels.kind in ("prolate", "oblate") and weights.rule == "K":
-        k = kc if levels.kind == "oblate" else ka
-        both = weights.of_symmetric(levels.rotational, k, oblate=levels.kind == "oblate")
-        if "0odd" in weights.classes:
-            raise ValueError(
-                "spin weights by 0even and 0odd: the components of a split ±K pair differ in weight, and which is which is "
-                "not known here; give weights by parity of (Ka, Kc) or by K alone"
-            )
-        return np.asarray(both // np.where(k == 0, 1, 2))
+        k, other = (kc, ka) if levels.kind == "oblate" else (ka, kc)
+        of_even_and_odd = np.array([weights.of_symmetric(j, 0) for j in (0, 1)])  # of K = 0, whose other label is J
+        both = weights.of_symmetric(levels.rotational, k, oblate=levels.kind == "oblate") // np.where(k == 0, 1, 2)
+        return np.where(k % weights.modulus == 0, of_even_and_odd[other % 2], both)
     of_parity = np.array([[weights.of_ka_kc(a + c) for c in "eo"] for a in "eo"], dtype=np.int64)
     return np.asarray(of_parity[ka % 2, kc % 2])

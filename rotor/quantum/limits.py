@@ -4,14 +4,16 @@
 |---|---|---|
 | a nucleus of spin 1 or more | nuclear quadrupole coupling | 234.96 MHz/barn · |Q|: a field gradient of one atomic unit |
 | constants of a geometry alone | error of the geometry, centrifugal distortion | δB/B · 2B(J+1); 4D(J+1)³, D = 4B³/ν² with ν = 500 cm⁻¹ |
-| a methyl group beside atoms off its axis | internal rotation | not estimated: it depends on the barrier |
-| a pyramidal nitrogen | inversion | not estimated: it depends on the barrier |
+| a methyl group beside atoms off its axis | internal rotation | at most F = ħ²/2 I_red, that of a free group |
+| a pyramidal nitrogen with two hydrogens | inversion | at most about 24 GHz, that of ammonia |
 | an odd number of electrons, an odd electronic state | electron spin | not estimated |
 | nuclei with spin | spin-rotation and spin-spin coupling | not estimated |
 
 D = 4B³/ν² holds exactly for a harmonic diatomic molecule (A. Kratzer, Z. Phys. 3 (1920) 289), for others in order of magnitude.
 The unit of the field gradient is e/(4π ε0 a0³); gradients at nuclei of bonded atoms are of this order, several times as large at
-heavy halogens.
+heavy halogens. I_red = I_m (1 - I_m Σ_g λ_g²/I_g), I_m the moment of the methyl group about its axis and λ_g the cosines of this axis
+in the principal frame: the energy F p² of a group that turns freely against the rest, whose levels m = 0 (A) and m = ±1 (E) are F
+apart (C. C. Lin and J. D. Swalen, Rev. Mod. Phys. 31 (1959) 841).
 """
 
 from __future__ import annotations
@@ -39,21 +41,28 @@ VIBRATION_CM = 500.0  # a wavenumber of vibration, for distortion that was not c
 COMPUTE = "its constants are known, add the effects of spins"  # the command line names its option in place of this
 CH_ANGSTROM, NEIGHBOUR_ANGSTROM = 1.3, 1.7  # bonds of hydrogen to carbon or nitrogen, and of nitrogen to heavier atoms
 OFF_AXIS = 0.05  # sine of the angle from which an atom is off the axis of a methyl group
+ELECTRON_SPIN = "electron spin"
+AMMONIA_MHZ = 24_000.0  # the splitting of NH3, see docs/limitations.md
 FLAT_DEGREES = 355.0  # sum of the three angles at a nitrogen that is not pyramidal
 
 
 @dataclass(frozen=True)
 class Limit:
-    """Something that a calculation leaves out. size_mhz: for a line at the J in question; None: not estimated."""
+    """Something that a calculation leaves out. size_mhz: for a line at the J in question; None: not estimated.
+
+    at_most: whether the size is the largest that it can have, not an estimate.
+    """
 
     name: str
     size_mhz: float | None
     text: str
+    at_most: bool = False
 
     @property
     def sentence(self) -> str:
         """Name, size and what it does, as a report prints them."""
-        size = "not estimated" if self.size_mhz is None else f"about {float(f'{self.size_mhz:.1g}'):g} MHz"
+        known = "not estimated" if self.size_mhz is None else f"about {float(f'{self.size_mhz:.1g}'):g} MHz"
+        size = f"at most {known}" if self.at_most else known
         return f"{self.name}: {size}; {self.text}"
 
 
@@ -91,7 +100,9 @@ def _quadrupole(nuclei: Sequence[Splitting]) -> NuclearQuadrupole | None:
 
 
 def model_limits(top: Top, j: int, effects: Sequence[QuantumEffect]) -> list[Limit]:
-    """What a calculation with these effects leaves out, largest first; what is not estimated comes last.
+    """What a calculation with these effects leaves out, largest first.
+
+    Of what is not estimated, electron spin comes first, since it may be larger than all else, and the coupling of nuclear spins last.
 
     >>> from rotor.tops.top import Top
     >>> [limit.name for limit in model_limits(Top.from_constants("B=57.6 GHz"), 7, ())]
@@ -101,7 +112,14 @@ def model_limits(top: Top, j: int, effects: Sequence[QuantumEffect]) -> list[Lim
     found = [*_of_constants(top, j), *(_of_nuclei(top, j, effects))]
     if top.molecule is not None:
         found += _of_geometry(top, top.molecule, present)
-    return sorted(found, key=lambda limit: -(limit.size_mhz or 0.0))
+    return sorted(found, key=_rank)
+
+
+def _rank(limit: Limit) -> float:
+    """Smaller for what comes first."""
+    if limit.size_mhz is None:
+        return -math.inf if limit.name == ELECTRON_SPIN else 0.0
+    return -limit.size_mhz
 
 
 def limit_facts(top: Top, j: int, effects: Sequence[QuantumEffect]) -> dict[str, Any]:
@@ -166,22 +184,18 @@ def _split_text(nuclei: Sequence[Splitting]) -> str:
 
 
 def _of_geometry(top: Top, molecule: Molecule, present: set[str]) -> list[Limit]:
-    """Motions of large amplitude, and unpaired electrons, that the geometry tells of."""
+    """Motions of large amplitude, and unpaired electrons, that the geometry shows."""
     found = []
     if tops := _internal_rotors(molecule):
-        what = "a methyl group turns" if tops == 1 else f"{tops} methyl groups turn"
-        found.append(
-            Limit("internal rotation", None, f"{what} against the rest: lines split, those of A and E are far apart")
-        )
+        what = "a methyl group turns" if len(tops) == 1 else f"{len(tops)} methyl groups turn"
+        text = f"{what} against the rest: lines of A and of E species are apart, by less the higher the barrier"
+        found.append(Limit("internal rotation", max(tops), text, at_most=True))
     if _pyramidal_nitrogens(molecule) and "interacting states" not in present:
-        found.append(
-            Limit("inversion", None, "nitrogen is pyramidal: every level is a pair, and only their mean is here")
-        )
+        text = "nitrogen is pyramidal: its levels are pairs that this leaves out; the size is ammonia's, heavier groups have less"
+        found.append(Limit("inversion", AMMONIA_MHZ, text, at_most=True))
     electrons = sum(one.element_number for one in molecule.nuclei) - molecule.charge
     if (electrons % 2 or molecule.electronic == "odd") and "spin-rotation" not in present:
-        found.append(
-            Limit("electron spin", None, "the molecule has unpaired electrons: levels and lines are multiplets")
-        )
+        found.append(Limit(ELECTRON_SPIN, None, "the molecule has unpaired electrons: levels and lines are multiplets"))
     return found
 
 
@@ -208,17 +222,36 @@ def _pairs_within(x: Floats, reach: float) -> Ints:
     return np.argwhere(np.triu(apart < reach, k=1))
 
 
-def _internal_rotors(molecule: Molecule) -> int:
-    """Methyl groups whose turning is not that of the whole: some other atom lies off their axis."""
-    count, x, bonds = 0, molecule.positions_angstrom, _neighbours(molecule)
+def _internal_rotors(molecule: Molecule) -> list[float]:
+    """F in MHz of each methyl group whose turning is not that of the whole: other atoms lie off its axis."""
+    found: list[tuple[Floats, list[int]]] = []
+    x, bonds = molecule.positions_angstrom, _neighbours(molecule)
     for carbon, near in enumerate(bonds):
         symbols = Counter(molecule.symbols[i] for i in near.tolist())
         if molecule.symbols[carbon] != "C" or symbols["H"] != 3:
             continue
         hydrogens = [i for i in near.tolist() if molecule.symbols[i] == "H"]
         axis = x[carbon] - x[hydrogens].mean(axis=0)
-        count += _any_off_axis(x, [carbon, *hydrogens], axis)
-    return count
+        if len(x) > len(hydrogens) + 2 and _any_off_axis(x, [carbon, *hydrogens], axis):
+            found.append((axis / np.linalg.norm(axis), hydrogens))
+    return _free_rotation_mhz(molecule, found)
+
+
+def _free_rotation_mhz(molecule: Molecule, groups: Sequence[tuple[Floats, list[int]]]) -> list[float]:
+    """F = ħ²/2 I_red in MHz of groups, each with its unit axis and its atoms off it."""
+    if not groups:
+        return []
+    from rotor.geometry.inertia import point_masses, principal_frame
+
+    x, mass = molecule.positions_angstrom, molecule.masses_u
+    frame, found = principal_frame(point_masses(mass, x)), []
+    for axis, atoms in groups:
+        off = x[atoms] - x[atoms].mean(axis=0)
+        off -= np.outer(off @ axis, axis)
+        own = float(mass[atoms] @ np.sum(off**2, axis=1))
+        share = own * float(np.sum((frame.axes @ axis) ** 2 / frame.moments))
+        found.append(units.ROTATIONAL_MHZ_U_ANGSTROM2 / (own * (1.0 - share)))
+    return found
 
 
 def _any_off_axis(x: Floats, group: list[int], axis: Floats) -> bool:

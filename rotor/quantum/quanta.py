@@ -72,8 +72,26 @@ def value_text(value: Any, half: bool = False) -> str:
 
 
 def labels(quanta: Quanta, rows: NDArray[Any], halves: Collection[str] = (), width: int = 2) -> list[str]:
-    """Each level as its quantum numbers in a row of text, each at least `width` characters wide.
+    """Each level as its quantum numbers in a row of text.
 
+    Parameters
+    ----------
+    quanta : mapping of str to (n,) array of int
+        Quantum numbers by name; half-integers are doubled.
+    rows : (rows,) array of int
+        Indices of the levels.
+    halves : collection of str, optional
+        Names of the doubled columns.
+    width : int, optional
+        Least number of characters of each quantum number.
+
+    Returns
+    -------
+    list of str
+        One text for each row.
+
+    Examples
+    --------
     >>> labels({"j": np.array([4]), "ka": np.array([1]), "kc": np.array([3])}, np.array([0]))
     [' 4  1  3']
     """

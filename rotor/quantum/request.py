@@ -135,7 +135,7 @@ class LevelsAnswer:
             "level_count": len(self.table),
             "ground_mhz": self.table.ground_mhz,
             "notes": [*request.top.notes, *self.warnings],
-            **limit_facts(request.top, max(request.jmax, 1), request.effects),
+            **limit_facts(request.top, max(request.jmax, 1), self.table.levels.effects),
         }
 
 

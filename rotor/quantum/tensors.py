@@ -180,14 +180,34 @@ def body_tensor(cartesian: ArrayLike, rank: int, representation: str) -> BodyTen
 
 
 def coupling(j_low: int, j_up: int, rank: int, q: int, k: ArrayLike) -> Floats:
-    """√((2J'+1)(2J+1)) (-1)^(J'-k') (J' K J; -k' q k) from k to k' = k + q, for an array of k; 0 where k or k' do not exist.
+    """√((2J'+1)(2J+1)) (-1)^(J'-k') (J' K J; -k' q k) from k to k' = k + q: √(2J+1) ⟨J k K q|J' k'⟩.
 
-    It is √(2J+1) ⟨J k K q|J' k'⟩. For K ≤ 2 in closed forms: K = 1 as the direction cosines of P. C. Cross, R. M. Hainer and
-    G. W. King, J. Chem. Phys. 12, 210 (1944), table I; K = 2 from D. A. Varshalovich, A. N. Moskalev and V. K. Khersonskii,
-    Quantum Theory of Angular Momentum, 1988, table 8.4. Else from `three_j`. J' < J and q < 0 follow from
+    Parameters
+    ----------
+    j_low, j_up : int
+        J and J'.
+    rank : int
+        K of the tensor.
+    q : int
+        Its component in the molecule.
+    k : (...) array
+        Projections of the lower function.
+
+    Returns
+    -------
+    (...) array
+        Pure numbers; 0 where k or k' do not exist.
+
+    Notes
+    -----
+    For K ≤ 2 in closed forms: K = 1 as the direction cosines of P. C. Cross, R. M. Hainer and G. W. King, J. Chem.
+    Phys. 12, 210 (1944), table I; K = 2 from D. A. Varshalovich, A. N. Moskalev and V. K. Khersonskii, Quantum Theory
+    of Angular Momentum, 1988, table 8.4. Else from `three_j`. J' < J and q < 0 follow from
 
         c(J → J', q, k) = (-1)^(J'-J-q) c(J' → J, -q, k+q) = (-1)^(J'-J-K) c(J → J', -q, -k).
 
+    Examples
+    --------
     >>> round(float(coupling(1, 3, 2, 0, 0)) ** 2, 6)  # (3/2) (J+1)(J+2)/(2J+3) of a linear molecule
     1.8
     """
@@ -351,7 +371,22 @@ def block_elements(up: WangBlock, low: WangBlock, tensor: BodyTensor) -> Floats:
 
 
 def acting_on(vectors: Floats, up: WangBlock, low: WangBlock, tensor: BodyTensor) -> Floats:
-    """T times columns (low.size, n) over the lower block: columns (up.size, n) over the upper one."""
+    """A tensor times columns over the lower block.
+
+    Parameters
+    ----------
+    vectors : (low.size, n) array
+        Columns over the lower block.
+    up, low : WangBlock
+        The upper and the lower block.
+    tensor : BodyTensor
+        Components in the molecule.
+
+    Returns
+    -------
+    (up.size, n) array
+        Columns over the upper block, in the unit of the tensor.
+    """
     states = vectors.T
     moved = np.zeros((states.shape[0], up.size))
     for number, (source, target, elements) in enumerate(bands_between(up, low, tensor)):

@@ -1,4 +1,4 @@
-"""Matrices of scalar operators of the angular momentum in the Wang basis, block by block.
+"""Matrices of scalar operators of the angular momentum in the Wang basis, block by block, and their eigenvalues.
 
 An operator is a table {(p, q, n): c in MHz} of c · ½[Jz^2q, J₊^2n + J₋^2n]₊ · J^2p (n = 0: c · J^2p Jz^2q). With X = J(J+1),
 
@@ -10,11 +10,16 @@ with the phases of J∓ (body-fixed) real and positive.
 
 from __future__ import annotations
 
+import sys
+
 import numpy as np
 from numpy.typing import NDArray
 
+from rotor.arrays import Floats
 from rotor.quantum.basis import WangBlock
 from rotor.tops.operators import Operators
+
+SMALL = 100  # rows of a tridiagonal block up to which scipy.linalg, 0.2 s to load, is not loaded for it
 
 
 def scalar_energy(operators: Operators, j: int) -> float:
@@ -94,3 +99,45 @@ def block_bands(of_j: JMatrix, block: WangBlock) -> list[NDArray[np.float64]]:
             if high <= last:
                 bands[(high - low) // 2][(low - block.first_k) // 2] += block.sign * of_j.folded(low, n)
     return bands
+
+
+def diagonalise(bands: list[Floats], vectors: bool = True) -> tuple[Floats, Floats]:
+    """Eigenvalues, rising, and eigenvectors in columns of a symmetric matrix given by its diagonals.
+
+    Tridiagonal matrices go to LAPACK's divide and conquer (dstevd), wider ones to its dense form (dsyevd, numpy's eigh). So do
+    tridiagonal ones of up to `SMALL` rows where scipy.linalg is not loaded, which takes longer than all of them together: the
+    dense form leaves a tridiagonal matrix as it is and goes on like the other, to the same bits.
+    Raises ValueError where LAPACK does not converge or the matrix has numbers that are not finite.
+    """
+    size = len(bands[0])
+    if size == 1:
+        return bands[0], np.ones((1, 1))
+    if not all(np.isfinite(band).all() for band in bands):
+        raise ValueError("a block of the Hamiltonian overflows: J max is too high for these distortion constants")
+    if len(bands) == 1:
+        return _diagonal(bands[0], vectors)
+    if len(bands) > 2 or (size <= SMALL and "scipy.linalg" not in sys.modules):
+        return _dense(bands, vectors)
+
+    from scipy.linalg.lapack import dstevd
+
+    energies, states, info = dstevd(bands[0], bands[1], compute_v=int(vectors))
+    if info:
+        raise ValueError(f"LAPACK dstevd did not converge on a block of size {size} (info = {info})")
+    return energies, states
+
+
+def _diagonal(band: Floats, vectors: bool) -> tuple[Floats, Floats]:
+    order = np.argsort(band, kind="stable")
+    return band[order], np.eye(len(band))[:, order] if vectors else np.zeros((0, 0))
+
+
+def _dense(bands: list[Floats], vectors: bool) -> tuple[Floats, Floats]:
+    size = len(bands[0])
+    matrix = np.zeros((size, size))
+    for n, band in enumerate(bands):
+        matrix.flat[n * size :: size + 1] = band  # eigh reads the lower triangle
+    if not vectors:
+        return np.asarray(np.linalg.eigvalsh(matrix), dtype=np.float64), np.zeros((0, 0))
+    solved = np.linalg.eigh(matrix)
+    return np.asarray(solved.eigenvalues), np.asfortranarray(solved.eigenvectors)  # a state's components side by side

@@ -40,8 +40,25 @@ _FEW_TERMS = 20  # twice the j below which the sum is short
 def three_j(j1: ArrayLike, j2: ArrayLike, j3: ArrayLike, m1: ArrayLike, m2: ArrayLike, m3: ArrayLike) -> Floats:
     """Wigner's 3j symbols (j1 j2 j3; m1 m2 m3) of arrays that broadcast.
 
-    Raises ValueError for a number that is not a multiple of ½, a negative j, and an m that does not belong to its j.
+    Parameters
+    ----------
+    j1, j2, j3 : (...) arrays
+        Angular momenta, integers or half-integers.
+    m1, m2, m3 : (...) arrays
+        Their projections.
 
+    Returns
+    -------
+    (...) array
+        The symbols, right to some 1e-15 of themselves; 0 where a rule forbids them.
+
+    Raises
+    ------
+    ValueError
+        For a number that is not a multiple of ½, a negative j, and an m that does not belong to its j.
+
+    Examples
+    --------
     >>> round(float(three_j(2, 1, 1, 0, 0, 0)) ** 2 * 15, 12)
     2.0
     >>> three_j(0.5, 0.5, [0, 1], 0.5, -0.5, 0).round(6).tolist()
@@ -59,8 +76,25 @@ def three_j(j1: ArrayLike, j2: ArrayLike, j3: ArrayLike, m1: ArrayLike, m2: Arra
 def six_j(j1: ArrayLike, j2: ArrayLike, j3: ArrayLike, l1: ArrayLike, l2: ArrayLike, l3: ArrayLike) -> Floats:
     """Wigner's 6j symbols {j1 j2 j3; l1 l2 l3} of arrays that broadcast.
 
-    Raises ValueError for a number that is negative or not a multiple of ½.
+    Parameters
+    ----------
+    j1, j2, j3 : (...) arrays
+        Angular momenta of the upper row, integers or half-integers.
+    l1, l2, l3 : (...) arrays
+        Angular momenta of the lower row.
 
+    Returns
+    -------
+    (...) array
+        The symbols, right to some 1e-15 of themselves; 0 where a rule forbids them.
+
+    Raises
+    ------
+    ValueError
+        For a number that is negative or not a multiple of ½.
+
+    Examples
+    --------
     >>> round(float(six_j(1, 1, 1, 1, 1, 1)) * 6, 12)
     1.0
     """
@@ -94,18 +128,41 @@ def nine_j(rows: ArrayLike) -> Floats:
 
 
 def three_j_over_m(j1: float, j2: float, j3: float, m1: float) -> tuple[Floats, Floats]:
-    """All 3j symbols (j1 j2 j3; m1 m2 -m1-m2) of one m1: the m2 (n,), rising, and the symbols (n,).
+    """All 3j symbols (j1 j2 j3; m1 m2 -m1-m2) of one m1.
 
+    Parameters
+    ----------
+    j1, j2, j3 : float
+        Angular momenta, integers or half-integers.
+    m1 : float
+        Projection of the first.
+
+    Returns
+    -------
+    m2 : (n,) array
+        Rising.
+    symbols : (n,) array
+        Zeros where the triangle rule is broken. Errors are some 1e-12 of the largest symbol at J = 1000; values below
+        1e-308 are 0.
+
+    Raises
+    ------
+    ValueError
+        For a negative j, and for an m1 larger than j1 or not like it (integer or half-integer).
+
+    Notes
+    -----
     As a function of m2 they are the eigenvector of (J2 + J3)² with the eigenvalue j1(j1+1),
 
         c(m2-1) x(m2-1) + [j2(j2+1) + j3(j3+1) - j1(j1+1) + 2 m2 m3] x(m2) + c(m2) x(m2+1) = 0,
         c(m2)² = (j2-m2)(j2+m2+1)(j3+m3)(j3-m3+1),     Σ x² = 1/(2 j1+1),     sign (-1)^(j2-j3-m1) at the last m2
 
     Like the recursions of K. Schulten and R. G. Gordon, J. Math. Phys. 16, 1961 (1975), it is run from both ends to the
-    middle, where both directions are stable. Where one j is small, `three_j` is used, because the eigenvalues are close to
-    each other then, in units of the matrix. Errors are some 1e-12 of the largest symbol at J = 1000; values below 1e-308
-    are 0.
+    middle, where both directions are stable. Where one j is small, `three_j` is used, because the eigenvalues are close
+    to each other then, in units of the matrix.
 
+    Examples
+    --------
     >>> m2, symbols = three_j_over_m(2, 1, 1, 0)
     >>> m2.tolist(), (symbols**2 * 30).round(9).tolist()
     ([-1.0, 0.0, 1.0], [1.0, 4.0, 1.0])

@@ -97,12 +97,44 @@ def classical_band(
     executor: ThreadPoolExecutor | None = None,
     progress: Callable[[int], object] | None = None,
 ) -> Spectrum:
-    """The absorption cross section in nm² of a classical free gas of rigid tops, smoothed by a Gaussian.
+    """The absorption cross section of a classical free gas of rigid tops, smoothed by a Gaussian.
 
-    top: with a dipole; its A, B, C make it rigid. grid_mhz: (n,). fwhm_mhz: of the Gaussian, as in `Spectrum.from_lines`,
-    so that both can be laid over each other. molecules: drawn; the scatter of σ falls as 1/√molecules, about 1 % of the
-    peak for 2e5 of water with a width of a tenth of the band. Times are chosen from the width and the band.
+    Times are chosen from the width and the band.
 
+    Parameters
+    ----------
+    top : Top
+        With a dipole; its A, B, C make it rigid.
+    grid_mhz : (n,) array
+        Frequencies.
+    fwhm_mhz : float
+        Full width of the Gaussian, as in `Spectrum.from_lines`, so that both can be laid over each other.
+    temperature_k : float, optional
+        Of the gas.
+    correction : "harmonic", "standard", "schofield" or "egelstaff", optional
+        The factor that restores detailed balance; see the head of the module.
+    molecules : int, optional
+        How many are drawn; the scatter of σ falls as 1/√molecules, about 1 % of the peak for 2e5 of water with a width
+        of a tenth of the band.
+    rng : numpy.random.Generator
+        Draws the gas.
+    executor : ThreadPoolExecutor, optional
+        The molecules are spread over it.
+    progress : callable, optional
+        Called with a number of molecules as they are done.
+
+    Returns
+    -------
+    Spectrum
+        σ (n,) in nm² of one molecule.
+
+    Raises
+    ------
+    ValueError
+        For a top without a dipole or with one of zero, and as `band_from_correlation` does.
+
+    Notes
+    -----
     Neglected: quantum mechanics but for the factor `correction`, distortion, spin weights (a hot gas averages them).
     """
     dipole, moments = _dipole(top), np.array(top.moments_u_angstrom2)
@@ -142,10 +174,35 @@ def band_from_correlation(
     temperature_k: float,
     correction: Correction = "harmonic",
 ) -> Spectrum:
-    """The cross section in nm² of one molecule from its C1 at even times from 0, of a gas or of anything that turns.
+    """The cross section of one molecule from its C1 at even times from 0, of a gas or of anything that turns.
 
-    times_ps, correlation: (n,), C1 with what never decays taken off (it would be a line at frequency 0). dipole2_debye2: μ².
-    Raises ValueError for times that are not even or too short for the width: the window must have closed by then.
+    Parameters
+    ----------
+    times_ps : (n,) array
+        Even times from 0, 8 or more.
+    correlation : (n,) array
+        C1 with what never decays taken off (it would be a line at frequency 0).
+    dipole2_debye2 : float
+        μ².
+    grid_mhz : (m,) array
+        Frequencies.
+    fwhm_mhz : float
+        Full width of the Gaussian that smooths the band.
+    temperature_k : float
+        Of the gas.
+    correction : "harmonic", "standard", "schofield" or "egelstaff", optional
+        The factor that restores detailed balance.
+
+    Returns
+    -------
+    Spectrum
+        σ (m,) in nm².
+
+    Raises
+    ------
+    ValueError
+        For an unknown correction, and for times that are not even or too short for the width: the window must have
+        closed by then.
     """
     times, c1 = np.asarray(times_ps, dtype=float), np.asarray(correlation, dtype=float)
     grid = np.asarray(grid_mhz, dtype=float)

@@ -187,8 +187,29 @@ def _add_depth(depth: Floats, grid: Floats, lines: Lines, source: Source) -> Non
 
 
 def source_grid(first_mhz: float, last_mhz: float, source: Source, points_per_width: int = 8) -> Floats:
-    """Frequencies (n,) from first to last, each `points_per_width` to a line's full width: even in log ν.
+    """Frequencies from first to last, each `points_per_width` to a line's full width: even in log ν.
 
+    Parameters
+    ----------
+    first_mhz, last_mhz : float
+        Ends of the range, rising and above 0.
+    source : Source
+        Its full width in km/s is that of the lines.
+    points_per_width : int, optional
+        Points to a full width at half maximum.
+
+    Returns
+    -------
+    (n,) array
+        MHz, rising.
+
+    Raises
+    ------
+    ValueError
+        For a range that does not rise or does not begin above 0.
+
+    Examples
+    --------
     >>> len(source_grid(100e3, 100.1e3, Source(1e14, 10, 1.0)))
     2399
     """

@@ -34,8 +34,30 @@ def jmax_for_cut(top: Top, dipole_abc: tuple[float, float, float], temperature_k
     """The J beyond which every line is weaker than 10^cut nm² MHz at this temperature.
 
     The lowest level of each J is above C J(J+1) in a rigid top, a line's strength is at most (J+1) μ² times the spin
-    weight, its frequency is taken as 2A(J+1). Without a cut, the reach of the usual cut of -12 is taken.
-    Raises ValueError where more than J = 600 would be needed.
+    weight, its frequency is taken as 2A(J+1).
+
+    Parameters
+    ----------
+    top : Top
+        Rotational constants and spin weights.
+    dipole_abc : (float, float, float)
+        Components of μ in debye.
+    temperature_k : float
+        Of the gas.
+    q : float
+        Partition function.
+    cut : float
+        log10 of nm² MHz; for -inf, no cut, the reach of the usual cut of -12 is taken.
+
+    Returns
+    -------
+    int
+        J max of the levels to solve.
+
+    Raises
+    ------
+    ValueError
+        Where more than J = 600 would be needed.
     """
     constants = top.rotational_constants_mhz
     a, c = max(x for x in constants if math.isfinite(x)), constants[2]
@@ -59,12 +81,27 @@ def jmax_for_cut(top: Top, dipole_abc: tuple[float, float, float], temperature_k
 
 
 def population(levels: Levels, temperature_k: float, q: float, ground_mhz: float | None = None) -> Floats:
-    """The fraction of molecules in one state, one component and one M, of every level, with its spin weight, (n,).
+    """The fraction of molecules in one state, one component and one M, of every level, with its spin weight.
 
-    ground_mhz: the energy from which Q counts; that of the lowest of these levels that exists if None.
+    Parameters
+    ----------
+    levels : Levels
+        Energies and weights.
+    temperature_k : float
+        Of the gas.
+    q : float
+        Partition function, with the same spin weights.
+    ground_mhz : float, optional
+        The energy from which Q counts; that of the lowest of these levels that exists by default.
+
+    Returns
+    -------
+    (levels,) array
+        Pure numbers.
     """
     above_k = (levels.energy_mhz - (levels.ground_mhz if ground_mhz is None else ground_mhz)) / units.MHZ_PER_K
-    return np.asarray(levels.weight_per_component / q * np.exp(-above_k / temperature_k))
+    exponent = np.minimum(-above_k / temperature_k, 600.0)  # levels that mean nothing may lie far below the ground
+    return np.asarray(levels.weight_per_component / q * np.exp(exponent))
 
 
 def largest(values: Floats, count: int) -> Ints:
@@ -101,7 +138,26 @@ class IntensityCut:
 def intensity_cut(
     levels: Levels, temperature_k: float, q: float, least_lgint: float, ground_mhz: float | None = None
 ) -> IntensityCut | None:
-    """The cut at an LGINT of `least_lgint`; None for -inf, which cuts nothing. ground_mhz: as in `population`."""
+    """The cut at an LGINT of `least_lgint`.
+
+    Parameters
+    ----------
+    levels : Levels
+        Energies and weights.
+    temperature_k : float
+        Of the gas.
+    q : float
+        Partition function.
+    least_lgint : float
+        log10 of nm² MHz of the weakest line that counts.
+    ground_mhz : float, optional
+        As in `population`.
+
+    Returns
+    -------
+    IntensityCut or None
+        None for -inf, which cuts nothing.
+    """
     if math.isinf(least_lgint):
         return None
     scaled = LGINT_NM2_MHZ * population(levels, temperature_k, q, ground_mhz)

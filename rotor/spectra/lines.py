@@ -38,7 +38,7 @@ from rotor.spectra.intensity import (
 )
 from rotor.spectra.transitions import all_transitions
 from rotor.thermo import PartitionFunction, VibrationalStates, partition_function
-from rotor.thermo.trusted_levels import are_trusted
+from rotor.thermo.trusted_levels import are_trusted, in_level_table
 from rotor.tops.covariance import Covariance
 
 if TYPE_CHECKING:
@@ -99,8 +99,15 @@ class Lines(TransitionTable):
         exact = [name for name in self.top.constants.values if name not in known]
         partly = f"errors of frequencies take {', '.join(exact)} as exact: their uncertainty is not known"
         beyond = f"{self.untrusted} lines of levels beyond the reach of the distortion constants are left out"
-        found = warnings_of(self.top, self.levels) + ((beyond,) if self.untrusted else ())
+        found = () if self._tabulated else warnings_of(self.top, self.levels)
+        found += (beyond,) if self.untrusted else ()
         return found + ((partly,) if known and exact else ())
+
+    @property
+    def _tabulated(self) -> bool:
+        """Whether every line is between levels of the top's table, so that the distortion series does not matter."""
+        known = in_level_table(self.top, self.levels)
+        return known is not None and bool(known[self.upper].all() and known[self.lower].all())
 
     @cached_property
     def spread(self) -> Floats | None:
@@ -260,19 +267,54 @@ def line_list(
 ) -> Lines:
     """Electric-dipole lines of a top: every transition that the selection rules allow, cut only where you say.
 
-    temperature_k: for intensities. jmax: the highest J; by default the one beyond which no line can reach
-    `min_lgint`. min_lgint: log10 of nm² MHz below which lines are left out, None for none left out. range_mhz: first
-    and last frequency. q: partition function to use instead of the summed one, spin weights reduced by their common
-    divisor. vibrational_factor: multiplies Q. vibrations: states or fundamentals whose factor at this temperature multiplies
-    Q instead. covariance: of the constants, for the errors of frequencies;
-    by default the uncertainties that the constants carry, uncorrelated, but not those of a fit whose correlations are
-    unknown (the library's): they would make errors many times too large. untrusted: list lines
-    of levels beyond the reach of the distortion constants too (`rotor.thermo.trusted_levels`); they are left out and counted. effects: what
-    the Hamiltonian consists of. executor: J are spread over it.
+    Parameters
+    ----------
+    top : Top
+        With a dipole in debye.
+    temperature_k : float, optional
+        For intensities.
+    jmax : int, optional
+        The highest J; by default the one beyond which no line can reach `min_lgint`.
+    min_lgint : float or None, optional
+        log10 of nm² MHz below which lines are left out; None for none left out.
+    range_mhz : (float, float), optional
+        First and last frequency.
+    q : float, optional
+        Partition function to use instead of the summed one, spin weights reduced by their common divisor.
+    vibrational_factor : float, optional
+        Multiplies Q.
+    vibrations : VibrationalStates, optional
+        States or fundamentals whose factor at this temperature multiplies Q instead.
+    covariance : Covariance, optional
+        Of the constants, for the errors of frequencies; by default the uncertainties that the constants carry,
+        uncorrelated, but not those of a fit whose correlations are unknown (the library's): they would make errors many
+        times too large.
+    sort : bool, optional
+        Whether lines rise in frequency; False leaves them in the order in which they are found.
+    untrusted : bool, optional
+        List lines of levels beyond the reach of the distortion constants too (`rotor.thermo.trusted_levels`); by
+        default they are left out and counted.
+    effects : sequence of QuantumEffect, optional
+        What the Hamiltonian consists of.
+    executor : Executor, optional
+        J are spread over it.
 
+    Returns
+    -------
+    Lines
+        Frequencies in MHz, strengths in D², and the levels behind them.
+
+    Raises
+    ------
+    ValueError
+        Where the top has no known dipole, for a temperature not above 0, and for J max below 0.
+
+    Notes
+    -----
     Neglected: all but electric dipole, nuclear hyperfine structure, vibrational states, dependence of μ on J.
-    Raises ValueError where the top has no known dipole, for a temperature not above 0, and for J max below 0.
 
+    Examples
+    --------
     >>> from rotor.tops.top import Top
     >>> lines = line_list(Top.from_constants("B=57635.968 MHz", dipole_abc_debye=(0.11, 0, 0)), jmax=2)
     >>> [round(float(f), 3) for f in lines.frequency_mhz]
@@ -340,7 +382,33 @@ def partition_of(
     vibrations: VibrationalStates | None,
     effects: Sequence[QuantumEffect] = SEMI_RIGID,
 ) -> PartitionFunction | None:
-    """Q as the user gave it, or the summed one times a vibrational factor; None where it is to be summed as it is."""
+    """Q as the user gave it, or the summed one times a vibrational factor.
+
+    Parameters
+    ----------
+    top : Top
+        Whose levels are summed.
+    temperature_k : float
+        Of the gas.
+    q : float or None
+        The partition function, where it is given.
+    vibrational_factor : float
+        Multiplies Q; 1 for none.
+    vibrations : VibrationalStates or None
+        States whose factor at this temperature multiplies Q instead.
+    effects : sequence of QuantumEffect, optional
+        What the Hamiltonian consists of.
+
+    Returns
+    -------
+    PartitionFunction or None
+        None where Q is to be summed as it is.
+
+    Raises
+    ------
+    ValueError
+        For both kinds of vibrational factor at once, and for a Q or a factor that is not a finite number above 0.
+    """
     if vibrations is not None:
         if vibrational_factor != 1.0:
             raise ValueError(f"vibrational factor {vibrational_factor:g} and vibrational energies: give one of them")

@@ -44,11 +44,33 @@ def column_density_per_cm2(pressure_bar: float, path_cm: float, temperature_k: f
 def line_optical_depth(
     lines: Lines, pressure_bar: float, path_cm: float, *, profile: str = "gaussian", fwhm_mhz: float | None = None
 ) -> Floats:
-    """Optical depth (lines,) at the centre of every line, as if it were alone.
+    """Optical depth at the centre of every line, as if it were alone.
 
-    profile, fwhm_mhz: shape and full width at half maximum as `Spectrum.from_lines` takes them: Doppler's width unless
-    given. Raises ValueError for a pressure or a path not above 0, and for a Doppler width without a mass.
+    Parameters
+    ----------
+    lines : Lines
+        At their temperature.
+    pressure_bar : float
+        Of the absorbing molecules themselves.
+    path_cm : float
+        Length of the layer.
+    profile : "gaussian", "lorentzian" or "voigt", optional
+        Shape, as `Spectrum.from_lines` takes it.
+    fwhm_mhz : float, optional
+        Full width at half maximum, as there; Doppler's by default.
 
+    Returns
+    -------
+    (lines,) array
+        Pure numbers: absorbed is 1 - exp(-τ).
+
+    Raises
+    ------
+    ValueError
+        For a pressure or a path not above 0, and for a Doppler width without a mass.
+
+    Examples
+    --------
     >>> from rotor.spectra.lines import line_list
     >>> from rotor.tops.top import Top
     >>> rod = Top.from_constants("B=57635.968 MHz", dipole_abc_debye=(0.11011, 0, 0))

@@ -181,6 +181,11 @@ def raman_lines(
     executor : Executor, optional
         J are spread over it.
 
+    Returns
+    -------
+    RamanLines
+        Stokes and anti-Stokes lines, rising in shift.
+
     Raises
     ------
     ValueError

@@ -118,6 +118,10 @@ def _symmetric(levels: Levels, tensor: Floats, spin_weights: SpinWeights) -> Ram
     x, y, z = ("abc".index(axis) for axis in axes_of(representation))
     along = (2 * tensor[z, z] - tensor[x, x] - tensor[y, y]) / np.sqrt(6)
     if anisotropy_squared(tensor) - 1.5 * along**2 > (ROUND_OFF * np.linalg.norm(tensor)) ** 2:
+        if "v" in levels.quanta:
+            raise ValueError(
+                "several states of a symmetric top: expected a polarizability with its axis; check the tensor"
+            )
         if spin_weights.rule == "K":
             raise ValueError("spin weights by K need an axis, and the polarizability has none; check the tensor")
         return _without_axis(levels, tensor, spin_weights, representation)
@@ -135,7 +139,8 @@ def _of_axial(levels: Levels, delta_j: int, along: float) -> RamanTransitions:
     factor = np.empty(len(j))
     for value in np.unique(j).tolist():
         factor[j == value] = coupling(value, value + delta_j, 2, 0, k[j == value])
-    first, second = levels.rows_of(j=j, k=k), levels.rows_of(j=j + delta_j, k=k)
+    state = {"v": levels.quanta["v"][lower]} if "v" in levels.quanta else {}  # no polarizability connects two states
+    first, second = np.flatnonzero(lower), levels.rows_of(j=j + delta_j, k=k, **state)
     strength = 1.5 * (along * factor) ** 2 * np.where(k == 0, 1, 2)
     return _ordered(levels, strength, first, second, _of_both(levels, first, second))
 

@@ -95,6 +95,11 @@ class Spectrum(Table):
             unless given. The relative error of an area is below it; that of the intensity at a point is below the sum
             of I_i s_i(reach) over the lines i further away than their reach: at most 2.5e-8 of their peaks.
 
+        Returns
+        -------
+        Spectrum
+            (n,) in nm².
+
         Raises
         ------
         ValueError
@@ -130,10 +135,32 @@ def resolving_grid(
     range_mhz: tuple[float, float] | None = None,
     outside: float | None = None,
 ) -> Floats:
-    """Frequencies (n,) in MHz that follow every line: close at its centre, wider away from it, and even in between.
+    """Frequencies that follow every line: close at its centre, wider away from it, and even in between.
 
-    Straight lines between its points enclose the area of a line within 0.2 %. `outside` as in `Spectrum.from_lines`.
-    Raises ValueError for a grid of more than 20 million points: a narrower range has fewer lines.
+    Straight lines between its points enclose the area of a line within 0.2 %.
+
+    Parameters
+    ----------
+    lines : Lines
+        Their frequencies and, for a Doppler width, the mass of their top.
+    fwhm_mhz : float, optional
+        Full width at half maximum, as in `Spectrum.from_lines`.
+    profile : "gaussian", "lorentzian" or "voigt", optional
+        Shape.
+    range_mhz : (float, float), optional
+        First and last frequency; by default all lines with their reach.
+    outside : float, optional
+        Share of a line's area beyond its reach, as in `Spectrum.from_lines`.
+
+    Returns
+    -------
+    (n,) array
+        MHz, rising.
+
+    Raises
+    ------
+    ValueError
+        For a range that does not rise, and for a grid of more than 20 million points: a narrower range has fewer lines.
     """
     shape = _shape(lines, profile, fwhm_mhz)
     width, reach = shape.fwhm(), shape.reach(_fraction(profile, outside))

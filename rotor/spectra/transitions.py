@@ -49,12 +49,29 @@ def all_transitions(
 ) -> Transitions:
     """Every transition between `levels` that is allowed, in the range and above the cut, in no particular order.
 
-    dipoles_abc: components of μ along a, b, c in debye; of several states by pairs (v', v), each pair once. moments: others, of
-    levels that were solved with spins.
+    Parameters
+    ----------
+    levels : Levels
+        With eigenvectors where the top is asymmetric.
+    dipoles_abc : (float, float, float) or mapping of (int, int) to it
+        Components of μ along a, b, c in debye; of several states by pairs (v', v), each pair once.
+    range_mhz : (float, float), optional
+        First and last frequency.
+    cut : IntensityCut, optional
+        The least intensity; by default nothing is cut.
+    moments : sequence of Moment, optional
+        Others than dipoles, of levels that were solved with spins.
+
+    Returns
+    -------
+    Transitions
+        Frequencies in MHz, S μ² in D², and rows of both states.
     """
     dipoles = dipoles_abc if isinstance(dipoles_abc, Mapping) else {(0, 0): dipoles_abc}
     if levels.representation is None:
-        return _joined(list(_closed_form(levels, dipoles[0, 0], range_mhz, cut)))
+        return _joined(
+            [piece for states, mu in dipoles.items() for piece in _closed_form(levels, states, mu, range_mhz, cut)]
+        )
 
     blocks, some_without = _blocks_with_weight(levels)
     pairs, between = _acting(levels, blocks, dipoles, moments)
@@ -234,24 +251,37 @@ def _states(block: Any, first: int, last: int) -> Any:
 
 
 def _closed_form(
-    levels: Levels, dipole_abc: tuple[float, float, float], range_mhz: tuple[float, float], cut: IntensityCut | None
+    levels: Levels,
+    states: tuple[int, int],
+    dipole_abc: Vector,
+    range_mhz: tuple[float, float],
+    cut: IntensityCut | None,
 ) -> Iterator[Transitions]:
-    """Lines of linear and symmetric tops; a spherical top without field or distortion has none."""
+    """Lines of linear and symmetric tops by one dipole; a spherical top without field or distortion has none."""
     if levels.kind == "spherical":
         return
     along, across2 = _split(levels.kind, dipole_abc)
-    for delta_j, delta_k, dipole2 in ((1, 0, along**2), (0, 1, across2), (1, 1, across2), (1, -1, across2)):
-        if dipole2 == 0:
-            continue
-        first, second, strength = _hoenl_london(levels, delta_j, delta_k)
+    ways = [states, states[::-1]] if states[0] != states[1] else [states]
+    rises = [(v, delta_j, delta_k, s2) for v in ways for delta_j, delta_k, s2 in _rises(along**2, across2)]
+    if states[0] != states[1] and along:
+        rises.append((states, 0, 0, along**2))
+    for between, delta_j, delta_k, dipole2 in rises:
+        first, second, strength = _hoenl_london(levels, delta_j, delta_k, between)
         difference = levels.energy_mhz[second] - levels.energy_mhz[first]
         frequency, strength = np.abs(difference), strength * dipole2
         upper, lower = np.where(difference < 0, first, second), np.where(difference < 0, second, first)
 
-        keep = (frequency >= range_mhz[0]) & (frequency <= range_mhz[1]) & (levels.weight[lower] > 0)
+        keep = (frequency >= range_mhz[0]) & (frequency <= range_mhz[1])
+        keep &= (levels.weight[lower] > 0) & (levels.weight[upper] > 0)
         if cut is not None:
             keep &= cut.keeps(frequency, strength, cut.population[lower])
         yield Transitions(frequency[keep], strength[keep], upper[keep].astype(np.int32), lower[keep].astype(np.int32))
+
+
+def _rises(along2: float, across2: float) -> list[tuple[int, int, float]]:
+    """ΔJ, ΔK and the square of the dipole for the branches that lead from one level to another, each line once."""
+    steps = ((1, 0, along2), (0, 1, across2), (1, 1, across2), (1, -1, across2))
+    return [(delta_j, delta_k, dipole2) for delta_j, delta_k, dipole2 in steps if dipole2]
 
 
 def _split(kind: str, dipole_abc: tuple[float, float, float]) -> tuple[float, float]:
@@ -262,10 +292,12 @@ def _split(kind: str, dipole_abc: tuple[float, float, float]) -> tuple[float, fl
     return (a, b * b + c * c) if FIGURE_AXIS[kind] == "a" else (c, a * a + b * b)
 
 
-def _hoenl_london(levels: Levels, delta_j: int, delta_k: int) -> tuple[NDArray[np.int64], NDArray[np.int64], Floats]:
-    """Rows of J, K and of J + ΔJ, K + ΔK, and S summed over both signs of K, for a unit dipole.
+def _hoenl_london(
+    levels: Levels, delta_j: int, delta_k: int, states: tuple[int, int] = (0, 0)
+) -> tuple[NDArray[np.int64], NDArray[np.int64], Floats]:
+    """Rows of v, J, K and of v', J + ΔJ, K + ΔK, and S summed over both signs of K, for a unit dipole.
 
-    Parallel: [(J+1)² - K²]/(J+1) for R, nothing for Q (no change of energy). Perpendicular, with the square of the
+    Parallel: [(J+1)² - K²]/(J+1) for R, (2J+1) K²/(J(J+1)) for Q, within a state no change of energy. Perpendicular, with the square of the
     dipole across the axis: Q: (2J+1)(J∓K)(J±K+1)/(2J(J+1)), R: (J±K+1)(J±K+2)/(2(J+1)), over both signs of K (the
     squares of `tensors.coupling`; W. Gordy and R. L. Cook, Microwave Molecular Spectra, table 2.1). Q with
     K - 1 is Q with K + 1 from the other side.
@@ -273,12 +305,21 @@ def _hoenl_london(levels: Levels, delta_j: int, delta_k: int) -> tuple[NDArray[n
     all_j = levels.quanta["j"]
     all_k = levels.quanta.get("k", np.zeros_like(all_j))
     to_j, to_k = all_j + delta_j, all_k + delta_k
-    first = np.nonzero((to_j <= levels.jmax) & (to_k >= 0) & (to_k <= to_j))[0]
+    here = (to_j <= levels.jmax) & (to_k >= 0) & (to_k <= to_j)
+    if "v" in levels.quanta:
+        here &= levels.quanta["v"] == states[0]
+    if delta_j == delta_k == 0:
+        here &= all_k > 0
+    first = np.nonzero(here)[0]
     reached = {"j": to_j[first]} | ({"k": to_k[first]} if "k" in levels.quanta else {})
+    if "v" in levels.quanta:
+        reached["v"] = np.full(len(first), states[1])
     second = levels.rows_of(**reached)
 
     j, k = all_j[first].astype(float), all_k[first].astype(float)
-    if delta_k == 0:
+    if delta_k == 0 and delta_j == 0:
+        strength = 2.0 * (2 * j + 1) * k**2 / (j * (j + 1))
+    elif delta_k == 0:
         strength = np.where(k == 0, 1.0, 2.0) * ((j + 1) ** 2 - k**2) / (j + 1)
     elif delta_j:
         strength = (j + delta_k * k + 1) * (j + delta_k * k + 2) / (2 * (j + 1))

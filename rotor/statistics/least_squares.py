@@ -25,6 +25,8 @@ Progress = Callable[["Iteration"], None]
 
 CONVERGED, STALLED, EXHAUSTED, INTERRUPTED = "converged", "stalled", "too many iterations", "interrupted"
 FIRST_DAMPING, MOST_DAMPING = 1e-4, 1e12  # λ where D p has columns of length 1
+_FLOOR = 10.0  # times the tolerance, below which a step that does not come nearer says that round-off is reached
+_NOISE = 1e-8  # of χ², below which round-off of the residuals hides whether a step has decreased it: the linear model decides
 ROUND_OFF = 1e-13  # singular values below this part of the largest carry no information
 
 
@@ -93,7 +95,8 @@ def minimise(
     start : (n,) array
     tolerance : float
         The search has converged when the full step would move the parameters by less than this many standard errors,
-        times the weighted rms where that is above 1.
+        times the weighted rms where that is above 1; or where an undamped step has not halved what is left, which is then round-off,
+        and that is below ten times as much.
     most_iterations : int
         Evaluations after the first.
     floor : (n,) array, optional
@@ -124,12 +127,13 @@ def minimise(
     point = np.array(start, dtype=float)
     blind = np.zeros(len(point)) if floor is None else floor
     state = _State.at(point, *_evaluated(evaluate, point))
-    scale, damping, taken = state.norms, 0.0, list[Iteration]()
+    scale, damping, taken, before = state.norms, 0.0, list[Iteration](), math.inf
     try:
         while True:
             scale = np.maximum(scale, state.norms)
             linear = _Linear.of(state, scale, blind)
-            if linear.distance <= tolerance * max(1.0, state.rms):
+            enough = tolerance * max(1.0, state.rms)
+            if linear.distance <= enough or (linear.distance > before / 2 and linear.distance <= _FLOOR * enough):
                 return state.ended(CONVERGED, linear, taken)
             if len(taken) >= most_iterations:
                 return state.ended(EXHAUSTED, linear, taken)
@@ -138,8 +142,10 @@ def minimise(
             trial = _tried(evaluate, state.parameters + step)
             after = trial.rms if trial else math.inf
             gain = (state.rms**2 - after**2) * len(state.residuals) / predicted if predicted > 0 else -1.0
-            good = math.isfinite(after) and gain > 1e-4
+            small = predicted <= _NOISE * state.rms**2 * len(state.residuals) and after <= (1 + _NOISE) * state.rms
+            good = math.isfinite(after) and (gain > 1e-4 or (small and damping == 0))
             taken.append(Iteration(len(taken) + 1, state.rms, after, damping, predicted, good))
+            before = linear.distance if damping == 0 else math.inf
             if good and trial:
                 state = trial
             if progress:

@@ -2,7 +2,7 @@
 
 A structure is refined along totally symmetric displacements u (an orthonormal basis S of those Cartesian displacements that
 every operation leaves alike, translations and rotations taken out), so that x = x₀ + S u retains its point group whatever is
-fitted. Named coordinates q(x) are set by Newton's method, S δu = S (B S)⁺ (q_wanted - q(x)), B the matrix of Wilson; what the
+fitted. Named coordinates q(x) are set by Newton's method, S δu = S (B S)⁺ (q_asked - q(x)), B the matrix of Wilson; what the
 names leave open moves as little as it can (the pseudo-inverse).
 """
 
@@ -178,9 +178,28 @@ def _rigid_motions(positions: Floats) -> Floats:
 
 
 def moved_to(positions: Floats, space: Floats, coordinates: Sequence[Named], targets: Floats) -> Floats:
-    """Positions (n, 3) at which the coordinates have the target values (Å, degrees), reached along `space` (3n, k).
+    """Positions at which the coordinates have the target values, reached along totally symmetric displacements.
 
-    Raises ValueError where they cannot all be had (coordinates that contradict each other, or a step that does not settle).
+    Parameters
+    ----------
+    positions : (n, 3) array
+        The start, Å.
+    space : (3n, k) array
+        Orthonormal displacements that may be used.
+    coordinates : sequence of Named
+        c distances, angles and dihedral angles.
+    targets : (c,) array
+        Their values, Å and degrees.
+
+    Returns
+    -------
+    (n, 3) array
+        Å; what the coordinates leave open has moved as little as it can.
+
+    Raises
+    ------
+    ValueError
+        Where they cannot all be had (coordinates that contradict each other, or a step that does not settle).
     """
     x = positions.copy()
     factors = np.array([one.factor for one in coordinates])

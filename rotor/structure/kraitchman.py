@@ -107,7 +107,9 @@ def kraitchman(
         I_a, I_b, I_c of the parent and of the isotopologue. A moment that the shape does not use may be nan: those that are
         not in `pair` for "planar", I_a and one of I_b, I_c for "linear".
     mass_u : float
-        Mass of the parent. change_u : what the substitution adds, below zero for a lighter isotope.
+        Mass of the parent.
+    change_u : float
+        What the substitution adds, below zero for a lighter isotope.
     shape : "asymmetric", "planar", "linear" or "symmetric"
         Which axes the atom can lie off, see above. "symmetric" takes the two equal moments of the parent, which may be the
         smaller (oblate) or the larger (prolate); a symmetric isotopologue (an atom on the axis) may have I_a = nan.

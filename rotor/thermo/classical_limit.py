@@ -66,7 +66,8 @@ class ClassicalLimit:
     """The classical limit of a top: q = mean_weight · scale · T^(n/2), to be multiplied by 1 + a/T + b/T² + d T + e T².
 
     degrees: n, 2 for a linear molecule, else 3. scale: in K^(-n/2). a, b, d, e, f: in K, K², 1/K, 1/K², 1/K³; see
-    the module. theta_k: the largest finite and the middle rotational temperature. period: of the spin weights.
+    the module. theta_k: the largest finite and the middle rotational temperature. period: of the spin weights. states: of each
+    further state how much it counts beside the first, and its energy over k in K.
     """
 
     degrees: int
@@ -79,11 +80,21 @@ class ClassicalLimit:
     f: float = 0.0
     theta_k: tuple[float, float] = (0.0, 0.0)
     period: int = 1
+    states: tuple[tuple[float, float], ...] = ()
 
     def q(self, temperatures_k: ArrayLike) -> Floats:
         """Q in the classical limit, (n,)."""
         t = np.asarray(temperatures_k, dtype=np.float64)
-        return np.asarray(self.mean_weight * self.scale * t ** (self.degrees / 2))
+        return np.asarray(self.mean_weight * self.scale * t ** (self.degrees / 2) * self.state_sums(t)[0])
+
+    def state_sums(self, t: Floats) -> tuple[Floats, Floats, Floats]:
+        """Σ w e⁻ˣ over the states with x = E/kT, and mean and variance of x, (n,) each; 1, 0, 0 of one state."""
+        share, energy = np.array([(1.0, 0.0), *self.states]).T
+        x = energy / np.asarray(t)[..., None]
+        terms = share * np.exp(-x)
+        total = terms.sum(axis=-1)
+        mean = (terms * x).sum(axis=-1) / total
+        return total, mean, (terms * x * x).sum(axis=-1) / total - mean**2
 
     def corrected(self, temperatures_k: ArrayLike) -> tuple[Floats, Floats, Floats]:
         """Q, U/RT and C_v/R with the corrections, (n,) each; NaN where one of these is more than half of 1.
@@ -97,8 +108,9 @@ class ClassicalLimit:
         valid = np.max(np.abs([first + second, fourth, sixth]), axis=0) < SERIES_LIMIT
         half = np.where(valid, self.degrees / 2, np.nan)
         ln_f = np.where(valid, first + second + fourth + sixth, np.nan)
-        energy = half - first - 2 * second + fourth + 2 * sixth
-        return self.q(t) * np.exp(ln_f), energy, half + 2 * second + 2 * fourth + 6 * sixth
+        _, mean, spread = self.state_sums(t)
+        energy = half - first - 2 * second + fourth + 2 * sixth + mean
+        return self.q(t) * np.exp(ln_f), energy, half + 2 * second + 2 * fourth + 6 * sixth + spread
 
     def errors(self, temperatures_k: ArrayLike) -> Floats:
         """Estimated relative errors (3, n) of the corrected Q, U/RT and C_v/R: the next terms, see the module.
@@ -141,7 +153,23 @@ def classical_limit(top: Top, weights: SpinWeights | None = None) -> ClassicalLi
     if top.kind == "linear":
         return ClassicalLimit(2, of.mean, 1 / b, b / 3, b**2 / 15, *_distortion(top), (b, b), period)
     scale = math.sqrt(math.pi / (a * b * c))
-    return ClassicalLimit(3, of.mean, scale, *_stripp_kirkwood(a, b, c), *_distortion(top), (a, b), period)
+    corrections = (*_stripp_kirkwood(a, b, c), *_distortion(top))
+    return ClassicalLimit(3, of.mean, scale, *corrections, (a, b), period, _other_states(top))
+
+
+def _other_states(top: Top) -> tuple[tuple[float, float], ...]:
+    """How much each further state counts beside the first, by its mean weight and its A, B, C, and its energy over k in K."""
+    states = top.states
+    if states is None:
+        return ()
+    volume, mean = math.prod(top.rotational_constants_mhz), states.weights.get(0, top.spin_weights).mean
+    found = []
+    for v in range(1, states.count):
+        own = states.of_state(v)
+        axes = [own.get(name, own["B"]) for name in ("A", "B", "C")]
+        weight = states.weights.get(v, top.spin_weights).mean / mean
+        found.append((weight * math.sqrt(volume / math.prod(axes)), own.get("E", 0.0) / units.MHZ_PER_K))
+    return tuple(found)
 
 
 def rotational_temperatures_k(top: Top) -> tuple[float, float, float]:
@@ -172,11 +200,8 @@ def classical_partition_function(top: Top, temperature_k: ArrayLike) -> float | 
     >>> round(classical_partition_function(Top.from_constants("B=57635.968 MHz"), 300.0), 2)
     108.46
     """
-    kt_mhz = np.asarray(temperature_k, dtype=np.float64) * units.MHZ_PER_K
-    a, b, c = top.rotational_constants_mhz
-    mean = top.spin_weights.mean
-    q = mean * kt_mhz / b if top.kind == "linear" else mean * np.sqrt(math.pi * kt_mhz**3 / (a * b * c))
-    return np.asarray(q) if kt_mhz.ndim else float(q)
+    q = classical_limit(top).q(temperature_k)
+    return q if np.ndim(temperature_k) else float(q)
 
 
 def _stripp_kirkwood(a: float, b: float, c: float) -> tuple[float, float]:

@@ -43,8 +43,26 @@ def populations_in_field(
 ) -> Populations:
     """Populations of the states of blocks that hold every M.
 
-    In equilibrium Q is that of the free top and what the states given differ by in the field; those above them are shifted by
-    amounts whose sum over M is 0 to second order.
+    Parameters
+    ----------
+    top : Top
+        Constants and spin weights.
+    solved : sequence of BlockStates
+        Energies (f, states) in MHz of each block at the same fields.
+    temperature_k : float
+        Of the gas.
+    populations : str
+        "adiabatic": each state has the population of the level it comes from; else equilibrium in the field.
+
+    Returns
+    -------
+    Populations
+        (f, states) of each block, and Q (f,).
+
+    Notes
+    -----
+    In equilibrium Q is that of the free top and what the states given differ by in the field. Neglected: those above
+    them are shifted by amounts whose sum over M is 0 to second order.
     """
     kt = temperature_k * MHZ_PER_K
     ground = lowest_level_k(top, [top.spin_weights])[0] * MHZ_PER_K

@@ -197,6 +197,11 @@ def _parts(top: Top, species: str) -> tuple[dict[str, SpinWeights], dict[str, fl
     return {species: known[species]}, {}
 
 
+def _tunnelling_components(top: Top) -> int:
+    """States that the spin weights of the geometry take together: they are what tunnelling between equivalent forms makes of one."""
+    return len(top.states.weights) if top.states is not None and 0 in top.states.weights else 1
+
+
 def _rotation(
     top: Top,
     species: str,
@@ -218,7 +223,7 @@ def _rotation(
         species=species,
         fractions=fractions,
         symmetry_number=symmetry_number,
-        spin_factor=limit.mean_weight * symmetry_number,
+        spin_factor=limit.mean_weight * symmetry_number * _tunnelling_components(top),
         temperature_k=temperatures,
         q_rot=np.exp(ln_q),
         q_rot_classical=limit.q(temperatures),

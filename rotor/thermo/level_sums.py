@@ -28,9 +28,10 @@ from rotor import units
 from rotor.arrays import Floats, Ints
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.watson import SEMI_RIGID
-from rotor.quantum.levels import weights_of_levels
+from rotor.quantum.levels import Levels, weights_of_levels
 from rotor.quantum.solve import solve_levels
 from rotor.thermo.classical_limit import classical_limit
+from rotor.thermo.species import of_species
 from rotor.thermo.trusted_levels import trusted_energies_mhz
 from rotor.tops.spin_weights import SpinWeights
 
@@ -202,10 +203,11 @@ class _Ladder:
         progress: Progress | None = None,
     ) -> None:
         self.top, self.weights, self._effects, self._progress = top, weights, effects, progress
-        self.semi_rigid = effects == SEMI_RIGID
+        self.semi_rigid = effects == SEMI_RIGID and top.states is None
         self._by_j: list[Shell] = []
         self.last = 0
-        self.heaviest = [heaviest_component(one) for one in weights]
+        others = [] if top.states is None else list(top.states.weights.values())
+        self.heaviest = [max(heaviest_component(each) for each in (one, *others)) for one in weights]
         self.ground = [self._lowest(s) for s in range(len(weights))]
 
     def at(self, j: int) -> Shell:
@@ -221,7 +223,7 @@ class _Ladder:
             self._progress(first, max(self.last, first))
         levels = solve_levels(self.top, last, jmin=first, effects=self._effects, vectors=False)
         plain = levels.states.astype(np.float64)
-        spin = np.array([levels.multiplicity * weights_of_levels(levels, one) for one in self.weights], dtype=float)
+        spin = np.array([levels.multiplicity * self._weights(levels, one) for one in self.weights], dtype=float)
         energies = lower = levels.energy_mhz
         if self.semi_rigid:
             energies, lower = trusted_energies_mhz(self.top, levels)
@@ -230,6 +232,17 @@ class _Ladder:
             here = rotational == j
             kelvin, low = energies[here] / units.MHZ_PER_K, lower[here] / units.MHZ_PER_K
             self._by_j.append(Shell(kelvin, plain[here], spin[:, here], low if (low < kelvin).any() else None))
+
+    def _weights(self, levels: Levels, one: SpinWeights) -> Ints:
+        """The weights of levels by one set; of several states by their own, where the set has the level's class at all."""
+        if "v" not in levels.quanta or self.top.states is None:
+            return weights_of_levels(levels, one)
+        total = np.zeros(len(levels), dtype=np.int64)
+        for v in range(self.top.states.count):
+            own = self.top.states.weights.get(v)
+            weights = weights_of_levels(levels, one if own is None else of_species(own, one))
+            total = np.where(levels.quanta["v"] == v, weights, total)
+        return total
 
     def _lowest(self, s: int) -> tuple[float, int]:
         """Energy in K and J of the lowest level that exists, among those of the J solved by then."""

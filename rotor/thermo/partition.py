@@ -98,11 +98,33 @@ def partition_function(
 ) -> PartitionFunction | PartitionFunctions:
     """Q(T) of a top: one for a number, a table of arrays for a list or an array of temperatures.
 
-    Summed over levels until the tail is below `relative_error` of it, or, where the sum would be long and that is as good,
-    the classical limit with its corrections; see `rotor.thermo.level_sums`. The error of the answer is larger than what
-    was asked where levels count that the distortion constants do not serve; above 10 % there is no answer but a
-    ValueError, as for a temperature not above 0 K.
+    Summed over levels until the tail is below `relative_error` of it, or, where the sum would be long and that is as
+    good, the classical limit with its corrections; see `rotor.thermo.level_sums`.
 
+    Parameters
+    ----------
+    top : Top
+        Constants and spin weights.
+    temperature_k : float or (n,) array
+        One temperature or many.
+    relative_error : float, optional
+        Asked of Q.
+    effects : sequence of QuantumEffect, optional
+        What the Hamiltonian consists of.
+
+    Returns
+    -------
+    PartitionFunction or PartitionFunctions
+        Q with J max, error and source. The error is larger than what was asked where levels count that the distortion
+        constants do not serve.
+
+    Raises
+    ------
+    ValueError
+        For an error above 10 %, and for a temperature not above 0 K.
+
+    Examples
+    --------
     >>> from rotor.tops.top import Top
     >>> top = Top.from_constants("B=57635.968 MHz")
     >>> round(partition_function(top, 300.0).q, 2), partition_function(top, [10.0, 300.0]).q.round(2).tolist()
@@ -120,7 +142,31 @@ def partition_functions(
     *,
     progress: Progress | None = None,
 ) -> PartitionFunctions:
-    """Q at several temperatures from one set of levels; see `partition_function`, and for progress `level_sums`."""
+    """Q at several temperatures from one set of levels; see `partition_function`.
+
+    Parameters
+    ----------
+    top : Top
+        Constants and spin weights.
+    temperatures_k : (n,) array
+        Above 0 K.
+    relative_error : float, optional
+        Asked of Q.
+    effects : sequence of QuantumEffect, optional
+        What the Hamiltonian consists of.
+    progress : callable, optional
+        Called as `progress(j, last)` whenever more levels are solved; see `level_sums`.
+
+    Returns
+    -------
+    PartitionFunctions
+        (n,) arrays of Q, J max and error, with the source of each.
+
+    Raises
+    ------
+    ValueError
+        For an error above 10 %, and for a temperature not above 0 K.
+    """
     temperatures = checked_temperatures(temperatures_k)
     weights = [top.spin_weights]
     spinless, factor = without_spins(top, effects)

@@ -36,7 +36,7 @@ def spin_species(weights: SpinWeights) -> dict[str, SpinWeights]:
 
 
 def _groups(weights: SpinWeights) -> list[tuple[str, ...]]:
-    """Classes that one species holds: K and n - K, the two parities that a half turn tells apart, else each by itself."""
+    """Classes that one species holds: K and n - K, the two parities that differ under a half turn, else each by itself."""
     if weights.rule == "K":
         return _by_k(weights)
     if weights.rule == "KaKc":
@@ -60,6 +60,24 @@ def _value(weights: SpinWeights, name: str) -> int:
 def _only(weights: SpinWeights, names: tuple[str, ...]) -> SpinWeights:
     remaining = (value if name in names else 0 for name, value in zip(weights.classes, weights.values, strict=True))
     return replace(weights, values=tuple(remaining))
+
+
+def of_species(weights: SpinWeights, species: SpinWeights) -> SpinWeights:
+    """The weights of a state, all classes weighing 0 that a species of the molecule has not.
+
+    >>> state = SpinWeights.from_mapping({"0even": 0, "0odd": 4, "1": 1, "2": 1})
+    >>> of_species(state, SpinWeights("K", ("0", "1", "2"), (0, 1, 1))).values
+    (0, 0, 1, 1)
+    """
+    if species.rule == "none":
+        return weights
+    if weights.rule != species.rule:
+        raise ValueError(
+            f"spin weights of a state by {weights.rule}, and of the molecule by {species.rule}: expected one rule"
+        )
+    of = dict(zip(species.classes, species.values, strict=True))
+    whole = {name: of[name] if name in of else of["0"] for name in weights.classes}
+    return _only(weights, tuple(name for name, value in whole.items() if value))
 
 
 def implied_symmetry_number(weights: SpinWeights) -> int:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats
-from rotor.quantum.effects.watson import centrifugal_operators, operators_by_name
+from rotor.quantum.effects.watson import SEMI_RIGID, centrifugal_operators, operators_by_name
 from rotor.quantum.levels import Levels
 from rotor.quantum.solve import solve_levels
 from rotor.quantum.spherical_top import scalar_and_tensor
@@ -76,14 +76,29 @@ def trusted_energies_mhz(top: Top, levels: Levels) -> tuple[Floats, Floats]:
 
 
 def are_trusted(top: Top, levels: Levels) -> NDArray[np.bool_]:
-    """Which levels (n,) are energies of a molecule; all of a rigid top, and of one with spins or further states."""
+    """Which levels (n,) are energies of a molecule; all of a rigid top, and of one with spins or further states.
+
+    Of a top with a level table those that the table has.
+    """
     plain = not {"v", "f", "irrep"} & levels.quanta.keys()
     if not plain or not centrifugal_operators(top.constants):
         return np.ones(len(levels), dtype=np.bool_)
+    if (tabulated := in_level_table(top, levels)) is not None:
+        return tabulated
     rigid = rigid_energies_mhz(top, levels)
     if not _untrusted(levels, levels.energy_mhz, rigid).any():
         return np.ones(len(levels), dtype=np.bool_)
     return ~_untrusted(levels, levels.energy_mhz, _simpler_mhz(top, levels, rigid)[0])
+
+
+def in_level_table(top: Top, levels: Levels) -> NDArray[np.bool_] | None:
+    """Which levels (n,) have the energy of the top's table; None where there is no table, or other effects than its own.
+
+    A molecule has a table because its distortion series does not converge: its other levels are not to be trusted.
+    """
+    if top.level_table is None or tuple(levels.effects) != SEMI_RIGID:
+        return None
+    return np.asarray(top.level_table.rows_of(levels.quanta) >= 0)
 
 
 def _untrusted(levels: Levels, energy: Floats, rigid: Floats) -> NDArray[np.bool_]:

@@ -106,11 +106,36 @@ def vibrational_partition_function(
 ) -> float | Floats:
     """Q of vibration, the ground state counted as 1: Σ g exp(-E/kT) over the states listed, or of harmonic oscillators.
 
-    With `harmonic` the energies are fundamentals and Q = Π (1 - exp(-E/kT))^-g, all overtones among it (G. Herzberg,
-    Molecular Spectra and Molecular Structure II, eqs. V,20 and V,21; anharmonicity and what splits overtones neglected).
-    energies_cm, degeneracies: (n,). A number for one temperature, an array of the same shape for an array. Raises ValueError
-    for a temperature not above 0 K or energies not above 0.
+    With `harmonic` the energies are fundamentals and Q = Π (1 - exp(-E/kT))^-g, all overtones among it.
 
+    Parameters
+    ----------
+    energies_cm : (n,) array
+        Energies above the ground state in cm⁻¹.
+    degeneracies : (n,) array of int
+        Of each state or fundamental.
+    temperature_k : float or (...) array
+        Above 0 K.
+    harmonic : bool, optional
+        Whether the energies are fundamentals of harmonic oscillators.
+
+    Returns
+    -------
+    float or (...) array
+        A number for one temperature, an array of the same shape for an array.
+
+    Raises
+    ------
+    ValueError
+        For a temperature not above 0 K or energies not above 0.
+
+    Notes
+    -----
+    G. Herzberg, Molecular Spectra and Molecular Structure II, eqs. V,20 and V,21. Neglected in the harmonic form:
+    anharmonicity and what splits overtones.
+
+    Examples
+    --------
     >>> round(vibrational_partition_function([667.4, 1388.2, 2349.1], [2, 1, 1], 300.0, harmonic=True), 4)  # CO2
     1.0881
     """

@@ -76,7 +76,26 @@ def invariant_tensor(whole: Floats, symmetry: Symmetry) -> Floats:
 def refuse_forbidden_dipole(
     dipole_abc: ArrayLike, symmetry: Symmetry | None, frame: PrincipalFrame | None, weights: SpinWeights
 ) -> None:
-    """ValueError for a dipole (3,) in principal axes with more than 0.001 D along an axis that symmetry forbids."""
+    """Refuse a dipole with more than 0.001 D along an axis that symmetry forbids.
+
+    Without a geometry the spin weights decide: a component that joins levels of different weight is forbidden.
+
+    Parameters
+    ----------
+    dipole_abc : (3,) array
+        Debye, along the principal axes.
+    symmetry : Symmetry or None
+        The point group, where the geometry is known.
+    frame : PrincipalFrame or None
+        Principal axes of that geometry.
+    weights : SpinWeights
+        Nuclear-spin weights.
+
+    Raises
+    ------
+    ValueError
+        For such a dipole, with what is allowed.
+    """
     values = np.asarray(dipole_abc, dtype=float)
     if symmetry is not None and frame is not None:
         rest = values - frame.axes @ invariant_vector(values @ frame.axes, symmetry)
@@ -98,7 +117,24 @@ def refuse_forbidden_dipole(
 def refuse_forbidden_polarizability(
     tensor_abc: ArrayLike, symmetry: Symmetry | None, frame: PrincipalFrame | None, weights: SpinWeights
 ) -> None:
-    """ValueError for a polarizability (3, 3) in principal axes with more than 0.001 of it in what symmetry forbids."""
+    """Refuse a polarizability with more than 0.001 of it in what symmetry forbids.
+
+    Parameters
+    ----------
+    tensor_abc : (3, 3) array
+        Å³, along the principal axes.
+    symmetry : Symmetry or None
+        The point group, where the geometry is known.
+    frame : PrincipalFrame or None
+        Principal axes of that geometry.
+    weights : SpinWeights
+        Nuclear-spin weights, which decide without a geometry.
+
+    Raises
+    ------
+    ValueError
+        For such a polarizability, with the part that is allowed.
+    """
     whole = np.asarray(tensor_abc, dtype=float)
     if symmetry is not None and frame is not None:
         part = frame.axes @ invariant_tensor(frame.axes.T @ whole @ frame.axes, symmetry) @ frame.axes.T

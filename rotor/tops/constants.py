@@ -193,6 +193,29 @@ class Constants:
         The digits in brackets are the uncertainty in the last digits. Each item may carry a unit; a unit at the end,
         after a space, serves every item that carries none; without any, numbers are MHz.
 
+        Parameters
+        ----------
+        text : str
+            Names and values.
+        reduction : str, optional
+            "A" or "S", for a top with distortion that needs one.
+        representation : str, optional
+            Which principal axes are x, y, z: "Ir", "IIIl", ...
+        kind : str, optional
+            "linear", "prolate", "oblate", "spherical" or "asymmetric"; by default what the names and values say.
+
+        Returns
+        -------
+        Constants
+            Values and uncertainties in MHz.
+
+        Raises
+        ------
+        ValueError
+            For text that cannot be read, and for a set of constants that contradicts itself.
+
+        Examples
+        --------
         >>> Constants.parse("B=9.2GHz DJ=3.8kHz").values["D"]
         0.0038
         >>> Constants.parse("A=5.17 B=0.25(2) cm-1").uncertainties["B"]
@@ -234,7 +257,7 @@ def ray_kappa(a: float, b: float, c: float) -> float:
     if math.isinf(a):
         return -1.0
     if not a >= b >= c or a == c:
-        raise ValueError(f"Ray's κ of A = {a!r}, B = {b!r}, C = {c!r}: it wants A >= B >= C and A > C")
+        raise ValueError(f"Ray's κ of A = {a!r}, B = {b!r}, C = {c!r}: expected A >= B >= C and A > C")
     return (2 * b - a - c) / (a - c)
 
 
@@ -370,7 +393,7 @@ def _kind(values: Mapping[str, float], kind: str | None) -> str:
         "asymmetric": given == "ABC",
     }
     if not fits[kind]:
-        wants = {
+        needed = {
             "linear": "B alone",
             "spherical": "B, or equal A, B, C",
             "prolate": "A and B, or A, B, C with B = C exactly",
@@ -378,7 +401,7 @@ def _kind(values: Mapping[str, float], kind: str | None) -> str:
             "asymmetric": "A, B and C",
         }[kind]
         have = ", ".join(f"{name} = {values[name]!r}" for name in given) or "none of A, B, C"
-        raise ValueError(f"kind {kind!r} wants {wants}, but the constants have {have}")
+        raise ValueError(f"kind {kind!r} needs {needed}, but the constants have {have}")
     return kind
 
 

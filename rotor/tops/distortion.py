@@ -92,8 +92,33 @@ def cylindrical(tensor: Floats, axes: tuple[int, int, int]) -> Cylindrical:
 def reduced(tensor: Floats, rigid_mhz: Floats, axes: tuple[int, int, int], reduction: str) -> Cylindrical:
     """The tensor turned by exp(i s (JxJyJz + JzJyJx)) so that one of the six operators vanishes.
 
-    The turn adds s (By - Bx), s (Bz - By), s (Bx - Bz) to T_xy, T_yz, T_xz and leaves the levels alone (Watson 1977,
-    § 3). A: no J₊⁴ + J₋⁴; S: no Jz² u.
+    A: no J₊⁴ + J₋⁴; S: no Jz² u.
+
+    Parameters
+    ----------
+    tensor : (3, 3) array
+        T_αβ along a, b, c, MHz.
+    rigid_mhz : (3,) array
+        A, B, C.
+    axes : (int, int, int)
+        Places of x, y, z among a, b, c.
+    reduction : str
+        "A" or "S".
+
+    Returns
+    -------
+    Cylindrical
+        Coefficients of the operators, MHz.
+
+    Raises
+    ------
+    ValueError
+        For the A-reduction of a top so nearly symmetric that it would divide by nearly zero.
+
+    Notes
+    -----
+    The turn adds s (By - Bx), s (Bz - By), s (Bx - Bz) to T_xy, T_yz, T_xz and leaves the levels alone (Watson 1977, §
+    3).
     """
     x, y, z = axes
     bx, by, bz = rigid_mhz[list(axes)]

@@ -53,8 +53,24 @@ def top_facts(top: Top) -> dict[str, Any]:
         "spin_constants_mhz": dict(top.spin_constants.values) if top.spin_constants else None,
         "spins": {name: twice / 2 for name, twice in top.spin_constants.twice.items()} if top.spin_constants else None,
         "spin_constants_source": (top.spin_constants.source or None) if top.spin_constants else None,
+        "further_states": _states(top),
         "source": top.source or None,
         "notes": list(top.notes),
+    }
+
+
+def _states(top: Top) -> dict[str, Any] | None:
+    """Further states of a top: constants and couplings by name, names, weights and dipoles of states."""
+    states = top.states
+    if states is None:
+        return None
+    return {
+        "constants_mhz": dict(states.values),
+        "names": [states.name_of(v) for v in range(states.count)],
+        "symmetry": states.symmetry or None,
+        "spin_weights": {str(v): one.to_mapping() for v, one in states.weights.items()},
+        "dipoles_abc_debye": {f"{low},{up}" if low != up else f"{up}": m for (up, low), m in states.dipoles.items()},
+        "source": states.source or None,
     }
 
 

@@ -76,7 +76,31 @@ def _angle(rotation: Floats) -> float:
 
 
 def carried_over(parent: Top, rigid: Top, turned: Top, axes: str, angle: float) -> Top:
-    """The top of the geometry, with the parent's constants carried over where they are others than its geometry's."""
+    """The top of the geometry, with the parent's constants carried over where they are others than its geometry's.
+
+    Parameters
+    ----------
+    parent : Top
+        The parent, with its own constants.
+    rigid : Top
+        The parent as its geometry gives it.
+    turned : Top
+        The isotopologue as its geometry gives it.
+    axes : str
+        The parent's axes nearest to a, b, c, as `matched_axes` gives them.
+    angle : float
+        How far they turned, in degrees.
+
+    Returns
+    -------
+    Top
+        The parent itself where no mass differs; `turned` where the parent's constants are those of its geometry.
+
+    Notes
+    -----
+    Neglected: what vibration changes in the ratio of constants. Such constants were 0.02 % off where heavy atoms were
+    replaced, and up to 0.8 % where hydrogen was.
+    """
     if _masses(turned) == _masses(parent):
         return parent
     if _of_geometry(parent.constants, rigid.constants):

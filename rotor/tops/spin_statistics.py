@@ -56,6 +56,11 @@ def weights_of(
     inversion : None leaves inversion doublets unresolved; `"symmetric"` or `"antisymmetric"` gives the weights of the
         one state of a molecule that inverts through the plane of its a and b axes, such as NH3.
 
+    Returns
+    -------
+    SpinWeights
+        By symmetry species of the levels.
+
     Examples
     --------
     >>> water = Molecule(("O", "H", "H"), [[0, 0, 0.1173], [0, 0.7572, -0.4692], [0, -0.7572, -0.4692]])
@@ -173,7 +178,28 @@ def inverting_symmetry(
     The molecule is flattened onto the plane of its a and b axes, halfway between its two forms. Rotations of the flat
     form that the rigid one has keep it in its form: +1. The others exchange the forms: -1.
 
-    Raises ValueError for a molecule that is flat already, that has no one such plane, or whose nuclei would meet.
+    Parameters
+    ----------
+    kinds : sequence of hashable
+        Which nuclei are alike, one entry for each.
+    masses_u : (n,) array
+        Masses of the nuclei.
+    positions_angstrom : (n, 3) array
+        Of one of the two forms.
+    tolerance : float, optional
+        Of the symmetry, relative to the shortest distance.
+
+    Returns
+    -------
+    symmetry : Symmetry
+        Of the flat form.
+    characters : tuple of int
+        1 or -1 for each of its rotations.
+
+    Raises
+    ------
+    ValueError
+        For a molecule that is flat already, that has no one such plane, or whose nuclei would meet.
     """
     rigid = find_symmetry(kinds, masses_u, positions_angstrom, tolerance)
     points = np.asarray(positions_angstrom, dtype=float)

@@ -68,6 +68,12 @@ class SpinWeights:
         values = self._by_residue() if self.rule == "K" else self.values
         return float(sum(values) / len(values))
 
+    @property
+    def modulus(self) -> int:
+        """n of weights by K modulo n."""
+        self._require(("K",), "K")
+        return len(self.classes) - ("0odd" in self.classes)
+
     def of_ka_kc(self, species: str) -> int:
         """Weight of an asymmetric-top level whose parities of Ka and Kc are `species`."""
         if self.rule == "none":

@@ -31,6 +31,8 @@ from rotor.tops.level_table import LevelTable
 from rotor.tops.operators import KINDS
 from rotor.tops.spin_constants import SpinConstants
 from rotor.tops.spin_weights import SpinWeights
+from rotor.tops.state_constants import StateConstants
+from rotor.tops.state_rules import refuse_forbidden_couplings, refuse_forbidden_state_dipoles, refuse_incomplete_states
 
 if TYPE_CHECKING:
     from rotor.molecules.molecule import Molecule
@@ -54,8 +56,9 @@ class Top:
     kind_of_top: how the kind was decided. molecule, symmetry: of a geometry. source: where the constants are from.
     independent_errors: whether the uncertainties of the constants may count as uncorrelated; not those of a fit whose
     correlations are unknown. covariance: of the constants, where it is known. notes: limits of the data. spin_constants: of
-    nuclear and electron spins, None where none are known. level_table: energies that count instead of those of the
-    constants where it has them; it belongs to these constants alone (`with_constants` leaves it out). symmetry_checked:
+    nuclear and electron spins, None where none are known. states: further vibrational or tunnelling states; the spin weights are
+    then those with the states taken together, and each state may have its own. level_table: energies that count instead of those of
+    the constants where it has them; both belong to these constants alone (`with_constants` leaves them out). symmetry_checked:
     False takes a dipole that spin weights forbid as it is, as SPCAT does.
 
     Raises ValueError for a dipole or a polarizability that the symmetry of the nuclei, or of the spin weights, forbids.
@@ -79,6 +82,7 @@ class Top:
     polarizability_source: str = ""
     covariance: Covariance | None = None
     spin_constants: SpinConstants | None = None
+    states: StateConstants | None = None
 
     level_table: LevelTable | None = None
     symmetry_checked: bool = True
@@ -91,6 +95,14 @@ class Top:
         if self.polarizability_abc_angstrom3 is not None:
             tensor = self.polarizability_abc_angstrom3
             refuse_forbidden_polarizability(tensor, self.symmetry, self.frame, self.spin_weights)
+        if self.states is not None:
+            self._check_states(self.states)
+
+    def _check_states(self, states: StateConstants) -> None:
+        refuse_incomplete_states(states, self.kind, self.constants)
+        if self.symmetry is not None and self.frame is not None and self.kind == "asymmetric":
+            refuse_forbidden_couplings(states, self.symmetry, self.frame)
+        refuse_forbidden_state_dipoles(states, self.kind, self.spin_weights, self.dipole_abc_debye)
 
     @property
     def provenance(self) -> dict[str, Any]:
@@ -120,8 +132,26 @@ class Top:
     ) -> Top:
         """A top from named constants, or from their text such as "A=835840.288 B=435351.717 C=278138.7 MHz".
 
-        constants: a mapping has numbers in MHz or texts with a unit by name: `{"A": "9.2 GHz", "B": 3000, "C": 2500}`.
-        others: any further field of `Top`. Raises ValueError for unknown names, units or an impossible set.
+        Parameters
+        ----------
+        constants : Constants, mapping or str
+            A mapping has numbers in MHz or texts with a unit by name: `{"A": "9.2 GHz", "B": 3000, "C": 2500}`.
+        dipole_abc_debye : (3,) array, optional
+            Along the principal axes.
+        spin_weights : SpinWeights or dict of str to int, optional
+            Nuclear-spin weights; 1 for all by default.
+        **others : object
+            Any further field of `Top`.
+
+        Returns
+        -------
+        Top
+            Without a geometry.
+
+        Raises
+        ------
+        ValueError
+            For unknown names, units or an impossible set.
         """
         if isinstance(constants, str):
             constants = Constants.parse(constants)
@@ -144,13 +174,37 @@ class Top:
         """A rigid top from a geometry: principal axes, A, B, C, kind, dipole and polarizability turned along, spin weights.
 
         The symmetry of the nuclei decides the kind where it can (C3v is a symmetric top), the moments where it cannot.
-        Nuclear-spin weights follow from it and from `molecule.electronic`, inversion doublets unresolved;
-        `symmetry_within` is its tolerance, relative to the shortest distance. What symmetry forbids of a dipole or a
-        polarizability is left out where it is noise (`rotor.tops.allowed`).
+        Nuclear-spin weights follow from it and from `molecule.electronic`, inversion doublets unresolved. What symmetry
+        forbids of a dipole or a polarizability is left out where it is noise (`rotor.tops.allowed`).
 
-        Raises ValueError for a single atom, and for a dipole or polarizability that symmetry forbids. Neglected: everything
-        that vibration and centrifugal distortion do, about 0.3 to 1 % between an equilibrium geometry and measured constants.
+        Parameters
+        ----------
+        molecule : Molecule
+            Two atoms or more.
+        linear_below : float, optional
+            Ratio of the smallest to the largest moment below which the top is linear.
+        equal_within : float, optional
+            Relative difference below which two moments are equal.
+        symmetry_within : float, optional
+            Tolerance of the symmetry, relative to the shortest distance.
 
+        Returns
+        -------
+        Top
+            Constants in MHz, dipole in debye, polarizability in Å³.
+
+        Raises
+        ------
+        ValueError
+            For a single atom, and for a dipole or polarizability that symmetry forbids.
+
+        Notes
+        -----
+        Neglected: everything that vibration and centrifugal distortion do, about 0.3 to 1 % between an equilibrium
+        geometry and measured constants.
+
+        Examples
+        --------
         >>> from rotor.molecules.molecule import Molecule
         >>> top = Top.from_molecule(Molecule(("C", "O"), [[0, 0, 0], [0, 0, 1.128323]]))
         >>> top.kind, round(top.constants["B"], 0)
@@ -253,12 +307,16 @@ class Top:
         return Top.from_molecule(self.molecule, symmetry_within=2.1 * displacement_angstrom / shortest)
 
     def with_constants(self, constants: Constants, source: str = "") -> Top:
-        """The same top with other constants, and without the covariance and the level energies of its own."""
-        return replace(self, constants=constants, source=source or self.source, covariance=None, level_table=None)
+        """The same top with other constants, and without the covariance, the level energies and the further states of its own."""
+        return replace(
+            self, constants=constants, source=source or self.source, covariance=None, level_table=None, states=None
+        )
 
     def with_dipole(self, dipole_abc_debye: ArrayLike, source: str) -> Top:
-        """The same top with another dipole in principal axes."""
-        return replace(self, dipole_abc_debye=_three(dipole_abc_debye), dipole_source=source)
+        """The same top with another dipole in principal axes; dipoles of its states that are the top's own change with it."""
+        dipole = _three(dipole_abc_debye)
+        states = self.states.with_dipole(self.dipole_abc_debye, dipole) if self.states and dipole else self.states
+        return replace(self, dipole_abc_debye=dipole, dipole_source=source, states=states)
 
     def with_polarizability(self, polarizability_abc_angstrom3: ArrayLike, source: str) -> Top:
         """The same top with another polarizability (3, 3) in principal axes, Å³."""
@@ -273,8 +331,9 @@ class Top:
         return replace(self, dipole_abc_debye=_in_frame(self.frame, allowed), dipole_source=source)
 
     def with_weights(self, weights: dict[str, int], source: str) -> Top:
-        """The same top with other spin weights."""
-        return replace(self, spin_weights=SpinWeights.from_mapping(weights), weights_source=source)
+        """The same top with other spin weights, which serve all of its states."""
+        states = replace(self.states, weights={}) if self.states else None
+        return replace(self, spin_weights=SpinWeights.from_mapping(weights), weights_source=source, states=states)
 
 
 def _near_notes(symmetry: Symmetry) -> list[str]:
@@ -350,3 +409,19 @@ def _three(vector: ArrayLike | None) -> tuple[float, float, float] | None:
     if values.shape != (3,) or not np.isfinite(values).all():
         raise ValueError(f"a dipole is three finite numbers (μa, μb, μc) in debye, not {values.tolist()}")
     return float(values[0]), float(values[1]), float(values[2])
+
+
+def one_state(top: Top, what: str) -> Top:
+    """The top itself where it has one state; ValueError, with what cannot be computed, where it has more.
+
+    >>> from rotor.tops.top import Top
+    >>> one_state(Top.from_constants("B=5 MHz"), "levels in a field").kind
+    'linear'
+    """
+    if top.states is not None:
+        names = ", ".join(top.states.name_of(v) for v in range(top.states.count))
+        raise ValueError(
+            f"{what} of {top.name or 'this top'}: computed for tops of one state, and this one has {top.states.count} ({names}); "
+            "give the constants of one of them alone"
+        )
+    return top

@@ -41,3 +41,32 @@ class ChangingInertia(InertiaChange):
         if np.any(moments == 0.0):
             raise ValueError(f"changing inertia at time {time:g}: moments {moments.tolist()} must all be positive")
         return moments
+
+
+@dataclass(frozen=True)
+class MomentsByTime(InertiaChange):
+    """Principal moments (n, 3) at rising times (n,), straight between them and constant before and after.
+
+    >>> MomentsByTime([0.0, 2.0], [[4.0, 4.0, 4.0], [4.0, 4.0, 2.0]]).moments(1.0)
+    array([4., 4., 3.])
+    """
+
+    conserves_momentum: ClassVar[bool] = True
+    depends_on_time: ClassVar[bool] = True
+
+    times: ArrayLike
+    rows: ArrayLike
+
+    def __init__(self, times: ArrayLike, moments: ArrayLike) -> None:
+        knots, rows = np.array(times, dtype=np.float64), checked_moments(moments)
+        if knots.ndim != 1 or rows.shape != (len(knots), 3) or not np.all(np.diff(knots) > 0.0) or np.any(rows == 0.0):
+            raise ValueError(
+                f"moments by time: expected rising times and three positive moments at each; got {rows.tolist()}"
+            )
+        object.__setattr__(self, "times", knots)
+        object.__setattr__(self, "rows", rows)
+
+    def moments(self, time: float) -> Floats:
+        """The moments of this moment in time."""
+        rows = np.asarray(self.rows)
+        return np.array([np.interp(time, np.asarray(self.times), rows[:, axis]) for axis in range(3)])

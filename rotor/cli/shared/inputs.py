@@ -51,6 +51,11 @@ class Input:
     spins: str | None = option(
         None, metavar="LIST", help='Sizes and order of the spins: "S=1/2 14N=1"; isotopes have their own.'
     )
+    state_constants: str | None = option(
+        None,
+        metavar="TEXT",
+        help='Further states and couplings: "E[1]=120GHz A[1]=... G_c[0,1]=450 W[0,1]=3 MHz" (MHz).',
+    )
     calculator: str | None = option(
         None, metavar="NAME", help="Refine the geometry with an ASE calculator of that name, such as xtb or psi4."
     )
@@ -209,10 +214,21 @@ def read_top(given: Input) -> Top:
         top = replace(top, spin_constants=_spin_constants(given.spin_constants, given.spins))
     elif given.spins is not None:
         raise ValueError("--spins: says how large the spins of --spin-constants are; give those too")
+    if given.state_constants is not None:
+        top = _with_states(top, given.state_constants)
     _refuse_weights_of_another_kind(top)
     for text in top.notes:
         note(text)
     return top
+
+
+def _with_states(top: Top, text: str) -> Top:
+    from rotor.tops.state_constants import StateConstants
+
+    def read(value: str) -> Top:
+        return replace(top, states=StateConstants.parse(value, "given (--state-constants)"))
+
+    return parsed("--state-constants", text, read)
 
 
 def _spin_constants(text: str, spins: str | None) -> SpinConstants:

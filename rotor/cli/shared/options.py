@@ -20,6 +20,7 @@ import typer
 import typer.core
 
 Command = Callable[..., None]
+MOST_WHOLE = 10**15  # of an option: beyond it a double no longer holds every whole number
 
 
 def option(default: Any, *names: str, **settings: Any) -> Any:
@@ -111,9 +112,14 @@ def _value(one: Field[Any], kind: Any, given: Any) -> Any:
     for number, name in ((int, "a whole number"), (float, "a number")):
         if number in kinds:
             try:
-                return number(given)
+                found = number(given)
             except ValueError:
-                raise ValueError(f"{name_of(one)}: {given!r}: expected {name}") from None
+                raise ValueError(f"{name_of(one)}: {given!r:.60}: expected {name}") from None
+            if number is int and abs(found) > MOST_WHOLE:
+                raise ValueError(
+                    f"{name_of(one)}: a number of {len(str(abs(found)))} digits; expected at most {MOST_WHOLE}"
+                )
+            return found
     return given
 
 

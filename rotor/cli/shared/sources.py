@@ -26,6 +26,8 @@ def short_source(text: str) -> str:
     """
     marked = re.match(r"(?:[\w, ]+ )?unverified[:;] ?", text)
     mark, rest = (marked[0], text[marked.end() :]) if marked else ("", text)
+    if scaled := re.match(r"scaled from [^(;]+", rest):
+        return mark + scaled[0].rstrip()
     if found := _CATALOGUE.search(rest):
         verb = "fitted to " if "fitted" in rest[: found.start()] else "from "
         return mark + verb + found[0]
@@ -39,6 +41,8 @@ def short_source(text: str) -> str:
 def source_facts(top: Top, tables: Sequence[str], whole: bool) -> list[tuple[str, str]]:
     """The sources of tables of a top (constants, dipole, polarizability, spin weights), one line or all of it."""
     texts = {table: getattr(top, _TABLES[table]) for table in tables if getattr(top, _TABLES[table])}
+    if top.states is not None and top.states.source and "constants" in tables:
+        texts["states"] = top.states.source
     if whole:
         return [(f"{table} from", text) for table, text in texts.items()]
     cited = [f"{table}: {short_source(text)}" for table, text in texts.items() if table != "spin weights"]

@@ -29,6 +29,7 @@ FIELDS = {
     "spin_weights": "WTPL and WTMN",
     "spin_constants": "the constants",
     "spins": "SPIND",
+    "state_constants": "the constants",
     "hyperfine": "SPIND",
     "hyperfine_method": "SPIND",
     "hyperfine_tolerance": "SPIND",

@@ -244,7 +244,7 @@ class RigidPotential(Calculator):
             raise ValueError("Ewald's sum needs a cell that repeats in all three directions (pbc)")
 
     def _field_of(self) -> Floats:
-        """Numbers that the kernel of charges wants."""
+        """Numbers that the kernel of charges takes."""
         if self.electrostatics == "reaction-field":
             return reaction_field(self.cutoff_angstrom, self.dielectric)
         if self.electrostatics == "shifted":

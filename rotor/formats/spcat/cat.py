@@ -305,6 +305,10 @@ def _assembled(text: bytes, name: str, lines: _Lines, layout: Layout, columns: C
         line = text[lines.starts[number] : lines.stops[number]]
         if line.strip(_BLANKS):
             records[number] = _careful_record(line, f"{name}, line {number + 1}")
+            if text.endswith(line) and set(records[number].quanta_lower) == {BLANK}:
+                raise ValueError(
+                    f"{name}, line {number + 1}: the file ends without a lower state and a line end; it was cut"
+                )
     columns = _with_records(columns, records)
 
     stored = known.copy()

@@ -135,6 +135,11 @@ def catalogue_of(
     tag : of the species
     linear : whether Q rises as that of a linear molecule does, DR = 2
 
+    Returns
+    -------
+    Catalogue
+        (n,) lines, in the order given.
+
     Raises
     ------
     ValueError

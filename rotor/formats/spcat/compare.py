@@ -106,12 +106,12 @@ def likely_temperature_k(comparison: Comparison, temperature_k: float) -> float:
     them start from one energy.
     """
     rows = comparison.of_reference[np.argsort(-comparison.reference.lgint[comparison.of_reference])[:MOST_OF_SLOPE]]
-    kept = np.isin(comparison.of_reference, rows)
-    energy = comparison.reference.energy_lower_cm[comparison.of_reference][kept]
+    selected = np.isin(comparison.of_reference, rows)
+    energy = comparison.reference.energy_lower_cm[comparison.of_reference][selected]
     if len(energy) < 3 or np.ptp(energy) == 0:
         return float("nan")
-    frequency = comparison.reference.frequency_mhz[comparison.of_reference][kept]
-    off = comparison.differences("lgint")[kept]
+    frequency = comparison.reference.frequency_mhz[comparison.of_reference][selected]
+    off = comparison.differences("lgint")[selected]
 
     def populated(kelvin: Floats) -> Floats:
         at = units.MHZ_PER_K * kelvin[:, None]
@@ -254,5 +254,5 @@ def _refuse_two_frequencies(seen: Catalogue, code: Rows) -> None:
         one, two = order[np.argmax(apart)], order[np.argmax(apart) + 1]
         raise ValueError(
             f"measured lines at {seen.frequency_mhz[one]} and {seen.frequency_mhz[two]} MHz have one label; "
-            "give the quantum number that tells them apart, or one of them"
+            "give the quantum number that distinguishes them, or one of them"
         )

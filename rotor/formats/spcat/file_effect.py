@@ -44,10 +44,31 @@ class CodedLine(NamedTuple):
 def coded_lines(
     parameters: Iterable[Parameter], states: int, oblate: bool, doubled: frozenset[int] = frozenset()
 ) -> list[CodedLine]:
-    """The parameter lines of a file with so many states; ValueError, naming the line, for what does not compute.
+    """The parameter lines of a file with so many states.
 
-    A parameter of value zero does nothing and is not looked at, nor is one of a state and 9 (99, 999), which SPFIT takes for a
-    place holder. doubled: states that are l-doubled, within which an odd operator acts with the sign of l.
+    A parameter of value zero does nothing and is not looked at, nor is one of a state and 9 (99, 999), which SPFIT
+    takes for a place holder.
+
+    Parameters
+    ----------
+    parameters : iterable of Parameter
+        Codes, values in MHz, and labels.
+    states : int
+        Number of states, NVIB.
+    oblate : bool
+        Whether z is the c axis (IIIl) and not the a axis (Ir).
+    doubled : frozenset of int, optional
+        States that are l-doubled, within which an odd operator acts with the sign of l.
+
+    Returns
+    -------
+    list of CodedLine
+        Operators and the states that they connect.
+
+    Raises
+    ------
+    ValueError
+        Naming the line, for what does not compute: an unknown operator or state, a violation of time reversal.
     """
     wild, axes = 10 ** (1 if states <= 9 else 2 if states <= 99 else 3) - 1, AXES["IIIl" if oblate else "Ir"]
     found: list[CodedLine] = []
@@ -85,7 +106,7 @@ class FileEffect(QuantumEffect):
 
     lines: with the file's numbers of states. numbers: the states taken, in their order here. coupled: the spins by place. moments:
     dipoles in debye by pairs of numbers here. limits: least and largest K of states, by number here. others: moments of other kinds.
-    ixx: which sums of angular momenta are kept, bit by bit from N on. pairs: l-doubled states, by number here.
+    ixx: which sums of angular momenta are conserved, bit by bit from N on. pairs: l-doubled states, by number here.
     """
 
     name: ClassVar[str] = ""
@@ -185,8 +206,8 @@ class FileEffect(QuantumEffect):
         """The moments of other kinds of the .int file."""
         return self.others
 
-    def kept(self, top: Top) -> frozenset[str]:
-        """The sums that IXX keeps."""
+    def conserved_sums(self, top: Top) -> frozenset[str]:
+        """The sums that IXX holds for conserved."""
         sums = ("n", *Scheme(self.coupled).names)
         return frozenset(name for bit, name in enumerate(sums) if self.ixx >> bit & 1)
 

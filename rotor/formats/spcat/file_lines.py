@@ -2,7 +2,7 @@
 
 Quantum numbers are N, then nothing, K or Ka Kc, then v where there are several states, then J, F1, ... F, half-integers rounded up.
 Where that makes more than six (ten, where NLINE is negative), one number that counts the coupling patterns stands for all but F.
-QNFMT = 100 Q + 10 H + NQN: Q tells the kind of quanta, H in binary which of the last ones are half-integers.
+QNFMT = 100 Q + 10 H + NQN: Q is the kind of quanta, H in binary which of the last ones are half-integers.
 """
 
 from __future__ import annotations
@@ -88,9 +88,23 @@ def format_of(file: ParameterFile, groups: list[Group]) -> Format:
 
 
 def quanta_of(group: Group, levels: Levels, form: Format, negative: bool = False) -> Ints:
-    """The quantum numbers of every row as the file prints them, (n, width), of one component of ±K.
+    """The quantum numbers of every row as the file prints them, of one component of ±K.
 
-    negative: of a K doublet whose two levels differ in species, the one with -K.
+    Parameters
+    ----------
+    group : Group
+        The connected states that the levels belong to.
+    levels : Levels
+        n solved levels.
+    form : Format
+        Which columns there are.
+    negative : bool, optional
+        Of a K doublet whose two levels differ in species, the one with -K.
+
+    Returns
+    -------
+    (n, width) array of int
+        Half-integers rounded up.
     """
     quanta, n = levels.quanta, levels.rotational
     v = quanta.get("v", np.zeros(len(levels), dtype=np.int64))
@@ -182,7 +196,28 @@ def within(request: Request, frequency_mhz: Floats, intensity: Floats) -> NDArra
 
 
 def lines_of(group: Group, levels: Levels, found: Transitions, form: Format, request: Request, q: float) -> GroupLines:
-    """The lines of a group within the limits of an .int file, with intensities in nm² MHz, those of one component."""
+    """The lines of a group within the limits of an .int file, those of one component of a K doublet each.
+
+    Parameters
+    ----------
+    group : Group
+        The connected states.
+    levels : Levels
+        Their levels.
+    found : Transitions
+        Frequencies in MHz and strengths in D² between them.
+    form : Format
+        Which quantum numbers there are.
+    request : Request
+        Temperature and limits.
+    q : float
+        Partition function as the file counts it.
+
+    Returns
+    -------
+    GroupLines
+        Frequencies and lower energies in MHz, intensities in nm² MHz.
+    """
     count = np.maximum(levels.components[found.upper], levels.components[found.lower])
     weight = (levels.weight // levels.components)[found.lower]
     energy, kt = levels.energy_mhz[found.lower], request.temperature_k * units.MHZ_PER_K
@@ -211,7 +246,29 @@ def lines_of(group: Group, levels: Levels, found: Transitions, form: Format, req
 
 
 def as_catalogue(lines: list[tuple[GroupLines, int]], form: Format, tag: int, dr: int) -> Catalogue:
-    """Lines of all groups, each with its QNFMT, in order of frequency."""
+    """Lines of all groups, each with its QNFMT, in order of frequency.
+
+    Parameters
+    ----------
+    lines : list of (GroupLines, int)
+        Lines of each group, and the code of its quantum numbers.
+    form : Format
+        Which quantum numbers there are.
+    tag : int
+        Of the species.
+    dr : int
+        2 where all states are those of linear molecules, else 3.
+
+    Returns
+    -------
+    Catalogue
+        Frequencies in MHz, lower energies in cm⁻¹, log10 of intensities in nm² MHz.
+
+    Raises
+    ------
+    ValueError
+        For a tag of more than six digits.
+    """
     joined = {name: np.concatenate([getattr(each, name) for each, _ in lines]) for name in _COLUMNS}
     qnfmt = np.concatenate([np.full(len(each.frequency_mhz), code) for each, code in lines])
     order = np.argsort(joined["frequency_mhz"], kind="stable")

@@ -22,7 +22,7 @@ from rotor.formats.spcat.states import StateOptions, states_of
 from rotor.quantum.levels import Levels
 from rotor.quantum.moments import DEBYE_PER_BOHR_MAGNETON, Moment
 from rotor.quantum.solve import solve_levels
-from rotor.quantum.spins.blocks import levels_of_f
+from rotor.quantum.spins.levels import levels_of_f
 from rotor.quantum.spins.operators import is_axial
 from rotor.quantum.spins.terms import Spin
 from rotor.tops.constants import Constants
@@ -283,7 +283,7 @@ NOT_YET = "is read but not computed yet"
 
 
 def moment_of(dipole: Dipole, code: DipoleCode, states: tuple[int, int], spins: int) -> Moment:
-    """A line of another kind than a plain component; states: as numbered in its group.
+    """A moment that makes lines of another kind than a plain component of the dipole does.
 
     | TYP, I1, SYM | moment |
     |---|---|
@@ -291,7 +291,26 @@ def moment_of(dipole: Dipole, code: DipoleCode, states: tuple[int, int], spins: 
     | 0; 0 or a spin; 0 | N, or that spin, in Bohr magnetons |
     | 1; a spin; 0 | S ½(3 Nz² - N²), in Bohr magnetons, as the program computes it (documented: φ_z S_z - ½ φ_x S_x - ½ φ_y S_y) |
 
-    Raises ValueError, with what it stands for, for any other.
+    Parameters
+    ----------
+    dipole : Dipole
+        The line of the .int file, its value in D or Bohr magnetons.
+    code : DipoleCode
+        Its code in parts.
+    states : (int, int)
+        As numbered in its group.
+    spins : int
+        How many spins SPIND names.
+
+    Returns
+    -------
+    Moment
+        In debye.
+
+    Raises
+    ------
+    ValueError
+        With what it stands for, for any other code.
     """
     if code.spin > spins:
         raise ValueError(f"dipole {dipole.code}: spin {code.spin} is not among the {spins} that SPIND names")

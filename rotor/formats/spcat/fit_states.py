@@ -19,8 +19,8 @@ from rotor.formats.spcat.par import ParameterFile
 from rotor.quantum.effect_units import unit_levels
 from rotor.quantum.labelled import LevelModel
 from rotor.quantum.levels import Levels
-from rotor.quantum.solve import solve_rotation
-from rotor.quantum.spins.blocks import levels_of_f
+from rotor.quantum.rotation import solve_rotation
+from rotor.quantum.spins.levels import levels_of_f
 from rotor.quantum.unit_blocks import UnitBlocks
 
 _NO_REQUEST = IntensityFile("", Request(), ())

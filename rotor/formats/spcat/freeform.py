@@ -104,7 +104,31 @@ def _ends(text: str, at: int) -> bool:
 
 
 def number(line: Line, words: Sequence[Word], index: int, name: str, default: float | None = None) -> float:
-    """The number that is called `name`; its default where it is left out, an error where it has none."""
+    """The number that is called `name`; its default where it is left out, an error where it has none.
+
+    Parameters
+    ----------
+    line : Line
+        Named in errors.
+    words : sequence of Word
+        The numbers of the line.
+    index : int
+        Which of them, from 0.
+    name : str
+        What it is called in errors.
+    default : float, optional
+        Its value where it is left out.
+
+    Returns
+    -------
+    float
+        A finite number; exponents may be written with D.
+
+    Raises
+    ------
+    ValueError
+        With file, line and column, where it is missing or too large.
+    """
     word = words[index] if index < len(words) else Word(None, len(line.body))
     if word.text is None:
         if default is None:
@@ -117,7 +141,31 @@ def number(line: Line, words: Sequence[Word], index: int, name: str, default: fl
 
 
 def whole(line: Line, words: Sequence[Word], index: int, name: str, default: int | None = None) -> int:
-    """The whole number that is called `name`, of at most 30 digits."""
+    """The whole number that is called `name`, of at most 30 digits.
+
+    Parameters
+    ----------
+    line : Line
+        Named in errors.
+    words : sequence of Word
+        The numbers of the line.
+    index : int
+        Which of them, from 0.
+    name : str
+        What it is called in errors.
+    default : int, optional
+        Its value where it is left out.
+
+    Returns
+    -------
+    int
+        A decimal point and what follows it are passed over.
+
+    Raises
+    ------
+    ValueError
+        With file, line and column, where it is missing or not a whole number.
+    """
     word = words[index] if index < len(words) else Word(None, len(line.body))
     if word.text is None:
         if default is None:

@@ -97,9 +97,30 @@ def couplings_with_pairs(
 ) -> list[Coupling]:
     """What a parameter stands for over real states, where one of its states at least is l-doubled.
 
-    of: the operator with the factor i where it is odd. states: lower number first. reversed_: V2 > V1 in the code, Δk Δl < 0.
+    Parameters
+    ----------
+    name : str
+        Of the parameter.
+    of : callable
+        (J, representation) to the operator in |J k⟩, with the factor i where it is odd.
+    odd : bool
+        Whether the operator changes sign under time reversal.
+    states : (int, int)
+        Lower number first.
+    reversed_ : bool
+        V2 > V1 in the code, Δk Δl < 0.
+    pairs : sequence of Pair
+        The l-doubled states of the file.
 
-    Raises ValueError for what symmetry or this package does not allow.
+    Returns
+    -------
+    list of Coupling
+        As the table at the head of the module.
+
+    Raises
+    ------
+    ValueError
+        For what symmetry or this package does not allow.
     """
     low, high = states
     firsts, seconds = {pair.first: pair for pair in pairs}, {pair.second: pair for pair in pairs}

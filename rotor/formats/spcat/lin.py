@@ -234,16 +234,25 @@ def format_lin(lines: LineList) -> bytes:
 
 def _line_text(lines: LineList, index: int) -> str:
     measured, stored = lines.measured(index), lines.texts.get(index, "")
-    if stored and read_measured(Line(stored.rstrip("\r\n").rpartition("\n")[2], index, "stored text")) == measured:
+    if lines.per_state:  # blanks among them
+        measured = measured._replace(quanta=tuple(lines.quanta[index, : 2 * lines.per_state].tolist()))
+    if stored and _stored(stored, index, lines.per_state) == measured:
         return stored
-    wrong = next((q for q in measured.quanta if not -99 <= q <= 999), None)
+    wrong = next((q for q in measured.quanta if q != BLANK and not -99 <= q <= 999), None)
     if wrong is not None or not measured.quanta or len(measured.quanta) % 2:
         raise ValueError(
             f"line {index + 1} cannot be written: quantum numbers {measured.quanta}; as many for the upper as for "
             "the lower state, from -99 to 999, fit the format"
         )
-    quanta = "".join(f"{q:3d}" for q in measured.quanta)
+    quanta = "".join("   " if q == BLANK else f"{q:3d}" for q in measured.quanta)
     return f"{quanta:<{_WIDTH}} {measured.frequency!r:>16} {measured.error!r:>10} {measured.weight!r}\n"
+
+
+def _stored(text: str, index: int, per_state: int) -> Measured:
+    """The numbers of a line as it was read, blank fields among them where lines lack quantum numbers."""
+    line = Line(text.rstrip("\r\n").rpartition("\n")[2], index, "stored text")
+    found, fields = read_measured(line), _fields(line)[: 2 * per_state]
+    return found._replace(quanta=fields + (BLANK,) * (2 * per_state - len(fields))) if per_state else found
 
 
 def write_lin(lines: LineList, path: str | os.PathLike[str]) -> None:
@@ -253,8 +262,31 @@ def write_lin(lines: LineList, path: str | os.PathLike[str]) -> None:
 
 
 def line_list(quanta_upper: Any, quanta_lower: Any, frequency_mhz: Any, error_mhz: Any, weight: Any = 1.0) -> LineList:
-    """A line list from quantum numbers (n, k) of both states, k up to 6, frequencies and errors in MHz.
+    """A line list from quantum numbers of both states, frequencies and errors.
 
+    Parameters
+    ----------
+    quanta_upper, quanta_lower : (n, k) arrays of int
+        k up to 6.
+    frequency_mhz : (n,) array
+        Measured.
+    error_mhz : (n,) array or float
+        Not negative.
+    weight : (n,) array or float, optional
+        Shares in blends.
+
+    Returns
+    -------
+    LineList
+        n lines.
+
+    Raises
+    ------
+    ValueError
+        For shapes that do not fit each other, and errors below 0.
+
+    Examples
+    --------
     >>> print(format_lin(line_list([[1]], [[0]], [115271.2018], 0.0005)).decode(), end="")
       1  0                                    115271.2018     0.0005 1.0
     """

@@ -146,7 +146,7 @@ def parameter_file(top: Top, kmax: int) -> ParameterFile:
 def intensity_file(top: Top, request: Request) -> IntensityFile:
     """The .int file of a top; a component of exactly zero has no line."""
     if top.dipole_abc_debye is None:
-        raise ValueError(f"{top.name or 'the top'} has no dipole; an .int file wants one, (μa, μb, μc) in D")
+        raise ValueError(f"{top.name or 'the top'} has no dipole; expected one for an .int file, (μa, μb, μc) in D")
     components = enumerate(top.dipole_abc_debye, 1)
     dipoles = tuple(Dipole(code, value) for code, value in components if value)
     return IntensityFile(top.name, request, dipoles)

@@ -158,10 +158,10 @@ def format_par(file: ParameterFile) -> bytes:
     title = file.title_text if _title(Line(file.title_text, 1, "")) == file.title else ""
     return encode([
         title or _line(file.title),
-        _kept(file.header, _header) or _header_text(file.header),
-        *(_kept(options, partial(_options, defaults=_defaults(file, at))) or _options_text(options)
+        _as_read(file.header, _header) or _header_text(file.header),
+        *(_as_read(options, partial(_options, defaults=_defaults(file, at))) or _options_text(options)
           for at, options in enumerate(file.options)),
-        *(_kept(parameter, _parameter) or _parameter_text(parameter) for parameter in file.parameters),
+        *(_as_read(parameter, _parameter) or _parameter_text(parameter) for parameter in file.parameters),
         file.rest,
     ])  # fmt: skip
 
@@ -170,7 +170,7 @@ def _defaults(file: ParameterFile, at: int) -> Options:
     return file.options[0] if at else Options()
 
 
-def _kept(thing: Any, read: Any) -> str:
+def _as_read(thing: Any, read: Any) -> str:
     """The text a thing was read from if reading it gives the thing, otherwise nothing."""
     text: str = thing.text
     return text if text and read(Line(text, 0, "stored text")) == thing else ""

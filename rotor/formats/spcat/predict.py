@@ -26,7 +26,8 @@ from rotor.formats.spcat.par import Options, ParameterFile, read_par
 from rotor.formats.spcat.predict_states import is_plain, predicted
 from rotor.quantum.basis import wang_blocks
 from rotor.quantum.levels import Levels
-from rotor.quantum.solve import hamiltonian, solve_levels
+from rotor.quantum.rotation import hamiltonian
+from rotor.quantum.solve import solve_levels
 from rotor.quantum.wang_matrix import JMatrix, block_bands
 from rotor.spectra.lines import Lines, line_list
 from rotor.thermo import PartitionFunction, partition_function
@@ -76,15 +77,34 @@ def predict(
 ) -> Prediction:
     """The catalogue that SPCAT makes of its two input files, from true eigenvalues.
 
-    A line is listed when both its J (F, without nuclear spins) lie from FBGN to FEND, its frequency below FQLIM, and its
-    intensity, that of one component of a K doublet, above 10^STR0 + 10^STR1 (ν/300 GHz)² nm² MHz.
+    A line is listed when both its J (F, without nuclear spins) lie from FBGN to FEND, its frequency below FQLIM, and
+    its intensity, that of one component of a K doublet, above 10^STR0 + 10^STR1 (ν/300 GHz)² nm² MHz.
 
-    own_q: the partition function is summed from the levels, whatever FEND is, instead of taken from QROT. as_spcat: K beyond
-    KNMAX is left out of the basis, as the program does in silence; by default all K are in it.
+    Parameters
+    ----------
+    parameters : ParameterFile
+        The .var or .par file.
+    intensities : IntensityFile
+        The .int file.
+    own_q : bool, optional
+        The partition function is summed from the levels, whatever FEND is, instead of taken from QROT.
+    as_spcat : bool, optional
+        K beyond KNMAX is left out of the basis, as the program does in silence; by default all K are in it.
 
-    Raises ValueError for an empty range of F, for a Q or a temperature that is not above 0, and for what is read but not
-    computed yet, by its meaning: internal rotation, Euler series, l-doubled states, spins of equivalent nuclei in a total spin.
+    Returns
+    -------
+    Prediction
+        Catalogue, lines, Q, and notes on what the program passes over in silence.
 
+    Raises
+    ------
+    ValueError
+        For an empty range of F, for a Q or a temperature that is not above 0, and for what is read but not computed
+        yet, by its meaning: internal rotation, Euler series, some cases of l-doubled states and of spins of equivalent
+        nuclei in a total spin.
+
+    Examples
+    --------
     >>> from rotor.formats.spcat.int_file import read_int
     >>> from rotor.formats.spcat.par import read_par
     >>> file = read_par(b"OCS\\n 1 0 0 0\\nl -1 1 0 0\\n 100 6081.492 0\\n")
@@ -166,7 +186,7 @@ def _parts_doublets(levels: Levels, options: Options) -> bool:
 def _parted_doublets(merged: Catalogue, fold: int) -> Catalogue:
     """Each line of a K doublet as the two lines that the program prints.
 
-    Where K is a multiple of the fold the two states of a doublet differ in symmetry (A1, A2); the program tells them by
+    Where K is a multiple of the fold the two states of a doublet differ in symmetry (A1, A2); the program distinguishes them by
     the sign of K, and a line with ΔK = 0 joins -K to K. The others (E) are printed twice with one label. Lines with
     ΔK ≠ 0 stay as they are.
     """

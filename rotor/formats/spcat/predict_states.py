@@ -61,7 +61,37 @@ def is_plain(parameters: ParameterFile, intensities: IntensityFile | None) -> bo
 def predicted(
     parameters: ParameterFile, intensities: IntensityFile, *, own_q: bool = False, as_spcat: bool = False
 ) -> tuple[Catalogue, Lines, float, LevelList, list[str]]:
-    """Catalogue, lines, Q, levels and notes; see `predict.predict`."""
+    """The prediction of files with spins, several states or other operators; see `predict.predict`.
+
+    Parameters
+    ----------
+    parameters : ParameterFile
+        The .var or .par file.
+    intensities : IntensityFile
+        The .int file.
+    own_q : bool, optional
+        Whether Q is summed from the levels instead of taken from QROT.
+    as_spcat : bool, optional
+        Whether K beyond KNMAX is left out of the basis.
+
+    Returns
+    -------
+    catalogue : Catalogue
+        As the program would list it.
+    lines : Lines
+        The same lines before K doublets were parted.
+    q : float
+        As the file counts it.
+    levels : LevelList
+        As the program would list them.
+    notes : list of str
+        What the program passes over in silence.
+
+    Raises
+    ------
+    ValueError
+        As `predict` does.
+    """
     request = intensities.request
     groups = groups_of(parameters, intensities, as_spcat=as_spcat)
     form = format_of(parameters, groups)

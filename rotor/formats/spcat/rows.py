@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rotor.classical.error_free import halves
 from rotor.formats.spcat.fields import BLANK, QUANTUM_RANGE, spell_degeneracy, spell_quantum
 
 Text = NDArray[np.uint8]
@@ -61,9 +62,8 @@ def round_decimal(values: NDArray[np.float64], decimals: int) -> tuple[NDArray[n
     fits = a < 2.0**52 / scale  # false for nan
     a = np.where(fits, a, 0.0)
     product = a * scale
-    split = a * 134217729.0  # 2^27 + 1: the upper 26 bits of a, times scale < 2^27, are exact
-    upper = split - (split - a)
-    rest = (upper * scale - product) + (a - upper) * scale
+    upper, lower = halves(a)  # 26 bits of a, times scale < 2^27, are exact
+    rest = (upper * scale - product) + lower * scale
     whole = np.floor(product)
     above_half = (product - whole - 0.5) + rest
     magnitude = whole.astype(np.int64)
@@ -71,7 +71,7 @@ def round_decimal(values: NDArray[np.float64], decimals: int) -> tuple[NDArray[n
 
 
 def _put_digits(out: Text, magnitude: NDArray[np.int64], negative: Mask) -> Mask:
-    """Whole numbers with their sign, right-justified, digit by digit; false where they need more room than `out` has."""
+    """Whole numbers with their sign, right-justified, digit by digit; false where they need more columns than `out` has."""
     left, sign = magnitude, negative
     for column in range(out.shape[1] - 1, -1, -1):
         left, digit = np.divmod(left, 10)
@@ -107,7 +107,7 @@ def _put_group(out: Text, table: Text, index: NDArray[np.int64]) -> None:
 
 
 def _put_natural(out: Text, magnitude: NDArray[np.int64]) -> Mask:
-    """Whole numbers without a sign, right-justified, four digits at a time; false where they need more room."""
+    """Whole numbers without a sign, right-justified, four digits at a time; false where they need more columns."""
     left, stop = magnitude, out.shape[1]
     while stop > 0:
         size = min(4, stop)
@@ -119,21 +119,21 @@ def _put_natural(out: Text, magnitude: NDArray[np.int64]) -> Mask:
 
 
 def _put_signed(out: Text, magnitude: NDArray[np.int64], negative: Mask) -> Mask:
-    """Whole numbers with their sign, right-justified; false where they need more room than `out` has."""
+    """Whole numbers with their sign, right-justified; false where they need more columns than `out` has."""
     fits = _put_natural(out, magnitude)
     if not negative.any():
         return fits
-    room = out.shape[1] - 1
-    if room > 4:  # a long field has few negative numbers
+    width = out.shape[1] - 1
+    if width > 4:  # a long field has few negative numbers
         rows = np.flatnonzero(negative)
-        text = np.empty((len(rows), room + 1), dtype=np.uint8)
+        text = np.empty((len(rows), width + 1), dtype=np.uint8)
         fits[rows] = _put_digits(text, magnitude[rows], negative[rows])
         out[rows] = text
         return fits
-    for digits in range(1, room + 1):  # of a short one the sign stands before the first of few digits
+    for digits in range(1, width + 1):  # of a short one the sign stands before the first of few digits
         least = 10 ** (digits - 1) if digits > 1 else 0
-        out[negative & (magnitude >= least) & (magnitude < 10**digits), room - digits] = _MINUS
-    return np.asarray(fits & ~(negative & (magnitude >= 10**room)))
+        out[negative & (magnitude >= least) & (magnitude < 10**digits), width - digits] = _MINUS
+    return np.asarray(fits & ~(negative & (magnitude >= 10**width)))
 
 
 def _put_decimal(out: Text, values: NDArray[np.float64], decimals: int) -> Mask:

@@ -63,7 +63,19 @@ class StateOptions:
     def weights(self, ka: Ints, kc: Ints, k: Ints, i_tot: Ints | int = 0) -> Ints:
         """Nuclear-spin weight of one component of levels, as the file has it; zero or less where a level does not exist.
 
-        ka, kc: (n,) labels, k: K along the axis of the basis, i_tot: the total spin, where it is odd the two weights change places.
+        Parameters
+        ----------
+        ka, kc : (n,) arrays of int
+            Labels.
+        k : (n,) array of int
+            K along the axis of the basis.
+        i_tot : (n,) array of int or int, optional
+            The total spin; where it is odd the two weights change places.
+
+        Returns
+        -------
+        (n,) array of int
+            WTPL, WTMN or EWT, by the axis of the file.
         """
         odd = {1: ka % 2, 2: (ka + kc) % 2, 3: kc % 2}.get(self.iax, (ka + kc) % 2)
         even = (odd + i_tot) % 2 == 0

@@ -16,6 +16,7 @@ from rotor.units import BOHR_RADIUS_ANGSTROM, DEBYE_PER_E_ANGSTROM
 
 _DENSITY = re.compile(r"Population analysis using the (.+?) density", re.IGNORECASE)
 _EXCITED_METHOD = re.compile(r"\b(CIS|TDA|TD-?DFT|EOM|STEOM|ROCIS|relaxed density)", re.IGNORECASE)
+_DEBYE_PER_AU = DEBYE_PER_E_ANGSTROM * BOHR_RADIUS_ANGSTROM
 _LINES_OF_HEAD = 12  # between the head of ORCA's dipole and its total
 _LINES_BEFORE = 25  # in which an older ORCA names the method of the density
 
@@ -42,12 +43,15 @@ def is_excited(output: Output, start: int) -> bool:
 
 
 def printed_dipole(output: Output, start: int) -> Floats | None:
-    """The dipole (3,) in D that opens at a line of Gaussian or ORCA, in the axes it is printed in; None where it is not found."""
+    """The dipole (3,) in D that opens at a line of Gaussian, ORCA or Psi4, in the axes it is printed in; None where it is not found."""
     if output.program.name == "Gaussian":
         numbers = re.findall(r"[XYZ]=\s*(-?\d+\.\d+)", output.lines[start + 1])
         return np.array([float(x) for x in numbers]) if len(numbers) == 3 else None
+    if output.program.name == "Psi4":
+        numbers = re.findall(r"[XYZ]:\s*(-?\d+\.\d+)", output.lines[min(start + 1, len(output.lines) - 1)])
+        return np.array([float(x) for x in numbers]) * _DEBYE_PER_AU if len(numbers) == 3 else None
     for line in output.lines[start : start + _LINES_OF_HEAD + 6]:
         if line.strip().startswith("Total Dipole Moment"):
             au = np.array([float(x) for x in line.partition(":")[2].split()])
-            return au * DEBYE_PER_E_ANGSTROM * BOHR_RADIUS_ANGSTROM
+            return au * _DEBYE_PER_AU
     return None

@@ -1,4 +1,4 @@
-"""What the outputs of quantum-chemistry programs look like, and what is refused in them before anybody reads a number.
+"""What the outputs of quantum-chemistry programs look like, and what is refused in them before a number is read.
 
 Each program is a row of `PROGRAMS`: its banner, its last words, what opens its tables and tensors. Whatever is used of
 an output is looked through first: asterisks, `D` exponents where there are none, a cut end.

@@ -37,6 +37,10 @@ CONSTANTS_AGREE = 1e-4  # relative; printed constants have 6 to 8 digits, coordi
 OTHER_GEOMETRY = 5e-3  # relative difference of constants from which on the geometry read is not the one of the output
 SAME_GEOMETRY_ANGSTROM = 1e-3  # rmsd: a tensor printed for a geometry further from the last one is not its tensor
 SAME_DIPOLE_DEBYE = 2e-3  # Gaussian prints its dipole to 1e-4 D and, in a second place, in atomic units
+OTHER_ENDINGS = {  # last words of programs whose versions end otherwise than cclib expects
+    "MOPAC": ("== MOPAC DONE ==", "JOB ENDED NORMALLY"),
+    "Molpro": ("Variable memory released", "Molpro calculation terminated"),
+}
 WITHOUT_CCLIB = "cclib is not installed; install the extra with it: pip install 'molrotor[qc]'"
 
 
@@ -46,7 +50,7 @@ def read_output(path: Path | str) -> Molecule:
     Parameters
     ----------
     path : Path or str
-        Output of Gaussian, ORCA, Psi4 or CFOUR; of the other programs that cclib tells apart, the geometry alone.
+        Output of Gaussian, ORCA, Psi4 or CFOUR; of the other programs that cclib distinguishes, the geometry alone.
 
     Returns
     -------
@@ -126,9 +130,23 @@ def _parse(text: str, where: str) -> Any:
         raise ValueError(f"{where}: cclib cannot read it ({why}); give an xyz file of the geometry") from reason
     if data is None:
         raise ValueError(f"{where}: no output of a program that cclib knows; give an xyz file of the geometry")
+    if not hasattr(data, "atomcoords") and data.metadata.get("package") == "MOPAC":
+        _set_last_table(data, text)
     if not hasattr(data, "atomcoords") or not hasattr(data, "atomnos"):
         raise ValueError(f"{where}: no geometry in it; give an output with one")
     return data
+
+
+def _set_last_table(data: Any, text: str) -> None:
+    """Give cclib's data the last table of Cartesian coordinates of MOPAC, which it reads from input in Cartesians alone."""
+    from ase.data import atomic_numbers
+
+    tables = re.split(r"CARTESIAN COORDINATES *\n(?:\s*NO\. .*)?\s*\n", text)[1:]
+    rows = re.match(r"(?:\s*\d+\s+[A-Z][a-z]?(?:\s+-?\d+\.\d+){3} *\n)+", tables[-1]) if tables else None
+    if rows is not None:
+        words = [line.split() for line in rows[0].strip().splitlines()]
+        data.atomnos = [atomic_numbers[row[1]] for row in words]
+        data.atomcoords = np.array([[[float(x) for x in row[2:5]] for row in words]])
 
 
 def _geometry(data: Any, where: str, program: str) -> Molecule:
@@ -175,7 +193,8 @@ def _read_other(text: str, where: str) -> Molecule:
     """The geometry alone, of a program whose axes of tensors are not known here."""
     data = _parse(text, where)
     program = data.metadata.get("package", "a program")
-    if not data.metadata.get("success", False):
+    ended_well = any(words in text for words in OTHER_ENDINGS.get(program, ()))
+    if not data.metadata.get("success", False) and not ended_well:
         last = len(text.rstrip().splitlines())
         raise ValueError(f"{where}: line {last}: {program} does not say here that it ended well; give a whole output")
     note = (
@@ -210,9 +229,13 @@ def _axes_at(
 def _with_dipole(molecule: Molecule, data: Any, output: Output) -> Molecule:
     """The dipole of the ground state, D: turned to the axes of the geometry, and of an ion moved to the centre of mass."""
     starts = dipole_lines(output)
-    if not starts or len(getattr(data, "moments", ())) < 2:
+    if not starts:
         return molecule
-    start, printed = starts[-1], np.asarray(data.moments[1], dtype=np.float64)
+    start, known = starts[-1], len(getattr(data, "moments", ())) > 1
+    own = np.asarray(data.moments[1], dtype=np.float64) if known else printed_dipole(output, starts[-1])
+    if own is None:
+        return molecule
+    printed = own
     if is_excited(output, start):
         ground = [
             (i, dipole)

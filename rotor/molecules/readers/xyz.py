@@ -129,7 +129,9 @@ def _extended(comment: str, where: str) -> tuple[dict[str, Any], _Columns]:
     try:
         info = read_pairs(comment)
     except (IndexError, ValueError) as reason:
-        raise ValueError(f"{where}: {comment!r:.80} is no list of key=value; mend its quotes and brackets") from reason
+        raise ValueError(
+            f"{where}: {comment!r:.80} is no list of key=value; correct its quotes and brackets"
+        ) from reason
     if "Properties" not in info:
         return info, _Columns()
     words = str(info["Properties"]).split(":")

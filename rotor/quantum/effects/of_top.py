@@ -1,8 +1,9 @@
-"""The effects of a top's own spins, from its named constants."""
+"""The effects of a top's own spins and further states, from its named constants."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from rotor.quantum.effect import QuantumEffect
@@ -64,10 +65,43 @@ def _refuse_like_nuclei(top: Top) -> None:
         )
 
 
+def state_effects(top: Top) -> tuple[QuantumEffect, ...]:
+    """The states beyond a top's own, with what couples them; none for a top of one state."""
+    if top.states is None:
+        return ()
+    from rotor.quantum.effects.interactions import InteractingStates
+
+    found = top.states
+    return (InteractingStates(found.values, found.weights, found.dipoles),)
+
+
+def with_states(top: Top, effects: Sequence[QuantumEffect]) -> tuple[Top, tuple[QuantumEffect, ...]]:
+    """The effects of a calculation, and the top with the spin weights that its own state has among others.
+
+    Where the effects are the semi-rigid ones, the other states of the top are added; other effects stay as they are given.
+    """
+    effects = tuple(effects)
+    if top.states is None:
+        return top, effects
+    if effects == SEMI_RIGID:
+        effects = (*effects, *state_effects(top))
+    weights = top.states.weights.get(0, top.spin_weights)
+    return replace(top, spin_weights=weights, symmetry_checked=False), effects
+
+
+def has_own_hamiltonian(top: Top, effects: Sequence[QuantumEffect]) -> bool:
+    """Whether the effects are those of the constants of a top and of its states, no more and no other values."""
+    if top.states is None:
+        return tuple(effects) == SEMI_RIGID
+    known = dict(state_effects(top)[0].parameters(top))
+    rest = [effect for effect in effects if effect not in SEMI_RIGID]
+    return len(effects) == len(SEMI_RIGID) + 1 and len(rest) == 1 and dict(rest[0].parameters(top)) == known
+
+
 def effects_of(
     top: Top, hyperfine: bool, method: str = "exact", tolerance_mhz: float = TOLERANCE_MHZ
 ) -> tuple[QuantumEffect, ...]:
-    """The semi-rigid Hamiltonian of a top, and with `hyperfine` its spins.
+    """The semi-rigid Hamiltonian of a top in all its states, and with `hyperfine` its spins.
 
     Parameters
     ----------
@@ -85,14 +119,14 @@ def effects_of(
         Where spins are asked for and the top has no constants of any.
     """
     if not hyperfine:
-        return SEMI_RIGID
+        return (*SEMI_RIGID, *state_effects(top))
     found = spin_effects(top)
     if not found:
         raise ValueError(
             f"hyperfine structure of {top.name or 'this top'}: no constants of spins are known; give them, such as "
             "chi_aa(14N)=-4.2 MHz"
         )
-    return (*SEMI_RIGID, *found, *_method(top, found, method, tolerance_mhz))
+    return (*SEMI_RIGID, *state_effects(top), *found, *_method(top, found, method, tolerance_mhz))
 
 
 def _method(top: Top, found: Sequence[QuantumEffect], method: str, tolerance_mhz: float) -> tuple[QuantumEffect, ...]:

@@ -12,7 +12,7 @@ here: the matrices are solved.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import partial
@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike
 
 from rotor import units
 from rotor.quantum.effect import QuantumEffect
-from rotor.quantum.fields.blocks import Contraction, FieldBlock
+from rotor.quantum.fields.blocks import Contraction, FieldBlock, FieldSpace
 from rotor.quantum.fields.field_map import (
     BlockProblem,
     FieldMap,
@@ -33,6 +33,8 @@ from rotor.quantum.fields.field_map import (
     field_map,
 )
 from rotor.quantum.fields.space import field_space
+from rotor.quantum.fields.spin_fields import spin_field_space
+from rotor.quantum.spins import scheme_of
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
@@ -85,6 +87,7 @@ def stark_map(
     m_values: Sequence[int] | None = None,
     intensity_w_per_cm2: float = 0.0,
     direction: Sequence[float] = Z,
+    effects: Sequence[QuantumEffect] = (),
     jmax: int | None = None,
     tolerance_mhz: float = DEFAULT_TOLERANCE_MHZ,
     diabatic_gap_mhz: float | None = None,
@@ -101,11 +104,13 @@ def stark_map(
     j_highest : int
         States that belong to free levels up to this J.
     m_values : sequence of int, optional
-        |M|; by default 0 ... `j_highest`.
+        |M|; by default 0 ... `j_highest`. With spins it is |M_F|, a multiple of ½.
     intensity_w_per_cm2 : float
         Of a laser far from resonance, polarized along Z, at every field.
     direction : (3,)
         Of the static field, any length; at an angle with Z it mixes M, and the column m is -1.
+    effects : sequence of QuantumEffect
+        The Hamiltonian of a top with spins (`rotor.quantum.effects`), the semi-rigid ones with them; states are |F M_F⟩ then.
     jmax : int, optional
         Of the basis; by default chosen.
     tolerance_mhz : float
@@ -131,7 +136,15 @@ def stark_map(
     Neglected: the polarizability in the static field (0.5 Δα E², below 1e-3 of the dipole's part), hyperfine coupling.
     """
     request = map_request(
-        top, fields_kv_per_cm, j_highest, m_values, intensity_w_per_cm2, direction, tolerance_mhz, diabatic_gap_mhz
+        top,
+        fields_kv_per_cm,
+        j_highest,
+        m_values,
+        intensity_w_per_cm2,
+        direction,
+        tolerance_mhz,
+        diabatic_gap_mhz,
+        effects,
     )
     return field_map(request, jmax, executor)
 
@@ -145,8 +158,39 @@ def map_request(
     direction: Sequence[float] = Z,
     tolerance_mhz: float = DEFAULT_TOLERANCE_MHZ,
     diabatic_gap_mhz: float | None = None,
+    effects: Sequence[QuantumEffect] = (),
 ) -> MapRequest:
-    """What `stark_map` solves, every argument checked; parameters and errors are those of `stark_map`."""
+    """What `stark_map` solves, every argument checked.
+
+    Parameters
+    ----------
+    top : Top
+        With a dipole, or a polarizability where there is light.
+    fields_kv_per_cm : (f,) array
+        Static fields.
+    j_highest : int
+        States that come from levels up to this J are followed.
+    m_values : sequence of int or None
+        The |M| of the states; None for all.
+    intensity_w_per_cm2 : float
+        Of a laser beam polarised along Z; 0 for none.
+    direction : (3,) sequence, optional
+        Of the static field in space; Z by default.
+    tolerance_mhz : float, optional
+        By how much energies may move when J max is raised.
+    diabatic_gap_mhz : float, optional
+        Crossings with a smaller gap are passed diabatically; by default labels are adiabatic.
+
+    Returns
+    -------
+    MapRequest
+        Blocks, matrices and fields of the map.
+
+    Raises
+    ------
+    ValueError
+        As `stark_map` does, and for `m_values` beside a field at an angle with Z.
+    """
     fields = checked_fields(fields_kv_per_cm, "kV/cm", HIGHEST_KV_PER_CM)
     unit = checked_direction(direction)
     dipole, light = acting(top, intensity_w_per_cm2, unit)
@@ -155,18 +199,40 @@ def map_request(
         raise ValueError("a field at an angle with Z mixes M: its states have no M to choose; leave m_values out")
     names = {"costheta": _orientation(top, unit), "cos2theta": _alignment(top)}
     contractions = tuple(one for one in (dipole, light) if one is not None)
+    space: Callable[[int], FieldSpace] = partial(field_space, top, contractions=contractions)
+    if effects:
+        space = partial(spin_field_space, top, effects=tuple(effects), contractions=contractions)
     return MapRequest(
-        space=partial(field_space, top, contractions=contractions),
+        space=space,
         problem=partial(_problem, dipole, light, intensity_w_per_cm2, names),
         fields=fields,
         j_highest=checked_j(j_highest),
-        m_values=(0,) if tilted else checked_m(m_values, j_highest),
+        m_values=(0,)
+        if tilted
+        else checked_m(m_values, j_highest)
+        if not effects
+        else doubled_m(top, effects, m_values, j_highest),
         tolerance_mhz=checked_tolerance_mhz(tolerance_mhz),
         field_name="field_kv_per_cm",
         slope_name="mu_eff_debye",
         slope_unit_mhz=units.MHZ_PER_DEBYE_KV_PER_CM,
         diabatic_gap_mhz=diabatic_gap_mhz,
     )
+
+
+def doubled_m(
+    top: Top, effects: Sequence[QuantumEffect], m_values: Sequence[float] | None, j_highest: int
+) -> tuple[int, ...]:
+    """Twice |M_F| from those that F has, each once, all of them for None; ValueError for others."""
+    total = scheme_of(top, tuple(effects)).total
+    possible = range(total % 2, 2 * j_highest + total + 1, 2)
+    values = tuple(possible) if m_values is None else tuple(sorted({round(2 * m) for m in m_values}))
+    if not values or not set(values) <= set(possible) or (m_values is not None and any((2 * m) % 1 for m in m_values)):
+        raise ValueError(
+            f"M_F of {list(m_values or ())}: expected are {possible[0] / 2:g}, {possible[0] / 2 + 1:g} ... {possible[-1] / 2:g} "
+            "(M and -M coincide)"
+        )
+    return values
 
 
 def checked_direction(direction: Sequence[float]) -> tuple[float, float, float]:

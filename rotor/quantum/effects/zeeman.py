@@ -4,11 +4,17 @@
 
 with the rotational g tensor along a, b, c (W. H. Flygare, Chem. Rev. 74, 653 (1974), eq. 8), Φ_Zi the direction cosines and J_j in the
 molecule. A linear top has J across its axis alone, so that H = -g μ_N B J_Z and E = E0 - g μ_N B M exactly; a symmetric top has
-g⊥ J_Z + (g∥ - g⊥) Φ_Zz J_z. M is good, and M and -M differ. Neglected: the magnetisability (of the order of 1e-4 MHz/T²), nuclear spins.
+g⊥ J_Z + (g∥ - g⊥) Φ_Zz J_z. M is good, and M and -M differ. To second order the magnetisability χ acts,
+
+    -½ B² χ_ZZ,          1e-6 erg/(G² mol) = 0.0250607 MHz/T²,
+
+which is some 0.1 MHz/T² for an anisotropy of ten of these units. With effects that have spins, -μ_N B Σ g_I I_Z is added, the shielding
+of the nuclei neglected.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
 from functools import cached_property, partial
@@ -18,6 +24,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rotor.arrays import Floats
+from rotor.quantum.effect import QuantumEffect
+from rotor.quantum.effects.stark import doubled_m
 from rotor.quantum.fields.blocks import AxialBlock, AxialSpace, Contraction, FieldBlock, FieldSpace, FreeLevels
 from rotor.quantum.fields.direction_cosines import cosine_bands
 from rotor.quantum.fields.field_map import (
@@ -29,11 +37,12 @@ from rotor.quantum.fields.field_map import (
     field_map,
 )
 from rotor.quantum.fields.space import axial_levels
+from rotor.quantum.fields.spin_fields import Magnet, SpinFieldBlock, spin_field_space
 from rotor.quantum.fields.wang_blocks import WangBlockInField, WangSpace, coloured_components, wang_space
 from rotor.quantum.j_operators import between_blocks, components
 from rotor.quantum.reduced import wang_amplitudes
 from rotor.quantum.tensors import BodyTensor, body_tensor
-from rotor.units import NUCLEAR_MAGNETON_MHZ_PER_T
+from rotor.units import AVOGADRO_PER_MOL, NUCLEAR_MAGNETON_MHZ_PER_T, PLANCK_J_S
 
 if TYPE_CHECKING:
     from rotor.quantum.levels import SolvedBlock
@@ -41,6 +50,7 @@ if TYPE_CHECKING:
 
 HIGHEST_TESLA = 1000.0
 DEFAULT_TOLERANCE_MHZ = 1e-6
+MHZ_PER_T2 = 1e-11 / (AVOGADRO_PER_MOL * PLANCK_J_S)  # of 1e-6 erg/(G² mol), which is 1e-5 J/(T² mol)
 Z = (0.0, 0.0, 1.0)
 _PRODUCTS = {"aa": "ee", "bb": "ee", "cc": "ee", "ab": "oe", "ac": "oo", "bc": "eo"}  # change of species by g_ij
 
@@ -50,6 +60,9 @@ def zeeman_map(
     fields_tesla: ArrayLike,
     g: ArrayLike,
     *,
+    magnetisability: ArrayLike | None = None,
+    effects: Sequence[QuantumEffect] = (),
+    nuclear_g: Mapping[str, float] | None = None,
     j_highest: int = 2,
     jmax: int | None = None,
     tolerance_mhz: float = DEFAULT_TOLERANCE_MHZ,
@@ -65,6 +78,12 @@ def zeeman_map(
         Each once, in rising order.
     g : float, (3,) or (3, 3)
         Rotational g tensor along a, b, c; one number or three for a linear top, whose g_aa does nothing.
+    magnetisability : (3,) or (3, 3), optional
+        χ along a, b, c in 1e-6 erg/(G² mol), with its sign (diamagnetic: negative).
+    effects : sequence of QuantumEffect
+        The Hamiltonian of a linear or asymmetric top with spins, the semi-rigid ones with them; states are |F M_F⟩ then.
+    nuclear_g : mapping, optional
+        g = μ/(μ_N I) of nuclei by the names of their spins; those that are left out do not feel the field.
     j_highest : int
         States that belong to free levels up to this J.
     jmax : int, optional
@@ -82,7 +101,8 @@ def zeeman_map(
     Raises
     ------
     ValueError
-        For a g tensor that does not have the symmetry of a linear or symmetric top, and fields beyond 1000 T.
+        For a g tensor or a magnetisability that does not have the symmetry of a linear or symmetric top, fields beyond 1000 T, and g
+        of nuclei that the effects do not have.
 
     >>> from rotor.tops.top import Top
     >>> found = zeeman_map(Top.from_constants("B=6000 MHz"), [0.0, 1.0], -0.03, j_highest=1)
@@ -90,13 +110,24 @@ def zeeman_map(
     >>> (found.energy_mhz[rows] - 12000).round(4).tolist()  # 0.03 μ_N B
     [0.0, 0.2287]
     """
-    tensor = checked_g(top, g)
+    tensor, nuclei = checked_g(top, g), dict(nuclear_g or {})
+    if nuclei and not effects:
+        raise ValueError("nuclear_g: give the effects that have these spins too")
+    square = None if magnetisability is None else Contraction(_axial_tensor(top, magnetisability, "χ"), np.outer(Z, Z))
+    magnet = Magnet(tensor, nuclei)
+    contractions = () if square is None else (square,)
+    space: Callable[[int], FieldSpace] = partial(_space, top, tensor, contractions)
+    m_values = tuple(range(-j_highest, j_highest + 1))
+    if effects:
+        space = partial(spin_field_space, top, effects=tuple(effects), contractions=contractions, magnet=magnet)
+        positive = doubled_m(top, effects, None, j_highest)
+        m_values = tuple(sorted({*positive, *(-m for m in positive)}))
     request = MapRequest(
-        space=partial(_space, top, tensor),
-        problem=partial(_problem, tensor),
+        space=space,
+        problem=partial(_problem, magnet, square),
         fields=checked_fields(fields_tesla, "T", HIGHEST_TESLA),
         j_highest=j_highest,
-        m_values=tuple(range(-j_highest, j_highest + 1)),
+        m_values=m_values,
         tolerance_mhz=checked_tolerance_mhz(tolerance_mhz),
         field_name="field_tesla",
         slope_name="moment_nuclear_magnetons",
@@ -107,17 +138,22 @@ def zeeman_map(
 
 def checked_g(top: Top, g: ArrayLike) -> Floats:
     """The g tensor (3, 3) along a, b, c; ValueError where it is not finite or does not fit the kind of top."""
-    array = np.asarray(g, dtype=np.float64)
-    tensor = np.diag(np.broadcast_to(array, 3)) if array.ndim < 2 else array
-    if tensor.shape != (3, 3) or not np.isfinite(tensor).all():
-        raise ValueError(f"a g tensor is one number, three, or (3, 3), finite; got {array.tolist()}")
     if top.kind == "spherical":
         raise ValueError("a spherical top has an isotropic g: E = E0 - g μ_N B M; no map is needed")
+    return _axial_tensor(top, g, "g")
+
+
+def _axial_tensor(top: Top, given: ArrayLike, name: str) -> Floats:
+    """A tensor (3, 3) from one number, three or all of it; ValueError where it does not have the symmetry of the top."""
+    array = np.asarray(given, dtype=np.float64)
+    tensor = np.diag(np.broadcast_to(array, 3)) if array.ndim < 2 and array.size in (1, 3) else array
+    if tensor.shape != (3, 3) or not np.isfinite(tensor).all():
+        raise ValueError(f"a {name} tensor is one number, three, or (3, 3), finite; got {array.tolist()}")
     if top.kind != "asymmetric":
         axis = 2 if top.kind == "oblate" else 0
         if not Contraction(tensor, np.outer(Z, Z)).axial_about(axis):
             raise ValueError(
-                f"the g tensor of a {top.kind} top is symmetric about {'abc'[axis]}; got {tensor.tolist()}"
+                f"the {name} tensor of a {top.kind} top is symmetric about {'abc'[axis]}; got {tensor.tolist()}"
             )
     return np.array(tensor)
 
@@ -154,6 +190,10 @@ class _MagneticSpace(FieldSpace):
                 change = "".join("e" if p == q else "o" for p, q in zip(a.species, b.species, strict=True))
                 if up != low and 0 <= a.j - b.j <= 1 and change in self._changes:
                     edges.append((up, low, 0))
+        here = set(nodes)
+        for contraction in self.free.contractions:
+            pairs = self.free.connected(contraction)
+            edges += [(up, low, 0) for up, low in pairs if up != low and up in here and low in here]
         return nodes, edges
 
     @cached_property
@@ -162,17 +202,21 @@ class _MagneticSpace(FieldSpace):
         return {_PRODUCTS["".join(sorted("abc"[i] + "abc"[j]))] for i, j in pairs}
 
 
-def _space(top: Top, g: Floats, jmax: int) -> FieldSpace:
+def _space(top: Top, g: Floats, contractions: tuple[Contraction, ...], jmax: int) -> FieldSpace:
     if top.kind == "asymmetric":
-        free: AxialSpace | WangSpace = wang_space(top, jmax, ())
+        free: AxialSpace | WangSpace = wang_space(top, jmax, contractions)
     else:
         free = AxialSpace(axial_levels(top, jmax), jmax, 2 if top.kind == "oblate" else 0, True)
     return _MagneticSpace(free.levels, jmax, free, g)
 
 
-def _problem(g: Floats, block: FieldBlock) -> BlockProblem:
-    moment = axial_moment(block, g) if isinstance(block, AxialBlock) else _wang_moment(block, g)
-    return BlockProblem(np.diag(block.energies_mhz), -NUCLEAR_MAGNETON_MHZ_PER_T * moment, {})
+def _problem(magnet: Magnet, square: Contraction | None, block: FieldBlock) -> BlockProblem:
+    if isinstance(block, SpinFieldBlock):
+        moment = block.moment(magnet)
+    else:
+        moment = axial_moment(block, magnet.g) if isinstance(block, AxialBlock) else _wang_moment(block, magnet.g)
+    curvature = None if square is None else -0.5 * MHZ_PER_T2 * block.dense(square)
+    return BlockProblem(np.diag(block.energies_mhz), -NUCLEAR_MAGNETON_MHZ_PER_T * moment, {}, curvature)
 
 
 def axial_moment(block: AxialBlock, g: Floats) -> Floats:

@@ -121,7 +121,7 @@ class FieldBlock(ABC):
     rising in J. A matrix is real where the block has real phases, else complex and Hermitian.
     """
 
-    m: int
+    m: float
     copies: int
     rows: Ints
 

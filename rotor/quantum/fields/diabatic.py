@@ -22,9 +22,28 @@ DEEPEST = 24  # halvings of an interval
 
 
 def diabatic_ranks(solve: Solve, fields: Floats, count: int, gap_mhz: float) -> Ints:
-    """The adiabatic rank (fields, count) at the first field whose name each state has at each field.
+    """The adiabatic rank at the first field whose name each state has at each field.
 
-    gap_mhz: crossings with a smallest gap below it are passed diabatically.
+    Parameters
+    ----------
+    solve : callable
+        Fields (f,) to energies (f, states) in MHz and slopes dE/dx (f, states) in MHz per unit of the field.
+    fields : (f,) array
+        Rising fields, in any unit.
+    count : int
+        How many states, the lowest ones, are named.
+    gap_mhz : float
+        Crossings with a smallest gap below it are passed diabatically, in MHz.
+
+    Returns
+    -------
+    (f, count) array of int
+        Ranks from 0.
+
+    Raises
+    ------
+    ValueError
+        For a gap not above 0.
     """
     if not gap_mhz > 0:
         raise ValueError(f"diabatic gap {gap_mhz} MHz: a number above 0 is expected")

@@ -231,7 +231,24 @@ def _blocks(request: MapRequest, jmax: int) -> list[FieldBlock]:
 def each_block(
     request: MapRequest, jmax: int, run: Callable[[FieldBlock], Of], executor: Executor | None = None
 ) -> list[Of]:
-    """`run` of every block that holds states of the map; an executor spreads the blocks."""
+    """`run` of every block that holds states of the map.
+
+    Parameters
+    ----------
+    request : MapRequest
+        What is solved.
+    jmax : int
+        Highest J of the basis.
+    run : callable
+        Takes a block; must be picklable for a pool of processes.
+    executor : Executor, optional
+        The blocks are spread over it.
+
+    Returns
+    -------
+    list
+        What `run` returned, in the order of the blocks.
+    """
     blocks = _blocks(request, jmax)
     return list(executor.map(run, blocks) if executor else map(run, blocks))
 
@@ -273,7 +290,24 @@ def _count(request: MapRequest, block: FieldBlock) -> int:
 
 
 def block_states(request: MapRequest, block: FieldBlock, fields: Floats, with_vectors: bool = True) -> BlockStates:
-    """The states of a block that a map follows, at fields (f,)."""
+    """The states of a block that a map follows, at several fields.
+
+    Parameters
+    ----------
+    request : MapRequest
+        What is solved.
+    block : FieldBlock
+        One of its blocks.
+    fields : (f,) array
+        In the unit of the request.
+    with_vectors : bool, optional
+        False leaves the eigenvectors out where energies can be found without them.
+
+    Returns
+    -------
+    BlockStates
+        Energies (f, states) in MHz, and the states that they belong to.
+    """
     return _states_of(request, block, request.problem(block), fields, with_vectors)
 
 

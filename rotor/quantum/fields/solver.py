@@ -46,10 +46,30 @@ def expectation(matrix: Matrix, vectors: Matrix) -> Floats:
 def solve_fields(
     terms: Terms, fields: Floats, count: int, with_vectors: bool, tolerance_mhz: float = 0.0
 ) -> tuple[Floats, Matrix]:
-    """The lowest `count` states of Σ x^n H_n: energies (fields, count), vectors (fields, n, count).
+    """The lowest `count` states of Σ x^n H_n at many fields x.
 
-    Small matrices are solved for all fields at once, large ones one by one or, where many fields are asked for, in a basis of
-    their own eigenvectors at a few fields (`reduced_basis`), to `tolerance_mhz`.
+    Small matrices are solved for all fields at once, large ones one by one or, where many fields are asked for, in a
+    basis of their own eigenvectors at a few fields (`reduced_basis`).
+
+    Parameters
+    ----------
+    terms : tuple of (n, n) arrays
+        H_0, H_1, ... real symmetric or complex Hermitian, MHz per power of the unit of the field.
+    fields : (f,) array
+        Values of x.
+    count : int
+        How many states.
+    with_vectors : bool
+        False leaves eigenvectors out where they are not needed.
+    tolerance_mhz : float, optional
+        Largest error of an energy in the reduced basis; 0 solves every field in full.
+
+    Returns
+    -------
+    energies : (f, count) array
+        MHz, rising.
+    vectors : (f, n, count) array
+        Eigenvectors in columns; without columns where they are left out.
     """
     size = len(terms[0])
     if size <= DENSE:
@@ -82,7 +102,28 @@ def _lowest(matrix: Matrix, count: int, with_vectors: bool = True) -> tuple[Floa
 
 
 def reduced_basis(terms: Terms, fields: Floats, count: int, tolerance_mhz: float) -> tuple[Floats, Matrix]:
-    """The lowest states at many fields from full solutions at a few: energies (fields, count), vectors (fields, n, count)."""
+    """The lowest states at many fields from full solutions at a few.
+
+    Where no small basis serves, or the error in it exceeds the tolerance, each field is solved in full.
+
+    Parameters
+    ----------
+    terms : tuple of (n, n) arrays
+        H_0, H_1, ... in MHz per power of the unit of the field.
+    fields : (f,) array
+        Values of the field.
+    count : int
+        How many states.
+    tolerance_mhz : float
+        Largest error of an energy, estimated as |residual|²/gap.
+
+    Returns
+    -------
+    energies : (f, count) array
+        MHz, rising.
+    vectors : (f, n, count) array
+        Eigenvectors in columns.
+    """
     basis = spanning(terms, fields[:: len(fields) // SPANNED + 1], count, tolerance_mhz)
     if basis is None:
         return _each(terms, fields, count)
@@ -91,11 +132,27 @@ def reduced_basis(terms: Terms, fields: Floats, count: int, tolerance_mhz: float
 
 
 def spanning(terms: Terms, fields: Floats, count: int, tolerance_mhz: float) -> Matrix | None:
-    """A basis (n, r) for the lowest states at all fields; None where it would be as large as half of the matrix.
+    """A basis for the lowest states at all fields, from eigenvectors at a few of them.
 
     The eigenvectors at some fields, a few more than are asked for, span a space that holds those at the fields between. In it
     the matrices are small. An energy is wrong by |residual|²/gap, the gap reaching to the highest of the further states; the field
     where that is largest is solved in full and joins, until it is below a tenth of the tolerance everywhere.
+
+    Parameters
+    ----------
+    terms : tuple of (n, n) arrays
+        H_0, H_1, ... in MHz per power of the unit of the field.
+    fields : (f,) array
+        Values of the field.
+    count : int
+        How many states.
+    tolerance_mhz : float
+        Largest error of an energy in the basis.
+
+    Returns
+    -------
+    (n, r) array or None
+        Orthonormal columns; None where it would be as large as half of the matrix.
     """
     anchors = np.unique(np.linspace(0, len(fields) - 1, FIRST_ANCHORS).astype(int)).tolist()
     found = [_lowest(at_fields(terms, fields[place : place + 1])[0], count + BUFFER)[1] for place in anchors]

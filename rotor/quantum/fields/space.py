@@ -11,6 +11,7 @@ from rotor.quantum.fields.blocks import AxialSpace, Contraction, FieldSpace, Fre
 from rotor.quantum.fields.tilted_blocks import tilted_space
 from rotor.quantum.fields.wang_blocks import wang_space
 from rotor.quantum.solve import solve_levels
+from rotor.tops.top import one_state
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
@@ -36,7 +37,7 @@ def field_space(top: Top, jmax: int, contractions: Sequence[Contraction]) -> Fie
 
 def axial_levels(top: Top, jmax: int) -> FreeLevels:
     """Levels of a linear or symmetric top, K and -K apart, by K and then by J."""
-    solved = solve_levels(top, jmax)
+    solved = solve_levels(one_state(top, "levels in a field"), jmax)
     j, each = solved.rotational, solved.weight_per_component
     if top.kind == "linear":
         return FreeLevels(j, solved.energy_mhz, {}, each)

@@ -200,11 +200,12 @@ def tilted_space(top: Top, jmax: int, contractions: Sequence[Contraction]) -> Ti
     Raises ValueError for a spherical top.
     """
     from rotor.quantum.effects.watson import SEMI_RIGID
-    from rotor.quantum.solve import representation_of, solve_rotation
+    from rotor.quantum.rotation import representation_of, solve_rotation
+    from rotor.tops.top import one_state
 
     if top.kind == "spherical":
         raise ValueError(f"{top.name or 'this top'} is a spherical top: neither a dipole nor an anisotropy turns it")
-    levels = solve_rotation(top, SEMI_RIGID, 0, jmax, in_blocks=True)
+    levels = solve_rotation(one_state(top, "levels in a field"), SEMI_RIGID, 0, jmax, in_blocks=True)
     quanta = {name: column for name, column in levels.quanta.items() if name != "j"}
     free = FreeLevels(levels.rotational, levels.energy_mhz, quanta, levels.weight_per_component)
     return TiltedSpace(free, jmax, representation_of(top), levels.blocks, tuple(contractions))

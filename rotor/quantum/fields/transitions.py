@@ -35,7 +35,7 @@ class BlockPair(NamedTuple):
 
 def pairs_of_blocks(blocks: Sequence[FieldBlock]) -> Iterator[BlockPair]:
     """Pairs of blocks with M ≥ 0, M' = M (a block with itself) or M + 1."""
-    by_m: dict[int, list[int]] = {}
+    by_m: dict[float, list[int]] = {}
     for place, block in enumerate(blocks):
         if block.m >= 0:
             by_m.setdefault(block.m, []).append(place)

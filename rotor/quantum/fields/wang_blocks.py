@@ -93,7 +93,26 @@ class WangSpace(FieldSpace):
         return [self.solved[i] for i in self._by_j.get(j, [])]
 
     def block_of(self, m: int, copies: int, members: list[int], colours: list[int], real: bool) -> WangBlockInField:
-        """A block of the Wang blocks `members`."""
+        """A block of the field made of some Wang blocks, for one M.
+
+        Parameters
+        ----------
+        m : int
+            Projection M on the field, with its sign where the block is complex.
+        copies : int
+            2 where the block stands for +M and -M, else 1.
+        members : list of int
+            Indices of the Wang blocks in `solved`.
+        colours : list of int
+            0 or 1 for each of them: its states are multiplied by 1 or i.
+        real : bool
+            Whether the matrices are real then.
+
+        Returns
+        -------
+        WangBlockInField
+            With the rows of its states among the levels.
+        """
         names = sorted({self.solved[i].basis.species for i in members})
         rows = np.concatenate([np.arange(b.start, b.start + b.basis.size) for b in (self.solved[i] for i in members)])
         return WangBlockInField(m, "+".join(names), copies, tuple(members), tuple(colours), real, rows, self)
@@ -108,6 +127,10 @@ class WangSpace(FieldSpace):
                 if up in here and low in here and self.space_factor(j_up, j_low, contraction.rank)[m]:
                     out.append((up, low, contraction.rank % 2))
         return out
+
+    def connected(self, contraction: Contraction) -> list[tuple[int, int]]:
+        """Pairs (up, low) of solved blocks that the body part of a contraction connects."""
+        return list(self._pairs(contraction))
 
     @cached_property
     def _cache(self) -> dict[Any, Any]:
@@ -212,9 +235,10 @@ def coloured_components(
 def wang_space(top: Top, jmax: int, contractions: Sequence[Contraction]) -> WangSpace:
     """The space of a top whose tensors do not have the axis of a symmetric top."""
     from rotor.quantum.effects.watson import SEMI_RIGID
-    from rotor.quantum.solve import representation_of, solve_rotation
+    from rotor.quantum.rotation import representation_of, solve_rotation
+    from rotor.tops.top import one_state
 
-    levels = solve_rotation(top, SEMI_RIGID, 0, jmax, in_blocks=True)
+    levels = solve_rotation(one_state(top, "levels in a field"), SEMI_RIGID, 0, jmax, in_blocks=True)
     quanta = {name: column for name, column in levels.quanta.items() if name != "j"}
     free = FreeLevels(levels.rotational, levels.energy_mhz, quanta, levels.weight_per_component)
     return WangSpace(free, jmax, representation_of(top), levels.blocks, tuple(contractions))

@@ -42,8 +42,24 @@ def spin_levels(
     """All levels of a top with spins whose label has N from `jmin` to `jmax`, by (v), n, k or ka and kc, j, f1, ... f.
 
     Every F that such an N reaches is solved with all its N, so that nothing is left out of a block.
+
+    Parameters
+    ----------
+    top : Top
+        Constants, kind and spin weights.
+    effects : tuple of QuantumEffect
+        What the Hamiltonian consists of, spins among it.
+    jmin, jmax : int
+        Lowest and highest N of the labels.
+    executor : Executor, optional
+        The rotation is spread over it by N.
+
+    Returns
+    -------
+    Levels
+        Energies in MHz; half-integer quantum numbers are doubled.
     """
-    from rotor.quantum.spins.blocks import levels_of_f
+    from rotor.quantum.spins.levels import levels_of_f
 
     total = scheme_of(top, effects).total
     first = max(2 * jmin - total, total % 2)
@@ -51,7 +67,29 @@ def spin_levels(
 
 
 def spin_derivatives(top: Top, levels: Levels, names: Sequence[str], rows: Ints) -> Floats:
-    """∂E/∂c of levels with spins, (rows, names)."""
+    """∂E/∂c of levels with spins.
+
+    Parameters
+    ----------
+    top : Top
+        The constants that the levels were solved with.
+    levels : Levels
+        Levels with spins and their eigenvectors.
+    names : sequence of str
+        Parameters, in the order of the columns.
+    rows : (rows,) array of int
+        Indices of the levels.
+
+    Returns
+    -------
+    (rows, names) array
+        MHz per MHz.
+
+    Raises
+    ------
+    ValueError
+        For levels without vectors.
+    """
     from rotor.quantum.spins.lines import derivatives
 
     return derivatives(top, levels, names, rows)

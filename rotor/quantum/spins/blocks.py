@@ -13,7 +13,7 @@ first, and among the levels of one sub-block Ka rises with energy.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -22,9 +22,8 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum.effect import QuantumEffect
-from rotor.quantum.levels import Levels, weights_of_levels
 from rotor.quantum.spins.coupling import coefficients, n_dot_s, patterns, recoupling
-from rotor.quantum.spins.method import FIRST_ORDER, Used, simplified
+from rotor.quantum.spins.method import FIRST_ORDER, Used
 from rotor.quantum.spins.operators import AxialState
 from rotor.quantum.spins.rotor import (
     Channel,
@@ -111,12 +110,27 @@ class Plan(NamedTuple):
 
 
 def plan_of(top: Top, effects: tuple[QuantumEffect, ...], nmin: int, nmax: int, executor: Executor | None) -> Plan:
-    """The rotation solved from N = `nmin` to `nmax`, and every channel contracted to it."""
+    """The rotation solved from N = `nmin` to `nmax`, and every channel contracted to it.
+
+    Parameters
+    ----------
+    top : Top
+    effects : tuple of QuantumEffect
+        All of the Hamiltonian, those of spins among them.
+    nmin, nmax : int
+        Lowest and highest N.
+    executor : Executor or None
+        N are spread over it.
+
+    Returns
+    -------
+    Plan
+    """
     scheme, terms = scheme_of(top, effects), valued_terms(top, effects)
     blocks, representation = solved_rotor(top, effects, terms, nmin, nmax, executor)
     channels = channels_of(terms, scheme)
     operators = {}
-    reach = 0 if "n" in scheme.kept else 2
+    reach = 0 if "n" in scheme.conserved else 2
     for i, k in _near(blocks, reach):
         if found := operators_between(blocks[i], blocks[k], channels, representation):
             operators[i, k] = found
@@ -136,7 +150,22 @@ def _near(blocks: list[RotorBlock], reach: int) -> Iterator[tuple[int, int]]:
 def operators_between(
     up: RotorBlock, low: RotorBlock, channels: Channels, representation: str
 ) -> dict[Channel, Floats]:
-    """Σ c ⟨r'|X|r⟩ of every channel that acts."""
+    """Σ c ⟨r'|X|r⟩ of every channel that acts between two solved blocks of the rotation.
+
+    Parameters
+    ----------
+    up, low : RotorBlock
+        The blocks of r' (rows) and r (columns).
+    channels : dict of Channel to list of Piece
+        Pieces of the Hamiltonian that share their coefficients of coupling.
+    representation : str
+        Which principal axes are x, y, z.
+
+    Returns
+    -------
+    dict of Channel to (n', n) array
+        Contracted matrices in MHz; empty where nothing acts.
+    """
     bases = up.parts[0].basis, low.parts[0].basis
     if isinstance(bases[0], AxialState) and isinstance(bases[1], AxialState) and bases[0].axial_k != bases[1].axial_k:
         return {}
@@ -241,7 +270,7 @@ def product(left: Floats, right: Floats) -> Floats:
 def coefficients_of(scheme: Scheme, channel: Channel, every: Ints) -> Floats:
     """c(p', p) of a channel between all patterns of an F, with its powers of N·S."""
     found = _of_exchange(scheme, channel, every) if scheme.paired else _one_by_one(scheme, channel, every)
-    for column in scheme.kept_columns:
+    for column in scheme.conserved_columns:
         found = np.where(every[:, None, column] == every[None, :, column], found, 0.0)
     if not channel.ns:
         return found
@@ -323,83 +352,3 @@ def assigned(shares: Floats, capacity: Ints) -> Ints:
 
 
 _AT_A_TIME = 1000
-
-
-def levels_of_f(
-    top: Top,
-    effects: tuple[QuantumEffect, ...],
-    every_f: Sequence[int],
-    n_range: tuple[int, int] | None = None,
-    executor: Executor | None = None,
-    exist: Exist | None = None,
-) -> Levels:
-    """The levels of all F (doubled) in `every_f`, those whose label has N within `n_range`, if that is given.
-
-    exist: which of levels (n, columns as `SpinBlock.labels`) there are; blocks that hold none of them are not solved.
-    """
-    total = scheme_of(top, effects).total
-    lowest = min(max(0, (f - total) // 2) for f in every_f)
-    highest = max((f + total) // 2 for f in every_f)
-    plan = simplified(plan_of(top, effects, lowest, highest, executor), effects, every_f)
-    solved = [block for f in every_f for block in solve_f(plan, f, exist)]
-    if n_range:
-        solved = [_within(block, n_range) for block in solved]
-    blocks = tuple(_placed(solved))
-    return _table(top, effects, plan.shared, blocks, highest if n_range is None else n_range[1])
-
-
-def _within(block: SpinBlock, n_range: tuple[int, int]) -> SpinBlock:
-    n = block.labels[:, 3] // 2
-    chosen = (n >= n_range[0]) & (n <= n_range[1])
-    cut = {name: getattr(block, name)[chosen] for name in ("energies_mhz", "labels", "mixing")}
-    return replace(block, vectors=block.vectors[:, chosen], **cut)
-
-
-def _placed(blocks: Iterable[SpinBlock]) -> Iterator[SpinBlock]:
-    start = 0
-    for block in blocks:
-        if len(block.energies_mhz):
-            yield replace(block, start=start)
-            start += len(block.energies_mhz)
-
-
-def _table(
-    top: Top, effects: tuple[QuantumEffect, ...], shared: Shared, blocks: tuple[SpinBlock, ...], jmax: int
-) -> Levels:
-    if not blocks:
-        raise ValueError("no level with these spins exists in the range of F")
-    labels = np.concatenate([block.labels for block in blocks])
-    axial = isinstance(blocks[0].parts[0].rotor.parts[0].basis, AxialState)
-    quanta = {"v": labels[:, 0]} if any(effect.states(top) for effect in effects) else {}
-    quanta |= {"n": labels[:, 3] // 2}
-    if axial:
-        quanta |= {"k": labels[:, 1]}
-    elif top.kind != "linear":
-        quanta |= {"ka": labels[:, 1], "kc": labels[:, 2]}
-    scheme = shared.scheme
-    for column, (name, half) in enumerate(zip(scheme.names, scheme.half, strict=True), 4):
-        quanta[name] = labels[:, column] if half else labels[:, column] // 2
-    ones = np.ones(len(labels), dtype=np.int64)
-    levels = Levels(
-        kind=top.kind,
-        representation=shared.representation,
-        jmax=jmax,
-        energy_mhz=np.concatenate([block.energies_mhz for block in blocks]),
-        quanta=quanta,
-        multiplicity=labels[:, -1] + 1,
-        components=np.where(labels[:, 1] > 0, 2, 1) if axial else ones,
-        weight=ones,
-        halves=frozenset(name for name, half in zip(scheme.names, scheme.half, strict=True) if half),
-        effects=effects,
-        blocks=blocks,
-        mixing=np.concatenate([block.mixing for block in blocks]),
-    )
-    return replace(levels, weight=_weights(top, effects, levels))
-
-
-def _weights(top: Top, effects: tuple[QuantumEffect, ...], levels: Levels) -> Ints:
-    weight = weights_of_levels(levels, top.spin_weights)
-    for state in (state for effect in effects for state in effect.states(top)):
-        if state.spin_weights is not None:
-            weight = np.where(levels.quanta["v"] == state.v, weights_of_levels(levels, state.spin_weights), weight)
-    return weight

@@ -80,7 +80,7 @@ def reduced_spin(spin: int, rank: int) -> float:
     return sqrt((i + 1) * (2 * i + 1) * (2 * i + 3) / (24 * i * (2 * i - 1)))
 
 
-def passed_on(bra: Ints, ket: Ints, spin: int, rank: int) -> Floats:
+def _passed_on(bra: Ints, ket: Ints, spin: int, rank: int) -> Floats:
     """⟨(j' S)J'‖T^K‖(j S)J⟩ over ⟨j'‖T^K‖j⟩ where T does not touch S: bra and ket are pairs (..., 2) of doubled j, J.
 
     (-1)^(j'+S+J+K) √((2J'+1)(2J+1)) {j' J' S; J j K}
@@ -90,14 +90,14 @@ def passed_on(bra: Ints, ket: Ints, spin: int, rank: int) -> Floats:
     return _sign(a + spin + d + 2 * rank) * root * six_j(a / 2, b / 2, spin / 2, d / 2, c / 2, rank)
 
 
-def closed(bra: Ints, ket: Ints, spin: int, rank: int) -> Floats:
+def _closed(bra: Ints, ket: Ints, spin: int, rank: int) -> Floats:
     """⟨(j' S)J'|T^K · W^K(S)|(j S)J⟩ over ⟨j'‖T‖j⟩⟨S‖W‖S⟩: (-1)^(j+S+J) {J S j'; K j S}, zero where J' ≠ J."""
     a, b, c, d = bra[..., 0], bra[..., 1], ket[..., 0], ket[..., 1]
     symbol = six_j(d / 2, spin / 2, a / 2, rank, c / 2, spin / 2)
     return np.where(b == d, _sign(c + spin + d) * symbol, 0.0)
 
 
-def opened(bra: Ints, ket: Ints, spin: int, rank: int) -> Floats:
+def _opened(bra: Ints, ket: Ints, spin: int, rank: int) -> Floats:
     """⟨(j' S)J'‖[T^L x S]^1‖(j S)J⟩ over ⟨j'‖T^L‖j⟩⟨S‖S‖S⟩: √(3 (2J'+1)(2J+1)) {j' j L; S S 1; J' J 1}."""
     a, b, c, d = np.broadcast_arrays(bra[..., 0], bra[..., 1], ket[..., 0], ket[..., 1])
     rows = [[a, c, np.full_like(a, 2 * rank)], [spin + 0 * a, spin + 0 * a, 2 + 0 * a], [b, d, 2 + 0 * a]]
@@ -139,28 +139,61 @@ def coefficients(spins: tuple[int, ...], acting: tuple[int, ...], rank: int, bra
             total = total * (pair[0][..., 1] == pair[1][..., 1])
         elif place == last:
             own = 2 if acting == (last, last) else 1
-            total = total * closed(*pair, spin, own) * reduced_spin(spin, own)
+            total = total * _closed(*pair, spin, own) * reduced_spin(spin, own)
         elif place == first:
-            total = total * opened(*pair, spin, carried) * reduced_spin(spin, 1)
+            total = total * _opened(*pair, spin, carried) * reduced_spin(spin, 1)
             carried = 1
         else:
-            total = total * passed_on(*pair, spin, carried)
+            total = total * _passed_on(*pair, spin, carried)
     if first != last:
         total = total * _RECOUPLED[rank]
     return np.asarray(np.where((left[..., 0] == right[..., 0]), total, 0.0) if rank == 0 else total)
 
 
 def tensor_coefficients(spins: tuple[int, ...], rank: int, bra: Ints, ket: Ints) -> Floats:
-    """⟨p'‖T^K‖p⟩ over ⟨N'‖T^K‖N⟩ of an operator that touches no spin, such as the dipole: (patterns, patterns)."""
+    """⟨p'‖T^K‖p⟩ over ⟨N'‖T^K‖N⟩ of an operator that touches no spin, such as the dipole.
+
+    Parameters
+    ----------
+    spins : tuple of int
+        The spins in the order in which they are coupled, doubled.
+    rank : int
+        K of the tensor.
+    bra, ket : (patterns, columns) arrays of int
+        Coupling patterns N, J1, ... F of both sides, doubled.
+
+    Returns
+    -------
+    (bra patterns, ket patterns) array
+        Pure numbers: the product over the chain of A. R. Edmonds (1957), eq. (7.1.7).
+    """
     total = np.ones((len(bra), len(ket)))
     for place, spin in enumerate(spins):
-        total = total * passed_on(bra[:, None, place : place + 2], ket[None, :, place : place + 2], spin, rank)
+        total = total * _passed_on(bra[:, None, place : place + 2], ket[None, :, place : place + 2], spin, rank)
     return total
 
 
 def moment_coefficients(spins: tuple[int, ...], rank: int, acting: int | None, bra: Ints, ket: Ints) -> Floats:
-    """⟨p'‖V‖p⟩ over ⟨N'‖T^L‖N⟩ of a vector V: T^1 itself (acting None), S of one spin (L = 0), or Σ_q T²_pq S_q (L = 2).
+    """⟨p'‖V‖p⟩ over ⟨N'‖T^L‖N⟩ of a vector V: T^1 itself, S of one spin (L = 0), or Σ_q T²_pq S_q (L = 2).
 
+    Parameters
+    ----------
+    spins : tuple of int
+        The spins in the order in which they are coupled, doubled.
+    rank : int
+        L of the tensor of the rotation.
+    acting : int or None
+        Which spin belongs to V, counted from 0; None for T^1 itself.
+    bra, ket : (patterns, columns) arrays of int
+        Coupling patterns N, J1, ... F of both sides, doubled.
+
+    Returns
+    -------
+    (bra patterns, ket patterns) array
+        Pure numbers.
+
+    Notes
+    -----
     T^0 is given as a plain matrix, not as a reduced one.
     """
     if acting is None:
@@ -171,9 +204,9 @@ def moment_coefficients(spins: tuple[int, ...], rank: int, acting: int | None, b
     for place, spin in enumerate(spins):
         pair = left[..., place : place + 2], right[..., place : place + 2]
         if place == acting:
-            total = total * opened(*pair, spin, rank) * reduced_spin(spin, 1)
+            total = total * _opened(*pair, spin, rank) * reduced_spin(spin, 1)
         else:
-            total = total * passed_on(*pair, spin, rank if place < acting else 1)
+            total = total * _passed_on(*pair, spin, rank if place < acting else 1)
     return np.asarray(total)
 
 

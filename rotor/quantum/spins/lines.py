@@ -128,7 +128,29 @@ def _tensor_coefficients(scheme: Scheme, rank: int, bra: Ints, ket: Ints) -> Flo
 
 
 def derivatives(top: Top, levels: Levels, names: Sequence[str], rows: Ints) -> Floats:
-    """∂E/∂c = ⟨i|∂H/∂c|i⟩ of levels with spins, (rows, names); see `derivatives.level_derivatives`."""
+    """∂E/∂c = ⟨i|∂H/∂c|i⟩ of levels with spins; see `derivatives.level_derivatives`.
+
+    Parameters
+    ----------
+    top : Top
+        The constants that the levels were solved with.
+    levels : Levels
+        Levels with spins and their eigenvectors.
+    names : sequence of str
+        Parameters, in the order of the columns.
+    rows : (rows,) array of int
+        Indices of the levels.
+
+    Returns
+    -------
+    (rows, names) array
+        MHz per MHz.
+
+    Raises
+    ------
+    ValueError
+        For levels without vectors.
+    """
     out = np.zeros((len(levels), len(names)))
     if not levels.blocks:
         raise ValueError("these levels have no vectors; solve them with their spins anew")

@@ -17,7 +17,7 @@ from rotor.quantum.basis import names_of
 from rotor.quantum.coupled import CoupledBlock
 from rotor.quantum.effect import k_limits_of
 from rotor.quantum.levels import SolvedBlock
-from rotor.quantum.solve import hamiltonian, solve_rotation
+from rotor.quantum.rotation import hamiltonian, solve_rotation
 from rotor.quantum.spins.operators import EVERY_STATE, AxialState, Basis, Rotor, is_axial, summed
 from rotor.quantum.spins.scheme import Scheme, scheme_of
 from rotor.quantum.spins.terms import SpinTerm
@@ -82,6 +82,26 @@ def solved_rotor(
     """The rotation solved from N = `nmin` to `nmax`, and the representation of its functions.
 
     A symmetric top whose terms are all axial is left in |N K⟩, one function a block.
+
+    Parameters
+    ----------
+    top : Top
+        Constants and kind.
+    effects : tuple of QuantumEffect
+        What the Hamiltonian consists of.
+    terms : list of (float, SpinTerm)
+        Terms with spins, each with its value in MHz.
+    nmin, nmax : int
+        Lowest and highest N.
+    executor : Executor or None
+        N are spread over it.
+
+    Returns
+    -------
+    blocks : list of RotorBlock
+        Solved blocks, energies in MHz.
+    representation : str
+        Which principal axes are x, y, z.
     """
     if top.kind in ("prolate", "oblate") and _all_axial(top, effects, terms):
         levels = solve_rotation(top, effects, nmin, nmax, False, executor)
@@ -157,10 +177,24 @@ def _by_exchange(channel: Channel, scheme: Scheme) -> list[tuple[Channel, float]
 
 
 def contracted(up: RotorBlock, low: RotorBlock, pieces: Sequence[Piece], representation: str) -> Floats | None:
-    """Σ value ⟨r'‖X‖r⟩ between the states of two blocks, None where nothing acts.
+    """Σ value ⟨r'‖X‖r⟩ between the states of two blocks.
 
-    A piece between different states acts from its ket to its bra; the other way round it is the transposed element, which
-    belongs to the other order of the two blocks.
+    A piece between different states acts from its ket to its bra; the other way round it is the transposed element,
+    which belongs to the other order of the two blocks.
+
+    Parameters
+    ----------
+    up, low : RotorBlock
+        The blocks of r' (rows) and r (columns).
+    pieces : sequence of Piece
+        Operators with their values in MHz.
+    representation : str
+        Which principal axes are x, y, z.
+
+    Returns
+    -------
+    (n', n) array or None
+        MHz; None where nothing acts.
     """
     total: Floats | None = None
     for piece in pieces:
@@ -194,6 +228,22 @@ def _powers(piece: Piece, left: RotorPart, right: RotorPart) -> Floats:
 def in_both_orders(up: RotorBlock, low: RotorBlock, pieces: Sequence[Piece], representation: str) -> Floats | None:
     """`contracted` and, for pieces between different states, their Hermitian conjugates from the other order.
 
+    Parameters
+    ----------
+    up, low : RotorBlock
+        The blocks of r' (rows) and r (columns).
+    pieces : sequence of Piece
+        Operators with their values in MHz.
+    representation : str
+        Which principal axes are x, y, z.
+
+    Returns
+    -------
+    (n', n) array or None
+        MHz; None where nothing acts.
+
+    Notes
+    -----
     Coefficients of coupling have c(p', p) = (-1)^(N'-N) c(p, p').
     """
     found = contracted(up, low, pieces, representation)

@@ -22,12 +22,12 @@ if TYPE_CHECKING:
 class Scheme:
     """Which spins are coupled, and what the angular momenta on the way to F are called.
 
-    paired: whether the last two are coupled to a total spin first. kept: names of sums between whose values all elements are left
+    paired: whether the last two are coupled to a total spin first. conserved: names of sums between whose values all elements are left
     out, as in perturbation theory.
     """
 
     spins: tuple[Spin, ...]
-    kept: frozenset[str] = frozenset()
+    conserved: frozenset[str] = frozenset()
     twice: tuple[int, ...] = field(init=False)
     paired: bool = field(init=False, default=False)
 
@@ -81,9 +81,9 @@ class Scheme:
         return tuple([*halves[:-2], False, halves[-1]] if self.paired else halves)
 
     @property
-    def kept_columns(self) -> list[int]:
-        """Columns of the patterns that are kept."""
-        return [column for column, name in enumerate(("n", *self.names)) if name in self.kept]
+    def conserved_columns(self) -> list[int]:
+        """Columns of the patterns that are conserved."""
+        return [column for column, name in enumerate(("n", *self.names)) if name in self.conserved]
 
     def place(self, name: str) -> int:
         """The place of a spin by its name."""
@@ -99,5 +99,5 @@ def scheme_of(top: Top, effects: Sequence[QuantumEffect]) -> Scheme:
     for spin in (spin for effect in effects for spin in effect.spins(top)):
         if found.setdefault(spin.name, spin) != spin:
             raise ValueError(f"spin {spin.name}: given as {found[spin.name].twice}/2 and as {spin.twice}/2")
-    kept = frozenset(name for effect in effects for name in effect.kept(top))
-    return Scheme(tuple(sorted(found.values(), key=lambda spin: not spin.electron)), kept)
+    conserved = frozenset(name for effect in effects for name in effect.conserved_sums(top))
+    return Scheme(tuple(sorted(found.values(), key=lambda spin: not spin.electron)), conserved)

@@ -1,0 +1,137 @@
+"""A request for the motion of one body under effects, and what answers it: torques, drag, drives, gyrostats, gravity, contact.
+
+The free body has an exact motion of its own (`rotor.classical.tumble`); here the equations are stepped.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from rotor.arrays import Floats
+from rotor.checks import require_between
+from rotor.classical.effect import ClassicalEffect
+from rotor.classical.euler import checked_moments
+from rotor.classical.integrators.lie_runge_kutta import LieRungeKutta
+from rotor.classical.integrators.method import Method, Motion, integrate
+from rotor.classical.system import momentum_of
+from rotor.classical.tumble import Three
+from rotor.geometry.rotations import continuous
+from rotor.table import Table
+
+Four = tuple[float, float, float, float]
+METHODS = ("lie-runge-kutta", "splitting")
+DEFAULT_TOLERANCE = 1e-10
+
+
+@dataclass(frozen=True)
+class DrivenRequest:
+    """A motion under effects to compute; every field is checked when the request is made.
+
+    moments: (3,), principal moments. times: (n,), the start first. effects: that act. angular_velocity: (3,) in body axes at the
+    start; angular_momentum: instead, with what the effects add to it. attitude: quaternion, body to space, at the start.
+    tolerance: of a step of the adaptive Runge-Kutta method, relative to |L| and to one radian. step: of a splitting of
+    `order` instead, which holds no torque of the angular velocity. Any coherent units.
+    """
+
+    moments: Three
+    times: tuple[float, ...]
+    effects: tuple[ClassicalEffect, ...] = ()
+    angular_velocity: Three | None = None
+    angular_momentum: Three | None = None
+    attitude: Four = (1.0, 0.0, 0.0, 0.0)
+    tolerance: float = DEFAULT_TOLERANCE
+    step: float | None = None
+    order: int = 4
+
+    def __post_init__(self) -> None:
+        checked_moments(self.moments)
+        require_between("tolerance", self.tolerance, 0.0, 1.0)
+        if (self.angular_velocity is None) == (self.angular_momentum is None):
+            raise ValueError("angular_velocity, angular_momentum: give one of them")
+        if len(self.times) < 2 or not np.isfinite(self.times).all():
+            raise ValueError("times: expected at least two finite times, the start first")
+        if abs(float(np.linalg.norm(self.attitude)) - 1.0) > 1e-6:
+            raise ValueError(f"attitude: {self.attitude}: expected a unit quaternion, scalar first")
+
+    @property
+    def method(self) -> Method:
+        """What steps the motion."""
+        if self.step is None:
+            return LieRungeKutta(self.tolerance)
+        from rotor.classical.integrators.splitting import SymmetricTopSplitting
+
+        return SymmetricTopSplitting(self.step, self.order)
+
+    @property
+    def momentum(self) -> Floats:
+        """L (3,) in body axes at the start."""
+        if self.angular_momentum is not None:
+            return np.array(self.angular_momentum)
+        assert self.angular_velocity is not None  # one of the two is given
+        return np.asarray(momentum_of(self.angular_velocity, self.moments, self.effects, self.attitude))
+
+
+@dataclass(frozen=True, repr=False)
+class DrivenTable(Table):
+    """The motion by columns: t, L, attitude, energy, ω; all vectors in body axes."""
+
+    motion: Motion
+
+    @cached_property
+    def columns(self) -> dict[str, Floats]:
+        """t, m1, m2, m3, qw, qx, qy, qz, energy, w1, w2, w3."""
+        one = self.motion
+        names = ("t", "m1", "m2", "m3", "qw", "qx", "qy", "qz", "energy", "w1", "w2", "w3")
+        values = (one.times, *one.momentum.T, *continuous(one.attitude).T, one.energy, *one.omega.T)
+        return dict(zip(names, values, strict=True))
+
+
+@dataclass(frozen=True)
+class DrivenAnswer:
+    """The motion that a request asked for."""
+
+    request: DrivenRequest
+    motion: Motion
+
+    @property
+    def table(self) -> DrivenTable:
+        """The motion by columns."""
+        return DrivenTable(self.motion)
+
+    def facts(self) -> dict[str, Any]:
+        """Everything about the answer but its table.
+
+        energy_drift: largest change of the energy over the largest kinetic one, where every effect conserves it; else None.
+        """
+        energy = self.motion.energy
+        conserved = all(effect.conserves_energy for effect in self.request.effects)
+        size = 0.5 * float(np.max(np.sum(np.array(self.request.moments) * self.motion.omega**2, axis=-1)))
+        return {
+            "moments": list(self.request.moments),
+            "effects": [type(effect).__name__ for effect in self.request.effects],
+            "method": repr(self.request.method),
+            "steps": self.motion.steps,
+            "energy_first": float(energy[0]),
+            "energy_last": float(energy[-1]),
+            "energy_drift": float(np.ptp(energy)) / size if conserved and size else None,
+            "last_time": float(self.motion.times[-1]),
+        }
+
+
+def answer_driven(request: DrivenRequest) -> DrivenAnswer:
+    """The motion of a request.
+
+    Raises ValueError for a method that cannot serve an effect, and for a motion that does not stay finite.
+
+    >>> from rotor.classical.effects.drag import LinearDrag
+    >>> asked = DrivenRequest((1.0, 1.0, 1.0), (0.0, 1.0), (LinearDrag([1, 1, 1]),), angular_velocity=(0.0, 0.0, 1.0))
+    >>> round(float(answer_driven(asked).table.columns["w3"][-1]), 9)  # exp(-1)
+    0.367879441
+    """
+    method, start = request.method, request.momentum
+    motion = integrate(method, request.moments, start, request.times, request.attitude, request.effects)
+    return DrivenAnswer(request, motion)

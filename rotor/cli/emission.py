@@ -1,0 +1,243 @@
+"""`rotor emission`: lines as a radio telescope sees them, of one or several molecules in one source."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from rotor.checks import require_whole
+from rotor.cli.shared import inputs, plot_options
+from rotor.cli.shared.inputs import Input, json_option
+from rotor.cli.shared.options import argument, file_option, grouped, option
+from rotor.cli.shared.output import (
+    Files,
+    Table,
+    Writer,
+    answering,
+    deliver,
+    json_with_rows,
+    note,
+    show_facts,
+    show_table,
+)
+from rotor.cli.shared.plot_options import PlotOptions
+
+if TYPE_CHECKING:
+    from rotor.spectra.emission import Source
+    from rotor.spectra.emission_request import EmissionAnswer, EmissionRequest
+
+EXAMPLES = """\b
+Examples:
+  rotor emission CO --range 115.1:115.4GHz --column 1e17 --excitation 20 --width 2
+  rotor emission CH3CN HC3N SO2 --band ALMA6 --column 1e15,3e14,1e15 --excitation 100 --width 5 --plot core.png
+  rotor emission CO --isotope C=13C --band ALMA3 --column 1e16 --excitation 10 --velocity 5.6 --csv co.csv"""
+
+NAMES = {
+    "columns_per_cm2": "--column", "column_per_cm2": "--column", "excitation_k": "--excitation", "background_k": "--background",
+    "filling": "--filling", "velocity_km_s": "--velocity", "fwhm_km_s": "--width", "range_mhz": "--range",
+    "least_depth": "--least-depth",
+}  # fmt: skip  # field of the request -> option
+
+
+@dataclass(frozen=True)
+class Options:
+    """The molecules, the source, and what of it is looked at."""
+
+    sources: list[str] | None = argument(None, metavar="SOURCE...", help="Molecules: names, files, SMILES:...")
+    isotope: list[str] | None = option(
+        None, metavar="1=2H", help="Another isotope, by atom number or element, of a single molecule; repeatable."
+    )
+    column: str = option("1e14", metavar="N", help="Column density, one for all or one each: 1e14,3e13 (1/cm²).")
+    excitation: str = option("100", metavar="T", help="Excitation temperature of rotation (K).")
+    background: str = option("2.725", metavar="T", help="Temperature behind the source (K).")
+    filling: float = option(1.0, metavar="F", help="Part of the beam that the source fills.")
+    velocity: float = option(0.0, metavar="V", help="Of the source, receding positive, radio convention (km/s).")
+    width: float = option(1.0, metavar="W", help="Full width of the lines at half maximum (km/s).")
+    band: str | None = option(None, metavar="NAME", help="A receiver's band instead of --range: ALMA1 to ALMA10.")
+    range_: str | None = option(None, "--range", metavar="A:B", help="First and last frequency observed (MHz).")
+    least_depth: float = option(1e-6, metavar="X", help="Leave out lines of less optical depth.")
+    top_lines: int = option(20, "--top", metavar="N", help="How many of the brightest lines are shown.")
+
+
+@dataclass(frozen=True)
+class Outputs:
+    """Files to write."""
+
+    csv: str | None = file_option(".csv", help="Write the lines as CSV.")
+    parquet: str | None = file_option(".parquet", help="Write the lines as Parquet.")
+    profile_csv: str | None = file_option(".csv", help="Write T_B and optical depth on the grid as CSV.")
+    plot: str | None = file_option(".png", ".pdf", ".svg", help="Draw T_B of every molecule (.png, .pdf, .svg).")
+    json: str | None = json_option()
+
+
+@grouped()
+def command(context: typer.Context, options: Options, outputs: Outputs, picture: PlotOptions) -> None:
+    """Brightness temperature of a source in local thermodynamic equilibrium."""
+    require_whole("--top", options.top_lines, 0)
+    if not options.sources:
+        raise ValueError("SOURCE: expected one molecule or several, such as 'rotor emission CO HCN --band ALMA3'")
+    files = Files.of(outputs)
+    drawn = plot_options.settings_of(picture, files)
+    with inputs.fields_as_options(**NAMES):
+        request = _request(options)
+    from rotor.spectra.emission_request import answer_emission
+
+    with answering():
+        answer = answer_emission(request)
+        content = _content(answer, options, context.obj)
+    for text in answer.notes:
+        note(text)
+    content["files"] = files.names
+    show = lambda: _show(answer, options.top_lines)  # noqa: E731
+    deliver(files, _writers(answer, content, drawn), lambda: json_with_rows(answer.lines, "lines", content), show)
+
+
+def _request(options: Options) -> EmissionRequest:
+    from rotor.spectra.emission_request import EmissionRequest
+
+    source, range_mhz = _source(options), _range(options)
+    if options.isotope and len(_sources(options)) > 1:
+        raise ValueError("--isotope: expected with a single molecule; which of several is meant is not said")
+    tops = tuple(
+        inputs.with_some_dipole(inputs.read_top(Input(one, isotope=options.isotope))) for one in _sources(options)
+    )
+    columns = _columns(options.column)
+    if len(columns) == 1:
+        columns *= len(tops)
+    return EmissionRequest(tops, columns, source, range_mhz, options.least_depth)
+
+
+def _sources(options: Options) -> list[str]:
+    return options.sources or []
+
+
+def _source(options: Options) -> Source:
+    from rotor.spectra.emission import Source
+
+    return Source(
+        column_per_cm2=_columns(options.column)[0],
+        excitation_k=inputs.positive("--excitation", options.excitation, "K"),
+        fwhm_km_s=options.width,
+        velocity_km_s=options.velocity,
+        background_k=inputs.quantity("--background", options.background, "K"),
+        filling=options.filling,
+    )
+
+
+def _columns(text: str) -> tuple[float, ...]:
+    from rotor.units import parse_quantity
+
+    bare = text.replace("cm-2", "").replace("cm^-2", "").replace("/cm2", "").replace("1/cm²", "")
+    return inputs.parsed("--column", bare, lambda t: tuple(parse_quantity(item, "") for item in t.split(",")))
+
+
+def _range(options: Options) -> tuple[float, float]:
+    from rotor.spectra.emission import band_mhz
+    from rotor.units import parse_range
+
+    if (options.band is None) == (options.range_ is None):
+        raise ValueError("--range or --band: expected one of them, such as --range 86:116GHz or --band ALMA3")
+    if options.band is not None:
+        return inputs.parsed("--band", options.band, band_mhz)
+    return inputs.parsed("--range", options.range_ or "", lambda text: parse_range(text, "MHz"))
+
+
+def _content(answer: EmissionAnswer, options: Options, command: str) -> dict[str, Any]:
+    """What is printed and more, by the keys of docs/command_line.md."""
+    from rotor.cli.shared.report import begin
+
+    return {**begin(command, " ".join(_sources(options))), **answer.facts()}
+
+
+def _writers(answer: EmissionAnswer, content: dict[str, Any], drawn: dict[str, Any]) -> dict[str, Writer]:
+    import rotor
+
+    keys = ("command", "input", "molecules", "source", "range_mhz")
+    record = {key: content[key] for key in keys}
+
+    def draw(path: Path) -> None:
+        from rotor.plots.emission import plot_emission
+
+        plot_emission(answer, path, provenance=record, **drawn)
+
+    return {
+        "--csv": lambda path: rotor.write(answer.lines, path, settings=record),
+        "--parquet": lambda path: rotor.write(answer.lines, path, settings=record),
+        "--profile-csv": lambda path: rotor.write(answer.spectrum, path, settings=record),
+        "--plot": draw,
+    }
+
+
+def _show(answer: EmissionAnswer, shown: int) -> None:
+    from rotor.cli.shared.sources import short_source
+
+    request, source = answer.request, answer.request.source
+    print(
+        f"{', '.join(request.names)}: brightness temperature, from {request.range_mhz[0]:.10g} to {request.range_mhz[1]:.10g} MHz"
+    )
+    behind = f"background {source.background_k:g} K, filling {source.filling:g}"
+    facts = [
+        ("excitation", f"{source.excitation_k:g} K; {behind}"),
+        (
+            "lines",
+            f"{len(answer.lines)}, {source.fwhm_km_s:g} km/s wide, source at {source.velocity_km_s:g} km/s (radio convention)",
+        ),
+    ]
+    for name, column, q in zip(request.names, request.columns_per_cm2, answer.partition_functions, strict=True):
+        facts.append((name, f"N = {column:.4g} /cm², Q = {q:.6g}"))
+    if len(answer.lines):
+        at, peak = answer.spectrum.brightness_k.argmax(), answer.spectrum
+        facts.append(
+            (
+                "brightest",
+                f"{peak.brightness_k[at]:.4g} K at {peak.frequency_mhz[at]:.4f} MHz, τ = {peak.optical_depth[at]:.3g}",
+            )
+        )
+    show_facts(facts)
+    if not len(answer.lines):
+        print("\nno lines: none is inside the range and deep enough; widen --range or lower --least-depth")
+    elif shown:
+        print()
+        show_table(_table(answer, shown))
+    print()
+    cited = "; ".join(
+        f"{name}: {short_source(top.source)}" for name, top in zip(request.names, request.tops, strict=True)
+    )
+    show_facts(
+        [
+            ("sources", cited),
+            ("left out", "departures from one excitation temperature, structure in the beam, hyperfine splitting"),
+        ]
+    )
+
+
+def _table(answer: EmissionAnswer, shown: int) -> Table:
+    """The brightest lines, in order of frequency."""
+    import numpy as np
+
+    lines, names = answer.lines, answer.request.names
+    rows = np.sort(np.argsort(-lines.brightness_k, kind="stable")[:shown]).tolist()
+    cells = [
+        (
+            names[lines.molecule[i]],
+            f"{lines.frequency_mhz[i]:.4f}",
+            f"{lines.observed_mhz[i]:.4f}",
+            lines.upper[i],
+            lines.lower[i],
+            f"{lines.energy_upper_k[i]:.2f}",
+            f"{lines.einstein_a_per_s[i]:.2e}",
+            str(lines.g_upper[i]),
+            f"{lines.optical_depth[i]:.3g}",
+            f"{lines.brightness_k[i]:.4g}",
+            f"{lines.integrated_k_km_s[i]:.4g}",
+        )
+        for i in rows
+    ]
+    title = f"the {len(rows)} brightest lines" if len(rows) < len(lines) else "all lines"
+    columns = (
+        "molecule", "at rest (MHz)", "observed (MHz)", "upper", "lower", "E_u (K)", "A (1/s)", "g_u", "τ", "T_B (K)", "∫T_B dv (K km/s)",
+    )  # fmt: skip
+    return Table(f"{title}, in order of frequency; each by itself", columns, cells, frozenset({"molecule"}))

@@ -1,0 +1,186 @@
+"""`rotor run`: a scene file run, or all points of its sweep."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from rotor.checks import require_whole
+from rotor.cli.shared.inputs import json_option
+from rotor.cli.shared.options import argument, grouped, option
+from rotor.cli.shared.output import (
+    ComputationError,
+    Files,
+    Table,
+    deliver,
+    json_with_rows,
+    note,
+    plain,
+    show_facts,
+    show_table,
+)
+
+if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
+    from rotor.scenes.run import SceneResult
+    from rotor.scenes.scene import Scene
+    from rotor.scenes.sweep import SweepResult
+    from rotor.table import Table as Columns
+
+SHOWN = 20  # rows of the table in the report
+
+EXAMPLES = """\b
+Examples:
+  rotor run s.toml
+  rotor run s.toml --out results --json -
+  rotor run sweep.toml --workers 4"""
+
+
+@dataclass(frozen=True)
+class Options:
+    """The scene, and where its files go."""
+
+    scene: str = argument(..., help="A scene file.")
+    out: str = option(".", metavar="FOLDER", help="From which the files that are written are counted.")
+    workers: int | None = option(None, metavar="N", help="Spread the points of a sweep, or the work, over N processes.")
+    record: str | None = option(
+        None, metavar="FILE", help="Of a sweep: what is done; by default SCENE.sweep.jsonl in the folder of --out."
+    )
+    json: str | None = json_option()
+
+
+@grouped()
+def command(context: typer.Context, options: Options) -> None:
+    """Run a scene: write the files that it names, and report; a sweep goes on where it stopped."""
+    from rotor.scenes.scene_file import read_scene
+
+    require_whole("--workers", options.workers, 1)
+    if not Path(options.out).is_dir():
+        raise ValueError(f"--out {options.out}: there is no such folder; make it first")
+    scene = read_scene(options.scene)
+    if options.record is not None and not scene.sweep:
+        raise ValueError("--record: this scene has no sweep")
+    files = Files()
+    files.ask_json(options.json)
+    with _workers(options.workers) as pool:
+        if scene.sweep:
+            _sweep(scene, options, files, pool, context.obj)
+        else:
+            _single(scene, options, files, pool, context.obj)
+
+
+@contextmanager
+def _workers(number: int | None) -> Iterator[Executor | None]:
+    """A pool of processes; None for one process."""
+    if number is None or number == 1:
+        yield None
+        return
+    from concurrent.futures import ProcessPoolExecutor
+    from multiprocessing import get_context
+
+    pool = ProcessPoolExecutor(number, mp_context=get_context("spawn"))
+    try:
+        yield pool
+    finally:
+        pool.shutdown(wait=True, cancel_futures=True)
+
+
+def _folder(options: Options) -> Path:
+    return Path(options.scene).parent
+
+
+def _single(scene: Scene, options: Options, files: Files, pool: Executor | None, command: str) -> None:
+    from rotor.fluid.run import RunStopped
+    from rotor.scenes.run import run_scene
+
+    try:
+        result = run_scene(scene, folder=_folder(options), out=options.out, executor=pool)
+    except RunStopped as error:
+        raise ComputationError(str(error)) from error
+    for remark in _notes(result):
+        note(remark)
+    content = _content(result, options, command)
+    text = lambda: json_with_rows(result.table, "rows", content)  # noqa: E731
+    deliver(files, {}, text, lambda: _show(result))
+
+
+def _notes(result: SceneResult) -> list[str]:
+    top = getattr(result.request, "top", None)
+    facts = result.answer.facts()
+    return list(dict.fromkeys([*(top.notes if top is not None else ()), *facts.get("notes", ())]))
+
+
+def _content(result: SceneResult, options: Options, command: str) -> dict[str, Any]:
+    import rotor
+
+    head = {
+        "rotor_version": rotor.__version__,
+        "command": command,
+        "scene": options.scene,
+        "kind_of_scene": result.scene.kind,
+    }
+    names = [str(path) for path in result.files]
+    return {**head, **result.answer.facts(), "seconds": result.seconds, "files": names}
+
+
+def _show(result: SceneResult) -> None:
+    scene, facts = result.scene, result.answer.facts()
+    print(scene.title or f"a scene of the kind {scene.kind}")
+    single = {
+        name: value for name, value in plain(facts).items() if isinstance(value, int | float | str) and value != ""
+    }
+    show_facts(
+        [
+            *((name, f"{value:.10g}" if isinstance(value, float) else str(value)) for name, value in single.items()),
+            ("rows", str(len(result.table))),
+            ("files", ", ".join(map(str, result.files)) or "none: [outputs] names none"),
+            ("seconds", f"{result.seconds:.3g}"),
+        ]
+    )
+    if not result.files and len(result.table):
+        print()
+        show_table(_some_rows(result.table))
+
+
+def _some_rows(table: Columns) -> Table:
+    """Some rows of a table, evenly chosen."""
+    count, columns = len(table), table.columns
+    rows = sorted({round(i * (count - 1) / (SHOWN - 1)) for i in range(SHOWN)}) if count > SHOWN else range(count)
+    cells = [[_cell(column[row]) for column in columns.values()] for row in rows]
+    return Table("all rows" if len(cells) == count else f"{len(cells)} of {count} rows", list(columns), cells)
+
+
+def _cell(value: Any) -> str:
+    return f"{value:.8g}" if hasattr(value, "dtype") and value.dtype.kind == "f" else str(value)
+
+
+def _sweep(scene: Scene, options: Options, files: Files, pool: Executor | None, command: str) -> None:
+    import rotor
+    from rotor.scenes.sweep import run_sweep
+
+    record = options.record or str(Path(options.out) / f"{Path(options.scene).stem}.sweep.jsonl")
+    result = run_sweep(
+        scene, folder=_folder(options), out=options.out, record=record, executor=pool, on_point=_say_point
+    )
+    head = {"rotor_version": rotor.__version__, "command": command, "scene": options.scene, "kind_of_scene": scene.kind}
+    content = {**head, "record": record, "computed": result.computed, "files": list(result.files)}
+    text = lambda: json_with_rows(result, "points", content)  # noqa: E731
+    deliver(files, {}, text, lambda: _show_sweep(result, record))
+
+
+def _say_point(record: Mapping[str, Any]) -> None:
+    import sys
+
+    values = ", ".join(f"{name} = {value}" for name, value in record["values"].items())
+    print(f"done: {values} ({record['seconds']:.3g} s)", file=sys.stderr)
+
+
+def _show_sweep(result: SweepResult, record: str) -> None:
+    print(f"a sweep of {len(result)} points, {result.computed} of them computed now; the others are from {record}")
+    show_table(_some_rows(result))

@@ -1,0 +1,90 @@
+"""A picture of what a telescope sees: brightness temperature of several molecules in colours of their own, and of all."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from typing import Any
+
+from rotor.plots.picture import GREY, PALETTE, checked_suffix, name_of_top, new_figure, save, styled
+from rotor.plots.spectrum import UNITS, thinned
+from rotor.spectra.emission_request import EmissionAnswer
+
+
+def plot_emission(
+    answer: EmissionAnswer, path: str | os.PathLike[str], *, provenance: Mapping[str, Any] | None = None, **options: Any
+) -> None:
+    """Draw a spectrum of brightness temperature into a .png, .pdf or .svg file.
+
+    Parameters
+    ----------
+    answer : EmissionAnswer
+    path : path
+    provenance : mapping, optional
+        Written into the metadata of the file.
+    options :
+        title, unit, range_mhz and log, as in `emission_figure`.
+
+    Raises
+    ------
+    ValueError
+        A suffix that is no picture.
+    """
+    checked_suffix(path)
+    save(emission_figure(answer, **options), path, options.get("title") or _title(answer), provenance or {})
+
+
+def emission_figure(
+    answer: EmissionAnswer,
+    *,
+    title: str | None = None,
+    unit: str | None = None,
+    range_mhz: tuple[float, float] | None = None,
+    log: bool | None = None,
+) -> Any:
+    """A matplotlib figure of T_B against the observed frequency.
+
+    Parameters
+    ----------
+    answer : EmissionAnswer
+        Each of its molecules is a curve; where there are several, all together is a grey one behind them.
+    title : str, optional
+        Instead of the names and the source.
+    unit : "MHz", "GHz", "THz" or "cm-1", optional
+        Of the frequency axis, GHz by default.
+    range_mhz : (2,), optional
+        Frequencies shown, those of the request by default.
+    log : bool, optional
+        Whether T_B is on a logarithmic axis.
+    """
+    mhz = UNITS[unit or "GHz"]
+    first, last = range_mhz or answer.request.range_mhz
+    names = [
+        name_of_top(top) if top.name else name
+        for top, name in zip(answer.request.tops, answer.request.names, strict=True)
+    ]
+    with styled():
+        figure = new_figure()
+        axes = figure.add_subplot()
+        if len(names) > 1:
+            x, y = thinned(answer.spectrum.frequency_mhz / mhz, answer.spectrum.brightness_k)
+            axes.plot(x, y, color=GREY, linewidth=2.0, alpha=0.4, label="together")
+        for number, (part, name) in enumerate(zip(answer.parts, names, strict=True)):
+            x, y = thinned(part.frequency_mhz / mhz, part.brightness_k)
+            axes.plot(x, y, color=PALETTE[number % len(PALETTE)], linewidth=0.8, label=name)
+        axes.set_xlim(first / mhz, last / mhz)
+        peak = answer.spectrum.brightness_k
+        if log:
+            axes.set_yscale("log")
+            axes.set_ylim(1e-5 * float(peak.max()), 2 * float(peak.max()))
+        axes.set_xlabel("Wavenumber (cm⁻¹)" if unit == "cm-1" else f"Frequency ({unit or 'GHz'})")
+        axes.set_ylabel("Brightness temperature (K)")
+        axes.set_title(_title(answer) if title is None else title, loc="left")
+        figure.legend(loc="outside lower right", ncols=4, frameon=False, fontsize=7)
+    return figure
+
+
+def _title(answer: EmissionAnswer) -> str:
+    source = answer.request.source
+    text = f"excitation {source.excitation_k:g} K, width {source.fwhm_km_s:g} km/s"
+    return text + (f", velocity {source.velocity_km_s:g} km/s" if source.velocity_km_s else "")

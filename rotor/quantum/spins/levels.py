@@ -1,0 +1,123 @@
+"""Levels with spins, F by F: the table of them, with their names, degeneracies and weights."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rotor.arrays import Ints
+from rotor.quantum.effect import QuantumEffect
+from rotor.quantum.levels import Levels, weights_of_levels
+from rotor.quantum.spins.operators import AxialState
+from rotor.quantum.spins.scheme import scheme_of
+from rotor.quantum.spins.simplify import simplified
+
+if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
+    from rotor.tops.top import Top
+
+
+from rotor.quantum.spins.blocks import Exist, Shared, SpinBlock, plan_of, solve_f
+
+
+def levels_of_f(
+    top: Top,
+    effects: tuple[QuantumEffect, ...],
+    every_f: Sequence[int],
+    n_range: tuple[int, int] | None = None,
+    executor: Executor | None = None,
+    exist: Exist | None = None,
+) -> Levels:
+    """The levels of all F in `every_f`, those whose label has N within `n_range`, if that is given.
+
+    Parameters
+    ----------
+    top : Top
+        Constants, kind and spin weights.
+    effects : tuple of QuantumEffect
+        What the Hamiltonian consists of.
+    every_f : sequence of int
+        Total angular momenta, doubled.
+    n_range : (int, int), optional
+        Lowest and highest N of the labels; all by default.
+    executor : Executor, optional
+        The rotation is spread over it by N.
+    exist : callable, optional
+        Which of levels (n, columns as `SpinBlock.labels`) there are, (n,) of bool; blocks with none of them are not
+        solved.
+
+    Returns
+    -------
+    Levels
+        Energies in MHz with eigenvectors and labels.
+    """
+    total = scheme_of(top, effects).total
+    lowest = min(max(0, (f - total) // 2) for f in every_f)
+    highest = max((f + total) // 2 for f in every_f)
+    plan = simplified(plan_of(top, effects, lowest, highest, executor), effects, every_f)
+    solved = [block for f in every_f for block in solve_f(plan, f, exist)]
+    if n_range:
+        solved = [_within(block, n_range) for block in solved]
+    blocks = tuple(_placed(solved))
+    return _table(top, effects, plan.shared, blocks, highest if n_range is None else n_range[1])
+
+
+def _within(block: SpinBlock, n_range: tuple[int, int]) -> SpinBlock:
+    n = block.labels[:, 3] // 2
+    chosen = (n >= n_range[0]) & (n <= n_range[1])
+    cut = {name: getattr(block, name)[chosen] for name in ("energies_mhz", "labels", "mixing")}
+    return replace(block, vectors=block.vectors[:, chosen], **cut)
+
+
+def _placed(blocks: Iterable[SpinBlock]) -> Iterator[SpinBlock]:
+    start = 0
+    for block in blocks:
+        if len(block.energies_mhz):
+            yield replace(block, start=start)
+            start += len(block.energies_mhz)
+
+
+def _table(
+    top: Top, effects: tuple[QuantumEffect, ...], shared: Shared, blocks: tuple[SpinBlock, ...], jmax: int
+) -> Levels:
+    if not blocks:
+        raise ValueError("no level with these spins exists in the range of F")
+    labels = np.concatenate([block.labels for block in blocks])
+    axial = isinstance(blocks[0].parts[0].rotor.parts[0].basis, AxialState)
+    quanta = {"v": labels[:, 0]} if any(effect.states(top) for effect in effects) else {}
+    quanta |= {"n": labels[:, 3] // 2}
+    if axial:
+        quanta |= {"k": labels[:, 1]}
+    elif top.kind != "linear":
+        quanta |= {"ka": labels[:, 1], "kc": labels[:, 2]}
+    scheme = shared.scheme
+    for column, (name, half) in enumerate(zip(scheme.names, scheme.half, strict=True), 4):
+        quanta[name] = labels[:, column] if half else labels[:, column] // 2
+    ones = np.ones(len(labels), dtype=np.int64)
+    levels = Levels(
+        kind=top.kind,
+        representation=shared.representation,
+        jmax=jmax,
+        energy_mhz=np.concatenate([block.energies_mhz for block in blocks]),
+        quanta=quanta,
+        multiplicity=labels[:, -1] + 1,
+        components=np.where(labels[:, 1] > 0, 2, 1) if axial else ones,
+        weight=ones,
+        halves=frozenset(name for name, half in zip(scheme.names, scheme.half, strict=True) if half),
+        effects=effects,
+        blocks=blocks,
+        mixing=np.concatenate([block.mixing for block in blocks]),
+    )
+    return replace(levels, weight=_weights(top, effects, levels))
+
+
+def _weights(top: Top, effects: tuple[QuantumEffect, ...], levels: Levels) -> Ints:
+    weight = weights_of_levels(levels, top.spin_weights)
+    for state in (state for effect in effects for state in effect.states(top)):
+        if state.spin_weights is not None:
+            weight = np.where(levels.quanta["v"] == state.v, weights_of_levels(levels, state.spin_weights), weight)
+    return weight

@@ -1,0 +1,1 @@
+"""Scenes: what to simulate, written in one file; read, planned and run."""

@@ -1,0 +1,156 @@
+"""The interface between scenes and the library: what each file of `rotor.scenes.kinds` gives, and what they share."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable, Iterable, Mapping
+from concurrent.futures import Executor
+from contextlib import contextmanager
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rotor.scenes.molecule import named
+from rotor.scenes.scene import Scene
+from rotor.scenes.sections import Grid, MoleculeSection, QuantumEffects, VibrationSection
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from rotor.quantum.effect import QuantumEffect
+    from rotor.table import Table
+    from rotor.thermo import VibrationalStates
+    from rotor.tops.top import Top
+
+Writer = Callable[[Path], None]
+Where = str | os.PathLike[str]
+
+
+def _no_writers(answer: Any, scene: Any) -> Mapping[str, Writer]:
+    return {}
+
+
+@dataclass(frozen=True)
+class Kind:
+    """How one kind of scene is computed.
+
+    request: of a scene in a folder; checks everything that can be checked beforehand. answer: of a request, for a scene with
+    files that grow in a folder. table: of an answer. writers: by the name of an output, what writes it, besides csv, parquet
+    and json, which the table itself becomes. grows: outputs that the answer itself writes. saved: the scene that a request is
+    the answer to, its molecule given.
+    """
+
+    request: Callable[[Any, Where], Any]
+    answer: Callable[[Any, Any, Where, Executor | None], Any]
+    table: Callable[[Any], Table]
+    saved: Callable[[Any, MoleculeSection | None], Scene]
+    writers: Callable[[Any, Any], Mapping[str, Writer]] = _no_writers
+    grows: frozenset[str] = frozenset()
+
+
+def kind_of(scene: Scene) -> Kind:
+    """What computes a scene; only the module of its kind is imported."""
+    found: Kind = import_module(f"rotor.scenes.kinds.{scene.kind}").KIND
+    return found
+
+
+def quantity(name: str, value: float | str, unit: str) -> float:
+    """A number in `unit`; a ValueError names the field."""
+    from rotor.units import parse_quantity
+
+    return named(name, lambda: parse_quantity(value, unit))
+
+
+def grid(name: str, value: Grid | None, unit: str) -> tuple[float, ...] | None:
+    """Numbers in `unit` of a list or of a text such as 0:10:101; None for none."""
+    from rotor.units import parse_grid
+
+    if value is None:
+        return None
+    if isinstance(value, str):
+        return named(name, lambda: tuple(parse_grid(value, unit).tolist()))
+    if not all(map(math.isfinite, value)):
+        raise ValueError(f"{name}: expected finite numbers")
+    return tuple(value)
+
+
+def frequencies(name: str, text: str | None) -> tuple[float, float]:
+    """First and last frequency in MHz; all of them for None."""
+    from rotor.units import parse_range
+
+    return (0.0, math.inf) if text is None else named(name, lambda: parse_range(text, "MHz"))
+
+
+def cut(name: str, value: float | str) -> float | None:
+    """A cut; None for the word none."""
+    if isinstance(value, str):
+        if value.strip().lower() != "none":
+            raise ValueError(f'{name}: {value!r}: expected a number, or "none"')
+        return None
+    return value
+
+
+def vibrations(given: VibrationSection) -> VibrationalStates | None:
+    """The vibrational states that one of the two keys gives."""
+    if given.fundamentals is None and given.states is None:
+        return None
+    from rotor.thermo import VibrationalStates
+
+    if given.fundamentals is not None and given.states is not None:
+        raise ValueError("vibration: fundamentals and states: give one of them")
+    harmonic = given.fundamentals is not None
+    name = "vibration.fundamentals" if harmonic else "vibration.states"
+    listed = given.fundamentals or given.states or ""
+    if isinstance(listed, str):
+        return named(name, lambda: VibrationalStates.parse(listed, harmonic=harmonic))
+    if any(len(pair) != 2 for pair in listed):
+        raise ValueError(f"{name}: expected pairs of an energy and its degeneracy")
+    energies, degeneracies = [pair[0] for pair in listed], [pair[1] for pair in listed]
+    return named(name, lambda: VibrationalStates(tuple(energies), tuple(map(int, degeneracies)), harmonic))
+
+
+def saved_vibrations(states: VibrationalStates | None) -> VibrationSection:
+    """The table that gives vibrational states back, the same doubles."""
+    if states is None:
+        return VibrationSection()
+    pairs = [[e, float(g)] for e, g in zip(states.energies_cm, states.degeneracies, strict=True)]
+    return VibrationSection(fundamentals=pairs) if states.harmonic else VibrationSection(states=pairs)
+
+
+def effects_of(top: Top, asked: QuantumEffects) -> tuple[QuantumEffect, ...]:
+    """The Hamiltonian that a scene asks for."""
+    from rotor.quantum.effects.watson import SEMI_RIGID, Rigid
+
+    base: tuple[QuantumEffect, ...] = SEMI_RIGID if asked.distortion else (Rigid(),)
+    hyperfine = top.spin_constants is not None if asked.hyperfine is None else asked.hyperfine
+    if not hyperfine:
+        return base
+    from rotor.quantum.effects.of_top import effects_of as with_spins
+
+    return (*base, *named("effects.hyperfine", lambda: with_spins(top, True))[len(SEMI_RIGID) :])
+
+
+def saved_effects(effects: Iterable[QuantumEffect], top: Top) -> QuantumEffects:
+    """The table that asks for these effects of a top.
+
+    Raises ValueError for effects that a scene has no name for.
+    """
+    names = {effect.name for effect in effects}
+    spins = {"nuclear quadrupole", "spin-rotation", "spin-spin"}
+    if unknown := names - spins - {"rigid rotor", "centrifugal distortion"}:
+        raise ValueError(f"a scene has no name for {', '.join(sorted(unknown))}")
+    hyperfine = None if top.spin_constants is None else bool(names & spins)
+    return QuantumEffects(distortion="centrifugal distortion" in names, hyperfine=hyperfine)
+
+
+@contextmanager
+def fields(**names: str) -> Iterator[None]:
+    """Inside, a ValueError that begins with a field of a request names the key of the scene instead."""
+    try:
+        yield
+    except ValueError as error:
+        text = str(error)
+        word = text.partition(":")[0]
+        raise ValueError(names.get(word, word) + text[len(word) :]) from None

@@ -1,0 +1,128 @@
+"""A scene run: its request filled, answered, and the answer written into the files that the scene names."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Mapping
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rotor.scenes.kind import Kind, Writer, kind_of
+from rotor.scenes.scene import Scene, within
+
+if TYPE_CHECKING:
+    from rotor.table import Table
+
+PICTURES = (".png", ".pdf", ".svg")
+SUFFIXES: Mapping[str, tuple[str, ...]] = {
+    "csv": (".csv",), "parquet": (".parquet",), "json": (".json",), "cat": (".cat", ".cat.gz"), "profile_csv": (".csv",),
+    "plot": PICTURES, "egy": (".egy",), "trajectories": (".traj", ".xyz", ".extxyz"), "checkpoint": (".npz",),
+}  # fmt: skip  # of every output that is a file
+
+
+@dataclass(frozen=True)
+class SceneResult:
+    """What came of a scene. request, answer: of the library. table: the rows. files: written. seconds: of the answer."""
+
+    scene: Scene
+    request: Any
+    answer: Any
+    table: Table
+    files: tuple[Path, ...]
+    seconds: float
+
+
+def run_scene(
+    scene: Scene,
+    *,
+    folder: str | os.PathLike[str] = ".",
+    out: str | os.PathLike[str] = ".",
+    executor: Executor | None = None,
+) -> SceneResult:
+    """Run one scene.
+
+    Parameters
+    ----------
+    scene : Scene
+        Without a sweep; `rotor.scenes.sweep.run_sweep` runs one.
+    folder : path
+        From which the files that the scene reads are counted.
+    out : path
+        From which the files that it writes are counted.
+    executor : Executor, optional
+        J, blocks or states are spread over it.
+
+    Returns
+    -------
+    SceneResult
+
+    Raises
+    ------
+    ValueError
+        What the scene asks for cannot be: with the key. Nothing is written then.
+
+    >>> from rotor.scenes.scene import LevelsScene
+    >>> len(run_scene(LevelsScene(molecule="CO")).table)
+    11
+    """
+    if scene.sweep:
+        raise ValueError("sweep: this scene has several points; run_sweep runs them")
+    kind = kind_of(scene)
+    targets = output_paths(scene, out)
+    request = kind.request(scene, folder)
+    start = time.perf_counter()
+    answer = kind.answer(request, scene, out, executor)
+    seconds = time.perf_counter() - start
+    table = kind.table(answer)
+    _write(scene, kind, answer, table, targets)
+    files = tuple(path for paths in targets.values() for path in paths)
+    return SceneResult(scene, request, answer, table, files, seconds)
+
+
+def output_paths(scene: Scene, out: str | os.PathLike[str]) -> dict[str, list[Path]]:
+    """The files that a scene writes, by the name of the output.
+
+    Raises ValueError for a suffix that an output has not, a folder that is not there, and one file for two outputs.
+    """
+    found: dict[str, list[Path]] = {}
+    for name, suffixes in SUFFIXES.items():
+        given = getattr(scene.outputs, name, None)  # type: ignore[attr-defined]
+        names: list[str] = given if isinstance(given, list) else [] if given is None else [given]
+        if names:
+            found[name] = [_checked_path(f"outputs.{name}", within(out, one), suffixes) for one in names]
+    paths = [path.resolve() for every in found.values() for path in every]
+    for path in paths:
+        if paths.count(path) > 1:
+            raise ValueError(f"outputs: {path.name}: two outputs write this file; give another name")
+    return found
+
+
+def _checked_path(name: str, text: str, suffixes: tuple[str, ...]) -> Path:
+    path = Path(text)
+    if not path.name.lower().endswith(suffixes):
+        raise ValueError(f"{name}: {text}: the name must end in {' or '.join(suffixes)}")
+    if not path.parent.is_dir():
+        raise ValueError(f"{name}: {text}: there is no folder {path.parent}; make it first")
+    if path.is_dir() or not os.access(path.parent, os.W_OK):
+        raise ValueError(f"{name}: {text}: cannot be written; give another name")
+    return path
+
+
+def _write(scene: Scene, kind: Kind, answer: Any, table: Table, targets: Mapping[str, list[Path]]) -> None:
+    """Write all files together, but those that the answer itself has written."""
+    from rotor.formats.atomic_write import write_together
+    from rotor.scenes.scene_file import scene_text
+
+    provenance = {"scene": scene_text(scene)}
+
+    def rows(path: Path) -> None:
+        from rotor.formats import write
+
+        write(table, path, settings=provenance)
+
+    writers: dict[str, Writer] = {"csv": rows, "parquet": rows, "json": rows, **kind.writers(answer, scene)}
+    asked = {path: writers[name] for name, paths in targets.items() if name not in kind.grows for path in paths}
+    write_together(asked)

@@ -1,0 +1,216 @@
+"""A scene: what to simulate, as one object; the same as a scene file (`rotor.scenes.scene_file`).
+
+Nothing of the physics is imported here: a scene is data, checked for names and types; the library's requests check the rest.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from concurrent.futures import Executor
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from msgspec import Struct, field
+
+from rotor.scenes.effect_sections import EffectSection
+from rotor.scenes.sections import (
+    AlignConditions,
+    AlignNumerics,
+    AlignObservables,
+    BasisNumerics,
+    BodySection,
+    FluidConditions,
+    FluidNumerics,
+    FluidOutputs,
+    GasConditions,
+    GasNumerics,
+    GasObservables,
+    LevelsObservables,
+    LevelsOutputs,
+    MoleculeSection,
+    PulseSection,
+    QuantumEffects,
+    RamanConditions,
+    RamanObservables,
+    SpectrumConditions,
+    SpectrumObservables,
+    SpectrumOutputs,
+    StarkConditions,
+    StarkNumerics,
+    StarkObservables,
+    TableOutputs,
+    ThermoConditions,
+    ThermoNumerics,
+    ThermoObservables,
+    TumbleConditions,
+    TumbleNumerics,
+    VibrationSection,
+    said,
+)
+
+if TYPE_CHECKING:
+    from rotor.scenes.run import SceneResult
+
+SCHEMA = 1
+
+
+class Scene(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True, tag_field="kind"):
+    """What every kind of scene has. schema: version of the format."""
+
+    schema: Annotated[int, said("version of this format")] = SCHEMA
+    title: Annotated[str, said("a line for reports", "Water in the microwave region")] = ""
+    sweep: Annotated[
+        dict[str, list[Any]],
+        said("values by dotted name; every combination is run", {"conditions.temperature": ["10 K", "100 K", "300 K"]}),
+    ] = field(default_factory=dict)
+
+    @property
+    def kind(self) -> str:
+        """spectrum, levels, raman, thermo, tumble, gas, fluid, stark or align."""
+        return str(self.__struct_config__.tag)
+
+    def run(
+        self,
+        *,
+        folder: str | os.PathLike[str] = ".",
+        out: str | os.PathLike[str] = ".",
+        executor: Executor | None = None,
+    ) -> SceneResult:
+        """Run the scene, see `rotor.scenes.run.run_scene`."""
+        from rotor.scenes.run import run_scene
+
+        return run_scene(self, folder=folder, out=out, executor=executor)
+
+
+class SpectrumScene(Scene, frozen=True, tag="spectrum"):
+    """Rotational lines of a molecule."""
+
+    molecule: Annotated[str | MoleculeSection, said("a name, a file, SMILES:..., or a table")]
+    effects: QuantumEffects = QuantumEffects()
+    conditions: SpectrumConditions = SpectrumConditions()
+    observables: SpectrumObservables = SpectrumObservables()
+    vibration: VibrationSection = VibrationSection()
+    numerics: BasisNumerics = BasisNumerics()
+    outputs: SpectrumOutputs = SpectrumOutputs()
+
+
+class LevelsScene(Scene, frozen=True, tag="levels"):
+    """Energy levels of a molecule."""
+
+    molecule: Annotated[str | MoleculeSection, said("a name, a file, SMILES:..., or a table")]
+    effects: QuantumEffects = QuantumEffects()
+    observables: LevelsObservables = LevelsObservables()
+    outputs: LevelsOutputs = LevelsOutputs()
+
+
+class RamanScene(Scene, frozen=True, tag="raman"):
+    """Rotational Raman lines of a molecule."""
+
+    molecule: Annotated[str | MoleculeSection, said("a name, a file, SMILES:..., or a table")]
+    effects: QuantumEffects = QuantumEffects()
+    conditions: RamanConditions = RamanConditions()
+    observables: RamanObservables = RamanObservables()
+    vibration: VibrationSection = VibrationSection()
+    numerics: BasisNumerics = BasisNumerics()
+    outputs: TableOutputs = TableOutputs()
+
+
+class ThermoScene(Scene, frozen=True, tag="thermo"):
+    """Partition function, entropy and heat capacity of rotation."""
+
+    molecule: Annotated[str | MoleculeSection, said("a name, a file, SMILES:..., or a table")]
+    conditions: ThermoConditions = ThermoConditions()
+    observables: ThermoObservables = ThermoObservables()
+    vibration: VibrationSection = VibrationSection()
+    numerics: ThermoNumerics = ThermoNumerics()
+    outputs: TableOutputs = TableOutputs()
+
+
+class TumbleScene(Scene, frozen=True, tag="tumble"):
+    """The free rotation of a molecule; the rotation of a body, free or under effects."""
+
+    molecule: Annotated[str | MoleculeSection | None, said("a name, a file, SMILES:..., or a table", "water")] = None
+    body: Annotated[BodySection | None, said("instead of a molecule")] = None
+    effects: Annotated[list[EffectSection], said("what acts on a body")] = field(default_factory=list)
+    conditions: TumbleConditions = TumbleConditions()
+    numerics: TumbleNumerics = TumbleNumerics()
+    outputs: TableOutputs = TableOutputs()
+
+
+class GasScene(Scene, frozen=True, tag="gas"):
+    """A classical gas of free molecules: equipartition, correlation functions."""
+
+    molecule: Annotated[str | MoleculeSection, said("a name, a file, SMILES:..., or a table")]
+    conditions: GasConditions = GasConditions()
+    observables: GasObservables = GasObservables()
+    numerics: GasNumerics = GasNumerics()
+    outputs: TableOutputs = TableOutputs()
+
+
+class FluidScene(Scene, frozen=True, tag="fluid"):
+    """Rigid molecules that attract and repel, in a periodic box."""
+
+    conditions: FluidConditions
+    numerics: FluidNumerics = FluidNumerics()
+    outputs: FluidOutputs = FluidOutputs()
+
+
+class StarkScene(Scene, frozen=True, tag="stark"):
+    """Levels of a molecule in a static electric field."""
+
+    molecule: Annotated[str | MoleculeSection, said("a name, a file, SMILES:..., or a table")]
+    conditions: StarkConditions = StarkConditions()
+    observables: StarkObservables = StarkObservables()
+    numerics: StarkNumerics = StarkNumerics()
+    outputs: TableOutputs = TableOutputs()
+
+
+class AlignScene(Scene, frozen=True, tag="align"):
+    """Molecules aligned or oriented by pulses."""
+
+    molecule: Annotated[str | MoleculeSection, said("a name, a file, SMILES:..., or a table")]
+    pulses: Annotated[list[PulseSection], said("one or more; shape is gaussian, switched, kick, table or thz")]
+    conditions: AlignConditions = AlignConditions()
+    observables: AlignObservables = AlignObservables()
+    numerics: AlignNumerics = AlignNumerics()
+    outputs: TableOutputs = TableOutputs()
+
+
+AnyScene = (
+    SpectrumScene
+    | LevelsScene
+    | RamanScene
+    | ThermoScene
+    | TumbleScene
+    | GasScene
+    | FluidScene
+    | StarkScene
+    | AlignScene
+)
+KINDS: Mapping[str, type[Scene]] = {
+    "spectrum": SpectrumScene,
+    "levels": LevelsScene,
+    "raman": RamanScene,
+    "thermo": ThermoScene,
+    "tumble": TumbleScene,
+    "gas": GasScene,
+    "fluid": FluidScene,
+    "stark": StarkScene,
+    "align": AlignScene,
+}
+
+
+def molecule_of(scene: Scene) -> MoleculeSection | None:
+    """The molecule of a scene as a table, a name alone being its source; None where the scene has none.
+
+    >>> molecule_of(SpectrumScene(molecule="water")).source
+    'water'
+    """
+    given = getattr(scene, "molecule", None)
+    return MoleculeSection(source=given) if isinstance(given, str) else given
+
+
+def within(folder: str | os.PathLike[str], name: str) -> str:
+    """A file name of a scene, counted from the folder that the scene is in."""
+    return str(Path(folder) / name)

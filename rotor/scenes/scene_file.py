@@ -1,0 +1,193 @@
+"""Scene files: TOML read and checked, written, and their JSON Schema.
+
+An unknown key is an error with the nearest right one; types are checked by msgspec; ranges by the library's requests.
+"""
+
+from __future__ import annotations
+
+import difflib
+import json
+import math
+import os
+import re
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, get_args, get_type_hints
+
+import msgspec
+
+from rotor.scenes.scene import KINDS, SCHEMA, AnyScene, Scene
+
+_BARE = re.compile(r"[A-Za-z0-9_-]+")
+
+
+def read_scene(path: str | os.PathLike[str]) -> Scene:
+    """The scene of a file.
+
+    Raises ValueError, with file and key, for text that is no TOML, unknown keys, and values of another type.
+    """
+    try:
+        text = Path(path).read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise ValueError(f"{path}: a scene file is UTF-8 text: {error}") from None
+    return parse_scene(text, str(path))
+
+
+def parse_scene(text: str, where: str = "scene") -> Scene:
+    """The scene that a text in TOML describes; `where` names it in errors.
+
+    >>> parse_scene('schema = 1\\nkind = "levels"\\nmolecule = "CO"').molecule
+    'CO'
+    >>> parse_scene('schema = 1\\nkind = "levels"\\nmolecule = "CO"\\n[observables]\\nj_max = 3')
+    Traceback (most recent call last):
+        ...
+    ValueError: scene: [observables] has no key 'j_max'; the nearest is 'jmax'
+    """
+    try:
+        content = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise ValueError(f"{where}: not a TOML file: {error}") from None
+    return scene_of(content, where)
+
+
+def scene_of(content: Mapping[str, Any], where: str = "scene") -> Scene:
+    """The scene that tables, as of a TOML file, describe.
+
+    Raises ValueError for a version or a kind that there is not, unknown keys, and values of another type.
+    """
+    kind = _kind_of(content, where)
+    rest = {key: value for key, value in content.items() if key != "kind"}
+    _refuse_unknown_keys(rest, kind, where, "")
+    try:
+        found: Scene = msgspec.convert(content, kind)
+    except msgspec.ValidationError as error:
+        raise ValueError(f"{where}: {_said(error)}") from None
+    return found
+
+
+def _kind_of(content: Mapping[str, Any], where: str) -> type[Scene]:
+    schema, kind = content.get("schema"), content.get("kind")
+    if schema != SCHEMA:
+        found = "it has none" if schema is None else f"this one has {schema!r}"
+        raise ValueError(f"{where}: expected schema = {SCHEMA}, the version of the format, and {found}")
+    if not isinstance(kind, str) or kind not in KINDS:
+        found = "it has none" if kind is None else f"{kind!r} is none{_nearest(str(kind), KINDS)}"
+        raise ValueError(f"{where}: expected kind, one of {', '.join(KINDS)}; {found}")
+    return KINDS[kind]
+
+
+def _refuse_unknown_keys(content: Mapping[str, Any], kind: Any, where: str, place: str) -> None:
+    hints = get_type_hints(kind)
+    for key, value in content.items():
+        if kind.__struct_config__.tag_field == key:
+            continue
+        if key not in kind.__struct_fields__:
+            of = f"[{place}]" if place else "a scene of this kind"
+            raise ValueError(f"{where}: {of} has no key {key!r}{_nearest(key, kind.__struct_fields__)}")
+        inside = f"{place}.{key}" if place else key
+        for one, item in _tables_in(hints[key], value):
+            _refuse_unknown_keys(item, one, where, inside)
+
+
+def _tables_in(hint: Any, value: Any) -> list[tuple[Any, Mapping[str, Any]]]:
+    """Tables in a value, each with the structure that it must have."""
+    structures = structures_in(hint)
+    if isinstance(value, Mapping) and len(structures) == 1:
+        return [(structures[0], value)]
+    by_tag = {one.__struct_config__.tag: one for one in structures}
+    if not structures or not isinstance(value, list):
+        return []
+    word = structures[0].__struct_config__.tag_field
+    tables = [item for item in value if isinstance(item, Mapping)]
+    return [(by_tag[item[word]], item) for item in tables if item.get(word) in by_tag]
+
+
+def structures_in(hint: Any) -> list[Any]:
+    """The structures that a type allows."""
+    if isinstance(hint, type) and issubclass(hint, msgspec.Struct):
+        return [hint]
+    return [one for part in get_args(hint) for one in structures_in(part)]
+
+
+def _nearest(key: str, known: Any) -> str:
+    near = difflib.get_close_matches(key, list(known), n=1, cutoff=0.5)
+    return f"; the nearest is {near[0]!r}" if near else f"; there are {', '.join(known)}"
+
+
+def _said(error: msgspec.ValidationError) -> str:
+    """The words of msgspec with the key first: "Expected `int`, got `str` - at `$.numerics.jmax`"."""
+    text = str(error)
+    found = re.fullmatch(r"(.*) - at `\$\.?(.*)`", text)
+    return f"{found[2]}: {_lower(found[1])}" if found else _lower(text)
+
+
+def _lower(text: str) -> str:
+    return text[:1].lower() + text[1:].replace("`", "")
+
+
+def scene_text(scene: Scene) -> str:
+    """The scene as TOML; what has its default is left out, and every number reads back as the same double.
+
+    >>> from rotor.scenes.scene import LevelsScene
+    >>> print(scene_text(LevelsScene(molecule="CO")), end="")
+    schema = 1
+    kind = "levels"
+    molecule = "CO"
+    """
+    content: dict[str, Any] = msgspec.to_builtins(scene)
+    head = {"schema": scene.schema, "kind": content.pop("kind")}
+    content.pop("schema", None)
+    return "".join(_lines_of(head | content, ()))
+
+
+def _lines_of(table: Mapping[str, Any], path: tuple[str, ...]) -> list[str]:
+    """Lines of a table: its values first, then the tables in it."""
+    plain = {key: value for key, value in table.items() if not _is_table(value)}
+    lines = [f"{_key(key)} = {toml_value(value)}\n" for key, value in plain.items() if value is not None]
+    for key, value in table.items():
+        inner = (*path, key)
+        name = ".".join(_key(part) for part in inner)
+        if isinstance(value, Mapping) and _is_table(value):
+            lines += [f"\n[{name}]\n", *_lines_of(value, inner)]
+        elif _is_table(value):
+            for item in value:
+                lines += [f"\n[[{name}]]\n", *_lines_of(item, inner)]
+    return lines
+
+
+def _is_table(value: Any) -> bool:
+    if isinstance(value, Mapping):
+        return True
+    return isinstance(value, list) and bool(value) and all(isinstance(item, Mapping) for item in value)
+
+
+def _key(key: str) -> str:
+    return key if _BARE.fullmatch(key) else json.dumps(key, ensure_ascii=False)
+
+
+def toml_value(value: Any) -> str:
+    """A value as TOML writes it, every number such that the same double is read back."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    if isinstance(value, float):
+        return repr(value) if math.isfinite(value) else {math.inf: "inf", -math.inf: "-inf"}.get(value, "nan")
+    if isinstance(value, list):
+        return f"[{', '.join(map(toml_value, value))}]"
+    return str(value)
+
+
+def write_scene(scene: Scene, path: str | os.PathLike[str]) -> None:
+    """Write a scene as TOML, whole or not at all."""
+    from rotor.formats.atomic_write import open_atomic
+
+    with open_atomic(path, "w", encoding="utf-8", newline="\n") as handle:
+        handle.write(scene_text(scene))
+
+
+def json_schema() -> dict[str, Any]:
+    """The JSON Schema of all kinds of scene, from which editors complete scene files."""
+    schema: dict[str, Any] = msgspec.json.schema(AnyScene)
+    return {"title": "A scene of rotor", **schema}

@@ -1,0 +1,363 @@
+"""The tables of a scene file: molecule, effects, conditions, observables, numerics and outputs, kind by kind.
+
+Each field carries its description, from which templates and the JSON Schema are made. A quantity is a number in the unit that the
+description names, or a text with a unit of its own ("300 K"); a grid is a list of numbers or a text ("0:100kV/cm:21").
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import msgspec
+from msgspec import Meta, Struct, field
+
+Quantity = float | str
+Grid = list[float] | str
+
+
+def said(text: str, example: Any = None) -> Meta:
+    """The description of a field, and an example where its default is nothing."""
+    return Meta(description=text, examples=None if example is None else [example])
+
+
+class Section(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
+    """A table of a scene file."""
+
+
+class MoleculeSection(Section, frozen=True):
+    """Which molecule; either `source` or `constants`."""
+
+    source: Annotated[str | None, said("a name, a file (counted from the scene's folder) or SMILES:...", "water")] = (
+        None
+    )
+    constants: Annotated[str | None, said("constants by name instead of a source", "A=9.2 B=3 C=2.5 GHz")] = None
+    isotopes: Annotated[list[str], said("other isotopes, by atom number or element", ["1=2H"])] = field(
+        default_factory=list
+    )
+    dipole: Annotated[list[float] | None, said("in the frame of the input (D)", [0.0, 0.0, 1.85])] = None
+    dipole_abc: Annotated[list[float] | None, said("in principal axes (D)", [0.0, 1.85, 0.0])] = None
+    polarizability: Annotated[
+        list[float] | None,
+        said("aa, bb, cc[, ab, ac, bc] in principal axes; or along and across the axis (Å³)", [8.0, 4.0]),
+    ] = None
+    spin_weights: Annotated[dict[str, int] | None, said("of the levels", {"ee": 1, "eo": 3, "oe": 3, "oo": 1})] = None
+    spin_constants: Annotated[str | None, said("of nuclear and electron spins (MHz)", "chi_aa(14N)=-4.22 MHz")] = None
+    spins: Annotated[str | None, said("sizes and order of the spins", "14N=1")] = None
+    calculator: Annotated[str | None, said("ASE calculator that refines the geometry first", "xtb")] = None
+    hessian: Annotated[str | None, said("file of the Hessian that quartic distortion follows from", "hessian.txt")] = (
+        None
+    )
+    symmetry_tolerance: Annotated[Quantity | None, said("how far nuclei may be off a symmetry (Å)", "0.005 Å")] = None
+
+
+class QuantumEffects(Section, frozen=True):
+    """What the Hamiltonian consists of besides the rigid rotor."""
+
+    distortion: Annotated[bool, said("centrifugal distortion, as far as constants are there")] = True
+    hyperfine: Annotated[bool | None, said("spins of nuclei; by default where spin_constants are given", True)] = None
+
+
+class VibrationSection(Section, frozen=True):
+    """Vibrational states that the partition function counts; one of the two."""
+
+    fundamentals: Annotated[
+        str | list[list[float]] | None,
+        said("harmonic, with degeneracies (cm⁻¹); or pairs [energy, degeneracy]", "667.4x2,1388,2349"),
+    ] = None
+    states: Annotated[str | list[list[float]] | None, said("of single states, likewise (cm⁻¹)", "859,520x2")] = None
+
+
+class SpectrumConditions(Section, frozen=True):
+    """The gas, and the range that is looked at."""
+
+    temperature: Annotated[Quantity, said("of the gas (K)")] = "300 K"
+    range: Annotated[str | None, said("first and last frequency (MHz)", "2:18GHz")] = None
+    pressure: Annotated[Quantity | None, said("of these molecules, for optical depths; with path (bar)", "1 mbar")] = (
+        None
+    )
+    path: Annotated[Quantity | None, said("length of the layer of gas (cm)", "1 m")] = None
+
+
+class SpectrumObservables(Section, frozen=True):
+    """Which lines, and their shape."""
+
+    min_lgint: Annotated[float | str, said('least log10 of the intensity (nm² MHz), or "none"')] = -12.0
+    profile: Annotated[str | None, said("sticks, gaussian, lorentzian or voigt", "gaussian")] = None
+    fwhm: Annotated[Quantity | None, said("full width at half maximum; Doppler's by default (MHz)", "1 MHz")] = None
+    untrusted: Annotated[bool, said("lines of levels beyond the reach of the distortion constants too")] = False
+    q: Annotated[float | None, said("partition function instead of the summed one", 1000.0)] = None
+    vibrational_factor: Annotated[float, said("multiplies the partition function")] = 1.0
+
+
+class BasisNumerics(Section, frozen=True):
+    """Knobs; what is left out is chosen."""
+
+    jmax: Annotated[int | None, said("highest J", 40)] = None
+
+
+class SpectrumOutputs(Section, frozen=True):
+    """Files to write."""
+
+    csv: Annotated[str | None, said("all lines", "lines.csv")] = None
+    parquet: Annotated[str | None, said("all lines", "lines.parquet")] = None
+    json: Annotated[str | None, said("all lines", "lines.json")] = None
+    cat: Annotated[str | None, said("catalogue of 80 columns", "lines.cat")] = None
+    tag: Annotated[int, said("tag of the species in the catalogue")] = 0
+    profile_csv: Annotated[str | None, said("the profile on its grid", "profile.csv")] = None
+    plot: Annotated[str | None, said("picture (.png, .pdf, .svg)", "lines.png")] = None
+
+
+class LevelsObservables(Section, frozen=True):
+    """Which levels."""
+
+    jmin: Annotated[int, said("lowest J")] = 0
+    jmax: Annotated[int, said("highest J")] = 10
+    kmin: Annotated[int | None, said("lowest |K|, or Ka (Kc of a near-oblate top)", 0)] = None
+    kmax: Annotated[int | None, said("highest |K|, likewise", 3)] = None
+    max_energy: Annotated[Quantity | None, said("above the lowest level that exists (MHz)", "10 cm-1")] = None
+
+
+class LevelsOutputs(Section, frozen=True):
+    """Files to write."""
+
+    csv: Annotated[str | None, said("all levels", "levels.csv")] = None
+    parquet: Annotated[str | None, said("all levels", "levels.parquet")] = None
+    json: Annotated[str | None, said("all levels", "levels.json")] = None
+    egy: Annotated[str | None, said("list of SPCAT", "levels.egy")] = None
+    plot: Annotated[str | None, said("term diagram (.png, .pdf, .svg)", "levels.png")] = None
+
+
+class TableOutputs(Section, frozen=True):
+    """Files to write."""
+
+    csv: Annotated[str | None, said("the table", "out.csv")] = None
+    parquet: Annotated[str | None, said("the table", "out.parquet")] = None
+    json: Annotated[str | None, said("the table", "out.json")] = None
+    plot: Annotated[str | None, said("picture (.png, .pdf, .svg)", "out.png")] = None
+
+
+class RamanConditions(Section, frozen=True):
+    """The gas and the laser."""
+
+    temperature: Annotated[Quantity, said("of the gas (K)")] = "300 K"
+    laser: Annotated[Quantity, said("wavelength in vacuum (nm)")] = "532 nm"
+
+
+class RamanObservables(Section, frozen=True):
+    """Which lines."""
+
+    min_relative: Annotated[float | str, said('least cross section, of the strongest line, or "none"')] = 1e-6
+    q: Annotated[float | None, said("partition function instead of the summed one", 100.0)] = None
+
+
+class ThermoConditions(Section, frozen=True):
+    """The gas."""
+
+    temperature: Annotated[Grid | None, said("temperatures (K); by default some from 5 to 1000 K", "10:1000K:100")] = (
+        None
+    )
+    pressure: Annotated[
+        Quantity | None, said("of the ideal gas, whose functions are then given too (bar)", "1 bar")
+    ] = None
+
+
+class ThermoObservables(Section, frozen=True):
+    """Of which molecules."""
+
+    species: Annotated[str, said("equilibrium, normal, para, ortho, or a class of the spin weights")] = "equilibrium"
+
+
+class ThermoNumerics(Section, frozen=True):
+    """Knobs."""
+
+    relative_error: Annotated[float, said("of Q, U and C_v, the levels left out of the sums")] = 1e-6
+
+
+class BodySection(Section, frozen=True):
+    """A rigid body instead of a molecule, in any coherent units."""
+
+    moments: Annotated[list[float], said("principal moments of inertia, in any order", [0.3, 0.35, 0.4])]
+    units: Annotated[str, said('"SI" (kg m², s, J), or "" for any coherent set')] = ""
+    angular_momentum: Annotated[list[float] | None, said("at time 0 in principal axes", [1.8, 0.4, -0.9])] = None
+    angular_velocity: Annotated[list[float] | None, said("instead of the angular momentum", [0.1, 15.0, 0.1])] = None
+    attitude: Annotated[list[float] | None, said("quaternion, body to space, at time 0", [1.0, 0.0, 0.0, 0.0])] = None
+
+
+class TumbleNumerics(Section, frozen=True):
+    """Knobs of a motion under effects; the free motion is exact."""
+
+    tolerance: Annotated[float, said("of a step, relative to |L| and one radian")] = 1e-10
+    step: Annotated[float | None, said("of a splitting, where no torque depends on the angular velocity", 0.01)] = None
+    order: Annotated[int, said("of the splitting: 2, 4, 6 or 8")] = 4
+
+
+class TumbleConditions(Section, frozen=True):
+    """How the molecule starts, and when it is looked at."""
+
+    temperature: Annotated[Quantity, said("whose thermal mean |L| is, half a degree off the middle axis (K)")] = "300 K"
+    angular_momentum: Annotated[list[float] | None, said("instead, along a, b, c (ħ)", [10.0, 0.1, 0.1])] = None
+    times: Annotated[Grid | None, said("ps of a molecule; by default two periods", "0:2:201")] = None
+
+
+class GasConditions(Section, frozen=True):
+    """The gas."""
+
+    temperature: Annotated[Quantity, said("of the gas (K)")] = "300 K"
+
+
+class GasObservables(Section, frozen=True):
+    """What is measured."""
+
+    times: Annotated[Grid | None, said("of the correlation functions (ps); none without files", "0:2:201")] = None
+    confidence: Annotated[float, said("of the test of equipartition")] = 0.99
+
+
+class GasNumerics(Section, frozen=True):
+    """Knobs."""
+
+    molecules: Annotated[int, said("how many are drawn")] = 20_000
+    seed: Annotated[int, said("of the random numbers")] = 1
+
+
+class FluidConditions(Section, frozen=True):
+    """The liquid."""
+
+    model: Annotated[str, said("rigid model, such as spce, tip4p2005, argon")] = "spce"
+    molecules: Annotated[int | None, said("make a box of so many", 216)] = None
+    density: Annotated[float, said("of the box that is made (g/cm³)")] = 0.997
+    box: Annotated[str | None, said("or a file with a box, counted from the scene's folder", "liquid.traj")] = None
+    ensemble: Annotated[str, said("nve, langevin or nose-hoover")] = "nve"
+    temperature: Annotated[Quantity, said("of the thermostat and of starting velocities (K)")] = "298.15 K"
+    friction: Annotated[float, said("of langevin (1/ps)")] = 1.0
+    relaxation: Annotated[Quantity, said("time constant of nose-hoover (fs)")] = "100 fs"
+    steps: Annotated[int, said("how many steps")] = 1000
+    every: Annotated[int, said("steps between rows")] = 10
+
+
+class FluidNumerics(Section, frozen=True):
+    """Knobs."""
+
+    step: Annotated[Quantity, said("length of a step (fs)")] = "2 fs"
+    cutoff: Annotated[Quantity, said("of Lennard-Jones and of charges in real space (Å)")] = "9 Å"
+    electrostatics: Annotated[str, said("reaction-field, ewald or shifted")] = "reaction-field"
+    seed: Annotated[int, said("of the lattice, the velocities and the noise")] = 1
+    threads: Annotated[int, said("threads of the built-in potential, or of the engine")] = 1
+    engine: Annotated[str, said("rotor, openmm or lammps")] = "rotor"
+
+
+class FluidOutputs(Section, frozen=True):
+    """Files that grow during the run."""
+
+    csv: Annotated[str | None, said("rows as they come", "run.csv")] = None
+    trajectories: Annotated[list[str], said("frames (.traj, .xyz, .extxyz)", ["run.traj"])] = field(
+        default_factory=list
+    )
+    frames_every: Annotated[int | None, said("steps between frames; by default as every", 100)] = None
+    checkpoint: Annotated[
+        str | None, said("what a run needs to go on; one that is there is gone on from", "run.npz")
+    ] = None
+    checkpoint_every: Annotated[int, said("steps between checkpoints")] = 1000
+
+
+class StarkConditions(Section, frozen=True):
+    """The fields."""
+
+    field: Annotated[Grid, said("static electric fields (kV/cm)")] = "0:100kV/cm:201"
+    direction: Annotated[list[float], said("of the field")] = msgspec.field(default_factory=lambda: [0.0, 0.0, 1.0])
+    intensity: Annotated[Quantity, said("of a laser along Z, far from resonance (W/cm2)")] = 0.0
+
+
+class StarkObservables(Section, frozen=True):
+    """Which states."""
+
+    jmax: Annotated[int, said("levels of the free molecule up to this J")] = 2
+    m: Annotated[list[int] | None, said("|M| of the states; by default all", [0, 1])] = None
+    diabatic_gap: Annotated[Quantity | None, said("labels that pass crossings with a smaller gap (MHz)", "10 MHz")] = (
+        None
+    )
+
+
+class StarkNumerics(Section, frozen=True):
+    """Knobs."""
+
+    jmax: Annotated[int | None, said("highest J of the basis; by default what the tolerance needs", 30)] = None
+    tolerance: Annotated[Quantity, said("of the energies, the basis being finite (MHz)")] = "1e-4 MHz"
+
+
+class GaussianSection(Section, frozen=True, tag="gaussian", tag_field="shape"):
+    """A Gaussian pulse."""
+
+    peak: Annotated[Quantity, said("peak intensity (W/cm2)")]
+    fwhm: Annotated[Quantity, said("full width at half maximum of the intensity (ps)")]
+    centre: Annotated[Quantity, said("time of the peak (ps)")] = 0.0
+    axis: Annotated[str | list[list[float]], said("z, x, y, circular, elliptical:R, or parts of a unit vector")] = "z"
+
+
+class SwitchedSection(Section, frozen=True, tag="switched", tag_field="shape"):
+    """A pulse that is switched on and off."""
+
+    peak: Annotated[Quantity, said("peak intensity (W/cm2)")]
+    rise: Annotated[Quantity, said("(ps)")]
+    plateau: Annotated[Quantity, said("(ps)")]
+    fall: Annotated[Quantity, said("(ps)")]
+    start: Annotated[Quantity, said("(ps)")] = 0.0
+    axis: Annotated[str | list[list[float]], said("as of a gaussian pulse")] = "z"
+
+
+class KickSection(Section, frozen=True, tag="kick", tag_field="shape"):
+    """A pulse without duration."""
+
+    fluence: Annotated[Quantity, said("(J/cm2)")]
+    time: Annotated[Quantity, said("(ps)")] = 0.0
+    axis: Annotated[str | list[list[float]], said("as of a gaussian pulse")] = "z"
+
+
+class TableSection(Section, frozen=True, tag="table", tag_field="shape"):
+    """A pulse given by points."""
+
+    times: Annotated[list[float], said("(ps)")]
+    intensities: Annotated[list[float], said("(W/cm2)")]
+    axis: Annotated[str | list[list[float]], said("as of a gaussian pulse")] = "z"
+
+
+class FieldPulseSection(Section, frozen=True, tag="thz", tag_field="shape"):
+    """A field on the permanent dipole."""
+
+    peak: Annotated[Quantity, said("(kV/cm)")]
+    fwhm: Annotated[Quantity, said("of the envelope (ps)")]
+    frequency: Annotated[Quantity, said("(THz)")] = 0.0
+    phase: Annotated[float, said("(rad)")] = 0.0
+    centre: Annotated[Quantity, said("(ps)")] = 0.0
+
+
+PulseSection = GaussianSection | SwitchedSection | KickSection | TableSection | FieldPulseSection
+
+
+class AlignConditions(Section, frozen=True):
+    """The gas, or one level, and the times."""
+
+    temperature: Annotated[Quantity, said("of the gas, 0 for its lowest level (K)")] = "1 K"
+    state: Annotated[dict[str, int] | None, said("one level instead", {"j": 1, "ka": 0, "kc": 1})] = None
+    m: Annotated[int | None, said("|M| of that level; by default all alike", 0)] = None
+    first_time: Annotated[Quantity | None, said("by default where the pulses begin (ps)", "-1 ps")] = None
+    last_time: Annotated[Quantity | None, said("by default one revival after the pulses, or 100 ps (ps)", "100 ps")] = (
+        None
+    )
+    points: Annotated[int, said("how many times")] = 2001
+
+
+class AlignObservables(Section, frozen=True):
+    """Which cosines."""
+
+    cosines: Annotated[list[str], said("costheta, cos2theta, cos2theta_2d, cos_aZ, cos2_bX, ...")] = field(
+        default_factory=lambda: ["cos2theta"]
+    )
+    classical_molecules: Annotated[int, said("also a classical gas of so many under the same pulses")] = 0
+
+
+class AlignNumerics(Section, frozen=True):
+    """Knobs."""
+
+    tolerance: Annotated[float, said("of the cosines: steps, J max and populations follow from it")] = 1e-6
+    jmax: Annotated[int | None, said("highest J of the basis; by default what the tolerance needs", 30)] = None
+    seed: Annotated[int, said("of the classical gas")] = 1

@@ -1,0 +1,133 @@
+"""Scene files: what is read is what is written; mistakes are named with the nearest key; templates are scenes."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rotor.scenes.scene import KINDS, AlignScene, LevelsScene, SpectrumScene, StarkScene
+from rotor.scenes.scene_file import json_schema, parse_scene, read_scene, scene_text, write_scene
+from rotor.scenes.sections import GaussianSection, KickSection, MoleculeSection, StarkConditions
+from rotor.scenes.template import template
+
+HEAD = 'schema = 1\nkind = "spectrum"\nmolecule = "water"\n'
+
+
+def test_a_file_is_read_as_it_was_written(tmp_path):
+    scene = AlignScene(
+        molecule=MoleculeSection(source="OCS", isotopes=["O=18O"], spin_weights={"even": 1, "odd": 3}),
+        pulses=[GaussianSection(peak="1e13 W/cm2", fwhm=1), KickSection(fluence=0.1, axis=[[1, 0], [0, 1], [0, 0]])],
+        title='a "quoted" title\\ with µ and\ta tab',
+        sweep={"conditions.temperature": ["1 K", 2.5]},
+    )
+    write_scene(scene, tmp_path / "s.toml")
+    assert read_scene(tmp_path / "s.toml") == scene
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.floats(allow_nan=False, allow_infinity=False), st.text(st.characters(exclude_categories=["Cs"]), max_size=20))
+def test_every_number_and_text_comes_back(number, text):
+    scene = StarkScene(molecule=MoleculeSection(source=text), conditions=StarkConditions(field=[number]), title=text)
+    again = parse_scene(scene_text(scene))
+    assert again == scene
+    assert repr(again.conditions.field) == repr(scene.conditions.field)  # the sign of zero too
+
+
+BAD = [
+    ("", "expected schema = 1, the version of the format, and it has none"),
+    ("schema = 2", "expected schema = 1, the version of the format, and this one has 2"),
+    ("schema = 1", "expected kind, one of spectrum, levels"),
+    ('schema = 1\nkind = "spectrun"', "'spectrun' is none; the nearest is 'spectrum'"),
+    ('schema = 1\nkind = "spectrum"', "object missing required field molecule"),
+    (HEAD + "[condition]\ntemperature = 3", "a scene of this kind has no key 'condition'; the nearest is 'conditions'"),
+    (HEAD + "[conditions]\ntemprature = 3", "[conditions] has no key 'temprature'; the nearest is 'temperature'"),
+    (HEAD + '[numerics]\njmax = "5"', "numerics.jmax: expected int | null, got str"),
+    (HEAD + "[numerics]\njmax = 5.5", "numerics.jmax: expected int | null, got float"),
+    (HEAD + "[conditions]\ntemperature = true", "conditions.temperature: expected float | str, got bool"),
+    (HEAD + "[conditions]\ntemperature = ", "not a TOML file"),
+    (
+        'schema = 1\nkind = "align"\nmolecule = "OCS"\n[[pulses]]\nshape = "square"',
+        "pulses[0].shape: invalid value 'square'",
+    ),
+    (
+        'schema = 1\nkind = "align"\nmolecule = "OCS"\n[[pulses]]\nshape = "kick"\nfluense = 1',
+        "[pulses] has no key 'fluense'; the nearest is 'fluence'",
+    ),
+]
+
+
+@pytest.mark.parametrize(("text", "said"), BAD, ids=[said for _, said in BAD])
+def test_a_mistake_is_named(text, said):
+    with pytest.raises(ValueError, match=r".") as caught:
+        parse_scene(text, "s.toml")
+    assert str(caught.value).startswith("s.toml: ")
+    assert said in str(caught.value)
+
+
+def test_a_scene_file_that_is_no_text(tmp_path):
+    (tmp_path / "s.toml").write_bytes(b"\xff\xfe")
+    with pytest.raises(ValueError, match=r"UTF-8"):
+        read_scene(tmp_path / "s.toml")
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_template_is_a_scene_of_its_kind(kind):
+    scene = parse_scene(template(kind))
+    assert scene.kind == kind
+    assert isinstance(scene, KINDS[kind])
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_key_of_a_template_may_be_switched_on(kind):
+    """With the # taken away, every line is of a right type; only what excludes each other is left to the requests."""
+    lines = template(kind).splitlines()
+    switched = [re.sub(r"^# (?=[\w.]+ = |\[)", "", line) for line in lines]
+    assert len([a for a, b in zip(lines, switched, strict=True) if a != b]) > 5
+    assert parse_scene("\n".join(switched)).kind == kind
+
+
+def test_defaults_of_a_template_are_the_defaults():
+    """A template with all comments that are no examples switched on is the same scene."""
+    for kind in KINDS:
+        text = template(kind)
+        on = "\n".join(
+            line.removeprefix("# ") if re.match(r"# [\w.]+ = ", line) and "# example:" not in line else line
+            for line in text.splitlines()
+        )
+        assert parse_scene(on) == parse_scene(text)
+
+
+def test_the_json_schema_knows_every_key():
+    schema = json.dumps(json_schema())
+    for structure in KINDS.values():
+        for name in structure.__struct_fields__:
+            assert f'"{name}"' in schema
+    assert '"description"' in schema
+
+
+def test_nothing_of_the_physics_is_loaded_by_a_scene_alone():
+    code = (
+        "import sys\nfrom rotor.scenes.scene_file import parse_scene\n"
+        f"parse_scene({HEAD!r})\n"
+        "print(sorted(m for m in sys.modules if m.startswith('rotor.') or m in ('numpy', 'scipy', 'pydantic', 'numba')))"
+    )
+    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert eval(ran.stdout) == [
+        "rotor.scenes",
+        "rotor.scenes.effect_sections",
+        "rotor.scenes.scene",
+        "rotor.scenes.scene_file",
+        "rotor.scenes.sections",
+        "rotor.version",
+    ]
+
+
+def test_defaults_are_left_out_of_a_file():
+    assert scene_text(SpectrumScene(molecule="CO")).count("\n") == 3
+    assert scene_text(LevelsScene(molecule="CO")).count("\n") == 3
