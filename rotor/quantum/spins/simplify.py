@@ -11,17 +11,12 @@ a state; V is bounded by the largest coefficient of coupling of the F. A line ma
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from rotor.arrays import Floats
 from rotor.quantum.effect import QuantumEffect
-
-if TYPE_CHECKING:
-    from rotor.quantum.spins.blocks import Plan
-    from rotor.quantum.spins.rotor import Channel
-
 from rotor.quantum.spins.blocks import Plan, coefficients_of
 from rotor.quantum.spins.method import EXACT, FIRST_ORDER, N_DIAGONAL, HyperfineMethod, Used
 from rotor.quantum.spins.rotor import Channel
@@ -55,7 +50,6 @@ def _remaining(plan: Plan, method: str) -> dict[tuple[int, int], dict[Channel, F
 
 def largest_shifts(plan: Plan, every_f: Sequence[int]) -> tuple[float, float]:
     """The largest shift of a level in MHz by elements between different N, and by those between other states of one N."""
-
     scheme, largest = plan.shared.scheme, np.zeros(2)
     channels = {channel for operators in plan.operators.values() for channel in operators}
     for twice_f in every_f:
