@@ -11,6 +11,7 @@ import pytest
 from rotor.alignment.pulse import GaussianPulse
 from rotor.alignment.request import AlignRequest, answer_align
 from rotor.cli.shared.output import plain
+from rotor.cli.shared.workers import Counted, working
 from rotor.formats import read
 from rotor.quantum.fields.stark_request import StarkRequest, answer_stark
 from rotor.spectra.field_lines import field_lines
@@ -216,3 +217,16 @@ def test_wrong_input_is_one_line_and_code_2(call, arguments, message):
     assert message in err
     assert len(err.strip().splitlines()) == 1
     assert not [path for path in Path().iterdir() if path.suffix in (".png", ".csv", ".json")]
+
+
+def test_pieces_are_counted_in_order():
+    """On a terminal a bar says after each piece how many are done; results come in order, errors where they are asked for."""
+    seen: list[tuple[int, int]] = []
+    counted = Counted(None, lambda done, total: seen.append((done, total)))
+    assert list(counted.map(lambda x: x * x, [3, 1, 2])) == [9, 1, 4]
+    assert seen == [(1, 3), (2, 3), (3, 3)]
+    assert counted.submit(int, "7").result() == 7
+    with pytest.raises(ValueError, match="invalid literal"):
+        counted.submit(int, "x").result()
+    with working(1, "blocks") as executor:
+        assert executor is None  # standard error is no terminal here

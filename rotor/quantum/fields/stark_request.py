@@ -87,10 +87,8 @@ class StarkAnswer(TextOf):
     def facts(self) -> Mapping[str, Any]:
         """Everything about the answer but its table of states, by the keys of docs/command_line.md."""
         fields, request = self.states.fields, self.request
-        top = top_facts(request.top)
-        del top["states"]  # of the top: the map has states of its own, and those of one vibrational state alone
         return {
-            **top,
+            **top_facts(request.top),
             "field_kv_per_cm": [float(fields[0]), float(fields[-1]), len(fields)],
             "intensity_w_per_cm2": request.intensity_w_per_cm2,
             "field_direction": list(request.direction),
