@@ -26,7 +26,7 @@ INFO = """
     representation rotational_constants_mhz rotational_constants_cm kappa moments_u_angstrom2 planar_moments_u_angstrom2
     inertial_defect_u_angstrom2 frame dipole_abc_debye dipole_source
     polarizability_abc_angstrom3 polarizability_source spin_weights spin_weights_source spin_constants_mhz spins spin_constants_source
-    states
+    further_states
     partition_function source notes sizes_at_j effects limits splitting_nuclei
 """
 SPECTRUM = """
