@@ -14,10 +14,12 @@ import pytest
 
 import rotor
 from rotor import units
+from rotor.quantum.effects.of_top import effects_of
 from rotor.quantum.solve import solve_levels
 from rotor.spectra.lines import line_list
 from rotor.thermo import partition_function
 from rotor.tops.isotopologues import isotopologue
+from rotor.tops.spin_constants import SpinConstants
 from rotor.tops.spin_statistics import weights_of
 from rotor.tops.spin_weights import SpinWeights
 from rotor.tops.state_constants import StateConstants
@@ -93,6 +95,24 @@ def test_q_is_the_catalogue_s(temperature_k):
     assert np.log10(q * (1 + vibration)) == pytest.approx(
         JPL_LOG_Q[temperature_k], abs=1.5e-4
     )  # digits; B of ν2 = 1 is 0.5 % off
+
+
+def test_quadrupole_components_of_the_first_rotational_line():
+    """1(0)-0(0) by F of 14N, table 1 of Cazzoli et al., each the mean of what protons split by up to 0.06 MHz."""
+    with_rotation = SpinConstants.parse("chi_cc(14N)=-4.08983MHz C_aa(14N)=6.774kHz C_bb(14N)=6.774kHz")  # its table 2
+    measured = {1: (572497.1247 + 572497.1565) / 2, 2: (572498.3391 + 572498.3885 + 572498.3979) / 3, 0: 572500.1913}
+    assert dict(AMMONIA.spin_constants.values) == {"chi_cc(14N)": -4.08983}
+    top = replace(AMMONIA, spin_constants=with_rotation)
+    lines = line_list(top, jmax=1, effects=effects_of(top, hyperfine=True), range_mhz=(5e5, 6e5), min_lgint=None)
+    found = dict(zip(lines.levels.quanta["f"][lines.upper].tolist(), lines.frequency_mhz.tolist(), strict=True))
+    centre = (
+        2 * AMMONIA.constants["B"]
+        - 4 * AMMONIA.constants["DJ"]
+        + 8 * AMMONIA.constants["HJ"]
+        - AMMONIA.states.values["E[1]"]
+    )
+    for f, frequency in measured.items():
+        assert found[f] - centre == pytest.approx(frequency - ROTATION, abs=0.03)  # half of what the protons split
 
 
 def test_states_go_with_the_constants_of_this_isotopologue_alone():

@@ -331,8 +331,8 @@ def test_command_line_shows_states(folder, call):
     assert "dipole between 0+ and 0-" in out
     assert "states: made for a test" in out
     content = json.loads((folder / "info.json").read_text())
-    assert content["states"]["constants_mhz"]["B[1]"] == 5980.0
-    assert content["states"]["names"] == ["0+", "0-"]
+    assert content["further_states"]["constants_mhz"]["B[1]"] == 5980.0
+    assert content["further_states"]["names"] == ["0+", "0-"]
     assert call("levels", "doublet.toml", "--jmax", "1", "--csv", "levels.csv")[0] == 0
     rows = list(csv.DictReader((folder / "levels.csv").read_text().splitlines()))
     assert {row["v"] for row in rows} == {"0", "1"}

@@ -16,7 +16,7 @@ import numpy as np
 from rotor import units
 from rotor.arrays import Floats
 from rotor.quantum.fields.blocks import FreeLevels
-from rotor.tops.state_rules import one_state
+from rotor.tops.top import one_state
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top

@@ -53,7 +53,7 @@ def top_facts(top: Top) -> dict[str, Any]:
         "spin_constants_mhz": dict(top.spin_constants.values) if top.spin_constants else None,
         "spins": {name: twice / 2 for name, twice in top.spin_constants.twice.items()} if top.spin_constants else None,
         "spin_constants_source": (top.spin_constants.source or None) if top.spin_constants else None,
-        "states": _states(top),
+        "further_states": _states(top),
         "source": top.source or None,
         "notes": list(top.notes),
     }

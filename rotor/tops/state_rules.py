@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rotor.tops.constants import vocabulary
+from rotor.tops.constants import Constants, vocabulary
 from rotor.tops.operators import powers_of_spelled
 from rotor.tops.spin_weights import SpinWeights
 from rotor.tops.state_constants import StateConstants, Vector
@@ -18,7 +18,6 @@ from rotor.tops.state_constants import StateConstants, Vector
 if TYPE_CHECKING:
     from rotor.geometry.inertia import PrincipalFrame
     from rotor.molecules.symmetry.point_group import Symmetry
-    from rotor.tops.top import Top
 
 NOISE_DEBYE = 1e-3
 _ALONG = 1e-2  # of the elements of an operation, below which it has the principal axes for its own
@@ -26,44 +25,26 @@ _FIGURE = {"linear": 0, "prolate": 0, "oblate": 2}
 _JOINED = ((("ee", "eo"), ("oe", "oo")), (("ee", "oo"), ("eo", "oe")), (("ee", "oe"), ("eo", "oo")))  # by μa, μb, μc
 
 
-def one_state(top: Top, what: str) -> Top:
-    """The top itself where it has one state; ValueError, with what cannot be computed, where it has more.
-
-    >>> from rotor.tops.top import Top
-    >>> one_state(Top.from_constants("B=5 MHz"), "levels in a field").kind
-    'linear'
-    """
-    if top.states is not None:
-        names = ", ".join(top.states.name_of(v) for v in range(top.states.count))
-        raise ValueError(
-            f"{what} of {top.name or 'this top'}: computed for tops of one state, and this one has {top.states.count} ({names}); "
-            "give the constants of one of them alone"
-        )
-    return top
-
-
-def refuse_impossible_states(states: StateConstants, top: Top) -> None:
-    """ValueError for states that a top cannot have.
-
-    Each needs the same of A, B, C as the top; couplings are those that its geometry allows together; dipoles join levels of equal
-    weight. What neither geometry nor weights tell is taken as given.
-    """
-    rigid = [name for name in top.constants.values if name in ("A", "B", "C")]
-    known = ("E", *vocabulary(top.kind, top.constants.reduction))
+def refuse_incomplete_states(states: StateConstants, kind: str, constants: Constants) -> None:
+    """ValueError where a further state lacks one of A, B, C that the first has, or has a constant that no such top has."""
+    rigid = [name for name in constants.values if name in ("A", "B", "C")]
+    known = ("E", *vocabulary(kind, constants.reduction))
     for v in range(1, states.count):
         strange = [name for name in states.of_state(v) if name not in known and not powers_of_spelled(name)]
         if strange:
-            raise ValueError(f"{strange[0]}[{v}]: a state of this {top.kind} top has {', '.join(known)}")
+            raise ValueError(f"{strange[0]}[{v}]: a state of this {kind} top has {', '.join(known)}")
         missing = [name for name in rigid if name not in states.of_state(v)]
         if missing:
             raise ValueError(
                 f"state {states.name_of(v)}: no {', '.join(f'{name}[{v}]' for name in missing)}; each state has constants of its own"
             )
-    if top.symmetry is not None and top.frame is not None and top.kind == "asymmetric":
-        group, even = _even_rotations(top.symmetry, top.frame)
-        if len(even) < 3:
-            states.refuse_couplings(group, even)
-    _refuse_dipoles(states, top)
+
+
+def refuse_forbidden_couplings(states: StateConstants, symmetry: Symmetry, frame: PrincipalFrame) -> None:
+    """ValueError for couplings of an asymmetric top that its geometry does not allow together."""
+    group, even = _even_rotations(symmetry, frame)
+    if len(even) < 3:
+        states.refuse_couplings(group, even)
 
 
 def _even_rotations(symmetry: Symmetry, frame: PrincipalFrame) -> tuple[str, str]:
@@ -80,14 +61,31 @@ def _even_rotations(symmetry: Symmetry, frame: PrincipalFrame) -> tuple[str, str
     return symmetry.point_group, found
 
 
-def _refuse_dipoles(states: StateConstants, top: Top) -> None:
-    own: dict[tuple[int, int], Vector] = {}
-    if top.dipole_abc_debye is not None:
-        own = {(v, v): top.dipole_abc_debye for v in range(states.count)}
+def refuse_forbidden_state_dipoles(
+    states: StateConstants, kind: str, spin_weights: SpinWeights, dipole_abc_debye: Vector | None
+) -> None:
+    """ValueError for a dipole in a state or between two that would join levels of different nuclear-spin weight.
+
+    Parameters
+    ----------
+    states : StateConstants
+    kind : str
+        Of the top.
+    spin_weights : SpinWeights
+        Of the first state, and of those without weights of their own.
+    dipole_abc_debye : (3,) tuple or None
+        Of every state without one of its own.
+
+    Raises
+    ------
+    ValueError
+        With the component, its value and the states. What weights do not tell is taken as given.
+    """
+    own = {} if dipole_abc_debye is None else {(v, v): dipole_abc_debye for v in range(states.count)}
     for (upper, lower), moment in (own | dict(states.dipoles)).items():
-        first, second = (states.weights.get(v, top.spin_weights) for v in (upper, lower))
+        first, second = (states.weights.get(v, spin_weights) for v in (upper, lower))
         for axis, value in enumerate(moment):
-            if abs(value) > NOISE_DEBYE and not _joins_equals(axis, top.kind, first, second):
+            if abs(value) > NOISE_DEBYE and not _joins_equals(axis, kind, first, second):
                 where = f"in state {states.name_of(upper)}" if upper == lower else "between states "
                 where += "" if upper == lower else f"{states.name_of(lower)} and {states.name_of(upper)}"
                 raise ValueError(

@@ -32,7 +32,7 @@ from rotor.tops.operators import KINDS
 from rotor.tops.spin_constants import SpinConstants
 from rotor.tops.spin_weights import SpinWeights
 from rotor.tops.state_constants import StateConstants
-from rotor.tops.state_rules import refuse_impossible_states
+from rotor.tops.state_rules import refuse_forbidden_couplings, refuse_forbidden_state_dipoles, refuse_incomplete_states
 
 if TYPE_CHECKING:
     from rotor.molecules.molecule import Molecule
@@ -96,7 +96,13 @@ class Top:
             tensor = self.polarizability_abc_angstrom3
             refuse_forbidden_polarizability(tensor, self.symmetry, self.frame, self.spin_weights)
         if self.states is not None:
-            refuse_impossible_states(self.states, self)
+            self._check_states(self.states)
+
+    def _check_states(self, states: StateConstants) -> None:
+        refuse_incomplete_states(states, self.kind, self.constants)
+        if self.symmetry is not None and self.frame is not None and self.kind == "asymmetric":
+            refuse_forbidden_couplings(states, self.symmetry, self.frame)
+        refuse_forbidden_state_dipoles(states, self.kind, self.spin_weights, self.dipole_abc_debye)
 
     @property
     def provenance(self) -> dict[str, Any]:
@@ -403,3 +409,19 @@ def _three(vector: ArrayLike | None) -> tuple[float, float, float] | None:
     if values.shape != (3,) or not np.isfinite(values).all():
         raise ValueError(f"a dipole is three finite numbers (μa, μb, μc) in debye, not {values.tolist()}")
     return float(values[0]), float(values[1]), float(values[2])
+
+
+def one_state(top: Top, what: str) -> Top:
+    """The top itself where it has one state; ValueError, with what cannot be computed, where it has more.
+
+    >>> from rotor.tops.top import Top
+    >>> one_state(Top.from_constants("B=5 MHz"), "levels in a field").kind
+    'linear'
+    """
+    if top.states is not None:
+        names = ", ".join(top.states.name_of(v) for v in range(top.states.count))
+        raise ValueError(
+            f"{what} of {top.name or 'this top'}: computed for tops of one state, and this one has {top.states.count} ({names}); "
+            "give the constants of one of them alone"
+        )
+    return top

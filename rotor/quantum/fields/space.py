@@ -11,7 +11,7 @@ from rotor.quantum.fields.blocks import AxialSpace, Contraction, FieldSpace, Fre
 from rotor.quantum.fields.tilted_blocks import tilted_space
 from rotor.quantum.fields.wang_blocks import wang_space
 from rotor.quantum.solve import solve_levels
-from rotor.tops.state_rules import one_state
+from rotor.tops.top import one_state
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top

@@ -201,7 +201,7 @@ def tilted_space(top: Top, jmax: int, contractions: Sequence[Contraction]) -> Ti
     """
     from rotor.quantum.effects.watson import SEMI_RIGID
     from rotor.quantum.rotation import representation_of, solve_rotation
-    from rotor.tops.state_rules import one_state
+    from rotor.tops.top import one_state
 
     if top.kind == "spherical":
         raise ValueError(f"{top.name or 'this top'} is a spherical top: neither a dipole nor an anisotropy turns it")
