@@ -306,7 +306,7 @@ def test_files_appear_all_or_none(call, folder, monkeypatch):
 
     monkeypatch.setattr(plots, "plot_spectrum", fails)
     code, out, err = call("spectrum", "CO", "--csv", "a.csv", "--cat", "a.cat", "--plot", "a.png")
-    assert (code, out, err) == (2, "", "error: a.png: No space left on device\n")
+    assert (code, out, err) == (1, "", "error: a.png: No space left on device\n")
     assert [p.name for p in folder.iterdir()] == ["a.csv"]
     assert (folder / "a.csv").read_text(encoding="utf-8") == "old"
 
