@@ -115,7 +115,13 @@ def test_a_cut_that_no_double_holds_is_refused(call, value):
 
 
 @pytest.mark.parametrize(
-    "words", [["info", "NH3", "--temperature", "1e300"], ["spectrum", "water", "--jmax", "1000000"]]
+    "words",
+    [
+        ["info", "NH3", "--temperature", "1e300"],
+        ["spectrum", "water", "--jmax", "1000000"],
+        ["stark", "H2O", "--field", "0:10kV/cm:3", "--jmax", "1000"],
+        ["fluid", "water", "--molecules", "27", "--steps", "4", "--cutoff", "1e300"],
+    ],
 )
 def test_work_without_end_is_refused(call, words):
     code, _, err = call(*words)
