@@ -90,6 +90,18 @@ def test_stark_writes_lines_spectra_mixtures_and_tables(call):
     assert Path("l.png").stat().st_size > 10_000
 
 
+def test_stark_with_the_spin_of_a_nucleus(call):
+    """A linear top in a weak field: three levels of J = 1 (F = 0, 1, 2) with their M_F, the picture too."""
+    arguments = ("--constants", "B=4549 MHz", "--dipole-abc", "3.73,0,0", "--spin-constants", "chi_aa(14N)=-4.3 MHz")
+    code, out, err = call("stark", *arguments, "--field", "0,0.1", "--states", "1", "--json", "-", "--plot", "a.png")
+    assert (code, err) == (0, "")
+    content = json.loads(out)
+    assert content["hyperfine"] is True
+    levels = {(row["label"], row["m"]) for row in content["states"]}
+    assert levels == {("0 1", 0), ("0 1", 1), ("1 0", 0), ("1 1", 0), ("1 1", 1), ("1 2", 0), ("1 2", 1), ("1 2", 2)}
+    assert Path("a.png").stat().st_size > 10_000
+
+
 @pytest.mark.slow
 def test_workers_change_no_number(call):
     found = []
@@ -182,6 +194,9 @@ def test_every_kind_of_pulse(call, options):
         (("stark", "OCS", "--intensity", "-1"), "intensity -1"),
         (("stark", "N2"), "no dipole"),
         (("stark", "OCS", "--light", "up"), "--light: 'up'"),
+        (("stark", "OCS", "--hyperfine"), "no constants of spins"),
+        (("stark", "OCS", "--m", "0.5"), "M of"),
+        (("stark", "OCS", "--m", "x"), "--m: 'x'"),
         (("stark", "OCS", "--line", "1"), "--line: '1'"),
         (("stark", "OCS", "--line", "9 - 8", "--lines", "a.csv"), "no line 9 - 8"),
         (("stark", "OCS", "--spread", "2"), "--spread: 2"),

@@ -41,6 +41,7 @@ VERBS = {  # and what the list of verbs says of each, short enough for 80 column
     "convert": "Constants from one file format into another.",
     "cat": "A catalogue as a table, filtered or compared.",
     "new": "A commented scene file to begin with.",
+    "plan": "What a scene will do, its cost, what it omits.",
     "run": "A scene file run; a sweep goes on where it stopped.",
 }
 FILES = {"run": "run_scene"}  # of verbs that this module has a function for
