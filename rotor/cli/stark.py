@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from rotor.checks import require_whole
 from rotor.cli.raman import with_polarizability
 from rotor.cli.shared import inputs
 from rotor.cli.shared.inputs import Input, json_option, parsed, positive, quantity
@@ -45,6 +46,7 @@ Examples:
   rotor stark HC3N --field 0:2kV/cm --states "J<=1" --spin-constants "chi_aa(14N)=-4.3 MHz" --plot hc3n.png
   rotor stark indole --field 0:50kV/cm --temperature 1 --mixture indole_1k.csv --deflection mu_eff.csv"""
 
+MOST_J = 500  # of the basis: a minute's work for an asymmetric top
 NAMES = {
     "fields_kv_per_cm": "--field", "j_highest": "--states", "m_values": "--m", "intensity_w_per_cm2": "--intensity",
     "jmax": "--jmax", "tolerance_mhz": "--tolerance", "diabatic_gap_mhz": "--diabatic-gap", "direction": "--tilt",
@@ -218,6 +220,7 @@ def _line(text: str) -> tuple[str, str]:
 def _settings(options: Options) -> dict[str, Any]:
     """Fields of the request from the texts of the options."""
     gap = options.diabatic_gap
+    require_whole("--jmax", options.jmax, 0, MOST_J)
     return {
         "fields_kv_per_cm": parsed("--field", options.field, _fields),
         "j_highest": parsed("--states", options.states, _highest_j),

@@ -317,7 +317,12 @@ def order_of(name: str, constants: Constants) -> int:
     if name in ("A", "B", "C"):
         return 2
     spelled = powers_of_spelled(name)
-    terms = {spelled: 1.0} if spelled else distortion_terms(constants.kind, constants.reduction)[name]
+    known = distortion_terms(constants.kind, constants.reduction)
+    if not spelled and name not in known:
+        raise ValueError(
+            f"{name!r} is no constant of the kind {constants.kind}; expected one such as {', '.join(list(known)[:3])}"
+        )
+    terms = {spelled: 1.0} if spelled else known[name]
     return max(2 * (p + q + n) for p, q, n in terms)
 
 
