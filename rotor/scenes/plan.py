@@ -71,6 +71,8 @@ def plan_of(scene: Scene, folder: str | os.PathLike[str] = ".") -> Plan:
     ValueError
         Whatever the scene itself would be refused for.
 
+    Examples
+    --------
     >>> from rotor.scenes.scene import LevelsScene
     >>> plan_of(LevelsScene(molecule="CO")).counts
     {'levels': 11}

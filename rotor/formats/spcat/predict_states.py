@@ -103,7 +103,24 @@ def line_names(file: ParameterFile) -> tuple[str, ...]:
 
 
 def level_spreads(group: Group, levels: Levels, names: Sequence[str], factor: Floats | None) -> Floats | None:
-    """What the covariance of a file's parameters makes of each level, ∂E/∂p F (levels, k) in MHz; None without one."""
+    """What the covariance of a file's parameters makes of each level, ∂E/∂p F; None without one.
+
+    Parameters
+    ----------
+    group : Group
+        Of states, with their effect and top.
+    levels : Levels
+        Of the group.
+    names : sequence of str
+        The parameters of the file, in the order of the rows of `factor`.
+    factor : (parameters, k) array or None
+        F with F Fᵀ the covariance, in MHz.
+
+    Returns
+    -------
+    (levels, k) array or None
+        In MHz.
+    """
     if factor is None:
         return None
     own = tuple(group.effect.parameters(group.top))
