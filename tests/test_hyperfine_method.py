@@ -143,7 +143,46 @@ def test_the_command_line_says_which_method_was_used(capsys):
     assert run(command) == 0
     assert "hyperfine     exact" in capsys.readouterr().out
     assert run([*command, "--hyperfine-method", "best"]) == 2
-    assert "auto, exact, first-order" in capsys.readouterr().err
+    assert "auto, exact, N-diagonal, first-order" in capsys.readouterr().err
     assert run(["spectrum", "HCONH2", "--hyperfine-method", "auto"]) == 2
     assert "--hyperfine" in capsys.readouterr().err
     assert rotor.read("HCONH2").spin_constants is not None
+
+
+def test_a_picture_names_the_components_inside_its_axes():
+    from rotor.plots.spectrum import spectrum_figure
+
+    top = rotor.read("HCONH2")
+    lines = line_list(top, jmax=2, temperature_k=300.0, effects=effects_of(top, True))
+    figure = spectrum_figure(lines, range_mhz=(21206.0, 21209.0))
+    axes = figure.axes[0]
+    figure.canvas.draw()
+    names = {text.get_text(): text.get_window_extent() for text in axes.texts}
+    assert len(names) == 3
+    assert any("$F = 2 – 1$" in name for name in names)
+    assert all(box.y1 <= axes.bbox.y1 for box in names.values())
+    assert axes.get_xlabel() == "Frequency (MHz)"
+
+
+def test_unresolved_components_are_one_line(capsys):
+    """Sums of intensity stay, the mean is that of the line without spins, and nothing of another line comes in."""
+    from rotor.cli import run
+    from rotor.spectra.patterns import patterns
+
+    top = rotor.read("HCONH2")
+    lines = line_list(top, jmax=4, temperature_k=300.0, effects=effects_of(top, True))
+    for resolution in (1e-6, 0.5, 50.0):
+        found = patterns(lines, resolution)
+        assert found.components.sum() == len(lines)
+        assert found.intensity_nm2_mhz.sum() == pytest.approx(lines.intensity_nm2_mhz.sum(), rel=1e-12)
+    plain = line_list(top, jmax=4, temperature_k=300.0)
+    strong = found.intensity_nm2_mhz > 1e-7
+    assert strong.sum() > 30
+    for frequency in found.frequency_mhz[strong]:
+        assert np.abs(plain.frequency_mhz - frequency).min() < 0.02  # second order, χ²/(B + C) is 1 kHz; and the cut
+    command = ["spectrum", "HCONH2", "--hyperfine", "--jmax", "2", "--range", "21206:21209"]
+    assert run([*command, "--resolution", "0.7"]) == 0
+    out = capsys.readouterr().out
+    assert "components" in out
+    assert "21206.4546" in out
+    assert "21207.3340" not in out

@@ -282,3 +282,24 @@ def test_a_sample_of_mutated_inputs_makes_no_traceback():
     failing, done = fuzz.fuzz(10_000_000, 300, fuzz.QUICK)
     assert done == 300
     assert [(one.failing, one.words, one.said) for one in failing] == []
+
+
+# Long sums
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["info", "--constants", "A=430 B=57 C=55 MHz"],
+        ["thermo", "--constants", "A=430 B=57 C=55 MHz"],
+        ["info", "mistyped.xyz"],
+    ],
+    ids=lambda words: " ".join(words[:2]),
+)
+def test_sums_over_very_many_levels_take_seconds(call, words):
+    Path("mistyped.xyz").write_text("3\n\nO 0 0 0\nH 0.96 0 0\nH -0.24 9300 0\n")  # 0.93 was meant
+    started = time.perf_counter()
+    code, out, _ = call(*words)
+    assert time.perf_counter() - started < 15.0  # s; 1 on a quiet machine, 39 and more than 60 before
+    assert code == 0
+    assert out

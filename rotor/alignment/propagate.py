@@ -268,6 +268,13 @@ def split_through(
         The states whose population is leakage, looked at a dozen times.
     snapshots : list, optional
         The states at the sampled times, (times, n, m) in pieces, are appended.
+
+    Returns
+    -------
+    states : (n, m) array
+        At the end of the window.
+    leaked : (m,) array
+        Largest population at the edge.
     """
     from rotor.alignment._kernels import kick_and_drift
 
@@ -326,7 +333,32 @@ def magnus_through(
     edge: NDArray[np.bool_],
     snapshots: list[Complexes] | None = None,
 ) -> tuple[Complexes, Floats]:
-    """As `split_through`, of a window with any channels, one operator (n, n), dense or sparse, for each."""
+    """States after a window with any channels, and each one's largest population at the edge; see `split_through`.
+
+    Parameters
+    ----------
+    window : Window
+        Its channels give the strength of each operator over time.
+    grid : Grid
+        Steps, and which of them end at a sampled time.
+    energies : (n,) array
+        Of the free states, rad/ps.
+    operators : sequence of (n, n) arrays
+        Dense or sparse, one for each channel.
+    states : (n, m) array
+        At the start of the window.
+    edge : (n,) array of bool
+        The states whose population is leakage.
+    snapshots : list, optional
+        The states at the sampled times, (times, n, m) in pieces, are appended.
+
+    Returns
+    -------
+    states : (n, m) array
+        At the end of the window.
+    leaked : (m,) array
+        Largest population at the edge.
+    """
     first, second = 0.5 - math.sqrt(3) / 6, 0.5 + math.sqrt(3) / 6
     large, small = 0.25 + math.sqrt(3) / 6, 0.25 - math.sqrt(3) / 6
     reach = [_norm_bound(operator) for operator in operators]

@@ -37,7 +37,7 @@ class Pilot:
     whole: bool = False  # whether task and outcome are all there is
 
 
-def plan_of(problem: Problem, steps: Sequence[int], rule: str | None, factor: int = 1) -> Plan:
+def _plan_of(problem: Problem, steps: Sequence[int], rule: str | None, factor: int = 1) -> Plan:
     """Passages with about so many steps a window, `factor` times as many; a Magnus method where `rule` is None."""
     out: list[propagate.KickPlan | propagate.Grid | float] = []
     for window, count in zip(problem.windows, steps, strict=True):
@@ -56,7 +56,7 @@ def pilot_of(problem: Problem, jmax: int) -> Pilot:
     space = problem.space(jmax)
     task, whole = _pilot_task(problem, space)
     if task is None or all(window.is_kick for window in problem.windows):
-        plan = plan_of(problem, [1] * len(problem.windows), "nystrom 4")
+        plan = _plan_of(problem, [1] * len(problem.windows), "nystrom 4")
         outcome = None if task is None else run(replace(task, plan=plan))
         edge = _relative_edge(outcome, task) if outcome and task else 0.0
         return Pilot(plan, (0,) * len(problem.windows), 0.0, edge, space, task, outcome, whole)
@@ -91,10 +91,10 @@ def _refined(
     """
     goal, before, factor = 0.5 * problem.tolerance, 0.0, 1
     counts = [first] * len(problem.windows)
-    plan = plan_of(problem, counts, rule)
+    plan = _plan_of(problem, counts, rule)
     outcome = run(replace(task, plan=plan))
     while sum(_steps_of(plan)) <= MOST_STEPS:
-        finer = plan_of(problem, counts, rule, 2 * factor)
+        finer = _plan_of(problem, counts, rule, 2 * factor)
         check = run(replace(task, plan=finer))
         error = _difference(problem, space, task, outcome, check)
         if finer_order and error <= ASYMPTOTIC and (left := error / 2 ** (finer_order - 1)) <= goal < error:
@@ -104,7 +104,7 @@ def _refined(
             edge, mine = _relative_edge(check, task), Pilot(plan, _steps_of(plan), error, 0.0, space, task, outcome)
             if before > error > 0:
                 steps = 0.5 * 2 ** (math.log(before / goal) / math.log(before / error)) * sum(_steps_of(plan))
-                fewer = plan_of(problem, [math.ceil(steps / len(counts))] * len(counts), rule)
+                fewer = _plan_of(problem, [math.ceil(steps / len(counts))] * len(counts), rule)
                 if steps <= sum(_steps_of(fewer)) and _cost(fewer) < _cost(plan):
                     mine = Pilot(fewer, _steps_of(fewer), goal, 0.0, space, task)
             mine = replace(mine, edge=edge)

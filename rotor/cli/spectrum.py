@@ -74,9 +74,14 @@ class Options:
         help="Split lines by the spins of nuclei; by default where --spin-constants are given.",
     )
     hyperfine_method: str = option(
-        "exact", metavar="NAME", help="exact, first-order, or auto: the cheapest that keeps --hyperfine-tolerance."
+        "exact",
+        metavar="NAME",
+        help="exact, N-diagonal, first-order, or auto: the cheapest that keeps --hyperfine-tolerance.",
     )
     hyperfine_tolerance: str = option("0.1kHz", metavar="D", help="How far auto may be off exact lines (MHz).")
+    resolution: str | None = option(
+        None, metavar="D", help="Show components of one rotational line that are closer (MHz) as one line."
+    )
     as_spcat: bool = option(
         False, "--as-spcat", help="Of an .int file: K above KNMAX is left out of the basis, as SPCAT leaves it out."
     )
@@ -115,6 +120,7 @@ def command(
     require_whole("--top", options.top_lines, 0)
     require_whole("--tag", options.tag, 0, 999_999)
     files, shape = Files.of(outputs), _shape(options, layer)
+    resolution = inputs.positive("--resolution", options.resolution, "MHz") if options.resolution else None
     drawn = plot_options.settings_of(picture, files)
     settings = {
         **_settings(options, "296" if outputs.hitran else "300"),
@@ -137,6 +143,7 @@ def command(
         note(warning)
     with answering():
         content = _content(answer, given, context.obj, options.top_lines)
+        content["patterns"] = None if resolution is None else _patterns(answer.lines, resolution, options.top_lines)
     content["files"] = files.names
 
     writers = _writers(answer, content, {"tag": tag, **hitran}, drawn)
@@ -300,8 +307,10 @@ def _show(answer: SpectrumAnswer, content: dict[str, Any], range_text: str | Non
     show_facts(_facts(lines, content))
     if len(lines) == 0:
         print(f"\nno lines: {_why_none(answer, range_text)}")
-        return
-    if len(content["strongest"]):
+    elif content["patterns"] is not None:
+        print()
+        show_table(_patterns_table(content["patterns"]))
+    elif len(content["strongest"]):
         print()
         show_table(_lines_table(lines, content["strongest"], content["optical_depth"]))
     print()
@@ -366,6 +375,31 @@ def _count_text(lines: Lines) -> str:
     if not len(lines):
         return "none"
     return f"{len(lines)}, from {lines.frequency_mhz[0]:.4f} to {lines.frequency_mhz[-1]:.4f} MHz"
+
+
+def _patterns(lines: Lines, resolution_mhz: float, shown: int) -> list[dict[str, Any]]:
+    """The strongest lines at a resolution, by frequency."""
+    from rotor.quantum.quanta import labels, of_rotation
+    from rotor.spectra.intensity import largest
+    from rotor.spectra.patterns import patterns
+
+    found, levels = patterns(lines, resolution_mhz), lines.levels
+    quanta = of_rotation(levels.quanta)
+    rows = sorted(largest(found.intensity_nm2_mhz, shown).tolist()) if shown else []
+    sides = {s: labels(quanta, getattr(lines, s)[found.strongest], levels.halves) for s in ("upper", "lower")}
+    names = ("frequency_mhz", "intensity_nm2_mhz", "components", "width_mhz")
+    records = []
+    for row in rows:
+        record: dict[str, Any] = {name: getattr(found, name)[row].item() for name in names}
+        records.append(record | {side: text[row].strip() for side, text in sides.items()})
+    return records
+
+
+def _patterns_table(records: list[dict[str, Any]]) -> Table:
+    forms = {"frequency_mhz": "{:.4f}", "intensity_nm2_mhz": "{:.3e}", "components": "{}", "width_mhz": "{:.4f}"}
+    rows = [(*(form.format(one[name]) for name, form in forms.items()), one["upper"], one["lower"]) for one in records]
+    columns = ("frequency (MHz)", "nm² MHz", "components", "width (MHz)", "upper", "lower")
+    return Table("the strongest lines at this resolution, in order of frequency", columns, rows)
 
 
 class _Column(NamedTuple):

@@ -227,7 +227,8 @@ def choose_constants(
     start = with_names(constants, base)
     fit = fit_lines(lines, start, parameters(start, base), _patient(options))
     fixed, taken = tuple(fit.parameters.names), list[Trial]()
-    names = dict.fromkeys(start.own_name(name) for name in candidates)
+    known = with_names(start, [name for name in candidates if name not in start])  # refuses names that there are not
+    names = dict.fromkeys(known.own_name(name) for name in candidates)
     orders = {name: order_of(name, start) for name in names if name not in fixed}
 
     def take(trial: Trial) -> Fit:

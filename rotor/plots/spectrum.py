@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor.arrays import Floats
+from rotor.arrays import Floats, Ints
 from rotor.checks import require_one_of
 from rotor.plots.picture import BLUE, GREY, MOST_VECTOR_STICKS, checked_suffix, name_of_top, new_figure, save, styled
-from rotor.quantum.quanta import state_text
+from rotor.quantum.quanta import line_text
 from rotor.spectra.lines import Lines
 from rotor.spectra.spectrum import Spectrum, line_widths
 from rotor.units import MHZ_PER_CM
@@ -22,6 +22,7 @@ from rotor.units import MHZ_PER_CM
 UNITS = {"MHz": 1.0, "GHz": 1e3, "THz": 1e6, "cm-1": MHZ_PER_CM}  # of the frequency axis
 VISIBLE = 4e-3  # lines below this part of the strongest do not stretch the axis of frequency
 TALL = 1e-2  # and below this they cannot be seen on a linear axis
+NARROW = 1e-3  # of the frequency: a range that is narrower is shown in MHz, with all digits
 MOST_DECADES = 8
 MOST_VERTICES = 20_000  # of a curve; more cannot be distinguished on paper
 
@@ -98,6 +99,11 @@ def spectrum_figure(
     log : bool, optional
         Whether the axis of intensity is logarithmic; else it is where fewer than ten lines would be seen on a linear one.
 
+    Returns
+    -------
+    matplotlib.figure.Figure
+        One panel.
+
     Raises
     ------
     ValueError
@@ -137,7 +143,8 @@ def _frequency_axis(
 ) -> _Axis:
     first, last = range_mhz or _range_shown(thing, lines, heights)
     if unit is None:
-        unit = next((name for name in ("MHz", "GHz") if last < 2e3 * UNITS[name]), "THz")
+        narrow = last - first < NARROW * last
+        unit = "MHz" if narrow else next((name for name in ("MHz", "GHz") if last < 2e3 * UNITS[name]), "THz")
     return _Axis(unit, UNITS[unit], first, last)
 
 
@@ -195,6 +202,8 @@ def _scale(
         axes.set_ylim(tallest * 10 ** (-1.05 * decades), tallest * 10 ** (0.28 * decades))
     else:
         axes.set_ylim(0.0, 1.28 * tallest)
+    if x.last - x.first < NARROW * x.last:
+        axes.ticklabel_format(axis="x", useOffset=False, style="plain")
 
 
 def _tallest(thing: Lines | Spectrum, x: _Axis) -> float:
@@ -244,6 +253,7 @@ def _name_lines(
     figure.canvas.draw()  # places the axes, so that sizes in pixels are known
     rows = np.flatnonzero(x.inside(lines.frequency_mhz) & _stands_out(thing, lines, heights))
     rows = rows[np.argsort(-lines.intensity_nm2_mhz[rows], kind="stable")][: 15 * most]
+    _make_room(axes, lines, rows, heights, x)
     drawn = _drawn_points(axes, thing, x)
     places = axes.transData.transform(np.stack([lines.frequency_mhz[rows] / x.mhz, heights[rows]], axis=1))
     taken: list[Any] = []
@@ -260,6 +270,19 @@ def _name_lines(
             taken.append(box)
         else:
             text.remove()
+
+
+def _make_room(axes: Any, lines: Lines, rows: Ints, heights: Floats, x: _Axis) -> None:
+    """Raise the upper limit of a linear axis until the name of the strongest line stands inside."""
+    if not len(rows) or axes.get_yscale() == "log":
+        return
+    name = _label(axes, lines, int(rows[0]), heights[rows[0]], x)
+    box, top = name.get_window_extent(), axes.get_ylim()[1]
+    name.remove()
+    beyond = box.y1 + 4 - axes.bbox.y1
+    if beyond > 0:  # the part above the line keeps its height in pixels
+        above = (axes.bbox.height - (heights[rows[0]] / top) * axes.bbox.height + beyond) / axes.bbox.height
+        axes.set_ylim(0.0, heights[rows[0]] / max(1 - above, 0.3))
 
 
 def _move_inside(text: Any, axes: Any) -> None:
@@ -297,11 +320,9 @@ def _fits(box: Any, frame: Any, taken: Sequence[Any], drawn: Floats) -> bool:
 
 
 def _label(axes: Any, lines: Lines, row: int, height: float, x: _Axis) -> Any:
-    upper, lower = (
-        state_text(lines.levels.quanta, int(states[row]), lines.levels.halves) for states in (lines.upper, lines.lower)
-    )
+    levels = lines.levels
     name = axes.annotate(
-        f"{upper} – {lower}",
+        line_text(levels.quanta, int(lines.upper[row]), int(lines.lower[row]), levels.halves),
         (lines.frequency_mhz[row] / x.mhz, height),
         xytext=(0, 3),
         textcoords="offset points",

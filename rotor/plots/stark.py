@@ -116,7 +116,7 @@ def _slopes(axes: Any, field_map: FieldMap, unit: str) -> None:
         )
     axes.axhline(0.0, color="#555555", linewidth=0.6, linestyle=":")
     axes.set_xlabel(f"field ({unit})")
-    name = "μ_eff (D)" if field_map.slope_name == "mu_eff_debye" else field_map.slope_name
+    name = r"$\mu_{\mathrm{eff}}$ (D)" if field_map.slope_name == "mu_eff_debye" else field_map.slope_name
     axes.set_ylabel(name)
 
 

@@ -135,13 +135,18 @@ def between_blocks(up: WangBlock, low: WangBlock, operator: JOperator) -> Comple
     """
     j, k = operator.j, low.k
     out = np.zeros((up.size, low.size), dtype=np.complex128)
+    bands = {
+        q: band for q, band in operator.bands.items() if (low.first_k + q - up.first_k) % 2 == 0
+    }  # K in steps of 2
+    if not bands:
+        return out
     for side in (1, -1):
         columns = np.flatnonzero(k > 0) if side < 0 else np.arange(low.size)
         amplitude = np.where(k[columns] == 0, 1.0, np.sqrt(0.5)) * (low.sign if side < 0 else 1)
-        for q, band in operator.bands.items():
+        for q, band in bands.items():
             target = side * k[columns] + q
             place = (np.abs(target) - up.first_k) // 2
-            inside = ((target - up.first_k) % 2 == 0) & (place >= 0) & (place < up.size)
+            inside = (np.abs(target) >= up.first_k) & (place < up.size)
             chosen, goal = columns[inside], target[inside]
             back = np.where(goal == 0, 1.0, np.sqrt(0.5)) * np.where(goal < 0, up.sign, 1)
             values = band[side * k[chosen] + j] * amplitude[inside] * back

@@ -102,6 +102,35 @@ def labels(quanta: Quanta, rows: NDArray[Any], halves: Collection[str] = (), wid
     return [" ".join(row) for row in zip(*texts, strict=True)]
 
 
+def line_text(quanta: Quanta, upper: int, lower: int, halves: Collection[str] = ()) -> str:
+    r"""A line as a plot names it, upper level first; sums with spins come after both rotational levels, F = F' – F".
+
+    >>> quanta = {"n": np.array([1, 2]), "ka": np.array([0, 0]), "kc": np.array([1, 2]), "f": np.array([2, 3])}
+    >>> line_text(quanta, 1, 0)
+    '$2_{0,2}$ – $1_{0,1}$, $F = 3 – 2$'
+    """
+    rotation = of_rotation(quanta)
+    sums = [name for name in quanta if name not in rotation]
+    text = " – ".join(state_text(rotation, row, halves) for row in (upper, lower))
+    if not sums:
+        return text
+    names = ", ".join(_SUBSCRIPTED.get(name, heading(name)) for name in sums)
+    values = (", ".join(value_text(quanta[name][row], name in halves) for name in sums) for row in (upper, lower))
+    return f"{text}, ${names} = {' – '.join(values)}$"
+
+
+def of_rotation(quanta: Quanta) -> dict[str, NDArray[Any]]:
+    """Quantum numbers without those of sums with spins, which levels with n have.
+
+    >>> list(of_rotation({"n": np.array([1]), "k": np.array([0]), "f1": np.array([3]), "f": np.array([2])}))
+    ['n', 'k']
+    """
+    return {name: column for name, column in quanta.items() if name in _OF_ROTATION or "n" not in quanta}
+
+
+_OF_ROTATION = ("v", "n", "k", "ka", "kc", "irrep", "m")
+
+
 def state_text(quanta: Quanta, row: int, halves: Collection[str] = ()) -> str:
     r"""One level as a plot names it: J, J with K or Ka,Kc as subscripts, F after a comma, v before it all.
 

@@ -108,9 +108,15 @@ def effects_of(
     top : Top
     hyperfine : bool
     method : str
-        "exact", "first-order", or "auto", the cheapest that is estimated to keep the tolerance (`rotor.quantum.spins.method`).
+        "exact", "N-diagonal", "first-order", or "auto", the cheapest that is estimated to keep the tolerance, see
+        `rotor.quantum.spins.method`.
     tolerance_mhz : float
         By how much lines may differ from exact ones with "auto".
+
+    Returns
+    -------
+    tuple of QuantumEffect
+        For `solve_levels`, `line_list` and others.
 
     Raises
     ------

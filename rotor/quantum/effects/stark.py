@@ -180,6 +180,8 @@ def map_request(
         By how much energies may move when J max is raised.
     diabatic_gap_mhz : float, optional
         Crossings with a smaller gap are passed diabatically; by default labels are adiabatic.
+    effects : sequence of QuantumEffect, optional
+        The Hamiltonian of a top with spins; `m_values` are |M_F| then.
 
     Returns
     -------
@@ -223,7 +225,29 @@ def map_request(
 def doubled_m(
     top: Top, effects: Sequence[QuantumEffect], m_values: Sequence[float] | None, j_highest: int
 ) -> tuple[int, ...]:
-    """Twice |M_F| from those that F has, each once, all of them for None; ValueError for others."""
+    """Twice the |M_F| of a top with spins, each once.
+
+    Parameters
+    ----------
+    top : Top
+        Kind and nuclei.
+    effects : sequence of QuantumEffect
+        The Hamiltonian, spins among it.
+    m_values : sequence of float or None
+        |M_F|; None for all.
+    j_highest : int
+        The highest N that is followed.
+
+    Returns
+    -------
+    tuple of int
+        Rising.
+
+    Raises
+    ------
+    ValueError
+        For values that no F of these spins has.
+    """
     total = scheme_of(top, tuple(effects)).total
     possible = range(total % 2, 2 * j_highest + total + 1, 2)
     values = tuple(possible) if m_values is None else tuple(sorted({round(2 * m) for m in m_values}))

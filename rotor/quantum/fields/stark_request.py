@@ -19,6 +19,7 @@ from rotor.quantum.effects.stark import (
     stark_map,
 )
 from rotor.quantum.fields.field_map import FieldMap
+from rotor.table import TextOf
 from rotor.tops.facts import top_facts
 
 if TYPE_CHECKING:
@@ -74,9 +75,11 @@ class StarkRequest:
         return bool(self.direction[0] or self.direction[1])
 
 
-@dataclass(frozen=True)
-class StarkAnswer:
+@dataclass(frozen=True, repr=False)
+class StarkAnswer(TextOf):
     """The map that a request asked for."""
+
+    shown = "states"
 
     request: StarkRequest
     states: FieldMap

@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from rotor.tops.top import Top
 
 
+_AT_A_TIME = 1000  # entries of a table of shares that are looked at together
 Exist = Callable[[Ints], NDArray[np.bool_]]
 
 
@@ -339,8 +340,13 @@ def assigned(shares: Floats, capacity: Ints) -> Ints:
     if (np.bincount(found, minlength=len(capacity)) == capacity).all():
         return np.asarray(found)
     found, left = np.full(shares.shape[1], -1), capacity.copy()
-    for place in np.argsort(-shares, axis=None, kind="stable").tolist():
-        sub, state = divmod(place, shares.shape[1])
-        if found[state] < 0 and left[sub]:
-            found[state], left[sub] = sub, left[sub] - 1
+    every = np.argsort(-shares, axis=None, kind="stable")
+    for start in range(0, len(every), _AT_A_TIME):
+        subs, states = np.divmod(every[start : start + _AT_A_TIME], shares.shape[1])
+        free = (found[states] < 0) & (left[subs] > 0)  # of what was decided before
+        for sub, state in zip(subs[free].tolist(), states[free].tolist(), strict=True):
+            if found[state] < 0 and left[sub]:
+                found[state], left[sub] = sub, left[sub] - 1
+        if not left.any():
+            break
     return found

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from rotor.quantum.spins.terms import Spin
     from rotor.tops.top import Top
 
-METHODS = ("auto", "exact", "first-order")
+METHODS = ("auto", "exact", "N-diagonal", "first-order")
 EXACT, N_DIAGONAL, FIRST_ORDER = "exact", "N-diagonal", "first-order"
 TOLERANCE_MHZ = 1e-4
 
@@ -29,7 +29,7 @@ class Used:
 
 @dataclass(frozen=True)
 class HyperfineMethod(QuantumEffect):
-    """Which method is asked for: "exact", "first-order", or "auto", the cheapest that is estimated to keep a tolerance.
+    """Which method is asked for: "exact", "N-diagonal", "first-order", or "auto", the cheapest that is estimated to keep a tolerance.
 
     coupled: the spins that the other effects couple.
     """

@@ -36,14 +36,14 @@ def simplified(plan: Plan, effects: Sequence[QuantumEffect], every_f: Sequence[i
         return plan.with_method(Used(EXACT, 0.0, asked.tolerance_mhz), plan.operators)
     other_n, same_n = largest_shifts(plan, every_f)
     estimates = {FIRST_ORDER: 2 * (other_n + same_n), N_DIAGONAL: 2 * other_n, EXACT: 0.0}
-    chosen = FIRST_ORDER
-    if asked.method == "auto":
+    chosen = asked.method
+    if chosen == "auto":
         chosen = next(name for name, size in estimates.items() if size <= asked.tolerance_mhz)
     used = Used(chosen, estimates[chosen], asked.tolerance_mhz)
-    return plan.with_method(used, _kept(plan, chosen))
+    return plan.with_method(used, _operators_of(plan, chosen))
 
 
-def _kept(plan: Plan, method: str) -> dict[tuple[int, int], dict[Channel, Floats]]:
+def _operators_of(plan: Plan, method: str) -> dict[tuple[int, int], dict[Channel, Floats]]:
     blocks = plan.blocks
     if method == N_DIAGONAL:
         return {pair: found for pair, found in plan.operators.items() if blocks[pair[0]].n == blocks[pair[1]].n}

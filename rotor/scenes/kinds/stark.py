@@ -52,7 +52,24 @@ def _direction(numbers: list[float]) -> tuple[float, float, float]:
 
 
 def answer(asked: StarkRequest, scene: StarkScene, out: Where, executor: Executor | None) -> StarkAnswer:
-    """The map."""
+    """The map.
+
+    Parameters
+    ----------
+    asked : StarkRequest
+        The scene as the library takes it, checked.
+    scene : StarkScene
+        Not used.
+    out : path
+        Not used.
+    executor : Executor or None
+        Its workers share the work.
+
+    Returns
+    -------
+    StarkAnswer
+        Energies against the field.
+    """
     with kind.fields(**_NAMES):
         return answer_stark(asked, executor)
 
