@@ -1,45 +1,157 @@
-"""How long it takes until something happens: whole processes, median and best of seven, against numpy and scipy alone.
+"""Whole commands as a user meets them: processes from start to end, beside `python -c "import numpy, typer, rich.table"`.
 
-python benchmarks/bench_start.py
+    python benchmarks/bench_start.py [rounds]
+
+All commands take their turn in every round, so that a change of the machine's speed meets all alike; the median of the rounds
+counts (seven unless given), as a ratio to the imports alone. "First" runs have an empty cache of compiled code. The last rows
+are of one process: making a list in memory. Results go to benchmarks/results/start.json.
 """
 
 from __future__ import annotations
 
 import json
+import os
+import platform
 import statistics
 import subprocess
 import sys
+import tempfile
 import time
+from dataclasses import dataclass
 from pathlib import Path
 
-COMMANDS = {
-    "import numpy, scipy.linalg": ["-c", "import numpy, scipy.linalg"],
-    "import rotor": ["-c", "import rotor"],
-    "rotor spectrum water": ["-m", "rotor", "spectrum", "water"],
-    "rotor info water": ["-m", "rotor", "info", "water"],
-}
+ROOT = Path(__file__).parents[1]
 RESULTS = Path(__file__).parent / "results" / "start.json"
+BASE = 'python -c "import numpy, typer, rich.table"'
+TOP = ["--constants", "A=8572 B=3640 C=2790 MHz", "--dipole-abc", "1.201,1.916,0.365", "--q", "93882.35", "--top", "0"]
+TUMBLE = ["tumble", "water", "--times", "0:1:11"]
 
 
-def main() -> None:
-    """Measure, print a table, keep the figures."""
-    times: dict[str, list[float]] = {name: [] for name in COMMANDS}
-    for _ in range(7):  # in turn, so that a change of the machine's speed meets all alike
-        for name, arguments in COMMANDS.items():
-            started = time.perf_counter()
-            subprocess.run([sys.executable, *arguments], capture_output=True, check=True)
-            times[name].append(time.perf_counter() - started)
+@dataclass(frozen=True)
+class Case:
+    """One command. goal: of its ratio to the imports alone, of its seconds, or of its seconds beyond the later runs (`first`)."""
 
-    base = statistics.median(times["import numpy, scipy.linalg"])
-    rows = [
-        {"what": name, "median_s": statistics.median(t), "best_s": min(t), "ratio": statistics.median(t) / base}
-        for name, t in times.items()
-    ]
-    for row in rows:
-        print(f"{row['what']:28} median {row['median_s']:.3f} s, best {row['best_s']:.3f} s, ratio {row['ratio']:.2f}")
-    RESULTS.parent.mkdir(exist_ok=True)
-    RESULTS.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
+    name: str
+    arguments: tuple[str, ...]
+    ratio: float | None = None
+    seconds: float | None = None
+    beyond: str = ""
+    spcat_s: float | None = None
+
+
+def _list(jmax: int, cut: str) -> tuple[str, ...]:
+    return ("-m", "rotor", "spectrum", *TOP, "--jmax", str(jmax), "--min-lgint", cut, "--cat", "out.cat")
+
+
+IN_MEMORY = """
+import time
+from rotor.spectra.lines import line_list
+from rotor.tops.top import Top
+top = Top.from_constants("A=8572 B=3640 C=2790 MHz", dipole_abc_debye=(1.201, 1.916, 0.365))
+line_list(top, jmax=40, min_lgint={cut}, q=93882.35)
+best = 9e9
+for _ in range(3):
+    start = time.perf_counter()
+    line_list(top, jmax=200, min_lgint={cut}, q=93882.35)
+    best = min(best, time.perf_counter() - start)
+print(best)
+"""
+CASES = (
+    Case(BASE, ("-c", "import numpy, typer, rich.table")),
+    Case("python -c 'import rotor'", ("-c", "import rotor")),
+    Case("rotor info water", ("-m", "rotor", "info", "water"), ratio=2.0),
+    Case("rotor spectrum water", ("-m", "rotor", "spectrum", "water"), ratio=2.0),
+    Case("J ≤ 60 above 1e-12, .cat", _list(60, "-12"), ratio=4.0, spcat_s=0.18),
+    Case("J ≤ 100 above 1e-12, .cat", _list(100, "-12"), ratio=5.0, spcat_s=0.67),
+    Case("J ≤ 150 above 1e-12, .cat", _list(150, "-12"), spcat_s=1.5),
+    Case("J ≤ 60 all lines, .cat", _list(60, "none"), spcat_s=0.70),
+    Case("J ≤ 100 all lines, .cat", _list(100, "none"), ratio=3.7 / 3.5 / 0.16, spcat_s=3.7),
+    Case("J ≤ 150 all lines, .cat", _list(150, "none"), ratio=16 / 5 / 0.16, spcat_s=16.0),
+    Case("rotor tumble water", ("-m", "rotor", *TUMBLE)),
+    Case("first: rotor info water", ("-m", "rotor", "info", "water"), beyond="rotor info water", seconds=2.0),
+    Case(
+        "first: rotor spectrum water", ("-m", "rotor", "spectrum", "water"), beyond="rotor spectrum water", seconds=2.0
+    ),
+    Case("first: J ≤ 60 above 1e-12", _list(60, "-12"), beyond="J ≤ 60 above 1e-12, .cat", seconds=2.0),
+    Case("first: J ≤ 100 all lines", _list(100, "none"), beyond="J ≤ 100 all lines, .cat", seconds=2.0),
+    Case("first: rotor tumble water", ("-m", "rotor", *TUMBLE), beyond="rotor tumble water", seconds=2.0),
+)
+MEMORY = {"J ≤ 200 above 1e-12, in memory": ("-12", 0.22), "J ≤ 200 all lines, in memory": ("None", None)}
+
+
+def _environment() -> dict[str, str]:
+    """Of an installation: this package, its modules compiled to bytecode once."""
+    own = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
+    return own | {"PYTHONPATH": str(ROOT), "MPLBACKEND": "Agg"}
+
+
+def run(case: Case, folder: Path) -> float:
+    """Seconds of one process, in a folder for what it writes; a first run has a cache of its own."""
+    environment = _environment()
+    with tempfile.TemporaryDirectory() as cache:
+        if case.beyond:
+            environment["NUMBA_CACHE_DIR"] = cache
+        started = time.perf_counter()
+        subprocess.run([sys.executable, *case.arguments], capture_output=True, check=True, cwd=folder, env=environment)
+        return time.perf_counter() - started
+
+
+def in_memory(cut: str) -> float:
+    """Seconds of the best of three lists to J = 200 in one process."""
+    environment = _environment()
+    code = IN_MEMORY.format(cut=cut)
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, check=True, text=True, env=environment)
+    return float(done.stdout)
+
+
+def measured(rounds: int) -> tuple[dict[str, list[float]], dict[str, list[float]]]:
+    """Seconds of every process in every round, after one round that fills the cache of compiled code."""
+    times: dict[str, list[float]] = {case.name: [] for case in CASES}
+    lists: dict[str, list[float]] = {name: [] for name in MEMORY}
+    with tempfile.TemporaryDirectory() as name:
+        for turn in range(-1, rounds):
+            for case in CASES:
+                if turn >= 0 or not case.beyond:
+                    seconds = run(case, Path(name))
+                    times[case.name] += [seconds] if turn >= 0 else []
+            for title, (cut, _) in MEMORY.items():
+                lists[title] += [in_memory(cut)] if turn >= 0 else []
+    return times, lists
+
+
+def main(rounds: int) -> None:
+    """Measure, print a table with the goals, write the figures."""
+    times, lists = measured(rounds)
+    medians = {name: statistics.median(values) for name, values in times.items()}
+    rows = []
+    print(f"{'what':36} {'median s':>8} {'best':>6} {'ratio':>6} {'goal':>6}  {'SPCAT s':>7}")
+    for case in CASES:
+        ratio = medians[case.name] / medians[BASE]
+        row = {"what": case.name, "median_s": medians[case.name], "best_s": min(times[case.name]), "ratio": ratio}
+        goal, reached = "", True
+        if case.ratio is not None:
+            goal, reached = f"{case.ratio:.1f}", ratio <= case.ratio
+            row["goal_ratio"] = case.ratio
+        if case.beyond and case.seconds is not None:
+            row["longer_s"] = medians[case.name] - medians[case.beyond]
+            goal, reached = f"+{row['longer_s']:.1f}", row["longer_s"] <= case.seconds
+        if case.spcat_s is not None:
+            row["spcat_s"] = case.spcat_s
+        rows.append(row)
+        print(f"{case.name:36} {row['median_s']:8.3f} {row['best_s']:6.3f} {ratio:6.2f} {goal:>6}{' ' if reached else '!'} "
+              f"{'' if case.spcat_s is None else case.spcat_s:>7}", flush=True)  # fmt: skip
+    for title, values in lists.items():
+        row = {"what": title, "median_s": statistics.median(values), "best_s": min(values)}
+        if MEMORY[title][1] is not None:
+            row["goal_s"] = MEMORY[title][1]
+        rows.append(row)
+        print(f"{title:36} {row['median_s']:8.3f} {row['best_s']:6.3f}        {MEMORY[title][1] or ''}")
+    machine = (
+        f"{platform.processor() or platform.machine()}, {os.cpu_count()} cores, Python {platform.python_version()}"
+    )
+    text = json.dumps({"machine": machine, "rounds": rounds, "rows": rows}, indent=1, ensure_ascii=False)
+    RESULTS.write_text(text + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":
-    main()
+    main(int(sys.argv[1]) if len(sys.argv) > 1 else 7)

@@ -4,7 +4,7 @@
 
 Case k is the same on every machine: its random numbers begin from k alone. Each is a seed file or command line of one of many
 formats and verbs, with some of it replaced, cut, doubled, or made extreme. In process; counted are defects (an exception that
-is not the user's mistake, a traceback, an exit code other than 0, 1 or 2), hangs (over 20 s) and files that stay behind.
+is not the user's mistake, a traceback, an exit code other than 0, 1 or 2), hangs (over 20 s of processor time) and files that stay behind.
 Results are added to benchmarks/results/fuzz.json.
 """
 
@@ -296,8 +296,10 @@ def run_case(number: int, files: dict[str, bytes], templates: tuple[str, ...]) -
         finally:
             os.chdir(before)
         new = _names(folder) - given
-        if outcome.code != 0 and words[:1] != ["fluid"]:  # the rows of a fluid that stops on its way stay
-            outcome.left = sorted(new)
+        if outcome.code != 0 and words[:1] != [
+            "fluid"
+        ]:  # the rows of a fluid, the report of a fit without an end, stay
+            outcome.left = sorted(name for name in new if not (words[:1] == ["fit"] and name.endswith(".fit")))
         outcome.left += sorted(
             name for name in new if Path(name).name.startswith(".rotor") and name not in outcome.left
         )
@@ -313,7 +315,7 @@ def _names(folder: Path) -> set[str]:
 def _run(words: list[str]) -> Outcome:
     from rotor.cli import run
 
-    stdout, stderr, started = io.TextIOWrapper(io.BytesIO()), io.StringIO(), time.perf_counter()
+    stdout, stderr, started = io.TextIOWrapper(io.BytesIO()), io.StringIO(), time.process_time()
     code: int | None = None
     stdin, sys.stdin = sys.stdin, io.TextIOWrapper(io.BytesIO(b"2\n\nC 0 0 0\nO 0 0 1.128\n"))
     try:
@@ -325,7 +327,7 @@ def _run(words: list[str]) -> Outcome:
         stderr.write(f"escaped, this is a defect: {type(error).__name__}: {error}")
     finally:
         sys.stdin = stdin
-    return Outcome(words, code, stderr.getvalue(), time.perf_counter() - started)
+    return Outcome(words, code, stderr.getvalue(), time.process_time() - started)
 
 
 @contextlib.contextmanager
@@ -335,13 +337,13 @@ def _alarm() -> Iterator[None]:
     def ring(number: int, frame: FrameType | None) -> None:
         raise Hang
 
-    signal.signal(signal.SIGALRM, ring)
-    signal.setitimer(signal.ITIMER_REAL, HANG_S + 1)
+    signal.signal(signal.SIGPROF, ring)
+    signal.setitimer(signal.ITIMER_PROF, HANG_S + 1)
     faulthandler.dump_traceback_later(5 * HANG_S, exit=True)
     try:
         yield
     finally:
-        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.setitimer(signal.ITIMER_PROF, 0)
         faulthandler.cancel_dump_traceback_later()
 
 

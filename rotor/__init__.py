@@ -42,6 +42,13 @@ if TYPE_CHECKING:
     from rotor.quantum.request import LevelsRequest as LevelsRequest
     from rotor.quantum.request import answer_levels as answer_levels
     from rotor.quantum.solve import solve_levels as solve_levels
+    from rotor.scenes.plan import plan_of as plan_of
+    from rotor.scenes.run import run_scene as run_scene
+    from rotor.scenes.scene_file import read_scene as read_scene
+    from rotor.scenes.scene_file import write_scene as write_scene
+    from rotor.scenes.sweep import run_sweep as run_sweep
+    from rotor.spectra.emission_request import EmissionRequest as EmissionRequest
+    from rotor.spectra.emission_request import answer_emission as answer_emission
     from rotor.spectra.lines import Lines as Lines
     from rotor.spectra.lines import line_list as line_list
     from rotor.spectra.raman import RamanLines as RamanLines
@@ -79,6 +86,7 @@ _MODULES = {
     "RamanLines": "rotor.spectra.raman",
     "RamanRequest": "rotor.spectra.raman_request",
     "Spectrum": "rotor.spectra.spectrum",
+    "EmissionRequest": "rotor.spectra.emission_request",
     "SpectrumRequest": "rotor.spectra.request",
     "StarkRequest": "rotor.quantum.fields.stark_request",
     "ThermoRequest": "rotor.thermo.request",
@@ -91,6 +99,7 @@ _MODULES = {
     "answer_gas": "rotor.thermo.classical_gas",
     "answer_levels": "rotor.quantum.request",
     "answer_raman": "rotor.spectra.raman_request",
+    "answer_emission": "rotor.spectra.emission_request",
     "answer_spectrum": "rotor.spectra.request",
     "answer_stark": "rotor.quantum.fields.stark_request",
     "answer_thermo": "rotor.thermo.request",
@@ -99,15 +108,20 @@ _MODULES = {
     "line_list": "rotor.spectra.lines",
     "partition_function": "rotor.thermo",
     "plot": "rotor.plots.show",
+    "plan_of": "rotor.scenes.plan",
     "raman_lines": "rotor.spectra.raman",
     "read": "rotor.formats",
+    "read_scene": "rotor.scenes.scene_file",
     "refine": "rotor.molecules.optimise",
+    "run_scene": "rotor.scenes.run",
+    "run_sweep": "rotor.scenes.sweep",
     "solve_levels": "rotor.quantum.solve",
     "stark_map": "rotor.quantum.effects.stark",
     "stream_lines": "rotor.formats.streamed_lines",
     "thermal_tumble": "rotor.thermo.thermal_tumble",
     "thermodynamic_functions": "rotor.thermo",
     "write": "rotor.formats",
+    "write_scene": "rotor.scenes.scene_file",
 }
 
 _OF_TOPS = frozenset(

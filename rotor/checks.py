@@ -18,14 +18,51 @@ def require_positive(name: str, value: float, unit: str = "") -> float:
 
 
 def require_whole(name: str, value: int | None, least: int, most: int | None = None) -> None:
-    """Refuse, with a ValueError, a whole number out of bounds; None passes."""
+    """Refuse a whole number out of bounds; None passes.
+
+    Parameters
+    ----------
+    name : str
+        What the number is called in the error.
+    value : int or None
+        The number.
+    least : int
+        The smallest that is allowed.
+    most : int, optional
+        The largest that is allowed.
+
+    Raises
+    ------
+    ValueError
+        With name, value and bounds.
+    """
     if value is not None and (value < least or (most is not None and value > most)):
         bounds = f"of {least} or more" if most is None else f"from {least} to {most}"
         raise ValueError(f"{name}: {value}: expected a whole number {bounds}")
 
 
 def require_between(name: str, value: float, low: float, high: float) -> float:
-    """The value, refused with a ValueError unless it lies between two bounds, neither of them included."""
+    """The value, refused unless it lies between two bounds, neither of them included.
+
+    Parameters
+    ----------
+    name : str
+        What the number is called in the error.
+    value : float
+        The number.
+    low, high : float
+        Bounds.
+
+    Returns
+    -------
+    float
+        The value.
+
+    Raises
+    ------
+    ValueError
+        With name, value and bounds.
+    """
     if not low < value < high:
         raise ValueError(f"{name}: {value:g}: expected a number between {low:g} and {high:g}")
     return value

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -88,6 +88,32 @@ class Table(ABC):
         if not short:
             lines.insert(_SHOWN // 2, ["..."] * len(texts))
         return list(texts), lines
+
+
+class TextOf:
+    """The text of an answer: its class, and what its attribute `shown` has, which for a table is some rows.
+
+    >>> from dataclasses import dataclass
+    >>> @dataclass(frozen=True, repr=False)
+    ... class Answer(TextOf):
+    ...     value: float
+    ...     shown = "value"
+    >>> Answer(2.0)
+    Answer: 2.0
+    """
+
+    shown: ClassVar[str]
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}: {getattr(self, self.shown)!r}"
+
+    def _repr_html_(self) -> str:
+        """The same for notebooks."""
+        import html
+
+        thing = getattr(self, self.shown)
+        inner = thing._repr_html_() if hasattr(thing, "_repr_html_") else f"<pre>{html.escape(repr(thing))}</pre>"
+        return f"<p>{html.escape(type(self).__name__)}</p>{inner}"
 
 
 def _text(value: Any) -> str:

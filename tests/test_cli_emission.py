@@ -115,3 +115,13 @@ def test_every_option_and_key_is_documented(call):
     content = json.loads(call(*THIN, "--json", "-")[1])
     for key in (*content, *content["lines"][0], *content["source"], *content["molecules"][0]):
         assert f"`{key}`" in part, key
+
+
+def test_the_report_ends_with_what_is_left_out_of_each_molecule(call):
+    _, out, _ = call(
+        "emission", "NH3", "CH3OH", "--range", "23:25GHz", "--excitation", "20", "--width", "5", "--top", "0"
+    )
+    last = " ".join(out.partition("left out")[2].split())
+    assert "structure of the source in the beam" in last
+    assert "inversion" not in last  # both states of ammonia are in the list
+    assert "CH3OH: internal rotation: at most about 800000 MHz" in last

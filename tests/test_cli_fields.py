@@ -11,6 +11,7 @@ import pytest
 from rotor.alignment.pulse import GaussianPulse
 from rotor.alignment.request import AlignRequest, answer_align
 from rotor.cli.shared.output import plain
+from rotor.cli.shared.workers import Counted, working
 from rotor.formats import read
 from rotor.quantum.fields.stark_request import StarkRequest, answer_stark
 from rotor.spectra.field_lines import field_lines
@@ -88,6 +89,18 @@ def test_stark_writes_lines_spectra_mixtures_and_tables(call):
     strongest = spectrum[np.argmax(spectrum[:, 1]), 0]
     assert strongest == pytest.approx(found.frequency_mhz[-1], abs=2.5)  # the spread: 2 % of a shift of 62 MHz, twice
     assert Path("l.png").stat().st_size > 10_000
+
+
+def test_stark_with_the_spin_of_a_nucleus(call):
+    """A linear top in a weak field: three levels of J = 1 (F = 0, 1, 2) with their M_F, the picture too."""
+    arguments = ("--constants", "B=4549 MHz", "--dipole-abc", "3.73,0,0", "--spin-constants", "chi_aa(14N)=-4.3 MHz")
+    code, out, err = call("stark", *arguments, "--field", "0,0.1", "--states", "1", "--json", "-", "--plot", "a.png")
+    assert (code, err) == (0, "")
+    content = json.loads(out)
+    assert content["hyperfine"] is True
+    levels = {(row["label"], row["m"]) for row in content["states"]}
+    assert levels == {("0 1", 0), ("0 1", 1), ("1 0", 0), ("1 1", 0), ("1 1", 1), ("1 2", 0), ("1 2", 1), ("1 2", 2)}
+    assert Path("a.png").stat().st_size > 10_000
 
 
 @pytest.mark.slow
@@ -182,6 +195,9 @@ def test_every_kind_of_pulse(call, options):
         (("stark", "OCS", "--intensity", "-1"), "intensity -1"),
         (("stark", "N2"), "no dipole"),
         (("stark", "OCS", "--light", "up"), "--light: 'up'"),
+        (("stark", "OCS", "--hyperfine"), "no constants of spins"),
+        (("stark", "OCS", "--m", "0.5"), "M of"),
+        (("stark", "OCS", "--m", "x"), "--m: 'x'"),
         (("stark", "OCS", "--line", "1"), "--line: '1'"),
         (("stark", "OCS", "--line", "9 - 8", "--lines", "a.csv"), "no line 9 - 8"),
         (("stark", "OCS", "--spread", "2"), "--spread: 2"),
@@ -201,3 +217,16 @@ def test_wrong_input_is_one_line_and_code_2(call, arguments, message):
     assert message in err
     assert len(err.strip().splitlines()) == 1
     assert not [path for path in Path().iterdir() if path.suffix in (".png", ".csv", ".json")]
+
+
+def test_pieces_are_counted_in_order():
+    """On a terminal a bar says after each piece how many are done; results come in order, errors where they are asked for."""
+    seen: list[tuple[int, int]] = []
+    counted = Counted(None, lambda done, total: seen.append((done, total)))
+    assert list(counted.map(lambda x: x * x, [3, 1, 2])) == [9, 1, 4]
+    assert seen == [(1, 3), (2, 3), (3, 3)]
+    assert counted.submit(int, "7").result() == 7
+    with pytest.raises(ValueError, match="invalid literal"):
+        counted.submit(int, "x").result()
+    with working(1, "blocks") as executor:
+        assert executor is None  # standard error is no terminal here

@@ -36,7 +36,7 @@ def test_a_box_is_made_and_run(call, folder):
 def test_the_report_names_what_was_run(call, folder):
     code, out, _ = call(*VAPOUR, "--steps", "10", "--ensemble", "nose-hoover", "--json", "a.json")
     assert code == 0
-    assert "27 OH2: 10 steps of 1 fs, nose-hoover, by rotor" in out
+    assert "27 H2O: 10 steps of 1 fs, nose-hoover, by rotor" in out
     assert "78 of translation, 81 of rotation; 3 removed" in out
     assert "potential energy" in out
     assert json.loads(Path("a.json").read_text())["thermometer"] == "half"

@@ -63,6 +63,7 @@ def test_json_has_the_keys_of_the_contract(call):
     info = set(json.loads(call("info", "H2", "--json", "-")[1])) - {
         "partition_function",
         "sizes_at_j",
+        "splitting_nuclei",
         "effects",
         "limits",
     }

@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 
 from rotor.fit.assignment import assignments, duplicates, merged
-from rotor.fit.choose import bootstrap, choose_constants, suggest_lines, try_constants
+from rotor.fit.choose import bootstrap, chi_squared, choose_constants, promised, suggest_lines, try_constants
 from rotor.fit.fit import FitOptions, fit_lines, robust
 from rotor.fit.parameters import parameters, with_names
 from rotor.fit.publication import publication_table, value_text
 from rotor.fit.report import decisive, report_text
+from rotor.formats.assigned_lines import read_assigned_lines
+from rotor.formats.spcat.cat import read_cat
 from rotor.quantum.solve import solve_levels
 from rotor.quantum.uncertainty import level_errors
 from rotor.spectra.lines import line_list
@@ -387,3 +389,47 @@ def test_a_line_that_alone_fixes_a_constant_is_called_decisive():
     start = Constants(B=6081.5, D=1.3e-3)
     fit = fit_lines(seen, start, parameters(start, ["B", "D"]), FitOptions(poor_rms=1e9))
     assert any("30 - 29" in text for text in decisive(fit))
+
+
+def test_what_the_linear_model_promises_is_what_a_fit_gains():
+    """Near the minimum χ² falls by what `promised` says when one constant, or two, are set free; a made-up one promises nothing."""
+    lines = synthetic(TRUE)
+    held = TRUE.replace(deltaK=TRUE["deltaK"] * 1.001, DeltaJK=TRUE["DeltaJK"] * 1.001)
+    names = [name for name in TRUE.values if name not in ("deltaK", "DeltaJK")]
+    fit = fit_lines(lines, held, parameters(held, names), FitOptions(poor_rms=1e12))
+    alone, pairs = promised(fit, ["deltaK", "DeltaJK", "A"])
+
+    def gained(*more):
+        return chi_squared(fit) - chi_squared(fit_lines(lines, held, parameters(held, [*names, *more])))
+
+    assert alone[0] == pytest.approx(gained("deltaK"), rel=1e-3)  # second derivatives at 0.1 % of a constant
+    assert alone[1] == pytest.approx(gained("DeltaJK"), rel=1e-3)
+    assert pairs[0, 1] == pytest.approx(gained("deltaK", "DeltaJK"), rel=1e-3)
+    assert alone[2] == 0.0  # A is free already
+
+
+def test_a_model_from_all_orders_at_once():
+    rigid = TRUE.replace(**{name: None for name in TRUE.values if name not in "ABC"}, reduction="A")
+    candidates = ["DeltaJ", "DeltaJK", "DeltaK", "deltaJ", "deltaK", "PhiJ", "PhiK"]
+    fit, steps = choose_constants(synthetic(TRUE), with_names(rigid, []), ["A", "B", "C"], candidates, by_order=False)
+    assert set(candidates[:5]) <= set(fit.parameters.names)
+    assert fit.weighted_rms < 1.2
+    assert len({step.name for step in steps}) == len(steps)
+    with pytest.raises(ValueError, match="'ZZ' is not a rotational constant"):
+        choose_constants(synthetic(TRUE), with_names(rigid, []), ["A", "B", "C"], ["ZZ"])
+
+
+@pytest.mark.oracle
+def test_components_of_spins_of_a_catalogue_are_put_at_their_mean(shared):
+    """HNCO: 255 entries with F make 84 lines; 1(0,1) - 0(0,0) is the mean of F = 1, 2, 0 by intensity."""
+    path = shared / "reference" / "library_lines" / "c043002.cat.gz"
+    lines, notes = read_assigned_lines(path, ASYMMETRIC)
+    assert len(lines) == 84
+    assert "255 components of spins are put together" in notes[0]
+    catalogue = read_cat(path)
+    rows = (catalogue.tag < 0) & (catalogue.quanta_upper[:, :3] == [1, 0, 1]).all(axis=1)
+    rows &= (catalogue.quanta_lower[:, :3] == [0, 0, 0]).all(axis=1)
+    mean = np.average(catalogue.frequency_mhz[rows], weights=10 ** catalogue.lgint[rows])
+    found = (lines.upper == [1, 0, 1]).all(axis=1) & (lines.lower == [0, 0, 0]).all(axis=1)
+    assert rows.sum() == 3
+    assert lines.frequency_mhz[found] == pytest.approx(mean, rel=1e-12)  # round-off

@@ -5,17 +5,22 @@ from __future__ import annotations
 import gzip
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from rotor.fit.fit import fit_lines
+from rotor.formats.spcat.cat import read_cat
 from rotor.formats.spcat.file_lines import format_of
 from rotor.formats.spcat.fit_input import error_factor, fitted_file, read_fit, spfit_input
 from rotor.formats.spcat.fit_states import FileLevels, groups_for_fit, names_of_quanta
+from rotor.formats.spcat.int_file import read_int
 from rotor.formats.spcat.lin import read_lin
 from rotor.formats.spcat.par import read_par
+from rotor.formats.spcat.predict import predict
+from rotor.formats.spcat.variances import variance_factor
 
 # weighted rms, rms of lines in MHz and of those in cm-1, as SPFIT printed them
 FITS = {
@@ -184,3 +189,34 @@ def test_levels_that_a_file_does_not_have_are_refused():
         FileLevels.of(read_par(TWO_STATES), np.array([[2, 1, 1, 0, 9]]))
     with pytest.raises(ValueError, match="there is no level 2 1 1 5 2"):
         FileLevels.of(read_par(TWO_STATES), np.array([[2, 1, 1, 5, 2]]))
+
+
+@pytest.mark.oracle
+@pytest.mark.parametrize("name", FITS)
+def test_errors_of_predicted_lines_are_those_of_spcat(shared: Path, name: str):
+    """From errors and correlations of the .var: one state, several states, spins; hyperfine components too."""
+    results = next((shared / "reference" / "fits").glob(f"*/{name}.par")).parent / "v2008_results"
+    made = predict(read_par(results / f"{name}.var"), read_int(results.parent / f"{name}.int"), as_spcat=True).catalogue
+    theirs = read_cat(results / f"{name}.cat")
+
+    def labels(catalogue):
+        return np.concatenate([catalogue.quanta_upper, catalogue.quanta_lower], axis=1).tolist()
+
+    ours = dict(zip(map(tuple, labels(made)), made.error_mhz.tolist(), strict=True))
+    predicted = [
+        (ours[tuple(q)], e) for q, e, t in zip(labels(theirs), theirs.error_mhz, theirs.tag, strict=True) if t > 0
+    ]
+    assert len(predicted) > 60
+    for mine, other in predicted:
+        if other < 999:  # larger ones are printed as 999.9999
+            assert mine == pytest.approx(other, abs=5.1e-5, rel=2e-6)  # four decimals; seven of the correlations
+
+
+def test_correlations_that_do_not_fit_the_parameters_are_refused():
+    file = read_par(TWO_STATES.replace(b"1E+36", b"1E-03"))
+    assert variance_factor(read_par(TWO_STATES)) is None
+    assert variance_factor(file).shape == (7, 6)
+    with pytest.raises(ValueError, match="4 correlations stand at the end"):
+        variance_factor(replace(file, rest="".join(f"{x:10.7f}" for x in (1, 0, 1, 0)) + "\n"))
+    with pytest.raises(ValueError, match="correlations of 2 parameters"):
+        variance_factor(replace(file, rest="".join(f"{x:10.7f}" for x in (1, 0, 1)) + "\n"))

@@ -339,7 +339,7 @@ def test_frames_that_are_gone_or_cut_short_are_told_by_name(folder, harm):
     run_fluid(box(), SETTINGS, FILES)
     harm(Path("run.traj"))
     with pytest.raises(
-        ValueError, match=r"^run.traj: cannot be continued \(.+\); the checkpoint wants its first \d+ frames"
+        ValueError, match=r"^run.traj: cannot be continued \(.+\); the checkpoint needs its first \d+ frames"
     ):
         run_fluid(box(), SETTINGS, FILES, resume=True)
     assert sorted(path.name for path in Path().iterdir() if path.name.startswith(".")) == []

@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
 
 HEAVY = (
     "ase",
@@ -22,7 +28,8 @@ HEAVY = (
 
 def loaded_after(code: str) -> set[str]:
     program = f"import sys\n{code}\nprint(' '.join(sys.modules))"
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    environment = os.environ | {"PYTHONPATH": str(ROOT), "PYTHONIOENCODING": "utf-8"}
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True, env=environment)
     return set(done.stdout.split())
 
 
@@ -50,3 +57,45 @@ def test_public_names_exist():
     for name in rotor.__all__:
         assert getattr(rotor, name) is not None
     assert "line_list" in dir(rotor)
+
+
+NOT_FOR_SHORT_COMMANDS = (
+    "scipy.linalg", "scipy.stats", "scipy.special", "numba", "polars", "pandas", "duckdb", "pydantic", "rdkit", "ase", "matplotlib",
+    "qutip",
+)  # fmt: skip
+LIST_TO_J60 = [
+    "spectrum",
+    "--constants",
+    "A=8572 B=3640 C=2790 MHz",
+    "--dipole-abc",
+    "1.201,1.916,0.365",
+    "--jmax",
+    "60",
+]
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["info", "water"],
+        ["spectrum", "water"],
+        ["levels", "water"],
+        ["info", "--constants", "B=10 C=5 GHz"],
+        [*LIST_TO_J60, "--min-lgint", "-12", "--q", "93882.35", "--cat", "out.cat"],
+        ["spectrum", "water", "--csv", "out.csv"],
+    ],
+    ids=lambda words: " ".join(words[:2] + words[-2:]),
+)
+def test_a_short_command_loads_nothing_heavy(folder, words):
+    """Lists of modules, not seconds: scipy.linalg costs 0.2 s, numba 0.26, polars 0.17 where water costs 0.05."""
+    loaded = loaded_after(f"from rotor.cli import run\nassert run({words!r}) == 0")
+    assert sorted(loaded & set(NOT_FOR_SHORT_COMMANDS)) == []
+
+
+def test_a_short_motion_compiles_nothing(folder):
+    """Kernels as plain Python give the same report; compiling them takes seconds the first time."""
+    environment = os.environ | {"PYTHONPATH": str(ROOT), "NUMBA_CACHE_DIR": str(folder / "cache")}
+    words = [sys.executable, "-m", "rotor", "tumble", "water", "--times", "0:1:11", "--json", "-"]
+    first = subprocess.run(words, capture_output=True, text=True, check=True, env=environment)
+    assert not (folder / "cache").exists() or not list((folder / "cache").rglob("*.nbi"))
+    assert '"motion"' in first.stdout

@@ -135,14 +135,15 @@ def test_the_most_populated_j():
     )  # rounding of a flat maximum
 
 
-@pytest.mark.parametrize("verb", ["info", "spectrum", "levels"])
+@pytest.mark.parametrize("verb", ["info", "spectrum", "levels", "raman"])
 def test_reports_end_with_the_limits(call, verb):
-    code, out, _ = call(verb, "HCN")
+    given = ("HCN", "--polarizability", "3,2") if verb == "raman" else ("HCN",)
+    code, out, _ = call(verb, *given)
     assert code == 0
     last = out.rstrip().splitlines()[-3:]
     assert last[0].startswith("effects   at J = ")
     assert last[1].startswith("left out  nuclear quadrupole: about 5 MHz; 14N splits lines of low J; an order")
     assert "magnetic coupling" in last[2]
-    told = json.loads(call(verb, "HCN", "--json", "-")[1])
+    told = json.loads(call(verb, *given, "--json", "-")[1])
     assert [one["name"] for one in told["limits"]] == ["nuclear quadrupole", "magnetic coupling of nuclear spins"]
     assert {one["name"]: one["present"] for one in told["effects"]}["nuclear quadrupole"] is False

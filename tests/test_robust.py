@@ -108,6 +108,36 @@ def test_a_data_base_is_read_and_not_written(call):
     assert os.listdir() == ["x.db"]
 
 
+@pytest.mark.parametrize("value", ["1000000", "-1e6"])
+def test_a_cut_that_no_double_holds_is_refused(call, value):
+    code, _, err = call("spectrum", "CO", "--jmax", "3", "--min-lgint", value)
+    assert (code, "--min-lgint" in err) == (2, True)
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["info", "NH3", "--temperature", "1e300"],
+        ["spectrum", "water", "--jmax", "1000000"],
+        ["stark", "H2O", "--field", "0:10kV/cm:3", "--jmax", "1000"],
+        ["fluid", "water", "--molecules", "27", "--steps", "4", "--cutoff", "1e300"],
+    ],
+)
+def test_work_without_end_is_refused(call, words):
+    code, _, err = call(*words)
+    assert code in (1, 2)
+    assert err.splitlines()[-1].startswith("error: ")
+
+
+def test_an_unknown_constant_to_choose_is_named(call):
+    Path("g.csv").write_text(
+        "j_upper,ka_upper,kc_upper,j_lower,ka_lower,kc_lower,frequency_mhz,error_mhz\n1,0,1,0,0,0,11000.0,0.01\n"
+        "2,0,2,1,0,1,21900.0,0.01\n2,1,2,1,1,1,20900.0,0.01\n2,1,1,1,1,0,23100,0.01\n"
+    )
+    code, _, err = call("fit", "g.csv", "--constants", "A=43 B=6 C=5 GHz", "--free", "B", "--choose", "x")
+    assert (code, "'x' is no constant of the kind asymmetric" in err) == (2, True)
+
+
 # A disk that is full
 
 
@@ -282,3 +312,24 @@ def test_a_sample_of_mutated_inputs_makes_no_traceback():
     failing, done = fuzz.fuzz(10_000_000, 300, fuzz.QUICK)
     assert done == 300
     assert [(one.failing, one.words, one.said) for one in failing] == []
+
+
+# Long sums
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["info", "--constants", "A=430 B=57 C=55 MHz"],
+        ["thermo", "--constants", "A=430 B=57 C=55 MHz"],
+        ["info", "mistyped.xyz"],
+    ],
+    ids=lambda words: " ".join(words[:2]),
+)
+def test_sums_over_very_many_levels_take_seconds(call, words):
+    Path("mistyped.xyz").write_text("3\n\nO 0 0 0\nH 0.96 0 0\nH -0.24 9300 0\n")  # 0.93 was meant
+    started = time.perf_counter()
+    code, out, _ = call(*words)
+    assert time.perf_counter() - started < 15.0  # s; 1 on a quiet machine, 39 and more than 60 before
+    assert code == 0
+    assert out

@@ -49,6 +49,9 @@ SAVED = [  # a verb with its options; --csv a.csv goes with each
     ("spectrum", "OCS --jmax 9 --pressure 2mbar --path 1m --fwhm 3MHz --profile-csv p.csv"),
     ("spectrum", "ROD --spin-constants|chi_aa(14N)=-4.2 chi_bb-cc(14N)=1.1 MHz|--jmax 3"),
     ("spectrum", "--constants|A=9.2 B=3 C=2.5 GHz|--dipole-abc 0,2,0 --spin-weights ee=1,eo=3,oe=3,oo=1 --q 99 --jmax 3"),
+    ("spectrum", "HCONH2 --hyperfine --hyperfine-method auto --hyperfine-tolerance 1kHz --jmax 4"),
+    ("spectrum", "NH3 --jmax 3"),
+    ("levels", "NH3 --jmax 3"),
     ("levels", "CH3CN --k 0:3 --jmax 6 --max-energy 30cm-1 --egy a.egy"),
     ("raman", "CO2 --laser 488 --temperature 77.7 --min-relative 1e-3"),
     ("raman", "--constants|B=1.98958 cm-1|--polarizability 2.22,1.53 --spin-weights even=2,odd=1"),
@@ -316,3 +319,27 @@ def test_a_killed_sweep_goes_on(folder):
     result = run_sweep(scene, record=record)
     assert 0 < result.computed < 40
     assert result.columns["rows"].tolist() == [(j + 1) ** 2 for j in range(20, 60)]
+
+
+HEAVY = ("rotor.fluid", "rotor.alignment", "rotor.classical", "rotor.quantum.effects.stark", "rotor.quantum.spins.blocks", "rotor.spectra",
+         "rotor.thermo.functions", "matplotlib", "ase", "rdkit", "qutip", "numba", "duckdb")  # fmt: skip
+LOADED = {  # of HEAVY, what a kind has a use for
+    "spectrum": {"rotor.spectra", "rotor.thermo.functions"},
+    "levels": set(),
+    "stark": {"rotor.quantum.effects.stark", "rotor.quantum.spins.blocks"},  # lines in a field know blocks with spins
+    "thermo": {"rotor.thermo.functions"},
+    "tumble": {"rotor.classical", "numba"},
+}  # fmt: skip
+MOLECULE = {"tumble": "[body]\nmoments = [1.0, 2.0, 3.0]\nangular_velocity = [1.0, 2.0, 3.0]"}
+
+
+@pytest.mark.parametrize("kind", LOADED)
+def test_modules_of_absent_effects_are_not_imported(kind):
+    text = f'schema = 1\nkind = "{kind}"\n' + MOLECULE.get(kind, 'molecule = "OCS"\n')
+    code = (
+        "import sys\nfrom rotor.scenes.scene_file import parse_scene\n"
+        f"parse_scene({text!r}).run()\n"
+        f"print([name for name in {HEAVY!r} if name in sys.modules])"
+    )
+    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert set(eval(ran.stdout)) <= LOADED[kind]

@@ -11,6 +11,8 @@ from matplotlib.figure import Figure
 import rotor
 from rotor.classical.tumble import TumbleRequest
 from rotor.plots.spectrum import spectrum_figure
+from rotor.spectra.emission import Source
+from rotor.spectra.emission_request import EmissionRequest
 from rotor.spectra.spectrum import resolving_grid
 
 CO = "B=57635.968 D=0.1835 MHz"
@@ -32,12 +34,18 @@ def things() -> dict[str, object]:
         "thermodynamic functions": rotor.thermodynamic_functions("CO", np.linspace(5, 300, 30)),
         "correlations": gas.correlations,
         "equipartition": gas.test,
+        "gas answer": gas,
+        "emission answer": rotor.answer_emission(
+            EmissionRequest((rotor.read("CO"),), (1e16,), Source(1e16, 20.0, 5.0), (110e3, 120e3))
+        ),
+        "stark answer": rotor.answer_stark(rotor.StarkRequest(rotor.read("OCS"), (0.0, 10.0, 20.0))),
     }
 
 
 KINDS = (
     "lines", "spectrum", "spectrum answer", "Raman lines", "levels", "levels answer", "motion", "tumble answer",
     "thermodynamic functions", "correlations", "equipartition",
+    "gas answer", "emission answer", "stark answer",
 )  # fmt: skip
 
 
@@ -46,13 +54,39 @@ def test_a_figure_of_everything(things, kind, tmp_path):
     figure = rotor.plot(things[kind], tmp_path / "a.png")
     assert isinstance(figure, Figure)
     axes = figure.axes[0]
-    assert axes.get_xlabel() or axes.get_xticklabels() or kind in ("motion", "tumble answer")
+    assert (
+        axes.get_xlabel()
+        or axes.get_xticklabels()
+        or figure.axes[-1].get_xlabel()
+        or kind in ("motion", "tumble answer")
+    )
     assert axes.lines or axes.collections or axes.patches
     assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_everything_has_a_short_text(things, kind):
+    text = repr(things[kind])
+    assert 1 <= len(text.splitlines()) <= 10
+    assert len(text) < 1500
+    if kind != "motion":
+        assert "<" in things[kind]._repr_html_()
+
+
+def test_tops_molecules_and_constants_are_one_line():
+    top = rotor.read("water")
+    assert repr(top) == (
+        "Top(water, H2O, asymmetric: A 835852.4057, B 435264.025, C 278212.2207 MHz, 27 of distortion (S-reduction, Ir); "
+        "dipole 0, 1.8507, 0 D)"
+    )
+    assert repr(top.molecule) == "Molecule(water, H2O, 3 atoms)"
+    assert repr(rotor.Top.from_constants("B=1 GHz")) == "Top(linear: B 1000 MHz; dipole not known)"
+    assert "<td>DJ</td>" in top._repr_html_()
+    assert len(repr(rotor.SpectrumRequest(top))) < 800
+
+
 def test_what_cannot_be_drawn_is_refused(tmp_path):
-    with pytest.raises(ValueError, match=r"there is no picture of a int; there are pictures of Catalogue, .*Lines"):
+    with pytest.raises(ValueError, match=r"there is no picture of a int; there are pictures of .*Catalogue, .*Lines"):
         rotor.plot(3)
     with pytest.raises(ValueError, match=r"\.png, \.pdf or \.svg"):
         rotor.plot(rotor.line_list("CO", jmax=3), tmp_path / "a.txt")

@@ -23,9 +23,7 @@ NITRILE = Top.from_constants(
 
 
 def test_text_becomes_values_and_spins():
-    constants = SpinConstants.parse(
-        "chi_aa(35Cl_1)=-57.1 chi_aa(35Cl_2)=33.5 MHz C_bb(D)=1.2e-3MHz".replace(" MHz C", " C")
-    )
+    constants = SpinConstants.parse("chi_aa(35Cl_1)=-57.1 chi_aa(35Cl_2)=33.5 C_bb(D)=1.2e-3 MHz")
     assert dict(constants.twice) == {"35Cl_1": 3, "35Cl_2": 3, "D": 2}
     assert constants.values["chi_aa(35Cl_2)"] == 33.5
     mixed = SpinConstants.parse("eps_aa(S)=500kHz b_F(S,14N)=12.5 MHz", "S=1/2 14N=1")
@@ -140,3 +138,11 @@ def test_command_refuses(more, says, capsys):
     error = capsys.readouterr().err
     assert re.search(says, error)
     assert error.count("\n") == 1
+
+
+def test_a_unit_at_one_constant_does_not_serve_the_others():
+    with pytest.raises(
+        ValueError, match=r"kHz stands at C_bb\(14N\) only; put a space before it to serve chi_aa\(14N\) too"
+    ):
+        SpinConstants.parse("chi_aa(14N)=-4.22 C_bb(14N)=1.8kHz")
+    assert SpinConstants.parse("chi_aa(14N)=-4.22 C_bb(14N)=1.8 MHz").values["C_bb(14N)"] == 1.8

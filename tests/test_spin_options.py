@@ -38,7 +38,7 @@ class Kept(QuantumEffect):
     def size_mhz(self, top, j):
         return 0.0
 
-    def kept(self, top):
+    def conserved_sums(self, top):
         return self.sums
 
 

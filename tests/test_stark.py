@@ -14,6 +14,7 @@ from scipy.special import obl_cv
 
 from rotor.quantum.effects.stark import MHZ_ANGSTROM3_W_PER_CM2, Stark, stark_map
 from rotor.quantum.fields.blocks import Contraction
+from rotor.quantum.fields.chains import chain_states, is_chain
 from rotor.quantum.fields.solver import reduced_basis, solve_fields
 from rotor.quantum.fields.space import field_space
 from rotor.tops.top import Top
@@ -273,3 +274,37 @@ def test_bad_input(change, message):
 def test_the_effect_knows_its_size():
     assert Stark(1.0).size_mhz(OCS, 0) == pytest.approx(3.5524, rel=1e-4)  # μ²E²/6B
     assert Stark(1.0).size_mhz(CH3CN, 1) == pytest.approx(987.18, rel=1e-4)  # μE/2
+
+
+# Chains
+
+
+@given(seed=st.integers(0, 10**6), size=st.integers(4, 24))
+@settings(max_examples=25, deadline=None)
+def test_chains_have_the_states_of_the_full_matrix_or_none(seed, size):
+    """Random tridiagonal matrices, levels as close as they fall: LAPACK's energies, vectors without residual, or no answer."""
+    rng = np.random.default_rng(seed)
+    fixed = np.diag(np.sort(rng.uniform(0, 1e5, size)))
+    beside = rng.normal(size=size - 1)
+    slope = np.diag(beside, 1) + np.diag(beside, -1) + np.diag(rng.normal(size=size))
+    fields, count = np.linspace(-200, 300, 61), 3
+    assert is_chain((fixed, slope))
+    found = chain_states((fixed, slope), fields, count)
+    matrices = fixed + fields[:, None, None] * slope
+    if found is None:
+        return
+    energies, vectors = found
+    assert np.abs(energies - np.linalg.eigvalsh(matrices)[:, :count]).max() < 1e-9  # round-off of 1e5
+    residual = matrices @ vectors - energies[:, None, :] * vectors
+    assert np.abs(residual).max() < 1e-7  # square root of what an energy is wrong by, times the gaps; seen: 1e-10
+    assert np.abs((vectors**2).sum(axis=1) - 1).max() < 1e-14
+
+
+def test_chains_of_a_top_are_solved_without_lapack():
+    """The iteration succeeds for OCS: else the test above would be about nothing."""
+    space = field_space(OCS, 14, [Contraction(OCS.dipole_abc_debye, [0, 0, 1.0])])
+    for m in range(3):
+        block = space.blocks(m)[0]
+        slope = -MHZ_PER_DEBYE_KV_PER_CM * block.matrix(Contraction(OCS.dipole_abc_debye, [0, 0, 1.0]))
+        assert chain_states((np.diag(block.energies_mhz), slope), np.linspace(0, 200, 201), 3 - m) is not None
+    assert not is_chain((slope, slope @ slope))

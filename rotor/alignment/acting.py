@@ -51,7 +51,30 @@ def contractions_of(top: Top, windows: Sequence[Window]) -> tuple[tuple[Contract
 
 
 def guessed_jmax(top: Top, pulses: Sequence[Pulse], highest: int, tolerance: float) -> int:
-    """J that a gas reaches from J = `highest`: J + min(P, √(J² + U0/B) - J) for each pulse, P = ∫U0 dt/ħ, U0 the well; and a tail."""
+    """The J that a gas reaches from J = `highest`, and a tail.
+
+    J + min(P, √(J² + U0/B) - J) for each pulse, P = ∫U0 dt/ħ, U0 the depth of the well.
+
+    Parameters
+    ----------
+    top : Top
+        With what the pulses act on.
+    pulses : sequence of Pulse
+        One after another.
+    highest : int
+        The highest J that is populated before the first pulse.
+    tolerance : float
+        Of the populations, from which the tail follows.
+
+    Returns
+    -------
+    int
+        J max to begin with.
+
+    Notes
+    -----
+    An estimate: the population of the highest J has to be looked at afterwards.
+    """
     smallest = RAD_PER_PS_MHZ * min(x for x in top.rotational_constants_mhz if math.isfinite(x))
     reached = float(highest)
     for pulse in pulses:

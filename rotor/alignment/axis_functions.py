@@ -51,7 +51,7 @@ def _between_functions(j: Ints, k: int, m: int, function: EvenFunction) -> Float
     """
     points, weights = _half_points(int(j[-1]) + 2)
     x = np.concatenate([-points, points])
-    functions = symmetric_top_functions(int(j[-1]), k, m, x)[j - max(abs(k), abs(m))]
+    functions = _symmetric_top_functions(int(j[-1]), k, m, x)[j - max(abs(k), abs(m))]
     return np.asarray((functions * (function(x) * np.concatenate([weights, weights]))) @ functions.T)
 
 
@@ -61,7 +61,7 @@ def _half_points(count: int) -> tuple[Floats, Floats]:
     return (x + 1) / 2, w / 2
 
 
-def symmetric_top_functions(jmax: int, k: int, m: int, x: Floats) -> Floats:
+def _symmetric_top_functions(jmax: int, k: int, m: int, x: Floats) -> Floats:
     """√(J+½) d^J_Mk as functions of x = cosθ, normalised over -1 < x < 1, for J = max(|k|, |M|) ... jmax, (J, points).
 
     The lowest is N (1+x)^|k+M|/2 (1-x)^|k-M|/2; the others follow from x f_J = Σ ⟨J'|cosθ|J⟩ f_J', upwards, which is stable.

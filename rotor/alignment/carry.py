@@ -192,7 +192,25 @@ class _Snapshots(list[Complexes]):
 
 
 def task_of(problem: Problem, block: FieldBlock, plan: Plan, before: bool) -> Task | None:
-    """What has to be done for a block; None where nothing in it is populated."""
+    """What has to be done for a block.
+
+    Parameters
+    ----------
+    problem : Problem
+        Top, pulses, times, gas and observables.
+    block : FieldBlock
+        States that the pulses leave apart from all others.
+    plan : Plan
+        Steps of every window.
+    before : bool
+        Whether some of the times lie before the first pulse.
+
+    Returns
+    -------
+    Task or None
+        Energies in rad/ps, matrices, and the populated columns with their weights; None where nothing in it is
+        populated.
+    """
     population = problem.ensemble.populations(block.levels)[block.rows] * block.copies
     if problem.ensemble.m is not None:
         population = population * (block.abs_m == problem.ensemble.m) / (2 if problem.ensemble.m else 1)
@@ -235,6 +253,24 @@ def _made(block: FieldBlock, contraction: Contraction, made: dict[int, NDArray[A
 
 
 def tasks_of(problem: Problem, space: FieldSpace, plan: Plan, before: bool) -> Iterator[Task]:
+    """What has to be done for all blocks with populated states.
+
+    Parameters
+    ----------
+    problem : Problem
+        Top, pulses, times, gas and observables.
+    space : FieldSpace
+        The states up to J max.
+    plan : Plan
+        Steps of every window.
+    before : bool
+        Whether some of the times lie before the first pulse.
+
+    Returns
+    -------
+    iterator of Task
+        One for each block, made when it is asked for.
+    """
     for m in problem.m_values(space):
         for block in space.blocks(m):
             task = task_of(problem, block, plan, before)

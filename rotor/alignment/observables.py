@@ -33,6 +33,7 @@ Complexes = NDArray[np.complex128]
 _SPACE = "XYZ"
 _EVEN_WITHIN = 1e-9  # of a step: times that differ less from an even grid are on it
 _CHUNK = 1 << 21
+FEW_LINES = 64  # which are not worth being searched for pairs that are there more than once
 
 
 @dataclass(frozen=True)
@@ -196,8 +197,10 @@ def harmonics(pieces: Sequence[Coherences], energies: Floats, remainder: float) 
     size = len(energies)
     key = np.concatenate([piece.first * size + piece.second for piece in pieces])
     amplitude = np.concatenate([piece.amplitudes for piece in pieces])
-    pairs, place = np.unique(key, return_inverse=True)
-    total = np.bincount(place, amplitude.real, len(pairs)) + 1j * np.bincount(place, amplitude.imag, len(pairs))
+    pairs, total = key, amplitude
+    if len(key) > FEW_LINES:
+        pairs, place = np.unique(key, return_inverse=True)
+        total = np.bincount(place, amplitude.real, len(pairs)) + 1j * np.bincount(place, amplitude.imag, len(pairs))
     return Harmonics(constant, total, energies[pairs // size] - energies[pairs % size])
 
 

@@ -22,6 +22,7 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -64,10 +65,17 @@ class Splitting:
         """When each kick acts, in steps."""
         return np.concatenate([[0.0], np.cumsum(self.drifts)])
 
+    @cached_property
+    def different_drifts(self) -> tuple[Floats, Ints]:
+        """Each duration of a drift once, and which of them each drift has."""
+        shares, which = np.unique(self.drifts, return_inverse=True)
+        return shares, which
+
 
 SPLITTINGS = ("gradient", "nystrom 4", "nystrom 6")
 
 
+@lru_cache(maxsize=8)
 def splitting(name: str) -> Splitting:
     """A composition by its name in `SPLITTINGS`: order 4 with 2, order 4 with 6, order 6 with 11 drifts a step.
 
@@ -172,21 +180,22 @@ def kick_plan(window: Window, grid: Grid, rule: Splitting) -> KickPlan:
     gradients = _merged(strength**2 * rule.gradients * steps[:, None] ** 3) if rule.gradients.any() else None
 
     lengths, kind = np.unique(np.round(grid.steps, 13), return_inverse=True)
-    shares, share = np.unique(rule.drifts, return_inverse=True)
+    shares, share = rule.different_drifts
     durations = np.multiply.outer(lengths, shares).ravel()
     which = np.add.outer(np.repeat(kind.ravel(), grid.counts) * len(shares), share.ravel()).ravel()
     last = np.cumsum(grid.counts) * stages - 1
     piece = max(1, len(steps) // CHECKS) * stages
-    looked = np.union1d(last[grid.sampled], np.arange(piece - 1, len(areas) - 1, piece))
-    marks = np.zeros(len(areas) - 1, dtype=bool)
-    marks[looked] = True
+    marks, observed = np.zeros((2, len(areas) - 1), dtype=bool)
+    observed[last[grid.sampled]] = True
+    marks[piece - 1 :: piece] = True
+    marks |= observed
     return KickPlan(
         np.asarray(durations, dtype=np.float64),
         which.ravel(),
         areas,
         gradients,
         marks,
-        _among(looked, last[grid.sampled]),
+        observed[marks],
         len(steps),
     )
 
@@ -259,6 +268,13 @@ def split_through(
         The states whose population is leakage, looked at a dozen times.
     snapshots : list, optional
         The states at the sampled times, (times, n, m) in pieces, are appended.
+
+    Returns
+    -------
+    states : (n, m) array
+        At the end of the window.
+    leaked : (m,) array
+        Largest population at the edge.
     """
     from rotor.alignment._kernels import kick_and_drift
 
@@ -283,6 +299,8 @@ def split_through(
 def _pieces(marks: NDArray[np.bool_], size: int) -> list[slice]:
     """Stages in pieces whose snapshots of `size` numbers fit into memory."""
     at_once = max(1, SNAPSHOT_NUMBERS // max(size, 1))
+    if np.count_nonzero(marks) < at_once:
+        return [slice(0, len(marks))]
     ends = np.flatnonzero(marks)[at_once - 1 :: at_once] + 1
     edges = np.unique(np.concatenate([[0], ends, [len(marks)]])).tolist()
     return [slice(first, last) for first, last in itertools.pairwise(edges)]
@@ -315,7 +333,32 @@ def magnus_through(
     edge: NDArray[np.bool_],
     snapshots: list[Complexes] | None = None,
 ) -> tuple[Complexes, Floats]:
-    """As `split_through`, of a window with any channels, one operator (n, n), dense or sparse, for each."""
+    """States after a window with any channels, and each one's largest population at the edge; see `split_through`.
+
+    Parameters
+    ----------
+    window : Window
+        Its channels give the strength of each operator over time.
+    grid : Grid
+        Steps, and which of them end at a sampled time.
+    energies : (n,) array
+        Of the free states, rad/ps.
+    operators : sequence of (n, n) arrays
+        Dense or sparse, one for each channel.
+    states : (n, m) array
+        At the start of the window.
+    edge : (n,) array of bool
+        The states whose population is leakage.
+    snapshots : list, optional
+        The states at the sampled times, (times, n, m) in pieces, are appended.
+
+    Returns
+    -------
+    states : (n, m) array
+        At the end of the window.
+    leaked : (m,) array
+        Largest population at the edge.
+    """
     first, second = 0.5 - math.sqrt(3) / 6, 0.5 + math.sqrt(3) / 6
     large, small = 0.25 + math.sqrt(3) / 6, 0.25 - math.sqrt(3) / 6
     reach = [_norm_bound(operator) for operator in operators]

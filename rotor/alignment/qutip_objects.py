@@ -84,7 +84,30 @@ def block_objects(
 ) -> BlockObjects:
     """The block number `block` of those with |M| = `m` that the pulses leave apart, as objects of QuTiP.
 
-    jmax: by default what the pulses need from J = 0 on. Raises ValueError for a block that does not exist.
+    Parameters
+    ----------
+    top : Top
+        With what the pulses act on.
+    pulses : sequence of Pulse
+        One after another.
+    m : int, optional
+        |M| of the block.
+    block : int, optional
+        Its number among those of this |M|, from 0.
+    jmax : int, optional
+        Highest J; by default what the pulses need from J = 0 on.
+    cosines : sequence of str, optional
+        Names of the observables to make.
+
+    Returns
+    -------
+    BlockObjects
+        Free Hamiltonian and interactions in rad/ps, cosines, J and labels of the states.
+
+    Raises
+    ------
+    ValueError
+        For a block that does not exist.
     """
     import qutip
 
@@ -118,9 +141,23 @@ def block_objects(
 def solve_windows(
     objects: BlockObjects, ket: Any, times_ps: ArrayLike, *, options: dict[str, Any] | None = None
 ) -> dict[str, Floats]:
-    """Cosines (t,) by name of a pure state at rising times, the pulses by `qutip.sesolve`, all else by exact phases.
+    """Cosines of a pure state, the pulses by `qutip.sesolve`, all else by exact phases.
 
-    ket: before the first pulse. options: of sesolve, in place of `BEST_OPTIONS`; max_step is always set.
+    Parameters
+    ----------
+    objects : BlockObjects
+        From `block_objects`.
+    ket : qutip.Qobj
+        The state before the first pulse.
+    times_ps : (t,) array
+        Rising.
+    options : dict, optional
+        Of sesolve, in place of `BEST_OPTIONS`; max_step is always set.
+
+    Returns
+    -------
+    dict of str to (t,) array
+        By the names of the observables.
     """
     import qutip
 

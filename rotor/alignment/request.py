@@ -14,7 +14,7 @@ from rotor.alignment.align import DEFAULT_TOLERANCE, AlignmentTrace, align
 from rotor.alignment.pulse import Pulse
 from rotor.arrays import Floats
 from rotor.checks import require_between, require_whole
-from rotor.table import Table
+from rotor.table import Table, TextOf
 from rotor.tops.facts import top_facts
 
 if TYPE_CHECKING:
@@ -100,9 +100,11 @@ class AlignmentTable(Table):
         return self.trace.provenance
 
 
-@dataclass(frozen=True)
-class AlignAnswer:
+@dataclass(frozen=True, repr=False)
+class AlignAnswer(TextOf):
     """The cosines that a request asked for."""
+
+    shown = "table"
 
     request: AlignRequest
     trace: AlignmentTrace

@@ -19,6 +19,8 @@ LARGEST_SPLIT = 700  # states of a block whose operator is still diagonalised
 MOST_STEPS = 200_000
 PILOT_COLUMNS = 64
 PILOT_TIMES = 256
+USUAL_TOLERANCE = 1e-8  # that 16 steps of a short pulse give
+ASYMPTOTIC = 1e-4  # error of a cosine below which it falls as the order of the method says
 
 
 @dataclass(frozen=True)
@@ -35,7 +37,7 @@ class Pilot:
     whole: bool = False  # whether task and outcome are all there is
 
 
-def plan_of(problem: Problem, steps: Sequence[int], rule: str | None, factor: int = 1) -> Plan:
+def _plan_of(problem: Problem, steps: Sequence[int], rule: str | None, factor: int = 1) -> Plan:
     """Passages with about so many steps a window, `factor` times as many; a Magnus method where `rule` is None."""
     out: list[propagate.KickPlan | propagate.Grid | float] = []
     for window, count in zip(problem.windows, steps, strict=True):
@@ -54,7 +56,7 @@ def pilot_of(problem: Problem, jmax: int) -> Pilot:
     space = problem.space(jmax)
     task, whole = _pilot_task(problem, space)
     if task is None or all(window.is_kick for window in problem.windows):
-        plan = plan_of(problem, [1] * len(problem.windows), "nystrom 4")
+        plan = _plan_of(problem, [1] * len(problem.windows), "nystrom 4")
         outcome = None if task is None else run(replace(task, plan=plan))
         edge = _relative_edge(outcome, task) if outcome and task else 0.0
         return Pilot(plan, (0,) * len(problem.windows), 0.0, edge, space, task, outcome, whole)
@@ -62,7 +64,9 @@ def pilot_of(problem: Problem, jmax: int) -> Pilot:
         return replace(_refined(problem, space, task, None), whole=whole)
     if whole:
         rule = "nystrom 4" if problem.tolerance >= 1e-10 else "nystrom 6"
-        return replace(_refined(problem, space, task, rule, 16), whole=True)
+        order = propagate.splitting(rule).order
+        first = max(16, math.ceil(16 * (USUAL_TOLERANCE / problem.tolerance) ** (1 / order)))
+        return replace(_refined(problem, space, task, rule, first, finer_order=order), whole=True)
     rules = propagate.SPLITTINGS if task.gradients is not None else propagate.SPLITTINGS[1:]
     best = _refined(problem, space, task, rules[0])
     for rule in rules[1:]:
@@ -77,25 +81,30 @@ def _refined(
     rule: str | None,
     first: int = FIRST_STEPS,
     below: Pilot | None = None,
+    finer_order: int = 0,
 ) -> Pilot:
     """About the fewest steps of a method whose error is below half the tolerance; `below` where that would cost more.
 
     The number of steps is doubled; the difference between a run and the next is taken as the error of the first. Of the number that
     is enough and its half, between which the answer lies, the place is taken where log(error) on a straight line meets the goal.
+    finer_order: of a method whose finer run serves as the answer, its error taken as the difference over half of what the order gives.
     """
     goal, before, factor = 0.5 * problem.tolerance, 0.0, 1
     counts = [first] * len(problem.windows)
-    plan = plan_of(problem, counts, rule)
+    plan = _plan_of(problem, counts, rule)
     outcome = run(replace(task, plan=plan))
     while sum(_steps_of(plan)) <= MOST_STEPS:
-        finer = plan_of(problem, counts, rule, 2 * factor)
+        finer = _plan_of(problem, counts, rule, 2 * factor)
         check = run(replace(task, plan=finer))
         error = _difference(problem, space, task, outcome, check)
+        if finer_order and error <= ASYMPTOTIC and (left := error / 2 ** (finer_order - 1)) <= goal < error:
+            edge = _relative_edge(check, task)
+            return Pilot(finer, _steps_of(finer), left, edge, space, task, check)
         if error <= goal:
             edge, mine = _relative_edge(check, task), Pilot(plan, _steps_of(plan), error, 0.0, space, task, outcome)
             if before > error > 0:
                 steps = 0.5 * 2 ** (math.log(before / goal) / math.log(before / error)) * sum(_steps_of(plan))
-                fewer = plan_of(problem, [math.ceil(steps / len(counts))] * len(counts), rule)
+                fewer = _plan_of(problem, [math.ceil(steps / len(counts))] * len(counts), rule)
                 if steps <= sum(_steps_of(fewer)) and _cost(fewer) < _cost(plan):
                     mine = Pilot(fewer, _steps_of(fewer), goal, 0.0, space, task)
             mine = replace(mine, edge=edge)

@@ -16,7 +16,7 @@ Three = tuple[float, float, float]
 _MM = 1e-3
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class NamedBody:
     """A body in SI units, its principal axes along x, y, z. text: its sizes and masses in words. axes: names of x, y, z."""
 
@@ -24,6 +24,10 @@ class NamedBody:
     body: Body
     text: str
     axes: tuple[str, str, str]
+
+    def __repr__(self) -> str:
+        moments = ", ".join(f"{moment:.4g}" for moment in self.moments_kg_m2)
+        return f"NamedBody({self.name}: {self.text}; moments {moments} kg m²)"
 
     @property
     def moments_kg_m2(self) -> Three:

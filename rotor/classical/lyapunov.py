@@ -99,6 +99,8 @@ def body_flow(
         Of y = L (3,), or (L, q) (7,) where a torque depends on the attitude; the quaternion's length then adds one exponent that
         is zero.
 
+    Examples
+    --------
     >>> body_flow([1.0, 2.0, 4.0], [1.0, 1.0, 0.0]).rate(0.0, np.array([[1.0, 1.0, 0.0]])).tolist()
     [[0.0, 0.0, -0.5]]
     """
@@ -278,6 +280,8 @@ def poincare_section(
     (p,) array, (p, d) array
         Times and states of the crossings.
 
+    Examples
+    --------
     >>> circle = Flow(lambda t, y: np.stack([y[:, 1], -y[:, 0]], axis=-1), np.array([1.0, 0.0]))
     >>> times, states = poincare_section(circle, lambda t, y: y[0], time=12.0)
     >>> (times / np.pi).round(6).tolist(), states[:, 1].round(6).tolist()

@@ -156,6 +156,8 @@ def momentum_of(
     (..., 3) array
         L in body axes.
 
+    Examples
+    --------
     >>> from rotor.classical.effects.gyrostat import SpinningRotor
     >>> momentum_of([1.0, 1.0, 0.5], [1.0, 2.0, 4.0], [SpinningRotor([0, 0, 1.0])]).tolist()
     [1.0, 2.0, 3.0]

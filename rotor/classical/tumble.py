@@ -19,6 +19,7 @@ from rotor.classical.euler import checked_moments, checked_momentum, energy
 from rotor.classical.free.free_motion import FreeMotion, free_motion
 from rotor.classical.free.stability import Stability, stability
 from rotor.classical.motion import InvariantDrift, MotionTable, invariant_drift, sampled
+from rotor.table import TextOf
 
 PERIODS, TURNS, POINTS = 2, 10, 201
 Three = tuple[float, float, float]
@@ -117,13 +118,15 @@ class TumbleRequest:
         )
 
 
-@dataclass(frozen=True)
-class TumbleAnswer:
+@dataclass(frozen=True, repr=False)
+class TumbleAnswer(TextOf):
     """The exact motion that a request asked for.
 
     motion: in the coherent set of the moments. table: the motion at the times asked for, in the units of the request.
     drift: of what the motion conserves, over the table.
     """
+
+    shown = "table"
 
     request: TumbleRequest
     motion: FreeMotion

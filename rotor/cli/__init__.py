@@ -18,6 +18,7 @@ from typing import cast
 
 import typer
 
+from rotor.cli.shared import process
 from rotor.cli.shared.options import PlainCommand, PlainGroup
 from rotor.cli.shared.output import ComputationError
 
@@ -40,6 +41,7 @@ VERBS = {  # and what the list of verbs says of each, short enough for 80 column
     "convert": "Constants from one file format into another.",
     "cat": "A catalogue as a table, filtered or compared.",
     "new": "A commented scene file to begin with.",
+    "plan": "What a scene will do, its cost, what it omits.",
     "run": "A scene file run; a sweep goes on where it stopped.",
 }
 FILES = {"run": "run_scene"}  # of verbs that this module has a function for
@@ -182,6 +184,7 @@ def _fail(code: int, message: str, arguments: Sequence[str]) -> int:
 
 def main() -> None:
     """The console script `rotor`."""
+    process.begin()
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")  # a terminal without Greek letters shows a question mark, no traceback

@@ -206,12 +206,19 @@ def _show(answer: EmissionAnswer, shown: int) -> None:
     cited = "; ".join(
         f"{name}: {short_source(top.source)}" for name, top in zip(request.names, request.tops, strict=True)
     )
-    show_facts(
-        [
-            ("sources", cited),
-            ("left out", "departures from one excitation temperature, structure in the beam, hyperfine splitting"),
-        ]
-    )
+    show_facts([("sources", cited), *_limits(answer)])
+
+
+def _limits(answer: EmissionAnswer) -> list[tuple[str, str]]:
+    """What is left out: of the source, and the largest of each molecule."""
+    from rotor.quantum.limits import model_limits, populated_j
+
+    request = answer.request
+    facts = [("left out", "departures from one excitation temperature; structure of the source in the beam")]
+    for name, top, effects in zip(request.names, request.tops, answer.effects, strict=True):
+        limits = model_limits(top, populated_j(top, request.source.excitation_k), effects)
+        facts += [("", f"{name}: {limit.sentence}") for limit in limits[:1]]
+    return facts
 
 
 def _table(answer: EmissionAnswer, shown: int) -> Table:

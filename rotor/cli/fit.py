@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -105,6 +106,9 @@ class Options:
 @grouped()
 def command(context: typer.Context, given: Options) -> None:
     """Constants from measured lines, with errors, correlations and what the lines leave open; exit code 1 unless converged."""
+    os.environ.setdefault(
+        "OPENBLAS_NUM_THREADS", "1"
+    )  # before numpy is loaded: on small blocks threads only wait for each other
     require_whole("--bootstrap", given.bootstrap, 0)
     require_whole("--iterations", given.iterations, 1)
     files = _files(given)

@@ -97,7 +97,7 @@ def command(context: typer.Context, options: Options, outputs: Outputs) -> None:
     with inputs.fields_as_options(**NAMES), frames_for(growing, files) as (growing, frames):
         request = _request(options, settings)
         answer, start = _answer(request, growing, outputs, {"command": context.obj, "input": options.source})
-        paths = _paths(answer, frames)
+        paths = _paths(answer, frames) if "--plot" in files.paths else None
     for remark in answer.notes:
         note(remark)
     grown = [growing.csv, *(outputs.trajectory or ()), growing.checkpoint, *files.paths.values()]
@@ -128,20 +128,23 @@ def _paths(answer: FluidAnswer, frames: str | None) -> Floats:
     from ase.io import read
 
     from rotor.fluid.forces.models import models_of, shapes_of
+    from rotor.fluid.initial_box import model_labels
     from rotor.fluid.motion.bodies import bodies_of
 
-    shapes = shapes_of(models_of(answer.request.settings.model))
+    models = models_of(answer.request.settings.model)
+    shapes = shapes_of(models)
     taken = read(frames, ":") if frames is not None else [answer.atoms]
     for atoms in taken:
         if "molecule" not in atoms.arrays:
-            atoms.arrays["molecule"] = answer.atoms.arrays["molecule"]
+            atoms.arrays["molecule"] = model_labels(atoms, models)
     return np.array([bodies_of(atoms, shapes=shapes)[1].centres for atoms in taken[len(taken) // 2 :]])
 
 
-def _draw(answer: FluidAnswer, paths: Floats, path: Path, command: str) -> None:
+def _draw(answer: FluidAnswer, paths: Floats | None, path: Path, command: str) -> None:
     from rotor.fluid.analysis import pair_distribution
     from rotor.plots.fluid import plot_fluid
 
+    assert paths is not None
     atoms, settings = answer.atoms, answer.request.settings
     edges = atoms.cell.lengths()
     shells = None
@@ -255,8 +258,15 @@ def _claim(content: dict[str, Any], settings: Settings) -> str:
     return "" if content["engine"] == "lammps" and settings.ensemble != "nve" else ": no error of order h²"
 
 
+def _hill(symbols: str) -> str:
+    """A formula in Hill's order: OH2 is H2O."""
+    from ase.formula import Formula
+
+    return str(Formula(symbols).format("hill"))
+
+
 def _show(content: dict[str, Any], settings: Settings) -> None:
-    kinds = ", ".join(f"{kind['count']} {kind['name']}" for kind in content["molecules"])
+    kinds = ", ".join(f"{kind['count']} {_hill(kind['name'])}" for kind in content["molecules"])
     degrees = content["degrees"]
     print(f"{kinds}: {settings.steps} steps of {settings.step_fs:g} fs, {settings.ensemble}, by {content['engine']}")
     rms, drift = content["conserved_rms_ev"], content["conserved_drift_ev_per_ns"]

@@ -130,7 +130,7 @@ def _facts(top: Top, content: dict[str, Any]) -> list[tuple[str, str]]:
         ("spin weights", weights),
         *_states_facts(top),
         ("mass", f"{top.mass_u:.6f} u" if top.mass_u else "not known"),
-        ("inertial defect", f"{content['inertial_defect_u_angstrom2']:.6g} u Å²"),
+        ("inertial defect", f"{round(content['inertial_defect_u_angstrom2'], 9) + 0.0:.6g} u Å²"),
     ]
     if top.kind_of_top:
         facts.append(("kind", _kind_text(content["kind"], content["kind_decision"])))

@@ -26,7 +26,7 @@ from rotor.cli.shared.output import (
     show_table,
 )
 from rotor.cli.shared.save_scene import save_scene, save_scene_option
-from rotor.cli.shared.sources import with_sources
+from rotor.cli.shared.sources import source_facts
 
 if TYPE_CHECKING:
     from rotor.spectra.raman import RamanLines
@@ -95,12 +95,7 @@ def command(context: typer.Context, given: Input, options: Options, vibration: V
         files,
         _writers(answer.lines, content) | saved,
         text,
-        with_sources(
-            lambda: _show(answer, content),
-            answer.lines.top,
-            ("constants", "polarizability", "spin weights"),
-            given.sources,
-        ),
+        lambda: _show(answer, content, given.sources),
     )
 
 
@@ -169,8 +164,8 @@ def _writers(lines: RamanLines, content: dict[str, Any]) -> dict[str, Writer]:
     return {"--csv": table, "--parquet": table, "--plot": draw}
 
 
-def _show(answer: RamanAnswer, content: dict[str, Any]) -> None:
-    from rotor.cli.shared.report import heading
+def _show(answer: RamanAnswer, content: dict[str, Any], whole_sources: bool) -> None:
+    from rotor.cli.shared.report import heading, model_facts
 
     lines = answer.lines
     print(heading(lines.top))
@@ -180,6 +175,9 @@ def _show(answer: RamanAnswer, content: dict[str, Any]) -> None:
     elif len(content["strongest"]):
         print()
         show_table(_table(lines, content["strongest"]))
+    print()
+    tables = ("constants", "polarizability", "spin weights")
+    show_facts([*source_facts(lines.top, tables, whole_sources), *model_facts(content)])
 
 
 def _facts(lines: RamanLines, content: dict[str, Any]) -> list[tuple[str, str]]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -126,7 +126,8 @@ def _content(result: SceneResult, options: Options, command: str) -> dict[str, A
         "kind_of_scene": result.scene.kind,
     }
     names = [str(path) for path in result.files]
-    return {**head, **result.answer.facts(), "seconds": result.seconds, "files": names}
+    accuracy = None if result.reached is None else asdict(result.reached)
+    return {**head, **result.answer.facts(), "accuracy": accuracy, "seconds": result.seconds, "files": names}
 
 
 def _show(result: SceneResult) -> None:
@@ -141,11 +142,21 @@ def _show(result: SceneResult) -> None:
             ("rows", str(len(result.table))),
             ("files", ", ".join(map(str, result.files)) or "none: [outputs] names none"),
             ("seconds", f"{result.seconds:.3g}"),
+            *_accuracy(result),
         ]
     )
     if not result.files and len(result.table):
         print()
         show_table(_some_rows(result.table))
+
+
+def _accuracy(result: SceneResult) -> list[tuple[str, str]]:
+    """The error that was reached, where the scene asks for one."""
+    one = result.reached
+    if one is None:
+        return []
+    unit = f" {one.unit}" if one.unit else ""
+    return [("accuracy", f"{one.error:.2g}{unit} reached, {one.asked:g}{unit} asked for: {one.how}")]
 
 
 def _some_rows(table: Columns) -> Table:

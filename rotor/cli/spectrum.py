@@ -307,8 +307,7 @@ def _show(answer: SpectrumAnswer, content: dict[str, Any], range_text: str | Non
     show_facts(_facts(lines, content))
     if len(lines) == 0:
         print(f"\nno lines: {_why_none(answer, range_text)}")
-        return
-    if content["patterns"] is not None:
+    elif content["patterns"] is not None:
         print()
         show_table(_patterns_table(content["patterns"]))
     elif len(content["strongest"]):

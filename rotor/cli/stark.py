@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
 
+from rotor.checks import require_whole
 from rotor.cli.raman import with_polarizability
 from rotor.cli.shared import inputs
 from rotor.cli.shared.inputs import Input, json_option, parsed, positive, quantity
@@ -41,13 +43,15 @@ Examples:
   rotor stark OCS --field 0:50kV/cm:101 --intensity "1e11 W/cm2" --tilt 45 --states "J<=1"
   rotor stark OCS --field 0:5kV/cm:21 --states "J<=3" --line "2 - 1" --light perpendicular --lines lobes.csv --coefficients c.csv
   rotor stark OCS --field 20kV/cm --states "J<=6" --spread 0.005 --linewidth 0.5MHz --range 0:90GHz --spectrum ocs.csv
+  rotor stark HC3N --field 0:2kV/cm --states "J<=1" --spin-constants "chi_aa(14N)=-4.3 MHz" --plot hc3n.png
   rotor stark indole --field 0:50kV/cm --temperature 1 --mixture indole_1k.csv --deflection mu_eff.csv"""
 
+MOST_J = 500  # of the basis: a minute's work for an asymmetric top
 NAMES = {
     "fields_kv_per_cm": "--field", "j_highest": "--states", "m_values": "--m", "intensity_w_per_cm2": "--intensity",
     "jmax": "--jmax", "tolerance_mhz": "--tolerance", "diabatic_gap_mhz": "--diabatic-gap", "direction": "--tilt",
     "temperature_k": "--temperature", "populations": "--populations", "linewidth_mhz": "--linewidth", "range_mhz": "--range",
-    "spread": "--spread", "light": "--light",
+    "spread": "--spread", "light": "--light", "hyperfine": "--hyperfine",
 }  # fmt: skip  # field of the request -> option
 POINTS = 201
 SHOWN = 24
@@ -61,7 +65,9 @@ class Options:
         "0:100kV/cm", metavar="GRID", help="Fields: start:stop[:count], of 201 by default, or a comma list (kV/cm)."
     )
     states: str = option("J<=2", metavar="TEXT", help="Levels up to this J of the free molecule.")
-    m: str | None = option(None, "--m", metavar="LIST", help="|M| of the states: 0,1; by default 0 to the highest J.")
+    m: str | None = option(
+        None, "--m", metavar="LIST", help="|M| of the states: 0,1; by default all. With spins |M_F|: 0.5,1.5."
+    )
     intensity: str = option("0", metavar="I", help="Of a laser along the field, far from resonance (W/cm2).")
     diabatic_gap: str | None = option(
         None, metavar="GAP", help="Also labels that pass near crossings with a smaller gap (MHz)."
@@ -74,6 +80,11 @@ class Options:
     )
     jmax: int | None = option(None, metavar="N", help="Highest J of the basis; by default what the tolerance needs.")
     tolerance: str = option("1e-4", metavar="E", help="Of the energies (MHz).")
+    hyperfine: bool | None = option(
+        None,
+        "--hyperfine/--no-hyperfine",
+        help="With the spins of nuclei; by default where --spin-constants are given.",
+    )
     workers: int = option(1, metavar="N", help="Processes over which blocks of states are spread.")
 
 
@@ -119,7 +130,7 @@ class Outputs:
     save_scene: str | None = save_scene_option()
 
 
-@grouped(given=("spin_weights", "calculator", "hessian", "spin_constants", "spins", "state_constants"))
+@grouped(given=("spin_weights", "calculator", "hessian", "state_constants"))
 def command(context: typer.Context, given: Input, options: Options, sample: Sample, outputs: Outputs) -> None:
     """Levels in a static electric field: energies, labels, effective dipoles and cosines of every M; lines and mixtures."""
     from rotor.cli.shared.workers import working
@@ -127,6 +138,7 @@ def command(context: typer.Context, given: Input, options: Options, sample: Samp
     from rotor.spectra.field_request import FieldRequest
 
     settings, of_sample = _settings(options), _sample(sample)
+    settings["hyperfine"] = given.spin_constants is not None if options.hyperfine is None else options.hyperfine
     files = Files.of(outputs)
     if "--plot" in files.paths and len(settings["fields_kv_per_cm"]) < 2:
         raise ValueError("--plot: a picture of a map needs two fields or more; give --field a range")
@@ -208,6 +220,7 @@ def _line(text: str) -> tuple[str, str]:
 def _settings(options: Options) -> dict[str, Any]:
     """Fields of the request from the texts of the options."""
     gap = options.diabatic_gap
+    require_whole("--jmax", options.jmax, 0, MOST_J)
     return {
         "fields_kv_per_cm": parsed("--field", options.field, _fields),
         "j_highest": parsed("--states", options.states, _highest_j),
@@ -254,11 +267,11 @@ def _highest_j(text: str) -> int:
     return int(number)
 
 
-def _m_values(text: str) -> tuple[int, ...]:
+def _m_values(text: str) -> tuple[float, ...]:
     parts = [part.strip() for part in text.split(",")]
-    if not all(part.isdecimal() for part in parts):
-        raise ValueError(f"{text!r}: expected whole numbers of 0 or more between commas, such as 0,1")
-    return tuple(int(part) for part in parts)
+    if not all(re.fullmatch(r"\d+(\.[05])?", part) for part in parts):
+        raise ValueError(f"{text!r}: expected numbers of 0 or more between commas, such as 0,1, or 0.5,1.5 of M_F")
+    return tuple(float(part) if "." in part else int(part) for part in parts)
 
 
 def _content(answer: StarkAnswer, given: Input, command: str) -> dict[str, Any]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from rotor.cli.shared import inputs
+from rotor.cli.shared import inputs, process
 from rotor.cli.shared.inputs import Input, json_option
 from rotor.cli.shared.options import file_option, grouped
 from rotor.cli.shared.output import Files, Table, Writer, deliver, json_with_rows, show_facts, show_table
@@ -32,6 +32,7 @@ Examples:
   rotor tumble --moments "0.6,0.8,1.0 kg m2" --omega "0.1,60,0 rpm"
   rotor tumble --moments 0.6,0.8,1.0 --angular-momentum 1.8,0.4,-0.9 --times 0:10:101 --csv out.csv"""
 
+FEW_TIMES = 10_000  # half a second of plain Python, as long as loading the compiler takes
 NAMES = {"moments": "--moments", "angular_momentum": "--angular-momentum", "times": "--times"}
 
 
@@ -62,6 +63,8 @@ def command(context: typer.Context, given: Input, options: Options, outputs: Out
         )
     from rotor.classical.tumble import answer_tumble
 
+    if asked is None or len(asked) <= FEW_TIMES:
+        process.leave_compiler_out()
     answer = answer_tumble(start.request)
     content = _content(start, answer, context.obj)
     content["files"] = files.names

@@ -129,6 +129,8 @@ def assignments(
     ValueError
         For arrays that do not fit each other, and numbers that are not finite or below 0.
 
+    Examples
+    --------
     >>> lines = assignments(("j",), [[1], [2]], [[0], [1]], [115271.2018, 230538.0], 0.0005)
     >>> len(lines), lines.text(1), lines.blend.tolist()
     (2, '2 - 1', [0, 1])

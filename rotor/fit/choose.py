@@ -227,7 +227,8 @@ def choose_constants(
     start = with_names(constants, base)
     fit = fit_lines(lines, start, parameters(start, base), _patient(options))
     fixed, taken = tuple(fit.parameters.names), list[Trial]()
-    names = dict.fromkeys(start.own_name(name) for name in candidates)
+    known = with_names(start, [name for name in candidates if name not in start])  # refuses names that there are not
+    names = dict.fromkeys(known.own_name(name) for name in candidates)
     orders = {name: order_of(name, start) for name in names if name not in fixed}
 
     def take(trial: Trial) -> Fit:
@@ -316,7 +317,12 @@ def order_of(name: str, constants: Constants) -> int:
     if name in ("A", "B", "C"):
         return 2
     spelled = powers_of_spelled(name)
-    terms = {spelled: 1.0} if spelled else distortion_terms(constants.kind, constants.reduction)[name]
+    known = distortion_terms(constants.kind, constants.reduction)
+    if not spelled and name not in known:
+        raise ValueError(
+            f"{name!r} is no constant of the kind {constants.kind}; expected one such as {', '.join(list(known)[:3])}"
+        )
+    terms = {spelled: 1.0} if spelled else known[name]
     return max(2 * (p + q + n) for p, q, n in terms)
 
 

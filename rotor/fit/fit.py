@@ -257,7 +257,7 @@ def _errors_of(lines: Assignments, options: FitOptions) -> tuple[dict[int, str],
     zero = lines.error_mhz == 0
     if zero.all() and options.default_error_mhz is None:
         raise ValueError(
-            "every line has an error of 0: give errors in the file, or one for all of them (default_error_mhz)"
+            "every line has an error of 0: give errors in the file, or one for all of them (default_error_mhz, --default-error)"
         )
     if options.default_error_mhz is not None:
         return {}, np.where(zero, options.default_error_mhz, lines.error_mhz)

@@ -83,6 +83,8 @@ def parameters(
     ValueError
         A name given twice, unknown, free and tied at once, or tied to what is not free; no free constant; a prior not above 0.
 
+    Examples
+    --------
     >>> set_ = Constants(A=9.0, B=3.0, C=2.0)
     >>> parameters(set_, ["A", "B"], ties=["C = B - 1"]).constants_of(np.array([9.5, 3.5])).tolist()
     [9.5, 3.5, 2.5]

@@ -61,6 +61,8 @@ def pair_distribution(path: ArrayLike, edges: ArrayLike, r_max: float, bins: int
     PairDistribution
         With this norm an ideal gas has g = 1 for any n.
 
+    Examples
+    --------
     >>> crystal = np.array([[[i, j, k] for i in range(4) for j in range(4) for k in range(4)]], dtype=float)
     >>> shells = pair_distribution(crystal, [4.0, 4.0, 4.0], 1.2, 12)
     >>> round(float(shells.coordination[-1]), 12)  # six nearest neighbours of a simple cubic crystal
@@ -180,6 +182,8 @@ def yeh_hummer_correction(
     Diffusion
         With the correction beside.
 
+    Examples
+    --------
     >>> found = Diffusion(2.5e-9, 0.0)
     >>> round(yeh_hummer_correction(found, 298.15, 0.729e-3, 18.64).corrected * 1e9, 3)
     2.956

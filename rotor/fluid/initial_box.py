@@ -43,6 +43,8 @@ def lattice_box(model: RigidModel, molecules: int, density_g_cm3: float, rng: np
     ase.Atoms
         Labelled in arrays["molecule"]. Neighbours may stand too close: `relax` the box before anything is measured.
 
+    Examples
+    --------
     >>> from rotor.fluid.forces.models import model_of
     >>> box = lattice_box(model_of("spce"), 216, 0.997, np.random.default_rng(1))
     >>> len(box), round(float(box.cell[0, 0]), 3)

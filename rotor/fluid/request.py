@@ -17,6 +17,7 @@ from rotor.fluid.record import FluidRecord
 from rotor.fluid.run import Outputs, Progress, bodies_and_degrees, calculator_of, run_fluid
 from rotor.fluid.settings import Settings
 from rotor.fluid.summary import conserved, means
+from rotor.table import TextOf
 from rotor.units import ATOMIC_MASS_KG
 
 if TYPE_CHECKING:
@@ -73,9 +74,11 @@ class FluidRequest:
         )
 
 
-@dataclass(frozen=True, eq=False)
-class FluidAnswer:
+@dataclass(frozen=True, eq=False, repr=False)
+class FluidAnswer(TextOf):
     """A run: the table, the atoms where it ended, and how it started."""
+
+    shown = "record"
 
     request: FluidRequest
     record: FluidRecord

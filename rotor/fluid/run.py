@@ -92,12 +92,21 @@ def run_fluid(
         Molecules one after another, atoms in the order of their models; its own calculator, if it has one, takes the place
         of the model's potential. Momenta are used if there are any (without their total, where that is conserved), else
         drawn at `settings.temperature_k`.
+    settings : Settings
+        Model, ensemble, temperature and steps.
+    outputs : Outputs, optional
+        Files that grow, and checkpoints; none by default.
     resume : bool
         Continue from `outputs.checkpoint`; the files that grow are cut back to where they were then.
     progress : callable, optional
         Called with step, steps and ns per day from time to time; without it a bar is shown on a terminal.
     on_start : callable, optional
         Called once everything is found to be in order and the files are open.
+
+    Returns
+    -------
+    FluidRecord
+        One row every `settings.every` steps.
 
     Raises
     ------

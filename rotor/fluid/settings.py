@@ -9,6 +9,9 @@ ENSEMBLES = ("nve", "langevin", "nose-hoover")
 ELECTROSTATICS = ("reaction-field", "ewald", "shifted")
 
 
+LARGEST = 1e30  # of any number here: its powers are formed
+
+
 @dataclass(frozen=True)
 class Settings:
     """A run, apart from the atoms.
@@ -37,6 +40,8 @@ class Settings:
             value = getattr(self, name)
             if not (math.isfinite(value) and value > 0):
                 raise ValueError(f"{name} = {value}: expected a number above 0")
+            if value > LARGEST:
+                raise ValueError(f"{name} = {value}: expected at most {LARGEST:g}; its powers overflow")
         for name, least in (("steps", 0), ("every", 1), ("seed", 0)):
             if getattr(self, name) < least:
                 raise ValueError(f"{name} = {getattr(self, name)}: expected at least {least}")

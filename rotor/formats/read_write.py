@@ -45,6 +45,8 @@ def read(source: Any, *, isotopes: Isotopes | None = None) -> Any:
     ValueError
         What was read, where, which rule it breaks and what would do.
 
+    Examples
+    --------
     >>> read("CO").kind
     'linear'
     """

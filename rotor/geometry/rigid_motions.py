@@ -35,6 +35,8 @@ def compose(q1: ArrayLike, position1: ArrayLike, q2: ArrayLike, position2: Array
     (..., 4) array, (..., 3) array
         q1 q2 and q1 p2 q1* + p1.
 
+    Examples
+    --------
     >>> compose([1, 0, 0, 0], [1, 0, 0], [1, 0, 0, 0], [0, 2, 0])[1].tolist()
     [1.0, 2.0, 0.0]
     """

@@ -38,6 +38,8 @@ def estimate_dipole(molecule: Molecule) -> tuple[Floats | None, str]:
     note : str
         How far to trust it, or why there is none.
 
+    Examples
+    --------
     >>> carbon_monoxide = Molecule(("C", "O"), [[0, 0, 0], [0, 0, 1.128]])
     >>> estimate_dipole(carbon_monoxide)[1]
     'no dipole for CO: MMFF94 has no charges for it; give one'

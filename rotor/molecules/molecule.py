@@ -25,7 +25,7 @@ FEW_ATOMS = 100  # up to which all distances are as quick as a k-d tree
 CLOSEST_ANGSTROM = 0.1  # no two nuclei of a molecule come nearer; H2 has 0.74 Å
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Molecule:
     """Nuclei at fixed positions, checked.
 
@@ -110,6 +110,11 @@ class Molecule:
         """Centre of mass (3,) in Å, in the frame of the positions."""
         return np.asarray(self.masses_u @ self.positions_angstrom / self.mass_u, dtype=np.float64)
 
+    def __repr__(self) -> str:
+        names = ", ".join(dict.fromkeys(filter(None, (self.name, self.formula))))
+        charge = f", charge {self.charge:+d}" if self.charge else ""
+        return f"Molecule({names}, {len(self.symbols)} atom{'s' if len(self.symbols) != 1 else ''}{charge})"
+
     @property
     def formula(self) -> str:
         """Formula in Hill's order; isotopes that are not the most abundant are marked, as in `"C[13C]H6O"`."""
@@ -135,6 +140,8 @@ class Molecule:
         ValueError
             An atom or element that the molecule does not have, or an isotope of another element.
 
+        Examples
+        --------
         >>> Molecule(("C", "O"), [[0, 0, 0], [0, 0, 1.128]]).with_isotopes("O=18O").mass_numbers
         (12, 18)
         """

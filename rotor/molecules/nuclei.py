@@ -110,6 +110,8 @@ def isotope(symbol: str, mass_number: int | None = None) -> Isotope:
     ValueError
         A name or mass number that the table does not have, with near matches; two mass numbers that differ.
 
+    Examples
+    --------
     >>> isotope("Cl").mass_number
     35
     >>> isotope("D").mass_u, isotope("2H").spin

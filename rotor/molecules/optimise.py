@@ -67,6 +67,8 @@ def refine(
     ValueError
         Where the search does not converge, with the force that is left, and where the calculator fails.
 
+    Examples
+    --------
     >>> from ase.calculators.lj import LennardJones
     >>> pair = Molecule(("Ar", "Ar"), [[0, 0, 0], [0, 0, 1.3]])
     >>> near = refine(pair, LennardJones(rc=100.0, smooth=False), most_force_ev_per_angstrom=1e-6)

@@ -92,9 +92,33 @@ def animate(
     """Write a film of one free rotation from the first to the last of `times`, at even steps of the exact motion.
 
     Left the body in space, L upright: the atoms, or without them the uniform box that has these moments. Right the
-    path of L over the momentum sphere in the body. times: in the units of the motion; shown multiplied by `time_factor`.
-    provenance: what the comment of the file (of the gif format, or the tag of an mp4) shall say besides version.
-    Raises ValueError for a suffix that cannot be made here and for times that are all the same.
+    path of L over the momentum sphere in the body.
+
+    Parameters
+    ----------
+    motion : FreeMotion
+        Of one body, in any units.
+    times : (n,) array
+        In the units of the motion, of which only the range counts.
+    path : path
+        A .gif or .mp4 file.
+    atoms : Atoms, optional
+        To be drawn in place of the box.
+    axis_names : (str, str, str), optional
+        Of the principal axes.
+    time_unit : str, optional
+        Of the times shown.
+    time_factor : float, optional
+        By which times are multiplied before they are shown.
+    frames : int, optional
+        Pictures of the film.
+    provenance : mapping, optional
+        What the comment of the file (of the gif format, or the tag of an mp4) shall say besides version.
+
+    Raises
+    ------
+    ValueError
+        For a suffix that cannot be made here and for times that are all the same.
     """
     check_film(path)
     times = np.asarray(times, dtype=np.float64)

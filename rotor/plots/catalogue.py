@@ -15,9 +15,23 @@ MEASURED = ORANGE
 
 
 def plot_catalogue(lines: Catalogue, path: str | os.PathLike[str], *, title: str = "", command: str = "") -> None:
-    """Draw log10 of the intensity against frequency into a .png, .pdf or .svg file.
+    """Draw log10 of the intensity against frequency into a picture; measured lines (a negative tag) stand out.
 
-    Measured lines (a negative tag) stand out. title: above the picture. command: written into the file's metadata.
+    Parameters
+    ----------
+    lines : Catalogue
+        What is drawn.
+    path : path
+        A .png, .pdf or .svg file.
+    title : str, optional
+        Above the picture.
+    command : str, optional
+        Written into the file's metadata.
+
+    Raises
+    ------
+    ValueError
+        For another suffix.
     """
     checked_suffix(path)
     save(catalogue_figure(lines, title=title), path, title, {"command": command})

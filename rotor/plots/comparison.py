@@ -29,7 +29,24 @@ _DIFFERENCES = ((1e-1, 1e3, "kHz"), (1e2, 1.0, "MHz"), (np.inf, 1e-3, "GHz"))  #
 def plot_comparison(
     found: Comparison, path: str | os.PathLike[str], *, names: tuple[str, str] = ("", ""), command: str = ""
 ) -> None:
-    """Draw a comparison into a .png, .pdf or .svg file; command: written into the file's metadata."""
+    """Draw a comparison of two line lists into a picture.
+
+    Parameters
+    ----------
+    found : Comparison
+        What is drawn, see `comparison_figure`.
+    path : path
+        A .png, .pdf or .svg file.
+    names : (str, str), optional
+        Of the two lists.
+    command : str, optional
+        Written into the file's metadata.
+
+    Raises
+    ------
+    ValueError
+        For another suffix.
+    """
     checked_suffix(path)
     save(comparison_figure(found, names=names), path, " and ".join(filter(None, names)), {"command": command})
 

@@ -56,6 +56,11 @@ def emission_figure(
         Frequencies shown, those of the request by default.
     log : bool, optional
         Whether T_B is on a logarithmic axis.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        One panel.
     """
     mhz = UNITS[unit or "GHz"]
     first, last = range_mhz or answer.request.range_mhz

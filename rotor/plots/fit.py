@@ -46,9 +46,23 @@ def _title(fit: Fit, title: str) -> str:
 def plot_fit(
     fit: Fit, path: str | os.PathLike[str], *, title: str = "", provenance: Mapping[str, Any] | None = None
 ) -> None:
-    """Draw `fit_figure` into a .png, .pdf or .svg file, with the provenance in its metadata.
+    """Draw `fit_figure` into a picture, with the provenance in its metadata.
 
-    Raises ValueError for another suffix.
+    Parameters
+    ----------
+    fit : Fit
+        A finished fit.
+    path : path
+        A .png, .pdf or .svg file.
+    title : str, optional
+        Above the picture.
+    provenance : mapping, optional
+        What the metadata shall say besides constants, rms and convergence.
+
+    Raises
+    ------
+    ValueError
+        For another suffix.
     """
     checked_suffix(path)
     names = fit.constants.text() if fit.constants else fit.parameters.names

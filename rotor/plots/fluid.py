@@ -53,6 +53,11 @@ def fluid_figure(record: FluidRecord, shells: PairDistribution | None, molecules
     molecules : int
         By which the energy is divided.
     title : str
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Temperatures and energy over time, g(r) beside them.
     """
     with styled():
         figure = new_figure((7.2, 4.2))

@@ -57,9 +57,27 @@ def plot_gas(
     plateau: float | None = None,
     provenance: Mapping[str, Any] | None = None,
 ) -> None:
-    """Draw the test, and the correlation functions beside it where there are some, into a .png, .pdf or .svg file.
+    """Draw the test, and the correlation functions beside it where there are some, into a picture.
 
-    plateau: where C1 ends, drawn as a line. provenance: written into the metadata. ValueError for a suffix that is no picture.
+    Parameters
+    ----------
+    test : Equipartition
+        Of every degree of freedom.
+    curves : Correlations or None
+        C1 and C2.
+    path : path
+        A .png, .pdf or .svg file.
+    title : str, optional
+        Above the picture.
+    plateau : float, optional
+        Where C1 ends, drawn as a line.
+    provenance : mapping, optional
+        Written into the metadata.
+
+    Raises
+    ------
+    ValueError
+        For a suffix that is no picture.
     """
     checked_suffix(path)
     figure, axes = _panels(1 if curves is None else 2, 2, SIZE_INCHES[1])

@@ -71,7 +71,29 @@ def plot_levels(
 def levels_figure(
     table: SelectedLevels, top: Top | None = None, *, unit: str = "cm-1", title: str | None = None
 ) -> Any:
-    """A matplotlib figure of a term diagram; see `plot_levels`. top: None: an asymmetric top stands in columns of Ka."""
+    """A matplotlib figure of a term diagram; see `plot_levels`.
+
+    Parameters
+    ----------
+    table : SelectedLevels
+        What is drawn.
+    top : Top, optional
+        Whose levels they are; without it an asymmetric top stands in columns of Ka.
+    unit : str, optional
+        Of the energies.
+    title : str, optional
+        Instead of the name of the top.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        One panel.
+
+    Raises
+    ------
+    ValueError
+        For an unknown unit, and for a table without levels.
+    """
     require_one_of("unit", unit, UNITS)
     if not len(table):
         raise ValueError("there is no level to draw; widen the range of J or K, or raise the limit of energy")

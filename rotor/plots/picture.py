@@ -63,7 +63,24 @@ def styled() -> Any:
 
 
 def save(figure: Any, path: str | os.PathLike[str], title: str, facts: Mapping[str, Any]) -> None:
-    """Write a figure with its title and facts, as JSON, in the metadata; no date, so that the same picture is the same file."""
+    """Write a figure with its title and facts, as JSON, in the metadata; no date, so that like pictures are like files.
+
+    Parameters
+    ----------
+    figure : matplotlib.figure.Figure
+        What is written.
+    path : path
+        A .png, .pdf or .svg file.
+    title : str
+        Dollar signs of formulas are left out of the metadata.
+    facts : mapping
+        What the metadata says of the picture.
+
+    Raises
+    ------
+    ValueError
+        For a suffix that is no picture.
+    """
     suffix, plain = checked_suffix(path), title.replace("$", "")
     text = json.dumps(dict(facts), ensure_ascii=False, default=str)
     program = f"rotor {version()}"

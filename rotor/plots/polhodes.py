@@ -36,8 +36,30 @@ def polhode_figure(
     moment (green), the separatrix (black) and the path of L from the first to the last time (orange; the dot is the
     start). Filled axis ends are stable, open ones unstable. Right the components of L/|L| over time.
 
-    motion: of one body, in any units. times: (n,), in the units of the motion, of which only the range counts; they are
-    shown multiplied by `time_factor`. Raises ValueError for a body at rest and for more than one body.
+    Parameters
+    ----------
+    motion : FreeMotion
+        Of one body, in any units.
+    times : (n,) array
+        In the units of the motion, of which only the range counts.
+    axis_names : (str, str, str), optional
+        Of the principal axes.
+    time_label : str, optional
+        Of the axis of time.
+    time_factor : float, optional
+        By which times are multiplied before they are shown.
+    title : str, optional
+        Above the picture.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Two panels.
+
+    Raises
+    ------
+    ValueError
+        For a body at rest, for more than one body, and for no times.
     """
     times = np.asarray(times, dtype=np.float64)
     size = np.linalg.norm(motion.momentum0, axis=-1)
@@ -71,9 +93,31 @@ def plot_polhodes(
     title: str = "",
     provenance: Mapping[str, Any] | None = None,
 ) -> None:
-    """Draw `polhode_figure` into a .png, .pdf or .svg file, with the provenance in its metadata.
+    """Draw `polhode_figure` into a picture, with the provenance in its metadata.
 
-    Raises ValueError for a suffix that is no picture, and as `polhode_figure` does.
+    Parameters
+    ----------
+    motion : FreeMotion
+        Of one body, in any units.
+    times : (n,) array
+        In the units of the motion, of which only the range counts.
+    path : path
+        A .png, .pdf or .svg file.
+    axis_names : (str, str, str), optional
+        Of the principal axes.
+    time_label : str, optional
+        Of the axis of time.
+    time_factor : float, optional
+        By which times are multiplied before they are shown.
+    title : str, optional
+        Above the picture.
+    provenance : mapping, optional
+        Written into the metadata.
+
+    Raises
+    ------
+    ValueError
+        For a suffix that is no picture, and as `polhode_figure` does.
     """
     suffix = Path(path).suffix.lower()
     if suffix not in (".png", ".pdf", ".svg"):
@@ -162,7 +206,7 @@ def _draw_right(axes: Any, moments: Floats, times: Floats, path: Floats, names: 
     rank = np.argsort(np.argsort(moments, kind="stable"))
     for axis, name in enumerate(names):
         colour = (SMALL, MIDDLE, LARGE)[rank[axis]]
-        axes.plot(times, path[:, axis], color=colour, linewidth=1.3, label=f"$L_{name}$")
+        axes.plot(times, path[:, axis], color=colour, linewidth=1.3, label=rf"$L_{{\mathrm{{{name}}}}}$")
     axes.set(ylim=(-1.12, 1.12), yticks=(-1, -0.5, 0, 0.5, 1))
     if times[-1] > times[0]:
         axes.set_xlim(times[0], times[-1])

@@ -20,11 +20,25 @@ def plot_raman(
     title: str | None = None,
     provenance: Mapping[str, Any] | None = None,
 ) -> None:
-    """Draw Raman lines as sticks at their shifts into a .png, .pdf or .svg file.
+    """Draw Raman lines as sticks at their shifts into a picture.
 
-    title: instead of name, temperature and laser. provenance: what the metadata of the file shall say besides version
-    and settings. Lines below 0.4 % of the strongest do not stretch the axis. Raises ValueError for a suffix that is no
-    picture and for no lines.
+    Lines below 0.4 % of the strongest do not stretch the axis.
+
+    Parameters
+    ----------
+    lines : RamanLines
+        What is drawn.
+    path : path
+        A .png, .pdf or .svg file.
+    title : str, optional
+        Instead of name, temperature and laser.
+    provenance : mapping, optional
+        What the metadata of the file shall say besides version and settings.
+
+    Raises
+    ------
+    ValueError
+        For a suffix that is no picture and for no lines.
     """
     checked_suffix(path)
     save(raman_figure(lines, title), path, title or _title(lines), {**(provenance or {}), **_facts(lines)})

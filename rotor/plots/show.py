@@ -9,19 +9,27 @@ from typing import Any
 
 import numpy as np
 
+from rotor.alignment.align import AlignmentTrace
+from rotor.alignment.request import AlignAnswer
 from rotor.classical.free.free_motion import FreeMotion
 from rotor.classical.gas.ensembles import Correlations
 from rotor.classical.tumble import PERIODS, TumbleAnswer
+from rotor.fluid.request import FluidAnswer
 from rotor.formats.spcat.catalogue import Catalogue
+from rotor.formats.spcat.compare import Comparison
 from rotor.plots.picture import save
+from rotor.quantum.fields.field_map import FieldMap
+from rotor.quantum.fields.stark_request import StarkAnswer
 from rotor.quantum.levels import Levels
 from rotor.quantum.request import LevelsAnswer, SelectedLevels
+from rotor.spectra.emission_request import EmissionAnswer
 from rotor.spectra.lines import Lines
 from rotor.spectra.raman import RamanLines
 from rotor.spectra.raman_request import RamanAnswer
 from rotor.spectra.request import SpectrumAnswer
 from rotor.spectra.spectrum import Spectrum
 from rotor.statistics.equipartition import Equipartition
+from rotor.thermo.classical_gas import GasAnswer
 from rotor.thermo.functions import ThermoFunctions
 from rotor.thermo.request import ThermoAnswer
 
@@ -48,6 +56,8 @@ def plot(thing: Any, path: str | os.PathLike[str] | None = None, **options: Any)
     ValueError
         A thing that there is no picture of; a suffix that is no picture.
 
+    Examples
+    --------
     >>> from rotor.spectra.lines import line_list
     >>> from rotor.tops.top import Top
     >>> figure = plot(line_list(Top.from_constants("B=57.6 GHz", dipole_abc_debye=(0.1, 0, 0)), jmax=5))
@@ -160,5 +170,52 @@ def _passed_on(attribute: str) -> Callable[..., Any]:
     return figure
 
 
+@_figure.register
+def _(thing: EmissionAnswer, **options: Any) -> Any:
+    from rotor.plots.emission import emission_figure
+
+    return emission_figure(thing, **options)
+
+
+@_figure.register
+def _(thing: FieldMap, **options: Any) -> Any:
+    from rotor.plots.stark import stark_figure
+
+    return stark_figure(thing, **options)
+
+
+@_figure.register
+def _(thing: AlignmentTrace, **options: Any) -> Any:
+    from rotor.plots.alignment import alignment_figure
+
+    return alignment_figure(thing, **options)
+
+
+@_figure.register
+def _(thing: AlignAnswer, **options: Any) -> Any:
+    return _figure(thing.trace, **({"classical": thing.classical} | options))
+
+
+@_figure.register
+def _(thing: Comparison, **options: Any) -> Any:
+    from rotor.plots.comparison import comparison_figure
+
+    return comparison_figure(thing, **options)
+
+
+@_figure.register
+def _(thing: GasAnswer, **options: Any) -> Any:
+    return _figure(thing.test if thing.correlations is None else thing.correlations, **options)
+
+
+@_figure.register
+def _(thing: FluidAnswer, **options: Any) -> Any:
+    from rotor.plots.fluid import fluid_figure
+
+    molecules = len(np.unique(thing.atoms.arrays["molecule"]))
+    return fluid_figure(thing.record, None, molecules, **options)
+
+
+_figure.register(StarkAnswer, _passed_on("states"))
 _figure.register(RamanAnswer, _passed_on("lines"))
 _figure.register(ThermoAnswer, _passed_on("functions"))

@@ -99,6 +99,11 @@ def spectrum_figure(
     log : bool, optional
         Whether the axis of intensity is logarithmic; else it is where fewer than ten lines would be seen on a linear one.
 
+    Returns
+    -------
+    matplotlib.figure.Figure
+        One panel.
+
     Raises
     ------
     ValueError
@@ -248,7 +253,7 @@ def _name_lines(
     figure.canvas.draw()  # places the axes, so that sizes in pixels are known
     rows = np.flatnonzero(x.inside(lines.frequency_mhz) & _stands_out(thing, lines, heights))
     rows = rows[np.argsort(-lines.intensity_nm2_mhz[rows], kind="stable")][: 15 * most]
-    _make_room(axes, lines, rows, heights, x)
+    _leave_space(axes, lines, rows, heights, x)
     drawn = _drawn_points(axes, thing, x)
     places = axes.transData.transform(np.stack([lines.frequency_mhz[rows] / x.mhz, heights[rows]], axis=1))
     taken: list[Any] = []
@@ -267,7 +272,7 @@ def _name_lines(
             text.remove()
 
 
-def _make_room(axes: Any, lines: Lines, rows: Ints, heights: Floats, x: _Axis) -> None:
+def _leave_space(axes: Any, lines: Lines, rows: Ints, heights: Floats, x: _Axis) -> None:
     """Raise the upper limit of a linear axis until the name of the strongest line stands inside."""
     if not len(rows) or axes.get_yscale() == "log":
         return

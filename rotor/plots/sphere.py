@@ -63,7 +63,19 @@ def draw_sphere(axes: Any) -> None:
 
 
 def draw_curve(axes: Any, view: View, curve: Floats, **style: Any) -> None:
-    """A curve (n, 3) on the sphere: its visible parts in full, its hidden ones faint and thin."""
+    """A curve on the sphere: its visible parts in full, its hidden ones faint and thin.
+
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes
+        Where it is drawn.
+    view : View
+        From where the sphere is seen.
+    curve : (n, 3) array
+        Points on the unit sphere.
+    style : object
+        Of `Axes.plot`: colour, width, label.
+    """
     flat, front = view.flat(curve), view.depth(curve) >= 0.0
     width = style.pop("linewidth", 1.0)
     label = style.pop("label", None)
@@ -77,7 +89,19 @@ def draw_curve(axes: Any, view: View, curve: Floats, **style: Any) -> None:
 def draw_family(axes: Any, view: View, moments: Floats, per_side: int = 5) -> None:
     """Polhodes on both sides of the separatrix, in the colour of the axis that they go round, and the separatrix.
 
-    A symmetric top has circles and an equator of points at rest, drawn dotted; a spherical or linear body has no polhodes.
+    A symmetric top has circles and an equator of points at rest, drawn dotted; a spherical or linear body has no
+    polhodes.
+
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes
+        Where they are drawn.
+    view : View
+        From where the sphere is seen.
+    moments : (3,) array
+        Moments of inertia, any unit.
+    per_side : int, optional
+        Energies on each side of the separatrix.
     """
     if np.any(moments == 0.0):
         _draw_equator(axes, view, int(np.argmin(moments)))
@@ -96,7 +120,19 @@ def draw_family(axes: Any, view: View, moments: Floats, per_side: int = 5) -> No
 
 
 def draw_axes(axes: Any, view: View, moments: Floats, names: tuple[str, str, str]) -> None:
-    """The ends of the principal axes: filled where spin about them is stable, open where it is not, and their names."""
+    """The ends of the principal axes: filled where spin about them is stable, open where it is not, and their names.
+
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes
+        Where they are drawn.
+    view : View
+        From where the sphere is seen.
+    moments : (3,) array
+        Moments of inertia, any unit.
+    names : (str, str, str)
+        Of the axes, as TeX.
+    """
     values = np.sort(moments)
     for axis, name in enumerate(names):
         if moments[axis] == 0.0:  # L cannot point there

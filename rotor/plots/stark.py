@@ -70,12 +70,12 @@ def plot_stark(
 
 
 def _energies(axes: Any, field_map: FieldMap) -> None:
-    seen: set[int] = set()
+    seen: set[float] = set()
     ends: list[tuple[float, str]] = []
     for rows in field_map.curves():
-        m = int(field_map.m[rows.start])
+        m = float(field_map.m[rows.start])
         energies = field_map.energy_mhz[rows] / MHZ_PER_CM
-        label = None if m in seen else ("M mixed" if m < 0 else f"|M| = {m}")
+        label = None if m in seen else ("M mixed" if m < 0 else f"|M| = {m:g}")
         axes.plot(field_map.field[rows], energies, color=_colour(m), linewidth=0.9, label=label)
         seen.add(m)
         ends.append((float(energies[0]), str(field_map.label[rows.start])))
@@ -85,8 +85,8 @@ def _energies(axes: Any, field_map: FieldMap) -> None:
         axes.legend(frameon=False, fontsize=8, loc="lower right", bbox_to_anchor=(1, 1), ncols=len(seen))
 
 
-def _colour(m: int) -> str:
-    return COLOURS[m % len(COLOURS)] if m >= 0 else COLOURS[0]
+def _colour(m: float) -> str:
+    return COLOURS[int(m) % len(COLOURS)] if m >= 0 else COLOURS[0]
 
 
 def _labels(axes: Any, field_map: FieldMap, ends: list[tuple[float, str]]) -> None:
@@ -112,11 +112,11 @@ def _labels(axes: Any, field_map: FieldMap, ends: list[tuple[float, str]]) -> No
 def _slopes(axes: Any, field_map: FieldMap, unit: str) -> None:
     for rows in field_map.curves():
         axes.plot(
-            field_map.field[rows], field_map.slope[rows], color=_colour(int(field_map.m[rows.start])), linewidth=0.8
+            field_map.field[rows], field_map.slope[rows], color=_colour(float(field_map.m[rows.start])), linewidth=0.8
         )
     axes.axhline(0.0, color="#555555", linewidth=0.6, linestyle=":")
     axes.set_xlabel(f"field ({unit})")
-    name = "μ_eff (D)" if field_map.slope_name == "mu_eff_debye" else field_map.slope_name
+    name = r"$\mu_{\mathrm{eff}}$ (D)" if field_map.slope_name == "mu_eff_debye" else field_map.slope_name
     axes.set_ylabel(name)
 
 

@@ -51,9 +51,25 @@ def plot_structure(
     title: str = "",
     provenance: Mapping[str, Any] | None = None,
 ) -> None:
-    """Draw `structure_figure` into a .png, .pdf or .svg file, with the provenance in its metadata.
+    """Draw `structure_figure` into a picture, with the provenance in its metadata.
 
-    Raises ValueError for a suffix that is no picture.
+    Parameters
+    ----------
+    molecule : Molecule
+        Positions in Å.
+    path : path
+        A .png, .pdf or .svg file.
+    values : sequence of Value, optional
+        Distances and angles with their errors.
+    title : str, optional
+        Above the picture.
+    provenance : mapping, optional
+        What the metadata shall say besides the atoms.
+
+    Raises
+    ------
+    ValueError
+        For a suffix that is no picture.
     """
     checked_suffix(path)
     places = np.round(molecule.positions_angstrom, 6).tolist()

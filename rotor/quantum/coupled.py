@@ -135,7 +135,7 @@ def extra_states(top: Top, effects: tuple[QuantumEffect, ...]) -> list[State]:
 def coupled_levels(
     top: Top, effects: tuple[QuantumEffect, ...], model: Model, jmin: int, jmax: int, executor: Executor | None = None
 ) -> Levels:
-    """All levels of a coupled calculation from J = `jmin` to `jmax`, by quantum numbers j, ka, kc and, of several states, v.
+    """All levels of a coupled calculation, by quantum numbers j, ka, kc and, of several states, v.
 
     Parameters
     ----------

@@ -235,7 +235,7 @@ def _of_asymmetric(levels: Levels, weights: SpinWeights) -> Ints:
     """By parities of (Ka, Kc); a symmetric top whose ±K are split has weights by K, one component each.
 
     Of a pair with K a multiple of n, 0even and 0odd go by the parity of the other label, which is J where K = 0: a half turn about
-    an axis across the main one tells the two components of the pair apart.
+    an axis across the main one distinguishes the two components of the pair.
     """
     ka, kc = levels.quanta["ka"], levels.quanta["kc"]
     if levels.kind in ("prolate", "oblate") and weights.rule == "K":

@@ -13,7 +13,7 @@ D = 4B³/ν² holds exactly for a harmonic diatomic molecule (A. Kratzer, Z. Phy
 The unit of the field gradient is e/(4π ε0 a0³); gradients at nuclei of bonded atoms are of this order, several times as large at
 heavy halogens. I_red = I_m (1 - I_m Σ_g λ_g²/I_g), I_m the moment of the methyl group about its axis and λ_g the cosines of this axis
 in the principal frame: the energy F p² of a group that turns freely against the rest, whose levels m = 0 (A) and m = ±1 (E) are F
-apart (C. C. Lin and J. D. Swalen, Rev. Mod. Phys. 31 (1959) 841).
+apart. tests/test_limits.py has I_red from the kinetic energy of the atoms.
 """
 
 from __future__ import annotations

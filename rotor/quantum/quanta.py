@@ -105,6 +105,20 @@ def labels(quanta: Quanta, rows: NDArray[Any], halves: Collection[str] = (), wid
 def line_text(quanta: Quanta, upper: int, lower: int, halves: Collection[str] = ()) -> str:
     r"""A line as a plot names it, upper level first; sums with spins come after both rotational levels, F = F' – F".
 
+    Parameters
+    ----------
+    quanta : dict of str to (levels,) arrays
+    upper, lower : int
+        Rows of the two levels.
+    halves : collection of str
+        Which quanta are stored doubled.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
     >>> quanta = {"n": np.array([1, 2]), "ka": np.array([0, 0]), "kc": np.array([1, 2]), "f": np.array([2, 3])}
     >>> line_text(quanta, 1, 0)
     '$2_{0,2}$ – $1_{0,1}$, $F = 3 – 2$'

@@ -18,7 +18,7 @@ from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.levels import Levels
 from rotor.quantum.limits import limit_facts
 from rotor.quantum.solve import solve_levels
-from rotor.table import Table
+from rotor.table import Table, TextOf
 from rotor.tops.facts import top_facts
 
 if TYPE_CHECKING:
@@ -109,9 +109,11 @@ class SelectedLevels(Table):
         return {name: column[self.rows] for name, column in self.levels.quanta.items()} | numbers | counts
 
 
-@dataclass(frozen=True)
-class LevelsAnswer:
+@dataclass(frozen=True, repr=False)
+class LevelsAnswer(TextOf):
     """The levels that a request asked for, and the limits of the model behind them."""
+
+    shown = "table"
 
     request: LevelsRequest
     table: SelectedLevels

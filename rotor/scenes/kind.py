@@ -119,17 +119,17 @@ def saved_vibrations(states: VibrationalStates | None) -> VibrationSection:
     return VibrationSection(fundamentals=pairs) if states.harmonic else VibrationSection(states=pairs)
 
 
-def effects_of(top: Top, asked: QuantumEffects) -> tuple[QuantumEffect, ...]:
-    """The Hamiltonian that a scene asks for."""
-    from rotor.quantum.effects.watson import SEMI_RIGID, Rigid
+def effects_of(top: Top, asked: QuantumEffects, molecule: MoleculeSection) -> tuple[QuantumEffect, ...]:
+    """The Hamiltonian that a scene asks for; spins by default where the scene itself gives their constants."""
+    from rotor.quantum.effects.of_top import effects_of as library_effects
+    from rotor.quantum.effects.watson import Centrifugal
 
-    base: tuple[QuantumEffect, ...] = SEMI_RIGID if asked.distortion else (Rigid(),)
-    hyperfine = top.spin_constants is not None if asked.hyperfine is None else asked.hyperfine
-    if not hyperfine:
-        return base
-    from rotor.quantum.effects.of_top import effects_of as with_spins
-
-    return (*base, *named("effects.hyperfine", lambda: with_spins(top, True))[len(SEMI_RIGID) :])
+    hyperfine = molecule.spin_constants is not None if asked.hyperfine is None else asked.hyperfine
+    if asked.hyperfine_method != "exact" and not hyperfine:
+        raise ValueError("effects.hyperfine_method: without hyperfine no line is split; add hyperfine = true")
+    tolerance = quantity("effects.hyperfine_tolerance", asked.hyperfine_tolerance, "MHz")
+    found = named("effects.hyperfine", lambda: library_effects(top, hyperfine, asked.hyperfine_method, tolerance))
+    return found if asked.distortion else tuple(one for one in found if not isinstance(one, Centrifugal))
 
 
 def saved_effects(effects: Iterable[QuantumEffect], top: Top) -> QuantumEffects:
@@ -137,12 +137,22 @@ def saved_effects(effects: Iterable[QuantumEffect], top: Top) -> QuantumEffects:
 
     Raises ValueError for effects that a scene has no name for.
     """
-    names = {effect.name for effect in effects}
+    every = {effect.name: effect for effect in effects}
     spins = {"nuclear quadrupole", "spin-rotation", "spin-spin"}
-    if unknown := names - spins - {"rigid rotor", "centrifugal distortion"}:
+    known = {"rigid rotor", "centrifugal distortion", "interacting states", "hyperfine method"}
+    if unknown := every.keys() - spins - known:
         raise ValueError(f"a scene has no name for {', '.join(sorted(unknown))}")
-    hyperfine = None if top.spin_constants is None else bool(names & spins)
-    return QuantumEffects(distortion="centrifugal distortion" in names, hyperfine=hyperfine)
+    hyperfine = None if top.spin_constants is None else bool(every.keys() & spins)
+    distortion, method = "centrifugal distortion" in every, every.get("hyperfine method")
+    if method is None:
+        return QuantumEffects(distortion=distortion, hyperfine=hyperfine)
+    from rotor.quantum.spins.method import HyperfineMethod
+
+    assert isinstance(method, HyperfineMethod)
+    tolerance = f"{method.tolerance_mhz!r} MHz"
+    return QuantumEffects(
+        distortion=distortion, hyperfine=hyperfine, hyperfine_method=method.method, hyperfine_tolerance=tolerance
+    )
 
 
 @contextmanager

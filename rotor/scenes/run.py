@@ -6,7 +6,7 @@ import os
 import time
 from collections.abc import Mapping
 from concurrent.futures import Executor
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +14,7 @@ from rotor.scenes.kind import Kind, Writer, kind_of
 from rotor.scenes.scene import Scene, within
 
 if TYPE_CHECKING:
+    from rotor.scenes.accuracy import Reached
     from rotor.table import Table
 
 PICTURES = (".png", ".pdf", ".svg")
@@ -25,7 +26,8 @@ SUFFIXES: Mapping[str, tuple[str, ...]] = {
 
 @dataclass(frozen=True)
 class SceneResult:
-    """What came of a scene. request, answer: of the library. table: the rows. files: written. seconds: of the answer."""
+    """What came of a scene. request, answer: of the library. table: the rows. files: written. seconds: of the
+    answer. reached: the error, where the scene asks for an accuracy."""
 
     scene: Scene
     request: Any
@@ -33,6 +35,7 @@ class SceneResult:
     table: Table
     files: tuple[Path, ...]
     seconds: float
+    reached: Reached | None = None
 
 
 def run_scene(
@@ -64,6 +67,8 @@ def run_scene(
     ValueError
         What the scene asks for cannot be: with the key. Nothing is written then.
 
+    Examples
+    --------
     >>> from rotor.scenes.scene import LevelsScene
     >>> len(run_scene(LevelsScene(molecule="CO")).table)
     11
@@ -73,13 +78,24 @@ def run_scene(
     kind = kind_of(scene)
     targets = output_paths(scene, out)
     request = kind.request(scene, folder)
-    start = time.perf_counter()
+    start, how = time.perf_counter(), None
+    if getattr(scene, "accuracy", None) is not None:
+        from rotor.scenes.accuracy import chosen
+
+        request, how = chosen(scene, request)
     answer = kind.answer(request, scene, out, executor)
     seconds = time.perf_counter() - start
+    found = None if how is None else _reached(scene, answer, how)
     table = kind.table(answer)
-    _write(scene, kind, answer, table, targets)
+    _write(scene, kind, answer, table, targets, found)
     files = tuple(path for paths in targets.values() for path in paths)
-    return SceneResult(scene, request, answer, table, files, seconds)
+    return SceneResult(scene, request, answer, table, files, seconds, found)
+
+
+def _reached(scene: Scene, answer: Any, how: str) -> Reached:
+    from rotor.scenes.accuracy import reached
+
+    return reached(scene, answer, how)
 
 
 def output_paths(scene: Scene, out: str | os.PathLike[str]) -> dict[str, list[Path]]:
@@ -111,12 +127,16 @@ def _checked_path(name: str, text: str, suffixes: tuple[str, ...]) -> Path:
     return path
 
 
-def _write(scene: Scene, kind: Kind, answer: Any, table: Table, targets: Mapping[str, list[Path]]) -> None:
+def _write(
+    scene: Scene, kind: Kind, answer: Any, table: Table, targets: Mapping[str, list[Path]], found: Reached | None
+) -> None:
     """Write all files together, but those that the answer itself has written."""
     from rotor.formats.atomic_write import write_together
     from rotor.scenes.scene_file import scene_text
 
-    provenance = {"scene": scene_text(scene)}
+    provenance: dict[str, Any] = {"scene": scene_text(scene)}
+    if found is not None:
+        provenance["accuracy"] = asdict(found)
 
     def rows(path: Path) -> None:
         from rotor.formats import write

@@ -50,6 +50,7 @@ from rotor.scenes.sections import (
 )
 
 if TYPE_CHECKING:
+    from rotor.scenes.plan import Plan
     from rotor.scenes.run import SceneResult
 
 SCHEMA = 1
@@ -82,12 +83,19 @@ class Scene(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_
 
         return run_scene(self, folder=folder, out=out, executor=executor)
 
+    def plan(self, *, folder: str | os.PathLike[str] = ".") -> Plan:
+        """What the scene will do and leave out, see `rotor.scenes.plan.plan_of`."""
+        from rotor.scenes.plan import plan_of
+
+        return plan_of(self, folder)
+
 
 class SpectrumScene(Scene, frozen=True, tag="spectrum"):
     """Rotational lines of a molecule."""
 
     molecule: Annotated[str | MoleculeSection, said("a name, a file, SMILES:..., or a table")]
     effects: QuantumEffects = QuantumEffects()
+    accuracy: Annotated[str | float | None, said("of the frequencies", "1 kHz")] = None
     conditions: SpectrumConditions = SpectrumConditions()
     observables: SpectrumObservables = SpectrumObservables()
     vibration: VibrationSection = VibrationSection()
@@ -120,6 +128,7 @@ class ThermoScene(Scene, frozen=True, tag="thermo"):
     """Partition function, entropy and heat capacity of rotation."""
 
     molecule: Annotated[str | MoleculeSection, said("a name, a file, SMILES:..., or a table")]
+    accuracy: Annotated[str | float | None, said("of Q, U and C_v", "0.1 %")] = None
     conditions: ThermoConditions = ThermoConditions()
     observables: ThermoObservables = ThermoObservables()
     vibration: VibrationSection = VibrationSection()
@@ -133,6 +142,7 @@ class TumbleScene(Scene, frozen=True, tag="tumble"):
     molecule: Annotated[str | MoleculeSection | None, said("a name, a file, SMILES:..., or a table", "water")] = None
     body: Annotated[BodySection | None, said("instead of a molecule")] = None
     effects: Annotated[list[EffectSection], said("what acts on a body")] = field(default_factory=list)
+    accuracy: Annotated[str | float | None, said("of the attitude", "1e-6 rad")] = None
     conditions: TumbleConditions = TumbleConditions()
     numerics: TumbleNumerics = TumbleNumerics()
     outputs: TableOutputs = TableOutputs()
@@ -160,6 +170,7 @@ class StarkScene(Scene, frozen=True, tag="stark"):
     """Levels of a molecule in a static electric field."""
 
     molecule: Annotated[str | MoleculeSection, said("a name, a file, SMILES:..., or a table")]
+    accuracy: Annotated[str | float | None, said("of the energies", "1 kHz")] = None
     conditions: StarkConditions = StarkConditions()
     observables: StarkObservables = StarkObservables()
     numerics: StarkNumerics = StarkNumerics()
@@ -171,6 +182,7 @@ class AlignScene(Scene, frozen=True, tag="align"):
 
     molecule: Annotated[str | MoleculeSection, said("a name, a file, SMILES:..., or a table")]
     pulses: Annotated[list[PulseSection], said("one or more; shape is gaussian, switched, kick, table or thz")]
+    accuracy: Annotated[str | float | None, said("of the cosines", 1e-4)] = None
     conditions: AlignConditions = AlignConditions()
     observables: AlignObservables = AlignObservables()
     numerics: AlignNumerics = AlignNumerics()

@@ -190,13 +190,13 @@ def run_sweep(
 
 def _computed(arguments: list[tuple[Any, ...]], executor: Executor | None) -> Iterable[dict[str, Any]]:
     if executor is None:
-        yield from (run_point(*one) for one in arguments)
+        yield from (_run_point(*one) for one in arguments)
         return
-    for future in as_completed([executor.submit(run_point, *one) for one in arguments]):
+    for future in as_completed([executor.submit(_run_point, *one) for one in arguments]):
         yield future.result()
 
 
-def run_point(text: str, values: dict[str, Any], folder: str, out: str) -> dict[str, Any]:
+def _run_point(text: str, values: dict[str, Any], folder: str, out: str) -> dict[str, Any]:
     """Run one point from the text of its scene; what the record holds of it."""
     point = Point(values, parse_scene(text))
     result = run_scene(point.scene, folder=folder, out=out)

@@ -147,6 +147,8 @@ def emission(lines: Lines | Sequence[Lines], source: Source, grid_mhz: ArrayLike
     ValueError
         For lines at another temperature than the source's, and for a grid that does not rise.
 
+    Examples
+    --------
     >>> from rotor.spectra.lines import line_list
     >>> from rotor.tops.top import Top
     >>> co = Top.from_constants("B=57635.968 D=0.1835 MHz", dipole_abc_debye=(0.11011, 0, 0))

@@ -20,9 +20,10 @@ from rotor.spectra.emission import Emission, Source, emission, planck_k, source_
 from rotor.spectra.lines import Lines, line_list
 from rotor.spectra.opacity import NM2_IN_CM2
 from rotor.spectra.profiles import gaussian
-from rotor.table import Table
+from rotor.table import Table, TextOf
 
 if TYPE_CHECKING:
+    from rotor.quantum.effect import QuantumEffect
     from rotor.tops.top import Top
 
 LEAST_DEPTH = 1e-6  # lines of less are left out
@@ -108,15 +109,18 @@ class EmissionLines(Table):
         }
 
 
-@dataclass(frozen=True)
-class EmissionAnswer:
-    """The spectrum of all molecules together, of each, and their lines."""
+@dataclass(frozen=True, repr=False)
+class EmissionAnswer(TextOf):
+    """The spectrum of all molecules together, of each, and their lines; effects: what the Hamiltonian of each consists of."""
+
+    shown = "lines"
 
     request: EmissionRequest
     spectrum: Emission
     parts: tuple[Emission, ...]
     lines: EmissionLines
     partition_functions: tuple[float, ...]
+    effects: tuple[tuple[QuantumEffect, ...], ...]
     notes: tuple[str, ...]
 
     def facts(self) -> dict[str, Any]:
@@ -150,7 +154,7 @@ def answer_emission(request: EmissionRequest) -> EmissionAnswer:
     (1, 5.532)
     """
     grid = source_grid(*request.range_mhz, request.source)
-    parts, tables, sums = [], [], []
+    parts, tables, sums, effects = [], [], [], []
     notes: list[str] = []
     for number, (top, column) in enumerate(zip(request.tops, request.columns_per_cm2, strict=True)):
         source = replace(request.source, column_per_cm2=column)
@@ -159,11 +163,14 @@ def answer_emission(request: EmissionRequest) -> EmissionAnswer:
         parts.append(emission(lines, source, grid))
         tables.append(_line_table(number, lines, source))
         sums.append(float(lines.q))
+        effects.append(tuple(lines.levels.effects))
     depth = np.sum([part.optical_depth for part in parts], axis=0)
     source = replace(request.source, column_per_cm2=sum(request.columns_per_cm2))
     contrast = source.filling * (planck_k(grid, source.excitation_k) - planck_k(grid, source.background_k))
     total = Emission(grid, depth, contrast * -np.expm1(-depth), source)
-    return EmissionAnswer(request, total, tuple(parts), _joined(tables), tuple(sums), tuple(dict.fromkeys(notes)))
+    return EmissionAnswer(
+        request, total, tuple(parts), _joined(tables), tuple(sums), tuple(effects), tuple(dict.fromkeys(notes))
+    )
 
 
 def _lines_of(top: Top, source: Source, request: EmissionRequest) -> Lines:
@@ -187,7 +194,9 @@ def _line_table(number: int, lines: Lines, source: Source) -> EmissionLines:
     contrast = planck_k(observed, source.excitation_k) - planck_k(observed, source.background_k)
     integral = np.array([_across(one) for one in depth]) * source.fwhm_km_s
     upper_cm = lines.energy_lower_cm + lines.frequency_mhz / units.MHZ_PER_CM
-    labels = [tuple(lines.levels.labels(states)) for states in (lines.upper, lines.lower)]
+    labels = [
+        tuple(" ".join(text.split()) for text in lines.levels.labels(states)) for states in (lines.upper, lines.lower)
+    ]
     return EmissionLines(
         molecule=np.full(len(lines), number, dtype=np.int64),
         row=np.arange(len(lines)),

@@ -65,6 +65,8 @@ def _lines_at(request: FieldRequest, fields: Any, executor: Executor | None) -> 
     from rotor.spectra.field_lines import field_lines
 
     stark = request.stark
+    if stark.hyperfine:
+        raise ValueError("lines of states with spins in a field are not computed: leave out the hyperfine structure")
     if stark.tilted:
         raise ValueError("lines need states with a good M: leave out the angle between field and light")
     found = field_lines(
@@ -122,6 +124,8 @@ def coefficients_of(request: FieldRequest, states: FieldMap, executor: Executor 
 def mixture_of(request: FieldRequest, states: FieldMap, executor: Executor | None = None) -> Table:
     """Means of the thermal mixture in every field."""
     stark = request.stark
+    if stark.hyperfine:
+        raise ValueError("mixtures of states with spins are not computed: leave out the hyperfine structure")
     return field_mixture(
         stark.top,
         states.fields,

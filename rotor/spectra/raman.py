@@ -191,6 +191,8 @@ def raman_lines(
     ValueError
         No polarizability; a temperature or wavelength not above 0; a cut not between 0 and 1; a J max below 0.
 
+    Notes
+    -----
     Neglected: the dependence of the polarizability on J (0.2 % per J of H2, less of all others) and on the wavelength,
     lines of vibrational states, electron spin (the lines of O2 are triplets, resolved at 0.1 cm⁻¹ only for the lowest N).
 

@@ -11,6 +11,7 @@ from rotor.arrays import Ints
 from rotor.checks import require_between, require_positive, require_whole
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.watson import SEMI_RIGID
+from rotor.quantum.limits import limit_facts, populated_j
 from rotor.spectra.intensity import largest
 from rotor.spectra.raman import (
     DEFAULT_LASER_NM,
@@ -20,6 +21,7 @@ from rotor.spectra.raman import (
     band_cross_section,
     raman_lines,
 )
+from rotor.table import TextOf
 from rotor.thermo import VibrationalStates
 from rotor.thermo.request import partition_facts
 from rotor.tops.facts import top_facts
@@ -62,9 +64,11 @@ class RamanRequest:
             )
 
 
-@dataclass(frozen=True)
-class RamanAnswer:
+@dataclass(frozen=True, repr=False)
+class RamanAnswer(TextOf):
     """The Raman lines that a request asked for."""
+
+    shown = "lines"
 
     request: RamanRequest
     lines: RamanLines
@@ -105,6 +109,7 @@ class RamanAnswer:
             "jmax_source": self.jmax_source,
             "min_relative": self.request.min_relative,
             "line_count": len(lines),
+            **limit_facts(lines.top, populated_j(lines.top, lines.temperature_k), lines.levels.effects),
         }
 
 

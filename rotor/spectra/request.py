@@ -20,6 +20,7 @@ from rotor.quantum.limits import limit_facts, populated_j
 from rotor.quantum.spins.method import hyperfine_facts
 from rotor.spectra.intensity import USUAL_CUT, largest
 from rotor.spectra.lines import DEFAULT_MIN_LGINT, Lines, line_list
+from rotor.table import TextOf
 from rotor.thermo import VibrationalStates
 from rotor.thermo.request import partition_facts
 from rotor.tops.covariance import Covariance
@@ -116,9 +117,11 @@ class SpectrumRequest:
         return "sticks" if self.fwhm_mhz is None and self.layer is None else "gaussian"
 
 
-@dataclass(frozen=True)
-class SpectrumAnswer:
+@dataclass(frozen=True, repr=False)
+class SpectrumAnswer(TextOf):
     """The lines that a request asked for, and what follows from them."""
+
+    shown = "lines"
 
     request: SpectrumRequest
     lines: Lines

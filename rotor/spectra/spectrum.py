@@ -105,6 +105,8 @@ class Spectrum(Table):
         ValueError
             A grid that does not rise, a width not above 0, a shape that is not known, a Doppler width without a mass.
 
+        Notes
+        -----
         Neglected: Dicke narrowing, line mixing, and the change of the radiation factor across a line.
 
         >>> from rotor.spectra.lines import line_list

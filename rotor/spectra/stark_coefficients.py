@@ -60,7 +60,7 @@ def level_coefficients(states: FieldMap) -> StarkCoefficients:
     >>> rod = Top.from_constants("B=6000 MHz", dipole_abc_debye=(0.7, 0, 0))
     >>> found = level_coefficients(stark_map(rod, np.linspace(0, 0.5, 11), j_highest=0))
     >>> found.coefficients[0, 1].round(5).item()  # -μ²/6B
-    -3.44938
+    -3.44937
     """
     first = [rows.start for rows in states.curves()]
     shifts = np.array([states.energy_mhz[rows] - states.free_mhz[rows] for rows in states.curves()])

@@ -162,6 +162,8 @@ def kinetic_degrees(
     ValueError
         Energy about an axis that carries no degree of freedom; shapes that do not fit.
 
+    Examples
+    --------
     >>> gas = kinetic_degrees(moments=[[0.0, 2.0, 2.0]] * 2, momenta=[[0.0, 1.0, 2.0], [0.0, 2.0, 0.0]])
     >>> {name: energies.tolist() for name, energies in gas.energies.items()}, gas.total
     ({'rotation b': [0.25, 1.0], 'rotation c': [1.0, 0.0]}, 4.0)

@@ -132,6 +132,8 @@ def family(
         No species, a first one that is not the parent, one isotopologue twice, constants that are none of A, B, C or not
         above 0, errors or corrections without their constant, and constants that a kind of top does not have.
 
+    Examples
+    --------
     >>> rod = Molecule(("C", "O"), [[0, 0, 0], [0, 0, 1.128]])
     >>> two = family(rod, [("CO", "", {"B": 57635.968}, {}), ("13CO", "1=13C", {"B": 55101.011}, {})])
     >>> two.linear, two.species[1].moments.round(4).tolist()

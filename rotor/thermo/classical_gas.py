@@ -21,6 +21,7 @@ from rotor.classical.gas.correlations import ShortTime, plateau, short_time
 from rotor.classical.gas.ensembles import Correlations, Ensemble, free_gas_correlations, thermal_ensemble
 from rotor.statistics.degrees_of_freedom import count_degrees
 from rotor.statistics.equipartition import Equipartition, equipartition
+from rotor.table import TextOf
 from rotor.tops.facts import top_facts
 
 if TYPE_CHECKING:
@@ -82,9 +83,11 @@ class Probes:
     tensor_source: str
 
 
-@dataclass(frozen=True)
-class GasAnswer:
+@dataclass(frozen=True, repr=False)
+class GasAnswer(TextOf):
     """The gas after it has moved, the verdict on equipartition, and the correlation functions with times in ps."""
+
+    shown = "test"
 
     request: GasRequest
     ensemble: Ensemble

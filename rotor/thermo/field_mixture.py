@@ -168,7 +168,7 @@ def field_mixture(
     >>> from rotor.tops.top import Top
     >>> rod = Top.from_constants("B=6000 MHz", dipole_abc_debye=(0.7, 0, 0))
     >>> round(float(field_mixture(rod, [0.0, 30.0], 1.0).cosines["costheta"][1]), 4)
-    0.1654
+    0.1512
     """
     require_positive("temperature_k", temperature_k, "K")
     require_between("left_out", left_out, 1e-9, 0.5)

@@ -170,6 +170,8 @@ def thermodynamic_functions(
     ValueError
         A temperature not above 0 K, a species that the molecule has not, no mass; distortion beyond its reach.
 
+    Examples
+    --------
     >>> from rotor.tops.top import Top
     >>> found = thermodynamic_functions(Top.from_constants("B=10 cm-1"), [5.0, 300.0])
     >>> [round(float(x), 4) for x in found.cv_over_r]  # 3x² e⁻ˣ/(1 + 3e⁻ˣ)², x = 2Θ/T; 1 + (Θ/T)²/45

@@ -123,6 +123,8 @@ def level_sums(
     ValueError
         A temperature not above 0 K; an error above `at_worst`.
 
+    Examples
+    --------
     >>> from rotor.tops.top import Top
     >>> top = Top.from_constants("B=60 GHz")
     >>> sums = level_sums(top, [top.spin_weights], [300.0])[0]

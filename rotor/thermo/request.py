@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from rotor.checks import require_positive
+from rotor.table import TextOf
 from rotor.thermo.classical_limit import (
     classical_limit,
     classical_partition_function,
@@ -61,9 +62,11 @@ class ThermoRequest:
                 raise ValueError("the ideal gas needs the mass, which bare constants do not have; give a molecule")
 
 
-@dataclass(frozen=True)
-class ThermoAnswer:
+@dataclass(frozen=True, repr=False)
+class ThermoAnswer(TextOf):
     """The functions that a request asked for, and what follows from the top."""
+
+    shown = "functions"
 
     request: ThermoRequest
     functions: ThermoFunctions

@@ -53,6 +53,8 @@ def thermal_tumble(
     ValueError
         A temperature not above 0 K; an angular momentum along the axis of a linear molecule.
 
+    Examples
+    --------
     >>> from rotor.tops.top import Top
     >>> request = thermal_tumble(Top.from_constants("A=10 B=10 C=10 GHz"))
     >>> round(math.hypot(*request.angular_momentum), 2)  # √(4 kT/πhB), kT/h = 6250.98 GHz

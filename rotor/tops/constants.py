@@ -33,7 +33,7 @@ _WITHOUT_K = {"DJ": "D", "HJ": "H", "LJ": "L"}  # what linear and spherical tops
 _SETTINGS = ("reduction", "representation", "kind", "uncertainties", "sources")
 
 
-@dataclass(frozen=True, init=False)
+@dataclass(frozen=True, init=False, repr=False)
 class Constants:
     """Named rotational constants in MHz, immutable, equal when all their content is equal.
 
@@ -113,6 +113,13 @@ class Constants:
         }
         for field, thing in content.items():
             object.__setattr__(self, field, thing)
+
+    def __repr__(self) -> str:
+        form = ", ".join(filter(None, (self.reduction and f"{self.reduction}-reduction", self.representation)))
+        rigid = ", ".join(f"{name} {self.values[name]:.10g}" for name in self.values if name in "ABC")
+        more = sum(name not in "ABC" for name in self.values)
+        rest = f", {more} of distortion" if more else ""
+        return f"Constants({self.kind}: {rigid} MHz{rest}{f' ({form})' if form else ''})"
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _rebuilt, (self._settings(), dict(self.values))
@@ -197,12 +204,8 @@ class Constants:
         ----------
         text : str
             Names and values.
-        reduction : str, optional
-            "A" or "S", for a top with distortion that needs one.
-        representation : str, optional
-            Which principal axes are x, y, z: "Ir", "IIIl", ...
-        kind : str, optional
-            "linear", "prolate", "oblate", "spherical" or "asymmetric"; by default what the names and values say.
+        reduction, representation, kind : str, optional
+            "A" or "S"; which axes are x, y, z ("Ir", ...); kind of top. By default what the names and values say.
 
         Returns
         -------

@@ -157,6 +157,8 @@ def distortion_constants(field: ForceField, *, reduction: str = "S", representat
     ValueError
         A geometry that is no minimum, an A-reduction of a nearly symmetric top, an unknown reduction.
 
+    Examples
+    --------
     >>> from rotor.molecules.force_field import force_field_from_internal
     >>> from rotor.molecules.internal_coordinates import stretch
     >>> from rotor.molecules.molecule import Molecule

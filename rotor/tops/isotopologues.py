@@ -84,6 +84,8 @@ def isotopologues(parent: Top, *, min_abundance: float = 1e-4) -> tuple[Isotopol
     ValueError
         A top without geometry, a limit that nothing reaches or that too many placements exceed.
 
+    Examples
+    --------
     >>> from rotor.molecules.molecule import Molecule
     >>> water = Molecule(("O", "H", "H"), [[0, 0, 0.1173], [0, 0.7572, -0.4692], [0, -0.7572, -0.4692]])
     >>> for one in isotopologues(Top.from_molecule(water)):

@@ -19,7 +19,7 @@ from rotor.molecules.nuclei import isotope
 from rotor.units import parse_quantity
 
 _ITEM = re.compile(
-    r"(?P<name>[A-Za-z][\w-]*\([^()]*\))\s*=\s*(?P<number>[-+−]?[\d.]+(?:[eEdD][-+]?\d+)?)\s*(?P<unit>[A-Za-z][\w-]*(?![\w(-]))?"
+    r"(?P<name>[A-Za-z][\w-]*\([^()]*\))\s*=\s*(?P<number>[-+−]?[\d.]+(?:[eEdD][-+]?\d+)?)(?P<gap>\s*)(?P<unit>[A-Za-z][\w-]*(?![\w(-]))?"
 )
 _ISOTOPE = re.compile(r"(\d+[A-Z][a-z]?|D|T)(?:_\w+)?")
 
@@ -70,8 +70,8 @@ class SpinConstants:
     def of(self, spin: str) -> dict[str, float]:
         """The constants of one spin alone, by name without the spin.
 
-        >>> SpinConstants.parse("chi_aa(14N)=-4.22 C_bb(14N)=1.8kHz T_aa(14N,D)=2kHz").of("14N")
-        {'chi_aa': -4.22, 'C_bb': 0.0018}
+        >>> SpinConstants.parse("chi_aa(14N)=-4.22MHz C_bb(14N)=2kHz T_aa(14N,D)=2kHz").of("14N")
+        {'chi_aa': -4.22, 'C_bb': 0.002}
         """
         return {name.partition("(")[0]: value for name, value in self.values.items() if spins_of(name) == (spin,)}
 
@@ -79,7 +79,8 @@ class SpinConstants:
     def parse(cls, text: str, spins: str | None = None, source: str = "") -> SpinConstants:
         """From text such as "chi_aa(14N)=-4.22 chi_bb-cc(14N)=1.1 MHz" and, where a name is no isotope, "S=1/2 14N=1".
 
-        An item keeps its own unit; a unit at the end serves every item that carries none; without any, numbers are MHz.
+        An item keeps its own unit; a unit at the end, after a space, serves every item that carries none; without any,
+        numbers are MHz.
 
         >>> constants = SpinConstants.parse("chi_aa(14N)=-4.22408 MHz")
         >>> dict(constants.values), dict(constants.twice)
@@ -92,7 +93,13 @@ class SpinConstants:
                 f"{text!r}: expected constants such as chi_aa(14N)=-4.22 MHz"
                 + (f"; {rest!r} is none" if rest and items else "")
             )
-        shared = items[-1]["unit"] or "MHz"
+        last, unitless = items[-1], [item["name"] for item in items if not item["unit"]]
+        if unitless and last["unit"] and not last["gap"]:
+            raise ValueError(
+                f"{text!r}: {last['unit']} stands at {last['name']} only; put a space before it to serve {', '.join(unitless)} "
+                "too, or give each its own"
+            )
+        shared = last["unit"] or "MHz"
         values: dict[str, float] = {}
         for item in items:
             name = re.sub(r"\s+", "", item["name"])

@@ -102,6 +102,8 @@ def spin_weights(symmetry: Symmetry, spins: Sequence[float], electronic: str | S
         Spins that do not fit the nuclei, differ between like nuclei or are not multiples of 1/2; characters that are no
         representation.
 
+    Examples
+    --------
     >>> found = find_symmetry("OO", [15.995, 15.995], [[0, 0, -0.604], [0, 0, 0.604]])
     >>> spin_weights(found, [0, 0], electronic="odd").to_mapping()
     {'even': 0, 'odd': 1}

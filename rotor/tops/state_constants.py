@@ -6,9 +6,8 @@ Names are those of `rotor.quantum.effects.interactions`; state 0 is the top's ow
 constant that it is to have; none is taken over.
 
 Which couplings exist between two states is a question of symmetry: G_c and F_ab transform like a rotation about c, G_a and F_bc like
-one about a, G_b and F_ac like one about b, W like nothing at all. The product of the species of two states is one species, so that two
-of these kinds exist together only where the group does not tell them apart (I. M. Mills, in Molecular Spectroscopy: Modern Research
-(1972), section 3.2.3, Jahn's rule).
+one about a, G_b and F_ac like one about b, W like nothing at all. The product of the species of two states is one species, so that
+two of these kinds exist together only where no operation of the group has different characters for them.
 """
 
 from __future__ import annotations
@@ -199,7 +198,7 @@ def kind_of_coupling(name: str) -> str:
 
 
 def _class_of(kind: str, even: str) -> str:
-    """Kinds that a group does not tell apart have one class: those of `even` are like none, the two others alike, or each its own."""
+    """Kinds that a group does not distinguish have one class: those of `even` are like none, the two others alike, or each its own."""
     if kind in even:
         return ""
     return "".join(sorted(set("abc") - set(even))) if len(even) == 1 else kind

@@ -1,6 +1,6 @@
 """Which states, couplings and dipoles of states a top can have: its constants' names, its geometry and its spin weights decide.
 
-Two couplings between the same two states are allowed together only if no operation of the point group tells them apart. A
+Two couplings between the same two states are allowed together only if no operation of the point group distinguishes them. A
 dipole between two states joins levels of equal nuclear-spin weight alone, since light does not turn ortho into para.
 """
 

@@ -46,7 +46,7 @@ SYMMETRIC_WITHIN = 1e-3  # of the shortest distance between nuclei: displacement
 NO_WEIGHTS = SpinWeights()
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Top:
     """A rigid or semi-rigid rotor.
 
@@ -104,6 +104,26 @@ class Top:
             refuse_forbidden_couplings(states, self.symmetry, self.frame)
         refuse_forbidden_state_dipoles(states, self.kind, self.spin_weights, self.dipole_abc_debye)
 
+    def __repr__(self) -> str:
+        formula = self.molecule.formula if self.molecule is not None else ""
+        name = ", ".join(dict.fromkeys(filter(None, (self.name, formula))))
+        dipole = self.dipole_abc_debye
+        known = "not known" if dipole is None else ", ".join(f"{mu + 0.0:.5g}" for mu in dipole) + " D"
+        inner = repr(self.constants).removeprefix("Constants(").removesuffix(")")
+        return f"Top({f'{name}, ' if name else ''}{inner}; dipole {known})"
+
+    def _repr_html_(self) -> str:
+        """The constants with their errors, for notebooks."""
+        import html
+
+        errors = self.constants.uncertainties
+        rows = "".join(
+            f"<tr><td>{name}</td><td>{value:.12g}</td><td>{f'{errors[name]:.2g}' if name in errors else ''}</td></tr>"
+            for name, value in self.constants.values.items()
+        )
+        head = "<tr><th></th><th>MHz</th><th>±</th></tr>"
+        return f"<p>{html.escape(repr(self))}</p><table>{head}{rows}</table>"
+
     @property
     def provenance(self) -> dict[str, Any]:
         """What the top consists of and where that is from: constants, dipole, weights, notes."""
@@ -140,7 +160,7 @@ class Top:
             Along the principal axes.
         spin_weights : SpinWeights or dict of str to int, optional
             Nuclear-spin weights; 1 for all by default.
-        **others : object
+        others : object
             Any further field of `Top`.
 
         Returns

@@ -21,7 +21,7 @@ SMALLEST_MOMENT = (
 SMALLEST_PART = 1e-120  # of |L|: a smaller component, not zero, would underflow when squared
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class FreeMotion:
     """A torque-free motion of one body or of many, ready to be asked for any time.
 
@@ -41,6 +41,15 @@ class FreeMotion:
     steady: NDArray[np.bool_]
     separatrix: NDArray[np.bool_]
     rows: Rows
+
+    def __repr__(self) -> str:
+        if self.period.ndim:
+            return f"FreeMotion({self.period.size} bodies)"
+        moments, momentum = (
+            ", ".join(f"{x:.6g}" for x in vector.tolist()) for vector in (self.moments, self.momentum0)
+        )
+        period = f"period {float(self.period):.6g}" if np.isfinite(self.period) else "no period"
+        return f"FreeMotion(moments {moments}; momentum {momentum}; {period})"
 
     @property
     def centre_axis(self) -> NDArray[np.int64]:

@@ -32,7 +32,7 @@ from rotor.table import Table
 PIECE = 10_000  # molecules that are drawn and moved together
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Ensemble:
     """n molecules of one kind at one moment.
 
@@ -46,6 +46,9 @@ class Ensemble:
     attitude: Floats
     mass: float | None = None
     velocity: Floats | None = None
+
+    def __repr__(self) -> str:
+        return f"Ensemble({len(self)} molecules, moments {', '.join(f'{x:.6g}' for x in self.moments.tolist())})"
 
     def __len__(self) -> int:
         return len(self.momentum)
@@ -146,6 +149,8 @@ def thermal_momenta(moments: ArrayLike, kt: float, size: int, *, rng: np.random.
     (size, 3) array
         L in √(moment x energy), any coherent units; L_i is normal of variance I_i kT.
 
+    Examples
+    --------
     >>> thermal_momenta([0.0, 2.0, 2.0], 1.5, 1000, rng=np.random.default_rng(3)).std(axis=0).round(1)
     array([0. , 1.7, 1.8])
     """
@@ -186,6 +191,8 @@ def thermal_ensemble(
     ValueError
         Moments, kT or a mass that cannot be.
 
+    Examples
+    --------
     >>> gas = thermal_ensemble([0.6, 1.3, 1.9], 0.0258, 1000, rng=np.random.default_rng(1), mass=18.0)
     >>> sorted(gas.kinetic.counts)
     ['rotation a', 'rotation b', 'rotation c', 'translation x', 'translation y', 'translation z']

@@ -31,14 +31,52 @@ class ExactDrift(Composed):
     """
 
     def states(self, system: System, momentum: Floats, attitude: Floats, times: Floats) -> tuple[Floats, Floats, int]:
-        """One evaluation per time for free motion, else kicks and drifts."""
+        """One evaluation per time for free motion, else kicks and drifts.
+
+        Parameters
+        ----------
+        system : System
+            Moments and effects.
+        momentum, attitude : (n, 3) array, (n, 4) array
+            The start of n bodies, at times[0]; momentum in the body.
+        times : (t,) array
+            Rising or falling.
+
+        Returns
+        -------
+        momenta : (t, n, 3) array
+            In the bodies.
+        attitudes : (t, n, 4) array
+            Unit quaternions.
+        steps : int
+            How many steps were taken; 0 for free motion.
+
+        Raises
+        ------
+        ValueError
+            Where there are torques, as `KickDrift.states` does.
+        """
         if not system.free:
             return super().states(system, momentum, attitude, times)
         path, attitudes = free_motion(system.start_moments, momentum, attitude).at(times - times[0])
         return np.moveaxis(path, 1, 0), np.moveaxis(attitudes, 1, 0), 0
 
     def drift(self, moments: Floats, state: Floats, carry: Floats, step: float, steps: int, whole: bool) -> None:
-        """The state after steps x step; an exact state carries nothing over."""
+        """The state after steps x step; an exact state carries nothing over.
+
+        Parameters
+        ----------
+        moments : (n, 3) array
+            Principal moments during the drift.
+        state, carry : (n, 7) array
+            Momentum and attitude, and what rounding has left out of them; both change in place.
+        step : float
+            Length of a step.
+        steps : int
+            Number of steps.
+        whole : bool
+            Whether the steps are of the full order of the method; otherwise base steps, for the parts of a composition.
+        """
         momentum, attitude = free_motion(moments, state[:, :3], state[:, 3:]).at(step * steps)
         state[:, :3], state[:, 3:] = momentum, attitude
         carry[:] = 0.0

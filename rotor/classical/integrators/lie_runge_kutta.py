@@ -48,7 +48,26 @@ class LieRungeKutta(Method):
             raise ValueError(f"a fixed step is a positive time; got {self.fixed_step!r}")
 
     def states(self, system: System, momentum: Floats, attitude: Floats, times: Floats) -> tuple[Floats, Floats, int]:
-        """Steps that end at each of the times."""
+        """The states of n bodies at all times, by steps that end at each of the times.
+
+        Parameters
+        ----------
+        system : System
+            Moments and effects.
+        momentum, attitude : (n, 3) array, (n, 4) array
+            The start of n bodies, at times[0]; momentum in the body.
+        times : (t,) array
+            Rising or falling.
+
+        Returns
+        -------
+        momenta : (t, n, 3) array
+            In the bodies.
+        attitudes : (t, n, 4) array
+            Unit quaternions.
+        steps : int
+            How many steps were taken.
+        """
         space, q = rotate(attitude, momentum), np.array(attitude)
         out, attitudes, taken = [momentum], [attitude], 0
         step = self.fixed_step or self._first_step(system, float(times[0]), momentum, attitude)

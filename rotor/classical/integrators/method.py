@@ -106,6 +106,8 @@ def integrate(
     ValueError
         A method that cannot serve an effect, with the one that can; a motion that does not stay finite.
 
+    Examples
+    --------
     >>> from rotor.classical.integrators.splitting import RotationSplitting
     >>> motion = integrate(RotationSplitting(step=0.01, order=4), [0.6, 0.8, 1.0], [1.8, 0.4, -0.9], [0.0, 10.0])
     >>> motion.momentum[-1].round(6).tolist()  # exact: 1.765963, -0.695464, 0.77955498
@@ -165,7 +167,31 @@ class KickDrift(Method):
         """
 
     def states(self, system: System, momentum: Floats, attitude: Floats, times: Floats) -> tuple[Floats, Floats, int]:
-        """Steps of equal length from each time to the next, the longest that do not exceed `step`."""
+        """Steps of equal length from each time to the next, the longest that do not exceed `step`.
+
+        Parameters
+        ----------
+        system : System
+            Moments and effects.
+        momentum, attitude : (n, 3) array, (n, 4) array
+            The start of n bodies, at times[0]; momentum in the body.
+        times : (t,) array
+            Rising or falling.
+
+        Returns
+        -------
+        momenta : (t, n, 3) array
+            In the bodies.
+        attitudes : (t, n, 4) array
+            Unit quaternions.
+        steps : int
+            How many steps were taken.
+
+        Raises
+        ------
+        ValueError
+            For torques that depend on angular velocity, and for added inertia: they need `LieRungeKutta`.
+        """
         from rotor.classical.integrators._step_kernels import rows
 
         if system.needs_velocity:

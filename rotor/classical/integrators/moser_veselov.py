@@ -63,7 +63,26 @@ class MoserVeselov(KickDrift):
         return fractions(self.kick_order)
 
     def drift(self, moments: Floats, state: Floats, carry: Floats, step: float, steps: int, whole: bool) -> None:
-        """Steps with moments modified for the invariants the drift starts with."""
+        """Steps with moments modified for the invariants the drift starts with.
+
+        Parameters
+        ----------
+        moments : (n, 3) array
+            Principal moments during the drift.
+        state, carry : (n, 7) array
+            Momentum and attitude, and what rounding has left out of them; both change in place.
+        step : float
+            Length of a step.
+        steps : int
+            Number of steps.
+        whole : bool
+            Whether the steps are of the full order of the method; otherwise base steps, for the parts of a composition.
+
+        Raises
+        ------
+        ValueError
+            Where a step is too long for the motion or the body too nearly linear.
+        """
         from rotor.classical.integrators._step_kernels import moser_veselov
 
         acting = 1.0 / acting_inverse(moments)

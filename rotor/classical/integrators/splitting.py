@@ -36,7 +36,26 @@ class RotationSplitting(Composed):
     """
 
     def drift(self, moments: Floats, state: Floats, carry: Floats, step: float, steps: int, whole: bool) -> None:
-        """Turns about axes 1, 2, 3, 2, 1."""
+        """Turns about axes 1, 2, 3, 2, 1.
+
+        Parameters
+        ----------
+        moments : (n, 3) array
+            Principal moments during the drift.
+        state, carry : (n, 7) array
+            Momentum and attitude, and what rounding has left out of them; both change in place.
+        step : float
+            Length of a step.
+        steps : int
+            Number of steps.
+        whole : bool
+            Whether the steps are of the full order of the method; otherwise base steps, for the parts of a composition.
+
+        Raises
+        ------
+        ValueError
+            For a linear rotor, which `SymmetricTopSplitting` steps.
+        """
         from rotor.classical.integrators._step_kernels import rotations
 
         if np.any(moments == 0.0):
@@ -59,7 +78,21 @@ class SymmetricTopSplitting(Composed):
     """
 
     def drift(self, moments: Floats, state: Floats, carry: Floats, step: float, steps: int, whole: bool) -> None:
-        """Half the larger remainder, the smaller one, half the larger one; the sphere for all steps at once."""
+        """Half the larger remainder, the smaller one, half the larger one; the sphere for all steps at once.
+
+        Parameters
+        ----------
+        moments : (n, 3) array
+            Principal moments during the drift.
+        state, carry : (n, 7) array
+            Momentum and attitude, and what rounding has left out of them; both change in place.
+        step : float
+            Length of a step.
+        steps : int
+            Number of steps.
+        whole : bool
+            Whether the steps are of the full order of the method; otherwise base steps, for the parts of a composition.
+        """
         from rotor.classical.integrators._step_kernels import symmetric
 
         inverse = acting_inverse(moments)

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 
 USUAL_LEAST_MHZ = 100.0  # of the largest constant of a molecule: below it MHz without a unit are pointed out
+MOST_KELVIN = 1e6
+MOST_LOG10 = 300  # of an intensity that a double can hold
 MOST_TIMES = 10_000_000
 
 
@@ -122,6 +124,8 @@ def temperatures(name: str, text: str) -> list[float]:
     found: list[float] = parsed(name, text, lambda value: parse_grid(value, "K").tolist())
     if not all(0 < t < float("inf") for t in found):
         raise ValueError(f"{name}: {text!r}: temperatures are above 0 K")
+    if max(found, default=0.0) > MOST_KELVIN:
+        raise ValueError(f"{name}: {text!r}: expected temperatures up to {MOST_KELVIN:g} K; no molecule lasts beyond")
     return found
 
 
@@ -166,6 +170,8 @@ def cut(name: str, text: str) -> float | None:
             number = math.nan
         if not math.isfinite(number):
             raise ValueError(f"{value!r} is not a finite number or 'none'")
+        if abs(number) > MOST_LOG10:
+            raise ValueError(f"{value!r}: expected the log10 of an intensity, up to {MOST_LOG10} in size")
         return number
 
     return parsed(name, text, parse)

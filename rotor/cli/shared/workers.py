@@ -22,14 +22,14 @@ def working(workers: int, what: str) -> Iterator[Executor | None]:
     terminal = sys.stderr.isatty()
     if workers == 1:
         with progress_bar(what) if terminal else _nothing() as advance:
-            yield _Counted(None, advance) if advance else None
+            yield Counted(None, advance) if advance else None
         return
     context = multiprocessing.get_context("spawn")
     with (
         ProcessPoolExecutor(workers, mp_context=context) as pool,
         progress_bar(what) if terminal else _nothing() as advance,
     ):
-        yield _Counted(pool, advance)
+        yield Counted(pool, advance)
 
 
 @contextmanager
@@ -49,7 +49,7 @@ def progress_bar(what: str) -> Iterator[Callable[[int, int], object]]:
         yield lambda done, total: bar.update(task, completed=done, total=total)
 
 
-class _Counted(Executor):
+class Counted(Executor):
     """An executor, or this process where it is None, that reports after each piece of a `map` how many are done."""
 
     def __init__(self, pool: Executor | None, advance: Callable[[int, int], object] | None) -> None:

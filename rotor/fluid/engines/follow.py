@@ -45,6 +45,11 @@ def follow_engine(
     on_start : callable
         Called when the engine has given its first frame, before any file is opened.
 
+    Returns
+    -------
+    FluidRecord
+        One row every `settings.every` steps.
+
     Raises
     ------
     ValueError

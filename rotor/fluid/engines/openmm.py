@@ -323,7 +323,29 @@ def _context(mm: Any, system: Any, made: Any, platform: str | None, threads: int
 
 
 def frames(engine_input: EngineInput, settings: Settings, form: Form | None = None, **options: Any) -> Iterator[Frame]:
-    """Run, and give a frame at step 0 and after every `settings.every` steps; options as of `session`."""
+    """Run, and give a frame at step 0 and after every `settings.every` steps.
+
+    Parameters
+    ----------
+    engine_input : EngineInput
+        The box as engines take it.
+    settings : Settings
+        What is run.
+    form : Form, optional
+        What of the potential is not in `settings`; see `session`.
+    options : object
+        As of `session`.
+
+    Returns
+    -------
+    iterator of Frame
+        Positions in Å, energies in eV.
+
+    Raises
+    ------
+    RuntimeError
+        Where OpenMM stops on its way.
+    """
     mm = load()
     try:
         run = session(engine_input, settings, form, **options)

@@ -31,11 +31,32 @@ class EngineRun:
 def run_engine(name: str, atoms: Any, settings: Settings, **options: Any) -> EngineRun:
     """Run a box by the engine of that name and read it back.
 
-    atoms: an ase.Atoms box. options: of the engine, see `rotor.fluid.engines.openmm.frames` and
-    `rotor.fluid.engines.lammps.frames`.
+    Parameters
+    ----------
+    name : str
+        "openmm" or "lammps".
+    atoms : ase.Atoms
+        The box.
+    settings : Settings
+        What is run.
+    options : object
+        Of the engine, see `rotor.fluid.engines.openmm.frames` and `rotor.fluid.engines.lammps.frames`.
 
-    Raises ValueError for what the engine cannot represent, ModuleNotFoundError where it is not installed, OSError where it
-    does not load, RuntimeError where it stops on its way.
+    Returns
+    -------
+    EngineRun
+        Input, table and positions in Å.
+
+    Raises
+    ------
+    ValueError
+        For what the engine cannot represent.
+    ModuleNotFoundError
+        Where it is not installed.
+    OSError
+        Where it does not load.
+    RuntimeError
+        Where it stops on its way.
     """
     engine_input = engine_input_of(atoms, settings)
     seen = list(engine_frames(name, engine_input, settings, **options))
@@ -45,7 +66,31 @@ def run_engine(name: str, atoms: Any, settings: Settings, **options: Any) -> Eng
 
 
 def engine_frames(name: str, engine_input: EngineInput, settings: Settings, **options: Any) -> Iterator[Frame]:
-    """The frames of an engine by its name, each checked to be finite."""
+    """The frames of an engine by its name, each checked to be finite.
+
+    Parameters
+    ----------
+    name : str
+        "openmm" or "lammps".
+    engine_input : EngineInput
+        The box as engines take it.
+    settings : Settings
+        What is run.
+    options : object
+        Of the engine.
+
+    Returns
+    -------
+    iterator of Frame
+        At step 0 and after every `settings.every` steps.
+
+    Raises
+    ------
+    ValueError
+        For an unknown engine.
+    RuntimeError
+        For energies or positions that are not finite.
+    """
     if name not in ENGINES:
         raise ValueError(f"{name!r} is no engine; there are {', '.join(ENGINES)}")
     engine = importlib.import_module(f"rotor.fluid.engines.{name}")

@@ -116,6 +116,8 @@ def parameters_for(
     EwaldParameters
         α, k_cut.
 
+    Examples
+    --------
     >>> box = np.array([31.0, 31.0, 31.0])
     >>> found = parameters_for(1e-5, 9.0, np.tile([-0.8476, 0.4238, 0.4238], 1000), box)
     >>> round(found.alpha_per_angstrom, 3), round(found.k_cut_per_angstrom, 2)

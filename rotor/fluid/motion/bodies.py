@@ -141,11 +141,20 @@ def bodies_of(
     tolerance_angstrom : float
         By how much an atom may stand off its place in the shape; the shape's place is used.
 
+    Returns
+    -------
+    bodies : Bodies
+        Masses in u, moments in u Å², shapes in Å.
+    pose : Pose
+        Centres in Å and attitudes, unit quaternions.
+
     Raises
     ------
     ValueError
         An atom in no molecule or in two; a shape that departs from its species; a constraint on the atoms.
 
+    Examples
+    --------
     >>> from ase.build import molecule
     >>> bodies, pose = bodies_of(molecule("H2O"))
     >>> bodies.moments.round(2).tolist(), bodies.degrees().total

@@ -1,9 +1,9 @@
 """Lines split by spins as the lines they are split from, so that a catalogue with F meets a list without.
 
 Of the lines that differ in their spin quantum numbers alone, intensities are added; frequency, its error and the energy are
-their means, weighted by intensity: a quadrupole or spin-rotation splitting of first order leaves the centre of the pattern
-where the unsplit line is (C. H. Townes and A. L. Schawlow, Microwave Spectroscopy (1955), ch. 6). How many numbers belong
-to spins is in QNFMT = 100 Q + 10 H + NQN: the last digit of Q counts those that do not.
+their means, weighted by intensity. A splitting of first order leaves this centre where the unsplit line is: strengths summed over
+the components of the other level go as 2F + 1 of a level, and Σ (2F + 1) ΔE(F) is the trace of the coupling over the spins, which is 0.
+How many numbers belong to spins is in QNFMT = 100 Q + 10 H + NQN: the last digit of Q counts those that do not.
 """
 
 from __future__ import annotations

@@ -165,9 +165,10 @@ class GroupLines:
     g_upper: Ints
     upper: Ints
     lower: Ints
+    error_mhz: Floats
 
 
-_COLUMNS = ("frequency_mhz", "intensity", "energy_lower_mhz", "g_upper", "upper", "lower")
+_COLUMNS = ("frequency_mhz", "intensity", "energy_lower_mhz", "g_upper", "upper", "lower", "error_mhz")
 
 
 def transitions_of(group: Group, levels: Levels) -> Transitions:
@@ -195,7 +196,15 @@ def within(request: Request, frequency_mhz: Floats, intensity: Floats) -> NDArra
     return np.asarray(limits & (intensity > least))
 
 
-def lines_of(group: Group, levels: Levels, found: Transitions, form: Format, request: Request, q: float) -> GroupLines:
+def lines_of(
+    group: Group,
+    levels: Levels,
+    found: Transitions,
+    form: Format,
+    request: Request,
+    q: float,
+    spread: Floats | None = None,
+) -> GroupLines:
     """The lines of a group within the limits of an .int file, those of one component of a K doublet each.
 
     Parameters
@@ -212,6 +221,8 @@ def lines_of(group: Group, levels: Levels, found: Transitions, form: Format, req
         Temperature and limits.
     q : float
         Partition function as the file counts it.
+    spread : (levels, k) array, optional
+        MHz; the differences have the errors of the lines as their lengths, which are 0 without it.
 
     Returns
     -------
@@ -225,7 +236,9 @@ def lines_of(group: Group, levels: Levels, found: Transitions, form: Format, req
     intensity = LGINT_NM2_MHZ / q * found.frequency_mhz * found.strength_debye2 / count * weight * below
     chosen = np.flatnonzero(within(request, found.frequency_mhz, intensity))
     up, low = found.upper[chosen], found.lower[chosen]
-    columns = (found.frequency_mhz[chosen], intensity[chosen], energy[chosen], levels.multiplicity[up] * weight[chosen])
+    error = np.zeros(len(chosen)) if spread is None else np.linalg.norm(spread[up] - spread[low], axis=1)
+    g_upper = levels.multiplicity[up] * weight[chosen]
+    columns = (found.frequency_mhz[chosen], intensity[chosen], energy[chosen], g_upper, error)
     pair = levels.components[up], levels.components[low]
     count = np.maximum(*pair)
     plus, minus = (quanta_of(group, levels, form, negative) for negative in (False, True))
@@ -241,8 +254,8 @@ def lines_of(group: Group, levels: Levels, found: Transitions, form: Format, req
     ]
     index = np.concatenate([piece[0] for piece in pieces])
     upper, lower = (np.concatenate([piece[i] for piece in pieces]) for i in (1, 2))
-    frequency, strength, energy, g = (column[index] for column in columns)
-    return GroupLines(frequency, strength, energy, g, upper, lower)
+    frequency, strength, energy, g, error = (column[index] for column in columns)
+    return GroupLines(frequency, strength, energy, g, upper, lower, error)
 
 
 def as_catalogue(lines: list[tuple[GroupLines, int]], form: Format, tag: int, dr: int) -> Catalogue:
@@ -282,6 +295,7 @@ def as_catalogue(lines: list[tuple[GroupLines, int]], form: Format, tag: int, dr
         lgint = np.log10(joined["intensity"][order])
     numbers = {
         "frequency_mhz": joined["frequency_mhz"][order],
+        "error_mhz": joined["error_mhz"][order],
         "lgint": lgint,
         "energy_lower_cm": joined["energy_lower_mhz"][order] / units.MHZ_PER_CM,
         "g_upper": joined["g_upper"][order],

@@ -21,17 +21,14 @@ from rotor.fit.fit import Fit, FitOptions
 from rotor.fit.parameters import Parameters
 from rotor.formats.assigned_lines import QUANTA
 from rotor.formats.spcat.codes import HELD_BELOW, constants_and_matrix
-from rotor.formats.spcat.file_lines import format_of
-from rotor.formats.spcat.fit_states import FileLevels, groups_for_fit, line_names, names_of_quanta
 from rotor.formats.spcat.lin import LineList, line_list, note_of_defaults, read_lin, with_defaults
 from rotor.formats.spcat.model import parameter_file
 from rotor.formats.spcat.par import Header, Parameter, ParameterFile, read_par
-from rotor.formats.spcat.predict_states import is_plain
+from rotor.formats.spcat.states import is_plain
+from rotor.formats.spcat.variances import FREE_ABOVE
 from rotor.quantum.labelled import LevelModel
 from rotor.tops.constants import Constants
 from rotor.tops.top import Top
-
-FREE_ABOVE = 1e30  # an a-priori error so large is none
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,6 +69,9 @@ def _quanta_names(file: ParameterFile) -> tuple[str, ...]:
     """The quantum numbers of a state in the .lin file."""
     if is_plain(file, None):
         return QUANTA[constants_and_matrix(file)[0].kind]
+    from rotor.formats.spcat.file_lines import format_of
+    from rotor.formats.spcat.fit_states import groups_for_fit, names_of_quanta
+
     return names_of_quanta(format_of(file, groups_for_fit(file)))
 
 
@@ -89,6 +89,9 @@ def spfit_input(file: ParameterFile, lines: LineList, source: str = "") -> Spfit
         constants, matrix = constants_and_matrix(file)
         names, kmax = tuple(constants.values), _kmax(file, constants)
     else:
+        from rotor.formats.spcat.fit_states import FileLevels
+        from rotor.formats.spcat.predict_states import line_names
+
         matrix, names = np.eye(len(file.parameters)), line_names(file)
         model = partial(FileLevels.of, file)
     values = np.array([p.value for p in file.parameters])
@@ -109,7 +112,8 @@ def spfit_input(file: ParameterFile, lines: LineList, source: str = "") -> Spfit
 def _refuse_options(header: Header) -> None:
     if header.nxpar:
         raise ValueError(
-            f"NXPAR = {header.nxpar}: parameters that special lines leave out are not supported; set it to 0"
+            f"NXPAR = {header.nxpar}: lines with a negative F that leave out the last parameters (hyperfine structure that is not "
+            "resolved) are not supported; set it to 0 and give such lines as blends of their components"
         )
     if not header.errtst > 0:
         raise ValueError(f"ERRTST = {header.errtst:g}: the largest |obs - calc|/error of a line that counts is above 0")

@@ -16,6 +16,7 @@ from rotor.formats.spcat.file_lines import Format, format_of, quanta_of
 from rotor.formats.spcat.file_model import Group, groups_of
 from rotor.formats.spcat.int_file import IntensityFile, Request
 from rotor.formats.spcat.par import ParameterFile
+from rotor.formats.spcat.predict_states import line_names
 from rotor.quantum.effect_units import unit_levels
 from rotor.quantum.labelled import LevelModel
 from rotor.quantum.levels import Levels
@@ -91,11 +92,6 @@ class FileLevels(LevelModel):
             energies[part.rows] = found
             slopes[part.rows[:, None], part.columns] = derived
         return energies, slopes
-
-
-def line_names(file: ParameterFile) -> tuple[str, ...]:
-    """The parameter lines as `file_effect.coded_lines` names them."""
-    return tuple(f"{parameter.code}#{place}" for place, parameter in enumerate(file.parameters, 1))
 
 
 def _levels(group: Group, angular: Sequence[int]) -> Levels:

@@ -23,7 +23,9 @@ from rotor.formats.spcat.file_lines import LEAST_MHZ
 from rotor.formats.spcat.int_file import IntensityFile, Request, read_int
 from rotor.formats.spcat.model import FOLD, common_weight, top_of
 from rotor.formats.spcat.par import Options, ParameterFile, read_par
-from rotor.formats.spcat.predict_states import is_plain, predicted
+from rotor.formats.spcat.predict_states import predicted
+from rotor.formats.spcat.states import is_plain
+from rotor.formats.spcat.variances import constants_covariance
 from rotor.quantum.basis import wang_blocks
 from rotor.quantum.levels import Levels
 from rotor.quantum.rotation import hamiltonian
@@ -124,7 +126,7 @@ def predict(
         made, of_states, q, levels, notes = predicted(parameters, intensities, own_q=own_q, as_spcat=as_spcat)
         return Prediction(made, of_states, q, request, tuple(notes), levels)
 
-    top = top_of(parameters, intensities)
+    top = replace(top_of(parameters, intensities), covariance=constants_covariance(parameters))
     common = common_weight(options)
     q = summed_q(top, options, request.temperature_k).q if own_q else request.qrot
     lines = _lines_asked_for(top, request, q / common)

@@ -6,13 +6,14 @@ The other files go through `predict`, with constants by their names.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from rotor import units
-from rotor.arrays import Ints
+from rotor.arrays import Floats, Ints
 from rotor.formats.spcat.catalogue import Catalogue
 from rotor.formats.spcat.codes import constants_of, split_code
 from rotor.formats.spcat.egy import LevelList
@@ -29,7 +30,8 @@ from rotor.formats.spcat.file_lines import (
 from rotor.formats.spcat.file_model import Group, groups_of
 from rotor.formats.spcat.int_file import IntensityFile, Request
 from rotor.formats.spcat.par import ParameterFile
-from rotor.formats.spcat.states import doubled_spins
+from rotor.formats.spcat.variances import variance_factor
+from rotor.quantum.derivatives import level_derivatives
 from rotor.quantum.levels import Levels
 from rotor.spectra.lines import Lines
 from rotor.spectra.transitions import Transitions
@@ -39,23 +41,6 @@ from rotor.tops.top import Top
 _TAIL = 1e-7  # of Q: what may lie beyond the last F
 _STEP = 8  # F that are added to Q at a time
 _LAST = 2000
-
-
-def is_plain(parameters: ParameterFile, intensities: IntensityFile | None) -> bool:
-    """Whether a file has one state, no spin and operators of orthorhombic symmetry, so that its constants have names."""
-    first = parameters.options[0]
-    one = abs(first.nvib) == 1 and len(parameters.options) == 1 and not doubled_spins(first.spind)
-    if not one or first.knmin != 0 or first.iax not in (0, 1, 2, 3, 6, 9) or first.ixx:
-        return False
-    if first.spind < 0 and first.knmax and first.wtpl != first.wtmn:  # the two levels of one K weigh differently
-        return False
-    digits = [split_code(parameter.code) for parameter in parameters.parameters]
-    orthorhombic = all(
-        not (d.i1 or d.i2 or d.ns) and (d.typ < 12 or d.typ >= 80) and (d.v1, d.v2) in ((0, 0), (9, 9)) for d in digits
-    )
-    energies = any(not any(d[:8]) for d in digits)
-    own = intensities is None or all(dipole.code in (1, 2, 3) for dipole in intensities.dipoles)
-    return orthorhombic and own and not energies
 
 
 def predicted(
@@ -98,14 +83,49 @@ def predicted(
     q = summed_q(groups, request.temperature_k).q if own_q else request.qrot
     solved = [(group, group.levels(f_range(group, request))) for group in groups]
     transitions = [transitions_of(group, levels) for group, levels in solved]
+    factor, names = variance_factor(parameters), line_names(parameters)
+    spreads = [level_spreads(group, levels, names, factor) for group, levels in solved]
     pieces = [
-        (lines_of(group, levels, found, form, request, q), form.qnfmt(group.spins))
-        for (group, levels), found in zip(solved, transitions, strict=True)
+        (lines_of(group, levels, found, form, request, q, spread), form.qnfmt(group.spins))
+        for (group, levels), found, spread in zip(solved, transitions, spreads, strict=True)
     ]
     made = as_catalogue(pieces, form, request.tag, 2 if all(s.linear for g in groups for s in g.states) else 3)
     notes = _notes(parameters, groups, request, as_spcat)
     lines = _lines(parameters, solved, transitions, form, request, q)
+    if factor is not None:
+        lines = replace(lines, given_spread=np.concatenate([one for one in spreads if one is not None]))
     return made, lines, q, as_level_list(solved, form), notes
+
+
+def line_names(file: ParameterFile) -> tuple[str, ...]:
+    """The parameter lines as `file_effect.coded_lines` names them."""
+    return tuple(f"{parameter.code}#{place}" for place, parameter in enumerate(file.parameters, 1))
+
+
+def level_spreads(group: Group, levels: Levels, names: Sequence[str], factor: Floats | None) -> Floats | None:
+    """What the covariance of a file's parameters makes of each level, ∂E/∂p F; None without one.
+
+    Parameters
+    ----------
+    group : Group
+        Of states, with their effect and top.
+    levels : Levels
+        Of the group.
+    names : sequence of str
+        The parameters of the file, in the order of the rows of `factor`.
+    factor : (parameters, k) array or None
+        F with F Fᵀ the covariance, in MHz.
+
+    Returns
+    -------
+    (levels, k) array or None
+        In MHz.
+    """
+    if factor is None:
+        return None
+    own = tuple(group.effect.parameters(group.top))
+    rows = [names.index(name) for name in own]
+    return np.asarray(level_derivatives(group.top, levels, own) @ factor[rows])
 
 
 def f_range(group: Group, request: Request) -> tuple[int, int]:

@@ -13,6 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Ints
+from rotor.formats.spcat.codes import split_code
+from rotor.formats.spcat.int_file import IntensityFile
 from rotor.formats.spcat.par import Options, ParameterFile
 
 SPECIES = {"ee": "A", "eo": "a", "oo": "b", "oe": "c"}  # of the rotational function, by parities of Ka and Kc
@@ -157,3 +159,20 @@ def _state(v: int, line: Options, first: Options, swapped: bool) -> StateOptions
 def is_odd(ka: Ints, kc: Ints) -> NDArray[np.bool_]:
     """Which levels have a species that SPCAT counts as odd: Ba and Bc, Ka + Kc odd."""
     return np.asarray((ka + kc) % 2 == 1)
+
+
+def is_plain(parameters: ParameterFile, intensities: IntensityFile | None) -> bool:
+    """Whether a file has one state, no spin and operators of orthorhombic symmetry, so that its constants have names."""
+    first = parameters.options[0]
+    one = abs(first.nvib) == 1 and len(parameters.options) == 1 and not doubled_spins(first.spind)
+    if not one or first.knmin != 0 or first.iax not in (0, 1, 2, 3, 6, 9) or first.ixx:
+        return False
+    if first.spind < 0 and first.knmax and first.wtpl != first.wtmn:  # the two levels of one K weigh differently
+        return False
+    digits = [split_code(parameter.code) for parameter in parameters.parameters]
+    orthorhombic = all(
+        not (d.i1 or d.i2 or d.ns) and (d.typ < 12 or d.typ >= 80) and (d.v1, d.v2) in ((0, 0), (9, 9)) for d in digits
+    )
+    energies = any(not any(d[:8]) for d in digits)
+    own = intensities is None or all(dipole.code in (1, 2, 3) for dipole in intensities.dipoles)
+    return orthorhombic and own and not energies

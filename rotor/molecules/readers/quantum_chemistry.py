@@ -67,6 +67,8 @@ def read_output(path: Path | str) -> Molecule:
         where the program prints none, or a file that was cut, with the line; printed constants that are more than
         0.5 % away from those of the geometry that was read.
 
+    Notes
+    -----
     The dipole of an ion is moved from the program's origin to the centre of mass. Vibrational corrections are
     neglected. Reader: N. M. O'Boyle, A. L. Tenderholt, K. M. Langner, J. Comput. Chem. 29, 839 (2008).
     """

@@ -41,6 +41,8 @@ def read_molecule(source: Any, *, isotopes: dict[int | str, str] | str | None = 
     ValueError
         What was read, where, which rule it breaks and what would do.
 
+    Examples
+    --------
     >>> read_molecule("H2O", isotopes="O=18O").formula
     'H2[18O]'
     """

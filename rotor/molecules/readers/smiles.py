@@ -66,6 +66,8 @@ def from_smiles(text: str) -> Molecule:
     ValueError
         For text that is no SMILES, with RDKit's reason; several molecules; no force field; no geometry found.
 
+    Examples
+    --------
     >>> from_smiles("[2H]O[2H]").formula
     '[2H]2O'
     """
@@ -103,6 +105,8 @@ def conformers(text: str, count: int = CONFORMERS) -> tuple[Conformer, ...]:
     ValueError
         As `from_smiles`, and for a count below 1.
 
+    Examples
+    --------
     >>> [round(one.energy_kj_per_mol, 1) for one in conformers("CCCC")]
     [0.0, 3.3]
     """

@@ -66,6 +66,8 @@ def parse_xyz(text: str, where: str = "xyz text") -> Molecule:
         With file and line: a count that is none or does not fit, labels such as `C13` that may mean a number as well
         as an isotope, asterisks of an overflowed field, a file that ends early, a second structure.
 
+    Examples
+    --------
     >>> parse_xyz("2\nfrom a textbook\nH 0 0 0\nCl 0 0 1.2746D0\n").formula
     'ClH'
     """

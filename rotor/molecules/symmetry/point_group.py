@@ -130,6 +130,8 @@ def find_symmetry(
         No nuclei, arrays that do not fit, numbers that are not finite, masses not above 0, nuclei nearer than 0.1 Å,
         a tolerance out of range, or more operations than can be named.
 
+    Examples
+    --------
     >>> square = [[1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0]]
     >>> found = find_symmetry("FFFF", [19] * 4, square)
     >>> found.point_group, found.rotation_group, found.symmetry_number, found.equivalent

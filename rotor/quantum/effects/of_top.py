@@ -113,6 +113,11 @@ def effects_of(
     tolerance_mhz : float
         By how much lines may differ from exact ones with "auto".
 
+    Returns
+    -------
+    tuple of QuantumEffect
+        For `solve_levels`, `line_list` and others.
+
     Raises
     ------
     ValueError

@@ -84,7 +84,7 @@ def stark_map(
     fields_kv_per_cm: ArrayLike,
     *,
     j_highest: int = 2,
-    m_values: Sequence[int] | None = None,
+    m_values: Sequence[float] | None = None,
     intensity_w_per_cm2: float = 0.0,
     direction: Sequence[float] = Z,
     effects: Sequence[QuantumEffect] = (),
@@ -103,7 +103,7 @@ def stark_map(
         Each once, in rising order.
     j_highest : int
         States that belong to free levels up to this J.
-    m_values : sequence of int, optional
+    m_values : sequence of numbers, optional
         |M|; by default 0 ... `j_highest`. With spins it is |M_F|, a multiple of ½.
     intensity_w_per_cm2 : float
         Of a laser far from resonance, polarized along Z, at every field.
@@ -153,7 +153,7 @@ def map_request(
     top: Top,
     fields_kv_per_cm: ArrayLike,
     j_highest: int,
-    m_values: Sequence[int] | None,
+    m_values: Sequence[float] | None,
     intensity_w_per_cm2: float,
     direction: Sequence[float] = Z,
     tolerance_mhz: float = DEFAULT_TOLERANCE_MHZ,
@@ -180,6 +180,8 @@ def map_request(
         By how much energies may move when J max is raised.
     diabatic_gap_mhz : float, optional
         Crossings with a smaller gap are passed diabatically; by default labels are adiabatic.
+    effects : sequence of QuantumEffect, optional
+        The Hamiltonian of a top with spins; `m_values` are |M_F| then.
 
     Returns
     -------
@@ -223,7 +225,29 @@ def map_request(
 def doubled_m(
     top: Top, effects: Sequence[QuantumEffect], m_values: Sequence[float] | None, j_highest: int
 ) -> tuple[int, ...]:
-    """Twice |M_F| from those that F has, each once, all of them for None; ValueError for others."""
+    """Twice the |M_F| of a top with spins, each once.
+
+    Parameters
+    ----------
+    top : Top
+        Kind and nuclei.
+    effects : sequence of QuantumEffect
+        The Hamiltonian, spins among it.
+    m_values : sequence of float or None
+        |M_F|; None for all.
+    j_highest : int
+        The highest N that is followed.
+
+    Returns
+    -------
+    tuple of int
+        Rising.
+
+    Raises
+    ------
+    ValueError
+        For values that no F of these spins has.
+    """
     total = scheme_of(top, tuple(effects)).total
     possible = range(total % 2, 2 * j_highest + total + 1, 2)
     values = tuple(possible) if m_values is None else tuple(sorted({round(2 * m) for m in m_values}))
@@ -254,12 +278,12 @@ def checked_j(j_highest: int) -> int:
     return int(j_highest)
 
 
-def checked_m(m_values: Sequence[int] | None, j_highest: int) -> tuple[int, ...]:
+def checked_m(m_values: Sequence[float] | None, j_highest: int) -> tuple[int, ...]:
     """|M| from 0 to J, each once, all of them for None; ValueError for others."""
     values = tuple(range(j_highest + 1)) if m_values is None else tuple(sorted({int(m) for m in m_values}))
-    if not values or not all(0 <= m <= j_highest for m in values):
+    if not values or not all(0 <= m <= j_highest for m in values) or any(m % 1 for m in m_values or ()):
         raise ValueError(
-            f"M of {list(values)}: whole numbers from 0 to J = {j_highest} are expected (M and -M coincide)"
+            f"M of {list(m_values or ())}: whole numbers from 0 to J = {j_highest} are expected (M and -M coincide)"
         )
     return values
 
@@ -313,4 +337,4 @@ def _problem(
     if light is not None:
         fixed = fixed - MHZ_ANGSTROM3_W_PER_CM2 * intensity * block.dense(light)
     slope = -units.MHZ_PER_DEBYE_KV_PER_CM * block.dense(dipole)
-    return BlockProblem(fixed, slope, {name: block.dense(one) for name, one in names.items()})
+    return BlockProblem(fixed, slope, {name: partial(block.dense, one) for name, one in names.items()})

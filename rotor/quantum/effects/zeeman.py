@@ -104,6 +104,8 @@ def zeeman_map(
         For a g tensor or a magnetisability that does not have the symmetry of a linear or symmetric top, fields beyond 1000 T, and g
         of nuclei that the effects do not have.
 
+    Examples
+    --------
     >>> from rotor.tops.top import Top
     >>> found = zeeman_map(Top.from_constants("B=6000 MHz"), [0.0, 1.0], -0.03, j_highest=1)
     >>> rows = found.curve("1", 1)

@@ -12,7 +12,7 @@ swap where two neighbours come closer than a stated gap (`rotor.quantum.fields.d
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import partial
@@ -47,12 +47,12 @@ STEP_J = 6
 class BlockProblem(NamedTuple):
     """Matrices over a block, all (n, n), of H(x) = fixed + x slope + x² curvature; curvature None where nothing is quadratic.
 
-    fixed: MHz. slope: MHz per unit of field. observables: by name.
+    fixed: MHz. slope: MHz per unit of field. observables: by name, made when called.
     """
 
     fixed: Matrix
     slope: Matrix
-    observables: dict[str, Matrix]
+    observables: Mapping[str, Callable[[], Matrix]]
     curvature: Matrix | None = None
 
     def terms(self, states: Ints) -> Terms:
@@ -325,7 +325,7 @@ def _solve_block(request: MapRequest, block: FieldBlock) -> _Solved:
     found = _states_of(request, block, problem, fields, True)
     vectors, inside = found.vectors, np.ix_(found.places, found.places)
     slopes = -derivatives(problem.terms(found.places), fields, vectors)
-    cosines = {name: expectation(one[inside], vectors) for name, one in problem.observables.items()}
+    cosines = {name: expectation(made()[inside], vectors) for name, made in problem.observables.items()}
     edge = (np.abs(vectors[:, block.j[found.places] > block.levels.j.max() - EDGE]) ** 2).sum(axis=1)
     return _Solved(found.energies, slopes, edge, cosines, found.rows, block)
 

@@ -13,11 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats
+from rotor.quantum.fields.chains import chain_states, is_chain
 
 Matrix = NDArray[Any]
 Terms = tuple[Matrix, ...]  # H_n (n, n)
 
 DENSE = 48  # matrices up to this size are solved whole, all fields at once
+MANY_FIELDS = 40  # from which on chains are solved from a few of them
 FIRST_ANCHORS = 5  # fields solved in full at first, of many
 SPANNED = 101  # fields at which a basis for many is tested while it is made
 BUFFER = 4  # further states in the basis of a map
@@ -72,6 +74,13 @@ def solve_fields(
         Eigenvectors in columns; without columns where they are left out.
     """
     size = len(terms[0])
+    if (
+        with_vectors
+        and len(fields) >= MANY_FIELDS
+        and is_chain(terms)
+        and (found := chain_states(terms, fields, count))
+    ):
+        return found
     if size <= DENSE:
         stack = at_fields(terms, fields)
         if not with_vectors:

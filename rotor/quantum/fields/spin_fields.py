@@ -101,7 +101,7 @@ class SpinFieldBlock(FieldBlock):
         for i, first in enumerate(solved):
             for k, second in enumerate(solved[: i + 1]):
                 (a, up), (b, low) = sorted(((i, first), (k, second)), key=lambda one: (-one[1].twice_f, -one[0]))
-                factor = in_space(up.twice_f, low.twice_f, rank, self.twice_m)
+                factor = _in_space(up.twice_f, low.twice_f, rank, self.twice_m)
                 found = reduced(up, low) if factor else None
                 if found is None:
                     continue
@@ -112,10 +112,10 @@ class SpinFieldBlock(FieldBlock):
         return out
 
 
-def in_space(twice_up: int, twice_low: int, rank: int, twice_m: int) -> float:
+def _in_space(twice_up: int, twice_low: int, rank: int, twice_m: int) -> float:
     """(-1)^(F'-M) (F' K F; -M 0 M) of doubled F and M.
 
-    >>> round(in_space(2, 0, 1, 0), 6)  # 1/√3 but for the sign
+    >>> round(_in_space(2, 0, 1, 0), 6)  # 1/√3 but for the sign
     0.57735
     """
     if not abs(twice_up - twice_low) <= 2 * rank <= twice_up + twice_low or abs(twice_m) > min(twice_up, twice_low):
@@ -168,7 +168,7 @@ class SpinSpace(FieldSpace):
             for k in nodes[: place + 1]:
                 up, low = sorted((self.solved[i], self.solved[k]), key=lambda one: -one.twice_f)
                 for rank, reduced in acting:
-                    if in_space(up.twice_f, low.twice_f, rank, twice_m) and reduced(up, low) is not None:
+                    if _in_space(up.twice_f, low.twice_f, rank, twice_m) and reduced(up, low) is not None:
                         yield i, k
                         break
 
@@ -286,8 +286,29 @@ def spin_field_space(
 ) -> SpinSpace:
     """The space of a top with the spins of its effects, N up to `jmax`, for fields along Z.
 
-    Raises ValueError for effects without spins, with several states, for fields at an angle, and for a symmetric top in a magnetic
-    field or with tensors that do not have its axis.
+    Parameters
+    ----------
+    top : Top
+        Constants, kind and spin weights.
+    jmax : int
+        The highest N.
+    effects : sequence of QuantumEffect
+        The Hamiltonian without the field, spins among it.
+    contractions : sequence of Contraction
+        Tensors of the molecule that the field acts on.
+    magnet : Magnet, optional
+        What a magnetic field acts on.
+
+    Returns
+    -------
+    SpinSpace
+        Solved levels and everything that will act on them.
+
+    Raises
+    ------
+    ValueError
+        For effects without spins, with several states, for fields at an angle, for a g of a nucleus that has no spin
+        here, and for a symmetric top in a magnetic field or with tensors that do not have its axis.
     """
     scheme = scheme_of(top, tuple(effects))
     if not scheme.spins:

@@ -15,12 +15,15 @@ from rotor.quantum.effects.stark import (
     checked_direction,
     checked_j,
     checked_m,
+    doubled_m,
     stark_map,
 )
 from rotor.quantum.fields.field_map import FieldMap
+from rotor.table import TextOf
 from rotor.tops.facts import top_facts
 
 if TYPE_CHECKING:
+    from rotor.quantum.effect import QuantumEffect
     from rotor.tops.top import Top
 
 
@@ -30,22 +33,26 @@ class StarkRequest:
 
     top: with its dipole. fields_kv_per_cm: of any order. j_highest: free levels up to this J are followed. m_values: |M|; None: all.
     intensity_w_per_cm2: of a laser along Z. direction: of the field. jmax: of the basis; None: what tolerance_mhz needs.
-    diabatic_gap_mhz: None: no diabatic labels.
+    diabatic_gap_mhz: None: no diabatic labels. hyperfine: with the spins of the top's constants; m_values are |M_F| then.
     """
 
     top: Top
     fields_kv_per_cm: tuple[float, ...]
     j_highest: int = 2
-    m_values: tuple[int, ...] | None = None
+    m_values: tuple[float, ...] | None = None
     intensity_w_per_cm2: float = 0.0
     direction: tuple[float, float, float] = Z
     jmax: int | None = None
     tolerance_mhz: float = DEFAULT_TOLERANCE_MHZ
     diabatic_gap_mhz: float | None = None
+    hyperfine: bool = False
 
     def __post_init__(self) -> None:
         checked_j(self.j_highest)
-        checked_m(self.m_values, self.j_highest)
+        if self.hyperfine:
+            doubled_m(self.top, self.effects, self.m_values, self.j_highest)
+        else:
+            checked_m(self.m_values, self.j_highest)
         require_whole("jmax", self.jmax, 2)
         require_positive("tolerance_mhz", self.tolerance_mhz)
         if self.diabatic_gap_mhz is not None:
@@ -56,14 +63,23 @@ class StarkRequest:
         acting(self.top, self.intensity_w_per_cm2)
 
     @property
+    def effects(self) -> tuple[QuantumEffect, ...]:
+        """The Hamiltonian with spins where they are asked for, else nothing beyond what is always there."""
+        from rotor.quantum.effects.of_top import effects_of
+
+        return effects_of(self.top, True) if self.hyperfine else ()
+
+    @property
     def tilted(self) -> bool:
         """Whether the field is at an angle with Z."""
         return bool(self.direction[0] or self.direction[1])
 
 
-@dataclass(frozen=True)
-class StarkAnswer:
+@dataclass(frozen=True, repr=False)
+class StarkAnswer(TextOf):
     """The map that a request asked for."""
+
+    shown = "states"
 
     request: StarkRequest
     states: FieldMap
@@ -77,6 +93,7 @@ class StarkAnswer:
             "intensity_w_per_cm2": request.intensity_w_per_cm2,
             "field_direction": list(request.direction),
             "j_highest": request.j_highest,
+            "hyperfine": request.hyperfine,
             "diabatic_gap_mhz": request.diabatic_gap_mhz,
             "tolerance_mhz": request.tolerance_mhz,
             **self.states.provenance,
@@ -99,6 +116,7 @@ def answer_stark(request: StarkRequest, executor: Executor | None = None) -> Sta
         m_values=request.m_values,
         intensity_w_per_cm2=request.intensity_w_per_cm2,
         direction=request.direction,
+        effects=request.effects,
         jmax=request.jmax,
         tolerance_mhz=request.tolerance_mhz,
         diabatic_gap_mhz=request.diabatic_gap_mhz,

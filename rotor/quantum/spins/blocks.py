@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from rotor.tops.top import Top
 
 
+_AT_A_TIME = 1000  # entries of a table of shares that are looked at together
 Exist = Callable[[Ints], NDArray[np.bool_]]
 
 
@@ -349,6 +350,3 @@ def assigned(shares: Floats, capacity: Ints) -> Ints:
         if not left.any():
             break
     return found
-
-
-_AT_A_TIME = 1000

@@ -35,10 +35,10 @@ def simplified(plan: Plan, effects: Sequence[QuantumEffect], every_f: Sequence[i
     if chosen == "auto":
         chosen = next(name for name, size in estimates.items() if size <= asked.tolerance_mhz)
     used = Used(chosen, estimates[chosen], asked.tolerance_mhz)
-    return plan.with_method(used, _kept(plan, chosen))
+    return plan.with_method(used, _remaining(plan, chosen))
 
 
-def _kept(plan: Plan, method: str) -> dict[tuple[int, int], dict[Channel, Floats]]:
+def _remaining(plan: Plan, method: str) -> dict[tuple[int, int], dict[Channel, Floats]]:
     blocks = plan.blocks
     if method == N_DIAGONAL:
         return {pair: found for pair, found in plan.operators.items() if blocks[pair[0]].n == blocks[pair[1]].n}

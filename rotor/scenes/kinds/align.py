@@ -130,7 +130,24 @@ def axis_of(given: str | list[list[float]]) -> Axis:
 
 
 def answer(asked: AlignRequest, scene: AlignScene, out: Where, executor: Executor | None) -> AlignAnswer:
-    """The cosines."""
+    """The cosines.
+
+    Parameters
+    ----------
+    asked : AlignRequest
+        The scene as the library takes it, checked.
+    scene : AlignScene
+        Not used.
+    out : path
+        Not used.
+    executor : Executor or None
+        Its workers share the work.
+
+    Returns
+    -------
+    AlignAnswer
+        Cosines over time.
+    """
     with kind.fields(**_NAMES):
         return answer_align(asked, executor)
 

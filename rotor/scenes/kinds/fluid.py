@@ -61,7 +61,24 @@ def _box(of: FluidConditions, folder: Where) -> NewBox | Atoms:
 
 
 def answer(asked: FluidRequest, scene: FluidScene, out: Where, executor: Executor | None) -> FluidAnswer:
-    """The run; it goes on from its checkpoint where there is one."""
+    """The run; it goes on from its checkpoint where there is one.
+
+    Parameters
+    ----------
+    asked : FluidRequest
+        The scene as the library takes it, checked.
+    scene : FluidScene
+        Names the files of the run.
+    out : path
+        Folder from which the files of the run are counted.
+    executor : Executor or None
+        Not used.
+
+    Returns
+    -------
+    FluidAnswer
+        The table of the run.
+    """
     files = outputs_in(scene.outputs, out)
     resume = files.checkpoint is not None and Path(files.checkpoint).is_file()
     return answer_fluid(asked, files, resume=resume, progress=lambda *_: None)

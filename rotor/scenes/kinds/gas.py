@@ -45,7 +45,24 @@ def request(scene: GasScene, folder: Where = ".") -> GasRequest:
 
 
 def answer(asked: GasRequest, scene: GasScene, out: Where, executor: Executor | None) -> GasAnswer:
-    """The gas, tested, and its correlation functions on all cores; the answer does not depend on their number."""
+    """The gas, tested, and its correlation functions on all cores; the answer does not depend on their number.
+
+    Parameters
+    ----------
+    asked : GasRequest
+        The scene as the library takes it, checked.
+    scene : GasScene
+        Not used.
+    out : path
+        Not used.
+    executor : Executor or None
+        Not used.
+
+    Returns
+    -------
+    GasAnswer
+        The test and the correlation functions.
+    """
     with ThreadPoolExecutor(os.cpu_count()) as threads:
         return answer_gas(asked, threads)
 

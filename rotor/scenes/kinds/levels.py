@@ -29,12 +29,29 @@ def request(scene: LevelsScene, folder: Where = ".") -> LevelsRequest:
             kmin=asked.kmin,
             kmax=asked.kmax,
             max_energy_mhz=highest,
-            effects=kind.effects_of(top, scene.effects),
+            effects=kind.effects_of(top, scene.effects, molecule),
         )
 
 
 def answer(asked: LevelsRequest, scene: LevelsScene, out: Where, executor: Executor | None) -> LevelsAnswer:
-    """The levels."""
+    """The levels.
+
+    Parameters
+    ----------
+    asked : LevelsRequest
+        The scene as the library takes it, checked.
+    scene : LevelsScene
+        Not used.
+    out : path
+        Not used.
+    executor : Executor or None
+        Its workers share the work.
+
+    Returns
+    -------
+    LevelsAnswer
+        Levels with their energies.
+    """
     return answer_levels(asked, executor)
 
 

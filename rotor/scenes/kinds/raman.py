@@ -36,12 +36,29 @@ def request(scene: RamanScene, folder: Where = ".") -> RamanRequest:
             min_relative=kind.cut("observables.min_relative", scene.observables.min_relative),
             q=scene.observables.q,
             vibrations=kind.vibrations(scene.vibration),
-            effects=kind.effects_of(top, scene.effects),
+            effects=kind.effects_of(top, scene.effects, molecule),
         )
 
 
 def answer(asked: RamanRequest, scene: RamanScene, out: Where, executor: Executor | None) -> RamanAnswer:
-    """The lines."""
+    """The lines.
+
+    Parameters
+    ----------
+    asked : RamanRequest
+        The scene as the library takes it, checked.
+    scene : RamanScene
+        Not used.
+    out : path
+        Not used.
+    executor : Executor or None
+        Its workers share the work.
+
+    Returns
+    -------
+    RamanAnswer
+        Raman lines.
+    """
     return answer_raman(asked, executor)
 
 

@@ -52,7 +52,7 @@ def request(scene: SpectrumScene, folder: Where = ".") -> SpectrumRequest:
             fwhm_mhz=fwhm,
             layer=_layer(gas),
             untrusted=asked.untrusted,
-            effects=kind.effects_of(top, scene.effects),
+            effects=kind.effects_of(top, scene.effects, molecule),
         )
 
 
@@ -66,7 +66,24 @@ def _layer(gas: SpectrumConditions) -> GasLayer | None:
 
 
 def answer(asked: SpectrumRequest, scene: SpectrumScene, out: Where, executor: Executor | None) -> SpectrumAnswer:
-    """The lines."""
+    """The lines.
+
+    Parameters
+    ----------
+    asked : SpectrumRequest
+        The scene as the library takes it, checked.
+    scene : SpectrumScene
+        Not used.
+    out : path
+        Not used.
+    executor : Executor or None
+        Its workers share the work.
+
+    Returns
+    -------
+    SpectrumAnswer
+        Lines, and a spectrum where one is asked for.
+    """
     return answer_spectrum(asked, executor)
 
 

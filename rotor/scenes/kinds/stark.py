@@ -52,7 +52,24 @@ def _direction(numbers: list[float]) -> tuple[float, float, float]:
 
 
 def answer(asked: StarkRequest, scene: StarkScene, out: Where, executor: Executor | None) -> StarkAnswer:
-    """The map."""
+    """The map.
+
+    Parameters
+    ----------
+    asked : StarkRequest
+        The scene as the library takes it, checked.
+    scene : StarkScene
+        Not used.
+    out : path
+        Not used.
+    executor : Executor or None
+        Its workers share the work.
+
+    Returns
+    -------
+    StarkAnswer
+        Energies against the field.
+    """
     with kind.fields(**_NAMES):
         return answer_stark(asked, executor)
 
@@ -76,6 +93,10 @@ def writers(found: StarkAnswer, scene: StarkScene) -> Mapping[str, Writer]:
 def saved(asked: StarkRequest, molecule: MoleculeSection | None) -> StarkScene:
     """The scene of a request."""
     assert molecule is not None
+    if asked.hyperfine:
+        raise ValueError(
+            "a scene of levels in a field has no spins: leave out the hyperfine structure, or run without a scene"
+        )
     return StarkScene(
         molecule=molecule,
         conditions=StarkConditions(
@@ -85,7 +106,7 @@ def saved(asked: StarkRequest, molecule: MoleculeSection | None) -> StarkScene:
         ),
         observables=StarkObservables(
             jmax=asked.j_highest,
-            m=None if asked.m_values is None else list(asked.m_values),
+            m=None if asked.m_values is None else [int(m) for m in asked.m_values],
             diabatic_gap=None if asked.diabatic_gap_mhz is None else f"{asked.diabatic_gap_mhz!r} MHz",
         ),
         numerics=StarkNumerics(jmax=asked.jmax, tolerance=f"{asked.tolerance_mhz!r} MHz"),

@@ -39,7 +39,24 @@ def request(scene: ThermoScene, folder: Where = ".") -> ThermoRequest:
 
 
 def answer(asked: ThermoRequest, scene: ThermoScene, out: Where, executor: Executor | None) -> ThermoAnswer:
-    """The functions."""
+    """The functions.
+
+    Parameters
+    ----------
+    asked : ThermoRequest
+        The scene as the library takes it, checked.
+    scene : ThermoScene
+        Not used.
+    out : path
+        Not used.
+    executor : Executor or None
+        Not used.
+
+    Returns
+    -------
+    ThermoAnswer
+        Thermodynamic functions by temperature.
+    """
     return answer_thermo(asked)
 
 

@@ -97,7 +97,24 @@ def _of_body(body: BodySection, start: TumbleConditions) -> TumbleRequest:
 def answer(
     asked: TumbleRequest | DrivenRequest, scene: TumbleScene, out: Where, executor: Executor | None
 ) -> TumbleAnswer | DrivenAnswer:
-    """The motion: exact where it is free, else stepped."""
+    """The motion: exact where it is free, else stepped.
+
+    Parameters
+    ----------
+    asked : TumbleRequest or DrivenRequest
+        The scene as the library takes it, checked.
+    scene : TumbleScene
+        Not used.
+    out : path
+        Not used.
+    executor : Executor or None
+        Not used.
+
+    Returns
+    -------
+    TumbleAnswer or DrivenAnswer
+        Momentum and attitude over time.
+    """
     if isinstance(asked, TumbleRequest):
         return answer_tumble(asked)
     from rotor.classical.driven import answer_driven

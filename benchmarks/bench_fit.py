@@ -1,0 +1,132 @@
+"""One iteration of a fit to 500, 5,000 and 25,000 lines; and what is left after each iteration.
+
+    OPENBLAS_NUM_THREADS=1 python benchmarks/bench_fit.py [--json benchmarks/results/fit.json]
+
+One iteration is levels, derivatives, residuals, QR and the step; lines are synthetic with normal errors of 20 kHz.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rotor.fit.assignment import Assignments, assignments
+from rotor.fit.fit import Fit, FitOptions, _labels, _Search, fit_lines
+from rotor.fit.parameters import Parameters, parameters
+from rotor.quantum.labelled import LevelModel, level_model
+from rotor.quantum.solve import solve_levels
+from rotor.statistics.least_squares import _Linear, _State
+from rotor.tops.constants import Constants
+from rotor.tops.top import Top
+
+TRUE = Constants(
+    A=8572.05, B=3640.12, C=2790.97, DeltaJ=1.1e-3, DeltaJK=-2.4e-3, DeltaK=1.1e-2, deltaJ=3.1e-4, deltaK=1.9e-3,
+    PhiJ=2e-9, PhiJK=-1e-8, PhiKJ=4e-8, PhiK=9e-8, phiJ=8e-10, phiJK=5e-9, phiK=3e-8, reduction="A",
+)  # fmt: skip
+ERROR_MHZ = 0.02
+NAMES = ("j", "ka", "kc")
+
+
+def lines_of(constants: Constants, count: int, jmax: int = 60) -> Assignments:
+    """So many a- and b-type lines to J max, drawn at random, with normal errors."""
+    rng = np.random.default_rng(count)
+    levels = solve_levels(Top(constants), jmax)
+    labels = np.stack([levels.quanta[name] for name in NAMES], axis=1)
+    upper = rng.integers(len(labels), size=40 * count)
+    lower = rng.integers(len(labels), size=40 * count)
+    change = labels[upper] - labels[lower]
+    near = (np.abs(change[:, 0]) <= 1) & (np.abs(change[:, 1]) <= 1)
+    while near.sum() < count:
+        more = rng.integers(len(labels), size=(2, 40 * count))
+        upper, lower = np.concatenate([upper[near], more[0]]), np.concatenate([lower[near], more[1]])
+        change = labels[upper] - labels[lower]
+        near = (np.abs(change[:, 0]) <= 1) & (np.abs(change[:, 1]) <= 1)
+    up, low = upper[near][:count], lower[near][:count]
+    frequency = levels.energy_mhz[up] - levels.energy_mhz[low] + ERROR_MHZ * rng.normal(size=count)
+    return assignments(NAMES, labels[up], labels[low], frequency, ERROR_MHZ)
+
+
+def iteration_ms(lines: Assignments, free: Parameters, model: LevelModel, repeats: int) -> float:
+    """The fastest of some iterations, processor time."""
+    _, upper, lower = _labels(lines)
+    used = np.ones(len(lines), dtype=bool)
+    search = _Search(lines, model, free, FitOptions(), upper, lower, lines.error_mhz, used)
+
+    def one() -> None:
+        state = _State.at(free.start, *search.evaluate(free.start))
+        _Linear.of(state, state.norms, np.zeros(len(free.start))).step(0.0)
+
+    return 1e3 * fastest(one, repeats)
+
+
+def fastest(run: Callable[[], object], repeats: int) -> float:
+    """Seconds of processor time of the fastest of some runs, after one that does not count."""
+    run()
+    seconds = []
+    for _ in range(repeats):
+        start = time.process_time()
+        run()
+        seconds.append(time.process_time() - start)
+    return min(seconds)
+
+
+def one_state() -> list[dict[str, Any]]:
+    """15 constants, J to 60."""
+    rows = []
+    for count in (500, 5_000, 25_000):
+        lines = lines_of(TRUE, count)
+        free = parameters(TRUE, list(TRUE.values))
+        model = level_model(TRUE, _labels(lines)[0])
+        rows.append(
+            {"case": "15 constants, J ≤ 60", "lines": count, "iteration_ms": iteration_ms(lines, free, model, 20)}
+        )
+    return rows
+
+
+def iterations(count: int = 500) -> list[dict[str, Any]]:
+    """What is left after each iteration, in standard errors, and the time so far; constants from 3 % off, each by its own."""
+    lines = lines_of(TRUE, count, 30)
+    off = 1 + 0.03 * np.random.default_rng(1).normal(size=len(TRUE.values))  # all by one factor would be one step
+    start = TRUE.replace(
+        **{name: value * factor for (name, value), factor in zip(TRUE.values.items(), off, strict=True)}
+    )
+    free = parameters(start, list(TRUE.values))
+
+    def fitted(most: int, tolerance: float = 1e-4) -> Fit:
+        return fit_lines(lines, start, free, FitOptions(most_iterations=most, tolerance=tolerance))
+
+    best, rows = fitted(100, 1e-9), []
+    for most in range(1, 10):
+        found = fitted(most)
+        left = float(np.abs((found.values - best.values) / best.errors).max())
+        seconds = fastest(lambda most=most: fitted(most), 3)  # type: ignore[misc]
+        rows.append({"iterations": len(found.minimum.iterations), "off_sigma": left, "ms": 1e3 * seconds})
+        if found.converged:
+            break
+    return rows
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--json", type=Path)
+    given = parser.parse_args()
+    found = {"one_state": one_state(), "iterations": iterations()}
+    for rows in found.values():
+        for row in rows:
+            print(
+                "  ".join(
+                    f"{key} {value:.3g}" if isinstance(value, float) else f"{key} {value}" for key, value in row.items()
+                )
+            )
+    if given.json:
+        given.json.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

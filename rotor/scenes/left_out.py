@@ -1,0 +1,152 @@
+"""How large is what a scene leaves out: each effect with its size, its formula and where that is from.
+
+| left out | size |
+|---|---|
+| distortion of the next order | c s_n²/s_(n-1), s the sizes of the last two orders at one J (`order_sizes_mhz`): a geometric series |
+| nuclear quadrupole, spin-rotation, spin-spin | constants known: `size_mhz`, of quadrupoles half of it; else `rotor.quantum.limits` |
+| Doppler width | ν √(8 ln2 kT/mc²), full width at half maximum (`rotor.spectra.profiles`) |
+| Stark shift of a stray field | linear, J = 0: (μE)²/6hB, second order; symmetric, J = K = 1: μE KM/J(J+1), first order |
+| geometry in place of constants, internal rotation, inversion, electron spin | `rotor.quantum.limits` |
+| quantum corrections of a classical gas | a/T of ln Q (`rotor.thermo.classical_limit`) |
+| centrifugal distortion of a classical gas | d T of ln Q (there) |
+
+c of the next order: 0.3 of a linear top from the quartic to the sextic order, 3 of other tops there, 1 of every higher order. A
+harmonic diatomic molecule has 2, and anharmonicity takes most of it away (Dunham's H = 2D(12B² - αω)/3ω²); these values were chosen
+on the library, where they hold within a factor of 3 for 25 of 30 orders (tests/test_scene_plans.py names the others).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from rotor import units
+
+if TYPE_CHECKING:
+    from rotor.quantum.effect import QuantumEffect
+    from rotor.tops.top import Top
+
+STRAY_KV_PER_CM = 1e-3  # 1 V/cm
+FACTORS = {"linear": 0.3, "other": 3.0, "higher": 1.0}  # c of the table
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """Something that a scene leaves out. size: in `unit`; None: not estimated. basis: how the size was found, and for what."""
+
+    name: str
+    size: float | None
+    unit: str
+    basis: str
+
+
+def of_levels(top: Top, j: int, effects: Sequence[QuantumEffect]) -> list[LeftOut]:
+    """What levels and lines of one J leave out, largest first, in MHz; what is not estimated comes last."""
+    from rotor.quantum.limits import model_limits
+
+    names = {effect.name for effect in effects}
+    found = [next_order(top, j, effects), stray_field(top), *_known_spins(top, j, names)]
+    for limit in model_limits(top, j, effects):
+        known = top.spin_constants is not None and limit.name == "nuclear quadrupole"
+        if limit.name != "centrifugal distortion" and not known:
+            found.append(LeftOut(limit.name, limit.size_mhz, "MHz", f"at J = {j}: {limit.text}"))
+        elif limit.name == "centrifugal distortion" and found[0] is None:
+            found[0] = LeftOut(limit.name, limit.size_mhz, "MHz", f"at J = {j}: {limit.text}")
+    return _largest_first([one for one in found if one is not None])
+
+
+def _largest_first(found: Sequence[LeftOut]) -> list[LeftOut]:
+    return sorted(found, key=lambda one: (one.size is None, -(one.size or 0.0)))
+
+
+def next_order(top: Top, j: int, effects: Sequence[QuantumEffect]) -> LeftOut | None:
+    """The order of distortion beyond the highest that the calculation has; None of rigid constants.
+
+    >>> from rotor.quantum.effects.watson import SEMI_RIGID
+    >>> from rotor.tops.top import Top
+    >>> one = next_order(Top.from_constants("B=6000 D=0.001 MHz"), 20, SEMI_RIGID)
+    >>> f"{one.size:.2e}"  # 0.3 D²/B (J(J+1))³
+    '3.70e-03'
+    """
+    from rotor.quantum.convergence import order_sizes_mhz
+
+    sizes = list(order_sizes_mhz(top, j, effects=effects).items())
+    if len(sizes) < 2 or not sizes[-2][1]:
+        return None
+    (_, before), (order, last) = sizes[-2:]
+    which = "higher" if order > 4 else "linear" if top.kind == "linear" else "other"
+    name = f"centrifugal distortion of order J^{order + 2}"
+    basis = f"at J = {j}: {FACTORS[which]:g} times the order J^{order} ({last:.2g} MHz) squared over the order before"
+    return LeftOut(name, FACTORS[which] * last**2 / before, "MHz", basis)
+
+
+def stray_field(top: Top) -> LeftOut | None:
+    """The Stark shift in 1 V/cm of the level that shows it first; None of an asymmetric top's, which depends on near degeneracies.
+
+    >>> from rotor.tops.top import Top
+    >>> rod = Top.from_constants("B=6000 MHz", dipole_abc_debye=(0.7, 0, 0))
+    >>> f"{stray_field(rod).size:.2e}"  # (μE)²/6hB
+    '3.45e-06'
+    """
+    if not any(top.dipole_abc_debye or ()) or top.kind not in ("linear", "prolate", "oblate") or top.states is not None:
+        return None
+    energy = math.hypot(*(top.dipole_abc_debye or ())) * units.MHZ_PER_DEBYE_KV_PER_CM * STRAY_KV_PER_CM
+    if top.kind == "linear":
+        size, basis = energy**2 / (6 * top.rotational_constants_mhz[1]), "of J = 0 in 1 V/cm: (μE)²/6hB"
+    else:
+        size, basis = energy / 2, "of J = K = 1 in 1 V/cm: μE KM/J(J+1)"
+    return LeftOut("Stark shift of a stray field", size, "MHz", basis)
+
+
+def _known_spins(top: Top, j: int, present: set[str]) -> list[LeftOut | None]:
+    """Couplings of spins whose constants are known and which the calculation has not."""
+    if top.spin_constants is None:
+        return []
+    from rotor.quantum.effects.of_top import spin_effects
+
+    absent = [effect for effect in spin_effects(top) if effect.name not in present]
+    halves = {"nuclear quadrupole": 0.5}  # of χ: J = 1 of I = 1 is shifted by χ/2 at most, higher J by χ/4
+    return [
+        LeftOut(
+            one.name, halves.get(one.name, 1.0) * one.size_mhz(top, j), "MHz", f"at J = {j}, from the constants known"
+        )
+        for one in absent
+    ]
+
+
+def doppler(top: Top, frequency_mhz: float, temperature_k: float) -> LeftOut | None:
+    """The Doppler width of a line; None of a top without a mass."""
+    if top.mass_u is None:
+        return None
+    from rotor.spectra.profiles import doppler_fwhm
+
+    width = float(doppler_fwhm(frequency_mhz, temperature_k, top.mass_u))
+    return LeftOut(
+        "Doppler width", width, "MHz", f"full width at half maximum at {frequency_mhz:g} MHz, {temperature_k:g} K"
+    )
+
+
+def of_classical_gas(top: Top, temperature_k: float) -> list[LeftOut]:
+    """What a classical gas of rigid molecules leaves out, as parts of Q in percent, largest first."""
+    from rotor.thermo.classical_limit import classical_limit
+
+    limit = classical_limit(top)
+    quantum, distortion = abs(limit.a) / temperature_k, abs(limit.d) * temperature_k
+    return _largest_first(
+        [
+            LeftOut("quantum corrections", 100 * quantum, "%", f"a/T of ln Q at {temperature_k:g} K"),
+            LeftOut("centrifugal distortion", 100 * distortion, "%", f"d T of ln Q at {temperature_k:g} K"),
+        ]
+    )
+
+
+def of_fluid() -> list[LeftOut]:
+    """What a box of rigid classical molecules leaves out; of these no size is estimated."""
+    return [
+        LeftOut("quantum mechanics of nuclei", None, "", "molecules are classical"),
+        LeftOut("vibration", None, "", "molecules are rigid"),
+        LeftOut("finite box", None, "", "correlations beyond half of its edge"),
+        LeftOut("finite step", None, "", "halve numerics.step and compare"),
+    ]

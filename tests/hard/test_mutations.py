@@ -1,0 +1,27 @@
+"""Every safeguard of mutations.py is missed by its test when it is taken away."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from pathlib import Path
+
+import pytest
+
+_spec = importlib.util.spec_from_file_location("mutations", Path(__file__).with_name("mutations.py"))
+mutations = importlib.util.module_from_spec(_spec)
+sys.modules["mutations"] = mutations  # dataclasses look their module up
+_spec.loader.exec_module(mutations)
+
+
+@pytest.fixture(scope="module")
+def copy(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("package")
+    mutations.copy_of_package(folder)
+    return folder
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("mutation", mutations.MUTATIONS, ids=lambda one: f"case {one.case}")
+def test_a_safeguard_is_missed(mutation, copy):
+    assert mutations.goes_red(mutation, copy)
