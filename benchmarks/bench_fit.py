@@ -17,8 +17,9 @@ from typing import Any
 import numpy as np
 
 from rotor.fit.assignment import Assignments, assignments
-from rotor.fit.fit import Fit, FitOptions, _labels, _Search, fit_lines
+from rotor.fit.fit import Fit, FitOptions, _labels, fit_lines
 from rotor.fit.parameters import Parameters, parameters
+from rotor.fit.search import Search
 from rotor.quantum.labelled import LevelModel, level_model
 from rotor.quantum.solve import solve_levels
 from rotor.statistics.least_squares import _Linear, _State
@@ -56,7 +57,7 @@ def iteration_ms(lines: Assignments, free: Parameters, model: LevelModel, repeat
     """The fastest of some iterations, processor time."""
     _, upper, lower = _labels(lines)
     used = np.ones(len(lines), dtype=bool)
-    search = _Search(lines, model, free, FitOptions(), upper, lower, lines.error_mhz, used)
+    search = Search(lines, model, free, FitOptions(), upper, lower, lines.error_mhz, used)
 
     def one() -> None:
         state = _State.at(free.start, *search.evaluate(free.start))

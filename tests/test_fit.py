@@ -7,10 +7,11 @@ import pytest
 
 from rotor.fit.assignment import assignments, duplicates, merged
 from rotor.fit.choose import bootstrap, chi_squared, choose_constants, promised, suggest_lines, try_constants
-from rotor.fit.fit import FitOptions, fit_lines, robust
+from rotor.fit.fit import FitOptions, fit_lines
 from rotor.fit.parameters import parameters, with_names
 from rotor.fit.publication import publication_table, value_text
 from rotor.fit.report import decisive, report_text
+from rotor.fit.search import robust
 from rotor.formats.assigned_lines import read_assigned_lines
 from rotor.formats.spcat.cat import read_cat
 from rotor.quantum.solve import solve_levels

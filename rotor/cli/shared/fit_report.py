@@ -1,0 +1,169 @@
+"""The record of a fit in JSON, and its tables on a terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from rotor.cli.shared.output import (
+    Table,
+)
+
+if TYPE_CHECKING:
+    from rotor.fit.assignment import Assignments
+    from rotor.fit.choose import Suggestion, Trial
+    from rotor.fit.fit import Fit, FitOptions
+    from rotor.formats.spcat.fit_input import SpfitInput
+    from rotor.tops.constants import Constants
+
+
+@dataclass(frozen=True)
+class Request:
+    """What is to be fitted, from either kind of input."""
+
+    lines: Assignments
+    constants: Constants | None
+    parameters: Any
+    options: FitOptions
+    title: str
+    start: str = ""
+    spfit: SpfitInput | None = None
+    notes: list[str] = field(default_factory=list)
+
+
+def record(
+    request: Request,
+    fit: Fit,
+    command_line: str,
+    steps: Sequence[Trial],
+    trials: Sequence[Trial],
+    suggestions: Sequence[Suggestion],
+    spread: Sequence[float],
+) -> dict[str, Any]:
+    """Everything about a fit, by the keys of docs/command_line.md."""
+    import rotor
+
+    statistics = fit.statistics
+    return {
+        "rotor_version": rotor.__version__,
+        "command": command_line,
+        "title": request.title,
+        "converged": fit.converged,
+        "reason": fit.reason,
+        "line_count": len(fit.lines),
+        "lines_used": int(fit.used.sum()),
+        "frequencies": len(fit.groups),
+        "weighted_rms": fit.weighted_rms,
+        "reduced_chi": fit.reduced_chi,
+        "rms_mhz": fit.rms_mhz(),
+        "rms_cm": fit.rms_mhz(wavenumber=True),
+        "degrees_of_freedom": fit.degrees_of_freedom,
+        "condition": statistics.condition,
+        "iterations": len(fit.minimum.iterations),
+        **_constants_record(fit.constants),
+        "parameters": [
+            {"name": n, "value": v, "error": e, "scaled_error": s, "start": b}
+            for n, v, e, s, b in zip(
+                fit.parameters.names, fit.values, fit.errors, fit.scaled_errors, fit.parameters.start, strict=True
+            )
+        ],
+        "bootstrap_errors": list(spread) or None,
+        "correlations": statistics.correlations,
+        "undetermined": [one.text for one in statistics.undetermined],
+        "changed_states": list(fit.changed_states),
+        "notes": [*request.notes, *fit.notes],
+        "chosen": [_trial_record(one) for one in steps],
+        "trials": [_trial_record(one) for one in trials],
+        "suggestions": [vars(one) for one in suggestions],
+        "lines": _line_records(fit),
+    }
+
+
+def _constants_record(constants: Constants | None) -> dict[str, Any]:
+    names = ("kind", "reduction", "representation", "constants_mhz", "uncertainties_mhz")
+    if constants is None:
+        return dict.fromkeys(names)
+    values = (
+        constants.kind,
+        constants.reduction,
+        constants.representation,
+        dict(constants.values),
+        dict(constants.uncertainties),
+    )
+    return dict(zip(names, values, strict=True))
+
+
+def _trial_record(trial: Trial) -> dict[str, Any]:
+    return {
+        "name": trial.name,
+        "added": trial.added,
+        "f": trial.f_ratio,
+        "chance": trial.chance,
+        "aicc": trial.aicc,
+        "aicc_before": trial.aicc_before,
+        "cross_validated_rms": trial.cross_validated,
+        "weighted_rms": trial.fit.weighted_rms,
+        "better": trial.better,
+    }
+
+
+def _line_records(fit: Fit) -> list[dict[str, Any]]:
+    lines = fit.lines
+    leverage = dict(zip(fit.groups.tolist(), fit.statistics.leverages.tolist(), strict=False))
+    return [
+        {
+            "upper": lines.upper[i],
+            "lower": lines.lower[i],
+            "frequency_mhz": lines.frequency_mhz[i],
+            "error_mhz": lines.error_mhz[i],
+            "calculated_mhz": fit.calculated_mhz[i],
+            "difference_mhz": fit.difference_mhz[i],
+            "calculated_error_mhz": fit.calculated_errors_mhz[i],
+            "blend": lines.blend[i],
+            "used": bool(fit.used[i]),
+            "leverage": leverage.get(i),
+        }
+        for i in range(len(lines))
+    ]
+
+
+def parameter_table(fit: Fit, spread: Sequence[float]) -> Table:
+    from rotor.fit.publication import value_text
+
+    columns = ["parameter", "value (MHz)", "error", "from scatter", *(["bootstrap"] if spread else [])]
+    rows = []
+    for i, name in enumerate(fit.parameters.names):
+        error = float(fit.errors[i])
+        text = (
+            value_text(float(fit.values[i]), error) if error < float("inf") else f"{fit.values[i]!r} (not determined)"
+        )
+        numbers = [f"{error:.3g}", f"{float(fit.scaled_errors[i]):.3g}", *([f"{spread[i]:.3g}"] if spread else [])]
+        rows.append([name, text, *numbers])
+    return Table("", columns, rows, frozenset({"parameter"}))
+
+
+def trial_table(title: str, trials: Sequence[Trial]) -> Table:
+    columns = ["constant", "step", "F", "by chance", "AICc", "from", "left-one-out rms", "weighted rms", "better"]
+    rows = [
+        [
+            one.name, "added" if one.added else "left out", f"{one.f_ratio:.3g}", f"{one.chance:.2g}", f"{one.aicc:.1f}",
+            f"{one.aicc_before:.1f}", f"{one.cross_validated:.4g}", f"{one.fit.weighted_rms:.4g}", "yes" if one.better else "no",
+        ]
+        for one in trials
+    ]  # fmt: skip
+    return Table(title, columns, rows, frozenset({"constant", "step"}))
+
+
+def suggestion_table(fit: Fit, suggestions: Sequence[Suggestion]) -> Table:
+    columns = ["upper - lower", "frequency (MHz)", "error", "error of the constant, after/before"]
+    rows = [
+        [
+            f"{' '.join(map(str, one.upper))} - {' '.join(map(str, one.lower))}",
+            f"{one.frequency_mhz:.4f}",
+            f"{one.error_mhz:.4f}",
+            f"{one.error_ratio:.4f}",
+        ]
+        for one in suggestions
+    ]
+    return Table("lines that would help most", columns, rows, frozenset({"upper - lower"}))

@@ -1,0 +1,276 @@
+"""The search of a fit: weighted residuals and their derivatives for any constants, blends, robust losses, far-off lines, stages.
+
+Levels keep their label by block and rank, so that no iteration reassigns a line.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor.arrays import Floats, Ints
+from rotor.fit.assignment import Assignments
+from rotor.fit.parameters import Parameters
+from rotor.quantum.labelled import LevelModel
+from rotor.statistics.least_squares import EXHAUSTED, INTERRUPTED, Minimum, Progress, minimise
+
+LOSSES = ("squares", "huber", "cauchy")
+POOR_RMS = 10.0  # weighted rms above which the lines are not described, unless the caller says otherwise
+_HUBER, _CAUCHY = 1.345, 2.385  # σ at which a loss bends: 95 % efficiency for normal errors
+_CANCELLED = 1e-12  # of the level derivatives: what is left of differences below it is round-off
+_REJECTIONS = 20
+_STAGES = (0.1, 0.2, 0.35, 0.5, 0.7, 0.85)  # shares of the lines, in order of J, of a search that begins with low J
+_ROUGH = 10.0  # standard errors within which a stage has converged
+_FIRST_ITERATIONS = 12  # of a direct search, after which it must have made way
+_WAY = 0.01  # of the weighted rms at the start, below which it has
+_AT_ZERO_MHZ = 1e-30  # how far a constant that starts at 0 may move in these stages
+
+
+@dataclass(frozen=True)
+class FitOptions:
+    """How a fit is done.
+
+    reject_above : lines with |obs - calc| above so many errors do not count; they are reported. None: every line counts
+    loss : "squares", or "huber" or "cauchy", whose weight falls for lines beyond 1.3 or 2.4 errors
+    default_error_mhz : of lines whose file gives 0; such lines are left out, and reported, where it is None
+    poor_rms : weighted rms above which the fit has failed
+    tolerance, most_iterations : of the search, see `rotor.statistics.least_squares.minimise`
+    kmax : cut of the basis of an asymmetric top, as SPFIT's KNMAX; None for the whole basis
+    """
+
+    reject_above: float | None = None
+    loss: str = "squares"
+    default_error_mhz: float | None = None
+    poor_rms: float = POOR_RMS
+    tolerance: float = 1e-4
+    most_iterations: int = 100
+    kmax: int | None = None
+
+    def __post_init__(self) -> None:
+        if self.loss not in LOSSES:
+            raise ValueError(f"loss {self.loss!r}: one of {', '.join(LOSSES)} is needed")
+        for name in ("reject_above", "default_error_mhz", "poor_rms", "tolerance"):
+            value = getattr(self, name)
+            if value is not None and not (np.isfinite(value) and value > 0):
+                raise ValueError(f"{name} = {value!r}: a finite number above 0 is needed")
+
+
+def robust(residuals: Floats, loss: str) -> tuple[Floats, Floats]:
+    """sign(r) √ρ(r²) and its derivative; ρ = r² for "squares".
+
+    Huber: r² up to c, then 2 c |r| - c². Cauchy: c² ln(1 + r²/c²). Source: P. J. Huber, Robust Statistics (1981).
+    """
+    r, size = residuals, np.abs(residuals)
+    if loss == "huber":
+        far = size > _HUBER
+        root = np.sqrt(np.where(far, 2 * _HUBER * size - _HUBER**2, r**2))
+        slope = np.where(far, _HUBER / np.where(far, root, 1.0), 1.0)
+        return np.sign(r) * root, slope
+    if loss == "cauchy":
+        root = _CAUCHY * np.sqrt(np.log1p((r / _CAUCHY) ** 2))
+        near = size < 1e-6
+        slope = np.where(near, 1.0, size / (1 + (r / _CAUCHY) ** 2) / np.where(near, 1.0, root))
+        return np.sign(r) * root, slope
+    return residuals, np.ones_like(residuals)
+
+
+@dataclass(frozen=True, eq=False)
+class Grouping:
+    """The measured frequencies that count: for each the position of its first line; order, starts, shares: how blends add.
+
+    plain : no blend among them; blended, members, bounds : which of them are blends, the places of their lines in `order`, and where
+    each begins among these
+    """
+
+    first: Ints
+    order: Ints
+    starts: Ints
+    shares: Floats
+    plain: bool
+    blended: Ints
+    members: Ints
+    bounds: Ints
+
+    @classmethod
+    def of(cls, lines: Assignments, used: NDArray[np.bool_]) -> Grouping:
+        rows = np.flatnonzero(used)
+        order = rows[np.argsort(lines.blend[rows], kind="stable")]
+        blend = lines.blend[order]
+        starts = np.flatnonzero(np.concatenate(([True], np.diff(blend) != 0))) if len(order) else np.zeros(0, np.int64)
+        weights = np.where(lines.weight[order] > 0, lines.weight[order], 0.0)
+        totals = np.add.reduceat(weights, starts) if len(starts) else np.zeros(0)
+        counts = np.diff(np.append(starts, len(order)))
+        each = np.repeat(np.arange(len(starts)), counts)
+        equal = 1.0 / counts[each] if len(order) else weights
+        shares = np.where(totals[each] > 0, weights / np.where(totals[each] > 0, totals[each], 1.0), equal)
+        blended = np.flatnonzero(counts > 1)
+        bounds = np.concatenate([[0], np.cumsum(counts[blended])[:-1]]).astype(np.int64)
+        members = np.flatnonzero(np.isin(each, blended))
+        return cls(order[starts], order, starts, shares, len(blended) == 0, blended, members, bounds)
+
+    def mean(self, values: Floats) -> Floats:
+        """The weighted mean over each blend of values (lines, ...)."""
+        out = values[self.first]
+        if not self.plain:
+            shares = self.shares[self.members].reshape(-1, *[1] * (values.ndim - 1))
+            out[self.blended] = np.add.reduceat(values[self.order[self.members]] * shares, self.bounds, axis=0)
+        return out
+
+    def spread_back(self, means: Floats, values: Floats) -> Floats:
+        """Values (lines,) with those of a blend replaced by its mean."""
+        out = values.copy()
+        out[self.order] = np.repeat(means, np.diff(np.append(self.starts, len(self.order))))
+        return out
+
+
+@dataclass(frozen=True, eq=False)
+class Search:
+    """What is evaluated at each point."""
+
+    lines: Assignments
+    model: LevelModel
+    parameters: Parameters
+    options: FitOptions
+    upper: Ints
+    lower: Ints
+    sigma: Floats
+    used: NDArray[np.bool_]
+
+    def lines_of(self, values: Floats) -> tuple[Floats, Floats, Floats]:
+        """Calculated lines (lines,), derivatives by the parameters (lines, n), and of the levels (levels, n)."""
+        energies, slopes = self.model.levels(self.parameters.constants_of(values))
+        slopes = slopes @ self.parameters.matrix
+        derivatives = slopes[self.upper]
+        derivatives -= slopes[self.lower]
+        return energies[self.upper] - energies[self.lower], derivatives, slopes
+
+    @property
+    def grouping(self) -> Grouping:
+        return Grouping.of(self.lines, self.used)
+
+    def evaluate(self, values: Floats) -> tuple[Floats, Floats]:
+        """Weighted residuals, those of a-priori values behind them, and the Jacobian."""
+        return self.bent(*self.weighted(values))
+
+    def weighted(self, values: Floats) -> tuple[Floats, Floats]:
+        calculated, jacobian, _ = self.lines_of(values)
+        group = self.group
+        sigma = self.sigma[group.first]
+        residuals = (self.lines.frequency_mhz[group.first] - group.mean(calculated)) / sigma
+        rows = group.mean(jacobian)
+        rows /= sigma[:, None]
+        known = np.flatnonzero(np.isfinite(self.parameters.prior))
+        if not len(known):
+            return residuals, rows
+        prior = self.parameters.prior[known]
+        behind = np.zeros((len(known), len(values)))
+        behind[np.arange(len(known)), known] = 1 / prior
+        return np.concatenate([residuals, (self.parameters.start - values)[known] / prior]), np.vstack([rows, behind])
+
+    @property
+    def group(self) -> Grouping:
+        cached: Grouping | None = self.__dict__.get("_group")
+        if cached is None:
+            cached = self.grouping
+            self.__dict__["_group"] = cached
+        return cached
+
+    def bent(self, residuals: Floats, jacobian: Floats) -> tuple[Floats, Floats]:
+        """√ρ(r²) with its sign in place of r for a robust loss, so that Σ ρ is what is made least."""
+        count = len(self.group.first)
+        bent, slope = robust(residuals[:count], self.options.loss)
+        if self.options.loss == "squares":
+            return residuals, jacobian
+        factor = np.concatenate([slope, np.ones(len(residuals) - count)])
+        return np.concatenate([bent, residuals[count:]]), jacobian * factor[:, None]
+
+
+def with_rejection(
+    search: Search, options: FitOptions, progress: Progress | None
+) -> tuple[Search, Minimum, dict[int, str]]:
+    """The search, repeated without the lines that are too far off until the same ones stay out."""
+    minimum = _searched(search, progress)
+    if options.reject_above is None:
+        return search, minimum, {}
+    may = search.used
+    for _ in range(_REJECTIONS):
+        calculated, _, _ = search.lines_of(minimum.parameters)
+        group = Grouping.of(search.lines, may)
+        means = group.spread_back(group.mean(calculated), calculated)
+        far = np.abs(search.lines.frequency_mhz - means) / search.sigma > options.reject_above
+        used = may & ~far
+        if (used == search.used).all():
+            break
+        refuse_too_few(search.lines, used, search.parameters)
+        search = replace(search, used=used)
+        minimum = _continued(minimum, _minimised(search, minimum.parameters, progress, options.most_iterations))
+    out = np.flatnonzero(may & ~search.used)
+    return search, minimum, {int(i): f"more than {options.reject_above:g} errors off" for i in out}
+
+
+def _searched(search: Search, progress: Progress | None) -> Minimum:
+    """A direct search; where it makes no way in its first iterations, or ends far from the lines, one by rising J."""
+    limit = search.options.most_iterations
+    first = _minimised(search, search.parameters.start, progress, min(_FIRST_ITERATIONS, limit))
+    before = first.iterations[0].rms_before if first.iterations else first.rms
+    slow = first.rms > _WAY * before and first.rms > search.options.poor_rms
+    if first.status == EXHAUSTED and limit > _FIRST_ITERATIONS and not slow:
+        first = _continued(first, _minimised(search, first.parameters, progress, limit - len(first.iterations)))
+    poor = first.rms > search.options.poor_rms and first.status != INTERRUPTED
+    return _by_stages(search, first, progress) if poor and len(first.iterations) < limit else first
+
+
+def _continued(first: Minimum, second: Minimum) -> Minimum:
+    """The second search with the iterations of both."""
+    return replace(second, iterations=(*first.iterations, *second.iterations))
+
+
+def _by_stages(search: Search, first: Minimum, progress: Progress | None) -> Minimum:
+    """The better of the minimum found and the one that a search by rising J ends in.
+
+    Low J moves nearly linearly with the constants even when these are 10 % off, and what it fixes carries the next lines: the
+    lines come in by J, a tenth of them first. Until all are in, a constant stays within about itself of its start, and one that
+    starts at 0 stays there.
+    """
+    j = np.maximum(search.lines.upper[:, 0], search.lines.lower[:, 0])
+    last, limit = replace(first, parameters=search.parameters.start), search.options.most_iterations
+    rough = replace(search.options, tolerance=_ROUGH)
+    try:
+        for share in _STAGES:
+            cut = np.quantile(j[search.used], share)
+            soft = np.minimum(search.parameters.prior, np.maximum(np.abs(search.parameters.start), _AT_ZERO_MHZ))
+            stage = replace(
+                search, options=rough, used=search.used & (j <= cut), parameters=replace(search.parameters, prior=soft)
+            )
+            last = _continued(last, _minimised(stage, last.parameters, progress, max(limit - len(last.iterations), 0)))
+        second = _continued(last, _minimised(search, last.parameters, progress, max(limit - len(last.iterations), 0)))
+    except ValueError:  # a stage left the bounds of the model
+        return first
+    return second if second.rms < first.rms else replace(first, iterations=second.iterations)
+
+
+def _minimised(search: Search, start: Floats, progress: Progress | None, limit: int) -> Minimum:
+    return minimise(
+        search.evaluate,
+        start,
+        tolerance=search.options.tolerance,
+        most_iterations=limit,
+        floor=round_off(search, search.lines_of(start)[2]),
+        progress=progress,
+    )
+
+
+def round_off(search: Search, slopes: Floats) -> Floats:
+    """Norms (n,) of weighted columns below which they are what round-off leaves of level derivatives that cancel."""
+    size = (np.abs(slopes[search.upper]) + np.abs(slopes[search.lower])) / search.sigma[:, None]
+    return np.asarray(_CANCELLED * np.sqrt(np.einsum("ij,ij->j", size[search.used], size[search.used])))
+
+
+def refuse_too_few(lines: Assignments, used: NDArray[np.bool_], parameters: Parameters) -> None:
+    count = len(np.unique(lines.blend[used])) + int(np.isfinite(parameters.prior).sum())
+    if count < len(parameters.names):
+        raise ValueError(
+            f"{len(parameters.names)} free constants for {count} measured frequencies; hold some, or add lines"
+        )
