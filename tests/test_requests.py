@@ -22,7 +22,7 @@ from rotor.thermo.classical_gas import GasRequest, answer_gas, settling_times_ps
 from rotor.thermo.request import ThermoRequest, answer_thermo
 from rotor.thermo.thermal_tumble import thermal_tumble
 
-OF_COMMAND = {"rotor_version", "command", "input", "files", "strongest"}  # keys that no request has
+OF_COMMAND = {"rotor_version", "command", "input", "files", "strongest", "patterns"}  # keys that no request has
 
 
 def told(call, *arguments: str) -> dict:
