@@ -72,3 +72,10 @@ def test_lines_of_a_tabulated_molecule_are_between_tabulated_levels(name):
     assert any("left out" in text for text in lines.warnings) == (lines.untrusted > 0)
     given = top.with_constants(top.constants)  # without the table
     assert any("does not converge" in text for text in rotor.line_list(given).warnings)
+
+
+def test_lines_between_tabulated_levels_have_no_error_of_the_constants():
+    lines = rotor.line_list("water", jmax=3)
+    assert lines.error_mhz is None
+    assert lines.errors_from == "none: the energies are from a table"
+    assert rotor.line_list("SO2", jmax=3).errors_from.startswith("covariance of A, B, C")

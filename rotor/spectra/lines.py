@@ -118,7 +118,12 @@ class Lines(TransitionTable):
 
     @property
     def covariance_used(self) -> Covariance | None:
-        """The covariance given, else the top's, else the uncertainties of the constants where these may count as uncorrelated."""
+        """The covariance given, else the top's, else the uncertainties of the constants where these may count as uncorrelated.
+
+        None for a top whose energies are in a table: they do not follow from its constants.
+        """
+        if self.covariance is None and self.top.level_table is not None:
+            return None
         known = self.covariance or self.top.covariance
         if known is None and self.top.independent_errors:
             return Covariance.of_uncertainties(self.top.constants)
@@ -135,8 +140,10 @@ class Lines(TransitionTable):
     @property
     def errors_from(self) -> str | None:
         """Which uncertainties the errors of frequencies come from, None where there are none."""
-        if self.covariance is not None:
-            return f"covariance of {', '.join(self.covariance.names)}"
+        if self.covariance is None and self.top.level_table is not None:
+            return "none: the energies are from a table"
+        if covariance := self.covariance or self.top.covariance:
+            return f"covariance of {', '.join(covariance.names)}"
         known = self.top.constants.uncertainties
         if known and self.covariance_used is None:
             return "none: the constants are from a fit whose correlations are not known"

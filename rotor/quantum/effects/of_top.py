@@ -128,7 +128,7 @@ def effects_of(
     found = spin_effects(top)
     if not found:
         raise ValueError(
-            f"hyperfine structure of {top.name or 'this top'}: no constants of spins are known; give them, such as "
+            f"{top.name or 'this top'}: no constants of spins are known, which hyperfine structure needs; give them, such as "
             "chi_aa(14N)=-4.2 MHz"
         )
     return (*SEMI_RIGID, *state_effects(top), *found, *_method(top, found, method, tolerance_mhz))
