@@ -14,7 +14,7 @@ from rotor.cli.shared.output import plain
 from rotor.cli.shared.workers import Counted, working
 from rotor.formats import read
 from rotor.quantum.fields.stark_request import StarkRequest, answer_stark
-from rotor.spectra.field_lines import field_lines
+from rotor.spectra.fields.lines import field_lines
 
 BARE = ("--constants", "B=6081.492 MHz", "--anisotropy", "4.04")
 SHORT = ("--pulse", "1e13 W/cm2, 50 fs", "--points", "51", "--temperature", "0", "--tolerance", "1e-4")

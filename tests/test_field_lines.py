@@ -8,10 +8,10 @@ from field_matrices import contracted_vectors, rigid, states
 
 from rotor.quantum.effects.stark import stark_map
 from rotor.quantum.fields.deflection import deflection_table
-from rotor.spectra.field_lines import field_lines
-from rotor.spectra.field_spectrum import FieldDistribution, field_spectrum
+from rotor.spectra.fields.lines import field_lines
+from rotor.spectra.fields.spectrum import FieldDistribution, field_spectrum
+from rotor.spectra.fields.stark_coefficients import level_coefficients, line_coefficients
 from rotor.spectra.lines import line_list
-from rotor.spectra.stark_coefficients import level_coefficients, line_coefficients
 from rotor.thermo.field_mixture import field_mixture
 from rotor.tops.top import Top
 from rotor.units import MHZ_PER_DEBYE_KV_PER_CM, MHZ_PER_K

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from rotor import table as tables
     from rotor.quantum.fields.field_map import FieldMap
     from rotor.quantum.fields.stark_request import StarkAnswer
-    from rotor.spectra.field_request import FieldRequest
+    from rotor.spectra.fields.request import FieldRequest
     from rotor.tops.top import Top
 
 EXAMPLES = """\b
@@ -135,7 +135,7 @@ def command(context: typer.Context, given: Input, options: Options, sample: Samp
     """Levels in a static electric field: energies, labels, effective dipoles and cosines of every M; lines and mixtures."""
     from rotor.cli.shared.workers import working
     from rotor.quantum.fields.stark_request import StarkRequest, answer_stark
-    from rotor.spectra.field_request import FieldRequest
+    from rotor.spectra.fields.request import FieldRequest
 
     settings, of_sample = _settings(options), _sample(sample)
     settings["hyperfine"] = given.spin_constants is not None if options.hyperfine is None else options.hyperfine
@@ -160,7 +160,7 @@ def command(context: typer.Context, given: Input, options: Options, sample: Samp
 
 def _made(request: FieldRequest, states: FieldMap, files: Files, executor: Executor | None) -> dict[str, tables.Table]:
     """The tables that files were asked for, by the option."""
-    from rotor.spectra.field_request import MAKERS
+    from rotor.spectra.fields.request import MAKERS
 
     asked = {name for name in MAKERS if f"--{name}" in files.paths}
     asked |= {"lines"} if "--lobes" in files.paths else set()

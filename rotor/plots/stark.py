@@ -10,7 +10,7 @@ import numpy as np
 
 from rotor.plots.picture import DPI, checked_suffix, new_figure, styled
 from rotor.quantum.fields.field_map import FieldMap
-from rotor.spectra.field_lines import FieldLines
+from rotor.spectra.fields.lines import FieldLines
 from rotor.units import MHZ_PER_CM
 from rotor.version import version
 

@@ -19,7 +19,7 @@ from rotor.quantum.fields.field_map import FieldMap
 from rotor.table import Table
 
 if TYPE_CHECKING:
-    from rotor.spectra.field_lines import FieldLines
+    from rotor.spectra.fields.lines import FieldLines
 
 POWERS = 4
 

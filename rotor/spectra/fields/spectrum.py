@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 
 from rotor.arrays import Floats
 from rotor.checks import require_positive
-from rotor.spectra.field_lines import FieldLines
+from rotor.spectra.fields.lines import FieldLines
 from rotor.spectra.profiles import gaussian, lorentzian
 from rotor.spectra.spectrum import Spectrum
 

@@ -16,7 +16,7 @@ from rotor.thermo.field_mixture import POPULATIONS, field_mixture
 
 if TYPE_CHECKING:
     from rotor.quantum.fields.field_map import FieldMap
-    from rotor.spectra.field_lines import FieldLines
+    from rotor.spectra.fields.lines import FieldLines
     from rotor.spectra.spectrum import Spectrum
 
 SPECTRUM_POINTS = 4001
@@ -44,7 +44,7 @@ class FieldRequest:
     spread: float = 0.0
 
     def __post_init__(self) -> None:
-        from rotor.spectra.field_lines import checked_light
+        from rotor.spectra.fields.lines import checked_light
 
         checked_light(self.light)
         require_positive("temperature_k", self.temperature_k, "K")
@@ -62,7 +62,7 @@ def lines_of(request: FieldRequest, states: FieldMap, executor: Executor | None 
 
 
 def _lines_at(request: FieldRequest, fields: Any, executor: Executor | None) -> FieldLines:
-    from rotor.spectra.field_lines import field_lines
+    from rotor.spectra.fields.lines import field_lines
 
     stark = request.stark
     if stark.hyperfine:
@@ -86,7 +86,7 @@ def _lines_at(request: FieldRequest, fields: Any, executor: Executor | None) -> 
 
 def spectrum_of(request: FieldRequest, states: FieldMap, executor: Executor | None = None) -> Spectrum:
     """The cross section at the highest field, every line smeared by the spread of the field."""
-    from rotor.spectra.field_spectrum import FieldDistribution, field_spectrum
+    from rotor.spectra.fields.spectrum import FieldDistribution, field_spectrum
 
     mean = float(states.fields[np.argmax(np.abs(states.fields))])
     deviation = request.spread * abs(mean)
@@ -114,7 +114,7 @@ def _around(lines: FieldLines, linewidth_mhz: float) -> tuple[float, float]:
 
 def coefficients_of(request: FieldRequest, states: FieldMap, executor: Executor | None = None) -> Table:
     """Stark coefficients of the states, or of the lines between the two levels of `line`."""
-    from rotor.spectra.stark_coefficients import level_coefficients, line_coefficients
+    from rotor.spectra.fields.stark_coefficients import level_coefficients, line_coefficients
 
     if request.line is None:
         return level_coefficients(states)

@@ -1,0 +1,1 @@
+"""Spectra of molecules in a static field: lines with M, spectra over a sample, Stark coefficients."""
