@@ -14,7 +14,8 @@ from pathlib import Path
 import numpy as np
 
 import rotor
-from rotor.fit.choose import Trial, aicc, choose_constants
+from rotor.fit.choose import Trial, choose_constants
+from rotor.fit.criteria import aicc
 from rotor.fit.fit import Fit, FitOptions
 from rotor.fit.parameters import with_names
 from rotor.formats.assigned_lines import QUANTA, read_assigned_lines

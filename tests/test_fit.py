@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from rotor.fit.assignment import assignments, duplicates, merged
-from rotor.fit.choose import bootstrap, chi_squared, choose_constants, promised, suggest_lines, try_constants
+from rotor.fit.choose import bootstrap, choose_constants, promised, suggest_lines, try_constants
+from rotor.fit.criteria import chi_squared
 from rotor.fit.fit import FitOptions, fit_lines
 from rotor.fit.parameters import parameters, with_names
 from rotor.fit.publication import publication_table, value_text
