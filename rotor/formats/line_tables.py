@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from rotor.formats.atomic_write import atomic_path
 from rotor.formats.provenance import record_of, write_beside
-from rotor.formats.spcat.cat import format_lines, write_cat
+from rotor.formats.spcat.cat import format_lines, load_compiled, write_cat
 from rotor.formats.spcat.catalogue import Catalogue, catalogue_of
 from rotor.formats.spcat.fields import BLANK
 from rotor.spectra.lines import Lines
@@ -98,6 +98,7 @@ def write_read_catalogue(lines: Catalogue, path: str | os.PathLike[str], setting
 def _write_in_pieces(lines: Lines, path: str | os.PathLike[str], tag: int) -> None:
     """The 80-column file of a long list: pieces made side by side on all cores and written in order."""
     _ = lines.partition, lines.spread  # made once, before the pieces ask for them
+    load_compiled(len(lines))
 
     def text(start: int) -> bytes:
         return format_lines(catalogue(lines.where(slice(start, start + PIECE)), tag))

@@ -176,7 +176,7 @@ def _chosen(
     """
     needed = np.full(len(levels), -np.inf)  # of ν S, for a line with this lower state
     if cut is not None:
-        with np.errstate(divide="ignore"):
+        with np.errstate(divide="ignore", over="ignore"):  # of no population: a line with that state reaches no cut
             needed = cut.least / cut.population
     counts = {} if most is None else _reaching(levels, needed, most)
     pieces = []
