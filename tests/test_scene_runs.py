@@ -326,7 +326,7 @@ HEAVY = ("rotor.fluid", "rotor.alignment", "rotor.classical", "rotor.quantum.eff
 LOADED = {  # of HEAVY, what a kind has a use for
     "spectrum": {"rotor.spectra", "rotor.thermo.functions"},
     "levels": set(),
-    "stark": {"rotor.quantum.effects.stark", "rotor.quantum.spins.blocks"},  # lines in a field know blocks with spins
+    "stark": {"rotor.quantum.effects.stark"},
     "thermo": {"rotor.thermo.functions"},
     "tumble": {"rotor.classical", "numba"},
 }  # fmt: skip

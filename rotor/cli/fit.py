@@ -13,6 +13,7 @@ import typer
 
 from rotor.checks import require_whole
 from rotor.cli.shared import inputs
+from rotor.cli.shared.fit_report import Request, parameter_table, record, suggestion_table, trial_table
 from rotor.cli.shared.inputs import json_option
 from rotor.cli.shared.options import argument, file_option, grouped, option
 from rotor.cli.shared.output import (
@@ -31,8 +32,6 @@ if TYPE_CHECKING:
     from rotor.fit.choose import Suggestion, Trial
     from rotor.fit.fit import Fit, FitOptions
     from rotor.statistics.least_squares import Iteration
-
-from rotor.cli.shared.fit_report import Request, parameter_table, record, suggestion_table, trial_table
 
 EXAMPLES = """\b
 Examples:

@@ -11,9 +11,8 @@ import numpy as np
 from rotor.alignment.align import AlignmentTrace
 from rotor.alignment.pulse import Kick
 from rotor.arrays import Floats
-from rotor.plots.picture import DPI, checked_suffix, new_figure, styled
+from rotor.plots.picture import checked_suffix, joined, new_figure, save_described, styled
 from rotor.plots.stark import COLOURS
-from rotor.version import version
 
 SIZE_INCHES = (7.2, 4.6)
 NAMES = {"cos2theta": "⟨cos²θ⟩", "costheta": "⟨cosθ⟩", "cos2theta_2d": "⟨cos²θ₂D⟩"}
@@ -63,10 +62,9 @@ def plot_alignment(
     ValueError
         For a trace of one time, and for a suffix that is no picture.
     """
-    suffix = checked_suffix(path)
+    checked_suffix(path)
     figure = alignment_figure(trace, classical=classical, title=title)
-    with styled():
-        figure.savefig(path, dpi=DPI, metadata=_metadata(suffix, trace, title.replace("$", ""), provenance or {}))
+    save_described(figure, path, title, joined(provenance, trace.provenance))
 
 
 def _pulses(axes: Any, trace: AlignmentTrace) -> None:
@@ -99,14 +97,3 @@ def _cosines(axes: Any, trace: AlignmentTrace, classical: Mapping[str, Floats]) 
     axes.set_xlim(trace.t_ps[0], trace.t_ps[-1])
     if len(trace.cosines) > 1 or classical:
         axes.legend(frameon=False, fontsize=8)
-
-
-def _metadata(suffix: str, trace: AlignmentTrace, title: str, more: Mapping[str, Any]) -> dict[str, Any]:
-    """Provenance by the keys that each format has; no date, so that the same picture is the same file."""
-    description = "; ".join(f"{name}: {value}" for name, value in {**more, **trace.provenance}.items())
-    program = f"rotor {version()}"
-    if suffix == ".png":
-        return {"Software": program, "Title": title, "Description": description}
-    if suffix == ".pdf":
-        return {"Creator": program, "Title": title, "Subject": description, "CreationDate": None}
-    return {"Creator": program, "Title": title, "Description": description, "Date": None}

@@ -81,17 +81,47 @@ def save(figure: Any, path: str | os.PathLike[str], title: str, facts: Mapping[s
     ValueError
         For a suffix that is no picture.
     """
-    suffix, plain = checked_suffix(path), title.replace("$", "")
-    text = json.dumps(dict(facts), ensure_ascii=False, default=str)
-    program = f"rotor {version()}"
+    save_described(figure, path, title, json.dumps(dict(facts), ensure_ascii=False, default=str))
+
+
+def save_described(figure: Any, path: str | os.PathLike[str], title: str, description: str) -> None:
+    """Write a figure with its title and a text of what it shows, by the keys that each format has.
+
+    Parameters
+    ----------
+    figure : matplotlib.figure.Figure
+        What is written.
+    path : path
+        A .png, .pdf or .svg file.
+    title : str
+        Dollar signs of formulas are left out of the metadata.
+    description : str
+        What the metadata says of the picture.
+
+    Raises
+    ------
+    ValueError
+        For a suffix that is no picture.
+    """
+    suffix, plain, program = checked_suffix(path), title.replace("$", ""), f"rotor {version()}"
     if suffix == ".png":
-        metadata: dict[str, Any] = {"Software": program, "Title": plain, "Description": text}
+        metadata: dict[str, Any] = {"Software": program, "Title": plain, "Description": description}
     elif suffix == ".pdf":
-        metadata = {"Creator": program, "Title": plain, "Subject": text, "CreationDate": None}
+        metadata = {"Creator": program, "Title": plain, "Subject": description, "CreationDate": None}
     else:
-        metadata = {"Creator": program, "Title": plain, "Description": text, "Date": None}
+        metadata = {"Creator": program, "Title": plain, "Description": description, "Date": None}
     with styled():
         figure.savefig(path, dpi=DPI, metadata=metadata)
+
+
+def joined(*facts: Mapping[str, Any] | None) -> str:
+    """Facts as one text, later ones instead of earlier ones of the same name.
+
+    >>> joined({"command": "a", "jmax": 1}, {"jmax": 2}, None)
+    'command: a; jmax: 2'
+    """
+    every = {name: value for some in facts for name, value in (some or {}).items()}
+    return "; ".join(f"{name}: {value}" for name, value in every.items())
 
 
 def formula_text(formula: str) -> str:

@@ -8,11 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from rotor.plots.picture import DPI, checked_suffix, new_figure, styled
+from rotor.plots.picture import checked_suffix, joined, new_figure, save_described, styled
 from rotor.quantum.fields.field_map import FieldMap
 from rotor.spectra.fields.lines import FieldLines
 from rotor.units import MHZ_PER_CM
-from rotor.version import version
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")  # Okabe and Ito
 SIZE_INCHES = (7.2, 6.4)
@@ -63,10 +62,9 @@ def plot_stark(
     ValueError
         For a map of one field, and for a suffix that is no picture.
     """
-    suffix = checked_suffix(path)
+    checked_suffix(path)
     figure = stark_figure(field_map, title, unit)
-    with styled():
-        figure.savefig(path, dpi=DPI, metadata=_metadata(suffix, field_map, title.replace("$", ""), provenance or {}))
+    save_described(figure, path, title, joined(provenance, field_map.provenance))
 
 
 def _energies(axes: Any, field_map: FieldMap) -> None:
@@ -118,17 +116,6 @@ def _slopes(axes: Any, field_map: FieldMap, unit: str) -> None:
     axes.set_xlabel(f"field ({unit})")
     name = r"$\mu_{\mathrm{eff}}$ (D)" if field_map.slope_name == "mu_eff_debye" else field_map.slope_name
     axes.set_ylabel(name)
-
-
-def _metadata(suffix: str, field_map: FieldMap | FieldLines, title: str, more: Mapping[str, Any]) -> dict[str, Any]:
-    """Provenance by the keys that each format has; no date, so that the same picture is the same file."""
-    description = "; ".join(f"{name}: {value}" for name, value in {**more, **field_map.provenance}.items())
-    program = f"rotor {version()}"
-    if suffix == ".png":
-        return {"Software": program, "Title": title, "Description": description}
-    if suffix == ".pdf":
-        return {"Creator": program, "Title": title, "Subject": description, "CreationDate": None}
-    return {"Creator": program, "Title": title, "Description": description, "Date": None}
 
 
 def lobes_figure(lines: FieldLines, title: str = "") -> Any:
@@ -189,7 +176,6 @@ def plot_lobes(
     ValueError
         For lines at one field, and for a suffix that is no picture.
     """
-    suffix = checked_suffix(path)
+    checked_suffix(path)
     figure = lobes_figure(lines, title)
-    with styled():
-        figure.savefig(path, dpi=DPI, metadata=_metadata(suffix, lines, title, provenance or {}))
+    save_described(figure, path, title, joined(provenance, lines.provenance))

@@ -77,9 +77,9 @@ def level_derivatives(top: Top, levels: Levels, names: Sequence[str] | None = No
     rows = np.arange(len(levels)) if rows is None else np.asarray(rows)
 
     if "f" in levels.quanta:
-        from rotor.quantum.spins import spin_derivatives
+        from rotor.quantum.spins.lines import derivatives
 
-        return spin_derivatives(top, levels, names, np.asarray(rows, dtype=np.int64))
+        return derivatives(top, levels, names, np.asarray(rows, dtype=np.int64))
     if "irrep" in levels.quanta:
         return _of_spherical(top, levels, names, rows)
     if any(isinstance(block, CoupledBlock) for block in levels.blocks):

@@ -25,9 +25,9 @@ def amplitudes(up: AnyBlock, low: AnyBlock, tensors: Tensors) -> Floats:
         return wang_amplitudes(up, low, tensors[0, 0])
     if isinstance(up, CoupledBlock):
         return _of_coupled(up, low, tensors)
-    from rotor.quantum.spins import spin_amplitudes
+    from rotor.quantum.spins import lines
 
-    return spin_amplitudes(up, low, tensors)
+    return lines.amplitudes(up, low, tensors)
 
 
 def _of_coupled(up: CoupledBlock, low: CoupledBlock, tensors: Tensors) -> Floats:
@@ -78,9 +78,9 @@ def twice_total(block: AnyBlock) -> int:
 
 def _connects(up: AnyBlock, low: AnyBlock, tensors: Tensors) -> bool:
     if not isinstance(up, CoupledBlock):
-        from rotor.quantum.spins import spin_blocks_connected
+        from rotor.quantum.spins import lines
 
-        return spin_blocks_connected(up, low, tensors)
+        return lines.connected(up, low, tensors)
     found = ((tensor_between(tensors, p.v, q.v), p, q) for p in up.parts for q in low.parts)
     return any(tensor is not None and tensor.between(p.basis, q.basis) is not None for tensor, p, q in found)
 

@@ -19,7 +19,7 @@ from rotor.quantum.effect import QuantumEffect, k_limits_of
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.levels import Levels, SolvedBlock, weights_of_levels
 from rotor.quantum.spherical_top import DIMENSION, is_cubic, scalar_and_tensor, tensor_eigenvalues
-from rotor.quantum.wang_matrix import JMatrix, block_bands, scalar_energy
+from rotor.quantum.wang_matrix import JMatrix, block_bands, diagonalise, scalar_energy
 from rotor.tops.operators import AXIAL_REPRESENTATION, Operators
 from rotor.tops.spin_weights import SpinWeights
 
@@ -27,8 +27,6 @@ if TYPE_CHECKING:
     from concurrent.futures import Executor
 
     from rotor.tops.top import Top
-
-from rotor.quantum.wang_matrix import diagonalise
 
 
 def hamiltonian(top: Top, effects: Sequence[QuantumEffect] = SEMI_RIGID) -> Operators:

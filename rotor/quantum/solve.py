@@ -20,14 +20,13 @@ from typing import TYPE_CHECKING
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.levels import Levels, SolvedBlock
+from rotor.quantum.rotation import solve_rotation
 from rotor.tops.level_table import LevelTable, tabulated_energies
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
     from rotor.tops.top import Top
-
-from rotor.quantum.rotation import solve_rotation
 
 MOST_LEVELS = 10_000_000  # in one piece: J up to 3161 of an asymmetric top, minutes and gigabytes
 
@@ -80,7 +79,7 @@ def solve_levels(
                 f"{effect.name}: its levels are labelled by M; expected effects of the free molecule, see `rotor.stark_map`"
             )
     if any(effect.spins(top) for effect in effects):
-        from rotor.quantum.spins import spin_levels
+        from rotor.quantum.spins.levels import spin_levels
 
         return spin_levels(top, effects, jmin, jmax, executor)
     found = solve_rotation(top, effects, jmin, jmax, vectors, executor)
@@ -94,7 +93,7 @@ def _with_states(top: Top, effects: Sequence[QuantumEffect]) -> tuple[Top, tuple
         return top, tuple(effects)
     from rotor.quantum.effects.of_top import with_states
 
-    return with_states(top, effects)
+    return with_states(top, top.states, effects)
 
 
 def _is_own(top: Top, effects: tuple[QuantumEffect, ...]) -> bool:

@@ -13,6 +13,7 @@ from rotor.quantum.spins.method import EXACT, TOLERANCE_MHZ, HyperfineMethod
 if TYPE_CHECKING:
     from rotor.quantum.effects.spin_effect import SpinEffect
     from rotor.tops.spin_constants import SpinConstants
+    from rotor.tops.state_constants import StateConstants
     from rotor.tops.top import Top
 
 
@@ -75,24 +76,22 @@ def state_effects(top: Top) -> tuple[QuantumEffect, ...]:
     return (InteractingStates(found.values, found.weights, found.dipoles),)
 
 
-def with_states(top: Top, effects: Sequence[QuantumEffect]) -> tuple[Top, tuple[QuantumEffect, ...]]:
-    """The effects of a calculation, and the top with the spin weights that its own state has among others.
+def with_states(
+    top: Top, states: StateConstants, effects: Sequence[QuantumEffect]
+) -> tuple[Top, tuple[QuantumEffect, ...]]:
+    """The effects of a calculation with the states of a top, and the top with the spin weights that its own state has among them.
 
     Where the effects are the semi-rigid ones, the other states of the top are added; other effects stay as they are given.
     """
     effects = tuple(effects)
-    if top.states is None:
-        return top, effects
     if effects == SEMI_RIGID:
         effects = (*effects, *state_effects(top))
-    weights = top.states.weights.get(0, top.spin_weights)
+    weights = states.weights.get(0, top.spin_weights)
     return replace(top, spin_weights=weights, symmetry_checked=False), effects
 
 
 def has_own_hamiltonian(top: Top, effects: Sequence[QuantumEffect]) -> bool:
-    """Whether the effects are those of the constants of a top and of its states, no more and no other values."""
-    if top.states is None:
-        return tuple(effects) == SEMI_RIGID
+    """Whether the effects are those of the constants of a top and of its further states, no more and no other values."""
     known = dict(state_effects(top)[0].parameters(top))
     rest = [effect for effect in effects if effect not in SEMI_RIGID]
     return len(effects) == len(SEMI_RIGID) + 1 and len(rest) == 1 and dict(rest[0].parameters(top)) == known

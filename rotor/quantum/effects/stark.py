@@ -33,7 +33,6 @@ from rotor.quantum.fields.field_map import (
     field_map,
 )
 from rotor.quantum.fields.space import field_space
-from rotor.quantum.fields.spin_fields import spin_field_space
 from rotor.quantum.spins import scheme_of
 
 if TYPE_CHECKING:
@@ -203,6 +202,8 @@ def map_request(
     contractions = tuple(one for one in (dipole, light) if one is not None)
     space: Callable[[int], FieldSpace] = partial(field_space, top, contractions=contractions)
     if effects:
+        from rotor.quantum.fields.spin_fields import spin_field_space
+
         space = partial(spin_field_space, top, effects=tuple(effects), contractions=contractions)
     return MapRequest(
         space=space,

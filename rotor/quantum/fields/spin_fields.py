@@ -24,9 +24,11 @@ from numpy.typing import NDArray
 from rotor.arrays import Floats, Ints
 from rotor.quantum.fields.blocks import Contraction, FieldBlock, FieldSpace, FreeLevels
 from rotor.quantum.fields.wang_blocks import coloured_components
-from rotor.quantum.spins import scheme_of, spin_amplitudes, spin_levels
+from rotor.quantum.spins import scheme_of
 from rotor.quantum.spins.blocks import SpinBlock, SpinPart, product
 from rotor.quantum.spins.coupling import moment_coefficients, patterns, recoupling
+from rotor.quantum.spins.levels import spin_levels
+from rotor.quantum.spins.lines import amplitudes
 from rotor.quantum.spins.operators import AxialState, CosinesWithN
 from rotor.quantum.tensors import BodyTensor, body_tensor
 from rotor.quantum.wigner import three_j
@@ -196,7 +198,7 @@ class SpinSpace(FieldSpace):
         def make(up: SpinBlock, low: SpinBlock) -> NDArray[Any]:
             if _k_of(up) != _k_of(low):
                 return np.zeros((len(up.energies_mhz), len(low.energies_mhz)))
-            found = spin_amplitudes(up, low, tensors)
+            found = amplitudes(up, low, tensors)
             if _k_of(up) is not None:
                 return found / np.sqrt(2.0) if _k_of(up) else found  # that of one sign of K
             return 1j * found if contraction.rank % 2 else found

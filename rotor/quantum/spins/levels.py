@@ -11,6 +11,7 @@ import numpy as np
 from rotor.arrays import Ints
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.levels import Levels, weights_of_levels
+from rotor.quantum.spins.blocks import Exist, Shared, SpinBlock, plan_of, solve_f
 from rotor.quantum.spins.operators import AxialState
 from rotor.quantum.spins.scheme import scheme_of
 from rotor.quantum.spins.simplify import simplified
@@ -21,7 +22,32 @@ if TYPE_CHECKING:
     from rotor.tops.top import Top
 
 
-from rotor.quantum.spins.blocks import Exist, Shared, SpinBlock, plan_of, solve_f
+def spin_levels(
+    top: Top, effects: tuple[QuantumEffect, ...], jmin: int, jmax: int, executor: Executor | None = None
+) -> Levels:
+    """All levels of a top with spins whose label has N from `jmin` to `jmax`, by (v), n, k or ka and kc, j, f1, ... f.
+
+    Every F that such an N reaches is solved with all its N, so that nothing is left out of a block.
+
+    Parameters
+    ----------
+    top : Top
+        Constants, kind and spin weights.
+    effects : tuple of QuantumEffect
+        What the Hamiltonian consists of, spins among it.
+    jmin, jmax : int
+        Lowest and highest N of the labels.
+    executor : Executor, optional
+        The rotation is spread over it by N.
+
+    Returns
+    -------
+    Levels
+        Energies in MHz; half-integer quantum numbers are doubled.
+    """
+    total = scheme_of(top, effects).total
+    first = max(2 * jmin - total, total % 2)
+    return levels_of_f(top, effects, range(first, 2 * jmax + total + 1, 2), (jmin, jmax), executor)
 
 
 def levels_of_f(
