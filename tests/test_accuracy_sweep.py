@@ -164,7 +164,7 @@ def test_the_error_of_a_gas_falls_with_the_root_of_its_molecules():
 def test_the_step_of_a_fluid_is_of_second_order():
     box = FluidConditions(model="spce", molecules=27, steps=10)
     table = work_precision(FluidScene(conditions=box, numerics=FluidNumerics(cutoff="4.5 Å", electrostatics="ewald")))
-    for of in ("conserved energy, for each degree of freedom", "positions after 48 fs"):
+    for of in ("conserved energy per degree", "positions after 48 fs"):
         found = errors(table, "numerics.step", of)
         assert found["2"] / found["1"] == pytest.approx(4.0, rel=0.15)  # leading term alone
     ewald = list(errors(table, "tolerance of Ewald's sum").values())

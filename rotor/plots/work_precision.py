@@ -12,7 +12,7 @@ from rotor.plots.picture import BLUE, GREY, ORANGE, PALETTE, checked_suffix, new
 
 PANEL_INCHES = (3.6, 2.8)
 LEAST_DRAWN = 1e-17  # an error of 0 is drawn as an open point below all others
-MARKERS = "osD^vP"
+MARKERS = "osD^vP*"  # one more than colours, so that no two curves are alike
 
 
 @dataclass(frozen=True)

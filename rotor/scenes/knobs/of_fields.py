@@ -13,7 +13,7 @@ from rotor.scenes.knobs.knob import Knob, Knobs, Measure, Setting, ladder
 ERRORS = (1e-1, 1e-2, 1e-3, 1e-4, 1e-6, 1e-8, 1e-10)  # of a partition function, relative
 FINEST_SUM = 1e-13
 TOLERANCES_MHZ = (1e3, 1e2, 1e1, 1.0, 1e-1, 1e-2, 1e-4, 1e-6)
-ANY_TOLERANCE_MHZ = 1e12  # of a basis that is to be seen failing
+WORST_MHZ = 1e9  # above any error of a basis
 TOLERANCES = (3e-2, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7)
 FINEST_TOLERANCE = 1e-11
 MORE_J = 6  # in the reference
@@ -60,11 +60,26 @@ def stark(request: Any) -> Knobs:
         against = f"a tolerance of {finest.tolerance_mhz:g} MHz"
         knobs.append(Knob("numerics.tolerance", (measure,), settings, finest, against, answer_stark))
     jmax = int(answer_stark(plain).facts()["jmax"])
-    any_basis = replace(plain, tolerance_mhz=ANY_TOLERANCE_MHZ)
-    basis = ladder(range(request.j_highest + 2, jmax + 1), jmax, lambda one: replace(any_basis, jmax=int(one)))
+    values = range(request.j_highest + 2, jmax + 1)
+    basis = ladder(values, jmax, lambda one: _served(replace(plain, jmax=int(one))))
     against = f"J max {jmax + MORE_J}"
     knobs.append(Knob("numerics.jmax", (measure,), basis, replace(plain, jmax=jmax + MORE_J), against, answer_stark))
     return Knobs(tuple(knobs))
+
+
+def _served(request: Any) -> Any:
+    """The request with the finest tolerance, in decades, that its J max is not refused for: a basis that is to be seen failing."""
+    from rotor.quantum.fields.stark_request import answer_stark
+
+    ends = tuple(dict.fromkeys((min(request.fields_kv_per_cm), max(request.fields_kv_per_cm))))
+    while request.tolerance_mhz < WORST_MHZ:
+        try:
+            answer_stark(replace(request, fields_kv_per_cm=ends))
+        except ValueError:
+            request = replace(request, tolerance_mhz=10.0 * request.tolerance_mhz)
+        else:
+            return request
+    return request
 
 
 def _apart(one: Any, other: Any) -> float:

@@ -187,7 +187,7 @@ def _moved(found: Any, reference: Any) -> float:
 
 def _step(request: FluidRequest) -> Knob:
     measures = (
-        Measure("conserved energy, for each degree of freedom", "K", lambda found, _: conserved_k(found)),
+        Measure("conserved energy per degree", "K", lambda found, _: conserved_k(found)),
         Measure(f"positions after {FOLLOWED_FS:g} fs", "Å", _moved),
     )
     settings = ladder(STEPS_FS, request.settings.step_fs, partial(followed, request))
