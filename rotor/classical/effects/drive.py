@@ -46,4 +46,4 @@ class PeriodicDrive(Torque):
 
     def compiled_form(self) -> TorqueForm:
         """The amplitude with its frequency and phase."""
-        return fixed_form(self.amplitude, self.frame, self.angular_frequency, self.phase)
+        return fixed_form(self.amplitude, self.frame, (self.angular_frequency, self.phase))

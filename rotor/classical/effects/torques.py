@@ -37,9 +37,9 @@ def in_body(vector: ArrayLike, frame: str, attitude: Floats) -> Floats:
     return np.broadcast_to(np.asarray(vector, dtype=np.float64), (*attitude.shape[:-1], 3))
 
 
-def fixed_form(vector: ArrayLike, frame: str, angular_frequency: float, phase: float) -> TorqueForm:
-    """vector cos(angular_frequency t + phase), fixed in the body or in space, for compiled integrators."""
-    return torque_form(SPACE_FIXED if frame == "space" else BODY_FIXED, vector, angular_frequency, phase)
+def fixed_form(vector: ArrayLike, frame: str, swing: tuple[float, float] = (0.0, 0.0)) -> TorqueForm:
+    """vector cos(Ω t + φ), swing = (Ω, φ), fixed in the body or in space, for compiled integrators."""
+    return torque_form(SPACE_FIXED if frame == "space" else BODY_FIXED, vector, swing)
 
 
 def checked_frame(frame: str) -> None:
@@ -85,7 +85,7 @@ class ConstantTorque(Torque):
 
     def compiled_form(self) -> TorqueForm:
         """A vector of frequency 0."""
-        return fixed_form(self.vector, self.frame, 0.0, 0.0)
+        return fixed_form(self.vector, self.frame)
 
 
 @dataclass(frozen=True)

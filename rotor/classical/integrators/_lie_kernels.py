@@ -101,7 +101,7 @@ def _accept(state: Floats, change: Floats) -> None:
 
 
 @njit(cache=True, fastmath={"contract"})
-def _next_factor(error: float, control: Any) -> float:
+def _next_factor(error: float, control: Any) -> Any:
     """By how much to change the step; control: tolerance, SHRINK, GROW, SAFETY, order."""
     _, shrink, grow, safety, order = control
     if error == 0.0:
