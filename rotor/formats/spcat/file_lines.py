@@ -172,17 +172,25 @@ _COLUMNS = ("frequency_mhz", "intensity", "energy_lower_mhz", "g_upper", "upper"
 
 
 def transitions_of(group: Group, levels: Levels) -> Transitions:
-    """The transitions between levels of a group that exist."""
+    """The transitions between levels of a group that exist and have one weight: those between unequal weights the program leaves out."""
     if not (group.effect.moments or group.effect.others):
         none = np.zeros(0, dtype=np.int32)
         return Transitions(np.zeros(0), np.zeros(0), none, none)
     found = all_transitions(levels, dict(group.effect.moments), moments=group.effect.others)
     exists = (levels.weight[found.lower] > 0) & (levels.weight[found.upper] > 0)
+    if not any(state.fold for state in group.states):  # with weights of E species, one that is equal is enough
+        exists &= equally_weighted(levels, found.upper, found.lower)
     if exists.all():
         return found
     return Transitions(
         *(getattr(found, name)[exists] for name in ("frequency_mhz", "strength_debye2", "upper", "lower"))
     )
+
+
+def equally_weighted(levels: Levels, upper: Ints, lower: Ints) -> NDArray[np.bool_]:
+    """Which transitions join levels of one nuclear-spin weight; between others there are none, whatever the dipole is."""
+    weight = levels.weight // levels.components
+    return np.asarray(weight[upper] == weight[lower])
 
 
 LEAST_MHZ = 0.00005  # a line that would print as 0.0000 is not in the program's files
