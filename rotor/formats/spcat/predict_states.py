@@ -83,7 +83,7 @@ def predicted(
     q = summed_q(groups, request.temperature_k).q if own_q else request.qrot
     groups = _with_levels(groups, request)
     solved = [(group, group.levels(f_range(group, request))) for group in groups]
-    transitions = [transitions_of(group, levels) for group, levels in solved]
+    transitions = [transitions_of(group, levels, request, q) for group, levels in solved]
     factor, names = variance_factor(parameters), line_names(parameters)
     spreads = [level_spreads(group, levels, names, factor) for group, levels in solved]
     pieces = [
