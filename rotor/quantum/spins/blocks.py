@@ -13,7 +13,7 @@ first, and among the levels of one sub-block Ka rises with energy.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum.effect import QuantumEffect
-from rotor.quantum.spins.coupling import coefficients, n_dot_s, patterns, recoupling
+from rotor.quantum.spins.coupling import coefficients, n_dot_s, patterns, recoupling, stacks
 from rotor.quantum.spins.method import FIRST_ORDER, Used
 from rotor.quantum.spins.operators import AxialState
 from rotor.quantum.spins.rotor import (
@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from rotor.tops.top import Top
 
 
+_FEW = 100  # patterns of an F; of more the coefficients are made when they are needed
 _AT_A_TIME = 1000  # entries of a table of shares that are looked at together
 Exist = Callable[[Ints], NDArray[np.bool_]]
 
@@ -205,14 +206,38 @@ def solve_f(plan: Plan, twice_f: int, exist: Exist | None = None) -> list[SpinBl
     where, first = np.unique(np.column_stack([every[:, 0] // 2, scheme.classes(every)]), axis=0, return_index=True)
     stops = [*first[1:].tolist(), len(every)]
     rows = {tuple(own): slice(a, b) for own, a, b in zip(where.tolist(), first.tolist(), stops, strict=True)}
-    acting = {channel for operators in plan.operators.values() for channel in operators}
-    known = {channel: coefficients_of(scheme, channel, every) for channel in acting}
+    known = plan.shared.cache.pop(("coupling", twice_f), None) or _couplings(plan, {twice_f: [every]})[twice_f]
     out = []
     for family in plan.families:
         members = [(i, rows[place]) for i, own in family if (place := (plan.blocks[i].n, own)) in rows]
         parts = _parts(plan, members)
         if members and (exist is None or exist(_names(parts, every)[0]).any()):
             out.append(_solved(plan, twice_f, every, parts, known))
+    return out
+
+
+def prepare(plan: Plan, every_f: Iterable[int]) -> None:
+    """Coefficients of all channels for many F at once; those of patterns with a total spin are made F by F."""
+    scheme = plan.shared.scheme
+    if scheme.paired:
+        return
+    tables = {f: [scheme.patterns(f)] for f in every_f}
+    plan.shared.cache["patterns"] = {f: own for f, (own,) in tables.items()}
+    if max(map(len, plan.shared.cache["patterns"].values()), default=0) <= _FEW:
+        found = _couplings(plan, tables)
+        plan.shared.cache.update({("coupling", f): own for f, own in found.items()})
+
+
+def _couplings(plan: Plan, tables: dict[int, list[Ints]]) -> dict[int, dict[Channel, Floats]]:
+    """c(p', p) of all channels by F."""
+    acting = {channel for operators in plan.operators.values() for channel in operators}
+    out: dict[int, dict[Channel, Floats]] = {f: {} for f in tables}
+    if plan.shared.scheme.paired:
+        return {f: {c: coefficients_of(plan.shared.scheme, c, own) for c in acting} for f, (own,) in tables.items()}
+    for every, (stack,) in stacks(tables):
+        for channel in acting:
+            for f, found in zip(every, coefficients_of(plan.shared.scheme, channel, stack), strict=True):
+                out[f][channel] = found
     return out
 
 
@@ -269,15 +294,15 @@ def product(left: Floats, right: Floats) -> Floats:
 
 
 def coefficients_of(scheme: Scheme, channel: Channel, every: Ints) -> Floats:
-    """c(p', p) of a channel between all patterns of an F, with its powers of N·S."""
+    """c(p', p) of a channel between all patterns of an F, with its powers of N·S; every: (..., n, columns)."""
     found = _of_exchange(scheme, channel, every) if scheme.paired else _one_by_one(scheme, channel, every)
     for column in scheme.conserved_columns:
-        found = np.where(every[:, None, column] == every[None, :, column], found, 0.0)
+        found = np.where(every[..., :, None, column] == every[..., None, :, column], found, 0.0)
     if not channel.ns:
         return found
-    n = every[:, 0] / 2.0
+    n = every[..., 0] / 2.0
     of_each = (n * (n + 1)) ** channel.n2 * n_dot_s(every, scheme.twice[0]) ** channel.ns
-    return np.asarray(found * (of_each[:, None] + of_each) / 2)
+    return np.asarray(found * (of_each[..., :, None] + of_each[..., None, :]) / 2)
 
 
 def _one_by_one(scheme: Scheme, channel: Channel, every: Ints) -> Floats:
