@@ -44,6 +44,7 @@ VERBS = {  # and what the list of verbs says of each, short enough for 80 column
     "new": "A commented scene file to begin with.",
     "plan": "What a scene will do, its cost, what it omits.",
     "run": "A scene file run; a sweep goes on where it stopped.",
+    "accuracy": "What accuracy costs in a scene: errors and times.",
 }
 FILES = {"run": "run_scene"}  # of verbs that this module has a function for
 COMPLETION = "_ROTOR_COMPLETE"  # set by a shell that asks for completions
