@@ -218,8 +218,8 @@ MUTATIONS = (
     ),
     Mutation(
         29, "rotor/fluid/motion/thermometers.py",
-        "    counts = (degrees.total, degrees.translation, degrees.rotation)\n    energies = (kinetic.total_ev, kinetic.translation_ev, kinetic.rotation_ev)",
-        "    counts = (degrees.total,) * 3\n    energies = (kinetic.total_ev,) * 3",
+        "    counts = (degrees.total, degrees.translation, degrees.rotation)\n",
+        "    counts, kinetic = (degrees.total,) * 3, Kinetic(kinetic.total_ev / 2, kinetic.total_ev / 2)\n",
         "tests/hard/test_safeguards.py::test_rotation_has_a_temperature_of_its_own",
     ),
 )  # fmt: skip
