@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor import units
-from rotor.arrays import Floats, Ints
+from rotor.arrays import Floats, Indices, Ints
 from rotor.formats.spcat.catalogue import Catalogue, catalogue_of
 from rotor.formats.spcat.egy import LevelList
 from rotor.formats.spcat.fields import BLANK
@@ -210,11 +210,12 @@ def _wide_cut(levels: Levels, request: Request, q: float) -> IntensityCut | None
     """A cut that no line of the file is below, None where STR0 is below all numbers."""
     kt, least = request.temperature_k * units.MHZ_PER_K, _NEARLY * 10.0**request.str0
     with np.errstate(over="ignore"):  # far below zero and cold: every line passes
-        population = LGINT_NM2_MHZ / q * (levels.weight // levels.components) * np.exp(-levels.energy_mhz / kt)
+        populated = LGINT_NM2_MHZ / q * (levels.weight // levels.components) * np.exp(-levels.energy_mhz / kt)
+    population = np.asarray(populated, dtype=float)
     return IntensityCut(population, kt, least) if least > 0 and np.isfinite(population).all() else None
 
 
-def equally_weighted(levels: Levels, upper: Ints, lower: Ints) -> NDArray[np.bool_]:
+def equally_weighted(levels: Levels, upper: Indices, lower: Indices) -> NDArray[np.bool_]:
     """Which transitions join levels of one nuclear-spin weight; between others there are none, whatever the dipole is."""
     weight = levels.weight // levels.components
     return np.asarray(weight[upper] == weight[lower])
