@@ -15,7 +15,7 @@ from rotor.arrays import Floats, Ints
 from rotor.quantum.coupled import CoupledBlock, names_of_states, parameter_matrix
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.levels import Levels, SolvedBlock
-from rotor.quantum.spins.blocks import SpinBlock, SpinPart, coefficients_of, labels_of, product
+from rotor.quantum.spins.blocks import SpinBlock, SpinPart, coefficients_of, labels_of, names_of_parts, product
 from rotor.quantum.spins.lines import ParameterOperator
 from rotor.quantum.spins.operators import Scalar
 from rotor.quantum.spins.rotor import Channel
@@ -173,7 +173,9 @@ def _sub_blocks(parts: tuple[SpinPart, ...], size: int) -> Ints:
 
 
 def _namer(parts: tuple[SpinPart, ...], every: Ints) -> Namer:
+    names = names_of_parts(parts, every)
+
     def namer(matrix: Floats, energies: Floats, vectors: Floats) -> Ints:
-        return labels_of(parts, every, vectors)[0]
+        return labels_of(parts, names, vectors)[0]
 
     return namer

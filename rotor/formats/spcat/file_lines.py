@@ -210,8 +210,9 @@ def _wide_cut(levels: Levels, request: Request, q: float) -> IntensityCut | None
     """A cut that no line of the file is below, None where STR0 is below all numbers."""
     kt, least = request.temperature_k * units.MHZ_PER_K, _NEARLY * 10.0**request.str0
     with np.errstate(over="ignore"):  # far below zero and cold: every line passes
-        population = LGINT_NM2_MHZ / q * (levels.weight // levels.components) * np.exp(-levels.energy_mhz / kt)
-    return IntensityCut(np.asarray(population), kt, least) if least > 0 and np.isfinite(population).all() else None
+        populated = LGINT_NM2_MHZ / q * (levels.weight // levels.components) * np.exp(-levels.energy_mhz / kt)
+    population = np.asarray(populated, dtype=float)
+    return IntensityCut(population, kt, least) if least > 0 and np.isfinite(population).all() else None
 
 
 def equally_weighted(levels: Levels, upper: Indices, lower: Indices) -> NDArray[np.bool_]:

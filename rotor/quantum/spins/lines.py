@@ -80,10 +80,13 @@ def _parts_between(
     up: SpinBlock, low: SpinBlock, tensors: Tensors, rank: int, known: dict[tuple[int, int], Floats | None]
 ) -> Iterator[tuple[SpinPart, SpinPart, Floats]]:
     t = _coefficients(up, low, rank) if low.shared.scheme.paired else None
+    by_n: dict[int, list[SpinPart]] = {}
+    for source in low.parts:
+        by_n.setdefault(source.rotor.n, []).append(source)
     for target in up.parts:
         n, number = target.rotor.n, target.number
-        for source in low.parts:
-            if abs(n - source.rotor.n) > rank or (t is not None and not t[target.patterns, source.patterns].any()):
+        for source in (part for near in range(n - rank, n + rank + 1) for part in by_n.get(near, ())):
+            if t is not None and not t[target.patterns, source.patterns].any():
                 continue
             key = (number, source.number)
             element = (
