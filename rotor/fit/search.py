@@ -142,9 +142,16 @@ class Search:
         """Calculated lines (lines,), derivatives by the parameters (lines, n), and of the levels (levels, n)."""
         energies, slopes = self.model.levels(self.parameters.constants_of(values))
         slopes = slopes @ self.parameters.matrix
+        if self.from_zero:  # the place -1 of such lower levels is the last one
+            energies, slopes = np.append(energies, 0.0), np.vstack([slopes, np.zeros(slopes.shape[1])])
         derivatives = slopes[self.upper]
         derivatives -= slopes[self.lower]
         return energies[self.upper] - energies[self.lower], derivatives, slopes
+
+    @property
+    def from_zero(self) -> bool:
+        """Whether a line is an energy from the zero of the Hamiltonian: its lower level has the place -1."""
+        return bool((self.lower < 0).any())
 
     @property
     def grouping(self) -> Grouping:

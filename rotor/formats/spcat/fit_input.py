@@ -110,10 +110,10 @@ def spfit_input(file: ParameterFile, lines: LineList, source: str = "") -> Spfit
 
 
 def _refuse_options(header: Header) -> None:
-    if header.nxpar:
+    if not 0 <= header.nxpar <= header.npar:
         raise ValueError(
-            f"NXPAR = {header.nxpar}: lines with a negative F that leave out the last parameters (hyperfine structure that is not "
-            "resolved) are not supported; set it to 0 and give such lines as blends of their components"
+            f"NXPAR = {header.nxpar}: so many parameters at the end of the list are left out for lines with F below 0; from 0 to "
+            f"NPAR = {header.npar}"
         )
     if not header.errtst > 0:
         raise ValueError(f"ERRTST = {header.errtst:g}: the largest |obs - calc|/error of a line that counts is above 0")
@@ -229,8 +229,8 @@ def fitted_file(asked: SpfitInput, fit: Fit, *, variances: bool) -> ParameterFil
     for parameter, column, ratio in zip(asked.file.parameters, asked.columns, asked.ratios, strict=True):
         value = parameter.value if column < 0 else float(fit.values[column]) * ratio
         error = parameter.error
-        if variances and column >= 0 and not parameter.constrained:
-            error = float(errors[column])
+        if variances and column >= 0:
+            error = float(errors[column]) * abs(ratio)
         made.append(replace(parameter, value=value, error=error))
     rest = correlation_text(fit) if variances else ""
     return replace(asked.file, parameters=tuple(made), rest=rest)

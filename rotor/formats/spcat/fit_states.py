@@ -2,6 +2,11 @@
 
 Every parameter line of the file is one constant, by the name that `file_effect` gives it. States that are connected are solved
 together, F by F, and only those F in which a line has a level. A level is found by the quantum numbers that the file prints for it.
+
+A label with F below 0 is a level of |F| without the last NXPAR parameters of the file, for lines whose hyperfine structure is not
+resolved: E - Σ p ∂E/∂p over them, and no derivative by them. That is what SPFIT does (`getblk`, `dnuadd`, `linein` in H. M. Pickett's
+program): where |F| is below 10 and has no such level, the next F up to 9 are looked through, and F = -1 means minus the sum of
+angular momenta before F, or N.
 """
 
 from __future__ import annotations
@@ -25,6 +30,7 @@ from rotor.quantum.spins.levels import levels_of_f
 from rotor.quantum.unit_blocks import UnitBlocks
 
 _NO_REQUEST = IntensityFile("", Request(), ())
+_HIGHEST_SEARCHED = 9  # F up to which a level with F below 0 is looked for where |F| has none
 _AT_ZERO = 1e-30  # MHz: a free parameter that starts at 0 must not be left out of the Hamiltonian
 
 
@@ -61,11 +67,16 @@ class _Solved:
 
 @dataclass(frozen=True)
 class FileLevels(LevelModel):
-    """Energies of the labelled levels of a file; names: its parameter lines as code#place."""
+    """Energies of the labelled levels of a file; names: its parameter lines as code#place.
+
+    reduced : levels with F below 0. excluded : the parameters that are taken off them
+    """
 
     names: tuple[str, ...]
     count: int
     solved: tuple[_Solved, ...]
+    reduced: Ints
+    excluded: Ints
 
     @classmethod
     def of(cls, file: ParameterFile, labels: Ints) -> FileLevels:
@@ -76,13 +87,17 @@ class FileLevels(LevelModel):
         groups = groups_for_fit(file)
         form, names = format_of(file, groups), line_names(file)
         values = np.array([p.value for p in file.parameters])
-        parts = [part for group in groups if (part := _with_labels(group, form, labels, names, values))]
-        found = np.concatenate([part.rows for part in parts]) if parts else np.zeros(0, np.int64)
-        lost = np.setdiff1d(np.arange(len(labels)), found)
-        if len(lost):
-            first = " ".join(map(str, labels[int(lost[0])].tolist()))
-            raise ValueError(f"there is no level {first} ({', '.join(names_of_quanta(form))}) in this model")
-        return cls(names, len(labels), tuple(parts))
+        reduced = np.flatnonzero(labels[:, -1] < 0) if form.spins else np.zeros(0, np.int64)
+        positive = labels.copy()
+        positive[reduced, -1] = -_spelled_out(labels[reduced], form)
+        parts = _parts(groups, form, positive, names, values)
+        while len(lost := np.setdiff1d(np.arange(len(labels)), _found(parts))):
+            if not np.isin(lost, reduced).all() or (positive[lost, -1] >= _HIGHEST_SEARCHED).any():
+                first = " ".join(map(str, labels[int(lost[0])].tolist()))
+                raise ValueError(f"there is no level {first} ({', '.join(names_of_quanta(form))}) in this model")
+            positive[lost, -1] += 1
+            parts = _parts(groups, form, positive, names, values)
+        return cls(names, len(labels), tuple(parts), reduced, excluded_parameters(file))
 
     def levels(self, values_mhz: Floats) -> tuple[Floats, Floats]:
         """See `LevelModel`."""
@@ -91,7 +106,35 @@ class FileLevels(LevelModel):
             found, derived = part.blocks.levels(values_mhz[part.columns])
             energies[part.rows] = found
             slopes[part.rows[:, None], part.columns] = derived
+        if len(self.reduced):
+            rows, columns = self.reduced[:, None], self.excluded
+            energies[self.reduced] -= slopes[rows, columns] @ values_mhz[columns]
+            slopes[rows, columns] = 0.0
         return energies, slopes
+
+
+def excluded_parameters(file: ParameterFile) -> Ints:
+    """Those of the last NXPAR parameter lines that follow no parameter before them, and what is tied to these."""
+    first = len(file.parameters) - file.header.nxpar
+    leader, leaders = 0, []
+    for place, parameter in enumerate(file.parameters):
+        leader = leader if parameter.constrained else place
+        leaders.append(leader)
+    return np.flatnonzero(np.array(leaders) >= first)
+
+
+def _spelled_out(labels: Ints, form: Format) -> Ints:
+    """F of labels with F below 0, where -1 stands for the sum of angular momenta before it."""
+    before = -labels[:, -2 if form.spins > 1 and not form.aggregate else 0]
+    return np.where((labels[:, -1] == -1) & (before < 0), before, labels[:, -1])
+
+
+def _parts(groups: Sequence[Group], form: Format, labels: Ints, names: Sequence[str], values: Floats) -> list[_Solved]:
+    return [part for group in groups if (part := _with_labels(group, form, labels, names, values))]
+
+
+def _found(parts: Sequence[_Solved]) -> Ints:
+    return np.concatenate([part.rows for part in parts]) if parts else np.zeros(0, np.int64)
 
 
 def _levels(group: Group, angular: Sequence[int]) -> Levels:
