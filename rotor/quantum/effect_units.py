@@ -19,12 +19,12 @@ from rotor.quantum.spins.blocks import SpinBlock, SpinPart, coefficients_of, lab
 from rotor.quantum.spins.lines import ParameterOperator
 from rotor.quantum.spins.operators import Scalar
 from rotor.quantum.spins.rotor import Channel
-from rotor.quantum.unit_blocks import Namer, UnitBlock, UnitBlocks, unit_block
+from rotor.quantum.unit_blocks import Elements, Namer, UnitBlock, UnitBlocks, elements_of, unit_block
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
 
-Units = dict[int, Floats]
+Units = dict[int, Elements]
 
 
 def unit_levels(top: Top, levels: Levels, rows: Ints, names: Sequence[str], values_mhz: Floats) -> UnitBlocks:
@@ -92,14 +92,15 @@ class _Makers:
         return self._coupled(block) if isinstance(block, CoupledBlock) else self._single(block)
 
     def _single(self, block: SolvedBlock) -> UnitBlock:
-        units: Units = {}
+        dense: dict[int, Floats] = {}
         for place, name in enumerate(self._names):
             for effect in self._effects:
                 operators = effect.operators(self._top).get(name)
                 if operators:
                     found = Scalar(tuple(operators.items())).elements(block.basis, block.basis, self._representation)
                     if found is not None:
-                        units[place] = units[place] + found if place in units else found
+                        dense[place] = dense[place] + found if place in dense else found
+        units = {place: elements_of(matrix) for place, matrix in dense.items()}
         return unit_block(units, np.zeros(block.basis.size, dtype=np.int64), _by_rank)
 
     def _coupled(self, block: CoupledBlock) -> UnitBlock:
@@ -107,7 +108,7 @@ class _Makers:
         for place, name in enumerate(self._names):
             found = parameter_matrix(self._top, self._effects, self._representation, block, name)
             if found.any():
-                units[place] = found
+                units[place] = elements_of(found)
         sub_blocks = np.repeat(np.arange(len(block.parts)), [part.basis.size for part in block.parts])
 
         def namer(matrix: Floats, energies: Floats, vectors: Floats) -> Ints:
@@ -138,7 +139,7 @@ class _SpinUnits:
         for place, operator in enumerate(self._operators):
             matrix = self._matrix(operator, parts, block)
             if matrix is not None:
-                units[place] = matrix
+                units[place] = elements_of(matrix)
         return unit_block(units, _sub_blocks(parts, parts[-1].place.stop), _namer(parts, block.patterns))
 
     def _matrix(self, operator: ParameterOperator, parts: tuple[SpinPart, ...], block: SpinBlock) -> Floats | None:

@@ -2,11 +2,7 @@
 
 Every parameter line of the file is one constant, by the name that `file_effect` gives it. States that are connected are solved
 together, F by F, and only those F in which a line has a level. A level is found by the quantum numbers that the file prints for it.
-
-A label with F below 0 is a level of |F| without the last NXPAR parameters of the file, for lines whose hyperfine structure is not
-resolved: E - Σ p ∂E/∂p over them, and no derivative by them. That is what SPFIT does (`getblk`, `dnuadd`, `linein` in H. M. Pickett's
-program): where |F| is below 10 and has no such level, the next F up to 9 are looked through, and F = -1 means minus the sum of
-angular momenta before F, or N.
+Levels of lines whose hyperfine structure is not resolved have F below 0; see `unresolved`.
 """
 
 from __future__ import annotations
@@ -22,6 +18,7 @@ from rotor.formats.spcat.file_model import Group, groups_of
 from rotor.formats.spcat.int_file import IntensityFile, Request
 from rotor.formats.spcat.par import ParameterFile
 from rotor.formats.spcat.predict_states import line_names
+from rotor.formats.spcat.unresolved import HIGHEST_SEARCHED, excluded_parameters, inner_file, refuse_far_f, spelled_out
 from rotor.quantum.effect_units import unit_levels
 from rotor.quantum.labelled import LevelModel
 from rotor.quantum.levels import Levels
@@ -30,7 +27,7 @@ from rotor.quantum.spins.levels import levels_of_f
 from rotor.quantum.unit_blocks import UnitBlocks
 
 _NO_REQUEST = IntensityFile("", Request(), ())
-_HIGHEST_SEARCHED = 9  # F up to which a level with F below 0 is looked for where |F| has none
+_MOST_ELEMENTS = 1e7  # of vectors over all functions of the F that are solved at a time
 _AT_ZERO = 1e-30  # MHz: a free parameter that starts at 0 must not be left out of the Hamiltonian
 
 
@@ -64,12 +61,16 @@ class _Solved:
     columns: Ints
     blocks: UnitBlocks
 
+    def at(self, places: Ints) -> _Solved:
+        """The same for labels that stand at these places of a longer list."""
+        return replace(self, rows=places[self.rows])
+
 
 @dataclass(frozen=True)
 class FileLevels(LevelModel):
     """Energies of the labelled levels of a file; names: its parameter lines as code#place.
 
-    reduced : levels with F below 0. excluded : the parameters that are taken off them
+    reduced : levels with F below 0 whose spins cannot be left out. excluded : the parameters that are taken off them
     """
 
     names: tuple[str, ...]
@@ -85,19 +86,19 @@ class FileLevels(LevelModel):
         Raises ValueError for labels that no level has, with the first of them, and for what does not compute.
         """
         groups = groups_for_fit(file)
-        form, names = format_of(file, groups), line_names(file)
-        values = np.array([p.value for p in file.parameters])
-        reduced = np.flatnonzero(labels[:, -1] < 0) if form.spins else np.zeros(0, np.int64)
-        positive = labels.copy()
-        positive[reduced, -1] = -_spelled_out(labels[reduced], form)
-        parts = _parts(groups, form, positive, names, values)
-        while len(lost := np.setdiff1d(np.arange(len(labels)), _found(parts))):
-            if not np.isin(lost, reduced).all() or (positive[lost, -1] >= _HIGHEST_SEARCHED).any():
-                first = " ".join(map(str, labels[int(lost[0])].tolist()))
-                raise ValueError(f"there is no level {first} ({', '.join(names_of_quanta(form))}) in this model")
-            positive[lost, -1] += 1
-            parts = _parts(groups, form, positive, names, values)
-        return cls(names, len(labels), tuple(parts), reduced, excluded_parameters(file))
+        form = format_of(file, groups)
+        none = np.zeros(0, dtype=np.int64)
+        reduced = np.flatnonzero(labels[:, -1] < 0) if form.spins else none
+        inner = inner_file(file, form) if len(reduced) else None
+        if inner is None:
+            parts = _searched(file, groups, form, labels, reduced)
+            return cls(line_names(file), len(labels), tuple(parts), reduced, excluded_parameters(file))
+        refuse_far_f(labels[reduced], form, names_of_quanta(form), max(sum(group.spins) for group in groups))
+        own = np.flatnonzero(labels[:, -1] >= 0)
+        parts = [part.at(own) for part in _searched(file, groups, form, labels[own], none)] if len(own) else []
+        for part in cls.of(inner.file, labels[reduced][:, : inner.width]).solved:
+            parts.append(replace(part.at(reduced), columns=inner.columns[part.columns]))
+        return cls(line_names(file), len(labels), tuple(parts), none, none)
 
     def levels(self, values_mhz: Floats) -> tuple[Floats, Floats]:
         """See `LevelModel`."""
@@ -113,28 +114,20 @@ class FileLevels(LevelModel):
         return energies, slopes
 
 
-def excluded_parameters(file: ParameterFile) -> Ints:
-    """Those of the last NXPAR parameter lines that follow no parameter before them, and what is tied to these."""
-    first = len(file.parameters) - file.header.nxpar
-    leader, leaders = 0, []
-    for place, parameter in enumerate(file.parameters):
-        leader = leader if parameter.constrained else place
-        leaders.append(leader)
-    return np.flatnonzero(np.array(leaders) >= first)
-
-
-def _spelled_out(labels: Ints, form: Format) -> Ints:
-    """F of labels with F below 0, where -1 stands for the sum of angular momenta before it."""
-    before = -labels[:, -2 if form.spins > 1 and not form.aggregate else 0]
-    return np.where((labels[:, -1] == -1) & (before < 0), before, labels[:, -1])
-
-
-def _parts(groups: Sequence[Group], form: Format, labels: Ints, names: Sequence[str], values: Floats) -> list[_Solved]:
-    return [part for group in groups if (part := _with_labels(group, form, labels, names, values))]
-
-
-def _found(parts: Sequence[_Solved]) -> Ints:
-    return np.concatenate([part.rows for part in parts]) if parts else np.zeros(0, np.int64)
+def _searched(file: ParameterFile, groups: Sequence[Group], form: Format, labels: Ints, reduced: Ints) -> list[_Solved]:
+    """The labels in the levels of the groups; those of `reduced` have F below 0."""
+    positive = labels.copy()
+    positive[reduced, -1] = -spelled_out(labels[reduced], form) if len(reduced) else 0
+    names, values = line_names(file), np.array([p.value for p in file.parameters])
+    while True:
+        parts = [part for group in groups for part in _with_labels(group, form, positive, names, values)]
+        lost = np.setdiff1d(np.arange(len(labels)), np.concatenate([part.rows for part in parts]) if parts else [])
+        if not len(lost):
+            return parts
+        if not np.isin(lost, reduced).all() or (positive[lost, -1] >= HIGHEST_SEARCHED).any():
+            first = " ".join(map(str, labels[int(lost[0])].tolist()))
+            raise ValueError(f"there is no level {first} ({', '.join(names_of_quanta(form))}) in this model")
+        positive[lost, -1] += 1
 
 
 def _levels(group: Group, angular: Sequence[int]) -> Levels:
@@ -145,16 +138,34 @@ def _levels(group: Group, angular: Sequence[int]) -> Levels:
     return solve_rotation(group.top, (group.effect,), min(j), max(j), in_blocks=True)
 
 
-def _with_labels(group: Group, form: Format, labels: Ints, names: Sequence[str], values: Floats) -> _Solved | None:
-    """The labels that lie in the group, found in its levels by the quantum numbers that the file prints; None without any."""
+def _with_labels(group: Group, form: Format, labels: Ints, names: Sequence[str], values: Floats) -> list[_Solved]:
+    """The labels that lie in the group, found in its levels by the quantum numbers that the file prints; some F at a time."""
     here = _of_group(group, form, labels)
     if not len(here):
-        return None
+        return []
     total = labels[here, -1] if form.spins else labels[here, 0]
-    half = sum(group.spins) % 2
-    angular = tuple(sorted({2 * int(f) - half for f in total}))
-    if min(angular) < 0:
+    if (total < 0).any():
         raise ValueError(f"F or J below 0 in the labels {labels[here[int(np.argmin(total))]].tolist()}")
+    twice = 2 * total - sum(group.spins) % 2
+    every = np.unique(twice)
+    size = len(group.states) * int(np.prod([spin + 1 for spin in group.spins]))
+    pieces = np.split(every, np.flatnonzero(np.diff(np.cumsum((size * (every + 1.0)) ** 2) // _MOST_ELEMENTS)) + 1)
+    found = [
+        _of_some_f(group, form, labels, here[np.isin(twice, some)], some.tolist(), names, values) for some in pieces
+    ]
+    return [one for one in found if one is not None]
+
+
+def _of_some_f(
+    group: Group,
+    form: Format,
+    labels: Ints,
+    here: Ints,
+    angular: Sequence[int],
+    names: Sequence[str],
+    values: Floats,
+) -> _Solved | None:
+    """The labels at the places `here` among the levels of some doubled F; None without any."""
     levels = _levels(group, angular)
     rows_by_label: dict[tuple[int, ...], int] = {}
     for negative in (True, False):

@@ -126,8 +126,8 @@ def read_lin(source: str | os.PathLike[str] | bytes, per_state: int = 0) -> Line
 
     As in the field's program a blank line ends the list, unless it stands at the beginning; text behind it is preserved; a
     missing error is 0.01 MHz, a missing weight 1. per_state: how many quantum numbers a state has, for lines that lack some;
-    unless given, as many as in the other lines; more than six take more than twelve fields. Raises ValueError with file, line, column and the rule that is broken; nothing
-    is skipped in silence.
+    unless given, as many as in the other lines; more than six take more than twelve fields. Raises ValueError with file, line,
+    column and the rule that is broken; nothing is skipped in silence.
     """
     lines = read_lines(source)
     first = next((i for i, line in enumerate(lines) if not line.blank), len(lines))
