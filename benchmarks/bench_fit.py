@@ -91,17 +91,23 @@ def one_state() -> list[dict[str, Any]]:
     return rows
 
 
-def iterations(count: int = 500) -> list[dict[str, Any]]:
-    """What is left after each iteration, in standard errors, and the time so far; constants from 3 % off, each by its own."""
-    lines = lines_of(TRUE, count, 30)
-    start = starts(0.03)
-    free = parameters(start, list(TRUE.values))
+def starts(share: float) -> Constants:
+    """The true constants, each off by its own part: all by one factor would be one step."""
+    off = 1 + share * np.random.default_rng(1).normal(size=len(TRUE.values))
+    pairs = zip(TRUE.values.items(), off.tolist(), strict=True)
+    return TRUE.replace(**{name: value * factor for (name, value), factor in pairs})
+
+
+def iterations(count: int = 500, jmax: int = 30, share: float = 0.03) -> list[dict[str, float]]:
+    """What is left after each iteration, in standard errors, and the time so far."""
+    lines, start = lines_of(TRUE, count, jmax), starts(share)
+    free, rows = parameters(start, list(TRUE.values)), list[dict[str, float]]()
 
     def fitted(most: int, tolerance: float = 1e-4) -> Fit:
         return fit_lines(lines, start, free, FitOptions(most_iterations=most, tolerance=tolerance))
 
-    best, rows = fitted(100, 1e-9), []
-    for most in range(1, 10):
+    best = fitted(100, 1e-9)
+    for most in range(1, 20):
         found = fitted(most)
         left = float(np.abs((found.values - best.values) / best.errors).max())
         seconds = fastest(lambda most=most: fitted(most), 3)  # type: ignore[misc]
@@ -109,13 +115,6 @@ def iterations(count: int = 500) -> list[dict[str, Any]]:
         if found.converged:
             break
     return rows
-
-
-def starts(share: float) -> Constants:
-    """The true constants, each off by its own part: all by one factor would be one step."""
-    off = 1 + share * np.random.default_rng(1).normal(size=len(TRUE.values))
-    pairs = zip(TRUE.values.items(), off.tolist(), strict=True)
-    return TRUE.replace(**{name: value * factor for (name, value), factor in pairs})
 
 
 def work_precision(count: int = 500, jmax: int = 30, share: float = 0.03) -> list[dict[str, float]]:
@@ -143,7 +142,7 @@ CURVES = ((500, 30, 0.001), (500, 30, 0.03), (5_000, 60, 0.001))  # lines, J max
 
 
 def picture(path: Path) -> None:
-    """Error against time of the fits of CURVES, a point for each number of iterations that some tolerance ends at."""
+    """Error against time of the fits of CURVES, a point for each iteration until the search ends by itself."""
     from rotor.plots.picture import PALETTE, new_figure, save, styled
 
     with styled():
@@ -151,18 +150,18 @@ def picture(path: Path) -> None:
         axes = figure.add_subplot()
         facts = {}
         for color, (count, jmax, share) in zip(PALETTE, CURVES, strict=False):
-            rows = work_precision(count, jmax, share)
+            rows = iterations(count, jmax, share)
             label = f"{count} lines, J ≤ {jmax}, start {100 * share:g} % off"
             facts[label] = rows
-            ends = {row["iterations"]: row for row in rows}.values()
-            x, y = [1e3 * row["seconds"] for row in ends], [max(row["off_sigma"], 1e-9) for row in ends]
-            axes.loglog(x, y, "o-", color=color, label=label, markersize=3.5)
-            for row, one, other in zip(ends, x, y, strict=True):
+            x, y = [row["ms"] for row in rows], [max(row["off_sigma"], 1e-9) for row in rows]
+            axes.semilogy(x, y, "o-", color=color, label=label, markersize=3.5)
+            for row, one, other in zip(rows, x, y, strict=True):
                 axes.annotate(
                     f"{row['iterations']:g}", (one, other), fontsize=6, xytext=(3, 3), textcoords="offset points"
                 )
         axes.axhline(1.0, color="#555555", linewidth=0.7)
         axes.axhline(1e-4, color="#555555", linewidth=0.7, linestyle="--")
+        axes.set_xlim(left=0)
         axes.set_xlabel("milliseconds of processor time of the whole fit (numbers: iterations)")
         axes.set_ylabel("largest error of 15 constants\n(standard errors)")
         axes.legend(frameon=False)
