@@ -209,7 +209,11 @@ def _notes(file: ParameterFile, options: FitOptions, plain: bool, lines: Assignm
         )
     if file.header.thresh:
         notes.append("THRESH, the first damping, is chosen by the search itself; the result does not depend on it")
-    unresolved = int(((lines.upper[:, -1] < 0) | (lines.lower[:, -1] < 0)).sum()) if lines.names[-1:] == ("f",) else 0
+    unresolved = (
+        int(((lines.upper[:, -1] < 0) | ((lines.lower[:, -1] < 0) & ~lines.from_zero)).sum())
+        if lines.names[-1:] == ("f",)
+        else 0
+    )
     if unresolved or file.header.nxpar:
         notes.append(
             f"{unresolved} lines with F below 0: the last {file.header.nxpar} parameters (NXPAR) do not count for them"

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from rotor.arrays import Floats, Ints
 from rotor.formats.spcat.file_lines import Format, format_of, quanta_of
 from rotor.formats.spcat.file_model import Group, groups_of
 from rotor.formats.spcat.int_file import IntensityFile, Request
+from rotor.formats.spcat.l_doubled import functions_of_l, named_by_l
 from rotor.formats.spcat.par import ParameterFile
 from rotor.formats.spcat.predict_states import line_names
 from rotor.formats.spcat.unresolved import HIGHEST_SEARCHED, excluded_parameters, inner_file, refuse_far_f, spelled_out
@@ -135,7 +137,9 @@ def _levels(group: Group, angular: Sequence[int]) -> Levels:
     if group.spins:
         return levels_of_f(group.top, (group.effect,), angular, None, None)
     j = [value // 2 for value in angular]
-    return solve_rotation(group.top, (group.effect,), min(j), max(j), in_blocks=True)
+    levels = solve_rotation(group.top, (group.effect,), min(j), max(j), in_blocks=True)
+    pairs = group.effect.pairs
+    return named_by_l(levels, pairs, str(levels.representation)) if pairs else levels
 
 
 def _with_labels(group: Group, form: Format, labels: Ints, names: Sequence[str], values: Floats) -> list[_Solved]:
@@ -177,7 +181,9 @@ def _of_some_f(
         return None
     own = tuple(group.effect.parameters(group.top))
     columns = np.array([names.index(name) for name in own])
-    blocks = unit_levels(group.top, levels, rows[found], own, np.where(values == 0, _AT_ZERO, values)[columns])
+    pairs, start = group.effect.pairs, np.where(values == 0, _AT_ZERO, values)[columns]
+    functions = partial(functions_of_l, pairs=pairs, representation=str(levels.representation)) if pairs else None
+    blocks = unit_levels(group.top, levels, rows[found], own, start, functions)
     return _Solved(here[found], columns, blocks)
 
 

@@ -215,8 +215,13 @@ def _leading(fields: tuple[int, ...]) -> int:
 
 
 def _lacks_some(fields: tuple[int, ...], per_state: int) -> bool:
-    """Whether a line lacks quantum numbers: an odd count before a blank, or a blank among as many as there should be."""
+    """Whether a line lacks quantum numbers: an odd count before a blank, or a blank among as many as there should be.
+
+    A lower state that begins with a number below 0 is none and needs no more of them.
+    """
     count = _leading(fields)
+    if per_state and per_state < len(fields) < 2 * per_state and fields[per_state] < 0:
+        return True
     return bool(count % 2) or not count or (count < len(fields) <= 2 * per_state)
 
 
