@@ -223,7 +223,7 @@ def _settings(options: Options) -> dict[str, Any]:
     require_whole("--jmax", options.jmax, 0, MOST_J)
     return {
         "fields_kv_per_cm": parsed("--field", options.field, _fields),
-        "j_highest": parsed("--states", options.states, _highest_j),
+        "j_highest": parsed("--states", options.states, inputs.highest_j),
         "m_values": None if options.m is None else parsed("--m", options.m, _m_values),
         "intensity_w_per_cm2": quantity("--intensity", options.intensity, "W/cm2"),
         "direction": parsed("--tilt", options.tilt, _direction),
@@ -258,13 +258,6 @@ def _direction(text: str) -> tuple[float, float, float]:
     if not math.isfinite(angle):
         raise ValueError(f"{text!r}: expected an angle in degrees")
     return (math.sin(math.radians(angle)), 0.0, math.cos(math.radians(angle))) if angle else (0.0, 0.0, 1.0)
-
-
-def _highest_j(text: str) -> int:
-    number = text.replace(" ", "").upper().removeprefix("J<=").removeprefix("J≤")
-    if not number.isdecimal():
-        raise ValueError(f"{text!r}: expected J<=2, or the number alone")
-    return int(number)
 
 
 def _m_values(text: str) -> tuple[float, ...]:
