@@ -11,8 +11,7 @@ swap where two neighbours come closer than a stated gap (`rotor.quantum.fields.d
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import partial
@@ -22,7 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.fields.blocks import FieldBlock, FieldSpace
+from rotor.quantum.fields.blocks import FieldBlock
+from rotor.quantum.fields.map_request import BlockProblem, MapRequest, over
 from rotor.quantum.fields.solver import (
     DENSE,
     SPANNED,
@@ -32,6 +32,7 @@ from rotor.quantum.fields.solver import (
     derivatives,
     expectation,
     solve_fields,
+    solve_together,
     spanning,
 )
 from rotor.table import Table
@@ -42,23 +43,6 @@ EDGE = 2  # the highest values of J whose population is leakage
 FIRST_BASIS = 64
 HIGHEST_J = 300
 STEP_J = 6
-
-
-class BlockProblem(NamedTuple):
-    """Matrices over a block, all (n, n), of H(x) = fixed + x slope + x² curvature; curvature None where nothing is quadratic.
-
-    fixed: MHz. slope: MHz per unit of field. observables: by name, made when called.
-    """
-
-    fixed: Matrix
-    slope: Matrix
-    observables: Mapping[str, Callable[[], Matrix]]
-    curvature: Matrix | None = None
-
-    def terms(self, states: Ints) -> Terms:
-        """The coefficients of H(x) as a polynomial in x, over some of the states."""
-        given = (self.fixed, self.slope) if self.curvature is None else (self.fixed, self.slope, self.curvature)
-        return tuple(one[np.ix_(states, states)] for one in given)
 
 
 @dataclass(frozen=True, repr=False)
@@ -139,26 +123,6 @@ class FieldMap(Table):
         raise ValueError(
             f"no state {label!r} with M = {m}; there are {', '.join(f'{name!r} M={value}' for name, value in known)}"
         )
-
-
-@dataclass(frozen=True)
-class MapRequest:
-    """What a map is of.
-
-    space: makes the states up to a J max. problem: the matrices of a block. fields: rising. j_highest: free levels up to this J are
-    followed. m_values: |M|, or signed where `signed`. tolerance_mhz: of energies. diabatic_gap_mhz: None for no diabatic labels.
-    """
-
-    space: Callable[[int], FieldSpace]
-    problem: Callable[[FieldBlock], BlockProblem]
-    fields: Floats
-    j_highest: int
-    m_values: tuple[int, ...]
-    tolerance_mhz: float
-    field_name: str
-    slope_name: str
-    slope_unit_mhz: float
-    diabatic_gap_mhz: float | None = None
 
 
 class BlockStates(NamedTuple):
@@ -321,11 +285,29 @@ def _states_of(
 
 
 def _solve_block(request: MapRequest, block: FieldBlock) -> _Solved:
-    problem, fields = request.problem(block), request.fields
-    found = _states_of(request, block, problem, fields, True)
-    vectors, inside = found.vectors, np.ix_(found.places, found.places)
+    problem = request.problem(block)
+    return _measured(request, block, problem, _states_of(request, block, problem, request.fields, True))
+
+
+def _solve_blocks(request: MapRequest, blocks: Sequence[FieldBlock]) -> list[_Solved]:
+    """All blocks in this process, in one go where they are chains."""
+    parts = []
+    for block in blocks:
+        problem, count, order = request.problem(block), _count(request, block), free_order(block)
+        places = _enough(problem, order, count, request.fields, request.tolerance_mhz)
+        parts.append((block, problem, block.rows[order[:count]], places, (problem.terms(places), count)))
+    found = solve_together([part[-1] for part in parts], request.fields, request.tolerance_mhz)
+    return [
+        _measured(request, block, problem, BlockStates(block, rows, energies, places, vectors))
+        for (block, problem, rows, places, _), (energies, vectors) in zip(parts, found, strict=True)
+    ]
+
+
+def _measured(request: MapRequest, block: FieldBlock, problem: BlockProblem, found: BlockStates) -> _Solved:
+    """Slopes, cosines and leakage of the states of a block."""
+    fields, vectors = request.fields, found.vectors
     slopes = -derivatives(problem.terms(found.places), fields, vectors)
-    cosines = {name: expectation(made()[inside], vectors) for name, made in problem.observables.items()}
+    cosines = {name: expectation(over(made(), found.places), vectors) for name, made in problem.observables.items()}
     edge = (np.abs(vectors[:, block.j[found.places] > block.levels.j.max() - EDGE]) ** 2).sum(axis=1)
     return _Solved(found.energies, slopes, edge, cosines, found.rows, block)
 
@@ -347,7 +329,10 @@ def _enough(problem: BlockProblem, order: Ints, count: int, fields: Floats, tole
 
 
 def _tabulated(request: MapRequest, jmax: int, moved: float, executor: Executor | None) -> FieldMap:
-    solved = each_block(request, jmax, partial(_solve_block, request), executor)
+    if executor is None:
+        solved = _solve_blocks(request, _blocks(request, jmax))
+    else:
+        solved = each_block(request, jmax, partial(_solve_block, request), executor)
     fields, rows = request.fields, []
     named = [None if request.diabatic_gap_mhz is None else _diabatic_ranks(request, one) for one in solved]
     for one, names in zip(solved, named, strict=True):
@@ -355,26 +340,29 @@ def _tabulated(request: MapRequest, jmax: int, moved: float, executor: Executor 
         listed = ours if names is None else ours | ours[names].any(axis=0)
         rows += [(one, rank) for rank in np.flatnonzero(listed).tolist()]
 
-    def column(pick: Callable[[_Solved, int], Any]) -> NDArray[Any]:
-        return np.concatenate([np.broadcast_to(pick(one, rank), len(fields)) for one, rank in rows])
+    def column(pick: Callable[[_Solved, int], Floats]) -> Floats:
+        return np.concatenate([pick(one, rank) for one, rank in rows])
+
+    def repeated(pick: Callable[[_Solved, int], Any]) -> NDArray[Any]:
+        return np.repeat([pick(one, rank) for one, rank in rows], len(fields))
 
     cosines = list(solved[0].cosines) if solved else []
     return FieldMap(
         field_name=request.field_name,
         slope_name=request.slope_name,
         field=np.tile(fields, len(rows)),
-        m=column(lambda one, rank: one.block.m),
-        block=column(lambda one, rank: np.array(one.block.label)),
-        rank=column(lambda one, rank: rank),
+        m=repeated(lambda one, rank: one.block.m),
+        block=repeated(lambda one, rank: one.block.label),
+        rank=repeated(lambda one, rank: rank),
         energy_mhz=column(lambda one, rank: one.energies[:, rank]),
-        label=column(lambda one, rank: np.array(one.block.levels.label(int(one.rows[rank])))),
-        slope=column(lambda one, rank: one.slopes[:, rank] / request.slope_unit_mhz),
+        label=repeated(lambda one, rank: one.block.levels.label(int(one.rows[rank]))),
+        slope=column(lambda one, rank: one.slopes[:, rank]) / request.slope_unit_mhz,
         cosines={name: column(partial(_cosine, name)) for name in cosines},
         edge_population=column(lambda one, rank: one.edge[:, rank]),
-        copies=column(lambda one, rank: one.block.copies),
-        free_row=column(lambda one, rank: one.rows[rank]),
-        free_mhz=column(lambda one, rank: one.block.levels.energy_mhz[one.rows[rank]]),
-        weight=column(lambda one, rank: one.block.levels.weight[one.rows[rank]]),
+        copies=repeated(lambda one, rank: one.block.copies),
+        free_row=repeated(lambda one, rank: one.rows[rank]),
+        free_mhz=repeated(lambda one, rank: one.block.levels.energy_mhz[one.rows[rank]]),
+        weight=repeated(lambda one, rank: one.block.levels.weight[one.rows[rank]]),
         jmax=jmax,
         accuracy_mhz=moved,
         diabatic_label=_diabatic_labels(solved, named, rows),
@@ -422,23 +410,3 @@ def _energies_and_slopes(terms: Terms, count: int, fields: Floats) -> tuple[Floa
     """Of the lowest states at fields (f,): energies and dE/dx (f, count)."""
     energies, vectors = np.linalg.eigh(at_fields(terms, fields))
     return energies[:, :count], derivatives(terms, fields, vectors[:, :, :count])
-
-
-def checked_fields(fields: Any, unit: str, highest: float) -> Floats:
-    """Fields (n,) that rise, finite and within ±`highest`; ValueError where they are not."""
-    values = np.unique(np.atleast_1d(np.asarray(fields, dtype=np.float64)))
-    if not len(values) or not np.isfinite(values).all():
-        raise ValueError(f"fields must be finite numbers of {unit}; got {np.asarray(fields).tolist()!r}")
-    if np.abs(values).max() > highest:
-        raise ValueError(
-            f"a field of {values[np.argmax(np.abs(values))]:g} {unit} is beyond {highest:g} {unit}, where no molecule holds together; "
-            "check the unit"
-        )
-    return values
-
-
-def checked_tolerance_mhz(tolerance_mhz: float) -> float:
-    """A tolerance of energies above zero, or ValueError."""
-    if not (math.isfinite(tolerance_mhz) and tolerance_mhz > 0):
-        raise ValueError(f"tolerance {tolerance_mhz} MHz: a finite number above 0 is expected")
-    return float(tolerance_mhz)
