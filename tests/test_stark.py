@@ -170,7 +170,7 @@ def test_effective_dipole_is_minus_the_slope_of_the_energy():
 
 
 def test_j_max_follows_from_the_tolerance():
-    coarse, fine = (stark_map(OCS, [300.0], j_highest=1, tolerance_mhz=t) for t in (1.0, 1e-8))
+    coarse, fine = (stark_map(OCS, [1000.0], j_highest=1, tolerance_mhz=t) for t in (1.0, 1e-8))
     assert coarse.jmax < fine.jmax
     assert np.abs(coarse.energy_mhz - fine.energy_mhz).max() < 1.0  # what was asked for
     assert fine.edge_population.max() < 1e-12  # leakage that goes with 1e-8 MHz
@@ -179,6 +179,21 @@ def test_j_max_follows_from_the_tolerance():
 def test_a_j_max_too_small_is_refused():
     with pytest.raises(ValueError, match="J max 6 is too small"):
         stark_map(OCS, [500.0], j_highest=2, jmax=6)
+    with pytest.raises(ValueError, match="J max 4 is too small: a state has"):
+        stark_map(OCS, [100.0], j_highest=1, jmax=4, tolerance_mhz=10.0)
+
+
+def test_accuracy_and_leakage_stand_beside_each_state():
+    """The highest state is the least accurate; a tolerance of energies alone would leave cosines wrong: J max rises for those too."""
+    found = stark_map(OCS, [0.0, 1000.0], j_highest=3, tolerance_mhz=1e-6)
+    finer = stark_map(OCS, [0.0, 1000.0], j_highest=3, tolerance_mhz=1e-8)
+    assert found.moved_mhz.max() == found.accuracy_mhz <= 1e-6
+    error = np.abs(found.energy_mhz - finer.energy_mhz)[1::2]
+    assert error == pytest.approx(found.moved_mhz[1::2], abs=1e-8)  # round-off of 1e6 MHz
+    assert found.moved_mhz[found.curve("3", 0)][0] > 1e-7 > found.moved_mhz[found.curve("0", 0)][0]
+    rough = stark_map(OCS, [300.0], j_highest=1, tolerance_mhz=1e3)
+    assert rough.edge_population.max() <= 1e-6  # the rule
+    assert np.abs(rough.cosines["costheta"] - stark_map(OCS, [300.0], j_highest=1).cosines["costheta"]).max() < 1e-5
 
 
 def test_the_reduced_basis_gives_the_energies_of_the_full_matrix():
