@@ -12,7 +12,8 @@ from rotor.checks import require_positive, require_whole
 from rotor.molecules.nuclei import isotope
 from rotor.quantum.effects.stark import checked_j
 from rotor.quantum.effects.zeeman import DEFAULT_TOLERANCE_MHZ, HIGHEST_TESLA, checked_g, zeeman_map
-from rotor.quantum.fields.field_map import FieldMap, checked_fields
+from rotor.quantum.fields.field_map import FieldMap
+from rotor.quantum.fields.map_request import checked_fields
 from rotor.table import TextOf
 from rotor.tops.facts import top_facts
 from rotor.tops.magnetic import MagneticTensors
