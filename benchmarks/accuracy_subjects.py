@@ -193,9 +193,9 @@ def free(_: Path | None) -> list[Panel]:
 
 def driven(_: Path | None) -> list[Panel]:
     every = {
-        "tolerance, a pendulum": "physical_pendulum",
-        "tolerance, a gyrostat": "dual_spin_satellite",
-        "tolerance, chaos": "driven_chaos",
+        "pendulum": "physical_pendulum",
+        "gyrostat": "dual_spin_satellite",
+        "chaos": "driven_chaos",
     }
     panel = {}
     for name, file in every.items():
@@ -235,7 +235,7 @@ def fluid_step(_: Path | None) -> list[Panel]:
 
 
 def ewald(_: Path | None) -> list[Panel]:
-    tolerance = curve(liquid("ewald"), "tolerance of Ewald's sum")
+    tolerance = curve(liquid("ewald"), "numerics.ewald_tolerance")
     cutoffs = {one: curve(liquid(one), f"numerics.cutoff, {one}") for one in ("ewald", "reaction-field", "shifted")}
     return [
         Panel("tolerance of Ewald's sum, 216 SPC/E molecules", "force (%)", {"tolerance": tolerance}),

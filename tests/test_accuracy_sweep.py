@@ -167,7 +167,7 @@ def test_the_step_of_a_fluid_is_of_second_order():
     for of in ("conserved energy per degree", "positions after 48 fs"):
         found = errors(table, "numerics.step", of)
         assert found["2"] / found["1"] == pytest.approx(4.0, rel=0.15)  # leading term alone
-    ewald = list(errors(table, "tolerance of Ewald's sum").values())
+    ewald = list(errors(table, "numerics.ewald_tolerance").values())
     assert ewald == sorted(ewald, reverse=True)
     assert ewald[-1] < 1e-3 < 0.01 < ewald[0]  # percent of a force
 

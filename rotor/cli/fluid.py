@@ -63,6 +63,7 @@ class Options:
     every: int = option(10, metavar="N", help="Steps between rows.")
     cutoff: str = option("9", metavar="R", help="Of Lennard-Jones and charges (Å).")
     electrostatics: str = option("reaction-field", metavar="NAME", help="reaction-field, ewald or shifted.")
+    ewald_tolerance: str = option("1e-5", metavar="X", help="Of forces by ewald, relative to e²/4πε0 Å².")
     friction: str = option("1", metavar="F", help="Of langevin (1/ps).")
     relaxation: str = option("100", metavar="T", help="Time constant of nose-hoover (fs).")
     seed: int = option(1, metavar="N", help="Of the lattice, the velocities and the noise.")
@@ -167,6 +168,7 @@ def _settings(options: Options) -> Settings:
         temperature_k=inputs.positive("--temperature", options.temperature, "K"),
         step_fs=inputs.positive("--step", options.step, "fs"),
         cutoff_angstrom=inputs.positive("--cutoff", options.cutoff, "angstrom"), electrostatics=options.electrostatics,
+        ewald_tolerance=inputs.positive("--ewald-tolerance", options.ewald_tolerance, ""),
         friction_per_ps=inputs.positive("--friction", options.friction, ""),
         relaxation_fs=inputs.positive("--relaxation", options.relaxation, "fs"),
     )  # fmt: skip

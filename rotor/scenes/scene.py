@@ -113,6 +113,7 @@ class LevelsScene(Scene, frozen=True, tag="levels"):
 
     molecule: Annotated[str | MoleculeSection, said("a name, a file, SMILES:..., or a table")]
     effects: QuantumEffects = QuantumEffects()
+    accuracy: Annotated[str | float | None, said("of the energies", "1 kHz")] = None
     observables: LevelsObservables = LevelsObservables()
     outputs: LevelsOutputs = LevelsOutputs()
 
@@ -122,6 +123,7 @@ class RamanScene(Scene, frozen=True, tag="raman"):
 
     molecule: Annotated[str | MoleculeSection, said("a name, a file, SMILES:..., or a table")]
     effects: QuantumEffects = QuantumEffects()
+    accuracy: Annotated[str | float | None, said("of the shifts", "1 kHz")] = None
     conditions: RamanConditions = RamanConditions()
     observables: RamanObservables = RamanObservables()
     vibration: VibrationSection = VibrationSection()
@@ -157,6 +159,9 @@ class GasScene(Scene, frozen=True, tag="gas"):
     """A classical gas of free molecules: equipartition, correlation functions."""
 
     molecule: Annotated[str | MoleculeSection, said("a name, a file, SMILES:..., or a table")]
+    accuracy: Annotated[
+        str | float | None, said("of temperature (K), heat capacity (%), or C1 and C2 (a number)", "1 K")
+    ] = None
     conditions: GasConditions = GasConditions()
     observables: GasObservables = GasObservables()
     numerics: GasNumerics = GasNumerics()
@@ -167,6 +172,9 @@ class FluidScene(Scene, frozen=True, tag="fluid"):
     """Rigid molecules that attract and repel, in a periodic box."""
 
     conditions: FluidConditions
+    accuracy: Annotated[str | float | None, said("of the conserved energy (K) or of Ewald's forces (%)", "0.5 K")] = (
+        None
+    )
     numerics: FluidNumerics = FluidNumerics()
     outputs: FluidOutputs = FluidOutputs()
 

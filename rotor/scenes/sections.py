@@ -244,6 +244,7 @@ class FluidNumerics(Section, frozen=True):
     step: Annotated[Quantity, said("length of a step (fs)")] = "2 fs"
     cutoff: Annotated[Quantity, said("of Lennard-Jones and of charges in real space (Å)")] = "9 Å"
     electrostatics: Annotated[str, said("reaction-field, ewald or shifted")] = "reaction-field"
+    ewald_tolerance: Annotated[float, said("of forces by ewald, relative to e²/4πε0 Å²")] = 1e-5
     seed: Annotated[int, said("of the lattice, the velocities and the noise")] = 1
     threads: Annotated[int, said("threads of the built-in potential, or of the engine")] = 1
     engine: Annotated[str, said("rotor, openmm or lammps")] = "rotor"

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rotor.scenes.knobs.knob import NOTHING_CHEAPER, Knob, Knobs, Measure, Setting, ladder
+from rotor.scenes.knobs.knob import NOTHING_CHEAPER, Knob, Knobs, Measure, ladder
 
 if TYPE_CHECKING:
     from rotor.fluid.request import FluidRequest
@@ -26,7 +26,7 @@ STEPS_FS = (8.0, 6.0, 4.0, 3.0, 2.0, 1.0, 0.5)
 FOLLOWED_FS, FINEST_STEP_FS = 48.0, 0.05  # how long a box is followed, and the step of its reference
 CUTOFFS = (5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 12.0)  # Å
 EWALD = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7)
-FINEST_EWALD, USUAL_EWALD = 1e-10, 1e-5
+FINEST_EWALD = 1e-10
 
 
 def tumble(request: Any) -> Knobs:
@@ -228,7 +228,8 @@ def forces_of(request: FluidRequest, electrostatics: str, cutoff: float, toleran
     return forces
 
 
-def _force_error(found: Any, reference: Any) -> float:
+def force_difference(found: Any, reference: Any) -> float:
+    """Root mean square difference of forces in percent of their root mean square."""
     return 100.0 * float(np.sqrt(np.mean((found - reference) ** 2) / np.mean(reference**2)))
 
 
@@ -241,10 +242,10 @@ def _cutoff(request: FluidRequest) -> Knob:
     most, own = _most(request), request.settings
     make = partial(forces_of, request, own.electrostatics)
     cutoffs = [one for one in CUTOFFS if one < 0.95 * most]
-    settings = ladder(cutoffs, own.cutoff_angstrom, lambda one: make(one, USUAL_EWALD))
+    settings = ladder(cutoffs, own.cutoff_angstrom, lambda one: make(one, own.ewald_tolerance))
     reference = forces_of(request, "ewald", 0.99 * most, FINEST_EWALD)
     against = f"Ewald's sum to {FINEST_EWALD:g}, Lennard-Jones to {0.99 * most:.3g} Å"
-    measure = Measure("force", "%", _force_error)
+    measure = Measure("force", "%", force_difference)
     return Knob(f"numerics.cutoff, {own.electrostatics}", (measure,), settings, reference, against, lambda call: call())
 
 
@@ -254,7 +255,7 @@ def _ewald(request: FluidRequest) -> list[Knob]:
     if own.electrostatics != "ewald":
         return []
     make = partial(forces_of, request, "ewald", own.cutoff_angstrom)
-    settings = tuple(Setting(f"{one:g}", make(one), one == USUAL_EWALD) for one in EWALD)
-    measure = Measure("force", "%", _force_error)
+    settings = ladder(EWALD, own.ewald_tolerance, make)
+    measure = Measure("force", "%", force_difference)
     against = f"a tolerance of {FINEST_EWALD:g}"
-    return [Knob("tolerance of Ewald's sum", (measure,), settings, make(FINEST_EWALD), against, lambda call: call())]
+    return [Knob("numerics.ewald_tolerance", (measure,), settings, make(FINEST_EWALD), against, lambda call: call())]
