@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from math import isnan
 from pathlib import Path
-from tempfile import TemporaryDirectory
+from tempfile import gettempdir
 from typing import TYPE_CHECKING, Any
 
 import typer
@@ -27,6 +27,7 @@ from rotor.cli.shared.output import (
 )
 from rotor.cli.shared.plot_options import ViewOptions, view_of
 from rotor.cli.shared.save_scene import save_scene, save_scene_option
+from rotor.temporary import locked_folder
 
 if TYPE_CHECKING:
     from rotor.arrays import Floats
@@ -121,8 +122,8 @@ def frames_for(growing: RunFiles, files: Files) -> Iterator[tuple[RunFiles, str 
     if "--plot" not in files.paths or growing.trajectories or growing.checkpoint is not None:
         yield growing, str(growing.trajectories[0]) if growing.trajectories else None
         return
-    with TemporaryDirectory(prefix="rotor-") as folder:
-        path = str(Path(folder) / "frames.traj")
+    with locked_folder(Path(gettempdir()), "rotor-frames-") as folder:
+        path = str(folder / "frames.traj")
         yield replace(growing, trajectories=(path,)), path
 
 
