@@ -65,6 +65,26 @@ def batch():
     return numbers(propagate(MOMENTS, np.array([MOMENTUM]), [1.0, 0, 0, 0], 0.05, 20))
 
 
+def compiled(method):
+    """The same in the compiled form, which otherwise only long motions take."""
+    from rotor.classical.integrators import lie_runge_kutta, splitting
+
+    usual = splitting.WORTH_LOADING, lie_runge_kutta.PLAIN_STEPS
+    splitting.WORTH_LOADING = lie_runge_kutta.PLAIN_STEPS = 0
+    try:
+        return driven(method)
+    finally:
+        splitting.WORTH_LOADING, lie_runge_kutta.PLAIN_STEPS = usual
+
+
+def batch_in_field():
+    from rotor.classical.effects.dipole_in_field import PermanentDipole
+    from rotor.classical.integrators.driven_batch import propagate_driven
+
+    dipole = PermanentDipole([0.3, 0.1, 0.2], [0, 0, 1.0])
+    return numbers(propagate_driven(MOMENTS, np.array([MOMENTUM]), [1.0, 0, 0, 0], 0.05, 20, [dipole]))
+
+
 def gas_exact():
     from rotor.classical.gas.ensembles import free_gas_correlations
 
@@ -157,8 +177,10 @@ def methods():
 
     return {
         "SymmetricTopSplitting": lambda: driven(SymmetricTopSplitting(0.05, 4)),
+        "SymmetricTopSplitting, compiled": lambda: compiled(SymmetricTopSplitting(0.05, 4)),
         "ExactDrift": lambda: driven(ExactDrift(0.35)),
         "LieRungeKutta": lambda: driven(LieRungeKutta(1e-8)),
+        "LieRungeKutta, compiled": lambda: compiled(LieRungeKutta(1e-8)),
         "RotationSplitting": lambda: driven(RotationSplitting(0.05, 4)),
         "MoserVeselov": lambda: stepped(MoserVeselov(0.05)),
         "MoserVeselov, order 4": lambda: stepped(MoserVeselov(0.05, 4)),
@@ -170,6 +192,7 @@ def probes(scenes):
     own = {
         "free motion, `rotor tumble`": tumble,
         "many free bodies, `propagate`": batch,
+        "many bodies in a field, `propagate_driven`": batch_in_field,
         "gas: correlations, exact": gas_exact,
         "gas: correlations, stepped": gas_stepped,
         "gas: short times": gas_beginning,

@@ -244,6 +244,40 @@ def test_what_a_killed_process_left_is_removed_by_the_next_one(call):
     assert sorted(os.listdir()) == ["x.csv", "x.csv.provenance.json"]
 
 
+KILLED = """
+import os, signal, sys
+from pathlib import Path
+from rotor.temporary import locked_folder
+with locked_folder(Path(sys.argv[1]), "rotor-lammps-") as folder:
+    (folder / "log").write_text("half")
+    os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+@pytest.mark.skipif(os.name == "nt", reason="no locks of folders")
+def test_the_folder_of_an_engine_that_was_killed_is_removed_by_the_next_run(folder, monkeypatch):
+    """Of a LAMMPS run, which stands where temporary files do; LAMMPS itself is not needed to begin one."""
+    from rotor.fluid.engines import lammps
+
+    subprocess.run([sys.executable, "-c", KILLED, str(folder)], check=False)
+    assert [name.startswith("rotor-lammps-") for name in os.listdir()] == [True]
+    (left,) = os.listdir()
+    begun = []
+    monkeypatch.setattr(lammps, "check", lambda: None)
+    monkeypatch.setattr(lammps.tempfile, "gettempdir", lambda: str(folder))
+
+    def write_files(place, *_, **__):
+        begun.append(os.listdir())
+        raise ValueError("no more is needed")
+
+    monkeypatch.setattr(lammps, "write_files", write_files)
+    with pytest.raises(ValueError, match="no more"):
+        next(lammps.frames(None, None))
+    assert len(begun[0]) == 1
+    assert begun[0] != [left]
+    assert os.listdir() == []
+
+
 @pytest.mark.skipif(os.name == "nt", reason="no locks of folders")
 def test_the_folder_of_a_living_process_stays(folder):
     with unfinished_folder(folder) as first, atomic_path(folder / "a.txt") as unfinished:

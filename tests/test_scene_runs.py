@@ -61,6 +61,9 @@ SAVED = [  # a verb with its options; --csv a.csv goes with each
     ("tumble", "--moments 0.6,0.8,1.0 --angular-momentum 1.8,0.4,-0.9 --times 0,1,2.7"),
     ("tumble", "book --times 0:2:21"),
     ("tumble", "--moments|1,2,3 kg m2|--omega 0.1,5,0 --times 0:2:21"),
+    ("tumble", "book --times 0:2:21 --effect|linear drag coefficients=1e-4,1e-4,2e-4|--effect|constant torque vector=0,1e-4,0|"),
+    ("tumble", "--moments 1,2,3 --omega 0.1,1,0 --times 0,1,2.7 --step 0.1 --order 2 --attitude 0.6,0,0.8,0"
+     " --effect|periodic drive amplitude=0.1,0,0 angular_frequency=1.2 frame=space|"),
     ("stark", "OCS --field 10,20 --states J<=1 --intensity|1e9 W/cm2|--tilt 45"),
     ("gas", "OCS --molecules 500 --temperature 200 --seed 5"),
     ("stark", "OCS --field 0:77.7kV/cm:5 --states J<=1 --intensity|1e10 W/cm2|--diabatic-gap 5"),

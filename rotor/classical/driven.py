@@ -14,10 +14,10 @@ import numpy as np
 from rotor.arrays import Floats
 from rotor.checks import require_between
 from rotor.classical.effect import ClassicalEffect
-from rotor.classical.euler import checked_moments
+from rotor.classical.euler import checked_moments, checked_momentum
 from rotor.classical.integrators.lie_runge_kutta import LieRungeKutta
 from rotor.classical.integrators.method import Method, Motion, integrate
-from rotor.classical.system import momentum_of
+from rotor.classical.system import momentum_of, system_of
 from rotor.classical.tumble import Three
 from rotor.geometry.rotations import continuous
 from rotor.table import Table
@@ -48,14 +48,30 @@ class DrivenRequest:
     order: int = 4
 
     def __post_init__(self) -> None:
-        checked_moments(self.moments)
+        moments = checked_moments(self.moments)
         require_between("tolerance", self.tolerance, 0.0, 1.0)
         if (self.angular_velocity is None) == (self.angular_momentum is None):
             raise ValueError("angular_velocity, angular_momentum: give one of them")
         if len(self.times) < 2 or not np.isfinite(self.times).all():
             raise ValueError("times: expected at least two finite times, the start first")
+        if not (np.all(np.diff(self.times) > 0.0) or np.all(np.diff(self.times) < 0.0)):
+            raise ValueError("times: expected times that all increase, or all decrease, without repetition")
         if abs(float(np.linalg.norm(self.attitude)) - 1.0) > 1e-6:
             raise ValueError(f"attitude: {self.attitude}: expected a unit quaternion, scalar first")
+        if not np.isfinite(self.angular_velocity or self.angular_momentum).all():  # type: ignore[arg-type]
+            raise ValueError("angular_velocity, angular_momentum: expected three finite numbers")
+        self._check_step()
+        checked_momentum(self.momentum, moments)
+
+    def _check_step(self) -> None:
+        """Refuse effects that a splitting does not hold, and steps of no length or order."""
+        system = system_of(self.moments, self.effects)
+        if self.step is not None and (system.needs_velocity or system.added):
+            raise ValueError(
+                "step: a splitting holds no torque of the angular velocity (drag) and no rolling; leave the step out: the "
+                "adaptive method serves them"
+            )
+        _ = self.method
 
     @property
     def method(self) -> Method:

@@ -10,6 +10,7 @@ from abc import ABC, abstractmethod
 from typing import ClassVar
 
 from rotor.arrays import Floats
+from rotor.classical.torque_form import TorqueForm
 
 
 class ClassicalEffect:
@@ -48,6 +49,10 @@ class Torque(ClassicalEffect, ABC):
         """Energy (...,) whose change with attitude is the torque; zero for a torque that has none."""
         return 0.0
 
+    def compiled_form(self) -> TorqueForm | None:
+        """The same torque for compiled integrators; None: they call `torque` at every step."""
+        return None
+
 
 class InnerMomentum(ClassicalEffect, ABC):
     """Angular momentum that parts carry relative to the body."""
@@ -55,6 +60,10 @@ class InnerMomentum(ClassicalEffect, ABC):
     @abstractmethod
     def inner_momentum(self, time: float) -> Floats:
         """h in body axes (3,) at `time`."""
+
+    def compiled_form(self) -> Floats | None:
+        """h (3,) where it never changes, for compiled integrators; else None."""
+        return None
 
 
 class AddedInertia(ClassicalEffect, ABC):

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,6 +15,7 @@ from numpy.typing import ArrayLike
 from rotor.arrays import Floats
 from rotor.classical.effect import AddedInertia, ClassicalEffect, InertiaChange, InnerMomentum, Torque
 from rotor.classical.euler import checked_moments, gyroscopic_rate, inverse_moments, kinetic_energy
+from rotor.classical.torque_form import SystemForm, system_form
 from rotor.geometry.rotations import IDENTITY
 
 
@@ -43,6 +45,11 @@ class System:
     def needs_attitude(self) -> bool:
         """Whether a torque or an added inertia depends on the attitude; else dL/dt follows from L and time alone."""
         return any(torque.needs_attitude for torque in self.torques) or any(a.needs_attitude for a in self.added)
+
+    @cached_property
+    def compiled(self) -> SystemForm | None:
+        """All effects for compiled integrators; None where one of them has to be called at every step."""
+        return None if self.added or self.inertia else system_form(self.torques, self.inner)
 
     def inverse(self, time: float) -> Floats:
         """1/I_i (n, 3) at `time`, 0 for the axis of a linear rotor."""

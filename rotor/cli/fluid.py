@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from math import isnan
 from pathlib import Path
-from tempfile import TemporaryDirectory
+from tempfile import gettempdir
 from typing import TYPE_CHECKING, Any
 
 import typer
@@ -25,13 +25,16 @@ from rotor.cli.shared.output import (
     show_facts,
     show_table,
 )
+from rotor.cli.shared.plot_options import ViewOptions, view_of
 from rotor.cli.shared.save_scene import save_scene, save_scene_option
+from rotor.temporary import locked_folder
 
 if TYPE_CHECKING:
     from rotor.arrays import Floats
     from rotor.fluid.request import FluidAnswer, FluidRequest, NewBox
     from rotor.fluid.run import Outputs as RunFiles
     from rotor.fluid.settings import Settings
+    from rotor.plots.view import View
 
 EXAMPLES = """\b
 Examples:
@@ -90,11 +93,12 @@ class Outputs:
     save_scene: str | None = save_scene_option()
 
 
-@grouped()
-def command(context: typer.Context, options: Options, outputs: Outputs) -> None:
+@grouped(picture=("plot_scale",))
+def command(context: typer.Context, options: Options, outputs: Outputs, picture: ViewOptions) -> None:
     """Rigid molecules in a periodic box: a run, its temperatures, energies and pressure."""
     settings = _settings(options)
     growing, files = _files(options.source, outputs)
+    view = view_of(picture, files, "ps")
     with inputs.fields_as_options(**NAMES), frames_for(growing, files) as (growing, frames):
         request = _request(options, settings)
         answer, start = _answer(request, growing, outputs, {"command": context.obj, "input": options.source})
@@ -104,7 +108,7 @@ def command(context: typer.Context, options: Options, outputs: Outputs) -> None:
     grown = [growing.csv, *(outputs.trajectory or ()), growing.checkpoint, *files.paths.values()]
     content = start | answer.facts() | {"files": [str(path) for path in grown if path is not None]}
     text = lambda: json_with_rows(answer.record, "record", content)  # noqa: E731
-    writers = {"--plot": lambda path: _draw(answer, paths, path, str(context.obj))}
+    writers = {"--plot": lambda path: _draw(answer, paths, path, str(context.obj), view)}
     writers |= save_scene("fluid", request, outputs)
     deliver(files, writers, text, lambda: _show(content, settings))
 
@@ -118,8 +122,8 @@ def frames_for(growing: RunFiles, files: Files) -> Iterator[tuple[RunFiles, str 
     if "--plot" not in files.paths or growing.trajectories or growing.checkpoint is not None:
         yield growing, str(growing.trajectories[0]) if growing.trajectories else None
         return
-    with TemporaryDirectory(prefix="rotor-") as folder:
-        path = str(Path(folder) / "frames.traj")
+    with locked_folder(Path(gettempdir()), "rotor-frames-") as folder:
+        path = str(folder / "frames.traj")
         yield replace(growing, trajectories=(path,)), path
 
 
@@ -141,7 +145,7 @@ def _paths(answer: FluidAnswer, frames: str | None) -> Floats:
     return np.array([bodies_of(atoms, shapes=shapes)[1].centres for atoms in taken[len(taken) // 2 :]])
 
 
-def _draw(answer: FluidAnswer, paths: Floats | None, path: Path, command: str) -> None:
+def _draw(answer: FluidAnswer, paths: Floats | None, path: Path, command: str, view: View) -> None:
     from rotor.fluid.analysis import pair_distribution
     from rotor.plots.fluid import plot_fluid
 
@@ -154,7 +158,7 @@ def _draw(answer: FluidAnswer, paths: Floats | None, path: Path, command: str) -
     title = f"{paths.shape[1]} molecules, {settings.model}, {settings.ensemble}, by {answer.request.engine}"
     if shells is not None:
         title += f"; g(r) of {len(paths)} frame{'s' if len(paths) > 1 else ''}"
-    plot_fluid(answer.record, shells, paths.shape[1], path, title=title, provenance={"command": command})
+    plot_fluid(answer.record, shells, paths.shape[1], path, title=title, view=view, provenance={"command": command})
 
 
 def _settings(options: Options) -> Settings:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from rotor.cli.shared import inputs, process
+from rotor.cli.shared.driven_tumble import Driven, answer_effects, refuse_without_effect
 from rotor.cli.shared.inputs import Input, json_option
 from rotor.cli.shared.options import file_option, grouped
 from rotor.cli.shared.output import Files, Table, Writer, deliver, json_with_rows, show_facts, show_table
@@ -30,7 +31,8 @@ Examples:
   rotor tumble book --plot book.png
   rotor tumble --body wing-nut --omega "0.01,0,20 rad/s" --gif nut.gif
   rotor tumble --moments "0.6,0.8,1.0 kg m2" --omega "0.1,60,0 rpm"
-  rotor tumble --moments 0.6,0.8,1.0 --angular-momentum 1.8,0.4,-0.9 --times 0:10:101 --csv out.csv"""
+  rotor tumble --moments 0.6,0.8,1.0 --angular-momentum 1.8,0.4,-0.9 --times 0:10:101 --csv out.csv
+  rotor tumble book --effect "linear drag coefficients=1e-4,1e-4,1e-4" --times 0:30:301 --csv slowed.csv"""
 
 FEW_TIMES = 10_000  # half a second of plain Python, as long as loading the compiler takes
 NAMES = {"moments": "--moments", "angular_momentum": "--angular-momentum", "times": "--times"}
@@ -51,8 +53,12 @@ class Outputs:
 @grouped(
     given=("dipole", "dipole_abc", "spin_weights", "state_constants", "calculator", "hessian", "symmetry_tolerance")
 )
-def command(context: typer.Context, given: Input, options: Options, outputs: Outputs) -> None:
-    """Free rotation: the exact motion, what it conserves, which axes are stable."""
+def command(context: typer.Context, given: Input, options: Options, driven: Driven, outputs: Outputs) -> None:
+    """Free rotation: the exact motion, what it conserves, which axes are stable; with --effect a motion under torques."""
+    if driven.effect:
+        answer_effects(given, options, driven, outputs, context.obj)
+        return
+    refuse_without_effect(driven)
     files = Files.of(outputs)
     _check_film(outputs.gif)
     start = read_start(given, options)

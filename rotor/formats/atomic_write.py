@@ -10,9 +10,11 @@ import errno
 import os
 import shutil
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import AbstractContextManager, ExitStack, contextmanager
 from pathlib import Path
 from typing import IO, Any
+
+from rotor.temporary import locked_folder
 
 PREFIX = ".rotor-"
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)  # the disk, a quota, the largest file allowed, the device
@@ -100,57 +102,9 @@ def place(made: Path, path: Path) -> None:
         shutil.copyfileobj(source, copy)
 
 
-@contextmanager
-def unfinished_folder(parent: Path) -> Iterator[Path]:
+def unfinished_folder(parent: Path) -> AbstractContextManager[Path]:
     """A new folder in `parent`, locked and at the end removed; those of processes that were killed are removed first."""
-    _remove_abandoned(parent)
-    folder, lock = _locked_folder(parent)
-    try:
-        yield folder
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
-        if lock is not None:
-            os.close(lock)
-
-
-def _locked_folder(parent: Path) -> tuple[Path, int | None]:
-    """The folder and its lock; made again where another process took it for abandoned before it was locked."""
-    import tempfile
-
-    while True:
-        folder = Path(tempfile.mkdtemp(prefix=PREFIX, dir=parent))
-        lock = _lock(folder)
-        if folder.exists():
-            return folder, lock
-        if lock is not None:
-            os.close(lock)
-
-
-def _lock(folder: Path) -> int | None:
-    """An open descriptor that holds the lock of a folder; None where it is locked, gone, or the system has no such locks."""
-    try:
-        import fcntl
-    except ImportError:  # not on Windows
-        return None
-    handle = None
-    try:
-        handle = os.open(folder, os.O_RDONLY)
-        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
-        if handle is not None:
-            os.close(handle)
-        return None
-    return handle
-
-
-def _remove_abandoned(parent: Path) -> None:
-    """Remove the folders of killed processes; one that is in use is locked."""
-    with suppress(OSError):  # a folder that cannot be listed has nothing that can be removed
-        for folder in parent.glob(f"{PREFIX}*"):
-            lock = _lock(folder) if folder.is_dir() and not folder.is_symlink() else None
-            if lock is not None:
-                shutil.rmtree(folder, ignore_errors=True)
-                os.close(lock)
+    return locked_folder(parent, PREFIX)
 
 
 def write_together(writers: Mapping[Path, Callable[[Path], object]]) -> None:

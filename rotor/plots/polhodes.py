@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import json
 import math
 import os
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,9 +12,11 @@ from numpy.typing import ArrayLike
 
 from rotor.arrays import Floats
 from rotor.classical.free.free_motion import FreeMotion
+from rotor.plots.picture import checked_suffix, new_figure, save, styled
 from rotor.plots.sphere import LARGE, MIDDLE, MOTION, SMALL, draw_axes, draw_curve, draw_family, draw_sphere, view_of
 from rotor.version import version
 
+SIZE_INCHES = (7.2, 3.6)
 POINTS = 1500  # of a curve
 MOST_PERIODS = 12  # in the diagram over time; more would be a solid band
 
@@ -65,10 +65,8 @@ def polhode_figure(
     size = np.linalg.norm(motion.momentum0, axis=-1)
     if motion.moments.shape != (3,) or not size > 0.0 or not times.size:
         raise ValueError("a polhode picture is that of one body with an angular momentum, at one time or more")
-    from matplotlib.figure import Figure
-
-    with _style():
-        figure = Figure(figsize=(7.2, 3.6), layout="constrained")
+    with styled():
+        figure = new_figure(SIZE_INCHES)
         left, right = figure.subplots(1, 2, width_ratios=(1.2, 1.0))
         span, cut = _shown(motion, times)
         drawn = np.linspace(*span, POINTS)
@@ -119,44 +117,11 @@ def plot_polhodes(
     ValueError
         For a suffix that is no picture, and as `polhode_figure` does.
     """
-    suffix = Path(path).suffix.lower()
-    if suffix not in (".png", ".pdf", ".svg"):
-        raise ValueError(f"{os.fspath(path)}: a picture is .png, .pdf or .svg; the suffix names the format")
+    checked_suffix(path)
     figure = polhode_figure(
         motion, times, axis_names=axis_names, time_label=time_label, time_factor=time_factor, title=title
     )
-    with _style():
-        figure.savefig(path, dpi=200, metadata=_metadata(suffix, title.replace("$", ""), provenance or {}))
-
-
-def _metadata(suffix: str, title: str, provenance: Mapping[str, Any]) -> dict[str, Any]:
-    """What made the picture, under the names that each format allows; no date, so that the same picture is the same file."""
-    description = json.dumps({"program": "rotor", "version": version(), **provenance}, ensure_ascii=False)
-    title = title or "polhodes"
-    if suffix == ".pdf":
-        return {"Title": title, "Subject": description, "CreationDate": None}
-    if suffix == ".svg":
-        return {"Title": title, "Description": description, "Date": None}
-    return {"Title": title, "Description": description}
-
-
-def _style() -> Any:
-    import matplotlib as mpl
-
-    return mpl.rc_context(
-        {
-            "font.size": 9,
-            "axes.linewidth": 0.7,
-            "axes.labelsize": 9,
-            "legend.fontsize": 8,
-            "xtick.labelsize": 8,
-            "ytick.labelsize": 8,
-            "mathtext.fontset": "dejavuserif",
-            "svg.fonttype": "none",
-            "svg.hashsalt": "rotor",
-            "pdf.fonttype": 42,
-        }
-    )
+    save(figure, path, title or "polhodes", {"program": "rotor", "version": version(), **(provenance or {})})
 
 
 def _shown(motion: FreeMotion, times: Floats) -> tuple[tuple[float, float], bool]:
@@ -213,5 +178,3 @@ def _draw_right(axes: Any, moments: Floats, times: Floats, path: Floats, names: 
     axes.grid(True, color="0.92", linewidth=0.6)
     axes.set_axisbelow(True)
     axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, frameon=False)
-    for side in ("top", "right"):
-        axes.spines[side].set_visible(False)

@@ -6,9 +6,10 @@ The parameters are those of the classes in `rotor.classical.effects`; a module t
 from __future__ import annotations
 
 from importlib import import_module
-from typing import Annotated, Any
+from typing import Annotated, Any, get_args
 
 import msgspec
+import numpy as np
 
 from rotor.scenes.sections import Section, said
 
@@ -138,3 +139,24 @@ def effect_of(section: EffectSection) -> Any:
     module, name = _CLASSES[str(section.__struct_config__.tag)]
     made = getattr(import_module(f"rotor.classical.effects.{module}"), name)
     return made(**msgspec.structs.asdict(section))
+
+
+def section_of(effect: Any) -> EffectSection:
+    """The table that names an effect: the way back from `effect_of`.
+
+    >>> section_of(effect_of(RotorSection(momentum=[0.0, 0.0, 0.7])))
+    RotorSection(momentum=[0.0, 0.0, 0.7])
+    """
+    place = type(effect).__module__.rpartition(".")[2], type(effect).__name__
+    names = [name for name, found in _CLASSES.items() if found == place]
+    if not names:
+        raise ValueError(f"{effect!r}: a scene has no table of this effect; there are {', '.join(_CLASSES)}")
+    kind = next(one for one in get_args(EffectSection) if one.__struct_config__.tag == names[0])
+    made: EffectSection = kind(**{name: _numbers(effect, name) for name in kind.__struct_fields__})
+    return made
+
+
+def _numbers(effect: Any, name: str) -> Any:
+    """A parameter of an effect in the types of a file; moments by time are its rows."""
+    value = getattr(effect, "rows" if name == "moments" else name)
+    return np.asarray(value).tolist()

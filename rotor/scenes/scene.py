@@ -14,12 +14,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 from msgspec import Struct, field
 
 from rotor.scenes.effect_sections import EffectSection
+from rotor.scenes.fit_sections import FitLines, FitNumerics, FitOutputs, FitParameters
 from rotor.scenes.sections import (
     AlignConditions,
     AlignNumerics,
     AlignObservables,
     BasisNumerics,
     BodySection,
+    EmissionConditions,
+    EmissionObservables,
+    EmissionOutputs,
+    EmittingMolecule,
     FluidConditions,
     FluidNumerics,
     FluidOutputs,
@@ -50,7 +55,7 @@ from rotor.scenes.sections import (
 )
 
 if TYPE_CHECKING:
-    from rotor.scenes.plan import Plan
+    from rotor.scenes.plan_parts import Plan
     from rotor.scenes.run import SceneResult
 
 SCHEMA = 1
@@ -68,7 +73,7 @@ class Scene(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_
 
     @property
     def kind(self) -> str:
-        """spectrum, levels, raman, thermo, tumble, gas, fluid, stark or align."""
+        """spectrum, levels, raman, thermo, tumble, gas, fluid, stark, align, fit or emission."""
         return str(self.__struct_config__.tag)
 
     def run(
@@ -197,6 +202,27 @@ class AlignScene(Scene, frozen=True, tag="align"):
     outputs: TableOutputs = TableOutputs()
 
 
+class FitScene(Scene, frozen=True, tag="fit"):
+    """Constants fitted to measured lines."""
+
+    lines: FitLines
+    molecule: Annotated[
+        str | MoleculeSection | None, said("where the fit starts; a .par file says so itself", "water")
+    ] = None
+    parameters: FitParameters = FitParameters()
+    numerics: FitNumerics = FitNumerics()
+    outputs: FitOutputs = FitOutputs()
+
+
+class EmissionScene(Scene, frozen=True, tag="emission"):
+    """Lines of a source of several molecules, as a radio telescope sees them."""
+
+    molecules: Annotated[list[EmittingMolecule], said("one or more")]
+    conditions: EmissionConditions = EmissionConditions()
+    observables: EmissionObservables = EmissionObservables()
+    outputs: EmissionOutputs = EmissionOutputs()
+
+
 AnyScene = (
     SpectrumScene
     | LevelsScene
@@ -207,6 +233,8 @@ AnyScene = (
     | FluidScene
     | StarkScene
     | AlignScene
+    | FitScene
+    | EmissionScene
 )
 KINDS: Mapping[str, type[Scene]] = {
     "spectrum": SpectrumScene,
@@ -218,6 +246,8 @@ KINDS: Mapping[str, type[Scene]] = {
     "fluid": FluidScene,
     "stark": StarkScene,
     "align": AlignScene,
+    "fit": FitScene,
+    "emission": EmissionScene,
 }
 
 

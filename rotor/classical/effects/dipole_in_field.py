@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from rotor.arrays import Floats
 from rotor.classical.effect import Torque
 from rotor.classical.effects.torques import checked_vector, from_body, lever_torque
+from rotor.classical.torque_form import INDUCED, LEVER, TorqueForm, torque_form
 
 
 @dataclass(frozen=True)
@@ -35,6 +36,10 @@ class PermanentDipole(Torque):
     def torque(self, time: float, attitude: Floats, omega: Floats) -> Floats:
         """μ x E in body axes."""
         return lever_torque(self.dipole, self.field, attitude)
+
+    def compiled_form(self) -> TorqueForm:
+        """μ x E."""
+        return torque_form(LEVER, self.dipole, self.field)
 
     def potential_energy(self, time: float, attitude: Floats) -> Floats:
         """-μ·E."""
@@ -75,6 +80,10 @@ class InducedDipole(Torque):
         field = from_body(self.field, attitude)
         induced = field @ np.asarray(self.polarizability)
         return np.asarray(np.cross(induced, field))
+
+    def compiled_form(self) -> TorqueForm:
+        """(αE) x E."""
+        return torque_form(INDUCED, self.polarizability, self.field)
 
     def potential_energy(self, time: float, attitude: Floats) -> Floats:
         """-½ E·αE."""

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from rotor.arrays import Floats
 from rotor.classical.effect import Torque
+from rotor.classical.torque_form import LINEAR, QUADRATIC, TorqueForm, torque_form
 
 
 @dataclass(frozen=True)
@@ -45,6 +46,10 @@ class LinearDrag(Torque):
         """-C ω."""
         return np.asarray(-omega @ np.asarray(self.coefficients).T)
 
+    def compiled_form(self) -> TorqueForm:
+        """-C ω."""
+        return torque_form(LINEAR, self.coefficients)
+
 
 @dataclass(frozen=True)
 class QuadraticDrag(Torque):
@@ -74,3 +79,7 @@ class QuadraticDrag(Torque):
         """-c |ω| ω."""
         speed = np.linalg.norm(omega, axis=-1, keepdims=True)
         return np.asarray(-np.asarray(self.coefficients) * speed * omega)
+
+    def compiled_form(self) -> TorqueForm:
+        """-c |ω| ω."""
+        return torque_form(QUADRATIC, self.coefficients)

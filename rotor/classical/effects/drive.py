@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike
 
 from rotor.arrays import Floats
 from rotor.classical.effect import Torque
-from rotor.classical.effects.torques import Frame, checked_frame, checked_vector, in_body
+from rotor.classical.effects.torques import Frame, checked_frame, checked_vector, fixed_form, in_body
+from rotor.classical.torque_form import TorqueForm
 
 
 @dataclass(frozen=True)
@@ -42,3 +43,7 @@ class PeriodicDrive(Torque):
         """The amplitude times the cosine of this moment, seen from the body."""
         now = np.asarray(self.amplitude) * math.cos(self.angular_frequency * time + self.phase)
         return in_body(now, self.frame, attitude)
+
+    def compiled_form(self) -> TorqueForm:
+        """The amplitude with its frequency and phase."""
+        return fixed_form(self.amplitude, self.frame, (self.angular_frequency, self.phase))

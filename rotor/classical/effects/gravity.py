@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from rotor.arrays import Floats
 from rotor.classical.effect import Torque
 from rotor.classical.effects.torques import checked_vector, from_body, lever_torque
+from rotor.classical.torque_form import LEVER, TorqueForm, torque_form
 
 
 @dataclass(frozen=True)
@@ -40,6 +41,10 @@ class GravityAboutPivot(Torque):
     def torque(self, time: float, attitude: Floats, omega: Floats) -> Floats:
         """r x m g in body axes."""
         return lever_torque(self.centre, self.mass * np.asarray(self.gravity), attitude)
+
+    def compiled_form(self) -> TorqueForm:
+        """r x m g."""
+        return torque_form(LEVER, self.centre, self.mass * np.asarray(self.gravity))
 
     def potential_energy(self, time: float, attitude: Floats) -> Floats:
         """-m g·r."""

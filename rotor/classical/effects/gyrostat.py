@@ -37,3 +37,7 @@ class SpinningRotor(InnerMomentum):
     def inner_momentum(self, time: float) -> Floats:
         """h, the same at any time."""
         return np.asarray(self.momentum)
+
+    def compiled_form(self) -> Floats:
+        """h."""
+        return np.asarray(self.momentum)

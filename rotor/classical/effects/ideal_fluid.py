@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 from rotor.arrays import Floats
 from rotor.classical.effect import Torque
 from rotor.classical.effects.torques import checked_vector, from_body
+from rotor.classical.torque_form import INDUCED, TorqueForm, torque_form
 from rotor.geometry.rotations import vector_product
 
 
@@ -47,6 +48,10 @@ class FluidImpulse(Torque):
         """p x u in body axes."""
         p = from_body(self.impulse, attitude)
         return vector_product(p, p / np.asarray(self.masses))
+
+    def compiled_form(self) -> TorqueForm:
+        """(M p) x p with M the negative diagonal of 1/masses."""
+        return torque_form(INDUCED, np.diag(-1.0 / np.asarray(self.masses)), self.impulse)
 
     def potential_energy(self, time: float, attitude: Floats) -> Floats:
         """½ p·u."""

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from rotor.arrays import Floats
 from rotor.classical.effect import Torque
+from rotor.classical.torque_form import BODY_FIXED, SPACE_FIXED, TorqueForm, torque_form
 
 Frame = Literal["body", "space"]
 
@@ -34,6 +35,11 @@ def in_body(vector: ArrayLike, frame: str, attitude: Floats) -> Floats:
     if frame == "space":
         return from_body(vector, attitude)
     return np.broadcast_to(np.asarray(vector, dtype=np.float64), (*attitude.shape[:-1], 3))
+
+
+def fixed_form(vector: ArrayLike, frame: str, swing: tuple[float, float] = (0.0, 0.0)) -> TorqueForm:
+    """vector cos(Ω t + φ), swing = (Ω, φ), fixed in the body or in space, for compiled integrators."""
+    return torque_form(SPACE_FIXED if frame == "space" else BODY_FIXED, vector, swing)
 
 
 def checked_frame(frame: str) -> None:
@@ -76,6 +82,10 @@ class ConstantTorque(Torque):
     def torque(self, time: float, attitude: Floats, omega: Floats) -> Floats:
         """The constant vector, seen from the body."""
         return in_body(self.vector, self.frame, attitude)
+
+    def compiled_form(self) -> TorqueForm:
+        """A vector of frequency 0."""
+        return fixed_form(self.vector, self.frame)
 
 
 @dataclass(frozen=True)

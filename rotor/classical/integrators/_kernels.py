@@ -26,11 +26,17 @@ WIDEST_TURN = 0.5  # rad per step: half of it is the largest argument of the pol
 
 
 @njit(cache=True, inline="always", fastmath={"contract"})
-def _sine_cosine(x: Any) -> Any:
-    """Taylor polynomials, |x| <= ¼: truncated at x¹³/13! = 2e-18 and x¹⁴/14! = 4e-20."""
-    y = x * x
+def sine_series(y: Any) -> Any:
+    """(x - sin x)/x³ and (1 - cos x)/x² by y = x², |x| <= ¼: Taylor polynomials, truncated at x¹³/13! = 2e-18 and x¹⁴/14!."""
     s = 1 / 6 - y * (1 / 120 - y * (1 / 5040 - y * (1 / 362880 - y * (1 / 39916800))))
-    c = 1 / 2 - y * (1 / 24 - y * (1 / 720 - y * (1 / 40320 - y * (1 / 3628800 - y * (1 / 479001600)))))
+    return s, 1 / 2 - y * (1 / 24 - y * (1 / 720 - y * (1 / 40320 - y * (1 / 3628800 - y * (1 / 479001600)))))
+
+
+@njit(cache=True, inline="always", fastmath={"contract"})
+def sine_cosine(x: Any) -> Any:
+    """sin x and cos x, |x| <= ¼."""
+    y = x * x
+    s, c = sine_series(y)
     return x - x * y * s, 1.0 - y * c
 
 
@@ -42,9 +48,9 @@ def block_turns(row: Floats, inner: float, outer: float) -> None:
     """
     for i in range(LANES):
         q = row[i], row[LANES + i], row[2 * LANES + i], row[3 * LANES + i]
-        s, c = _sine_cosine(inner * row[4 * LANES + i] * half_third_row(q)[1])
+        s, c = sine_cosine(inner * row[4 * LANES + i] * half_third_row(q)[1])
         q = product(q, (c, 0.0, s, 0.0))
-        s, c = _sine_cosine(outer * row[5 * LANES + i] * half_third_row(q)[0])
+        s, c = sine_cosine(outer * row[5 * LANES + i] * half_third_row(q)[0])
         row[i], row[LANES + i], row[2 * LANES + i], row[3 * LANES + i] = product(q, (c, s, 0.0, 0.0))
 
 

@@ -115,18 +115,23 @@ def _turns(body: Any, inner: float, outer: float) -> None:
     _turn(row, lost, a, (a + 1) % 3, (a + 2) % 3, outer * outer_rate * row[a])
 
 
+@njit(cache=True)
+def symmetric_drift(row: Any, lost: Any, inverse: Any, axes: Any, step: float, fractions: Any, steps: int) -> None:
+    """Steps of `strang.py` of one body; inverse moments (3,), axes (3,) of (outer, inner, sphere)."""
+    a, b, equal = axes[0], axes[1], inverse[axes[2]]
+    rates = remainders(inverse[a], inverse[b], equal)
+    symmetric_steps(_turns, (row, lost, rates, (a, b)), fractions, step, steps)
+    whole = steps * step * equal
+    _turn_about(row, lost, whole * row[0], whole * row[1], whole * row[2])
+
+
 @njit(cache=True, nogil=True)
 def symmetric(
     state: Floats, carry: Floats, inverse: Floats, axes: Any, step: float, fractions: Floats, steps: int
 ) -> None:
-    """Steps of `strang.py` of each body; axes (n, 3) of (outer, inner, sphere)."""
+    """The same of each body of rows (n, 7)."""
     for body in range(state.shape[0]):
-        row, lost = state[body], carry[body]
-        a, b, equal = axes[body, 0], axes[body, 1], inverse[body, axes[body, 2]]
-        rates = remainders(inverse[body, a], inverse[body, b], equal)
-        symmetric_steps(_turns, (row, lost, rates, (a, b)), fractions, step, steps)
-        whole = steps * step * equal
-        _turn_about(row, lost, whole * row[0], whole * row[1], whole * row[2])
+        symmetric_drift(state[body], carry[body], inverse[body], axes[body], step, fractions, steps)
 
 
 @njit(cache=True, inline="always")
@@ -267,32 +272,43 @@ def moser_veselov(state: Floats, carry: Floats, scaled: Floats, steps: int) -> i
     return -1
 
 
-@njit(cache=True, nogil=True)
-def turn_uniformly(state: Floats, carry: Floats, vectors: Floats) -> None:
-    """Each body turns by its rotation vector (n, 3) in body axes while L stays where it is in space."""
-    for body in range(state.shape[0]):
-        row, lost = state[body], carry[body]
-        x, y, z = vectors[body, 0], vectors[body, 1], vectors[body, 2]
-        angle = math.sqrt(x * x + y * y + z * z)
-        _turn_about(row, lost, x, y, z)
-        if angle == 0.0:
-            continue
+@njit(cache=True)
+def turn_body(row: Any, lost: Any, x: float, y: float, z: float) -> None:
+    """The body turns by the rotation vector (x, y, z) in body axes while L stays where it is in space."""
+    angle = math.sqrt(x * x + y * y + z * z)
+    _turn_about(row, lost, x, y, z)
+    if angle > 0.0:
         sine = math.sin(angle)
         sine2, sine2_low = two_square(sine)
         v, _ = _versed(sine2, sine2_low, math.cos(angle))
         n = (x / angle, y / angle, z / angle)
         across = cross((row[0], row[1], row[2]), n)
         inward = cross(across, n)
-        for i in range(3):
-            _add(row, lost, i, sine * across[i] + v * inward[i])
+        _add(row, lost, 0, sine * across[0] + v * inward[0])
+        _add(row, lost, 1, sine * across[1] + v * inward[1])
+        _add(row, lost, 2, sine * across[2] + v * inward[2])
+
+
+@njit(cache=True, nogil=True)
+def turn_uniformly(state: Floats, carry: Floats, vectors: Floats) -> None:
+    """Each body turns by its rotation vector (n, 3) in body axes while L stays where it is in space."""
+    for body in range(state.shape[0]):
+        turn_body(state[body], carry[body], vectors[body, 0], vectors[body, 1], vectors[body, 2])
+
+
+@njit(cache=True)
+def kick_body(row: Any, lost: Any, torque: Any, time: float) -> None:
+    """L gains torque times time."""
+    _add(row, lost, 0, time * torque[0])
+    _add(row, lost, 1, time * torque[1])
+    _add(row, lost, 2, time * torque[2])
 
 
 @njit(cache=True, nogil=True)
 def kick(state: Floats, carry: Floats, torque: Floats, time: float) -> None:
-    """L gains torque (n, 3) times time."""
+    """L of each body gains its torque (n, 3) times time."""
     for body in range(state.shape[0]):
-        for i in range(3):
-            _add(state[body], carry[body], i, time * torque[body, i])
+        kick_body(state[body], carry[body], torque[body], time)
 
 
 def rows(momentum: Floats, attitude: Floats) -> Floats:

@@ -24,6 +24,7 @@ from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -93,15 +94,31 @@ def propagate(
     out = momentum.copy(), attitude.copy()
     if steps == 0:
         return out
-    blocks, arguments = -(-n // LANES), (step, steps, rates, axes, (momentum, attitude), out)
-    if executor is None:
-        advance_blocks((0, blocks), *arguments)
-    else:
-        edges = np.linspace(0, blocks, min(blocks, 64) + 1).astype(int).tolist()
-        jobs = [executor.submit(advance_blocks, part, *arguments) for part in pairwise(edges)]
-        for job in jobs:
-            job.result()
+    over_blocks(advance_blocks, -(-n // LANES), (step, steps, rates, axes, (momentum, attitude), out), executor)
     return out
+
+
+def over_blocks(kernel: Any, blocks: int, arguments: tuple[Any, ...], executor: ThreadPoolExecutor | None) -> None:
+    """Call kernel((first, last), *arguments) for all blocks at once, or for parts of them by the threads of an executor.
+
+    Parameters
+    ----------
+    kernel : function
+        A compiled loop that releases the interpreter lock.
+    blocks : int
+        Number of blocks.
+    arguments : tuple
+        What the kernel takes after the range of blocks; it changes arrays in place.
+    executor : ThreadPoolExecutor or None
+        None: no threads.
+    """
+    if executor is None:
+        kernel((0, blocks), *arguments)
+        return
+    edges = np.linspace(0, blocks, min(blocks, 64) + 1).astype(int).tolist()
+    jobs = [executor.submit(kernel, part, *arguments) for part in pairwise(edges)]
+    for job in jobs:
+        job.result()
 
 
 def rates_and_axes(moments: Floats) -> tuple[Floats, Floats]:

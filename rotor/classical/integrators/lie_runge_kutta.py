@@ -22,6 +22,11 @@ from rotor.geometry.rotations import conjugate, rotate
 SHRINK, GROW, SAFETY = 0.2, 5.0, 0.9
 SMALLEST_STEP = 1e-13  # of the interval between two times asked for
 STAGES = 12
+PLAIN_STEPS = 400  # a tenth of a second in numpy, as long as loading the compiled form of all further ones
+_TOO_SHORT = (
+    "no step is short enough at time {time:g}: an effect is discontinuous or grows without bound there; "
+    "end the motion before it, or loosen the tolerance"
+)
 
 
 @dataclass(frozen=True)
@@ -68,15 +73,41 @@ class LieRungeKutta(Method):
         steps : int
             How many steps were taken.
         """
-        space, q = rotate(attitude, momentum), np.array(attitude)
-        out, attitudes, taken = [momentum], [attitude], 0
+        space, q, taken = rotate(attitude, momentum), np.array(attitude), 0
+        path = np.empty((len(times), len(q), 7))
+        path[0, :, :3], path[0, :, 3:] = momentum, attitude
         step = self.fixed_step or self._first_step(system, float(times[0]), momentum, attitude)
-        for start, stop in pairwise(times):
-            space, q, step, steps = self._to(system, (float(start), float(stop)), space, q, step)
+        most = np.inf if system.compiled is None else PLAIN_STEPS
+        for k, (start, stop) in enumerate(pairwise(times.tolist())):
+            space, q, step, steps, reached = self._to(system, (start, stop, most - taken), space, q, step)
             taken += steps
-            out.append(rotate(conjugate(q), space))
-            attitudes.append(q)
-        return np.stack(out), np.stack(attitudes), taken
+            if reached != stop:
+                rest = np.array([reached, *times[k + 1 :]])
+                path[k + 1 :], steps = self._rest(system, rest, np.concatenate([space, q], axis=-1), step)
+                taken += steps
+                break
+            path[k + 1, :, :3], path[k + 1, :, 3:] = rotate(conjugate(q), space), q
+        return path[..., :3], path[..., 3:], taken
+
+    def _rest(self, system: System, times: Floats, state: Floats, step: float) -> tuple[Floats, int]:
+        """The states (t - 1, n, 7) at all times but the first, and the count of steps, by one compiled call.
+
+        state: (n, 7), L in space and attitude at times[0].
+        """
+        from scipy.integrate import DOP853
+
+        from rotor.classical.integrators._lie_kernels import to_times
+
+        path = np.empty((len(times), *state.shape))
+        path[0] = state
+        tableau = DOP853.A[:STAGES, :STAGES], DOP853.B[None], DOP853.C[:STAGES], DOP853.E3[:STAGES], DOP853.E5[:STAGES]
+        control = (0.0 if self.fixed_step else self.tolerance, SHRINK, GROW, SAFETY, 8.0)
+        smallest = SMALLEST_STEP * np.abs(np.diff(times))
+        arrays = tuple(np.ascontiguousarray(part) for part in tableau)
+        steps, reached = to_times(system.compiled, system.start_acting, arrays, control, (times, smallest), path, step)
+        if reached != times[-1]:
+            raise ValueError(_TOO_SHORT.format(time=reached))
+        return path[1:], steps
 
     def _first_step(self, system: System, time: float, momentum: Floats, attitude: Floats) -> float:
         """A tenth of a radian of the fastest body, or a time unit for bodies at rest; the control corrects it."""
@@ -84,24 +115,24 @@ class LieRungeKutta(Method):
         return 0.1 / fastest if fastest > 0.0 else 1.0
 
     def _to(
-        self, system: System, span: tuple[float, float], space: Floats, q: Floats, step: float
-    ) -> tuple[Floats, Floats, float, int]:
-        """The state at the end of `span`, the next step and the count of steps."""
-        time, end = span
+        self, system: System, span: tuple[float, float, float], space: Floats, q: Floats, step: float
+    ) -> tuple[Floats, Floats, float, int, float]:
+        """The state at the end of `span` or after its number of steps, the next step, the count of steps, the time reached."""
+        time, end, most = span
         forward, smallest, steps = np.sign(end - time), SMALLEST_STEP * abs(end - time), 0
-        while (end - time) * forward > smallest:
+        while (end - time) * forward > smallest and steps < most:
             last = step >= abs(end - time) * (1.0 - 1e-12)
             h = end - time if last else forward * step
             new_space, new_q, error = self._step(system, time, space, q, h)
             steps += 1
             if self.fixed_step is None:
-                if not last or error > 1.0:
+                if not last or not error <= 1.0:
                     step = abs(h) * _factor(error)
                 if not error <= 1.0:
                     _check_step(step, smallest, time)
                     continue
             time, space, q = (end if last else time + h), new_space, new_q
-        return space, q, step, steps
+        return space, q, step, steps, end if (end - time) * forward <= smallest else time
 
     def _step(self, system: System, time: float, space: Floats, q: Floats, h: float) -> tuple[Floats, Floats, float]:
         """L in space and attitude after one step, and the error estimate in units of the tolerance."""
@@ -151,7 +182,4 @@ def _factor(error: float) -> float:
 
 def _check_step(step: float, smallest: float, time: float) -> None:
     if step < smallest:
-        raise ValueError(
-            f"no step is short enough at time {time:g}: an effect is discontinuous or grows without bound there; "
-            "end the motion before it, or loosen the tolerance"
-        )
+        raise ValueError(_TOO_SHORT.format(time=time))

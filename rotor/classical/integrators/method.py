@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from rotor.arrays import Floats
 from rotor.classical.effect import ClassicalEffect
@@ -123,8 +123,7 @@ def integrate(
     q0 = np.broadcast_to(attitude0, (*shape, 4)).reshape(-1, 4)
     momentum, attitude, steps = method.states(system, m0, q0, times)
     _check_finite(momentum, times, method)
-    rows = [(float(t), m, q) for t, m, q in zip(times, momentum, attitude, strict=True)]
-    omega, energy = np.stack([system.omega(*row) for row in rows]), np.stack([system.energy(*row) for row in rows])
+    omega, energy = _omega_and_energy(system, times, momentum, attitude)
     momentum, attitude, omega, energy = (_bodies_first(a, shape) for a in (momentum, attitude, omega, energy))
     return Motion(times, momentum, attitude, omega, energy, steps)
 
@@ -204,14 +203,36 @@ class KickDrift(Method):
                 f"{type(self).__name__} drifts with moments along fixed axes; added inertia (rolling) needs LieRungeKutta"
             )
         state = rows(momentum, attitude)
-        carry, out, taken = np.zeros_like(state), [state.copy()], 0
-        for start, stop in pairwise(times):
-            steps = max(1, int(np.ceil(abs(stop - start) / self.step - 1e-9)))
-            self._advance(system, state, carry, float(start), float(stop - start) / steps, steps)
-            out.append(state.copy())
-            taken += steps
-        path = np.stack(out)
-        return path[..., :3], path[..., 3:], taken
+        counts = np.maximum(1, np.ceil(np.abs(np.diff(times)) / self.step - 1e-9)).astype(np.int64)
+        path = np.empty((len(times), *state.shape))
+        path[0] = state
+        if not self.follow_compiled(system, times, counts, path):
+            carry = np.zeros_like(state)
+            for k, ((start, stop), steps) in enumerate(zip(pairwise(times.tolist()), counts.tolist(), strict=True)):
+                self._advance(system, state, carry, start, (stop - start) / steps, steps)
+                path[k + 1] = state
+        return path[..., :3], path[..., 3:], int(counts.sum())
+
+    def follow_compiled(self, system: System, times: Floats, counts: NDArray[np.int64], path: Floats) -> bool:
+        """Fill path (t, n, 7) from path[0] with one compiled call, where the method and the effects have it; whether it was.
+
+        Parameters
+        ----------
+        system : System
+            Moments and effects.
+        times : (t,) array
+            Rising or falling.
+        counts : (t - 1,) array
+            Steps between neighbouring times.
+        path : (t, n, 7) array
+            Momentum and attitude; changed in place.
+
+        Returns
+        -------
+        bool
+            False where nothing was done: the steps are to be made one by one.
+        """
+        return False
 
     def _advance(self, system: System, state: Floats, carry: Floats, start: float, step: float, steps: int) -> None:
         if system.free:
@@ -279,6 +300,15 @@ class _Kicker:
         if self.system.inner:
             rate = self.system.inner_momentum(time) * self.system.acting(time)
             turn_uniformly(self.state, self.carry, -duration * rate)
+
+
+def _omega_and_energy(system: System, times: Floats, momentum: Floats, attitude: Floats) -> tuple[Floats, Floats]:
+    """ω (t, n, 3) and energy (t, n); at once where neither depends on time itself, as in all effects that are compiled."""
+    if system.compiled is not None:
+        row = float(times[0]), momentum, attitude
+        return system.omega(*row), system.energy(*row)
+    rows = [(float(t), m, q) for t, m, q in zip(times, momentum, attitude, strict=True)]
+    return np.stack([system.omega(*row) for row in rows]), np.stack([system.energy(*row) for row in rows])
 
 
 def _checked_times(times: ArrayLike) -> Floats:

@@ -19,9 +19,10 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Floats
 from rotor.classical.integrators.method import Composed
-from rotor.classical.system import acting_inverse
+from rotor.classical.system import System, acting_inverse
 
 _BASE = np.ones(1)
+WORTH_LOADING = 4000  # drifts: a tenth of a second step by step, as long as loading the compiled form of all of them
 
 
 @dataclass(frozen=True)
@@ -76,6 +77,33 @@ class SymmetricTopSplitting(Composed):
     >>> motion.momentum[-1].round(12).tolist()  # cos and -sin of (1/I3 - 1/I1) L3 t = ½
     [0.87758256189, -0.479425538604, 1.0]
     """
+
+    def follow_compiled(self, system: System, times: Floats, counts: NDArray[np.int64], path: Floats) -> bool:
+        """All steps of all bodies in one compiled call, where every effect has a compiled form and there are steps enough.
+
+        Parameters
+        ----------
+        system : System
+            Moments and effects.
+        times : (t,) array
+            Rising or falling.
+        counts : (t - 1,) array
+            Steps between neighbouring times.
+        path : (t, n, 7) array
+            Momentum and attitude; changed in place.
+
+        Returns
+        -------
+        bool
+            Whether it was done.
+        """
+        if system.free or system.compiled is None or counts.sum() * len(self.kick_fractions) < WORTH_LOADING:
+            return False
+        from rotor.classical.integrators._driven_kernels import kicked
+
+        inverse = system.start_acting
+        kicked(system.compiled, inverse, turned_axes(inverse), self.kick_fractions, times, counts, path)
+        return True
 
     def drift(self, moments: Floats, state: Floats, carry: Floats, step: float, steps: int, whole: bool) -> None:
         """Half the larger remainder, the smaller one, half the larger one; the sphere for all steps at once.

@@ -18,7 +18,7 @@ from rotor.units import ASE_TIME_PS, HBAR_CLASSICAL
 if TYPE_CHECKING:
     from rotor.arrays import Floats
     from rotor.classical.bodies import NamedBody
-    from rotor.classical.tumble import Three, TumbleRequest
+    from rotor.classical.tumble import Three, TumbleRequest, Units
     from rotor.plots.animation import Atoms
     from rotor.tops.top import Top
 
@@ -88,8 +88,34 @@ class Start:
         return Atoms((molecule.positions_angstrom - frame.centre) @ frame.axes.T, molecule.symbols)
 
 
+@dataclass(frozen=True)
+class Body:
+    """A rigid body that is no molecule. text: what was given. moments: principal ones, in coherent or SI units.
+
+    named: what an ordinary body consists of. start: its angular momentum where none is given, and how that was chosen.
+    """
+
+    text: str
+    moments: Three
+    units: Units
+    axes: tuple[str, str, str] = ("1", "2", "3")
+    named: NamedBody | None = None
+    start: tuple[Three, str] | None = None
+
+    @property
+    def rate_unit(self) -> str:
+        """Of angular velocities; empty: of any coherent set."""
+        return f"rad/{self.units.time}" if self.units.time else ""
+
+
 def read_start(given: Input, options: Options) -> Start:
     """The body and its angular momentum that the options mean; notes go to standard error."""
+    body = read_body(given, options)
+    return _molecule(given, options) if body is None else _turning(body, options)
+
+
+def read_body(given: Input, options: Options) -> Body | None:
+    """The body of --moments or --body, or of a source that is the name of one; None for a molecule."""
     if options.omega is not None and options.angular_momentum is not None:
         raise ValueError("--omega and --angular-momentum: each fixes the motion; give one of them")
     if options.body is not None and options.moments is not None:
@@ -98,7 +124,7 @@ def read_start(given: Input, options: Options) -> Start:
     if options.moments is None and body is None:
         if given.source is None and given.constants is None:
             raise ValueError("expected a molecule, --constants, --moments or --body; try 'rotor tumble water'")
-        return _molecule(given, options)
+        return None
     what = "--moments" if body is None else "--body"
     if (given.source is not None and (body is None or options.body is not None)) or given.constants is not None:
         raise ValueError(f"a molecule and {what}: give one of them")
@@ -106,7 +132,7 @@ def read_start(given: Input, options: Options) -> Start:
         raise ValueError("--isotope: bare moments have no atoms; give the moments of the isotopologue itself")
     if options.temperature is not None:
         raise ValueError("--temperature: bare moments have no units for a temperature; give --angular-momentum alone")
-    return _bare_body(options) if body is None else _ordinary_body(body, options)
+    return _of_moments(options.moments or "") if body is None else _ordinary_body(body)
 
 
 def _named_body(given: Input, options: Options) -> NamedBody | None:
@@ -120,24 +146,51 @@ def _named_body(given: Input, options: Options) -> NamedBody | None:
     return BODIES.get(given.source.replace("-", " "))
 
 
-def _ordinary_body(body: NamedBody, options: Options) -> Start:
-    """An ordinary body in SI units: as it is spun, or one turn a second about the axis that it cannot keep."""
+def _ordinary_body(body: NamedBody) -> Body:
+    """An ordinary body in SI units: unless it is spun, one turn a second about the axis that it cannot keep."""
     import numpy as np
 
     from rotor.classical.gas.thermal_momentum import off_intermediate_axis
-    from rotor.classical.tumble import SI, TumbleRequest
+    from rotor.classical.tumble import SI
     from rotor.thermo.thermal_tumble import TILT_DEGREES
 
     moments = np.array(body.moments_kg_m2)
+    size = TURN_RAD_PER_S * float(np.sort(moments)[1])
+    momentum = _tuple(off_intermediate_axis(moments, size, math.radians(TILT_DEGREES)))
+    middle = body.axes[int(np.argsort(moments)[1])]
+    source = f"one turn a second, {TILT_DEGREES:g} degrees off the intermediate axis, {middle}"
+    return Body(body.name, _tuple(moments), SI, body.axes, body, (momentum, source))
+
+
+def _of_moments(text: str) -> Body:
+    from rotor.classical.euler import checked_moments
+    from rotor.classical.tumble import COHERENT, SI
+
+    si = bool(_UNIT_AT_END.search(text))
+    moments = inputs.parsed("--moments", text, lambda one: _checked(one, checked_moments, "kg*m2" if si else ""))
+    return Body(text, _tuple(moments), SI if si else COHERENT)
+
+
+def _turning(body: Body, options: Options) -> Start:
+    """A body that turns freely."""
+    import numpy as np
+
+    from rotor.classical.tumble import TumbleRequest
+
     if options.omega is not None or options.angular_momentum is not None:
-        momentum, source = _start_of(options, moments, "rad/s")
+        momentum, source = _start_of(options, np.array(body.moments), body.rate_unit)
+    elif body.start is not None:
+        momentum, source = body.start
     else:
-        size = TURN_RAD_PER_S * float(np.sort(moments)[1])
-        momentum = _tuple(off_intermediate_axis(moments, size, math.radians(TILT_DEGREES)))
-        middle = body.axes[int(np.argsort(moments)[1])]
-        source = f"one turn a second, {TILT_DEGREES:g} degrees off the intermediate axis, {middle}"
-    times = inputs.times("--times", options.times, "s")
-    return Start(body.name, TumbleRequest(_tuple(moments), momentum, times, SI, body.axes, source), body=body)
+        raise ValueError(
+            "--angular-momentum: expected with --moments: three components in the axes of the moments; or --omega"
+        )
+    times = inputs.times("--times", options.times, body.units.time)
+    request = TumbleRequest(body.moments, momentum, times, body.units, body.axes, source)
+    if body.named is None:
+        for text in request.notes:
+            note(text)
+    return Start(body.text, request, body=body.named)
 
 
 def _start_of(options: Options, moments: Floats, unit: str) -> tuple[Three, str]:
@@ -154,25 +207,6 @@ def _start_of(options: Options, moments: Floats, unit: str) -> tuple[Three, str]
         return _tuple(momentum)
 
     return inputs.parsed("--omega", options.omega, parse), SPUN
-
-
-def _bare_body(options: Options) -> Start:
-    from rotor.classical.euler import checked_moments
-    from rotor.classical.tumble import COHERENT, SI, TumbleRequest
-
-    si = bool(_UNIT_AT_END.search(options.moments or ""))
-    unit = "kg*m2" if si else ""
-    moments = inputs.parsed("--moments", options.moments or "", lambda text: _checked(text, checked_moments, unit))
-    if options.angular_momentum is None and options.omega is None:
-        raise ValueError(
-            "--angular-momentum: expected with --moments: three components in the axes of the moments; or --omega"
-        )
-    momentum, source = _start_of(options, moments, "rad/s" if si else "")
-    times = inputs.times("--times", options.times, "s" if si else "")
-    request = TumbleRequest(_tuple(moments), momentum, times, SI if si else COHERENT, source=source)
-    for text in request.notes:
-        note(text)
-    return Start(options.moments or "", request)
 
 
 def _molecule(given: Input, options: Options) -> Start:
@@ -210,6 +244,11 @@ def _momentum(text: str, moments: Floats) -> Three:
         return _tuple(momentum)
 
     return inputs.parsed("--angular-momentum", text, parse)
+
+
+def read_vector(text: str, unit: str) -> Three:
+    """Three finite numbers, in a unit of their own or in `unit`."""
+    return _tuple(_three(text, unit))
 
 
 def _checked(text: str, check: Callable[[Any], Floats], unit: str = "") -> Floats:

@@ -23,6 +23,7 @@ from rotor.fluid.engines.engine_input import EngineInput, Frame, rigid_motion
 from rotor.fluid.engines.lammps_input import data_file, input_file, table_file
 from rotor.fluid.engines.pair_tables import Form, tail_of
 from rotor.fluid.settings import Settings
+from rotor.temporary import locked_folder
 from rotor.units import EV_PER_ANGSTROM3_BAR
 
 RUN = (sys.executable, "-m", "rotor.fluid.engines._lammps_run")
@@ -126,12 +127,11 @@ def frames(
     """
     form = form or Form()
     check()
-    with tempfile.TemporaryDirectory(prefix="rotor-lammps-") as name:
-        folder = Path(name)
+    with locked_folder(Path(tempfile.gettempdir()), "rotor-lammps-") as folder:
         write_files(folder, engine_input, settings, form, accuracy=accuracy, kspace=kspace)
         with open(folder / "errors", "w+", encoding="utf-8") as errors:
             process = subprocess.Popen(
-                [*_launcher(cores), *RUN, name, str(settings.steps), str(settings.every)],
+                [*_launcher(cores), *RUN, str(folder), str(settings.steps), str(settings.every)],
                 env=environment(),
                 stdout=subprocess.PIPE,
                 stderr=errors,

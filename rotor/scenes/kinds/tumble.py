@@ -13,7 +13,7 @@ from rotor.scenes import kind
 from rotor.scenes.kind import Kind, Where, Writer
 from rotor.scenes.molecule import named, top_of
 from rotor.scenes.scene import TumbleScene, molecule_of
-from rotor.scenes.sections import BodySection, MoleculeSection, TumbleConditions
+from rotor.scenes.sections import BodySection, MoleculeSection, TumbleConditions, TumbleNumerics
 
 if TYPE_CHECKING:
     from rotor.classical.driven import DrivenAnswer, DrivenRequest
@@ -53,7 +53,7 @@ def _driven(scene: TumbleScene, body: BodySection) -> DrivenRequest:
         raise ValueError("conditions.times: expected with effects, the start first: such as 0:10:101")
     effects = tuple(named(f"effects[{number}]", partial(effect_of, one)) for number, one in enumerate(scene.effects))
     names = {name: f"body.{name}" for name in ("moments", "angular_velocity", "angular_momentum", "attitude")}
-    with kind.fields(**names, tolerance="numerics.tolerance", times="conditions.times"):
+    with kind.fields(**names, tolerance="numerics.tolerance", step="numerics.step", times="conditions.times"):
         w, x, y, z = body.attitude or (1.0, 0.0, 0.0, 0.0)
         return DrivenRequest(
             three(body.moments),
@@ -140,8 +140,10 @@ def writers(found: TumbleAnswer | DrivenAnswer, scene: TumbleScene) -> Mapping[s
     return {"plot": plot}
 
 
-def saved(asked: TumbleRequest, molecule: MoleculeSection | None) -> TumbleScene:
+def saved(asked: TumbleRequest | DrivenRequest, molecule: MoleculeSection | None) -> TumbleScene:
     """The scene of a request."""
+    if not isinstance(asked, TumbleRequest):
+        return _saved_driven(asked)
     times = None if asked.times is None else list(asked.times)
     if molecule is None:
         units = next(name for name, one in UNITS.items() if one == asked.units)
@@ -150,6 +152,22 @@ def saved(asked: TumbleRequest, molecule: MoleculeSection | None) -> TumbleScene
         return TumbleScene(body=body, conditions=TumbleConditions(times=times))
     conditions = TumbleConditions(angular_momentum=list(asked.angular_momentum), times=times)
     return TumbleScene(molecule=molecule, conditions=conditions)
+
+
+def _saved_driven(asked: DrivenRequest) -> TumbleScene:
+    from rotor.scenes.effect_sections import section_of
+
+    spin = asked.angular_velocity
+    body = BodySection(
+        moments=list(asked.moments),
+        angular_velocity=None if spin is None else list(spin),
+        angular_momentum=None if asked.angular_momentum is None else list(asked.angular_momentum),
+        attitude=list(asked.attitude),
+    )
+    numerics = TumbleNumerics(tolerance=asked.tolerance, step=asked.step, order=asked.order)
+    effects = [section_of(effect) for effect in asked.effects]
+    conditions = TumbleConditions(times=list(asked.times))
+    return TumbleScene(body=body, effects=effects, conditions=conditions, numerics=numerics)
 
 
 KIND = Kind(request, answer, table, saved, writers)

@@ -1,0 +1,52 @@
+"""Compiled kicks and drifts of bodies under the torques of `rotor.classical.torque_form`, from time to time.
+
+The plain form is `KickDrift._advance` of `method.py` with the drift of `SymmetricTopSplitting`; the order of all operations is
+the same, so that both give the same numbers.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from rotor.arrays import Floats
+from rotor.classical.integrators._step_kernels import kick_body, symmetric_drift, turn_body
+from rotor.classical.integrators._torque_kernels import torque_at
+
+NO_OMEGA = (np.nan, np.nan, np.nan)  # torques that look at it are refused before
+
+
+@njit(cache=True, nogil=True)
+def kicked(form: Any, inverse: Floats, axes: Any, fractions: Floats, times: Floats, counts: Any, path: Floats) -> None:
+    """Fill path (t, n, 7) from its first rows, with counts (t - 1,) steps of equal length between neighbouring times.
+
+    form: codes, parameters, inner momentum. inverse, axes (n, 3): inverse moments; (outer, inner, sphere) of `strang.py`.
+    """
+    codes, parameters, inner = form
+    turning = inner[0] != 0.0 or inner[1] != 0.0 or inner[2] != 0.0
+    row, lost, one = np.empty(7), np.zeros(7), np.ones(1)
+    for body in range(path.shape[1]):
+        for i in range(7):  # component by component: assigning slices takes seconds to compile
+            row[i], lost[i] = path[0, body, i], 0.0
+        i0, i1, i2 = inverse[body, 0], inverse[body, 1], inverse[body, 2]
+        for k in range(counts.shape[0]):
+            step = (times[k + 1] - times[k]) / counts[k]
+            torque = torque_at(codes, parameters, times[k], (row[3], row[4], row[5], row[6]), NO_OMEGA)
+            for s in range(counts[k]):
+                time = times[k] + s * step
+                for fraction in fractions:
+                    h = fraction * step
+                    half = 0.5 * h
+                    kick_body(row, lost, torque, half)
+                    if turning:
+                        turn_body(row, lost, -half * inner[0] * i0, -half * inner[1] * i1, -half * inner[2] * i2)
+                    symmetric_drift(row, lost, inverse[body], axes[body], h, one, one.shape[0])
+                    if turning:
+                        turn_body(row, lost, -half * inner[0] * i0, -half * inner[1] * i1, -half * inner[2] * i2)
+                    time += h
+                    torque = torque_at(codes, parameters, time, (row[3], row[4], row[5], row[6]), NO_OMEGA)
+                    kick_body(row, lost, torque, half)
+            for i in range(7):
+                path[k + 1, body, i] = row[i]

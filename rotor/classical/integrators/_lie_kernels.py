@@ -1,0 +1,163 @@
+"""Compiled steps of the Lie-group Runge-Kutta method for bodies under the torques of `rotor.classical.torque_form`.
+
+The plain form is `lie_runge_kutta.py`; the order of operations within sums differs, so that both agree to round-off. All bodies of
+a call share the step.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from rotor.arrays import Floats
+from rotor.classical.integrators._attitude_kernels import ahead, turning_of
+from rotor.classical.integrators._torque_kernels import torque_at
+from rotor.geometry._kernels import conjugate, turned
+
+STAGES = 12
+
+
+@njit(cache=True, fastmath={"contract"})
+def _carried(slopes: Floats, weights: Floats, row: int, stages: int, h: float, out: Floats) -> None:
+    """out (n, 6) = h Σ weights[row] slopes over the first `stages`."""
+    for i in range(out.shape[0]):
+        a, b, c, d, e, f = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        for s in range(stages):
+            w = weights[row, s]
+            if w != 0.0:
+                a += w * slopes[s, i, 0]
+                b += w * slopes[s, i, 1]
+                c += w * slopes[s, i, 2]
+                d += w * slopes[s, i, 3]
+                e += w * slopes[s, i, 4]
+                f += w * slopes[s, i, 5]
+        out[i, 0], out[i, 1], out[i, 2], out[i, 3], out[i, 4], out[i, 5] = h * a, h * b, h * c, h * d, h * e, h * f
+
+
+@njit(cache=True, fastmath={"contract"})
+def _rate(form: Any, inverse: Floats, time: float, state: Any, change: Any, out: Any, stage: int, i: int) -> None:
+    """dL/dt in space and du/dt of body i into out[stage, i]; state: L in space and attitude before the step."""
+    codes, parameters, inner = form
+    u = (change[i, 3], change[i, 4], change[i, 5])
+    q = ahead((state[i, 3], state[i, 4], state[i, 5], state[i, 6]), u)
+    m = turned(conjugate(q), (state[i, 0] + change[i, 0], state[i, 1] + change[i, 1], state[i, 2] + change[i, 2]))
+    omega = (
+        (m[0] - inner[0]) * inverse[i, 0],
+        (m[1] - inner[1]) * inverse[i, 1],
+        (m[2] - inner[2]) * inverse[i, 2],
+    )
+    torque = turned(q, torque_at(codes, parameters, time, q, omega))
+    rate = turning_of(u, omega)
+    for k in range(3):
+        out[stage, i, k], out[stage, i, 3 + k] = torque[k], rate[k]
+
+
+@njit(cache=True, fastmath={"contract"})
+def _error(slopes: Floats, h: float, third: Floats, fifth: Floats, state: Floats, change: Floats) -> float:
+    """The estimate |h| |e5|²/√(|e5|² + 0.01 |e3|²) of the worst body, momenta over |L| + |change of L|."""
+    worst = 0.0
+    for i in range(state.shape[0]):
+        size = math.sqrt(state[i, 0] ** 2 + state[i, 1] ** 2 + state[i, 2] ** 2)
+        size += math.sqrt(change[i, 0] ** 2 + change[i, 1] ** 2 + change[i, 2] ** 2)
+        five, three = 0.0, 0.0
+        for k in range(6):
+            e5, e3 = 0.0, 0.0
+            for s in range(STAGES):
+                e5 += fifth[s] * slopes[s, i, k]
+                e3 += third[s] * slopes[s, i, k]
+            scale = 1.0 / size if k < 3 and size > 0.0 else 1.0
+            five += (scale * e5) ** 2
+            three += (scale * e3) ** 2
+        both = math.sqrt(five + 0.01 * three)
+        error = abs(h) * five / both if both > 0.0 else 0.0 * both
+        if not error <= worst:  # a number that is none is the worst
+            worst = error
+    return worst
+
+
+@njit(cache=True, fastmath={"contract"})
+def _stepped(form: Any, inverse: Floats, tableau: Any, time: float, h: float, state: Floats, work: Any) -> float:
+    """One step: work[1] (n, 6) is then the change of L in space and u, and the error estimate is returned."""
+    a, b, c, third, fifth = tableau
+    slopes, change = work
+    for stage in range(STAGES):
+        _carried(slopes, a, stage, stage, h, change)
+        for i in range(state.shape[0]):
+            _rate(form, inverse, time + c[stage] * h, state, change, slopes, stage, i)
+    _carried(slopes, b, 0, STAGES, h, change)
+    return _error(slopes, h, third, fifth, state, change)
+
+
+@njit(cache=True, fastmath={"contract"})
+def _accept(state: Floats, change: Floats) -> None:
+    for i in range(state.shape[0]):
+        q = ahead((state[i, 3], state[i, 4], state[i, 5], state[i, 6]), (change[i, 3], change[i, 4], change[i, 5]))
+        for k in range(3):
+            state[i, k] += change[i, k]
+        state[i, 3], state[i, 4], state[i, 5], state[i, 6] = q
+
+
+@njit(cache=True, fastmath={"contract"})
+def _next_factor(error: float, control: Any) -> Any:
+    """By how much to change the step; control: tolerance, SHRINK, GROW, SAFETY, order."""
+    _, shrink, grow, safety, order = control
+    if error == 0.0:
+        return grow
+    factor = safety * error ** (-1.0 / order) if math.isfinite(error) else shrink
+    return min(grow, max(shrink, factor))
+
+
+@njit(cache=True, nogil=True)
+def to_time(form: Any, inverse: Floats, tableau: Any, control: Any, span: Any, state: Floats, step: float) -> Any:
+    """Carry state (n, 7), L in space and attitude, from span[0] to span[1]; the next step, the count and the time reached.
+
+    The time is short of span[1] where no step is short enough (span[2]: the smallest). control[0]: tolerance, 0 for a step that
+    never changes.
+    """
+    time, end, smallest = span
+    work = np.zeros((STAGES, state.shape[0], 6)), np.zeros((state.shape[0], 6))
+    forward, steps = (1.0 if end > time else -1.0), 0
+    while (end - time) * forward > smallest:
+        last = step >= abs(end - time) * (1.0 - 1e-12)
+        h = end - time if last else forward * step
+        error = _stepped(form, inverse, tableau, time, h, state, work)
+        steps += 1
+        if control[0] > 0.0:
+            error /= control[0]
+            if not last or not error <= 1.0:
+                step = abs(h) * _next_factor(error, control)
+            if not error <= 1.0:
+                if step < smallest:
+                    return step, steps, time
+                continue
+        _accept(state, work[1])
+        time = end if last else time + h
+    return step, steps, end
+
+
+@njit(cache=True, nogil=True)
+def to_times(form: Any, inverse: Floats, tableau: Any, control: Any, times: Any, path: Floats, step: float) -> Any:
+    """Fill path (t, n, 7), L in body axes and attitude, from its first rows, which hold L in space; count and time reached.
+
+    times: (times (t,), the smallest step of each interval (t - 1,)).
+    """
+    grid, smallest = times
+    state, total = np.empty((path.shape[1], 7)), 0
+    for i in range(state.shape[0]):
+        for k in range(7):
+            state[i, k] = path[0, i, k]
+    for j in range(grid.shape[0] - 1):
+        step, steps, time = to_time(form, inverse, tableau, control, (grid[j], grid[j + 1], smallest[j]), state, step)
+        total += steps
+        if time != grid[j + 1]:
+            return total, time
+        for i in range(state.shape[0]):
+            q = (state[i, 3], state[i, 4], state[i, 5], state[i, 6])
+            m = turned(conjugate(q), (state[i, 0], state[i, 1], state[i, 2]))
+            path[j + 1, i, 0], path[j + 1, i, 1], path[j + 1, i, 2] = m
+            for k in range(3, 7):
+                path[j + 1, i, k] = state[i, k]
+    return total, grid[-1]

@@ -1,0 +1,74 @@
+"""What compiled integrators know of effects: a code and parameters for each torque that they evaluate themselves.
+
+| code | torque in body axes | parameters |
+|---|---|---|
+| `BODY_FIXED` | v cos(Ω t + φ) | v, Ω, φ |
+| `SPACE_FIXED` | Rᵀ v cos(Ω t + φ) | v, Ω, φ |
+| `LEVER` | a x Rᵀ f | a of the body, f of space |
+| `INDUCED` | (M e) x e, e = Rᵀ f | M by rows, f of space |
+| `LINEAR` | -C ω | C by rows |
+| `QUADRATIC` | -c \\|ω\\| ω | c |
+
+R takes body axes to space. An effect says its form in `compiled_form`; its `torque` is the plain form of the same, and one
+without a compiled form is called at every step. The kernels are `integrators/_torque_kernels.py`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rotor.arrays import Floats
+
+BODY_FIXED, SPACE_FIXED, LEVER, INDUCED, LINEAR, QUADRATIC = range(6)
+WIDTH = 12  # parameters of the longest form
+
+
+class TorqueForm(NamedTuple):
+    """One torque: its code and its parameters, at most `WIDTH` numbers."""
+
+    code: int
+    parameters: tuple[float, ...]
+
+
+class SystemForm(NamedTuple):
+    """All that acts on a body: codes (k,), parameters (k, WIDTH), and the sum h (3,) of inner momenta."""
+
+    codes: NDArray[np.int64]
+    parameters: Floats
+    inner: Floats
+
+
+def torque_form(code: int, *parts: ArrayLike) -> TorqueForm:
+    """A form from its parameters: numbers, vectors and matrices, one after another.
+
+    >>> torque_form(LEVER, [1.0, 0.0, 0.0], [0.0, 0.0, 2.0]).parameters
+    (1.0, 0.0, 0.0, 0.0, 0.0, 2.0)
+    """
+    return TorqueForm(code, tuple(np.concatenate([np.ravel(part) for part in parts]).tolist()))
+
+
+def own_form(effect: Any, plain: str) -> Any:
+    """The compiled form of an effect whose class states it beside its plain method of the name given; else None.
+
+    A class that overrides the plain method alone would inherit a form of another torque: its form is None.
+    """
+    for kind in type(effect).__mro__:
+        if plain in vars(kind):
+            return effect.compiled_form() if "compiled_form" in vars(kind) else None
+    return None
+
+
+def system_form(torques: Iterable[Any], inner: Iterable[Any]) -> SystemForm | None:
+    """The forms of torques and inner momenta together, None where one of them has none."""
+    forms, momenta = [own_form(t, "torque") for t in torques], [own_form(h, "inner_momentum") for h in inner]
+    if any(form is None for form in (*forms, *momenta)):
+        return None
+    parameters = np.zeros((len(forms), WIDTH))
+    for row, form in zip(parameters, forms, strict=True):
+        row[: len(form.parameters)] = form.parameters
+    codes = np.array([form.code for form in forms], dtype=np.int64)
+    return SystemForm(codes, parameters, np.sum([np.zeros(3), *momenta], axis=0))
