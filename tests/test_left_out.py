@@ -18,7 +18,13 @@ from rotor.quantum.solve import solve_levels
 from rotor.scenes import left_out
 from rotor.scenes.plan import plan_of
 from rotor.scenes.scene import FluidScene, LevelsScene, SpectrumScene
-from rotor.scenes.sections import FluidConditions, LevelsObservables, SpectrumConditions, SpectrumObservables
+from rotor.scenes.sections import (
+    FluidConditions,
+    FluidNumerics,
+    LevelsObservables,
+    SpectrumConditions,
+    SpectrumObservables,
+)
 
 ATM_PER_BAR, TORR_PER_BAR = 1 / 1.01325, 760 / 1.01325
 MEASURED = [  # half widths at half maximum, MHz per bar
@@ -130,7 +136,8 @@ def test_the_sizes_of_a_plan_are_those_of_the_equilibrated_fluid():
     from rotor.fluid.request import box_of
     from rotor.scenes.kind import kind_of
 
-    scene = FluidScene(conditions=FluidConditions(molecules=64, ensemble="langevin", friction=5.0, steps=100))
+    box = FluidConditions(molecules=64, ensemble="langevin", friction=5.0, steps=100)
+    scene = FluidScene(conditions=box, numerics=FluidNumerics(cutoff="6 Å"))
     planned = {one.name: one.size for one in plan_of(scene).left_out}
     request = kind_of(scene).request(scene, ".")
     atoms, kelvin, step_fs = box_of(request), 298.15, 2.0
