@@ -194,7 +194,7 @@ def test_a_start_that_does_not_find_the_way_back_says_so(tmp_path):
     asked = read_fit(tmp_path / "case.par")
     fit = fit_lines(asked.lines, None, asked.parameters, asked.options, model=asked.model)
     assert not fit.converged
-    assert "does not describe the lines: weighted rms 35.7" in fit.reason
+    assert "does not describe the lines" in fit.reason
 
 
 @pytest.mark.slow
