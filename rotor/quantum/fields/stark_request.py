@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from rotor.checks import require_positive, require_whole
+from rotor.quantum.effects.of_top import effects_of
 from rotor.quantum.effects.stark import (
     DEFAULT_TOLERANCE_MHZ,
     Z,
@@ -19,6 +20,7 @@ from rotor.quantum.effects.stark import (
     stark_map,
 )
 from rotor.quantum.fields.field_map import FieldMap
+from rotor.quantum.limits import limit_facts
 from rotor.table import TextOf
 from rotor.tops.facts import top_facts
 
@@ -65,8 +67,6 @@ class StarkRequest:
     @property
     def effects(self) -> tuple[QuantumEffect, ...]:
         """The Hamiltonian with spins where they are asked for, else nothing beyond what is always there."""
-        from rotor.quantum.effects.of_top import effects_of
-
         return effects_of(self.top, True) if self.hyperfine else ()
 
     @property
@@ -98,6 +98,7 @@ class StarkAnswer(TextOf):
             "tolerance_mhz": request.tolerance_mhz,
             **self.states.provenance,
             "curves": len(self.states.curves()),
+            **limit_facts(request.top, max(request.j_highest, 1), effects_of(request.top, request.hyperfine)),
         }
 
 
