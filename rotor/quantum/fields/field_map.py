@@ -22,7 +22,8 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum.fields.block_states import BlockStates, block_states, count_of, enough_states, free_order, states_of
-from rotor.quantum.fields.blocks import FieldBlock
+from rotor.quantum.fields.blocks import AxialBlock, FieldBlock
+from rotor.quantum.fields.chains import TOGETHER
 from rotor.quantum.fields.map_request import BlockProblem, MapRequest, over
 from rotor.quantum.fields.solver import (
     DENSE,
@@ -282,6 +283,13 @@ def _solve_blocks(request: MapRequest, blocks: Sequence[FieldBlock]) -> list[_So
     ]
 
 
+def _is_small(request: MapRequest, blocks: Sequence[FieldBlock]) -> bool:
+    """Whether all blocks are chains that one sweep holds together: milliseconds, which other processes would not shorten."""
+    states = sum(count_of(request, block) for block in blocks)
+    chains = all(isinstance(block, AxialBlock) for block in blocks)
+    return chains and max(map(len, blocks), default=0) * len(request.fields) * states <= TOGETHER
+
+
 def _measured(request: MapRequest, block: FieldBlock, problem: BlockProblem, found: BlockStates) -> _Solved:
     """Slopes, cosines and leakage of the states of a block."""
     fields, vectors = request.fields, found.vectors
@@ -292,8 +300,9 @@ def _measured(request: MapRequest, block: FieldBlock, problem: BlockProblem, fou
 
 
 def _tabulated(request: MapRequest, jmax: int, moved: Floats, executor: Executor | None) -> FieldMap:
-    if executor is None:
-        solved = _solve_blocks(request, _blocks(request, jmax))
+    blocks = _blocks(request, jmax)
+    if executor is None or _is_small(request, blocks):
+        solved = _solve_blocks(request, blocks)
     else:
         solved = each_block(request, jmax, partial(_solve_block, request), executor)
     fields, rows = request.fields, []
