@@ -12,8 +12,7 @@ import numpy as np
 from scipy.special import obl_cv
 
 import rotor
-from rotor.plots.stark import lobes_figure, stark_figure
-from rotor.plots.zeeman import zeeman_figure
+from rotor.plots.stark import stark_figure
 from rotor.quantum.effects.stark import MHZ_ANGSTROM3_W_PER_CM2, stark_map
 from rotor.quantum.effects.zeeman import zeeman_map
 from rotor.quantum.fields.deflection import deflection_table
@@ -67,7 +66,7 @@ assert abs(low + dipole**2 / (6 * b)) < 1e-4
 
 # %%
 indole = rotor.read("indole")
-states = stark_map(indole, np.linspace(0, 100, 51), j_highest=2, tolerance_mhz=1e-3)
+states = stark_map(indole, np.linspace(0, 100, 51), j_highest=1, tolerance_mhz=1e-3)
 print(f"indole: {len(states.curves())} states, J max {states.jmax}, edge population {states.edge_population.max():.1e}")
 stark_figure(states, title="indole in a static field")
 
@@ -88,7 +87,13 @@ slope = first.shift_mhz[1] / fields[1] ** 2
 print(f"J = 1 - 0, M = 0: {slope:.4f} MHz/(kV/cm)²; formula {8 / 15 * dipole**2 / (2 * b):.4f}")
 for row in line_coefficients(lobes).to_pandas().itertuples():
     print(f"J = 2 - 1, M = {row.upper_m} - {row.lower_m}: {row.c2_mhz_per_kv2_per_cm2:+.4f} MHz/(kV/cm)²")
-lobes_figure(lobes, title="OCS, J = 2 - 1 in unpolarized light")
+figure, axes = plt.subplots(figsize=(5.5, 2.8), layout="constrained")
+for rows in lobes.pairs():
+    upper, lower = int(lobes.upper_m[rows.start]), int(lobes.lower_m[rows.start])
+    style = "-" if upper == lower else "--"
+    axes.plot(fields, lobes.shift_mhz[rows], style, lw=1.0, label=f"|M| = {lower} to {upper}")
+axes.set(xlabel="field (kV/cm)", ylabel="shift (MHz)", title="OCS, J = 1 to 2, unpolarized light")
+axes.legend(frameon=False, fontsize=8)
 
 # %%
 assert abs(slope - 8 / 15 * dipole**2 / (2 * b)) < 1e-3  # of fourth order in the field
@@ -104,7 +109,7 @@ assert len(lobes.pairs()) == 5  # M = 0 - 0, 1 - 1, 1 - 0, 0 - 1, 2 - 1
 fields = np.linspace(0, 200, 41)
 gas, beam = (field_mixture(ocs, fields, 2.0, populations=kind) for kind in ("equilibrium", "adiabatic"))
 table = deflection_table(stark_map(ocs, fields, j_highest=2))
-figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.5), layout="constrained")
+figure, (left, right) = plt.subplots(1, 2, figsize=(7, 2.6), layout="constrained")
 for mixture, name in ((gas, "gas, in equilibrium"), (beam, "beam, adiabatic")):
     left.plot(mixture.field_kv_per_cm, mixture.cosines["costheta"], label=name)
 left.set(xlabel="field (kV/cm)", ylabel="⟨cosθ⟩", title="OCS at 2 K")
@@ -136,7 +141,7 @@ for angle in np.radians(angles):
     tilted = stark_map(bright, [5.0], j_highest=0, intensity_w_per_cm2=2e11, direction=direction, tolerance_mhz=1.0)
     along.append(tilted.cosines["costheta"][0])
     held.append(tilted.cosines["cos2theta"][0])
-figure, axes = plt.subplots(figsize=(6, 3.2), layout="constrained")
+figure, axes = plt.subplots(figsize=(5, 2.7), layout="constrained")
 axes.plot(angles, held, "s-", ms=4, label="⟨cos²θ⟩ with the laser")
 axes.plot(angles, along, "o-", ms=4, label="⟨cosθ⟩ with the field")
 axes.plot(angles, along[0] * np.cos(np.radians(angles)), "k:", lw=0.8, label="the projection of an axis along Z")
@@ -167,7 +172,7 @@ for omega in omegas:
     energies.append(found.energy_mhz[0] / 6000)
     aligned.append(found.cosines["cos2theta"][0])
 
-figure, (left, right) = plt.subplots(1, 2, figsize=(8, 3.5), layout="constrained")
+figure, (left, right) = plt.subplots(1, 2, figsize=(6, 2.4), layout="constrained")
 fine = np.logspace(-1, 2, 200)
 left.semilogx(fine, [obl_cv(0, 0, np.sqrt(omega)) / omega for omega in fine], "k-", lw=0.8, label="spheroidal function")
 left.semilogx(omegas, np.array(energies) / omegas, "o", ms=4, label="stark_map")
@@ -192,10 +197,14 @@ print(
     f"OCS, J = 1, M = 1 in 1 T, with g = -0.03 (a made-up value): {shift * 1e3:.2f} kHz; {shift / MHZ_PER_CM:.2e} cm⁻¹"
 )
 symmetric = Top.from_constants("A=20 B=6 GHz")
-zeeman_figure(
-    zeeman_map(symmetric, np.linspace(0, 20, 21), (0.5, -0.2, -0.2), magnetisability=(-3, -7, -7), j_highest=1),
-    title="A symmetric top with made-up g and magnetisability",
-)
+components = zeeman_map(symmetric, np.linspace(0, 20, 21), (0.5, -0.2, -0.2), magnetisability=(-3, -7, -7), j_highest=1)
+figure, axes = plt.subplots(figsize=(5.5, 2.6), layout="constrained")
+for rows in components.curves():
+    if components.label[rows.start] == "1 1":
+        shifts = components.energy_mhz[rows] - components.free_mhz[rows]
+        axes.plot(components.field[rows], shifts, label=f"M = {components.m[rows.start]:+d}")
+axes.set(xlabel="magnetic field (T)", ylabel="shift (MHz)", title="J = K = 1 of a symmetric top, made-up g and χ")
+axes.legend(frameon=False, fontsize=8)
 
 # %%
 assert abs(shift - 0.03 * 7.6225932188) < 1e-8

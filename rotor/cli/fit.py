@@ -334,7 +334,7 @@ def _components(fit: Fit) -> tuple[float, float, float]:
     return a, b, c
 
 
-def _bootstrap(request: Request, fit: Fit, options: FitOptions, samples: int, seed: int) -> list[float]:
+def _bootstrap(request: FitRequest, fit: Fit, options: FitOptions, samples: int, seed: int) -> list[float]:
     if not samples:
         return []
     import numpy as np

@@ -40,7 +40,6 @@ from rotor.table import Table
 Of = TypeVar("Of")
 
 EDGE = 2  # the highest values of J whose population is leakage
-MOST_AT_EDGE = 1e-6  # of that population: cosines are wrong by about as much
 HIGHEST_J = 300
 STEP_J = 6
 
@@ -142,7 +141,7 @@ def field_map(request: MapRequest, jmax: int | None = None, executor: Executor |
     """The map that a request asks for.
 
     jmax: of the basis; by default it is raised until no energy at the highest field moves by more than the tolerance, and until no
-    state has more than 1e-6 of its population in the two highest J.
+    state has more of its population in the two highest J than the request allows.
     executor: blocks are spread over it.
 
     Raises ValueError where a given J max is too small for either, and where J of 300 would not be enough.
@@ -152,12 +151,12 @@ def field_map(request: MapRequest, jmax: int | None = None, executor: Executor |
         enough, moved = converged_jmax(request, tried, executor, given=jmax is not None)
         found = _tabulated(request, enough, moved, executor)
         leaked = float(found.edge_population.max(initial=0.0))
-        if leaked <= MOST_AT_EDGE:
+        if leaked <= request.most_at_edge:
             return found
         if jmax is not None:
             raise ValueError(
                 f"J max {jmax} is too small: a state has {leaked:.2g} of its population in the two highest J, more than "
-                f"{MOST_AT_EDGE:g}; give a higher J max, or none and it is chosen"
+                f"{request.most_at_edge:g}; give a higher J max, or none and it is chosen"
             )
         tried = enough + max(STEP_J, enough // 4)
 
