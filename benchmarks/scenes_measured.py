@@ -190,8 +190,8 @@ def tail(rows: list[Measured]) -> str:
     if not spared:
         return "\nOne step coarser at least one knob of every scene misses its accuracy.\n"
     return (
-        f"\nOne step coarser at least one knob of every scene misses its accuracy, but of {', '.join(spared)}: there an estimate is larger "
-        "than the error, or the population of the highest J, on which cosines depend, decides before energies do.\n"
+        f"\nOne step coarser at least one knob of every scene misses its accuracy, but of {', '.join(spared)}: there the estimate is "
+        "larger than the error.\n"
     )
 
 
