@@ -186,7 +186,7 @@ def misses(one: Measured) -> list[str]:
 
 def tail(rows: list[Measured]) -> str:
     """Which scenes could be coarser."""
-    spared = [one.scene for one in rows if EXACT not in one.how and not misses(one)]
+    spared = [one.scene for one in rows if EXACT not in one.how and one.knobs and not misses(one)]
     if not spared:
         return "\nOne step coarser at least one knob of every scene misses its accuracy.\n"
     return (
