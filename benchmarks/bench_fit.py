@@ -1,6 +1,7 @@
-"""One iteration of a fit to 500, 5,000 and 25,000 lines; and what is left after each iteration.
+"""One iteration of a fit to 500, 5,000 and 25,000 lines; what is left after each iteration; and what a tolerance costs.
 
     OPENBLAS_NUM_THREADS=1 python benchmarks/bench_fit.py [--json benchmarks/results/fit.json]
+    OPENBLAS_NUM_THREADS=1 python benchmarks/bench_fit.py --picture docs/pictures/fit_accuracy.png
 
 One iteration is levels, derivatives, residuals, QR and the step; lines are synthetic with normal errors of 20 kHz.
 """
@@ -90,20 +91,23 @@ def one_state() -> list[dict[str, Any]]:
     return rows
 
 
-def iterations(count: int = 500) -> list[dict[str, Any]]:
-    """What is left after each iteration, in standard errors, and the time so far; constants from 3 % off, each by its own."""
-    lines = lines_of(TRUE, count, 30)
-    off = 1 + 0.03 * np.random.default_rng(1).normal(size=len(TRUE.values))  # all by one factor would be one step
-    start = TRUE.replace(
-        **{name: value * factor for (name, value), factor in zip(TRUE.values.items(), off, strict=True)}
-    )
-    free = parameters(start, list(TRUE.values))
+def starts(share: float) -> Constants:
+    """The true constants, each off by its own part: all by one factor would be one step."""
+    off = 1 + share * np.random.default_rng(1).normal(size=len(TRUE.values))
+    pairs = zip(TRUE.values.items(), off.tolist(), strict=True)
+    return TRUE.replace(**{name: value * factor for (name, value), factor in pairs})
+
+
+def iterations(count: int = 500, jmax: int = 30, share: float = 0.03) -> list[dict[str, float]]:
+    """What is left after each iteration, in standard errors, and the time so far."""
+    lines, start = lines_of(TRUE, count, jmax), starts(share)
+    free, rows = parameters(start, list(TRUE.values)), list[dict[str, float]]()
 
     def fitted(most: int, tolerance: float = 1e-4) -> Fit:
         return fit_lines(lines, start, free, FitOptions(most_iterations=most, tolerance=tolerance))
 
-    best, rows = fitted(100, 1e-9), []
-    for most in range(1, 10):
+    best = fitted(100, 1e-9)
+    for most in range(1, 20):
         found = fitted(most)
         left = float(np.abs((found.values - best.values) / best.errors).max())
         seconds = fastest(lambda most=most: fitted(most), 3)  # type: ignore[misc]
@@ -113,11 +117,66 @@ def iterations(count: int = 500) -> list[dict[str, Any]]:
     return rows
 
 
+def work_precision(count: int = 500, jmax: int = 30, share: float = 0.03) -> list[dict[str, float]]:
+    """Tolerance of the search, iterations, seconds of processor time of the whole fit, and how far its constants are from the minimum
+    in standard errors, the worst of 15."""
+    lines, start = lines_of(TRUE, count, jmax), starts(share)
+    free, rows = parameters(start, list(TRUE.values)), list[dict[str, float]]()
+
+    def fitted(tolerance: float) -> Fit:
+        return fit_lines(lines, start, free, FitOptions(tolerance=tolerance, poor_rms=1e12))
+
+    best = fitted(1e-9)
+    for tolerance in 10.0 ** np.arange(5, -8, -1):
+        found = fitted(tolerance)
+        rows.append({
+            "tolerance": float(tolerance),
+            "iterations": len(found.minimum.iterations),
+            "seconds": fastest(lambda tolerance=tolerance: fitted(tolerance), 3),  # type: ignore[misc]
+            "off_sigma": float(np.abs((found.values - best.values) / best.errors).max()),
+        })  # fmt: skip
+    return rows
+
+
+CURVES = ((500, 30, 0.001), (500, 30, 0.03), (5_000, 60, 0.001))  # lines, J max, how far the start is off
+
+
+def picture(path: Path) -> None:
+    """Error against time of the fits of CURVES, a point for each iteration until the search ends by itself."""
+    from rotor.plots.picture import PALETTE, new_figure, save, styled
+
+    with styled():
+        figure = new_figure()
+        axes = figure.add_subplot()
+        facts = {}
+        for color, (count, jmax, share) in zip(PALETTE, CURVES, strict=False):
+            rows = iterations(count, jmax, share)
+            label = f"{count} lines, J ≤ {jmax}, start {100 * share:g} % off"
+            facts[label] = rows
+            x, y = [row["ms"] for row in rows], [max(row["off_sigma"], 1e-9) for row in rows]
+            axes.semilogy(x, y, "o-", color=color, label=label, markersize=3.5)
+            for row, one, other in zip(rows, x, y, strict=True):
+                axes.annotate(
+                    f"{row['iterations']:g}", (one, other), fontsize=6, xytext=(3, 3), textcoords="offset points"
+                )
+        axes.axhline(1.0, color="#555555", linewidth=0.7)
+        axes.axhline(1e-4, color="#555555", linewidth=0.7, linestyle="--")
+        axes.set_xlim(left=0)
+        axes.set_xlabel("milliseconds of processor time of the whole fit (numbers: iterations)")
+        axes.set_ylabel("largest error of 15 constants\n(standard errors)")
+        axes.legend(frameon=False)
+    save(figure, path, "Fits: accuracy against time", facts)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--json", type=Path)
+    parser.add_argument("--picture", type=Path)
     given = parser.parse_args()
-    found = {"one_state": one_state(), "iterations": iterations()}
+    if given.picture:
+        picture(given.picture)
+        return
+    found = {"one_state": one_state(), "iterations": iterations(), "work_precision": work_precision()}
     for rows in found.values():
         for row in rows:
             print(

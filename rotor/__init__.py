@@ -36,8 +36,11 @@ if TYPE_CHECKING:
     from rotor.molecules.optimise import refine as refine
     from rotor.plots.show import plot as plot
     from rotor.quantum.effects.stark import stark_map as stark_map
+    from rotor.quantum.effects.zeeman import zeeman_map as zeeman_map
     from rotor.quantum.fields.stark_request import StarkRequest as StarkRequest
     from rotor.quantum.fields.stark_request import answer_stark as answer_stark
+    from rotor.quantum.fields.zeeman_request import ZeemanRequest as ZeemanRequest
+    from rotor.quantum.fields.zeeman_request import answer_zeeman as answer_zeeman
     from rotor.quantum.levels import Levels as Levels
     from rotor.quantum.request import LevelsRequest as LevelsRequest
     from rotor.quantum.request import answer_levels as answer_levels
@@ -93,6 +96,7 @@ _MODULES = {
     "Top": "rotor.tops.top",
     "TumbleRequest": "rotor.classical.tumble",
     "VibrationalStates": "rotor.thermo",
+    "ZeemanRequest": "rotor.quantum.fields.zeeman_request",
     "align": "rotor.alignment.align",
     "answer_align": "rotor.alignment.request",
     "answer_fluid": "rotor.fluid.request",
@@ -104,6 +108,7 @@ _MODULES = {
     "answer_stark": "rotor.quantum.fields.stark_request",
     "answer_thermo": "rotor.thermo.request",
     "answer_tumble": "rotor.classical.tumble",
+    "answer_zeeman": "rotor.quantum.fields.zeeman_request",
     "free_motion": "rotor.classical.free.free_motion",
     "line_list": "rotor.spectra.lines",
     "partition_function": "rotor.thermo",
@@ -122,12 +127,13 @@ _MODULES = {
     "thermodynamic_functions": "rotor.thermo",
     "write": "rotor.formats",
     "write_scene": "rotor.scenes.scene_file",
+    "zeeman_map": "rotor.quantum.effects.zeeman",
 }
 
 _OF_TOPS = frozenset(
     {
         "align", "line_list", "partition_function", "raman_lines", "solve_levels", "stark_map", "stream_lines",
-        "thermal_tumble", "thermodynamic_functions",
+        "thermal_tumble", "thermodynamic_functions", "zeeman_map",
     }
 )  # fmt: skip  # functions whose first argument is a top
 

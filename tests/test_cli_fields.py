@@ -14,7 +14,9 @@ from rotor.cli.shared.output import plain
 from rotor.cli.shared.workers import Counted, working
 from rotor.formats import read
 from rotor.quantum.fields.stark_request import StarkRequest, answer_stark
+from rotor.quantum.fields.zeeman_request import ZeemanRequest, answer_zeeman
 from rotor.spectra.fields.lines import field_lines
+from rotor.units import NUCLEAR_MAGNETON_MHZ_PER_T
 
 BARE = ("--constants", "B=6081.492 MHz", "--anisotropy", "4.04")
 SHORT = ("--pulse", "1e13 W/cm2, 50 fs", "--points", "51", "--temperature", "0", "--tolerance", "1e-4")
@@ -230,3 +232,78 @@ def test_pieces_are_counted_in_order():
         counted.submit(int, "x").result()
     with working(1, "blocks") as executor:
         assert executor is None  # standard error is no terminal here
+
+
+# rotor zeeman
+
+NITRILE = """
+name = "nitrile"
+[constants]
+B = 4549.06
+[magnetic]
+source = "invented"
+g = -0.01
+magnetisability_parallel = -40.0
+magnetisability_perpendicular = -30.0
+[spins.14N]
+chi_aa = -4.3
+"""
+
+
+def test_zeeman_writes_what_the_library_computes(call):
+    """Tensors of the file, g of 14N of the table of isotopes, a field in gauss; the same request from Python."""
+    Path("m.toml").write_text(NITRILE)
+    arguments = ("--field", "0:200G:3", "--states", "J<=1", "--hyperfine", "--csv", "a.csv", "--plot", "a.png")
+    code, out, err = call("zeeman", "m.toml", *arguments, "--json", "a.json")
+    assert (code, err) == (0, "")
+    assert "μ_N" in out
+    content = json.loads(Path("a.json").read_text())
+    answer = answer_zeeman(ZeemanRequest(read("m.toml"), (0.0, 0.01, 0.02), j_highest=1, hyperfine=True))
+    assert set(content) - OF_COMMAND == {*answer.facts(), "states"}
+    for key, value in plain(answer.facts()).items():
+        assert content[key] == value, key
+    assert content["nuclear_g"]["14N"] == pytest.approx(0.4037, abs=1e-3)  # μ/(μ_N I), shielding aside
+    assert content["magnetisability_abc"][0][0] == -40.0
+    assert [row["energy_mhz"] for row in content["states"]] == answer.states.energy_mhz.tolist()
+    assert rows("a.csv")[0][:6] == ["field_tesla", "m", "rank", "energy_mhz", "label", "moment_nuclear_magnetons"]
+    assert sum(row["copies"] for row in content["states"]) == 3 * 12  # (2I+1) (1 + 3) states at 3 fields
+    assert Path("a.png").stat().st_size > 10_000
+
+
+def test_zeeman_of_bare_constants(call):
+    """A linear top is E0 - g μ_N B M, whichever way g is given."""
+    for text in ("-0.03", "0,-0.03", "5,-0.03,-0.03"):
+        code, out, _ = call(
+            "zeeman", "--constants", "B=6000 MHz", "--g", text, "--field", "2T", "--states", "1", "--json", "-"
+        )
+        assert code == 0
+        shifts = sorted(row["energy_mhz"] for row in json.loads(out)["states"])
+        step = 0.06 * NUCLEAR_MAGNETON_MHZ_PER_T
+        assert shifts == pytest.approx([0.0, 12000 - step, 12000.0, 12000 + step], abs=1e-9)  # round-off of 12000
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("OCS",), "the rotational g tensor is not known: give --g"),
+        (("OCS", "--g", "1,2,3,4"), "--g: 4 numbers for a top of the kind linear"),
+        (("OCS", "--g", "x"), "expected numbers between commas"),
+        (("OCS", "--g", "-.03", "--field", "0:1kV/cm"), "--field: '0:1kV/cm:51': unit 'kV/cm'"),
+        (("OCS", "--g", "-.03", "--field", "2000T"), "2000 T is beyond 1000 T"),
+        (("OCS", "--g", "-.03", "--field", "1T", "--plot", "a.png"), "--plot: a picture of a map needs two fields"),
+        (("OCS", "--g", "-.03", "--nuclear-g", "14N=2"), "--nuclear-g: belongs to spins"),
+        (("CH4", "--g", "0.3"), "a spherical top has an isotropic g"),
+        (("CH3CN", "--g", "1,2,3"), "symmetric about a"),
+        (
+            ("CH3CN", "--g", "1,2", "--hyperfine", "--nuclear-g", "15N=1"),
+            "--nuclear-g: 15N: the spins of this top are 14N",
+        ),
+    ],
+)
+def test_wrong_input_of_zeeman(call, arguments, message):
+    code, out, err = call("zeeman", *arguments)
+    assert (code, out) == (2, "")
+    assert err.startswith("error: ")
+    assert message in err
+    assert err.count("\n") == 1
+    assert not list(Path().glob("*.png"))

@@ -140,7 +140,7 @@ def test_wrong_input_is_one_line_and_nothing_is_written(call, folder, arguments,
 
 def test_spfits_options_are_honoured_or_refused_by_name(call, folder):
     write_lines(folder / "co.lin")
-    for old, new, words in (("   20    0 ", "   20    1 ", "NXPAR = 1"), ("1.0000E+006", "0.0", "ERRTST = 0")):
+    for old, new, words in (("   20    0 ", "   20   99 ", "NXPAR = 99"), ("1.0000E+006", "0.0", "ERRTST = 0")):
         (folder / "co.par").write_text(PAR.replace(old, new, 1))
         code, _, err = call("fit", "co.par")
         assert code == 2

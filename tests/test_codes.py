@@ -10,7 +10,8 @@ from rotor.formats.spcat.egy import read_egy
 from rotor.formats.spcat.int_file import Dipole, IntensityFile, Request, read_int
 from rotor.formats.spcat.par import Options, Parameter, ParameterFile, format_par, read_par
 from rotor.quantum.effects.watson import centrifugal_operators, rigid_operators
-from rotor.tops.constants import Constants, vocabulary
+from rotor.tops.constants import Constants
+from rotor.tops.kind_of_constants import vocabulary
 from rotor.tops.spin_weights import SpinWeights
 from rotor.tops.top import Top
 

@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rotor.tops.constants import A_REDUCTION, S_REDUCTION, Constants, ray_kappa, vocabulary
+from rotor.tops.constants import Constants
+from rotor.tops.kind_of_constants import A_REDUCTION, S_REDUCTION, ray_kappa, vocabulary
 from rotor.units import MHZ_PER_CM
 
 

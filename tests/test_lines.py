@@ -150,6 +150,8 @@ def test_compiled_and_plain_loops_give_the_same_bits(monkeypatch):
     [
         (ABC, None, {"min_lgint": -7.0, "jmax": 40}),
         (ABC, None, {"min_lgint": -5.5, "jmax": 60, "temperature_k": 20.0}),  # most states of high J reach no line
+        # the lower state at the higher J, its partner above the states that may be lower ones
+        ("A=90 B=5 C=4.8 GHz", None, {"min_lgint": -6.0, "jmax": 8, "temperature_k": 1.0}),
         (
             "A=90 B=5 C=4.8 GHz",
             {"ee": 1, "eo": 3, "oe": 3, "oo": 1},

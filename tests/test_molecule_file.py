@@ -268,3 +268,45 @@ def test_polarizability_turns_along_with_isotopes():
     water, hdo = (np.array(rotor.read("water", isotopes=i).polarizability_abc_angstrom3) for i in (None, "2=2H"))
     assert np.linalg.eigvalsh(hdo) == pytest.approx(np.linalg.eigvalsh(water), rel=1e-12)  # round-off of a turn
     assert abs(hdo[0, 1]) == pytest.approx(0.020, abs=0.001)  # ½ (1.528 - 1.468) sin 2·21°
+
+
+MAGNETIC = """
+[constants]
+A = 10
+B = 6
+C = 4
+[magnetic]
+source = "invented"
+g_aa = 0.6
+g_bb = -0.2
+g_cc = 0.3
+g_ab = 0.1
+magnetisability_aa = -3
+magnetisability_bb = 2
+magnetisability_cc = -7
+"""
+
+
+def test_magnetic_tensors_are_read_and_written():
+    read = parse_molecule_file(MAGNETIC)
+    assert read.magnetic.g == ((0.6, 0.1, 0.0), (0.1, -0.2, 0.0), (0.0, 0.0, 0.3))
+    assert read.magnetic.magnetisability[2] == (0.0, 0.0, -7.0)
+    assert parse_molecule_file(molecule_file_text(read)).magnetic == read.magnetic
+    axial = parse_molecule_file("[constants]\nB = 6\nC = 4\n[magnetic]\ng_parallel = 0.5\ng_perpendicular = 0.1")
+    assert np.diag(axial.magnetic.g).tolist() == [0.1, 0.1, 0.5]  # oblate: the axis is c
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("g_aa = 0.6\n", "", "g_aa is missing"),
+        ("g_aa = 0.6", "g = 0.6", "g_ab, g_bb, g_cc beside g"),
+        ("g_aa = 0.6", "g_dd = 0.6", "unknown key 'g_dd'"),
+        ("g_aa = 0.6", "g_aa = 'x'", "g_aa = 'x': expected a finite number"),
+        ("g_aa = 0.6\ng_bb = -0.2\ng_cc = 0.3\ng_ab = 0.1\n", "", "no g: give g_aa"),
+        ("g_aa = 0.6\ng_bb = -0.2\ng_cc = 0.3\ng_ab = 0.1\n", "g = 1\n", "1 numbers for a top of the kind asymmetric"),
+    ],
+)
+def test_bad_magnetic_tables_are_refused(old, new, message):
+    with pytest.raises(ValueError, match=message):
+        parse_molecule_file(MAGNETIC.replace(old, new))

@@ -121,6 +121,7 @@ def test_nothing_of_the_physics_is_loaded_by_a_scene_alone():
     assert eval(ran.stdout) == [
         "rotor.scenes",
         "rotor.scenes.effect_sections",
+        "rotor.scenes.fit_sections",
         "rotor.scenes.scene",
         "rotor.scenes.scene_file",
         "rotor.scenes.sections",

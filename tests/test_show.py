@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from rotor.plots.spectrum import spectrum_figure
 from rotor.spectra.emission import Source
 from rotor.spectra.emission_request import EmissionRequest
 from rotor.spectra.spectrum import resolving_grid
+from rotor.tops.magnetic import MagneticTensors, tensor_for
 
 CO = "B=57635.968 D=0.1835 MHz"
 
@@ -39,13 +41,18 @@ def things() -> dict[str, object]:
             EmissionRequest((rotor.read("CO"),), (1e16,), Source(1e16, 20.0, 5.0), (110e3, 120e3))
         ),
         "stark answer": rotor.answer_stark(rotor.StarkRequest(rotor.read("OCS"), (0.0, 10.0, 20.0))),
+        "zeeman answer": rotor.answer_zeeman(
+            rotor.ZeemanRequest(
+                replace(rotor.read("OCS"), magnetic=MagneticTensors(tensor_for("linear", [-0.03]))), (0.0, 1.0)
+            )
+        ),
     }
 
 
 KINDS = (
     "lines", "spectrum", "spectrum answer", "Raman lines", "levels", "levels answer", "motion", "tumble answer",
     "thermodynamic functions", "correlations", "equipartition",
-    "gas answer", "emission answer", "stark answer",
+    "gas answer", "emission answer", "stark answer", "zeeman answer",
 )  # fmt: skip
 
 

@@ -33,6 +33,7 @@ VERBS = {  # and what the list of verbs says of each, short enough for 80 column
     "thermo": "Partition function, entropy, heat capacity.",
     "tumble": "The exact free rotation of a molecule or a body.",
     "stark": "Levels in a static electric field.",
+    "zeeman": "Levels in a static magnetic field.",
     "align": "Molecules aligned or oriented by pulses of light.",
     "gas": "A classical gas: equipartition, correlations.",
     "fluid": "Rigid molecules in a periodic box, run in time.",
@@ -43,6 +44,7 @@ VERBS = {  # and what the list of verbs says of each, short enough for 80 column
     "new": "A commented scene file to begin with.",
     "plan": "What a scene will do, its cost, what it omits.",
     "run": "A scene file run; a sweep goes on where it stopped.",
+    "accuracy": "What accuracy costs in a scene: errors and times.",
 }
 FILES = {"run": "run_scene"}  # of verbs that this module has a function for
 COMPLETION = "_ROTOR_COMPLETE"  # set by a shell that asks for completions
@@ -64,6 +66,7 @@ Examples:
   rotor thermo water --temperature 10:1000K:100 --plot heat.png
   rotor tumble water --plot water.png
   rotor stark OCS --field 0:200kV/cm --plot stark.png
+  rotor zeeman --constants "B=6081.5 MHz" --g -0.03 --field 0:5T
   rotor align OCS --pulse "1e13 W/cm2, 1 ps" --plot align.png
   rotor gas water --molecules 20000 --seed 7
   rotor fluid water --molecules 216 --csv run.csv

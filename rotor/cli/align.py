@@ -22,6 +22,7 @@ from rotor.cli.shared.output import (
     show_facts,
     show_table,
 )
+from rotor.cli.shared.plot_options import ViewOptions, view_of
 from rotor.cli.shared.pulse_inputs import Pulses, pulses_of
 from rotor.cli.shared.save_scene import save_scene, save_scene_option
 from rotor.cli.shared.sources import with_sources
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     from rotor.alignment.align import AlignmentTrace
     from rotor.alignment.pulse import Pulse
     from rotor.alignment.request import AlignAnswer
+    from rotor.plots.view import View
     from rotor.tops.top import Top
 
 EXAMPLES = """\b
@@ -86,8 +88,12 @@ class Outputs:
     save_scene: str | None = save_scene_option()
 
 
-@grouped(given=("dipole", "calculator", "hessian", "spin_constants", "spins", "state_constants"))
-def command(context: typer.Context, given: Input, pulses: Pulses, options: Options, outputs: Outputs) -> None:
+@grouped(
+    given=("dipole", "calculator", "hessian", "spin_constants", "spins", "state_constants"), picture=("plot_scale",)
+)
+def command(
+    context: typer.Context, given: Input, pulses: Pulses, options: Options, outputs: Outputs, picture: ViewOptions
+) -> None:
     """Molecules aligned or oriented by pulses of light: cosines against time of a rotational wave packet."""
     from rotor.alignment.request import AlignRequest, answer_align
     from rotor.cli.shared.workers import working
@@ -95,6 +101,7 @@ def command(context: typer.Context, given: Input, pulses: Pulses, options: Optio
     acting = pulses_of(pulses)
     settings = _settings(options)
     files = Files.of(outputs)
+    view = view_of(picture, files, "ps")
     top = _with_tensor(inputs.read_top(given), options, acting)
     with inputs.fields_as_options(**NAMES):
         request = AlignRequest(top, acting, **settings)
@@ -110,7 +117,7 @@ def command(context: typer.Context, given: Input, pulses: Pulses, options: Optio
     saved = save_scene("align", request, outputs, given, by_hand)
     deliver(
         files,
-        _writers(answer, content) | saved,
+        _writers(answer, content, view) | saved,
         text,
         with_sources(
             lambda: _show(answer, content), answer.trace.top, ("constants", "dipole", "polarizability"), given.sources
@@ -181,7 +188,7 @@ def _content(answer: AlignAnswer, given: Input, command: str) -> dict[str, Any]:
     return {**begin(command, given.text), **answer.facts()}
 
 
-def _writers(answer: AlignAnswer, content: dict[str, Any]) -> dict[str, Writer]:
+def _writers(answer: AlignAnswer, content: dict[str, Any], view: View) -> dict[str, Writer]:
     provenance = {"command": content["command"], "input": content["input"]}
 
     def table(path: Path) -> None:
@@ -196,7 +203,12 @@ def _writers(answer: AlignAnswer, content: dict[str, Any]) -> dict[str, Writer]:
         trace = answer.trace
         title = ", ".join(filter(None, (name_of_top(trace.top), _ensemble_text(trace))))
         plot_alignment(
-            trace, path, classical=answer.classical, title=title, provenance={"command": provenance["command"]}
+            trace,
+            path,
+            classical=answer.classical,
+            title=title,
+            view=view,
+            provenance={"command": provenance["command"]},
         )
 
     return {"--csv": table, "--parquet": table, "--plot": draw}

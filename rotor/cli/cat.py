@@ -32,10 +32,12 @@ from rotor.cli.shared.output import (
     show_facts,
     show_table,
 )
+from rotor.cli.shared.plot_options import ViewOptions, view_of
 
 if TYPE_CHECKING:
     from rotor.formats.spcat.catalogue import Catalogue
     from rotor.formats.spcat.compare import Comparison
+    from rotor.plots.view import View
 
 EXAMPLES = """\b
 Examples:
@@ -66,12 +68,17 @@ class Outputs:
     json: str | None = json_option()
 
 
-@grouped()
-def command(context: typer.Context, options: Options, comparing: CompareOptions, outputs: Outputs) -> None:
+@grouped(picture=("plot_scale",))
+def command(
+    context: typer.Context, options: Options, comparing: CompareOptions, outputs: Outputs, picture: ViewOptions
+) -> None:
     """A catalogue as a table; or how another list differs from it."""
     require_whole("--top", options.top_lines, 0)
     refuse_without_molecule(comparing)
     files, file, measured, top_lines = Files.of(outputs), options.file, options.measured, options.top_lines
+    view = view_of(picture, files, "MHz")
+    if view.vertical is not None and comparing.compare is not None:
+        raise ValueError("--plot-vertical: a comparison shows both lists whole; expected without --compare")
     lines = _chosen(read_catalogue(file), options)
     if measured is not None:
         from rotor.formats.spcat.compare import with_measured_lines
@@ -89,7 +96,7 @@ def command(context: typer.Context, options: Options, comparing: CompareOptions,
     content["lines"] = [line_record(lines, row) for row in range(len(lines))]
 
     show = lambda: _show(lines, content, found, top_lines)  # noqa: E731
-    deliver(files, _writers(lines, content, found), lambda: json_text(content), show)
+    deliver(files, _writers(lines, content, found, view), lambda: json_text(content), show)
 
 
 def _chosen(lines: Catalogue, options: Options) -> Catalogue:
@@ -131,23 +138,26 @@ def summary(lines: Catalogue, file: str, command: str) -> dict[str, Any]:
     }
 
 
-def _writers(lines: Catalogue, content: dict[str, Any], found: Comparison | None) -> dict[str, Writer]:
+def _writers(lines: Catalogue, content: dict[str, Any], found: Comparison | None, view: View) -> dict[str, Writer]:
     from rotor.formats.spcat.cat import write_cat
 
-    return {"--out": lambda path: write_cat(lines, path), "--plot": lambda path: draw(lines, path, content, found)}
+    return {
+        "--out": lambda path: write_cat(lines, path),
+        "--plot": lambda path: draw(lines, path, content, found, view),
+    }
 
 
-def draw(lines: Catalogue, path: Path, content: dict[str, Any], found: Comparison | None = None) -> None:
+def draw(lines: Catalogue, path: Path, content: dict[str, Any], found: Comparison | None, view: View) -> None:
     """Sticks of the lines, measured ones in another colour; or both lists of a comparison, with the differences."""
     if found is not None:
         from rotor.plots.comparison import plot_comparison
 
         names = Path(str(content["input"])).name, Path(str(content["compared"]["other"])).name
-        plot_comparison(found, path, names=names, command=str(content["command"]))
+        plot_comparison(found, path, names=names, view=view, command=str(content["command"]))
         return
     from rotor.plots.catalogue import plot_catalogue
 
-    plot_catalogue(lines, path, title=Path(str(content["input"])).name, command=str(content["command"]))
+    plot_catalogue(lines, path, title=Path(str(content["input"])).name, view=view, command=str(content["command"]))
 
 
 def _show(lines: Catalogue, content: dict[str, Any], found: Comparison | None, shown: int) -> None:

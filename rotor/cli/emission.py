@@ -24,8 +24,10 @@ from rotor.cli.shared.output import (
     show_table,
 )
 from rotor.cli.shared.plot_options import PlotOptions
+from rotor.cli.shared.save_scene import molecule_of, save_made, save_scene_option
 
 if TYPE_CHECKING:
+    from rotor.scenes.scene import EmissionScene
     from rotor.spectra.emission import Source
     from rotor.spectra.emission_request import EmissionAnswer, EmissionRequest
 
@@ -71,6 +73,7 @@ class Outputs:
     profile_csv: str | None = file_option(".csv", help="Write T_B and optical depth on the grid as CSV.")
     plot: str | None = file_option(".png", ".pdf", ".svg", help="Draw T_B of every molecule (.png, .pdf, .svg).")
     json: str | None = json_option()
+    save_scene: str | None = save_scene_option()
 
 
 @grouped()
@@ -92,7 +95,8 @@ def command(context: typer.Context, options: Options, outputs: Outputs, picture:
         note(text)
     content["files"] = files.names
     show = lambda: _show(answer, options.top_lines)  # noqa: E731
-    deliver(files, _writers(answer, content, drawn), lambda: json_with_rows(answer.lines, "lines", content), show)
+    writers = _writers(answer, content, drawn) | save_made(lambda folder: _scene(request, options, folder), outputs)
+    deliver(files, writers, lambda: json_with_rows(answer.lines, "lines", content), show)
 
 
 def _request(options: Options) -> EmissionRequest:
@@ -108,6 +112,14 @@ def _request(options: Options) -> EmissionRequest:
     if len(columns) == 1:
         columns *= len(tops)
     return EmissionRequest(tops, columns, source, range_mhz, options.least_depth)
+
+
+def _scene(request: EmissionRequest, options: Options, folder: Path) -> EmissionScene:
+    """The scene that a file in a folder holds."""
+    from rotor.scenes.kinds.emission import saved_molecules
+
+    given = [Input(one, isotope=options.isotope) for one in _sources(options)]
+    return saved_molecules(request, [molecule_of(one, request, folder) for one in given])
 
 
 def _sources(options: Options) -> list[str]:

@@ -13,8 +13,8 @@ import typer
 
 from rotor.checks import require_whole
 from rotor.cli.shared import inputs
-from rotor.cli.shared.fit_report import Request, parameter_table, record, suggestion_table, trial_table
-from rotor.cli.shared.inputs import json_option
+from rotor.cli.shared.fit_report import parameter_table, record, suggestion_table, trial_table
+from rotor.cli.shared.inputs import Input, json_option
 from rotor.cli.shared.options import argument, file_option, grouped, option
 from rotor.cli.shared.output import (
     ComputationError,
@@ -27,10 +27,12 @@ from rotor.cli.shared.output import (
     show_table,
     write_text,
 )
+from rotor.cli.shared.save_scene import beside, save_scene, save_scene_option
 
 if TYPE_CHECKING:
     from rotor.fit.choose import Suggestion, Trial
     from rotor.fit.fit import Fit, FitOptions
+    from rotor.formats.fit_request import FitAnswer, FitRequest
     from rotor.statistics.least_squares import Iteration
 
 EXAMPLES = """\b
@@ -84,6 +86,7 @@ class Options:
     save_lines: str | None = file_option(".lin", ".csv", help="The assigned lines, merged.")
     plot: str | None = file_option(".png", ".pdf", ".svg", help="Residuals against frequency, J and K.")
     json: str | None = json_option()
+    save_scene: str | None = save_scene_option()
 
 
 @grouped()
@@ -95,18 +98,19 @@ def command(context: typer.Context, given: Options) -> None:
     require_whole("--bootstrap", given.bootstrap, 0)
     require_whole("--iterations", given.iterations, 1)
     files = _files(given)
-    request = _with_more(read_request(given), given.more)
-    options = _options(request.options, given)
-    source = given.source
+    _refuse_unsaved(given)
+    request = read_request(given)
+    options, source = request.options, given.source
     _refuse_overwriting(files, [source, given.lin, given.start, given.more, str(Path(source).with_suffix(".lin"))])
 
     steps: list[Trial] = []
     if given.all_orders and given.choose is None:
         raise ValueError("--all-orders goes with --choose, which names the constants to choose from")
     if given.choose is not None:
-        fit, steps = _chosen(request, options, _names(given.choose), not given.all_orders)
+        answer, steps = _chosen(request, _names(given.choose), not given.all_orders)
     else:
-        fit = _fitted(request, options)
+        answer = _fitted(request)
+    fit = answer.fit
     for text in request.notes:
         note(text)
     if fit.constants is None and "--out .toml" in files.paths:
@@ -118,12 +122,46 @@ def command(context: typer.Context, given: Options) -> None:
     if not fit.converged and fit.minimum.status != "interrupted":
         for name in ("--out .toml", "--out .par", "--out .var"):
             files.paths.pop(name, None)
-    content = record(request, fit, context.obj, steps, trials, suggestions, spread)
+    content = record(answer, context.obj, steps, trials, suggestions, spread)
     content["files"] = files.names
-    writers = _writers(request, fit, content, source)
+    writers = _writers(answer, content) | _saved(answer, given)
     deliver(files, writers, lambda: json_text(content), lambda: _show(request, fit, steps, trials, suggestions, spread))
     if not fit.converged:
         raise ComputationError(f"not converged: {fit.reason}")
+
+
+def _refuse_unsaved(given: Options) -> None:
+    if given.save_scene is not None and given.choose is not None:
+        raise ValueError(
+            "--save-scene: a scene has no --choose; choose first, then save the fit of those constants with --free"
+        )
+
+
+def _saved(answer: FitAnswer, given: Options) -> dict[str, Writer]:
+    """The writer of --save-scene, with files counted from the folder of the scene."""
+    if given.save_scene is None:
+        return {}
+    left = [
+        name
+        for name, value in (("--try", given.try_), ("--suggest", given.suggest), ("--bootstrap", given.bootstrap))
+        if value
+    ]
+    if left:
+        note(f"the scene does not repeat {', '.join(left)}")
+    from rotor.formats.fit_request import FitFiles
+
+    folder, stem = Path(given.save_scene).parent, given.out
+    read = answer.request.files
+    files = FitFiles(
+        str(beside(read.source, folder)), *(beside(one, folder) for one in (read.lin, read.merge, read.start))
+    )
+    molecule = None if answer.request.spfit is not None else Input(given.start, given.constants)
+    others: dict[str, Any] = (
+        {} if stem is None else {"report": f"{stem}.fit", "par": f"{stem}.par", "var": f"{stem}.var"}
+    )
+    if stem is not None and answer.fit.constants is not None:
+        others["toml"] = f"{stem}.toml"
+    return save_scene("fit", replace(answer.request, files=files), given, molecule, **others)
 
 
 def _files(given: Options) -> Files:
@@ -152,49 +190,41 @@ def _names(text: str) -> list[str]:
 # What comes in
 
 
-def read_request(given: Options) -> Request:
+def read_request(given: Options) -> FitRequest:
     """The fit that the options mean."""
-    if given.source.lower().endswith(".par"):
-        others = {
-            "--start": given.start, "--constants": given.constants, "--free": given.free, "--tie": given.tie,
-            "--prior": given.prior,
-        }  # fmt: skip
-        unused = [name for name, value in others.items() if value]
-        if unused:
-            raise ValueError(f"{', '.join(unused)}: a .par file says itself what is free and where the fit starts")
-        return _of_spfit(given.source, given.lin)
+    from rotor.formats.fit_request import with_more_lines
+
+    request = _of_spfit(given) if given.source.lower().endswith(".par") else _of_lines(given)
+    if given.more is not None:
+        request = with_more_lines(request, given.more)
+    return replace(request, options=_options(request.options, given))
+
+
+def _of_spfit(given: Options) -> FitRequest:
+    from rotor.formats.fit_request import fit_of_spfit
+
+    others = {
+        "--start": given.start, "--constants": given.constants, "--free": given.free, "--tie": given.tie,
+        "--prior": given.prior,
+    }  # fmt: skip
+    unused = [name for name, value in others.items() if value]
+    if unused:
+        raise ValueError(f"{', '.join(unused)}: a .par file says itself what is free and where the fit starts")
+    return fit_of_spfit(given.source, given.lin)
+
+
+def _of_lines(given: Options) -> FitRequest:
+    from rotor.formats.fit_request import fit_of_lines
+
     if given.lin is not None:
         raise ValueError("--lin goes with a .par file; give the lines as the source otherwise")
-    return _of_lines(given)
-
-
-def _of_spfit(source: str, lin: str | None) -> Request:
-    from rotor.formats.spcat.fit_input import read_fit
-
-    asked = read_fit(source, lin)
-    title = " ".join(asked.file.title.split()) or Path(source).stem
-    return Request(
-        asked.lines, asked.constants, asked.parameters, asked.options, title, source, asked, list(asked.notes)
-    )
-
-
-def _of_lines(given: Options) -> Request:
-    from rotor.fit.fit import FitOptions
-    from rotor.fit.parameters import parameters, with_names
-    from rotor.formats.assigned_lines import QUANTA, read_assigned_lines
-
     if (given.start is None) == (given.constants is None):
         raise ValueError("either --start or --constants says where the fit starts; give one of them")
-    top = inputs.read_top(inputs.Input(given.start, given.constants))
-    lines, notes = read_assigned_lines(given.source, QUANTA[top.kind])
-    names = _names(given.free) if given.free is not None else list(top.constants.uncertainties)
-    if not names:
-        raise ValueError("--free: name the constants to fit, such as A,B,C,DeltaJ; those of the start have no errors")
-    begin = with_names(top.constants, names)
+    top = inputs.read_top(Input(given.start, given.constants))
+    names = None if given.free is None else _names(given.free)
     priors = dict(_prior(text) for text in given.prior or [])
-    made = parameters(begin, names, ties=given.tie or [], priors_mhz=priors)
-    title = " ".join(top.name.split()) or Path(given.source).name
-    return Request(lines, begin, made, FitOptions(), title, given.start or "", None, notes)
+    with inputs.fields_as_options(free="--free"):
+        return fit_of_lines(given.source, top, names, ties=given.tie or [], priors_mhz=priors, start=given.start)
 
 
 def _prior(text: str) -> tuple[str, float]:
@@ -202,17 +232,6 @@ def _prior(text: str) -> tuple[str, float]:
     if not (name and equals and value):
         raise ValueError(f"--prior {text!r}: name=error is needed, such as DeltaK=0.02")
     return name, inputs.quantity("--prior", value, "MHz")
-
-
-def _with_more(request: Request, path: str | None) -> Request:
-    if path is None:
-        return request
-    from rotor.fit.assignment import merged
-    from rotor.formats.assigned_lines import read_assigned_lines
-
-    more, notes = read_assigned_lines(path, request.lines.names)
-    both, found = merged(request.lines, more)
-    return replace(request, lines=both, notes=[*request.notes, *notes, *found])
 
 
 def _options(options: FitOptions, given: Options) -> FitOptions:
@@ -229,11 +248,10 @@ def _options(options: FitOptions, given: Options) -> FitOptions:
 # What is done
 
 
-def _fitted(request: Request, options: FitOptions) -> Fit:
-    from rotor.fit.fit import fit_lines
+def _fitted(request: FitRequest) -> FitAnswer:
+    from rotor.formats.fit_request import answer_fit
 
-    model = request.spfit.model if request.spfit else None
-    return fit_lines(request.lines, request.constants, request.parameters, options, model=model, progress=_progress())
+    return answer_fit(request, _progress())
 
 
 def _progress() -> Any:
@@ -250,20 +268,19 @@ def _progress() -> Any:
     return show
 
 
-def _chosen(
-    request: Request, options: FitOptions, candidates: Sequence[str], by_order: bool
-) -> tuple[Fit, list[Trial]]:
+def _chosen(request: FitRequest, candidates: Sequence[str], by_order: bool) -> tuple[FitAnswer, list[Trial]]:
     from rotor.fit.choose import choose_constants
-    from rotor.fit.fit import fit_lines
     from rotor.fit.parameters import parameters
+    from rotor.formats.fit_request import answer_fit
 
     if request.spfit is not None:
         raise ValueError("--choose: start from a line list and constants, whose free ones are the base of the model")
     assert request.constants is not None  # a list of lines has constants to start from
     fit, steps = choose_constants(
-        request.lines, request.constants, request.parameters.names, candidates, options, by_order=by_order
+        request.lines, request.constants, request.parameters.names, candidates, request.options, by_order=by_order
     )
-    return fit_lines(request.lines, fit.named, parameters(fit.named, fit.parameters.names), options), steps
+    free = parameters(fit.named, fit.parameters.names)
+    return answer_fit(replace(request, constants=fit.named, parameters=free)), steps
 
 
 def _trials(fit: Fit, options: FitOptions, text: str | None) -> list[Trial]:
@@ -330,10 +347,13 @@ def _bootstrap(fit: Fit, options: FitOptions, samples: int, seed: int) -> list[f
 # What goes out
 
 
-def _writers(request: Request, fit: Fit, content: dict[str, Any], source: str) -> dict[str, Writer]:
+def _writers(answer: FitAnswer, content: dict[str, Any]) -> dict[str, Writer]:
     from rotor.fit.publication import publication_table
     from rotor.fit.report import report_text
     from rotor.formats.assigned_lines import write_assigned_lines
+    from rotor.formats.fit_request import write_fitted_par, write_fitted_toml
+
+    request, fit = answer.request, answer.fit
 
     def picture(path: Path) -> None:
         from rotor.plots.fit import plot_fit
@@ -343,50 +363,17 @@ def _writers(request: Request, fit: Fit, content: dict[str, Any], source: str) -
     form = {".txt": "text", ".md": "markdown", ".tex": "latex"}
     return {
         "--out .fit": lambda path: write_text(path, report_text(fit, request.title, notes=request.notes)),
-        "--out .toml": lambda path: _write_toml(request, fit, source, path),
-        "--out .par": lambda path: _write_par(request, fit, path, variances=False),
-        "--out .var": lambda path: _write_par(request, fit, path, variances=True),
+        "--out .toml": lambda path: write_fitted_toml(answer, path),
+        "--out .par": lambda path: write_fitted_par(answer, path, variances=False),
+        "--out .var": lambda path: write_fitted_par(answer, path, variances=True),
         "--table": lambda path: write_text(path, publication_table(fit, form[path.suffix.lower()])),
         "--save-lines": lambda path: write_assigned_lines(fit.lines, path),
         "--plot": picture,
     }
 
 
-def _write_toml(request: Request, fit: Fit, source: str, path: Path) -> None:
-    """The constants with errors and correlations in the file of the start, or in a new one."""
-    from rotor.formats.molecule_file import MoleculeFile, read_molecule_file
-    from rotor.formats.molecule_writer import write_molecule_file
-
-    origin = (
-        f"fitted by rotor to {int(fit.used.sum())} lines of {Path(source).name}, weighted by their errors; weighted rms "
-        f"{fit.weighted_rms:.4g}; errors from the stated errors of the lines"
-    )
-    own = request.start.lower().endswith(".toml") and Path(request.start).exists()
-    file = read_molecule_file(request.start) if own else MoleculeFile(request.title or path.stem)
-    covariance = None if fit.statistics.undetermined else fit.covariance
-    made = replace(
-        file,
-        constants=fit.named,
-        covariance=covariance,
-        levels=None,
-        serves=None,
-        sources={**file.sources, "constants": origin},
-    )
-    write_molecule_file(made, path)
-
-
-def _write_par(request: Request, fit: Fit, path: Path, *, variances: bool) -> None:
-    from rotor.formats.spcat.fit_input import fitted_file, named_file
-    from rotor.formats.spcat.par import write_par
-
-    if request.spfit is not None:
-        write_par(fitted_file(request.spfit, fit, variances=variances), path)
-    else:
-        write_par(named_file(fit, request.title, variances=variances), path)
-
-
 def _show(
-    request: Request,
+    request: FitRequest,
     fit: Fit,
     steps: Sequence[Trial],
     trials: Sequence[Trial],

@@ -25,6 +25,7 @@ from rotor.cli.shared.output import (
     show_facts,
     show_table,
 )
+from rotor.cli.shared.plot_options import ViewOptions, view_of
 from rotor.cli.shared.save_scene import save_scene, save_scene_option
 from rotor.temporary import locked_folder
 
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     from rotor.fluid.request import FluidAnswer, FluidRequest, NewBox
     from rotor.fluid.run import Outputs as RunFiles
     from rotor.fluid.settings import Settings
+    from rotor.plots.view import View
 
 EXAMPLES = """\b
 Examples:
@@ -64,6 +66,7 @@ class Options:
     every: int = option(10, metavar="N", help="Steps between rows.")
     cutoff: str = option("9", metavar="R", help="Of Lennard-Jones and charges (Å).")
     electrostatics: str = option("reaction-field", metavar="NAME", help="reaction-field, ewald or shifted.")
+    ewald_tolerance: str = option("1e-5", metavar="X", help="Of forces by ewald, relative to e²/4πε0 Å².")
     friction: str = option("1", metavar="F", help="Of langevin (1/ps).")
     relaxation: str = option("100", metavar="T", help="Time constant of nose-hoover (fs).")
     seed: int = option(1, metavar="N", help="Of the lattice, the velocities and the noise.")
@@ -90,11 +93,12 @@ class Outputs:
     save_scene: str | None = save_scene_option()
 
 
-@grouped()
-def command(context: typer.Context, options: Options, outputs: Outputs) -> None:
+@grouped(picture=("plot_scale",))
+def command(context: typer.Context, options: Options, outputs: Outputs, picture: ViewOptions) -> None:
     """Rigid molecules in a periodic box: a run, its temperatures, energies and pressure."""
     settings = _settings(options)
     growing, files = _files(options.source, outputs)
+    view = view_of(picture, files, "ps")
     with inputs.fields_as_options(**NAMES), frames_for(growing, files) as (growing, frames):
         request = _request(options, settings)
         answer, start = _answer(request, growing, outputs, {"command": context.obj, "input": options.source})
@@ -104,7 +108,7 @@ def command(context: typer.Context, options: Options, outputs: Outputs) -> None:
     grown = [growing.csv, *(outputs.trajectory or ()), growing.checkpoint, *files.paths.values()]
     content = start | answer.facts() | {"files": [str(path) for path in grown if path is not None]}
     text = lambda: json_with_rows(answer.record, "record", content)  # noqa: E731
-    writers = {"--plot": lambda path: _draw(answer, paths, path, str(context.obj))}
+    writers = {"--plot": lambda path: _draw(answer, paths, path, str(context.obj), view)}
     writers |= save_scene("fluid", request, outputs)
     deliver(files, writers, text, lambda: _show(content, settings))
 
@@ -141,7 +145,7 @@ def _paths(answer: FluidAnswer, frames: str | None) -> Floats:
     return np.array([bodies_of(atoms, shapes=shapes)[1].centres for atoms in taken[len(taken) // 2 :]])
 
 
-def _draw(answer: FluidAnswer, paths: Floats | None, path: Path, command: str) -> None:
+def _draw(answer: FluidAnswer, paths: Floats | None, path: Path, command: str, view: View) -> None:
     from rotor.fluid.analysis import pair_distribution
     from rotor.plots.fluid import plot_fluid
 
@@ -154,7 +158,7 @@ def _draw(answer: FluidAnswer, paths: Floats | None, path: Path, command: str) -
     title = f"{paths.shape[1]} molecules, {settings.model}, {settings.ensemble}, by {answer.request.engine}"
     if shells is not None:
         title += f"; g(r) of {len(paths)} frame{'s' if len(paths) > 1 else ''}"
-    plot_fluid(answer.record, shells, paths.shape[1], path, title=title, provenance={"command": command})
+    plot_fluid(answer.record, shells, paths.shape[1], path, title=title, view=view, provenance={"command": command})
 
 
 def _settings(options: Options) -> Settings:
@@ -168,6 +172,7 @@ def _settings(options: Options) -> Settings:
         temperature_k=inputs.positive("--temperature", options.temperature, "K"),
         step_fs=inputs.positive("--step", options.step, "fs"),
         cutoff_angstrom=inputs.positive("--cutoff", options.cutoff, "angstrom"), electrostatics=options.electrostatics,
+        ewald_tolerance=inputs.positive("--ewald-tolerance", options.ewald_tolerance, ""),
         friction_per_ps=inputs.positive("--friction", options.friction, ""),
         relaxation_fs=inputs.positive("--relaxation", options.relaxation, "fs"),
     )  # fmt: skip

@@ -17,11 +17,13 @@ from rotor.cli.shared import inputs
 from rotor.cli.shared.inputs import Input, json_option
 from rotor.cli.shared.options import file_option, grouped, option
 from rotor.cli.shared.output import Files, Table, Writer, deliver, json_text, rows_of, show_facts, show_table
+from rotor.cli.shared.plot_options import ViewOptions, view_of
 from rotor.cli.shared.save_scene import save_scene, save_scene_option
 from rotor.cli.shared.sources import with_sources
 
 if TYPE_CHECKING:
     from rotor.classical.gas.ensembles import Correlations
+    from rotor.plots.view import View
     from rotor.thermo.classical_gas import GasAnswer, GasRequest
 
 SHOWN = 11  # rows of the correlation functions in the report
@@ -61,12 +63,15 @@ class Outputs:
     save_scene: str | None = save_scene_option()
 
 
-@grouped(given=("spin_weights", "state_constants", "calculator", "hessian", "symmetry_tolerance"))
-def command(context: typer.Context, given: Input, options: Options, outputs: Outputs) -> None:
+@grouped(
+    given=("spin_weights", "state_constants", "calculator", "hessian", "symmetry_tolerance"), picture=("plot_scale",)
+)
+def command(context: typer.Context, given: Input, options: Options, outputs: Outputs, picture: ViewOptions) -> None:
     """A classical gas of free molecules: equipartition, correlation functions."""
     from rotor.thermo.classical_gas import GasRequest, settling_times_ps
 
     settings, files = _settings(options), Files.of(outputs)
+    view = view_of(picture, files, "ps")
     top = inputs.read_top(given)
     with inputs.fields_as_options(**NAMES):
         request = GasRequest(top, **settings)
@@ -77,7 +82,7 @@ def command(context: typer.Context, given: Input, options: Options, outputs: Out
     content["files"] = files.names
     deliver(
         files,
-        _writers(answer, content) | save_scene("gas", request, outputs, given),
+        _writers(answer, content, view) | save_scene("gas", request, outputs, given),
         lambda: json_text(content),
         with_sources(lambda: _show(answer, content), answer.request.top, ("constants",), given.sources),
     )
@@ -136,7 +141,7 @@ def _content(answer: GasAnswer, given: Input, command: str) -> dict[str, Any]:
     return {**begin(command, given.text), **answer.facts(), "correlation": rows}
 
 
-def _writers(answer: GasAnswer, content: dict[str, Any]) -> dict[str, Writer]:
+def _writers(answer: GasAnswer, content: dict[str, Any], view: View) -> dict[str, Writer]:
     keys = (
         "command", "input", "source", "temperature_k", "molecules", "seed", "vector_source", "tensor_source",
     )  # fmt: skip
@@ -152,9 +157,8 @@ def _writers(answer: GasAnswer, content: dict[str, Any]) -> dict[str, Writer]:
         from rotor.plots.picture import name_of_top
 
         title = f"{name_of_top(answer.request.top)}, {content['temperature_k']:g} K, {content['molecules']:,} molecules"
-        plot_gas(
-            answer.test, answer.correlations, path, title=title, plateau=content["c1_plateau"], provenance=provenance
-        )
+        plateau = content["c1_plateau"]
+        plot_gas(answer.test, answer.correlations, path, title=title, plateau=plateau, view=view, provenance=provenance)
 
     return {"--csv": table, "--parquet": table, "--plot": draw}
 

@@ -24,10 +24,12 @@ from rotor.cli.shared.output import (
     show_facts,
     show_table,
 )
+from rotor.cli.shared.plot_options import ViewOptions, view_of
 from rotor.cli.shared.save_scene import save_scene, save_scene_option
 from rotor.cli.shared.sources import source_facts
 
 if TYPE_CHECKING:
+    from rotor.plots.view import View
     from rotor.quantum.request import LevelsAnswer
 
 COLUMNS = {"MHz": ("energy_mhz", "{:.4f}"), "cm-1": ("energy_cm", "{:.6f}"), "K": ("energy_k", "{:.6f}")}
@@ -70,14 +72,15 @@ class Outputs:
     save_scene: str | None = save_scene_option()
 
 
-@grouped(given=("dipole", "dipole_abc"))
-def command(context: typer.Context, given: Input, options: Options, outputs: Outputs) -> None:
+@grouped(given=("dipole", "dipole_abc"), picture=("plot_scale",))
+def command(context: typer.Context, given: Input, options: Options, outputs: Outputs, picture: ViewOptions) -> None:
     """Energy levels: quantum numbers, energies, degeneracies, term diagram."""
     from rotor.quantum.request import LevelsRequest, answer_levels
 
     require_whole("--top", options.top_levels, 0)
     require_one_of("--unit", options.unit, COLUMNS)
     settings, files = _settings(options), Files.of(outputs)
+    view = view_of(picture, files)
     with inputs.fields_as_options(**NAMES):
         request = LevelsRequest(inputs.read_top(given), **settings)
     with answering():
@@ -93,7 +96,7 @@ def command(context: typer.Context, given: Input, options: Options, outputs: Out
     text = lambda: json_with_rows(answer.table, "levels", content)  # noqa: E731
     deliver(
         files,
-        _writers(answer, content, options.unit) | save_scene("levels", request, outputs, given),
+        _writers(answer, content, options.unit, view) | save_scene("levels", request, outputs, given),
         text,
         lambda: _show(answer, content, options, given.sources),
     )
@@ -119,7 +122,7 @@ def _settings(options: Options) -> dict[str, Any]:
     return settings
 
 
-def _writers(answer: LevelsAnswer, content: dict[str, Any], unit: str) -> dict[str, Writer]:
+def _writers(answer: LevelsAnswer, content: dict[str, Any], unit: str, view: View) -> dict[str, Writer]:
     import rotor
 
     provenance = {"command": content["command"], "input": content["input"]}
@@ -130,7 +133,7 @@ def _writers(answer: LevelsAnswer, content: dict[str, Any], unit: str) -> dict[s
     def draw(path: Path) -> None:
         from rotor.plots.levels import plot_levels
 
-        plot_levels(answer.table, answer.request.top, path, unit=unit, provenance=provenance)
+        plot_levels(answer.table, answer.request.top, path, unit=unit, view=view, provenance=provenance)
 
     return {"--csv": table, "--parquet": table, "--egy": table, "--plot": draw}
 

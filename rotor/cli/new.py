@@ -21,7 +21,9 @@ Examples:
 class Options:
     """Which scene."""
 
-    kind: str | None = argument(help="spectrum, levels, raman, thermo, tumble, gas, fluid, stark or align.")
+    kind: str | None = argument(
+        help="spectrum, levels, raman, thermo, tumble, gas, fluid, stark, align, fit or emission."
+    )
     schema: bool = option(False, "--schema", help="The JSON Schema of scene files instead, for editors.")
     out: str | None = file_option(".toml", ".json", help="Write it into a file.")
 

@@ -25,10 +25,12 @@ from rotor.cli.shared.output import (
     show_facts,
     show_table,
 )
+from rotor.cli.shared.plot_options import ViewOptions, view_of
 from rotor.cli.shared.save_scene import save_scene, save_scene_option
 from rotor.cli.shared.sources import source_facts
 
 if TYPE_CHECKING:
+    from rotor.plots.view import View
     from rotor.spectra.raman import RamanLines
     from rotor.spectra.raman_request import RamanAnswer
     from rotor.tops.top import Top
@@ -70,13 +72,21 @@ class Outputs:
 
 
 @grouped(given=("dipole", "dipole_abc", "calculator", "hessian"))
-def command(context: typer.Context, given: Input, options: Options, vibration: Vibration, outputs: Outputs) -> None:
+def command(
+    context: typer.Context,
+    given: Input,
+    options: Options,
+    vibration: Vibration,
+    outputs: Outputs,
+    picture: ViewOptions,
+) -> None:
     """Rotational Raman lines: Stokes and anti-Stokes shifts and their cross sections."""
     from rotor.spectra.raman_request import RamanRequest, answer_raman
 
     require_whole("--top", options.top_lines, 0)
     settings = {**_settings(options), "vibrations": gas_layer.vibrations_of(vibration)}
     files = Files.of(outputs)
+    view = view_of(picture, files, "cm-1")
     top = with_polarizability(inputs.read_top(given), options.polarizability)
     with inputs.fields_as_options(**NAMES):
         request = RamanRequest(top, **settings)
@@ -93,7 +103,7 @@ def command(context: typer.Context, given: Input, options: Options, vibration: V
     saved = save_scene("raman", request, outputs, given, options.polarizability is not None)
     deliver(
         files,
-        _writers(answer.lines, content) | saved,
+        _writers(answer.lines, content, view) | saved,
         text,
         lambda: _show(answer, content, given.sources),
     )
@@ -148,7 +158,7 @@ def _given(top: Top, text: str) -> Top:
     return top.with_polarizability([[aa, ab, ac], [ab, bb, bc], [ac, bc, cc]], source)
 
 
-def _writers(lines: RamanLines, content: dict[str, Any]) -> dict[str, Writer]:
+def _writers(lines: RamanLines, content: dict[str, Any], view: View) -> dict[str, Writer]:
     provenance = {"command": content["command"], "input": content["input"]}
 
     def table(path: Path) -> None:
@@ -159,7 +169,7 @@ def _writers(lines: RamanLines, content: dict[str, Any]) -> dict[str, Writer]:
     def draw(path: Path) -> None:
         from rotor.plots.raman import plot_raman
 
-        plot_raman(lines, path, provenance={"command": provenance["command"]})
+        plot_raman(lines, path, view=view, provenance={"command": provenance["command"]})
 
     return {"--csv": table, "--parquet": table, "--plot": draw}
 

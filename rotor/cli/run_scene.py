@@ -97,11 +97,12 @@ def _folder(options: Options) -> Path:
 
 def _single(scene: Scene, options: Options, files: Files, pool: Executor | None, command: str) -> None:
     from rotor.fluid.run import RunStopped
+    from rotor.scenes.kind import NoResultError
     from rotor.scenes.run import run_scene
 
     try:
         result = run_scene(scene, folder=_folder(options), out=options.out, executor=pool)
-    except RunStopped as error:
+    except (RunStopped, NoResultError) as error:
         raise ComputationError(str(error)) from error
     for remark in _notes(result):
         note(remark)

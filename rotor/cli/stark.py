@@ -23,6 +23,7 @@ from rotor.cli.shared.output import (
     show_facts,
     show_table,
 )
+from rotor.cli.shared.plot_options import ViewOptions, view_of
 from rotor.cli.shared.save_scene import save_scene, save_scene_option
 from rotor.cli.shared.sources import with_sources
 
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     from concurrent.futures import Executor
 
     from rotor import table as tables
+    from rotor.plots.view import View
     from rotor.quantum.fields.field_map import FieldMap
     from rotor.quantum.fields.stark_request import StarkAnswer
     from rotor.spectra.fields.request import FieldRequest
@@ -130,8 +132,15 @@ class Outputs:
     save_scene: str | None = save_scene_option()
 
 
-@grouped(given=("spin_weights", "calculator", "hessian", "state_constants"))
-def command(context: typer.Context, given: Input, options: Options, sample: Sample, outputs: Outputs) -> None:
+@grouped(given=("spin_weights", "calculator", "hessian", "state_constants"), picture=("plot_scale",))
+def command(
+    context: typer.Context,
+    given: Input,
+    options: Options,
+    sample: Sample,
+    outputs: Outputs,
+    picture: ViewOptions,
+) -> None:
     """Levels in a static electric field: energies, labels, effective dipoles and cosines of every M; lines and mixtures."""
     from rotor.cli.shared.workers import working
     from rotor.quantum.fields.stark_request import StarkRequest, answer_stark
@@ -140,6 +149,7 @@ def command(context: typer.Context, given: Input, options: Options, sample: Samp
     settings, of_sample = _settings(options), _sample(sample)
     settings["hyperfine"] = given.spin_constants is not None if options.hyperfine is None else options.hyperfine
     files = Files.of(outputs)
+    view = view_of(picture, files, "kV/cm")
     if "--plot" in files.paths and len(settings["fields_kv_per_cm"]) < 2:
         raise ValueError("--plot: a picture of a map needs two fields or more; give --field a range")
     top = _acted_on(inputs.read_top(given), options, settings["intensity_w_per_cm2"])
@@ -152,7 +162,7 @@ def command(context: typer.Context, given: Input, options: Options, sample: Samp
     content = _content(answer, given, context.obj)
     content["files"] = files.names
     text = lambda: json_with_rows(answer.states, "states", content)  # noqa: E731
-    writers = {**_writers(top, answer.states, content), **_further_writers(made, content)}
+    writers = {**_writers(top, answer.states, content, view), **_further_writers(made, content)}
     writers |= save_scene("stark", answer.request, outputs, given, options.polarizability is not None)
     show = with_sources(lambda: _show(top, answer.states, content), top, ("constants", "dipole"), given.sources)
     deliver(files, writers, text, show)
@@ -223,7 +233,7 @@ def _settings(options: Options) -> dict[str, Any]:
     require_whole("--jmax", options.jmax, 0, MOST_J)
     return {
         "fields_kv_per_cm": parsed("--field", options.field, _fields),
-        "j_highest": parsed("--states", options.states, _highest_j),
+        "j_highest": parsed("--states", options.states, inputs.highest_j),
         "m_values": None if options.m is None else parsed("--m", options.m, _m_values),
         "intensity_w_per_cm2": quantity("--intensity", options.intensity, "W/cm2"),
         "direction": parsed("--tilt", options.tilt, _direction),
@@ -260,13 +270,6 @@ def _direction(text: str) -> tuple[float, float, float]:
     return (math.sin(math.radians(angle)), 0.0, math.cos(math.radians(angle))) if angle else (0.0, 0.0, 1.0)
 
 
-def _highest_j(text: str) -> int:
-    number = text.replace(" ", "").upper().removeprefix("J<=").removeprefix("J≤")
-    if not number.isdecimal():
-        raise ValueError(f"{text!r}: expected J<=2, or the number alone")
-    return int(number)
-
-
 def _m_values(text: str) -> tuple[float, ...]:
     parts = [part.strip() for part in text.split(",")]
     if not all(re.fullmatch(r"\d+(\.[05])?", part) for part in parts):
@@ -281,7 +284,7 @@ def _content(answer: StarkAnswer, given: Input, command: str) -> dict[str, Any]:
     return {**begin(command, given.text), **answer.facts()}
 
 
-def _writers(top: Top, states: FieldMap, content: dict[str, Any]) -> dict[str, Writer]:
+def _writers(top: Top, states: FieldMap, content: dict[str, Any], view: View) -> dict[str, Writer]:
     provenance = {"command": content["command"], "input": content["input"], "dipole_abc_debye": top.dipole_abc_debye}
 
     def table(path: Path) -> None:
@@ -293,7 +296,7 @@ def _writers(top: Top, states: FieldMap, content: dict[str, Any]) -> dict[str, W
         from rotor.plots.picture import name_of_top
         from rotor.plots.stark import plot_stark
 
-        plot_stark(states, path, title=name_of_top(top), provenance={"command": provenance["command"]})
+        plot_stark(states, path, title=name_of_top(top), view=view, provenance={"command": provenance["command"]})
 
     return {"--csv": table, "--parquet": table, "--plot": draw}
 

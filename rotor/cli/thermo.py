@@ -25,10 +25,12 @@ from rotor.cli.shared.output import (
     show_table,
     sum_progress,
 )
+from rotor.cli.shared.plot_options import ViewOptions, view_of
 from rotor.cli.shared.save_scene import save_scene, save_scene_option
 from rotor.cli.shared.sources import with_sources
 
 if TYPE_CHECKING:
+    from rotor.plots.view import View
     from rotor.thermo import ThermoFunctions
     from rotor.thermo.request import ThermoAnswer
 
@@ -70,12 +72,20 @@ class Outputs:
 
 
 @grouped(given=("dipole", "dipole_abc", "calculator", "hessian"))
-def command(context: typer.Context, given: Input, options: Options, vibration: Vibration, outputs: Outputs) -> None:
+def command(
+    context: typer.Context,
+    given: Input,
+    options: Options,
+    vibration: Vibration,
+    outputs: Outputs,
+    picture: ViewOptions,
+) -> None:
     """Rotational partition function, energy, entropy and heat capacity, quantum and classical."""
     from rotor.thermo.request import ThermoRequest, answer_thermo
 
     settings = _settings(options, vibration)
     files = Files.of(outputs)
+    view = view_of(picture, files, "K")
     with inputs.fields_as_options(**NAMES):
         request = ThermoRequest(inputs.read_top(given), **settings)
     with answering():
@@ -85,7 +95,7 @@ def command(context: typer.Context, given: Input, options: Options, vibration: V
     text = lambda: json_with_rows(answer.functions, "functions", content)  # noqa: E731
     deliver(
         files,
-        _writers(answer, content) | save_scene("thermo", request, outputs, given),
+        _writers(answer, content, view) | save_scene("thermo", request, outputs, given),
         text,
         with_sources(
             lambda: _show(answer.functions, content), answer.functions.top, ("constants", "spin weights"), given.sources
@@ -112,7 +122,7 @@ def _content(answer: ThermoAnswer, given: Input, command: str) -> dict[str, Any]
     return {**begin(command, given.text), **answer.facts()}
 
 
-def _writers(answer: ThermoAnswer, content: dict[str, Any]) -> dict[str, Writer]:
+def _writers(answer: ThermoAnswer, content: dict[str, Any], view: View) -> dict[str, Writer]:
     provenance = {"command": content["command"], "input": content["input"]}
 
     def table(path: Path) -> None:
@@ -129,7 +139,8 @@ def _writers(answer: ThermoAnswer, content: dict[str, Any]) -> dict[str, Writer]
         grid = tuple(curve_temperatures(answer.functions.temperature_k).tolist())
         smooth = answer_thermo(replace(request, temperatures_k=grid, pressure_bar=None)).functions
         label = "quantum" if request.species == "equilibrium" else f"quantum, {request.species}"
-        plot_heat_capacity([Panel(name_of_top(request.top), {label: smooth})], path, provenance=provenance)
+        title = name_of_top(request.top) if view.title is None else view.title
+        plot_heat_capacity([Panel(title, {label: smooth})], path, view=view, provenance=provenance)
 
     return {
         "--csv": table,

@@ -18,7 +18,8 @@ from rotor.units import MHZ_PER_CM
 class Assignments(Table):
     """Assigned lines as columns of equal length n.
 
-    names : quantum numbers of a state, such as ("j", "ka", "kc"). upper, lower (n, k) : labels of the two states
+    names : quantum numbers of a state, such as ("j", "ka", "kc"). upper, lower (n, k) : labels of the two states; a lower one that
+    begins with a number below 0 is none, the line is an energy from the zero of the Hamiltonian
     frequency_mhz, error_mhz (n,) : measured. A line of wavenumbers stands in MHz and marked in `wavenumber` (n,)
     weight (n,) : share within its blend. blend (n,) : lines of one number are one measured frequency, the mean of their
     calculated ones by weight; a line alone has a number of its own
@@ -63,6 +64,11 @@ class Assignments(Table):
             for i, name in enumerate(self.names)
         }
         return {**labels, **{name: getattr(self, name) for name in ("frequency_mhz", "error_mhz", "weight", "blend")}}
+
+    @property
+    def from_zero(self) -> NDArray[np.bool_]:
+        """Which lines are energies from the zero of the Hamiltonian, (n,): their lower state begins with a number below 0."""
+        return np.asarray(self.lower[:, 0] < 0) if self.names else np.zeros(len(self), dtype=bool)
 
     def take(self, index: NDArray[Any]) -> Assignments:
         """The lines that a mask or an array of positions picks."""

@@ -209,9 +209,11 @@ def weighted_derivatives(fit: Fit, names: Sequence[str], options: FitOptions | N
 
 
 def _labels(lines: Assignments) -> tuple[Ints, Ints, Ints]:
-    """The levels that occur, and for each line the places of its upper and lower one among them."""
-    labels, places = np.unique(np.concatenate([lines.upper, lines.lower]), axis=0, return_inverse=True)
-    places = places.reshape(-1)
+    """The levels that occur, and for each line the places of its upper and lower one among them, -1 for the zero of energy."""
+    there = np.concatenate([np.ones(len(lines), dtype=bool), ~lines.from_zero])
+    labels, found = np.unique(np.concatenate([lines.upper, lines.lower])[there], axis=0, return_inverse=True)
+    places = np.full(2 * len(lines), -1, dtype=np.int64)
+    places[there] = found.reshape(-1)
     return labels, places[: len(lines)], places[len(lines) :]
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -33,6 +34,27 @@ def report_text(fit: Fit, title: str = "", *, notes: Sequence[str] = ()) -> str:
     if said:
         parts.append(["NOTES", *(f"- {text}" for text in said), ""])
     return "\n".join(line for part in parts for line in part).rstrip() + "\n"
+
+
+def fit_facts(fit: Fit) -> dict[str, Any]:
+    """What is known of a fit as a whole, by the keys of its record."""
+    return {
+        "converged": fit.converged,
+        "reason": fit.reason,
+        "line_count": len(fit.lines),
+        "lines_used": int(fit.used.sum()),
+        "frequencies": len(fit.groups),
+        "weighted_rms": fit.weighted_rms,
+        "reduced_chi": fit.reduced_chi,
+        "rms_mhz": fit.rms_mhz(),
+        "rms_cm": fit.rms_mhz(wavenumber=True),
+        "degrees_of_freedom": fit.degrees_of_freedom,
+        "condition": fit.statistics.condition,
+        "iterations": len(fit.minimum.iterations),
+        "undetermined": [one.text for one in fit.statistics.undetermined],
+        "changed_states": list(fit.changed_states),
+        "notes": list(fit.notes),
+    }
 
 
 def status_text(fit: Fit) -> str:

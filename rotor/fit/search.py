@@ -5,6 +5,7 @@ Levels keep their label by block and rank, so that no iteration reassigns a line
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,7 +15,7 @@ from rotor.arrays import Floats, Ints
 from rotor.fit.assignment import Assignments
 from rotor.fit.parameters import Parameters
 from rotor.quantum.labelled import LevelModel
-from rotor.statistics.least_squares import EXHAUSTED, INTERRUPTED, Minimum, Progress, minimise
+from rotor.statistics.least_squares import INTERRUPTED, Iteration, Minimum, Progress, minimise
 
 LOSSES = ("squares", "huber", "cauchy")
 POOR_RMS = 10.0  # weighted rms above which the lines are not described, unless the caller says otherwise
@@ -25,6 +26,7 @@ _STAGES = (0.1, 0.2, 0.35, 0.5, 0.7, 0.85)  # shares of the lines, in order of J
 _ROUGH = 10.0  # standard errors within which a stage has converged
 _FIRST_ITERATIONS = 12  # of a direct search, after which it must have made way
 _WAY = 0.01  # of the weighted rms at the start, below which it has
+_LATELY = 6  # iterations in which it must halve the weighted rms after these
 _AT_ZERO_MHZ = 1e-30  # how far a constant that starts at 0 may move in these stages
 
 
@@ -142,9 +144,16 @@ class Search:
         """Calculated lines (lines,), derivatives by the parameters (lines, n), and of the levels (levels, n)."""
         energies, slopes = self.model.levels(self.parameters.constants_of(values))
         slopes = slopes @ self.parameters.matrix
+        if self.from_zero:  # the place -1 of such lower levels is the last one
+            energies, slopes = np.append(energies, 0.0), np.vstack([slopes, np.zeros(slopes.shape[1])])
         derivatives = slopes[self.upper]
         derivatives -= slopes[self.lower]
         return energies[self.upper] - energies[self.lower], derivatives, slopes
+
+    @property
+    def from_zero(self) -> bool:
+        """Whether a line is an energy from the zero of the Hamiltonian: its lower level has the place -1."""
+        return bool((self.lower < 0).any())
 
     @property
     def grouping(self) -> Grouping:
@@ -211,14 +220,19 @@ def with_rejection(
 
 
 def _searched(search: Search, progress: Progress | None) -> Minimum:
-    """A direct search; where it makes no way in its first iterations, or ends far from the lines, one by rising J."""
-    limit = search.options.most_iterations
-    first = _minimised(search, search.parameters.start, progress, min(_FIRST_ITERATIONS, limit))
-    before = first.iterations[0].rms_before if first.iterations else first.rms
-    slow = first.rms > _WAY * before and first.rms > search.options.poor_rms
-    if first.status == EXHAUSTED and limit > _FIRST_ITERATIONS and not slow:
-        first = _continued(first, _minimised(search, first.parameters, progress, limit - len(first.iterations)))
-    poor = first.rms > search.options.poor_rms and first.status != INTERRUPTED
+    """A direct search; where it makes no way for some iterations, or ends far from the lines, one by rising J."""
+    options = search.options
+
+    def hopeless(taken: Sequence[Iteration]) -> bool:
+        if len(taken) < _FIRST_ITERATIONS:
+            return False
+        now = min(one.rms_after for one in taken)
+        lately = min(one.rms_after for one in taken[:-_LATELY])
+        return now > options.poor_rms and (now > _WAY * taken[0].rms_before or now > lately / 2)
+
+    limit = options.most_iterations
+    first = _minimised(search, search.parameters.start, progress, limit, hopeless)
+    poor = first.rms > options.poor_rms and first.status != INTERRUPTED
     return _by_stages(search, first, progress) if poor and len(first.iterations) < limit else first
 
 
@@ -251,7 +265,13 @@ def _by_stages(search: Search, first: Minimum, progress: Progress | None) -> Min
     return second if second.rms < first.rms else replace(first, iterations=second.iterations)
 
 
-def _minimised(search: Search, start: Floats, progress: Progress | None, limit: int) -> Minimum:
+def _minimised(
+    search: Search,
+    start: Floats,
+    progress: Progress | None,
+    limit: int,
+    hopeless: Callable[[Sequence[Iteration]], bool] | None = None,
+) -> Minimum:
     return minimise(
         search.evaluate,
         start,
@@ -259,6 +279,7 @@ def _minimised(search: Search, start: Floats, progress: Progress | None, limit: 
         most_iterations=limit,
         floor=round_off(search, search.lines_of(start)[2]),
         progress=progress,
+        hopeless=hopeless,
     )
 
 

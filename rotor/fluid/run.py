@@ -190,6 +190,7 @@ def calculator_of(settings: Settings, threads: int = 1) -> Any:
         settings.model,
         cutoff_angstrom=settings.cutoff_angstrom,
         electrostatics=settings.electrostatics,
+        tolerance=settings.ewald_tolerance,
         threads=threads,
     )
 

@@ -19,7 +19,8 @@ class Settings:
     model: name in `models.MODELS`, or several joined by commas for a mixture. ensemble: nve, langevin or nose-hoover.
     temperature_k: of the thermostat and of the starting velocities. step_fs, steps: of the integrator. every: steps
     between rows of the table. cutoff_angstrom: of Lennard-Jones and of charges in real space. electrostatics:
-    reaction-field, ewald (PME in the engines) or shifted. friction_per_ps: of Langevin's thermostat. relaxation_fs: time
+    reaction-field, ewald (PME in the engines) or shifted. ewald_tolerance: error of a force relative to e²/4πε0 Å², see
+    `rotor.fluid.forces.ewald.parameters_for`. friction_per_ps: of Langevin's thermostat. relaxation_fs: time
     constant of Nosé-Hoover chains. seed: of velocities and noise.
     """
 
@@ -34,6 +35,7 @@ class Settings:
     friction_per_ps: float = 1.0
     relaxation_fs: float = 100.0
     seed: int = 1
+    ewald_tolerance: float = 1e-5
 
     def __post_init__(self) -> None:
         for name in ("temperature_k", "step_fs", "cutoff_angstrom", "friction_per_ps", "relaxation_fs"):
@@ -42,6 +44,8 @@ class Settings:
                 raise ValueError(f"{name} = {value}: expected a number above 0")
             if value > LARGEST:
                 raise ValueError(f"{name} = {value}: expected at most {LARGEST:g}; its powers overflow")
+        if not 1e-14 < self.ewald_tolerance < 1.0:
+            raise ValueError(f"ewald_tolerance = {self.ewald_tolerance}: expected a number between 1e-14 and 1")
         for name, least in (("steps", 0), ("every", 1), ("seed", 0)):
             if getattr(self, name) < least:
                 raise ValueError(f"{name} = {getattr(self, name)}: expected at least {least}")

@@ -102,6 +102,10 @@ def _of_csv(path: str | os.PathLike[str], names: Sequence[str]) -> Assignments:
     error = next((name for name in _ERROR if name in columns), None)
     numbers = [[_whole(path, i, name, row) for name in labels] for i, row in enumerate(rows, 1)]
     quanta = np.array(numbers, dtype=np.int64).reshape(len(rows), len(labels))
+    bad = np.flatnonzero(quanta[:, len(names)] < 0)
+    if len(bad):
+        lower = " ".join(map(str, quanta[bad[0], len(names) :].tolist()))
+        raise ValueError(f"{path}, line {bad[0] + 1} of the list: there is no level {lower}; {names[0]} is 0 or more")
     frequency = np.array([_real(path, i, unit, row) for i, row in enumerate(rows, 1)]) * _FREQUENCY[unit]
     errors = [_real(path, i, error, row, 0.0) if error else 0.0 for i, row in enumerate(rows, 1)]
     return assignments(

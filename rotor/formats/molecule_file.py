@@ -35,6 +35,11 @@
     mean = 1.45
     anisotropy = 0.1
 
+    [magnetic]                          # what a magnetic field acts on, along a, b, c: the rotational g tensor, as
+    source = "..."                      # g_aa, g_bb, g_cc (g_ab, ... where not 0), g_parallel and g_perpendicular, or the
+    g = -0.03                           # one g of a linear top; the magnetisability in 1e-6 erg/(G2 mol) likewise as
+                                        # magnetisability_aa, ... or _parallel, _perpendicular
+
     [spin_weights]                      # classes of rotor.tops.spin_weights
     source = "..."
     ee = 1
@@ -86,6 +91,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from rotor.formats.magnetic_table import magnetic_of_table
 from rotor.formats.molecule_tables import (
     MeasuredLines,
     Served,
@@ -95,6 +101,7 @@ from rotor.formats.molecule_tables import (
     covariance_of,
     dipole_of,
     geometry,
+    kind_of,
     level_table_of,
     polarizability_of,
     refuse_unknown_keys,
@@ -110,6 +117,7 @@ from rotor.molecules.molecule import Molecule
 from rotor.tops.constants import Constants
 from rotor.tops.covariance import Covariance
 from rotor.tops.level_table import LevelTable
+from rotor.tops.magnetic import MagneticTensors
 from rotor.tops.spin_constants import SpinConstants
 from rotor.tops.spin_weights import SpinWeights
 from rotor.tops.state_constants import StateConstants
@@ -124,6 +132,7 @@ _TABLES = (
     "covariance",
     "dipole",
     "polarizability",
+    "magnetic",
     "spin_weights",
     "states",
     "spins",
@@ -153,6 +162,7 @@ class MoleculeFile:
     covariance : of the constants, where the file has their correlations
     states : further states of the top
     spin_constants : of nuclear and electron spins
+    magnetic : what a magnetic field acts on
     """
 
     name: str
@@ -172,6 +182,7 @@ class MoleculeFile:
     unverified: frozenset[str] = frozenset()
     states: StateConstants | None = None
     spin_constants: SpinConstants | None = None
+    magnetic: MagneticTensors | None = None
 
     def cited(self, table: str) -> str:
         """The source of a table, with what in it is unverified said first."""
@@ -253,4 +264,5 @@ def parse_molecule_file(
         covariance=covariance_of(tables.get("covariance"), constants),
         states=states_of(tables.get("states"), constants),
         spin_constants=spins_of_table(tables.get("spins"), molecule),
+        magnetic=magnetic_of_table(tables.get("magnetic"), kind_of(constants, molecule)),
     )

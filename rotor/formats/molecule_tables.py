@@ -300,7 +300,7 @@ def polarizability_of(
     given = [key for key in table.content if key not in ("unit", "source", "unverified")]
     values = {key: table.quantity(key, table.content[key], unit, "Å3") for key in given}
     if tuple(sorted(given)) in (tuple(sorted(pair)) for pair in _AXIAL):
-        return _axial(table, values, _kind(constants, molecule))
+        return _axial(table, values, kind_of(constants, molecule))
     if not {"aa", "bb", "cc"} <= set(given) <= set(_ELEMENTS):
         raise ValueError(
             f"{table.place}: {', '.join(given) or 'nothing'}: expected aa, bb and cc (with ab, ac, bc where not 0), "
@@ -323,7 +323,8 @@ def _axial(table: TableReader, values: Mapping[str, float], kind: str) -> Tensor
     return (aa, 0.0, 0.0), (0.0, across, 0.0), (0.0, 0.0, cc)
 
 
-def _kind(constants: Constants | None, molecule: Molecule | None) -> str:
+def kind_of(constants: Constants | None, molecule: Molecule | None) -> str:
+    """The kind of top of a file: as its constants have it, else its geometry."""
     if constants is not None:
         return constants.kind
     assert molecule is not None  # the reader refuses a file with neither

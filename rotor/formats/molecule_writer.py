@@ -9,6 +9,7 @@ from typing import Any
 
 from rotor.formats.atomic_write import open_atomic
 from rotor.formats.level_table import write_level_table
+from rotor.formats.magnetic_table import magnetic_table
 from rotor.formats.molecule_file import MoleculeFile
 from rotor.formats.spin_table import spin_tables
 from rotor.tops.state_constants import StateConstants
@@ -49,6 +50,7 @@ def molecule_file_text(molecule: MoleculeFile, levels_file: str = "") -> str:
         "covariance": _covariance(molecule),
         "dipole": _dipole(molecule),
         "polarizability": _polarizability(molecule),
+        "magnetic": magnetic_table(molecule.magnetic),
         "spin_weights": molecule.spin_weights.to_mapping(),
         "states": _states(molecule.states),
         "catalogue": _catalogue(molecule),

@@ -15,6 +15,7 @@ from rotor.formats.molecule_file import MoleculeFile, parse_molecule_file, read_
 from rotor.formats.packed import HARMLESS_BYTES, refuse_bomb
 from rotor.formats.registry import reader_of, writer_of
 from rotor.tops.constants import Constants
+from rotor.tops.magnetic import MagneticTensors
 from rotor.tops.top import Top
 
 Isotopes = Mapping[int | str, str] | str
@@ -182,7 +183,7 @@ def _top_as_written(file: MoleculeFile) -> Top:
     geometry = Top.from_molecule(file.molecule) if file.molecule is not None else None
     if file.constants is None:
         assert geometry is not None  # the reader refuses a file with neither
-        return replace(geometry, name=file.name, spin_constants=file.spin_constants)
+        return replace(geometry, name=file.name, spin_constants=file.spin_constants, magnetic=_magnetic(file))
     return replace(
         geometry or Top.from_constants(file.constants),
         constants=file.constants,
@@ -199,7 +200,12 @@ def _top_as_written(file: MoleculeFile) -> Top:
         states=file.states,
         covariance=file.covariance,
         spin_constants=replace(file.spin_constants, source=file.cited("spins")) if file.spin_constants else None,
+        magnetic=_magnetic(file),
     )
+
+
+def _magnetic(file: MoleculeFile) -> MagneticTensors | None:
+    return replace(file.magnetic, source=file.cited("magnetic")) if file.magnetic else None
 
 
 def write(thing: Any, path: str | os.PathLike[str], *, settings: Mapping[str, Any] | None = None) -> None:

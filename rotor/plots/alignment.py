@@ -13,6 +13,7 @@ from rotor.alignment.pulse import Kick
 from rotor.arrays import Floats
 from rotor.plots.picture import checked_suffix, joined, new_figure, save_described, styled
 from rotor.plots.stark import COLOURS
+from rotor.plots.view import WHOLE, View, show_part
 
 SIZE_INCHES = (7.2, 4.6)
 NAMES = {"cos2theta": "⟨cos²θ⟩", "costheta": "⟨cosθ⟩", "cos2theta_2d": "⟨cos²θ₂D⟩"}
@@ -40,6 +41,7 @@ def plot_alignment(
     *,
     classical: Mapping[str, Floats] | None = None,
     title: str = "",
+    view: View = WHOLE,
     provenance: Mapping[str, Any] | None = None,
 ) -> None:
     """Draw `alignment_figure` into a .png, .pdf or .svg file.
@@ -54,6 +56,8 @@ def plot_alignment(
         Cosines of a classical gas at the same times, by the same names.
     title : str
         Above the picture.
+    view : View
+        Times (ps) and cosines shown, and another title.
     provenance : mapping, optional
         Further facts for the metadata.
 
@@ -63,7 +67,9 @@ def plot_alignment(
         For a trace of one time, and for a suffix that is no picture.
     """
     checked_suffix(path)
+    title = title if view.title is None else view.title
     figure = alignment_figure(trace, classical=classical, title=title)
+    show_part(figure.axes[1], view)  # the cosines; times of both panels go together
     save_described(figure, path, title, joined(provenance, trace.provenance))
 
 

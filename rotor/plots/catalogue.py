@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from typing import Any
 
@@ -10,11 +11,14 @@ import numpy as np
 from rotor.formats.spcat.catalogue import Catalogue
 from rotor.formats.spcat.compare import in_mhz
 from rotor.plots.picture import BLUE, MOST_VECTOR_STICKS, ORANGE, checked_suffix, new_figure, save, styled
+from rotor.plots.view import WHOLE, View, show_part
 
 MEASURED = ORANGE
 
 
-def plot_catalogue(lines: Catalogue, path: str | os.PathLike[str], *, title: str = "", command: str = "") -> None:
+def plot_catalogue(
+    lines: Catalogue, path: str | os.PathLike[str], *, title: str = "", view: View = WHOLE, command: str = ""
+) -> None:
     """Draw log10 of the intensity against frequency into a picture; measured lines (a negative tag) stand out.
 
     Parameters
@@ -25,6 +29,8 @@ def plot_catalogue(lines: Catalogue, path: str | os.PathLike[str], *, title: str
         A .png, .pdf or .svg file.
     title : str, optional
         Above the picture.
+    view : View
+        Frequencies (MHz) and log10 of intensities shown, and another title.
     command : str, optional
         Written into the file's metadata.
 
@@ -34,13 +40,19 @@ def plot_catalogue(lines: Catalogue, path: str | os.PathLike[str], *, title: str
         For another suffix.
     """
     checked_suffix(path)
-    save(catalogue_figure(lines, title=title), path, title, {"command": command})
+    title = title if view.title is None else view.title
+    figure = catalogue_figure(lines, title=title, least=math.inf if view.vertical is None else view.vertical[0])
+    show_part(figure.axes[0], view, scale=1e-3)
+    save(figure, path, title, {"command": command})
 
 
-def catalogue_figure(lines: Catalogue, *, title: str = "") -> Any:
-    """A matplotlib figure of log10 of the intensity against frequency, measured lines in a colour of their own."""
+def catalogue_figure(lines: Catalogue, *, title: str = "", least: float = math.inf) -> Any:
+    """A matplotlib figure of log10 of the intensity against frequency, measured lines in a colour of their own.
+
+    Sticks begin below the weakest line, or at `least` where that is lower.
+    """
     frequency, _ = in_mhz(lines)
-    bottom = float(lines.lgint.min()) - 0.3
+    bottom = min(float(lines.lgint.min()) - 0.3, least)
     with styled():
         figure = new_figure()
         axes = figure.add_subplot()

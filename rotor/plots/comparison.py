@@ -21,13 +21,19 @@ from rotor.plots.picture import (
     save,
     styled,
 )
+from rotor.plots.view import WHOLE, View, show_part
 
 UNPAIRED = ORANGE
 _DIFFERENCES = ((1e-1, 1e3, "kHz"), (1e2, 1.0, "MHz"), (np.inf, 1e-3, "GHz"))  # largest in MHz, factor, name
 
 
 def plot_comparison(
-    found: Comparison, path: str | os.PathLike[str], *, names: tuple[str, str] = ("", ""), command: str = ""
+    found: Comparison,
+    path: str | os.PathLike[str],
+    *,
+    names: tuple[str, str] = ("", ""),
+    view: View = WHOLE,
+    command: str = "",
 ) -> None:
     """Draw a comparison of two line lists into a picture.
 
@@ -39,6 +45,8 @@ def plot_comparison(
         A .png, .pdf or .svg file.
     names : (str, str), optional
         Of the two lists.
+    view : View
+        Frequencies shown (MHz), and a title; the vertical limits are those of the lists.
     command : str, optional
         Written into the file's metadata.
 
@@ -48,7 +56,11 @@ def plot_comparison(
         For another suffix.
     """
     checked_suffix(path)
-    save(comparison_figure(found, names=names), path, " and ".join(filter(None, names)), {"command": command})
+    figure = comparison_figure(found, names=names)
+    show_part(figure.axes[0], View(horizontal=view.horizontal), scale=1e-3)
+    if view.title is not None:
+        figure.axes[0].set_title(view.title, loc="left")
+    save(figure, path, view.title or " and ".join(filter(None, names)), {"command": command})
 
 
 def comparison_figure(found: Comparison, *, names: tuple[str, str] = ("", "")) -> Any:

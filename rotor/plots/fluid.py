@@ -11,7 +11,10 @@ import numpy as np
 from rotor.fluid.analysis import PairDistribution
 from rotor.fluid.record import FluidRecord
 from rotor.plots.picture import BLUE, GREEN, GREY, ORANGE, checked_suffix, new_figure, save, styled
+from rotor.plots.view import WHOLE, View, show_part
 from rotor.units import KJ_PER_MOL_EV
+
+TIME = "$t$ (ps)"
 
 
 def plot_fluid(
@@ -21,6 +24,7 @@ def plot_fluid(
     path: str | os.PathLike[str],
     *,
     title: str = "",
+    view: View = WHOLE,
     provenance: Mapping[str, Any] | None = None,
 ) -> None:
     """Draw a run into a .png, .pdf or .svg file.
@@ -30,6 +34,8 @@ def plot_fluid(
     record, shells, molecules, title :
         As in `fluid_figure`.
     path : path
+    view : View
+        Times (ps) and temperatures shown, and another title.
     provenance : mapping, optional
         Written into the metadata of the file.
 
@@ -39,7 +45,12 @@ def plot_fluid(
         A suffix that is no picture.
     """
     checked_suffix(path)
-    save(fluid_figure(record, shells, molecules, title=title), path, title, provenance or {})
+    title = title if view.title is None else view.title
+    figure = fluid_figure(record, shells, molecules, title=title)
+    warm, deep = (one for one in figure.axes if one.get_xlabel() == TIME)
+    show_part(warm, view)
+    show_part(deep, View(horizontal=view.horizontal))
+    save(figure, path, title, provenance or {})
 
 
 def fluid_figure(record: FluidRecord, shells: PairDistribution | None, molecules: int, *, title: str = "") -> Any:
@@ -69,7 +80,7 @@ def fluid_figure(record: FluidRecord, shells: PairDistribution | None, molecules
             _draw_shells(panels["g"], shells)
         _draw_temperatures(warm, record)
         deep.plot(record.time_ps, record.potential_ev * KJ_PER_MOL_EV / molecules, color=BLUE, linewidth=0.8)
-        deep.set(xlabel="$t$ (ps)", ylabel="potential (kJ/mol)")
+        deep.set(xlabel=TIME, ylabel="potential (kJ/mol)")
         figure.suptitle(title, fontsize=10, x=0.01, ha="left")
     return figure
 
@@ -84,7 +95,7 @@ def _draw_temperatures(axes: Any, record: FluidRecord) -> None:
     for name, kelvin, colour in curves:
         if np.isfinite(kelvin).all():
             axes.plot(record.time_ps, kelvin, color=colour, linewidth=0.8, label=name)
-    axes.set(xlabel="$t$ (ps)", ylabel="temperature (K)")
+    axes.set(xlabel=TIME, ylabel="temperature (K)")
     axes.legend(frameon=False, ncols=3, fontsize=7, loc="best")
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from rotor.classical.gas.ensembles import Correlations
 from rotor.plots.picture import BLUE, GREEN, GREY, ORANGE, SIZE_INCHES, checked_suffix, new_figure, save, styled
+from rotor.plots.view import WHOLE, View, show_part
 from rotor.spectra.spectrum import Spectrum
 from rotor.statistics.equipartition import Equipartition
 from rotor.units import MHZ_PER_CM
@@ -55,6 +56,7 @@ def plot_gas(
     *,
     title: str = "",
     plateau: float | None = None,
+    view: View = WHOLE,
     provenance: Mapping[str, Any] | None = None,
 ) -> None:
     """Draw the test, and the correlation functions beside it where there are some, into a picture.
@@ -71,6 +73,8 @@ def plot_gas(
         Above the picture.
     plateau : float, optional
         Where C1 ends, drawn as a line.
+    view : View
+        Times (ps) and correlations shown, and another title.
     provenance : mapping, optional
         Written into the metadata.
 
@@ -86,6 +90,8 @@ def plot_gas(
         _draw_test(axes[0], test, f"equipartition {verdict}, p = {test.p_value:.2g}")
         if curves is not None:
             _draw_curves(axes[1], curves, "correlation functions", plateau)
+            show_part(axes[1], view)
+        title = title if view.title is None else view.title
         figure.suptitle(title, fontsize=10, x=0.01, ha="left")
         save(figure, path, title, provenance or {})
 

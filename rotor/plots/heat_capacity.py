@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotor.plots.picture import PALETTE, SIZE_INCHES, checked_suffix, new_figure, save, styled
+from rotor.plots.view import WHOLE, View, show_part
 from rotor.thermo import ThermoFunctions
 from rotor.version import version
 
@@ -37,11 +38,11 @@ class Panel:
     points: Sequence[Points] = field(default=())
 
 
-def heat_capacity_figure(panels: Sequence[Panel], columns: int = 2) -> Any:
+def heat_capacity_figure(panels: Sequence[Panel], columns: int = 2, view: View = WHOLE) -> Any:
     """A matplotlib figure of C_v/R of rotation, and of vibration where it is given, against temperature.
 
     Full lines: the quantum sum; thick grey: the classical limit; dotted: that with its first corrections, of the first curve.
-    Where there are vibrational states a dashed line of the same colour adds them.
+    Where there are vibrational states a dashed line of the same colour adds them. The scale of a view is that of the temperatures.
     """
     if not panels or not all(panel.curves for panel in panels):
         raise ValueError("a picture of heat capacities needs a panel, and a curve in each")
@@ -52,23 +53,42 @@ def heat_capacity_figure(panels: Sequence[Panel], columns: int = 2) -> Any:
         figure = new_figure(size)
         for panel, axes in zip(panels, figure.subplots(rows, across, squeeze=False).flat, strict=False):
             _draw(axes, panel)
+            _frame(axes, view)
     return figure
 
 
 def plot_heat_capacity(
-    panels: Sequence[Panel], path: str | os.PathLike[str], *, provenance: Mapping[str, Any] | None = None
+    panels: Sequence[Panel],
+    path: str | os.PathLike[str],
+    *,
+    view: View = WHOLE,
+    provenance: Mapping[str, Any] | None = None,
 ) -> None:
-    """Draw `heat_capacity_figure` into a .png, .pdf or .svg file, with the provenance in its metadata.
+    """Draw `heat_capacity_figure` into a .png, .pdf or .svg file.
 
-    Raises ValueError for a suffix that is no picture, and for nothing to draw.
+    Parameters
+    ----------
+    panels : sequence of Panel
+        One diagram each.
+    path : path
+        Its suffix chooses the format.
+    view : View
+        Temperatures (K) and C_v/R shown, and whether the temperatures are on a logarithmic axis.
+    provenance : mapping, optional
+        What the metadata of the file shall say besides the version.
+
+    Raises
+    ------
+    ValueError
+        For a suffix that is no picture, and for nothing to draw.
     """
     checked_suffix(path)
-    figure = heat_capacity_figure(panels)
+    figure = heat_capacity_figure(panels, view=view)
     curves = {panel.title: list(panel.curves) for panel in panels}
     save(
         figure,
         path,
-        "heat capacity",
+        view.title or "heat capacity",
         {"program": "rotor", "version": version(), "curves": curves, **(provenance or {})},
     )
 
@@ -108,6 +128,19 @@ def _draw(axes: Any, panel: Panel) -> None:
     axes.set_ylabel("$C_v/R$ without translation")
     axes.set_title(panel.title, loc="left")
     axes.legend(frameon=False, fontsize=7.5, loc="best")
+
+
+def _frame(axes: Any, view: View) -> None:
+    """The limits of a view; its scale is that of the temperatures."""
+    if view.log:
+        _make_logarithmic(axes)
+    elif view.log is not None:
+        axes.set_xscale("linear")
+    if view.horizontal is not None and view.horizontal[0] <= 0 and axes.get_xscale() == "log":
+        raise ValueError(
+            f"temperatures from {view.horizontal[0]:g} K: a logarithmic axis has none of 0 or less; raise the first"
+        )
+    show_part(axes, replace(view, log=None))
 
 
 def _make_logarithmic(axes: Any) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,7 @@ from rotor.plots.picture import (
     save,
     styled,
 )
+from rotor.plots.view import WHOLE, View, show_part
 from rotor.quantum.quanta import heading, state_text
 from rotor.quantum.request import SelectedLevels
 from rotor.tops.top import Top
@@ -39,6 +41,7 @@ def plot_levels(
     *,
     unit: str = "cm-1",
     title: str | None = None,
+    view: View = WHOLE,
     provenance: Mapping[str, Any] | None = None,
 ) -> None:
     """Draw a term diagram into a .png, .pdf or .svg file.
@@ -56,6 +59,8 @@ def plot_levels(
         Of the energies, from the lowest level that exists.
     title : str, optional
         Instead of name and formula.
+    view : View
+        Which columns and energies are shown, where they are given, and another title.
     provenance : mapping, optional
         What the metadata of the file shall say besides the version.
 
@@ -65,11 +70,18 @@ def plot_levels(
         A suffix that is no picture, an unknown unit, or no levels.
     """
     checked_suffix(path)
-    save(levels_figure(table, top, unit=unit, title=title), path, title or name_of_top(top), provenance or {})
+    title = title if view.title is None else view.title
+    figure = levels_figure(table, top, unit=unit, title=title, view=view)
+    save(figure, path, title or name_of_top(top), provenance or {})
 
 
 def levels_figure(
-    table: SelectedLevels, top: Top | None = None, *, unit: str = "cm-1", title: str | None = None
+    table: SelectedLevels,
+    top: Top | None = None,
+    *,
+    unit: str = "cm-1",
+    title: str | None = None,
+    view: View = WHOLE,
 ) -> Any:
     """A matplotlib figure of a term diagram; see `plot_levels`.
 
@@ -83,6 +95,8 @@ def levels_figure(
         Of the energies.
     title : str, optional
         Instead of the name of the top.
+    view : View
+        Which columns and energies are shown, where they are given.
 
     Returns
     -------
@@ -92,23 +106,36 @@ def levels_figure(
     Raises
     ------
     ValueError
-        For an unknown unit, and for a table without levels.
+        For an unknown unit, and for a table without levels in the view.
     """
     require_one_of("unit", unit, UNITS)
     if not len(table):
         raise ValueError("there is no level to draw; widen the range of J or K, or raise the limit of energy")
     name, column = ladders(table, top)
+    table, column = _in_view(table, column, np.asarray(getattr(table, UNITS[unit])), view)
     energy = np.asarray(getattr(table, UNITS[unit]))
     with styled():
         figure = new_figure(SIZE_INCHES)
         axes = figure.add_subplot()
         _draw(axes, column, energy, table.levels.weight[table.rows] > 0)
+        show_part(axes, View(vertical=view.vertical))
         axes.set_xlabel({"Ka": "$K_a$", "Kc": "$K_c$"}.get(name, f"${name}$"))
         axes.set_ylabel(f"Energy ({unit.replace('cm-1', 'cm⁻¹')})")
         heading_text = f"{table.levels.kind} top" if top is None else name_of_top(top)
         axes.set_title(title if title is not None else heading_text, loc="left")
         _label(figure, axes, table, column, energy)
     return figure
+
+
+def _in_view(table: SelectedLevels, column: Ints, energy: Floats, view: View) -> tuple[SelectedLevels, Ints]:
+    """The levels, and their columns, that a view shows."""
+    shown = np.ones(len(column), dtype=bool)
+    for values, limits in ((column, view.horizontal), (energy, view.vertical)):
+        if limits is not None:
+            shown &= (values >= limits[0]) & (values <= limits[1])
+    if not shown.any():
+        raise ValueError("there is no level between the limits of the picture; widen them")
+    return replace(table, rows=table.rows[shown]), column[shown]
 
 
 def ladders(table: SelectedLevels, top: Top | None) -> tuple[str, Ints]:

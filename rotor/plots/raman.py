@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from rotor.plots.picture import BLUE, GREY, MOST_VECTOR_STICKS, checked_suffix, name_of_top, new_figure, save, styled
-from rotor.plots.spectrum import VISIBLE
+from rotor.plots.spectrum import MOST_DECADES, VISIBLE
+from rotor.plots.view import WHOLE, View, show_part
 from rotor.spectra.raman import RamanLines
 
 
@@ -18,6 +19,7 @@ def plot_raman(
     path: str | os.PathLike[str],
     *,
     title: str | None = None,
+    view: View = WHOLE,
     provenance: Mapping[str, Any] | None = None,
 ) -> None:
     """Draw Raman lines as sticks at their shifts into a picture.
@@ -32,19 +34,22 @@ def plot_raman(
         A .png, .pdf or .svg file.
     title : str, optional
         Instead of name, temperature and laser.
+    view : View
+        Shifts (cm⁻¹) and cross sections shown, another title, and whether the cross sections are on a logarithmic axis.
     provenance : mapping, optional
         What the metadata of the file shall say besides version and settings.
 
     Raises
     ------
     ValueError
-        For a suffix that is no picture and for no lines.
+        For a suffix that is no picture, for no lines, and none in the view.
     """
     checked_suffix(path)
-    save(raman_figure(lines, title), path, title or _title(lines), {**(provenance or {}), **_facts(lines)})
+    title = title if view.title is None else view.title
+    save(raman_figure(lines, title, view), path, title or _title(lines), {**(provenance or {}), **_facts(lines)})
 
 
-def raman_figure(lines: RamanLines, title: str | None = None) -> Any:
+def raman_figure(lines: RamanLines, title: str | None = None, view: View = WHOLE) -> Any:
     """A matplotlib figure of Raman lines as sticks at their shifts; ValueError for no lines."""
     if not len(lines):
         raise ValueError(f"there is no Raman line to draw for {lines.top.name or 'this top'}")
@@ -52,6 +57,7 @@ def raman_figure(lines: RamanLines, title: str | None = None) -> Any:
         figure = new_figure()
         axes = figure.add_subplot()
         _draw(axes, lines)
+        _frame(axes, lines, view)
         axes.set_title(title if title is not None else _title(lines), loc="left")
     return figure
 
@@ -66,6 +72,21 @@ def _draw(axes: Any, lines: RamanLines) -> None:
     axes.set_ylim(0.0, 1.1 * float(heights.max()))
     axes.set_xlabel("Raman shift (cm⁻¹): anti-Stokes below, Stokes above 0")
     axes.set_ylabel("dσ/dΩ (cm² sr⁻¹)")
+
+
+def _frame(axes: Any, lines: RamanLines, view: View) -> None:
+    """The limits of a view; without vertical ones from the lines that it shows, at most eight decades of a logarithmic axis."""
+    first, last = view.horizontal or axes.get_xlim()
+    heights = lines.cross_section_cm2_per_sr[(lines.shift_cm >= first) & (lines.shift_cm <= last)]
+    if not len(heights):
+        raise ValueError(f"there is no line between {first:g} and {last:g} cm-1 to draw; widen the range")
+    tallest = float(heights.max())
+    if view.log:
+        lowest = max(float(heights[heights > 0].min()), tallest * 10.0**-MOST_DECADES)
+        axes.set_ylim(lowest / 2, 2 * tallest)
+    elif view.horizontal is not None:
+        axes.set_ylim(0.0, 1.1 * tallest)
+    show_part(axes, view)
 
 
 def _title(lines: RamanLines) -> str:

@@ -20,6 +20,7 @@ from rotor.formats.spcat.compare import Comparison
 from rotor.plots.picture import save
 from rotor.quantum.fields.field_map import FieldMap
 from rotor.quantum.fields.stark_request import StarkAnswer
+from rotor.quantum.fields.zeeman_request import ZeemanAnswer
 from rotor.quantum.levels import Levels
 from rotor.quantum.request import LevelsAnswer, SelectedLevels
 from rotor.spectra.emission_request import EmissionAnswer
@@ -214,6 +215,13 @@ def _(thing: FluidAnswer, **options: Any) -> Any:
 
     molecules = len(np.unique(thing.atoms.arrays["molecule"]))
     return fluid_figure(thing.record, None, molecules, **options)
+
+
+@_figure.register
+def _(thing: ZeemanAnswer, **options: Any) -> Any:
+    from rotor.plots.zeeman import zeeman_figure
+
+    return zeeman_figure(thing.states, spins=len(thing.request.spin_g), **options)
 
 
 _figure.register(StarkAnswer, _passed_on("states"))

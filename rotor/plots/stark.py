@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from rotor.arrays import Ints
 from rotor.plots.picture import checked_suffix, joined, new_figure, save_described, styled
+from rotor.plots.view import WHOLE, View, show_part
 from rotor.quantum.fields.field_map import FieldMap
 from rotor.spectra.fields.lines import FieldLines
 from rotor.units import MHZ_PER_CM
@@ -18,18 +21,37 @@ SIZE_INCHES = (7.2, 6.4)
 LEAST_DRAWN = 1e-4  # of the strongest line
 
 
-def stark_figure(field_map: FieldMap, title: str = "", unit: str = "kV/cm") -> Any:
-    """A matplotlib figure of a map of levels in a field, of two fields or more; `unit` is that of the field.
+def stark_figure(field_map: FieldMap, title: str = "", unit: str = "kV/cm", view: View = WHOLE) -> Any:
+    """A matplotlib figure of a map of levels in a field.
 
-    Raises ValueError for a map of one field.
+    Parameters
+    ----------
+    field_map : FieldMap
+        Of two fields or more.
+    title : str
+        Above the picture.
+    unit : str
+        Of the field.
+    view : View
+        Fields and energies (cm⁻¹) shown; its title is not used here.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Energies above, slopes below.
+
+    Raises
+    ------
+    ValueError
+        For a map of one field, or with less than two in the view.
     """
     if len(field_map.fields) < 2:
         raise ValueError("a picture of a map needs two fields or more")
     with styled():
         figure = new_figure(SIZE_INCHES)
         above, below = figure.subplots(2, 1, sharex=True, height_ratios=(3, 1.4))
-        _energies(above, field_map)
-        _slopes(below, field_map, unit)
+        _energies(above, field_map, view)
+        _slopes(below, field_map, unit, view)
         above.set_title(title, loc="left")
     return figure
 
@@ -40,6 +62,7 @@ def plot_stark(
     *,
     title: str = "",
     unit: str = "kV/cm",
+    view: View = WHOLE,
     provenance: Mapping[str, Any] | None = None,
 ) -> None:
     """Draw `stark_figure` into a .png, .pdf or .svg file.
@@ -54,6 +77,8 @@ def plot_stark(
         Above the picture.
     unit : str
         Of the field.
+    view : View
+        Fields and energies (cm⁻¹) shown, and another title.
     provenance : mapping, optional
         Further facts for the metadata.
 
@@ -63,41 +88,55 @@ def plot_stark(
         For a map of one field, and for a suffix that is no picture.
     """
     checked_suffix(path)
-    figure = stark_figure(field_map, title, unit)
+    title = title if view.title is None else view.title
+    figure = stark_figure(field_map, title, unit, view)
     save_described(figure, path, title, joined(provenance, field_map.provenance))
 
 
-def _energies(axes: Any, field_map: FieldMap) -> None:
+def _energies(axes: Any, field_map: FieldMap, view: View) -> None:
     seen: set[float] = set()
     ends: list[tuple[float, str]] = []
-    for rows in field_map.curves():
-        m = float(field_map.m[rows.start])
+    for rows in _curves(field_map, view):
+        m = float(field_map.m[rows[0]])
         energies = field_map.energy_mhz[rows] / MHZ_PER_CM
         label = None if m in seen else ("M mixed" if m < 0 else f"|M| = {m:g}")
         axes.plot(field_map.field[rows], energies, color=_colour(m), linewidth=0.9, label=label)
         seen.add(m)
-        ends.append((float(energies[0]), str(field_map.label[rows.start])))
-    _labels(axes, field_map, ends)
+        ends.append((float(energies[0]), str(field_map.label[rows[0]])))
+    show_part(axes, replace(view, horizontal=None))
+    fields = field_map.field[_curves(field_map, view)[0]]
+    _labels(axes, (float(fields[0]), float(fields[-1])), ends)
     axes.set_ylabel("E/hc (cm⁻¹)")
     if seen != {-1}:
         axes.legend(frameon=False, fontsize=8, loc="lower right", bbox_to_anchor=(1, 1), ncols=len(seen))
+
+
+def _curves(field_map: FieldMap, view: View) -> list[Ints]:
+    """The rows of each curve at the fields that a view shows."""
+    low, high = view.horizontal or (-np.inf, np.inf)
+    shown = np.flatnonzero((field_map.fields >= low) & (field_map.fields <= high))
+    if len(shown) < 2:
+        raise ValueError(
+            f"the map has {len(shown)} of its fields from {low:g} to {high:g}; a picture needs two or more"
+        )
+    return [rows.start + shown for rows in field_map.curves()]
 
 
 def _colour(m: float) -> str:
     return COLOURS[int(m) % len(COLOURS)] if m >= 0 else COLOURS[0]
 
 
-def _labels(axes: Any, field_map: FieldMap, ends: list[tuple[float, str]]) -> None:
+def _labels(axes: Any, fields: tuple[float, float], ends: list[tuple[float, str]]) -> None:
     """Names of the free levels at the left, those that would stand on each other left out."""
     low, high = axes.get_ylim()
-    first, end = field_map.fields[0], field_map.fields[-1]
+    first, end = fields
     axes.set_xlim(first - 0.09 * (end - first), end + 0.02 * (end - first))
     last = -np.inf
     for energy, label in sorted(set(ends)):
         if energy - last > (high - low) / 40:
             axes.annotate(
                 label,
-                (field_map.fields[0], energy),
+                (first, energy),
                 (-4, 0),
                 textcoords="offset points",
                 ha="right",
@@ -107,10 +146,10 @@ def _labels(axes: Any, field_map: FieldMap, ends: list[tuple[float, str]]) -> No
             last = energy
 
 
-def _slopes(axes: Any, field_map: FieldMap, unit: str) -> None:
-    for rows in field_map.curves():
+def _slopes(axes: Any, field_map: FieldMap, unit: str, view: View) -> None:
+    for rows in _curves(field_map, view):
         axes.plot(
-            field_map.field[rows], field_map.slope[rows], color=_colour(float(field_map.m[rows.start])), linewidth=0.8
+            field_map.field[rows], field_map.slope[rows], color=_colour(float(field_map.m[rows[0]])), linewidth=0.8
         )
     axes.axhline(0.0, color="#555555", linewidth=0.6, linestyle=":")
     axes.set_xlabel(f"field ({unit})")

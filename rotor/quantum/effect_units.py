@@ -6,7 +6,7 @@ basis, one matrix for each parameter (`unit_blocks`).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,19 +15,35 @@ from rotor.arrays import Floats, Ints
 from rotor.quantum.coupled import CoupledBlock, names_of_states, parameter_matrix
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.levels import Levels, SolvedBlock
-from rotor.quantum.spins.blocks import SpinBlock, SpinPart, coefficients_of, labels_of, product
+from rotor.quantum.spins.blocks import (
+    SpinBlock,
+    SpinPart,
+    assigned,
+    coefficients_of,
+    labels_of,
+    names_of_parts,
+    product,
+)
 from rotor.quantum.spins.lines import ParameterOperator
 from rotor.quantum.spins.operators import Scalar
 from rotor.quantum.spins.rotor import Channel
-from rotor.quantum.unit_blocks import Namer, UnitBlock, UnitBlocks, unit_block
+from rotor.quantum.unit_blocks import Elements, Namer, UnitBlock, UnitBlocks, elements_of, unit_block
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
 
-Units = dict[int, Floats]
+Units = dict[int, Elements]
+Functions = Callable[[CoupledBlock], tuple[Floats, Ints]]
 
 
-def unit_levels(top: Top, levels: Levels, rows: Ints, names: Sequence[str], values_mhz: Floats) -> UnitBlocks:
+def unit_levels(
+    top: Top,
+    levels: Levels,
+    rows: Ints,
+    names: Sequence[str],
+    values_mhz: Floats,
+    functions: Functions | None = None,
+) -> UnitBlocks:
     """The blocks in which the rows of levels lie, for other values of the parameters.
 
     Parameters
@@ -41,6 +57,9 @@ def unit_levels(top: Top, levels: Levels, rows: Ints, names: Sequence[str], valu
         Parameters of the effects of the levels, in the order of the values.
     values_mhz : (parameters,) array
         At which the levels were solved.
+    functions : callable, optional
+        Of coupled blocks: the functions (n, n) in rows by which the states are called, and their names v, Ka, Kc (n, 3), where these
+        are not the functions of the basis; the levels have these names.
 
     Returns
     -------
@@ -57,7 +76,7 @@ def unit_levels(top: Top, levels: Levels, rows: Ints, names: Sequence[str], valu
     of_row = np.searchsorted(starts, rows, side="right") - 1
     numbers = np.unique(of_row).tolist()
     blocks = [levels.blocks[number] for number in numbers]
-    makers = _Makers(top, levels, names, blocks)
+    makers = _Makers(top, levels, names, blocks, functions)
     units = [makers.unit(block) for block in blocks]
     inside = [np.flatnonzero(of_row == number) for number in numbers]
 
@@ -65,10 +84,14 @@ def unit_levels(top: Top, levels: Levels, rows: Ints, names: Sequence[str], valu
         """Labels of the block by their names, which are those that the levels have."""
         block, own = blocks[place], inside[place]
         state_of = {tuple(name): state for state, name in enumerate(found.tolist())}
-        asked = _names(block)[rows[own] - block.start]
+        asked = _quanta(levels)[rows[own]] if functions else _names(block)[rows[own] - block.start]
         return own, np.array([state_of[tuple(name)] for name in asked.tolist()])
 
     return UnitBlocks(units, len(rows), find, values_mhz)
+
+
+def _quanta(levels: Levels) -> Ints:
+    return np.stack([levels.quanta[name] for name in ("v", "ka", "kc")], axis=1)
 
 
 def _names(block: Any) -> Ints:
@@ -79,7 +102,10 @@ def _names(block: Any) -> Ints:
 class _Makers:
     """Unit matrices of solved blocks of any kind, with what they share."""
 
-    def __init__(self, top: Top, levels: Levels, names: Sequence[str], blocks: Sequence[Any]) -> None:
+    def __init__(
+        self, top: Top, levels: Levels, names: Sequence[str], blocks: Sequence[Any], functions: Functions | None
+    ) -> None:
+        self._functions = functions
         self._top, self._effects, self._names = top, levels.effects, tuple(names)
         self._representation = str(levels.representation)
         self._spins = _SpinUnits(top, levels.effects, self._names, blocks) if isinstance(blocks[0], SpinBlock) else None
@@ -92,14 +118,15 @@ class _Makers:
         return self._coupled(block) if isinstance(block, CoupledBlock) else self._single(block)
 
     def _single(self, block: SolvedBlock) -> UnitBlock:
-        units: Units = {}
+        dense: dict[int, Floats] = {}
         for place, name in enumerate(self._names):
             for effect in self._effects:
                 operators = effect.operators(self._top).get(name)
                 if operators:
                     found = Scalar(tuple(operators.items())).elements(block.basis, block.basis, self._representation)
                     if found is not None:
-                        units[place] = units[place] + found if place in units else found
+                        dense[place] = dense[place] + found if place in dense else found
+        units = {place: elements_of(matrix) for place, matrix in dense.items()}
         return unit_block(units, np.zeros(block.basis.size, dtype=np.int64), _by_rank)
 
     def _coupled(self, block: CoupledBlock) -> UnitBlock:
@@ -107,7 +134,9 @@ class _Makers:
         for place, name in enumerate(self._names):
             found = parameter_matrix(self._top, self._effects, self._representation, block, name)
             if found.any():
-                units[place] = found
+                units[place] = elements_of(found)
+        if self._functions:
+            return _turned(units, *self._functions(block))
         sub_blocks = np.repeat(np.arange(len(block.parts)), [part.basis.size for part in block.parts])
 
         def namer(matrix: Floats, energies: Floats, vectors: Floats) -> Ints:
@@ -115,6 +144,21 @@ class _Makers:
             return names_of_states(block.parts, whole, vectors, self._representation)[0]
 
         return unit_block(units, sub_blocks, namer)
+
+
+def _turned(units: Units, functions: Floats, names: Ints) -> UnitBlock:
+    """The block over other functions, each of a state by itself: the sub-blocks are their v and the parity of Ka."""
+    turned = {}
+    for place, (places, values) in units.items():
+        lower = np.zeros(functions.shape)
+        lower.ravel()[places] = values
+        turned[place] = elements_of(functions @ (lower + np.tril(lower, -1).T) @ functions.T)
+
+    def namer(matrix: Floats, energies: Floats, vectors: Floats) -> Ints:
+        return np.asarray(names[assigned(vectors**2, np.ones(len(names), dtype=np.int64))])
+
+    members = 2 * names[:, 0] + names[:, 1] % 2
+    return unit_block(turned, np.unique(members, return_inverse=True)[1].reshape(-1), namer)
 
 
 def _by_rank(matrix: Floats, energies: Floats, vectors: Floats) -> Ints:
@@ -138,7 +182,7 @@ class _SpinUnits:
         for place, operator in enumerate(self._operators):
             matrix = self._matrix(operator, parts, block)
             if matrix is not None:
-                units[place] = matrix
+                units[place] = elements_of(matrix)
         return unit_block(units, _sub_blocks(parts, parts[-1].place.stop), _namer(parts, block.patterns))
 
     def _matrix(self, operator: ParameterOperator, parts: tuple[SpinPart, ...], block: SpinBlock) -> Floats | None:
@@ -172,7 +216,9 @@ def _sub_blocks(parts: tuple[SpinPart, ...], size: int) -> Ints:
 
 
 def _namer(parts: tuple[SpinPart, ...], every: Ints) -> Namer:
+    names = names_of_parts(parts, every)
+
     def namer(matrix: Floats, energies: Floats, vectors: Floats) -> Ints:
-        return labels_of(parts, every, vectors)[0]
+        return labels_of(parts, names, vectors)[0]
 
     return namer

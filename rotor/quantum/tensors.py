@@ -387,14 +387,31 @@ def acting_on(vectors: Floats, up: WangBlock, low: WangBlock, tensor: BodyTensor
     (up.size, n) array
         Columns over the upper block, in the unit of the tensor.
     """
+    moved = np.zeros((vectors.shape[1], up.size))
+    add_acting_on(moved, vectors, up, low, tensor)
+    return moved.T
+
+
+def add_acting_on(zeros: Floats, vectors: Floats, up: WangBlock, low: WangBlock, tensor: BodyTensor) -> None:
+    """The same, transposed, into an array of zeros (n, up.size).
+
+    Parameters
+    ----------
+    zeros : (n, up.size) array
+        Receives the columns over the upper block as rows.
+    vectors : (low.size, n) array
+        Columns over the lower block.
+    up, low : WangBlock
+        The upper and the lower block.
+    tensor : BodyTensor
+        Components in the molecule.
+    """
     states = vectors.T
-    moved = np.zeros((states.shape[0], up.size))
     for number, (source, target, elements) in enumerate(bands_between(up, low, tensor)):
         if number == 0:
-            np.multiply(states[:, source], elements, out=moved[:, target])
+            np.multiply(states[:, source], elements, out=zeros[:, target])
         else:
-            moved[:, target] += states[:, source] * elements
-    return moved.T
+            zeros[:, target] += states[:, source] * elements
 
 
 # One for each pair of states

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -50,13 +51,33 @@ class UnitBlock:
         return np.asarray(weights.T @ self.factors)
 
 
-def unit_block(units: dict[int, Floats], sub_blocks: Ints, namer: Namer) -> UnitBlock:
-    """From the dense unit matrix of every parameter, by its number, that acts in the block."""
-    parameters = np.array(sorted(units), dtype=np.int64)
-    size = len(sub_blocks)
-    stacked = np.stack([units[i] for i in parameters.tolist()]) if len(parameters) else np.zeros((0, size, size))
-    rows, columns = np.nonzero(np.tril((stacked != 0).any(axis=0) | np.eye(size, dtype=bool)))
-    return UnitBlock(size, rows, columns, stacked[:, rows, columns].T.copy(), parameters, sub_blocks, namer)
+class Elements(NamedTuple):
+    """Elements of a matrix that are not zero, of its lower triangle: places row * size + column, rising, and values."""
+
+    places: Ints
+    values: Floats
+
+
+def elements_of(matrix: Floats) -> Elements:
+    """Of a dense matrix (size, size).
+
+    >>> elements_of(np.array([[1.0, 9.0], [0.0, 2.0]])).places.tolist()
+    [0, 3]
+    """
+    places = np.flatnonzero(np.tril(matrix))
+    return Elements(places, matrix.ravel()[places])
+
+
+def unit_block(units: dict[int, Elements], sub_blocks: Ints, namer: Namer) -> UnitBlock:
+    """From the unit matrix of every parameter, by its number, that acts in the block."""
+    parameters, size = sorted(units), len(sub_blocks)
+    diagonal = np.arange(size) * (size + 1)
+    places = np.unique(np.concatenate([diagonal, *(units[i].places for i in parameters)]))
+    factors = np.zeros((len(places), len(parameters)))
+    for column, i in enumerate(parameters):
+        factors[np.searchsorted(places, units[i].places), column] = units[i].values
+    rows, columns = np.divmod(places, size)
+    return UnitBlock(size, rows, columns, factors, np.array(parameters, dtype=np.int64), sub_blocks, namer)
 
 
 @dataclass

@@ -2,11 +2,12 @@
 
 | kind | accuracy of | what is chosen | error stated |
 |---|---|---|---|
-| spectrum | frequencies, such as "1 kHz" | spins whose constants are known, left out if smaller | rounding, and spins left out |
+| spectrum, levels, raman | frequencies, energies, shifts, "1 kHz" | spins with known constants, left out if smaller | rounding, and these |
 | stark | energies, "1 kHz" | tolerance, and with it J max of the basis | by which energies move with a higher J max |
 | align | cosines, 1e-4 | tolerance: steps, J max, populations | step error, edge population, population left out |
 | thermo | Q, U and C_v, "0.1 %" | levels summed, or the classical limit with corrections | of the sums |
 | tumble | attitude, "1e-6 rad" | tolerance of the steps; free motion is exact | from steps a hundred times finer |
+| gas, fluid | see `rotor.scenes.accuracy_sampled` | | |
 
 It is the numerical error with the constants as given. Their own uncertainty, and orders of distortion that they do not have, are
 beside it in a plan. What double precision cannot give is refused.
@@ -30,7 +31,8 @@ ROUNDING = 8 * float(
     np.finfo(np.float64).eps
 )  # of an eigenvalue, relative to the largest: a few units in the last place
 FINEST_TOLERANCE, FINER, COARSER = 1e-13, 1e-2, 10.0
-UNITS = {"spectrum": "MHz", "stark": "MHz", "align": "", "thermo": "", "tumble": "rad"}
+UNITS = {"spectrum": "MHz", "levels": "MHz", "raman": "MHz", "stark": "MHz", "align": "", "thermo": "", "tumble": "rad"}
+SAMPLED = {"gas": ("K", "%", ""), "fluid": ("K", "%")}  # units, of which each is the accuracy of something else
 
 
 @dataclass(frozen=True)
@@ -53,6 +55,8 @@ def asked_of(scene: Scene) -> float | None:
     given = getattr(scene, "accuracy", None)
     if given is None:
         return None
+    if scene.kind in SAMPLED:
+        return _sampled(scene.kind, given)
     text, scale = str(given).strip(), 1.0
     if text.endswith("%"):
         text, scale = text[:-1], 0.01
@@ -62,6 +66,42 @@ def asked_of(scene: Scene) -> float | None:
         raise ValueError(f"accuracy: {given!r}: expected {UNITS[scene.kind]}, not a percentage")
     unit = UNITS[scene.kind] if UNITS[scene.kind] == "MHz" else ""
     value = scale * quantity("accuracy", text, unit)
+    if not value > 0.0:
+        raise ValueError(f"accuracy: {given!r}: expected more than 0")
+    return value
+
+
+def unit_of(scene: Scene) -> str:
+    """The unit of the accuracy of a scene.
+
+    >>> from rotor.scenes.scene import GasScene
+    >>> [unit_of(GasScene(molecule="water", accuracy=one)) for one in ("1 K", "0.1 %", 0.02)]
+    ['K', '%', '']
+    """
+    if scene.kind not in SAMPLED:
+        return UNITS[scene.kind]
+    text = str(getattr(scene, "accuracy", "")).strip()
+    return "%" if text.endswith("%") else "" if _is_number(text) else "K"
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def _sampled(kind: str, given: str | float) -> float:
+    """The accuracy of a gas or fluid in K, percent, or as a number.
+
+    Raises ValueError for a unit that the kind has not.
+    """
+    text = str(given).strip()
+    if _is_number(text) and "" not in SAMPLED[kind]:
+        raise ValueError(f"accuracy: {given!r}: expected a unit: K of the conserved energy, or % of the forces")
+    percent = text.endswith("%")
+    value = quantity("accuracy", text.removesuffix("%"), "" if percent or _is_number(text) else "K")
     if not value > 0.0:
         raise ValueError(f"accuracy: {given!r}: expected more than 0")
     return value
@@ -81,13 +121,31 @@ def reached(scene: Scene, answer: Any, how: str) -> Reached:
     """The error that an answer reached; ValueError where it is more than what was asked for, with the reason."""
     asked = asked_of(scene)
     assert asked is not None
-    error = _ERRORS[scene.kind](answer)
+    unit = unit_of(scene)
+    error = _sampled_error(answer, unit) if scene.kind in SAMPLED else _ERRORS[scene.kind](answer)
     if error > asked:
         raise ValueError(
-            f"accuracy: {asked:g} {UNITS[scene.kind]}".rstrip()
-            + f" cannot be given: the error here is {error:.2g} ({how})"
+            f"accuracy: {asked:g} {unit}".rstrip() + f" cannot be given: the error here is {error:.2g} ({how})"
         )
-    return Reached(asked, error, UNITS[scene.kind], how)
+    return Reached(asked, error, unit, how)
+
+
+def _sampled_error(answer: Any, unit: str) -> float:
+    from rotor.scenes.accuracy_sampled import error_of_fluid, error_of_gas
+
+    return error_of_gas(answer, unit) if hasattr(answer, "correlations") else error_of_fluid(answer, unit)
+
+
+def _gas(scene: Any, request: Any, asked: float) -> tuple[Any, str]:
+    from rotor.scenes.accuracy_sampled import choose_molecules
+
+    return choose_molecules(scene, request, asked, unit_of(scene))
+
+
+def _fluid(scene: Any, request: Any, asked: float) -> tuple[Any, str]:
+    from rotor.scenes.accuracy_sampled import choose_step
+
+    return choose_step(scene, request, asked, unit_of(scene))
 
 
 def _spectrum(scene: Any, request: Any, asked: float) -> tuple[Any, str]:
@@ -111,11 +169,11 @@ def _spin_size(top: Any, present: tuple[QuantumEffect, ...]) -> float:
     return max((effect.size_mhz(top, 1) for effect in spin_effects(top)), default=0.0)
 
 
-def _spectrum_error(answer: Any) -> float:
-    lines = answer.lines
-    rounding = ROUNDING * float(np.abs(lines.levels.energy_mhz).max(initial=0.0))
-    has_spins = any(effect.spins(lines.top) for effect in lines.levels.effects)
-    left = 0.0 if has_spins or lines.top.spin_constants is None else _spin_size(lines.top, lines.levels.effects)
+def _levels_error(top: Any, levels: Any) -> float:
+    """Rounding of the largest energy, and the size of known spins that are left out."""
+    rounding = ROUNDING * float(np.abs(levels.energy_mhz).max(initial=0.0))
+    has_spins = any(effect.spins(top) for effect in levels.effects)
+    left = 0.0 if has_spins or top.spin_constants is None else _spin_size(top, levels.effects)
     return rounding + left
 
 
@@ -178,13 +236,19 @@ def _tumble_error(answer: Any) -> float:
 
 _CHOICES: dict[str, Callable[[Any, Any, float], tuple[Any, str]]] = {
     "spectrum": _spectrum,
+    "levels": _spectrum,
+    "raman": _spectrum,
+    "gas": _gas,
+    "fluid": _fluid,
     "stark": _tolerance("tolerance_mhz", "1e-4 MHz", 1e-9),
     "align": _tolerance("tolerance", 1e-6, 1e-11),
     "thermo": _tolerance("relative_error", 1e-6, 1e-13),
     "tumble": _tumble,
 }
 _ERRORS: dict[str, Callable[[Any], float]] = {
-    "spectrum": _spectrum_error,
+    "spectrum": lambda answer: _levels_error(answer.lines.top, answer.lines.levels),
+    "levels": lambda answer: _levels_error(answer.request.top, answer.table.levels),
+    "raman": lambda answer: _levels_error(answer.lines.top, answer.lines.levels),
     "stark": lambda answer: float(answer.facts()["accuracy_mhz"]),
     "align": lambda answer: float(answer.facts()["error_estimate"]),
     "thermo": lambda answer: float(answer.functions.relative_error.max()),

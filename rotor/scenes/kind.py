@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import Executor
 from contextlib import contextmanager
@@ -26,6 +27,10 @@ if TYPE_CHECKING:
 
 Writer = Callable[[Path], None]
 Where = str | os.PathLike[str]
+
+
+class NoResultError(RuntimeError):
+    """A scene that could be run and has no result, such as a fit that does not converge; nothing is written."""
 
 
 def _no_writers(answer: Any, scene: Any) -> Mapping[str, Writer]:
@@ -162,5 +167,6 @@ def fields(**names: str) -> Iterator[None]:
         yield
     except ValueError as error:
         text = str(error)
-        word = text.partition(":")[0]
+        found = re.match(r"\w+", text)
+        word = found[0] if found else ""
         raise ValueError(names.get(word, word) + text[len(word) :]) from None

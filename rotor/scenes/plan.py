@@ -8,48 +8,22 @@ from __future__ import annotations
 
 import math
 import os
-import time
-from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Callable
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from rotor.scenes import left_out
 from rotor.scenes.kind import kind_of
-from rotor.scenes.left_out import LeftOut
+from rotor.scenes.plan_parts import Plan, effect_texts, extrapolated, good_numbers, level_parts, timed
 from rotor.scenes.scene import Scene
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from rotor.quantum.effect import QuantumEffect
     from rotor.tops.top import Top
 
 SHORT_J = (12, 30)  # of the calibration; a J that is not above the second is timed itself
 SHORT_FIELDS, SHORT_GAS, SHORT_STEPS = (2, 20), (500, 2000), (5, 20)  # likewise
 BYTES_A_LINE = 100  # columns of a line in memory
-ENERGY, STEPS = "energies are eigenvalues of the truncated Hamiltonian", "Runge-Kutta of order 8, adaptive"
-
-
-@dataclass(frozen=True)
-class Plan:
-    """What a scene will do.
-
-    effects: taken, with their sizes where they have one. good: quantum numbers, or what the motion conserves. parts: name and
-    words: basis, blocks, method and why. counts: by name. seconds, memory_mb: estimated. left_out: largest first.
-    """
-
-    kind: str
-    effects: tuple[str, ...]
-    good: tuple[str, ...]
-    parts: tuple[tuple[str, str], ...]
-    counts: Mapping[str, int]
-    seconds: float
-    memory_mb: float
-    left_out: tuple[LeftOut, ...]
-
-    def facts(self) -> dict[str, Any]:
-        """The plan as plain records."""
-        return asdict(self) | {"parts": dict(self.parts), "counts": dict(self.counts)}
+STEPS = "Runge-Kutta of order 8, adaptive"
 
 
 def plan_of(scene: Scene, folder: str | os.PathLike[str] = ".") -> Plan:
@@ -81,64 +55,6 @@ def plan_of(scene: Scene, folder: str | os.PathLike[str] = ".") -> Plan:
         raise ValueError("sweep: a plan is of one point; plan the scene without its sweep")
     request = kind_of(scene).request(scene, folder)
     return _PLANS[scene.kind](request)
-
-
-def _seconds(call: Callable[[], Any]) -> float:
-    """Processor time of a call, its second one where the first is short: without imports and compilation."""
-    start = time.process_time()
-    call()
-    first = time.process_time() - start
-    if first > 1.0:
-        return first
-    start = time.process_time()
-    call()
-    return time.process_time() - start
-
-
-def _extrapolated(call: Callable[[int], Any], work: Callable[[int], float], sizes: tuple[int, int], size: int) -> float:
-    """Seconds of a call of one size from two smaller ones: a part that is always there, and one in proportion to the work."""
-    first, second = (min(one, size) for one in sizes)
-    seconds = _seconds(lambda: call(second))
-    if second == size:
-        return seconds
-    rate = max(seconds - _seconds(lambda: call(first)), 0.0) / (work(second) - work(first))
-    return seconds + rate * (work(size) - work(second))
-
-
-def _level_parts(top: Top, jmax: int, effects: Sequence[QuantumEffect]) -> list[tuple[str, str]]:
-    """Basis, blocks and method of the levels of a top."""
-    from rotor.quantum.basis import wang_blocks
-    from rotor.quantum.rotation import representation_of
-
-    spins = [spin for effect in effects for spin in effect.spins(top)]
-    if top.kind in ("linear", "spherical", "prolate", "oblate"):
-        basis, method = f"J to {jmax}; no matrix", f"closed form: H is diagonal in the basis of a {top.kind} top"
-    else:
-        largest = max(block.size for block in wang_blocks(jmax, representation_of(top)))
-        basis = f"J to {jmax}; four Wang blocks of each J, of up to {largest} states"
-        method = f"Wang blocks one by one, {representation_of(top)}; {ENERGY}"
-    parts = [("basis", basis), ("method", method)]
-    if spins:
-        size = math.prod(spin.twice + 1 for spin in spins)
-        parts.append(("spins", f"blocks of F over the solved rotation, {size} spin functions: {_names(spins)}"))
-    return parts
-
-
-def _names(spins: Sequence[Any]) -> str:
-    return ", ".join(dict.fromkeys(spin.name for spin in spins))
-
-
-def _effects(top: Top, j: int, effects: Sequence[QuantumEffect]) -> tuple[str, ...]:
-    from rotor.quantum.effect import effect_sizes
-
-    return tuple(f"{one.name}, {one.size_mhz:.2g} MHz at J = {j}" for one in effect_sizes(top, j, effects))
-
-
-def _good(top: Top, effects: Sequence[QuantumEffect]) -> tuple[str, ...]:
-    """Quantum numbers that stay good under the effects, as the levels have them."""
-    from rotor.quantum.solve import solve_levels
-
-    return solve_levels(top, 1, effects=effects, vectors=False).quanta_names
 
 
 def allowed_lines(top: Top, jmax: int) -> int:
@@ -195,7 +111,7 @@ def _spectrum(request: Any) -> Plan:
     j = min(populated_j(top, kelvin), max(jmax, 1))
     spins = math.prod(spin.twice + 1 for effect in request.effects for spin in effect.spins(top))
     lines = allowed_lines(top, jmax)
-    seconds = _extrapolated(
+    seconds = extrapolated(
         lambda j: answer_spectrum(replace(request, jmax=j)),
         lambda j: (j + 1.0) ** (3 if top.kind == "asymmetric" else 1),
         (max(SHORT_J[0], jmax // 3), max(SHORT_J[1], jmax // 2)),
@@ -207,9 +123,9 @@ def _spectrum(request: Any) -> Plan:
         absent = sorted([*absent, width], key=lambda one: (one.size is None, -(one.size or 0.0)))
     return Plan(
         kind="spectrum",
-        effects=_effects(top, j, request.effects),
-        good=_good(top, request.effects),
-        parts=(("J max", f"{jmax}: {why}"), *_level_parts(top, jmax, request.effects)),
+        effects=effect_texts(top, j, request.effects),
+        good=good_numbers(top, request.effects),
+        parts=(("J max", f"{jmax}: {why}"), *level_parts(top, jmax, request.effects)),
         counts={"allowed lines of one state, without spins, before range and cut": lines},
         seconds=seconds,
         memory_mb=lines * BYTES_A_LINE * spins / 1e6,
@@ -223,17 +139,15 @@ def _levels(request: Any) -> Plan:
     top, jmax = request.top, request.jmax
     plain = replace(request, jmin=0, kmin=None, kmax=None, max_energy_mhz=None)
     power = 3 if top.kind == "asymmetric" else 1
-    seconds = _extrapolated(
-        lambda j: answer_levels(replace(plain, jmax=j)), lambda j: (j + 1.0) ** power, SHORT_J, jmax
-    )
+    seconds = extrapolated(lambda j: answer_levels(replace(plain, jmax=j)), lambda j: (j + 1.0) ** power, SHORT_J, jmax)
     count = (jmax + 1) ** 2 - request.jmin**2 if top.kind == "asymmetric" else jmax + 1 - request.jmin
     if top.kind in ("prolate", "oblate"):
         count = (jmax + 1) * (jmax + 2) // 2 - request.jmin * (request.jmin + 1) // 2
     return Plan(
         kind="levels",
-        effects=_effects(top, max(jmax, 1), request.effects),
-        good=_good(top, request.effects),
-        parts=tuple(_level_parts(top, jmax, request.effects)),
+        effects=effect_texts(top, max(jmax, 1), request.effects),
+        good=good_numbers(top, request.effects),
+        parts=tuple(level_parts(top, jmax, request.effects)),
         counts={"levels": count},
         seconds=seconds,
         memory_mb=count * 8 * (jmax + 2) / 2e6 if top.kind == "asymmetric" else count * 50e-6,
@@ -249,7 +163,7 @@ def _stark(request: Any) -> Plan:
     ends = tuple(dict.fromkeys((min(fields), max(fields))))
     found = answer_stark(replace(request, fields_kv_per_cm=ends, diabatic_gap_mhz=None))
     lasting = sorted(fields, key=abs, reverse=True)  # the highest fields need the largest basis
-    seconds = _extrapolated(
+    seconds = extrapolated(
         lambda n: answer_stark(replace(request, fields_kv_per_cm=tuple(lasting[:n]), diabatic_gap_mhz=None)),
         float,
         SHORT_FIELDS,
@@ -259,7 +173,7 @@ def _stark(request: Any) -> Plan:
     spins = [one for one in left_out.of_levels(top, j, SEMI_RIGID) if one.name != "Stark shift of a stray field"]
     return Plan(
         kind="stark",
-        effects=(*_effects(top, j, SEMI_RIGID), f"dipole in the field, up to {max(map(abs, fields)):g} kV/cm"),
+        effects=(*effect_texts(top, j, SEMI_RIGID), f"dipole in the field, up to {max(map(abs, fields)):g} kV/cm"),
         good=("M",) if not request.tilted else (),
         parts=(
             ("basis", f"J to {facts['jmax']}: the tolerance of {request.tolerance_mhz:g} MHz at the highest field"),
@@ -279,7 +193,7 @@ def _stark(request: Any) -> Plan:
 def _gas(request: Any) -> Plan:
     from rotor.thermo.classical_gas import answer_gas
 
-    seconds = _extrapolated(lambda n: answer_gas(replace(request, molecules=n)), float, SHORT_GAS, request.molecules)
+    seconds = extrapolated(lambda n: answer_gas(replace(request, molecules=n)), float, SHORT_GAS, request.molecules)
     points = len(request.times_ps or ())
     return Plan(
         kind="gas",
@@ -299,13 +213,13 @@ def _raman(request: Any) -> Plan:
 
     top, kelvin = request.top, request.temperature_k
     found: list[Any] = []
-    seconds = _seconds(lambda: found.append(answer_raman(request)))  # milliseconds for what is not an asymmetric top
+    seconds = timed(lambda: found.append(answer_raman(request)))  # milliseconds for what is not an asymmetric top
     lines, j = found[-1].lines, populated_j(top, kelvin)
     return Plan(
         kind="raman",
-        effects=_effects(top, j, request.effects),
-        good=_good(top, request.effects),
-        parts=(("J max", f"{lines.jmax}: {found[-1].jmax_source}"), *_level_parts(top, lines.jmax, request.effects)),
+        effects=effect_texts(top, j, request.effects),
+        good=good_numbers(top, request.effects),
+        parts=(("J max", f"{lines.jmax}: {found[-1].jmax_source}"), *level_parts(top, lines.jmax, request.effects)),
         counts={"lines": len(lines)},
         seconds=seconds,
         memory_mb=len(lines) * BYTES_A_LINE / 1e6,
@@ -320,15 +234,15 @@ def _thermo(request: Any) -> Plan:
 
     top, hottest = request.top, max(request.temperatures_k)
     found: list[Any] = []
-    seconds = _seconds(lambda: found.append(answer_thermo(replace(request, temperatures_k=(hottest,)))))
+    seconds = timed(lambda: found.append(answer_thermo(replace(request, temperatures_k=(hottest,)))))
     jmax = int(found[-1].functions.jmax.max())
     summed = f"levels summed to J = {jmax} at {hottest:g} K" if jmax >= 0 else "classical with corrections: no levels"
     vibration = [] if request.vibrations else [left_out.LeftOut("vibration", None, "", "no states given")]
     j = populated_j(top, hottest)
     return Plan(
         kind="thermo",
-        effects=_effects(top, j, SEMI_RIGID),
-        good=_good(top, SEMI_RIGID),
+        effects=effect_texts(top, j, SEMI_RIGID),
+        good=good_numbers(top, SEMI_RIGID),
         parts=(("method", f"{summed}, to {request.relative_error:g} of Q, U and C_v"),),
         counts={"temperatures": len(request.temperatures_k)},
         seconds=seconds,
@@ -343,11 +257,11 @@ def _align(request: Any) -> Plan:
 
     coarse = replace(request, tolerance=max(request.tolerance, 1e-3), points=11, classical_molecules=0)
     found = answer_align(coarse)
-    seconds = _seconds(lambda: answer_align(coarse)) * (coarse.tolerance / request.tolerance) ** 0.25
+    seconds = timed(lambda: answer_align(coarse)) * (coarse.tolerance / request.tolerance) ** 0.25
     trace, j = found.trace, max(found.trace.ensemble.jmax, 1)
     return Plan(
         kind="align",
-        effects=(*_effects(request.top, j, SEMI_RIGID), *(f"pulse on the {one.acts_on}" for one in request.pulses)),
+        effects=(*effect_texts(request.top, j, SEMI_RIGID), *(f"pulse on the {one.acts_on}" for one in request.pulses)),
         good=("M",) if all(one.axis == (0, 0, 1) for one in request.pulses) else (),
         parts=(
             ("basis", f"J to {trace.jmax} at least, for a tolerance of {coarse.tolerance:g}"),
@@ -369,7 +283,7 @@ def _tumble(request: Any) -> Plan:
     if isinstance(request, TumbleRequest):
         conserved = ("energy", "angular momentum in space")
         parts = (("method", "the exact free motion (theta functions): no step, round-off alone"),)
-        seconds, count = _seconds(lambda: answer_tumble(request)), len(request.times or ()) or 201
+        seconds, count = timed(lambda: answer_tumble(request)), len(request.times or ()) or 201
         return Plan("tumble", ("free rotation",), conserved, parts, {"times": count}, seconds, count * 1e-4, ())
     return _driven(request)
 
@@ -396,7 +310,7 @@ def _driven(request: Any) -> Plan:
         good=good,
         parts=(("method", STEPS if local else f"splitting of order {request.order}, step {request.step:g}"),),
         counts={"steps": steps, "times": len(request.times)},
-        seconds=_seconds(lambda: answer_driven(start)) * share,
+        seconds=timed(lambda: answer_driven(start)) * share,
         memory_mb=len(request.times) * 13 * 8 / 1e6,
         left_out=(left_out.LeftOut("error of the steps", error, "rad", basis),),
     )
@@ -415,7 +329,7 @@ def _fluid(request: Any) -> Plan:
             replace(made, box=made.box.copy(), settings=replace(settings, steps=steps)), progress=lambda *_: None
         )
 
-    seconds = _extrapolated(short, float, SHORT_STEPS, settings.steps)
+    seconds = extrapolated(short, float, SHORT_STEPS, settings.steps)
     return Plan(
         kind="fluid",
         effects=("Lennard-Jones and charges of rigid sites", settings.electrostatics),
@@ -431,7 +345,19 @@ def _fluid(request: Any) -> Plan:
     )
 
 
+def _fit(request: Any) -> Plan:
+    from rotor.scenes.plan_measured import plan_of_fit
+
+    return plan_of_fit(request)
+
+
+def _emission(request: Any) -> Plan:
+    from rotor.scenes.plan_measured import plan_of_emission
+
+    return plan_of_emission(request)
+
+
 _PLANS: dict[str, Callable[[Any], Plan]] = {
     "spectrum": _spectrum, "levels": _levels, "raman": _raman, "thermo": _thermo, "stark": _stark, "align": _align,
-    "tumble": _tumble, "gas": _gas, "fluid": _fluid,
+    "tumble": _tumble, "gas": _gas, "fluid": _fluid, "fit": _fit, "emission": _emission,
 }  # fmt: skip

@@ -21,6 +21,8 @@ PICTURES = (".png", ".pdf", ".svg")
 SUFFIXES: Mapping[str, tuple[str, ...]] = {
     "csv": (".csv",), "parquet": (".parquet",), "json": (".json",), "cat": (".cat", ".cat.gz"), "profile_csv": (".csv",),
     "plot": PICTURES, "egy": (".egy",), "trajectories": (".traj", ".xyz", ".extxyz"), "checkpoint": (".npz",),
+    "report": (".fit",), "toml": (".toml",), "par": (".par",), "var": (".var",), "table": (".txt", ".md", ".tex"),
+    "save_lines": (".lin", ".csv"),
 }  # fmt: skip  # of every output that is a file
 
 

@@ -14,12 +14,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 from msgspec import Struct, field
 
 from rotor.scenes.effect_sections import EffectSection
+from rotor.scenes.fit_sections import FitLines, FitNumerics, FitOutputs, FitParameters
 from rotor.scenes.sections import (
     AlignConditions,
     AlignNumerics,
     AlignObservables,
     BasisNumerics,
     BodySection,
+    EmissionConditions,
+    EmissionObservables,
+    EmissionOutputs,
+    EmittingMolecule,
     FluidConditions,
     FluidNumerics,
     FluidOutputs,
@@ -50,7 +55,7 @@ from rotor.scenes.sections import (
 )
 
 if TYPE_CHECKING:
-    from rotor.scenes.plan import Plan
+    from rotor.scenes.plan_parts import Plan
     from rotor.scenes.run import SceneResult
 
 SCHEMA = 1
@@ -68,7 +73,7 @@ class Scene(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_
 
     @property
     def kind(self) -> str:
-        """spectrum, levels, raman, thermo, tumble, gas, fluid, stark or align."""
+        """spectrum, levels, raman, thermo, tumble, gas, fluid, stark, align, fit or emission."""
         return str(self.__struct_config__.tag)
 
     def run(
@@ -108,6 +113,7 @@ class LevelsScene(Scene, frozen=True, tag="levels"):
 
     molecule: Annotated[str | MoleculeSection, said("a name, a file, SMILES:..., or a table")]
     effects: QuantumEffects = QuantumEffects()
+    accuracy: Annotated[str | float | None, said("of the energies", "1 kHz")] = None
     observables: LevelsObservables = LevelsObservables()
     outputs: LevelsOutputs = LevelsOutputs()
 
@@ -117,6 +123,7 @@ class RamanScene(Scene, frozen=True, tag="raman"):
 
     molecule: Annotated[str | MoleculeSection, said("a name, a file, SMILES:..., or a table")]
     effects: QuantumEffects = QuantumEffects()
+    accuracy: Annotated[str | float | None, said("of the shifts", "1 kHz")] = None
     conditions: RamanConditions = RamanConditions()
     observables: RamanObservables = RamanObservables()
     vibration: VibrationSection = VibrationSection()
@@ -152,6 +159,9 @@ class GasScene(Scene, frozen=True, tag="gas"):
     """A classical gas of free molecules: equipartition, correlation functions."""
 
     molecule: Annotated[str | MoleculeSection, said("a name, a file, SMILES:..., or a table")]
+    accuracy: Annotated[
+        str | float | None, said("of temperature (K), heat capacity (%), or C1 and C2 (a number)", "1 K")
+    ] = None
     conditions: GasConditions = GasConditions()
     observables: GasObservables = GasObservables()
     numerics: GasNumerics = GasNumerics()
@@ -162,6 +172,9 @@ class FluidScene(Scene, frozen=True, tag="fluid"):
     """Rigid molecules that attract and repel, in a periodic box."""
 
     conditions: FluidConditions
+    accuracy: Annotated[str | float | None, said("of the conserved energy (K) or of Ewald's forces (%)", "0.5 K")] = (
+        None
+    )
     numerics: FluidNumerics = FluidNumerics()
     outputs: FluidOutputs = FluidOutputs()
 
@@ -189,6 +202,27 @@ class AlignScene(Scene, frozen=True, tag="align"):
     outputs: TableOutputs = TableOutputs()
 
 
+class FitScene(Scene, frozen=True, tag="fit"):
+    """Constants fitted to measured lines."""
+
+    lines: FitLines
+    molecule: Annotated[
+        str | MoleculeSection | None, said("where the fit starts; a .par file says so itself", "water")
+    ] = None
+    parameters: FitParameters = FitParameters()
+    numerics: FitNumerics = FitNumerics()
+    outputs: FitOutputs = FitOutputs()
+
+
+class EmissionScene(Scene, frozen=True, tag="emission"):
+    """Lines of a source of several molecules, as a radio telescope sees them."""
+
+    molecules: Annotated[list[EmittingMolecule], said("one or more")]
+    conditions: EmissionConditions = EmissionConditions()
+    observables: EmissionObservables = EmissionObservables()
+    outputs: EmissionOutputs = EmissionOutputs()
+
+
 AnyScene = (
     SpectrumScene
     | LevelsScene
@@ -199,6 +233,8 @@ AnyScene = (
     | FluidScene
     | StarkScene
     | AlignScene
+    | FitScene
+    | EmissionScene
 )
 KINDS: Mapping[str, type[Scene]] = {
     "spectrum": SpectrumScene,
@@ -210,6 +246,8 @@ KINDS: Mapping[str, type[Scene]] = {
     "fluid": FluidScene,
     "stark": StarkScene,
     "align": AlignScene,
+    "fit": FitScene,
+    "emission": EmissionScene,
 }
 
 

@@ -100,6 +100,8 @@ def _tables_in(hint: Any, value: Any) -> list[tuple[Any, Mapping[str, Any]]]:
         return []
     word = structures[0].__struct_config__.tag_field
     tables = [item for item in value if isinstance(item, Mapping)]
+    if word is None:
+        return [(structures[0], item) for item in tables]
     return [(by_tag[item[word]], item) for item in tables if item.get(word) in by_tag]
 
 

@@ -244,6 +244,7 @@ class FluidNumerics(Section, frozen=True):
     step: Annotated[Quantity, said("length of a step (fs)")] = "2 fs"
     cutoff: Annotated[Quantity, said("of Lennard-Jones and of charges in real space (Å)")] = "9 Å"
     electrostatics: Annotated[str, said("reaction-field, ewald or shifted")] = "reaction-field"
+    ewald_tolerance: Annotated[float, said("of forces by ewald, relative to e²/4πε0 Å²")] = 1e-5
     seed: Annotated[int, said("of the lattice, the velocities and the noise")] = 1
     threads: Annotated[int, said("threads of the built-in potential, or of the engine")] = 1
     engine: Annotated[str, said("rotor, openmm or lammps")] = "rotor"
@@ -365,3 +366,37 @@ class AlignNumerics(Section, frozen=True):
     tolerance: Annotated[float, said("of the cosines: steps, J max and populations follow from it")] = 1e-6
     jmax: Annotated[int | None, said("highest J of the basis; by default what the tolerance needs", 30)] = None
     seed: Annotated[int, said("of the classical gas")] = 1
+
+
+class EmittingMolecule(MoleculeSection, frozen=True):
+    """A molecule of the source; either `source` or `constants`."""
+
+    column: Annotated[float, said("molecules in the line of sight (1/cm²)")] = 1e14
+
+
+class EmissionConditions(Section, frozen=True):
+    """The source, and what of it is observed; range or band."""
+
+    excitation: Annotated[Quantity, said("excitation temperature of rotation (K)")] = "100 K"
+    background: Annotated[Quantity, said("temperature behind the source (K)")] = "2.725 K"
+    filling: Annotated[float, said("part of the beam that the source fills")] = 1.0
+    velocity: Annotated[float, said("receding positive, radio convention (km/s)")] = 0.0
+    width: Annotated[float, said("full width of the lines at half maximum (km/s)")] = 1.0
+    range: Annotated[str | None, said("first and last frequency observed (MHz)", "86:116GHz")] = None
+    band: Annotated[str | None, said("a receiver's band instead: ALMA1 to ALMA10", "ALMA6")] = None
+
+
+class EmissionObservables(Section, frozen=True):
+    """Which lines."""
+
+    least_depth: Annotated[float, said("optical depth at the centre below which a line is left out")] = 1e-6
+
+
+class EmissionOutputs(Section, frozen=True):
+    """Files to write."""
+
+    csv: Annotated[str | None, said("the lines", "lines.csv")] = None
+    parquet: Annotated[str | None, said("the lines", "lines.parquet")] = None
+    json: Annotated[str | None, said("the lines", "lines.json")] = None
+    profile_csv: Annotated[str | None, said("T_B and optical depth on a grid", "profile.csv")] = None
+    plot: Annotated[str | None, said("picture (.png, .pdf, .svg)", "emission.png")] = None

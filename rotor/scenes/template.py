@@ -26,6 +26,14 @@ STARTS: dict[str, dict[str, Any]] = {
         "molecule.source": "OCS", "pulses.shape": "gaussian", "pulses.peak": "1e13 W/cm2", "pulses.fwhm": "1 ps",
         "conditions.temperature": "1 K", "outputs.csv": "align.csv",
     },
+    "fit": {
+        "lines.source": "lines.csv", "molecule.source": "water", "parameters.free": ["A", "B", "C"],
+        "outputs.csv": "fit.csv", "outputs.report": "out.fit",
+    },
+    "emission": {
+        "molecules.source": "CO", "molecules.column": 1e16, "conditions.excitation": "20 K",
+        "conditions.range": "115:116GHz", "outputs.csv": "emission.csv",
+    },
 }  # fmt: skip  # what a template has switched on, by dotted name
 
 TAGS = {
@@ -67,10 +75,10 @@ def _lines(structure: Any, kind: str, place: str) -> Iterator[str]:
         else:
             yield _key_line(one, hints[one.name], STARTS[kind].get(f"{place}{one.name}"))
     for name, table, absent in inner:
-        many = name == "pulses" or (name == "effects" and kind == "tumble")
+        many = name in ("pulses", "molecules") or (name == "effects" and kind == "tumble")
         hash_ = "# " if absent else ""
         yield f"\n{hash_}[[{name}]]" if many else f"\n{hash_}[{name}]"
-        if many:
+        if many and name in TAGS:
             yield _in_comment(TAGS[name]) if absent else TAGS[name]
         lines = _lines(table, kind, f"{place}{name}.")
         yield from map(_in_comment, lines) if absent else lines

@@ -23,7 +23,7 @@ from rotor.spectra.raman import (
 )
 from rotor.table import TextOf
 from rotor.thermo import VibrationalStates
-from rotor.thermo.request import partition_facts
+from rotor.thermo.partition_table import partition_facts
 from rotor.tops.facts import top_facts
 
 if TYPE_CHECKING:

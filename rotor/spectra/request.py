@@ -22,7 +22,7 @@ from rotor.spectra.intensity import USUAL_CUT, largest
 from rotor.spectra.lines import DEFAULT_MIN_LGINT, Lines, line_list
 from rotor.table import TextOf
 from rotor.thermo import VibrationalStates
-from rotor.thermo.request import partition_facts
+from rotor.thermo.partition_table import partition_facts
 from rotor.tops.covariance import Covariance
 from rotor.tops.facts import top_facts
 

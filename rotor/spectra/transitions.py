@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from rotor.arrays import Floats, Indices
 from rotor.quantum.levels import Block, Levels, SolvedBlock
 from rotor.quantum.moments import Moment
-from rotor.quantum.reduced import amplitudes, connected_pairs, pairs_where
+from rotor.quantum.reduced import amplitudes, connected_pairs, pairs_where, wang_columns
 from rotor.quantum.tensors import body_tensor
 from rotor.spectra.intensity import IntensityCut
 from rotor.tops.operators import FIGURE_AXIS
@@ -26,7 +26,7 @@ LONG_LIST = 30_000_000  # lines from which the compiled loop is loaded: the comp
 COMPILED = "rotor.spectra._kernels"
 
 Vector = tuple[float, float, float]
-Amplitudes = Callable[[Any, Any], Floats]  # of a pair of blocks, (n_up, n_low)
+Amplitudes = Callable[[Any, Sequence[Any]], Floats]  # of a block with others, side by side: (n_up, sum of n_low)
 Pair = tuple[Block, Block]  # two blocks with an allowed transition, the one of higher or equal J first
 
 
@@ -92,10 +92,17 @@ def _acting(
         from rotor.quantum.spins.moments import moments_of
 
         found = moments_of(levels, dict(dipoles), moments)
-        return list(pairs_where(blocks, 1, found.connected)), found.amplitudes
+        return list(pairs_where(blocks, 1, found.connected)), _side_by_side(found.amplitudes)
     representation = str(levels.representation)
     tensors = {states: body_tensor(mu, 1, representation) for states, mu in dipoles.items()}
-    return list(connected_pairs(blocks, tensors)), lambda up, low: amplitudes(up, low, tensors)
+    pairs = list(connected_pairs(blocks, tensors))
+    if blocks and isinstance(blocks[0], SolvedBlock):
+        return pairs, lambda up, lows: wang_columns(up, lows, tensors[0, 0])
+    return pairs, _side_by_side(lambda up, low: amplitudes(up, low, tensors))
+
+
+def _side_by_side(of_pair: Callable[[Any, Any], Floats]) -> Amplitudes:
+    return lambda up, lows: np.hstack([of_pair(up, low) for low in lows])
 
 
 def _blocks_with_weight(levels: Levels) -> tuple[list[Block], bool]:
@@ -132,7 +139,7 @@ def _every_pair(pairs: list[Pair], between: Amplitudes) -> Transitions:
         here = slice(at, at + size)
         at += size
         fill(
-            up.energies_mhz, low.energies_mhz, between(up, low), up.start, low.start,
+            up.energies_mhz, low.energies_mhz, between(up, [low]), up.start, low.start,
             out.frequency_mhz[here], out.strength_debye2[here], out.upper[here], out.lower[here],
         )  # fmt: skip
     return out
@@ -180,12 +187,14 @@ def _chosen(
             needed = cut.least / cut.population
     counts = {} if most is None else _reaching(levels, needed, most)
     pieces = []
-    for up, low in pairs:
-        for ups, lows in _parts(up, low, counts):
-            amplitude = between(ups, lows)
-            places = np.flatnonzero(_candidates(ups, lows, amplitude, needed, range_mhz))
-            i, k = np.divmod(places, len(lows.energies_mhz))
-            pieces.append((i + ups.start, k + lows.start, amplitude.ravel()[places]))
+    for up, lows in _by_upper(pairs):
+        for ups, parts in _parts(up, lows, counts):
+            rows = np.concatenate([np.arange(part.start, part.start + len(part.energies_mhz)) for part in parts])
+            amplitude = between(ups, parts)
+            keep = _candidates(levels, ups, rows, amplitude, needed, range_mhz)
+            places = np.flatnonzero(np.tril(keep, -1) if up is lows[0] else keep)  # both ways round stand there
+            i, k = np.divmod(places, len(rows))
+            pieces.append((i + ups.start, rows[k], amplitude.ravel()[places]))
     if not pieces:
         return _joined([])
 
@@ -199,17 +208,29 @@ def _chosen(
     return _rows(found, cut.keeps(found.frequency_mhz, found.strength_debye2, cut.population[lower]))
 
 
+def _by_upper(pairs: list[Pair]) -> Iterator[tuple[Block, list[Block]]]:
+    """Each upper block with those that it makes lines with; a block with itself stands alone."""
+    lows_of: dict[int, tuple[Block, list[Block]]] = {}
+    for up, low in pairs:
+        if up is low:
+            yield up, [low]
+        else:
+            lows_of.setdefault(up.start, (up, []))[1].append(low)
+    yield from lows_of.values()
+
+
 def _candidates(
-    up: Block, low: Block, amplitude: Floats, needed: Floats, range_mhz: tuple[float, float]
-) -> NDArray[np.bool_]:
-    """Which of all states of two blocks make a line in the range that may reach the cut, (n_up, n_low)."""
-    frequency = np.subtract.outer(up.energies_mhz, low.energies_mhz)
+    levels: Levels, up: Block, rows: NDArray[np.int64], amplitude: Floats, needed: Floats,
+    range_mhz: tuple[float, float],
+) -> NDArray[np.bool_]:  # fmt: skip
+    """Which of all states of a block and of other `rows` make a line in the range that may reach the cut, (n_up, rows)."""
+    frequency = np.subtract.outer(up.energies_mhz, levels.energy_mhz[rows])
     np.abs(frequency, out=frequency)
-    of_up, of_low = (needed[block.start : block.start + len(block.energies_mhz)] for block in (up, low))
-    keep: NDArray[np.bool_] = frequency * (amplitude * amplitude) >= np.minimum.outer(of_up, of_low)
+    of_up = needed[up.start : up.start + len(up.energies_mhz)]
+    keep: NDArray[np.bool_] = frequency * (amplitude * amplitude) >= np.minimum.outer(of_up, needed[rows])
     if range_mhz != EVERYTHING:
         keep &= (frequency >= range_mhz[0]) & (frequency <= range_mhz[1])
-    return np.tril(keep, -1) if up is low else keep  # both ways round stand in the matrix of a block with itself
+    return keep
 
 
 def _reaching(levels: Levels, needed: Floats, most: float) -> dict[int, int]:
@@ -229,24 +250,30 @@ def _reaching(levels: Levels, needed: Floats, most: float) -> dict[int, int]:
     return dict(zip(starts.tolist(), counts.tolist(), strict=True))
 
 
-def _parts(up: Block, low: Block, counts: Mapping[int, int]) -> Iterator[tuple[Block, Block]]:
-    """The parts of two blocks between which a line may reach the cut: all with the lowest states of one, or of the other.
+def _parts(up: Block, lows: list[Block], counts: Mapping[int, int]) -> Iterator[tuple[Block, list[Block]]]:
+    """The parts of blocks between which a line may reach the cut: all with the lowest states of one side, or of the other.
 
     counts: of the lowest states by block, as `_reaching` gives them; blocks that are not in it are taken whole.
     """
-    all_up, all_low = len(up.energies_mhz), len(low.energies_mhz)
-    of_up, of_low = counts.get(up.start, all_up), counts.get(low.start, all_low)
-    if of_up == all_up or of_low == all_low:
-        yield up, low
+    all_up = len(up.energies_mhz)
+    of_up = counts.get(up.start, all_up)
+    if of_up == all_up:
+        yield up, lows
         return
-    if of_low:
-        yield up, _states(low, 0, of_low)
-    if of_up:
-        yield _states(up, 0, of_up), _states(low, of_low, all_low)
+    sizes = [len(low.energies_mhz) for low in lows]
+    splits = [min(counts.get(low.start, size), size) for low, size in zip(lows, sizes, strict=True)]
+    lowest = [_states(low, 0, split) for low, split in zip(lows, splits, strict=True) if split]
+    if lowest:
+        yield up, lowest
+    others = [_states(low, split, size) for low, split, size in zip(lows, splits, sizes, strict=True) if split < size]
+    if of_up and others:
+        yield _states(up, 0, of_up), others
 
 
 def _states(block: Any, first: int, last: int) -> Any:
     """The states `first` to `last` of a Wang block."""
+    if last - first == len(block.energies_mhz):
+        return block
     return SolvedBlock(block.basis, block.energies_mhz[first:last], block.vectors[:, first:last], block.start + first)
 
 

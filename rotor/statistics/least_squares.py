@@ -13,7 +13,7 @@ with 0: where the model is nearly linear, Gauss and Newton need a handful of ste
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -84,6 +84,7 @@ def minimise(
     most_iterations: int = 100,
     floor: Floats | None = None,
     progress: Progress | None = None,
+    hopeless: Callable[[Sequence[Iteration]], bool] | None = None,
 ) -> Minimum:
     """The parameters that make Σ r² least, from a start.
 
@@ -103,6 +104,8 @@ def minimise(
         Norms below which a column of the Jacobian is what round-off leaves of numbers that cancel: the parameter is not moved.
     progress : callable, optional
         Called with every `Iteration`. A KeyboardInterrupt, there or in `evaluate`, ends the search with the best point.
+    hopeless : callable, optional
+        Whether the iterations so far make further ones a waste: the search ends as if they were used up.
 
     Returns
     -------
@@ -135,7 +138,7 @@ def minimise(
             enough = tolerance * max(1.0, state.rms)
             if linear.distance <= enough or (linear.distance > before / 2 and linear.distance <= _FLOOR * enough):
                 return state.ended(CONVERGED, linear, taken)
-            if len(taken) >= most_iterations:
+            if len(taken) >= most_iterations or (hopeless and hopeless(taken)):
                 return state.ended(EXHAUSTED, linear, taken)
 
             step, predicted = linear.step(damping)

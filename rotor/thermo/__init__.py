@@ -1,7 +1,7 @@
 """Thermodynamics of rotation: sums over levels, their classical limit, nuclear-spin species, and the ideal gas.
 
 A module for each: `level_sums`, `partition`, `classical_limit`, `classical_onset`, `species`, `vibration` and `functions`,
-which brings them together. They are loaded when a name is first used.
+which brings them together; `partition_table` gives Q(T) as records. They are loaded when a name is first used.
 """
 
 from importlib import import_module

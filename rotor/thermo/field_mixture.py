@@ -18,7 +18,8 @@ from numpy.typing import ArrayLike, NDArray
 from rotor.arrays import Floats
 from rotor.checks import require_between, require_one_of, require_positive
 from rotor.quantum.effects.stark import checked_direction, stark_map
-from rotor.quantum.fields.field_map import BlockStates, FieldMap
+from rotor.quantum.fields.block_states import BlockStates
+from rotor.quantum.fields.field_map import FieldMap
 from rotor.table import Table
 from rotor.thermo.level_sums import lowest_level_k
 from rotor.thermo.partition import partition_function

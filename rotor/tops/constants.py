@@ -15,18 +15,10 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
 
-from rotor.tops import operators as published
-from rotor.tops.operators import KINDS, Powers, axes_of, powers_of_spelled, published_name, spelled_term
+from rotor.tops.kind_of_constants import KNOWN, RIGID, kind_of, reduction_of, representation_of, vocabulary
+from rotor.tops.operators import Powers, powers_of_spelled, published_name, spelled_term
 from rotor.tops.uncertain_numbers import parse_named, write_number
 from rotor.units import parse_quantity
-
-RIGID = ("A", "B", "C")
-LINEAR, SPHERICAL, SYMMETRIC = tuple(published.LINEAR), tuple(published.SPHERICAL), tuple(published.SYMMETRIC)
-S_REDUCTION, A_REDUCTION = tuple(published.S_REDUCTION), tuple(published.A_REDUCTION)
-_DISTORTION = {"linear": LINEAR, "spherical": SPHERICAL, "prolate": SYMMETRIC, "oblate": SYMMETRIC}
-_REDUCED = {"A": A_REDUCTION, "S": S_REDUCTION}
-_SHARED = {*RIGID, *A_REDUCTION} & {*RIGID, *S_REDUCTION}
-_KNOWN = tuple(dict.fromkeys((*RIGID, *LINEAR, *SPHERICAL, *S_REDUCTION, *A_REDUCTION)))
 
 _GREEK = {"Δ": "Delta", "∆": "Delta", "δ": "delta", "Φ": "Phi", "φ": "phi", "ϕ": "phi"}
 _WITHOUT_K = {"DJ": "D", "HJ": "H", "LJ": "L"}  # what linear and spherical tops call them
@@ -91,7 +83,7 @@ class Constants:
         given = _renamed([*values_mhz.items(), *_spelled(terms).items()], _published_name)
         _refuse_unknown(given)
         numbers = {name: _finite(name, value) for name, value in given.items()}
-        kind = _kind(numbers, kind)
+        kind = kind_of(numbers, kind)
         values = _renamed(numbers.items(), lambda name: _name_in(kind, name))
 
         errors = _renamed((uncertainties or {}).items(), lambda name: _name_in(kind, _published_name(name)))
@@ -99,14 +91,14 @@ class Constants:
         _refuse_strays("uncertainties", errors, values)
         _refuse_strays("sources", origins, values)
 
-        reduction = _reduction(kind, values, reduction)
+        reduction = reduction_of(kind, values, reduction)
         _refuse_misplaced(kind, reduction, values)
         _refuse_disorder(kind, values)
 
         content = {
             "values": MappingProxyType(values),
             "reduction": reduction,
-            "representation": _representation(kind, values, representation),
+            "representation": representation_of(kind, values, representation),
             "kind": kind,
             "uncertainties": MappingProxyType({name: _spread(name, errors[name]) for name in values if name in errors}),
             "sources": MappingProxyType(origins),
@@ -249,32 +241,6 @@ class Constants:
         }
 
 
-def ray_kappa(a: float, b: float, c: float) -> float:
-    """Ray's asymmetry parameter κ = (2B - A - C)/(A - C): -1 prolate, +1 oblate; -1 for a linear top (A infinite).
-
-    Source: Ray, Z. Phys. 78 (1932) 74. Raises ValueError for a spherical top, where κ is 0/0.
-
-    >>> ray_kappa(3.0, 2.0, 1.0)
-    0.0
-    """
-    if math.isinf(a):
-        return -1.0
-    if not a >= b >= c or a == c:
-        raise ValueError(f"Ray's κ of A = {a!r}, B = {b!r}, C = {c!r}: expected A >= B >= C and A > C")
-    return (2 * b - a - c) / (a - c)
-
-
-def vocabulary(kind: str, reduction: str | None = None) -> tuple[str, ...]:
-    """The names that constants of a kind of top may have; both reductions of an asymmetric top if none is given.
-
-    >>> vocabulary("linear")
-    ('B', 'D', 'H', 'L')
-    """
-    if kind == "asymmetric":
-        return RIGID + (_REDUCED[reduction] if reduction else tuple(dict.fromkeys(S_REDUCTION + A_REDUCTION)))
-    return (("B",) if kind == "linear" else RIGID) + _DISTORTION[kind]
-
-
 # Names
 
 
@@ -303,12 +269,12 @@ def _renamed(things: Iterable[tuple[str, Any]], rename: Callable[[str], str]) ->
 
 def _refuse_unknown(names: Iterable[str]) -> None:
     for name in names:
-        if name not in _KNOWN and not powers_of_spelled(name):
-            near = [known for known in _KNOWN if known.casefold() == name.casefold()]
-            near = near or difflib.get_close_matches(name, _KNOWN, n=3)
+        if name not in KNOWN and not powers_of_spelled(name):
+            near = [known for known in KNOWN if known.casefold() == name.casefold()]
+            near = near or difflib.get_close_matches(name, KNOWN, n=3)
             hint = f"did you mean {' or '.join(near)}? " if near else ""
             raise ValueError(
-                f"{name!r} is not a rotational constant known here: {hint}Known are {', '.join(_KNOWN)}, and terms "
+                f"{name!r} is not a rotational constant known here: {hint}Known are {', '.join(KNOWN)}, and terms "
                 "spelled out such as J4Jz2Jpm6"
             )
 
@@ -376,86 +342,6 @@ def _refuse_disorder(kind: str, values: Mapping[str, float]) -> None:
     if list(rigid.values()) != sorted(rigid.values(), reverse=True):
         given = ", ".join(f"{name} = {value!r}" for name, value in rigid.items())
         raise ValueError(f"{given} MHz: the names follow the order {' >= '.join(rigid)}; exchange them")
-
-
-# Kind, reduction, representation
-
-
-def _kind(values: Mapping[str, float], kind: str | None) -> str:
-    given = "".join(name for name in RIGID if name in values)
-    if kind is None:
-        return _kind_by_rule(given, values)
-    if kind not in KINDS:
-        raise ValueError(f"kind {kind!r}: a top is one of {', '.join(KINDS)}")
-
-    fits = {
-        "linear": given == "B",
-        "spherical": "B" in given and len({values[name] for name in given}) == 1,
-        "prolate": given == "AB" or (given == "ABC" and values["B"] == values["C"]),
-        "oblate": given == "BC" or (given == "ABC" and values["A"] == values["B"]),
-        "asymmetric": given == "ABC",
-    }
-    if not fits[kind]:
-        needed = {
-            "linear": "B alone",
-            "spherical": "B, or equal A, B, C",
-            "prolate": "A and B, or A, B, C with B = C exactly",
-            "oblate": "B and C, or A, B, C with A = B exactly",
-            "asymmetric": "A, B and C",
-        }[kind]
-        have = ", ".join(f"{name} = {values[name]!r}" for name in given) or "none of A, B, C"
-        raise ValueError(f"kind {kind!r} needs {needed}, but the constants have {have}")
-    return kind
-
-
-def _kind_by_rule(given: str, values: Mapping[str, float]) -> str:
-    if given not in ("B", "AB", "BC", "ABC"):
-        raise ValueError(
-            f"constants with {given or 'none of A, B, C'}: give B (linear molecule), A and B (prolate top), "
-            "B and C (oblate top) or A, B and C"
-        )
-    if given == "B":
-        return "linear"
-    if len({values[name] for name in given}) == 1:
-        return "spherical"
-    if given == "AB" or (given == "ABC" and values["B"] == values["C"]):
-        return "prolate"
-    if given == "BC" or values["A"] == values["B"]:
-        return "oblate"
-    return "asymmetric"
-
-
-def _reduction(kind: str, names: Mapping[str, float], reduction: str | None) -> str | None:
-    """The reduction given, or the one the names tell; None for a rigid asymmetric top and every other kind."""
-    if reduction not in (None, "A", "S"):
-        raise ValueError(f"reduction {reduction!r}: Watson's reductions are 'A' and 'S'")
-    if kind != "asymmetric":
-        if reduction:
-            raise ValueError(f"reduction {reduction!r} belongs to asymmetric tops; the kind here is {kind!r}")
-        return None
-
-    own = {key: [n for n in names if n in table and n not in _SHARED] for key, table in _REDUCED.items()}
-    if own["A"] and own["S"]:
-        raise ValueError(f"both reductions in one set: {', '.join(own['A'])} (A) with {', '.join(own['S'])} (S)")
-    found = next((key for key, members in own.items() if members), None)
-    if reduction and found and reduction != found:
-        raise ValueError(f"reduction {reduction!r}, but {', '.join(own[found])} belong to the {found}-reduction")
-    if not reduction and not found and any(name in _SHARED - {*RIGID} for name in names):
-        raise ValueError("octic and decic names alone fit both reductions; say reduction='A' or reduction='S'")
-    return reduction or found
-
-
-def _representation(kind: str, values: Mapping[str, float], representation: str | None) -> str | None:
-    if representation is not None:
-        axes_of(representation)  # refuses one that does not exist
-    if kind != "asymmetric":
-        if representation:
-            raise ValueError(f"representation {representation!r} belongs to asymmetric tops; kind is {kind!r}")
-        return None
-    if representation:
-        return representation
-    a, b, c = values["A"], values["B"], values["C"]
-    return "IIIl" if a > c and ray_kappa(a, b, c) > 0 else "Ir"
 
 
 def _rebuilt(settings: dict[str, Any], values: dict[str, Any]) -> Constants:

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rotor.tops.constants import Constants, vocabulary
+from rotor.tops.constants import Constants
+from rotor.tops.kind_of_constants import vocabulary
 from rotor.tops.operators import powers_of_spelled
 from rotor.tops.spin_weights import SpinWeights
 from rotor.tops.state_constants import StateConstants, Vector

@@ -28,6 +28,7 @@ from rotor.tops.constants import Constants
 from rotor.tops.covariance import Covariance
 from rotor.tops.kind import KindOfTop, kind_from_moments, kind_with_symmetry
 from rotor.tops.level_table import LevelTable
+from rotor.tops.magnetic import MagneticTensors
 from rotor.tops.operators import KINDS
 from rotor.tops.spin_constants import SpinConstants
 from rotor.tops.spin_weights import SpinWeights
@@ -59,7 +60,7 @@ class Top:
     nuclear and electron spins, None where none are known. states: further vibrational or tunnelling states; the spin weights are
     then those with the states taken together, and each state may have its own. level_table: energies that count instead of those of
     the constants where it has them; both belong to these constants alone (`with_constants` leaves them out). symmetry_checked:
-    False takes a dipole that spin weights forbid as it is, as SPCAT does.
+    False takes a dipole that spin weights forbid as it is, as SPCAT does. magnetic: what a magnetic field acts on.
 
     Raises ValueError for a dipole or a polarizability that the symmetry of the nuclei, or of the spin weights, forbids.
     """
@@ -86,6 +87,7 @@ class Top:
 
     level_table: LevelTable | None = None
     symmetry_checked: bool = True
+    magnetic: MagneticTensors | None = None
 
     def __post_init__(self) -> None:
         if not self.symmetry_checked:

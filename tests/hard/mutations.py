@@ -1,11 +1,13 @@
 """Safeguards taken away one by one, in a copy of the package, each with the tests that must go red.
 
 python tests/hard/mutations.py          # all of them; exit code 1 if one stays green
+python tests/hard/mutations.py 7 21     # those of some cases
 """
 
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -26,28 +28,178 @@ class Mutation:
     test: str
 
 
+WHOLE_MATRIX = """
+    from scipy.linalg import block_diag, eigh
+
+    of_k, parts = np.zeros((2 * j + 1, 2 * j + 1)), [block_bands(of_j, block) for block in whole]
+    for block, start in zip(whole, np.cumsum([0] + [b.size for b in whole]), strict=False):
+        for row, k in enumerate(block.k):
+            of_k[start + row, j + k] += np.sqrt(0.5) if k else 1.0
+            of_k[start + row, j - k] += block.sign * np.sqrt(0.5) if k else 0.0
+    joined = block_diag(*[sum(np.diag(b, -n) + (np.diag(b, n) if n else 0) for n, b in enumerate(p)) for p in parts])
+    energies, states = eigh(of_k.T @ joined @ of_k)
+    states = of_k @ states
+    shares = np.add.reduceat(states**2, np.cumsum([0] + [b.size for b in whole])[:-1], axis=0)
+    start = 0
+    for place, block in enumerate(whole):
+        mine = np.sort(np.argsort(-shares[place])[: block.size])
+        out.append((block, energies[mine] + scalar, states[start : start + block.size, mine]))
+        start += block.size
+    return out
+"""
+BY_OVERLAP = """
+    for n in range(1, len(fields)):
+        follow = np.abs(vectors[n - 1].conj().T @ vectors[n]).argmax(axis=1)
+        energies[n], vectors[n] = energies[n][follow], vectors[n][:, follow]
+"""
+
 MUTATIONS = (
     Mutation(
-        2,
-        "rotor/quantum/convergence.py",
+        1, "rotor/quantum/rotation.py",
+        "    labels = [names_of(b.basis, representation) for b in blocks]\n",
+        "    labels = [tuple(q[np.abs(b.vectors).argmax(axis=0)] for q in names_of(b.basis, representation)) for b in blocks]\n",
+        "tests/test_levels.py::test_every_label_stands_once",
+    ),
+    Mutation(
+        2, "rotor/quantum/convergence.py",
         "    found = disordered_blocks(top, levels)\n    if not found:",
         "    found = disordered_blocks(top, levels)\n    if True:",
         "tests/test_reliability.py::test_quartic_water_is_told_of",
     ),
     Mutation(
-        8,
-        "rotor/geometry/inertia.py",
-        "    moments = np.where(moments < 1e-12 * moments[2], 0.0, moments)\n",
-        "",
+        3, "rotor/quantum/rotation.py",
+        "    whole = wang_blocks(j, representation)\n",
+        "    whole = wang_blocks(j, representation)\n" + WHOLE_MATRIX,
+        "tests/hard/test_safeguards.py::test_vectors_of_near_degenerate_partners_lie_in_one_block",
+    ),
+    Mutation(
+        4, "rotor/quantum/wang_matrix.py",
+        "    if len(bands) == 1:\n",
+        "    if len(bands) == 1 or (np.diff(bands[0]) < 0).any():\n",
+        "tests/hard/test_safeguards.py::test_energies_are_eigenvalues_where_the_diagonal_turns_round",
+    ),
+    Mutation(
+        5, "rotor/tops/distortion.py",
+        "        if abs(bx - by) < _NEAR_SYMMETRIC * bz:", "        if False:",
+        "tests/test_distortion.py::test_near_symmetric_tops_refuse_the_a_reduction",
+    ),
+    Mutation(
+        5, "rotor/quantum/reductions.py",
+        "    place = [old.index(axis) for axis in new]", "    place = [old.index(axis) for axis in (new if new[2] != old[2] else old)]",
+        "tests/test_conversions.py::test_left_handed_axes_change_signs_alone",
+    ),
+    Mutation(
+        6, "rotor/tops/constants.py",
+        '    if given == "AB" or (given == "ABC" and values["B"] == values["C"]):\n        return "prolate"',
+        '    if given == "AB" or (given == "ABC" and abs(values["B"] / values["C"] - 1) < 1e-5):\n        return "prolate"',
+        "tests/hard/test_safeguards.py::test_the_doublet_of_a_near_symmetric_top_is_there",
+    ),
+    Mutation(
+        7, "rotor/quantum/rotation.py",
+        "        energies, states = diagonalise(block_bands(of_j, block), vectors)\n        out.append((block, energies + scalar, states))",
+        "        bands = block_bands(of_j, block)\n        bands[0] += scalar\n        out.append((block, *diagonalise(bands, vectors)))",
+        "tests/test_safeguards.py::test_the_scalar_part_stays_out_of_the_matrix",
+    ),
+    Mutation(
+        8, "rotor/geometry/inertia.py",
+        "    moments = np.where(moments < 1e-12 * moments[2], 0.0, moments)\n", "",
         "tests/test_top.py::test_linear_in_any_orientation",
+    ),
+    Mutation(
+        9, "rotor/geometry/inertia.py", "LINEAR_BELOW = 1e-6", "LINEAR_BELOW = 1e-14",
+        "tests/test_top.py::test_near_linear_says_by_which_number",
+    ),
+    Mutation(
+        10, "rotor/quantum/spherical_top.py",
+        "    of_a, of_e = states[:, characters > 0.25], states[:, characters < 0.25]  # 1 and -½",
+        "    of_a, of_e = np.split(np.linalg.eigh(matrix)[1], [(characters > 0.25).sum()], axis=1)",
+        "tests/test_clusters.py::test_eigenvalues_and_irreps_of_the_full_matrix",
+    ),
+    Mutation(
+        11, "rotor/tops/spin_weights.py",
+        "        if self.rule == \"none\":\n            return np.asarray(np.where(k == 0, 1, 2))",
+        "        if self.rule in (\"none\", \"KaKc\"):\n            return np.asarray(np.where(k == 0, 1, 2))",
+        "tests/test_spin_statistics.py::test_accidental_symmetric_top_keeps_its_weights",
+    ),
+    Mutation(
+        12, "rotor/structure/least_squares.py",
+        "        and family.planar\n", "        and not family.planar\n",
+        "tests/hard/test_safeguards.py::test_three_dependent_moments_of_a_planar_molecule_are_named",
+    ),
+    Mutation(
+        13, "rotor/tops/isotopic_scaling.py",
+        "    best = max(ways, key=lambda way: round(sum(squares[i, j] for i, j in enumerate(way)), 9))", "    best = next(ways)",
+        "tests/test_isotopologues.py::test_axes_that_change_places_are_matched_by_overlap",
+    ),
+    Mutation(
+        14, "rotor/geometry/inertia.py",
+        "    if not (np.isfinite(m).all() and (m > 0).all() and np.isfinite(r).all()):", "    if False:",
+        "tests/test_inertia.py::test_impossible_masses",
+    ),
+    Mutation(
+        15, "rotor/molecules/readers/xyz.py",
+        "    plain = word.translate(_MINUS_SIGNS)", "    plain = word",
+        "tests/test_xyz.py::test_every_line_ending_mark_minus_and_exponent_gives_the_same",
+    ),
+    Mutation(
+        15, "rotor/molecules/readers/xyz.py",
+        '        return float(plain.replace("D", "e").replace("d", "e"))', '        return float(plain.replace("D", "").replace("d", "e"))',
+        "tests/test_xyz.py::test_every_line_ending_mark_minus_and_exponent_gives_the_same",
+    ),
+    Mutation(
+        16, "rotor/statistics/regression.py",
+        "    safe = np.where(blind, 1.0, scale)", "    safe = np.ones_like(scale)",
+        "tests/test_fit.py::test_a_of_a_near_prolate_chain_has_an_honest_error",
+    ),
+    Mutation(
+        17, "rotor/statistics/regression.py",
+        "    covariance[np.diag_indices_from(covariance)] = np.where(open_, np.inf, np.diag(covariance))\n", "",
+        "tests/test_least_squares.py::test_what_is_not_determined_is_named",
+    ),
+    Mutation(
+        18, "rotor/quantum/unit_blocks.py",
+        "        if (leading == one.leading).all():", "        if True:",
+        "tests/test_fit_spcat.py::test_labels_follow_their_states_where_energies_cross",
+    ),
+    Mutation(
+        19, "rotor/statistics/least_squares.py",
+        "    return CONVERGED if linear.distance < 100 * tolerance * max(1.0, state.rms) else STALLED", "    return CONVERGED",
+        "tests/test_least_squares.py::test_it_does_not_say_that_it_has_converged_when_it_has_not",
+    ),
+    Mutation(
+        19, "rotor/statistics/least_squares.py",
+        "                return state.ended(EXHAUSTED, linear, taken)", "                return state.ended(CONVERGED, linear, taken)",
+        "tests/test_least_squares.py::test_it_does_not_say_that_it_has_converged_when_it_has_not",
     ),
     Mutation(
         20, "rotor/quantum/levels.py", "self.energy_mhz[self.weight > 0].min()", "self.energy_mhz.min()",
         "tests/test_requests.py::test_levels_count_from_the_lowest_that_exists",
     ),
     Mutation(
+        21, "rotor/spectra/transitions.py",
+        "        keep &= (levels.weight[lower] > 0) & (levels.weight[upper] > 0)\n", "",
+        "tests/test_safeguards.py::test_levels_that_do_not_exist_make_no_lines_in_closed_form",
+    ),
+    Mutation(
+        22, "rotor/quantum/fields/field_map.py",
+        "    energies, vectors = solve_fields(problem.terms(places), fields, count, with_vectors, request.tolerance_mhz)\n",
+        "    energies, vectors = solve_fields(problem.terms(places), fields, count, True, request.tolerance_mhz)\n" + BY_OVERLAP,
+        "tests/hard/test_safeguards.py::test_labels_are_ranks_whatever_the_grid",
+    ),
+    Mutation(
+        23, "rotor/quantum/fields/field_map.py",
+        "        if moved <= request.tolerance_mhz:", "        if True:",
+        "tests/test_stark.py::test_a_j_max_too_small_is_refused",
+    ),
+    Mutation(
         24, "rotor/alignment/pulse.py", "    2 * math.pi * 1e-30 * 1e4", "    4 * math.pi * 1e-30 * 1e4",
         "tests/hard/test_safeguards.py::test_the_factor_of_an_oscillating_field",
+    ),
+    Mutation(
+        25, "rotor/classical/free/theta.py",
+        "        rates=np.stack([c.pace.hi, c.pace.lo, c.start.hi, c.start.lo, half_turns.hi, half_turns.lo], axis=-1),",
+        "        rates=np.stack([c.pace.hi, 0 * y, c.start.hi, 0 * y, half_turns.hi, 0 * y], axis=-1),",
+        "tests/test_free.py::test_double_double_phases_are_what_keeps_a_million_periods",
     ),
     Mutation(
         26, "rotor/geometry/rotations.py", "    angle = np.asarray(2.0 * np.arctan2(sine, q[..., 0]))",
@@ -55,42 +207,67 @@ MUTATIONS = (
         "tests/test_rotations.py::test_log_gives_back_the_smallest_rotation_vectors_in_any_direction",
     ),
     Mutation(
-        28,
-        "rotor/statistics/degrees_of_freedom.py",
+        27, "rotor/classical/lyapunov.py", "    errors = np.hypot(spread, bias)[order]", "    errors = spread[order]",
+        "tests/hard/test_safeguards.py::test_the_growth_of_a_free_body_is_within_its_error_of_zero",
+    ),
+    Mutation(
+        28, "rotor/statistics/degrees_of_freedom.py",
         "    turns = rotating_axes(array, linear_below).sum(axis=-1)",
         "    turns = 3 * rotating_axes(array, linear_below).any(axis=-1)",
         "tests/test_degrees.py::test_a_linear_triatomic_has_five_degrees_not_six",
+    ),
+    Mutation(
+        29, "rotor/fluid/motion/thermometers.py",
+        "    counts = (degrees.total, degrees.translation, degrees.rotation)\n",
+        "    counts, kinetic = (degrees.total,) * 3, Kinetic(kinetic.total_ev / 2, kinetic.total_ev / 2)\n",
+        "tests/hard/test_safeguards.py::test_rotation_has_a_temperature_of_its_own",
     ),
 )  # fmt: skip
 
 
 def copy_of_package(folder: Path) -> None:
-    """The package, its data and its tests, as they are now."""
-    for name in ("rotor", "data", "tests"):
-        shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__", "*.nbi", "*.nbc"))
+    """The package, its data, its tests and the scripts of its pages, as they are now."""
+    left = shutil.ignore_patterns("__pycache__", "*.nbi", "*.nbc", "*.png", "*.md", "site")
+    for name in ("rotor", "data", "tests", "docs"):
+        shutil.copytree(ROOT / name, folder / name, ignore=left)
     shutil.copy(ROOT / "pyproject.toml", folder)
 
 
+NO_VERDICT = re.compile(
+    r"^E +(NameError|UnboundLocalError|SyntaxError|ImportError|ModuleNotFoundError|FileNotFoundError)", re.M
+)
+
+
 def goes_red(mutation: Mutation, folder: Path) -> bool:
-    """Whether the test passes in the copy and fails without the safeguard; the copy is as before afterwards."""
+    """Whether the test passes in the copy and fails without the safeguard; the copy is as before afterwards.
+
+    Raises AssertionError where the text to be replaced is not there exactly once, where the test fails or is skipped beforehand, and
+    where what fails is the mutation itself, by a name or a file that does not exist.
+    """
     path = folder / mutation.file
     whole = path.read_text(encoding="utf-8")
     assert whole.count(mutation.old) == 1, f"case {mutation.case}: {mutation.file} has changed; write the mutation anew"
-    assert passes(mutation.test, folder), f"case {mutation.case}: {mutation.test} fails already"
+    code, output = ran(mutation.test, folder)
+    assert code == 0, f"case {mutation.case}: {mutation.test} fails already\n{output}"
+    assert re.search(r"\d passed", output), f"case {mutation.case}: {mutation.test} does not run here\n{output}"
     path.write_text(whole.replace(mutation.old, mutation.new), encoding="utf-8")
     try:
-        return not passes(mutation.test, folder)
+        code, output = ran(mutation.test, folder)
     finally:
         path.write_text(whole, encoding="utf-8")
+    assert not NO_VERDICT.search(output), f"case {mutation.case}: the mutation is at fault, not the test\n{output}"
+    return code == 1
 
 
-def passes(test: str, folder: Path) -> bool:
-    """Whether a test passes in the copy."""
-    command = [sys.executable, "-B", "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", test]
+def ran(test: str, folder: Path) -> tuple[int, str]:
+    """Exit code, 0 or 1, and output of a test in the copy."""
+    options = ["-q", "-x", "-p", "no:cacheprovider", "-m", "slow or not slow"]
     environment = {**os.environ, "PYTHONPATH": str(folder), "PYTHONDONTWRITEBYTECODE": "1"}
-    ran = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True)
-    assert ran.returncode in (0, 1), ran.stdout + ran.stderr  # 1: tests failed; anything else is no verdict
-    return ran.returncode == 0
+    command = [sys.executable, "-B", "-m", "pytest", *options, test]
+    done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True)
+    output = done.stdout + done.stderr
+    assert done.returncode in (0, 1), output  # 1: tests failed; anything else is no verdict
+    return done.returncode, output
 
 
 if __name__ == "__main__":
@@ -98,7 +275,8 @@ if __name__ == "__main__":
 
     with tempfile.TemporaryDirectory() as temporary:
         copy_of_package(Path(temporary))
-        green = [one for one in MUTATIONS if not goes_red(one, Path(temporary))]
+        chosen = [one for one in MUTATIONS if not sys.argv[1:] or str(one.case) in sys.argv[1:]]
+        green = [one for one in chosen if not goes_red(one, Path(temporary))]
     for one in green:
         print(f"case {one.case}: {one.test} stays green without its safeguard")
     sys.exit(bool(green))

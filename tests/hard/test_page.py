@@ -22,5 +22,5 @@ def test_every_test_named_exists():
 
 def test_the_marked_cases_are_those_with_a_mutation():
     text = Path(__file__).with_name("mutations.py").read_text(encoding="utf-8")
-    mutated = sorted(int(number) for number in re.findall(r"Mutation\(\n\s+(\d+),", text))
+    mutated = sorted({int(number) for number in re.findall(r"Mutation\(\n\s+(\d+),", text)})
     assert [int(number) for number in re.findall(r"^\| (\d+)\* ", PAGE, re.MULTILINE)] == mutated

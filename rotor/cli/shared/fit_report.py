@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from rotor.cli.shared.output import (
@@ -11,30 +10,17 @@ from rotor.cli.shared.output import (
 )
 
 if TYPE_CHECKING:
-    from rotor.fit.assignment import Assignments
     from rotor.fit.choose import Suggestion, Trial
-    from rotor.fit.fit import Fit, FitOptions
-    from rotor.formats.spcat.fit_input import SpfitInput
+    from rotor.fit.fit import Fit
+    from rotor.formats.fit_request import FitAnswer
     from rotor.tops.constants import Constants
 
 
-@dataclass(frozen=True)
-class Request:
-    """What is to be fitted, from either kind of input."""
-
-    lines: Assignments
-    constants: Constants | None
-    parameters: Any
-    options: FitOptions
-    title: str
-    start: str = ""
-    spfit: SpfitInput | None = None
-    notes: list[str] = field(default_factory=list)
+_AFTER = ("undetermined", "changed_states", "notes")  # facts that come behind the parameters
 
 
 def record(
-    request: Request,
-    fit: Fit,
+    answer: FitAnswer,
     command_line: str,
     steps: Sequence[Trial],
     trials: Sequence[Trial],
@@ -44,23 +30,11 @@ def record(
     """Everything about a fit, by the keys of docs/command_line.md."""
     import rotor
 
-    statistics = fit.statistics
+    fit, facts = answer.fit, answer.facts()
     return {
         "rotor_version": rotor.__version__,
         "command": command_line,
-        "title": request.title,
-        "converged": fit.converged,
-        "reason": fit.reason,
-        "line_count": len(fit.lines),
-        "lines_used": int(fit.used.sum()),
-        "frequencies": len(fit.groups),
-        "weighted_rms": fit.weighted_rms,
-        "reduced_chi": fit.reduced_chi,
-        "rms_mhz": fit.rms_mhz(),
-        "rms_cm": fit.rms_mhz(wavenumber=True),
-        "degrees_of_freedom": fit.degrees_of_freedom,
-        "condition": statistics.condition,
-        "iterations": len(fit.minimum.iterations),
+        **{name: value for name, value in facts.items() if name not in _AFTER},
         **_constants_record(fit.constants),
         "parameters": [
             {"name": n, "value": v, "error": e, "scaled_error": s, "start": b}
@@ -69,10 +43,8 @@ def record(
             )
         ],
         "bootstrap_errors": list(spread) or None,
-        "correlations": statistics.correlations,
-        "undetermined": [one.text for one in statistics.undetermined],
-        "changed_states": list(fit.changed_states),
-        "notes": [*request.notes, *fit.notes],
+        "correlations": fit.statistics.correlations,
+        **{name: facts[name] for name in _AFTER},
         "chosen": [_trial_record(one) for one in steps],
         "trials": [_trial_record(one) for one in trials],
         "suggestions": [vars(one) for one in suggestions],

@@ -104,6 +104,18 @@ def positive(name: str, text: str, unit: str) -> float:
     return require_positive(name, quantity(name, text, unit), unit)
 
 
+def highest_j(text: str) -> int:
+    """The J of `J<=2`, or of the number alone.
+
+    >>> highest_j("J <= 2"), highest_j("3")
+    (2, 3)
+    """
+    number = text.replace(" ", "").upper().removeprefix("J<=").removeprefix("J≤")
+    if not number.isdecimal():
+        raise ValueError(f"{text!r}: expected J<=2, or the number alone")
+    return int(number)
+
+
 @contextmanager
 def fields_as_options(**names: str) -> Iterator[None]:
     """Inside, a ValueError that names fields of a request names the options they come from.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +13,7 @@ from rotor.cli.shared.options import file_option, files_asked
 from rotor.cli.shared.output import Writer, note
 
 if TYPE_CHECKING:
+    from rotor.scenes.scene import Scene
     from rotor.scenes.sections import MoleculeSection
 
 
@@ -48,16 +50,25 @@ def save_scene(
         By the name of the option.
     """
 
-    def write(path: Path) -> None:
+    def make(folder: Path) -> Scene:
         from importlib import import_module
 
+        molecule = None if given is None or not given.text else molecule_of(given, request, folder, polarizability)
+        scene: Scene = import_module(f"rotor.scenes.kinds.{kind}").KIND.saved(request, molecule)
+        return scene
+
+    return save_made(make, outputs, **others)
+
+
+def save_made(make: Callable[[Path], Scene], outputs: Any, **others: Any) -> dict[str, Writer]:
+    """The writer of --save-scene for a scene that is made for the folder that it will be in; outputs, others: as `save_scene`."""
+
+    def write(path: Path) -> None:
         import msgspec
 
         from rotor.scenes.scene_file import write_scene
 
-        folder = Path(outputs.save_scene).parent
-        molecule = None if given is None or not given.text else _molecule(given, request, folder, polarizability)
-        scene = import_module(f"rotor.scenes.kinds.{kind}").KIND.saved(request, molecule)
+        scene: Any = make(Path(outputs.save_scene).parent)
         write_scene(msgspec.structs.replace(scene, outputs=_outputs(type(scene.outputs), outputs, others)), path)
 
     return {"--save-scene": write}
@@ -82,7 +93,7 @@ def _field(option: str) -> str:
     return option.removeprefix("--").replace("-", "_")
 
 
-def _molecule(given: Input, request: Any, folder: Path, polarizability: bool) -> MoleculeSection:
+def molecule_of(given: Input, request: Any, folder: Path, polarizability: bool = False) -> MoleculeSection:
     """The molecule of the options, files counted from the folder of the scene."""
     from rotor.scenes.sections import MoleculeSection
 
@@ -94,9 +105,9 @@ def _molecule(given: Input, request: Any, folder: Path, polarizability: bool) ->
             "--save-scene: an .int file and the constants beside it say all themselves; a scene holds none"
         )
     by_hand = given.dipole is not None or given.dipole_abc is not None
-    hessian = given.hessian if given.hessian == "calculator" else _beside(given.hessian, folder)
+    hessian = given.hessian if given.hessian == "calculator" else beside(given.hessian, folder)
     return MoleculeSection(
-        source=_beside(source, folder),
+        source=beside(source, folder),
         constants=given.constants,
         isotopes=list(given.isotope or ()),
         dipole_abc=list(request.top.dipole_abc_debye) if by_hand else None,
@@ -110,7 +121,7 @@ def _molecule(given: Input, request: Any, folder: Path, polarizability: bool) ->
     )
 
 
-def _beside(name: str | None, folder: Path) -> str | None:
+def beside(name: str | None, folder: Path) -> str | None:
     """A file as it is counted from a folder; other words stay."""
     return os.path.relpath(name, folder) if name is not None and Path(name).is_file() else name
 

@@ -64,7 +64,8 @@ def follow_engine(
         )
     engine_input = engine_input_of(atoms, settings)
     try:
-        frames = engine_frames(engine, engine_input, settings, **{THREAD_OPTIONS[engine]: threads})
+        options: dict[str, Any] = {THREAD_OPTIONS[engine]: threads, "accuracy": settings.ewald_tolerance}
+        frames = engine_frames(engine, engine_input, settings, **options)
         return _follow(frames, engine_input, atoms, settings, outputs, on_start)
     except ModuleNotFoundError as error:
         raise ValueError(str(error)) from error

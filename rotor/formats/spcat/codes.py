@@ -21,7 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.formats.spcat.par import Options, Parameter, ParameterFile
-from rotor.tops.constants import RIGID, Constants
+from rotor.tops.constants import Constants
+from rotor.tops.kind_of_constants import RIGID
 from rotor.tops.operators import axes_of, powers_of_spelled, spelled_term
 
 NOT_YET = "is read but not computed yet"

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor import units
-from rotor.arrays import Floats, Ints
+from rotor.arrays import Floats, Indices, Ints
 from rotor.formats.spcat.catalogue import Catalogue, catalogue_of
 from rotor.formats.spcat.egy import LevelList
 from rotor.formats.spcat.fields import BLANK
@@ -22,7 +22,7 @@ from rotor.formats.spcat.int_file import Request
 from rotor.formats.spcat.par import ParameterFile
 from rotor.formats.spcat.states import is_odd
 from rotor.quantum.levels import Levels
-from rotor.spectra.intensity import LGINT_NM2_MHZ
+from rotor.spectra.intensity import LGINT_NM2_MHZ, IntensityCut
 from rotor.spectra.transitions import Transitions, all_transitions
 
 
@@ -171,13 +171,34 @@ class GroupLines:
 _COLUMNS = ("frequency_mhz", "intensity", "energy_lower_mhz", "g_upper", "upper", "lower", "error_mhz")
 
 
-def transitions_of(group: Group, levels: Levels) -> Transitions:
-    """The transitions between levels of a group that exist."""
+def transitions_of(group: Group, levels: Levels, request: Request, q: float) -> Transitions:
+    """The transitions between levels of a group that exist, have one weight and may pass the cut of an .int file.
+
+    Parameters
+    ----------
+    group : Group
+        The connected states.
+    levels : Levels
+        Their levels.
+    request : Request
+        Temperature and limits.
+    q : float
+        Partition function as the file counts it.
+
+    Returns
+    -------
+    Transitions
+        Frequencies in MHz and strengths in D². Lines between unequal weights are those that the program leaves out too.
+    """
     if not (group.effect.moments or group.effect.others):
         none = np.zeros(0, dtype=np.int32)
         return Transitions(np.zeros(0), np.zeros(0), none, none)
-    found = all_transitions(levels, dict(group.effect.moments), moments=group.effect.others)
+    found = all_transitions(
+        levels, dict(group.effect.moments), cut=_wide_cut(levels, request, q), moments=group.effect.others
+    )
     exists = (levels.weight[found.lower] > 0) & (levels.weight[found.upper] > 0)
+    if not any(state.fold for state in group.states):  # with weights of E species, one that is equal is enough
+        exists &= equally_weighted(levels, found.upper, found.lower)
     if exists.all():
         return found
     return Transitions(
@@ -185,6 +206,22 @@ def transitions_of(group: Group, levels: Levels) -> Transitions:
     )
 
 
+def _wide_cut(levels: Levels, request: Request, q: float) -> IntensityCut | None:
+    """A cut that no line of the file is below, None where STR0 is below all numbers."""
+    kt, least = request.temperature_k * units.MHZ_PER_K, _NEARLY * 10.0**request.str0
+    with np.errstate(over="ignore"):  # far below zero and cold: every line passes
+        populated = LGINT_NM2_MHZ / q * (levels.weight // levels.components) * np.exp(-levels.energy_mhz / kt)
+    population = np.asarray(populated, dtype=float)
+    return IntensityCut(population, kt, least) if least > 0 and np.isfinite(population).all() else None
+
+
+def equally_weighted(levels: Levels, upper: Indices, lower: Indices) -> NDArray[np.bool_]:
+    """Which transitions join levels of one nuclear-spin weight; between others there are none, whatever the dipole is."""
+    weight = levels.weight // levels.components
+    return np.asarray(weight[upper] == weight[lower])
+
+
+_NEARLY = 0.999  # of the cut: what is found so is looked at with all digits and both terms of the cut
 LEAST_MHZ = 0.00005  # a line that would print as 0.0000 is not in the program's files
 _STR_SCALE_MHZ = 300_000.0  # STR1 counts (ν/300 GHz)²
 

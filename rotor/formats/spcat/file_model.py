@@ -67,6 +67,12 @@ class Group:
                 levels = named_by_l(levels, self.effect.pairs, str(levels.representation))
         return replace(levels, weight=self._weights(levels))
 
+    def has_levels(self, twice_f: tuple[int, int]) -> bool:
+        """Whether any level from the first to the last of the doubled F has a weight and a K from KNMIN on."""
+        highest = (twice_f[1] + sum(self.spins)) // 2
+        weighted = any(max(state.plus, state.minus, state.e_weight if state.fold else 0) > 0 for state in self.states)
+        return weighted and twice_f[0] <= twice_f[1] and any(state.kmin <= highest for state in self.states)
+
     def _exist(self, labels: Ints) -> NDArray[np.bool_]:
         """Which labels v, Ka, Kc, N, ..., F belong to levels of a weight."""
         v, ka, kc = labels[:, 0], labels[:, 1], labels[:, 2]

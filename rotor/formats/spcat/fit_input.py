@@ -110,10 +110,10 @@ def spfit_input(file: ParameterFile, lines: LineList, source: str = "") -> Spfit
 
 
 def _refuse_options(header: Header) -> None:
-    if header.nxpar:
+    if not 0 <= header.nxpar <= header.npar:
         raise ValueError(
-            f"NXPAR = {header.nxpar}: lines with a negative F that leave out the last parameters (hyperfine structure that is not "
-            "resolved) are not supported; set it to 0 and give such lines as blends of their components"
+            f"NXPAR = {header.nxpar}: so many parameters at the end of the list are left out for lines with F below 0; from 0 to "
+            f"NPAR = {header.npar}"
         )
     if not header.errtst > 0:
         raise ValueError(f"ERRTST = {header.errtst:g}: the largest |obs - calc|/error of a line that counts is above 0")
@@ -209,6 +209,15 @@ def _notes(file: ParameterFile, options: FitOptions, plain: bool, lines: Assignm
         )
     if file.header.thresh:
         notes.append("THRESH, the first damping, is chosen by the search itself; the result does not depend on it")
+    unresolved = (
+        int(((lines.upper[:, -1] < 0) | ((lines.lower[:, -1] < 0) & ~lines.from_zero)).sum())
+        if lines.names[-1:] == ("f",)
+        else 0
+    )
+    if unresolved or file.header.nxpar:
+        notes.append(
+            f"{unresolved} lines with F below 0: the last {file.header.nxpar} parameters (NXPAR) do not count for them"
+        )
     highest = int(max(lines.upper[:, 0].max(initial=0), lines.lower[:, 0].max(initial=0)))
     if options.kmax is not None and options.kmax < highest:
         notes.append(f"KNMAX = {options.kmax} is below the highest J, {highest}: the basis is cut there, as SPFIT does")
@@ -229,8 +238,8 @@ def fitted_file(asked: SpfitInput, fit: Fit, *, variances: bool) -> ParameterFil
     for parameter, column, ratio in zip(asked.file.parameters, asked.columns, asked.ratios, strict=True):
         value = parameter.value if column < 0 else float(fit.values[column]) * ratio
         error = parameter.error
-        if variances and column >= 0 and not parameter.constrained:
-            error = float(errors[column])
+        if variances and column >= 0:
+            error = float(errors[column]) * abs(ratio)
         made.append(replace(parameter, value=value, error=error))
     rest = correlation_text(fit) if variances else ""
     return replace(asked.file, parameters=tuple(made), rest=rest)

@@ -2,12 +2,14 @@
 
 Every parameter line of the file is one constant, by the name that `file_effect` gives it. States that are connected are solved
 together, F by F, and only those F in which a line has a level. A level is found by the quantum numbers that the file prints for it.
+Levels of lines whose hyperfine structure is not resolved have F below 0; see `unresolved`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -15,8 +17,10 @@ from rotor.arrays import Floats, Ints
 from rotor.formats.spcat.file_lines import Format, format_of, quanta_of
 from rotor.formats.spcat.file_model import Group, groups_of
 from rotor.formats.spcat.int_file import IntensityFile, Request
+from rotor.formats.spcat.l_doubled import functions_of_l, named_by_l
 from rotor.formats.spcat.par import ParameterFile
 from rotor.formats.spcat.predict_states import line_names
+from rotor.formats.spcat.unresolved import HIGHEST_SEARCHED, excluded_parameters, inner_file, refuse_far_f, spelled_out
 from rotor.quantum.effect_units import unit_levels
 from rotor.quantum.labelled import LevelModel
 from rotor.quantum.levels import Levels
@@ -25,6 +29,7 @@ from rotor.quantum.spins.levels import levels_of_f
 from rotor.quantum.unit_blocks import UnitBlocks
 
 _NO_REQUEST = IntensityFile("", Request(), ())
+_MOST_ELEMENTS = 1e7  # of vectors over all functions of the F that are solved at a time
 _AT_ZERO = 1e-30  # MHz: a free parameter that starts at 0 must not be left out of the Hamiltonian
 
 
@@ -58,14 +63,23 @@ class _Solved:
     columns: Ints
     blocks: UnitBlocks
 
+    def at(self, places: Ints) -> _Solved:
+        """The same for labels that stand at these places of a longer list."""
+        return replace(self, rows=places[self.rows])
+
 
 @dataclass(frozen=True)
 class FileLevels(LevelModel):
-    """Energies of the labelled levels of a file; names: its parameter lines as code#place."""
+    """Energies of the labelled levels of a file; names: its parameter lines as code#place.
+
+    reduced : levels with F below 0 whose spins cannot be left out. excluded : the parameters that are taken off them
+    """
 
     names: tuple[str, ...]
     count: int
     solved: tuple[_Solved, ...]
+    reduced: Ints
+    excluded: Ints
 
     @classmethod
     def of(cls, file: ParameterFile, labels: Ints) -> FileLevels:
@@ -74,15 +88,19 @@ class FileLevels(LevelModel):
         Raises ValueError for labels that no level has, with the first of them, and for what does not compute.
         """
         groups = groups_for_fit(file)
-        form, names = format_of(file, groups), line_names(file)
-        values = np.array([p.value for p in file.parameters])
-        parts = [part for group in groups if (part := _with_labels(group, form, labels, names, values))]
-        found = np.concatenate([part.rows for part in parts]) if parts else np.zeros(0, np.int64)
-        lost = np.setdiff1d(np.arange(len(labels)), found)
-        if len(lost):
-            first = " ".join(map(str, labels[int(lost[0])].tolist()))
-            raise ValueError(f"there is no level {first} ({', '.join(names_of_quanta(form))}) in this model")
-        return cls(names, len(labels), tuple(parts))
+        form = format_of(file, groups)
+        none = np.zeros(0, dtype=np.int64)
+        reduced = np.flatnonzero(labels[:, -1] < 0) if form.spins else none
+        inner = inner_file(file, form) if len(reduced) else None
+        if inner is None:
+            parts = _searched(file, groups, form, labels, reduced)
+            return cls(line_names(file), len(labels), tuple(parts), reduced, excluded_parameters(file))
+        refuse_far_f(labels[reduced], form, names_of_quanta(form), max(sum(group.spins) for group in groups))
+        own = np.flatnonzero(labels[:, -1] >= 0)
+        parts = [part.at(own) for part in _searched(file, groups, form, labels[own], none)] if len(own) else []
+        for part in cls.of(inner.file, labels[reduced][:, : inner.width]).solved:
+            parts.append(replace(part.at(reduced), columns=inner.columns[part.columns]))
+        return cls(line_names(file), len(labels), tuple(parts), none, none)
 
     def levels(self, values_mhz: Floats) -> tuple[Floats, Floats]:
         """See `LevelModel`."""
@@ -91,7 +109,27 @@ class FileLevels(LevelModel):
             found, derived = part.blocks.levels(values_mhz[part.columns])
             energies[part.rows] = found
             slopes[part.rows[:, None], part.columns] = derived
+        if len(self.reduced):
+            rows, columns = self.reduced[:, None], self.excluded
+            energies[self.reduced] -= slopes[rows, columns] @ values_mhz[columns]
+            slopes[rows, columns] = 0.0
         return energies, slopes
+
+
+def _searched(file: ParameterFile, groups: Sequence[Group], form: Format, labels: Ints, reduced: Ints) -> list[_Solved]:
+    """The labels in the levels of the groups; those of `reduced` have F below 0."""
+    positive = labels.copy()
+    positive[reduced, -1] = -spelled_out(labels[reduced], form) if len(reduced) else 0
+    names, values = line_names(file), np.array([p.value for p in file.parameters])
+    while True:
+        parts = [part for group in groups for part in _with_labels(group, form, positive, names, values)]
+        lost = np.setdiff1d(np.arange(len(labels)), np.concatenate([part.rows for part in parts]) if parts else [])
+        if not len(lost):
+            return parts
+        if not np.isin(lost, reduced).all() or (positive[lost, -1] >= HIGHEST_SEARCHED).any():
+            first = " ".join(map(str, labels[int(lost[0])].tolist()))
+            raise ValueError(f"there is no level {first} ({', '.join(names_of_quanta(form))}) in this model")
+        positive[lost, -1] += 1
 
 
 def _levels(group: Group, angular: Sequence[int]) -> Levels:
@@ -99,19 +137,39 @@ def _levels(group: Group, angular: Sequence[int]) -> Levels:
     if group.spins:
         return levels_of_f(group.top, (group.effect,), angular, None, None)
     j = [value // 2 for value in angular]
-    return solve_rotation(group.top, (group.effect,), min(j), max(j), in_blocks=True)
+    levels = solve_rotation(group.top, (group.effect,), min(j), max(j), in_blocks=True)
+    pairs = group.effect.pairs
+    return named_by_l(levels, pairs, str(levels.representation)) if pairs else levels
 
 
-def _with_labels(group: Group, form: Format, labels: Ints, names: Sequence[str], values: Floats) -> _Solved | None:
-    """The labels that lie in the group, found in its levels by the quantum numbers that the file prints; None without any."""
+def _with_labels(group: Group, form: Format, labels: Ints, names: Sequence[str], values: Floats) -> list[_Solved]:
+    """The labels that lie in the group, found in its levels by the quantum numbers that the file prints; some F at a time."""
     here = _of_group(group, form, labels)
     if not len(here):
-        return None
+        return []
     total = labels[here, -1] if form.spins else labels[here, 0]
-    half = sum(group.spins) % 2
-    angular = tuple(sorted({2 * int(f) - half for f in total}))
-    if min(angular) < 0:
+    if (total < 0).any():
         raise ValueError(f"F or J below 0 in the labels {labels[here[int(np.argmin(total))]].tolist()}")
+    twice = 2 * total - sum(group.spins) % 2
+    every = np.unique(twice)
+    size = len(group.states) * int(np.prod([spin + 1 for spin in group.spins]))
+    pieces = np.split(every, np.flatnonzero(np.diff(np.cumsum((size * (every + 1.0)) ** 2) // _MOST_ELEMENTS)) + 1)
+    found = [
+        _of_some_f(group, form, labels, here[np.isin(twice, some)], some.tolist(), names, values) for some in pieces
+    ]
+    return [one for one in found if one is not None]
+
+
+def _of_some_f(
+    group: Group,
+    form: Format,
+    labels: Ints,
+    here: Ints,
+    angular: Sequence[int],
+    names: Sequence[str],
+    values: Floats,
+) -> _Solved | None:
+    """The labels at the places `here` among the levels of some doubled F; None without any."""
     levels = _levels(group, angular)
     rows_by_label: dict[tuple[int, ...], int] = {}
     for negative in (True, False):
@@ -123,7 +181,9 @@ def _with_labels(group: Group, form: Format, labels: Ints, names: Sequence[str],
         return None
     own = tuple(group.effect.parameters(group.top))
     columns = np.array([names.index(name) for name in own])
-    blocks = unit_levels(group.top, levels, rows[found], own, np.where(values == 0, _AT_ZERO, values)[columns])
+    pairs, start = group.effect.pairs, np.where(values == 0, _AT_ZERO, values)[columns]
+    functions = partial(functions_of_l, pairs=pairs, representation=str(levels.representation)) if pairs else None
+    blocks = unit_levels(group.top, levels, rows[found], own, start, functions)
     return _Solved(here[found], columns, blocks)
 
 

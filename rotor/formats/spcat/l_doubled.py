@@ -183,8 +183,12 @@ def named_by_l(levels: Levels, pairs: Sequence[Pair], representation: str) -> Le
     return replace(levels, quanta=quanta, mixing=mixing)
 
 
-def _names_of_block(block: CoupledBlock, pairs: Sequence[Pair], representation: str) -> tuple[Ints, Floats]:
-    functions, names = [], []
+def functions_of_l(block: CoupledBlock, pairs: Sequence[Pair], representation: str) -> tuple[Floats, Ints]:
+    """The functions (n, n), in rows, by which the states of a block are called, and their names v, Ka, Kc (n, 3).
+
+    Those of states that are not l-doubled are the basis; of a pair they are |K, l⟩ ± |-K, -l⟩ with K l > 0 and with K l < 0.
+    """
+    functions, names = list[Floats](), list[tuple[int, int, int]]()
     second = {pair.first: pair.second for pair in pairs}
     members = {v for pair in pairs for v in pair}
     for part in block.parts:
@@ -201,9 +205,14 @@ def _names_of_block(block: CoupledBlock, pairs: Sequence[Pair], representation: 
             elif k == 0:
                 functions.append(own)
                 names.append((part.v, ka, kc))
-    shares = (np.array(functions) @ block.vectors) ** 2
+    return np.array(functions), np.array(names)
+
+
+def _names_of_block(block: CoupledBlock, pairs: Sequence[Pair], representation: str) -> tuple[Ints, Floats]:
+    functions, names = functions_of_l(block, pairs, representation)
+    shares = (functions @ block.vectors) ** 2
     of_state = assigned(shares, np.ones(len(functions), dtype=np.int64))
-    return np.array(names)[of_state], shares[of_state, np.arange(len(of_state))]
+    return names[of_state], shares[of_state, np.arange(len(of_state))]
 
 
 def _by_k(part: Part, representation: str) -> tuple[list[int], list[int]]:

@@ -1,4 +1,8 @@
-"""Measured lines for SPFIT, .lin: quantum numbers in twelve fields of three, then frequency, error and weight."""
+"""Measured lines for SPFIT, .lin: quantum numbers in twelve fields of three, then frequency, error and weight.
+
+States of more than six quantum numbers (NLINE below 0 in the .par file) have twice as many fields as a state has numbers. A lower
+state whose first number is below 0 is none: the line is an energy from the zero of the Hamiltonian.
+"""
 
 from __future__ import annotations
 
@@ -15,8 +19,8 @@ from rotor.formats.spcat.fields import BLANK, read_whole
 from rotor.formats.spcat.freeform import Line, encode, number, read_lines, read_words
 from rotor.units import MHZ_PER_CM
 
-QUANTA_FIELDS = 12
-_WIDTH = 3 * QUANTA_FIELDS
+QUANTA_FIELDS = 12  # at least
+MOST_QUANTA = 10  # of a state
 NO_ERROR_MHZ = 0.01  # of a line that states none, as in SPFIT
 _ROTATION = ("j", "n", "k", "ka", "kc", "v")
 
@@ -34,7 +38,7 @@ class Measured(NamedTuple):
 class LineList:
     """Measured lines, columns of equal length n.
 
-    quanta (n, 12): upper state, then at once the lower one; -32768 where blank. frequency, error (n,): as written,
+    quanta (n, 12 or more): upper state, then at once the lower one; -32768 where blank. frequency, error (n,): as written,
     MHz or, where the error is negative, cm⁻¹. weight (n,): share within a blend. texts: lines as they were read,
     with the blank lines before them. rest: what follows the last line. per_state: quantum numbers of each state where some
     line lacks one, which is -32768 then; 0 where every line has as many as it needs. defaulted: lines without an error.
@@ -52,11 +56,18 @@ class LineList:
     def __post_init__(self) -> None:
         n = len(self.frequency)
         shapes = {name: np.shape(getattr(self, name)) for name in ("quanta", "frequency", "error", "weight")}
-        if shapes != {"quanta": (n, QUANTA_FIELDS), "frequency": (n,), "error": (n,), "weight": (n,)}:
+        if shapes != {"quanta": (n, self.fields), "frequency": (n,), "error": (n,), "weight": (n,)} or not (
+            QUANTA_FIELDS <= self.fields <= 2 * MOST_QUANTA
+        ):
             raise ValueError(f"columns of shapes {shapes}; expected quanta (n, {QUANTA_FIELDS}) and the others (n,)")
 
     def __len__(self) -> int:
         return len(self.frequency)
+
+    @property
+    def fields(self) -> int:
+        """Fields of quantum numbers in a line."""
+        return int(np.shape(self.quanta)[-1])
 
     @property
     def frequency_mhz(self) -> NDArray[np.float64]:
@@ -69,8 +80,8 @@ class LineList:
         return np.where(self.error < 0, -self.error * MHZ_PER_CM, self.error)
 
     def states(self) -> tuple[NDArray[np.int16], NDArray[np.int16]]:
-        """Quantum numbers of the upper and the lower states, two arrays (n, 6), blanks -32768."""
-        upper, lower = (np.full((len(self), QUANTA_FIELDS // 2), BLANK, dtype=np.int16) for _ in range(2))
+        """Quantum numbers of the upper and the lower states, two arrays (n, 6 or more), blanks -32768."""
+        upper, lower = (np.full((len(self), self.fields // 2), BLANK, dtype=np.int16) for _ in range(2))
         if count := self.per_state:
             upper[:, :count], lower[:, :count] = self.quanta[:, :count], self.quanta[:, count : 2 * count]
             return upper, lower
@@ -115,8 +126,8 @@ def read_lin(source: str | os.PathLike[str] | bytes, per_state: int = 0) -> Line
 
     As in the field's program a blank line ends the list, unless it stands at the beginning; text behind it is preserved; a
     missing error is 0.01 MHz, a missing weight 1. per_state: how many quantum numbers a state has, for lines that lack some;
-    unless given, as many as in the other lines. Raises ValueError with file, line, column and the rule that is broken; nothing
-    is skipped in silence.
+    unless given, as many as in the other lines; more than six take more than twelve fields. Raises ValueError with file, line,
+    column and the rule that is broken; nothing is skipped in silence.
     """
     lines = read_lines(source)
     first = next((i for i, line in enumerate(lines) if not line.blank), len(lines))
@@ -125,7 +136,8 @@ def read_lin(source: str | os.PathLike[str] | bytes, per_state: int = 0) -> Line
     texts = {i: line.text for i, line in enumerate(listed)}
     if texts:
         texts[0] = "".join(line.text for line in lines[:first]) + texts[0]
-    fields = [_fields(line) for line in listed]
+    width = max(QUANTA_FIELDS, 2 * per_state)
+    fields = [_fields(line, width) for line in listed]
     missing = next((i for i, row in enumerate(fields) if _lacks_some(row, per_state)), None)
     if missing is not None:
         per_state = per_state or max((_leading(row) // 2 for row in fields if _leading(row) % 2 == 0), default=0)
@@ -136,14 +148,14 @@ def read_lin(source: str | os.PathLike[str] | bytes, per_state: int = 0) -> Line
                 f"{count} quantum numbers; expected as many for the upper state as for the lower, "
                 "or other lines, or the constants of a fit, that show how many are missing",
             )
-    measured = [read_measured(line) for line in listed]
-    quanta = np.full((len(measured), QUANTA_FIELDS), BLANK, dtype=np.int16)
+    measured = [read_measured(line, width) for line in listed]
+    quanta = np.full((len(measured), width), BLANK, dtype=np.int16)
     for row, found, line in zip(quanta, fields, measured, strict=True):
         known = line.quanta if missing is None else found[: 2 * per_state]
         row[: len(known)] = known
     columns = np.array([line[1:] for line in measured], dtype=np.float64).reshape(-1, 3)
     rest = "".join(line.text for line in lines[end if texts else 0 :])
-    without_error = frozenset(i for i, line in enumerate(listed) if len(read_words(_plain(line), _WIDTH, 3)[0]) < 2)
+    without_error = frozenset(i for i, line in enumerate(listed) if len(read_words(_plain(line), 3 * width, 3)[0]) < 2)
     return LineList(
         quanta,
         columns[:, 0],
@@ -186,12 +198,12 @@ def _plain(line: Line) -> Line:
     return line._replace(text=line.body.removeprefix("\ufeff"))
 
 
-def read_measured(line: Line) -> Measured:
-    """The numbers of one line of the file."""
+def read_measured(line: Line, width: int = QUANTA_FIELDS) -> Measured:
+    """The numbers of one line of the file with so many fields of quantum numbers."""
     plain = _plain(line)
-    fields = _fields(plain)
-    words, _ = read_words(plain, _WIDTH, 3)
-    frequency = number(line, words, 0, "the frequency (from column 37 on)")
+    fields = _fields(plain, width)
+    words, _ = read_words(plain, 3 * width, 3)
+    frequency = number(line, words, 0, f"the frequency (from column {3 * width + 1} on)")
     error = number(line, words, 1, "the error of the frequency", NO_ERROR_MHZ)
     quanta = fields[: _leading(fields)]
     return Measured(quanta, frequency, error, number(line, words, 2, "the weight", 1.0))
@@ -203,14 +215,19 @@ def _leading(fields: tuple[int, ...]) -> int:
 
 
 def _lacks_some(fields: tuple[int, ...], per_state: int) -> bool:
-    """Whether a line lacks quantum numbers: an odd count before a blank, or a blank among as many as there should be."""
+    """Whether a line lacks quantum numbers: an odd count before a blank, or a blank among as many as there should be.
+
+    A lower state that begins with a number below 0 is none and needs no more of them.
+    """
     count = _leading(fields)
+    if per_state and per_state < len(fields) < 2 * per_state and fields[per_state] < 0:
+        return True
     return bool(count % 2) or not count or (count < len(fields) <= 2 * per_state)
 
 
-def _fields(line: Line) -> tuple[int, ...]:
+def _fields(line: Line, width: int) -> tuple[int, ...]:
     """The fields of three columns up to the last quantum number, blank ones among them; an annotation behind a blank ends them."""
-    text, quanta = _plain(line).text[:_WIDTH], list[int]()
+    text, quanta = _plain(line).text[: 3 * width], list[int]()
     for column in range(0, len(text), 3):
         part = text[column : column + 3]
         if not part.strip(" "):
@@ -236,7 +253,7 @@ def _line_text(lines: LineList, index: int) -> str:
     measured, stored = lines.measured(index), lines.texts.get(index, "")
     if lines.per_state:  # blanks among them
         measured = measured._replace(quanta=tuple(lines.quanta[index, : 2 * lines.per_state].tolist()))
-    if stored and _stored(stored, index, lines.per_state) == measured:
+    if stored and _stored(stored, index, lines.per_state, lines.fields) == measured:
         return stored
     wrong = next((q for q in measured.quanta if q != BLANK and not -99 <= q <= 999), None)
     if wrong is not None or not measured.quanta or len(measured.quanta) % 2:
@@ -245,13 +262,13 @@ def _line_text(lines: LineList, index: int) -> str:
             "the lower state, from -99 to 999, fit the format"
         )
     quanta = "".join("   " if q == BLANK else f"{q:3d}" for q in measured.quanta)
-    return f"{quanta:<{_WIDTH}} {measured.frequency!r:>16} {measured.error!r:>10} {measured.weight!r}\n"
+    return f"{quanta:<{3 * lines.fields}} {measured.frequency!r:>16} {measured.error!r:>10} {measured.weight!r}\n"
 
 
-def _stored(text: str, index: int, per_state: int) -> Measured:
+def _stored(text: str, index: int, per_state: int, width: int) -> Measured:
     """The numbers of a line as it was read, blank fields among them where lines lack quantum numbers."""
     line = Line(text.rstrip("\r\n").rpartition("\n")[2], index, "stored text")
-    found, fields = read_measured(line), _fields(line)[: 2 * per_state]
+    found, fields = read_measured(line, width), _fields(line, width)[: 2 * per_state]
     return found._replace(quanta=fields + (BLANK,) * (2 * per_state - len(fields))) if per_state else found
 
 
@@ -267,7 +284,7 @@ def line_list(quanta_upper: Any, quanta_lower: Any, frequency_mhz: Any, error_mh
     Parameters
     ----------
     quanta_upper, quanta_lower : (n, k) arrays of int
-        k up to 6.
+        k up to 10.
     frequency_mhz : (n,) array
         Measured.
     error_mhz : (n,) array or float
@@ -292,9 +309,9 @@ def line_list(quanta_upper: Any, quanta_lower: Any, frequency_mhz: Any, error_mh
     """
     upper, lower = np.asarray(quanta_upper), np.asarray(quanta_lower)
     frequency = np.asarray(frequency_mhz, dtype=np.float64)
-    if upper.shape != lower.shape or upper.ndim != 2 or upper.shape[1] > 6 or len(upper) != len(frequency):
+    if upper.shape != lower.shape or upper.ndim != 2 or upper.shape[1] > MOST_QUANTA or len(upper) != len(frequency):
         raise ValueError(f"quantum numbers of shapes {upper.shape}, {lower.shape} for {len(frequency)} lines; (n, k)")
-    quanta = np.full((len(upper), QUANTA_FIELDS), BLANK, dtype=np.int16)
+    quanta = np.full((len(upper), max(QUANTA_FIELDS, 2 * upper.shape[1])), BLANK, dtype=np.int16)
     quanta[:, : 2 * upper.shape[1]] = np.concatenate([upper, lower], axis=1)
     error, share = (np.broadcast_to(np.asarray(v, dtype=np.float64), frequency.shape) for v in (error_mhz, weight))
     if (error < 0).any():

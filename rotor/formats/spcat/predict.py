@@ -19,7 +19,7 @@ from rotor.formats.spcat.catalogue import Catalogue
 from rotor.formats.spcat.codes import is_linear
 from rotor.formats.spcat.egy import LevelList
 from rotor.formats.spcat.fields import QUANTUM_RANGE
-from rotor.formats.spcat.file_lines import LEAST_MHZ
+from rotor.formats.spcat.file_lines import LEAST_MHZ, equally_weighted
 from rotor.formats.spcat.int_file import IntensityFile, Request, read_int
 from rotor.formats.spcat.model import FOLD, common_weight, top_of
 from rotor.formats.spcat.par import Options, ParameterFile, read_par
@@ -79,8 +79,9 @@ def predict(
 ) -> Prediction:
     """The catalogue that SPCAT makes of its two input files, from true eigenvalues.
 
-    A line is listed when both its J (F, without nuclear spins) lie from FBGN to FEND, its frequency below FQLIM, and
-    its intensity, that of one component of a K doublet, above 10^STR0 + 10^STR1 (ν/300 GHz)² nm² MHz.
+    A line is listed when both its J (F, without nuclear spins) lie from FBGN to FEND, its two levels have one nuclear-spin
+    weight, its frequency lies below FQLIM, and its intensity, that of one component of a K doublet, is above
+    10^STR0 + 10^STR1 (ν/300 GHz)² nm² MHz.
 
     Parameters
     ----------
@@ -166,6 +167,7 @@ def _lines_asked_for(top: Top, request: Request, q_reduced: float) -> Lines:
     )
     j, components = lines.levels.rotational, lines.levels.components[lines.lower]
     in_range = np.minimum(j[lines.upper], j[lines.lower]) >= request.fbgn
+    in_range &= equally_weighted(lines.levels, lines.upper, lines.lower)
     return lines.where(in_range & (10.0**lines.lgint / components > least_intensity(request, lines.frequency_mhz)))
 
 

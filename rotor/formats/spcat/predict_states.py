@@ -81,8 +81,9 @@ def predicted(
     groups = groups_of(parameters, intensities, as_spcat=as_spcat)
     form = format_of(parameters, groups)
     q = summed_q(groups, request.temperature_k).q if own_q else request.qrot
+    groups = _with_levels(groups, request)
     solved = [(group, group.levels(f_range(group, request))) for group in groups]
-    transitions = [transitions_of(group, levels) for group, levels in solved]
+    transitions = [transitions_of(group, levels, request, q) for group, levels in solved]
     factor, names = variance_factor(parameters), line_names(parameters)
     spreads = [level_spreads(group, levels, names, factor) for group, levels in solved]
     pieces = [
@@ -95,6 +96,18 @@ def predicted(
     if factor is not None:
         lines = replace(lines, given_spread=np.concatenate([one for one in spreads if one is not None]))
     return made, lines, q, as_level_list(solved, form), notes
+
+
+def _with_levels(groups: list[Group], request: Request) -> list[Group]:
+    """The groups with levels from FBGN to FEND; ValueError where no group has any."""
+    found = [group for group in groups if group.has_levels(f_range(group, request))]
+    if not found:
+        limits = sorted({(state.kmin, state.plus, state.minus) for group in groups for state in group.states})
+        raise ValueError(
+            f"no level exists from FBGN = {request.fbgn} to FEND = {request.fend}: N must reach KNMIN and a weight be above 0; "
+            f"KNMIN, WTPL, WTMN of the states are {limits}"
+        )
+    return found
 
 
 def line_names(file: ParameterFile) -> tuple[str, ...]:
@@ -131,7 +144,7 @@ def level_spreads(group: Group, levels: Levels, names: Sequence[str], factor: Fl
 def f_range(group: Group, request: Request) -> tuple[int, int]:
     """The doubled F from FBGN to FEND, which are rounded up."""
     half = sum(group.spins) % 2
-    return max(0, 2 * request.fbgn - half), 2 * request.fend - half
+    return max(half, 2 * request.fbgn - half), 2 * request.fend - half
 
 
 def summed_q(groups: list[Group], temperature_k: float) -> PartitionFunction:

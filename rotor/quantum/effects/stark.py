@@ -24,13 +24,13 @@ from numpy.typing import ArrayLike
 from rotor import units
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.fields.blocks import Contraction, FieldBlock, FieldSpace
-from rotor.quantum.fields.field_map import (
+from rotor.quantum.fields.field_map import FieldMap, field_map
+from rotor.quantum.fields.map_request import (
     BlockProblem,
-    FieldMap,
+    KnownSpaces,
     MapRequest,
     checked_fields,
     checked_tolerance_mhz,
-    field_map,
 )
 from rotor.quantum.fields.space import field_space
 from rotor.quantum.spins import scheme_of
@@ -206,7 +206,7 @@ def map_request(
 
         space = partial(spin_field_space, top, effects=tuple(effects), contractions=contractions)
     return MapRequest(
-        space=space,
+        space=KnownSpaces(space),
         problem=partial(_problem, dipole, light, intensity_w_per_cm2, names),
         fields=fields,
         j_highest=checked_j(j_highest),

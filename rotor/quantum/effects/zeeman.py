@@ -28,13 +28,13 @@ from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.stark import doubled_m
 from rotor.quantum.fields.blocks import AxialBlock, AxialSpace, Contraction, FieldBlock, FieldSpace, FreeLevels
 from rotor.quantum.fields.direction_cosines import cosine_bands
-from rotor.quantum.fields.field_map import (
+from rotor.quantum.fields.field_map import FieldMap, field_map
+from rotor.quantum.fields.map_request import (
     BlockProblem,
-    FieldMap,
+    KnownSpaces,
     MapRequest,
     checked_fields,
     checked_tolerance_mhz,
-    field_map,
 )
 from rotor.quantum.fields.space import axial_levels
 from rotor.quantum.fields.spin_fields import Magnet, SpinFieldBlock, spin_field_space
@@ -125,7 +125,7 @@ def zeeman_map(
         positive = doubled_m(top, effects, None, j_highest)
         m_values = tuple(sorted({*positive, *(-m for m in positive)}))
     request = MapRequest(
-        space=space,
+        space=KnownSpaces(space),
         problem=partial(_problem, magnet, square),
         fields=checked_fields(fields_tesla, "T", HIGHEST_TESLA),
         j_highest=j_highest,

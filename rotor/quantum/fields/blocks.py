@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -61,7 +61,7 @@ class Contraction:
         """1 of vectors, 2 of tensors (their traces are a number besides)."""
         return int(self.body.ndim)
 
-    @property
+    @cached_property
     def along_z(self) -> bool:
         """Whether the space part is symmetric about Z, so that M is conserved."""
         return _axial(self.space, 2)
@@ -192,11 +192,12 @@ class AxialBlock(FieldBlock):
     def bands(self, contraction: Contraction) -> list[Floats]:
         """Diagonals of the matrix, the main one first; at most three."""
         size = _along(contraction.body, self.axis) * _along(contraction.space, 2)
-        first = max(abs(self.k), abs(self.m))
-        j, skip = np.arange(first, self.j[-1] + 1), int(self.j[0]) - first
+        first, j = max(abs(self.k), abs(self.m)), self.j
+        skip = int(j[0]) - first
+        bands = _cosines(contraction.rank, first, int(j[-1]), self.k, self.m)
         if contraction.rank == 1:
-            return [size * band[skip:] for band in cosine_bands(j, self.k, self.m)]
-        d, one, two = (band[skip:] for band in cosine_squared_bands(j, self.k, self.m))
+            return [size * band[skip:] for band in bands]
+        d, one, two = (band[skip:] for band in bands)
         main = contraction.scalar + size * (d[:: self.step] - 1 / 3)
         return [main, size * two[::2]] if self.step == 2 else [main, size * one, size * two]
 
@@ -204,11 +205,17 @@ class AxialBlock(FieldBlock):
         """The contraction over the states (n, n), real; that of a vector connects nothing where J even and odd are apart."""
         if self.step == 2 and contraction.rank == 1:
             return np.zeros((len(self), len(self)))
-        out = np.zeros((len(self), len(self)))
+        size = len(self)
+        out = np.zeros(size * size)
         for n, band in enumerate(self.bands(contraction)):
-            place = np.arange(len(self) - n)
-            out[place, place + n] = out[place + n, place] = band
-        return out
+            out[n : size * (size - n) : size + 1] = out[n * size :: size + 1] = band
+        return out.reshape(size, size)
+
+
+@lru_cache(maxsize=4096)
+def _cosines(power: int, first: int, last: int, k: int, m: int) -> tuple[Floats, ...]:
+    """Bands of cosθ (power 1) or cos²θ (2) over J = first ... last."""
+    return (cosine_bands if power == 1 else cosine_squared_bands)(np.arange(first, last + 1), k, m)
 
 
 class FieldSpace(ABC):

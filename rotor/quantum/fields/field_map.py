@@ -11,8 +11,7 @@ swap where two neighbours come closer than a stated gap (`rotor.quantum.fields.d
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import partial
@@ -22,16 +21,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.fields.blocks import FieldBlock, FieldSpace
+from rotor.quantum.fields.block_states import BlockStates, block_states, count_of, enough_states, free_order, states_of
+from rotor.quantum.fields.blocks import FieldBlock
+from rotor.quantum.fields.map_request import BlockProblem, MapRequest, over
 from rotor.quantum.fields.solver import (
     DENSE,
     SPANNED,
-    Matrix,
     Terms,
     at_fields,
     derivatives,
     expectation,
-    solve_fields,
+    solve_together,
     spanning,
 )
 from rotor.table import Table
@@ -39,26 +39,9 @@ from rotor.table import Table
 Of = TypeVar("Of")
 
 EDGE = 2  # the highest values of J whose population is leakage
-FIRST_BASIS = 64
+MOST_AT_EDGE = 1e-6  # of that population: cosines are wrong by about as much
 HIGHEST_J = 300
 STEP_J = 6
-
-
-class BlockProblem(NamedTuple):
-    """Matrices over a block, all (n, n), of H(x) = fixed + x slope + x² curvature; curvature None where nothing is quadratic.
-
-    fixed: MHz. slope: MHz per unit of field. observables: by name, made when called.
-    """
-
-    fixed: Matrix
-    slope: Matrix
-    observables: Mapping[str, Callable[[], Matrix]]
-    curvature: Matrix | None = None
-
-    def terms(self, states: Ints) -> Terms:
-        """The coefficients of H(x) as a polynomial in x, over some of the states."""
-        given = (self.fixed, self.slope) if self.curvature is None else (self.fixed, self.slope, self.curvature)
-        return tuple(one[np.ix_(states, states)] for one in given)
 
 
 @dataclass(frozen=True, repr=False)
@@ -69,7 +52,7 @@ class FieldMap(Table):
     energy_mhz: E/h. label: the free level of that rank. slope: -dE/dfield, in `slope_name`. cosines: expectation values by name.
     edge_population: of the two highest J. copies: states that coincide (M and -M). diabatic_label: or None. free_row, free_mhz,
     weight: of the level in the free top, the spin weight that of one state. jmax: of the basis. accuracy_mhz: by which energies still
-    moved when J max was raised.
+    moved when J max was raised, moved_mhz: that of each state, at the highest field.
     """
 
     field_name: str
@@ -89,6 +72,7 @@ class FieldMap(Table):
     weight: Floats
     jmax: int
     accuracy_mhz: float
+    moved_mhz: Floats
     diabatic_label: NDArray[np.str_] | None = None
 
     def __len__(self) -> int:
@@ -108,6 +92,7 @@ class FieldMap(Table):
             "block": self.block,
             "edge_population": self.edge_population,
             "copies": self.copies,
+            "accuracy_mhz": self.moved_mhz,
         }
         return out if self.diabatic_label is None else {**out, "diabatic_label": self.diabatic_label}
 
@@ -141,39 +126,6 @@ class FieldMap(Table):
         )
 
 
-@dataclass(frozen=True)
-class MapRequest:
-    """What a map is of.
-
-    space: makes the states up to a J max. problem: the matrices of a block. fields: rising. j_highest: free levels up to this J are
-    followed. m_values: |M|, or signed where `signed`. tolerance_mhz: of energies. diabatic_gap_mhz: None for no diabatic labels.
-    """
-
-    space: Callable[[int], FieldSpace]
-    problem: Callable[[FieldBlock], BlockProblem]
-    fields: Floats
-    j_highest: int
-    m_values: tuple[int, ...]
-    tolerance_mhz: float
-    field_name: str
-    slope_name: str
-    slope_unit_mhz: float
-    diabatic_gap_mhz: float | None = None
-
-
-class BlockStates(NamedTuple):
-    """The lowest states of one block: free rows (states,) that name them, energies (fields, states), vectors (fields, n, states).
-
-    places: (n,) of the functions of the block over which the vectors are.
-    """
-
-    block: FieldBlock
-    rows: Ints
-    energies: Floats
-    places: Ints
-    vectors: Matrix
-
-
 class _Solved(NamedTuple):
     """Of one block: energies, slopes -dE/dx in MHz, edge populations (fields, states), cosines by name, and the free rows (states,)."""
 
@@ -188,18 +140,56 @@ class _Solved(NamedTuple):
 def field_map(request: MapRequest, jmax: int | None = None, executor: Executor | None = None) -> FieldMap:
     """The map that a request asks for.
 
-    jmax: of the basis; by default it is raised until no energy at the highest field moves by more than the tolerance.
+    jmax: of the basis; by default it is raised until no energy at the highest field moves by more than the tolerance, and until no
+    state has more than 1e-6 of its population in the two highest J.
     executor: blocks are spread over it.
 
-    Raises ValueError where a given J max is too small for the tolerance, and where J of 300 would not be enough.
+    Raises ValueError where a given J max is too small for either, and where J of 300 would not be enough.
     """
-    enough, moved = converged_jmax(request, jmax, executor)
-    return _tabulated(request, enough, moved, executor)
+    tried = jmax
+    while True:
+        enough, moved = converged_jmax(request, tried, executor, given=jmax is not None)
+        found = _tabulated(request, enough, moved, executor)
+        leaked = float(found.edge_population.max(initial=0.0))
+        if leaked <= MOST_AT_EDGE:
+            return found
+        if jmax is not None:
+            raise ValueError(
+                f"J max {jmax} is too small: a state has {leaked:.2g} of its population in the two highest J, more than "
+                f"{MOST_AT_EDGE:g}; give a higher J max, or none and it is chosen"
+            )
+        tried = enough + max(STEP_J, enough // 4)
 
 
-def converged_jmax(request: MapRequest, jmax: int | None = None, executor: Executor | None = None) -> tuple[int, float]:
-    """J max of the basis of a map, and by how many MHz energies at the highest field move with a higher one; as `field_map`."""
-    given = jmax is not None
+def converged_jmax(
+    request: MapRequest, jmax: int | None = None, executor: Executor | None = None, given: bool | None = None
+) -> tuple[int, Floats]:
+    """J max of the basis of a map, and by how many MHz each energy at the highest field moves with a higher one.
+
+    Parameters
+    ----------
+    request : MapRequest
+        What is solved.
+    jmax : int, optional
+        Where to begin; by default the lowest that can serve.
+    executor : Executor, optional
+        Blocks are spread over it.
+    given : bool, optional
+        Whether no other J max may be taken; by default where one is given.
+
+    Returns
+    -------
+    jmax : int
+        That is enough.
+    moved : (states,) array
+        Of the states that come from levels up to the J asked for, in the order of the map.
+
+    Raises
+    ------
+    ValueError
+        As `field_map`.
+    """
+    given = jmax is not None if given is None else given
     jmax = jmax if jmax is not None else _first_jmax(request)
     if jmax < request.j_highest + EDGE:
         raise ValueError(
@@ -210,12 +200,13 @@ def converged_jmax(request: MapRequest, jmax: int | None = None, executor: Execu
     while True:
         more = jmax + max(STEP_J, jmax // 4)
         after = _energies_at(request, more, ends, executor)
-        moved = float(np.abs(after - before).max(initial=0.0))
-        if moved <= request.tolerance_mhz:
+        moved = np.abs(after - before)
+        worst = float(moved.max(initial=0.0))
+        if worst <= request.tolerance_mhz:
             return jmax, moved
         if given:
             raise ValueError(
-                f"J max {jmax} is too small: with {more} energies at the highest field move by {moved:.3g} MHz, more than "
+                f"J max {jmax} is too small: with {more} energies at the highest field move by {worst:.3g} MHz, more than "
                 f"{request.tolerance_mhz:g}; give a higher J max, or none and it is chosen"
             )
         jmax, before = more, after
@@ -272,82 +263,39 @@ def _energies_at(request: MapRequest, jmax: int, fields: Floats, executor: Execu
     )
 
 
-def free_order(block: FieldBlock) -> Ints:
-    """Places of the states of a block in order of their free energies, J deciding between equal ones."""
-    return np.lexsort((block.j, np.round(block.energies_mhz, 9)))
-
-
-def followed(block: FieldBlock, j_highest: int) -> int:
-    """How many of the lowest states of a block hold all free levels up to J = `j_highest`."""
-    order = free_order(block)
-    return int(np.flatnonzero(block.j[order] <= j_highest)[-1]) + 1
-
-
-def _count(request: MapRequest, block: FieldBlock) -> int:
-    """States to be solved: those followed, and where labels are diabatic as many above as they may cross."""
-    count = followed(block, request.j_highest)
-    return count if request.diabatic_gap_mhz is None else min(len(block), count + count // 2 + 4)
-
-
-def block_states(request: MapRequest, block: FieldBlock, fields: Floats, with_vectors: bool = True) -> BlockStates:
-    """The states of a block that a map follows, at several fields.
-
-    Parameters
-    ----------
-    request : MapRequest
-        What is solved.
-    block : FieldBlock
-        One of its blocks.
-    fields : (f,) array
-        In the unit of the request.
-    with_vectors : bool, optional
-        False leaves the eigenvectors out where energies can be found without them.
-
-    Returns
-    -------
-    BlockStates
-        Energies (f, states) in MHz, and the states that they belong to.
-    """
-    return _states_of(request, block, request.problem(block), fields, with_vectors)
-
-
-def _states_of(
-    request: MapRequest, block: FieldBlock, problem: BlockProblem, fields: Floats, with_vectors: bool
-) -> BlockStates:
-    count, order = _count(request, block), free_order(block)
-    places = _enough(problem, order, count, fields, request.tolerance_mhz)
-    energies, vectors = solve_fields(problem.terms(places), fields, count, with_vectors, request.tolerance_mhz)
-    return BlockStates(block, block.rows[order[:count]], energies, places, vectors)
-
-
 def _solve_block(request: MapRequest, block: FieldBlock) -> _Solved:
-    problem, fields = request.problem(block), request.fields
-    found = _states_of(request, block, problem, fields, True)
-    vectors, inside = found.vectors, np.ix_(found.places, found.places)
+    problem = request.problem(block)
+    return _measured(request, block, problem, states_of(request, block, problem, request.fields, True))
+
+
+def _solve_blocks(request: MapRequest, blocks: Sequence[FieldBlock]) -> list[_Solved]:
+    """All blocks in this process, in one go where they are chains."""
+    parts = []
+    for block in blocks:
+        problem, count, order = request.problem(block), count_of(request, block), free_order(block)
+        places = enough_states(problem, order, count, request.fields, request.tolerance_mhz)
+        parts.append((block, problem, block.rows[order[:count]], places, (problem.terms(places), count)))
+    found = solve_together([part[-1] for part in parts], request.fields, request.tolerance_mhz)
+    return [
+        _measured(request, block, problem, BlockStates(block, rows, energies, places, vectors))
+        for (block, problem, rows, places, _), (energies, vectors) in zip(parts, found, strict=True)
+    ]
+
+
+def _measured(request: MapRequest, block: FieldBlock, problem: BlockProblem, found: BlockStates) -> _Solved:
+    """Slopes, cosines and leakage of the states of a block."""
+    fields, vectors = request.fields, found.vectors
     slopes = -derivatives(problem.terms(found.places), fields, vectors)
-    cosines = {name: expectation(made()[inside], vectors) for name, made in problem.observables.items()}
+    cosines = {name: expectation(over(made(), found.places), vectors) for name, made in problem.observables.items()}
     edge = (np.abs(vectors[:, block.j[found.places] > block.levels.j.max() - EDGE]) ** 2).sum(axis=1)
     return _Solved(found.energies, slopes, edge, cosines, found.rows, block)
 
 
-def _enough(problem: BlockProblem, order: Ints, count: int, fields: Floats, tolerance_mhz: float) -> Ints:
-    """Of the free states the lowest that are enough at the strongest field, found by doubling; in the order of the block."""
-    size = max(FIRST_BASIS, 2 * count)
-    if len(order) <= max(size, 2 * DENSE):
-        return np.arange(len(order))
-    strongest = fields[np.argmax(np.abs(fields))][None]
-    before = None
-    while size < len(order):
-        basis = np.sort(order[:size])
-        energies = solve_fields(problem.terms(basis), strongest, count, False)[0]
-        if before is not None and np.abs(energies - before).max() <= 0.1 * tolerance_mhz:
-            return basis
-        before, size = energies, int(1.4 * size) + 1
-    return np.arange(len(order))
-
-
-def _tabulated(request: MapRequest, jmax: int, moved: float, executor: Executor | None) -> FieldMap:
-    solved = each_block(request, jmax, partial(_solve_block, request), executor)
+def _tabulated(request: MapRequest, jmax: int, moved: Floats, executor: Executor | None) -> FieldMap:
+    if executor is None:
+        solved = _solve_blocks(request, _blocks(request, jmax))
+    else:
+        solved = each_block(request, jmax, partial(_solve_block, request), executor)
     fields, rows = request.fields, []
     named = [None if request.diabatic_gap_mhz is None else _diabatic_ranks(request, one) for one in solved]
     for one, names in zip(solved, named, strict=True):
@@ -355,30 +303,42 @@ def _tabulated(request: MapRequest, jmax: int, moved: float, executor: Executor 
         listed = ours if names is None else ours | ours[names].any(axis=0)
         rows += [(one, rank) for rank in np.flatnonzero(listed).tolist()]
 
-    def column(pick: Callable[[_Solved, int], Any]) -> NDArray[Any]:
-        return np.concatenate([np.broadcast_to(pick(one, rank), len(fields)) for one, rank in rows])
+    def column(pick: Callable[[_Solved, int], Floats]) -> Floats:
+        return np.concatenate([pick(one, rank) for one, rank in rows])
+
+    def repeated(pick: Callable[[_Solved, int], Any]) -> NDArray[Any]:
+        return np.repeat([pick(one, rank) for one, rank in rows], len(fields))
 
     cosines = list(solved[0].cosines) if solved else []
     return FieldMap(
         field_name=request.field_name,
         slope_name=request.slope_name,
         field=np.tile(fields, len(rows)),
-        m=column(lambda one, rank: one.block.m),
-        block=column(lambda one, rank: np.array(one.block.label)),
-        rank=column(lambda one, rank: rank),
+        m=repeated(lambda one, rank: one.block.m),
+        block=repeated(lambda one, rank: one.block.label),
+        rank=repeated(lambda one, rank: rank),
         energy_mhz=column(lambda one, rank: one.energies[:, rank]),
-        label=column(lambda one, rank: np.array(one.block.levels.label(int(one.rows[rank])))),
-        slope=column(lambda one, rank: one.slopes[:, rank] / request.slope_unit_mhz),
+        label=repeated(lambda one, rank: one.block.levels.label(int(one.rows[rank]))),
+        slope=column(lambda one, rank: one.slopes[:, rank]) / request.slope_unit_mhz,
         cosines={name: column(partial(_cosine, name)) for name in cosines},
         edge_population=column(lambda one, rank: one.edge[:, rank]),
-        copies=column(lambda one, rank: one.block.copies),
-        free_row=column(lambda one, rank: one.rows[rank]),
-        free_mhz=column(lambda one, rank: one.block.levels.energy_mhz[one.rows[rank]]),
-        weight=column(lambda one, rank: one.block.levels.weight[one.rows[rank]]),
+        copies=repeated(lambda one, rank: one.block.copies),
+        free_row=repeated(lambda one, rank: one.rows[rank]),
+        free_mhz=repeated(lambda one, rank: one.block.levels.energy_mhz[one.rows[rank]]),
+        weight=repeated(lambda one, rank: one.block.levels.weight[one.rows[rank]]),
         jmax=jmax,
-        accuracy_mhz=moved,
+        accuracy_mhz=float(moved.max(initial=0.0)),
+        moved_mhz=np.repeat(_accuracy(request, rows, moved), len(fields)),
         diabatic_label=_diabatic_labels(solved, named, rows),
     )
+
+
+def _accuracy(request: MapRequest, rows: list[tuple[_Solved, int]], moved: Floats) -> Floats:
+    """By how much the energy of each state moves with a higher J max; NaN for states listed for their diabatic label alone."""
+    asked = np.array([one.block.levels.j[one.rows[rank]] <= request.j_highest for one, rank in rows], dtype=bool)
+    out = np.full(len(rows), np.nan)
+    out[asked] = moved
+    return out
 
 
 def _cosine(name: str, one: _Solved, rank: int) -> Floats:
@@ -410,7 +370,7 @@ def _diabatic_labels(
 def _small(request: MapRequest, block: FieldBlock, count: int) -> Terms:
     """The Hamiltonian of a block in a basis for its lowest states at all fields."""
     problem = request.problem(block)
-    terms = problem.terms(_enough(problem, free_order(block), count, request.fields, request.tolerance_mhz))
+    terms = problem.terms(enough_states(problem, free_order(block), count, request.fields, request.tolerance_mhz))
     if len(terms[0]) <= DENSE:
         return terms
     fields = np.linspace(request.fields[0], request.fields[-1], SPANNED)
@@ -422,23 +382,3 @@ def _energies_and_slopes(terms: Terms, count: int, fields: Floats) -> tuple[Floa
     """Of the lowest states at fields (f,): energies and dE/dx (f, count)."""
     energies, vectors = np.linalg.eigh(at_fields(terms, fields))
     return energies[:, :count], derivatives(terms, fields, vectors[:, :, :count])
-
-
-def checked_fields(fields: Any, unit: str, highest: float) -> Floats:
-    """Fields (n,) that rise, finite and within ±`highest`; ValueError where they are not."""
-    values = np.unique(np.atleast_1d(np.asarray(fields, dtype=np.float64)))
-    if not len(values) or not np.isfinite(values).all():
-        raise ValueError(f"fields must be finite numbers of {unit}; got {np.asarray(fields).tolist()!r}")
-    if np.abs(values).max() > highest:
-        raise ValueError(
-            f"a field of {values[np.argmax(np.abs(values))]:g} {unit} is beyond {highest:g} {unit}, where no molecule holds together; "
-            "check the unit"
-        )
-    return values
-
-
-def checked_tolerance_mhz(tolerance_mhz: float) -> float:
-    """A tolerance of energies above zero, or ValueError."""
-    if not (math.isfinite(tolerance_mhz) and tolerance_mhz > 0):
-        raise ValueError(f"tolerance {tolerance_mhz} MHz: a finite number above 0 is expected")
-    return float(tolerance_mhz)

@@ -7,6 +7,7 @@ solved in full.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -73,14 +74,28 @@ def solve_fields(
     vectors : (f, n, count) array
         Eigenvectors in columns; without columns where they are left out.
     """
+    if with_vectors and len(fields) >= MANY_FIELDS and is_chain(terms):
+        found = chain_states([(terms, count)], fields)
+        if found is not None:
+            return found[0]
+    return _solve_matrices(terms, fields, count, with_vectors, tolerance_mhz)
+
+
+def solve_together(
+    blocks: Sequence[tuple[Terms, int]], fields: Floats, tolerance_mhz: float
+) -> list[tuple[Floats, Matrix]]:
+    """`solve_fields` of several blocks, each with its number of states; those that are chains are solved in one go."""
+    if len(fields) >= MANY_FIELDS and all(is_chain(terms) for terms, _ in blocks):
+        found = chain_states(blocks, fields)
+        if found is not None:
+            return list(found)
+    return [solve_fields(terms, fields, count, True, tolerance_mhz) for terms, count in blocks]
+
+
+def _solve_matrices(
+    terms: Terms, fields: Floats, count: int, with_vectors: bool, tolerance_mhz: float
+) -> tuple[Floats, Matrix]:
     size = len(terms[0])
-    if (
-        with_vectors
-        and len(fields) >= MANY_FIELDS
-        and is_chain(terms)
-        and (found := chain_states(terms, fields, count))
-    ):
-        return found
     if size <= DENSE:
         stack = at_fields(terms, fields)
         if not with_vectors:

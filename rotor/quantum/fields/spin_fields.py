@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from rotor.quantum.effect import QuantumEffect
     from rotor.tops.top import Top
 
+Z = (0.0, 0.0, 1.0)
 Tensors = dict[tuple[int, int], BodyTensor]
 Reduced = Callable[[SpinBlock, SpinBlock], NDArray[Any] | None]
 
@@ -310,7 +311,7 @@ def spin_field_space(
     ------
     ValueError
         For effects without spins, with several states, for fields at an angle, for a g of a nucleus that has no spin
-        here, and for a symmetric top in a magnetic field or with tensors that do not have its axis.
+        here, and for a symmetric top with tensors that do not have its axis.
     """
     scheme = scheme_of(top, tuple(effects))
     if not scheme.spins:
@@ -320,8 +321,9 @@ def spin_field_space(
     if not all(one.along_z for one in contractions):
         raise ValueError("a top with spins is solved in fields along Z alone; leave out the angle")
     axis = {"prolate": 0, "oblate": 2}.get(top.kind)
-    if axis is not None and (magnet is not None or not all(one.axial_about(axis) for one in contractions)):
-        raise ValueError("a symmetric top with spins is solved in an electric field, with tensors that have its axis")
+    acting = contractions if magnet is None else (*contractions, Contraction(magnet.g, np.outer(Z, Z)))
+    if axis is not None and not all(one.axial_about(axis) for one in acting):
+        raise ValueError("a symmetric top with spins is solved with tensors that have its axis")
     unknown = set(magnet.nuclei) - {spin.name for spin in scheme.spins} if magnet is not None else set()
     if unknown:
         raise ValueError(

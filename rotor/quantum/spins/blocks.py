@@ -13,7 +13,7 @@ first, and among the levels of one sub-block Ka rises with energy.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum.effect import QuantumEffect
-from rotor.quantum.spins.coupling import coefficients, n_dot_s, patterns, recoupling
+from rotor.quantum.spins.coupling import coefficients, n_dot_s, patterns, recoupling, stacks
 from rotor.quantum.spins.method import FIRST_ORDER, Used
 from rotor.quantum.spins.operators import AxialState
 from rotor.quantum.spins.rotor import (
@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from rotor.tops.top import Top
 
 
+_FEW = 100  # patterns of an F; of more the coefficients are made when they are needed
 _AT_A_TIME = 1000  # entries of a table of shares that are looked at together
 Exist = Callable[[Ints], NDArray[np.bool_]]
 
@@ -130,13 +131,24 @@ def plan_of(top: Top, effects: tuple[QuantumEffect, ...], nmin: int, nmax: int, 
     scheme, terms = scheme_of(top, effects), valued_terms(top, effects)
     blocks, representation = solved_rotor(top, effects, terms, nmin, nmax, executor)
     channels = channels_of(terms, scheme)
+    firsts = _alike(channels)
+    distinct = {first: channels[first] for first in firsts.values()}
     operators = {}
     reach = 0 if "n" in scheme.conserved else 2
     for i, k in _near(blocks, reach):
-        if found := operators_between(blocks[i], blocks[k], channels, representation):
-            operators[i, k] = found
+        if found := operators_between(blocks[i], blocks[k], distinct, representation):
+            operators[i, k] = {channel: found[first] for channel, first in firsts.items() if first in found}
     families = _families(len(blocks), operators, 2 if scheme.paired else 1)
     return Plan(Shared(scheme, representation), blocks, operators, families)
+
+
+def _alike(channels: Channels) -> dict[Channel, Channel]:
+    """Of each channel the first one with the same operators of N, such as that of an equivalent nucleus: they share their matrices."""
+    firsts: dict[Channel, Channel] = {}
+    for channel, pieces in channels.items():
+        alike = (other for other in firsts.values() if other.rank == channel.rank and channels[other] == pieces)
+        firsts[channel] = next(alike, channel)
+    return firsts
 
 
 def _near(blocks: list[RotorBlock], reach: int) -> Iterator[tuple[int, int]]:
@@ -205,14 +217,41 @@ def solve_f(plan: Plan, twice_f: int, exist: Exist | None = None) -> list[SpinBl
     where, first = np.unique(np.column_stack([every[:, 0] // 2, scheme.classes(every)]), axis=0, return_index=True)
     stops = [*first[1:].tolist(), len(every)]
     rows = {tuple(own): slice(a, b) for own, a, b in zip(where.tolist(), first.tolist(), stops, strict=True)}
-    acting = {channel for operators in plan.operators.values() for channel in operators}
-    known = {channel: coefficients_of(scheme, channel, every) for channel in acting}
+    known = plan.shared.cache.pop(("coupling", twice_f), None) or _couplings(plan, {twice_f: [every]})[twice_f]
     out = []
     for family in plan.families:
         members = [(i, rows[place]) for i, own in family if (place := (plan.blocks[i].n, own)) in rows]
         parts = _parts(plan, members)
-        if members and (exist is None or exist(_names(parts, every)[0]).any()):
-            out.append(_solved(plan, twice_f, every, parts, known))
+        if not members:
+            continue
+        names = names_of_parts(parts, every)
+        if exist is None or exist(names[0]).any():
+            out.append(_solved(plan, twice_f, every, parts, known, names))
+    return out
+
+
+def prepare(plan: Plan, every_f: Iterable[int]) -> None:
+    """Coefficients of all channels for many F at once; those of patterns with a total spin are made F by F."""
+    scheme = plan.shared.scheme
+    if scheme.paired:
+        return
+    tables = {f: [scheme.patterns(f)] for f in every_f}
+    plan.shared.cache["patterns"] = {f: own for f, (own,) in tables.items()}
+    if max(map(len, plan.shared.cache["patterns"].values()), default=0) <= _FEW:
+        found = _couplings(plan, tables)
+        plan.shared.cache.update({("coupling", f): own for f, own in found.items()})
+
+
+def _couplings(plan: Plan, tables: dict[int, list[Ints]]) -> dict[int, dict[Channel, Floats]]:
+    """c(p', p) of all channels by F."""
+    acting = {channel for operators in plan.operators.values() for channel in operators}
+    out: dict[int, dict[Channel, Floats]] = {f: {} for f in tables}
+    if plan.shared.scheme.paired:
+        return {f: {c: coefficients_of(plan.shared.scheme, c, own) for c in acting} for f, (own,) in tables.items()}
+    for every, (stack,) in stacks(tables):
+        for channel in acting:
+            for f, found in zip(every, coefficients_of(plan.shared.scheme, channel, stack), strict=True):
+                out[f][channel] = found
     return out
 
 
@@ -227,24 +266,38 @@ def _parts(plan: Plan, members: list[tuple[int, slice]]) -> tuple[SpinPart, ...]
 
 
 def _solved(
-    plan: Plan, twice_f: int, every: Ints, parts: tuple[SpinPart, ...], known: dict[Channel, Floats]
+    plan: Plan,
+    twice_f: int,
+    every: Ints,
+    parts: tuple[SpinPart, ...],
+    known: dict[Channel, Floats],
+    names: tuple[Ints, Ints],
 ) -> SpinBlock:
     if plan.shared.used is not None and plan.shared.used.method == FIRST_ORDER and len(parts) == 1:
         energies, vectors = _state_by_state(plan, parts[0], known)
-        labels, mixing = labels_of(parts, every, vectors)
+        labels, mixing = labels_of(parts, names, vectors)
         return SpinBlock(twice_f, every, parts, energies, vectors, labels, mixing, plan.shared)
     zero = float(parts[0].rotor.energies_mhz[0])  # taken out of the matrix for the sake of digits
     diagonal = [np.tile(part.rotor.energies_mhz - zero, part.repeats) for part in parts]
     matrix = np.diag(np.concatenate(diagonal))
     for a, up in enumerate(parts):
         for low in parts[: a + 1]:
-            for channel, operator in plan.operators.get((up.number, low.number), {}).items():
-                matrix[up.place, low.place] += product(known[channel][up.patterns, low.patterns], operator)
+            for operator, of_it in _by_operator(plan.operators.get((up.number, low.number), {})):
+                factors = sum(known[channel][up.patterns, low.patterns] for channel in of_it)
+                matrix[up.place, low.place] += product(np.asarray(factors), operator)
     if not np.isfinite(matrix).all():
         raise ValueError("a block of the Hamiltonian overflows: N max is too high for these constants")
     energies, vectors = np.linalg.eigh(matrix)  # reads the lower triangle
-    labels, mixing = labels_of(parts, every, vectors)
+    labels, mixing = labels_of(parts, names, vectors)
     return SpinBlock(twice_f, every, parts, energies + zero, vectors, labels, mixing, plan.shared)
+
+
+def _by_operator(operators: dict[Channel, Floats]) -> list[tuple[Floats, list[Channel]]]:
+    """Each matrix once, with the channels that share it."""
+    found: dict[int, tuple[Floats, list[Channel]]] = {}
+    for channel, operator in operators.items():
+        found.setdefault(id(operator), (operator, []))[1].append(channel)
+    return list(found.values())
 
 
 def _state_by_state(plan: Plan, part: SpinPart, known: dict[Channel, Floats]) -> tuple[Floats, Floats]:
@@ -269,15 +322,15 @@ def product(left: Floats, right: Floats) -> Floats:
 
 
 def coefficients_of(scheme: Scheme, channel: Channel, every: Ints) -> Floats:
-    """c(p', p) of a channel between all patterns of an F, with its powers of N·S."""
+    """c(p', p) of a channel between all patterns of an F, with its powers of N·S; every: (..., n, columns)."""
     found = _of_exchange(scheme, channel, every) if scheme.paired else _one_by_one(scheme, channel, every)
     for column in scheme.conserved_columns:
-        found = np.where(every[:, None, column] == every[None, :, column], found, 0.0)
+        found = np.where(every[..., :, None, column] == every[..., None, :, column], found, 0.0)
     if not channel.ns:
         return found
-    n = every[:, 0] / 2.0
+    n = every[..., 0] / 2.0
     of_each = (n * (n + 1)) ** channel.n2 * n_dot_s(every, scheme.twice[0]) ** channel.ns
-    return np.asarray(found * (of_each[:, None] + of_each) / 2)
+    return np.asarray(found * (of_each[..., :, None] + of_each[..., None, :]) / 2)
 
 
 def _one_by_one(scheme: Scheme, channel: Channel, every: Ints) -> Floats:
@@ -296,9 +349,9 @@ def _of_exchange(scheme: Scheme, channel: Channel, every: Ints) -> Floats:
     return np.asarray(turn.T @ found @ turn)
 
 
-def labels_of(parts: tuple[SpinPart, ...], every: Ints, vectors: Floats) -> tuple[Ints, Floats]:
+def labels_of(parts: tuple[SpinPart, ...], named: tuple[Ints, Ints], vectors: Floats) -> tuple[Ints, Floats]:
     """Names (n, 3 + pattern) of the states of a block, energies rising, and the shares of the sub-blocks that give them."""
-    names, sizes = _names(parts, every)
+    names, sizes = named
     shares: list[Floats] = []
     for part in parts:
         states = len(part.rotor.energies_mhz)
@@ -315,7 +368,7 @@ def labels_of(parts: tuple[SpinPart, ...], every: Ints, vectors: Floats) -> tupl
     return labels, np.asarray(table[of_state, np.arange(len(of_state))])
 
 
-def _names(parts: tuple[SpinPart, ...], every: Ints) -> tuple[Ints, Ints]:
+def names_of_parts(parts: tuple[SpinPart, ...], every: Ints) -> tuple[Ints, Ints]:
     """v, Ka, Kc and the pattern of the levels that the sub-blocks name, (functions, 3 + pattern), and how many each names."""
     found, sizes = [], []
     for part in parts:
@@ -339,6 +392,16 @@ def assigned(shares: Floats, capacity: Ints) -> Ints:
     found = shares.argmax(axis=0)
     if (np.bincount(found, minlength=len(capacity)) == capacity).all():
         return np.asarray(found)
+    clear = shares[found, np.arange(len(found))] > 0.5  # before all others; where they fit in, they are decided
+    left = capacity - np.bincount(found[clear], minlength=len(capacity))
+    if (left < 0).any():
+        return _largest_first(shares, capacity)
+    rest, subs = np.flatnonzero(~clear), np.flatnonzero(left > 0)
+    found[rest] = subs[_largest_first(shares[np.ix_(subs, rest)], left[subs])]
+    return np.asarray(found)
+
+
+def _largest_first(shares: Floats, capacity: Ints) -> Ints:
     found, left = np.full(shares.shape[1], -1), capacity.copy()
     every = np.argsort(-shares, axis=None, kind="stable")
     for start in range(0, len(every), _AT_A_TIME):

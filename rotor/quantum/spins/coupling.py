@@ -13,6 +13,7 @@ Two equivalent spins, the last ones, may be coupled to a total first, I_a + I_b 
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping, Sequence
 from math import sqrt
 
 import numpy as np
@@ -121,17 +122,17 @@ def coefficients(spins: tuple[int, ...], acting: tuple[int, ...], rank: int, bra
     acting : places of the spins in the operator, from 0: (i,) the vector of one spin (K = 1), (i, i) its quadrupole (K = 2),
         (i, j) the product of two, coupled to K = 0 (S_i · S_j) or 2; () none
     rank : K of the operator of N. One of rank 0 is given as a plain matrix, not as a reduced one.
-    bra, ket : patterns (n, 1 + spins), doubled
+    bra, ket : patterns (..., n, 1 + spins), doubled
 
     Returns
     -------
-    (n, m). T² · [S_i x S_j]² is -√(5/3) [T² x S_i]¹ · S_j, by the recoupling of three tensors to a scalar.
+    (..., n, m). T² · [S_i x S_j]² is -√(5/3) [T² x S_i]¹ · S_j, by the recoupling of three tensors to a scalar.
     """
-    left, right = bra[:, None, :], ket[None, :, :]
+    left, right = bra[..., :, None, :], ket[..., None, :, :]
     if not acting:
         return np.asarray((left == right).all(axis=-1).astype(float))
     first, last = min(acting), max(acting)
-    total = np.sqrt(left[..., 0] + 1.0) if rank == 0 else np.ones((len(bra), len(ket)))
+    total = np.sqrt(left[..., 0] + 1.0) if rank == 0 else np.ones(1)
     carried = rank
     for place, spin in enumerate(spins):
         pair = left[..., place : place + 2], right[..., place : place + 2]
@@ -159,18 +160,19 @@ def tensor_coefficients(spins: tuple[int, ...], rank: int, bra: Ints, ket: Ints)
         The spins in the order in which they are coupled, doubled.
     rank : int
         K of the tensor.
-    bra, ket : (patterns, columns) arrays of int
+    bra, ket : (..., patterns, columns) arrays of int
         Coupling patterns N, J1, ... F of both sides, doubled.
 
     Returns
     -------
-    (bra patterns, ket patterns) array
+    (..., bra patterns, ket patterns) array
         Pure numbers: the product over the chain of A. R. Edmonds (1957), eq. (7.1.7).
     """
-    total = np.ones((len(bra), len(ket)))
+    left, right = bra[..., :, None, :], ket[..., None, :, :]
+    total = np.ones(1)
     for place, spin in enumerate(spins):
-        total = total * _passed_on(bra[:, None, place : place + 2], ket[None, :, place : place + 2], spin, rank)
-    return total
+        total = total * _passed_on(left[..., place : place + 2], right[..., place : place + 2], spin, rank)
+    return np.asarray(total)
 
 
 def moment_coefficients(spins: tuple[int, ...], rank: int, acting: int | None, bra: Ints, ket: Ints) -> Floats:
@@ -210,7 +212,22 @@ def moment_coefficients(spins: tuple[int, ...], rank: int, acting: int | None, b
     return np.asarray(total)
 
 
+_AT_ONCE = 200_000  # elements of a stack: the arrays on the way stay in the cache of the processor
+
+
+def stacks(tables: Mapping[int, Sequence[Ints]]) -> Iterator[tuple[list[int], list[Ints]]]:
+    """Tables of patterns by F, gathered where they have the same shapes: the F, and each of the tables as one array (F, n, columns)."""
+    groups: dict[tuple[int, ...], list[int]] = {}
+    for f, own in tables.items():
+        groups.setdefault(tuple(len(table) for table in own), []).append(f)
+    for sizes, every in groups.items():
+        step = max(1, _AT_ONCE // (max(sizes) ** 2 + 1))
+        for start in range(0, len(every), step):
+            some = every[start : start + step]
+            yield some, [np.stack([tables[f][place] for f in some]) for place in range(len(sizes))]
+
+
 def n_dot_s(pattern: Ints, spin: int) -> Floats:
-    """N·S of the first spin, (n,): ½[J(J+1) - N(N+1) - S(S+1)]."""
-    n, j = pattern[:, 0], pattern[:, 1]
+    """N·S of the first spin, (...,): ½[J(J+1) - N(N+1) - S(S+1)]."""
+    n, j = pattern[..., 0], pattern[..., 1]
     return np.asarray((j * (j + 2) - n * (n + 2) - spin * (spin + 2)) / 8)

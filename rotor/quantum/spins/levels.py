@@ -11,7 +11,7 @@ import numpy as np
 from rotor.arrays import Ints
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.levels import Levels, weights_of_levels
-from rotor.quantum.spins.blocks import Exist, Shared, SpinBlock, plan_of, solve_f
+from rotor.quantum.spins.blocks import Exist, Shared, SpinBlock, plan_of, prepare, solve_f
 from rotor.quantum.spins.operators import AxialState
 from rotor.quantum.spins.scheme import scheme_of
 from rotor.quantum.spins.simplify import simplified
@@ -85,6 +85,7 @@ def levels_of_f(
     lowest = min(max(0, (f - total) // 2) for f in every_f)
     highest = max((f + total) // 2 for f in every_f)
     plan = simplified(plan_of(top, effects, lowest, highest, executor), effects, every_f)
+    prepare(plan, every_f)
     solved = [block for f in every_f for block in solve_f(plan, f, exist)]
     if n_range:
         solved = [_within(block, n_range) for block in solved]

@@ -19,7 +19,7 @@ from rotor.quantum.basis import WangBlock
 from rotor.quantum.j_operators import JOperator, between_blocks
 from rotor.quantum.levels import Levels
 from rotor.quantum.spins.blocks import Shared, SpinBlock, SpinPart, coefficients_of, operators_between, product
-from rotor.quantum.spins.coupling import patterns, recoupling, tensor_coefficients
+from rotor.quantum.spins.coupling import patterns, recoupling, stacks, tensor_coefficients
 from rotor.quantum.spins.operators import AxialState, Scalar, tensor_elements
 from rotor.quantum.spins.rotor import Channel, RotorBlock, channels_of
 from rotor.quantum.spins.scheme import Scheme
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from rotor.quantum.effect import QuantumEffect
     from rotor.tops.top import Top
 
+_FEW = 10_000  # elements between two F; where there are more, they are made when they are needed
 ROUND_OFF = 1e-13  # of sums of products of a few coefficients of size 1
 
 
@@ -79,10 +80,13 @@ def _parts_between(
     up: SpinBlock, low: SpinBlock, tensors: Tensors, rank: int, known: dict[tuple[int, int], Floats | None]
 ) -> Iterator[tuple[SpinPart, SpinPart, Floats]]:
     t = _coefficients(up, low, rank) if low.shared.scheme.paired else None
+    by_n: dict[int, list[SpinPart]] = {}
+    for source in low.parts:
+        by_n.setdefault(source.rotor.n, []).append(source)
     for target in up.parts:
         n, number = target.rotor.n, target.number
-        for source in low.parts:
-            if abs(n - source.rotor.n) > rank or (t is not None and not t[target.patterns, source.patterns].any()):
+        for source in (part for near in range(n - rank, n + rank + 1) for part in by_n.get(near, ())):
+            if t is not None and not t[target.patterns, source.patterns].any():
                 continue
             key = (number, source.number)
             element = (
@@ -113,9 +117,23 @@ def _coefficients(up: SpinBlock, low: SpinBlock, rank: int) -> Floats:
     """t(p', p) between all patterns of two F."""
     shared, key = low.shared, ("tensor", rank, up.twice_f, low.twice_f)
     if key not in shared.cache:
-        shared.cache[key] = _tensor_coefficients(shared.scheme, rank, up.patterns, low.patterns)
+        shared.cache.update(_of_alike(shared, rank, up, low))
     found: Floats = shared.cache[key]
     return found
+
+
+def _of_alike(shared: Shared, rank: int, up: SpinBlock, low: SpinBlock) -> dict[tuple[str, int, int, int], Floats]:
+    """t(p', p) between these F and, where patterns are few, between all others of the same distance."""
+    if shared.scheme.paired or "patterns" not in shared.cache or len(up.patterns) * len(low.patterns) > _FEW:
+        only = _tensor_coefficients(shared.scheme, rank, up.patterns, low.patterns)
+        return {("tensor", rank, up.twice_f, low.twice_f): only}
+    every, step = shared.cache["patterns"], up.twice_f - low.twice_f
+    tables = {f: [every[f + step], own] for f, own in every.items() if f + step in every}
+    out: dict[tuple[str, int, int, int], Floats] = {}
+    for some, (bra, ket) in stacks(tables):
+        found = tensor_coefficients(shared.scheme.twice, rank, bra, ket)
+        out |= {("tensor", rank, f + step, f): own for f, own in zip(some, found, strict=True)}
+    return out
 
 
 def _tensor_coefficients(scheme: Scheme, rank: int, bra: Ints, ket: Ints) -> Floats:

@@ -24,7 +24,8 @@ from numpy.typing import ArrayLike, NDArray
 from rotor.arrays import Floats, Ints
 from rotor.checks import require_one_of, require_positive
 from rotor.quantum.effects.stark import map_request
-from rotor.quantum.fields.field_map import BlockStates, block_states, converged_jmax, each_block
+from rotor.quantum.fields.block_states import BlockStates, block_states
+from rotor.quantum.fields.field_map import converged_jmax, each_block
 from rotor.quantum.fields.transitions import BlockPair, dipole_elements, pairs_of_blocks
 from rotor.spectra.intensity import INTENSITY_NM2_MHZ
 from rotor.table import Table
@@ -196,7 +197,7 @@ def field_lines(
         populations=populations,
         field_kv_per_cm=np.tile(request.fields, len(columns["upper"]) // len(request.fields)),
         jmax=jmax,
-        accuracy_mhz=2 * moved,
+        accuracy_mhz=2 * float(moved.max(initial=0.0)),
         q=found.q,
         **columns,
     )

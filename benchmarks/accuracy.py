@@ -1,0 +1,124 @@
+"""Work-precision pictures of the whole package: measured, drawn, and written as docs/accuracy.md.
+
+    python benchmarks/accuracy.py [--shared FOLDER] [--only SUBJECT ...] [--page]
+
+All subjects need about three minutes of one core; --only measures some of them and leaves the figures of the others as they are in
+benchmarks/results/accuracy.json. --page measures nothing and writes pictures and page from that file. --shared: the folder of
+reference files, for the orders of distortion, whose figures stay as they are without it. Times are those of the processor, without
+start-up and compilation.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from dataclasses import asdict
+from pathlib import Path
+
+from accuracy_subjects import SUBJECTS, Subject
+
+from rotor.plots.work_precision import Panel, Point, plot_work_precision
+
+ROOT = Path(__file__).resolve().parents[1]
+RESULTS = ROOT / "benchmarks" / "results" / "accuracy.json"
+PAGE, PICTURES = ROOT / "docs" / "accuracy.md", ROOT / "docs" / "pictures"
+
+HEAD = """# Accuracy and what it costs
+
+Made by `python benchmarks/accuracy.py`, from the functions behind [`rotor accuracy`](command_line.md#rotor-accuracy), which does the
+same for a scene of yours. Every picture shows error against processor time, without start-up and compilation; a setting stands
+beside its point, the usual one has a ring, and an open point shows no difference from the reference. Errors are numerical: the
+constants are taken as given, except where measured lines are named. Times are of one core of a shared machine: their ratios
+inside one picture mean something, no more.
+
+| subject | what to choose |
+|---|---|
+"""
+
+
+def page(results: dict[str, list[Panel]]) -> str:
+    """The whole page."""
+    rows = "".join(
+        f"| [{one.title}](#{anchor(one.title)}) | {one.choose} |\n" for one in SUBJECTS if one.name in results
+    )
+    return HEAD + rows + "".join(section(one, results[one.name]) for one in SUBJECTS if one.name in results)
+
+
+def anchor(title: str) -> str:
+    """What a heading is linked by.
+
+    >>> anchor("Q(T)"), anchor("Hyperfine structure: exact or not")
+    ('qt', 'hyperfine-structure-exact-or-not')
+    """
+    return "".join(c for c in title.lower().replace(" ", "-") if c.isalnum() or c == "-")
+
+
+def section(subject: Subject, panels: list[Panel]) -> str:
+    """Picture, sentence and table of the errors of one subject."""
+    head = f"\n## {subject.title}\n\n{subject.what}\n\n![{subject.title}](pictures/accuracy_{subject.name}.png)\n\n**{subject.choose}**\n"
+    return head + "".join(table(panel) for panel in panels)
+
+
+def table(panel: Panel) -> str:
+    """The errors of a panel, a row a curve."""
+    rows = [
+        f"| {name} | "
+        + ", ".join(f"{one.setting}: {one.error:.1e}" if one.setting else f"{one.error:.1e}" for one in points)
+        + " |"
+        for name, points in panel.curves.items()
+    ]
+    return f"\n| {panel.title} | error of {panel.of} |\n|---|---|\n" + "\n".join(rows) + "\n"
+
+
+def read_results() -> dict[str, list[Panel]]:
+    """The figures of the last measurements."""
+    if not RESULTS.exists():
+        return {}
+    content = json.loads(RESULTS.read_text(encoding="utf-8"))
+    return {name: [panel_of(one) for one in panels] for name, panels in content.items()}
+
+
+def panel_of(record: dict) -> Panel:
+    """A panel from its record."""
+    curves = {name: [Point(**point) for point in points] for name, points in record["curves"].items()}
+    return Panel(record["title"], record["of"], curves)
+
+
+def write(results: dict[str, list[Panel]]) -> None:
+    """Figures, pictures and page."""
+    ordered = {one.name: results[one.name] for one in SUBJECTS if one.name in results}
+    content = {name: [asdict(panel) for panel in panels] for name, panels in ordered.items()}
+    RESULTS.write_text(json.dumps(content, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    for subject in SUBJECTS:
+        if subject.name in results:
+            picture = PICTURES / f"accuracy_{subject.name}.png"
+            plot_work_precision(
+                results[subject.name], picture, title=subject.title, facts={"made by": "benchmarks/accuracy.py"}
+            )
+    PAGE.write_text(page(results), encoding="utf-8", newline="\n")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--shared", type=Path)
+    parser.add_argument("--only", nargs="*", choices=[one.name for one in SUBJECTS])
+    parser.add_argument("--page", action="store_true")
+    given = parser.parse_args()
+    results = read_results()
+    for subject in SUBJECTS:
+        if (
+            given.page
+            or (given.only and subject.name not in given.only)
+            or (subject.name == "orders" and given.shared is None)
+        ):
+            continue
+        start = time.perf_counter()
+        results[subject.name] = subject.panels(given.shared)
+        print(f"{subject.name}: {time.perf_counter() - start:.0f} s")
+        write(results)
+    write(results)
+
+
+if __name__ == "__main__":
+    main()

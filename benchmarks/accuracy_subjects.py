@@ -1,0 +1,386 @@
+"""The subjects of docs/accuracy.md: what is swept for each, mostly by the functions behind `rotor accuracy`, and what to choose."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from rotor.plots.work_precision import Panel, Point
+from rotor.scenes.accuracy_panels import points_of
+from rotor.scenes.accuracy_sweep import knobs_of, sweep, timed
+from rotor.scenes.knobs.knob import Knob, Measure, ladder
+from rotor.scenes.scene import (
+    FluidScene,
+    GasScene,
+    LevelsScene,
+    Scene,
+    SpectrumScene,
+    StarkScene,
+    ThermoScene,
+)
+from rotor.scenes.scene_file import read_scene
+from rotor.scenes.sections import (
+    FluidConditions,
+    FluidNumerics,
+    GasNumerics,
+    GasObservables,
+    LevelsObservables,
+    MoleculeSection,
+    SpectrumConditions,
+    SpectrumObservables,
+    StarkConditions,
+    ThermoConditions,
+)
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+
+SCENES = Path(__file__).resolve().parents[1] / "examples" / "scenes"
+LIMIT_SECONDS = 60.0  # of one knob
+INDOLE = MoleculeSection(constants="A=3877.826 B=1636.047 C=1150.8997 MHz", dipole_abc=[1.376, 1.40, 0.0])
+
+
+@dataclass(frozen=True)
+class Subject:
+    """One picture. name: of its file. choose: the sentence that tells a user what to choose. panels: what is drawn; made when called,
+    with the folder of reference files or None."""
+
+    name: str
+    title: str
+    what: str
+    choose: str
+    panels: Callable[[Path | None], list[Panel]]
+
+
+def curve(scene: Scene, knob: str, error_of: str | None = None) -> list[Point]:
+    """The points of one knob of a scene."""
+    return next(points for name, _, points in curves(scene, knob) if error_of in (None, name))
+
+
+def curves(scene: Scene, knob: str) -> list[tuple[str, str, list[Point]]]:
+    """The points of one knob of a scene for every error: what it is of, its unit, the points."""
+    found = next(one for one in knobs_of(scene, SCENES).knobs if one.name == knob)
+    rows, against, _, _ = sweep(found, LIMIT_SECONDS)
+    if "time limit" in against:
+        raise ValueError(f"{knob}: {against}; the page needs the whole sweep")
+    return [(m.of, m.unit, points_of([row for row in rows if row.error_of == m.of])) for m in found.measures]
+
+
+def spectra() -> dict[str, SpectrumScene]:
+    """Lists of lines: a light linear molecule, a heavy asymmetric one, a cold one."""
+    every = SpectrumObservables(min_lgint=-12.0)
+    return {
+        "CO, 300 K": SpectrumScene(molecule="CO", observables=every),
+        "SO₂, 300 K": SpectrumScene(molecule="SO2", observables=SpectrumObservables(min_lgint=-8.0)),
+        "CH₂OHCHO, 10 K": SpectrumScene(
+            molecule="CH2OHCHO", conditions=SpectrumConditions(temperature="10 K"), observables=every
+        ),
+    }
+
+
+def highest_j(_: Path | None) -> list[Panel]:
+    return [
+        Panel(
+            "J max of a list",
+            "intensity left out (%)",
+            {n: curve(one, "numerics.jmax") for n, one in spectra().items()},
+        )
+    ]
+
+
+def cut(_: Path | None) -> list[Panel]:
+    found = {name: curve(one, "observables.min_lgint") for name, one in spectra().items()}
+    return [Panel("least lgint of a list", "intensity left out (%)", found)]
+
+
+def orders(shared: Path | None) -> list[Panel]:
+    """Lines that a laboratory measured, of catalogues, beside the constants up to each order."""
+    if shared is None:
+        raise ValueError(
+            "the orders of distortion are compared with measured lines: give --shared, the folder of reference files"
+        )
+    return [
+        Panel(
+            "order of distortion",
+            "median |measured - calculated| (MHz)",
+            {n: measured(n, shared) for n in ("SO2", "H2CS", "HCOOH", "CH3CN")},
+        )
+    ]
+
+
+def measured(name: str, shared: Path) -> list[Point]:
+    """Median difference from the measured lines of a catalogue inside the range that the constants are held against."""
+    import rotor
+    from rotor.formats.library import library_molecule
+    from rotor.formats.line_tables import catalogue
+    from rotor.formats.spcat.cat import read_cat
+    from rotor.formats.spcat.compare import compare
+    from rotor.scenes.knobs.of_levels import order_of, to_order
+
+    tag = library_molecule(name).catalogue
+    paths = (shared / "reference" / folder / f"{tag.tag}.cat.gz" for folder in ("catalogues", "library_lines"))
+    reference = read_cat(next(path for path in paths if path.exists()))
+    seen = reference.take((reference.tag < 0) & (reference.quanta_upper[:, 0] <= tag.j_max))
+    top, jmax = rotor.read(name), int(seen.quanta_upper[:, 0].max())
+    points = []
+    for order in sorted({2, *(order_of(one, top) for one in top.constants.values)}):
+        lines, seconds, _ = timed(lambda o=order: rotor.line_list(to_order(top, o), jmax=jmax, min_lgint=None, q=1.0))
+        found = compare(seen, catalogue(lines))
+        points.append(Point(f"J^{order}", seconds, float(np.median(np.abs(found.differences("frequency_mhz"))))))
+    return points
+
+
+def partition(_: Path | None) -> list[Panel]:
+    found = {}
+    for name in ("CO", "water", "CH2OHCHO"):
+        scene = ThermoScene(molecule=name, conditions=ThermoConditions(temperature=[10.0, 100.0, 300.0]))
+        found[name] = curve(scene, "numerics.relative_error", "Q")
+    return [Panel("relative_error of Q(T) at 10, 100 and 300 K", "Q (%)", found)]
+
+
+def hyperfine(_: Path | None) -> list[Panel]:
+    from bench_spins import METHODS, methods
+
+    found = {
+        name: [Point(method, *own[method], own=method == "exact") for method in METHODS]
+        for name, own in methods(3).items()
+    }
+    formamide = read_scene(SCENES / "formamide_hyperfine.toml")
+    scene = LevelsScene(molecule=formamide.molecule, effects=formamide.effects, observables=LevelsObservables(jmax=20))
+    found["formamide, N ≤ 20"] = curve(scene, "effects.hyperfine_method")
+    return [Panel("hyperfine_method", "energy of a level (MHz)", found)]
+
+
+def stark(_: Path | None) -> list[Panel]:
+    found = {}
+    for name, molecule in (("OCS", "OCS"), ("indole", INDOLE)):
+        scene = StarkScene(molecule=molecule, conditions=StarkConditions(field="0:200kV/cm:21"))
+        found[f"{name}, 200 kV/cm"] = curve(scene, "numerics.jmax")
+    return [Panel("J max of the basis, states of J ≤ 2", "energy (MHz)", found)]
+
+
+def pulse(_: Path | None) -> list[Panel]:
+    from bench_alignment import work_precision
+
+    settings = {
+        "ours": ("1e-4", "1e-6", "1e-8", "1e-10"),
+        "QuTiP vern7": ("1e-6", "1e-8", "1e-10", "1e-12"),
+        "scipy expm_multiply": ("64 steps", "256 steps", "1024 steps"),
+    }
+    one = {
+        name: [Point(s, ms / 1e3, error) for s, (error, ms) in zip(settings[name], points, strict=True)]
+        for name, points in work_precision().items()
+    }
+    thermal = curve(read_scene(SCENES / "ocs_alignment.toml"), "numerics.tolerance")
+    return [
+        Panel("OCS from J = 0, 50 fs, 4001 times", "⟨cos²θ⟩", one),
+        Panel("OCS at 1 K, 1 ps: tolerance", "⟨cos²θ⟩", {"ours": thermal}),
+    ]
+
+
+def free(_: Path | None) -> list[Panel]:
+    from bench_work_precision import curves as methods
+
+    found = {}
+    for name, points in methods().items():
+        if name.endswith(("order 2", "order 8", "Moser-Veselov 8", "DOP853")) or name.startswith("exact"):
+            found[name] = [Point("", us * 1e-6, error) for us, error in points]
+    return [Panel("after 1000 periods, time of one period", "attitude (rad)", found)]
+
+
+def driven(_: Path | None) -> list[Panel]:
+    every = {
+        "pendulum": "physical_pendulum",
+        "gyrostat": "dual_spin_satellite",
+        "chaos": "driven_chaos",
+    }
+    panel = {}
+    for name, file in every.items():
+        scene = read_scene(SCENES / f"{file}.toml")
+        few = replace_times(scene, 5)
+        panel[name] = curve(few, "numerics.tolerance")
+    pendulum = replace_times(read_scene(SCENES / "physical_pendulum.toml"), 5)
+    split = {f"order {n}": curve(pendulum, f"numerics.step, order {n}") for n in (2, 4, 6, 8)}
+    return [
+        Panel("tolerance of a step", "attitude (rad)", panel),
+        Panel("step of a splitting, a pendulum", "attitude (rad)", split),
+    ]
+
+
+def replace_times(scene: Scene, points: int) -> Scene:
+    """The same motion looked at a few times only: a table with many rows makes the steps short by itself."""
+    import msgspec
+
+    first, last, _ = scene.conditions.times.split(":")
+    when = msgspec.structs.replace(scene.conditions, times=f"{first}:{last}:{points}")
+    return msgspec.structs.replace(scene, conditions=when)
+
+
+def liquid(electrostatics: str) -> FluidScene:
+    """A small box of water."""
+    return FluidScene(
+        conditions=FluidConditions(model="spce", molecules=216, steps=100),
+        numerics=FluidNumerics(electrostatics=electrostatics),
+    )
+
+
+def fluid_step(_: Path | None) -> list[Panel]:
+    return [
+        Panel("step (fs), 216 SPC/E molecules", f"{of} ({unit})", {"step": points})
+        for of, unit, points in curves(liquid("reaction-field"), "numerics.step")
+    ]
+
+
+def ewald(_: Path | None) -> list[Panel]:
+    tolerance = curve(liquid("ewald"), "numerics.ewald_tolerance")
+    cutoffs = {one: curve(liquid(one), f"numerics.cutoff, {one}") for one in ("ewald", "reaction-field", "shifted")}
+    return [
+        Panel("tolerance of Ewald's sum, 216 SPC/E molecules", "force (%)", {"tolerance": tolerance}),
+        Panel("cutoff (Å) by electrostatics", "force (%)", cutoffs),
+    ]
+
+
+def samples(_: Path | None) -> list[Panel]:
+    times = GasObservables(times="0:0.5:51")
+    scene = GasScene(molecule="water", observables=times, numerics=GasNumerics(molecules=10_000))
+    knobs = [one for one in knobs_of(scene).knobs if one.name == "numerics.molecules"]
+    panels = []
+    for knob in knobs:
+        rows, _, _, _ = sweep(knob, LIMIT_SECONDS)
+        for m in knob.measures:
+            points = points_of([row for row in rows if row.error_of == m.of])
+            label = f"{m.of} ({m.unit})" if m.unit else m.of
+            panels.append(Panel("molecules of a gas of water, 300 K", label, {"molecules": points}))
+    return panels
+
+
+def fit(_: Path | None) -> list[Panel]:
+    """Constants of a fit to 500 synthetic lines from a start 1 % off, beside a fit with a tolerance of 1e-12."""
+    from bench_fit import TRUE, lines_of
+
+    from rotor.fit.fit import FitOptions, fit_lines
+    from rotor.fit.parameters import parameters
+
+    lines, rng = lines_of(TRUE, 500, jmax=20), np.random.default_rng(1)
+    start = TRUE.replace(**{name: value * (1 + 0.01 * rng.uniform(-1, 1)) for name, value in TRUE.values.items()})
+    free_ones = parameters(start, list(TRUE.values))
+
+    def answer(tolerance: float) -> object:
+        return fit_lines(lines, start, free_ones, FitOptions(tolerance=tolerance))
+
+    def error(found: object, reference: object) -> float:
+        return max(
+            abs(found.constants[name] - reference.constants[name]) / reference.constants.uncertainties[name]
+            for name in TRUE.values
+        )
+
+    settings = ladder((1.0, 1e-1, 1e-2, 1e-3, 1e-4, 1e-6, 1e-8), 1e-4, lambda one: one)
+    knob = Knob("tolerance", (Measure("constants", "σ", error),), settings, 1e-12, "1e-12", answer)
+    rows, _, _, _ = sweep(knob, LIMIT_SECONDS)
+    return [
+        Panel("tolerance of a fit, 500 lines, 15 constants", "a constant (standard errors)", {"fit": points_of(rows)})
+    ]
+
+
+SUBJECTS: Sequence[Subject] = (
+    Subject(
+        "levels",
+        "Levels and J max",
+        "The energies of one J are eigenvalues of whole blocks: no J max makes them better, and a list loses whole lines only. "
+        "The part of the intensity that is left out, beside a J max 1.3 times higher:",
+        "Leave `jmax` out: it is chosen from the cut, and then nothing of the intensity above the cut is missing.",
+        highest_j,
+    ),
+    Subject(
+        "cut",
+        "Cut of a line list",
+        "The part of the intensity that all lines below the cut hold together, beside a cut two decades lower.",
+        "Each decade of the cut leaves out about a tenth of what the decade before did, and costs a tenth to a fifth more time.",
+        cut,
+    ),
+    Subject(
+        "orders",
+        "Orders of centrifugal distortion",
+        "Constants of the library up to each order, beside lines measured in laboratories, inside the range that "
+        "[measured_lines.md](measured_lines.md) names.",
+        "Take every order that the constants have, since none costs time; rigid constants alone miss these lines by 0.5 to 5 GHz.",
+        orders,
+    ),
+    Subject(
+        "partition",
+        "Q(T)",
+        "The error of the sum over levels that `relative_error` asks for, beside a sum to 1e-13.",
+        "Leave `relative_error` at 1e-6: the error reached is below what is asked for, and more is a matter of milliseconds.",
+        partition,
+    ),
+    Subject(
+        "hyperfine",
+        "Hyperfine structure: exact or not",
+        "Largest error of a level by method, beside the exact one.",
+        "Take `exact` with one nucleus, where it costs no more than an approximation; with several nuclei `auto` takes the "
+        "cheapest that keeps a tolerance.",
+        hyperfine,
+    ),
+    Subject(
+        "stark",
+        "Basis of a Stark map",
+        "Largest error of an energy in fields up to 200 kV/cm by J max of the basis, beside six J more.",
+        "Leave `jmax` out and give a tolerance: from some J on each J more gains one to two digits, and the basis is raised "
+        "until the energies stand still.",
+        stark,
+    ),
+    Subject(
+        "pulse",
+        "Pulse propagation",
+        "Largest error of ⟨cos²θ⟩, beside a tolerance a hundred times finer.",
+        "Take the tolerance that the use needs and no J max: four digits more cost less than a factor of two in time.",
+        pulse,
+    ),
+    Subject(
+        "free",
+        "Free tumbling",
+        "Attitude of a free asymmetric top by integrators of the package and by scipy; the exact motion after 48,000 periods.",
+        "Take the exact motion, as `rotor tumble` does: it is both the most accurate and the cheapest.",
+        free,
+    ),
+    Subject(
+        "driven",
+        "Driven motion",
+        "Attitude of driven bodies, looked at at five times, beside steps to a hundred times finer than the finest.",
+        "Give a tolerance rather than a step: three digits more cost about a factor of two, and a splitting needs more time for the "
+        "same error over so short a time.",
+        driven,
+    ),
+    Subject(
+        "fluid_step",
+        "Step of a fluid",
+        "A box followed for 48 fs without a thermostat, beside a step of 0.05 fs.",
+        "2 fs conserves the energy of rigid water to 0.4 K for each degree of freedom; half the step has a quarter of the error.",
+        fluid_step,
+    ),
+    Subject(
+        "ewald",
+        "Ewald's sum and cutoffs",
+        "Root mean square error of the forces, beside Ewald's sum to 1e-10; for cutoffs, with Lennard-Jones to half of the box.",
+        "Take Ewald's sum where forces matter to better than some percent: its tolerance of 1e-5 is 0.01 % of the force, while the "
+        "reaction field and shifted charges at 9 Å differ by 3 to 4 %.",
+        ewald,
+    ),
+    Subject(
+        "samples",
+        "Sample counts",
+        "Root mean square error of eight gases for temperature and heat capacity; largest error of one gas for correlation functions.",
+        "The error falls with the root of the number: a hundred times more molecules for each digit.",
+        samples,
+    ),
+    Subject(
+        "fit",
+        "Tolerance of a fit",
+        "Largest change of a constant in its standard errors, beside a tolerance of 1e-12.",
+        "Leave the tolerance at 1e-4: the last steps of the search are quadratic, and constants are converged far below their errors.",
+        fit,
+    ),
+)

@@ -1,0 +1,215 @@
+"""A request for a fit, from either kind of input: SPFIT's .par and .lin, or a list of lines with constants to start from.
+
+`rotor fit` and a scene of the kind fit fill the same request; what they write of its answer is written here.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor.arrays import Floats
+from rotor.fit.assignment import Assignments, merged
+from rotor.fit.fit import Fit, FitOptions, fit_lines
+from rotor.fit.parameters import Parameters, parameters, with_names
+from rotor.fit.report import fit_facts
+from rotor.formats.assigned_lines import QUANTA, read_assigned_lines
+from rotor.formats.spcat.fit_input import SpfitInput, fitted_file, named_file, read_fit
+from rotor.statistics.least_squares import Progress
+from rotor.table import Table
+from rotor.tops.constants import Constants
+from rotor.tops.top import Top
+
+
+@dataclass(frozen=True)
+class FitFiles:
+    """Files that a request was read from: the lines or case.par, the .lin of a case.par, lines merged with them, the start."""
+
+    source: str
+    lin: str | None = None
+    merge: str | None = None
+    start: str | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class FitRequest:
+    """What is to be fitted.
+
+    lines, constants, parameters, options: as `rotor.fit.fit.fit_lines` takes them. title: for reports. files: what it was read
+    from. spfit: the files of SPFIT, where it was read from them. ties, priors_mhz: as given, of a list of lines. notes: what must be
+    known of how it was read.
+    """
+
+    lines: Assignments
+    constants: Constants | None
+    parameters: Parameters
+    options: FitOptions
+    title: str
+    files: FitFiles
+    spfit: SpfitInput | None = None
+    ties: tuple[str, ...] = ()
+    priors_mhz: Mapping[str, float] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+
+    @property
+    def top(self) -> Top | None:
+        """The constants to start from as a top; None of codes with spins or several states."""
+        return None if self.constants is None else Top.from_constants(self.constants)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class FittedParameters(Table):
+    """Free parameters (n,) of a fit in MHz: values, standard errors from the stated errors of the lines and from their scatter, start."""
+
+    names: tuple[str, ...]
+    value_mhz: Floats
+    error_mhz: Floats
+    scaled_error_mhz: Floats
+    start_mhz: Floats
+
+    @property
+    def columns(self) -> dict[str, NDArray[Any]]:
+        """parameter, value_mhz, error_mhz, scaled_error_mhz, start_mhz."""
+        numbers = ("value_mhz", "error_mhz", "scaled_error_mhz", "start_mhz")
+        return {"parameter": np.array(self.names), **{name: getattr(self, name) for name in numbers}}
+
+
+@dataclass(frozen=True, eq=False)
+class FitAnswer:
+    """A fit that was asked for."""
+
+    request: FitRequest
+    fit: Fit
+
+    @property
+    def parameters(self) -> FittedParameters:
+        """The free parameters with their errors."""
+        fit = self.fit
+        return FittedParameters(fit.parameters.names, fit.values, fit.errors, fit.scaled_errors, fit.parameters.start)
+
+    def facts(self) -> dict[str, Any]:
+        """What is known of the fit as a whole."""
+        facts = fit_facts(self.fit)
+        return {"title": self.request.title, **facts, "notes": [*self.request.notes, *facts["notes"]]}
+
+
+def answer_fit(request: FitRequest, progress: Progress | None = None) -> FitAnswer:
+    """The fit that a request asks for; `fit.converged` says whether it is a result.
+
+    Raises ValueError as `rotor.fit.fit.fit_lines` does.
+    """
+    model = request.spfit.model if request.spfit else None
+    fit = fit_lines(
+        request.lines, request.constants, request.parameters, request.options, model=model, progress=progress
+    )
+    return FitAnswer(request, fit)
+
+
+def fit_of_spfit(par: str, lin: str | None = None) -> FitRequest:
+    """The request of a .par file and its lines; what is free and where it starts, the file says. Raises ValueError as `read_fit`."""
+    asked = read_fit(par, lin)
+    title = " ".join(asked.file.title.split()) or Path(par).stem
+    files = FitFiles(par, lin)
+    return FitRequest(
+        asked.lines, asked.constants, asked.parameters, asked.options, title, files, asked, notes=tuple(asked.notes)
+    )
+
+
+def fit_of_lines(
+    lines: str,
+    top: Top,
+    free: Sequence[str] | None = None,
+    *,
+    ties: Sequence[str] = (),
+    priors_mhz: Mapping[str, float] | None = None,
+    start: str | None = None,
+) -> FitRequest:
+    """The request of a file of assigned lines and of constants to start from.
+
+    Parameters
+    ----------
+    lines : path
+        .lin, .csv, .cat or .cat.gz.
+    top : Top
+        Whose constants the fit starts from.
+    free : sequence of str, optional
+        Constants to fit; those that have an error by default. One that the top does not have starts at 0.
+    ties, priors_mhz : optional
+        As of `rotor.fit.parameters.parameters`.
+    start : path, optional
+        The file of the top: its other tables go into a file of the result.
+
+    Returns
+    -------
+    FitRequest
+
+    Raises
+    ------
+    ValueError
+        Lines or names that cannot be, and no constant to fit.
+    """
+    read, notes = read_assigned_lines(lines, QUANTA[top.kind])
+    names = list(top.constants.uncertainties) if free is None else list(free)
+    if not names:
+        raise ValueError("free: name the constants to fit, such as A,B,C,DeltaJ; those of the start have no errors")
+    begin = with_names(top.constants, names)
+    priors = dict(priors_mhz or {})
+    made = parameters(begin, names, ties=ties, priors_mhz=priors)
+    title = " ".join(top.name.split()) or Path(lines).name
+    files = FitFiles(lines, start=start)
+    return FitRequest(
+        read, begin, made, FitOptions(), title, files, ties=tuple(ties), priors_mhz=priors, notes=tuple(notes)
+    )
+
+
+def with_more_lines(request: FitRequest, path: str) -> FitRequest:
+    """The request with the lines of one more file of the same kind."""
+    more, notes = read_assigned_lines(path, request.lines.names)
+    both, found = merged(request.lines, more)
+    files = replace(request.files, merge=path)
+    return replace(request, lines=both, files=files, notes=(*request.notes, *notes, *found))
+
+
+def write_fitted_toml(answer: FitAnswer, path: str | os.PathLike[str]) -> None:
+    """The constants with errors and correlations in the file of the start, or in a new one.
+
+    Raises ValueError of spins and several states, which have no named constants.
+    """
+    from rotor.formats.molecule_file import MoleculeFile, read_molecule_file
+    from rotor.formats.molecule_writer import write_molecule_file
+
+    request, fit = answer.request, answer.fit
+    origin = (
+        f"fitted by rotor to {int(fit.used.sum())} lines of {Path(request.files.source).name}, weighted by their errors; weighted rms "
+        f"{fit.weighted_rms:.4g}; errors from the stated errors of the lines"
+    )
+    start = request.files.start or ""
+    own = start.lower().endswith(".toml") and Path(start).exists()
+    file = read_molecule_file(start) if own else MoleculeFile(request.title or Path(path).stem)
+    covariance = None if fit.statistics.undetermined else fit.covariance
+    made = replace(
+        file,
+        constants=fit.named,
+        covariance=covariance,
+        levels=None,
+        serves=None,
+        sources={**file.sources, "constants": origin},
+    )
+    write_molecule_file(made, path)
+
+
+def write_fitted_par(answer: FitAnswer, path: str | os.PathLike[str], *, variances: bool) -> None:
+    """The .par file of SPFIT after the fit, or, with variances, the .var file."""
+    from rotor.formats.spcat.par import write_par
+
+    request, fit = answer.request, answer.fit
+    if request.spfit is not None:
+        write_par(fitted_file(request.spfit, fit, variances=variances), path)
+    else:
+        write_par(named_file(fit, request.title, variances=variances), path)

@@ -1,0 +1,101 @@
+"""A picture of levels in a magnetic field: for each free level how far its components move, a colour for each M."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from rotor.plots.picture import checked_suffix, joined, new_figure, save_described, styled
+from rotor.quantum.fields.field_map import FieldMap
+
+PANELS = 9  # levels drawn at most: the first ones
+PANEL_INCHES = (2.6, 2.3)
+
+
+def zeeman_figure(field_map: FieldMap, title: str = "", spins: int = 0) -> Any:
+    """A matplotlib figure of a map of levels in a magnetic field, of two fields or more.
+
+    One panel for each level of the free top without its spins; `spins` is how many quantum numbers at the end of a label are theirs.
+    Raises ValueError for a map of one field.
+    """
+    if len(field_map.fields) < 2:
+        raise ValueError("a picture of a map needs two fields or more")
+    levels = _levels(field_map, spins)
+    columns = min(3, len(levels))
+    rows = -(-len(levels) // columns)
+    with styled():
+        figure = new_figure((0.8 + PANEL_INCHES[0] * columns, 0.8 + PANEL_INCHES[1] * rows))
+        panels = figure.subplots(rows, columns, sharex=True, squeeze=False)
+        for axes, (label, curves) in zip(panels.ravel(), levels.items(), strict=False):
+            _panel(axes, field_map, label, curves)
+        for axes in panels.ravel()[len(levels) :]:
+            axes.set_visible(False)
+        figure.supxlabel("magnetic field (T); blue: M < 0, red: M > 0", fontsize=10)
+        figure.supylabel("shift from the level (MHz)", fontsize=10)
+        figure.suptitle(title, x=0.02, ha="left", fontsize=11)
+    return figure
+
+
+def plot_zeeman(
+    field_map: FieldMap,
+    path: str | os.PathLike[str],
+    *,
+    title: str = "",
+    spins: int = 0,
+    provenance: Mapping[str, Any] | None = None,
+) -> None:
+    """Draw `zeeman_figure` into a .png, .pdf or .svg file.
+
+    Parameters
+    ----------
+    field_map : FieldMap
+        Of two fields or more.
+    path : path
+        Its suffix chooses the format.
+    title : str
+        Above the picture.
+    spins : int
+        Quantum numbers of spins at the end of a label.
+    provenance : mapping, optional
+        Further facts for the metadata.
+
+    Raises
+    ------
+    ValueError
+        For a map of one field, and for a suffix that is no picture.
+    """
+    checked_suffix(path)
+    figure = zeeman_figure(field_map, title, spins)
+    save_described(figure, path, title, joined(provenance, field_map.provenance))
+
+
+def _levels(field_map: FieldMap, spins: int) -> dict[str, list[slice]]:
+    """The first levels, in order of energy, with their curves."""
+    found: dict[str, list[slice]] = {}
+    curves = sorted(field_map.curves(), key=lambda rows: float(field_map.free_mhz[rows.start]))
+    for rows in curves:
+        words = str(field_map.label[rows.start]).split()
+        found.setdefault(" ".join(words[: len(words) - spins]), []).append(rows)
+    return dict(list(found.items())[:PANELS])
+
+
+def _panel(axes: Any, field_map: FieldMap, label: str, curves: list[slice]) -> None:
+    """Energies from the mean of the free level, weighted by how many states coincide."""
+    from matplotlib import colormaps
+
+    free = np.array([field_map.free_mhz[rows.start] for rows in curves])
+    copies = np.array([field_map.copies[rows.start] for rows in curves], dtype=float)
+    centre = float(np.average(free, weights=copies))
+    largest = max(1e-12, *(abs(float(field_map.m[rows.start])) for rows in curves))
+    for rows in curves:
+        m = float(field_map.m[rows.start])
+        shade = colormaps["coolwarm"](0.5 + 0.5 * m / largest) if m else (0.2, 0.2, 0.2, 1.0)
+        axes.plot(field_map.field[rows], field_map.energy_mhz[rows] - centre, color=shade, linewidth=0.9)
+    name = f"{largest:.0f}" if float(largest).is_integer() else f"{largest:g}"
+    axes.set_title(
+        f"{label}   M = -{name} ... {name}" if largest >= 0.5 else f"{label}   M = 0", fontsize=8, loc="left"
+    )
+    axes.ticklabel_format(useOffset=False)

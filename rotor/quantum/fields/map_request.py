@@ -1,0 +1,92 @@
+"""What a map of levels in a field is of: the matrices of a block, the fields, the states, checked."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from rotor.arrays import Floats, Ints
+from rotor.quantum.fields.blocks import FieldBlock, FieldSpace
+from rotor.quantum.fields.solver import Matrix, Terms
+
+
+class BlockProblem(NamedTuple):
+    """Matrices over a block, all (n, n), of H(x) = fixed + x slope + x² curvature; curvature None where nothing is quadratic.
+
+    fixed: MHz. slope: MHz per unit of field. observables: by name, made when called.
+    """
+
+    fixed: Matrix
+    slope: Matrix
+    observables: Mapping[str, Callable[[], Matrix]]
+    curvature: Matrix | None = None
+
+    def terms(self, states: Ints) -> Terms:
+        """The coefficients of H(x) as a polynomial in x, over some of the states, which rise."""
+        given = (self.fixed, self.slope) if self.curvature is None else (self.fixed, self.slope, self.curvature)
+        return tuple(over(one, states) for one in given)
+
+
+def over(matrix: Matrix, states: Ints) -> Matrix:
+    """A matrix over some of the states, which rise; the matrix itself where these are all of them."""
+    return matrix if len(states) == len(matrix) else np.asarray(matrix[np.ix_(states, states)])
+
+
+@dataclass(frozen=True)
+class MapRequest:
+    """What a map is of.
+
+    space: makes the states up to a J max. problem: the matrices of a block. fields: rising. j_highest: free levels up to this J are
+    followed. m_values: |M|, or signed where `signed`. tolerance_mhz: of energies. diabatic_gap_mhz: None for no diabatic labels.
+    """
+
+    space: Callable[[int], FieldSpace]
+    problem: Callable[[FieldBlock], BlockProblem]
+    fields: Floats
+    j_highest: int
+    m_values: tuple[int, ...]
+    tolerance_mhz: float
+    field_name: str
+    slope_name: str
+    slope_unit_mhz: float
+    diabatic_gap_mhz: float | None = None
+
+
+class KnownSpaces:
+    """Makes the space of a J max; the last two stay known, since a map is solved at the J max that was tried last but one."""
+
+    def __init__(self, make: Callable[[int], FieldSpace]) -> None:
+        self._make = make
+        self._known: dict[int, FieldSpace] = {}
+
+    def __call__(self, jmax: int) -> FieldSpace:
+        if jmax not in self._known:
+            self._known = {**dict(list(self._known.items())[-1:]), jmax: self._make(jmax)}
+        return self._known[jmax]
+
+    def __reduce__(self) -> tuple[type[KnownSpaces], tuple[Callable[[int], FieldSpace]]]:
+        return KnownSpaces, (self._make,)
+
+
+def checked_fields(fields: Any, unit: str, highest: float) -> Floats:
+    """Fields (n,) that rise, finite and within ±`highest`; ValueError where they are not."""
+    values = np.unique(np.atleast_1d(np.asarray(fields, dtype=np.float64)))
+    if not len(values) or not np.isfinite(values).all():
+        raise ValueError(f"fields must be finite numbers of {unit}; got {np.asarray(fields).tolist()!r}")
+    if np.abs(values).max() > highest:
+        raise ValueError(
+            f"a field of {values[np.argmax(np.abs(values))]:g} {unit} is beyond {highest:g} {unit}, where no molecule holds together; "
+            "check the unit"
+        )
+    return values
+
+
+def checked_tolerance_mhz(tolerance_mhz: float) -> float:
+    """A tolerance of energies above zero, or ValueError."""
+    if not (math.isfinite(tolerance_mhz) and tolerance_mhz > 0):
+        raise ValueError(f"tolerance {tolerance_mhz} MHz: a finite number above 0 is expected")
+    return float(tolerance_mhz)

@@ -1,0 +1,148 @@
+"""A request for levels in a static magnetic field, and what answers it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from rotor.checks import require_positive, require_whole
+from rotor.molecules.nuclei import isotope
+from rotor.quantum.effects.stark import checked_j
+from rotor.quantum.effects.zeeman import DEFAULT_TOLERANCE_MHZ, HIGHEST_TESLA, checked_g, zeeman_map
+from rotor.quantum.fields.field_map import FieldMap
+from rotor.quantum.fields.map_request import checked_fields
+from rotor.table import TextOf
+from rotor.tops.facts import top_facts
+from rotor.tops.magnetic import MagneticTensors
+
+if TYPE_CHECKING:
+    from rotor.quantum.effect import QuantumEffect
+    from rotor.tops.top import Top
+
+
+@dataclass(frozen=True)
+class ZeemanRequest:
+    """A map of levels in a magnetic field to compute; every field is checked when the request is made.
+
+    top: with its g tensor in `magnetic`. fields_tesla: of any order. j_highest: free levels up to this J are followed. jmax: of the
+    basis; None: what tolerance_mhz needs. hyperfine: with the spins of the top's constants. nuclear_g: g = μ/(μ_N I) by the names of
+    spins; those left out are nuclei with the g of their isotope, an electron spin must be here.
+    """
+
+    top: Top
+    fields_tesla: tuple[float, ...]
+    j_highest: int = 2
+    jmax: int | None = None
+    tolerance_mhz: float = DEFAULT_TOLERANCE_MHZ
+    hyperfine: bool = False
+    nuclear_g: Mapping[str, float] | None = None
+
+    def __post_init__(self) -> None:
+        checked_j(self.j_highest)
+        checked_fields(self.fields_tesla, "T", HIGHEST_TESLA)
+        checked_g(self.top, self.magnetic.g)
+        require_whole("jmax", self.jmax, 2)
+        require_positive("tolerance_mhz", self.tolerance_mhz)
+        if self.nuclear_g and not self.hyperfine:
+            raise ValueError("nuclear_g: belongs to spins; ask for the hyperfine structure too")
+        _ = self.effects, self.spin_g
+
+    @property
+    def magnetic(self) -> MagneticTensors:
+        """The tensors of the top; ValueError where they are not known."""
+        if self.top.magnetic is None:
+            raise ValueError(
+                f"the rotational g tensor of {self.top.name or 'this top'} is not known: give one, in principal axes"
+            )
+        return self.top.magnetic
+
+    @property
+    def effects(self) -> tuple[QuantumEffect, ...]:
+        """The Hamiltonian with spins where they are asked for, else nothing beyond what is always there."""
+        from rotor.quantum.effects.of_top import effects_of
+
+        return effects_of(self.top, True) if self.hyperfine else ()
+
+    @property
+    def spin_g(self) -> dict[str, float]:
+        """g of every spin, given or that of its isotope; ValueError where one is not known."""
+        constants = self.top.spin_constants
+        if not self.hyperfine or constants is None:
+            return {}
+        given = dict(self.nuclear_g or {})
+        if unknown := sorted(given.keys() - constants.twice.keys()):
+            raise ValueError(f"nuclear_g: {', '.join(unknown)}: the spins of this top are {', '.join(constants.twice)}")
+        return {name: _finite(name, given[name]) if name in given else _g_of(name) for name in constants.twice}
+
+
+def _finite(name: str, value: float) -> float:
+    if not math.isfinite(value):
+        raise ValueError(f"nuclear_g: {name} = {value}: a finite number is expected")
+    return float(value)
+
+
+def _g_of(name: str) -> float:
+    """g of the isotope that a spin is called after, such as 35Cl_1."""
+    label = name.partition("_")[0]
+    try:
+        found = isotope(label).g_factor
+    except ValueError:
+        found = None
+    if found is None:
+        raise ValueError(f"nuclear_g: the g of {name} is not known; give it")
+    return found
+
+
+@dataclass(frozen=True, repr=False)
+class ZeemanAnswer(TextOf):
+    """The map that a request asked for."""
+
+    shown = "states"
+
+    request: ZeemanRequest
+    states: FieldMap
+
+    def facts(self) -> Mapping[str, Any]:
+        """Everything about the answer but its table of states, by the keys of docs/command_line.md."""
+        fields, request, magnetic = self.states.fields, self.request, self.request.magnetic
+        return {
+            **top_facts(request.top),
+            "field_tesla": [float(fields[0]), float(fields[-1]), len(fields)],
+            "g_abc": magnetic.g,
+            "magnetisability_abc": magnetic.magnetisability,
+            "magnetic_source": magnetic.source or None,
+            "nuclear_g": request.spin_g,
+            "j_highest": request.j_highest,
+            "hyperfine": request.hyperfine,
+            "tolerance_mhz": request.tolerance_mhz,
+            **self.states.provenance,
+            "curves": len(self.states.curves()),
+        }
+
+
+def answer_zeeman(request: ZeemanRequest, executor: Executor | None = None) -> ZeemanAnswer:
+    """The map of a request. executor: blocks of states are spread over it.
+
+    >>> from rotor.tops.magnetic import MagneticTensors, tensor_for
+    >>> from rotor.tops.top import Top
+    >>> rod = Top.from_constants("B=6000 MHz", magnetic=MagneticTensors(tensor_for("linear", [-0.03])))
+    >>> states = answer_zeeman(ZeemanRequest(rod, (0.0, 1.0), j_highest=1)).states
+    >>> (states.energy_mhz[states.curve("1", 1)] - 12000).round(4).tolist()  # 0.03 μ_N B
+    [0.0, 0.2287]
+    """
+    states = zeeman_map(
+        request.top,
+        request.fields_tesla,
+        request.magnetic.g,
+        magnetisability=request.magnetic.magnetisability,
+        effects=request.effects,
+        nuclear_g=request.spin_g,
+        j_highest=request.j_highest,
+        jmax=request.jmax,
+        tolerance_mhz=request.tolerance_mhz,
+        executor=executor,
+    )
+    return ZeemanAnswer(request, states)

@@ -1,0 +1,228 @@
+"""Accuracy of what is sampled or stepped in a gas and a fluid: how many molecules, which step, which tolerance of Ewald's sum.
+
+| kind | accuracy of | what is chosen | error stated |
+|---|---|---|---|
+| gas, "1 K" | temperature of the kinetic energy | molecules: z T √(2/fN) | the same |
+| gas, "1 %" | heat capacity var(E)/kT² | molecules: z √((2 + 12/f)/N) | the same |
+| gas, 0.02 | C1 and C2 at each time | molecules: z s/√N, s of a small gas | from the spread in the run |
+| fluid, "0.5 K" | conserved energy, 2E/k per degree | the step, by short runs of the box | root mean square of the run |
+| fluid, "0.1 %" | forces of Ewald's sum | its tolerance, by forces in the box | where the run ends |
+
+The energy E of the f degrees of freedom of one molecule has a gamma distribution of shape f/2: mean f kT/2, variance f (kT)²/2, excess
+kurtosis κ = 12/f. Of N independent values the mean has the variance var/N, and the variance has var² (2/(N - 1) + κ/N). z is the
+two-sided quantile of the confidence of the scene. The conserved energy of a fluid departs by the square of the step
+(`rotor.fluid.motion.dynamics`); it is that of rigid molecules with the forces of the scene, whose cutoff is part of the model.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rotor.fluid.request import FluidRequest
+    from rotor.thermo.classical_gas import GasAnswer, GasRequest
+
+PILOT_MOLECULES = 2_000
+SPARE = 2.0  # a run is longer than the short ones that its step was chosen by: their error is to be so much smaller
+LONGEST_STEP_FS, SHORTEST_STEP_FS = 8.0, 0.05
+EWALD_LADDER = tuple(10.0**-n for n in range(2, 11))
+REFERENCE_EWALD = 1e-12
+
+
+def quantile(confidence: float) -> float:
+    """z of a two-sided interval of a normal distribution.
+
+    >>> round(quantile(0.99), 4)
+    2.5758
+    """
+    from statistics import NormalDist
+
+    return NormalDist().inv_cdf(0.5 + 0.5 * confidence)
+
+
+def degrees_of(request: GasRequest) -> int:
+    """Degrees of freedom of one molecule whose energy is drawn; bare constants have no translation."""
+    from rotor.statistics.degrees_of_freedom import count_degrees
+
+    one = count_degrees([request.top.moments_u_angstrom2])
+    return round(one.rotation + (one.translation if request.top.mass_u is not None else 0))
+
+
+def relative_spread(unit: str, degrees: int) -> float:
+    """Standard error times √N of the temperature ("K") or of the heat capacity ("%"), as a part of it.
+
+    >>> relative_spread("K", 6), relative_spread("%", 6)
+    (0.5773502691896257, 2.0)
+    """
+    return math.sqrt(2.0 / degrees) if unit == "K" else math.sqrt(2.0 + 12.0 / degrees)
+
+
+def choose_molecules(scene: Any, request: GasRequest, asked: float, unit: str) -> tuple[GasRequest, str]:
+    """The request with as many molecules as the accuracy needs.
+
+    Parameters
+    ----------
+    scene : GasScene
+        Without a number of molecules of its own.
+    request : GasRequest
+        That of the scene.
+    asked : float
+        In the unit.
+    unit : str
+        "K" of the temperature, "%" of the heat capacity, nothing of C1 and C2.
+
+    Returns
+    -------
+    GasRequest, str
+        And what was chosen, in words.
+
+    Raises
+    ------
+    ValueError
+        Where molecules are given too, and where more are needed than a run has.
+    """
+    from rotor.scenes.sections import GasNumerics
+    from rotor.thermo.classical_gas import MOST_MOLECULES
+
+    if scene.numerics.molecules != GasNumerics().molecules:
+        raise ValueError("accuracy and numerics.molecules: give one of them")
+    z = quantile(request.confidence)
+    count = max(math.ceil((z * _spread(request, asked, unit) / asked) ** 2), 2)
+    if count > MOST_MOLECULES:
+        raise ValueError(
+            f"accuracy: {asked:g} {unit}".rstrip()
+            + f" would need {count:.2g} molecules, more than the {MOST_MOLECULES:g} of a run; ask for less"
+        )
+    return replace(request, molecules=count), f"{count} molecules, at a confidence of {request.confidence:g}"
+
+
+def _spread(request: GasRequest, asked: float, unit: str) -> float:
+    """Standard error times √N in the unit of the accuracy."""
+    if unit:
+        scale = request.temperature_k if unit == "K" else 100.0
+        return scale * relative_spread(unit, degrees_of(request))
+    if request.times_ps is None:
+        raise ValueError(f"accuracy: {asked:g}: is of correlation functions; give observables.times, or a unit, K or %")
+    from rotor.thermo.classical_gas import answer_gas
+
+    pilot = answer_gas(replace(request, molecules=PILOT_MOLECULES))
+    return 1.1 * _largest_error(pilot) * math.sqrt(PILOT_MOLECULES)  # the spread itself is known to some percent
+
+
+def _largest_error(answer: GasAnswer) -> float:
+    """The largest standard error of C1 and C2."""
+    curves = answer.correlations
+    assert curves is not None
+    return max(float(error.max()) for error in (curves.c1_error, curves.c2_error) if error is not None)
+
+
+def error_of_gas(answer: GasAnswer, unit: str) -> float:
+    """Within what the result is, at the confidence asked for."""
+    request = answer.request
+    z = quantile(request.confidence)
+    if not unit:
+        return z * _largest_error(answer)
+    scale = request.temperature_k if unit == "K" else 100.0
+    return z * scale * relative_spread(unit, degrees_of(request)) / math.sqrt(request.molecules)
+
+
+def choose_step(scene: Any, request: FluidRequest, asked: float, unit: str) -> tuple[FluidRequest, str]:
+    """The request with the longest step, or the coarsest tolerance of Ewald's sum, that reaches an accuracy.
+
+    Parameters
+    ----------
+    scene : FluidScene
+        Without a value of its own for that knob.
+    request : FluidRequest
+        That of the scene.
+    asked : float
+        In the unit.
+    unit : str
+        "K" of the conserved energy, "%" of the forces.
+
+    Returns
+    -------
+    FluidRequest, str
+        With a box that is made, and what was chosen, in words.
+
+    Raises
+    ------
+    ValueError
+        For another engine, a knob that is given too, and what no step or tolerance reaches.
+    """
+    if request.engine != "rotor":
+        raise ValueError(f"accuracy: the engine {request.engine} is not swept; give numerics.step, or the engine rotor")
+    made = _made(request)
+    return _by_energy(scene, made, asked) if unit == "K" else _by_forces(scene, made, asked)
+
+
+def _made(request: FluidRequest) -> FluidRequest:
+    """The request with its box, made once."""
+    from rotor.fluid.request import NewBox, box_of
+
+    if not isinstance(request.box, NewBox):
+        return request
+    box = box_of(request)
+    box.calc = None  # that of the settings is made anew, by those that are chosen
+    return replace(request, box=box, box_source=request.start)
+
+
+def _by_energy(scene: Any, request: FluidRequest, asked: float) -> tuple[FluidRequest, str]:
+    from rotor.scenes.kind import quantity
+    from rotor.scenes.knobs.of_motion import answer_followed, conserved_k, followed
+    from rotor.scenes.sections import FluidNumerics
+
+    given, usual = (quantity("numerics.step", one, "fs") for one in (scene.numerics.step, FluidNumerics().step))
+    if given != usual:
+        raise ValueError("accuracy and numerics.step: give one of them")
+    step = LONGEST_STEP_FS
+    while step > SHORTEST_STEP_FS:
+        error = conserved_k(answer_followed(followed(request, step)))
+        if error <= asked / SPARE:
+            return replace(request, settings=replace(request.settings, step_fs=step)), f"a step of {step:g} fs"
+        # of second order: the step that reaches it, in hundredths of a femtosecond, and shorter than the one before at least
+        step = min(math.floor(100.0 * step * math.sqrt(asked / SPARE / error)) / 100.0, 0.9 * step)
+    raise ValueError(
+        f"accuracy: {asked:g} K cannot be given: the steps would be shorter than {SHORTEST_STEP_FS:g} fs; ask for less"
+    )
+
+
+def _by_forces(scene: Any, request: FluidRequest, asked: float) -> tuple[FluidRequest, str]:
+    from rotor.scenes.sections import FluidNumerics
+
+    own = request.settings
+    if own.electrostatics != "ewald":
+        raise ValueError(
+            f"accuracy: {asked:g} %: of the forces is that of Ewald's sum, and {own.electrostatics} is another model; give "
+            'numerics.electrostatics = "ewald", or an accuracy of the conserved energy in K'
+        )
+    if scene.numerics.ewald_tolerance != FluidNumerics().ewald_tolerance:
+        raise ValueError("accuracy and numerics.ewald_tolerance: give one of them")
+    for tolerance in EWALD_LADDER:
+        chosen = replace(request, settings=replace(own, ewald_tolerance=tolerance))
+        error = force_error(chosen)
+        if error <= asked / SPARE:
+            return chosen, f"a tolerance of {tolerance:g} of Ewald's sum"
+    raise ValueError(
+        f"accuracy: {asked:g} % cannot be given: Ewald's sum to {tolerance:g} is still off by {error:.2g} %"
+    )
+
+
+def force_error(request: FluidRequest) -> float:
+    """Root mean square error in percent of the forces in a box, beside Ewald's sum to 1e-12 with the same cutoff."""
+    from rotor.scenes.knobs.of_motion import force_difference, forces_of
+
+    own = request.settings
+    found, true = (
+        forces_of(request, "ewald", own.cutoff_angstrom, one)() for one in (own.ewald_tolerance, REFERENCE_EWALD)
+    )
+    return force_difference(found, true)
+
+
+def error_of_fluid(answer: Any, unit: str) -> float:
+    """The error of a run: of its conserved energy, or of the forces where it ends."""
+    from rotor.scenes.knobs.of_motion import conserved_k
+
+    return conserved_k(answer) if unit == "K" else force_error(replace(answer.request, box=answer.atoms))

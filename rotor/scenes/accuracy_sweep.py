@@ -1,0 +1,224 @@
+"""What accuracy costs in one scene: every numerical knob swept, error against a reference about a hundred times finer, and time.
+
+    table = work_precision(read_scene("s.toml"))
+
+Coarse settings come first and the reference last. Where the time limit ends a sweep before its reference, the finest answer that
+there is serves as one, and the table says so. Times are those of the processor, the shortest of a few calls where they are short.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor.scenes.kind import kind_of
+from rotor.scenes.knobs.knob import Knob, Knobs, Setting
+from rotor.scenes.scene import Scene
+from rotor.table import Table
+
+Progress = Callable[[str, str], object]
+SHORT_SECONDS, REPEATS = 0.05, 3  # calls that are shorter are made so often
+COMPILING_SECONDS = 20.0  # a first call that took longer is not repeated
+USUAL_LIMIT = 120.0  # seconds of processor time for all knobs together
+
+
+@dataclass(frozen=True)
+class Row:
+    """One error of one setting. own: whether the scene has it. seconds: of the processor, of one calculation."""
+
+    knob: str
+    setting: str
+    own: bool
+    error_of: str
+    error: float
+    unit: str
+    seconds: float
+
+
+@dataclass(frozen=True, repr=False)
+class WorkPrecision(Table):
+    """Errors and times of every setting of every knob.
+
+    kind: of the scene. rows: coarse settings first. references: by knob, what errors are measured against. remarks: what has no
+    knob, what was not swept and why.
+    """
+
+    kind: str
+    rows: tuple[Row, ...]
+    references: Mapping[str, str]
+    remarks: tuple[str, ...] = ()
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    @cached_property
+    def columns(self) -> dict[str, NDArray[Any]]:
+        """knob, setting, own, error_of, error, unit, seconds."""
+        names = Row.__dataclass_fields__
+        return {name: np.array([getattr(row, name) for row in self.rows]) for name in names}
+
+    @property
+    def provenance(self) -> dict[str, Any]:
+        """Kind of scene, references and remarks."""
+        return {
+            "kind": self.kind,
+            "references": dict(self.references),
+            "remarks": list(self.remarks),
+            "rows": len(self),
+        }
+
+    def curves(self) -> dict[tuple[str, str, str], list[Row]]:
+        """The rows by knob, what the error is of, and unit."""
+        found: dict[tuple[str, str, str], list[Row]] = {}
+        for row in self.rows:
+            found.setdefault((row.knob, row.error_of, row.unit), []).append(row)
+        return found
+
+
+def knobs_of(scene: Scene, folder: str | os.PathLike[str] = ".") -> Knobs:
+    """All numerical knobs of a scene in a folder.
+
+    Raises ValueError for a scene with a sweep, and whatever the scene itself would be refused for.
+    """
+    from importlib import import_module
+
+    if scene.sweep:
+        raise ValueError("sweep: the knobs of one point are swept; give the scene without its sweep")
+    module = import_module(f"rotor.scenes.knobs.{_FILES[scene.kind]}")
+    found: Knobs = getattr(module, scene.kind)(kind_of(scene).request(scene, folder))
+    return found
+
+
+_FILES = {
+    "levels": "of_levels", "spectrum": "of_levels", "raman": "of_levels", "thermo": "of_fields", "stark": "of_fields",
+    "align": "of_fields", "tumble": "of_motion", "gas": "of_motion", "fluid": "of_motion",
+}  # fmt: skip
+
+
+def work_precision(
+    scene: Scene,
+    *,
+    folder: str | os.PathLike[str] = ".",
+    limit_seconds: float = USUAL_LIMIT,
+    progress: Progress = lambda knob, setting: None,
+    on_knob: Callable[[WorkPrecision], object] = lambda table: None,
+) -> WorkPrecision:
+    """Sweep every knob of a scene.
+
+    Parameters
+    ----------
+    scene : Scene
+        Without a sweep.
+    folder : path
+        From which the files that the scene reads are counted.
+    limit_seconds : float
+        Of processor time for all knobs together; each has an equal share of what is left.
+    progress : callable
+        Called with the knob and the setting before each calculation.
+    on_knob : callable
+        Called with the table so far after each knob.
+
+    Returns
+    -------
+    WorkPrecision
+        Without rows where nothing can be swept; the remarks say why.
+
+    Raises
+    ------
+    ValueError
+        Whatever the scene itself would be refused for.
+
+    Examples
+    --------
+    >>> from rotor.scenes.scene import LevelsScene
+    >>> table = work_precision(LevelsScene(molecule="CO"))
+    >>> [row.setting for row in table.rows], table.rows[0].error > table.rows[-1].error == 0.0
+    (['order J^2', 'order J^4', 'order J^6', 'order J^8'], True)
+    """
+    found, left = knobs_of(scene, folder), limit_seconds
+    table = WorkPrecision(scene.kind, (), {}, found.remarks)
+    for number, knob in enumerate(found.knobs):
+        rows, against, remarks, spent = sweep(knob, left / (len(found.knobs) - number), progress)
+        left = max(left - spent, 0.0)
+        references = {**table.references, f"{knob.name}: {knob.measures[0].of}": against}
+        table = WorkPrecision(scene.kind, (*table.rows, *rows), references, (*table.remarks, *remarks))
+        on_knob(table)
+    return table
+
+
+def sweep(
+    knob: Knob, limit_seconds: float, progress: Progress = lambda knob, setting: None
+) -> tuple[list[Row], str, list[str], float]:
+    """The rows of one knob, what their errors are measured against, remarks on what was left out, and the seconds that were timed.
+
+    A setting that would go beyond the limit, judged by how much longer each setting took than the one before, is left out.
+    """
+    every = [*knob.settings, *([] if knob.reference is None else [Setting("the reference", knob.reference)])]
+    done: list[tuple[Setting, Any, float]] = []
+    remarks: list[str] = []
+    refused: list[str] = []
+    spent = 0.0
+    for setting in every:
+        if spent + _next_seconds([seconds for _, _, seconds in done]) > limit_seconds:
+            remarks.append(f"{knob.name}: {setting.label} and finer ones are beyond the time limit")
+            break
+        progress(knob.name, setting.label)
+        try:
+            answer, seconds, both = timed(lambda asked=setting.request: knob.answer(asked), warm=bool(done))  # type: ignore[misc]
+        except ValueError as error:
+            refused.append(setting.label)
+            why = str(error)
+            continue
+        spent += both
+        done.append((setting, answer, seconds))
+    if refused:
+        remarks.append(f"{knob.name}: {', '.join(refused)}: refused, the last of them with: {why}")
+    if not done:
+        return [], knob.against, remarks, spent
+    last, reference, _ = done[-1]
+    reached = knob.reference is None or last.label == "the reference"
+    against = knob.against if reached else f"the finest within the time limit, {last.label}"
+    shown = done if knob.reference is None else done[:-1]
+    rows = [
+        Row(knob.name, setting.label, setting.own, m.of, m.error(answer, reference), m.unit, seconds / knob.repeats)
+        for m in knob.measures
+        for setting, answer, seconds in shown
+    ]
+    return rows, against, remarks, spent
+
+
+def _next_seconds(taken: list[float]) -> float:
+    """How long the next setting may take: as much longer than the last one as that was than the one before; nothing is known at first."""
+    if not taken:
+        return 0.0
+    if len(taken) == 1 or taken[-2] < 1e-3:
+        return taken[-1]
+    return taken[-1] * max(taken[-1] / taken[-2], 1.0)
+
+
+def timed(call: Callable[[], Any], warm: bool = True) -> tuple[Any, float, float]:
+    """The answer of a call, its processor time in seconds, and that of all calls that were timed.
+
+    The time of a short call is the shortest of a few. warm: False where the call may load modules or compile; it is made once
+    more then, and the first time does not count.
+    """
+    answer, first = _once(call)
+    if not warm and SHORT_SECONDS < first < COMPILING_SECONDS:
+        answer, first = _once(call)
+    if first > SHORT_SECONDS:
+        return answer, first, first
+    again = [_once(call)[1] for _ in range(REPEATS)]
+    return answer, min(again), first + sum(again)
+
+
+def _once(call: Callable[[], Any]) -> tuple[Any, float]:
+    start = time.process_time()
+    answer = call()
+    return answer, time.process_time() - start

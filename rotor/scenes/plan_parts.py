@@ -1,0 +1,114 @@
+"""What the plans of all kinds share: the plan itself, the short calibration, and the words about levels."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+from rotor.scenes.left_out import LeftOut
+
+if TYPE_CHECKING:
+    from rotor.quantum.effect import QuantumEffect
+    from rotor.tops.top import Top
+
+ENERGY = "energies are eigenvalues of the truncated Hamiltonian"
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a scene will do.
+
+    effects: taken, with their sizes where they have one. good: quantum numbers, or what the motion conserves. parts: name and
+    words: basis, blocks, method and why. counts: by name. seconds, memory_mb: estimated. left_out: largest first.
+    """
+
+    kind: str
+    effects: tuple[str, ...]
+    good: tuple[str, ...]
+    parts: tuple[tuple[str, str], ...]
+    counts: Mapping[str, int]
+    seconds: float
+    memory_mb: float
+    left_out: tuple[LeftOut, ...]
+
+    def facts(self) -> dict[str, Any]:
+        """The plan as plain records."""
+        return asdict(self) | {"parts": dict(self.parts), "counts": dict(self.counts)}
+
+
+def timed(call: Callable[[], Any]) -> float:
+    """Processor time of a call, its second one where the first is short: without imports and compilation."""
+    start = time.process_time()
+    call()
+    first = time.process_time() - start
+    if first > 1.0:
+        return first
+    start = time.process_time()
+    call()
+    return time.process_time() - start
+
+
+def extrapolated(call: Callable[[int], Any], work: Callable[[int], float], sizes: tuple[int, int], size: int) -> float:
+    """Seconds of a call of one size from two smaller ones: a part that is always there, and one in proportion to the work.
+
+    Parameters
+    ----------
+    call : callable
+        Does what is timed, for a size.
+    work : callable
+        What the growing part is in proportion to, of a size.
+    sizes : (int, int)
+        The two sizes that are timed, the smaller first.
+    size : int
+        The size that is asked for.
+
+    Returns
+    -------
+    float
+        Processor time.
+    """
+    first, second = (min(one, size) for one in sizes)
+    seconds = timed(lambda: call(second))
+    if second == size:
+        return seconds
+    rate = max(seconds - timed(lambda: call(first)), 0.0) / (work(second) - work(first))
+    return seconds + rate * (work(size) - work(second))
+
+
+def level_parts(top: Top, jmax: int, effects: Sequence[QuantumEffect]) -> list[tuple[str, str]]:
+    """Basis, blocks and method of the levels of a top."""
+    from rotor.quantum.basis import wang_blocks
+    from rotor.quantum.rotation import representation_of
+
+    spins = [spin for effect in effects for spin in effect.spins(top)]
+    if top.kind in ("linear", "spherical", "prolate", "oblate"):
+        basis, method = f"J to {jmax}; no matrix", f"closed form: H is diagonal in the basis of a {top.kind} top"
+    else:
+        largest = max(block.size for block in wang_blocks(jmax, representation_of(top)))
+        basis = f"J to {jmax}; four Wang blocks of each J, of up to {largest} states"
+        method = f"Wang blocks one by one, {representation_of(top)}; {ENERGY}"
+    parts = [("basis", basis), ("method", method)]
+    if spins:
+        size = math.prod(spin.twice + 1 for spin in spins)
+        parts.append(("spins", f"blocks of F over the solved rotation, {size} spin functions: {_names(spins)}"))
+    return parts
+
+
+def _names(spins: Sequence[Any]) -> str:
+    return ", ".join(dict.fromkeys(spin.name for spin in spins))
+
+
+def effect_texts(top: Top, j: int, effects: Sequence[QuantumEffect]) -> tuple[str, ...]:
+    from rotor.quantum.effect import effect_sizes
+
+    return tuple(f"{one.name}, {one.size_mhz:.2g} MHz at J = {j}" for one in effect_sizes(top, j, effects))
+
+
+def good_numbers(top: Top, effects: Sequence[QuantumEffect]) -> tuple[str, ...]:
+    """Quantum numbers that stay good under the effects, as the levels have them."""
+    from rotor.quantum.solve import solve_levels
+
+    return solve_levels(top, 1, effects=effects, vectors=False).quanta_names

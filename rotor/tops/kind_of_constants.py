@@ -1,0 +1,122 @@
+"""What a set of constants is by its names and sizes: kind of top, reduction, representation; and which names each kind has."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from rotor.tops import operators as published
+from rotor.tops.operators import KINDS, axes_of
+
+RIGID = ("A", "B", "C")
+LINEAR, SPHERICAL, SYMMETRIC = tuple(published.LINEAR), tuple(published.SPHERICAL), tuple(published.SYMMETRIC)
+S_REDUCTION, A_REDUCTION = tuple(published.S_REDUCTION), tuple(published.A_REDUCTION)
+DISTORTION = {"linear": LINEAR, "spherical": SPHERICAL, "prolate": SYMMETRIC, "oblate": SYMMETRIC}
+REDUCED = {"A": A_REDUCTION, "S": S_REDUCTION}
+_SHARED = {*RIGID, *A_REDUCTION} & {*RIGID, *S_REDUCTION}
+KNOWN = tuple(dict.fromkeys((*RIGID, *LINEAR, *SPHERICAL, *S_REDUCTION, *A_REDUCTION)))
+
+
+def ray_kappa(a: float, b: float, c: float) -> float:
+    """Ray's asymmetry parameter κ = (2B - A - C)/(A - C): -1 prolate, +1 oblate; -1 for a linear top (A infinite).
+
+    Source: Ray, Z. Phys. 78 (1932) 74. Raises ValueError for a spherical top, where κ is 0/0.
+
+    >>> ray_kappa(3.0, 2.0, 1.0)
+    0.0
+    """
+    if math.isinf(a):
+        return -1.0
+    if not a >= b >= c or a == c:
+        raise ValueError(f"Ray's κ of A = {a!r}, B = {b!r}, C = {c!r}: expected A >= B >= C and A > C")
+    return (2 * b - a - c) / (a - c)
+
+
+def vocabulary(kind: str, reduction: str | None = None) -> tuple[str, ...]:
+    """The names that constants of a kind of top may have; both reductions of an asymmetric top if none is given.
+
+    >>> vocabulary("linear")
+    ('B', 'D', 'H', 'L')
+    """
+    if kind == "asymmetric":
+        return RIGID + (REDUCED[reduction] if reduction else tuple(dict.fromkeys(S_REDUCTION + A_REDUCTION)))
+    return (("B",) if kind == "linear" else RIGID) + DISTORTION[kind]
+
+
+def kind_of(values: Mapping[str, float], kind: str | None) -> str:
+    """The kind given, where it fits the constants, else that of the rule of `Constants`; ValueError where neither is possible."""
+    given = "".join(name for name in RIGID if name in values)
+    if kind is None:
+        return _by_rule(given, values)
+    if kind not in KINDS:
+        raise ValueError(f"kind {kind!r}: a top is one of {', '.join(KINDS)}")
+
+    fits = {
+        "linear": given == "B",
+        "spherical": "B" in given and len({values[name] for name in given}) == 1,
+        "prolate": given == "AB" or (given == "ABC" and values["B"] == values["C"]),
+        "oblate": given == "BC" or (given == "ABC" and values["A"] == values["B"]),
+        "asymmetric": given == "ABC",
+    }
+    if not fits[kind]:
+        needed = {
+            "linear": "B alone",
+            "spherical": "B, or equal A, B, C",
+            "prolate": "A and B, or A, B, C with B = C exactly",
+            "oblate": "B and C, or A, B, C with A = B exactly",
+            "asymmetric": "A, B and C",
+        }[kind]
+        have = ", ".join(f"{name} = {values[name]!r}" for name in given) or "none of A, B, C"
+        raise ValueError(f"kind {kind!r} needs {needed}, but the constants have {have}")
+    return kind
+
+
+def _by_rule(given: str, values: Mapping[str, float]) -> str:
+    if given not in ("B", "AB", "BC", "ABC"):
+        raise ValueError(
+            f"constants with {given or 'none of A, B, C'}: give B (linear molecule), A and B (prolate top), "
+            "B and C (oblate top) or A, B and C"
+        )
+    if given == "B":
+        return "linear"
+    if len({values[name] for name in given}) == 1:
+        return "spherical"
+    if given == "AB" or (given == "ABC" and values["B"] == values["C"]):
+        return "prolate"
+    if given == "BC" or values["A"] == values["B"]:
+        return "oblate"
+    return "asymmetric"
+
+
+def reduction_of(kind: str, names: Mapping[str, float], reduction: str | None) -> str | None:
+    """The reduction given, or the one the names tell; None for a rigid asymmetric top and every other kind."""
+    if reduction not in (None, "A", "S"):
+        raise ValueError(f"reduction {reduction!r}: Watson's reductions are 'A' and 'S'")
+    if kind != "asymmetric":
+        if reduction:
+            raise ValueError(f"reduction {reduction!r} belongs to asymmetric tops; the kind here is {kind!r}")
+        return None
+
+    own = {key: [n for n in names if n in table and n not in _SHARED] for key, table in REDUCED.items()}
+    if own["A"] and own["S"]:
+        raise ValueError(f"both reductions in one set: {', '.join(own['A'])} (A) with {', '.join(own['S'])} (S)")
+    found = next((key for key, members in own.items() if members), None)
+    if reduction and found and reduction != found:
+        raise ValueError(f"reduction {reduction!r}, but {', '.join(own[found])} belong to the {found}-reduction")
+    if not reduction and not found and any(name in _SHARED - {*RIGID} for name in names):
+        raise ValueError("octic and decic names alone fit both reductions; say reduction='A' or reduction='S'")
+    return reduction or found
+
+
+def representation_of(kind: str, values: Mapping[str, float], representation: str | None) -> str | None:
+    """The axes given, or Ir for κ <= 0 and IIIl for κ > 0; None for every kind but asymmetric tops."""
+    if representation is not None:
+        axes_of(representation)  # refuses one that does not exist
+    if kind != "asymmetric":
+        if representation:
+            raise ValueError(f"representation {representation!r} belongs to asymmetric tops; kind is {kind!r}")
+        return None
+    if representation:
+        return representation
+    a, b, c = values["A"], values["B"], values["C"]
+    return "IIIl" if a > c and ray_kappa(a, b, c) > 0 else "Ir"

@@ -1,0 +1,47 @@
+"""docs/fitted_catalogues.md is what its script makes: one row in every run, the others in the slow proofs, a part of them each day."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from pathlib import Path
+
+import pytest
+
+SCRIPT = Path(__file__).parents[1] / "docs" / "make_fitted_catalogues.py"
+
+
+@pytest.fixture(scope="module")
+def make():
+    spec = importlib.util.spec_from_file_location("make_fitted_catalogues", SCRIPT)
+    module = sys.modules["make_fitted_catalogues"] = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    yield module
+    del sys.modules["make_fitted_catalogues"]
+
+
+ROWS = ("OCS", "HC3N", "H2CO", "SO2", "SO2, J ≤ 40", "CH2CO", "HCONH2", "c-C2H4O", "CH2OHCHO", "HCOOH", "H2CS", "HNCO", "HNCO, Ka ≤ 1",
+        "D2O", "D2O, J ≤ 5")  # fmt: skip
+
+
+def cells(row: str) -> list[str]:
+    return [cell.strip() for cell in row.strip().strip("|").split("|")]
+
+
+def test_the_page_has_the_rows_and_texts_of_its_script(make):
+    page = make.PAGE.read_text(encoding="utf-8")
+    assert page.startswith(make.HEAD)
+    assert page.endswith(make.TAIL)
+    rows = [cells(line) for line in page[len(make.HEAD) : -len(make.TAIL)].splitlines() if line]
+    assert [row[0] for row in rows] == list(make.CASES) == list(ROWS)
+
+
+@pytest.mark.oracle
+@pytest.mark.parametrize("label", [pytest.param(one, marks=pytest.mark.slow) if one != "OCS" else one for one in ROWS])
+def test_a_row_made_anew_is_that_of_the_page(shared, make, label):
+    """Lines, reduction and number of constants as they stand there; the rms to the last digit."""
+    page = make.PAGE.read_text(encoding="utf-8")
+    written = next(cells(line) for line in page.splitlines() if cells(line)[0] == label)
+    found = cells(make.row(label, shared))
+    assert found[:7] == written[:7]
+    assert float(found[7]) == pytest.approx(float(written[7]), abs=0.011)  # two decimals, one unit of the last
