@@ -2,7 +2,7 @@
 
     python benchmarks/bench_plans.py
 
-The first two are made longer than their example scenes, so that what is compared is above start-up.
+The first three are made longer than their example scenes, so that what is compared is above start-up.
 """
 
 from __future__ import annotations
@@ -18,7 +18,11 @@ from rotor.scenes.scene import Scene
 from rotor.scenes.scene_file import read_scene
 
 FOLDER = Path(__file__).resolve().parents[1] / "examples" / "scenes"
-CHANGED = {"water_gas": {"numerics": {"molecules": 100_000}}, "rigid_water": {"conditions": {"steps": 1500}}}
+CHANGED = {
+    "water_gas": {"numerics": {"molecules": 100_000}},
+    "rigid_water": {"conditions": {"steps": 1500}},
+    "formamide_hyperfine": {"conditions": {"temperature": "300 K", "range": None}, "numerics": {"jmax": None}},
+}
 NAMES = (*CHANGED, "so2_far_infrared", "ocs_alignment", "driven_chaos")
 
 

@@ -15,6 +15,10 @@ import rotor
 from rotor.plots.stark import stark_figure
 from rotor.quantum.effects.stark import MHZ_ANGSTROM3_W_PER_CM2, stark_map
 from rotor.quantum.effects.zeeman import zeeman_map
+from rotor.quantum.fields.deflection import deflection_table
+from rotor.spectra.fields.lines import field_lines
+from rotor.spectra.fields.stark_coefficients import line_coefficients
+from rotor.thermo.field_mixture import field_mixture
 from rotor.tops.top import Top
 from rotor.units import MHZ_PER_CM, MHZ_PER_DEBYE_KV_PER_CM
 
@@ -62,12 +66,92 @@ assert abs(low + dipole**2 / (6 * b)) < 1e-4
 
 # %%
 indole = rotor.read("indole")
-states = stark_map(indole, np.linspace(0, 100, 51), j_highest=2, tolerance_mhz=1e-3)
+states = stark_map(indole, np.linspace(0, 100, 51), j_highest=1, tolerance_mhz=1e-3)
 print(f"indole: {len(states.curves())} states, J max {states.jmax}, edge population {states.edge_population.max():.1e}")
 stark_figure(states, title="indole in a static field")
 
 # %%
 assert states.edge_population.max() < 1e-6
+
+# %% [markdown]
+# ## Lines in the field
+#
+# A field switched on and off shows each line as its M components, the lobes. Light across the field lets M change by one, light along
+# it does not. J = 1 - 0, M = 0 moves by (8/15) μ²E²/2hB, 5.684 MHz/(kV/cm)² of OCS.
+
+# %%
+fields = np.linspace(0, 5, 26)
+lobes = field_lines(ocs, fields, j_highest=3, light="isotropic", temperature_k=300.0).lobes("2", "1")
+first = field_lines(ocs, fields, j_highest=1, light="parallel", temperature_k=300.0).lobes("1", "0")
+slope = first.shift_mhz[1] / fields[1] ** 2
+print(f"J = 1 - 0, M = 0: {slope:.4f} MHz/(kV/cm)²; formula {8 / 15 * dipole**2 / (2 * b):.4f}")
+for row in line_coefficients(lobes).to_pandas().itertuples():
+    print(f"J = 2 - 1, M = {row.upper_m} - {row.lower_m}: {row.c2_mhz_per_kv2_per_cm2:+.4f} MHz/(kV/cm)²")
+figure, axes = plt.subplots(figsize=(5.5, 2.8), layout="constrained")
+for rows in lobes.pairs():
+    upper, lower = int(lobes.upper_m[rows.start]), int(lobes.lower_m[rows.start])
+    style = "-" if upper == lower else "--"
+    axes.plot(fields, lobes.shift_mhz[rows], style, lw=1.0, label=f"|M| = {lower} to {upper}")
+axes.set(xlabel="field (kV/cm)", ylabel="shift (MHz)", title="OCS, J = 1 to 2, unpolarized light")
+axes.legend(frameon=False, fontsize=8)
+
+# %%
+assert abs(slope - 8 / 15 * dipole**2 / (2 * b)) < 1e-3  # of fourth order in the field
+assert len(lobes.pairs()) == 5  # M = 0 - 0, 1 - 1, 1 - 0, 0 - 1, 2 - 1
+
+# %% [markdown]
+# ## A gas, a beam, a deflector
+#
+# In equilibrium a gas is oriented by the field. In a beam each state is followed and keeps its population, so that states which the
+# field pushes out take part. What a deflector needs is μ_eff of each state, as a table.
+
+# %%
+fields = np.linspace(0, 200, 41)
+gas, beam = (field_mixture(ocs, fields, 2.0, populations=kind) for kind in ("equilibrium", "adiabatic"))
+table = deflection_table(stark_map(ocs, fields, j_highest=2))
+figure, (left, right) = plt.subplots(1, 2, figsize=(7, 2.6), layout="constrained")
+for mixture, name in ((gas, "gas, in equilibrium"), (beam, "beam, adiabatic")):
+    left.plot(mixture.field_kv_per_cm, mixture.cosines["costheta"], label=name)
+left.set(xlabel="field (kV/cm)", ylabel="⟨cosθ⟩", title="OCS at 2 K")
+left.legend(frameon=False)
+share = table.populations(2.0)
+for name, moment, population in zip(table.states, table.mu_eff_debye, share, strict=True):
+    label = name.replace(" M", ", |M| = ")
+    right.plot(fields, moment, lw=0.4 + 4 * population, label=f"J = {label}: {100 * population:.0f} %")
+right.axhline(0, color="black", lw=0.5, ls=":")
+right.set(xlabel="field (kV/cm)", ylabel="μ_eff (D)", title="Effective dipoles; width: population at 2 K")
+right.legend(frameon=False, fontsize=7, loc="center left", bbox_to_anchor=(1.0, 0.5))
+print(f"at 200 kV/cm: gas {gas.cosines['costheta'][-1]:.3f}, beam {beam.cosines['costheta'][-1]:.3f}")
+
+# %%
+assert gas.cosines["costheta"][-1] > beam.cosines["costheta"][-1] > 0
+assert abs(share.sum() - 1) < 1e-12
+assert (table.mu_eff_debye[:, 1] < 0).any()  # low-field seekers
+
+# %% [markdown]
+# ## A field at an angle with a laser
+#
+# M is mixed then. The laser holds the axis along Z; the field chooses its sense, as long as it has a part along Z.
+
+# %%
+bright = ocs.with_polarizability(np.diag([4.04, 0.0, 0.0]), "the anisotropy alone")
+angles, along, held = np.linspace(0, 90, 7), [], []
+for angle in np.radians(angles):
+    direction = (np.sin(angle), 0.0, np.cos(angle))
+    tilted = stark_map(bright, [5.0], j_highest=0, intensity_w_per_cm2=2e11, direction=direction, tolerance_mhz=1.0)
+    along.append(tilted.cosines["costheta"][0])
+    held.append(tilted.cosines["cos2theta"][0])
+figure, axes = plt.subplots(figsize=(5, 2.7), layout="constrained")
+axes.plot(angles, held, "s-", ms=4, label="⟨cos²θ⟩ with the laser")
+axes.plot(angles, along, "o-", ms=4, label="⟨cosθ⟩ with the field")
+axes.plot(angles, along[0] * np.cos(np.radians(angles)), "k:", lw=0.8, label="the projection of an axis along Z")
+axes.set(xlabel="angle between field and laser (°)", title="OCS, ground state, 5 kV/cm and 0.2 TW/cm²")
+axes.legend(frameon=False, fontsize=8)
+print("<cosθ>:", np.round(along, 3), "<cos²θ>:", np.round(held, 3))
+
+# %%
+assert along[0] > 0.5 > 0.2 > along[-1]
+assert np.ptp(held) < 0.05  # the laser alone decides how well the axis is held
 
 # %% [markdown]
 # ## Pendular states
@@ -88,7 +172,7 @@ for omega in omegas:
     energies.append(found.energy_mhz[0] / 6000)
     aligned.append(found.cosines["cos2theta"][0])
 
-figure, (left, right) = plt.subplots(1, 2, figsize=(8, 3.5), layout="constrained")
+figure, (left, right) = plt.subplots(1, 2, figsize=(6, 2.4), layout="constrained")
 fine = np.logspace(-1, 2, 200)
 left.semilogx(fine, [obl_cv(0, 0, np.sqrt(omega)) / omega for omega in fine], "k-", lw=0.8, label="spheroidal function")
 left.semilogx(omegas, np.array(energies) / omegas, "o", ms=4, label="stark_map")
@@ -107,9 +191,20 @@ assert abs(found.cosines["cos2theta"][0] - 0.89984260) < 1e-8
 # Rotation alone makes a moment: a linear molecule shifts by -g μ_N B M exactly.
 
 # %%
-magnetic = zeeman_map(ocs, [0.0, 1.0], -0.03, j_highest=1)
+magnetic = zeeman_map(ocs, np.linspace(0, 1, 5), -0.03, j_highest=1)
 shift = np.ptp(magnetic.energy_mhz[magnetic.curve("1", 1)])
 print(
     f"OCS, J = 1, M = 1 in 1 T, with g = -0.03 (a made-up value): {shift * 1e3:.2f} kHz; {shift / MHZ_PER_CM:.2e} cm⁻¹"
 )
+symmetric = Top.from_constants("A=20 B=6 GHz")
+components = zeeman_map(symmetric, np.linspace(0, 20, 21), (0.5, -0.2, -0.2), magnetisability=(-3, -7, -7), j_highest=1)
+figure, axes = plt.subplots(figsize=(5.5, 2.6), layout="constrained")
+for rows in components.curves():
+    if components.label[rows.start] == "1 1":
+        shifts = components.energy_mhz[rows] - components.free_mhz[rows]
+        axes.plot(components.field[rows], shifts, label=f"M = {components.m[rows.start]:+d}")
+axes.set(xlabel="magnetic field (T)", ylabel="shift (MHz)", title="J = K = 1 of a symmetric top, made-up g and χ")
+axes.legend(frameon=False, fontsize=8)
+
+# %%
 assert abs(shift - 0.03 * 7.6225932188) < 1e-8

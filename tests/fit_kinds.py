@@ -43,7 +43,7 @@ def parameter_file(kind: Kind) -> ParameterFile:
         for code, value, label in rows
     )
     head = (
-        f"{len(rows):4d} {-kind.lines if kind.ten else kind.lines:5d}   30 {kind.nxpar:4d}  0.0E+00 1.0E+06 1.0E+00 1.0"
+        f"{len(rows):4d} {-kind.lines if kind.ten else kind.lines:5d}  100 {kind.nxpar:4d}  0.0E+00 1.0E+06 1.0E+00 1.0"
     )
     return read_par(f"a kind\n{head}\n{kind.options.strip()}\n{text}".encode())
 

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rotor.fit.choose import bootstrap
 from rotor.fit.fit import fit_lines
 from rotor.formats.spcat.cat import read_cat
 from rotor.formats.spcat.file_lines import format_of
@@ -33,6 +34,9 @@ FITS = {
 }
 STARTS = ("ared6_500_p0p1pct", "ared6_500_p1pct", "ared6_500_p3pct_et1e9", "ared6_500_p5pct_et1e9", "ared6_500_p10pct_et1e9",
           "ared6_5000_p1pct", "formamide_hfs")  # fmt: skip
+
+
+KINDS = Path(__file__).parent / "oracles" / "kinds"
 
 
 def fitted(par, lin):
@@ -220,3 +224,42 @@ def test_correlations_that_do_not_fit_the_parameters_are_refused():
         variance_factor(replace(file, rest="".join(f"{x:10.7f}" for x in (1, 0, 1, 0)) + "\n"))
     with pytest.raises(ValueError, match="correlations of 2 parameters"):
         variance_factor(replace(file, rest="".join(f"{x:10.7f}" for x in (1, 0, 1)) + "\n"))
+
+
+@pytest.mark.parametrize("name", ["o2", "oc33s"])
+def test_fits_of_a_triplet_and_of_a_bent_state_come_out_as_spfit_has_them(tmp_path, name):
+    """A .var of SPFIT as the start, each free constant 1e-6 off: ties, an a-priori error of 1e-19, an energy from zero (N = -1)."""
+    folder = KINDS / name
+    theirs = read_par(folder / f"{name}.var")
+    made, factor = [], 1.0
+    for p in theirs.parameters:
+        fixed = p.error == 1e-19
+        factor = factor if p.constrained else 1.0 if fixed else 1 + 1e-6
+        made.append(replace(p, value=p.value * factor, error=1e-19 if fixed else 1e-37 if p.constrained else 1e36))
+    start = replace(theirs, parameters=tuple(made), rest="")
+    lines = read_lin(folder / f"{name}.lin", len(names_of_quanta(format_of(start, groups_for_fit(start)))))
+    asked, fit = fitted(start, lines)
+    assert fit.converged, fit.reason
+    assert fit.used.all()
+    ours = fitted_file(asked, fit, variances=True)
+    for mine, other in zip(ours.parameters, theirs.parameters, strict=True):
+        assert abs(mine.value - other.value) < 0.01 * other.error  # the issue's limit
+        assert mine.error == pytest.approx(other.error, rel=1e-6)  # derivatives at a step of less than 0.01 of an error
+    mine, other = (np.array([float(x) for x in re.findall(r"-?\d+\.\d{7}", one.rest)]) for one in (ours, theirs))
+    if len(other):  # the samples of the package have them only where a prediction needs them
+        assert np.abs(np.abs(mine) - np.abs(other)).max() < 1e-6  # seven decimals are printed
+    whole = np.flatnonzero(fit.lines.from_zero)
+    assert len(whole) == (name == "o2")
+
+
+def test_lines_of_a_file_with_spins_are_drawn_anew():
+    """The bootstrap with the file's own levels; a-priori errors of 1e18 MHz are none."""
+    folder = KINDS / "oc33s"
+    theirs = read_par(folder / "oc33s.var")
+    made = tuple(replace(p, error=1e-19 if p.error == 1e-19 else 1e18) for p in theirs.parameters)
+    asked, fit = fitted(replace(theirs, parameters=made, rest=""), read_lin(folder / "oc33s.lin", 3))
+    assert fit.degrees_of_freedom == 23 - 7
+    _, spread = bootstrap(fit, 12, np.random.default_rng(1), model=asked.model)
+    assert spread[0] < 1e-15  # held by its a-priori error
+    ratio = spread[1:] / fit.scaled_errors[1:]
+    assert 0.3 < np.median(ratio) < 3.0  # deviations of 12 samples are good to a fifth, 23 lines to another

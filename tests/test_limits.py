@@ -147,3 +147,28 @@ def test_reports_end_with_the_limits(call, verb):
     told = json.loads(call(verb, *given, "--json", "-")[1])
     assert [one["name"] for one in told["limits"]] == ["nuclear quadrupole", "magnetic coupling of nuclear spins"]
     assert {one["name"]: one["present"] for one in told["effects"]}["nuclear quadrupole"] is False
+
+
+@pytest.mark.parametrize(
+    ("command", "said"),
+    [
+        (("raman", "CO2", "--jmax", "4"), "nothing that the molecule shows signs of"),
+        (("thermo", "HCN", "--temperature", "10"), "nuclear quadrupole: about 5 MHz"),
+        (("stark", "HCN", "--field", "0,1", "--states", "0"), "nuclear quadrupole: about 5 MHz"),
+        (
+            ("align", "CO2", "--pulse", "1e12 W/cm2, 50 fs", "--until", "1ps"),
+            "nothing that the molecule shows signs of",
+        ),
+        (
+            ("gas", "CO2", "--molecules", "50"),
+            "collisions; vibrations; quantum mechanics: the heat capacity is classical",
+        ),
+        (("spectrum", "--constants", "B=9 D=1e-6 GHz", "--dipole-abc", "1,0,0", "--jmax", "2"), "of constants alone"),
+    ],
+)
+def test_every_report_says_what_is_left_out(call, command, said):
+    code, out, _ = call(*command)
+    assert code == 0
+    assert f"\nleft out  {said}" in out
+    told = json.loads(call(*command, "--json", "-")[1])
+    assert "left_out" in told if command[0] == "gas" else told["effects"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gzip
 import itertools
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -174,6 +175,16 @@ def test_j_max_follows_from_the_tolerance():
     assert coarse.jmax < fine.jmax
     assert np.abs(coarse.energy_mhz - fine.energy_mhz).max() < 1.0  # what was asked for
     assert fine.edge_population.max() < 1e-12  # leakage that goes with 1e-8 MHz
+
+
+def test_processes_change_no_number():
+    """Chains that one sweep holds, an asymmetric top, and a map of so many fields that its chains are solved apart."""
+    with ThreadPoolExecutor(2) as pool:
+        for top, fields in ((OCS, 50), (nearly_c2v(0.1), 3), (OCS, 20_000)):
+            grid = np.linspace(0, 100, fields)
+            maps = [stark_map(top, grid, j_highest=2, tolerance_mhz=1e-3, executor=one) for one in (None, pool)]
+            assert (maps[0].energy_mhz == maps[1].energy_mhz).all()
+            assert (maps[0].cosines["costheta"] == maps[1].cosines["costheta"]).all()
 
 
 def test_a_j_max_too_small_is_refused():

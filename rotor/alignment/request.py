@@ -14,6 +14,8 @@ from rotor.alignment.align import DEFAULT_TOLERANCE, AlignmentTrace, align
 from rotor.alignment.pulse import Pulse
 from rotor.arrays import Floats
 from rotor.checks import require_between, require_whole
+from rotor.quantum.effects.of_top import effects_of
+from rotor.quantum.limits import limit_facts
 from rotor.table import Table, TextOf
 from rotor.tops.facts import top_facts
 
@@ -128,6 +130,7 @@ class AlignAnswer(TextOf):
             "extremes": [_extremes(name, trace.t_ps, values) for name, values in cosines.items()],
             "classical_molecules": self.request.classical_molecules,
             "times": len(trace.t_ps),
+            **limit_facts(trace.top, max(trace.ensemble.jmax, 1), effects_of(trace.top, hyperfine=False)),
         }
 
 

@@ -24,6 +24,7 @@ from rotor.cli.shared.output import (
 )
 from rotor.cli.shared.plot_options import ViewOptions, view_of
 from rotor.cli.shared.pulse_inputs import Pulses, pulses_of
+from rotor.cli.shared.report import model_facts
 from rotor.cli.shared.save_scene import save_scene, save_scene_option
 from rotor.cli.shared.sources import with_sources
 
@@ -120,7 +121,11 @@ def command(
         _writers(answer, content, view) | saved,
         text,
         with_sources(
-            lambda: _show(answer, content), answer.trace.top, ("constants", "dipole", "polarizability"), given.sources
+            lambda: _show(answer, content),
+            answer.trace.top,
+            ("constants", "dipole", "polarizability"),
+            given.sources,
+            lambda: model_facts(content),
         ),
     )
 

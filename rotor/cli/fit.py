@@ -118,7 +118,7 @@ def command(context: typer.Context, given: Options) -> None:
         note("spins or several states: no .toml is written, the .par and .var have everything")
     trials = _trials(fit, options, given.try_)
     suggestions = _suggestions(fit, given.suggest)
-    spread = _bootstrap(fit, options, given.bootstrap, given.seed)
+    spread = _bootstrap(request, fit, options, given.bootstrap, given.seed)
     if not fit.converged and fit.minimum.status != "interrupted":
         for name in ("--out .toml", "--out .par", "--out .var"):
             files.paths.pop(name, None)
@@ -334,14 +334,15 @@ def _components(fit: Fit) -> tuple[float, float, float]:
     return a, b, c
 
 
-def _bootstrap(fit: Fit, options: FitOptions, samples: int, seed: int) -> list[float]:
+def _bootstrap(request: FitRequest, fit: Fit, options: FitOptions, samples: int, seed: int) -> list[float]:
     if not samples:
         return []
     import numpy as np
 
     from rotor.fit.choose import bootstrap
 
-    return [float(x) for x in bootstrap(fit, samples, np.random.default_rng(seed), options)[1]]
+    model = request.spfit.model if request.spfit else None
+    return [float(x) for x in bootstrap(fit, samples, np.random.default_rng(seed), options, model=model)[1]]
 
 
 # What goes out

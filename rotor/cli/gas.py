@@ -18,6 +18,7 @@ from rotor.cli.shared.inputs import Input, json_option
 from rotor.cli.shared.options import file_option, grouped, option
 from rotor.cli.shared.output import Files, Table, Writer, deliver, json_text, rows_of, show_facts, show_table
 from rotor.cli.shared.plot_options import ViewOptions, view_of
+from rotor.cli.shared.report import left_out_facts
 from rotor.cli.shared.save_scene import save_scene, save_scene_option
 from rotor.cli.shared.sources import with_sources
 
@@ -84,7 +85,13 @@ def command(context: typer.Context, given: Input, options: Options, outputs: Out
         files,
         _writers(answer, content, view) | save_scene("gas", request, outputs, given),
         lambda: json_text(content),
-        with_sources(lambda: _show(answer, content), answer.request.top, ("constants",), given.sources),
+        with_sources(
+            lambda: _show(answer, content),
+            answer.request.top,
+            ("constants",),
+            given.sources,
+            lambda: left_out_facts(content["left_out"]),
+        ),
     )
 
 

@@ -39,7 +39,8 @@ EXAMPLES = """\b
 Examples:
   rotor run s.toml
   rotor run s.toml --out results --json -
-  rotor run sweep.toml --workers 4"""
+  rotor run sweep.toml --workers 4
+  rotor run sweep.toml --dask tcp://head:8786"""
 
 
 @dataclass(frozen=True)
@@ -49,6 +50,9 @@ class Options:
     scene: str = argument(..., help="A scene file.")
     out: str = option(".", metavar="FOLDER", help="From which the files that are written are counted.")
     workers: int | None = option(None, metavar="N", help="Spread the points of a sweep, or the work, over N processes.")
+    dask: str | None = option(
+        None, metavar="ADDRESS", help="Spread them over the workers of a Dask scheduler instead: tcp://head:8786."
+    )
     record: str | None = option(
         None, metavar="FILE", help="Of a sweep: what is done; by default SCENE.sweep.jsonl in the folder of --out."
     )
@@ -68,7 +72,7 @@ def command(context: typer.Context, options: Options) -> None:
         raise ValueError("--record: this scene has no sweep")
     files = Files()
     files.ask_json(options.json)
-    with _workers(options.workers) as pool:
+    with _workers(options) as pool:
         if scene.sweep:
             _sweep(scene, options, files, pool, context.obj)
         else:
@@ -76,8 +80,15 @@ def command(context: typer.Context, options: Options) -> None:
 
 
 @contextmanager
-def _workers(number: int | None) -> Iterator[Executor | None]:
-    """A pool of processes; None for one process."""
+def _workers(options: Options) -> Iterator[Executor | None]:
+    """A pool of processes, or of workers of a cluster; None for one process."""
+    number = options.workers
+    if options.dask is not None:
+        if number is not None:
+            raise ValueError("--workers and --dask: give one of them; the cluster has its own workers")
+        with _of_dask(options.dask) as cluster:
+            yield cluster
+        return
     if number is None or number == 1:
         yield None
         return
@@ -89,6 +100,20 @@ def _workers(number: int | None) -> Iterator[Executor | None]:
         yield pool
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
+
+
+@contextmanager
+def _of_dask(address: str) -> Iterator[Executor]:
+    from contextlib import ExitStack
+
+    from rotor.scenes.cluster import dask_executor
+
+    with ExitStack() as stack:
+        try:
+            pool = stack.enter_context(dask_executor(address))
+        except ValueError as error:
+            raise ValueError(f"--dask: {error}") from None
+        yield pool
 
 
 def _folder(options: Options) -> Path:

@@ -24,6 +24,7 @@ from rotor.cli.shared.output import (
     show_table,
 )
 from rotor.cli.shared.plot_options import ViewOptions, view_of
+from rotor.cli.shared.report import model_facts
 from rotor.cli.shared.save_scene import save_scene, save_scene_option
 from rotor.cli.shared.sources import with_sources
 
@@ -164,7 +165,13 @@ def command(
     text = lambda: json_with_rows(answer.states, "states", content)  # noqa: E731
     writers = {**_writers(top, answer.states, content, view), **_further_writers(made, content)}
     writers |= save_scene("stark", answer.request, outputs, given, options.polarizability is not None)
-    show = with_sources(lambda: _show(top, answer.states, content), top, ("constants", "dipole"), given.sources)
+    show = with_sources(
+        lambda: _show(top, answer.states, content),
+        top,
+        ("constants", "dipole"),
+        given.sources,
+        lambda: model_facts(content),
+    )
     deliver(files, writers, text, show)
 
 

@@ -26,6 +26,7 @@ from rotor.cli.shared.output import (
     sum_progress,
 )
 from rotor.cli.shared.plot_options import ViewOptions, view_of
+from rotor.cli.shared.report import model_facts
 from rotor.cli.shared.save_scene import save_scene, save_scene_option
 from rotor.cli.shared.sources import with_sources
 
@@ -98,7 +99,11 @@ def command(
         _writers(answer, content, view) | save_scene("thermo", request, outputs, given),
         text,
         with_sources(
-            lambda: _show(answer.functions, content), answer.functions.top, ("constants", "spin weights"), given.sources
+            lambda: _show(answer.functions, content),
+            answer.functions.top,
+            ("constants", "spin weights"),
+            given.sources,
+            lambda: model_facts(content),
         ),
     )
 

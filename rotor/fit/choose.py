@@ -381,7 +381,12 @@ def suggest_lines(
 
 
 def bootstrap(
-    fit: Fit, samples: int, rng: np.random.Generator, options: FitOptions | None = None
+    fit: Fit,
+    samples: int,
+    rng: np.random.Generator,
+    options: FitOptions | None = None,
+    *,
+    model: Callable[[Ints], LevelModel] | None = None,
 ) -> tuple[Floats, Floats]:
     """Parameters of fits to lines drawn anew with replacement, and their standard deviations.
 
@@ -398,6 +403,8 @@ def bootstrap(
         Draws the lines.
     options : FitOptions, optional
         Of each fit.
+    model : callable, optional
+        As in `fit_lines`.
 
     Returns
     -------
@@ -427,7 +434,7 @@ def bootstrap(
         rows = np.concatenate([members[int(b)] for b in drawn])
         blend = np.repeat(np.arange(len(drawn)), [len(members[int(b)]) for b in drawn])
         lines = replace(fit.lines.take(rows), blend=blend, comments=())
-        one = fit_lines(lines, fit.named, at, _patient(options))
+        one = fit_lines(lines, fit.constants, at, _patient(options), model=model)
         if one.statistics.rank == fit.statistics.rank:
             out.append(one.values)
     if len(out) < samples:

@@ -10,6 +10,7 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -90,7 +91,7 @@ class Molecule:
         object.__setattr__(self, "charge", int(charge))
         object.__setattr__(self, "notes", tuple(self.notes))
 
-    @property
+    @cached_property
     def nuclei(self) -> tuple[Isotope, ...]:
         """The isotope of each atom, with its mass, spin and moments."""
         return tuple(isotope(s, a) for s, a in zip(self.symbols, self.mass_numbers, strict=True))

@@ -121,6 +121,18 @@ def series_ratio(top: Top, jmax: int, kmax: int | None = None, effects: Sequence
     return max((ratio for ratio, _ in _ratios(top, jmax, kmax, effects)), default=0.0)
 
 
+def converges_to(top: Top, jmax: int, effects: Sequence[QuantumEffect] = SEMI_RIGID) -> int:
+    """The highest J, up to `jmax`, at which no order of the distortion is above `RATIO_LIMIT` of the order before it.
+
+    >>> from rotor.tops.top import Top
+    >>> converges_to(Top.from_constants("A=835840 B=435352 C=278139 DeltaK=973 MHz"), 20)
+    16
+    """
+    if not jmax or series_ratio(top, jmax, None, effects) <= RATIO_LIMIT:
+        return jmax
+    return _first(top, jmax, None, effects) - 1
+
+
 def _ratios(
     top: Top, j: int, kmax: int | None, effects: Sequence[QuantumEffect] = SEMI_RIGID
 ) -> list[tuple[float, int]]:

@@ -19,7 +19,6 @@ apart. tests/test_limits.py has I_red from the kinetic energy of the atoms.
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
@@ -42,6 +41,7 @@ COMPUTE = "its constants are known, add the effects of spins"  # the command lin
 CH_ANGSTROM, NEIGHBOUR_ANGSTROM = 1.3, 1.7  # bonds of hydrogen to carbon or nitrogen, and of nitrogen to heavier atoms
 OFF_AXIS = 0.05  # sine of the angle from which an atom is off the axis of a methyl group
 ELECTRON_SPIN = "electron spin"
+OF_SPINS = frozenset({"nuclear quadrupole", "magnetic coupling of nuclear spins", ELECTRON_SPIN})
 AMMONIA_MHZ = 24_000.0  # the splitting of NH3, see docs/limitations.md
 FLAT_DEGREES = 355.0  # sum of the three angles at a nitrogen that is not pyramidal
 
@@ -185,12 +185,12 @@ def _split_text(nuclei: Sequence[Splitting]) -> str:
 
 def _of_geometry(top: Top, molecule: Molecule, present: set[str]) -> list[Limit]:
     """Motions of large amplitude, and unpaired electrons, that the geometry shows."""
-    found = []
-    if tops := _internal_rotors(molecule):
+    found, bonds = [], _neighbours(molecule)
+    if tops := _internal_rotors(molecule, bonds):
         what = "a methyl group turns" if len(tops) == 1 else f"{len(tops)} methyl groups turn"
         text = f"{what} against the rest: lines of A and of E species are apart, by less the higher the barrier"
         found.append(Limit("internal rotation", max(tops), text, at_most=True))
-    if _pyramidal_nitrogens(molecule) and "interacting states" not in present:
+    if _pyramidal_nitrogens(molecule, bonds) and "interacting states" not in present:
         text = "nitrogen is pyramidal: its levels are pairs that this leaves out; the size is ammonia's, heavier groups have less"
         found.append(Limit("inversion", AMMONIA_MHZ, text, at_most=True))
     electrons = sum(one.element_number for one in molecule.nuclei) - molecule.charge
@@ -204,11 +204,12 @@ def _neighbours(molecule: Molecule) -> list[Ints]:
     x = molecule.positions_angstrom
     hydrogen = np.array([symbol == "H" for symbol in molecule.symbols])
     found: list[list[int]] = [[] for _ in x]
-    for first, second in _pairs_within(x, NEIGHBOUR_ANGSTROM).tolist():
-        reach = CH_ANGSTROM if hydrogen[first] or hydrogen[second] else NEIGHBOUR_ANGSTROM
-        if np.linalg.norm(x[first] - x[second]) < reach:
-            found[first].append(second)
-            found[second].append(first)
+    pairs = _pairs_within(x, NEIGHBOUR_ANGSTROM)
+    apart = np.linalg.norm(x[pairs[:, 0]] - x[pairs[:, 1]], axis=1)
+    reach = np.where(hydrogen[pairs].any(axis=1), CH_ANGSTROM, NEIGHBOUR_ANGSTROM)
+    for first, second in pairs[apart < reach].tolist():
+        found[first].append(second)
+        found[second].append(first)
     return [np.array(sorted(near), dtype=np.int64) for near in found]
 
 
@@ -222,15 +223,14 @@ def _pairs_within(x: Floats, reach: float) -> Ints:
     return np.argwhere(np.triu(apart < reach, k=1))
 
 
-def _internal_rotors(molecule: Molecule) -> list[float]:
+def _internal_rotors(molecule: Molecule, bonds: Sequence[Ints]) -> list[float]:
     """F in MHz of each methyl group whose turning is not that of the whole: other atoms lie off its axis."""
     found: list[tuple[Floats, list[int]]] = []
-    x, bonds = molecule.positions_angstrom, _neighbours(molecule)
+    x = molecule.positions_angstrom
     for carbon, near in enumerate(bonds):
-        symbols = Counter(molecule.symbols[i] for i in near.tolist())
-        if molecule.symbols[carbon] != "C" or symbols["H"] != 3:
-            continue
         hydrogens = [i for i in near.tolist() if molecule.symbols[i] == "H"]
+        if molecule.symbols[carbon] != "C" or len(hydrogens) != 3:
+            continue
         axis = x[carbon] - x[hydrogens].mean(axis=0)
         if len(x) > len(hydrogens) + 2 and _any_off_axis(x, [carbon, *hydrogens], axis):
             found.append((axis / np.linalg.norm(axis), hydrogens))
@@ -269,10 +269,10 @@ def _sines(vectors: Floats, axis: Floats) -> Floats:
     return np.asarray(np.linalg.norm(np.cross(vectors, axis), axis=1) / lengths)
 
 
-def _pyramidal_nitrogens(molecule: Molecule) -> int:
+def _pyramidal_nitrogens(molecule: Molecule, bonds: Sequence[Ints]) -> int:
     """Nitrogens with three neighbours, two of them hydrogens, that are not flat."""
     count, x = 0, molecule.positions_angstrom
-    for atom, near in enumerate(_neighbours(molecule)):
+    for atom, near in enumerate(bonds):
         hydrogens = sum(molecule.symbols[i] == "H" for i in near.tolist())
         if molecule.symbols[atom] != "N" or len(near) != 3 or hydrogens < 2:
             continue

@@ -21,7 +21,9 @@ if TYPE_CHECKING:
     from rotor.tops.top import Top
 
 SHORT_J = (12, 30)  # of the calibration; a J that is not above the second is timed itself
+SETTLING_STEPS = 50  # of a box, after which its forces are nearly those of a fluid
 SHORT_FIELDS, SHORT_GAS, SHORT_STEPS = (2, 20), (500, 2000), (5, 20)  # likewise
+MILLIBAR = 1e-3  # of a gas whose pressure is not given
 BYTES_A_LINE = 100  # columns of a line in memory
 STEPS = "Runge-Kutta of order 8, adaptive"
 BEGINNINGS = 20  # of a driven motion, one of which is made to count its steps
@@ -121,8 +123,12 @@ def _spectrum(request: Any) -> Plan:
     )
     _, b, c = top.rotational_constants_mhz
     absent = left_out.of_levels(top, j, request.effects)
-    if request.shape == "sticks" and (width := left_out.doppler(top, (b + c) * (j + 1), kelvin)):
-        absent = sorted([*absent, width], key=lambda one: (one.size is None, -(one.size or 0.0)))
+    pressure = request.layer.pressure_bar if request.layer else MILLIBAR
+    widths = [
+        left_out.doppler(top, (b + c) * (j + 1), kelvin) if request.shape == "sticks" else None,
+        left_out.pressure_width(top, kelvin, pressure) if request.shape in ("sticks", "gaussian") else None,
+    ]
+    absent = left_out.largest_first([*absent, *(one for one in widths if one is not None)])
     return Plan(
         kind="spectrum",
         effects=effect_texts(top, j, request.effects),
@@ -362,8 +368,18 @@ def _fluid(request: Any) -> Plan:
         counts={"atoms": len(made.box), "steps": settings.steps},
         seconds=seconds,
         memory_mb=len(made.box) * 2e-3,
-        left_out=tuple(left_out.of_fluid()),
+        left_out=tuple(_left_out_of_fluid(short(min(SETTLING_STEPS, settings.steps)).atoms, settings)),
     )
+
+
+def _left_out_of_fluid(atoms: Any, settings: Any) -> list[left_out.LeftOut]:
+    """By the forces and torques of a box."""
+    from rotor.fluid.motion.dynamics import RigidDynamics
+    from rotor.fluid.run import bodies_and_degrees
+
+    bodies = bodies_and_degrees(atoms, settings)[0]
+    force, torque = RigidDynamics(atoms, 1.0, removed=0).wrench()
+    return left_out.of_fluid(bodies, force, torque, settings.temperature_k, settings.step_fs)
 
 
 def _fit(request: Any) -> Plan:

@@ -81,6 +81,7 @@ def extrapolated(call: Callable[[int], Any], work: Callable[[int], float], sizes
 def level_parts(top: Top, jmax: int, effects: Sequence[QuantumEffect]) -> list[tuple[str, str]]:
     """Basis, blocks and method of the levels of a top."""
     from rotor.quantum.basis import wang_blocks
+    from rotor.quantum.convergence import converges_to
     from rotor.quantum.rotation import representation_of
 
     spins = [spin for effect in effects for spin in effect.spins(top)]
@@ -91,6 +92,13 @@ def level_parts(top: Top, jmax: int, effects: Sequence[QuantumEffect]) -> list[t
         basis = f"J to {jmax}; four Wang blocks of each J, of up to {largest} states"
         method = f"Wang blocks one by one, {representation_of(top)}; {ENERGY}"
     parts = [("basis", basis), ("method", method)]
+    if (reach := converges_to(top, jmax, effects)) < jmax:
+        parts.append(
+            (
+                "warning",
+                f"the distortion series converges to J = {reach}; energies above at the highest K are not to be trusted",
+            )
+        )
     if spins:
         size = math.prod(spin.twice + 1 for spin in spins)
         parts.append(("spins", f"blocks of F over the solved rotation, {size} spin functions: {_names(spins)}"))

@@ -19,9 +19,12 @@ from rotor.arrays import Floats
 from rotor.checks import require_between, require_positive, require_whole
 from rotor.classical.gas.correlations import ShortTime, plateau, short_time
 from rotor.classical.gas.ensembles import Correlations, Ensemble, free_gas_correlations, thermal_ensemble
+from rotor.quantum.effects.of_top import effects_of
+from rotor.quantum.limits import OF_SPINS, model_limits, model_sizes, populated_j
 from rotor.statistics.degrees_of_freedom import count_degrees
 from rotor.statistics.equipartition import Equipartition, equipartition
 from rotor.table import TextOf
+from rotor.thermo.classical_onset import classical_above_k
 from rotor.tops.facts import top_facts
 
 if TYPE_CHECKING:
@@ -105,6 +108,19 @@ class GasAnswer(TextOf):
         top, probes = self.request.top, self.probes
         return short_time(top.moments_u_angstrom2, self.request.kt, probes.vector, probes.tensor)
 
+    @property
+    def left_out(self) -> list[str]:
+        """What a classical gas of free rigid tops leaves out: quantum mechanics, distortion, and what the molecule shows signs of."""
+        top = self.request.top
+        j, effects = populated_j(top, self.request.temperature_k), effects_of(top, hyperfine=False)
+        quantum = (
+            f"quantum mechanics: the heat capacity is classical within 1 % above {classical_above_k(top, 0.01):.3g} K"
+        )
+        sizes = [one for one in model_sizes(top, j, effects) if one.present and one.name == "centrifugal distortion"]
+        distortion = [f"{one.name}: {one.size_mhz:.2g} MHz of a level at J = {j}" for one in sizes]
+        seen = [limit.sentence for limit in model_limits(top, j, effects) if limit.name not in OF_SPINS]
+        return [f"collisions; vibrations; {quantum}", *distortion, *seen]
+
     def facts(self) -> dict[str, Any]:
         """Everything about the answer but its table, by the keys of docs/command_line.md."""
         request, test = self.request, self.test
@@ -132,6 +148,7 @@ class GasAnswer(TextOf):
             "failing": list(test.failing),
             "degrees": [asdict(d) | {"energy_cm": half_kt * d.mean, "expected_cm": half_kt} for d in test.degrees],
             **self._facts_of_correlations(),
+            "left_out": self.left_out,
         }
 
     def _facts_of_correlations(self) -> dict[str, Any]:

@@ -8,6 +8,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from rotor.checks import require_positive
+from rotor.quantum.effects.of_top import effects_of
+from rotor.quantum.limits import limit_facts, populated_j
 from rotor.table import TextOf
 from rotor.thermo.classical_limit import classical_limit, rotational_temperatures_k
 from rotor.thermo.classical_onset import classical_above_k
@@ -91,6 +93,9 @@ class ThermoAnswer(TextOf):
             "relative_error": float(functions.relative_error.max()),
             "vibrations": vibrations.text if vibrations is not None else None,
             "pressure_bar": gas.pressure_bar if gas is not None else None,
+            **limit_facts(
+                top, populated_j(top, float(functions.temperature_k.max())), effects_of(top, hyperfine=False)
+            ),
         }
 
 

@@ -62,6 +62,7 @@ def test_three_dependent_moments_of_a_planar_molecule_are_named():
     assert not any("they depend on each other" in note for note in two.notes)
 
 
+@pytest.mark.slow
 def test_labels_are_ranks_whatever_the_grid():
     """Case 22: 11 and 101 fields through avoided crossings give each label the same energy at the last one."""
     top = Top.from_constants("A=5655.2654 B=1546.875864 C=1214.40399 MHz", dipole_abc_debye=(4.5152, 0.05, 0))

@@ -19,6 +19,9 @@ KINDS = {
     "asymmetric": "asymmetric top",
 }
 
+NOTHING_SEEN = "nothing that the molecule shows signs of; further states of vibration are not those of these constants"
+NOTHING_KNOWN = "of constants alone, nuclear spins and motions of large amplitude are not known; a geometry shows them"
+
 
 def begin(command: str, text: str) -> dict[str, Any]:
     """The first keys of every JSON: version, command line, and the input as given."""
@@ -39,7 +42,12 @@ def model_facts(content: Mapping[str, Any]) -> list[tuple[str, str]]:
     present = [f"{one['name']} {one['size_mhz']:.2g} MHz" for one in content["effects"] if one["present"]]
     facts = [("effects", f"at J = {content['sizes_at_j']}: " + ", ".join(present))]
     limits = [Limit(**one).sentence.replace(COMPUTE, "rotor spectrum --hyperfine") for one in content["limits"]]
-    return facts + [("left out" if not i else "", sentence) for i, sentence in enumerate(limits)]
+    return facts + left_out_facts(limits or [NOTHING_SEEN if content["mass_u"] is not None else NOTHING_KNOWN])
+
+
+def left_out_facts(sentences: Sequence[str]) -> list[tuple[str, str]]:
+    """Sentences of what is left out, the first with the name of the list."""
+    return [("left out" if not i else "", sentence) for i, sentence in enumerate(sentences)]
 
 
 def heading(top: Top) -> str:

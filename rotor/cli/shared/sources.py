@@ -50,13 +50,38 @@ def source_facts(top: Top, tables: Sequence[str], whole: bool) -> list[tuple[str
     return [("sources", "; ".join(cited) + (" (--sources: all of it)" if longer else ""))] if cited else []
 
 
-def with_sources(show: Callable[[], None], top: Top | None, tables: Sequence[str], whole: bool) -> Callable[[], None]:
-    """What prints a report and, below it, its sources, where there is a top."""
+def with_sources(
+    show: Callable[[], None],
+    top: Top | None,
+    tables: Sequence[str],
+    whole: bool,
+    further: Callable[[], list[tuple[str, str]]] = list,
+) -> Callable[[], None]:
+    """What prints a report and, below it, its sources and what the model leaves out.
+
+    Parameters
+    ----------
+    show : callable
+        Prints the report.
+    top : Top, optional
+        Without one there are no sources.
+    tables : sequence of str
+        Whose sources, see `source_facts`.
+    whole : bool
+        All of each source, not its citation alone.
+    further : callable
+        Gives what the model has and leaves out, as names and texts.
+
+    Returns
+    -------
+    callable
+        Prints all of it.
+    """
     from rotor.cli.shared.output import show_facts
 
     def show_all() -> None:
         show()
-        facts = [] if top is None else source_facts(top, tables, whole)
+        facts = ([] if top is None else source_facts(top, tables, whole)) + further()
         if facts:
             show_facts(facts)
 

@@ -81,7 +81,24 @@ def _with_spins(options: Options, count: int) -> Options:
 
 
 def refuse_far_f(labels: Ints, form: Format, names: tuple[str, ...], twice_spins: int) -> None:
-    """ValueError for a label with F below 0 whose |F| no coupling of its N with the spins gives."""
+    """Refuse labels with F below 0 whose |F| no coupling of N with the spins gives.
+
+    Parameters
+    ----------
+    labels : (n, quanta) array
+        Quantum numbers by line, N first.
+    form : Format
+        Of the quantum numbers of the file.
+    names : tuple of str
+        Of the columns.
+    twice_spins : int
+        Twice the sum of all spins.
+
+    Raises
+    ------
+    ValueError
+        With the first such label.
+    """
     far = np.abs(-spelled_out(labels, form) - labels[:, 0]) > (twice_spins + 1) // 2
     if far.any():
         first = " ".join(map(str, labels[int(np.argmax(far))].tolist()))

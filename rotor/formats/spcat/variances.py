@@ -13,7 +13,7 @@ from rotor.formats.spcat.codes import HELD_BELOW, constants_and_matrix
 from rotor.formats.spcat.par import Parameter, ParameterFile
 from rotor.tops.covariance import Covariance
 
-FREE_ABOVE = 1e30  # an a-priori error so large is none
+FREE_ABOVE = 1e15  # MHz: an a-priori error so large is none; SPFIT counts it as no datum either
 _WIDTH = 10
 
 

@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, ClassVar
 
@@ -26,6 +26,7 @@ from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.fields.blocks import Contraction, FieldBlock, FieldSpace
 from rotor.quantum.fields.field_map import FieldMap, field_map
 from rotor.quantum.fields.map_request import (
+    MOST_AT_EDGE,
     BlockProblem,
     KnownSpaces,
     MapRequest,
@@ -90,6 +91,7 @@ def stark_map(
     jmax: int | None = None,
     tolerance_mhz: float = DEFAULT_TOLERANCE_MHZ,
     diabatic_gap_mhz: float | None = None,
+    most_at_edge: float = MOST_AT_EDGE,
     executor: Executor | None = None,
 ) -> FieldMap:
     """Energies, effective dipoles and cosines of a top against a static field.
@@ -116,6 +118,8 @@ def stark_map(
         Of energies, by raising J max.
     diabatic_gap_mhz : float, optional
         Near crossings with a smaller gap are passed diabatically in the column `diabatic_label`.
+    most_at_edge : float
+        Of the population of a state, in the two highest J of the basis.
     executor : Executor, optional
         Blocks are spread over it.
 
@@ -145,7 +149,7 @@ def stark_map(
         diabatic_gap_mhz,
         effects,
     )
-    return field_map(request, jmax, executor)
+    return field_map(replace(request, most_at_edge=most_at_edge), jmax, executor)
 
 
 def map_request(

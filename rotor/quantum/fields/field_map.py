@@ -22,7 +22,8 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum.fields.block_states import BlockStates, block_states, count_of, enough_states, free_order, states_of
-from rotor.quantum.fields.blocks import FieldBlock
+from rotor.quantum.fields.blocks import AxialBlock, FieldBlock
+from rotor.quantum.fields.chains import TOGETHER
 from rotor.quantum.fields.map_request import BlockProblem, MapRequest, over
 from rotor.quantum.fields.solver import (
     DENSE,
@@ -39,7 +40,6 @@ from rotor.table import Table
 Of = TypeVar("Of")
 
 EDGE = 2  # the highest values of J whose population is leakage
-MOST_AT_EDGE = 1e-6  # of that population: cosines are wrong by about as much
 HIGHEST_J = 300
 STEP_J = 6
 
@@ -141,7 +141,7 @@ def field_map(request: MapRequest, jmax: int | None = None, executor: Executor |
     """The map that a request asks for.
 
     jmax: of the basis; by default it is raised until no energy at the highest field moves by more than the tolerance, and until no
-    state has more than 1e-6 of its population in the two highest J.
+    state has more of its population in the two highest J than the request allows.
     executor: blocks are spread over it.
 
     Raises ValueError where a given J max is too small for either, and where J of 300 would not be enough.
@@ -151,12 +151,12 @@ def field_map(request: MapRequest, jmax: int | None = None, executor: Executor |
         enough, moved = converged_jmax(request, tried, executor, given=jmax is not None)
         found = _tabulated(request, enough, moved, executor)
         leaked = float(found.edge_population.max(initial=0.0))
-        if leaked <= MOST_AT_EDGE:
+        if leaked <= request.most_at_edge:
             return found
         if jmax is not None:
             raise ValueError(
                 f"J max {jmax} is too small: a state has {leaked:.2g} of its population in the two highest J, more than "
-                f"{MOST_AT_EDGE:g}; give a higher J max, or none and it is chosen"
+                f"{request.most_at_edge:g}; give a higher J max, or none and it is chosen"
             )
         tried = enough + max(STEP_J, enough // 4)
 
@@ -282,6 +282,13 @@ def _solve_blocks(request: MapRequest, blocks: Sequence[FieldBlock]) -> list[_So
     ]
 
 
+def _is_small(request: MapRequest, blocks: Sequence[FieldBlock]) -> bool:
+    """Whether all blocks are chains that one sweep holds together: milliseconds, which other processes would not shorten."""
+    states = sum(count_of(request, block) for block in blocks)
+    chains = all(isinstance(block, AxialBlock) for block in blocks)
+    return chains and max(map(len, blocks), default=0) * len(request.fields) * states <= TOGETHER
+
+
 def _measured(request: MapRequest, block: FieldBlock, problem: BlockProblem, found: BlockStates) -> _Solved:
     """Slopes, cosines and leakage of the states of a block."""
     fields, vectors = request.fields, found.vectors
@@ -292,8 +299,9 @@ def _measured(request: MapRequest, block: FieldBlock, problem: BlockProblem, fou
 
 
 def _tabulated(request: MapRequest, jmax: int, moved: Floats, executor: Executor | None) -> FieldMap:
-    if executor is None:
-        solved = _solve_blocks(request, _blocks(request, jmax))
+    blocks = _blocks(request, jmax)
+    if executor is None or _is_small(request, blocks):
+        solved = _solve_blocks(request, blocks)
     else:
         solved = each_block(request, jmax, partial(_solve_block, request), executor)
     fields, rows = request.fields, []

@@ -13,6 +13,8 @@ from rotor.arrays import Floats, Ints
 from rotor.quantum.fields.blocks import FieldBlock, FieldSpace
 from rotor.quantum.fields.solver import Matrix, Terms
 
+MOST_AT_EDGE = 1e-6  # of the population of a state, in the highest J of the basis: cosines are wrong by about as much
+
 
 class BlockProblem(NamedTuple):
     """Matrices over a block, all (n, n), of H(x) = fixed + x slope + x² curvature; curvature None where nothing is quadratic.
@@ -42,6 +44,7 @@ class MapRequest:
 
     space: makes the states up to a J max. problem: the matrices of a block. fields: rising. j_highest: free levels up to this J are
     followed. m_values: |M|, or signed where `signed`. tolerance_mhz: of energies. diabatic_gap_mhz: None for no diabatic labels.
+    most_at_edge: the population that a state may have in the two highest J.
     """
 
     space: Callable[[int], FieldSpace]
@@ -54,6 +57,7 @@ class MapRequest:
     slope_name: str
     slope_unit_mhz: float
     diabatic_gap_mhz: float | None = None
+    most_at_edge: float = MOST_AT_EDGE
 
 
 class KnownSpaces:

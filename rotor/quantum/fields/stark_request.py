@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from rotor.checks import require_positive, require_whole
+from rotor.quantum.effects.of_top import effects_of
 from rotor.quantum.effects.stark import (
     DEFAULT_TOLERANCE_MHZ,
     Z,
@@ -19,6 +20,8 @@ from rotor.quantum.effects.stark import (
     stark_map,
 )
 from rotor.quantum.fields.field_map import FieldMap
+from rotor.quantum.fields.map_request import MOST_AT_EDGE
+from rotor.quantum.limits import limit_facts
 from rotor.table import TextOf
 from rotor.tops.facts import top_facts
 
@@ -34,6 +37,7 @@ class StarkRequest:
     top: with its dipole. fields_kv_per_cm: of any order. j_highest: free levels up to this J are followed. m_values: |M|; None: all.
     intensity_w_per_cm2: of a laser along Z. direction: of the field. jmax: of the basis; None: what tolerance_mhz needs.
     diabatic_gap_mhz: None: no diabatic labels. hyperfine: with the spins of the top's constants; m_values are |M_F| then.
+    most_at_edge: population that a state may have in the two highest J of the basis; cosines are wrong by about as much.
     """
 
     top: Top
@@ -46,6 +50,7 @@ class StarkRequest:
     tolerance_mhz: float = DEFAULT_TOLERANCE_MHZ
     diabatic_gap_mhz: float | None = None
     hyperfine: bool = False
+    most_at_edge: float = MOST_AT_EDGE
 
     def __post_init__(self) -> None:
         checked_j(self.j_highest)
@@ -55,6 +60,7 @@ class StarkRequest:
             checked_m(self.m_values, self.j_highest)
         require_whole("jmax", self.jmax, 2)
         require_positive("tolerance_mhz", self.tolerance_mhz)
+        require_positive("most_at_edge", self.most_at_edge)
         if self.diabatic_gap_mhz is not None:
             require_positive("diabatic_gap_mhz", self.diabatic_gap_mhz)
         checked_direction(self.direction)
@@ -65,8 +71,6 @@ class StarkRequest:
     @property
     def effects(self) -> tuple[QuantumEffect, ...]:
         """The Hamiltonian with spins where they are asked for, else nothing beyond what is always there."""
-        from rotor.quantum.effects.of_top import effects_of
-
         return effects_of(self.top, True) if self.hyperfine else ()
 
     @property
@@ -98,6 +102,7 @@ class StarkAnswer(TextOf):
             "tolerance_mhz": request.tolerance_mhz,
             **self.states.provenance,
             "curves": len(self.states.curves()),
+            **limit_facts(request.top, max(request.j_highest, 1), effects_of(request.top, request.hyperfine)),
         }
 
 
@@ -120,6 +125,7 @@ def answer_stark(request: StarkRequest, executor: Executor | None = None) -> Sta
         jmax=request.jmax,
         tolerance_mhz=request.tolerance_mhz,
         diabatic_gap_mhz=request.diabatic_gap_mhz,
+        most_at_edge=request.most_at_edge,
         executor=executor,
     )
     return StarkAnswer(request, states)
