@@ -10,6 +10,7 @@ import math
 import os
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from rotor.scenes import left_out
@@ -297,9 +298,10 @@ def _tumble(request: Any) -> Plan:
 
 
 def _beginning(request: Any, share: float) -> Any:
-    """The request for the first part of its time alone."""
+    """The request for the first part of its time alone; steps end at the times asked for, so these stay."""
     first, last = request.times[0], request.times[-1]
-    return replace(request, times=(first, first + share * (last - first)))
+    end = first + share * (last - first)
+    return replace(request, times=(*(t for t in request.times if abs(t - first) < abs(end - first)), end))
 
 
 def _seconds_of_steps(request: Any, steps: int) -> float:
@@ -314,7 +316,7 @@ def _seconds_of_steps(request: Any, steps: int) -> float:
     if steps < more * some:
         return timed(lambda: answer_driven(request))
     share = some / steps
-    near, far = (timed(lambda part=part: answer_driven(_beginning(request, part))) for part in (share, more * share))
+    near, far = (timed(partial(answer_driven, _beginning(request, part))) for part in (share, more * share))
     return near + (steps / some - 1) / (more - 1) * max(far - near, 0.0)
 
 
