@@ -376,12 +376,11 @@ def _fluid(request: Any) -> Plan:
 
 def _left_out_of_fluid(atoms: Any, settings: Any) -> list[left_out.LeftOut]:
     """By the forces and torques of a box."""
+    from rotor.fluid.forces.models import models_of, shapes_of
     from rotor.fluid.motion.dynamics import RigidDynamics
-    from rotor.fluid.run import bodies_and_degrees
 
-    bodies = bodies_and_degrees(atoms, settings)[0]
-    force, torque = RigidDynamics(atoms, 1.0, removed=0).wrench()
-    return left_out.of_fluid(bodies, force, torque, settings.temperature_k, settings.step_fs)
+    dynamics = RigidDynamics(atoms, 1.0, removed=0, shapes=shapes_of(models_of(settings.model)))
+    return left_out.of_fluid(dynamics.bodies, *dynamics.wrench(), settings.temperature_k, settings.step_fs)
 
 
 def _fit(request: Any) -> Plan:
