@@ -85,11 +85,20 @@ def panel_of(record: dict) -> Panel:
     return Panel(record["title"], record["of"], curves)
 
 
+def _by_panel(content: dict) -> str:
+    """JSON with one panel a line."""
+    every = (
+        f"{json.dumps(name)}: [\n" + ",\n".join(json.dumps(one, ensure_ascii=False) for one in panels) + "\n]"
+        for name, panels in content.items()
+    )
+    return "{\n" + ",\n".join(every) + "\n}\n"
+
+
 def write(results: dict[str, list[Panel]]) -> None:
     """Figures, pictures and page."""
     ordered = {one.name: results[one.name] for one in SUBJECTS if one.name in results}
     content = {name: [asdict(panel) for panel in panels] for name, panels in ordered.items()}
-    RESULTS.write_text(json.dumps(content, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    RESULTS.write_text(_by_panel(content), encoding="utf-8")
     for subject in SUBJECTS:
         if subject.name in results:
             picture = PICTURES / f"accuracy_{subject.name}.png"

@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     from rotor.thermo.classical_gas import GasAnswer, GasRequest
 
 PILOT_MOLECULES = 2_000
-SPARE = 2.0  # a run is longer than the short ones that its step was chosen by: their error is to be so much smaller
-LONGEST_STEP_FS, SHORTEST_STEP_FS = 8.0, 0.05
+SPARE = 1.25  # a run is longer than the short ones that its step was chosen by: their error is to be so much smaller
+FIRST_STEP_FS, LONGEST_STEP_FS, SHORTEST_STEP_FS = 1.0, 8.0, 0.05
 EWALD_LADDER = tuple(10.0**-n for n in range(2, 11))
 REFERENCE_EWALD = 1e-12
 
@@ -177,13 +177,17 @@ def _by_energy(scene: Any, request: FluidRequest, asked: float) -> tuple[FluidRe
     given, usual = (quantity("numerics.step", one, "fs") for one in (scene.numerics.step, FluidNumerics().step))
     if given != usual:
         raise ValueError("accuracy and numerics.step: give one of them")
-    step = LONGEST_STEP_FS
+
+    def error(step_fs: float) -> float:
+        return conserved_k(answer_followed(followed(request, step_fs)))
+
+    # of second order: the step that reaches it, in hundredths of a femtosecond, from one that is short; then shorter until it does
+    step = FIRST_STEP_FS * math.sqrt(asked / SPARE / error(FIRST_STEP_FS))
+    step = min(math.floor(100.0 * step) / 100.0, LONGEST_STEP_FS)
     while step > SHORTEST_STEP_FS:
-        error = conserved_k(answer_followed(followed(request, step)))
-        if error <= asked / SPARE:
+        if error(step) <= asked / SPARE:
             return replace(request, settings=replace(request.settings, step_fs=step)), f"a step of {step:g} fs"
-        # of second order: the step that reaches it, in hundredths of a femtosecond, and shorter than the one before at least
-        step = min(math.floor(100.0 * step * math.sqrt(asked / SPARE / error)) / 100.0, 0.9 * step)
+        step = math.floor(95.0 * step) / 100.0
     raise ValueError(
         f"accuracy: {asked:g} K cannot be given: the steps would be shorter than {SHORTEST_STEP_FS:g} fs; ask for less"
     )

@@ -83,7 +83,7 @@ class WorkPrecision(Table):
 
 
 def knobs_of(scene: Scene, folder: str | os.PathLike[str] = ".") -> Knobs:
-    """All numerical knobs of a scene in a folder.
+    """All numerical knobs of a scene in a folder; where it asks for an accuracy, about the settings that are chosen for it.
 
     Raises ValueError for a scene with a sweep, and whatever the scene itself would be refused for.
     """
@@ -92,7 +92,12 @@ def knobs_of(scene: Scene, folder: str | os.PathLike[str] = ".") -> Knobs:
     if scene.sweep:
         raise ValueError("sweep: the knobs of one point are swept; give the scene without its sweep")
     module = import_module(f"rotor.scenes.knobs.{_FILES[scene.kind]}")
-    found: Knobs = getattr(module, scene.kind)(kind_of(scene).request(scene, folder))
+    request = kind_of(scene).request(scene, folder)
+    if getattr(scene, "accuracy", None) is not None:
+        from rotor.scenes.accuracy import chosen
+
+        request, _ = chosen(scene, request)
+    found: Knobs = getattr(module, scene.kind)(request)
     return found
 
 

@@ -59,7 +59,20 @@ def plan_of(scene: Scene, folder: str | os.PathLike[str] = ".") -> Plan:
     if scene.sweep:
         raise ValueError("sweep: a plan is of one point; plan the scene without its sweep")
     request = kind_of(scene).request(scene, folder)
-    return _PLANS[scene.kind](request)
+    if getattr(scene, "accuracy", None) is None:
+        return _PLANS[scene.kind](request)
+    request, how = _chosen(scene, request)
+    plan = _PLANS[scene.kind](request)
+    return replace(plan, parts=(*plan.parts, ("accuracy", how)))
+
+
+def _chosen(scene: Scene, request: Any) -> tuple[Any, str]:
+    """The settings that reach the accuracy of a scene; those of a driven motion are found by the motion itself, when it is run."""
+    if scene.kind == "tumble" and hasattr(request, "tolerance"):
+        return request, "the loosest tolerance that reaches it, found when the scene is run"
+    from rotor.scenes.accuracy import chosen
+
+    return chosen(scene, request)
 
 
 def allowed_lines(top: Top, jmax: int) -> int:

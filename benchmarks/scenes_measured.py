@@ -1,0 +1,234 @@
+"""Every scene of examples/scenes that asks for an accuracy: its plan beside what really happened, and what one step coarser would do.
+
+    python benchmarks/scenes_measured.py [--only SCENE ...] [--page]
+
+Each scene is measured in a process of its own; benchmarks/results/scenes_measured.json and docs/scenes_measured.md are written. Seconds
+are of the processor, the second run, without start-up and compilation; memory is the peak of what Python and NumPy allocate in one run.
+The error is against a calculation about a hundred times finer, or the exact value, by the knobs that `rotor accuracy` sweeps. --page
+measures nothing.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import subprocess
+import sys
+import tempfile
+import time
+import tracemalloc
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import msgspec
+
+from rotor.scenes.accuracy_sampled import quantile
+from rotor.scenes.accuracy_sweep import Row, WorkPrecision, work_precision
+from rotor.scenes.run import run_scene
+from rotor.scenes.scene import Scene
+from rotor.scenes.scene_file import read_scene
+
+ROOT = Path(__file__).resolve().parents[1]
+SCENES, RESULTS = ROOT / "examples" / "scenes", ROOT / "benchmarks" / "results" / "scenes_measured.json"
+PAGE = ROOT / "docs" / "scenes_measured.md"
+LIMIT_SECONDS = 60.0
+EXACT = "exact: nothing cheaper"
+
+HEAD = """# Scenes: the plan beside what happened
+
+Made by `python benchmarks/scenes_measured.py`: the scenes of `examples/scenes` that ask for an accuracy. "Stated" is the error that
+the result says it reached; "found" is that against a calculation about a hundred times finer, or against the exact value. "Coarser" is
+the same with the knob one step coarser: one J less, ten times the tolerance, about half of the molecules, 3 fs instead of 2. Seconds are of
+the processor of a shared machine, without start-up and compilation, and with the search of the settings; memory is the peak that
+one run allocates. The error of a gas is the root mean square of eight, times the quantile of the confidence that is stated, 2.58.
+
+| scene | asked | chosen | stated | found | coarser | seconds: plan, run | MB: plan, run |
+|---|---|---|---|---|---|---|---|
+"""
+
+
+@dataclass(frozen=True)
+class Knob:
+    """A knob of a scene. found, coarser: errors with its setting and with the one before it."""
+
+    name: str
+    error_of: str
+    unit: str
+    setting: str
+    found: float
+    coarser_setting: str | None
+    coarser: float | None
+
+
+@dataclass(frozen=True)
+class Measured:
+    """One scene. how: which settings were chosen. knobs: whose errors are those that the accuracy is of."""
+
+    scene: str
+    asked: float
+    unit: str
+    how: str
+    stated: float
+    knobs: tuple[Knob, ...]
+    plan_seconds: float
+    run_seconds: float
+    plan_mb: float
+    run_mb: float
+
+
+# which knobs move the error that the accuracy of a kind is of; of others (a cut, J max of a list) lines are lost, not accuracy
+KNOBS = {
+    "stark": ("energy",), "align": ("cosine",), "thermo": ("Q", "U", "C_v"), "tumble": ("attitude",),
+    "gas": ("temperature",), "fluid": ("conserved energy per degree",),
+}  # fmt: skip
+
+
+def asking() -> list[str]:
+    """Names of the scenes that ask for an accuracy."""
+    return [
+        path.stem for path in sorted(SCENES.glob("*.toml")) if getattr(read_scene(path), "accuracy", None) is not None
+    ]
+
+
+def one_point(name: str) -> Scene:
+    """A scene without its sweep, whose other values are those of the file."""
+    return msgspec.structs.replace(read_scene(SCENES / f"{name}.toml"), sweep={})
+
+
+def without_files(scene: Scene) -> Scene:
+    return msgspec.structs.replace(scene, outputs=type(scene.outputs)())
+
+
+def measure(name: str) -> Measured:
+    scene = without_files(one_point(name))
+    plan = scene.plan(folder=SCENES)
+    with tempfile.TemporaryDirectory() as out:
+
+        def run() -> object:
+            return run_scene(scene, folder=SCENES, out=out)
+
+        run()
+        start = time.process_time()
+        result = run()
+        seconds = time.process_time() - start
+        tracemalloc.start()
+        run()
+        peak = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+    one = result.reached
+    table = work_precision(scene, folder=SCENES, limit_seconds=LIMIT_SECONDS)
+    found = knobs(table, KNOBS.get(scene.kind, ()), quantile(result.request.confidence) if scene.kind == "gas" else 1.0)
+    return Measured(
+        name, one.asked, one.unit, one.how, one.error, found, plan.seconds, seconds, plan.memory_mb, peak / 1e6
+    )
+
+
+def knobs(table: WorkPrecision, errors_of: tuple[str, ...], widening: float) -> tuple[Knob, ...]:
+    """What was found with the setting of the scene and with the one before, times the quantile of a confidence."""
+    found = []
+    for (name, error_of, unit), rows in table.curves().items():
+        place = next((n for n, row in enumerate(rows) if row.own), None)
+        if error_of not in errors_of or place is None:
+            continue
+        before = next((row for row in reversed(rows[:place]) if coarser(row, rows[place])), None)
+        found.append(
+            Knob(
+                name, error_of, unit, rows[place].setting, widening * rows[place].error,
+                None if before is None else before.setting, None if before is None else widening * before.error,
+            )
+        )  # fmt: skip
+    return tuple(found)
+
+
+def coarser(row: Row, own: Row) -> bool:
+    """Whether a setting is a step coarser: of a length of a step by a quarter at least, else any that comes before."""
+    return row.knob != "numerics.step" or float(row.setting) >= 1.25 * float(own.setting)
+
+
+def page(rows: list[Measured]) -> str:
+    """The whole page."""
+    return HEAD + "".join(line(one) for one in rows) + tail(rows)
+
+
+def line(one: Measured) -> str:
+    unit = f" {one.unit}" if one.unit else ""
+    exact = EXACT in one.how or not one.knobs
+    found = (
+        ""
+        if exact
+        else "<br>".join(f"{k.name.removeprefix('numerics.')} {k.setting}: {k.found:.1e}" + _unit(k) for k in one.knobs)
+    )
+    coarser = (
+        "nothing is cheaper" if exact
+        else "<br>".join(f"{k.coarser_setting}: {k.coarser:.1e}" + _unit(k) for k in one.knobs if k.coarser is not None)
+    )  # fmt: skip
+    seconds, memory = f"{one.plan_seconds:.2g}, {one.run_seconds:.2g}", f"{one.plan_mb:.2g}, {one.run_mb:.2g}"
+    return f"| {one.scene} | {one.asked:g}{unit} | {one.how} | {one.stated:.1e} | {found} | {coarser} | {seconds} | {memory} |\n"
+
+
+def _unit(knob: Knob) -> str:
+    return f" {knob.unit} of {knob.error_of}" if knob.error_of in ("Q", "U", "C_v") else f" {knob.unit}".rstrip()
+
+
+def in_unit_asked(one: Measured, error: float, knob: Knob) -> float:
+    """An error in the unit of the accuracy: percent become parts where that is a number."""
+    return error / 100.0 if knob.unit == "%" and one.unit == "" else error
+
+
+def misses(one: Measured) -> list[str]:
+    """The knobs of a scene that one step coarser would miss its accuracy."""
+    return [
+        knob.name
+        for knob in one.knobs
+        if knob.coarser is not None and in_unit_asked(one, knob.coarser, knob) > one.asked
+    ]
+
+
+def tail(rows: list[Measured]) -> str:
+    """Which scenes could be coarser."""
+    spared = [one.scene for one in rows if EXACT not in one.how and not misses(one)]
+    if not spared:
+        return "\nOne step coarser at least one knob of every scene misses its accuracy.\n"
+    return (
+        f"\nOne step coarser at least one knob of every scene misses its accuracy, but of {', '.join(spared)}: there the estimate "
+        "that the choice is made by is larger than the error.\n"
+    )
+
+
+def read_results() -> list[Measured]:
+    """What was measured last, by name of scene."""
+    if not RESULTS.exists():
+        return []
+    return [
+        Measured(**{**one, "knobs": tuple(Knob(**knob) for knob in one["knobs"])})
+        for one in json.loads(RESULTS.read_text(encoding="utf-8"))
+    ]
+
+
+def write(rows: list[Measured]) -> None:
+    text = ",\n".join(json.dumps(asdict(one), ensure_ascii=False) for one in rows)
+    RESULTS.write_text(f"[\n{text}\n]\n", encoding="utf-8")
+    PAGE.write_text(page(rows), encoding="utf-8", newline="\n")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--only", nargs="*", choices=asking())
+    parser.add_argument("--page", action="store_true")
+    parser.add_argument("--measure", help=argparse.SUPPRESS)  # one scene, in this process
+    given = parser.parse_args()
+    if given.measure:
+        print(json.dumps(asdict(measure(given.measure)), ensure_ascii=False))
+        return
+    known = {one.scene: one for one in read_results()}
+    for name in [] if given.page else given.only or asking():
+        command = [sys.executable, __file__, "--measure", name]
+        done = subprocess.run(command, capture_output=True, text=True, check=True)
+        record = json.loads(done.stdout.splitlines()[-1])
+        known[name] = Measured(**{**record, "knobs": tuple(Knob(**knob) for knob in record["knobs"])})
+        print(line(known[name]), end="", flush=True)
+    write([known[name] for name in asking() if name in known])
+
+
+if __name__ == "__main__":
+    main()
