@@ -148,7 +148,8 @@ def test_kinds_without_a_knob_say_so():
     drag = [LinearDragSection(coefficients=[0.1, 0.1, 0.1])]
     driven = knobs_of(TumbleScene(body=racket, effects=drag, conditions=TumbleConditions(times=[0.0, 1.0])))
     assert [one.name for one in driven.knobs] == ["numerics.tolerance"]
-    assert "drag" in driven.remarks[0] and "adaptive method" in driven.remarks[0]  # why no splitting serves a drag
+    assert "drag" in driven.remarks[0]
+    assert "adaptive method" in driven.remarks[0]
 
 
 @pytest.mark.slow
