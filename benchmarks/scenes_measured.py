@@ -190,8 +190,8 @@ def tail(rows: list[Measured]) -> str:
     if not spared:
         return "\nOne step coarser at least one knob of every scene misses its accuracy.\n"
     return (
-        f"\nOne step coarser at least one knob of every scene misses its accuracy, but of {', '.join(spared)}: there the estimate "
-        "that the choice is made by is larger than the error.\n"
+        f"\nOne step coarser at least one knob of every scene misses its accuracy, but of {', '.join(spared)}: there the estimate is "
+        "larger than the error.\n"
     )
 
 

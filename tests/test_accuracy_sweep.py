@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,10 +13,14 @@ from rotor.scenes import accuracy_sweep
 from rotor.scenes.accuracy_panels import panels_of
 from rotor.scenes.accuracy_sweep import Row, WorkPrecision, knobs_of, sweep, work_precision
 from rotor.scenes.effect_sections import GravitySection, LinearDragSection
+from rotor.scenes.fit_sections import FitLines
 from rotor.scenes.knobs.knob import Knob, Measure, Setting
 from rotor.scenes.knobs.of_levels import energies_like, to_order
 from rotor.scenes.scene import (
+    KINDS,
     AlignScene,
+    EmissionScene,
+    FitScene,
     FluidScene,
     GasScene,
     LevelsScene,
@@ -29,6 +34,8 @@ from rotor.scenes.scene_file import write_scene
 from rotor.scenes.sections import (
     BasisNumerics,
     BodySection,
+    EmissionConditions,
+    EmittingMolecule,
     FluidConditions,
     FluidNumerics,
     GasNumerics,
@@ -41,6 +48,8 @@ from rotor.scenes.sections import (
     ThermoConditions,
     TumbleConditions,
 )
+
+ROOT = Path(__file__).resolve().parents[1]
 
 
 def errors(table: WorkPrecision, knob: str, of: str | None = None) -> dict[str, float]:
@@ -111,6 +120,7 @@ def test_methods_of_hyperfine_structure():
 def test_a_stark_map_converges_with_j_max():
     table = work_precision(StarkScene(molecule="OCS", conditions=StarkConditions(field=[0.0, 100.0])))
     by_j = list(errors(table, "numerics.jmax").values())
+    assert by_j[:4] == sorted(by_j[:4], reverse=True)
     assert by_j[0] > 10.0  # MHz, with the least J max
     assert by_j[-1] < 1e-8  # round-off of 1e5 MHz is 1e-11
     for tolerance, error in errors(table, "numerics.tolerance").items():
@@ -148,8 +158,7 @@ def test_kinds_without_a_knob_say_so():
     drag = [LinearDragSection(coefficients=[0.1, 0.1, 0.1])]
     driven = knobs_of(TumbleScene(body=racket, effects=drag, conditions=TumbleConditions(times=[0.0, 1.0])))
     assert [one.name for one in driven.knobs] == ["numerics.tolerance"]
-    assert "drag" in driven.remarks[0]
-    assert "adaptive method" in driven.remarks[0]
+    assert "a splitting holds no torque of the angular velocity" in driven.remarks[0]
 
 
 @pytest.mark.slow
@@ -186,6 +195,24 @@ def test_raman_lines():
     found = errors(work_precision(RamanScene(molecule="N2")), "observables.min_relative")
     assert list(found.values()) == sorted(found.values(), reverse=True)
     assert found["1e-06"] < 1e-3 < found["0.1"]  # percent of all cross sections
+
+
+def test_every_kind_of_scene_is_known():
+    assert set(accuracy_sweep._FILES) == set(KINDS)
+
+
+def test_a_fit_and_a_source():
+    spectrum = [EmittingMolecule(source="CO", column=1e18), EmittingMolecule(source="CH3CN", column=1e14)]
+    source = EmissionScene(molecules=spectrum, conditions=EmissionConditions(excitation="20 K", range="110:116GHz"))
+    found = list(errors(work_precision(source), "observables.least_depth").values())
+    assert found == sorted(found, reverse=True)
+    assert found[-1] < 1e-3 < found[0]  # K
+
+    lines = ROOT / "tests" / "oracles" / "fits"
+    par = next(iter(sorted(lines.rglob("*.par"))))
+    table = work_precision(FitScene(lines=FitLines(source=str(par))))
+    by_tolerance = errors(table, "tolerance of the search")
+    assert by_tolerance["1e-08"] <= by_tolerance["0.0001"] < 0.1  # standard errors
 
 
 def slow_knob(seconds: list[float], clock: list[float]) -> Knob:

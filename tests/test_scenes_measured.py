@@ -37,7 +37,7 @@ def test_every_stated_error_is_met(program):
             assert program.in_unit_asked(one, knob.found, knob) <= one.asked, (one.scene, knob.name)
 
 
-SPARED = {"ocs_alignment"}  # its estimate is twenty times the error: halving the steps gains two digits
+SPARED = {"ocs_alignment"}  # its estimate is larger than its error: halving the steps gains two digits
 
 
 def test_one_step_coarser_would_miss(program):
@@ -57,9 +57,7 @@ def test_seconds_of_the_plans(program):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "name", ["ocs_stark_map", "hydrogen_heat_capacity", "driven_chaos", "rigid_water", "water_gas"]
-)
+@pytest.mark.parametrize("name", ["hydrogen_heat_capacity", "driven_chaos", "rigid_water", "water_gas"])
 def test_a_scene_measured_again(program, name):
     """The same settings, the accuracy met, and missed one step coarser."""
     stored = next(one for one in program.read_results() if one.scene == name)

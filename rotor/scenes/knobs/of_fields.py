@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,6 @@ from rotor.scenes.knobs.knob import Knob, Knobs, Measure, Setting, ladder
 ERRORS = (1e-1, 1e-2, 1e-3, 1e-4, 1e-6, 1e-8, 1e-10)  # of a partition function, relative
 FINEST_SUM = 1e-13
 TOLERANCES_MHZ = (1e3, 1e2, 1e1, 1.0, 1e-1, 1e-2, 1e-4, 1e-6)
-WORST_MHZ = 1e9  # above any error of a basis
 TOLERANCES = (3e-2, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7)
 FINEST_TOLERANCE = 1e-11
 MORE_J = 6  # in the reference
@@ -62,26 +62,32 @@ def stark(request: Any) -> Knobs:
         against = f"a tolerance of {finest.tolerance_mhz:g} MHz"
         knobs.append(Knob("numerics.tolerance", (measure,), settings, finest, against, answer_stark))
     jmax = int(answer_stark(plain).facts()["jmax"])
-    values = range(request.j_highest + 2, jmax + 1)
-    basis = ladder(values, jmax, lambda one: _served(replace(plain, jmax=int(one))))
-    against = f"J max {jmax + MORE_J}"
-    knobs.append(Knob("numerics.jmax", (measure,), basis, replace(plain, jmax=jmax + MORE_J), against, answer_stark))
+    values, energy = range(request.j_highest + 2, jmax + 1), Measure("energy", "MHz", _apart)
+    basis = ladder(values, jmax, lambda one: (plain, int(one)))
+    beyond = jmax + MORE_J
+    knobs.append(Knob("numerics.jmax", (energy,), basis, (plain, beyond), f"J max {beyond}", _energies))
     return Knobs(tuple(knobs))
 
 
-def _served(request: Any) -> Any:
-    """The request with the finest tolerance, in decades, that its J max is not refused for: a basis that is to be seen failing."""
-    from rotor.quantum.fields.stark_request import answer_stark
+def _energies(asked: tuple[Any, int]) -> Any:
+    """Energies of all states of a map with one J max of the basis, however small: a map itself refuses one that is too small."""
+    from rotor.quantum.effects.stark import map_request
+    from rotor.quantum.fields.field_map import each_block
 
-    ends = tuple(dict.fromkeys((min(request.fields_kv_per_cm), max(request.fields_kv_per_cm))))
-    while request.tolerance_mhz < WORST_MHZ:
-        try:
-            answer_stark(replace(request, fields_kv_per_cm=ends))
-        except ValueError:
-            request = replace(request, tolerance_mhz=10.0 * request.tolerance_mhz)
-        else:
-            return request
-    return request
+    request, jmax = asked
+    of_map = map_request(
+        request.top, request.fields_kv_per_cm, request.j_highest, request.m_values, request.intensity_w_per_cm2,
+        request.direction, request.tolerance_mhz, None, request.effects,
+    )  # fmt: skip
+    parts = each_block(of_map, jmax, partial(_of_block, of_map))
+    return np.concatenate([part.ravel() for part in parts])
+
+
+def _of_block(request: Any, block: Any) -> Any:
+    from rotor.quantum.fields.block_states import block_states
+
+    found = block_states(request, block, fields=request.fields, with_vectors=False)
+    return found.energies[:, block.levels.j[found.rows] <= request.j_highest]
 
 
 def _apart(one: Any, other: Any) -> float:
