@@ -167,7 +167,10 @@ def test_molecules_as_a_table_and_one_of_them(capsys):
     assert "unverified constants" in plainly
     assert "constants from unverified: ground state; NIST CCCBDB release 22" in plainly
     assert run(["info", "ozone"]) == 0
-    assert "sources  constants: unverified: ground state; dipole: unverified: not known" in capsys.readouterr().out
+    assert (
+        "sources   constants: unverified: ground state; dipole: NIST CCCBDB (experimental dipole moments"
+        in capsys.readouterr().out
+    )
     assert run(["info", "CH3Cl"]) == 0
     assert "constants: A, DK unverified; fitted to c050007 of JPL" in capsys.readouterr().out
     assert run(["info", "CH3Cl", "--sources"]) == 0

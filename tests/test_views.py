@@ -142,5 +142,5 @@ def test_the_strongest_line_has_its_name_and_names_lie_on_nothing(call, folder, 
         tips = np.concatenate([one.get_xydata() for one in axes.lines])
     tallest = tips[tips[:, 1].argmax()]
     near = max(names, key=lambda text: text.xy[1])
-    assert near.xy == pytest.approx(tuple(tallest), rel=2e-3)  # the grid of a curve beside the centre of its line
+    assert near.xy == pytest.approx(tuple(tallest), rel=5e-3)  # grid points lie beside the centre of a line
     assert strongest is None or near.get_text() == strongest
