@@ -1,7 +1,7 @@
 """Hyperfine components measured in laboratories, met by the library's constants and by those of published fits.
 
 The samples in tests/oracles/hyperfine are cut by the script there: CH3CN (CDMS fit, references in its line list), CsF (CDMS fit of
-the lines of Zorn et al.), CH3Cl (c050007) and HNCO (c043002) of JPL.
+the lines of Zorn et al.), CH3Cl (c050007) and HNCO (c043002) of JPL; HCN as data/molecules/HCN.toml says.
 """
 
 from __future__ import annotations
@@ -105,6 +105,14 @@ def test_methyl_chloride():
     assert (
         np.sort(np.abs(off))[-2] < 3.2
     )  # one line, 4 3 3 - 3 3 2 at 106,337.92 MHz, is 0.18 MHz off; then normal deviates
+
+
+def test_hydrogen_cyanide():
+    """The triplet of J = 1-0: χ and C are from its distances, B and D from other lines, so that its centre is a test."""
+    off = in_errors(rotor.read("HCN"), measured("hcn"))
+    assert len(off) == 3
+    assert np.abs(off).max() < 1.5  # kHz: 1 of each line, 0.7 of the centre, 1.3 of the library's 2 B - 4 D
+    assert np.ptp(off) < 0.1  # its own three digits of χ and C
 
 
 MISLABELLED = {((2, 1, 2), (1, 1, 1)), ((2, 1, 1), (1, 1, 0))}

@@ -129,6 +129,16 @@ def test_the_box_slows_diffusion_as_yeh_and_hummer_have_it(count):
 
 
 @pytest.mark.slow
+def test_a_plan_of_atoms_on_a_perfect_lattice():
+    """64 atoms of argon: forces are round-off at the start, which is no net force; atoms have no step error of rotation."""
+    box = FluidConditions(model="argon", molecules=64, density=1.0, steps=10, every=5)
+    plan = plan_of(FluidScene(conditions=box, numerics=FluidNumerics(cutoff="7 Å")))
+    sizes = {one.name: one.size for one in plan.left_out}
+    assert sizes["finite box"] == pytest.approx(25.0)  # 64^(-1/3)
+    assert "finite step" not in sizes
+
+
+@pytest.mark.slow
 def test_the_sizes_of_a_plan_are_those_of_the_equilibrated_fluid():
     """Forces and torques after 50 steps from a lattice, against those after two picoseconds; rotation at full steps is colder."""
     from rotor.fluid.motion.dynamics import RigidDynamics

@@ -107,7 +107,8 @@ def test_breaking_a_piece_changes_exactly_its_users(piece, plain, tmp_path):
 @pytest.mark.slow
 def test_compiled_and_plain_forms_give_the_same_numbers(plain, tmp_path):
     compiled = answers(copied(tmp_path), compiled=True)
-    assert not {name for name in plain if differs(plain[name], compiled[name], 1e-12)}  # fused multiply-adds of blocks
+    # fused multiply-adds of blocks, 1e-16 each; and thousands of adaptive steps whose sums are in another order
+    assert not {name for name in plain if differs(plain[name], compiled[name], 1e-11)}
 
 
 @pytest.mark.slow

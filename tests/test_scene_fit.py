@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rotor.scenes.accuracy_sweep import work_precision
 from rotor.scenes.fit_sections import FitLines, FitNumerics, FitOutputs, FitParameters
 from rotor.scenes.kind import NoResultError
 from rotor.scenes.plan import plan_of
@@ -167,3 +168,23 @@ def test_a_plan_of_a_source_counts_lines_and_points():
     sizes = [one.size for one in plan.left_out if one.size is not None]
     assert sizes == sorted(sizes, reverse=True)
     assert np.isfinite(plan.seconds)
+
+
+def test_the_knobs_of_a_fit_and_of_a_source():
+    """A loose tolerance stops far away, that of the scene within a thousandth of an error; a deep cut leaves a line out."""
+    table = work_precision(
+        FitScene(lines=FitLines(source="ocs.csv"), molecule=START, parameters=FitParameters(free=["B", "D", "H"])),
+        folder=DATA,
+    )
+    errors = {row.setting: row.error for row in table.rows}
+    assert errors["10"] > 100.0
+    assert errors["0.0001"] < 1e-3
+    core = EmissionScene(
+        molecules=[EmittingMolecule(source="CO", column=1e14)],
+        conditions=EmissionConditions(excitation="10 K", range="115.2:115.4GHz"),
+    )
+    errors = {row.setting: row.error for row in work_precision(core).rows}
+    assert errors["0.1"] == pytest.approx(
+        float(run_scene(core).answer.spectrum.brightness_k.max()), rel=1e-9
+    )  # no line is left
+    assert errors["1e-06"] == 0.0

@@ -116,3 +116,31 @@ def test_names_of_levels_stand_left_of_the_fields_that_are_shown(call, folder, f
     names = figures[0].axes[0].texts
     assert {name.xy[0] for name in names} == {20.0}
     assert {name.get_text() for name in names} >= {"0", "1"}
+
+
+@pytest.mark.parametrize(
+    ("command", "strongest"),
+    [
+        (("raman", "N2", "--jmax", "20"), "6 → 8"),
+        (("raman", "water", "--jmax", "6", "--plot-scale", "log"), None),
+        (("emission", "HC3N", "SO2", "--range", "225:230GHz", "--column", "1e14"), "25 – 24"),
+        (("emission", "HCN", "--range", "88.6:88.66GHz", "--column", "1e14", "--plot-scale", "log"), "1 – 0"),
+    ],
+)
+def test_the_strongest_line_has_its_name_and_names_lie_on_nothing(call, folder, figures, command, strongest):
+    assert call(*command, "--plot", "a.png")[0] == 0
+    axes = figures[0].axes[0]
+    figures[0].canvas.draw()
+    names = [text for text in axes.texts if text.get_text()]
+    boxes = [text.get_window_extent() for text in names]
+    assert names
+    assert not any(a.overlaps(b) for i, a in enumerate(boxes) for b in boxes[:i])
+    assert all(axes.bbox.x0 <= b.x0 and b.x1 <= axes.bbox.x1 and b.y1 <= axes.bbox.y1 for b in boxes)
+    if command[0] == "raman":
+        tips = np.array([segment[1] for one in axes.collections for segment in one.get_segments()])
+    else:
+        tips = np.concatenate([one.get_xydata() for one in axes.lines])
+    tallest = tips[tips[:, 1].argmax()]
+    near = max(names, key=lambda text: text.xy[1])
+    assert near.xy == pytest.approx(tuple(tallest), rel=5e-3)  # grid points lie beside the centre of a line
+    assert strongest is None or near.get_text() == strongest

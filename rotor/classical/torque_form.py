@@ -15,6 +15,7 @@ without a compiled form is called at every step. The kernels are `integrators/_t
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable
 from typing import Any, NamedTuple
 
@@ -49,6 +50,11 @@ def torque_form(code: int, *parts: ArrayLike) -> TorqueForm:
     (1.0, 0.0, 0.0, 0.0, 0.0, 2.0)
     """
     return TorqueForm(code, tuple(np.concatenate([np.ravel(part) for part in parts]).tolist()))
+
+
+def kernels_are_compiled() -> bool:
+    """False where NUMBA_DISABLE_JIT asks for plain Python, in which the loop of a kernel is slower than numpy."""
+    return os.environ.get("NUMBA_DISABLE_JIT", "0") in ("", "0")
 
 
 def own_form(effect: Any, plain: str) -> Any:

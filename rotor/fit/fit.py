@@ -20,7 +20,7 @@ from rotor.fit.assignment import Assignments, duplicates
 from rotor.fit.parameters import Parameters, with_names
 from rotor.fit.parameters import parameters as parameters_of
 from rotor.fit.search import FitOptions as FitOptions
-from rotor.fit.search import Search, refuse_too_few, round_off, with_rejection
+from rotor.fit.search import Search, round_off, too_few, with_rejection
 from rotor.quantum.labelled import LevelModel, level_model
 from rotor.statistics.least_squares import Minimum, Progress
 from rotor.statistics.regression import Regression, regression
@@ -186,7 +186,8 @@ def fit_lines(
 
     used = np.ones(len(lines), dtype=bool)
     used[list(left_out)] = False
-    refuse_too_few(lines, used, parameters)
+    if few := too_few(lines, used, parameters):
+        raise ValueError(few)
     search = Search(lines, made, parameters, options, upper, lower, sigma, used)
     search, minimum, rejected = with_rejection(search, options, progress)
     left_out |= rejected

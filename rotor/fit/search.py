@@ -199,9 +199,12 @@ class Search:
 def with_rejection(
     search: Search, options: FitOptions, progress: Progress | None
 ) -> tuple[Search, Minimum, dict[int, str]]:
-    """The search, repeated without the lines that are too far off until the same ones stay out."""
+    """The search, repeated without the lines that are too far off until the same ones stay out.
+
+    Where no minimum was reached, or too few lines would be left, all lines count: the constants are wrong, not the lines.
+    """
     minimum = _searched(search, progress)
-    if options.reject_above is None:
+    if options.reject_above is None or not minimum.converged:
         return search, minimum, {}
     may = search.used
     for _ in range(_REJECTIONS):
@@ -212,7 +215,8 @@ def with_rejection(
         used = may & ~far
         if (used == search.used).all():
             break
-        refuse_too_few(search.lines, used, search.parameters)
+        if too_few(search.lines, used, search.parameters):
+            break
         search = replace(search, used=used)
         minimum = _continued(minimum, _minimised(search, minimum.parameters, progress, options.most_iterations))
     out = np.flatnonzero(may & ~search.used)
@@ -289,9 +293,9 @@ def round_off(search: Search, slopes: Floats) -> Floats:
     return np.asarray(_CANCELLED * np.sqrt(np.einsum("ij,ij->j", size[search.used], size[search.used])))
 
 
-def refuse_too_few(lines: Assignments, used: NDArray[np.bool_], parameters: Parameters) -> None:
+def too_few(lines: Assignments, used: NDArray[np.bool_], parameters: Parameters) -> str:
+    """What is wrong with fewer measured frequencies than free constants; empty where they are enough."""
     count = len(np.unique(lines.blend[used])) + int(np.isfinite(parameters.prior).sum())
-    if count < len(parameters.names):
-        raise ValueError(
-            f"{len(parameters.names)} free constants for {count} measured frequencies; hold some, or add lines"
-        )
+    if count >= len(parameters.names):
+        return ""
+    return f"{len(parameters.names)} free constants for {count} measured frequencies; hold some, or add lines"

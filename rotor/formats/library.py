@@ -89,17 +89,52 @@ def library_molecule(name: str) -> MoleculeFile:
 def written_formula(name: str, formula: str) -> str:
     """The formula as the library writes that of a molecule of this name, else as it is, in Hill's order.
 
+    An isotopologue of such a molecule, whose name has its own formula in brackets, is written like it where that says which atoms
+    are replaced: all of an element, or some of its hydrogens.
+
     >>> written_formula("cyanoacetylene", "C3HN"), written_formula("", "O2S")
     ('HC3N', 'O2S')
+    >>> written_formula("formaldehyde (CH[2H]O)", "CH[2H]O"), written_formula("cyanoacetylene (C2[13C]HN)", "C2[13C]HN")
+    ('HDCO', 'C2[13C]HN')
     """
-    path = library_file(name) if name else None
+    parent = name.partition(" (")[0]
+    path = library_file(parent) if parent else None
     if path is None:
         return formula
     known = [path.stem, *(key for key, of in names().items() if of == path)]
-    return next((one for one in known if _atoms(one) == _atoms(formula)), formula)
+    same = (one for one in known if atoms_of(one) == atoms_of(formula))
+    return next(same, None) or next(filter(None, (_substituted(one, formula) for one in known)), formula)
 
 
-def _atoms(formula: str) -> dict[str, int]:
+def _substituted(written: str, formula: str) -> str | None:
+    """The isotopes of a formula in the order of a written one of the same elements; None where their places are not known.
+
+    >>> _substituted("H2CO", "[13C][2H]2O"), _substituted("CH3CN", "C[13C]H3N")
+    ('D2[13C]O', None)
+    """
+    tokens = re.findall(r"([A-Z][a-z]?)(\d*)", written)
+    isotopes: dict[str, dict[str, int]] = {}
+    for atom, count in atoms_of(formula).items():
+        isotopes.setdefault(re.sub(r"[\[\]\d]", "", atom), {})[_SHORT.get(atom, atom)] = count
+    elements = [element for element, _ in tokens]
+    whole = "".join(f"{element}{count}" for element, count in tokens) == written
+    if not whole or atoms_of(written) != {element: sum(found.values()) for element, found in isotopes.items()}:
+        return None
+    if any(len(found) > 1 and (element != "H" or elements.count("H") > 1) for element, found in isotopes.items()):
+        return None
+    one = {element: next(iter(found)) for element, found in isotopes.items()}
+    return "".join(
+        "".join(f"{atom}{n if n > 1 else ''}" for atom, n in isotopes[element].items())
+        if len(isotopes[element]) > 1
+        else one[element] + count
+        for element, count in tokens
+    )
+
+
+_SHORT = {"[2H]": "D", "[3H]": "T"}
+
+
+def atoms_of(formula: str) -> dict[str, int]:
     """How many atoms of each element, or of each isotope that is marked, a formula has."""
     counts: dict[str, int] = {}
     for atom, number in re.findall(r"(\[\d+[A-Z][a-z]?\]|[A-Z][a-z]?)(\d*)", formula):

@@ -9,6 +9,7 @@ A Mathematical Introduction to Robotic Manipulation, chapter 2, which writes v f
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -117,6 +118,49 @@ def twist_log(q: ArrayLike, position: ArrayLike) -> Floats:
     bent = np.cross(omega, position)
     velocity = position - 0.5 * bent + _cotangent_coefficient(theta) * np.cross(omega, bent)
     return np.concatenate(np.broadcast_arrays(omega, velocity), axis=-1)
+
+
+@dataclass(frozen=True)
+class Screw:
+    """A turn by `angle` (rad) about the line through `point` (3,) along `axis` (3,), and a shift along it.
+
+    point: the one of the line that is nearest to the origin. A pure translation has the angle 0 and the point (0, 0, 0).
+    """
+
+    axis: Floats
+    point: Floats
+    angle: float
+    shift: float
+
+
+def screw_of(q: ArrayLike, position: ArrayLike) -> Screw:
+    """The screw (Chasles) of one pose: with the twist (ω, v), axis ω/θ, shift v·ω/θ, point ω x v/θ².
+
+    >>> turn = screw_of([np.sqrt(0.5), 0, 0, np.sqrt(0.5)], [1.0, -1.0, 0.5])  # a quarter turn about the line (1, 0, z)
+    >>> (turn.point.round(12) + 0.0).tolist(), round(turn.shift, 12), round(np.degrees(turn.angle), 9) == 90.0
+    ([1.0, 0.0, 0.0], 0.5, np.True_)
+    """
+    twist = twist_log(q, position)
+    omega, velocity = twist[:3], twist[3:]
+    angle, length = float(np.linalg.norm(omega)), float(np.linalg.norm(velocity))
+    if angle == 0.0:
+        return Screw(velocity / length if length > 0.0 else np.array([0.0, 0.0, 1.0]), np.zeros(3), 0.0, length)
+    axis = omega / angle
+    return Screw(axis, np.cross(omega, velocity) / angle**2, angle, float(velocity @ axis))
+
+
+def bracket(first: ArrayLike, second: ArrayLike) -> Floats:
+    """The Lie bracket (..., 6) of twists, (ω1 x ω2, ω1 x v2 - ω2 x v1).
+
+    Moving by s along the first, s along the second, and back along each, is exp(s² [first, second]) up to order s³: how motions
+    that are allowed make one that is not.
+
+    >>> bracket([0, 0, 1, 0, 0, 0], [0, 0, 0, 1, 0, 0]).tolist()  # turning and driving make a sideways motion
+    [0.0, 0.0, 0.0, 0.0, 1.0, 0.0]
+    """
+    a, b = _six(first), _six(second)
+    spin = np.cross(a[..., :3], b[..., :3])
+    return np.concatenate([spin, np.cross(a[..., :3], b[..., 3:]) - np.cross(b[..., :3], a[..., 3:])], axis=-1)
 
 
 def _six(array: ArrayLike) -> Floats:

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -41,6 +41,8 @@ class Molecule:
     dipole_source : where the dipole is from
     polarizability_angstrom3 : (3, 3) symmetric array in the same frame, polarizability volume in Å³. None: not known
     polarizability_source : where the polarizability is from
+    quadrupole_mhz : (3, 3) traceless quadrupole couplings χ in MHz in the same frame, by the number of the atom, counted from 1
+    quadrupole_source : where they are from
     name, source : what it is called, where the geometry is from
     uncertainty : typical relative error of the rotational constants that follow from the geometry. None: not known
     notes : what a user must know
@@ -65,6 +67,8 @@ class Molecule:
     dipole_source: str = ""
     polarizability_angstrom3: Floats | None = None
     polarizability_source: str = ""
+    quadrupole_mhz: Mapping[int, Floats] = field(default_factory=dict)
+    quadrupole_source: str = ""
     name: str = ""
     source: str = ""
     uncertainty: float | None = None
@@ -78,6 +82,7 @@ class Molecule:
             if getattr(self, key) is not None:
                 object.__setattr__(self, key, _checked(getattr(self, key), shape, key))
         _refuse_lopsided(self.polarizability_angstrom3)
+        object.__setattr__(self, "quadrupole_mhz", _checked_couplings(self.quadrupole_mhz, len(nuclei)))
         charge = float(_checked(self.charge, (), "charge"))
         if not charge.is_integer():
             raise ValueError(f"charge {charge:g}: expected a whole number of elementary charges")
@@ -152,6 +157,7 @@ class Molecule:
             for atom in self._atoms_named(key):
                 numbers[atom] = _same_element(self.symbols[atom], name, atom).mass_number
         changed = replace(self, mass_numbers=tuple(numbers))
+        changed = replace(changed, quadrupole_mhz=_scaled_couplings(self, changed.nuclei))
         if self.dipole_debye is None or not self.charge:
             return changed
         shift = changed.centre_of_mass_angstrom - self.centre_of_mass_angstrom
@@ -169,7 +175,7 @@ class Molecule:
         return atoms
 
     def moved(self, rotation: ArrayLike = _UNTURNED, shift_angstrom: ArrayLike = (0.0, 0.0, 0.0)) -> Molecule:
-        """The molecule turned about the origin, then shifted: r' = R r + s; dipole R μ, polarizability R α Rᵀ.
+        """The molecule turned about the origin, then shifted: r' = R r + s; dipole R μ, polarizability R α Rᵀ, χ R χ Rᵀ.
 
         Raises ValueError for a matrix (3, 3) that is no proper rotation (a mirror image would be another molecule).
 
@@ -187,6 +193,7 @@ class Molecule:
             positions_angstrom=self.positions_angstrom @ r.T + shift,
             dipole_debye=None if dipole is None else r @ dipole,
             polarizability_angstrom3=None if alpha is None else r @ alpha @ r.T,
+            quadrupole_mhz={atom: r @ chi @ r.T for atom, chi in self.quadrupole_mhz.items()},
         )
 
 
@@ -221,6 +228,32 @@ def _checked(values: ArrayLike, shape: tuple[int, ...], what: str) -> Floats:
         raise ValueError(f"{what}{where}: a number that is not finite; every one must be")
     array.setflags(write=False)
     return array
+
+
+def _checked_couplings(couplings: Mapping[int, Floats], atoms: int) -> dict[int, Floats]:
+    """Read-only copies, symmetric and without a trace."""
+    found = {}
+    for atom, given in couplings.items():
+        if not 1 <= atom <= atoms:
+            raise ValueError(f"quadrupole_mhz of atom {atom}: the atoms are numbered from 1 to {atoms}")
+        chi = _checked(given, (3, 3), f"quadrupole_mhz of atom {atom}")
+        least = 1e-6 * max(1.0, float(np.abs(chi).max()))
+        if abs(np.trace(chi)) > least or np.abs(chi - chi.T).max() > least:
+            raise ValueError(f"quadrupole_mhz of atom {atom}: {chi.tolist()} is not symmetric and traceless; χ is")
+        found[atom] = chi
+    return found
+
+
+def _scaled_couplings(molecule: Molecule, nuclei: Sequence[Isotope]) -> dict[int, Floats]:
+    """χ Q'/Q for other isotopes: the gradient of the field stays. Nuclei without a known Q have none."""
+    found = {}
+    for atom, chi in molecule.quadrupole_mhz.items():
+        old, new = molecule.nuclei[atom - 1], nuclei[atom - 1]
+        if old == new:
+            found[atom] = chi
+        elif old.quadrupole_barn and new.quadrupole_barn and new.spin >= 1:
+            found[atom] = chi * (new.quadrupole_barn / old.quadrupole_barn)
+    return found
 
 
 def _refuse_lopsided(tensor: Floats | None) -> None:

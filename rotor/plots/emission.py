@@ -6,9 +6,14 @@ import os
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
+from rotor.plots.names import SPACE, Peak, name_peaks
 from rotor.plots.picture import GREY, PALETTE, checked_suffix, name_of_top, new_figure, save, styled
 from rotor.plots.spectrum import UNITS, thinned
 from rotor.spectra.emission_request import EmissionAnswer
+
+MOST_TRIED = 100  # lines, from the brightest down, for which a name is tried
 
 
 def plot_emission(
@@ -81,12 +86,33 @@ def emission_figure(
         peak = answer.spectrum.brightness_k
         if log:
             axes.set_yscale("log")
-            axes.set_ylim(1e-5 * float(peak.max()), 2 * float(peak.max()))
+            axes.set_ylim(1e-5 * float(peak.max()), 30 * float(peak.max()))
+        elif peak.max() > 0:
+            axes.set_ylim(min(1.1 * float(peak.min()), 0.0), SPACE * float(peak.max()))
         axes.set_xlabel("Wavenumber (cm⁻¹)" if unit == "cm-1" else f"Frequency ({unit or 'GHz'})")
         axes.set_ylabel("Brightness temperature (K)")
         axes.set_title(_title(answer) if title is None else title, loc="left")
         figure.legend(loc="outside lower right", ncols=4, frameon=False, fontsize=7)
+        _name(axes, answer, mhz)
     return figure
+
+
+def _name(axes: Any, answer: EmissionAnswer, mhz: float) -> None:
+    """Quantum numbers of the brightest lines, in the colour of their molecule where there are several."""
+    lines, spectrum = answer.lines, answer.spectrum
+    heights = np.interp(lines.observed_mhz, spectrum.frequency_mhz, spectrum.brightness_k)
+    several = len(answer.request.tops) > 1
+    peaks = [
+        Peak(
+            float(lines.observed_mhz[row]) / mhz,
+            float(heights[row]),
+            f"{lines.upper[row]} – {lines.lower[row]}",
+            PALETTE[int(lines.molecule[row]) % len(PALETTE)] if several else GREY,
+        )
+        for row in np.argsort(-lines.brightness_k, kind="stable")[:MOST_TRIED].tolist()
+    ]
+    x, y = thinned(spectrum.frequency_mhz / mhz, spectrum.brightness_k)
+    name_peaks(axes, peaks, np.stack([x, y], axis=1)[y > 0])
 
 
 def _title(answer: EmissionAnswer) -> str:

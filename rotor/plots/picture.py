@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from rotor.formats.library import written_formula
+from rotor.formats.library import atoms_of, written_formula
 from rotor.tops.top import Top
 from rotor.version import version
 
@@ -143,8 +143,13 @@ def name_of_top(top: Top) -> str:
     >>> name_of_top(read("HC3N")), name_of_top(Top.from_constants("B=1 GHz", name="SO2"))
     ('cyanoacetylene, HC$_{3}$N', 'SO$_{2}$')
     """
-    written = formula_text(written_formula(top.name, top.molecule.formula)) if top.molecule is not None else ""
-    return ", ".join(dict.fromkeys(filter(None, (name_text(top.name), written)))) or f"{top.kind} top"
+    if top.molecule is None:
+        return name_text(top.name) or f"{top.kind} top"
+    formula = top.molecule.formula
+    written, name = written_formula(top.name, formula), top.name.removesuffix(f" ({formula})")
+    if _COMPOSED.fullmatch(name) and atoms_of(name) == atoms_of(formula):
+        return name_text(name)  # it says all that the formula does
+    return ", ".join(dict.fromkeys(filter(None, (name_text(name), formula_text(written))))) or f"{top.kind} top"
 
 
 def name_text(name: str) -> str:

@@ -8,10 +8,14 @@ from typing import Any
 
 import numpy as np
 
+from rotor.plots.names import SPACE, Peak, name_peaks
 from rotor.plots.picture import BLUE, GREY, MOST_VECTOR_STICKS, checked_suffix, name_of_top, new_figure, save, styled
 from rotor.plots.spectrum import MOST_DECADES, VISIBLE
 from rotor.plots.view import WHOLE, View, show_part
+from rotor.quantum.quanta import state_text
 from rotor.spectra.raman import RamanLines
+
+MOST_TRIED = 100  # lines, from the strongest down, for which a name is tried
 
 
 def plot_raman(
@@ -58,6 +62,7 @@ def raman_figure(lines: RamanLines, title: str | None = None, view: View = WHOLE
         axes = figure.add_subplot()
         _draw(axes, lines)
         _frame(axes, lines, view)
+        _name(axes, lines)
         axes.set_title(title if title is not None else _title(lines), loc="left")
     return figure
 
@@ -69,7 +74,6 @@ def _draw(axes: Any, lines: RamanLines) -> None:
     axes.vlines(shifts, 0.0, heights, color=BLUE, linewidth=1.0 if len(lines) < 300 else 0.6, rasterized=many)
     axes.axvline(0.0, color=GREY, linewidth=0.7, linestyle=":")
     axes.set_xlim(-1.05 * seen, 1.05 * seen)
-    axes.set_ylim(0.0, 1.1 * float(heights.max()))
     axes.set_xlabel("Raman shift (cm⁻¹): anti-Stokes below, Stokes above 0")
     axes.set_ylabel("dσ/dΩ (cm² sr⁻¹)")
 
@@ -83,10 +87,29 @@ def _frame(axes: Any, lines: RamanLines, view: View) -> None:
     tallest = float(heights.max())
     if view.log:
         lowest = max(float(heights[heights > 0].min()), tallest * 10.0**-MOST_DECADES)
-        axes.set_ylim(lowest / 2, 2 * tallest)
-    elif view.horizontal is not None:
-        axes.set_ylim(0.0, 1.1 * tallest)
+        axes.set_ylim(lowest / 2, tallest * (tallest / lowest) ** (SPACE - 1))
+    else:
+        axes.set_ylim(0.0, SPACE * tallest)
     show_part(axes, view)
+
+
+def _name(axes: Any, lines: RamanLines) -> None:
+    """Names of the strongest lines, the initial level first."""
+    heights, shifts, levels = lines.cross_section_cm2_per_sr, lines.shift_cm, lines.levels
+    first, last = sorted(axes.get_xlim())
+    inside = np.flatnonzero((shifts >= first) & (shifts <= last))
+    strongest = inside[np.argsort(-heights[inside], kind="stable")][:MOST_TRIED]
+    peaks = [
+        Peak(
+            float(shifts[row]),
+            float(heights[row]),
+            " → ".join(
+                state_text(levels.quanta, int(side[row]), levels.halves) for side in (lines.initial, lines.final)
+            ),
+        )
+        for row in strongest.tolist()
+    ]
+    name_peaks(axes, peaks, np.stack([shifts, heights], axis=1)[heights > 0])
 
 
 def _title(lines: RamanLines) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
 from rotor.checks import require_one_of
+from rotor.plots.names import fits, move_inside
 from rotor.plots.picture import BLUE, GREY, MOST_VECTOR_STICKS, checked_suffix, name_of_top, new_figure, save, styled
 from rotor.quantum.quanta import line_text
 from rotor.spectra.lines import Lines
@@ -264,9 +265,9 @@ def _name_lines(
             continue  # no need to measure a name that cannot fit
         text = _label(axes, lines, row, heights[row], x)
         if not taken:  # the strongest line is always named, inside the axes even where it stands at their edge
-            _move_inside(text, axes)
+            move_inside(text, axes)
         box = text.get_window_extent().padded(2.0)
-        if not taken or _fits(box, axes.bbox, taken, drawn):
+        if not taken or fits(box, axes.bbox, taken, drawn):
             taken.append(box)
         else:
             text.remove()
@@ -283,14 +284,6 @@ def _leave_space(axes: Any, lines: Lines, rows: Ints, heights: Floats, x: _Axis)
     if beyond > 0:  # the part above the line keeps its height in pixels
         above = (axes.bbox.height - (heights[rows[0]] / top) * axes.bbox.height + beyond) / axes.bbox.height
         axes.set_ylim(0.0, heights[rows[0]] / max(1 - above, 0.3))
-
-
-def _move_inside(text: Any, axes: Any) -> None:
-    """Shift a name sideways until it is inside the axes."""
-    box = text.get_window_extent().padded(2.0)
-    beyond = min(box.x0 - axes.bbox.x0, 0.0) + max(box.x1 - axes.bbox.x1, 0.0)
-    across, up = text.get_position()
-    text.set_position((across - beyond * 72.0 / axes.figure.dpi, up))
 
 
 def _stands_out(thing: Lines | Spectrum, lines: Lines, heights: Floats) -> NDArray[np.bool_]:
@@ -310,13 +303,6 @@ def _drawn_points(axes: Any, thing: Lines | Spectrum, x: _Axis) -> Floats:
     height = thing.intensity_nm2_mhz if isinstance(thing, Lines) else thing.intensity
     points = np.stack([thing.frequency_mhz[shown] / x.mhz, height[shown]], axis=1)
     return np.asarray(axes.transData.transform(points[points[:, 1] > 0]))
-
-
-def _fits(box: Any, frame: Any, taken: Sequence[Any], drawn: Floats) -> bool:
-    """Whether a name lies inside the axes, on no other name and on nothing that is drawn."""
-    inside = box.x0 >= frame.x0 and box.x1 <= frame.x1 and box.y1 <= frame.y1
-    crossed = (drawn[:, 0] > box.x0) & (drawn[:, 0] < box.x1) & (drawn[:, 1] > box.y0)
-    return bool(inside and not crossed.any() and not any(box.overlaps(other) for other in taken))
 
 
 def _label(axes: Any, lines: Lines, row: int, height: float, x: _Axis) -> Any:

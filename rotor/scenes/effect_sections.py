@@ -9,7 +9,6 @@ from importlib import import_module
 from typing import Annotated, Any, get_args
 
 import msgspec
-import numpy as np
 
 from rotor.scenes.sections import Section, said
 
@@ -158,5 +157,7 @@ def section_of(effect: Any) -> EffectSection:
 
 def _numbers(effect: Any, name: str) -> Any:
     """A parameter of an effect in the types of a file; moments by time are its rows."""
+    import numpy as np  # a scene alone loads no arrays
+
     value = getattr(effect, "rows" if name == "moments" else name)
     return np.asarray(value).tolist()

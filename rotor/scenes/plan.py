@@ -10,6 +10,7 @@ import math
 import os
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from rotor.scenes import left_out
@@ -26,6 +27,8 @@ SHORT_FIELDS, SHORT_GAS, SHORT_STEPS = (2, 20), (500, 2000), (5, 20)  # likewise
 MILLIBAR = 1e-3  # of a gas whose pressure is not given
 BYTES_A_LINE = 100  # columns of a line in memory
 STEPS = "Runge-Kutta of order 8, adaptive"
+BEGINNINGS = 20  # of a driven motion, one of which is made to count its steps
+SOME_STEPS = 1000  # beyond those that are made one by one
 
 
 def plan_of(scene: Scene, folder: str | os.PathLike[str] = ".") -> Plan:
@@ -307,14 +310,34 @@ def _tumble(request: Any) -> Plan:
     return _driven(request)
 
 
+def _beginning(request: Any, share: float) -> Any:
+    """The request for the first part of its time alone; steps end at the times asked for, so these stay."""
+    first, last = request.times[0], request.times[-1]
+    end = first + share * (last - first)
+    return replace(request, times=(*(t for t in request.times if abs(t - first) < abs(end - first)), end))
+
+
+def _seconds_of_steps(request: Any, steps: int) -> float:
+    """Processor time of a driven motion: its first steps are made one by one and the further ones compiled, so two parts are timed."""
+    from rotor.classical.driven import answer_driven
+    from rotor.classical.system import system_of
+
+    some = SOME_STEPS if request.step is None or request.order > 2 else 4 * SOME_STEPS
+    more = (
+        2 if system_of(request.moments, request.effects).compiled is None else 50
+    )  # compiled steps are so much cheaper
+    if steps < more * some:
+        return timed(lambda: answer_driven(request))
+    share = some / steps
+    near, far = (timed(partial(answer_driven, _beginning(request, part))) for part in (share, more * share))
+    return near + (steps / some - 1) / (more - 1) * max(far - near, 0.0)
+
+
 def _driven(request: Any) -> Plan:
     from rotor.classical.driven import answer_driven
 
-    few = max(2, len(request.times) // 20)
-    start = replace(request, times=request.times[:few])
-    answer = answer_driven(start)
-    share = (request.times[-1] - request.times[0]) / (start.times[-1] - start.times[0])
-    steps = math.ceil(answer.motion.steps * share)
+    answer = answer_driven(_beginning(request, 1 / BEGINNINGS))
+    steps = math.ceil(answer.motion.steps * BEGINNINGS)
     good = ("energy",) if all(effect.conserves_energy for effect in request.effects) else ()
     local = request.step is None
     error = steps * request.tolerance if local else None
@@ -329,7 +352,7 @@ def _driven(request: Any) -> Plan:
         good=good,
         parts=(("method", STEPS if local else f"splitting of order {request.order}, step {request.step:g}"),),
         counts={"steps": steps, "times": len(request.times)},
-        seconds=timed(lambda: answer_driven(start)) * share,
+        seconds=_seconds_of_steps(request, steps),
         memory_mb=len(request.times) * 13 * 8 / 1e6,
         left_out=(left_out.LeftOut("error of the steps", error, "rad", basis),),
     )
@@ -366,12 +389,11 @@ def _fluid(request: Any) -> Plan:
 
 def _left_out_of_fluid(atoms: Any, settings: Any) -> list[left_out.LeftOut]:
     """By the forces and torques of a box."""
+    from rotor.fluid.forces.models import models_of, shapes_of
     from rotor.fluid.motion.dynamics import RigidDynamics
-    from rotor.fluid.run import bodies_and_degrees
 
-    bodies = bodies_and_degrees(atoms, settings)[0]
-    force, torque = RigidDynamics(atoms, 1.0, removed=0).wrench()
-    return left_out.of_fluid(bodies, force, torque, settings.temperature_k, settings.step_fs)
+    dynamics = RigidDynamics(atoms, 1.0, removed=0, shapes=shapes_of(models_of(settings.model)))
+    return left_out.of_fluid(dynamics.bodies, *dynamics.wrench(), settings.temperature_k, settings.step_fs)
 
 
 def _fit(request: Any) -> Plan:

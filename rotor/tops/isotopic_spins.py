@@ -167,7 +167,7 @@ def _turned_rotation(own: Mapping[str, float], change: _Change, g_ratio: float) 
         i, k = ("abc".index(letter) for letter in name.removeprefix("C_"))
         tensor[i, k] = tensor[k, i] = value
     electrons = change.rotation @ (tensor * change.moments) @ change.rotation.T
-    with np.errstate(divide="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore"):
         new = np.where(change.new_moments > 0, electrons / change.new_moments, 0.0) * g_ratio
     new = (new + new.T) / 2
     found = {letters: float(new["abc".index(letters[0]), "abc".index(letters[1])]) for letters in LETTERS}

@@ -30,6 +30,7 @@ from rotor.tops.kind import KindOfTop, kind_from_moments, kind_with_symmetry
 from rotor.tops.level_table import LevelTable
 from rotor.tops.magnetic import MagneticTensors
 from rotor.tops.operators import KINDS
+from rotor.tops.quadrupole import computed_couplings
 from rotor.tops.spin_constants import SpinConstants
 from rotor.tops.spin_weights import SpinWeights
 from rotor.tops.state_constants import StateConstants
@@ -193,7 +194,7 @@ class Top:
         equal_within: float = EQUAL_MOMENTS,
         symmetry_within: float = SYMMETRIC_WITHIN,
     ) -> Top:
-        """A rigid top from a geometry: principal axes, A, B, C, kind, dipole and polarizability turned along, spin weights.
+        """A rigid top from a geometry: principal axes, A, B, C, kind, spin weights, and its tensors turned along.
 
         The symmetry of the nuclei decides the kind where it can (C3v is a symmetric top), the moments where it cannot.
         Nuclear-spin weights follow from it and from `molecule.electronic`, inversion doublets unresolved. What symmetry
@@ -264,6 +265,7 @@ class Top:
             if tensor is None
             else _tensor_in_frame(frame, allowed_polarizability(tensor, symmetry)),
             polarizability_source="" if tensor is None else molecule.polarizability_source,
+            spin_constants=computed_couplings(molecule, frame),
         )
 
     @classmethod

@@ -17,6 +17,7 @@ import numpy as np
 from rotor.arrays import Floats
 from rotor.classical.integrators.method import Method
 from rotor.classical.system import System
+from rotor.classical.torque_form import kernels_are_compiled
 from rotor.geometry.rotations import conjugate, rotate
 
 SHRINK, GROW, SAFETY = 0.2, 5.0, 0.9
@@ -77,7 +78,7 @@ class LieRungeKutta(Method):
         path = np.empty((len(times), len(q), 7))
         path[0, :, :3], path[0, :, 3:] = momentum, attitude
         step = self.fixed_step or self._first_step(system, float(times[0]), momentum, attitude)
-        most = np.inf if system.compiled is None else PLAIN_STEPS
+        most = PLAIN_STEPS if system.compiled is not None and kernels_are_compiled() else np.inf
         for k, (start, stop) in enumerate(pairwise(times.tolist())):
             space, q, step, steps, reached = self._to(system, (start, stop, most - taken), space, q, step)
             taken += steps

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from rotor.arrays import Floats
 from rotor.classical.integrators.method import Composed
 from rotor.classical.system import System, acting_inverse
+from rotor.classical.torque_form import kernels_are_compiled
 
 _BASE = np.ones(1)
 WORTH_LOADING = 4000  # drifts: a tenth of a second step by step, as long as loading the compiled form of all of them
@@ -97,7 +98,8 @@ class SymmetricTopSplitting(Composed):
         bool
             Whether it was done.
         """
-        if system.free or system.compiled is None or counts.sum() * len(self.kick_fractions) < WORTH_LOADING:
+        few = counts.sum() * len(self.kick_fractions) < WORTH_LOADING
+        if system.free or system.compiled is None or few or not kernels_are_compiled():
             return False
         from rotor.classical.integrators._driven_kernels import kicked
 

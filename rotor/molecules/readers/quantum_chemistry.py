@@ -1,4 +1,4 @@
-"""A molecule from the output of a quantum-chemistry program: geometry, dipole, polarizability.
+"""A molecule from the output of a quantum-chemistry program: geometry, dipole, polarizability, quadrupole couplings.
 
 cclib reads the numbers, or `plain_outputs` where it cannot; the text is looked through first (`programs`), each tensor is
 turned from the axes it was printed in to those of the geometry, and the printed rotational constants are a check.
@@ -31,6 +31,7 @@ from rotor.molecules.readers.programs import (
     tables,
     without_constants,
 )
+from rotor.molecules.readers.quadrupole import with_quadrupole
 from rotor.units import BOHR_RADIUS_ANGSTROM, DEBYE_PER_E_ANGSTROM, ROTATIONAL_MHZ_U_ANGSTROM2
 
 CONSTANTS_AGREE = 1e-4  # relative; printed constants have 6 to 8 digits, coordinates 6 decimals
@@ -85,7 +86,7 @@ def read_output(path: Path | str) -> Molecule:
     data = read_plain(output) if plain else _parse(without_constants(output), str(path))
     molecule = _geometry(data, str(path), program.name if plain else f"{program.name}, read with cclib")
     molecule = _with_dipole(molecule, data, output)
-    molecule = _with_polarizability(molecule, data, output)
+    molecule = with_quadrupole(_with_polarizability(molecule, data, output), output)
     return replace(molecule, notes=(*molecule.notes, *unread(output), *_disagreement(molecule, data, output)))
 
 

@@ -169,7 +169,7 @@ def tensor_coefficients(spins: tuple[int, ...], rank: int, bra: Ints, ket: Ints)
         Pure numbers: the product over the chain of A. R. Edmonds (1957), eq. (7.1.7).
     """
     left, right = bra[..., :, None, :], ket[..., None, :, :]
-    total = np.ones(1)
+    total = np.ones(np.broadcast_shapes(left.shape[:-1], right.shape[:-1]))
     for place, spin in enumerate(spins):
         total = total * _passed_on(left[..., place : place + 2], right[..., place : place + 2], spin, rank)
     return np.asarray(total)

@@ -1,0 +1,47 @@
+"""Constants of nuclear quadrupole coupling of a top from the tensors of its molecule, along its principal axes.
+
+χ_abc = A χ Aᵀ       A: the principal axes in rows (W. Gordy and R. L. Cook, Microwave Molecular Spectra, 3rd ed., chapter IX)
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rotor.arrays import Floats
+from rotor.geometry.inertia import PrincipalFrame
+from rotor.molecules.molecule import Molecule
+from rotor.tops.spin_constants import SpinConstants
+
+NOISE = 1e-3  # of the largest element, and in MHz: programs print four decimals, and symmetry is met that well
+
+
+def computed_couplings(molecule: Molecule, frame: PrincipalFrame) -> SpinConstants | None:
+    """χ of every nucleus with a spin of 1 or more, None where no tensor is known.
+
+    What is below 1 kHz, or 1e-3 of the largest element, counts as 0 off the diagonal and in χ_bb - χ_cc.
+
+    >>> from rotor.geometry.inertia import point_masses, principal_frame
+    >>> chi = np.diag([2.4, 2.4, -4.8])
+    >>> hcn = Molecule(("H", "C", "N"), [[0, 0, -1.06], [0, 0, 0], [0, 0, 1.15]], quadrupole_mhz={3: chi})
+    >>> frame = principal_frame(point_masses(hcn.masses_u, hcn.positions_angstrom))
+    >>> dict(computed_couplings(hcn, frame).values)
+    {'chi_aa(14N)': -4.8}
+    """
+    with_spin = {atom: chi for atom, chi in molecule.quadrupole_mhz.items() if molecule.nuclei[atom - 1].spin >= 1}
+    if not with_spin:
+        return None
+    values: dict[str, float] = {}
+    twice, atoms = {}, {}
+    for atom, chi in sorted(with_spin.items()):
+        nucleus = molecule.nuclei[atom - 1]
+        alike = [other for other in sorted(with_spin) if molecule.nuclei[other - 1] == nucleus]
+        name = nucleus.label + (f"_{alike.index(atom) + 1}" if len(alike) > 1 else "")
+        twice[name], atoms[name] = round(2 * nucleus.spin), atom
+        values |= {f"{symbol}({name})": value for symbol, value in _named(frame.axes @ chi @ frame.axes.T).items()}
+    return SpinConstants(values, twice, f"computed: {molecule.quadrupole_source or molecule.source}", atoms=atoms)
+
+
+def _named(chi: Floats) -> dict[str, float]:
+    least = NOISE * max(1.0, float(np.abs(chi).max()))
+    rest = {"bb-cc": chi[1, 1] - chi[2, 2], "ab": chi[0, 1], "ac": chi[0, 2], "bc": chi[1, 2]}
+    return {"chi_aa": float(chi[0, 0])} | {f"chi_{k}": float(value) for k, value in rest.items() if abs(value) > least}

@@ -1,0 +1,126 @@
+"""Quadrupole couplings of a Gaussian output, from its axes to those of the top, its isotopologues and its lines."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from test_outputs import TURN, table
+
+import rotor
+from rotor.molecules.molecule import Molecule
+from rotor.molecules.nuclei import isotope
+from rotor.quantum.effects.of_top import effects_of
+from rotor.quantum.solve import solve_levels
+from rotor.tops.top import Top
+
+NUMBERS = (1, 7, 8)  # HNO, about
+PLANE = np.array([[0.94, 1.02, 0.0], [0.0, 0.6, 0.0], [0.0, -0.61, 0.0]])
+CHI_ABC = np.array([[0.36, 1.50, 0.0], [1.50, -5.46, 0.0], [0.0, 0.0, 5.10]])  # invented, traceless
+DIPOLE_ABC = np.array([1.03, 1.31, 0.0])
+FRAME = Top.from_molecule(Molecule(("H", "N", "O"), PLANE)).frame
+COLUMNS = {
+    "abc": np.eye(3),
+    "cab": np.eye(3)[[2, 0, 1]],
+    "bca": np.eye(3)[[1, 2, 0]],
+}  # which axes its letters stand for
+
+
+def output(columns: str, *, dipole: np.ndarray | None = None, isotope_of_n: int = 14, axes: bool = True) -> str:
+    """An imitation of a job with output=pickett, its couplings in a table whose columns are a, b, c in another order."""
+    order = COLUMNS[columns]
+    own = (PLANE - FRAME.centre) @ FRAME.axes.T @ order.T
+    chi, mu = order @ CHI_ABC @ order.T, order @ DIPOLE_ABC if dipole is None else dipole
+    standard = PLANE @ TURN.T
+    x, y, z = TURN @ FRAME.axes.T @ DIPOLE_ABC
+    text = " Entering Gaussian System, Link 0=g16\n Copyright (c) 1988-2016, Gaussian, Inc.  All Rights Reserved.\n"
+    text += " Charge =  0 Multiplicity = 1\n" + table("Standard orientation:", standard, NUMBERS)
+    text += (
+        f" Dipole moment (field-independent basis, Debye):\n    X={x:22.4f}    Y={y:22.4f}    Z={z:22.4f}  Tot= 1.0\n"
+    )
+    if axes:
+        text += f"{'Principal axis orientation:':>45}\n {'-' * 69}\n Center     Atomic                     Coordinates (Angstroms)\n"
+        text += f" Number     Number              X              Y              Z\n {'-' * 69}\n"
+        rows = zip(NUMBERS, own, strict=True)
+        text += "".join(f"{i:7d}{n:11d}    {r[0]:15.6f}{r[1]:15.6f}{r[2]:15.6f}\n" for i, (n, r) in enumerate(rows, 1))
+        text += f" {'-' * 69}\n"
+    text += f" Nuclear quadrupole coupling constants [Chi] (MHz):\n  2  N({isotope_of_n})\n"
+    for i, first in enumerate("abc"):
+        text += "".join(f"   {second}{first}={chi[k, i]:11.4f}" for k, second in enumerate("abc")) + "\n"
+    text += " Dipole moment (Debye):\n" + "".join(f"{m:15.7f}" for m in mu) + "  Tot=      1.0\n"
+    return text + " Normal termination of Gaussian 16 at Sat Jan  1 00:00:00 2022.\n"
+
+
+def read(folder: Path, text: str) -> Top:
+    path = folder / "hno.log"
+    path.write_text(text, encoding="utf-8")
+    return rotor.read(str(path))
+
+
+@pytest.mark.parametrize("columns", COLUMNS)
+def test_couplings_are_turned_to_the_principal_axes(tmp_path, columns):
+    found = read(tmp_path, output(columns)).spin_constants
+    assert dict(found.twice) == {"14N": 2}
+    assert dict(found.atoms) == {"14N": 2}
+    assert found.source.startswith("computed: Gaussian, ")
+    expected = {"chi_aa(14N)": 0.36, "chi_bb-cc(14N)": -10.56, "chi_ab(14N)": 1.5}
+    assert set(found.values) == set(expected)
+    for name, value in expected.items():
+        own = (
+            abs(found.values[name]) if name == "chi_ab(14N)" else found.values[name]
+        )  # its sign goes with that of the axes
+        assert own == pytest.approx(value, abs=3e-4)  # four decimals, and six of coordinates
+
+
+@pytest.mark.parametrize(
+    ("changes", "why"),
+    [
+        ({"dipole": np.array([1.31, 1.03, 0.0])}, "a dipole that is not the molecule's"),
+        ({"isotope_of_n": 15}, "are of 15N, atom 2 is 14N"),
+        ({"axes": False}, "axes that no table of the same geometry says"),
+    ],
+)
+def test_what_the_file_does_not_settle_is_left_out_with_a_note(tmp_path, changes, why):
+    top = read(tmp_path, output("cab", **changes))
+    assert top.spin_constants is None
+    assert any(why in note for note in top.notes)
+
+
+def test_isotopologues(tmp_path):
+    """Deuterium turns the axes and leaves the tensor of nitrogen; 15N has no quadrupole moment."""
+    from rotor.tops.isotopologues import isotopologue
+
+    parent = read(tmp_path, output("bca"))
+    heavy = isotopologue(parent, "H=2H").top
+    chi = heavy.frame.axes @ FRAME.axes.T @ CHI_ABC @ FRAME.axes @ heavy.frame.axes.T
+    turned = parent.molecule.with_isotopes("H=2H").quadrupole_mhz[2]
+    assert np.allclose(turned, parent.molecule.quadrupole_mhz[2])
+    assert heavy.spin_constants.values["chi_bb-cc(14N)"] == pytest.approx(-10.56, abs=0.3)
+    assert np.linalg.eigvalsh(chi) == pytest.approx(np.linalg.eigvalsh(turned), abs=1e-3)  # four decimals
+    assert isotopologue(parent, "N=15N").top.spin_constants is None
+
+
+def test_the_gradient_stays_and_q_changes():
+    """χ of 37Cl is that of 35Cl times Q'/Q, 0.788."""
+    chi = np.diag([-30.0, -45.0, 75.0])
+    light = Molecule(("H", "Cl"), [[0, 0, 0], [0, 0, 1.27]], quadrupole_mhz={2: chi})
+    ratio = isotope("Cl", 37).quadrupole_barn / isotope("Cl", 35).quadrupole_barn
+    assert np.allclose(light.with_isotopes("Cl=37Cl").quadrupole_mhz[2], ratio * chi)
+    assert 0.78 < ratio < 0.80
+    back = light.moved(TURN).moved(TURN.T)
+    assert np.allclose(back.quadrupole_mhz[2], chi)
+    with pytest.raises(ValueError, match="not symmetric and traceless"):
+        Molecule(("H", "Cl"), [[0, 0, 0], [0, 0, 1.27]], quadrupole_mhz={2: np.eye(3)})
+
+
+def test_levels_split(tmp_path):
+    """J = 1 of three components; their mean, weighted by 2F+1, is the level without spin."""
+    top = read(tmp_path, output("abc"))
+    with_spin, plain = solve_levels(top, 1, effects=effects_of(top, True)), solve_levels(top, 1)
+    of_one = with_spin.quanta["n"] == 1
+    assert of_one.sum() == 9
+    weights = with_spin.multiplicity[of_one]
+    mean = np.average(with_spin.energy_mhz[of_one], weights=weights)
+    assert mean == pytest.approx(plain.energy_mhz[plain.quanta["j"] == 1].mean(), abs=1e-3)  # χ²/A, less than 1 kHz
+    assert np.ptp(with_spin.energy_mhz[of_one]) > 0
