@@ -80,6 +80,13 @@ def test_labels_of_other_tops():
     assert sorted(cyanide.local_upper) == ["  1  0         ", "  2  0         ", "  2  1         "]
 
 
+def test_inversion_states_are_called_by_their_names():
+    lines = rotor.line_list(rotor.read("NH3"), temperature_k=296.0, jmax=2)
+    found = hitran_lines(lines, molecule=11)
+    pairs = set(zip(map(str.strip, found.global_upper), map(str.strip, found.global_lower), strict=True))
+    assert pairs == {("0-", "0+"), ("0+", "0-")}
+
+
 @pytest.mark.parametrize(
     ("change", "words"),
     [

@@ -277,7 +277,7 @@ def hitran_lines(lines: Lines, *, molecule: int, isotopologue: int = 1, abundanc
         raise ValueError(f"abundance {abundance}: the share of the isotopologue is above 0 and at most 1")
     lines = lines.where(np.argsort(lines.frequency_mhz, kind="stable"))
     levels, n = lines.levels, len(lines)
-    zero, vibration = np.zeros(n), np.full(n, _ground_state(lines))
+    zero, (global_upper, global_lower) = np.zeros(n), _global_quanta(lines)
     upper, lower = _local_quanta(lines)
     return HitranLines(
         molecule=np.full(n, molecule, dtype=np.int64),
@@ -290,8 +290,8 @@ def hitran_lines(lines: Lines, *, molecule: int, isotopologue: int = 1, abundanc
         energy_lower_cm=lines.energy_lower_cm,
         n_air=zero,
         delta_air=zero,
-        global_upper=vibration,
-        global_lower=vibration,
+        global_upper=global_upper,
+        global_lower=global_lower,
         local_upper=upper,
         local_lower=lower,
         uncertainties=np.full(n, "000000"),
@@ -300,6 +300,16 @@ def hitran_lines(lines: Lines, *, molecule: int, isotopologue: int = 1, abundanc
         g_upper=levels.degeneracy[lines.upper].astype(float),
         g_lower=levels.degeneracy[lines.lower].astype(float),
     )
+
+
+def _global_quanta(lines: Lines) -> tuple[NDArray[np.str_], NDArray[np.str_]]:
+    """The name of the state of every line, (n,) each: that of the top's states where it has several, such as 0+ and 0-."""
+    v, states = lines.levels.quanta.get("v"), lines.top.states
+    if v is None or states is None:
+        alike = np.full(len(lines), _ground_state(lines))
+        return alike, alike
+    names = np.array([states.name_of(number).rjust(15) for number in range(int(v.max()) + 1)])
+    return names[v[lines.upper]], names[v[lines.lower]]
 
 
 def _ground_state(lines: Lines) -> str:
