@@ -114,10 +114,10 @@ def orders(shared: Path | None) -> list[Panel]:
 def measured(name: str, shared: Path) -> list[Point]:
     """Median difference from the measured lines of a catalogue inside the range that the constants are held against."""
     import rotor
-    from rotor.formats.library import library_molecule
     from rotor.formats.line_tables import catalogue
-    from rotor.formats.spcat.cat import read_cat
+    from rotor.formats.molecules.library import library_molecule
     from rotor.formats.spcat.compare import compare
+    from rotor.formats.spcat.text.cat import read_cat
     from rotor.scenes.knobs.of_levels import order_of, to_order
 
     tag = library_molecule(name).catalogue

@@ -31,7 +31,7 @@ from rotor.quantum.effects.of_top import effects_of
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.solve import solve_levels
 from rotor.spectra.lines import line_list
-from rotor.tops.spin_constants import SpinConstants
+from rotor.tops.spins.spin_constants import SpinConstants
 from rotor.tops.top import Top
 
 ORACLES = Path(__file__).resolve().parents[1] / "tests" / "oracles"

@@ -15,10 +15,10 @@ from pathlib import Path
 
 import numpy as np
 
-from rotor.formats.level_table import read_level_table
-from rotor.quantum.derivatives import level_derivatives
+from rotor.formats.molecules.level_table import read_level_table
+from rotor.quantum.estimates.derivatives import level_derivatives
 from rotor.quantum.solve import solve_levels
-from rotor.tops.state_constants import StateConstants
+from rotor.tops.states.state_constants import StateConstants
 from rotor.tops.top import Top
 
 NAMES = ("B", "C", "DJ", "DJK", "DK", "HJ", "HJK", "HKJ", "HK", "LJ", "LJJK", "LJK", "LKKJ", "LK")

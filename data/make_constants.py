@@ -24,8 +24,8 @@ from rotor.fit.fit import Fit, FitOptions, fit_lines
 from rotor.fit.parameters import parameters
 from rotor.formats.assigned_lines import QUANTA, read_assigned_lines
 from rotor.formats.atomic_write import open_atomic
-from rotor.formats.molecule_file import MoleculeFile, read_molecule_file
-from rotor.formats.spcat.cat import read_cat
+from rotor.formats.molecules.molecule_file import MoleculeFile, read_molecule_file
+from rotor.formats.spcat.text.cat import read_cat
 from rotor.tops.constants import Constants
 from rotor.units import MHZ_PER_CM
 

@@ -27,8 +27,8 @@ import numpy as np
 import rotor
 from rotor import units
 from rotor.arrays import Floats
-from rotor.formats.spcat.cat import read_cat
-from rotor.formats.spcat.catalogue import Catalogue
+from rotor.formats.spcat.text.cat import read_cat
+from rotor.formats.spcat.text.catalogue import Catalogue
 
 TABLE = Path(__file__).with_name("dipoles.csv")
 COLUMNS = "molecule,axis,debye,catalogue,lines,relative_spread"

@@ -18,9 +18,9 @@ from pathlib import Path
 import numpy as np
 
 from rotor import units
-from rotor.formats.spcat.cat import read_cat
-from rotor.formats.spcat.catalogue import Catalogue
-from rotor.formats.spcat.fields import BLANK
+from rotor.formats.spcat.text.cat import read_cat
+from rotor.formats.spcat.text.catalogue import Catalogue
+from rotor.formats.spcat.text.fields import BLANK
 
 FOLDER = Path(__file__).with_name("levels")
 CATALOGUES = {"H2O": "c018003", "HDO": "c019002", "D2O": "c020001"}

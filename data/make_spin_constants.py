@@ -19,13 +19,13 @@ from typing import NamedTuple
 import numpy as np
 
 from rotor import read
-from rotor.formats.spcat.cat import read_cat
-from rotor.formats.spcat.catalogue import Catalogue
-from rotor.quantum.derivatives import level_derivatives
+from rotor.formats.spcat.text.cat import read_cat
+from rotor.formats.spcat.text.catalogue import Catalogue
 from rotor.quantum.effects.of_top import effects_of
+from rotor.quantum.estimates.derivatives import level_derivatives
 from rotor.quantum.levels import Levels
 from rotor.quantum.solve import solve_levels
-from rotor.tops.spin_constants import SpinConstants
+from rotor.tops.spins.spin_constants import SpinConstants
 from rotor.tops.top import Top
 
 WIDTH = {"linear": 1, "prolate": 2, "oblate": 2}  # quantum numbers of the rotation; of other tops 3

@@ -14,13 +14,13 @@ from pathlib import Path
 
 import numpy as np
 
-from rotor.formats.library import folders
-from rotor.formats.molecule_file import MoleculeFile, read_molecule_file
+from rotor.formats.molecules.library import folders
+from rotor.formats.molecules.molecule_file import MoleculeFile, read_molecule_file
 from rotor.formats.read_write import top_of_file
-from rotor.formats.spcat.cat import Catalogue, read_cat
-from rotor.formats.spcat.fields import BLANK
+from rotor.formats.spcat.text.cat import Catalogue, read_cat
+from rotor.formats.spcat.text.fields import BLANK
 from rotor.quantum.solve import solve_levels
-from rotor.tops.level_table import tabulated_energies
+from rotor.tops.states.level_table import tabulated_energies
 from rotor.tops.top import Top
 
 PAGE = Path(__file__).with_name("library.md")

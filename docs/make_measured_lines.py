@@ -12,11 +12,11 @@ from pathlib import Path
 import numpy as np
 
 import rotor
-from rotor.formats.library import library_molecule
 from rotor.formats.line_tables import catalogue
-from rotor.formats.molecule_file import MoleculeFile
-from rotor.formats.spcat.cat import read_cat
+from rotor.formats.molecules.library import library_molecule
+from rotor.formats.molecules.molecule_file import MoleculeFile
 from rotor.formats.spcat.compare import Agreement, Comparison, agreement, compare
+from rotor.formats.spcat.text.cat import read_cat
 
 PAGE = Path(__file__).with_name("measured_lines.md")
 MOLECULES = (

@@ -13,11 +13,11 @@ from pathlib import Path
 
 import numpy as np
 
-from rotor.formats.spcat.cat import format_lines, read_cat
 from rotor.formats.spcat.compare import compare
-from rotor.formats.spcat.egy import read_egy
-from rotor.formats.spcat.par import read_par
 from rotor.formats.spcat.predict import Prediction, predict_file, summed_q
+from rotor.formats.spcat.text.cat import format_lines, read_cat
+from rotor.formats.spcat.text.egy import read_egy
+from rotor.formats.spcat.text.par import read_par
 from rotor.units import MHZ_PER_CM
 
 PAGE = Path(__file__).with_name("reference_cases.md")

@@ -11,11 +11,11 @@ from pathlib import Path
 
 from rotor.formats.spcat.codes import AXES, split_code
 from rotor.formats.spcat.file_model import moment_of, split_dipole
-from rotor.formats.spcat.int_file import Dipole
 from rotor.formats.spcat.l_doubled import pairs_of
 from rotor.formats.spcat.operators import operator_of
-from rotor.formats.spcat.par import read_par
 from rotor.formats.spcat.states import states_of
+from rotor.formats.spcat.text.int_file import Dipole
+from rotor.formats.spcat.text.par import read_par
 
 TARGET = Path(__file__).with_name("spcat_codes.md")
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from rotor.molecules.molecule import Molecule
 from rotor.molecules.symmetry.point_group import Symmetry, symmetry_of
-from rotor.tops.spin_statistics import STATES, CharacterRow, character_rows, inverting_symmetry, spin_weights
+from rotor.tops.spins.spin_statistics import STATES, CharacterRow, character_rows, inverting_symmetry, spin_weights
 
 TARGET = Path(__file__).with_name("spin_weights.md")
 TURNS = np.arange(3) * 2 * np.pi / 3

@@ -13,7 +13,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import rotor
-from rotor.formats.spcat.egy import read_egy
+from rotor.formats.spcat.text.egy import read_egy
 from rotor.units import MHZ_PER_CM
 
 # %matplotlib inline

@@ -18,7 +18,7 @@ import rotor
 from rotor.classical.free.stability import growth_rate
 from rotor.classical.integrators.method import integrate
 from rotor.classical.integrators.splitting import RotationSplitting
-from rotor.formats.spcat.egy import read_egy
+from rotor.formats.spcat.text.egy import read_egy
 from rotor.geometry import rotations
 from rotor.units import MHZ_PER_CM
 

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from rotor.formats.spcat.fields import BLANK
-from rotor.formats.spcat.int_file import read_int
-from rotor.formats.spcat.par import Parameter, ParameterFile, format_par, read_par
 from rotor.formats.spcat.predict import predict
+from rotor.formats.spcat.text.fields import BLANK
+from rotor.formats.spcat.text.int_file import read_int
+from rotor.formats.spcat.text.par import Parameter, ParameterFile, format_par, read_par
 from rotor.units import MHZ_PER_CM
 
 ERROR_MHZ = 0.02

@@ -10,8 +10,8 @@ import gzip
 from dataclasses import dataclass
 from pathlib import Path
 
-from rotor.formats.spcat.int_file import IntensityFile, read_int
-from rotor.formats.spcat.par import ParameterFile, read_par
+from rotor.formats.spcat.text.int_file import IntensityFile, read_int
+from rotor.formats.spcat.text.par import ParameterFile, read_par
 
 PROLATE, OBLATE = "bca", "bac"  # axes (x, y, z) in which N± = Nx ± i Ny: Ir and IIIl
 

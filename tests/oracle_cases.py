@@ -15,11 +15,11 @@ from typing import Any
 
 import numpy as np
 
-from rotor.formats.spcat.catalogue import Catalogue
-from rotor.formats.spcat.egy import LevelList
 from rotor.formats.spcat.model import common_weight
-from rotor.formats.spcat.par import read_par
 from rotor.formats.spcat.predict import Prediction, predict_file
+from rotor.formats.spcat.text.catalogue import Catalogue
+from rotor.formats.spcat.text.egy import LevelList
+from rotor.formats.spcat.text.par import read_par
 from rotor.spectra.lines import Lines, line_list
 from rotor.tops.constants import Constants
 from rotor.tops.top import Top

@@ -18,11 +18,11 @@ from rotor.quantum.effects.of_top import effects_of
 from rotor.quantum.solve import solve_levels
 from rotor.spectra.lines import line_list
 from rotor.thermo import partition_function
-from rotor.tops.isotopologues import isotopologue
-from rotor.tops.spin_constants import SpinConstants
-from rotor.tops.spin_statistics import weights_of
-from rotor.tops.spin_weights import SpinWeights
-from rotor.tops.state_constants import StateConstants
+from rotor.tops.isotopes.isotopologues import isotopologue
+from rotor.tops.spins.spin_constants import SpinConstants
+from rotor.tops.spins.spin_statistics import weights_of
+from rotor.tops.spins.spin_weights import SpinWeights
+from rotor.tops.states.state_constants import StateConstants
 from rotor.tops.top import Top
 
 AMMONIA = rotor.read("NH3")

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from rotor.formats.atomic_write import atomic_path, open_atomic
-from rotor.formats.spcat import _kernels, cat, rows
-from rotor.formats.spcat.cat import format_lines, read_cat, write_cat
-from rotor.formats.spcat.catalogue import DTYPES, Catalogue, Layout
-from rotor.formats.spcat.fields import BLANK, read_degeneracy, read_quantum, spell_degeneracy, spell_quantum
-from rotor.formats.spcat.line import spell_record
+from rotor.formats.spcat.text import _kernels, cat, rows
+from rotor.formats.spcat.text.cat import format_lines, read_cat, write_cat
+from rotor.formats.spcat.text.catalogue import DTYPES, Catalogue, Layout
+from rotor.formats.spcat.text.fields import BLANK, read_degeneracy, read_quantum, spell_degeneracy, spell_quantum
+from rotor.formats.spcat.text.line import spell_record
 
 SAMPLES = sorted((Path(__file__).parent / "oracles" / "spcat").glob("*.cat"))
 SHARED = Path(__file__).resolve().parents[1].parent / "shared" / "reference"
@@ -356,7 +356,7 @@ def test_atomic_path_follows_a_link(tmp_path):
 
 def test_short_lists_do_not_load_the_compiler():
     code = (
-        "import sys; from rotor.formats.spcat.cat import read_cat, format_lines; "
+        "import sys; from rotor.formats.spcat.text.cat import read_cat, format_lines; "
         f"format_lines(read_cat({LINE!r} * 100)); sys.exit('numba' in sys.modules)"
     )
     assert subprocess.run([sys.executable, "-c", code], cwd=Path(__file__).parents[1]).returncode == 0

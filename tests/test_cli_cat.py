@@ -12,8 +12,8 @@ import pytest
 from oracle_cases import SAMPLES, disagreements, prediction
 
 import rotor
-from rotor.formats.spcat.cat import read_cat, write_cat
-from rotor.formats.spcat.par import read_par
+from rotor.formats.spcat.text.cat import read_cat, write_cat
+from rotor.formats.spcat.text.par import read_par
 
 DOCS = (Path(__file__).resolve().parents[1] / "docs" / "command_line.md").read_text(encoding="utf-8")
 OCS = str(SAMPLES / "ocs" / "sample.cat")

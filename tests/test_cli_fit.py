@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 import rotor
-from rotor.formats.molecule_file import read_molecule_file
-from rotor.formats.spcat.par import read_par
+from rotor.formats.molecules.molecule_file import read_molecule_file
+from rotor.formats.spcat.text.par import read_par
 from rotor.spectra.lines import line_list
 
 DOCS = (Path(__file__).resolve().parents[1] / "docs" / "command_line.md").read_text(encoding="utf-8")

@@ -12,11 +12,11 @@ import pytest
 
 import rotor
 from rotor.cli.shared.output import plain, rows_of
-from rotor.formats.spcat.egy import read_egy
-from rotor.formats.spcat.int_file import read_int
-from rotor.formats.spcat.level_list import level_list
 from rotor.formats.spcat.model import top_of
-from rotor.formats.spcat.par import read_par
+from rotor.formats.spcat.text.egy import read_egy
+from rotor.formats.spcat.text.int_file import read_int
+from rotor.formats.spcat.text.level_list import level_list
+from rotor.formats.spcat.text.par import read_par
 from rotor.plots.levels import ladders, plot_levels
 from rotor.quantum.request import LevelsRequest, answer_levels
 

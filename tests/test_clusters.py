@@ -7,11 +7,11 @@ import pytest
 from slow_matrix import cubic_matrix, threefold_turn
 
 from rotor.quantum.solve import solve_levels
-from rotor.quantum.spherical_top import DIMENSION, tensor_eigenvalues
+from rotor.quantum.wang.spherical_top import DIMENSION, tensor_eigenvalues
 from rotor.thermo import partition_function
 from rotor.tops.constants import Constants
 from rotor.tops.operators import CUBIC_TENSOR
-from rotor.tops.spin_weights import CUBIC_IRREPS, SpinWeights
+from rotor.tops.spins.spin_weights import CUBIC_IRREPS, SpinWeights
 from rotor.tops.top import Top
 
 METHANE = Constants(kind="spherical", B=157127.0, D=3.3236, Dt=0.13294)
@@ -123,7 +123,7 @@ def test_table_says_the_irrep():
 
 
 def test_noncubic_terms_leave_the_closed_form():
-    from rotor.quantum.spherical_top import is_cubic
+    from rotor.quantum.wang.spherical_top import is_cubic
 
     assert is_cubic({(1, 0, 0): 5.0, (2, 0, 0): -1e-4})
     assert is_cubic({(1, 0, 0): 5.0} | {powers: 0.1 * c for powers, c in CUBIC_TENSOR.items() if powers != (1, 0, 0)})

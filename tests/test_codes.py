@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from rotor.formats.spcat import codes, model
-from rotor.formats.spcat.egy import read_egy
-from rotor.formats.spcat.int_file import Dipole, IntensityFile, Request, read_int
-from rotor.formats.spcat.par import Options, Parameter, ParameterFile, format_par, read_par
+from rotor.formats.spcat.text.egy import read_egy
+from rotor.formats.spcat.text.int_file import Dipole, IntensityFile, Request, read_int
+from rotor.formats.spcat.text.par import Options, Parameter, ParameterFile, format_par, read_par
 from rotor.quantum.effects.watson import centrifugal_operators, rigid_operators
 from rotor.tops.constants import Constants
 from rotor.tops.kind_of_constants import vocabulary
-from rotor.tops.spin_weights import SpinWeights
+from rotor.tops.spins.spin_weights import SpinWeights
 from rotor.tops.top import Top
 
 SAMPLES = Path(__file__).parent / "oracles" / "spcat"

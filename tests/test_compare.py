@@ -9,9 +9,9 @@ import pytest
 from oracle_cases import SAMPLES, prediction
 
 from rotor.formats.line_tables import catalogue
-from rotor.formats.spcat.cat import read_cat
-from rotor.formats.spcat.catalogue import Layout
 from rotor.formats.spcat.compare import agreement, compare, in_mhz, likely_temperature_k, with_measured_lines
+from rotor.formats.spcat.text.cat import read_cat
+from rotor.formats.spcat.text.catalogue import Layout
 
 ONE = b"  115271.2018  0.0005 -5.0105 2    0.0000  3  28503 101 1           0           \n"
 TWO = b"  230538.0000  0.0005 -4.1197 2    3.8450  5 -28503 101 2           1           \n"

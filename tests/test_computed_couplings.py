@@ -89,7 +89,7 @@ def test_what_the_file_does_not_settle_is_left_out_with_a_note(tmp_path, changes
 
 def test_isotopologues(tmp_path):
     """Deuterium turns the axes and leaves the tensor of nitrogen; 15N has no quadrupole moment."""
-    from rotor.tops.isotopologues import isotopologue
+    from rotor.tops.isotopes.isotopologues import isotopologue
 
     parent = read(tmp_path, output("bca"))
     heavy = isotopologue(parent, "H=2H").top

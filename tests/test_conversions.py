@@ -9,9 +9,9 @@ import pytest
 from slow_matrix import body_operators, term_matrix
 
 from rotor.quantum import reductions as conversions
+from rotor.quantum.estimates.uncertainty import level_errors
 from rotor.quantum.reductions import to_reduction, to_representation
 from rotor.quantum.solve import solve_levels
-from rotor.quantum.uncertainty import level_errors
 from rotor.tops.constants import Constants
 from rotor.tops.covariance import Covariance
 from rotor.tops.operators import REPRESENTATIONS

@@ -13,13 +13,13 @@ import pytest
 from plain_watson import levels
 
 import rotor
-from rotor.formats.library import folders, library_molecule
-from rotor.formats.molecule_file import MoleculeFile, read_molecule_file
-from rotor.formats.spcat.cat import read_cat
+from rotor.formats.molecules.library import folders, library_molecule
+from rotor.formats.molecules.molecule_file import MoleculeFile, read_molecule_file
+from rotor.formats.spcat.text.cat import read_cat
 from rotor.molecules.symmetry.point_group import symmetry_of
 from rotor.quantum.solve import solve_levels
 from rotor.tops.covariance import Covariance
-from rotor.tops.spin_statistics import weights_of
+from rotor.tops.spins.spin_statistics import weights_of
 from rotor.tops.top import SYMMETRIC_WITHIN, Top
 from rotor.units import MHZ_PER_CM, ROTATIONAL_MHZ_U_ANGSTROM2
 

@@ -7,8 +7,8 @@ import time
 import numpy as np
 import pytest
 
-from rotor.quantum.derivatives import level_derivatives, term_expectations
 from rotor.quantum.effects.watson import operators_by_name
+from rotor.quantum.estimates.derivatives import level_derivatives, term_expectations
 from rotor.quantum.solve import solve_levels
 from rotor.tops.constants import Constants
 from rotor.tops.top import Top
@@ -106,7 +106,7 @@ def test_what_cannot_be_derived_is_said():
 
 
 def test_pieces_give_the_same(monkeypatch):
-    from rotor.quantum import derivatives
+    from rotor.quantum.estimates import derivatives
 
     top = Top(S_SET)
     levels = solve_levels(top, 15)

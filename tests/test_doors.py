@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import rotor
-from rotor.formats.spcat.catalogue import Catalogue
+from rotor.formats.spcat.text.catalogue import Catalogue
 
 XYZ = "3\nwater\nO 0 0 0.1173\nH 0 0.7572 -0.4692\nH 0 -0.7572 -0.4692\n"
 TOML = '[constants]\nsource = "memory"\nB = 57635.968\n[dipole]\nsource = "memory"\na = 0.11\n'

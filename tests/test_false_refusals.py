@@ -10,9 +10,9 @@ import pytest
 
 import rotor
 from rotor.formats.hitran import HitranLines, format_hitran, read_hitran
-from rotor.formats.spcat.cat import format_lines, read_cat
-from rotor.formats.spcat.fields import BLANK
-from rotor.formats.spcat.lin import LineList, format_lin, read_lin, with_defaults
+from rotor.formats.spcat.text.cat import format_lines, read_cat
+from rotor.formats.spcat.text.fields import BLANK
+from rotor.formats.spcat.text.lin import LineList, format_lin, read_lin, with_defaults
 from rotor.molecules.readers.quantum_chemistry import read_output
 from rotor.quantum.solve import solve_levels
 from rotor.units import BOHR_RADIUS_ANGSTROM

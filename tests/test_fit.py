@@ -14,9 +14,9 @@ from rotor.fit.publication import publication_table, value_text
 from rotor.fit.report import decisive, report_text
 from rotor.fit.search import robust
 from rotor.formats.assigned_lines import read_assigned_lines
-from rotor.formats.spcat.cat import read_cat
+from rotor.formats.spcat.text.cat import read_cat
+from rotor.quantum.estimates.uncertainty import level_errors
 from rotor.quantum.solve import solve_levels
-from rotor.quantum.uncertainty import level_errors
 from rotor.spectra.lines import line_list
 from rotor.tops.constants import Constants
 from rotor.tops.top import Top
@@ -95,7 +95,7 @@ def test_a_fit_far_from_the_lines_never_says_that_it_is_done(fitted):
 
 
 def test_the_covariance_goes_into_errors_of_lines(fitted):
-    """Prediction errors of the fit are those that rotor.quantum.uncertainty makes of its covariance."""
+    """Prediction errors of the fit are those that rotor.quantum.estimates.uncertainty makes of its covariance."""
     top = Top(fitted.constants)
     levels = solve_levels(top, 12)
     spread = level_errors(top, levels, fitted.covariance)
@@ -110,7 +110,7 @@ def test_the_covariance_goes_into_errors_of_lines(fitted):
         levels.find(**dict(zip(ASYMMETRIC, side[i].tolist(), strict=True)))
         for side in (fitted.lines.upper, fitted.lines.lower)
     ]
-    from rotor.quantum.uncertainty import level_spread, line_errors
+    from rotor.quantum.estimates.uncertainty import level_spread, line_errors
 
     found = line_errors(level_spread(top, levels, fitted.covariance), *(np.atleast_1d(end) for end in ends))
     assert found[0] == pytest.approx(fitted.calculated_errors_mhz[i], rel=1e-6)  # levels solved twice

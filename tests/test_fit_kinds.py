@@ -15,8 +15,8 @@ from fit_kinds import ERROR_MHZ, Kind, lin_text, lines_of, parameter_file, start
 from rotor.fit.fit import fit_lines
 from rotor.formats.spcat.fit_input import fitted_file, read_fit, spfit_input
 from rotor.formats.spcat.fit_states import FileLevels
-from rotor.formats.spcat.lin import read_lin
-from rotor.formats.spcat.par import read_par
+from rotor.formats.spcat.text.lin import read_lin
+from rotor.formats.spcat.text.par import read_par
 from rotor.formats.spcat.unresolved import excluded_parameters
 
 THREE = """10099 14500.1 A

@@ -13,14 +13,14 @@ import pytest
 
 from rotor.fit.choose import bootstrap
 from rotor.fit.fit import fit_lines
-from rotor.formats.spcat.cat import read_cat
 from rotor.formats.spcat.file_lines import format_of
 from rotor.formats.spcat.fit_input import error_factor, fitted_file, read_fit, spfit_input
 from rotor.formats.spcat.fit_states import FileLevels, groups_for_fit, names_of_quanta
-from rotor.formats.spcat.int_file import read_int
-from rotor.formats.spcat.lin import read_lin
-from rotor.formats.spcat.par import read_par
 from rotor.formats.spcat.predict import predict
+from rotor.formats.spcat.text.cat import read_cat
+from rotor.formats.spcat.text.int_file import read_int
+from rotor.formats.spcat.text.lin import read_lin
+from rotor.formats.spcat.text.par import read_par
 from rotor.formats.spcat.variances import variance_factor
 
 # weighted rms, rms of lines in MHz and of those in cm-1, as SPFIT printed them

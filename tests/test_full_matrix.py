@@ -15,9 +15,9 @@ import pytest
 from full_matrix_codes import Case, read_case, unpacked
 from full_matrix_levels import CM_MHZ, Block, lgint, solve, strengths
 
-from rotor.formats.spcat.cat import read_cat
-from rotor.formats.spcat.egy import read_egy
-from rotor.formats.spcat.fields import BLANK
+from rotor.formats.spcat.text.cat import read_cat
+from rotor.formats.spcat.text.egy import read_egy
+from rotor.formats.spcat.text.fields import BLANK
 
 SPINS = ("asym_spinrot", "formamide_quad", "vinylcl35_quad", "ch2cl2_2quad", "ch3cn_quad", "hcn_quad")
 STATES = ("two_state_coriolis", "three_states_fermi_coriolis", "tunnelling_doublet_quad")

@@ -16,8 +16,8 @@ from full_matrix import block, cartesian, pieces
 from full_matrix_codes import Case, case_of
 from full_matrix_rotor import wigner_3j, wigner_6j, wigner_9j
 
-from rotor.formats.spcat.int_file import read_int
-from rotor.formats.spcat.par import read_par
+from rotor.formats.spcat.text.int_file import read_int
+from rotor.formats.spcat.text.par import read_par
 
 RIGID = ((10000, 9400.0), (20000, 3100.0), (30000, 2500.0), (1100, 2.0), (41000, -0.3))
 

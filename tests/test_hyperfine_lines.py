@@ -17,7 +17,7 @@ import rotor
 from rotor.quantum.effects.of_top import effects_of
 from rotor.spectra.lines import Lines, line_list
 from rotor.tops.constants import Constants
-from rotor.tops.spin_constants import SpinConstants
+from rotor.tops.spins.spin_constants import SpinConstants
 from rotor.tops.top import Top
 
 SAMPLES = Path(__file__).parent / "oracles" / "hyperfine"

@@ -13,7 +13,7 @@ from rotor.quantum.solve import solve_levels
 from rotor.quantum.spins.method import used_method
 from rotor.quantum.spins.splittings import casimir
 from rotor.spectra.lines import line_list
-from rotor.tops.spin_constants import SpinConstants
+from rotor.tops.spins.spin_constants import SpinConstants
 from rotor.tops.top import Top
 
 CHLORIDE = Top.from_constants(

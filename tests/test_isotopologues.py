@@ -19,7 +19,7 @@ from rotor.molecules.molecule import Molecule
 from rotor.molecules.nuclei import data_folder, isotope, natural_isotopes
 from rotor.molecules.readers.read import g2_molecule
 from rotor.tops.distortion import distortion_constants, semirigid_top
-from rotor.tops.isotopologues import isotopologue, isotopologues, single_substitutions
+from rotor.tops.isotopes.isotopologues import isotopologue, isotopologues, single_substitutions
 from rotor.tops.top import Top
 
 # Which there are

@@ -7,11 +7,11 @@ import pytest
 from full_matrix_rotor import momenta
 
 from rotor.formats.spcat.file_model import groups_of
-from rotor.formats.spcat.int_file import read_int
 from rotor.formats.spcat.l_doubled import Pair, pairs_of
-from rotor.formats.spcat.par import read_par
 from rotor.formats.spcat.predict import predict
 from rotor.formats.spcat.states import states_of
+from rotor.formats.spcat.text.int_file import read_int
+from rotor.formats.spcat.text.par import read_par
 
 OPTIONS = "s -1 3 0 20 0 6 2 2 -1 1 1\ns -1 1 0 20 0 6 2 2 -1 101 1\ns -1 2 0 20 0 6 2 2 0 201 1\n"
 A_MINUS_B, B, DJ, DJK, DK, E8, ZETA, Q22, Q12, W1 = (

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rotor.quantum.derivatives import level_derivatives
+from rotor.quantum.estimates.derivatives import level_derivatives
 from rotor.quantum.labelled import level_model
 from rotor.quantum.solve import solve_levels
 from rotor.tops.constants import Constants

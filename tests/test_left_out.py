@@ -13,7 +13,7 @@ import rotor
 from rotor import units
 from rotor.fluid.analysis import Diffusion, yeh_hummer_correction
 from rotor.fluid.motion.bodies import bodies_of
-from rotor.quantum.convergence import warnings_of
+from rotor.quantum.estimates.convergence import warnings_of
 from rotor.quantum.solve import solve_levels
 from rotor.scenes import left_out
 from rotor.scenes.plan import plan_of

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import rotor
-from rotor.formats.spcat.cat import read_cat
+from rotor.formats.spcat.text.cat import read_cat
 from rotor.quantum.solve import solve_levels
 
 

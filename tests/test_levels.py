@@ -7,11 +7,11 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
-from rotor.quantum.basis import wang_blocks
-from rotor.quantum.convergence import disordered_blocks
+from rotor.quantum.estimates.convergence import disordered_blocks
 from rotor.quantum.solve import solve_levels
+from rotor.quantum.wang.basis import wang_blocks
 from rotor.tops.constants import Constants
-from rotor.tops.spin_weights import SpinWeights
+from rotor.tops.spins.spin_weights import SpinWeights
 from rotor.tops.top import Top
 
 WATER_QUARTIC = Constants(

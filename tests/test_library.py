@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 
 from rotor.cli import run
-from rotor.formats import library
-from rotor.formats.library import folders, library_file, library_molecule, names
+from rotor.formats.molecules import library
+from rotor.formats.molecules.library import folders, library_file, library_molecule, names
 
 OURS = Path(__file__).resolve().parents[1] / "data" / "molecules"
 
@@ -190,7 +190,7 @@ def test_molecules_that_are_not_there_are_refused(capsys, tmp_path):
 
 def test_a_spectrum_by_name_parses_one_file_alone():
     code = """
-import rotor.formats.library as library, rotor.formats.molecule_file as files
+import rotor.formats.molecules.library as library, rotor.formats.molecules.molecule_file as files
 read = []
 whole = files.parse_molecule_file
 files.parse_molecule_file = lambda *a, **k: read.append(a) or whole(*a, **k)

@@ -12,7 +12,7 @@ import rotor
 from rotor.molecules.nuclei import isotope
 from rotor.quantum.effects.hyperfine import NuclearQuadrupole
 from rotor.quantum.effects.watson import SEMI_RIGID
-from rotor.quantum.limits import VIBRATION_CM, model_limits, model_sizes, populated_j
+from rotor.quantum.estimates.limits import VIBRATION_CM, model_limits, model_sizes, populated_j
 from rotor.quantum.solve import solve_levels
 from rotor.quantum.spins import Spin
 from rotor.quantum.spins.splittings import GRADIENT_MHZ_PER_BARN

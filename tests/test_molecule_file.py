@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 import rotor
-from rotor.formats.library import library_file, library_molecule, names
-from rotor.formats.molecule_file import MoleculeFile, parse_molecule_file, read_molecule_file
-from rotor.formats.molecule_writer import molecule_file_text, write_molecule_file
+from rotor.formats.molecules.library import library_file, library_molecule, names
+from rotor.formats.molecules.molecule_file import MoleculeFile, parse_molecule_file, read_molecule_file
+from rotor.formats.molecules.molecule_writer import molecule_file_text, write_molecule_file
 from rotor.molecules.molecule import Molecule
 from rotor.tops.constants import Constants
-from rotor.tops.spin_weights import SpinWeights
+from rotor.tops.spins.spin_weights import SpinWeights
 
 LIBRARY = sorted(set(names().values()))
 

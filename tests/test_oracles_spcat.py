@@ -22,8 +22,8 @@ from oracle_cases import (
     read_case,
 )
 
-from rotor.formats.spcat.cat import read_cat, write_cat
-from rotor.formats.spcat.egy import read_egy
+from rotor.formats.spcat.text.cat import read_cat, write_cat
+from rotor.formats.spcat.text.egy import read_egy
 
 
 @pytest.mark.parametrize("case", CASES)

@@ -18,10 +18,10 @@ from oracle_cases import (
     prediction,
 )
 
-from rotor.formats.spcat.cat import read_cat, write_cat
-from rotor.formats.spcat.catalogue import Catalogue
 from rotor.formats.spcat.compare import compare
-from rotor.formats.spcat.egy import read_egy
+from rotor.formats.spcat.text.cat import read_cat, write_cat
+from rotor.formats.spcat.text.catalogue import Catalogue
+from rotor.formats.spcat.text.egy import read_egy
 
 EQUAL = [case for case in COUPLED if case != "three_states_fermi_coriolis"]
 

@@ -10,10 +10,10 @@ import pytest
 from oracle_cases import SAMPLES
 from test_spcat_files import mutated
 
-from rotor.formats.spcat.int_file import read_int
 from rotor.formats.spcat.model import common_weight
-from rotor.formats.spcat.par import read_par
 from rotor.formats.spcat.predict import least_intensity, predict, predict_file
+from rotor.formats.spcat.text.int_file import read_int
+from rotor.formats.spcat.text.par import read_par
 
 PAR = b"water\n 3 0 0 0\na 1 1 0 9 0 2 1 3 0 1 %d\n 10000 835840.3 0\n 20000 435351.7 0\n 30000 278138.7 0\n%s"
 INT = b"water\n 0 18003 178.1 %d %d %s 99999 300\n 2 1.8546\n"

@@ -17,8 +17,8 @@ from full_matrix_codes import case_of
 from full_matrix_levels import solve
 
 from rotor.formats.spcat.file_model import groups_of
-from rotor.formats.spcat.int_file import IntensityFile, read_int
-from rotor.formats.spcat.par import ParameterFile, read_par
+from rotor.formats.spcat.text.int_file import IntensityFile, read_int
+from rotor.formats.spcat.text.par import ParameterFile, read_par
 
 KINDS = Path(__file__).parent / "oracles" / "kinds"
 

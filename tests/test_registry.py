@@ -22,11 +22,11 @@ from rotor.formats import packed, tables
 from rotor.formats.line_tables import as_printed
 from rotor.formats.provenance import record_of
 from rotor.formats.registry import FORMATS, loaded, suffixes_for
-from rotor.formats.spcat.catalogue import Catalogue
-from rotor.formats.spcat.egy import LevelList
-from rotor.formats.spcat.fields import BLANK
 from rotor.formats.spcat.file_lines import Format
-from rotor.formats.spcat.lin import LineList
+from rotor.formats.spcat.text.catalogue import Catalogue
+from rotor.formats.spcat.text.egy import LevelList
+from rotor.formats.spcat.text.fields import BLANK
+from rotor.formats.spcat.text.lin import LineList
 from rotor.table import Table
 
 PROPANEDIOL = rotor.Top.from_constants("A=8572 B=3640 C=2790 MHz", dipole_abc_debye=(1.2, 1.9, 0.4))

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rotor.quantum.convergence import RATIO_LIMIT, order_sizes_mhz, series_ratio, warnings_of
-from rotor.quantum.rotation import hamiltonian
+from rotor.quantum.estimates.convergence import RATIO_LIMIT, order_sizes_mhz, series_ratio, warnings_of
 from rotor.quantum.solve import solve_levels
+from rotor.quantum.wang.rotation import hamiltonian
 from rotor.spectra.lines import line_list
 from rotor.tops.constants import Constants
 from rotor.tops.top import Top

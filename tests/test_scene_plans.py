@@ -12,7 +12,7 @@ import pytest
 import rotor
 from rotor.quantum.effects.of_top import spin_effects
 from rotor.quantum.effects.watson import SEMI_RIGID, operators_by_name
-from rotor.quantum.limits import populated_j
+from rotor.quantum.estimates.limits import populated_j
 from rotor.quantum.solve import solve_levels
 from rotor.scenes import left_out
 from rotor.scenes.plan import allowed_lines, plan_of
@@ -23,7 +23,7 @@ from rotor.scenes.sections import LevelsObservables
 from rotor.spectra.spectrum import Spectrum
 from rotor.thermo.classical_limit import classical_partition_function
 from rotor.tops.constants import Constants
-from rotor.tops.spin_constants import SpinConstants
+from rotor.tops.spins.spin_constants import SpinConstants
 
 FOLDER = Path(__file__).resolve().parents[1] / "examples" / "scenes"
 

@@ -9,12 +9,12 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from rotor.formats.spcat.cat import format_lines, read_cat
-from rotor.formats.spcat.egy import format_egy, read_egy, write_egy
-from rotor.formats.spcat.fields import BLANK
-from rotor.formats.spcat.int_file import Dipole, IntensityFile, Request, format_int, read_int, write_int
-from rotor.formats.spcat.lin import LineList, format_lin, line_list, read_lin, write_lin
-from rotor.formats.spcat.par import Header, Options, Parameter, ParameterFile, format_par, read_par, write_par
+from rotor.formats.spcat.text.cat import format_lines, read_cat
+from rotor.formats.spcat.text.egy import format_egy, read_egy, write_egy
+from rotor.formats.spcat.text.fields import BLANK
+from rotor.formats.spcat.text.int_file import Dipole, IntensityFile, Request, format_int, read_int, write_int
+from rotor.formats.spcat.text.lin import LineList, format_lin, line_list, read_lin, write_lin
+from rotor.formats.spcat.text.par import Header, Options, Parameter, ParameterFile, format_par, read_par, write_par
 
 SAMPLES = Path(__file__).parent / "oracles" / "spcat"
 SHARED = Path(__file__).resolve().parents[1].parent / "shared" / "reference"

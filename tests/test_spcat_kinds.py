@@ -10,13 +10,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rotor.formats.spcat.cat import format_lines, read_cat
-from rotor.formats.spcat.catalogue import Catalogue
 from rotor.formats.spcat.file_model import groups_of, moment_of, split_dipole
-from rotor.formats.spcat.int_file import Dipole, IntensityFile, Request, read_int
 from rotor.formats.spcat.operators import operator_of
-from rotor.formats.spcat.par import read_par
 from rotor.formats.spcat.predict import predict
+from rotor.formats.spcat.text.cat import format_lines, read_cat
+from rotor.formats.spcat.text.catalogue import Catalogue
+from rotor.formats.spcat.text.int_file import Dipole, IntensityFile, Request, read_int
+from rotor.formats.spcat.text.par import read_par
 
 KINDS = Path(__file__).parent / "oracles" / "kinds"
 RANGES = {"h2coh": (6, 10), "o2": (0, 75), "fso3": (0, 9), "oc33s": (0, 22), "co": (0, 99)}  # F that the samples need
@@ -117,7 +117,7 @@ def test_operators_of_n_are_hermitian_and_obey_time_reversal():
 def test_low_orders_are_cartesian_products():
     """TYP 21, 41, 61 are NbNc + NcNb, ...; 20, 40, 60 i times Na, Nb, Nc, in both bases."""
     from rotor.formats.spcat.codes import AXES, split_code
-    from rotor.quantum.j_operators import anticommutator, components
+    from rotor.quantum.wang.j_operators import anticommutator, components
 
     for axes, representation in ((AXES["Ir"], "Ir"), (AXES["IIIl"], "IIIl")):
         of = components(5, representation)

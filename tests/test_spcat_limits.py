@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rotor.formats.spcat.int_file import read_int
-from rotor.formats.spcat.par import read_par
 from rotor.formats.spcat.predict import Prediction, predict
+from rotor.formats.spcat.text.int_file import read_int
+from rotor.formats.spcat.text.par import read_par
 
 ABC = "10099 9400.0\n20099 3100.0\n30099 2500.0\n"
 

@@ -10,8 +10,8 @@ from rotor.quantum.effects.of_top import effects_of, spin_effects
 from rotor.spectra.lines import line_list
 from rotor.thermo import partition_function
 from rotor.thermo.spin_factor import without_spins
-from rotor.tops.spin_constants import SpinConstants, parse_spins, spins_of, twice_of
-from rotor.tops.spin_weights import SpinWeights
+from rotor.tops.spins.spin_constants import SpinConstants, parse_spins, spins_of, twice_of
+from rotor.tops.spins.spin_weights import SpinWeights
 from rotor.tops.top import Top
 
 CHI = -4.7

@@ -15,17 +15,17 @@ from hypothesis import strategies as st
 from scipy.linalg import expm
 
 import rotor
-from rotor.formats.spcat.cat import read_cat
+from rotor.formats.spcat.text.cat import read_cat
 from rotor.molecules.molecule import Molecule
 from rotor.molecules.symmetry.point_group import find_symmetry, symmetry_of
-from rotor.tops.spin_statistics import (
+from rotor.tops.spins.spin_statistics import (
     character_rows,
     inverting_symmetry,
     spin_characters,
     spin_weights,
     weights_of,
 )
-from rotor.tops.spin_weights import IRREPS, SpinWeights, irreps_in_j
+from rotor.tops.spins.spin_weights import IRREPS, SpinWeights, irreps_in_j
 from rotor.tops.top import Top
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"

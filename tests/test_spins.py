@@ -10,14 +10,14 @@ import pytest
 from full_matrix_codes import case_of
 from full_matrix_levels import solve, strengths
 
-from rotor.formats.spcat.int_file import read_int
-from rotor.formats.spcat.par import read_par
-from rotor.quantum.derivatives import level_derivatives
+from rotor.formats.spcat.text.int_file import read_int
+from rotor.formats.spcat.text.par import read_par
 from rotor.quantum.effects.hyperfine import NuclearQuadrupole, quadrupole_of_tensor
 from rotor.quantum.effects.interactions import InteractingStates
 from rotor.quantum.effects.spin_rotation import SpinRotation
 from rotor.quantum.effects.spin_spin import SpinSpin
 from rotor.quantum.effects.watson import SEMI_RIGID
+from rotor.quantum.estimates.derivatives import level_derivatives
 from rotor.quantum.solve import solve_levels
 from rotor.quantum.spins import Scheme, Spin
 from rotor.spectra.transitions import all_transitions

@@ -12,25 +12,25 @@ import pytest
 import rotor
 from rotor import units
 from rotor.alignment.ensemble import thermal
-from rotor.formats.molecule_file import parse_molecule_file
-from rotor.formats.molecule_writer import molecule_file_text
-from rotor.formats.spcat.cat import read_cat
+from rotor.formats.molecules.molecule_file import parse_molecule_file
+from rotor.formats.molecules.molecule_writer import molecule_file_text
+from rotor.formats.spcat.text.cat import read_cat
 from rotor.molecules.molecule import Molecule
-from rotor.quantum.convergence import warnings_of
-from rotor.quantum.derivatives import level_derivatives
 from rotor.quantum.effects.interactions import InteractingStates
 from rotor.quantum.effects.of_top import effects_of
 from rotor.quantum.effects.watson import SEMI_RIGID
-from rotor.quantum.rotation import solve_rotation
+from rotor.quantum.estimates.convergence import warnings_of
+from rotor.quantum.estimates.derivatives import level_derivatives
 from rotor.quantum.solve import solve_levels
+from rotor.quantum.wang.rotation import solve_rotation
 from rotor.spectra.lines import dipoles_by_state, line_list
 from rotor.spectra.raman import raman_lines
 from rotor.spectra.transitions import all_transitions
 from rotor.thermo import partition_function
 from rotor.thermo.request import ThermoRequest, answer_thermo
-from rotor.tops.spin_constants import SpinConstants
-from rotor.tops.spin_weights import SpinWeights
-from rotor.tops.state_constants import GROUPS, StateConstants
+from rotor.tops.spins.spin_constants import SpinConstants
+from rotor.tops.spins.spin_weights import SpinWeights
+from rotor.tops.states.state_constants import GROUPS, StateConstants
 from rotor.tops.top import Top
 
 OBLATE_STATES = {"E[1]": 800.0, "B[1]": 5980.0, "C[1]": 4010.0, "DJ[1]": 0.01, "DJK[1]": -0.02}

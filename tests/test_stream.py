@@ -15,7 +15,7 @@ import polars as pl
 import pytest
 
 import rotor
-from rotor.formats.spcat.cat import read_cat
+from rotor.formats.spcat.text.cat import read_cat
 from rotor.formats.streamed_lines import stream_lines
 from rotor.tops.constants import Constants
 from rotor.tops.top import Top

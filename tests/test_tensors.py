@@ -14,7 +14,6 @@ from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 from slow_matrix import AXES, watson_matrix
 
-from rotor.quantum.basis import REPRESENTATIONS, WangBlock, wang_blocks
 from rotor.quantum.reduced import connected_wang_blocks, wang_amplitudes
 from rotor.quantum.solve import solve_levels
 from rotor.quantum.tensors import (
@@ -30,6 +29,7 @@ from rotor.quantum.tensors import (
     spherical_components,
     symmetric_top_elements,
 )
+from rotor.quantum.wang.basis import REPRESENTATIONS, WangBlock, wang_blocks
 from rotor.quantum.wigner import three_j
 from rotor.tops.constants import Constants
 from rotor.tops.top import Top

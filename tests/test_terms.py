@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from slow_matrix import term_matrix, watson_matrix
 
-from rotor.formats.molecule_file import MoleculeFile, parse_molecule_file
-from rotor.formats.molecule_writer import molecule_file_text
+from rotor.formats.molecules.molecule_file import MoleculeFile, parse_molecule_file
+from rotor.formats.molecules.molecule_writer import molecule_file_text
 from rotor.quantum.effects.watson import centrifugal_operators, operators_by_name, rigid_operators
 from rotor.quantum.solve import solve_levels
 from rotor.tops.constants import Constants

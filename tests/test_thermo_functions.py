@@ -29,7 +29,7 @@ from rotor.thermo import (
     vibrational_functions,
 )
 from rotor.tops.constants import Constants
-from rotor.tops.spin_weights import SpinWeights
+from rotor.tops.spins.spin_weights import SpinWeights
 from rotor.tops.top import Top
 
 COLD_TO_HOT = [5.0, 20.0, 77.0, 150.0, 298.15, 600.0, 1000.0]

@@ -10,16 +10,16 @@ import pytest
 from slow_matrix import AXES
 from toy_axis_power import AxisPower
 
-from rotor.quantum.basis import REPRESENTATIONS
-from rotor.quantum.derivatives import level_derivatives
 from rotor.quantum.effect import QuantumEffect, effect_sizes, named_effect
 from rotor.quantum.effects.watson import SEMI_RIGID, Centrifugal, Rigid
+from rotor.quantum.estimates.derivatives import level_derivatives
 from rotor.quantum.solve import solve_levels
+from rotor.quantum.wang.basis import REPRESENTATIONS
 from rotor.spectra.lines import line_list
 from rotor.spectra.raman import raman_lines
 from rotor.thermo import partition_function
 from rotor.tops.constants import Constants
-from rotor.tops.spin_weights import SpinWeights
+from rotor.tops.spins.spin_weights import SpinWeights
 from rotor.tops.top import Top
 
 A, B, C = 9000.0, 5000.0, 3500.0
@@ -210,7 +210,7 @@ def test_an_odd_power_of_j_is_refused_within_a_state():
         name = ""
 
         def j_operator(self, top, name, j, representation):
-            from rotor.quantum.j_operators import components
+            from rotor.quantum.wang.j_operators import components
 
             return components(j, representation)["a"]
 

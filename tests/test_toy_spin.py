@@ -8,11 +8,11 @@ import qutip
 from direct_product import on_spins, rotor_matrix, space_cosines, states_up_to
 from toy_spin_tensor import SpinTensor
 
-from rotor.quantum.basis import REPRESENTATIONS
-from rotor.quantum.derivatives import level_derivatives
 from rotor.quantum.effect import effect_sizes, named_effect
 from rotor.quantum.effects.watson import SEMI_RIGID
+from rotor.quantum.estimates.derivatives import level_derivatives
 from rotor.quantum.solve import solve_levels
+from rotor.quantum.wang.basis import REPRESENTATIONS
 from rotor.spectra.lines import line_list
 from rotor.tops.constants import Constants
 from rotor.tops.top import Top

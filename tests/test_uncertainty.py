@@ -10,11 +10,11 @@ import pytest
 
 import rotor
 from rotor.formats.line_tables import catalogue
-from rotor.formats.spcat.cat import read_cat
 from rotor.formats.spcat.codes import constants_of
-from rotor.formats.spcat.par import read_par
+from rotor.formats.spcat.text.cat import read_cat
+from rotor.formats.spcat.text.par import read_par
+from rotor.quantum.estimates.uncertainty import level_errors
 from rotor.quantum.solve import solve_levels
-from rotor.quantum.uncertainty import level_errors
 from rotor.spectra.lines import line_list
 from rotor.tops.constants import Constants
 from rotor.tops.covariance import Covariance

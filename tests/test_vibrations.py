@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import rotor
-from rotor.formats.spcat.cat import read_cat
+from rotor.formats.spcat.text.cat import read_cat
 from rotor.spectra.lines import line_list
 from rotor.spectra.raman import raman_lines
 from rotor.thermo import VibrationalStates, partition_function, vibrational_partition_function

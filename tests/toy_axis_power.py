@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from rotor.quantum.effect import QuantumEffect
-from rotor.quantum.j_operators import JOperator, components
+from rotor.quantum.wang.j_operators import JOperator, components
 from rotor.tops.top import Top
 
 

@@ -15,7 +15,7 @@ from rotor.alignment.pulse import Pulse
 from rotor.arrays import Floats
 from rotor.checks import require_between, require_whole
 from rotor.quantum.effects.of_top import effects_of
-from rotor.quantum.limits import limit_facts
+from rotor.quantum.estimates.limits import limit_facts
 from rotor.table import Table, TextOf
 from rotor.tops.facts import top_facts
 

@@ -35,8 +35,8 @@ from rotor.cli.shared.output import (
 from rotor.cli.shared.plot_options import ViewOptions, view_of
 
 if TYPE_CHECKING:
-    from rotor.formats.spcat.catalogue import Catalogue
     from rotor.formats.spcat.compare import Comparison
+    from rotor.formats.spcat.text.catalogue import Catalogue
     from rotor.plots.view import View
 
 EXAMPLES = """\b
@@ -139,7 +139,7 @@ def summary(lines: Catalogue, file: str, command: str) -> dict[str, Any]:
 
 
 def _writers(lines: Catalogue, content: dict[str, Any], found: Comparison | None, view: View) -> dict[str, Writer]:
-    from rotor.formats.spcat.cat import write_cat
+    from rotor.formats.spcat.text.cat import write_cat
 
     return {
         "--out": lambda path: write_cat(lines, path),

@@ -63,7 +63,7 @@ def top_with_errors(source: str) -> Top:
         return top
 
     from rotor.formats.spcat.codes import constants_of
-    from rotor.formats.spcat.par import read_par
+    from rotor.formats.spcat.text.par import read_par
 
     return replace(top, constants=constants_of(read_par(path), errors=True))
 
@@ -71,8 +71,8 @@ def top_with_errors(source: str) -> Top:
 def writer_of(top: Top, source: str, target: str, kmax: int) -> Writer:
     """What writes the top in the format that the target's suffix names; what that cannot say is refused or noted."""
     if target.lower().endswith(".toml"):
-        from rotor.formats.molecule_file import MoleculeFile
-        from rotor.formats.molecule_writer import write_molecule_file
+        from rotor.formats.molecules.molecule_file import MoleculeFile
+        from rotor.formats.molecules.molecule_writer import write_molecule_file
 
         sources = {"constants": top.source, "dipole": top.dipole_source, "spin_weights": top.weights_source}
         sources = {table: text or f"converted from {Path(source).name}" for table, text in sources.items()}
@@ -88,7 +88,7 @@ def writer_of(top: Top, source: str, target: str, kmax: int) -> Writer:
         return lambda path: write_molecule_file(file, path)
 
     from rotor.formats.spcat.model import parameter_file
-    from rotor.formats.spcat.par import write_par
+    from rotor.formats.spcat.text.par import write_par
 
     if top.dipole_abc_debye and any(top.dipole_abc_debye):
         dipole = ", ".join(f"{mu:g}" for mu in top.dipole_abc_debye)

@@ -223,7 +223,7 @@ def _show(answer: EmissionAnswer, shown: int) -> None:
 
 def _limits(answer: EmissionAnswer) -> list[tuple[str, str]]:
     """What is left out: of the source, and the largest of each molecule."""
-    from rotor.quantum.limits import model_limits, populated_j
+    from rotor.quantum.estimates.limits import model_limits, populated_j
 
     request = answer.request
     facts = [("left out", "departures from one excitation temperature; structure of the source in the beam")]

@@ -14,7 +14,7 @@ from rotor.cli.shared.options import grouped, option
 from rotor.cli.shared.output import Files, Table, deliver, json_text, note, show_table
 
 if TYPE_CHECKING:
-    from rotor.tops.isotopologues import Isotopologue
+    from rotor.tops.isotopes.isotopologues import Isotopologue
     from rotor.tops.top import Top
 
 MIN_ABUNDANCE = 1e-4
@@ -70,7 +70,7 @@ def _family(
     parent: Top, min_abundance: float | None, each: Sequence[str], site: Sequence[str]
 ) -> tuple[Isotopologue, ...]:
     """Those above the least abundance, those of --each, that of --site; none of them twice."""
-    from rotor.tops.isotopologues import isotopologue, isotopologues, single_substitutions
+    from rotor.tops.isotopes.isotopologues import isotopologue, isotopologues, single_substitutions
 
     family: list[Isotopologue] = []
     if min_abundance is not None or not (each or site):

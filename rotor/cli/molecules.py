@@ -52,7 +52,7 @@ def _show(records: list[dict[str, Any]], alone: bool) -> None:
 
 def _paths(name: str | None) -> list[Path]:
     """The file of one name, or every file that a name leads to, the user's own first."""
-    from rotor.formats.library import folders, molecule_path, names
+    from rotor.formats.molecules.library import folders, molecule_path, names
 
     if name is not None:
         return [molecule_path(name)]
@@ -62,7 +62,7 @@ def _paths(name: str | None) -> list[Path]:
 
 def record(path: Path) -> dict[str, Any]:
     """What a molecule file says, by the keys of docs/command_line.md."""
-    from rotor.formats.molecule_file import read_molecule_file
+    from rotor.formats.molecules.molecule_file import read_molecule_file
     from rotor.formats.read_write import top_of_file
 
     file = read_molecule_file(path)

@@ -254,7 +254,7 @@ def _why_none(answer: SpectrumAnswer, range_text: str | None = None) -> str:
 def _program_catalogue(prediction: Prediction, content: dict[str, Any]) -> Writer:
     """The catalogue as SPCAT lists it: its weights, its zero of energy, K doublets as two lines."""
     from rotor.formats.provenance import record_of, write_beside
-    from rotor.formats.spcat.cat import write_cat
+    from rotor.formats.spcat.text.cat import write_cat
 
     def write(path: Path) -> None:
         write_cat(prediction.catalogue, path)

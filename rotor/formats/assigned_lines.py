@@ -18,8 +18,8 @@ import numpy as np
 
 from rotor.fit.assignment import Assignments, assignments
 from rotor.formats.atomic_write import open_atomic
-from rotor.formats.spcat.fields import BLANK
-from rotor.formats.spcat.lin import line_list, note_of_defaults, read_lin, with_defaults, write_lin
+from rotor.formats.spcat.text.fields import BLANK
+from rotor.formats.spcat.text.lin import line_list, note_of_defaults, read_lin, with_defaults, write_lin
 from rotor.units import MHZ_PER_CM
 
 SUFFIXES = (".lin", ".csv", ".cat", ".cat.gz")
@@ -157,8 +157,8 @@ def _blends(texts: Sequence[str]) -> list[int]:
 
 
 def _of_catalogue(path: str | os.PathLike[str], names: Sequence[str]) -> tuple[Assignments, list[str]]:
-    from rotor.formats.spcat.cat import read_cat
     from rotor.formats.spcat.compare import in_mhz
+    from rotor.formats.spcat.text.cat import read_cat
 
     catalogue = read_cat(path)
     measured = catalogue.take(catalogue.tag < 0)

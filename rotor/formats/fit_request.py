@@ -181,8 +181,8 @@ def write_fitted_toml(answer: FitAnswer, path: str | os.PathLike[str]) -> None:
 
     Raises ValueError of spins and several states, which have no named constants.
     """
-    from rotor.formats.molecule_file import MoleculeFile, read_molecule_file
-    from rotor.formats.molecule_writer import write_molecule_file
+    from rotor.formats.molecules.molecule_file import MoleculeFile, read_molecule_file
+    from rotor.formats.molecules.molecule_writer import write_molecule_file
 
     request, fit = answer.request, answer.fit
     origin = (
@@ -206,7 +206,7 @@ def write_fitted_toml(answer: FitAnswer, path: str | os.PathLike[str]) -> None:
 
 def write_fitted_par(answer: FitAnswer, path: str | os.PathLike[str], *, variances: bool) -> None:
     """The .par file of SPFIT after the fit, or, with variances, the .var file."""
-    from rotor.formats.spcat.par import write_par
+    from rotor.formats.spcat.text.par import write_par
 
     request, fit = answer.request, answer.fit
     if request.spfit is not None:

@@ -23,8 +23,8 @@ from numpy.typing import ArrayLike, NDArray
 from rotor import units
 from rotor.formats.atomic_write import open_atomic
 from rotor.formats.packed import first_bytes
-from rotor.formats.spcat.fields import read_decimal, read_whole
-from rotor.formats.spcat.freeform import Line, encode, read_lines
+from rotor.formats.spcat.text.fields import read_decimal, read_whole
+from rotor.formats.spcat.text.freeform import Line, encode, read_lines
 from rotor.spectra.lines import Lines
 from rotor.table import Table
 

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 
 from rotor.formats.atomic_write import atomic_path
 from rotor.formats.provenance import record_of, write_beside
-from rotor.formats.spcat.cat import format_lines, load_compiled, write_cat
-from rotor.formats.spcat.catalogue import Catalogue, catalogue_of
-from rotor.formats.spcat.fields import BLANK
+from rotor.formats.spcat.text.cat import format_lines, load_compiled, write_cat
+from rotor.formats.spcat.text.catalogue import Catalogue, catalogue_of
+from rotor.formats.spcat.text.fields import BLANK
 from rotor.spectra.lines import Lines
 
 if TYPE_CHECKING:

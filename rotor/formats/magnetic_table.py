@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from rotor.formats.molecule_tables import TableReader
+from rotor.formats.molecules.molecule_tables import TableReader
 from rotor.tops.magnetic import ELEMENTS, MagneticTensors, Tensor, tensor_for
 
 _TENSORS = ("g", "magnetisability")

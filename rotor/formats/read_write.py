@@ -10,8 +10,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from rotor.formats.library import library_file, names
-from rotor.formats.molecule_file import MoleculeFile, parse_molecule_file, read_molecule_file
+from rotor.formats.molecules.library import library_file, names
+from rotor.formats.molecules.molecule_file import MoleculeFile, parse_molecule_file, read_molecule_file
 from rotor.formats.packed import HARMLESS_BYTES, refuse_bomb
 from rotor.formats.registry import reader_of, writer_of
 from rotor.tops.constants import Constants
@@ -35,7 +35,7 @@ def read(source: Any, *, isotopes: Isotopes | None = None) -> Any:
         characters: HITRAN's lines. `rotor.formats.registry` has them all.
     isotopes : mapping or str, optional
         Substitutions such as `"1=2H"` (atom 1) or `"O=18O"` (every O). Measured constants of a library molecule are then
-        carried over by the ratio of those calculated from its geometry, and a note says so (`rotor.tops.isotopologues`).
+        carried over by the ratio of those calculated from its geometry, and a note says so (`rotor.tops.isotopes.isotopologues`).
 
     Returns
     -------
@@ -128,9 +128,9 @@ def _read_path(path: Path, isotopes: Isotopes | None) -> Any:
 
 def read_spcat_top(path: Path) -> Top:
     """The top of a .par or .var file, with the dipole of the .int file beside it; or of an .int file likewise."""
-    from rotor.formats.spcat.int_file import read_int
     from rotor.formats.spcat.model import top_of
-    from rotor.formats.spcat.par import read_par
+    from rotor.formats.spcat.text.int_file import read_int
+    from rotor.formats.spcat.text.par import read_par
 
     intensities = path.with_suffix(".int")
     parameters = path
@@ -164,7 +164,7 @@ def _read_standard_input(isotopes: Isotopes | None) -> Top:
 def _with_isotopes(top: Top, isotopes: Isotopes | None) -> Top:
     if not isotopes:
         return top
-    from rotor.tops.isotopologues import isotopologue
+    from rotor.tops.isotopes.isotopologues import isotopologue
 
     return isotopologue(top, isotopes).top
 

@@ -16,7 +16,7 @@ from typing import Any
 LINES = "rotor.spectra.lines:Lines"
 TABLE = "rotor.table:Table"
 MOTION = "rotor.classical.integrators.method:Motion"
-CATALOGUE = "rotor.formats.spcat.catalogue:Catalogue"
+CATALOGUE = "rotor.formats.spcat.text.catalogue:Catalogue"
 LEVELS = "rotor.quantum.request:SelectedLevels"
 HITRAN = "rotor.formats.hitran:HitranLines"
 
@@ -43,7 +43,7 @@ FORMATS = (
     Format(
         "catalogue of 80 columns",
         (".cat", ".cat.gz"),
-        "rotor.formats.spcat.cat:read_cat",
+        "rotor.formats.spcat.text.cat:read_cat",
         {
             LINES: "rotor.formats.line_tables:write_catalogue",
             CATALOGUE: "rotor.formats.line_tables:write_read_catalogue",
@@ -62,13 +62,13 @@ FORMATS = (
         recognises="rotor.formats.hitran:is_hitran_file",
     ),
     Format("input of SPFIT and SPCAT", (".par", ".var", ".int"), "rotor.formats.read_write:read_spcat_top"),
-    Format("measured lines of SPFIT", (".lin", ".lin.gz"), "rotor.formats.spcat.lin:read_lin"),
-    Format("levels of SPCAT", (".egy.gz",), "rotor.formats.spcat.egy:read_egy"),
+    Format("measured lines of SPFIT", (".lin", ".lin.gz"), "rotor.formats.spcat.text.lin:read_lin"),
+    Format("levels of SPCAT", (".egy.gz",), "rotor.formats.spcat.text.egy:read_egy"),
     Format(
         "levels of SPCAT",
         (".egy",),
-        "rotor.formats.spcat.egy:read_egy",
-        {LEVELS: "rotor.formats.spcat.level_list:write_level_list"},
+        "rotor.formats.spcat.text.egy:read_egy",
+        {LEVELS: "rotor.formats.spcat.text.level_list:write_level_list"},
     ),
     Format(
         "data of LAMDA",

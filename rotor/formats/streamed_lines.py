@@ -24,8 +24,8 @@ from rotor import units
 from rotor.formats.atomic_write import atomic_path, open_atomic
 from rotor.formats.line_tables import as_printed
 from rotor.formats.provenance import write_beside
-from rotor.formats.spcat.cat import format_lines
-from rotor.formats.spcat.catalogue import Catalogue, catalogue_of
+from rotor.formats.spcat.text.cat import format_lines
+from rotor.formats.spcat.text.catalogue import Catalogue, catalogue_of
 from rotor.formats.tables import copy_columns, quoted, run
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.watson import SEMI_RIGID

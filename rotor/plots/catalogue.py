@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from rotor.formats.spcat.catalogue import Catalogue
 from rotor.formats.spcat.compare import in_mhz
+from rotor.formats.spcat.text.catalogue import Catalogue
 from rotor.plots.picture import BLUE, MOST_VECTOR_STICKS, ORANGE, checked_suffix, new_figure, save, styled
 from rotor.plots.view import WHOLE, View, show_part
 

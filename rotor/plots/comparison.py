@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from rotor.arrays import Floats, Ints
-from rotor.formats.spcat.catalogue import Catalogue
 from rotor.formats.spcat.compare import Comparison
+from rotor.formats.spcat.text.catalogue import Catalogue
 from rotor.plots.picture import (
     BLUE,
     GREY,

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from rotor.formats.library import atoms_of, written_formula
+from rotor.formats.molecules.library import atoms_of, written_formula
 from rotor.tops.top import Top
 from rotor.version import version
 

@@ -15,8 +15,8 @@ from rotor.classical.free.free_motion import FreeMotion
 from rotor.classical.gas.ensembles import Correlations
 from rotor.classical.tumble import PERIODS, TumbleAnswer
 from rotor.fluid.request import FluidAnswer
-from rotor.formats.spcat.catalogue import Catalogue
 from rotor.formats.spcat.compare import Comparison
+from rotor.formats.spcat.text.catalogue import Catalogue
 from rotor.plots.picture import save
 from rotor.quantum.fields.field_map import FieldMap
 from rotor.quantum.fields.stark_request import StarkAnswer

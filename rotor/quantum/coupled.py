@@ -15,12 +15,12 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.basis import WangBlock, limited, names_of, wang_blocks
 from rotor.quantum.effect import k_limits_of
-from rotor.quantum.j_operators import Complexes, JOperator, between_blocks
 from rotor.quantum.levels import Levels, weights_of_levels
 from rotor.quantum.states import Coupling, State
-from rotor.quantum.wang_matrix import JMatrix, block_bands, scalar_energy
+from rotor.quantum.wang.basis import WangBlock, limited, names_of, wang_blocks
+from rotor.quantum.wang.j_operators import Complexes, JOperator, between_blocks
+from rotor.quantum.wang.wang_matrix import JMatrix, block_bands, scalar_energy
 from rotor.tops.operators import Operators
 
 if TYPE_CHECKING:

@@ -18,10 +18,10 @@ from typing import TYPE_CHECKING, ClassVar, NamedTuple
 from rotor.tops.operators import Operators
 
 if TYPE_CHECKING:
-    from rotor.quantum.j_operators import JOperator
     from rotor.quantum.moments import Moment
     from rotor.quantum.spins.terms import Spin, SpinTerm
     from rotor.quantum.states import Coupling, State
+    from rotor.quantum.wang.j_operators import JOperator
     from rotor.tops.top import Top
 
 EFFECTS: dict[str, type[QuantumEffect]] = {}
@@ -39,7 +39,7 @@ class QuantumEffect(ABC):
     A subclass gives its parameters and, for each of them, operators of one or more of these kinds:
 
     - `operators`: J^2p ½[Jz^2q, J₊^2n + J₋^2n]₊, by their powers (p, q, n): the fast path, for any kind of top;
-    - `j_operator`: any other Hermitian operator of J, as a `rotor.quantum.j_operators.JOperator`;
+    - `j_operator`: any other Hermitian operator of J, as a `rotor.quantum.wang.j_operators.JOperator`;
     - `spin_terms`: molecule-fixed tensors coupled to spins, with the `spins` they need;
     - `states`, `couplings` and `dipoles`: further vibrational or tunnelling states, and what connects them.
     """

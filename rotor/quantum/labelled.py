@@ -21,8 +21,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.basis import WangBlock, ka_kc, wang_blocks
 from rotor.quantum.effects.watson import operators_by_name
+from rotor.quantum.wang.basis import WangBlock, ka_kc, wang_blocks
 from rotor.tops.constants import Constants
 from rotor.tops.operators import Powers
 

@@ -15,9 +15,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum import quanta as names_of
-from rotor.quantum.basis import WangBlock
+from rotor.quantum.wang.basis import WangBlock
 from rotor.table import Table
-from rotor.tops.spin_weights import SpinWeights
+from rotor.tops.spins.spin_weights import SpinWeights
 
 if TYPE_CHECKING:
     from rotor.quantum.effect import QuantumEffect

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from rotor import units
 from rotor.arrays import Floats, Ints
 from rotor.checks import require_positive, require_whole
-from rotor.quantum.convergence import warnings_of
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.watson import SEMI_RIGID
+from rotor.quantum.estimates.convergence import warnings_of
+from rotor.quantum.estimates.limits import limit_facts
 from rotor.quantum.levels import Levels
-from rotor.quantum.limits import limit_facts
 from rotor.quantum.solve import solve_levels
 from rotor.table import Table, TextOf
 from rotor.tops.facts import top_facts

@@ -20,8 +20,8 @@ from typing import TYPE_CHECKING
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.levels import Levels, SolvedBlock
-from rotor.quantum.rotation import solve_rotation
-from rotor.tops.level_table import LevelTable, tabulated_energies
+from rotor.quantum.wang.rotation import solve_rotation
+from rotor.tops.states.level_table import LevelTable, tabulated_energies
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor

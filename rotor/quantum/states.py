@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from rotor.quantum.j_operators import JOperator
+from rotor.quantum.wang.j_operators import JOperator
 from rotor.tops.operators import Operators
-from rotor.tops.spin_weights import SpinWeights
+from rotor.tops.spins.spin_weights import SpinWeights
 
 OperatorOfJ = Callable[[int, str], JOperator]  # (J, representation) -> the operator in |J k⟩
 

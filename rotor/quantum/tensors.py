@@ -34,7 +34,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rotor.arrays import Floats
-from rotor.quantum.basis import WangBlock
+from rotor.quantum.wang.basis import WangBlock
 from rotor.quantum.wigner import three_j
 from rotor.tops.operators import axes_of as axes_of
 

@@ -3,12 +3,12 @@
 | left out | size |
 |---|---|
 | distortion of the next order | c s_n²/s_(n-1), s the sizes of the last two orders at one J (`order_sizes_mhz`): a geometric series |
-| nuclear quadrupole, spin-rotation, spin-spin | constants known: `size_mhz`, of quadrupoles half of it; else `rotor.quantum.limits` |
+| nuclear quadrupole, spin-rotation, spin-spin | constants known: `size_mhz`, of quadrupoles half; else `rotor.quantum.estimates.limits` |
 | Doppler width | ν √(8 ln2 kT/mc²), full width at half maximum (`rotor.spectra.profiles`) |
 | pressure width | 2 n ⟨v⟩ σ/2π, σ = π (4 Å)² + π μ²/(2 · 4πε₀ ħ⟨v⟩): a hard core, and V. Weisskopf's radius of dipoles |
 | Stark shift of a stray field | linear, J = 0: (μE)²/6hB, second order; symmetric, J = K = 1: μE KM/J(J+1), first order |
 | the same of an asymmetric top | J = M = 1: two levels that a component couples |
-| geometry in place of constants, internal rotation, inversion, electron spin | `rotor.quantum.limits` |
+| geometry in place of constants, internal rotation, inversion, electron spin | `rotor.quantum.estimates.limits` |
 | quantum corrections of a classical gas | a/T of ln Q (`rotor.thermo.classical_limit`) |
 | centrifugal distortion of a classical gas | d T of ln Q (there) |
 | quantum corrections of a fluid | ħ²/24(kT)³ (⟨F²⟩/m + Σ⟨T²⟩/I) of A/NkT (J. G. Powles and G. Rickayzen, Mol. Phys. 38, 1875 (1979)) |
@@ -53,7 +53,7 @@ class LeftOut:
 
 def of_levels(top: Top, j: int, effects: Sequence[QuantumEffect]) -> list[LeftOut]:
     """What levels and lines of one J leave out, largest first, in MHz; what is not estimated comes last."""
-    from rotor.quantum.limits import model_limits
+    from rotor.quantum.estimates.limits import model_limits
 
     names = {effect.name for effect in effects}
     found = [next_order(top, j, effects), stray_field(top), *_known_spins(top, j, names)]
@@ -80,7 +80,7 @@ def next_order(top: Top, j: int, effects: Sequence[QuantumEffect]) -> LeftOut | 
     >>> f"{one.size:.2e}"  # 0.3 D²/B (J(J+1))³
     '3.70e-03'
     """
-    from rotor.quantum.convergence import order_sizes_mhz
+    from rotor.quantum.estimates.convergence import order_sizes_mhz
 
     sizes = list(order_sizes_mhz(top, j, effects=effects).items())
     if len(sizes) < 2 or not sizes[-2][1]:

@@ -131,7 +131,7 @@ def _with_spins(top: Top, molecule: MoleculeSection) -> Top:
         if molecule.spins is not None:
             raise ValueError("molecule.spins: says how large the spins of spin_constants are; give those too")
         return top
-    from rotor.tops.spin_constants import SpinConstants
+    from rotor.tops.spins.spin_constants import SpinConstants
 
     text, spins = molecule.spin_constants, molecule.spins
     return replace(

@@ -85,9 +85,9 @@ def allowed_lines(top: Top, jmax: int) -> int:
     >>> allowed_lines(Top.from_constants("A=10 B=6 C=4 GHz", dipole_abc_debye=(1, 0, 0)), 1)  # 1(0,1)-0(0,0), 1(1,0)-1(1,1)
     2
     """
-    from rotor.quantum.basis import wang_blocks
-    from rotor.quantum.rotation import representation_of
     from rotor.quantum.solve import solve_levels
+    from rotor.quantum.wang.basis import wang_blocks
+    from rotor.quantum.wang.rotation import representation_of
 
     dipole = top.dipole_abc_debye or (0.0, 0.0, 0.0)
     if not any(dipole):
@@ -114,7 +114,7 @@ def _flipped(species: str, flip: tuple[bool, bool]) -> str:
 
 
 def _spectrum(request: Any) -> Plan:
-    from rotor.quantum.limits import populated_j
+    from rotor.quantum.estimates.limits import populated_j
     from rotor.spectra.intensity import jmax_for_cut
     from rotor.spectra.request import answer_spectrum
     from rotor.thermo import partition_function
@@ -230,7 +230,7 @@ def _gas(request: Any) -> Plan:
 
 
 def _raman(request: Any) -> Plan:
-    from rotor.quantum.limits import populated_j
+    from rotor.quantum.estimates.limits import populated_j
     from rotor.spectra.raman_request import answer_raman
 
     top, kelvin = request.top, request.temperature_k
@@ -251,7 +251,7 @@ def _raman(request: Any) -> Plan:
 
 def _thermo(request: Any) -> Plan:
     from rotor.quantum.effects.watson import SEMI_RIGID
-    from rotor.quantum.limits import populated_j
+    from rotor.quantum.estimates.limits import populated_j
     from rotor.thermo.request import answer_thermo
 
     top, hottest = request.top, max(request.temperatures_k)

@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from rotor.quantum.effects.watson import SEMI_RIGID
-from rotor.quantum.limits import populated_j
+from rotor.quantum.estimates.limits import populated_j
 from rotor.scenes import left_out
 from rotor.scenes.left_out import LeftOut
 from rotor.scenes.plan_parts import Plan, effect_texts, timed

@@ -80,9 +80,9 @@ def extrapolated(call: Callable[[int], Any], work: Callable[[int], float], sizes
 
 def level_parts(top: Top, jmax: int, effects: Sequence[QuantumEffect]) -> list[tuple[str, str]]:
     """Basis, blocks and method of the levels of a top."""
-    from rotor.quantum.basis import wang_blocks
-    from rotor.quantum.convergence import converges_to
-    from rotor.quantum.rotation import representation_of
+    from rotor.quantum.estimates.convergence import converges_to
+    from rotor.quantum.wang.basis import wang_blocks
+    from rotor.quantum.wang.rotation import representation_of
 
     spins = [spin for effect in effects for spin in effect.spins(top)]
     if top.kind in ("linear", "spherical", "prolate", "oblate"):

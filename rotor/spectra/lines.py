@@ -20,13 +20,13 @@ from numpy.typing import NDArray
 
 from rotor import units
 from rotor.arrays import Floats, Ints
-from rotor.quantum.convergence import warnings_of
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.watson import SEMI_RIGID
+from rotor.quantum.estimates.convergence import warnings_of
+from rotor.quantum.estimates.uncertainty import level_spread, line_errors
 from rotor.quantum.levels import Levels, TransitionTable
 from rotor.quantum.quanta import heading
 from rotor.quantum.solve import solve_levels
-from rotor.quantum.uncertainty import level_spread, line_errors
 from rotor.spectra.intensity import (
     EINSTEIN_PER_MHZ3,
     INTENSITY_NM2_MHZ,

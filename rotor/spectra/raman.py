@@ -23,9 +23,9 @@ from numpy.typing import NDArray
 
 from rotor import units
 from rotor.arrays import Floats, Ints
-from rotor.quantum.convergence import warnings_of
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.watson import SEMI_RIGID
+from rotor.quantum.estimates.convergence import warnings_of
 from rotor.quantum.levels import Levels, TransitionTable
 from rotor.quantum.solve import solve_levels
 from rotor.spectra.intensity import JMAX_DEFAULT_LIMIT

@@ -11,7 +11,7 @@ from rotor.arrays import Ints
 from rotor.checks import require_between, require_positive, require_whole
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.watson import SEMI_RIGID
-from rotor.quantum.limits import limit_facts, populated_j
+from rotor.quantum.estimates.limits import limit_facts, populated_j
 from rotor.spectra.intensity import largest
 from rotor.spectra.raman import (
     DEFAULT_LASER_NM,

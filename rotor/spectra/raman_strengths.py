@@ -16,12 +16,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum import reduced
-from rotor.quantum.basis import wang_blocks
 from rotor.quantum.levels import Block, Levels, SolvedBlock
 from rotor.quantum.reduced import connected_wang_blocks, wang_amplitudes
 from rotor.quantum.tensors import body_tensor, coupling
+from rotor.quantum.wang.basis import wang_blocks
 from rotor.tops.operators import AXIAL_REPRESENTATION, axes_of
-from rotor.tops.spin_weights import SpinWeights
+from rotor.tops.spins.spin_weights import SpinWeights
 
 NO_WEIGHTS = SpinWeights()
 ROUND_OFF = 1e-6  # of a tensor: what differs less from an axial or an isotropic one is the rounding of a frame

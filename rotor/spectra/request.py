@@ -16,7 +16,7 @@ from rotor.arrays import Floats, Ints
 from rotor.checks import require_one_of, require_positive, require_whole
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.watson import SEMI_RIGID
-from rotor.quantum.limits import limit_facts, populated_j
+from rotor.quantum.estimates.limits import limit_facts, populated_j
 from rotor.quantum.spins.method import hyperfine_facts
 from rotor.spectra.intensity import USUAL_CUT, largest
 from rotor.spectra.lines import DEFAULT_MIN_LGINT, Lines, line_list

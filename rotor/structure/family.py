@@ -10,7 +10,7 @@ import numpy as np
 from rotor.arrays import Floats
 from rotor.molecules.molecule import Molecule
 from rotor.structure.coordinates import symmetric_geometry
-from rotor.tops.isotopic_scaling import matched_axes
+from rotor.tops.isotopes.isotopic_scaling import matched_axes
 from rotor.tops.top import Top
 from rotor.units import ROTATIONAL_MHZ_U_ANGSTROM2
 

@@ -20,7 +20,7 @@ from rotor.checks import require_between, require_positive, require_whole
 from rotor.classical.gas.correlations import ShortTime, plateau, short_time
 from rotor.classical.gas.ensembles import Correlations, Ensemble, free_gas_correlations, thermal_ensemble
 from rotor.quantum.effects.of_top import effects_of
-from rotor.quantum.limits import OF_SPINS, model_limits, model_sizes, populated_j
+from rotor.quantum.estimates.limits import OF_SPINS, model_limits, model_sizes, populated_j
 from rotor.statistics.degrees_of_freedom import count_degrees
 from rotor.statistics.equipartition import Equipartition, equipartition
 from rotor.table import TextOf

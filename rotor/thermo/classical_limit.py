@@ -41,9 +41,9 @@ from numpy.typing import ArrayLike
 from rotor import units
 from rotor.arrays import Floats
 from rotor.quantum.effects.watson import centrifugal_operators
-from rotor.quantum.spherical_top import scalar_and_tensor
+from rotor.quantum.wang.spherical_top import scalar_and_tensor
 from rotor.tops.operators import AXIAL_REPRESENTATION, REPRESENTATIONS, Operators
-from rotor.tops.spin_weights import SpinWeights
+from rotor.tops.spins.spin_weights import SpinWeights
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top

@@ -32,7 +32,7 @@ from rotor.thermo.classical_limit import classical_limit
 from rotor.thermo.level_sums import LevelSums, Progress, checked_temperatures, level_sums, lowest_level_k
 from rotor.thermo.species import implied_symmetry_number, spin_species
 from rotor.thermo.vibration import VibrationalStates, vibrational_functions
-from rotor.tops.spin_weights import SpinWeights
+from rotor.tops.spins.spin_weights import SpinWeights
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top

@@ -33,7 +33,7 @@ from rotor.quantum.solve import solve_levels
 from rotor.thermo.classical_limit import classical_limit
 from rotor.thermo.species import of_species
 from rotor.thermo.trusted_levels import trusted_energies_mhz
-from rotor.tops.spin_weights import SpinWeights
+from rotor.tops.spins.spin_weights import SpinWeights
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from rotor.checks import require_positive
 from rotor.quantum.effects.of_top import effects_of
-from rotor.quantum.limits import limit_facts, populated_j
+from rotor.quantum.estimates.limits import limit_facts, populated_j
 from rotor.table import TextOf
 from rotor.thermo.classical_limit import classical_limit, rotational_temperatures_k
 from rotor.thermo.classical_onset import classical_above_k

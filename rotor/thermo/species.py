@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from rotor.tops.spin_weights import SpinWeights
+from rotor.tops.spins.spin_weights import SpinWeights
 
 _PAIRS = ((("ee", "oo"), ("eo", "oe")), (("ee", "eo"), ("oe", "oo")), (("ee", "oe"), ("eo", "oo")))
 

@@ -19,7 +19,7 @@ from rotor.arrays import Floats
 from rotor.quantum.effects.watson import SEMI_RIGID, centrifugal_operators, operators_by_name
 from rotor.quantum.levels import Levels
 from rotor.quantum.solve import solve_levels
-from rotor.quantum.spherical_top import scalar_and_tensor
+from rotor.quantum.wang.spherical_top import scalar_and_tensor
 from rotor.tops.constants import Constants
 from rotor.tops.operators import REPRESENTATIONS
 

@@ -1,1 +1,1 @@
-"""Tops: constants, operators, spin weights, isotopologues, distortion."""
+"""Tops: constants, operators, distortion; folders for isotopes, nuclear spins and vibrational states."""

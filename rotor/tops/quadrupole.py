@@ -10,7 +10,7 @@ import numpy as np
 from rotor.arrays import Floats
 from rotor.geometry.inertia import PrincipalFrame
 from rotor.molecules.molecule import Molecule
-from rotor.tops.spin_constants import SpinConstants
+from rotor.tops.spins.spin_constants import SpinConstants
 
 NOISE = 1e-3  # of the largest element, and in MHz: programs print four decimals, and symmetry is met that well
 

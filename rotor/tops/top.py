@@ -27,14 +27,18 @@ from rotor.tops.allowed import (
 from rotor.tops.constants import Constants
 from rotor.tops.covariance import Covariance
 from rotor.tops.kind import KindOfTop, kind_from_moments, kind_with_symmetry
-from rotor.tops.level_table import LevelTable
 from rotor.tops.magnetic import MagneticTensors
 from rotor.tops.operators import KINDS
 from rotor.tops.quadrupole import computed_couplings
-from rotor.tops.spin_constants import SpinConstants
-from rotor.tops.spin_weights import SpinWeights
-from rotor.tops.state_constants import StateConstants
-from rotor.tops.state_rules import refuse_forbidden_couplings, refuse_forbidden_state_dipoles, refuse_incomplete_states
+from rotor.tops.spins.spin_constants import SpinConstants
+from rotor.tops.spins.spin_weights import SpinWeights
+from rotor.tops.states.level_table import LevelTable
+from rotor.tops.states.state_constants import StateConstants
+from rotor.tops.states.state_rules import (
+    refuse_forbidden_couplings,
+    refuse_forbidden_state_dipoles,
+    refuse_incomplete_states,
+)
 
 if TYPE_CHECKING:
     from rotor.molecules.molecule import Molecule
@@ -238,7 +242,7 @@ class Top:
                 f"{molecule.name or 'the input'} is a single atom: it has no rotation; give 2 atoms or more"
             )
         from rotor.molecules.symmetry.point_group import symmetry_of
-        from rotor.tops.spin_statistics import spin_weights
+        from rotor.tops.spins.spin_statistics import spin_weights
 
         body = point_masses(molecule.masses_u, molecule.positions_angstrom)
         frame = principal_frame(body, molecule.masses_u, molecule.positions_angstrom, equal_within)

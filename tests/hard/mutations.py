@@ -56,25 +56,25 @@ BY_OVERLAP = """
 
 MUTATIONS = (
     Mutation(
-        1, "rotor/quantum/rotation.py",
+        1, "rotor/quantum/wang/rotation.py",
         "    labels = [names_of(b.basis, representation) for b in blocks]\n",
         "    labels = [tuple(q[np.abs(b.vectors).argmax(axis=0)] for q in names_of(b.basis, representation)) for b in blocks]\n",
         "tests/test_levels.py::test_every_label_stands_once",
     ),
     Mutation(
-        2, "rotor/quantum/convergence.py",
+        2, "rotor/quantum/estimates/convergence.py",
         "    found = disordered_blocks(top, levels)\n    if not found:",
         "    found = disordered_blocks(top, levels)\n    if True:",
         "tests/test_reliability.py::test_quartic_water_is_told_of",
     ),
     Mutation(
-        3, "rotor/quantum/rotation.py",
+        3, "rotor/quantum/wang/rotation.py",
         "    whole = wang_blocks(j, representation)\n",
         "    whole = wang_blocks(j, representation)\n" + WHOLE_MATRIX,
         "tests/hard/test_safeguards.py::test_vectors_of_near_degenerate_partners_lie_in_one_block",
     ),
     Mutation(
-        4, "rotor/quantum/wang_matrix.py",
+        4, "rotor/quantum/wang/wang_matrix.py",
         "    if len(bands) == 1:\n",
         "    if len(bands) == 1 or (np.diff(bands[0]) < 0).any():\n",
         "tests/hard/test_safeguards.py::test_energies_are_eigenvalues_where_the_diagonal_turns_round",
@@ -96,7 +96,7 @@ MUTATIONS = (
         "tests/hard/test_safeguards.py::test_the_doublet_of_a_near_symmetric_top_is_there",
     ),
     Mutation(
-        7, "rotor/quantum/rotation.py",
+        7, "rotor/quantum/wang/rotation.py",
         "        energies, states = diagonalise(block_bands(of_j, block), vectors)\n        out.append((block, energies + scalar, states))",
         "        bands = block_bands(of_j, block)\n        bands[0] += scalar\n        out.append((block, *diagonalise(bands, vectors)))",
         "tests/test_safeguards.py::test_the_scalar_part_stays_out_of_the_matrix",
@@ -111,13 +111,13 @@ MUTATIONS = (
         "tests/test_top.py::test_near_linear_says_by_which_number",
     ),
     Mutation(
-        10, "rotor/quantum/spherical_top.py",
+        10, "rotor/quantum/wang/spherical_top.py",
         "    of_a, of_e = states[:, characters > 0.25], states[:, characters < 0.25]  # 1 and -½",
         "    of_a, of_e = np.split(np.linalg.eigh(matrix)[1], [(characters > 0.25).sum()], axis=1)",
         "tests/test_clusters.py::test_eigenvalues_and_irreps_of_the_full_matrix",
     ),
     Mutation(
-        11, "rotor/tops/spin_weights.py",
+        11, "rotor/tops/spins/spin_weights.py",
         "        if self.rule == \"none\":\n            return np.asarray(np.where(k == 0, 1, 2))",
         "        if self.rule in (\"none\", \"KaKc\"):\n            return np.asarray(np.where(k == 0, 1, 2))",
         "tests/test_spin_statistics.py::test_accidental_symmetric_top_keeps_its_weights",
@@ -128,7 +128,7 @@ MUTATIONS = (
         "tests/hard/test_safeguards.py::test_three_dependent_moments_of_a_planar_molecule_are_named",
     ),
     Mutation(
-        13, "rotor/tops/isotopic_scaling.py",
+        13, "rotor/tops/isotopes/isotopic_scaling.py",
         "    best = max(ways, key=lambda way: round(sum(squares[i, j] for i, j in enumerate(way)), 9))", "    best = next(ways)",
         "tests/test_isotopologues.py::test_axes_that_change_places_are_matched_by_overlap",
     ),
@@ -158,7 +158,7 @@ MUTATIONS = (
         "tests/test_least_squares.py::test_what_is_not_determined_is_named",
     ),
     Mutation(
-        18, "rotor/quantum/unit_blocks.py",
+        18, "rotor/quantum/estimates/unit_blocks.py",
         "        if (leading == one.leading).all():", "        if True:",
         "tests/test_fit_spcat.py::test_labels_follow_their_states_where_energies_cross",
     ),

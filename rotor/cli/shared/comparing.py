@@ -16,8 +16,8 @@ from rotor.cli.shared.output import ComputationError, note
 if TYPE_CHECKING:
     import numpy as np
 
-    from rotor.formats.spcat.catalogue import Catalogue
     from rotor.formats.spcat.compare import Comparison
+    from rotor.formats.spcat.text.catalogue import Catalogue
 
 FORMAT_K = 300.0  # intensities of the 80-column format are those at 300 K
 DIFFERENCES = ("frequency_mhz", "lgint", "energy_lower_cm")
@@ -87,7 +87,7 @@ def read_catalogue(path: str) -> Catalogue:
     """The catalogue in a file; ValueError for a file of something else."""
     if not path.lower().endswith((".cat", ".cat.gz")):
         raise ValueError(f"{path}: expected a catalogue, .cat or .cat.gz")
-    from rotor.formats.spcat.cat import read_cat
+    from rotor.formats.spcat.text.cat import read_cat
 
     return read_cat(path)
 
@@ -175,7 +175,7 @@ def _spread(difference: np.ndarray[Any, Any]) -> dict[str, float] | None:
 
 def line_record(lines: Catalogue, row: int) -> dict[str, Any]:
     """One line by the fields of the format, without blank quantum numbers."""
-    from rotor.formats.spcat.fields import BLANK
+    from rotor.formats.spcat.text.fields import BLANK
 
     record = lines.record(row)._asdict()
     for side in ("quanta_upper", "quanta_lower"):

@@ -15,7 +15,7 @@ from rotor.cli.shared.output import note
 
 if TYPE_CHECKING:
     from rotor.molecules.molecule import Molecule
-    from rotor.tops.spin_constants import SpinConstants
+    from rotor.tops.spins.spin_constants import SpinConstants
     from rotor.tops.top import Top
 
 T = TypeVar("T")
@@ -241,7 +241,7 @@ def read_top(given: Input) -> Top:
 
 
 def _with_states(top: Top, text: str) -> Top:
-    from rotor.tops.state_constants import StateConstants
+    from rotor.tops.states.state_constants import StateConstants
 
     def read(value: str) -> Top:
         return replace(top, states=StateConstants.parse(value, "given (--state-constants)"))
@@ -250,7 +250,7 @@ def _with_states(top: Top, text: str) -> Top:
 
 
 def _spin_constants(text: str, spins: str | None) -> SpinConstants:
-    from rotor.tops.spin_constants import SpinConstants
+    from rotor.tops.spins.spin_constants import SpinConstants
 
     return parsed("--spin-constants", text, lambda value: SpinConstants.parse(value, spins, "given (--spin-constants)"))
 

@@ -36,8 +36,8 @@ def describe(top: Top, text: str, command: str) -> dict[str, Any]:
 
 
 def model_facts(content: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """What the model has and what it leaves out, largest first, from the keys of `rotor.quantum.limits.limit_facts`."""
-    from rotor.quantum.limits import COMPUTE, Limit
+    """What the model has and what it leaves out, largest first, from the keys of `rotor.quantum.estimates.limits.limit_facts`."""
+    from rotor.quantum.estimates.limits import COMPUTE, Limit
 
     present = [f"{one['name']} {one['size_mhz']:.2g} MHz" for one in content["effects"] if one["present"]]
     facts = [("effects", f"at J = {content['sizes_at_j']}: " + ", ".join(present))]
@@ -52,7 +52,7 @@ def left_out_facts(sentences: Sequence[str]) -> list[tuple[str, str]]:
 
 def heading(top: Top) -> str:
     """Name, formula and kind in one line."""
-    from rotor.formats.library import written_formula
+    from rotor.formats.molecules.library import written_formula
 
     formula = written_formula(top.name, formula_of(top) or "")
     names = ", ".join(dict.fromkeys(filter(None, (top.name, formula)))) or "constants"

@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor.formats.spcat.par import Options, Parameter, ParameterFile
+from rotor.formats.spcat.text.par import Options, Parameter, ParameterFile
 from rotor.tops.constants import Constants
 from rotor.tops.kind_of_constants import RIGID
 from rotor.tops.operators import axes_of, powers_of_spelled, spelled_term
@@ -192,7 +192,7 @@ def constants_of(file: ParameterFile, *, errors: bool = False) -> Constants:
 def constants_and_matrix(file: ParameterFile) -> tuple[Constants, NDArray[np.float64]]:
     """The constants of a file, and M (constants, parameters) with constants = M @ values of the parameters.
 
-    >>> from rotor.formats.spcat.par import read_par
+    >>> from rotor.formats.spcat.text.par import read_par
     >>> file = read_par(b"x\\n 2 1 1\\ns -1 1 0 20\\n 1000 4.0 1\\n 100 5.0 1\\n")
     >>> constants, matrix = constants_and_matrix(file)
     >>> constants.values["A"], matrix.tolist()

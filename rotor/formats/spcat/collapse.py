@@ -13,14 +13,14 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor.formats.spcat.catalogue import Catalogue
-from rotor.formats.spcat.fields import BLANK
+from rotor.formats.spcat.text.catalogue import Catalogue
+from rotor.formats.spcat.text.fields import BLANK
 
 
 def spin_quanta(catalogue: Catalogue) -> int:
     """How many quantum numbers of the spins each state of a catalogue has, the most of its lines.
 
-    >>> from rotor.formats.spcat.cat import read_cat
+    >>> from rotor.formats.spcat.text.cat import read_cat
     >>> spin_quanta(read_cat(b"   26164.4901  0.0010 -5.8078 3   -0.0000  8  52009 213 1 0 2       0 0 2       \\n"))
     1
     """

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from rotor import units
 from rotor.arrays import Floats
-from rotor.formats.spcat.catalogue import DTYPES, Catalogue
 from rotor.formats.spcat.collapse import spin_quanta, without_spins
-from rotor.formats.spcat.fields import BLANK
+from rotor.formats.spcat.text.catalogue import DTYPES, Catalogue
+from rotor.formats.spcat.text.fields import BLANK
 
 Rows = NDArray[np.int64]
 

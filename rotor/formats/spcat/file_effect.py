@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, ClassVar, NamedTuple
 from rotor.formats.spcat.codes import AXES, split_code
 from rotor.formats.spcat.l_doubled import Pair, couplings_with_pairs
 from rotor.formats.spcat.operators import CodedOperator, operator_of, plain_of_j
-from rotor.formats.spcat.par import Parameter
+from rotor.formats.spcat.text.par import Parameter
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.moments import Moment
 from rotor.quantum.spins import Scheme, Spin

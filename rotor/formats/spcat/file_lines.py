@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 
 from rotor import units
 from rotor.arrays import Floats, Indices, Ints
-from rotor.formats.spcat.catalogue import Catalogue, catalogue_of
-from rotor.formats.spcat.egy import LevelList
-from rotor.formats.spcat.fields import BLANK
 from rotor.formats.spcat.file_model import Group
-from rotor.formats.spcat.int_file import Request
-from rotor.formats.spcat.par import ParameterFile
 from rotor.formats.spcat.states import is_odd
+from rotor.formats.spcat.text.catalogue import Catalogue, catalogue_of
+from rotor.formats.spcat.text.egy import LevelList
+from rotor.formats.spcat.text.fields import BLANK
+from rotor.formats.spcat.text.int_file import Request
+from rotor.formats.spcat.text.par import ParameterFile
 from rotor.quantum.levels import Levels
 from rotor.spectra.intensity import LGINT_NM2_MHZ, IntensityCut
 from rotor.spectra.transitions import Transitions, all_transitions

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Ints
 from rotor.formats.spcat.file_effect import CodedLine, FileEffect, Vector, coded_lines
-from rotor.formats.spcat.int_file import Dipole, IntensityFile
 from rotor.formats.spcat.l_doubled import Pair, named_by_l, pairs_of
-from rotor.formats.spcat.par import Options, ParameterFile
 from rotor.formats.spcat.states import StateOptions, states_of
+from rotor.formats.spcat.text.int_file import Dipole, IntensityFile
+from rotor.formats.spcat.text.par import Options, ParameterFile
 from rotor.quantum.levels import Levels
 from rotor.quantum.moments import DEBYE_PER_BOHR_MAGNETON, Moment
 from rotor.quantum.solve import solve_levels

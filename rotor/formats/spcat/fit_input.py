@@ -21,10 +21,10 @@ from rotor.fit.fit import Fit, FitOptions
 from rotor.fit.parameters import Parameters
 from rotor.formats.assigned_lines import QUANTA
 from rotor.formats.spcat.codes import HELD_BELOW, constants_and_matrix
-from rotor.formats.spcat.lin import LineList, line_list, note_of_defaults, read_lin, with_defaults
 from rotor.formats.spcat.model import parameter_file
-from rotor.formats.spcat.par import Header, Parameter, ParameterFile, read_par
 from rotor.formats.spcat.states import is_plain
+from rotor.formats.spcat.text.lin import LineList, line_list, note_of_defaults, read_lin, with_defaults
+from rotor.formats.spcat.text.par import Header, Parameter, ParameterFile, read_par
 from rotor.formats.spcat.variances import FREE_ABOVE
 from rotor.quantum.labelled import LevelModel
 from rotor.tops.constants import Constants

@@ -16,17 +16,17 @@ import numpy as np
 from rotor.arrays import Floats, Ints
 from rotor.formats.spcat.file_lines import Format, format_of, quanta_of
 from rotor.formats.spcat.file_model import Group, groups_of
-from rotor.formats.spcat.int_file import IntensityFile, Request
 from rotor.formats.spcat.l_doubled import functions_of_l, named_by_l
-from rotor.formats.spcat.par import ParameterFile
 from rotor.formats.spcat.predict_states import line_names
+from rotor.formats.spcat.text.int_file import IntensityFile, Request
+from rotor.formats.spcat.text.par import ParameterFile
 from rotor.formats.spcat.unresolved import HIGHEST_SEARCHED, excluded_parameters, inner_file, refuse_far_f, spelled_out
-from rotor.quantum.effect_units import unit_levels
+from rotor.quantum.estimates.effect_units import unit_levels
+from rotor.quantum.estimates.unit_blocks import UnitBlocks
 from rotor.quantum.labelled import LevelModel
 from rotor.quantum.levels import Levels
-from rotor.quantum.rotation import solve_rotation
 from rotor.quantum.spins.levels import levels_of_f
-from rotor.quantum.unit_blocks import UnitBlocks
+from rotor.quantum.wang.rotation import solve_rotation
 
 _NO_REQUEST = IntensityFile("", Request(), ())
 _MOST_ELEMENTS = 1e7  # of vectors over all functions of the F that are solved at a time

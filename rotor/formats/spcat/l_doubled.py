@@ -28,12 +28,12 @@ import numpy as np
 
 from rotor.arrays import Floats, Ints
 from rotor.formats.spcat.states import StateOptions
-from rotor.quantum.basis import names_of
 from rotor.quantum.coupled import CoupledBlock, Part
-from rotor.quantum.j_operators import JOperator, between_blocks, j_z
 from rotor.quantum.levels import Levels
 from rotor.quantum.spins.blocks import assigned
 from rotor.quantum.states import Coupling, OperatorOfJ
+from rotor.quantum.wang.basis import names_of
+from rotor.quantum.wang.j_operators import JOperator, between_blocks, j_z
 
 
 class Pair(NamedTuple):

@@ -7,10 +7,10 @@ from functools import reduce
 from math import gcd
 
 from rotor.formats.spcat.codes import NOT_YET, constants_of, is_linear, parameters_of
-from rotor.formats.spcat.int_file import Dipole, IntensityFile, Request
-from rotor.formats.spcat.par import Header, Options, ParameterFile
+from rotor.formats.spcat.text.int_file import Dipole, IntensityFile, Request
+from rotor.formats.spcat.text.par import Header, Options, ParameterFile
 from rotor.tops.constants import Constants
-from rotor.tops.spin_weights import SpinWeights
+from rotor.tops.spins.spin_weights import SpinWeights
 from rotor.tops.top import Top
 
 # the classes of (Ka, Kc) that are even under a half turn about the axis: Ka, Ka + Kc and Kc tell a, b and c

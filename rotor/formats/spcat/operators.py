@@ -24,9 +24,9 @@ from math import sqrt
 from rotor.formats.spcat.codes import Digits
 from rotor.quantum.effects.interactions import with_powers
 from rotor.quantum.effects.spin_effect import ParameterName, matrix_of
-from rotor.quantum.j_operators import JOperator, anticommutator, components, identity, lowering, raising
 from rotor.quantum.spins.operators import Cosines, CosinesWithN, Matrix, Rotor, Scalar, Vector
 from rotor.quantum.states import OperatorOfJ
+from rotor.quantum.wang.j_operators import JOperator, anticommutator, components, identity, lowering, raising
 from rotor.tops.operators import Operators
 
 ODD = {20: "a", 40: "b", 60: "c"}  # change sign under time reversal

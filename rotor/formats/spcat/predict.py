@@ -15,22 +15,22 @@ from numpy.typing import NDArray
 
 from rotor import units
 from rotor.formats.line_tables import catalogue
-from rotor.formats.spcat.catalogue import Catalogue
 from rotor.formats.spcat.codes import is_linear
-from rotor.formats.spcat.egy import LevelList
-from rotor.formats.spcat.fields import QUANTUM_RANGE
 from rotor.formats.spcat.file_lines import LEAST_MHZ, equally_weighted
-from rotor.formats.spcat.int_file import IntensityFile, Request, read_int
 from rotor.formats.spcat.model import FOLD, common_weight, top_of
-from rotor.formats.spcat.par import Options, ParameterFile, read_par
 from rotor.formats.spcat.predict_states import predicted
 from rotor.formats.spcat.states import is_plain
+from rotor.formats.spcat.text.catalogue import Catalogue
+from rotor.formats.spcat.text.egy import LevelList
+from rotor.formats.spcat.text.fields import QUANTUM_RANGE
+from rotor.formats.spcat.text.int_file import IntensityFile, Request, read_int
+from rotor.formats.spcat.text.par import Options, ParameterFile, read_par
 from rotor.formats.spcat.variances import constants_covariance
-from rotor.quantum.basis import wang_blocks
 from rotor.quantum.levels import Levels
-from rotor.quantum.rotation import hamiltonian
 from rotor.quantum.solve import solve_levels
-from rotor.quantum.wang_matrix import JMatrix, block_bands
+from rotor.quantum.wang.basis import wang_blocks
+from rotor.quantum.wang.rotation import hamiltonian
+from rotor.quantum.wang.wang_matrix import JMatrix, block_bands
 from rotor.spectra.lines import Lines, line_list
 from rotor.thermo import PartitionFunction, partition_function
 from rotor.tops.top import Top
@@ -108,8 +108,8 @@ def predict(
 
     Examples
     --------
-    >>> from rotor.formats.spcat.int_file import read_int
-    >>> from rotor.formats.spcat.par import read_par
+    >>> from rotor.formats.spcat.text.int_file import read_int
+    >>> from rotor.formats.spcat.text.par import read_par
     >>> file = read_par(b"OCS\\n 1 0 0 0\\nl -1 1 0 0\\n 100 6081.492 0\\n")
     >>> expected = read_int(b"OCS\\n 0 60503 1028.6 0 3 -9 -9 99 300\\n 1 0.71519\\n")
     >>> predict(file, expected).catalogue.frequency_mhz.round(3).tolist()

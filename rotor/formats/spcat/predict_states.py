@@ -14,9 +14,7 @@ import numpy as np
 
 from rotor import units
 from rotor.arrays import Floats, Ints
-from rotor.formats.spcat.catalogue import Catalogue
 from rotor.formats.spcat.codes import constants_of, split_code
-from rotor.formats.spcat.egy import LevelList
 from rotor.formats.spcat.file_lines import (
     LEAST_MHZ,
     Format,
@@ -28,10 +26,12 @@ from rotor.formats.spcat.file_lines import (
     within,
 )
 from rotor.formats.spcat.file_model import Group, groups_of
-from rotor.formats.spcat.int_file import IntensityFile, Request
-from rotor.formats.spcat.par import ParameterFile
+from rotor.formats.spcat.text.catalogue import Catalogue
+from rotor.formats.spcat.text.egy import LevelList
+from rotor.formats.spcat.text.int_file import IntensityFile, Request
+from rotor.formats.spcat.text.par import ParameterFile
 from rotor.formats.spcat.variances import variance_factor
-from rotor.quantum.derivatives import level_derivatives
+from rotor.quantum.estimates.derivatives import level_derivatives
 from rotor.quantum.levels import Levels
 from rotor.spectra.lines import Lines
 from rotor.spectra.transitions import Transitions

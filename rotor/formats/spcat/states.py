@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Ints
 from rotor.formats.spcat.codes import split_code
-from rotor.formats.spcat.int_file import IntensityFile
-from rotor.formats.spcat.par import Options, ParameterFile
+from rotor.formats.spcat.text.int_file import IntensityFile
+from rotor.formats.spcat.text.par import Options, ParameterFile
 
 SPECIES = {"ee": "A", "eo": "a", "oo": "b", "oe": "c"}  # of the rotational function, by parities of Ka and Kc
 

@@ -20,8 +20,8 @@ import numpy as np
 from rotor.arrays import Ints
 from rotor.formats.spcat.codes import split_code
 from rotor.formats.spcat.file_lines import Format
-from rotor.formats.spcat.par import Options, ParameterFile
 from rotor.formats.spcat.states import doubled_spins
+from rotor.formats.spcat.text.par import Options, ParameterFile
 
 HIGHEST_SEARCHED = 9  # F up to which a level with F below 0 is looked for where |F| has none
 
@@ -53,7 +53,7 @@ def spelled_out(labels: Ints, form: Format) -> Ints:
 def inner_file(file: ParameterFile, form: Format) -> Inner | None:
     """The file that gives the levels of such lines; None where no spin can be left out.
 
-    >>> from rotor.formats.spcat.par import read_par
+    >>> from rotor.formats.spcat.text.par import read_par
     >>> made = read_par(b"t\\n 3 1 1 2\\na 44 1 0 5\\n 10000 9e3 1\\n 110010000 3 1\\n 220010000 3 1\\n")
     >>> found = inner_file(made, Format(3, False, 2))
     >>> found.file.options[0].spind, found.columns.tolist(), found.width

@@ -10,7 +10,7 @@ import numpy as np
 
 from rotor.arrays import Floats
 from rotor.formats.spcat.codes import HELD_BELOW, constants_and_matrix
-from rotor.formats.spcat.par import Parameter, ParameterFile
+from rotor.formats.spcat.text.par import Parameter, ParameterFile
 from rotor.tops.covariance import Covariance
 
 FREE_ABOVE = 1e15  # MHz: an a-priori error so large is none; SPFIT counts it as no datum either

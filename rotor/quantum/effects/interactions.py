@@ -19,10 +19,10 @@ from typing import TYPE_CHECKING, ClassVar, Self
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.spin_effect import ParameterName, parse_name
 from rotor.quantum.effects.watson import operators_of_name
-from rotor.quantum.j_operators import JOperator, anticommutator, components, identity, j_z, lowering, raising
 from rotor.quantum.states import Coupling, State
+from rotor.quantum.wang.j_operators import JOperator, anticommutator, components, identity, j_z, lowering, raising
 from rotor.tops.operators import Operators
-from rotor.tops.spin_weights import SpinWeights
+from rotor.tops.spins.spin_weights import SpinWeights
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top

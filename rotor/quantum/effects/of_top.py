@@ -12,8 +12,8 @@ from rotor.quantum.spins.method import EXACT, TOLERANCE_MHZ, HyperfineMethod
 
 if TYPE_CHECKING:
     from rotor.quantum.effects.spin_effect import SpinEffect
-    from rotor.tops.spin_constants import SpinConstants
-    from rotor.tops.state_constants import StateConstants
+    from rotor.tops.spins.spin_constants import SpinConstants
+    from rotor.tops.states.state_constants import StateConstants
     from rotor.tops.top import Top
 
 
@@ -22,7 +22,7 @@ def spin_effects(top: Top) -> tuple[QuantumEffect, ...]:
 
     Raises ValueError for a name that no effect knows, and for like nuclei whose exchange the spin weights count already.
 
-    >>> from rotor.tops.spin_constants import SpinConstants
+    >>> from rotor.tops.spins.spin_constants import SpinConstants
     >>> from rotor.tops.top import Top
     >>> top = Top.from_constants("B=44316 MHz", spin_constants=SpinConstants.parse("chi_aa(14N)=-4.7 MHz"))
     >>> [effect.name for effect in spin_effects(top)]

@@ -1,7 +1,7 @@
 """The semi-rigid Hamiltonian: rigid and centrifugal terms, A and S reductions, every representation.
 
 Every term of an effective Hamiltonian in one vibrational state is c · ½[Jz^2q, J₊^2n + J₋^2n]₊ · J^2p (n = 0:
-c · J^2p Jz^2q), so a Hamiltonian is a table {(p, q, n): c in MHz}, whose matrix elements are in `rotor.quantum.wang_matrix`.
+c · J^2p Jz^2q), so a Hamiltonian is a table {(p, q, n): c in MHz}, whose matrix elements are in `rotor.quantum.wang.wang_matrix`.
 Which name stands for which term: `rotor.tops.operators`.
 """
 

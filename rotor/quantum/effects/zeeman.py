@@ -39,9 +39,9 @@ from rotor.quantum.fields.map_request import (
 from rotor.quantum.fields.space import axial_levels
 from rotor.quantum.fields.spin_fields import Magnet, SpinFieldBlock, spin_field_space
 from rotor.quantum.fields.wang_blocks import WangBlockInField, WangSpace, coloured_components, wang_space
-from rotor.quantum.j_operators import between_blocks, components
 from rotor.quantum.reduced import wang_amplitudes
 from rotor.quantum.tensors import BodyTensor, body_tensor
+from rotor.quantum.wang.j_operators import between_blocks, components
 from rotor.units import AVOGADRO_PER_MOL, NUCLEAR_MAGNETON_MHZ_PER_T, PLANCK_J_S
 
 if TYPE_CHECKING:

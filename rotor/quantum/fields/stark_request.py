@@ -19,9 +19,9 @@ from rotor.quantum.effects.stark import (
     doubled_m,
     stark_map,
 )
+from rotor.quantum.estimates.limits import limit_facts
 from rotor.quantum.fields.field_map import FieldMap
 from rotor.quantum.fields.map_request import MOST_AT_EDGE
-from rotor.quantum.limits import limit_facts
 from rotor.table import TextOf
 from rotor.tops.facts import top_facts
 

@@ -20,11 +20,11 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.basis import WangBlock, wang_blocks
 from rotor.quantum.fields.blocks import Contraction, FieldBlock, FieldSpace, FreeLevels
 from rotor.quantum.fields.wang_blocks import coloured_components
 from rotor.quantum.reduced import wang_amplitudes
 from rotor.quantum.tensors import BodyTensor, block_elements, body_tensor
+from rotor.quantum.wang.basis import WangBlock, wang_blocks
 
 if TYPE_CHECKING:
     from rotor.quantum.levels import SolvedBlock
@@ -200,7 +200,7 @@ def tilted_space(top: Top, jmax: int, contractions: Sequence[Contraction]) -> Ti
     Raises ValueError for a spherical top.
     """
     from rotor.quantum.effects.watson import SEMI_RIGID
-    from rotor.quantum.rotation import representation_of, solve_rotation
+    from rotor.quantum.wang.rotation import representation_of, solve_rotation
     from rotor.tops.top import one_state
 
     if top.kind == "spherical":

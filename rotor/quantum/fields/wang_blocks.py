@@ -235,7 +235,7 @@ def coloured_components(
 def wang_space(top: Top, jmax: int, contractions: Sequence[Contraction]) -> WangSpace:
     """The space of a top whose tensors do not have the axis of a symmetric top."""
     from rotor.quantum.effects.watson import SEMI_RIGID
-    from rotor.quantum.rotation import representation_of, solve_rotation
+    from rotor.quantum.wang.rotation import representation_of, solve_rotation
     from rotor.tops.top import one_state
 
     levels = solve_rotation(one_state(top, "levels in a field"), SEMI_RIGID, 0, jmax, in_blocks=True)

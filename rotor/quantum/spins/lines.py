@@ -15,8 +15,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.basis import WangBlock
-from rotor.quantum.j_operators import JOperator, between_blocks
 from rotor.quantum.levels import Levels
 from rotor.quantum.spins.blocks import Shared, SpinBlock, SpinPart, coefficients_of, operators_between, product
 from rotor.quantum.spins.coupling import patterns, recoupling, stacks, tensor_coefficients
@@ -24,6 +22,8 @@ from rotor.quantum.spins.operators import AxialState, Scalar, tensor_elements
 from rotor.quantum.spins.rotor import Channel, RotorBlock, channels_of
 from rotor.quantum.spins.scheme import Scheme
 from rotor.quantum.tensors import Tensors, rank_of, tensor_between
+from rotor.quantum.wang.basis import WangBlock
+from rotor.quantum.wang.j_operators import JOperator, between_blocks
 
 if TYPE_CHECKING:
     from rotor.quantum.effect import QuantumEffect

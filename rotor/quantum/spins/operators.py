@@ -30,9 +30,9 @@ from typing import NamedTuple
 import numpy as np
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.basis import WangBlock
 from rotor.quantum.tensors import BodyTensor, block_elements, body_tensor, coupling
-from rotor.quantum.wang_matrix import JMatrix, block_bands, scalar_energy
+from rotor.quantum.wang.basis import WangBlock
+from rotor.quantum.wang.wang_matrix import JMatrix, block_bands, scalar_energy
 from rotor.tops.operators import Operators, Powers
 
 EVERY_STATE = -1  # in place of v: a term that is diagonal in the states, and the same in all of them

@@ -13,14 +13,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.basis import names_of
 from rotor.quantum.coupled import CoupledBlock
 from rotor.quantum.effect import k_limits_of
 from rotor.quantum.levels import SolvedBlock
-from rotor.quantum.rotation import hamiltonian, solve_rotation
 from rotor.quantum.spins.operators import EVERY_STATE, AxialState, Basis, Rotor, is_axial, summed
 from rotor.quantum.spins.scheme import Scheme, scheme_of
 from rotor.quantum.spins.terms import SpinTerm
+from rotor.quantum.wang.basis import names_of
+from rotor.quantum.wang.rotation import hamiltonian, solve_rotation
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rotor.tops.isotopic_spins import chi_tensor
+from rotor.tops.isotopes.isotopic_spins import chi_tensor
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top

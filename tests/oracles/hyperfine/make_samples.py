@@ -6,7 +6,7 @@ import gzip
 import sys
 from pathlib import Path
 
-from rotor.formats.spcat.cat import read_cat
+from rotor.formats.spcat.text.cat import read_cat
 
 HEAD = "frequency_mhz,error_mhz,upper,lower\n"  # quanta N (Ka Kc | K) F as the files have them, F rounded up
 HERE = Path(__file__).parent

@@ -1,0 +1,1 @@
+"""Molecule files and the library of molecules."""

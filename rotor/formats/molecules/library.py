@@ -1,0 +1,179 @@
+"""The library of molecules: every name and where its file is, in the package's folder and in the user's own.
+
+Folders are searched in this order, and the first that knows a name wins, so that a user's own water is the water meant:
+
+1. those named in the environment variable ROTOR_MOLECULES, separated as in PATH,
+2. `.rotor/molecules` in the user's home folder, if there is one,
+3. the one that comes with the package.
+
+A molecule answers to the `name` and `names` of its file, and to the file's own name without `.toml`.
+"""
+
+from __future__ import annotations
+
+import difflib
+import os
+import re
+import tomllib
+from functools import lru_cache
+from pathlib import Path
+
+from rotor.formats.molecules.molecule_file import MoleculeFile, read_molecule_file
+from rotor.molecules.nuclei import data_folder
+
+VARIABLE = "ROTOR_MOLECULES"
+
+Stamp = tuple[tuple[str, int], ...]
+
+
+def folders() -> tuple[Path, ...]:
+    """The folders of molecule files, in the order in which they are searched.
+
+    Raises ValueError where ROTOR_MOLECULES names a folder that does not exist.
+    """
+    named = [Path(item).expanduser() for item in os.environ.get(VARIABLE, "").split(os.pathsep) if item]
+    for folder in named:
+        if not folder.is_dir():
+            raise ValueError(f"{VARIABLE}: {folder} is no folder; make it, or take it out of the variable")
+    own = Path(os.path.expanduser("~")) / ".rotor" / "molecules"
+    return (*named, *([own] if own.is_dir() else []), data_folder() / "molecules")
+
+
+def names() -> dict[str, Path]:
+    """Every name and alias with the file it means: formulas as written, words in lower case.
+
+    A formula is a name with a capital after the first letter, or with a digit; anything else is a word.
+
+    Raises ValueError where two files of one folder claim one name.
+    """
+    found: dict[str, Path] = {}
+    for folder in reversed(folders()):
+        found.update(_index(folder))
+    return found
+
+
+def library_file(name: str) -> Path | None:
+    """The file of a molecule by name, formula (`CO` is not `Co`) or word (in any case); None if there is none.
+
+    >>> library_file("Heavy Water").name
+    'D2O.toml'
+    """
+    for folder in folders():
+        known = _index(folder)
+        path = known.get(name) or known.get(name.casefold())
+        if path is not None:
+            return path
+    return None
+
+
+def molecule_path(name: str) -> Path:
+    """The file of a molecule by name, as `library_file`; ValueError, with the nearest names, where there is none."""
+    path = library_file(name)
+    if path is None:
+        known = {key.casefold(): key for key in names()}
+        near = [known[key] for key in difflib.get_close_matches(name.casefold(), known, n=3)]
+        hint = f"did you mean {' or '.join(near)}? " if near else ""
+        raise ValueError(f"no molecule {name!r} in the library: {hint}'rotor molecules' lists what it has")
+    return path
+
+
+def library_molecule(name: str) -> MoleculeFile:
+    """The molecule of that name; ValueError, with the nearest names, for one that is not in the library.
+
+    >>> library_molecule("Water").constants["B"] > 400_000
+    True
+    """
+    return read_molecule_file(molecule_path(name))
+
+
+def written_formula(name: str, formula: str) -> str:
+    """The formula as the library writes that of a molecule of this name, else as it is, in Hill's order.
+
+    An isotopologue of such a molecule, whose name has its own formula in brackets, is written like it where that says which atoms
+    are replaced: all of an element, or some of its hydrogens.
+
+    >>> written_formula("cyanoacetylene", "C3HN"), written_formula("", "O2S")
+    ('HC3N', 'O2S')
+    >>> written_formula("formaldehyde (CH[2H]O)", "CH[2H]O"), written_formula("cyanoacetylene (C2[13C]HN)", "C2[13C]HN")
+    ('HDCO', 'C2[13C]HN')
+    """
+    parent = name.partition(" (")[0]
+    path = library_file(parent) if parent else None
+    if path is None:
+        return formula
+    known = [path.stem, *(key for key, of in names().items() if of == path)]
+    same = (one for one in known if atoms_of(one) == atoms_of(formula))
+    return next(same, None) or next(filter(None, (_substituted(one, formula) for one in known)), formula)
+
+
+def _substituted(written: str, formula: str) -> str | None:
+    """The isotopes of a formula in the order of a written one of the same elements; None where their places are not known.
+
+    >>> _substituted("H2CO", "[13C][2H]2O"), _substituted("CH3CN", "C[13C]H3N")
+    ('D2[13C]O', None)
+    """
+    tokens = re.findall(r"([A-Z][a-z]?)(\d*)", written)
+    isotopes: dict[str, dict[str, int]] = {}
+    for atom, count in atoms_of(formula).items():
+        isotopes.setdefault(re.sub(r"[\[\]\d]", "", atom), {})[_SHORT.get(atom, atom)] = count
+    elements = [element for element, _ in tokens]
+    whole = "".join(f"{element}{count}" for element, count in tokens) == written
+    if not whole or atoms_of(written) != {element: sum(found.values()) for element, found in isotopes.items()}:
+        return None
+    if any(len(found) > 1 and (element != "H" or elements.count("H") > 1) for element, found in isotopes.items()):
+        return None
+    one = {element: next(iter(found)) for element, found in isotopes.items()}
+    return "".join(
+        "".join(f"{atom}{n if n > 1 else ''}" for atom, n in isotopes[element].items())
+        if len(isotopes[element]) > 1
+        else one[element] + count
+        for element, count in tokens
+    )
+
+
+_SHORT = {"[2H]": "D", "[3H]": "T"}
+
+
+def atoms_of(formula: str) -> dict[str, int]:
+    """How many atoms of each element, or of each isotope that is marked, a formula has."""
+    counts: dict[str, int] = {}
+    for atom, number in re.findall(r"(\[\d+[A-Z][a-z]?\]|[A-Z][a-z]?)(\d*)", formula):
+        counts[atom] = counts.get(atom, 0) + int(number or 1)
+    return counts
+
+
+def _index(folder: Path) -> dict[str, Path]:
+    """Names with files of one folder, read anew only when a file has come, gone or changed."""
+    with os.scandir(folder) as entries:
+        files = [(entry.name, entry.stat().st_mtime_ns) for entry in entries if entry.name.endswith(".toml")]
+    return _read_index(folder, tuple(sorted(files)))
+
+
+@lru_cache(maxsize=32)
+def _read_index(folder: Path, files: Stamp) -> dict[str, Path]:
+    found: dict[str, Path] = {}
+    for path in (folder / name for name, _ in files):
+        for key in dict.fromkeys(map(_key, (*_names_in(path), path.stem))):
+            if found.setdefault(key, path) != path:
+                raise ValueError(f"{path}: the name {key!r} belongs to {found[key]} already; give one of them another")
+    return found
+
+
+def _names_in(path: Path) -> tuple[str, ...]:
+    """`name` and `names` of a file, from what stands before its first table; none where that cannot be understood.
+
+    Such a file is found by its own name alone: a request for it gets the error, and other requests are not disturbed.
+    """
+    head, _, _ = path.read_bytes().partition(b"\n[")
+    try:
+        content = tomllib.loads(head.decode("utf-8-sig"))
+    except (ValueError, RecursionError):  # no TOML, no UTF-8
+        return ()
+    listed = content.get("names", [])
+    found = [content.get("name"), *(listed if isinstance(listed, list) else [])]
+    return tuple(name for name in found if isinstance(name, str) and name)
+
+
+def _key(name: str) -> str:
+    formula = any(letter.isdigit() or letter.isupper() for letter in name[1:]) and " " not in name
+    return name if formula else name.casefold()

@@ -1,0 +1,444 @@
+"""The tables of a molecule file, one function each: what stands in it, checked, with file, table and key in every error."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor.formats.molecules.level_table import read_level_table
+from rotor.geometry.inertia import PrincipalFrame, point_masses, principal_frame
+from rotor.molecules.molecule import ELECTRONIC, Molecule
+from rotor.tops.constants import Constants
+from rotor.tops.covariance import Covariance
+from rotor.tops.kind import kind_from_moments
+from rotor.tops.spins.spin_weights import SpinWeights
+from rotor.tops.states.level_table import LevelTable
+from rotor.tops.states.state_constants import StateConstants
+from rotor.tops.top import Tensor
+from rotor.units import parse_quantity
+
+_RULES = {"linear": "J", "spherical": "irrep", "prolate": "K", "oblate": "K", "asymmetric": "KaKc"}
+
+Table = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class MeasuredLines:
+    """How constants meet the measured lines of a catalogue: rms in MHz of `lines` lines up to `j_max` and `k_max`.
+
+    k_max bounds Ka of an asymmetric and K of a symmetric top; None where there is no K or no bound.
+    """
+
+    tag: str
+    lines: int | None = None
+    rms_mhz: float | None = None
+    j_max: int | None = None
+    k_max: int | None = None
+
+
+@dataclass(frozen=True)
+class Served:
+    """The lines that a file's constants and level table are good for: up to `j_max`, `k_max` and `max_ghz`.
+
+    error_mhz: no measured line in that range is missed by more, three times the laboratory's error apart. None: there was no
+    catalogue to compare with, and the range is what the constants are meant for.
+    """
+
+    j_max: int
+    error_mhz: float | None = None
+    k_max: int | None = None
+    max_ghz: float | None = None
+
+
+class TableReader:
+    """One table of a file, whose errors say file, table and key."""
+
+    def __init__(self, where: str, name: str, content: Any) -> None:
+        self.place = f"{where}, [{name}]" if name else where
+        if not isinstance(content, dict):
+            raise ValueError(f"{self.place}: expected a table of key = value, found {content!r}")
+        self.content: Table = content
+
+    def refuse_unknown(self, known: Iterable[str]) -> None:
+        refuse_unknown_keys(self.content, known, self.place)
+
+    def error(self, key: str, reason: object) -> ValueError:
+        return ValueError(f"{self.place}, {key} = {self.content.get(key)!r}: {reason}")
+
+    def text(self, key: str, default: str = "") -> str:
+        value = self.content.get(key, default)
+        if not isinstance(value, str):
+            raise self.error(key, "expected text in quotes")
+        return value
+
+    def texts(self, key: str) -> tuple[str, ...]:
+        value = self.content.get(key, [])
+        if not isinstance(value, list) or not all(isinstance(item, str) and item for item in value):
+            raise self.error(key, 'expected a list of names such as ["H2O"]')
+        return tuple(value)
+
+    def choice(self, key: str, choices: tuple[str, ...]) -> str | None:
+        if key not in self.content:
+            return None
+        if self.content[key] not in choices:
+            raise self.error(key, f"expected one of {', '.join(choices)}")
+        return str(self.content[key])
+
+    def number(self, key: str, minimum: float | None = None) -> float | None:
+        if key not in self.content:
+            return None
+        value = self.content[key]
+        if not is_number(value) or (minimum is not None and value < minimum):
+            raise self.error(
+                key, "expected a finite number" + (f" of at least {minimum:g}" if minimum is not None else "")
+            )
+        return float(value)
+
+    def whole(self, key: str) -> int | None:
+        value = self.number(key, 0)
+        if value is not None and not value.is_integer():
+            raise self.error(key, "expected a whole number")
+        return None if value is None else int(value)
+
+    def quantity(self, key: str, value: Any, unit: str, expected: str) -> float:
+        """A number in the table's unit, or text with its own, in the unit expected.
+
+        Parameters
+        ----------
+        key : str
+            Named in the error.
+        value : object
+            What the table has under the key.
+        unit : str
+            Unit of a bare number.
+        expected : str
+            Unit of the result.
+
+        Returns
+        -------
+        float
+            In the unit expected.
+
+        Raises
+        ------
+        ValueError
+            With file, table and key, for what is no finite number or has a unit that does not fit.
+        """
+        if not is_number(value) and not isinstance(value, str):
+            raise self.error(key, f"expected a finite number of {unit}, or text with a unit")
+        try:
+            return parse_quantity(value if isinstance(value, str) else f"{float(value)!r} {unit}", expected)
+        except ValueError as reason:
+            raise self.error(key, reason) from None
+
+
+def is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def refuse_unknown_keys(given: Iterable[str], known: Iterable[str], place: str) -> None:
+    known = tuple(known)
+    for key in given:
+        if key not in known:
+            near = difflib.get_close_matches(key, known, n=1)
+            hint = f"did you mean {near[0]}? " if near else ""
+            raise ValueError(f"{place}: unknown key {key!r}; {hint}Known are {', '.join(known)}")
+
+
+# One function a table
+
+
+def geometry(
+    table: TableReader | None, name: str, dipole: tuple[float, float, float] | None, dipole_table: TableReader | None
+) -> Molecule | None:
+    """The molecule of a `[geometry]` table, with the dipole turned into its frame.
+
+    Parameters
+    ----------
+    table : TableReader or None
+        The geometry, where the file has one.
+    name : str
+        Of the molecule.
+    dipole : (float, float, float) or None
+        Debye, along a, b, c.
+    dipole_table : TableReader or None
+        Where the dipole comes from.
+
+    Returns
+    -------
+    Molecule or None
+        None without a table.
+
+    Raises
+    ------
+    ValueError
+        With file, table and key, for what is unknown or cannot be a molecule.
+    """
+    if table is None:
+        return None
+    table.refuse_unknown(("kind", "source", "vibrational_difference", "atoms", "charge", "electronic", "unverified"))
+    symbols, positions = _atoms(table)
+    try:
+        molecule = Molecule(
+            symbols,
+            positions,
+            name=name,
+            source=table.text("source"),
+            uncertainty=table.number("vibrational_difference", 0.0),
+            charge=table.content.get("charge", 0),
+            electronic=table.choice("electronic", ELECTRONIC) or "even",
+        )
+    except ValueError as reason:
+        raise ValueError(f"{table.place}, atoms: {reason}") from None
+    if dipole is None or dipole_table is None:
+        return molecule
+    vector = np.array(dipole) @ _frame_of(molecule).axes
+    return replace(molecule, dipole_debye=vector, dipole_source=dipole_table.text("source"))
+
+
+def _frame_of(molecule: Molecule) -> PrincipalFrame:
+    body = point_masses(molecule.masses_u, molecule.positions_angstrom)
+    return principal_frame(body, molecule.masses_u, molecule.positions_angstrom)
+
+
+def with_polarizability(molecule: Molecule | None, tensor: Tensor | None, table: TableReader | None) -> Molecule | None:
+    if molecule is None or tensor is None or table is None:
+        return molecule
+    axes = _frame_of(molecule).axes
+    turned = axes.T @ np.array(tensor) @ axes
+    return replace(molecule, polarizability_angstrom3=turned, polarizability_source=table.text("source"))
+
+
+def _atoms(table: TableReader) -> tuple[tuple[str, ...], NDArray[np.float64]]:
+    rows = table.content.get("atoms")
+    if not isinstance(rows, list) or not rows:
+        raise table.error("atoms", 'expected a list of ["symbol", x, y, z] in Å')
+    for i, row in enumerate(rows, start=1):
+        if not (isinstance(row, list) and len(row) == 4 and isinstance(row[0], str) and all(map(is_number, row[1:]))):
+            raise ValueError(f'{table.place}, atoms, atom {i} = {row!r}: expected ["symbol", x, y, z] in Å')
+    return tuple(row[0] for row in rows), np.array([row[1:] for row in rows], dtype=np.float64)
+
+
+def constants_of(table: TableReader | None) -> Constants | None:
+    if table is None:
+        return None
+    settings = {key: table.text(key) for key in ("reduction", "representation", "kind") if key in table.content}
+    unit = table.text("unit", "MHz")
+    values: dict[str, float] = {}
+    uncertainties: dict[str, float] = {}
+    sources: dict[str, str] = {}
+    for name, item in table.content.items():
+        if name in ("unit", "source", "reduction", "representation", "kind", "unverified"):
+            continue
+        one = TableReader(table.place, name, item if isinstance(item, dict) else {"value": item})
+        one.refuse_unknown(("value", "uncertainty", "source", "unverified"))
+        values[name] = one.quantity("value", one.content.get("value"), unit, "MHz")
+        if "uncertainty" in one.content:
+            uncertainties[name] = one.quantity("uncertainty", one.content["uncertainty"], unit, "MHz")
+        if "source" in one.content:
+            sources[name] = one.text("source")
+    try:
+        return Constants(**settings, uncertainties=uncertainties, sources=sources, **values)  # type: ignore[arg-type]
+    except ValueError as reason:
+        raise ValueError(f"{table.place}: {reason}") from None
+
+
+def covariance_of(table: TableReader | None, constants: Constants | None) -> Covariance | None:
+    """From the lower triangle of the correlations and the uncertainties of the constants."""
+    if table is None:
+        return None
+    table.refuse_unknown(("source", "names", "correlations"))
+    names = table.texts("names")
+    known = constants.uncertainties if constants is not None else {}
+    lost = [name for name in names if name not in known]
+    if lost or not names:
+        raise table.error("names", f"{', '.join(lost) or 'none'}: expected constants of the file with an uncertainty")
+    rows: Any = table.content.get("correlations") or []
+    lengths = [len(row) if isinstance(row, list) else 0 for row in rows] if isinstance(rows, list) else []
+    if lengths != [*range(1, len(names) + 1)] or not all(is_number(value) for row in rows for value in row):
+        raise table.error(
+            "correlations", f"expected {len(names)} rows of 1 to {len(names)} numbers, the lower triangle"
+        )
+    matrix = np.zeros((len(names), len(names)))
+    for i, row in enumerate(rows):
+        matrix[i, : i + 1] = row
+    matrix += np.tril(matrix, -1).T
+    try:
+        return Covariance.of_correlations(names, [known[name] for name in names], matrix)
+    except ValueError as reason:
+        raise ValueError(f"{table.place}: {reason}") from None
+
+
+def dipole_of(table: TableReader | None) -> tuple[float, float, float] | None:
+    if table is None:
+        return None
+    table.refuse_unknown(("unit", "source", "unverified", "a", "b", "c"))
+    unit = table.text("unit", "D")
+    a, b, c = (table.quantity(axis, table.content.get(axis, 0.0), unit, "D") for axis in "abc")
+    return a, b, c
+
+
+_ELEMENTS = ("aa", "bb", "cc", "ab", "ac", "bc")
+_AXIAL = (("parallel", "perpendicular"), ("mean", "anisotropy"))
+
+
+def polarizability_of(
+    table: TableReader | None, constants: Constants | None, molecule: Molecule | None
+) -> Tensor | None:
+    """The tensor along a, b, c, from its elements or from the two numbers that an axial one has."""
+    if table is None:
+        return None
+    table.refuse_unknown(("unit", "source", "unverified", *_ELEMENTS, *_AXIAL[0], *_AXIAL[1]))
+    unit = table.text("unit", "Å3")
+    given = [key for key in table.content if key not in ("unit", "source", "unverified")]
+    values = {key: table.quantity(key, table.content[key], unit, "Å3") for key in given}
+    if tuple(sorted(given)) in (tuple(sorted(pair)) for pair in _AXIAL):
+        return _axial(table, values, kind_of(constants, molecule))
+    if not {"aa", "bb", "cc"} <= set(given) <= set(_ELEMENTS):
+        raise ValueError(
+            f"{table.place}: {', '.join(given) or 'nothing'}: expected aa, bb and cc (with ab, ac, bc where not 0), "
+            "or parallel and perpendicular, or mean and anisotropy"
+        )
+    aa, bb, cc, ab, ac, bc = (values.get(key, 0.0) for key in _ELEMENTS)
+    return (aa, ab, ac), (ab, bb, bc), (ac, bc, cc)
+
+
+def _axial(table: TableReader, values: Mapping[str, float], kind: str) -> Tensor:
+    """α_parallel along a of a linear or prolate top, along c of an oblate one; mean (α∥ + 2α⊥)/3, anisotropy α∥ - α⊥."""
+    if kind == "asymmetric":
+        raise ValueError(f"{table.place}: an asymmetric top has no figure axis; give aa, bb and cc")
+    if "mean" in values:
+        across = values["mean"] - values["anisotropy"] / 3
+        along = across + values["anisotropy"]
+    else:
+        along, across = values["parallel"], values["perpendicular"]
+    aa, cc = (across, along) if kind == "oblate" else (along, across)
+    return (aa, 0.0, 0.0), (0.0, across, 0.0), (0.0, 0.0, cc)
+
+
+def kind_of(constants: Constants | None, molecule: Molecule | None) -> str:
+    """The kind of top of a file: as its constants have it, else its geometry."""
+    if constants is not None:
+        return constants.kind
+    assert molecule is not None  # the reader refuses a file with neither
+    return kind_from_moments(_frame_of(molecule).moments).kind
+
+
+def spin_weights_of(table: TableReader | None, constants: Constants | None) -> SpinWeights:
+    if table is None:
+        return SpinWeights()
+    classes = {key: value for key, value in table.content.items() if key != "source"}
+    for key, value in classes.items():
+        if not is_number(value):
+            raise table.error(key, "expected a whole number")
+    try:
+        weights = SpinWeights.from_mapping(classes)
+    except ValueError as reason:
+        raise ValueError(f"{table.place}: {reason}") from None
+    if constants is not None and weights.rule != _RULES[constants.kind]:
+        raise ValueError(
+            f"{table.place}: classes {', '.join(weights.classes)} go by {weights.rule}, but the constants are of kind "
+            f"{constants.kind!r}, whose weights go by {_RULES[constants.kind]}"
+        )
+    return weights
+
+
+def states_of(table: TableReader | None, constants: Constants | None) -> StateConstants | None:
+    """Further states of a top: constants with the state in brackets, their names, weights and dipoles."""
+    if table is None:
+        return None
+    if constants is None:
+        raise ValueError(f"{table.place}: states beyond the one of [constants], which is missing")
+    known = ("source", "unverified", "unit", "names", "symmetry", "weights", "dipoles")
+    unit, values = table.text("unit", "MHz"), {}
+    for key, value in table.content.items():
+        if key not in known:
+            values[key] = table.quantity(key, value, unit, "MHz")
+    weights = {_state(table, v): _weights_of_state(table, one, constants) for v, one in _part(table, "weights").items()}
+    dipoles = {}
+    for pair, moment in _part(table, "dipoles").items():
+        a, b = sorted(_state(table, part) for part in (pair.split(",") * 2)[:2])
+        if not (isinstance(moment, list) and len(moment) == 3 and all(is_number(x) for x in moment)):
+            raise table.error("dipoles", f"state {pair}: expected three numbers, along a, b, c in D")
+        dipoles[b, a] = (float(moment[0]), float(moment[1]), float(moment[2]))
+    try:
+        return StateConstants(
+            values, table.texts("names"), weights, dipoles, table.text("source"), table.text("symmetry")
+        )
+    except ValueError as reason:
+        raise ValueError(f"{table.place}: {reason}") from None
+
+
+def _part(table: TableReader, key: str) -> Table:
+    value = table.content.get(key, {})
+    if not isinstance(value, dict):
+        raise table.error(key, "expected a table, with the numbers of states as keys")
+    return value
+
+
+def _state(table: TableReader, text: str) -> int:
+    if not text.strip().isdigit():
+        raise ValueError(f"{table.place}: state {text!r}: expected a number, 0 for the top's own state")
+    return int(text)
+
+
+def _weights_of_state(table: TableReader, classes: Any, constants: Constants) -> SpinWeights:
+    weights = spin_weights_of(TableReader(f"{table.place}", "weights", classes), constants)
+    if weights.to_mapping() != classes:
+        raise ValueError(
+            f"{table.place}, weights = {classes}: expected numbers without a common divisor, as those of state 0 have"
+        )
+    return weights
+
+
+def catalogue_of(table: TableReader | None) -> MeasuredLines | None:
+    if table is None:
+        return None
+    table.refuse_unknown(("tag", "source", "lines", "rms_mhz", "j_max", "k_max"))
+    if not table.text("tag"):
+        raise ValueError(f'{table.place}: tag is missing; it names the catalogue, such as "c018003"')
+    return MeasuredLines(
+        table.text("tag"),
+        table.whole("lines"),
+        table.number("rms_mhz", 0.0),
+        table.whole("j_max"),
+        table.whole("k_max"),
+    )
+
+
+def served_of(table: TableReader | None) -> Served | None:
+    if table is None:
+        return None
+    table.refuse_unknown(("j_max", "k_max", "max_ghz", "error_mhz", "source"))
+    j_max, error = table.whole("j_max"), table.number("error_mhz", 0.0)
+    if j_max is None:
+        raise ValueError(f"{table.place}: expected j_max; found {', '.join(table.content) or 'nothing'}")
+    return Served(j_max, error, table.whole("k_max"), table.number("max_ghz", 0.0))
+
+
+def level_table_of(table: TableReader | None, folder: Path | None) -> LevelTable | None:
+    """The level energies in the file that the table names, beside the molecule file."""
+    if table is None:
+        return None
+    table.refuse_unknown(("file", "source"))
+    name = table.text("file")
+    if not name or folder is None:
+        raise ValueError(f"{table.place}: expected file = the name of a .csv beside a molecule file")
+    return read_level_table(folder / name, table.text("source"))
+
+
+def unverified_in(name: str, table: TableReader) -> frozenset[str]:
+    """What a table marks as unverified: its own name, or names such as constants.DK of single entries."""
+    entries = {f"{name}.{key}": item for key, item in table.content.items() if isinstance(item, dict)}
+    marks = {name: table.content, **entries}
+    for key, content in marks.items():
+        if not isinstance(content.get("unverified", False), bool):
+            raise ValueError(f"{table.place}, {key}: unverified is true or false, not {content['unverified']!r}")
+    return frozenset(key for key, content in marks.items() if content.get("unverified"))

@@ -1,0 +1,172 @@
+"""Writes a molecule file as text that reads back as the same molecule."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from rotor.formats.atomic_write import open_atomic
+from rotor.formats.magnetic_table import magnetic_table
+from rotor.formats.molecules.level_table import write_level_table
+from rotor.formats.molecules.molecule_file import MoleculeFile
+from rotor.formats.molecules.spin_table import spin_tables
+from rotor.tops.states.state_constants import StateConstants
+
+
+def write_molecule_file(molecule: MoleculeFile, path: str | os.PathLike[str]) -> None:
+    """Writes a molecule file, beside and renamed: the path holds the whole file or what it held before.
+
+    Level energies, where there are some, go to a file of their own beside it, `NAME_levels.csv`.
+    """
+    levels_file = f"{Path(path).stem}_levels.csv" if molecule.levels is not None else ""
+    text = molecule_file_text(molecule, levels_file)
+    if molecule.levels is not None:
+        write_level_table(molecule.levels, Path(path).with_name(levels_file))
+    with open_atomic(path, "w", encoding="utf-8", newline="\n") as handle:
+        handle.write(text)
+
+
+def molecule_file_text(molecule: MoleculeFile, levels_file: str = "") -> str:
+    """The TOML text of a molecule; constants in MHz, dipole in D, polarizability in Å³, positions in Å.
+
+    levels_file: where its level energies stand, which the text only names. Raises ValueError where they have no file.
+
+    >>> from rotor.tops.constants import Constants
+    >>> print(molecule_file_text(MoleculeFile("hydrogen chloride", constants=Constants(B=312989.0))))
+    name = "hydrogen chloride"
+    <BLANKLINE>
+    [constants]
+    unit = "MHz"
+    kind = "linear"
+    B = 312989.0
+    <BLANKLINE>
+    """
+    head = {"name": molecule.name, "names": list(molecule.names)}
+    tables: dict[str, Mapping[str, Any]] = {
+        "geometry": _geometry(molecule),
+        "constants": _constants(molecule),
+        "covariance": _covariance(molecule),
+        "dipole": _dipole(molecule),
+        "polarizability": _polarizability(molecule),
+        "magnetic": magnetic_table(molecule.magnetic),
+        "spin_weights": molecule.spin_weights.to_mapping(),
+        "states": _states(molecule.states),
+        "catalogue": _catalogue(molecule),
+        "serves": vars(molecule.serves) if molecule.serves else {},
+    }
+    if molecule.levels is not None:
+        if not levels_file:
+            raise ValueError(
+                f"{molecule.name}: level energies stand in a file of their own; name it, or leave them out"
+            )
+        tables["levels"] = {"file": levels_file}
+    parts = ["\n".join(_lines(head))]
+    for name, table in tables.items():
+        if table:
+            marks = {"source": molecule.sources.get(name), "unverified": True if name in molecule.unverified else None}
+            parts.append("\n".join([f"[{name}]", *_lines({**marks, **table})]))
+    for name, table in spin_tables(molecule.spin_constants, molecule.unverified).items():
+        heading = name if name == "spins" else f"spins.{_key(name)}"
+        parts.append("\n".join([f"[{heading}]", *_lines(table)]))
+    return "\n\n".join(parts) + "\n"
+
+
+def _states(states: StateConstants | None) -> dict[str, Any]:
+    if states is None:
+        return {}
+    weights = {str(v): one.to_mapping() for v, one in states.weights.items()}
+    dipoles = {",".join(map(str, sorted(set(pair)))): list(moment) for pair, moment in states.dipoles.items()}
+    more = {"names": list(states.names), "symmetry": states.symmetry, "weights": weights, "dipoles": dipoles}
+    return {"unit": "MHz", **states.values, **{key: value for key, value in more.items() if value}}
+
+
+def _geometry(molecule: MoleculeFile) -> dict[str, Any]:
+    if molecule.molecule is None:
+        return {}
+    body = molecule.molecule
+    labels = [one.label for one in body.nuclei]
+    return {
+        "kind": molecule.geometry_kind,
+        "vibrational_difference": molecule.vibrational_difference,
+        "charge": body.charge or None,
+        "electronic": None if body.electronic == "even" else body.electronic,
+        "atoms": [[label, *position] for label, position in zip(labels, body.positions_angstrom.tolist(), strict=True)],
+    }
+
+
+def _constants(molecule: MoleculeFile) -> dict[str, Any]:
+    constants = molecule.constants
+    if constants is None:
+        return {}
+    numbers: dict[str, Any] = {}
+    for name, value in constants.values.items():
+        extra = {"uncertainty": constants.uncertainties.get(name), "source": constants.sources.get(name)}
+        extra["unverified"] = True if f"constants.{name}" in molecule.unverified else None
+        extra = {key: thing for key, thing in extra.items() if thing is not None}
+        numbers[name] = {"value": value, **extra} if extra else value
+    return {
+        "unit": "MHz",
+        "kind": constants.kind,
+        "reduction": constants.reduction,
+        "representation": constants.representation,
+        **numbers,
+    }
+
+
+def _covariance(molecule: MoleculeFile) -> dict[str, Any]:
+    """Correlations as far as the diagonal; the standard errors stand with the constants."""
+    if molecule.covariance is None:
+        return {}
+    rows = [[float(value) for value in row[: i + 1]] for i, row in enumerate(molecule.covariance.correlations.tolist())]
+    return {"names": list(molecule.covariance.names), "correlations": rows}
+
+
+def _dipole(molecule: MoleculeFile) -> dict[str, Any]:
+    if molecule.dipole_abc_debye is None:
+        return {}
+    return {"unit": "D", **dict(zip("abc", molecule.dipole_abc_debye, strict=True))}
+
+
+def _polarizability(molecule: MoleculeFile) -> dict[str, Any]:
+    """The elements of the tensor; those off the diagonal only where they are not 0."""
+    if molecule.polarizability_abc_angstrom3 is None:
+        return {}
+    (aa, ab, ac), (_, bb, bc), (_, _, cc) = molecule.polarizability_abc_angstrom3
+    mixed = {name: value for name, value in (("ab", ab), ("ac", ac), ("bc", bc)) if value}
+    return {"unit": "Å3", "aa": aa, "bb": bb, "cc": cc, **mixed}
+
+
+def _catalogue(molecule: MoleculeFile) -> dict[str, Any]:
+    return vars(molecule.catalogue) if molecule.catalogue else {}
+
+
+def _lines(table: Mapping[str, Any]) -> list[str]:
+    return [f"{_key(key)} = {_value(value)}" for key, value in table.items() if value is not None and value != []]
+
+
+def _key(key: str) -> str:
+    bare = key.isascii() and key.replace("_", "").replace("-", "").isalnum()
+    return key if bare else _quoted(key)
+
+
+def _value(value: Any) -> str:
+    """A TOML value; a list of lists has a line for each."""
+    if isinstance(value, str):
+        return _quoted(value)
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, Mapping):
+        return "{ " + ", ".join(f"{_key(key)} = {_value(item)}" for key, item in value.items()) + " }"
+    if isinstance(value, list):
+        if value and isinstance(value[0], list):
+            return "[\n" + "".join(f"    {_value(row)},\n" for row in value) + "]"
+        return "[" + ", ".join(map(_value, value)) + "]"
+    return repr(value)
+
+
+def _quoted(text: str) -> str:
+    """A basic TOML string: quotes, backslashes and control characters escaped."""
+    escaped = text.replace("\\", "\\\\").replace('"', '\\"')
+    return '"' + "".join(c if c.isprintable() or c == " " else f"\\U{ord(c):08X}" for c in escaped) + '"'

@@ -1,0 +1,122 @@
+"""The table of spins in a molecule file: constants of nuclear and electron spins, spin by spin.
+
+    [spins]
+    unit = "MHz"
+    source = "..."
+
+    [spins.14N]                         # called after the isotope; 35Cl_1 and 35Cl_2 where there are several
+    atom = 3                            # which atom of [geometry]; may be left out where one alone is that isotope
+    chi_aa = { value = 1.9543, uncertainty = 0.0012 }
+    chi_bb-cc = 5.7476                  # the difference; names are those of rotor.quantum.effects
+
+    [spins.S]                           # any other name needs its spin
+    spin = "1/2"
+    eps_aa = 500.0
+
+    [spins."S,14N"]                     # what belongs to two spins
+    b_F = 12.5
+
+The spins are coupled in the order in which they stand here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from typing import TYPE_CHECKING, Any
+
+from rotor.formats.molecules.molecule_tables import TableReader
+from rotor.tops.spins.spin_constants import SpinConstants, parse_spins, spin_text, spins_of, twice_of
+
+if TYPE_CHECKING:
+    from rotor.molecules.molecule import Molecule
+
+_OF_TABLE = ("unit", "source", "unverified")
+_OF_SPIN = ("spin", "atom", "source", "unverified")
+
+
+def spins_of_table(table: TableReader | None, molecule: Molecule | None) -> SpinConstants | None:
+    """The constants of spins of a file, checked; None where it has none."""
+    if table is None:
+        return None
+    unit = table.text("unit", "MHz")
+    parts = {
+        name: TableReader(table.place, name, part) for name, part in table.content.items() if name not in _OF_TABLE
+    }
+    twice = {name: _twice(part, name) for name, part in parts.items() if "," not in name}
+    values: dict[str, float] = {}
+    errors: dict[str, float] = {}
+    for key, part in parts.items():
+        for symbol, item in part.content.items():
+            if symbol in _OF_SPIN:
+                continue
+            name = f"{symbol}({key.replace(' ', '')})"
+            one = TableReader(part.place, symbol, item if isinstance(item, dict) else {"value": item})
+            one.refuse_unknown(("value", "uncertainty", "source", "unverified"))
+            values[name] = one.quantity("value", one.content.get("value"), unit, "MHz")
+            if "uncertainty" in one.content:
+                errors[name] = one.quantity("uncertainty", one.content["uncertainty"], unit, "MHz")
+    sources = {name: part.text("source") for name, part in parts.items() if "source" in part.content}
+    atoms = {name: number for name, part in parts.items() if (number := _atom(part, name, molecule)) is not None}
+    try:
+        return SpinConstants(values, twice, table.text("source"), errors, sources, atoms)
+    except ValueError as reason:
+        raise ValueError(f"{table.place}: {reason}") from None
+
+
+def _twice(part: TableReader, name: str) -> int:
+    """Twice a spin, from the isotope it is called after or from what the table says."""
+    try:
+        if "spin" in part.content:
+            return parse_spins(f"{name}={part.text('spin')}")[name]
+        return twice_of(name)
+    except ValueError as reason:
+        raise ValueError(f"{part.place}: {reason}") from None
+
+
+def _atom(part: TableReader, name: str, molecule: Molecule | None) -> int | None:
+    """The number of the nucleus in the geometry; None for spins of electrons, and where there is no geometry."""
+    number = part.whole("atom")
+    if molecule is None or "," in name:
+        if number is not None:
+            raise part.error("atom", "expected only with a geometry, for one nucleus")
+        return None
+    label = name.partition("_")[0]
+    alike = [i for i, one in enumerate(molecule.nuclei, start=1) if label in (one.label, *_own_name(one.label))]
+    if number is None:
+        return alike[0] if len(alike) == 1 else None
+    if number not in alike:
+        which = ", ".join(map(str, alike)) or "none"
+        raise part.error("atom", f"expected the number of a {label} of the geometry, of which there is {which}")
+    return number
+
+
+def _own_name(label: str) -> tuple[str, ...]:
+    return {"2H": ("D",), "3H": ("T",)}.get(label, ())
+
+
+def spin_tables(constants: SpinConstants | None, unverified: Collection[str]) -> dict[str, dict[str, Any]]:
+    """The tables that a molecule file is written with, by name: that of all spins, and one for each.
+
+    unverified: names of tables that are marked so.
+    """
+    if constants is None:
+        return {}
+    marked = {"source": constants.source or None, "unverified": True if "spins" in unverified else None}
+    tables: dict[str, dict[str, Any]] = {"spins": {**marked, "unit": "MHz"}}
+    for name, twice in constants.twice.items():
+        tables[name] = {"spin": None if _is_isotope(name, twice) else spin_text(twice)}
+        tables[name] |= {"atom": constants.atoms.get(name), "source": constants.sources.get(name)}
+        tables[name]["unverified"] = True if f"spins.{name}" in unverified else None
+    for name, value in constants.values.items():
+        key = ",".join(spins_of(name))
+        error = constants.uncertainties.get(name)
+        tables.setdefault(key, {"source": constants.sources.get(key)})
+        tables[key][name.partition("(")[0]] = value if error is None else {"value": value, "uncertainty": error}
+    return tables
+
+
+def _is_isotope(name: str, twice: int) -> bool:
+    try:
+        return twice_of(name) == twice
+    except ValueError:
+        return False

@@ -1,0 +1,335 @@
+"""The 80-column catalogue, .cat: lines as columns of numbers, read and written character for character."""
+
+from __future__ import annotations
+
+import gzip
+import importlib
+import os
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor.formats.atomic_write import open_atomic
+from rotor.formats.packed import load
+from rotor.formats.spcat.text.catalogue import DTYPES, Catalogue, Layout
+from rotor.formats.spcat.text.fields import BLANK
+from rotor.formats.spcat.text.line import Record, error_cap, read_record, spell_record, width_of
+from rotor.formats.spcat.text.rows import (
+    ENERGY,
+    ERROR,
+    FREQUENCY,
+    LGINT,
+    QNFMT,
+    QUANTA,
+    Columns,
+    Mask,
+    Text,
+    put_rows,
+    take_rows,
+)
+
+COMPILED_FROM = 2_000_000  # lines; the compiler takes 0.3 s to load and saves 0.15 µs a line
+_FEW = 20_000  # lines, which take some hundredths of a second
+_COMPILED = "rotor.formats.spcat.text._kernels"
+_CHUNK = 1 << 14  # lines handled at once: about 1 MB of text, which a processor's cache holds
+_BOM = b"\xef\xbb\xbf"
+_BLANKS = b" \t\r\n\x1a"  # a line of these alone is blank; ^Z ended files under DOS
+
+
+def _capped(columns: Columns, decimals: tuple[int, int, int, int]) -> Columns:
+    return columns._replace(error_mhz=np.minimum(columns.error_mhz, error_cap(decimals[1])))
+
+
+def _length(layout: Layout, width: int) -> int:
+    if layout.line_length is not None:
+        return layout.line_length
+    return 80 if width == 6 else QUANTA + 4 * width
+
+
+def load_compiled(lines: int) -> None:
+    """Load the compiled form of rows for a list so long that this pays, or where the compiler is loaded already."""
+    if lines >= COMPILED_FROM or (lines >= _FEW and "numba" in sys.modules):
+        importlib.import_module(_COMPILED)
+
+
+def _row_form() -> Callable[[Text, Columns, tuple[int, int, int, int]], Mask]:
+    """The function that fills rows of text: the compiled one where it is loaded."""
+    fill: Callable[[Text, Columns, tuple[int, int, int, int]], Mask]
+    fill = sys.modules[_COMPILED].put_rows if _COMPILED in sys.modules else put_rows
+    return fill
+
+
+def _plain_rows(text: Text, columns: Columns, layout: Layout, fill: Callable[..., Mask]) -> Mask:
+    """Fill rows (n, full length and line end); true where a row is the line, nothing but blanks cut off its end."""
+    width = columns.quanta_upper.shape[1]
+    length = _length(layout, width)
+    full = max(length, QUANTA + 4 * width)
+    plain = fill(text[:, :full], _capped(columns, layout.decimals), layout.decimals)
+    plain &= (columns.qnfmt >= 0) & (np.maximum(columns.qnfmt % 10, 6) == width)
+    if layout.decimals[0] == 4:
+        plain &= columns.frequency_mhz < 99999999.0
+    if length < full:
+        plain &= (text[:, length:full] == ord(" ")).all(axis=1)
+    text[:, length : length + len(layout.newline)] = np.frombuffer(layout.newline, dtype=np.uint8)
+    return plain
+
+
+def _wide_rows(rows: Text, columns: Columns, layout: Layout, fill: Callable[..., Mask], plain: Mask) -> None:
+    """Fill the rows of numbers that need a decimal less, and mark them plain: long lists have many such lines.
+
+    The program prints FREQ, ERR and LGINT with three decimals where FREQ is wide; LGINT below -99.9999 has three.
+    """
+    if layout.decimals != (4, 4, 4, 4):
+        return
+    wide = columns.frequency_mhz >= 99999999.0
+    for chosen, decimals in ((wide, (3, 3, 3, 4)), (~wide & (columns.lgint <= -99.99995), (4, 4, 3, 4))):
+        index = np.flatnonzero(chosen & ~plain)
+        if len(index):
+            text = np.empty((len(index), rows.shape[1]), dtype=np.uint8)
+            chosen_columns: list[Any] = [column[index] for column in columns]
+            part = _capped(Columns(*chosen_columns), layout.decimals)
+            plain[index] = _plain_rows(text, part, replace(layout, decimals=decimals), fill)
+            rows[index] = text
+
+
+def _odd_line(catalogue: Catalogue, index: int) -> bytes:
+    """A line that stays as it was spelled, or whose numbers need a form of their own."""
+    record, layout = _within_format(catalogue.record(index), index), catalogue.layout
+    stored = layout.spelling.get(index)
+    if stored is not None and _record_of(stored) == record:
+        ends = stored.endswith(b"\n") or index == len(catalogue) - 1
+        return stored if ends else stored + layout.newline
+    try:
+        text = spell_record(record, layout.decimals)
+    except ValueError as error:
+        raise ValueError(f"line {index + 1} cannot be written: {error}") from None
+    length = _length(layout, len(record.quanta_upper))
+    return text.rstrip(" ").ljust(length).encode() + layout.newline
+
+
+def _record_of(text: bytes) -> Record:
+    """The record of a stored spelling, which may begin with blank lines."""
+    return read_record(next(line for line in text.split(b"\n") if line.strip()).rstrip(b"\r").decode("ascii"))
+
+
+def _within_format(record: Record, index: int) -> Record:
+    """The record with as many columns of quantum numbers as its QNFMT can hold."""
+    width = width_of(record.qnfmt)
+    states = [(*state, *(BLANK,) * width) for state in record[-2:]]
+    if any(q != BLANK for state in states for q in state[width:]):
+        raise ValueError(
+            f"line {index + 1} cannot be written: QNFMT {record.qnfmt} can hold {width} quantum numbers a state, "
+            "more are given; its last digit says how many"
+        )
+    return record._replace(quanta_upper=states[0][:width], quanta_lower=states[1][:width])
+
+
+def format_chunks(catalogue: Catalogue) -> Iterator[bytes]:
+    """The text of a catalogue in pieces of some thousand lines, for lists larger than memory should hold twice."""
+    layout, width = catalogue.layout, catalogue.quanta_upper.shape[1]
+    load_compiled(len(catalogue))
+    fill = _row_form()
+    space = max(_length(layout, width), QUANTA + 4 * width) + len(layout.newline)
+    end = _length(layout, width) + len(layout.newline)
+    buffer = np.empty((min(_CHUNK, len(catalogue)), space), dtype=np.uint8)
+    spelled = np.fromiter(layout.spelling, dtype=np.int64, count=len(layout.spelling))
+    yield layout.beginning
+    for start in range(0, len(catalogue), _CHUNK):
+        stop = min(start + _CHUNK, len(catalogue))
+        rows = buffer[: stop - start]
+        columns = catalogue.rows(start, stop)
+        plain = _plain_rows(rows, columns, layout, fill)
+        _wide_rows(rows, columns, layout, fill, plain)
+        plain[spelled[(spelled >= start) & (spelled < stop)] - start] = False
+        yield from _with_odd_lines(catalogue, start, rows[:, :end], plain)
+    yield layout.ending
+
+
+def _with_odd_lines(catalogue: Catalogue, start: int, rows: Text, plain: Mask) -> Iterator[bytes]:
+    """Text of `rows`, the lines from `start` on, with each that is not plain replaced by its own form."""
+    done = 0
+    for odd in np.flatnonzero(~plain).tolist():
+        yield rows[done:odd].tobytes()
+        yield _odd_line(catalogue, start + odd)
+        done = odd + 1
+    yield rows[done:].tobytes()
+
+
+def format_lines(catalogue: Catalogue) -> bytes:
+    """The text of a catalogue, each line ended as its layout says.
+
+    Numbers are rounded as C's printf does. Raises ValueError, with line, field and rule, for what has no place in
+    the format.
+    """
+    return b"".join(format_chunks(catalogue))
+
+
+def write_cat(catalogue: Catalogue, path: str | os.PathLike[str]) -> None:
+    """Write a catalogue, packed when `path` ends in .gz; an existing file is replaced at the end or not at all."""
+    with open_atomic(path) as handle:
+        if os.fspath(path).endswith(".gz"):
+            with gzip.GzipFile(filename="", fileobj=handle, mode="wb", mtime=0) as packed:
+                packed.writelines(format_chunks(catalogue))
+        else:
+            handle.writelines(format_chunks(catalogue))
+
+
+def read_cat(source: str | os.PathLike[str] | bytes) -> Catalogue:
+    """The catalogue in a file, packed with gzip or not, or in the bytes of one.
+
+    Raises ValueError with file, line, columns and the rule that is broken; OSError where the file cannot be opened.
+    """
+    text, name = load(source)
+    beginning = _BOM if text.startswith(_BOM) else b""
+    lines = _lines_of(text, len(beginning))
+    layout = replace(_layout_of(text, lines), beginning=beginning)
+    columns, known = _read_plain(text, lines, layout)
+    return _assembled(text, name, lines, layout, columns, known)
+
+
+class _Lines(NamedTuple):
+    """Where the lines of a text begin and end, their ends included, and which length is the most common."""
+
+    starts: NDArray[np.int64]
+    stops: NDArray[np.int64]
+    length: int
+
+
+def _lines_of(text: bytes, begin: int) -> _Lines:
+    stops = np.flatnonzero(np.frombuffer(text, dtype=np.uint8) == ord("\n")) + 1
+    if len(text) > (stops[-1] if len(stops) else begin):
+        stops = np.append(stops, len(text))
+    starts = np.concatenate(([begin], stops[:-1])).astype(np.int64)[: len(stops)]
+    length = int(np.bincount(stops - starts).argmax()) if len(stops) else 0
+    return _Lines(starts, stops, length)
+
+
+def _typical_line(text: bytes, lines: _Lines) -> bytes:
+    """The first line of the most common length, its end included."""
+    if not len(lines.starts):
+        return b""
+    first = int(np.argmax(lines.stops - lines.starts == lines.length))
+    return text[lines.starts[first] : lines.stops[first]]
+
+
+def _layout_of(text: bytes, lines: _Lines) -> Layout:
+    """The layout of a typical line; a wrong guess costs time, nothing else."""
+    line = _typical_line(text, lines)
+    newline = b"\r\n" if line.endswith(b"\r\n") else b"\n"
+    decimals = [_decimals_in(line, part) for part in (FREQUENCY, ERROR, LGINT, ENERGY)]
+    length = max(lines.length - len(newline), 0) if line else None
+    return Layout(length, newline, (decimals[0], decimals[1], decimals[2], decimals[3]))
+
+
+def _decimals_in(line: bytes, part: slice) -> int:
+    point = line.find(b".", part.start, part.stop)
+    places = part.stop - 1 - point
+    return places if point >= 0 and places < 7 else 4
+
+
+def _read_plain(text: bytes, lines: _Lines, layout: Layout) -> tuple[Columns, Mask]:
+    """The numbers of all lines, and which lines are just what those numbers would be written as."""
+    known = np.zeros(len(lines.starts), dtype=np.bool_)
+    width = _width_guess(text, lines)
+    parts = []
+    for start in range(0, len(known), _CHUNK):
+        chunk = slice(start, start + _CHUNK)
+        rows, regular = _rows_of(text, lines, chunk)
+        padded = np.full((len(rows), max(lines.length, QUANTA + 4 * width) + 2), ord(" "), dtype=np.uint8)
+        padded[:, : layout.line_length] = rows[:, : layout.line_length]
+        columns = take_rows(padded, width, layout.decimals)
+        plain = _plain_rows(padded, columns, layout, put_rows)
+        plain &= (padded[:, : lines.length] == rows).all(axis=1) & _quanta_present(columns)
+        known[chunk] = regular & plain
+        parts.append(columns)
+    return _joined(parts, width), known
+
+
+def _width_guess(text: bytes, lines: _Lines) -> int:
+    last = _typical_line(text, lines)[QNFMT][-1:]
+    return width_of(int(last)) if last.isdigit() else 6
+
+
+def _rows_of(text: bytes, lines: _Lines, chunk: slice) -> tuple[Text, Mask]:
+    """The lines of a chunk as rows of characters; those of another length are blank and marked false."""
+    starts, stops = lines.starts[chunk], lines.stops[chunk]
+    regular = stops - starts == lines.length
+    characters = np.frombuffer(text, dtype=np.uint8)
+    if regular.all():
+        return characters[starts[0] : stops[-1]].reshape(-1, lines.length), regular
+    rows = np.full((len(starts), lines.length), ord(" "), dtype=np.uint8)
+    rows[regular] = characters[starts[regular, None] + np.arange(lines.length)]
+    return rows, regular
+
+
+def _quanta_present(columns: Columns) -> Mask:
+    """Whether each line has as many quantum numbers as its QNFMT says."""
+    width = columns.quanta_upper.shape[1]
+    needed = np.arange(width) < (columns.qnfmt % 10)[:, None]
+    blank = (columns.quanta_upper == BLANK) | (columns.quanta_lower == BLANK)
+    return ~np.asarray((needed & blank).any(axis=1))
+
+
+def _joined(parts: list[Columns], width: int) -> Columns:
+    if not parts:
+        return _empty(0, width)
+    return Columns._make(np.concatenate([part[i] for part in parts]) for i in range(len(parts[0])))
+
+
+def _empty(lines: int, width: int) -> Columns:
+    shapes = [(lines, width) if name.startswith("quanta") else (lines,) for name in DTYPES]
+    return Columns._make(
+        np.full(s, BLANK if len(s) > 1 else 0, d) for s, d in zip(shapes, DTYPES.values(), strict=True)
+    )
+
+
+def _assembled(text: bytes, name: str, lines: _Lines, layout: Layout, columns: Columns, known: Mask) -> Catalogue:
+    """The catalogue, the lines not known yet read one by one; blank lines go with the line that follows."""
+    records: dict[int, Record] = {}
+    for number in np.flatnonzero(~known).tolist():
+        line = text[lines.starts[number] : lines.stops[number]]
+        if line.strip(_BLANKS):
+            records[number] = _careful_record(line, f"{name}, line {number + 1}")
+            if text.endswith(line) and set(records[number].quanta_lower) == {BLANK}:
+                raise ValueError(
+                    f"{name}, line {number + 1}: the file ends without a lower state and a line end; it was cut"
+                )
+    columns = _with_records(columns, records)
+
+    stored = known.copy()
+    stored[list(records)] = True
+    numbers, stops = np.flatnonzero(stored), lines.stops[stored]
+    begins = np.concatenate(([len(layout.beginning)], stops[:-1]))[: len(stops)]
+    odd = ~known[stored] | (begins < lines.starts[stored])
+    spelling = {i: text[begins[i] : stops[i]] for i in np.flatnonzero(odd).tolist()}
+    ending = text[stops[-1] if len(stops) else len(layout.beginning) :]
+    whole = columns if len(numbers) == len(known) else Columns._make(column[numbers] for column in columns)
+    return Catalogue(*whole, layout=replace(layout, spelling=spelling, ending=ending))
+
+
+def _careful_record(line: bytes, where: str) -> Record:
+    body = line.removesuffix(b"\n").removesuffix(b"\r")
+    strange = next((i for i, c in enumerate(body) if not 32 <= c < 127), None)
+    if strange is not None:
+        raise ValueError(f"{where}, column {strange + 1}: byte {body[strange]:#04x}; expected plain ASCII, no tab")
+    try:
+        return read_record(body.decode("ascii"))
+    except ValueError as error:
+        raise ValueError(f"{where}, {error}") from None
+
+
+def _with_records(columns: Columns, records: dict[int, Record]) -> Columns:
+    """The columns with the lines of `records` set, wider where one of them has more quantum numbers."""
+    width = max([columns.quanta_upper.shape[1], *(len(record.quanta_upper) for record in records.values())])
+    wider = _empty(len(columns.dr), width)
+    wider.quanta_upper[:, : columns.quanta_upper.shape[1]] = columns.quanta_upper
+    wider.quanta_lower[:, : columns.quanta_lower.shape[1]] = columns.quanta_lower
+    columns = columns._replace(quanta_upper=wider.quanta_upper, quanta_lower=wider.quanta_lower)
+    for number, record in records.items():
+        for name, value in record._asdict().items():
+            getattr(columns, name)[number] = (*value, *(BLANK,) * width)[:width] if isinstance(value, tuple) else value
+    return columns

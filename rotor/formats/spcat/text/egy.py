@@ -1,0 +1,162 @@
+"""Energy levels as SPCAT lists them, .egy: block, energy, mixing, degeneracy and quantum numbers."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor.formats.atomic_write import open_atomic
+from rotor.formats.spcat.text.fields import BLANK, read_decimal, read_whole
+from rotor.formats.spcat.text.freeform import Line, encode, read_lines
+
+_COLON = 63  # where the quantum numbers' colon stands
+
+
+class Level(NamedTuple):
+    """The numbers of one level; the names are those of `LevelList`."""
+
+    block: int
+    rank: int
+    energy_cm: float
+    error_cm: float
+    mixing: float
+    degeneracy: int
+    quanta: tuple[int, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class LevelList:
+    """Levels, columns of equal length n.
+
+    block, rank (n,): where in the program's Hamiltonian. energy_cm, error_cm (n,): cm⁻¹. mixing (n,): share of the
+    state that gives the label. degeneracy (n,): of M and of nuclear spins. quanta (n, w): -32768 where there is none.
+    texts: what was read that is not written so from the numbers: derivatives and vectors among the levels, other
+    spacing; it begins with what stands before the level. rest: what follows the last level.
+    """
+
+    block: NDArray[np.int32]
+    rank: NDArray[np.int32]
+    energy_cm: NDArray[np.float64]
+    error_cm: NDArray[np.float64]
+    mixing: NDArray[np.float64]
+    degeneracy: NDArray[np.int32]
+    quanta: NDArray[np.int16]
+    texts: Mapping[int, str] = field(default_factory=dict)
+    rest: str = ""
+
+    def __len__(self) -> int:
+        return len(self.block)
+
+    def level(self, index: int) -> Level:
+        """The numbers of one level."""
+        columns = (self.block, self.rank, self.energy_cm, self.error_cm, self.mixing, self.degeneracy)
+        quanta = tuple(q for q in self.quanta[index].tolist() if q != BLANK)
+        return Level._make([*(column[index].item() for column in columns), quanta])
+
+
+_FIELDS = (
+    ("IBLK", 0, 6, read_whole),
+    ("INDX", 6, 11, read_whole),
+    ("EGY", 11, 29, read_decimal),
+    ("ERR", 29, 47, read_decimal),
+    ("PMIX", 47, 58, read_decimal),
+    ("the degeneracy", 58, 63, read_whole),
+)
+
+
+def read_egy(source: str | os.PathLike[str] | bytes) -> LevelList:
+    """The levels in an .egy file, packed or not, or in the bytes of one.
+
+    A line without the colon before its quantum numbers is none of a level; it must be of a table of derivatives or
+    of a vector, which are preserved, not read. Raises ValueError with file, line, column and the rule that is broken.
+    """
+    levels: list[Level] = []
+    texts: dict[int, str] = {}
+    before = ""
+    for line in read_lines(source):
+        if line.blank or line.text.startswith(" " * 8):
+            before += line.text
+            continue
+        level = read_level(line)
+        if before or _plain_text(level) != line.text:
+            texts[len(levels)] = before + line.text
+        levels.append(level)
+        before = ""
+    return _level_list(levels, texts, before)
+
+
+def _level_list(levels: list[Level], texts: dict[int, str], rest: str) -> LevelList:
+    width = max((len(level.quanta) for level in levels), default=0)
+    quanta = np.full((len(levels), width), BLANK, dtype=np.int16)
+    for row, level in zip(quanta, levels, strict=True):
+        row[: len(level.quanta)] = level.quanta
+    columns = list(zip(*(level[:6] for level in levels), strict=True)) or [()] * 6
+    whole = [np.array(columns[i], dtype=np.int32) for i in (0, 1, 5)]
+    real = [np.array(columns[i], dtype=np.float64) for i in (2, 3, 4)]
+    return LevelList(whole[0], whole[1], real[0], real[1], real[2], whole[2], quanta, texts, rest)
+
+
+def read_level(line: Line) -> Level:
+    """The numbers of one line of the file."""
+    text = line.body
+    if text[_COLON : _COLON + 1] != ":":
+        raise line.error(_COLON, "a level has a colon here, before its quantum numbers")
+    numbers = []
+    for name, start, stop, read in _FIELDS:
+        try:
+            numbers.append(read(text[start:stop]))
+        except ValueError as error:
+            raise line.error(start, f"{name} reads {text[start:stop]!r}; {error}") from None
+        if isinstance(numbers[-1], int) and abs(numbers[-1]) > 2**31 - 1:
+            raise line.error(start, f"{name} = {numbers[-1]} is too large")
+    start = _COLON + 1
+    if text[start : start + 1] == "(" and text[start + 4 : start + 5] == ")":
+        start += 5  # the spin quantum number that stands in brackets where there are more than six quanta
+    return Level._make([*numbers, _quanta(line, start)])
+
+
+def _quanta(line: Line, first: int) -> tuple[int, ...]:
+    quanta = []
+    for start in range(first, len(line.body), 3):
+        part = line.body[start : start + 3]
+        try:
+            quanta.append(read_whole(part))
+        except ValueError as error:
+            raise line.error(start, f"quantum number reads {part!r}; {error}") from None
+    return tuple(quanta)
+
+
+def format_level(level: Level) -> str:
+    """The line of a level as SPCAT writes it; ValueError for numbers that do not fit its columns."""
+    text = _plain_text(level)
+    if text.find(":") != _COLON or any(not -99 <= q <= 999 for q in level.quanta):
+        raise ValueError(f"{level} does not fit the columns of an .egy file")
+    return text
+
+
+def _plain_text(level: Level) -> str:
+    numbers = f"{level.energy_cm:17.6f} {level.error_cm:17.6f} {level.mixing:10.6f} {level.degeneracy:4d}"
+    return f"{level.block:6d} {level.rank:4d} {numbers}:" + "".join(f"{q:3d}" for q in level.quanta) + "\n"
+
+
+def format_egy(levels: LevelList) -> bytes:
+    """The text of a level list; each line as it was read, as long as it says the same."""
+    texts = []
+    for index in range(len(levels)):
+        level, stored = levels.level(index), levels.texts.get(index, "")
+        last = stored.rstrip("\r\n").rpartition("\n")[2]
+        texts.append(
+            stored if stored and read_level(Line(last, index, "stored text")) == level else format_level(level)
+        )
+    return encode([*texts, levels.rest])
+
+
+def write_egy(levels: LevelList, path: str | os.PathLike[str]) -> None:
+    """Write an .egy file; an existing one is replaced at the end or not at all."""
+    with open_atomic(path) as handle:
+        handle.write(format_egy(levels))

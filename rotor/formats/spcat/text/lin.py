@@ -1,0 +1,319 @@
+"""Measured lines for SPFIT, .lin: quantum numbers in twelve fields of three, then frequency, error and weight.
+
+States of more than six quantum numbers (NLINE below 0 in the .par file) have twice as many fields as a state has numbers. A lower
+state whose first number is below 0 is none: the line is an energy from the zero of the Hamiltonian.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor.formats.atomic_write import open_atomic
+from rotor.formats.spcat.text.fields import BLANK, read_whole
+from rotor.formats.spcat.text.freeform import Line, encode, number, read_lines, read_words
+from rotor.units import MHZ_PER_CM
+
+QUANTA_FIELDS = 12  # at least
+MOST_QUANTA = 10  # of a state
+NO_ERROR_MHZ = 0.01  # of a line that states none, as in SPFIT
+_ROTATION = ("j", "n", "k", "ka", "kc", "v")
+
+
+class Measured(NamedTuple):
+    """The numbers of one line: quantum numbers of the upper state, then of the lower, and the rest as in the file."""
+
+    quanta: tuple[int, ...]
+    frequency: float
+    error: float
+    weight: float
+
+
+@dataclass(frozen=True, eq=False)
+class LineList:
+    """Measured lines, columns of equal length n.
+
+    quanta (n, 12 or more): upper state, then at once the lower one; -32768 where blank. frequency, error (n,): as written,
+    MHz or, where the error is negative, cm⁻¹. weight (n,): share within a blend. texts: lines as they were read,
+    with the blank lines before them. rest: what follows the last line. per_state: quantum numbers of each state where some
+    line lacks one, which is -32768 then; 0 where every line has as many as it needs. defaulted: lines without an error.
+    """
+
+    quanta: NDArray[np.int16]
+    frequency: NDArray[np.float64]
+    error: NDArray[np.float64]
+    weight: NDArray[np.float64]
+    texts: Mapping[int, str] = field(default_factory=dict)
+    rest: str = ""
+    per_state: int = 0
+    defaulted: frozenset[int] = frozenset()
+
+    def __post_init__(self) -> None:
+        n = len(self.frequency)
+        shapes = {name: np.shape(getattr(self, name)) for name in ("quanta", "frequency", "error", "weight")}
+        if shapes != {"quanta": (n, self.fields), "frequency": (n,), "error": (n,), "weight": (n,)} or not (
+            QUANTA_FIELDS <= self.fields <= 2 * MOST_QUANTA
+        ):
+            raise ValueError(f"columns of shapes {shapes}; expected quanta (n, {QUANTA_FIELDS}) and the others (n,)")
+
+    def __len__(self) -> int:
+        return len(self.frequency)
+
+    @property
+    def fields(self) -> int:
+        """Fields of quantum numbers in a line."""
+        return int(np.shape(self.quanta)[-1])
+
+    @property
+    def frequency_mhz(self) -> NDArray[np.float64]:
+        """Frequencies in MHz, (n,)."""
+        return np.where(self.error < 0, self.frequency * MHZ_PER_CM, self.frequency)
+
+    @property
+    def error_mhz(self) -> NDArray[np.float64]:
+        """Measurement errors in MHz, (n,), not negative."""
+        return np.where(self.error < 0, -self.error * MHZ_PER_CM, self.error)
+
+    def states(self) -> tuple[NDArray[np.int16], NDArray[np.int16]]:
+        """Quantum numbers of the upper and the lower states, two arrays (n, 6 or more), blanks -32768."""
+        upper, lower = (np.full((len(self), self.fields // 2), BLANK, dtype=np.int16) for _ in range(2))
+        if count := self.per_state:
+            upper[:, :count], lower[:, :count] = self.quanta[:, :count], self.quanta[:, count : 2 * count]
+            return upper, lower
+        counts = (self.quanta != BLANK).sum(axis=1) // 2
+        for count in np.unique(counts).tolist():
+            rows = counts == count
+            upper[rows, :count] = self.quanta[rows, :count]
+            lower[rows, :count] = self.quanta[rows, count : 2 * count]
+        return upper, lower
+
+    def blends(self) -> NDArray[np.int64]:
+        """Which blend each line belongs to, (n,), counted from 0; a line alone is a blend of one.
+
+        Lines of one frequency and error that follow each other are one blend. A line of the same frequency behind a
+        blend, with an error at least twice as large, is no line: it says how wide the blend may be, and has -1.
+
+        >>> lines = np.array([[5.0, 0.1], [5.0, 0.1], [5.0, 0.3], [7.0, 0.1]])
+        >>> LineList(np.zeros((4, 12), dtype=np.int16), lines[:, 0], lines[:, 1], np.ones(4)).blends()
+        array([ 0,  0, -1,  1])
+        """
+        groups = np.empty(len(self), dtype=np.int64)
+        first, blend = 0, -1
+        for i in range(len(self)):
+            alike = i > 0 and self.frequency[i] == self.frequency[first]
+            if alike and self.error[i] == self.error[first]:
+                groups[i] = blend
+            elif alike and i - first > 1 and abs(self.error[i]) >= 2 * abs(self.error[first]):
+                groups[i] = -1
+            else:
+                first, blend = i, blend + 1
+                groups[i] = blend
+        return groups
+
+    def measured(self, index: int) -> Measured:
+        """The numbers of one line."""
+        quanta = tuple(q for q in self.quanta[index].tolist() if q != BLANK)
+        return Measured(quanta, float(self.frequency[index]), float(self.error[index]), float(self.weight[index]))
+
+
+def read_lin(source: str | os.PathLike[str] | bytes, per_state: int = 0) -> LineList:
+    """The lines in a .lin file, or in the bytes of one.
+
+    As in the field's program a blank line ends the list, unless it stands at the beginning; text behind it is preserved; a
+    missing error is 0.01 MHz, a missing weight 1. per_state: how many quantum numbers a state has, for lines that lack some;
+    unless given, as many as in the other lines; more than six take more than twelve fields. Raises ValueError with file, line,
+    column and the rule that is broken; nothing is skipped in silence.
+    """
+    lines = read_lines(source)
+    first = next((i for i, line in enumerate(lines) if not line.blank), len(lines))
+    end = next((i for i, line in enumerate(lines) if i > first and line.blank), len(lines))
+    listed = lines[first:end]
+    texts = {i: line.text for i, line in enumerate(listed)}
+    if texts:
+        texts[0] = "".join(line.text for line in lines[:first]) + texts[0]
+    width = max(QUANTA_FIELDS, 2 * per_state)
+    fields = [_fields(line, width) for line in listed]
+    missing = next((i for i, row in enumerate(fields) if _lacks_some(row, per_state)), None)
+    if missing is not None:
+        per_state = per_state or max((_leading(row) // 2 for row in fields if _leading(row) % 2 == 0), default=0)
+        if not per_state:
+            count = _leading(fields[missing])
+            raise listed[missing].error(
+                3 * count,
+                f"{count} quantum numbers; expected as many for the upper state as for the lower, "
+                "or other lines, or the constants of a fit, that show how many are missing",
+            )
+    measured = [read_measured(line, width) for line in listed]
+    quanta = np.full((len(measured), width), BLANK, dtype=np.int16)
+    for row, found, line in zip(quanta, fields, measured, strict=True):
+        known = line.quanta if missing is None else found[: 2 * per_state]
+        row[: len(known)] = known
+    columns = np.array([line[1:] for line in measured], dtype=np.float64).reshape(-1, 3)
+    rest = "".join(line.text for line in lines[end if texts else 0 :])
+    without_error = frozenset(i for i, line in enumerate(listed) if len(read_words(_plain(line), 3 * width, 3)[0]) < 2)
+    return LineList(
+        quanta,
+        columns[:, 0],
+        columns[:, 1],
+        columns[:, 2],
+        texts,
+        rest,
+        0 if missing is None else per_state,
+        without_error,
+    )
+
+
+def with_defaults(lines: LineList, names: Sequence[str]) -> LineList:
+    """The lines with SPFIT's values for quantum numbers that are missing; as they are where none is.
+
+    0 for those of rotation and state; for a sum of angular momenta the sum before it, which is N for the first
+    (`deflin` and `getlin` in H. M. Pickett's program). names: of the quantum numbers of a state, rotation and state first.
+    """
+    if lines.per_state != len(names):
+        return lines
+    rotation = sum(name in _ROTATION for name in names)
+    quanta = lines.quanta.copy()
+    for start in (0, len(names)):
+        for k in range(len(names)):
+            before = 0 if k < rotation else quanta[:, start] if k == rotation else quanta[:, start + k - 1]
+            quanta[:, start + k] = np.where(quanta[:, start + k] == BLANK, before, quanta[:, start + k])
+    changed = np.flatnonzero((quanta != lines.quanta).any(axis=1)).tolist()
+    return replace(lines, quanta=quanta, per_state=0, defaulted=lines.defaulted | set(changed))
+
+
+def note_of_defaults(lines: LineList) -> str:
+    """What a user must know of lines that lack something."""
+    return (
+        f"{len(lines.defaulted)} lines lack quantum numbers or an error: SPFIT's defaults are taken (F as the sum before it, "
+        f"others 0; {NO_ERROR_MHZ} MHz)"
+    )
+
+
+def _plain(line: Line) -> Line:
+    return line._replace(text=line.body.removeprefix("\ufeff"))
+
+
+def read_measured(line: Line, width: int = QUANTA_FIELDS) -> Measured:
+    """The numbers of one line of the file with so many fields of quantum numbers."""
+    plain = _plain(line)
+    fields = _fields(plain, width)
+    words, _ = read_words(plain, 3 * width, 3)
+    frequency = number(line, words, 0, f"the frequency (from column {3 * width + 1} on)")
+    error = number(line, words, 1, "the error of the frequency", NO_ERROR_MHZ)
+    quanta = fields[: _leading(fields)]
+    return Measured(quanta, frequency, error, number(line, words, 2, "the weight", 1.0))
+
+
+def _leading(fields: tuple[int, ...]) -> int:
+    """Quantum numbers before the first blank field."""
+    return fields.index(BLANK) if BLANK in fields else len(fields)
+
+
+def _lacks_some(fields: tuple[int, ...], per_state: int) -> bool:
+    """Whether a line lacks quantum numbers: an odd count before a blank, or a blank among as many as there should be.
+
+    A lower state that begins with a number below 0 is none and needs no more of them.
+    """
+    count = _leading(fields)
+    if per_state and per_state < len(fields) < 2 * per_state and fields[per_state] < 0:
+        return True
+    return bool(count % 2) or not count or (count < len(fields) <= 2 * per_state)
+
+
+def _fields(line: Line, width: int) -> tuple[int, ...]:
+    """The fields of three columns up to the last quantum number, blank ones among them; an annotation behind a blank ends them."""
+    text, quanta = _plain(line).text[: 3 * width], list[int]()
+    for column in range(0, len(text), 3):
+        part = text[column : column + 3]
+        if not part.strip(" "):
+            quanta.append(BLANK)
+            continue
+        try:
+            quanta.append(read_whole(part))
+        except ValueError as error:
+            if BLANK in quanta:
+                break
+            raise line.error(column, f"quantum number reads {part!r}; {error}") from None
+    while quanta and quanta[-1] == BLANK:
+        quanta.pop()
+    return tuple(quanta)
+
+
+def format_lin(lines: LineList) -> bytes:
+    """The text of a line list; each line as it was read, as long as it says the same."""
+    return encode([*(_line_text(lines, index) for index in range(len(lines))), lines.rest])
+
+
+def _line_text(lines: LineList, index: int) -> str:
+    measured, stored = lines.measured(index), lines.texts.get(index, "")
+    if lines.per_state:  # blanks among them
+        measured = measured._replace(quanta=tuple(lines.quanta[index, : 2 * lines.per_state].tolist()))
+    if stored and _stored(stored, index, lines.per_state, lines.fields) == measured:
+        return stored
+    wrong = next((q for q in measured.quanta if q != BLANK and not -99 <= q <= 999), None)
+    if wrong is not None or not measured.quanta or len(measured.quanta) % 2:
+        raise ValueError(
+            f"line {index + 1} cannot be written: quantum numbers {measured.quanta}; as many for the upper as for "
+            "the lower state, from -99 to 999, fit the format"
+        )
+    quanta = "".join("   " if q == BLANK else f"{q:3d}" for q in measured.quanta)
+    return f"{quanta:<{3 * lines.fields}} {measured.frequency!r:>16} {measured.error!r:>10} {measured.weight!r}\n"
+
+
+def _stored(text: str, index: int, per_state: int, width: int) -> Measured:
+    """The numbers of a line as it was read, blank fields among them where lines lack quantum numbers."""
+    line = Line(text.rstrip("\r\n").rpartition("\n")[2], index, "stored text")
+    found, fields = read_measured(line, width), _fields(line, width)[: 2 * per_state]
+    return found._replace(quanta=fields + (BLANK,) * (2 * per_state - len(fields))) if per_state else found
+
+
+def write_lin(lines: LineList, path: str | os.PathLike[str]) -> None:
+    """Write a .lin file; an existing one is replaced at the end or not at all."""
+    with open_atomic(path) as handle:
+        handle.write(format_lin(lines))
+
+
+def line_list(quanta_upper: Any, quanta_lower: Any, frequency_mhz: Any, error_mhz: Any, weight: Any = 1.0) -> LineList:
+    """A line list from quantum numbers of both states, frequencies and errors.
+
+    Parameters
+    ----------
+    quanta_upper, quanta_lower : (n, k) arrays of int
+        k up to 10.
+    frequency_mhz : (n,) array
+        Measured.
+    error_mhz : (n,) array or float
+        Not negative.
+    weight : (n,) array or float, optional
+        Shares in blends.
+
+    Returns
+    -------
+    LineList
+        n lines.
+
+    Raises
+    ------
+    ValueError
+        For shapes that do not fit each other, and errors below 0.
+
+    Examples
+    --------
+    >>> print(format_lin(line_list([[1]], [[0]], [115271.2018], 0.0005)).decode(), end="")
+      1  0                                    115271.2018     0.0005 1.0
+    """
+    upper, lower = np.asarray(quanta_upper), np.asarray(quanta_lower)
+    frequency = np.asarray(frequency_mhz, dtype=np.float64)
+    if upper.shape != lower.shape or upper.ndim != 2 or upper.shape[1] > MOST_QUANTA or len(upper) != len(frequency):
+        raise ValueError(f"quantum numbers of shapes {upper.shape}, {lower.shape} for {len(frequency)} lines; (n, k)")
+    quanta = np.full((len(upper), max(QUANTA_FIELDS, 2 * upper.shape[1])), BLANK, dtype=np.int16)
+    quanta[:, : 2 * upper.shape[1]] = np.concatenate([upper, lower], axis=1)
+    error, share = (np.broadcast_to(np.asarray(v, dtype=np.float64), frequency.shape) for v in (error_mhz, weight))
+    if (error < 0).any():
+        raise ValueError("errors in MHz are not negative; in the file a minus sign means cm⁻¹")
+    return LineList(quanta, frequency, error, share)

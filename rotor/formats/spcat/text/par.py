@@ -1,0 +1,206 @@
+"""The parameter file of SPFIT and SPCAT, .par and .var: header, options, coded parameters, correlation as it is."""
+
+from __future__ import annotations
+
+import os
+import re
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Any
+
+from rotor.formats.atomic_write import open_atomic
+from rotor.formats.spcat.text.freeform import Line, encode, number, read_lines, read_words, spell, whole
+
+_LETTER = re.compile(r"[ \t]*([A-Za-z])?")
+
+
+@dataclass(frozen=True)
+class Header:
+    """Line 2. Only NPAR matters to a prediction; a negative NLINE allows ten quantum numbers a state."""
+
+    npar: int
+    nline: int = 1
+    nitr: int = 1
+    nxpar: int = 0
+    thresh: float = 0.0
+    errtst: float = 1e6
+    frac: float = 1.0
+    cal: float = 1.0
+    text: str = field(default="", compare=False)
+
+
+@dataclass(frozen=True)
+class Options:
+    """An option line; the defaults stand for fields that are left out.
+
+    chr: letter of the names file. spind: degeneracies of the spins, digit by digit; negative for the quantum numbers
+    of a symmetric top. nvib: number of vibrational states; negative for the oblate basis. knmin, knmax: range of K;
+    both 0 for a linear molecule. iax, wtpl, wtmn, ewt: statistical weights. vsym: negative when another option line
+    follows. diag: how levels are ordered and labelled.
+    """
+
+    chr: str = "g"
+    spind: int = 1
+    nvib: int = 1
+    knmin: int = 0
+    knmax: int = 359
+    ixx: int = 0
+    iax: int = 1
+    wtpl: int = 1
+    wtmn: int = 1
+    vsym: int = 0
+    ewt: int = 99
+    diag: int = 0
+    xopt: int = 0
+    text: str = field(default="", compare=False)
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A parameter line: the operator's code, the value in MHz, its error, a label.
+
+    constrained: the code is written with a minus sign, in a fit the parameter keeps its ratio to the one before.
+    error: a priori in a .par file, estimated in a .var file; None where it is left out.
+    """
+
+    code: int
+    value: float
+    error: float | None = None
+    label: str = ""
+    constrained: bool = False
+    text: str = field(default="", compare=False)
+
+
+@dataclass(frozen=True)
+class ParameterFile:
+    """A .par or .var file. `rest` is what follows the parameters, such as the correlation matrix, as it stands."""
+
+    title: str
+    header: Header
+    options: tuple[Options, ...]
+    parameters: tuple[Parameter, ...]
+    rest: str = ""
+    title_text: str = field(default="", compare=False)
+
+
+_HEADER = {"npar": 0, "nline": 1, "nitr": 1, "nxpar": 0, "thresh": 0.0, "errtst": 1e6, "frac": 1.0, "cal": 1.0}
+_OPTIONS = ("spind", "nvib", "knmin", "knmax", "ixx", "iax", "wtpl", "wtmn", "vsym", "ewt", "diag", "xopt")
+
+
+def read_par(source: str | os.PathLike[str] | bytes) -> ParameterFile:
+    """The parameters in a .par or .var file, or in the bytes of one.
+
+    Raises ValueError with file, line, column and the rule that is broken.
+    """
+    lines = read_lines(source)
+    if len(lines) < 3:
+        name = lines[0].file if lines else "the text given"
+        raise ValueError(f"{name}: {len(lines)} lines; expected a title, limits, options and parameters")
+    header = _header(lines[1])
+    options = [_options(lines[2])]
+    while options[-1].vsym < 0:
+        at = 2 + len(options)
+        if at == len(lines):
+            raise lines[-1].error(0, "VSYM is negative, so that another option line should follow; the file ends here")
+        options.append(_options(lines[at], options[0]))
+
+    first = 2 + len(options)
+    end = first
+    while end < min(len(lines), first + header.npar) and not lines[end].blank:
+        end += 1
+    parameters = tuple(_parameter(line) for line in lines[first:end])
+    rest = "".join(line.text for line in lines[end:])
+    return ParameterFile(_title(lines[0]), header, tuple(options), parameters, rest, lines[0].text)
+
+
+def _title(line: Line) -> str:
+    return line.body.removeprefix("\ufeff").strip()
+
+
+def _header(line: Line) -> Header:
+    words, _ = read_words(line, 0, len(_HEADER))
+    values: dict[str, Any] = {"npar": whole(line, words, 0, "NPAR")}
+    for index, (name, default) in enumerate(_HEADER.items()):
+        if isinstance(default, int):
+            values[name] = whole(line, words, index, name.upper(), values.get(name, default))
+        else:
+            values[name] = number(line, words, index, name.upper(), default)
+    if values["npar"] < 0:
+        raise line.error(0, f"NPAR is {values['npar']}; it counts the parameters")
+    return Header(**values, text=line.text)
+
+
+def _options(line: Line, defaults: Options = Options()) -> Options:
+    """An option line; the first one sets the defaults of those that follow, but for VSYM."""
+    letter = _LETTER.match(line.body)
+    start = letter.end() if letter else 0
+    words, _ = read_words(line, start, len(_OPTIONS))
+    defaults = replace(defaults, vsym=0)
+    values = {
+        name: whole(line, words, index, name.upper(), getattr(defaults, name)) for index, name in enumerate(_OPTIONS)
+    }
+    return Options(chr=(letter[1] if letter else None) or defaults.chr, **values, text=line.text)
+
+
+def _parameter(line: Line) -> Parameter:
+    words, end = read_words(line, 0, 3)
+    code = whole(line, words, 0, "the parameter code")
+    value = number(line, words, 1, "the parameter's value", 0.0)
+    error = number(line, words, 2, "the parameter's error") if len(words) > 2 and words[2].text else None
+    tail = line.body[end:]
+    label = tail.partition("/")[2].strip() if "/" in tail else ""
+    negative = words[0].text is not None and words[0].text.startswith("-")
+    return Parameter(abs(code), value, error, label, negative, line.text)
+
+
+def format_par(file: ParameterFile) -> bytes:
+    """The text of a parameter file; each line as it was read, as long as it says the same."""
+    title = file.title_text if _title(Line(file.title_text, 1, "")) == file.title else ""
+    return encode([
+        title or _line(file.title),
+        _as_read(file.header, _header) or _header_text(file.header),
+        *(_as_read(options, partial(_options, defaults=_defaults(file, at))) or _options_text(options)
+          for at, options in enumerate(file.options)),
+        *(_as_read(parameter, _parameter) or _parameter_text(parameter) for parameter in file.parameters),
+        file.rest,
+    ])  # fmt: skip
+
+
+def _defaults(file: ParameterFile, at: int) -> Options:
+    return file.options[0] if at else Options()
+
+
+def _as_read(thing: Any, read: Any) -> str:
+    """The text a thing was read from if reading it gives the thing, otherwise nothing."""
+    text: str = thing.text
+    return text if text and read(Line(text, 0, "stored text")) == thing else ""
+
+
+def _line(text: str) -> str:
+    if "\n" in text or "\r" in text:
+        raise ValueError(f"{text!r}: a title or label is one line")
+    return text + "\n"
+
+
+def _header_text(h: Header) -> str:
+    counts = f"{h.npar:5d}{h.nline:6d}{h.nitr:5d}{h.nxpar:5d}"
+    return f"{counts} {spell(h.thresh)} {spell(h.errtst)} {spell(h.frac)} {spell(h.cal)}\n"
+
+
+def _options_text(options: Options) -> str:
+    if not re.fullmatch("[A-Za-z]", options.chr):
+        raise ValueError(f"CHR is {options.chr!r}; expected one letter")
+    return options.chr + "".join(f" {getattr(options, name):4d}" for name in _OPTIONS) + "\n"
+
+
+def _parameter_text(parameter: Parameter) -> str:
+    code = f"{'-' if parameter.constrained else ''}{parameter.code}"
+    error = "" if parameter.error is None else f" {parameter.error:.8E}"
+    label = f" /{parameter.label}" if parameter.label else ""
+    return _line(f"{code:>13} {spell(parameter.value):>23}{error}{label}")
+
+
+def write_par(file: ParameterFile, path: str | os.PathLike[str]) -> None:
+    """Write a .par or .var file; an existing one is replaced at the end or not at all."""
+    with open_atomic(path) as handle:
+        handle.write(format_par(file))

@@ -1,0 +1,257 @@
+"""Catalogue lines as a matrix of characters: whole columns at a time, four digits of each number at a time from tables."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache, partial
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor.classical.error_free import halves
+from rotor.formats.spcat.text.fields import BLANK, QUANTUM_RANGE, spell_degeneracy, spell_quantum
+
+Text = NDArray[np.uint8]
+Mask = NDArray[np.bool_]
+
+FREQUENCY, ERROR, LGINT, DR = slice(0, 13), slice(13, 21), slice(21, 29), slice(29, 31)
+ENERGY, DEGENERACY, TAG, QNFMT = slice(31, 41), slice(41, 44), slice(44, 51), slice(51, 55)
+QUANTA = 55  # where the quantum numbers begin
+
+_BLANK, _MINUS, _POINT, _ZERO = (ord(c) for c in " -.0")
+
+
+class Columns(NamedTuple):
+    """The numbers of some lines, column by column; the names are those of `Catalogue`."""
+
+    frequency_mhz: NDArray[np.float64]
+    error_mhz: NDArray[np.float64]
+    lgint: NDArray[np.float64]
+    dr: NDArray[np.int16]
+    energy_lower_cm: NDArray[np.float64]
+    g_upper: NDArray[np.int32]
+    tag: NDArray[np.int32]
+    qnfmt: NDArray[np.int32]
+    quanta_upper: NDArray[np.int16]
+    quanta_lower: NDArray[np.int16]
+
+
+@cache
+def quantum_table() -> Text:
+    """Two characters for each quantum number, (630, 2): row 0 is blank, row i spells QUANTUM_RANGE[0] + i - 1."""
+    values = [BLANK, *range(QUANTUM_RANGE[0], QUANTUM_RANGE[1] + 1)]
+    return np.frombuffer("".join(map(spell_quantum, values)).encode(), dtype=np.uint8).reshape(-1, 2)
+
+
+@cache
+def degeneracy_table() -> Text:
+    """Three characters for each degeneracy from 0 to 3599, (3600, 3)."""
+    return np.frombuffer("".join(map(spell_degeneracy, range(3600))).encode(), dtype=np.uint8).reshape(-1, 3)
+
+
+def round_decimal(values: NDArray[np.float64], decimals: int) -> tuple[NDArray[np.int64], Mask]:
+    """|values| in units of the last decimal, rounded as printf does, and whether they are small enough for that.
+
+    printf rounds the exact binary value, ties to even. The product a s of a value and 10^decimals is p + e with p
+    its nearest double and e the rest, which Dekker's splitting gives exactly (Numer. Math. 18, 224 (1971)): the
+    sign of (p - floor(p) - 1/2) + e decides.
+    """
+    scale = 10.0**decimals
+    a = np.abs(values)
+    fits = a < 2.0**52 / scale  # false for nan
+    a = np.where(fits, a, 0.0)
+    product = a * scale
+    upper, lower = halves(a)  # 26 bits of a, times scale < 2^27, are exact
+    rest = (upper * scale - product) + lower * scale
+    whole = np.floor(product)
+    above_half = (product - whole - 0.5) + rest
+    magnitude = whole.astype(np.int64)
+    return magnitude + ((above_half > 0) | ((above_half == 0) & (magnitude % 2 == 1))), fits
+
+
+def _put_digits(out: Text, magnitude: NDArray[np.int64], negative: Mask) -> Mask:
+    """Whole numbers with their sign, right-justified, digit by digit; false where they need more columns than `out` has."""
+    left, sign = magnitude, negative
+    for column in range(out.shape[1] - 1, -1, -1):
+        left, digit = np.divmod(left, 10)
+        out[:, column] = _ZERO + digit
+        if column != out.shape[1] - 1:
+            beyond = (left == 0) & (digit == 0)
+            out[beyond, column] = np.where(sign[beyond], _MINUS, _BLANK)
+            sign = sign & ~beyond
+    return np.asarray((left == 0) & ~sign)
+
+
+@cache
+def _group_table(size: int, last: bool) -> Text:
+    """Texts of `size` digits, (2 · 10^size, size): first with zeros in front, for numbers that go on before them, then with blanks.
+
+    0 with blanks is written 0 in the last group of a number, else as blanks.
+    """
+    values, units = np.arange(10**size)[:, None], 10 ** np.arange(size - 1, -1, -1)
+    digits = (values // units % 10 + _ZERO).astype(np.uint8)
+    leading = values < units
+    if last:
+        leading[:, -1] = False
+    return np.concatenate([digits, np.where(leading, np.uint8(_BLANK), digits)])
+
+
+def _put_group(out: Text, table: Text, index: NDArray[np.int64]) -> None:
+    """Rows of a table of characters into `out`; four or two characters go as one number."""
+    kind = {4: np.uint32, 2: np.uint16}.get(out.shape[1])
+    if kind is None:
+        out[:] = table[index]
+    else:
+        out.view(kind)[:, 0] = table.view(kind)[:, 0][index]
+
+
+def _put_natural(out: Text, magnitude: NDArray[np.int64]) -> Mask:
+    """Whole numbers without a sign, right-justified, four digits at a time; false where they need more columns."""
+    left, stop = magnitude, out.shape[1]
+    while stop > 0:
+        size = min(4, stop)
+        higher = left // 10**size
+        index = left - higher * 10**size + (higher == 0) * 10**size
+        _put_group(out[:, stop - size : stop], _group_table(size, stop == out.shape[1]), index)
+        left, stop = higher, stop - size
+    return np.asarray(left == 0)
+
+
+def _put_signed(out: Text, magnitude: NDArray[np.int64], negative: Mask) -> Mask:
+    """Whole numbers with their sign, right-justified; false where they need more columns than `out` has."""
+    fits = _put_natural(out, magnitude)
+    if not negative.any():
+        return fits
+    width = out.shape[1] - 1
+    if width > 4:  # a long field has few negative numbers
+        rows = np.flatnonzero(negative)
+        text = np.empty((len(rows), width + 1), dtype=np.uint8)
+        fits[rows] = _put_digits(text, magnitude[rows], negative[rows])
+        out[rows] = text
+        return fits
+    for digits in range(1, width + 1):  # of a short one the sign stands before the first of few digits
+        least = 10 ** (digits - 1) if digits > 1 else 0
+        out[negative & (magnitude >= least) & (magnitude < 10**digits), width - digits] = _MINUS
+    return np.asarray(fits & ~(negative & (magnitude >= 10**width)))
+
+
+def _put_decimal(out: Text, values: NDArray[np.float64], decimals: int) -> Mask:
+    magnitude, fits = round_decimal(values, decimals)
+    whole = magnitude // 10**decimals
+    part, stop = magnitude - whole * 10**decimals, out.shape[1]
+    for size in [4] * (decimals // 4) + [decimals % 4] * (decimals % 4 > 0):
+        higher = part // 10**size
+        _put_group(out[:, stop - size : stop], _group_table(size, True), part - higher * 10**size)
+        part, stop = higher, stop - size
+    out[:, stop - 1] = _POINT
+    return fits & _put_signed(out[:, : stop - 1], whole, np.signbit(values))
+
+
+def _put_whole(out: Text, values: NDArray[np.integer]) -> Mask:
+    wide = values.astype(np.int64)
+    return _put_signed(out, np.abs(wide), wide < 0)
+
+
+def _put_quanta(out: Text, quanta: NDArray[np.int16]) -> Mask:
+    """Two characters for each of the quantum numbers (n, columns) of a state."""
+    legal = np.ones(len(out), dtype=np.bool_)
+    for column, values in enumerate(quanta.T):
+        index = values.astype(np.int64) - (QUANTUM_RANGE[0] - 1)
+        index[values == BLANK] = 0
+        wrong = (index < 0) | (index >= len(quantum_table())) | ((index == 0) & (values != BLANK))
+        index[wrong] = 0
+        legal &= ~wrong
+        _put_group(out[:, 2 * column : 2 * column + 2], quantum_table(), index)
+    return legal
+
+
+def _put_degeneracy(out: Text, values: NDArray[np.int32]) -> Mask:
+    known = (values >= 0) & (values < len(degeneracy_table()))
+    out[:] = degeneracy_table()[np.where(known, values, 0)]
+    return np.asarray(known)
+
+
+def _put_field(out: Text, values: NDArray[Any], put: Callable[[Text, Any], Mask]) -> Mask | bool:
+    """A column in its field; one that has a single value is spelled once."""
+    if (values[0] != values[-1]).any() or (values != values[0]).any():
+        return put(out, values)
+    once = np.empty((1, out.shape[1]), dtype=np.uint8)
+    fits = bool(put(once, values[:1])[0])
+    out[:] = once
+    return fits
+
+
+def put_rows(out: Text, columns: Columns, decimals: tuple[int, int, int, int]) -> Mask:
+    """Fill `out` (n, length), length at least 55 + 4 quanta, with the lines of `columns`.
+
+    True for each line whose numbers all fit their fields as they are; what `out` holds elsewhere is undefined.
+    """
+    plain = np.ones(len(out), dtype=np.bool_)
+    if not len(out):
+        return plain
+    numbers = zip((FREQUENCY, ERROR, LGINT, ENERGY), (*columns[:3], columns.energy_lower_cm), decimals, strict=True)
+    for field, values, places in numbers:
+        plain &= _put_field(out[:, field], values, partial(_put_decimal, decimals=places))
+    for field, whole in ((DR, columns.dr), (TAG, columns.tag), (QNFMT, columns.qnfmt)):
+        plain &= _put_field(out[:, field], whole, _put_whole)
+    plain &= _put_field(out[:, DEGENERACY], columns.g_upper, _put_degeneracy)
+    start = QUANTA
+    for quanta in (columns.quanta_upper, columns.quanta_lower):
+        for column in range(quanta.shape[1]):
+            plain &= _put_field(out[:, start : start + 2], quanta[:, column : column + 1], _put_quanta)
+            start += 2
+    out[:, start:] = _BLANK
+    return plain
+
+
+@cache
+def _code_table() -> NDArray[np.int16]:
+    """The quantum number of every pair of characters, by 256 first + second; 0 where the pair says none."""
+    table = np.zeros(65536, dtype=np.int16)
+    codes = quantum_table().astype(np.int64) @ [256, 1]
+    table[codes] = [BLANK, *range(QUANTUM_RANGE[0], QUANTUM_RANGE[1] + 1)]
+    return table
+
+
+def _take_number(digits: Text, characters: Text, field: slice, decimals: int | None = None) -> NDArray[np.int64]:
+    """The whole number in rows `field` of the turned text, its point (before `decimals` digits) left out."""
+    point = -1 if decimals is None else field.stop - 1 - decimals
+    number = np.zeros(digits.shape[1], dtype=np.int64)
+    for row in range(field.start, field.stop):
+        if row != point:
+            number *= 10
+            number += digits[row]
+    np.negative(number, out=number, where=(characters[field] == _MINUS).any(axis=0))
+    return number
+
+
+def take_rows(text: Text, width: int, decimals: tuple[int, int, int, int]) -> Columns:
+    """The numbers of lines `text` (n, 55 + 4 width at least), taken to be as `put_rows` writes them.
+
+    Nothing is checked here: the caller puts the numbers into rows again and compares the characters.
+    """
+    head = np.ascontiguousarray(text[:, :QUANTA].T)
+    digits = head - _ZERO
+    digits[digits > 9] = 0
+    letters = head[DEGENERACY.start] - ord("A")
+    digits[DEGENERACY.start][letters < 26] = letters[letters < 26] + 10
+    pairs = text[:, QUANTA : QUANTA + 4 * width].astype(np.int64)
+    quanta = _code_table()[256 * pairs[:, ::2] + pairs[:, 1::2]]
+    frequency, error, lgint, energy = (
+        _take_number(digits, head, field, places) / 10.0**places
+        for field, places in zip((FREQUENCY, ERROR, LGINT, ENERGY), decimals, strict=True)
+    )
+    dr, g_upper, tag, qnfmt = (_take_number(digits, head, field) for field in (DR, DEGENERACY, TAG, QNFMT))
+    return Columns(
+        frequency_mhz=frequency,
+        error_mhz=error,
+        lgint=lgint,
+        dr=dr.astype(np.int16),
+        energy_lower_cm=energy,
+        g_upper=g_upper.astype(np.int32),
+        tag=tag.astype(np.int32),
+        qnfmt=qnfmt.astype(np.int32),
+        quanta_upper=quanta[:, :width],
+        quanta_lower=quanta[:, width:],
+    )

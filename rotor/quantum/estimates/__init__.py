@@ -1,0 +1,1 @@
+"""How far levels can be relied on: convergence, limits, derivatives and errors."""

@@ -1,0 +1,231 @@
+"""Where an effective Hamiltonian stops being one: distortion that does not converge, levels out of order.
+
+The series J², J⁴, J⁶, ... of an effective Hamiltonian is asymptotic. As long as each order is a small part of the one
+before, what is left out is small too; where the ratio nears one, energies mean nothing, however many digits they have.
+The size of an order at one J is the largest sum of a row of its matrix, which bounds its eigenvalues (S. Gershgorin,
+Izv. Akad. Nauk SSSR 7 (1931) 749).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rotor.arrays import Floats
+from rotor.quantum.effect import QuantumEffect
+from rotor.quantum.effects.watson import SEMI_RIGID, Rigid, rigid_operators
+from rotor.quantum.levels import Levels, SolvedBlock
+from rotor.quantum.wang.rotation import hamiltonian
+from rotor.quantum.wang.wang_matrix import JMatrix, block_bands, scalar_energy
+from rotor.tops.operators import Operators
+
+if TYPE_CHECKING:
+    from rotor.tops.top import Top
+
+HALF = 0.5 - 1e-6  # two functions that share a level evenly are not mixed by more than half
+RATIO_LIMIT = 0.3  # of successive orders, above which the series is said not to converge
+
+
+def order_sizes_mhz(
+    top: Top, j: int, kmax: int | None = None, effects: Sequence[QuantumEffect] = SEMI_RIGID
+) -> dict[int, float]:
+    """How large every order of the Hamiltonian is for one J and |K| up to `kmax`.
+
+    The size of an order is the largest sum of absolute values of a row of its matrix, which bounds its eigenvalues
+    (Gershgorin).
+
+    Parameters
+    ----------
+    top : Top
+        The constants and the kind of top.
+    j : int
+        Rotational angular momentum J.
+    kmax : int, optional
+        The highest |K| of the rows; J by default.
+    effects : sequence of QuantumEffect, optional
+        What the Hamiltonian consists of.
+
+    Returns
+    -------
+    dict of int to float
+        {power of J: size in MHz}, in rising order of the powers.
+
+    Notes
+    -----
+    D_t of a spherical top is counted as an order of four as a whole, although its expansion has terms of J² too.
+
+    Examples
+    --------
+    >>> from rotor.tops.top import Top
+    >>> order_sizes_mhz(Top.from_constants("B=6000 D=0.01 MHz"), 10)
+    {2: 660000.0, 4: 121.0}
+    """
+    by_order: dict[int, Operators] = {}
+    for powers, value in hamiltonian(top, effects).items():
+        by_order.setdefault(2 * sum(powers), {})[powers] = value
+    if top.kind == "spherical":  # D_t, whose expansion has terms of J² too, is all of order four
+        by_order = _without_mixture(by_order)
+    highest = 0 if top.kind == "linear" else j if kmax is None else min(kmax, j)
+    return {order: _row_bound(by_order[order], j, highest) for order in sorted(by_order)}
+
+
+def _without_mixture(by_order: dict[int, Operators]) -> dict[int, Operators]:
+    lower = {powers: value for powers, value in by_order.get(2, {}).items() if powers == (1, 0, 0)}
+    return by_order | {2: lower}
+
+
+def _row_bound(operators: Operators, j: int, kmax: int) -> float:
+    """The largest Σ_K' |⟨K'|H|K⟩| over |K| ≤ kmax."""
+    multiplet = JMatrix(operators, j)
+    k = np.arange(kmax + 1)
+    rows = np.abs(multiplet.element(k, 0) + scalar_energy(operators, j))
+    for n in range(1, multiplet.order + 1):
+        rows += np.abs(multiplet.element(k, n)) + np.abs(multiplet.element(k - 2 * n, n))
+    return float(rows.max())
+
+
+def series_ratio(top: Top, jmax: int, kmax: int | None = None, effects: Sequence[QuantumEffect] = SEMI_RIGID) -> float:
+    """The largest ratio of one order of the Hamiltonian to the order before it, at J = `jmax` and |K| ≤ `kmax`.
+
+    Above 0.3 the series is not to be trusted.
+
+    Parameters
+    ----------
+    top : Top
+        The constants and the kind of top.
+    jmax : int
+        The J at which the orders are compared.
+    kmax : int, optional
+        The highest |K| of the rows; `jmax` by default.
+    effects : sequence of QuantumEffect, optional
+        What the Hamiltonian consists of.
+
+    Returns
+    -------
+    float
+        The ratio, a pure number; 0 for a rigid top.
+
+    Notes
+    -----
+    Orders without a constant are passed over.
+
+    Examples
+    --------
+    >>> from rotor.tops.top import Top
+    >>> round(series_ratio(Top.from_constants("A=835840 B=435352 C=278139 DeltaK=973 MHz"), 20), 2)
+    0.45
+    """
+    return max((ratio for ratio, _ in _ratios(top, jmax, kmax, effects)), default=0.0)
+
+
+def converges_to(top: Top, jmax: int, effects: Sequence[QuantumEffect] = SEMI_RIGID) -> int:
+    """The highest J, up to `jmax`, at which no order of the distortion is above `RATIO_LIMIT` of the order before it.
+
+    >>> from rotor.tops.top import Top
+    >>> converges_to(Top.from_constants("A=835840 B=435352 C=278139 DeltaK=973 MHz"), 20)
+    16
+    """
+    if not jmax or series_ratio(top, jmax, None, effects) <= RATIO_LIMIT:
+        return jmax
+    return _first(top, jmax, None, effects) - 1
+
+
+def _ratios(
+    top: Top, j: int, kmax: int | None, effects: Sequence[QuantumEffect] = SEMI_RIGID
+) -> list[tuple[float, int]]:
+    """(ratio to the order before, order) of every order above the first."""
+    sizes = list(order_sizes_mhz(top, j, kmax, effects).items())
+    pairs = pairwise(sizes)
+    return [(size / before if before else 0.0, order) for (_, before), (order, size) in pairs]
+
+
+def warnings_of(top: Top, levels: Levels) -> tuple[str, ...]:
+    """The limits of these levels, in sentences; empty where there are none.
+
+    That the distortion series does not converge at the highest J and K of the levels, and from which J on; that in
+    some blocks energies are not in the order of the rigid top any more, so that Ka and Kc only count states; that states or
+    species share levels so evenly that their names say little. Levels solved without vectors are judged by the first alone.
+    """
+    return tuple(text for text in (_divergence(top, levels), _disorder(top, levels), _mixture(levels)) if text)
+
+
+def _mixture(levels: Levels) -> str:
+    """How many levels have less than half of what they are called after."""
+    if levels.mixing is None:
+        return ""
+    mixed = levels.mixing < HALF
+    if not mixed.any():
+        return ""
+    lowest, total = int(np.argmin(levels.mixing)), "N" if "n" in levels.quanta else "J"
+    name, first = levels.labels(np.array([lowest]))[0].strip(), int(levels.rotational[mixed].min())
+    return (
+        f"{int(mixed.sum())} levels from {total} = {first} on are mixed by more than 50 %: what they are called after has less than "
+        f"half of them (least {levels.mixing[lowest]:.0%}: {name})"
+    )
+
+
+def _divergence(top: Top, levels: Levels) -> str:
+    j = int(levels.rotational.max(initial=0))
+    k = int(np.abs(levels.quanta["k"]).max(initial=0)) if "k" in levels.quanta else None
+    if not j or series_ratio(top, j, k, levels.effects) <= RATIO_LIMIT:
+        return ""
+    ratio, order = max(_ratios(top, j, k, levels.effects))
+    first = _first(top, j, k, levels.effects)
+    return (
+        f"the distortion series does not converge at J = {j}: the terms of order J^{order} are up to {ratio:.2g} of the "
+        f"order before (limit {RATIO_LIMIT:g}); energies above J = {first - 1} at the highest K are not to be trusted"
+    )
+
+
+def _first(top: Top, jmax: int, kmax: int | None, effects: Sequence[QuantumEffect]) -> int:
+    """The lowest J with a ratio above the limit, by halving: ratios rise with J."""
+    low, high = 0, jmax
+    while high - low > 1:
+        middle = (low + high) // 2
+        low, high = (low, middle) if series_ratio(top, middle, kmax, effects) > RATIO_LIMIT else (middle, high)
+    return high
+
+
+def _disorder(top: Top, levels: Levels) -> str:
+    found = disordered_blocks(top, levels)
+    if not found:
+        return ""
+    first = min(j for j, _ in found)
+    return (
+        f"in {len(found)} blocks from J = {first} on the order of energies is not that of the rigid top: Ka and Kc count "
+        "states there and say nothing about the motion"
+    )
+
+
+def disordered_blocks(top: Top, levels: Levels) -> list[tuple[int, str]]:
+    """(J, species) of Wang blocks where the order of energy is not that of the rigid energy ⟨A Ja² + B Jb² + C Jc²⟩.
+
+    There Ka and Kc only count states: distortion has outgrown the rigid energies (quartic-only water from J = 15 on).
+    ⟨Jz²⟩ itself (`SolvedBlock.jz_squared`) is not the measure, since it falls by a little near the separatrix of a
+    rigid top, where labels are in perfect order.
+    """
+    out: list[tuple[int, str]] = []
+    of_j: dict[int, JMatrix] = {}
+    if hamiltonian(top, levels.effects) == hamiltonian(top, (Rigid(),)):  # a rigid top is in order
+        return out
+    operators = rigid_operators(top.constants)
+    for block in levels.blocks:
+        if not isinstance(block, SolvedBlock) or block.basis.size == 1:
+            continue
+        j = block.basis.j
+        of_j[j] = of_j[j] if j in of_j else JMatrix(operators, j)
+        rigid = _expectations(block_bands(of_j[j], block.basis), block.vectors)
+        if (np.diff(rigid) < -1e-9 * np.abs(rigid).max()).any():
+            out.append((j, block.basis.species))
+    return out
+
+
+def _expectations(bands: list[Floats], vectors: Floats) -> Floats:
+    """⟨v|H|v⟩ for every column of `vectors`, H given by its diagonals."""
+    total = bands[0] @ vectors**2
+    for n, band in enumerate(bands[1:], 1):
+        total += 2 * (band @ (vectors[:-n] * vectors[n:]))
+    return np.asarray(total)

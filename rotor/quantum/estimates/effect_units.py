@@ -1,0 +1,224 @@
+"""The unit matrices of an effect's parameters over the blocks in which labelled levels lie, with spins and states or without.
+
+The levels are solved once as the core solves them; the blocks that have a label are then made anew over the functions of the
+basis, one matrix for each parameter (`unit_blocks`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rotor.arrays import Floats, Ints
+from rotor.quantum.coupled import CoupledBlock, names_of_states, parameter_matrix
+from rotor.quantum.effect import QuantumEffect
+from rotor.quantum.estimates.unit_blocks import Elements, Namer, UnitBlock, UnitBlocks, elements_of, unit_block
+from rotor.quantum.levels import Levels, SolvedBlock
+from rotor.quantum.spins.blocks import (
+    SpinBlock,
+    SpinPart,
+    assigned,
+    coefficients_of,
+    labels_of,
+    names_of_parts,
+    product,
+)
+from rotor.quantum.spins.lines import ParameterOperator
+from rotor.quantum.spins.operators import Scalar
+from rotor.quantum.spins.rotor import Channel
+
+if TYPE_CHECKING:
+    from rotor.tops.top import Top
+
+Units = dict[int, Elements]
+Functions = Callable[[CoupledBlock], tuple[Floats, Ints]]
+
+
+def unit_levels(
+    top: Top,
+    levels: Levels,
+    rows: Ints,
+    names: Sequence[str],
+    values_mhz: Floats,
+    functions: Functions | None = None,
+) -> UnitBlocks:
+    """The blocks in which the rows of levels lie, for other values of the parameters.
+
+    Parameters
+    ----------
+    top : Top
+    levels : Levels
+        Solved with vectors, at values near those of the parameters.
+    rows : (n,) array
+        Rows of levels, in the order in which `UnitBlocks.levels` gives them.
+    names : sequence of str
+        Parameters of the effects of the levels, in the order of the values.
+    values_mhz : (parameters,) array
+        At which the levels were solved.
+    functions : callable, optional
+        Of coupled blocks: the functions (n, n) in rows by which the states are called, and their names v, Ka, Kc (n, 3), where these
+        are not the functions of the basis; the levels have these names.
+
+    Returns
+    -------
+    UnitBlocks
+
+    Raises
+    ------
+    ValueError
+        For levels without blocks.
+    """
+    if not levels.blocks:
+        raise ValueError("levels of a closed form have no blocks; solve them in blocks")
+    starts = np.array([block.start for block in levels.blocks])
+    of_row = np.searchsorted(starts, rows, side="right") - 1
+    numbers = np.unique(of_row).tolist()
+    blocks = [levels.blocks[number] for number in numbers]
+    makers = _Makers(top, levels, names, blocks, functions)
+    units = [makers.unit(block) for block in blocks]
+    inside = [np.flatnonzero(of_row == number) for number in numbers]
+
+    def find(place: int, found: Ints) -> tuple[Ints, Ints]:
+        """Labels of the block by their names, which are those that the levels have."""
+        block, own = blocks[place], inside[place]
+        state_of = {tuple(name): state for state, name in enumerate(found.tolist())}
+        asked = _quanta(levels)[rows[own]] if functions else _names(block)[rows[own] - block.start]
+        return own, np.array([state_of[tuple(name)] for name in asked.tolist()])
+
+    return UnitBlocks(units, len(rows), find, values_mhz)
+
+
+def _quanta(levels: Levels) -> Ints:
+    return np.stack([levels.quanta[name] for name in ("v", "ka", "kc")], axis=1)
+
+
+def _names(block: Any) -> Ints:
+    """What the states of a solved block are called; the rank alone where one Wang block is solved by itself."""
+    return np.arange(len(block.energies_mhz))[:, None] if isinstance(block, SolvedBlock) else block.labels
+
+
+class _Makers:
+    """Unit matrices of solved blocks of any kind, with what they share."""
+
+    def __init__(
+        self, top: Top, levels: Levels, names: Sequence[str], blocks: Sequence[Any], functions: Functions | None
+    ) -> None:
+        self._functions = functions
+        self._top, self._effects, self._names = top, levels.effects, tuple(names)
+        self._representation = str(levels.representation)
+        self._spins = _SpinUnits(top, levels.effects, self._names, blocks) if isinstance(blocks[0], SpinBlock) else None
+
+    def unit(self, block: Any) -> UnitBlock:
+        """The unit matrices of one block."""
+        if isinstance(block, SpinBlock):
+            assert self._spins is not None
+            return self._spins.unit(block)
+        return self._coupled(block) if isinstance(block, CoupledBlock) else self._single(block)
+
+    def _single(self, block: SolvedBlock) -> UnitBlock:
+        dense: dict[int, Floats] = {}
+        for place, name in enumerate(self._names):
+            for effect in self._effects:
+                operators = effect.operators(self._top).get(name)
+                if operators:
+                    found = Scalar(tuple(operators.items())).elements(block.basis, block.basis, self._representation)
+                    if found is not None:
+                        dense[place] = dense[place] + found if place in dense else found
+        units = {place: elements_of(matrix) for place, matrix in dense.items()}
+        return unit_block(units, np.zeros(block.basis.size, dtype=np.int64), _by_rank)
+
+    def _coupled(self, block: CoupledBlock) -> UnitBlock:
+        units: Units = {}
+        for place, name in enumerate(self._names):
+            found = parameter_matrix(self._top, self._effects, self._representation, block, name)
+            if found.any():
+                units[place] = elements_of(found)
+        if self._functions:
+            return _turned(units, *self._functions(block))
+        sub_blocks = np.repeat(np.arange(len(block.parts)), [part.basis.size for part in block.parts])
+
+        def namer(matrix: Floats, energies: Floats, vectors: Floats) -> Ints:
+            whole = np.tril(matrix) + np.tril(matrix, -1).T
+            return names_of_states(block.parts, whole, vectors, self._representation)[0]
+
+        return unit_block(units, sub_blocks, namer)
+
+
+def _turned(units: Units, functions: Floats, names: Ints) -> UnitBlock:
+    """The block over other functions, each of a state by itself: the sub-blocks are their v and the parity of Ka."""
+    turned = {}
+    for place, (places, values) in units.items():
+        lower = np.zeros(functions.shape)
+        lower.ravel()[places] = values
+        turned[place] = elements_of(functions @ (lower + np.tril(lower, -1).T) @ functions.T)
+
+    def namer(matrix: Floats, energies: Floats, vectors: Floats) -> Ints:
+        return np.asarray(names[assigned(vectors**2, np.ones(len(names), dtype=np.int64))])
+
+    members = 2 * names[:, 0] + names[:, 1] % 2
+    return unit_block(turned, np.unique(members, return_inverse=True)[1].reshape(-1), namer)
+
+
+def _by_rank(matrix: Floats, energies: Floats, vectors: Floats) -> Ints:
+    return np.arange(len(energies))[:, None]
+
+
+class _SpinUnits:
+    """Unit matrices of blocks with spins."""
+
+    def __init__(
+        self, top: Top, effects: tuple[QuantumEffect, ...], names: Sequence[str], blocks: Sequence[SpinBlock]
+    ) -> None:
+        self._shared = blocks[0].shared
+        self._operators = [ParameterOperator(top, effects, name, self._shared) for name in names]
+        self._coefficients: dict[tuple[Channel, int], Floats] = {}
+
+    def unit(self, block: SpinBlock) -> UnitBlock:
+        """The unit matrices of one block of an F, the functions of the basis in place of the states of the rotation."""
+        parts = tuple(_in_functions(part) for part in block.parts)
+        units: Units = {}
+        for place, operator in enumerate(self._operators):
+            matrix = self._matrix(operator, parts, block)
+            if matrix is not None:
+                units[place] = elements_of(matrix)
+        return unit_block(units, _sub_blocks(parts, parts[-1].place.stop), _namer(parts, block.patterns))
+
+    def _matrix(self, operator: ParameterOperator, parts: tuple[SpinPart, ...], block: SpinBlock) -> Floats | None:
+        out: Floats | None = None
+        for a, up in enumerate(parts):
+            for low in parts[: a + 1]:
+                for channel, element in operator.elements(up, low).items():
+                    key = (channel, block.twice_f)
+                    if key not in self._coefficients:
+                        self._coefficients[key] = coefficients_of(self._shared.scheme, channel, block.patterns)
+                    out = np.zeros((parts[-1].place.stop,) * 2) if out is None else out
+                    out[up.place, low.place] += product(self._coefficients[key][up.patterns, low.patterns], element)
+        return out
+
+
+def _in_functions(part: SpinPart) -> SpinPart:
+    return part._replace(rotor=part.rotor._replace(vectors=np.eye(len(part.rotor.energies_mhz))))
+
+
+def _sub_blocks(parts: tuple[SpinPart, ...], size: int) -> Ints:
+    """The number of the Wang block and pattern of every function, as `labels_of` counts them."""
+    out, number = np.empty(size, dtype=np.int64), 0
+    for part in parts:
+        states = len(part.rotor.energies_mhz)
+        for own in part.rotor.parts:
+            for pattern in range(part.repeats):
+                start = part.place.start + pattern * states
+                out[start + own.place.start : start + own.place.stop] = number
+                number += 1
+    return out
+
+
+def _namer(parts: tuple[SpinPart, ...], every: Ints) -> Namer:
+    names = names_of_parts(parts, every)
+
+    def namer(matrix: Floats, energies: Floats, vectors: Floats) -> Ints:
+        return labels_of(parts, names, vectors)[0]
+
+    return namer

@@ -1,0 +1,55 @@
+"""What uncertain constants make of levels and lines.
+
+    σ² = d C dᵀ,      C the covariance of the constants, d = ∂E/∂c of a level, ∂E′/∂c - ∂E″/∂c of a line
+
+to first order, which is all there is as long as levels are linear in their constants over one σ. The constants are
+taken as the only cause: what the Hamiltonian leaves out is no part of it. With C = F Fᵀ the variance is the squared
+length of the row d F, so that a list of lines needs the rows of its levels only.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor.arrays import Floats
+from rotor.quantum.estimates.derivatives import level_derivatives
+from rotor.quantum.levels import Levels
+from rotor.tops.covariance import Covariance
+
+if TYPE_CHECKING:
+    from rotor.tops.top import Top
+
+
+_AT_ONCE = 1 << 16  # lines whose rows are gathered at a time
+
+
+def level_spread(top: Top, levels: Levels, covariance: Covariance) -> Floats:
+    """∂E/∂c F of every level, (levels, n) in MHz; lengths and differences of its rows are errors."""
+    return np.asarray(level_derivatives(top, levels, covariance.names) @ covariance.factor)
+
+
+def level_errors(top: Top, levels: Levels, covariance: Covariance) -> Floats:
+    """One standard deviation of every level's energy, (levels,) in MHz, against the Hamiltonian's zero.
+
+    >>> from rotor.tops.constants import Constants
+    >>> from rotor.quantum.solve import solve_levels
+    >>> from rotor.tops.top import Top
+    >>> top = Top(Constants(B=6000.0, uncertainties={"B": 0.1}))
+    >>> covariance = Covariance.of_uncertainties(top.constants)
+    >>> level_errors(top, solve_levels(top, 2), covariance).round(9).tolist()
+    [0.0, 0.2, 0.6]
+    """
+    return np.asarray(np.linalg.norm(level_spread(top, levels, covariance), axis=1))
+
+
+def line_errors(spread: Floats, upper: NDArray[np.integer], lower: NDArray[np.integer]) -> Floats:
+    """One standard deviation of lines between the levels `upper` and `lower`, (lines,) in MHz, from `level_spread`."""
+    out = np.empty(len(upper))
+    for start in range(0, len(upper), _AT_ONCE):
+        here = slice(start, start + _AT_ONCE)
+        difference = spread[upper[here]] - spread[lower[here]]
+        out[here] = np.sqrt(np.einsum("ij,ij->i", difference, difference))
+    return out

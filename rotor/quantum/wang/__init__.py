@@ -1,0 +1,1 @@
+"""Rotation alone: Wang functions, matrices of angular momentum, and their solution."""

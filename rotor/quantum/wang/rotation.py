@@ -1,0 +1,283 @@
+"""Levels of the rotation without spins, by the cheapest exact method: closed forms, Wang blocks, connected Wang blocks.
+
+`rotor.quantum.solve` says which method is for what.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor.arrays import Floats, Ints
+from rotor.quantum.coupled import Model, coupled_levels, model_of
+from rotor.quantum.effect import QuantumEffect, k_limits_of
+from rotor.quantum.effects.watson import SEMI_RIGID
+from rotor.quantum.levels import Levels, SolvedBlock, weights_of_levels
+from rotor.quantum.wang.basis import WangBlock, limited, names_of, wang_blocks
+from rotor.quantum.wang.spherical_top import DIMENSION, is_cubic, scalar_and_tensor, tensor_eigenvalues
+from rotor.quantum.wang.wang_matrix import JMatrix, block_bands, diagonalise, scalar_energy
+from rotor.tops.operators import AXIAL_REPRESENTATION, Operators
+from rotor.tops.spins.spin_weights import SpinWeights
+
+if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
+    from rotor.tops.top import Top
+
+
+def hamiltonian(top: Top, effects: Sequence[QuantumEffect] = SEMI_RIGID) -> Operators:
+    """The operators of all effects added: {(p, q, n): MHz}, zeros left out."""
+    total: Operators = {}
+    for effect in effects:
+        values = effect.parameters(top)
+        for name, operators in effect.operators(top).items():
+            for powers, factor in operators.items():
+                total[powers] = total.get(powers, 0.0) + factor * values[name]
+    return {powers: value for powers, value in total.items() if value}
+
+
+def representation_of(top: Top) -> str:
+    """The representation in which a top is solved where no closed form serves: its own, else that with the axis at z."""
+    return AXIAL_REPRESENTATION.get(top.kind) or str(top.constants.representation or "Ir")
+
+
+def solve_rotation(
+    top: Top,
+    effects: tuple[QuantumEffect, ...],
+    jmin: int,
+    jmax: int,
+    vectors: bool = True,
+    executor: Executor | None = None,
+    in_blocks: bool = False,
+) -> Levels:
+    """Levels of the rotation, and of states v, without spins; see `solve_levels`.
+
+    Parameters
+    ----------
+    top : Top
+        Constants, kind and spin weights.
+    effects : tuple of QuantumEffect
+        What the Hamiltonian consists of.
+    jmin, jmax : int
+        Lowest and highest rotational angular momentum.
+    vectors : bool, optional
+        False leaves the eigenvectors of an asymmetric top out.
+    executor : Executor, optional
+        J are spread over it.
+    in_blocks : bool, optional
+        Solve symmetric tops in Wang blocks too, so that the levels have eigenvectors.
+
+    Returns
+    -------
+    Levels
+        Energies in MHz, true eigenvalues, by the cheapest exact method of the table above.
+
+    Raises
+    ------
+    ValueError
+        For constants that overflow, and as `coupled_levels` does where blocks are connected.
+    """
+    operators, limits = hamiltonian(top, effects), k_limits_of(top, effects)
+    if top.kind != "linear":
+        representation = representation_of(top)
+        model = model_of(top, effects, operators, representation)
+        if _axial_states(top, model) and not in_blocks:
+            return _symmetric_states(top, effects, model, jmin, jmax)
+        if len(model.states) > 1 or model.couplings:
+            return coupled_levels(top, effects, model, jmin, jmax, executor)
+        if top.kind == "asymmetric" or in_blocks or limits or not _closed_form_holds(top.kind, operators):
+            return _in_wang_blocks(top, effects, operators, jmin, jmax, vectors, executor, limits.get(0))
+    if top.kind in ("prolate", "oblate"):
+        return _symmetric(top, effects, operators, jmin, jmax)
+    if top.kind == "spherical":
+        return _spherical(top.spin_weights, effects, operators, jmin, jmax)
+    return _linear(top, effects, operators, jmin, jmax, in_blocks)
+
+
+def _closed_form_holds(kind: str, operators: Operators) -> bool:
+    if kind == "spherical":
+        return is_cubic(operators)
+    return all(n == 0 for _, _, n in operators)
+
+
+def _scalar_energies(operators: Operators, jmin: int, jmax: int) -> tuple[Ints, Floats]:
+    j = np.arange(jmin, jmax + 1)
+    return j, np.array([scalar_energy(operators, int(value)) for value in j])
+
+
+def _linear(
+    top: Top, effects: tuple[QuantumEffect, ...], operators: Operators, jmin: int, jmax: int, in_blocks: bool
+) -> Levels:
+    """Linear tops: E = Σ c X^p. In blocks, each J is the one Wang function of K = 0 of the representation Iʳ."""
+    beyond = [powers for powers in operators if powers[1] or powers[2]]
+    with_axis = [
+        e.name or type(e).__name__ for e in effects if e.couplings(top) or e.states(top) or _has_j_operator(e, top)
+    ]
+    if beyond or with_axis:
+        what = f"operator {beyond[0]} (powers p, q, n of J², Jz², J±²)" if beyond else f"effect {with_axis[0]}"
+        raise ValueError(
+            f"{what}: a linear top in a Σ state has K = 0 and operators of J² alone; give the top an axis (kind prolate) or "
+            "leave the effect out"
+        )
+    j, energy = _scalar_energies(operators, jmin, jmax)
+    return Levels(
+        kind="linear",
+        representation="Ir" if in_blocks else None,
+        jmax=jmax,
+        energy_mhz=energy,
+        quanta={"j": j},
+        multiplicity=2 * j + 1,
+        components=np.ones_like(j),
+        weight=top.spin_weights.of_j(j),
+        effects=effects,
+        blocks=tuple(_one_function(int(one), e, row) for row, (one, e) in enumerate(zip(j, energy, strict=True)))
+        if in_blocks
+        else (),
+    )
+
+
+def _one_function(j: int, energy: float, row: int) -> SolvedBlock:
+    basis = WangBlock(j, "eo" if j % 2 else "ee", 0, 1, 1)
+    return SolvedBlock(basis, np.array([energy]), np.ones((1, 1)), row)
+
+
+def _has_j_operator(effect: QuantumEffect, top: Top) -> bool:
+    return any(effect.j_operator(top, name, 1, "Ir") is not None for name in effect.parameters(top))
+
+
+def _spherical(
+    weights: SpinWeights, effects: tuple[QuantumEffect, ...], operators: Operators, jmin: int, jmax: int
+) -> Levels:
+    """Spherical tops: E = Σ c X^p in one row of 2J+1 components, or, with D_t, a row for every level that it splits."""
+    scalars, dt = scalar_and_tensor(operators)
+    j, energy = _scalar_energies(scalars, jmin, jmax)
+    if not dt:
+        weight = weights.of_spherical(j)
+        return Levels("spherical", None, jmax, energy, {"j": j}, 2 * j + 1, 2 * j + 1, weight, effects=effects)
+
+    split = [tensor_eigenvalues(int(value), 1 if dt > 0 else -1) for value in j]
+    sizes = [len(irreps) for irreps, _ in split]
+    irreps = np.concatenate([irreps for irreps, _ in split])
+    return Levels(
+        kind="spherical",
+        representation=None,
+        jmax=jmax,
+        energy_mhz=np.repeat(energy, sizes) + dt * np.concatenate([omega for _, omega in split]),
+        quanta={"j": np.repeat(j, sizes), "irrep": irreps},
+        multiplicity=2 * np.repeat(j, sizes) + 1,
+        components=np.array([DIMENSION[irrep] for irrep in irreps]),
+        weight=np.array([weights.of_irrep(irrep) for irrep in irreps]),
+        effects=effects,
+    )
+
+
+def _symmetric(top: Top, effects: tuple[QuantumEffect, ...], operators: Operators, jmin: int, jmax: int) -> Levels:
+    """Symmetric tops: E(J, K) = Σ c X^p K^2q, one row for ±K."""
+    j = np.repeat(np.arange(jmin, jmax + 1), np.arange(jmin, jmax + 1) + 1)
+    k = np.concatenate([np.arange(value + 1) for value in range(jmin, jmax + 1)])
+    x, squares = (j * (j + 1)).astype(float), (k * k).astype(float)
+    energy = np.zeros(j.shape)
+    for (p, q, _), c in operators.items():
+        energy += c * x**p * squares**q
+
+    weight = top.spin_weights.of_symmetric(j, k, oblate=top.kind == "oblate")
+    components = np.where(k == 0, 1, 2)
+    return Levels(top.kind, None, jmax, energy, {"j": j, "k": k}, 2 * j + 1, components, weight, effects=effects)
+
+
+def _axial_states(top: Top, model: Model) -> bool:
+    """Whether several states of a symmetric top have closed forms: nothing couples them, and K is good in each."""
+    alone = len(model.states) > 1 and not model.couplings and not model.limits
+    return top.kind in ("prolate", "oblate") and alone and all(n == 0 for o in model.states.values() for _, _, n in o)
+
+
+def _symmetric_states(top: Top, effects: tuple[QuantumEffect, ...], model: Model, jmin: int, jmax: int) -> Levels:
+    """The closed forms of every state, each with its own weights, by J, state and K."""
+    weights = {state.v: state.spin_weights for effect in effects for state in effect.states(top)}
+    numbers = sorted(model.states)
+
+    def weighted(v: int) -> Top:
+        return replace(top, spin_weights=weights.get(v) or top.spin_weights, symmetry_checked=False)
+
+    own = [_symmetric(weighted(v), effects, model.states[v], jmin, jmax) for v in numbers]
+    quanta = {"v": np.repeat(numbers, len(own[0]))}
+    quanta |= {name: np.concatenate([one.quanta[name] for one in own]) for name in ("j", "k")}
+    order = np.lexsort((quanta["k"], quanta["v"], quanta["j"]))
+
+    def joined(name: str) -> NDArray[Any]:
+        return np.concatenate([getattr(one, name) for one in own])[order]
+
+    return replace(
+        own[0],
+        energy_mhz=joined("energy_mhz"),
+        quanta={name: column[order] for name, column in quanta.items()},
+        multiplicity=joined("multiplicity"),
+        components=joined("components"),
+        weight=joined("weight"),
+    )
+
+
+def _in_wang_blocks(
+    top: Top,
+    effects: tuple[QuantumEffect, ...],
+    operators: Operators,
+    jmin: int,
+    jmax: int,
+    vectors: bool,
+    executor: Executor | None,
+    limits: tuple[int, int] | None = None,
+) -> Levels:
+    representation = representation_of(top)
+    pieces = [(operators, j, representation, vectors, limits) for j in range(jmin, jmax + 1)]
+    solved = executor.map(_solve_j, *zip(*pieces, strict=True)) if executor else (_solve_j(*piece) for piece in pieces)
+    blocks = tuple(_placed(block for of_one_j in solved for block in of_one_j))
+
+    labels = [names_of(b.basis, representation) for b in blocks]
+    sizes = [b.basis.size for b in blocks]
+    j = np.repeat([b.basis.j for b in blocks], sizes)
+    quanta = {"j": j, "ka": np.concatenate([ka for ka, _ in labels]), "kc": np.concatenate([kc for _, kc in labels])}
+    return Levels(
+        kind=top.kind,
+        representation=representation,
+        jmax=jmax,
+        energy_mhz=np.concatenate([b.energies_mhz for b in blocks]),
+        quanta=quanta,
+        multiplicity=2 * j + 1,
+        components=np.ones(sum(sizes), dtype=np.int64),
+        weight=_weights_of_blocks(top, blocks, quanta),
+        effects=effects,
+        blocks=blocks if vectors else (),
+    )
+
+
+def _weights_of_blocks(top: Top, blocks: tuple[SolvedBlock, ...], quanta: dict[str, NDArray[np.int64]]) -> Ints:
+    """Spin weights; of an asymmetric top one number a block."""
+    if top.kind == "asymmetric":
+        return np.repeat([top.spin_weights.of_ka_kc(b.basis.species) for b in blocks], [b.basis.size for b in blocks])
+    ones = np.ones(len(quanta["j"]), dtype=np.int64)
+    bare = Levels(top.kind, None, int(quanta["j"].max()), ones.astype(float), dict(quanta), ones, ones, ones)
+    return weights_of_levels(bare, top.spin_weights)
+
+
+def _placed(solved: Iterator[tuple[WangBlock, Floats, Floats]]) -> Iterator[SolvedBlock]:
+    start = 0
+    for basis, energies, vectors in solved:
+        yield SolvedBlock(basis, energies, vectors, start)
+        start += basis.size
+
+
+def _solve_j(
+    operators: Operators, j: int, representation: str, vectors: bool = True, limits: tuple[int, int] | None = None
+) -> list[tuple[WangBlock, Floats, Floats]]:
+    """The Wang blocks of one J solved: (block, energies in MHz, eigenvectors) in the order ee, eo, oe, oo; K within `limits`."""
+    scalar, of_j = scalar_energy(operators, j), JMatrix(operators, j)
+    out = []
+    whole = wang_blocks(j, representation)
+    for block in whole if limits is None else [part for b in whole if (part := limited(b, *limits))]:
+        energies, states = diagonalise(block_bands(of_j, block), vectors)
+        out.append((block, energies + scalar, states))
+    return out

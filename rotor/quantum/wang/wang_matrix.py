@@ -1,0 +1,143 @@
+"""Matrices of scalar operators of the angular momentum in the Wang basis, block by block, and their eigenvalues.
+
+An operator is a table {(p, q, n): c in MHz} of c · ½[Jz^2q, J₊^2n + J₋^2n]₊ · J^2p (n = 0: c · J^2p Jz^2q). With X = J(J+1),
+
+    ⟨K|H|K⟩     = Σ c X^p K^2q                                             (n = 0)
+    ⟨K+2n|H|K⟩  = Σ c X^p ½[(K+2n)^2q + K^2q] √∏_{i<2n} (J-K-i)(J+K+i+1)    (n > 0)
+
+with the phases of J∓ (body-fixed) real and positive.
+"""
+
+from __future__ import annotations
+
+import sys
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor.arrays import Floats
+from rotor.quantum.wang.basis import WangBlock
+from rotor.tops.operators import Operators
+
+SMALL = 100  # rows of a tridiagonal block up to which scipy.linalg, 0.2 s to load, is not loaded for it
+
+
+def scalar_energy(operators: Operators, j: int) -> float:
+    """The part that is one number for the whole of J, Σ c X^p, left out of the matrices for the sake of digits."""
+    x = j * (j + 1)
+    return float(sum(c * x**p for (p, q, n), c in operators.items() if q == n == 0))
+
+
+class JMatrix:
+    """Matrix elements of all |J K⟩ of one J, from which its four Wang blocks are cut; the scalar part left out."""
+
+    def __init__(self, operators: Operators, j: int) -> None:
+        self.order = max((n for _, _, n in operators), default=0)
+        self._margin = 2 * self.order  # K starts at -margin, so that folded elements are at hand
+        k = np.arange(-self._margin, j + 1)
+        steps = _ladder_steps(j, np.arange(-self._margin, j + self._margin + 1))
+        with np.errstate(over="ignore", invalid="ignore"):  # said where the block is diagonalised
+            self._elements = [_elements(operators, j, k, n, steps) for n in range(self.order + 1)]
+
+    def element(self, k: NDArray[np.int64], n: int) -> NDArray[np.float64]:
+        """⟨K+2n|H|K⟩ for K from -2 `order` to J; zero where K + 2n is beyond J."""
+        return self._elements[n][self._margin + k]
+
+    def folded(self, low: int, n: int) -> float:
+        """⟨2n - low|H|-low⟩, which connects K = low and K = 2n - low of a Wang block."""
+        return float(self._elements[n][self._margin - low])
+
+    def band(self, block: WangBlock, n: int) -> NDArray[np.float64]:
+        """⟨K+2n|H|K⟩ over the K of a block, size - n of them."""
+        first = self._margin + block.first_k
+        return self._elements[n][first : first + 2 * (block.size - n) : 2].copy()
+
+
+def _ladder_steps(j: int, k: NDArray[np.int64]) -> NDArray[np.float64]:
+    """√(J(J+1) - K(K+1)), what J₊ makes of |J K⟩; zero outside the of_j."""
+    return np.asarray(np.sqrt(np.maximum((j - k) * (j + k + 1), 0)))
+
+
+def _elements(
+    operators: Operators, j: int, k: NDArray[np.int64], n: int, steps: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """⟨K+2n|H|K⟩ = ½[P((K+2n)²) + P(K²)] times the ladder, P(y) = Σ_q y^q Σ_p c X^p."""
+    x = float(j * (j + 1))
+    powers = [(p, q, c) for (p, q, order), c in operators.items() if order == n and (n or q)]
+    coefficients = np.zeros(1 + max((q for _, q, _ in powers), default=0))
+    for p, q, c in powers:
+        coefficients[-1 - q] += c * x**p
+
+    squares = np.arange(k[0], k[-1] + 2 * n + 1.0) ** 2
+    values = np.full(len(squares), coefficients[0])
+    for coefficient in coefficients[1:].tolist():
+        values *= squares
+        values += coefficient
+    if n == 0:
+        return values
+    total = 0.5 * (values[: len(k)] + values[2 * n :])
+    for i in range(2 * n):
+        total *= steps[i : i + len(k)]
+    return np.asarray(total)
+
+
+def block_bands(of_j: JMatrix, block: WangBlock) -> list[NDArray[np.float64]]:
+    """Diagonals of the block's matrix, without the scalar part: the n-th has the elements (i+n, i), size - n of them.
+
+    ⟨K' s|H|K s⟩ = ⟨K'|H|K⟩ + s ⟨K'|H|-K⟩, times √2 where one of them is K = 0. The second term is there where
+    K + K' = 2n and folds an operator of high n back to lower diagonals.
+    """
+    bands = [of_j.band(block, n) for n in range(min(of_j.order, block.size - 1) + 1)]
+    if block.first_k == 0:
+        for band in bands[1:]:
+            band[0] *= np.sqrt(2)
+
+    last = block.first_k + 2 * (block.size - 1)
+    for n in range(1, of_j.order + 1):
+        for low in range(max(block.first_k, 2 - block.first_k % 2), n + 1, 2):
+            high = 2 * n - low
+            if high <= last:
+                bands[(high - low) // 2][(low - block.first_k) // 2] += block.sign * of_j.folded(low, n)
+    return bands
+
+
+def diagonalise(bands: list[Floats], vectors: bool = True) -> tuple[Floats, Floats]:
+    """Eigenvalues, rising, and eigenvectors in columns of a symmetric matrix given by its diagonals.
+
+    Tridiagonal matrices go to LAPACK's divide and conquer (dstevd), wider ones to its dense form (dsyevd, numpy's eigh). So do
+    tridiagonal ones of up to `SMALL` rows where scipy.linalg is not loaded, which takes longer than all of them together: the
+    dense form leaves a tridiagonal matrix as it is and goes on like the other, to the same bits.
+    Raises ValueError where LAPACK does not converge or the matrix has numbers that are not finite.
+    """
+    size = len(bands[0])
+    if size == 1:
+        return bands[0], np.ones((1, 1))
+    if not all(np.isfinite(band).all() for band in bands):
+        raise ValueError("a block of the Hamiltonian overflows: J max is too high for these distortion constants")
+    if len(bands) == 1:
+        return _diagonal(bands[0], vectors)
+    if len(bands) > 2 or (size <= SMALL and "scipy.linalg" not in sys.modules):
+        return _dense(bands, vectors)
+
+    from scipy.linalg.lapack import dstevd
+
+    energies, states, info = dstevd(bands[0], bands[1], compute_v=int(vectors))
+    if info:
+        raise ValueError(f"LAPACK dstevd did not converge on a block of size {size} (info = {info})")
+    return energies, states
+
+
+def _diagonal(band: Floats, vectors: bool) -> tuple[Floats, Floats]:
+    order = np.argsort(band, kind="stable")
+    return band[order], np.eye(len(band))[:, order] if vectors else np.zeros((0, 0))
+
+
+def _dense(bands: list[Floats], vectors: bool) -> tuple[Floats, Floats]:
+    size = len(bands[0])
+    matrix = np.zeros((size, size))
+    for n, band in enumerate(bands):
+        matrix.flat[n * size :: size + 1] = band  # eigh reads the lower triangle
+    if not vectors:
+        return np.asarray(np.linalg.eigvalsh(matrix), dtype=np.float64), np.zeros((0, 0))
+    solved = np.linalg.eigh(matrix)
+    return np.asarray(solved.eigenvalues), np.asfortranarray(solved.eigenvectors)  # a state's components side by side

@@ -1,0 +1,1 @@
+"""Isotopologues: their constants and their nuclear coupling constants."""

@@ -1,0 +1,174 @@
+"""Constants of nuclear spins carried over to an isotopologue: tensors turned with its axes, scaled to its nuclei.
+
+    χ' = (Q'/Q) R χ Rᵀ         the gradient of the field belongs to the electrons and does not know isotopes
+    C' = (g'/g) R C I Rᵀ I'⁻¹   C = g K I⁻¹ with K of the electrons and the charges of the nuclei alone
+
+R turns the principal axes of the parent into those of the isotopologue, I are the moments of inertia (W. Gordy and R. L. Cook,
+Microwave Molecular Spectra, 3rd ed., chapters IX.4 and IX.7; Q and g of data/isotopes.csv). Neglected: vibration, which changes χ of
+deuterium by some percent and of heavier nuclei by less than one. What belongs to two spins is left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rotor.arrays import Floats
+from rotor.molecules.nuclei import Isotope
+from rotor.tops.spins.spin_constants import SpinConstants, spins_of
+
+if TYPE_CHECKING:
+    from rotor.tops.top import Top
+
+LETTERS = ("aa", "bb", "cc", "ab", "ac", "bc")
+TURNED_DEGREES = 0.1  # from which axes count as turned where a tensor off the diagonal is not known
+
+
+@dataclass(frozen=True)
+class _Change:
+    """One nucleus before and after, the rotation from the old axes to the new, and moments of inertia of both."""
+
+    old: Isotope
+    new: Isotope
+    rotation: Floats
+    moments: Floats
+    new_moments: Floats
+
+
+def carried_spins(parent: Top, top: Top, angle: float) -> tuple[SpinConstants | None, tuple[str, ...]]:
+    """The constants of the parent's spins as its isotopologue `top` has them, and what is to be said of them.
+
+    angle: by how many degrees the axes turned. None where no spin has constants any more.
+    """
+    constants = parent.spin_constants
+    if (
+        constants is None
+        or parent.molecule is None
+        or top.molecule is None
+        or parent.frame is None
+        or top.frame is None
+    ):
+        return constants, ()
+    if top.molecule.mass_numbers == parent.molecule.mass_numbers:
+        return constants, ()
+    rotation = top.frame.axes @ parent.frame.axes.T
+    values: dict[str, float] = {}
+    twice: dict[str, int] = {}
+    atoms: dict[str, int] = {}
+    notes = _of_pairs(constants)
+    for spin in constants.twice:
+        atom = constants.atoms.get(spin)
+        if atom is None:
+            notes.append(f"constants of {spin} are left out: which nucleus of the geometry it is, is not said")
+            continue
+        old, new = parent.molecule.nuclei[atom - 1], top.molecule.nuclei[atom - 1]
+        change = _Change(old, new, rotation, _moments(parent), _moments(top))
+        own, said = _of_spin(constants.of(spin), change, angle if top.kind == parent.kind else 90.0, parent.kind)
+        notes += [f"{spin}: {text}" for text in said]
+        if own:
+            name = spin if old == new else new.label + spin.removeprefix(spin.partition("_")[0])
+            values |= {f"{symbol}({name})": value for symbol, value in own.items()}
+            twice[name], atoms[name] = round(2 * new.spin), atom
+    if not values:
+        return None, tuple(notes)
+    source = (
+        f"from those of {parent.name or 'the parent'} ({constants.source}), turned with the axes and scaled by Q and g"
+    )
+    return SpinConstants(values, twice, source, atoms=atoms), tuple(notes)
+
+
+def _of_pairs(constants: SpinConstants) -> list[str]:
+    pairs = [name for name in constants.values if len(spins_of(name)) != 1]
+    return [f"{', '.join(pairs)}: what belongs to two spins is not carried over"] if pairs else []
+
+
+def _moments(top: Top) -> Floats:
+    return np.array(top.moments_u_angstrom2)
+
+
+def _of_spin(own: Mapping[str, float], change: _Change, angle: float, kind: str) -> tuple[dict[str, float], list[str]]:
+    """The constants of one nucleus, without its name, and remarks."""
+    chi = {name: value for name, value in own.items() if name.startswith("chi_")}
+    rotation = {name: value for name, value in own.items() if name.startswith("C_")}
+    notes = [f"{name} is not carried over" for name in own if name not in chi and name not in rotation]
+    out: dict[str, float] = {}
+    if chi and change.new.spin >= 1:
+        tensor = chi_tensor(chi)
+        diagonal = not any(tensor[i, k] for i, k in ((0, 1), (0, 2), (1, 2)))
+        if diagonal and kind == "asymmetric" and angle > TURNED_DEGREES:
+            notes.append(
+                f"the axes turned by {angle:.1f}° and elements of χ off the diagonal are not known: what they add along the new axes is "
+                "missing"
+            )
+        q_ratio = _ratio(change.new.quadrupole_barn, change.old.quadrupole_barn, "quadrupole moment", change)
+        out |= named_chi(q_ratio * change.rotation @ tensor @ change.rotation.T)
+    if rotation and change.new.spin > 0:
+        g_ratio = _ratio(change.new.g_factor, change.old.g_factor, "g factor", change)
+        out |= _turned_rotation(rotation, change, g_ratio)
+    return out, notes
+
+
+def _ratio(new: float | None, old: float | None, what: str, change: _Change) -> float:
+    if change.new == change.old:
+        return 1.0
+    if not new or not old:
+        raise ValueError(
+            f"{what} of {change.new.label} or {change.old.label} is not known: give the constants of this isotopologue"
+        )
+    return new / old
+
+
+def chi_tensor(chi: Mapping[str, float]) -> Floats:
+    """The traceless tensor (3, 3) along a, b, c of chi_aa, chi_bb-cc, ...; chi_aa alone has -½ chi_aa along b and c.
+
+    >>> chi_tensor({"chi_aa": 2.0, "chi_bb-cc": 1.0}).diagonal().tolist()
+    [2.0, -0.5, -1.5]
+    """
+    tensor = np.zeros((3, 3))
+    for name, value in chi.items():
+        letters = name.removeprefix("chi_")
+        first, _, second = letters.partition("-")
+        i, k = ("abc".index(letter) for letter in first)
+        if second:
+            j = "abc".index(second[0])
+            tensor[i, i] += value / 2
+            tensor[j, j] -= value / 2
+        elif i == k:
+            tensor += value * (1.5 * np.outer(np.eye(3)[i], np.eye(3)[i]) - 0.5 * np.eye(3))
+        else:
+            tensor[i, k] = tensor[k, i] = value
+    return tensor
+
+
+def named_chi(tensor: Floats) -> dict[str, float]:
+    """chi_aa, chi_bb-cc and what is not 0 off the diagonal, of a tensor; what is below 1e-6 of it counts as 0."""
+    found = {
+        "aa": tensor[0, 0],
+        "bb-cc": tensor[1, 1] - tensor[2, 2],
+        "ab": tensor[0, 1],
+        "ac": tensor[0, 2],
+        "bc": tensor[1, 2],
+    }
+    least = 1e-6 * float(np.abs(tensor).max())
+    return {f"chi_{letters}": float(value) for letters, value in found.items() if abs(value) > least}
+
+
+def _turned_rotation(own: Mapping[str, float], change: _Change, g_ratio: float) -> dict[str, float]:
+    """Spin-rotation constants with the new moments of inertia; of a linear molecule C_iso alone goes with B."""
+    if set(own) == {"C_iso"}:
+        return {"C_iso": own["C_iso"] * g_ratio * float(change.moments[1] / change.new_moments[1])}
+    if not set(own) <= {f"C_{letters}" for letters in LETTERS}:
+        return {}
+    tensor = np.zeros((3, 3))
+    for name, value in own.items():
+        i, k = ("abc".index(letter) for letter in name.removeprefix("C_"))
+        tensor[i, k] = tensor[k, i] = value
+    electrons = change.rotation @ (tensor * change.moments) @ change.rotation.T
+    with np.errstate(divide="ignore", invalid="ignore"):
+        new = np.where(change.new_moments > 0, electrons / change.new_moments, 0.0) * g_ratio
+    new = (new + new.T) / 2
+    found = {letters: float(new["abc".index(letters[0]), "abc".index(letters[1])]) for letters in LETTERS}
+    return {f"C_{letters}": value for letters, value in found.items() if abs(value) > 1e-9 * float(np.abs(new).max())}

@@ -1,0 +1,1 @@
+"""Nuclear spins of a top: coupling constants, statistics and weights."""

@@ -1,0 +1,1 @@
+"""Vibrational states of a top: constants, rules, and tables of levels."""

@@ -1,0 +1,204 @@
+"""Vibrational or tunnelling states beyond the one that a top's constants describe: their constants, what couples them, their dipoles.
+
+    E[1] = 23785.9 MHz     B[1] = 298041 MHz      G_c[0,1] = 450 MHz      F_ab[0,1], W[0,1] ...
+
+Names are those of `rotor.quantum.effects.interactions`; state 0 is the top's own, without brackets. Each further state has E and every
+constant that it is to have; none is taken over.
+
+Which couplings exist between two states is a question of symmetry: G_c and F_ab transform like a rotation about c, G_a and F_bc like
+one about a, G_b and F_ac like one about b, W like nothing at all. The product of the species of two states is one species, so that
+two of these kinds exist together only where no operation of the group has different characters for them.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+from typing import Any
+
+from rotor.tops.spins.spin_weights import SpinWeights
+from rotor.units import parse_quantity
+
+Vector = tuple[float, float, float]
+
+_ITEM = re.compile(
+    r"(?P<name>[A-Za-z][\w-]*\[[^\[\]]*\])\s*=\s*(?P<number>[-+−]?[\d.]+(?:[eEdD][-+]?\d+)?)\s*(?P<unit>[A-Za-z][\w-]*(?![\w\[]))?"
+)
+_COUPLINGS = re.compile(r"(?:G_(?P<g>[abc])|F_(?P<f>bc|ac|ab)|W)(?:_\w+)?")
+_EVEN = {
+    "C1": "abc",
+    "Ci": "abc",
+    "C2v": "",
+    "D2": "",
+    "D2h": "",
+}  # rotations that each group takes for totally symmetric
+_EVEN |= {f"{group}({axis})": axis for group in ("C2", "C2h") for axis in "abc"}
+_EVEN |= {f"Cs({plane})": axis for plane, axis in (("bc", "a"), ("ac", "b"), ("ab", "c"))}
+GROUPS = tuple(_EVEN)
+
+
+@dataclass(frozen=True, eq=False)
+class StateConstants:
+    """Values in MHz by name with the state in brackets, names of the states, weights and dipoles of states, and where they are from.
+
+    names: by number from 0 on, such as "0+", "0-". weights: of states, 0 among them, that differ from the top's. dipoles: (μa, μb, μc)
+    in debye by pairs (v', v), within states and between them; a state that is not named has the top's dipole, and no pair that is not
+    named has one. symmetry: a group of which the states are, such as "C2v" or "Cs(ab)", with the plane or the axis; "" where none is
+    declared.
+
+    Raises ValueError for names without a state, for a coupling or dipole of a state that has no constants, and for two couplings that
+    the declared symmetry does not allow together.
+
+    >>> StateConstants({"E[1]": 23786.0, "B[1]": 298041.0, "C[1]": 187000.0}).count
+    2
+    """
+
+    values: Mapping[str, float]
+    names: tuple[str, ...] = ()
+    weights: Mapping[int, SpinWeights] = field(default_factory=dict)
+    dipoles: Mapping[tuple[int, int], Vector] = field(default_factory=dict)
+    source: str = ""
+    symmetry: str = ""
+
+    def __post_init__(self) -> None:
+        pairs = {(max(pair), min(pair)): _vector(vector) for pair, vector in self.dipoles.items()}
+        for name, content in (("values", self.values), ("weights", self.weights), ("dipoles", pairs)):
+            object.__setattr__(self, name, MappingProxyType(dict(content)))
+        self._refuse_unknown_states()
+        for name in self.couplings:
+            kind_of_coupling(name)
+        if self.symmetry and self.symmetry not in GROUPS:
+            raise ValueError(f"symmetry {self.symmetry!r} of states: expected one of {', '.join(GROUPS)}")
+        if self.symmetry:
+            self.refuse_couplings(self.symmetry, _EVEN[self.symmetry])
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        content = (dict(self.values), self.names, dict(self.weights), dict(self.dipoles), self.source, self.symmetry)
+        return type(self), content
+
+    @property
+    def count(self) -> int:
+        """How many states there are with the top's own."""
+        return 1 + max((v for states in self._states.values() for v in states), default=0)
+
+    @property
+    def couplings(self) -> tuple[str, ...]:
+        """The names of the constants that connect two states."""
+        return tuple(name for name, states in self._states.items() if len(states) == 2)
+
+    def of_state(self, v: int) -> dict[str, float]:
+        """The constants of one state without its brackets, E among them, in MHz.
+
+        >>> StateConstants({"E[1]": 5.0, "B[1]": 3.0}).of_state(1)
+        {'E': 5.0, 'B': 3.0}
+        """
+        return {name.partition("[")[0]: self.values[name] for name, states in self._states.items() if states == (v,)}
+
+    def name_of(self, v: int) -> str:
+        """What a state is called: its name, else its number."""
+        return self.names[v] if self.names else str(v)
+
+    def with_dipole(self, before: Vector | None, after: Vector) -> StateConstants:
+        """The same states; a dipole that is the top's own one, `before`, becomes `after`, and the others stay."""
+        changed = {pair: after if vector == before else vector for pair, vector in self.dipoles.items()}
+        return replace(self, dipoles=changed)
+
+    @property
+    def _states(self) -> dict[str, tuple[int, ...]]:
+        return {name: states_of_name(name) for name in self.values}
+
+    def _refuse_unknown_states(self) -> None:
+        numbers = {0} | {states[0] for states in self._states.values() if len(states) == 1}
+        missing = sorted(set(range(self.count)) - numbers)
+        if missing:
+            name = next(name for name, states in self._states.items() if max(states) >= missing[0])
+            raise ValueError(f"{name}: there is no state {missing[0]}; give E[{missing[0]}] and its constants")
+        for pair in [*self.dipoles, *((v, v) for v in self.weights)]:
+            if not set(pair) <= numbers:
+                raise ValueError(
+                    f"weights or dipole of state {max(pair)}: there are {self.count} states, counted from 0"
+                )
+        if self.names and len(self.names) != self.count:
+            raise ValueError(f"names of states {', '.join(self.names)}: expected {self.count}, one for each state")
+
+    def refuse_couplings(self, group: str, even: str) -> None:
+        """ValueError for two couplings of one pair of states of which the group takes only one for allowed.
+
+        even: the axes, of "abc", about which a rotation is totally symmetric in the group.
+        """
+        found: dict[tuple[int, ...], tuple[str, str]] = {}
+        for name in self.couplings:
+            kind = _class_of(kind_of_coupling(name), even)
+            first, other = found.setdefault(self._states[name], (name, kind))
+            if kind != other:
+                raise ValueError(
+                    f"{first} and {name}: two states of a molecule of {group} have one of them or the other; G about two axes and "
+                    "W exist together in C1 only"
+                )
+
+    @classmethod
+    def parse(cls, text: str, source: str = "") -> StateConstants:
+        """From text such as "E[1]=23785.9 B[1]=298041 C[1]=187000 W[0,1]=3 MHz".
+
+        An item keeps its own unit; a unit at the end serves every item that carries none; without any, numbers are MHz.
+        """
+        items = list(_ITEM.finditer(text))
+        rest = _ITEM.sub("", text).strip(" ,")
+        if not items or rest:
+            hint = f"; {rest!r} is none" if rest and items else ""
+            raise ValueError(
+                f"{text!r}: expected constants of states such as E[1]=23785.9 MHz or G_c[0,1]=450 MHz{hint}"
+            )
+        shared = items[-1]["unit"] or "MHz"
+        values: dict[str, float] = {}
+        for item in items:
+            name = re.sub(r"\s+", "", item["name"])
+            if name in values:
+                raise ValueError(f"{text!r}: {name} is given twice; leave one out")
+            values[name] = parse_quantity(f"{item['number']} {item['unit'] or shared}", "MHz")
+        return cls(values, source=source)
+
+
+def _vector(vector: Any) -> Vector:
+    a, b, c = (float(x) for x in vector)
+    return a, b, c
+
+
+def states_of_name(name: str) -> tuple[int, ...]:
+    """The numbers in the brackets of a name, rising.
+
+    >>> states_of_name("B[1]"), states_of_name("G_c[1,0]")
+    ((1,), (0, 1))
+    """
+    inside = name.partition("[")[2].rstrip("]").split(",")
+    if not name.endswith("]") or len(inside) > 2 or not all(part.strip().isdigit() for part in inside):
+        raise ValueError(
+            f"{name}: expected a constant with its state or states in square brackets, such as B[1] or G_c[0,1]"
+        )
+    states = tuple(sorted(int(part) for part in inside))
+    if states == (0,):
+        raise ValueError(f"{name}: state 0 is the top's own, whose constants have no brackets")
+    if len(states) == 2 and states[0] == states[1]:
+        raise ValueError(f"{name}: a coupling connects two different states")
+    return states
+
+
+def kind_of_coupling(name: str) -> str:
+    """The axis of the rotation that a coupling transforms like, "" for W.
+
+    >>> [kind_of_coupling(name) for name in ("G_c[0,1]", "F_bc_J[0,1]", "W_pm2[0,1]")]
+    ['c', 'a', '']
+    """
+    match = _COUPLINGS.fullmatch(name.partition("[")[0])
+    if not match:
+        raise ValueError(f"{name}: couplings of two states are G_a, G_b, G_c, F_bc, F_ac, F_ab and W")
+    return match["g"] or {"bc": "a", "ac": "b", "ab": "c"}.get(match["f"] or "", "")
+
+
+def _class_of(kind: str, even: str) -> str:
+    """Kinds that a group does not distinguish have one class: those of `even` are like none, the two others alike, or each its own."""
+    if kind in even:
+        return ""
+    return "".join(sorted(set("abc") - set(even))) if len(even) == 1 else kind

@@ -1,0 +1,110 @@
+"""Which states, couplings and dipoles of states a top can have: its constants' names, its geometry and its spin weights decide.
+
+Two couplings between the same two states are allowed together only if no operation of the point group distinguishes them. A
+dipole between two states joins levels of equal nuclear-spin weight alone, since light does not turn ortho into para.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rotor.tops.constants import Constants
+from rotor.tops.kind_of_constants import vocabulary
+from rotor.tops.operators import powers_of_spelled
+from rotor.tops.spins.spin_weights import SpinWeights
+from rotor.tops.states.state_constants import StateConstants, Vector
+
+if TYPE_CHECKING:
+    from rotor.geometry.inertia import PrincipalFrame
+    from rotor.molecules.symmetry.point_group import Symmetry
+
+NOISE_DEBYE = 1e-3
+_ALONG = 1e-2  # of the elements of an operation, below which it has the principal axes for its own
+_FIGURE = {"linear": 0, "prolate": 0, "oblate": 2}
+_JOINED = ((("ee", "eo"), ("oe", "oo")), (("ee", "oo"), ("eo", "oe")), (("ee", "oe"), ("eo", "oo")))  # by μa, μb, μc
+
+
+def refuse_incomplete_states(states: StateConstants, kind: str, constants: Constants) -> None:
+    """ValueError where a further state lacks one of A, B, C that the first has, or has a constant that no such top has."""
+    rigid = [name for name in constants.values if name in ("A", "B", "C")]
+    known = ("E", *vocabulary(kind, constants.reduction))
+    for v in range(1, states.count):
+        strange = [name for name in states.of_state(v) if name not in known and not powers_of_spelled(name)]
+        if strange:
+            raise ValueError(f"{strange[0]}[{v}]: a state of this {kind} top has {', '.join(known)}")
+        missing = [name for name in rigid if name not in states.of_state(v)]
+        if missing:
+            raise ValueError(
+                f"state {states.name_of(v)}: no {', '.join(f'{name}[{v}]' for name in missing)}; each state has constants of its own"
+            )
+
+
+def refuse_forbidden_couplings(states: StateConstants, symmetry: Symmetry, frame: PrincipalFrame) -> None:
+    """ValueError for couplings of an asymmetric top that its geometry does not allow together."""
+    group, even = _even_rotations(symmetry, frame)
+    if len(even) < 3:
+        states.refuse_couplings(group, even)
+
+
+def _even_rotations(symmetry: Symmetry, frame: PrincipalFrame) -> tuple[str, str]:
+    """The point group, and the axes of "abc" about which a rotation is totally symmetric in it.
+
+    A rotation is an axial vector, that an operation R multiplies by det R times R_xx.
+    """
+    found = "abc"
+    for operation in (*symmetry.rotations, *symmetry.improper):
+        matrix = frame.axes @ operation.matrix @ frame.axes.T
+        if np.abs(matrix - np.diag(np.diag(matrix))).max() < _ALONG:
+            signs = np.diag(matrix) * np.linalg.det(matrix)
+            found = "".join(axis for axis, sign in zip("abc", signs, strict=True) if sign > 0 and axis in found)
+    return symmetry.point_group, found
+
+
+def refuse_forbidden_state_dipoles(
+    states: StateConstants, kind: str, spin_weights: SpinWeights, dipole_abc_debye: Vector | None
+) -> None:
+    """ValueError for a dipole in a state or between two that would join levels of different nuclear-spin weight.
+
+    Parameters
+    ----------
+    states : StateConstants
+    kind : str
+        Of the top.
+    spin_weights : SpinWeights
+        Of the first state, and of those without weights of their own.
+    dipole_abc_debye : (3,) tuple or None
+        Of every state without one of its own.
+
+    Raises
+    ------
+    ValueError
+        With the component, its value and the states. What weights do not tell is taken as given.
+    """
+    own = {} if dipole_abc_debye is None else {(v, v): dipole_abc_debye for v in range(states.count)}
+    for (upper, lower), moment in (own | dict(states.dipoles)).items():
+        first, second = (states.weights.get(v, spin_weights) for v in (upper, lower))
+        for axis, value in enumerate(moment):
+            if abs(value) > NOISE_DEBYE and not _joins_equals(axis, kind, first, second):
+                where = f"in state {states.name_of(upper)}" if upper == lower else "between states "
+                where += "" if upper == lower else f"{states.name_of(lower)} and {states.name_of(upper)}"
+                raise ValueError(
+                    f"dipole μ{'abc'[axis]} = {value:g} D {where}: it would join levels of different nuclear-spin weight; give 0"
+                )
+
+
+def _joins_equals(axis: int, kind: str, first: SpinWeights, second: SpinWeights) -> bool:
+    """Whether μ along one axis joins levels of equal weight alone, of two states with weights of one rule."""
+    if first.rule != second.rule:
+        return False
+    one, other = (dict(zip(of.classes, of.values, strict=True)) for of in (first, second))
+    if first.rule == "KaKc":
+        return all(one[a] == other[b] and one[b] == other[a] for a, b in _JOINED[axis])
+    if first.rule == "J":
+        return one["even"] == other["odd"] and one["odd"] == other["even"]
+    if first.rule == "K" and axis == _FIGURE.get(kind):  # along the axis K stays, and J of K = 0 changes by one
+        both = [(of.get("0even", of.get("0")), of.get("0odd", of.get("0"))) for of in (one, other)]
+        same = [[value for name, value in of.items() if not name.startswith("0")] for of in (one, other)]
+        return both[0] == both[1][::-1] and same[0] == same[1]
+    return True
