@@ -105,7 +105,7 @@ def orders(shared: Path | None) -> list[Panel]:
     return [
         Panel(
             "order of distortion",
-            "median |measured - calculated| (MHz)",
+            "median size of measured - calculated (MHz)",
             {n: measured(n, shared) for n in ("SO2", "H2CS", "HCOOH", "CH3CN")},
         )
     ]
