@@ -171,14 +171,13 @@ def test_a_plan_of_a_source_counts_lines_and_points():
 
 
 def test_the_knobs_of_a_fit_and_of_a_source():
-    """A loose tolerance stops far away, that of the scene within a thousandth of an error; a deep cut leaves a line out."""
+    """Lines of a linear top are linear in its constants, so that one iteration is enough; a deep cut leaves a line out."""
     table = work_precision(
         FitScene(lines=FitLines(source="ocs.csv"), molecule=START, parameters=FitParameters(free=["B", "D", "H"])),
         folder=DATA,
     )
-    errors = {row.setting: row.error for row in table.rows}
-    assert errors["10"] > 100.0
-    assert errors["0.0001"] < 1e-3
+    assert {row.knob for row in table.rows} == {"numerics.iterations", "tolerance of the search"}
+    assert max(row.error for row in table.rows) < 1e-6  # standard errors: round-off of sums over the lines
     core = EmissionScene(
         molecules=[EmittingMolecule(source="CO", column=1e14)],
         conditions=EmissionConditions(excitation="10 K", range="115.2:115.4GHz"),
