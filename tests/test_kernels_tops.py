@@ -8,7 +8,7 @@ import pytest
 from rotor.classical import euler
 from rotor.classical.free.free_motion import free_motion
 from rotor.classical.integrators import batch
-from rotor.classical.integrators._kernels import LANES, _sine_cosine
+from rotor.classical.integrators._kernels import LANES, sine_cosine
 from rotor.classical.integrators.method import integrate
 from rotor.classical.integrators.splitting import RotationSplitting, SymmetricTopSplitting, turned_axes
 from rotor.geometry.rotations import distance, normalised, rotate, uniform
@@ -100,7 +100,7 @@ def test_no_steps_and_shared_moments():
 
 def test_polynomials_of_sine_and_cosine():
     x = np.linspace(-0.25, 0.25, 2001)
-    s, c = np.array([_sine_cosine(value) for value in x]).T
+    s, c = np.array([sine_cosine(value) for value in x]).T
     assert np.max(np.abs(s - np.sin(x))) < 6e-17  # half an ulp of 0.25, and that of numpy
     assert np.max(np.abs(c - np.cos(x))) < 2.3e-16
 

@@ -177,7 +177,7 @@ def pressure_width(top: Top, temperature_k: float, pressure_bar: float) -> LeftO
     >>> from rotor.tops.top import Top
     >>> rod = Top.from_constants("B=6081.5 MHz", dipole_abc_debye=(0.715, 0, 0), mass_u=59.967)
     >>> f"{pressure_width(rod, 300.0, 1e-3).size:.1f}"  # MHz at 1 mbar
-    '7.7'
+    '7.6'
     """
     if top.mass_u is None:
         return None
