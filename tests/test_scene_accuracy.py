@@ -64,7 +64,7 @@ def test_a_stark_map(asked):
     )
     error = np.abs(result.table.columns["energy_mhz"] - fine.table.columns["energy_mhz"]).max()
     assert result.reached.error <= result.reached.asked
-    assert error <= result.reached.asked
+    assert error <= 1.1 * result.reached.error  # what is left after the next J max is a tenth at most
 
 
 def test_cosines_of_a_pulse():
