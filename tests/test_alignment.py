@@ -90,6 +90,7 @@ def test_iodobenzene_in_elliptical_light():
     assert highest == pytest.approx([0.7231, 0.6493, 0.5690], abs=2e-4)  # their grid of times is not known
 
 
+@pytest.mark.slow
 @pytest.mark.oracle
 def test_thermal_iodobenzene(shared):
     """1371 states; the file leaves 1e-4 of the population out and is good to 1e-5 beside that, 0.2e-4."""

@@ -225,6 +225,7 @@ def nearly_c2v(mu_b: float) -> Top:
     return Top.from_constants("A=5655.2654 B=1546.875864 C=1214.40399 MHz", dipole_abc_debye=(4.5152, mu_b, 0))
 
 
+@pytest.mark.slow
 def test_adiabatic_labels_do_not_depend_on_the_grid():
     """76 to 2401 fields: at those that all grids have, each label has one energy."""
     found = [
@@ -252,6 +253,7 @@ def test_labels_by_overlap_would_depend_on_the_grid():
     assert (names[0] != names[1]).any()
 
 
+@pytest.mark.slow
 def test_diabatic_labels_converge_and_tend_to_those_of_the_symmetric_molecule():
     """With μ_b = 1e-4 D the crossings of C2v species are avoided by below 5 MHz, and its true gaps are above."""
 
