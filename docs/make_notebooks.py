@@ -24,6 +24,8 @@ EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
 PYTHON3 = {"name": "python3", "display_name": "Python 3", "language": "python"}
 SECONDS = 20.0  # of one notebook, where its script names no other limit
 MOST_BYTES = 400_000
+# threads of BLAS wait for each other where another process has a core: a notebook of 15 s took 166
+ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
 DRAWN = "--InlineBackend.print_figure_kwargs={'dpi': 90, 'bbox_inches': 'tight'}"  # small files, all pictures alike
 
 
@@ -84,7 +86,7 @@ def executed(script: Path, patience: float = 10.0) -> tuple[Any, float]:
         client = NotebookClient(
             notebook, timeout=limit, kernel_name="python3", resources=place, config=config, extra_arguments=[DRAWN]
         )
-        client.execute(env=os.environ | {"MPLBACKEND": "module://matplotlib_inline.backend_inline"})
+        client.execute(env=ONE_THREAD | os.environ | {"MPLBACKEND": "module://matplotlib_inline.backend_inline"})
     for cell in notebook.cells:
         cell["metadata"] = {}  # times of execution
     if spoken := on_standard_error(notebook):
