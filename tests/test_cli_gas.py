@@ -32,20 +32,20 @@ def answer(call, *arguments: str) -> dict:
 
 
 def test_the_contract_of_water(call):
-    told = answer(call, "water", "--molecules", "20000", "--temperature", "300", "--seed", "7")
+    printed = answer(call, "water", "--molecules", "20000", "--temperature", "300", "--seed", "7")
     info = json.loads(call("info", "water", "--json", "-")[1])
-    assert set(told) == KEYS | {"left_out"} | set(info) - {
+    assert set(printed) == KEYS | {"left_out"} | set(info) - {
         "partition_function",
         "sizes_at_j",
         "effects",
         "limits",
         "splitting_nuclei",
     }
-    assert told["degrees_of_freedom"] == {"translation": 3, "rotation": 3, "total": 6, "gas": 120_000}
-    assert told["accepted"] is True
-    assert [set(row) for row in told["degrees"]] == [set(_COLUMNS.split())] * 6
-    assert told["correlation"] is None
-    for row in told["degrees"]:
+    assert printed["degrees_of_freedom"] == {"translation": 3, "rotation": 3, "total": 6, "gas": 120_000}
+    assert printed["accepted"] is True
+    assert [set(row) for row in printed["degrees"]] == [set(_COLUMNS.split())] * 6
+    assert printed["correlation"] is None
+    for row in printed["degrees"]:
         assert row["expected_cm"] == pytest.approx(0.5 * EV_PER_K * 300 * CM_PER_EV, rel=1e-12)
         assert row["energy_cm"] == pytest.approx(row["expected_cm"] * row["mean"], rel=1e-12)
         assert abs(row["mean"] - 1) < 4 * row["mean_spread"] == 4 * math.sqrt(2 / 20_000)  # 4 σ of a fixed seed
@@ -53,9 +53,9 @@ def test_the_contract_of_water(call):
 
 @pytest.mark.parametrize(("name", "degrees"), [("HCl", 5), ("CO2", 5), ("CH4", 6), ("NH3", 6), ("C6H6", 6)])
 def test_other_molecules_have_their_degrees(call, name, degrees):
-    told = answer(call, name, *SMALL)
-    assert told["chi2_degrees"] == len(told["degrees"]) == told["degrees_of_freedom"]["total"] == degrees
-    assert told["accepted"] is True
+    printed = answer(call, name, *SMALL)
+    assert printed["chi2_degrees"] == len(printed["degrees"]) == printed["degrees_of_freedom"]["total"] == degrees
+    assert printed["accepted"] is True
 
 
 def test_a_seed_is_a_gas(call):
@@ -65,10 +65,10 @@ def test_a_seed_is_a_gas(call):
 
 
 def test_correlation_functions_in_the_file_and_in_json(call, folder):
-    told = answer(call, "OCS", *SMALL, "--times", "0:4ps:9", "--csv", "ocs.csv")
+    printed = answer(call, "OCS", *SMALL, "--times", "0:4ps:9", "--csv", "ocs.csv")
     with open(folder / "ocs.csv", newline="") as handle:
         rows = [{key: float(text) for key, text in row.items()} for row in csv.DictReader(handle)]
-    assert rows == told["correlation"]
+    assert rows == printed["correlation"]
     assert list(rows[0]) == ["t", "c1", "c1_error", "c2", "c2_error"]
     assert [row["t"] for row in rows] == np.linspace(0, 4, 9).tolist()
     ocs = rotor.read("OCS")
@@ -78,9 +78,9 @@ def test_correlation_functions_in_the_file_and_in_json(call, folder):
         assert abs(row["c1"] - c1) < 4 * row["c1_error"]  # σ of a fixed seed
         assert abs(row["c2"] - c2) < 4 * row["c2_error"]
     start = short_time(ocs.moments_u_angstrom2, kt)
-    assert told["short_time_per_ps2"]["c1"] == pytest.approx(start.m2 / ASE_TIME_PS**2, rel=1e-12)
-    assert told["c1_plateau"] == 0.0
-    assert told["vector_source"] == "the dipole"
+    assert printed["short_time_per_ps2"]["c1"] == pytest.approx(start.m2 / ASE_TIME_PS**2, rel=1e-12)
+    assert printed["c1_plateau"] == 0.0
+    assert printed["vector_source"] == "the dipole"
     provenance = json.loads((folder / "ocs.csv.provenance.json").read_text(encoding="utf-8"))
     assert provenance["molecules"] == 3000
     assert provenance["seed"] == 1
@@ -91,18 +91,18 @@ def test_correlation_functions_in_the_file_and_in_json(call, folder):
     [("CH4", 0, "axis a"), ("C6H6", 2, "axis c"), ("CO2", 0, "axis a"), ("NH3", 2, "the dipole")],
 )
 def test_what_the_functions_are_of_is_said(call, name, axis, said):
-    told = answer(call, name, *SMALL, "--times", "0,1")
-    assert told["vector_source"].startswith(said)
-    assert np.abs(told["vector_abc"]).tolist() == np.eye(3)[axis].tolist()
+    printed = answer(call, name, *SMALL, "--times", "0,1")
+    assert printed["vector_source"].startswith(said)
+    assert np.abs(printed["vector_abc"]).tolist() == np.eye(3)[axis].tolist()
 
 
 def test_constants_alone_and_times_chosen(call, folder):
-    told = answer(call, "--constants", "A=10 B=5 C=4 GHz", *SMALL, "--csv", "x.csv")
-    assert [row["name"] for row in told["degrees"]] == ["rotation a", "rotation b", "rotation c"]
-    assert len(told["correlation"]) == 101
-    assert told["correlation"][0]["c1"] == pytest.approx(1.0, abs=1e-12)  # nothing has moved
-    assert abs(told["correlation"][-1]["c1"] - told["c1_plateau"]) < 0.1  # it has settled
-    assert told["tested_at_ps"] == told["correlation"][-1]["t"]
+    printed = answer(call, "--constants", "A=10 B=5 C=4 GHz", *SMALL, "--csv", "x.csv")
+    assert [row["name"] for row in printed["degrees"]] == ["rotation a", "rotation b", "rotation c"]
+    assert len(printed["correlation"]) == 101
+    assert printed["correlation"][0]["c1"] == pytest.approx(1.0, abs=1e-12)  # nothing has moved
+    assert abs(printed["correlation"][-1]["c1"] - printed["c1_plateau"]) < 0.1  # it has settled
+    assert printed["tested_at_ps"] == printed["correlation"][-1]["t"]
 
 
 def test_the_report(call):
@@ -123,9 +123,9 @@ def test_the_report(call):
 
 def test_a_rejected_gas_is_an_answer(call):
     """At a confidence of 1 % nearly every honest gas is rejected."""
-    told = answer(call, "water", *SMALL, "--confidence", "0.01")
-    assert told["accepted"] is False
-    assert told["confidence"] == 0.01
+    printed = answer(call, "water", *SMALL, "--confidence", "0.01")
+    assert printed["accepted"] is False
+    assert printed["confidence"] == 0.01
 
 
 def test_the_picture(call, folder):

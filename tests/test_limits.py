@@ -144,9 +144,9 @@ def test_reports_end_with_the_limits(call, verb):
     assert last[0].startswith("effects   at J = ")
     assert last[1].startswith("left out  nuclear quadrupole: about 4 MHz; 14N splits J = 1 by 3.53 MHz: rotor")
     assert "magnetic coupling" in last[2]
-    told = json.loads(call(verb, *given, "--json", "-")[1])
-    assert [one["name"] for one in told["limits"]] == ["nuclear quadrupole", "magnetic coupling of nuclear spins"]
-    assert {one["name"]: one["present"] for one in told["effects"]}["nuclear quadrupole"] is False
+    printed = json.loads(call(verb, *given, "--json", "-")[1])
+    assert [one["name"] for one in printed["limits"]] == ["nuclear quadrupole", "magnetic coupling of nuclear spins"]
+    assert {one["name"]: one["present"] for one in printed["effects"]}["nuclear quadrupole"] is False
 
 
 @pytest.mark.parametrize(
@@ -170,5 +170,5 @@ def test_every_report_says_what_is_left_out(call, command, said):
     code, out, _ = call(*command)
     assert code == 0
     assert f"\nleft out  {said}" in out
-    told = json.loads(call(*command, "--json", "-")[1])
-    assert "left_out" in told if command[0] == "gas" else told["effects"]
+    printed = json.loads(call(*command, "--json", "-")[1])
+    assert "left_out" in printed if command[0] == "gas" else printed["effects"]

@@ -341,8 +341,8 @@ def _bootstrap(request: FitRequest, fit: Fit, options: FitOptions, samples: int,
 
     from rotor.fit.choose import bootstrap
 
-    model = request.spfit.model if request.spfit else None
-    return [float(x) for x in bootstrap(fit, samples, np.random.default_rng(seed), options, model=model)[1]]
+    rng = np.random.default_rng(seed)
+    return [float(x) for x in bootstrap(fit, samples, rng, options, model=request.model)[1]]
 
 
 # What goes out

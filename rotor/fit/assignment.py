@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from rotor.arrays import Floats, Ints
 from rotor.table import Table
-from rotor.units import MHZ_PER_CM
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -201,8 +200,3 @@ def duplicates(lines: Assignments) -> list[tuple[int, int]]:
             out.append((seen[key], i))
         seen.setdefault(key, i)
     return out
-
-
-def mhz_per_unit(lines: Assignments) -> Floats:
-    """What one unit of each line is in MHz, (n,): 1, or 29979.2458 for a wavenumber."""
-    return np.where(lines.wavenumber, MHZ_PER_CM, 1.0)

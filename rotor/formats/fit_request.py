@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -14,13 +14,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor.arrays import Floats
+from rotor.arrays import Floats, Ints
 from rotor.fit.assignment import Assignments, merged
 from rotor.fit.fit import Fit, FitOptions, fit_lines
 from rotor.fit.parameters import Parameters, parameters, with_names
 from rotor.fit.report import fit_facts
 from rotor.formats.assigned_lines import QUANTA, read_assigned_lines
 from rotor.formats.spcat.fit_input import SpfitInput, fitted_file, named_file, read_fit
+from rotor.quantum.labelled import LevelModel
 from rotor.statistics.least_squares import Progress
 from rotor.table import Table
 from rotor.tops.constants import Constants
@@ -56,6 +57,11 @@ class FitRequest:
     ties: tuple[str, ...] = ()
     priors_mhz: Mapping[str, float] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+
+    @property
+    def model(self) -> Callable[[Ints], LevelModel] | None:
+        """What computes levels of codes with spins or several states; None where `constants` do."""
+        return self.spfit.model if self.spfit else None
 
     @property
     def top(self) -> Top | None:
@@ -104,9 +110,8 @@ def answer_fit(request: FitRequest, progress: Progress | None = None) -> FitAnsw
 
     Raises ValueError as `rotor.fit.fit.fit_lines` does.
     """
-    model = request.spfit.model if request.spfit else None
     fit = fit_lines(
-        request.lines, request.constants, request.parameters, request.options, model=model, progress=progress
+        request.lines, request.constants, request.parameters, request.options, model=request.model, progress=progress
     )
     return FitAnswer(request, fit)
 

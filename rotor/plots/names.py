@@ -43,14 +43,30 @@ def name_peaks(axes: Any, peaks: Sequence[Peak], drawn: Floats, most: int = 12) 
     for peak in sorted(peaks, key=lambda one: -one.y):
         if len(taken) == most or not (first <= peak.x <= last and low < peak.y <= high):
             continue
-        text = _written(axes, peak)
-        if not taken:
-            move_inside(text, axes)
-        box = text.get_window_extent().padded(2.0)
-        if not taken or fits(box, axes.bbox, taken, pixels):
-            taken.append(box)
-        else:
-            text.remove()
+        leave_or_remove(_written(axes, peak), axes, taken, pixels)
+
+
+def leave_or_remove(text: Any, axes: Any, taken: list[Any], drawn: Floats) -> None:
+    """Leave a name where it lies on nothing, else remove it; the first one always stays, inside the axes even at their edge.
+
+    Parameters
+    ----------
+    text : matplotlib.text.Annotation
+        The name, written.
+    axes : matplotlib.axes.Axes
+        On which it stands.
+    taken : list of Bbox
+        Of the names that are there, in pixels; that of a name that stays is added.
+    drawn : (n, 2) array
+        Tips of what is drawn, in pixels.
+    """
+    if not taken:
+        move_inside(text, axes)
+    box = text.get_window_extent().padded(2.0)
+    if not taken or fits(box, axes.bbox, taken, drawn):
+        taken.append(box)
+    else:
+        text.remove()
 
 
 def _written(axes: Any, peak: Peak) -> Any:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
 from rotor.checks import require_one_of
-from rotor.plots.names import fits, move_inside
+from rotor.plots.names import leave_or_remove
 from rotor.plots.picture import BLUE, GREY, MOST_VECTOR_STICKS, checked_suffix, name_of_top, new_figure, save, styled
 from rotor.quantum.quanta import line_text
 from rotor.spectra.lines import Lines
@@ -263,14 +263,7 @@ def _name_lines(
             break
         if any(box.x0 - 6 < place[0] < box.x1 + 6 and box.y0 - 40 < place[1] < box.y1 for box in taken):
             continue  # no need to measure a name that cannot fit
-        text = _label(axes, lines, row, heights[row], x)
-        if not taken:  # the strongest line is always named, inside the axes even where it stands at their edge
-            move_inside(text, axes)
-        box = text.get_window_extent().padded(2.0)
-        if not taken or fits(box, axes.bbox, taken, drawn):
-            taken.append(box)
-        else:
-            text.remove()
+        leave_or_remove(_label(axes, lines, row, heights[row], x), axes, taken, drawn)
 
 
 def _leave_space(axes: Any, lines: Lines, rows: Ints, heights: Floats, x: _Axis) -> None:

@@ -24,7 +24,6 @@ from rotor.arrays import Floats, Ints
 from rotor.quantum.effects.watson import operators_by_name
 from rotor.quantum.wang.basis import WangBlock, ka_kc, wang_blocks
 from rotor.tops.constants import Constants
-from rotor.tops.operators import Powers
 
 _FEW = 1000  # levels below which scipy.linalg is not loaded for them
 _MOST_PADDED = 1 << 22  # matrix elements of blocks that are worked on together: 32 MB
@@ -361,8 +360,3 @@ def _expectations(chunk: _Chunk, vectors: Floats) -> Floats:
             products = 2.0 * vectors[:, :-d, :] * vectors[:, d:, :]
             total += np.matmul(products.transpose(0, 2, 1), unit[:, :-d])
     return np.asarray(total[chunk.block, chunk.rank])
-
-
-def powers_of(constants: Constants) -> dict[str, dict[Powers, float]]:
-    """The terms of every named constant, for those who need ∂H/∂c itself."""
-    return operators_by_name(constants)

@@ -90,7 +90,7 @@ def wang_amplitudes(up: SolvedBlock, low: SolvedBlock, tensor: BodyTensor) -> Fl
 
     An odd rank stands for i times them, in the phases of |J K s)).
     """
-    return np.asarray(up.vectors.T @ acting_on(low.vectors, up.basis, low.basis, tensor))
+    return wang_columns(up, [low], tensor)
 
 
 def wang_columns(up: SolvedBlock, lows: Sequence[SolvedBlock], tensor: BodyTensor) -> Floats:

@@ -122,7 +122,7 @@ def reached(scene: Scene, answer: Any, how: str) -> Reached:
     asked = asked_of(scene)
     assert asked is not None
     unit = unit_of(scene)
-    error = _sampled_error(answer, unit) if scene.kind in SAMPLED else _ERRORS[scene.kind](answer)
+    error = _sampled_error(scene.kind, answer, unit) if scene.kind in SAMPLED else _ERRORS[scene.kind](answer)
     if error > asked:
         raise ValueError(
             f"accuracy: {asked:g} {unit}".rstrip() + f" cannot be given: the error here is {error:.2g} ({how})"
@@ -130,10 +130,10 @@ def reached(scene: Scene, answer: Any, how: str) -> Reached:
     return Reached(asked, error, unit, how)
 
 
-def _sampled_error(answer: Any, unit: str) -> float:
+def _sampled_error(kind: str, answer: Any, unit: str) -> float:
     from rotor.scenes.accuracy_sampled import error_of_fluid, error_of_gas
 
-    return error_of_gas(answer, unit) if hasattr(answer, "correlations") else error_of_fluid(answer, unit)
+    return error_of_gas(answer, unit) if kind == "gas" else error_of_fluid(answer, unit)
 
 
 def _gas(scene: Any, request: Any, asked: float) -> tuple[Any, str]:
@@ -255,8 +255,8 @@ _ERRORS: dict[str, Callable[[Any], float]] = {
     "spectrum": lambda answer: _levels_error(answer.lines.top, answer.lines.levels),
     "levels": lambda answer: _levels_error(answer.request.top, answer.table.levels),
     "raman": lambda answer: _levels_error(answer.lines.top, answer.lines.levels),
-    "stark": lambda answer: float(answer.facts()["accuracy_mhz"]),
-    "align": lambda answer: float(answer.facts()["error_estimate"]),
+    "stark": lambda answer: float(answer.states.accuracy_mhz),
+    "align": lambda answer: float(answer.trace.error_estimate),
     "thermo": lambda answer: float(answer.functions.relative_error.max()),
     "tumble": _tumble_error,
 }

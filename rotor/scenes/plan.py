@@ -323,9 +323,8 @@ def _seconds_of_steps(request: Any, steps: int) -> float:
     from rotor.classical.system import system_of
 
     some = SOME_STEPS if request.step is None or request.order > 2 else 4 * SOME_STEPS
-    more = (
-        2 if system_of(request.moments, request.effects).compiled is None else 50
-    )  # compiled steps are so much cheaper
+    # times as many for the second part: compiled steps are so much cheaper
+    more = 2 if system_of(request.moments, request.effects).compiled is None else 50
     if steps < more * some:
         return timed(lambda: answer_driven(request))
     share = some / steps

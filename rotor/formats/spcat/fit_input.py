@@ -23,7 +23,7 @@ from rotor.formats.assigned_lines import QUANTA
 from rotor.formats.spcat.codes import HELD_BELOW, constants_and_matrix
 from rotor.formats.spcat.model import parameter_file
 from rotor.formats.spcat.states import is_plain
-from rotor.formats.spcat.text.lin import LineList, line_list, note_of_defaults, read_lin, with_defaults
+from rotor.formats.spcat.text.lin import LineList, note_of_defaults, read_lin, with_defaults
 from rotor.formats.spcat.text.par import Header, Parameter, ParameterFile, read_par
 from rotor.formats.spcat.variances import FREE_ABOVE
 from rotor.quantum.labelled import LevelModel
@@ -300,11 +300,3 @@ def _lower_factor(correlations: Floats) -> Floats:
         except np.linalg.LinAlgError:
             lift = max(10 * lift, 1e-15)
     raise ValueError("the correlation matrix is not positive; some combination of the parameters is not determined")
-
-
-def written_lines(lines: Assignments) -> LineList:
-    """Assigned lines as a .lin file has them; wavenumbers stand as such."""
-    made = line_list(lines.upper, lines.lower, lines.frequency_mhz, lines.error_mhz, lines.weight)
-    unit = np.where(lines.wavenumber, 1 / 29979.2458, 1.0)
-    sign = np.where(lines.wavenumber, -1.0, 1.0)
-    return replace(made, frequency=lines.frequency_mhz * unit, error=sign * lines.error_mhz * unit)

@@ -49,9 +49,8 @@ def stark(request: Any) -> Knobs:
     """Of a scene of levels in a field."""
     from rotor.quantum.fields.stark_request import answer_stark
 
-    plain = replace(
-        request, diabatic_gap_mhz=None, most_at_edge=1.0
-    )  # energies alone decide on a basis that is to be seen failing
+    # energies alone decide on a basis that is to be seen failing
+    plain = replace(request, diabatic_gap_mhz=None, most_at_edge=1.0)
     measure = Measure(
         "energy", "MHz", lambda found, reference: _apart(found.states.energy_mhz, reference.states.energy_mhz)
     )
@@ -61,7 +60,7 @@ def stark(request: Any) -> Knobs:
         settings = ladder(TOLERANCES_MHZ, request.tolerance_mhz, lambda one: replace(plain, tolerance_mhz=one))
         against = f"a tolerance of {finest.tolerance_mhz:g} MHz"
         knobs.append(Knob("numerics.tolerance", (measure,), settings, finest, against, answer_stark))
-    jmax = int(answer_stark(plain).facts()["jmax"])
+    jmax = int(answer_stark(plain).states.jmax)
     values, energy = range(request.j_highest + 2, jmax + 1), Measure("energy", "MHz", _apart)
     basis = ladder(values, jmax, lambda one: (plain, int(one)))
     beyond = jmax + MORE_J
