@@ -12,6 +12,13 @@ import typer
 from rotor.checks import require_whole
 from rotor.cli.raman import with_polarizability
 from rotor.cli.shared import inputs
+from rotor.cli.shared.field_maps import (
+    accuracy_fact,
+    content_of,
+    fields_of,
+    refuse_picture_of_one_field,
+    table_of_states,
+)
 from rotor.cli.shared.inputs import Input, json_option, parsed, positive, quantity
 from rotor.cli.shared.options import file_option, grouped, option
 from rotor.cli.shared.output import (
@@ -34,7 +41,6 @@ if TYPE_CHECKING:
     from rotor import table as tables
     from rotor.plots.view import View
     from rotor.quantum.fields.field_map import FieldMap
-    from rotor.quantum.fields.stark_request import StarkAnswer
     from rotor.spectra.fields.request import FieldRequest
     from rotor.tops.top import Top
 
@@ -57,7 +63,6 @@ NAMES = {
     "spread": "--spread", "light": "--light", "hyperfine": "--hyperfine",
 }  # fmt: skip  # field of the request -> option
 POINTS = 201
-SHOWN = 24
 
 
 @dataclass(frozen=True)
@@ -151,8 +156,7 @@ def command(
     settings["hyperfine"] = given.spin_constants is not None if options.hyperfine is None else options.hyperfine
     files = Files.of(outputs)
     view = view_of(picture, files, "kV/cm")
-    if "--plot" in files.paths and len(settings["fields_kv_per_cm"]) < 2:
-        raise ValueError("--plot: a picture of a map needs two fields or more; give --field a range")
+    refuse_picture_of_one_field(files, settings["fields_kv_per_cm"])
     top = _acted_on(inputs.read_top(given), options, settings["intensity_w_per_cm2"])
     with inputs.fields_as_options(**NAMES):
         request = FieldRequest(StarkRequest(top, **settings), **of_sample)
@@ -160,7 +164,7 @@ def command(
             answer = answer_stark(request.stark, executor)
             made = _made(request, answer.states, files, executor)
 
-    content = _content(answer, given, context.obj)
+    content = content_of(answer, given, context.obj)
     content["files"] = files.names
     text = lambda: json_with_rows(answer.states, "states", content)  # noqa: E731
     writers = {**_writers(top, answer.states, content, view), **_further_writers(made, content)}
@@ -239,7 +243,7 @@ def _settings(options: Options) -> dict[str, Any]:
     gap = options.diabatic_gap
     require_whole("--jmax", options.jmax, 0, MOST_J)
     return {
-        "fields_kv_per_cm": parsed("--field", options.field, _fields),
+        "fields_kv_per_cm": parsed("--field", options.field, lambda text: fields_of(text, "kV/cm", POINTS)),
         "j_highest": parsed("--states", options.states, inputs.highest_j),
         "m_values": None if options.m is None else parsed("--m", options.m, _m_values),
         "intensity_w_per_cm2": quantity("--intensity", options.intensity, "W/cm2"),
@@ -256,12 +260,6 @@ def _acted_on(top: Top, options: Options, intensity_w_per_cm2: float) -> Top:
     if options.polarizability is not None or intensity_w_per_cm2:
         top = with_polarizability(top, options.polarizability)
     return top
-
-
-def _fields(text: str) -> tuple[float, ...]:
-    from rotor.units import parse_grid
-
-    return tuple(parse_grid(f"{text}:{POINTS}" if text.count(":") == 1 else text, "kV/cm").tolist())
 
 
 def _direction(text: str) -> tuple[float, float, float]:
@@ -282,13 +280,6 @@ def _m_values(text: str) -> tuple[float, ...]:
     if not all(re.fullmatch(r"\d+(\.[05])?", part) for part in parts):
         raise ValueError(f"{text!r}: expected numbers of 0 or more between commas, such as 0,1, or 0.5,1.5 of M_F")
     return tuple(float(part) if "." in part else int(part) for part in parts)
-
-
-def _content(answer: StarkAnswer, given: Input, command: str) -> dict[str, Any]:
-    """What is printed and more, by the keys of docs/command_line.md."""
-    from rotor.cli.shared.report import begin
-
-    return {**begin(command, given.text), **answer.facts()}
 
 
 def _writers(top: Top, states: FieldMap, content: dict[str, Any], view: View) -> dict[str, Writer]:
@@ -314,13 +305,19 @@ def _show(top: Top, states: FieldMap, content: dict[str, Any]) -> None:
     print(heading(top))
     show_facts(_facts(top, content))
     print()
-    curves, first, last = states.curves(), states.fields[0], states.fields[-1]
-    rows = []
-    for rows_of in curves[:SHOWN]:
-        at, end = rows_of.start, rows_of.stop - 1
+    show_table(_table(states))
+
+
+def _table(states: FieldMap) -> Table:
+    """The first states, by M and block."""
+    first, last = states.fields[0], states.fields[-1]
+
+    def row(rows: slice) -> list[str]:
+        at, end = rows.start, rows.stop - 1
         numbers = (states.energy_mhz[at], states.energy_mhz[end], states.slope[end], states.cosines["costheta"][end])
         m = "mixed" if states.m[at] < 0 else str(states.m[at])
-        rows.append([str(states.label[at]), m, *(f"{value:.6f}" for value in numbers)])
+        return [str(states.label[at]), m, *(f"{value:.6f}" for value in numbers)]
+
     names = (
         "state",
         "|M|",
@@ -329,8 +326,7 @@ def _show(top: Top, states: FieldMap, content: dict[str, Any]) -> None:
         "μ_eff there (D)",
         "⟨cosθ⟩ there",
     )
-    title = f"{len(rows)} of {len(curves)} states" if len(rows) < len(curves) else "all states"
-    show_table(Table(f"{title}, by M and block", names, rows, frozenset({"state"})))
+    return table_of_states(states, names, row)
 
 
 def _along(direction: list[float]) -> str:
@@ -353,5 +349,4 @@ def _facts(top: Top, content: dict[str, Any]) -> list[tuple[str, str]]:
     ]
     if content["intensity_w_per_cm2"]:
         facts.append(("laser", f"{content['intensity_w_per_cm2']:g} W/cm² along Z"))
-    accuracy = f"J max {content['jmax']}; energies move by {content['accuracy_mhz']:.1e} MHz with a higher one"
-    return [*facts, ("accuracy", f"{accuracy}, edge population {content['edge_population']:.1e}")]
+    return [*facts, accuracy_fact(content)]

@@ -10,6 +10,13 @@ import typer
 
 from rotor.checks import require_whole
 from rotor.cli.shared import inputs
+from rotor.cli.shared.field_maps import (
+    accuracy_fact,
+    content_of,
+    fields_of,
+    refuse_picture_of_one_field,
+    table_of_states,
+)
 from rotor.cli.shared.inputs import Input, json_option, parsed, positive
 from rotor.cli.shared.options import file_option, grouped, option
 from rotor.cli.shared.output import (
@@ -42,7 +49,6 @@ NAMES = {
     "hyperfine": "--hyperfine", "nuclear_g": "--nuclear-g",
 }  # fmt: skip  # field of the request -> option
 POINTS = 51
-SHOWN = 24
 
 
 @dataclass(frozen=True)
@@ -96,15 +102,14 @@ def command(context: typer.Context, given: Input, options: Options, outputs: Out
     settings = _settings(options)
     settings["hyperfine"] = given.spin_constants is not None if options.hyperfine is None else options.hyperfine
     files = Files.of(outputs)
-    if "--plot" in files.paths and len(settings["fields_tesla"]) < 2:
-        raise ValueError("--plot: a picture of a map needs two fields or more; give --field a range")
+    refuse_picture_of_one_field(files, settings["fields_tesla"])
     top = _with_tensors(inputs.read_top(given), options)
     with inputs.fields_as_options(**NAMES):
         request = ZeemanRequest(top, **settings)
         with working(options.workers, "blocks") as executor:
             answer = answer_zeeman(request, executor)
 
-    content = _content(answer, given, context.obj)
+    content = content_of(answer, given, context.obj)
     content["files"] = files.names
     text = lambda: json_with_rows(answer.states, "states", content)  # noqa: E731
     show = with_sources(lambda: _show(answer, content), top, ("constants",), given.sources)
@@ -115,18 +120,12 @@ def _settings(options: Options) -> dict[str, Any]:
     """Fields of the request from the texts of the options."""
     require_whole("--jmax", options.jmax, 0, MOST_J)
     return {
-        "fields_tesla": parsed("--field", options.field, _fields),
+        "fields_tesla": parsed("--field", options.field, lambda text: fields_of(text, "T", POINTS)),
         "j_highest": parsed("--states", options.states, inputs.highest_j),
         "jmax": options.jmax,
         "tolerance_mhz": positive("--tolerance", options.tolerance, "MHz"),
         "nuclear_g": None if options.nuclear_g is None else parsed("--nuclear-g", options.nuclear_g, _named),
     }
-
-
-def _fields(text: str) -> tuple[float, ...]:
-    from rotor.units import parse_grid
-
-    return tuple(parse_grid(f"{text}:{POINTS}" if text.count(":") == 1 else text, "T").tolist())
 
 
 def _named(text: str) -> dict[str, float]:
@@ -172,13 +171,6 @@ def _tensor(top: Top, text: str) -> Tensor:
     return tensor_for(top.kind, numbers)
 
 
-def _content(answer: ZeemanAnswer, given: Input, command: str) -> dict[str, Any]:
-    """What is printed and more, by the keys of docs/command_line.md."""
-    from rotor.cli.shared.report import begin
-
-    return {**begin(command, given.text), **answer.facts()}
-
-
 def _writers(answer: ZeemanAnswer, content: dict[str, Any]) -> dict[str, Writer]:
     provenance = {name: content[name] for name in ("command", "input", "g_abc", "magnetisability_abc", "nuclear_g")}
 
@@ -208,17 +200,15 @@ def _show(answer: ZeemanAnswer, content: dict[str, Any]) -> None:
 
 def _table(states: FieldMap) -> Table:
     """The first states, by M and block."""
-    curves, first, last = states.curves(), states.fields[0], states.fields[-1]
-    rows = []
-    for rows_of in curves[:SHOWN]:
-        at, end = rows_of.start, rows_of.stop - 1
+    first, last = states.fields[0], states.fields[-1]
+
+    def row(rows: slice) -> list[str]:
+        at, end = rows.start, rows.stop - 1
         numbers = (states.energy_mhz[at], states.energy_mhz[end], states.slope[end])
-        rows.append(
-            [str(states.label[at]), f"{states.m[at]:g}", *(f"{round(value, 6) + 0.0:.6f}" for value in numbers)]
-        )
+        return [str(states.label[at]), f"{states.m[at]:g}", *(f"{round(value, 6) + 0.0:.6f}" for value in numbers)]
+
     names = ("state", "M", f"E at {first:g} T (MHz)", f"E at {last:g} T (MHz)", "moment there (μ_N)")
-    title = f"{len(rows)} of {len(curves)} states" if len(rows) < len(curves) else "all states"
-    return Table(f"{title}, by M and block", names, rows, frozenset({"state"}))
+    return table_of_states(states, names, row)
 
 
 def _facts(answer: ZeemanAnswer, content: dict[str, Any]) -> list[tuple[str, str]]:
@@ -234,8 +224,7 @@ def _facts(answer: ZeemanAnswer, content: dict[str, Any]) -> list[tuple[str, str
         facts.append(("magnetisability", f"{_tensor_text(content['magnetisability_abc'])} 1e-6 erg/(G² mol)"))
     if content["nuclear_g"]:
         facts.append(("g of spins", ", ".join(f"{name} {value:g}" for name, value in content["nuclear_g"].items())))
-    accuracy = f"J max {content['jmax']}; energies move by {content['accuracy_mhz']:.1e} MHz with a higher one"
-    return [*facts, ("accuracy", f"{accuracy}, edge population {content['edge_population']:.1e}")]
+    return [*facts, accuracy_fact(content)]
 
 
 def _tensor_text(tensor: Tensor) -> str:
