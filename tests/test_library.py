@@ -75,7 +75,7 @@ def test_a_changed_a_new_and_a_removed_file_are_noticed(home):
     path = put(home / ".rotor" / "molecules", "a", 1.0, 'name = "first name"')
     assert library_file("first name") == path
     put(path.parent, "a", 1.0, 'name = "second name"')
-    os.utime(path, ns=(1, 1))  # a clock may be coarse: the change is told by the time of the file
+    os.utime(path, ns=(1, 1))  # a clock may be coarse: the change is known by the time of the file
     assert (library_file("second name"), library_file("first name")) == (path, None)
     new = put(path.parent, "b", 2.0)
     assert library_file("b") == new
@@ -160,10 +160,10 @@ def test_molecules_as_a_table_and_one_of_them(capsys):
     assert "constants, dipole" in row
 
     assert run(["molecules", "ozone"]) == 0
-    told = capsys.readouterr().out
-    assert "point group        C2v, symmetry number 2" in told
-    assert "spin weights from" in told
-    plainly = " ".join(told.split())
+    printed = capsys.readouterr().out
+    assert "point group        C2v, symmetry number 2" in printed
+    assert "spin weights from" in printed
+    plainly = " ".join(printed.split())
     assert "unverified constants" in plainly
     assert "constants from unverified: ground state; NIST CCCBDB release 22" in plainly
     assert run(["info", "ozone"]) == 0
