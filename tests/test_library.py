@@ -168,7 +168,9 @@ def test_molecules_as_a_table_and_one_of_them(capsys):
     assert "constants from unverified: G. Wlodarczak et al., J. Mol. Spectrosc. 127 (1988) 178, not read" in plainly
     assert run(["info", "pyridine"]) == 0
     printed = capsys.readouterr().out
-    assert "sources   constants: unverified: G. Wlodarczak et al., J. Mol. Spectrosc. 127 (1988); dipole: NIST" in printed
+    assert (
+        "sources   constants: unverified: G. Wlodarczak et al., J. Mol. Spectrosc. 127 (1988); dipole: NIST" in printed
+    )
     assert run(["info", "PH3"]) == 0
     assert "constants: C unverified; P. Helminger and W. Gordy, Phys. Rev. 188 (1969)" in capsys.readouterr().out
     assert run(["info", "PH3", "--sources"]) == 0
