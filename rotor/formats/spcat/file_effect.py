@@ -199,7 +199,9 @@ class FileEffect(QuantumEffect):
                 bra, ket = states or (EVERY_STATE, EVERY_STATE)
                 if o.odd and bra == ket:  # of an l-doubled pair, between its components
                     ket = next(pair.second if bra == pair.first else pair.first for pair in self.pairs if bra in pair)
-                found += self._at_pairs(line, states, SpinTerm(line.name, names, o.rotor, 1.0, o.n2, o.nz2, o.ns, bra, ket))
+                found += self._at_pairs(
+                    line, states, SpinTerm(line.name, names, o.rotor, 1.0, o.n2, o.nz2, o.ns, bra, ket)
+                )
         return tuple(found)
 
     def _at_pairs(self, line: CodedLine, states: tuple[int, int] | None, term: SpinTerm) -> list[SpinTerm]:

@@ -157,7 +157,9 @@ def pattern_steps(spins: tuple[int, ...]) -> Ints:
     >>> pattern_steps((1, 1)).tolist()
     [[-2, 1, 1], [0, 0, 1], [0, 1, 0], [2, 0, 0]]
     """
-    every = np.stack(np.meshgrid(*(np.arange(spin + 1) for spin in spins), indexing="ij"), axis=-1).reshape(-1, len(spins))
+    every = np.stack(np.meshgrid(*(np.arange(spin + 1) for spin in spins), indexing="ij"), axis=-1).reshape(
+        -1, len(spins)
+    )
     difference = (np.array(spins, dtype=np.int64) - 2 * every).sum(axis=1)
     return np.column_stack((difference, every))[np.lexsort((*every.T, difference))]
 

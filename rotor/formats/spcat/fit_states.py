@@ -144,7 +144,11 @@ def _with_labels(group: Group, form: Format, labels: Ints, names: Sequence[str],
     twice = 2 * total - sum(group.spins) % 2
     every = np.unique(twice)
     size = len(group.states) * int(np.prod([spin + 1 for spin in group.spins]))
-    if group.spins and size * int(every.max() + 1) > _LARGE and (found := _contracted(group, form, labels, here, every, names, values)):
+    if (
+        group.spins
+        and size * int(every.max() + 1) > _LARGE
+        and (found := _contracted(group, form, labels, here, every, names, values))
+    ):
         return [found]
     pieces = np.split(every, np.flatnonzero(np.diff(np.cumsum((size * (every + 1.0)) ** 2) // _MOST_ELEMENTS)) + 1)
     found = [
@@ -159,7 +163,9 @@ def _contracted(group, form, labels, here, every, names, values):
     found = rows >= 0
     columns, start = _columns_of(group, names, values)
     own = tuple(group.effect.parameters(group.top))
-    blocks = contracted_levels(group.top, (group.effect,), plan, levels, rows[found], own, start) if found.any() else None
+    blocks = (
+        contracted_levels(group.top, (group.effect,), plan, levels, rows[found], own, start) if found.any() else None
+    )
     return None if blocks is None else _Solved(here[found], columns, blocks)
 
 

@@ -62,9 +62,7 @@ def spin_terms_with_pairs(
         turned = 0.5 * sign * (1.0 if x in firsts else -1.0)
         return [_at(term, x, x, 0.5), _at(term, y, y, -0.5), *_at_turned(term, x, y, turned, axes)]
     if low in firsts and high in firsts:
-        return [
-            _at(term, *sorted((a, b))) for a, b in zip(firsts[low], firsts[high], strict=True)
-        ]
+        return [_at(term, *sorted((a, b))) for a, b in zip(firsts[low], firsts[high], strict=True)]
     if low in seconds or high in seconds:
         raise ValueError(
             "a spin operator of the state with K l ≤ 0 is read but not computed yet; name the one with K l > 0"
@@ -99,7 +97,7 @@ def turned_rotor(rotor: Rotor, axes: str) -> Rotor | None:
     >>> turned_rotor(Cosines(((0, 0, 0), (0, 1.0, 0), (0, 0, -1.0))), "bca").components  # bb - cc becomes bc + cb
     ((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, 1.0, 0.0))
     """
-    if not isinstance(rotor, Cosines | CosinesWithN) or rotor.rank == 1 and isinstance(rotor, Cosines):
+    if not isinstance(rotor, Cosines | CosinesWithN) or (rotor.rank == 1 and isinstance(rotor, Cosines)):
         return None
     x, y, z = ("abc".index(axis) for axis in axes)
     c, found = np.array(rotor.components, dtype=float), np.zeros((3, 3))
