@@ -32,7 +32,7 @@ Vector = tuple[float, float, float]
 class CodedLine(NamedTuple):
     """One parameter line: its name, value, operator, and the two states, lower first; None for every state.
 
-    reversed_: the code has V2 > V1.
+    reversed_: the code has V2 > V1. typ: TYP of the code.
     """
 
     name: str
@@ -40,6 +40,7 @@ class CodedLine(NamedTuple):
     operator: CodedOperator
     states: tuple[int, int] | None
     reversed_: bool = False
+    typ: int = 0
 
 
 def coded_lines(
@@ -96,6 +97,7 @@ def coded_lines(
                 operator,
                 None if low == wild else (low, high),
                 digits.v2 > digits.v1,
+                digits.typ,
             )
         )
     return found
@@ -199,7 +201,9 @@ class FileEffect(QuantumEffect):
                 bra, ket = states or (EVERY_STATE, EVERY_STATE)
                 if o.odd and bra == ket:  # of an l-doubled pair, between its components
                     ket = next(pair.second if bra == pair.first else pair.first for pair in self.pairs if bra in pair)
-                found += self._at_pairs(line, states, SpinTerm(line.name, names, o.rotor, 1.0, o.n2, o.nz2, o.ns, bra, ket))
+                found += self._at_pairs(
+                    line, states, SpinTerm(line.name, names, o.rotor, 1.0, o.n2, o.nz2, o.ns, bra, ket)
+                )
         return tuple(found)
 
     def _at_pairs(self, line: CodedLine, states: tuple[int, int] | None, term: SpinTerm) -> list[SpinTerm]:

@@ -62,17 +62,19 @@ def spin_terms_with_pairs(
         turned = 0.5 * sign * (1.0 if x in firsts else -1.0)
         return [_at(term, x, x, 0.5), _at(term, y, y, -0.5), *_at_turned(term, x, y, turned, axes)]
     if low in firsts and high in firsts:
-        return [
-            _at(term, *sorted((a, b))) for a, b in zip(firsts[low], firsts[high], strict=True)
-        ]
+        return [_at(term, *_in_order(a, b)) for a, b in zip(firsts[low], firsts[high], strict=True)]
     if low in seconds or high in seconds:
         raise ValueError(
             "a spin operator of the state with K l ≤ 0 is read but not computed yet; name the one with K l > 0"
         )
     pair = firsts[low] if low in firsts else firsts[high]
     other = high if low in firsts else low
-    first, second = sorted((other, pair.first)), sorted((other, pair.second))
-    return [_at(term, *first, 1 / sqrt(2.0)), *_at_turned(term, *second, sign / sqrt(2.0), axes)]
+    x, y = _in_order(other, pair.first), _in_order(other, pair.second)
+    return [_at(term, *x, 1 / sqrt(2.0)), *_at_turned(term, *y, sign / sqrt(2.0), axes)]
+
+
+def _in_order(one: int, other: int) -> tuple[int, int]:
+    return min(one, other), max(one, other)
 
 
 def _at(term: SpinTerm, bra: int, ket: int, factor: float = 1.0) -> SpinTerm:
@@ -99,7 +101,7 @@ def turned_rotor(rotor: Rotor, axes: str) -> Rotor | None:
     >>> turned_rotor(Cosines(((0, 0, 0), (0, 1.0, 0), (0, 0, -1.0))), "bca").components  # bb - cc becomes bc + cb
     ((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, 1.0, 0.0))
     """
-    if not isinstance(rotor, Cosines | CosinesWithN) or rotor.rank == 1 and isinstance(rotor, Cosines):
+    if not isinstance(rotor, Cosines | CosinesWithN) or (rotor.rank == 1 and isinstance(rotor, Cosines)):
         return None
     x, y, z = ("abc".index(axis) for axis in axes)
     c, found = np.array(rotor.components, dtype=float), np.zeros((3, 3))
