@@ -69,8 +69,8 @@ def spin_terms_with_pairs(
         )
     pair = firsts[low] if low in firsts else firsts[high]
     other = high if low in firsts else low
-    x, y = _in_order(other, pair.first), _in_order(other, pair.second)
-    return [_at(term, *x, 1 / sqrt(2.0)), *_at_turned(term, *y, sign / sqrt(2.0), axes)]
+    with_x, with_y = _in_order(other, pair.first), _in_order(other, pair.second)
+    return [_at(term, *with_x, 1 / sqrt(2.0)), *_at_turned(term, *with_y, sign / sqrt(2.0), axes)]
 
 
 def _in_order(one: int, other: int) -> tuple[int, int]:
