@@ -19,7 +19,7 @@ from rotor.formats.spcat.file_effect import CodedLine, FileEffect, Vector, coded
 from rotor.formats.spcat.l_doubled import Pair, named_by_l, pairs_of
 from rotor.formats.spcat.l_spins import named_by_l_with_spins
 from rotor.formats.spcat.states import StateOptions, states_of
-from rotor.formats.spcat.symmetry import forbidden, l_values, symmetric_part
+from rotor.formats.spcat.symmetry import forbidden, l_values, some_weights_agree, symmetric_part
 from rotor.formats.spcat.text.int_file import Dipole, IntensityFile
 from rotor.formats.spcat.text.par import Options, ParameterFile
 from rotor.quantum.levels import Levels
@@ -126,6 +126,8 @@ def groups_of(file: ParameterFile, intensities: IntensityFile, *, as_spcat: bool
     lines = allowed(lines, states, doubled, first.nvib < 0)[0]
     dipoles, others = dipoles_of(intensities.dipoles, len(states))
     dipoles = _of_both_components(dipoles, doubled)
+    if not others and not any(_has_elements(pair, mu, states, doubled) for pair, mu in dipoles.items()):
+        dipoles |= {(high, low): (-a, -b, -c) for (low, high), (a, b, c) in dipoles.items() if low != high}
     pairs = [line.states for line in lines if line.states] + list(dipoles) + [code.states for _, code in others]
     _refuse_missing_spins(lines, states)
     light = (dipoles, others)
@@ -133,6 +135,23 @@ def groups_of(file: ParameterFile, intensities: IntensityFile, *, as_spcat: bool
         _group([states[v] for v in numbers], lines, light, first, as_spcat, file.title, doubled)
         for numbers in _connected(len(states), [*pairs, *doubled])
     ]
+
+
+def left_out(file: ParameterFile) -> list[str]:
+    """A sentence for every parameter that the declared symmetry forbids."""
+    states, oblate = states_of(file), file.options[0].nvib < 0
+    doubled = pairs_of(states)
+    members = frozenset(v for pair in doubled for v in pair)
+    return allowed(coded_lines(file.parameters, len(states), oblate, members), states, doubled, oblate)[1]
+
+
+def _has_elements(pair: tuple[int, int], mu: Vector, states: tuple[StateOptions, ...], doubled: list[Pair]) -> bool:
+    """Whether a dipole is of one state and joins levels of one weight. Without such a dipole the program takes those between
+    states times i, so that they change their sign with the order of the states."""
+    low, high = pair
+    if low != high or low in {v for both in doubled for v in both}:
+        return low == high
+    return any(value and some_weights_agree(20 * axis, states[low], states[low]) for axis, value in enumerate(mu, 1))
 
 
 def allowed(

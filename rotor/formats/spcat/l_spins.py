@@ -53,8 +53,8 @@ def spin_terms_with_pairs(
     firsts, seconds = {pair.first: pair for pair in pairs}, {pair.second: pair for pair in pairs}
     sign = -1.0 if reversed_ else 1.0
     odd = term.rotor.odd
-    if low == high:
-        return _within(term, odd, firsts.get(low))
+    if low == high:  # in an oblate basis the sign of what is odd is another between states than within a pair
+        return _within(_at(term, term.bra, term.ket, -1.0) if odd and axes[2] == "c" else term, odd, firsts.get(low))
     if odd:
         raise ValueError("an odd spin operator between l-doubled states is read but not computed yet")
     if (low in firsts and firsts[low].second == high) or (high in firsts and firsts[high].second == low):

@@ -98,7 +98,9 @@ class StateOptions:
         steps = np.arange(0, 2 * fold.n, 2)  # K that stand in one Wang block, modulo n
         classes = (k[:, None] - self.l_code + steps) % fold.n
         alone = (classes == fold.alone).any(axis=1)
-        paired = np.isin(classes, fold.paired).any(axis=1)
+        paired = np.isin(classes, fold.paired).any(axis=1) | (
+            self.iax == 7
+        )  # which names both kinds of blocks of a 4-fold axis
         return np.stack([np.where(alone, own, 0), np.where(paired, self.e_weight, 0)], axis=1)
 
     def is_e(self, k: Ints) -> NDArray[np.bool_]:

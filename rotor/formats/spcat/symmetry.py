@@ -68,12 +68,13 @@ def forbidden(typ: int, low: StateOptions, high: StateOptions, del_l: int, oblat
         return "the axes of the two states differ"
     if low.fold > 2 and (delta_k(typ, oblate) - del_l) % low.fold:
         return f"its Δk - Δl is no multiple of {low.fold}"
-    if not (low.i_tot or doubled) and not _some_weights_agree(typ, low, high):
+    if not (low.i_tot or doubled) and not some_weights_agree(typ, low, high):
         return "it connects levels of unequal nuclear-spin weights"
     return ""
 
 
-def _some_weights_agree(typ: int, low: StateOptions, high: StateOptions) -> bool:
+def some_weights_agree(typ: int, low: StateOptions, high: StateOptions) -> bool:
+    """Whether an operator by its TYP (20, 40, 60: of the species of Na, Nb, Nc) joins levels of one weight."""
     turn = {1: (0, 1), 2: (1, 1), 3: (1, 0)}.get(typ // 20, (0, 0))  # species of the operator
     for species in _SPECIES:
         other = (species[0] ^ turn[0], species[1] ^ turn[1])
