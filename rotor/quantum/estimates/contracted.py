@@ -232,7 +232,9 @@ def coupling_columns(block: _Block, chosen: Ints, solved: _Solved) -> Floats:
     return out
 
 
-def _eliminated(rotation: Floats, diagonal: Floats, columns: Floats, inside: Ints, centre: float) -> tuple[Floats, Floats]:
+def _eliminated(
+    rotation: Floats, diagonal: Floats, columns: Floats, inside: Ints, centre: float
+) -> tuple[Floats, Floats]:
     """Energies (m,) and vectors (functions, m) of the functions inside, all others eliminated at the energy of the centre."""
     solved = columns[inside] + np.diag(rotation[inside] - centre)
     others = columns.copy()
@@ -353,5 +355,3 @@ def _window(levels: ContractedLevels, values_mhz: Floats) -> float:
         columns = coupling_columns(block, np.unique(_functions_of(block, states)), solved)
         longest = max(longest, float(np.sqrt(np.einsum("ij,ij->j", columns, columns)).max()))
     return max(_LEAST_RATIO * longest, float(np.sqrt(longest**3 / TOLERANCE_MHZ)))
-
-
