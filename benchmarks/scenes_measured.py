@@ -32,7 +32,7 @@ ROOT = Path(__file__).resolve().parents[1]
 SCENES, RESULTS = ROOT / "examples" / "scenes", ROOT / "benchmarks" / "results" / "scenes_measured.json"
 PAGE = ROOT / "docs" / "scenes_measured.md"
 LIMIT_SECONDS = 60.0
-EXACT = "exact: nothing cheaper"
+CHEAPEST = "nothing cheaper"
 
 HEAD = """# Scenes: the plan beside what happened
 
@@ -152,14 +152,9 @@ def page(rows: list[Measured]) -> str:
 
 def line(one: Measured) -> str:
     unit = f" {one.unit}" if one.unit else ""
-    exact = EXACT in one.how or not one.knobs
-    found = (
-        ""
-        if exact
-        else "<br>".join(f"{k.name.removeprefix('numerics.')} {k.setting}: {k.found:.1e}" + _unit(k) for k in one.knobs)
-    )
+    found = "<br>".join(f"{k.name.removeprefix('numerics.')} {k.setting}: {k.found:.1e}" + _unit(k) for k in one.knobs)
     coarser = (
-        "nothing is cheaper" if exact
+        "nothing is cheaper" if CHEAPEST in one.how or not one.knobs
         else "<br>".join(f"{k.coarser_setting}: {k.coarser:.1e}" + _unit(k) for k in one.knobs if k.coarser is not None)
     )  # fmt: skip
     seconds, memory = f"{one.plan_seconds:.2g}, {one.run_seconds:.2g}", f"{one.plan_mb:.2g}, {one.run_mb:.2g}"
@@ -186,7 +181,7 @@ def misses(one: Measured) -> list[str]:
 
 def tail(rows: list[Measured]) -> str:
     """Which scenes could be coarser."""
-    spared = [one.scene for one in rows if EXACT not in one.how and one.knobs and not misses(one)]
+    spared = [one.scene for one in rows if CHEAPEST not in one.how and one.knobs and not misses(one)]
     if not spared:
         return "\nOne step coarser at least one knob of every scene misses its accuracy.\n"
     return (

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import importlib.util
+import json
 import sys
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import numpy as np
 import pytest
@@ -75,3 +77,26 @@ def test_the_pages_claim_what_they_should():
     assert len(rows) == 26
     assert all(float(row[3]) <= 1.1e-4 and float(row[4]) <= 2e-4 and float(row[5]) <= 2e-4 for row in equal)
     assert all(float(row[7]) <= 1e-6 for row in equal)
+
+
+def results(name: str) -> dict[str, Any]:
+    return json.loads((DOCS.parent / "benchmarks" / "results" / f"{name}.json").read_text(encoding="utf-8"))
+
+
+def test_figures_in_the_text_are_those_that_the_benchmarks_wrote():
+    fluid = (DOCS / "fluid.md").read_text(encoding="utf-8").replace("\n", " ")
+    found = results("thermometers")
+    drifts = [
+        found["drifts"][name]["energy_rms_kj_per_mol"] for name in ("symmetric top and remainder", "three rotations")
+    ]
+    long = next(row["energy_rms_kj_per_mol"] for row in found["runs"] if row["step_fs"] == 2.0)
+    assert (
+        f"rms of the energy is {drifts[0]:.2f} kJ/mol with this drift and {drifts[1]:.2f} with three rotations" in fluid
+    )
+    assert f"Over 80 ps it is {long:.2f}" in fluid
+
+    cost = results("free_motion")
+    one, many, most = (cost[f"setting up {n} bodies, each"] for n in (1, 1000, 100_000))
+    for page, text in (("speed.md", ","), ("classical.md", " (up to 15 on a busy machine) and")):
+        stated = f"{one / 1000:.0f} ms for one body{text} {most:.0f} to {many:.0f} µs each for many"
+        assert stated in (DOCS / page).read_text(encoding="utf-8")

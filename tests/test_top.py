@@ -115,7 +115,7 @@ def test_linear_in_any_orientation(seed):
     ("bend_degrees", "kind"), [(0.0, "linear"), (0.01, "linear"), (0.5, "asymmetric"), (5.0, "asymmetric")]
 )
 def test_near_linear_says_by_which_number(bend_degrees, kind):
-    """Hard case 9: OCS bent a little; I_a/I_c against 1e-6 decides and is told with its margin."""
+    """Hard case 9: OCS bent a little; I_a/I_c against 1e-6 decides and is stated with its margin."""
     t = np.radians(bend_degrees)
     top = Top.from_molecule(
         Molecule(("O", "C", "S"), [[0, 0, 1.156], [0, 0, 0], [1.561 * np.sin(t), 0, -1.561 * np.cos(t)]])

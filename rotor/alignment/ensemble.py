@@ -1,7 +1,8 @@
 """Which states a gas is in before a pulse: all (level, M) at a temperature with their spin weights, or one chosen level.
 
 Levels are taken in order of the population of one state until what is left out is below a cut. What is left out is not scaled
-away: it stays isotropic (cos²θ = 1/3), so that a cut ε moves the cosines by about 0.2 ε.
+away: it stays isotropic (cos²θ = 1/3), so that a cut ε moves the cosines by ε times their own
+departure at the most (`AlignmentTrace.error_estimate`).
 """
 
 from __future__ import annotations

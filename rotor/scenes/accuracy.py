@@ -4,9 +4,9 @@
 |---|---|---|---|
 | spectrum, levels, raman | frequencies, energies, shifts, "1 kHz" | spins with known constants, left out if smaller | rounding, and these |
 | stark | energies, "1 kHz" | tolerance, and with it J max of the basis | by which energies move with a higher J max |
-| align | cosines, 1e-4 | tolerance: steps, J max, populations | step error, edge population, population left out |
+| align | cosines, 1e-4 | the loosest tolerance: steps, J max, populations | step error, edge population, population left out |
 | thermo | Q, U and C_v, "0.1 %" | levels summed, or the classical limit with corrections | of the sums |
-| tumble | attitude, "1e-6 rad" | tolerance of the steps; free motion is exact | from steps a hundred times finer |
+| tumble | attitude, "1e-6 rad" | see `rotor.scenes.accuracy_motion`; free motion is exact | from finer steps |
 | gas, fluid | see `rotor.scenes.accuracy_sampled` | | |
 
 It is the numerical error with the constants as given. Their own uncertainty, and orders of distortion that they do not have, are
@@ -16,11 +16,12 @@ beside it in a plan. What double precision cannot give is refused.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rotor.scenes.choice import NOTHING_CHEAPER, Choice, Reached
 from rotor.scenes.kind import quantity
 from rotor.scenes.scene import Scene
 
@@ -30,19 +31,10 @@ if TYPE_CHECKING:
 ROUNDING = 8 * float(
     np.finfo(np.float64).eps
 )  # of an eigenvalue, relative to the largest: a few units in the last place
-FINEST_TOLERANCE, FINER, COARSER = 1e-13, 1e-2, 10.0
+LOOSEST_COSINE = 0.05
+LOOSER = (1e3, 1e2, 1e1, 1.0)  # tolerances of cosines that are tried, times the accuracy
 UNITS = {"spectrum": "MHz", "levels": "MHz", "raman": "MHz", "stark": "MHz", "align": "", "thermo": "", "tumble": "rad"}
 SAMPLED = {"gas": ("K", "%", ""), "fluid": ("K", "%")}  # units, of which each is the accuracy of something else
-
-
-@dataclass(frozen=True)
-class Reached:
-    """asked, error: in `unit`. how: which settings were chosen for it."""
-
-    asked: float
-    error: float
-    unit: str
-    how: str
 
 
 def asked_of(scene: Scene) -> float | None:
@@ -107,8 +99,8 @@ def _sampled(kind: str, given: str | float) -> float:
     return value
 
 
-def chosen(scene: Scene, request: Any) -> tuple[Any, str]:
-    """The request with the cheapest settings that reach the accuracy of its scene, and what was chosen.
+def chosen(scene: Scene, request: Any) -> Choice:
+    """The request with the cheapest settings that reach the accuracy of its scene.
 
     Raises ValueError for what double precision cannot give, and where a knob is given by hand as well.
     """
@@ -117,17 +109,18 @@ def chosen(scene: Scene, request: Any) -> tuple[Any, str]:
     return _CHOICES[scene.kind](scene, request, asked)
 
 
-def reached(scene: Scene, answer: Any, how: str) -> Reached:
+def reached(scene: Scene, answer: Any, choice: Choice) -> Reached:
     """The error that an answer reached; ValueError where it is more than what was asked for, with the reason."""
     asked = asked_of(scene)
     assert asked is not None
     unit = unit_of(scene)
-    error = _sampled_error(scene.kind, answer, unit) if scene.kind in SAMPLED else _ERRORS[scene.kind](answer)
+    own = _sampled_error(scene.kind, answer, unit) if scene.kind in SAMPLED else _ERRORS[scene.kind](answer)
+    error = max(own, choice.error)
     if error > asked:
         raise ValueError(
-            f"accuracy: {asked:g} {unit}".rstrip() + f" cannot be given: the error here is {error:.2g} ({how})"
+            f"accuracy: {asked:g} {unit}".rstrip() + f" cannot be given: the error here is {error:.2g} ({choice.how})"
         )
-    return Reached(asked, error, unit, how)
+    return Reached(asked, error, unit, choice.how)
 
 
 def _sampled_error(kind: str, answer: Any, unit: str) -> float:
@@ -136,30 +129,30 @@ def _sampled_error(kind: str, answer: Any, unit: str) -> float:
     return error_of_gas(answer, unit) if kind == "gas" else error_of_fluid(answer, unit)
 
 
-def _gas(scene: Any, request: Any, asked: float) -> tuple[Any, str]:
+def _gas(scene: Any, request: Any, asked: float) -> Choice:
     from rotor.scenes.accuracy_sampled import choose_molecules
 
     return choose_molecules(scene, request, asked, unit_of(scene))
 
 
-def _fluid(scene: Any, request: Any, asked: float) -> tuple[Any, str]:
+def _fluid(scene: Any, request: Any, asked: float) -> Choice:
     from rotor.scenes.accuracy_sampled import choose_step
 
     return choose_step(scene, request, asked, unit_of(scene))
 
 
-def _spectrum(scene: Any, request: Any, asked: float) -> tuple[Any, str]:
+def _spectrum(scene: Any, request: Any, asked: float) -> Choice:
     """Spins whose constants are known are taken where they are larger than what was asked for."""
     if scene.effects.hyperfine is not None or request.top.spin_constants is None:
-        return request, "exact: nothing cheaper"
+        return Choice(request, NOTHING_CHEAPER)
     from rotor.quantum.effects.of_top import effects_of
 
     size = _spin_size(request.top, request.effects)
     if size <= asked:
-        return request, f"spins of nuclei left out, {size:.2g} MHz"
+        return Choice(request, f"spins of nuclei left out, {size:.2g} MHz")
     if any(effect.spins(request.top) for effect in request.effects):
-        return request, "with spins of nuclei: exact, nothing cheaper"
-    return replace(request, effects=effects_of(request.top, True)), f"with spins of nuclei, {size:.2g} MHz"
+        return Choice(request, "with spins of nuclei: exact, nothing cheaper")
+    return Choice(replace(request, effects=effects_of(request.top, True)), f"with spins of nuclei, {size:.2g} MHz")
 
 
 def _spin_size(top: Any, present: tuple[QuantumEffect, ...]) -> float:
@@ -177,77 +170,74 @@ def _levels_error(top: Any, levels: Any) -> float:
     return rounding + left
 
 
-def _tolerance(name: str, default: Any, least: float) -> Callable[[Any, Any, float], tuple[Any, str]]:
+def _tolerance(name: str, default: Any, least: float) -> Callable[[Any, Any, float], Choice]:
     """A choice that hands what was asked for to one field of the request."""
 
-    def choose(scene: Any, request: Any, asked: float) -> tuple[Any, str]:
+    def choose(scene: Any, request: Any, asked: float) -> Choice:
         key = {"tolerance_mhz": "tolerance"}.get(name, name)
         if getattr(scene.numerics, key) != default:
             raise ValueError(f"accuracy and numerics.{key}: give one of them")
         if asked < least:
             raise ValueError(f"accuracy: {asked:g}: the finest that is possible here is {least:g}")
-        return replace(request, **{name: asked}), f"{key} {asked:g}"
+        return Choice(replace(request, **{name: asked}), f"{key} {asked:g}")
 
     return choose
 
 
-def _tumble(scene: Any, request: Any, asked: float) -> tuple[Any, str]:
-    """The loosest tolerance whose motion differs by less than asked from one with a tolerance a hundred times finer."""
-    from rotor.classical.driven import DEFAULT_TOLERANCE, DrivenRequest
+def _align(scene: Any, request: Any, asked: float) -> Choice:
+    """The loosest tolerance, in decades, whose error as it is found by a run is what was asked for.
 
-    if not isinstance(request, DrivenRequest):
-        return request, "exact: nothing cheaper"
-    if scene.numerics.tolerance != DEFAULT_TOLERANCE or scene.numerics.step is not None:
-        raise ValueError("accuracy and numerics: give one of them")
-    tolerance, error = min(max(asked, FINEST_TOLERANCE), 1e-3), 0.0
-    while tolerance >= FINEST_TOLERANCE:
-        error = _step_error(request, tolerance)
-        if error <= asked:
-            return replace(request, tolerance=tolerance), f"tolerance {tolerance:.1g} of a step"
-        tolerance /= COARSER
-    raise ValueError(
-        f"accuracy: {asked:g} rad cannot be given: steps to {FINEST_TOLERANCE:g} still differ by {error:.2g} rad at the end, the motion is "
-        "chaotic or too long for double precision; ask for less, or for a shorter time"
-    )
+    A tolerance bounds each source of error; what a run finds is often a hundred times less. J max follows from the tolerance: a lower
+    one saves less time than its search takes (OCS at 1 K: 18 in place of 24, a twelfth).
+    """
+    from rotor.alignment.request import answer_align
+
+    if request.jmax is not None:
+        return _tolerance("tolerance", 1e-6, 1e-11)(scene, request, asked)
+    found = _tolerance("tolerance", 1e-6, 1e-11)(scene, request, asked)
+    for looser in LOOSER:
+        tried = replace(request, tolerance=min(looser * asked, LOOSEST_COSINE), classical_molecules=0)
+        trace = answer_align(tried).trace
+        if trace.error_estimate <= asked:
+            how = f"tolerance {tried.tolerance:g}, and J max {trace.jmax} from it"
+            return Choice(replace(request, tolerance=tried.tolerance), how)
+    return found
 
 
-def _step_error(request: Any, tolerance: float) -> float:
-    """The largest difference of attitude, in radians, from steps that are a hundred times finer."""
-    from rotor.classical.driven import answer_driven
-    from rotor.geometry.rotations import distance
+def _tumble(scene: Any, request: Any, asked: float) -> Choice:
+    from rotor.classical.tumble import TumbleRequest
+    from rotor.scenes.accuracy_motion import choose_tolerance
 
-    coarse, fine = (
-        answer_driven(replace(request, tolerance=one)).motion
-        for one in (tolerance, max(FINER * tolerance, 0.1 * FINEST_TOLERANCE))
-    )
-    return float(np.max(distance(coarse.attitude, fine.attitude)))
+    if isinstance(request, TumbleRequest):
+        return Choice(request, NOTHING_CHEAPER)
+    return choose_tolerance(scene, request, asked)
 
 
 def _tumble_error(answer: Any) -> float:
     from rotor.classical.tumble import TumbleAnswer
 
     if not isinstance(answer, TumbleAnswer):
-        return _step_error(answer.request, answer.request.tolerance)
+        return 0.0  # that of the steps was found when they were chosen
     turned = (
         float(answer.motion.turning_rate) * float(np.abs(answer.table.times).max()) / answer.request.units.time_factor
     )
     return ROUNDING * max(turned, 1.0)
 
 
-def _stark(scene: Scene, request: Any, asked: float) -> tuple[Any, str]:
+def _stark(scene: Scene, request: Any, asked: float) -> Choice:
     """Energies alone decide: the population at the edge of the basis, which cosines need, is reported and not limited."""
-    found, how = _tolerance("tolerance_mhz", "1e-4 MHz", 1e-9)(scene, request, asked)
-    return replace(found, most_at_edge=1.0), how
+    found = _tolerance("tolerance_mhz", "1e-4 MHz", 1e-9)(scene, request, asked)
+    return replace(found, request=replace(found.request, most_at_edge=1.0))
 
 
-_CHOICES: dict[str, Callable[[Any, Any, float], tuple[Any, str]]] = {
+_CHOICES: dict[str, Callable[[Any, Any, float], Choice]] = {
     "spectrum": _spectrum,
     "levels": _spectrum,
     "raman": _spectrum,
     "gas": _gas,
     "fluid": _fluid,
     "stark": _stark,
-    "align": _tolerance("tolerance", 1e-6, 1e-11),
+    "align": _align,
     "thermo": _tolerance("relative_error", 1e-6, 1e-13),
     "tumble": _tumble,
 }

@@ -5,13 +5,24 @@
 | gas, "1 K" | temperature of the kinetic energy | molecules: z T √(2/fN) | the same |
 | gas, "1 %" | heat capacity var(E)/kT² | molecules: z √((2 + 12/f)/N) | the same |
 | gas, 0.02 | C1 and C2 at each time | molecules: z s/√N, s of a small gas | from the spread in the run |
-| fluid, "0.5 K" | conserved energy, 2E/k per degree | the step, by short runs of the box | root mean square of the run |
+| fluid, "0.5 K" | conserved energy, 2E/k per degree | the step, by short runs of the box | bound of these, and of the run |
 | fluid, "0.1 %" | forces of Ewald's sum | its tolerance, by forces in the box | where the run ends |
 
 The energy E of the f degrees of freedom of one molecule has a gamma distribution of shape f/2: mean f kT/2, variance f (kT)²/2, excess
 kurtosis κ = 12/f. Of N independent values the mean has the variance var/N, and the variance has var² (2/(N - 1) + κ/N). z is the
-two-sided quantile of the confidence of the scene. The conserved energy of a fluid departs by the square of the step
-(`rotor.fluid.motion.dynamics`); it is that of rigid molecules with the forces of the scene, whose cutoff is part of the model.
+two-sided quantile of the confidence of the scene.
+
+The conserved energy of a fluid departs from its mean by h² G(q, p), h the step and G a function of coordinates and momenta: what a
+step of order 2 conserves to order h⁴ is H + h² G. How far it departs depends on the stretch of the motion: a box that starts with
+forces at rest and velocities drawn has more of it than a settled one, and a mean over a long run hides that. So n boxes are followed
+without a thermostat over `FOLLOWED_FS`, each with velocities of its own, and the root mean squares r of their conserved energies give
+a bound for one more such stretch: the difference of one more r and the mean of n is normal with the variance σ²(1 + 1/n), so that over
+s, the standard deviation of the n, it has Student's distribution, t its quantile:
+
+    r < mean(r) + t(0.99, n - 1) s(r) √(1 + 1/n)
+
+Stated is this bound, or the root mean square of the whole run where that is larger. It is that of rigid molecules with the forces of
+the scene, whose cutoff is part of the model.
 """
 
 from __future__ import annotations
@@ -20,12 +31,15 @@ import math
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+from rotor.scenes.choice import Choice
+
 if TYPE_CHECKING:
     from rotor.fluid.request import FluidRequest
     from rotor.thermo.classical_gas import GasAnswer, GasRequest
 
 PILOT_MOLECULES = 2_000
-SPARE = 1.25  # a run is longer than the short ones that its step was chosen by: their error is to be so much smaller
+SPARE = 1.25  # the forces where a run ends are others than those that Ewald's tolerance was chosen by
+BOXES, SURE = 8, 0.99  # boxes that are followed, and the confidence of the bound
 FIRST_STEP_FS, LONGEST_STEP_FS, SHORTEST_STEP_FS = 1.0, 8.0, 0.05
 EWALD_LADDER = tuple(10.0**-n for n in range(2, 11))
 REFERENCE_EWALD = 1e-12
@@ -59,7 +73,7 @@ def relative_spread(unit: str, degrees: int) -> float:
     return math.sqrt(2.0 / degrees) if unit == "K" else math.sqrt(2.0 + 12.0 / degrees)
 
 
-def choose_molecules(scene: Any, request: GasRequest, asked: float, unit: str) -> tuple[GasRequest, str]:
+def choose_molecules(scene: Any, request: GasRequest, asked: float, unit: str) -> Choice:
     """The request with as many molecules as the accuracy needs.
 
     Parameters
@@ -75,8 +89,7 @@ def choose_molecules(scene: Any, request: GasRequest, asked: float, unit: str) -
 
     Returns
     -------
-    GasRequest, str
-        And what was chosen, in words.
+    Choice
 
     Raises
     ------
@@ -95,7 +108,7 @@ def choose_molecules(scene: Any, request: GasRequest, asked: float, unit: str) -
             f"accuracy: {asked:g} {unit}".rstrip()
             + f" would need {count:.2g} molecules, more than the {MOST_MOLECULES:g} of a run; ask for less"
         )
-    return replace(request, molecules=count), f"{count} molecules, at a confidence of {request.confidence:g}"
+    return Choice(replace(request, molecules=count), f"{count} molecules, at a confidence of {request.confidence:g}")
 
 
 def _spread(request: GasRequest, asked: float, unit: str) -> float:
@@ -128,7 +141,7 @@ def error_of_gas(answer: GasAnswer, unit: str) -> float:
     return z * scale * relative_spread(unit, degrees_of(request)) / math.sqrt(request.molecules)
 
 
-def choose_step(scene: Any, request: FluidRequest, asked: float, unit: str) -> tuple[FluidRequest, str]:
+def choose_step(scene: Any, request: FluidRequest, asked: float, unit: str) -> Choice:
     """The request with the longest step, or the coarsest tolerance of Ewald's sum, that reaches an accuracy.
 
     Parameters
@@ -144,8 +157,8 @@ def choose_step(scene: Any, request: FluidRequest, asked: float, unit: str) -> t
 
     Returns
     -------
-    FluidRequest, str
-        With a box that is made, and what was chosen, in words.
+    Choice
+        Its request has a box that is made.
 
     Raises
     ------
@@ -154,11 +167,11 @@ def choose_step(scene: Any, request: FluidRequest, asked: float, unit: str) -> t
     """
     if request.engine != "rotor":
         raise ValueError(f"accuracy: the engine {request.engine} is not swept; give numerics.step, or the engine rotor")
-    made = _made(request)
+    made = made_of(request)
     return _by_energy(scene, made, asked) if unit == "K" else _by_forces(scene, made, asked)
 
 
-def _made(request: FluidRequest) -> FluidRequest:
+def made_of(request: FluidRequest) -> FluidRequest:
     """The request with its box, made once."""
     from rotor.fluid.request import NewBox, box_of
 
@@ -169,31 +182,51 @@ def _made(request: FluidRequest) -> FluidRequest:
     return replace(request, box=box, box_source=request.start)
 
 
-def _by_energy(scene: Any, request: FluidRequest, asked: float) -> tuple[FluidRequest, str]:
+def _by_energy(scene: Any, request: FluidRequest, asked: float) -> Choice:
     from rotor.scenes.kind import quantity
-    from rotor.scenes.knobs.of_motion import answer_followed, conserved_k, followed
     from rotor.scenes.sections import FluidNumerics
 
     given, usual = (quantity("numerics.step", one, "fs") for one in (scene.numerics.step, FluidNumerics().step))
     if given != usual:
         raise ValueError("accuracy and numerics.step: give one of them")
 
-    def error(step_fs: float) -> float:
-        return conserved_k(answer_followed(followed(request, step_fs)))
-
     # of second order: the step that reaches it, in hundredths of a femtosecond, from one that is short; then shorter until it does
-    step = FIRST_STEP_FS * math.sqrt(asked / SPARE / error(FIRST_STEP_FS))
+    step = FIRST_STEP_FS * math.sqrt(asked / conserved_bound_k(request, FIRST_STEP_FS))
     step = min(math.floor(100.0 * step) / 100.0, LONGEST_STEP_FS)
     while step > SHORTEST_STEP_FS:
-        if error(step) <= asked / SPARE:
-            return replace(request, settings=replace(request.settings, step_fs=step)), f"a step of {step:g} fs"
+        if (error := conserved_bound_k(request, step)) <= asked:
+            return Choice(
+                replace(request, settings=replace(request.settings, step_fs=step)), f"a step of {step:g} fs", error
+            )
         step = math.floor(95.0 * step) / 100.0
     raise ValueError(
         f"accuracy: {asked:g} K cannot be given: the steps would be shorter than {SHORTEST_STEP_FS:g} fs; ask for less"
     )
 
 
-def _by_forces(scene: Any, request: FluidRequest, asked: float) -> tuple[FluidRequest, str]:
+def conserved_bound_k(request: FluidRequest, step_fs: float) -> float:
+    """What the root mean square of the conserved energy of a box over a short time is below, in K for each degree of freedom.
+
+    request: with a box that is made; the first of the boxes that are followed has its own velocities, if there are any.
+    """
+    import numpy as np
+    from scipy.special import stdtrit
+
+    from rotor.scenes.knobs.of_motion import answer_followed, conserved_k, followed
+
+    every = []
+    for number in range(BOXES):
+        box: Any = request.box
+        box = box.copy()
+        if number:
+            box.set_momenta(np.zeros((len(box), 3)))  # drawn anew at the temperature
+        settings = replace(request.settings, seed=request.settings.seed + number)
+        every.append(conserved_k(answer_followed(followed(replace(request, box=box, settings=settings), step_fs))))
+    spread = float(np.std(every, ddof=1)) * math.sqrt(1.0 + 1.0 / BOXES)
+    return float(np.mean(every)) + float(stdtrit(BOXES - 1, SURE)) * spread
+
+
+def _by_forces(scene: Any, request: FluidRequest, asked: float) -> Choice:
     from rotor.scenes.sections import FluidNumerics
 
     own = request.settings
@@ -208,7 +241,7 @@ def _by_forces(scene: Any, request: FluidRequest, asked: float) -> tuple[FluidRe
         chosen = replace(request, settings=replace(own, ewald_tolerance=tolerance))
         error = force_error(chosen)
         if error <= asked / SPARE:
-            return chosen, f"a tolerance of {tolerance:g} of Ewald's sum"
+            return Choice(chosen, f"a tolerance of {tolerance:g} of Ewald's sum")
     raise ValueError(
         f"accuracy: {asked:g} % cannot be given: Ewald's sum to {tolerance:g} is still off by {error:.2g} %"
     )

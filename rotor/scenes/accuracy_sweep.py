@@ -96,7 +96,7 @@ def knobs_of(scene: Scene, folder: str | os.PathLike[str] = ".") -> Knobs:
     if getattr(scene, "accuracy", None) is not None:
         from rotor.scenes.accuracy import chosen
 
-        request, _ = chosen(scene, request)
+        request = chosen(scene, request).request
     found: Knobs = getattr(module, scene.kind)(request)
     return found
 

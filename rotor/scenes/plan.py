@@ -14,6 +14,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from rotor.scenes import left_out
+from rotor.scenes.choice import Choice
 from rotor.scenes.kind import kind_of
 from rotor.scenes.plan_parts import Plan, effect_texts, extrapolated, good_numbers, level_parts, timed
 from rotor.scenes.scene import Scene
@@ -27,6 +28,8 @@ SHORT_FIELDS, SHORT_GAS, SHORT_STEPS = (2, 20), (500, 2000), (5, 20)  # likewise
 MILLIBAR = 1e-3  # of a gas whose pressure is not given
 BYTES_A_LINE = 100  # columns of a line in memory
 STEPS = "Runge-Kutta of order 8, adaptive"
+LONG_SEARCH = 10.0  # seconds; a shorter one is made twice, as its first time has imports and compilation in it
+SEARCHED = 5  # motions that the search of a tolerance takes: three to seven in the example scenes
 BEGINNINGS = 20  # of a driven motion, one of which is made to count its steps
 SOME_STEPS = 1000  # beyond those that are made one by one
 
@@ -61,18 +64,26 @@ def plan_of(scene: Scene, folder: str | os.PathLike[str] = ".") -> Plan:
     request = kind_of(scene).request(scene, folder)
     if getattr(scene, "accuracy", None) is None:
         return _PLANS[scene.kind](request)
-    request, how = _chosen(scene, request)
-    plan = _PLANS[scene.kind](request)
-    return replace(plan, parts=(*plan.parts, ("accuracy", how)))
-
-
-def _chosen(scene: Scene, request: Any) -> tuple[Any, str]:
-    """The settings that reach the accuracy of a scene; those of a driven motion are found by the motion itself, when it is run."""
-    if scene.kind == "tumble" and hasattr(request, "tolerance"):
-        return request, "the loosest tolerance that reaches it, found when the scene is run"
+    if hasattr(request, "tolerance") and scene.kind == "tumble":
+        return _searched(scene, request)
     from rotor.scenes.accuracy import chosen
 
-    return chosen(scene, request)
+    found: list[Choice] = []
+    search = timed(lambda: found.append(chosen(scene, request)), LONG_SEARCH)
+    plan = _PLANS[scene.kind](found[-1].request)
+    return replace(plan, parts=(*plan.parts, ("accuracy", found[-1].how)), seconds=plan.seconds + search)
+
+
+def _searched(scene: Scene, request: Any) -> Plan:
+    """The plan of a driven motion whose tolerance is found by the motion itself when it is run: one of a likely tolerance."""
+    from rotor.scenes.accuracy import asked_of
+    from rotor.scenes.accuracy_motion import likely_tolerance
+
+    asked = asked_of(scene)
+    assert asked is not None
+    plan = _PLANS[scene.kind](replace(request, tolerance=likely_tolerance(asked)))
+    how = f"the loosest tolerance that reaches it, found when the scene is run, by about {SEARCHED} motions"
+    return replace(plan, parts=(*plan.parts, ("accuracy", how)), seconds=(SEARCHED + 1) * plan.seconds)
 
 
 def allowed_lines(top: Top, jmax: int) -> int:
@@ -202,7 +213,7 @@ def _stark(request: Any) -> Plan:
             ("method", "exact blocks of one |M| (and K, or D2 species), every field diagonalised"),
             (
                 "error",
-                f"{facts['accuracy_mhz']:.1e} MHz at the ends of the fields: by which energies move with a higher J max",
+                f"{facts['accuracy_mhz']:.1e} MHz at the ends of the fields: by which energies move with a higher J max, and round-off",
             ),
         ),
         counts={"fields": len(fields), "states": len(fields) * facts["curves"]},

@@ -39,12 +39,12 @@ class Plan:
         return asdict(self) | {"parts": dict(self.parts), "counts": dict(self.counts)}
 
 
-def timed(call: Callable[[], Any]) -> float:
-    """Processor time of a call, its second one where the first is short: without imports and compilation."""
+def timed(call: Callable[[], Any], long: float = 1.0) -> float:
+    """Processor time of a call, its second one unless the first takes longer than `long` seconds: without imports and compilation."""
     start = time.process_time()
     call()
     first = time.process_time() - start
-    if first > 1.0:
+    if first > long:
         return first
     start = time.process_time()
     call()

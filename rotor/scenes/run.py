@@ -14,7 +14,7 @@ from rotor.scenes.kind import Kind, Writer, kind_of
 from rotor.scenes.scene import Scene, within
 
 if TYPE_CHECKING:
-    from rotor.scenes.accuracy import Reached
+    from rotor.scenes.choice import Choice, Reached
     from rotor.table import Table
 
 PICTURES = (".png", ".pdf", ".svg")
@@ -80,24 +80,25 @@ def run_scene(
     kind = kind_of(scene)
     targets = output_paths(scene, out)
     request = kind.request(scene, folder)
-    start, how = time.perf_counter(), None
+    start, choice = time.perf_counter(), None
     if getattr(scene, "accuracy", None) is not None:
         from rotor.scenes.accuracy import chosen
 
-        request, how = chosen(scene, request)
+        choice = chosen(scene, request)
+        request = choice.request
     answer = kind.answer(request, scene, out, executor)
     seconds = time.perf_counter() - start
-    found = None if how is None else _reached(scene, answer, how)
+    found = None if choice is None else _reached(scene, answer, choice)
     table = kind.table(answer)
     _write(scene, kind, answer, table, targets, found)
     files = tuple(path for paths in targets.values() for path in paths)
     return SceneResult(scene, request, answer, table, files, seconds, found)
 
 
-def _reached(scene: Scene, answer: Any, how: str) -> Reached:
+def _reached(scene: Scene, answer: Any, choice: Choice) -> Reached:
     from rotor.scenes.accuracy import reached
 
-    return reached(scene, answer, how)
+    return reached(scene, answer, choice)
 
 
 def output_paths(scene: Scene, out: str | os.PathLike[str]) -> dict[str, list[Path]]:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 from rotor.formats.spcat.codes import AXES, split_code
 from rotor.formats.spcat.l_doubled import Pair, couplings_with_pairs
+from rotor.formats.spcat.l_spins import spin_terms_with_pairs
 from rotor.formats.spcat.operators import CodedOperator, operator_of, plain_of_j
 from rotor.formats.spcat.text.par import Parameter
 from rotor.quantum.effect import QuantumEffect
@@ -106,7 +107,7 @@ class FileEffect(QuantumEffect):
 
     lines: with the file's numbers of states. numbers: the states taken, in their order here. coupled: the spins by place. moments:
     dipoles in debye by pairs of numbers here. limits: least and largest K of states, by number here. others: moments of other kinds.
-    ixx: which sums of angular momenta are conserved, bit by bit from N on. pairs: l-doubled states, by number here.
+    ixx: which sums of angular momenta are conserved, bit by bit from N on. pairs: l-doubled states, by number here. axes: those at x, y, z.
     """
 
     name: ClassVar[str] = ""
@@ -120,6 +121,7 @@ class FileEffect(QuantumEffect):
     others: tuple[Moment, ...] = ()
     ixx: int = 0
     pairs: tuple[Pair, ...] = ()
+    axes: str = AXES["Ir"]
 
     @cached_property
     def _own(self) -> tuple[tuple[CodedLine, tuple[int, int] | None], ...]:
@@ -195,8 +197,20 @@ class FileEffect(QuantumEffect):
             if o.rotor is not None:
                 names = tuple(self.coupled[place - 1].name for place in o.spins)
                 bra, ket = states or (EVERY_STATE, EVERY_STATE)
-                found.append(SpinTerm(line.name, names, o.rotor, 1.0, o.n2, o.nz2, o.ns, bra, ket))
+                if o.odd and bra == ket:  # of an l-doubled pair, between its components
+                    ket = next(pair.second if bra == pair.first else pair.first for pair in self.pairs if bra in pair)
+                found += self._at_pairs(
+                    line, states, SpinTerm(line.name, names, o.rotor, 1.0, o.n2, o.nz2, o.ns, bra, ket)
+                )
         return tuple(found)
+
+    def _at_pairs(self, line: CodedLine, states: tuple[int, int] | None, term: SpinTerm) -> list[SpinTerm]:
+        if not states or set(states).isdisjoint(v for pair in self.pairs for v in pair):
+            return [term]
+        try:
+            return spin_terms_with_pairs(term, states, line.reversed_, self.pairs, self.axes)
+        except ValueError as error:
+            raise ValueError(f"parameter {line.name.partition('#')[0]}: {error}") from None
 
     def dipoles(self, top: Top) -> dict[tuple[int, int], Vector]:
         """The dipoles of the .int file."""

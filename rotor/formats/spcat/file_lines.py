@@ -7,6 +7,7 @@ QNFMT = 100 Q + 10 H + NQN: Q is the kind of quanta, H in binary which of the la
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -78,13 +79,7 @@ def format_of(file: ParameterFile, groups: list[Group]) -> Format:
     rotation = 3 if first.spind > 0 else 1 if linear else 2
     spins = max(len(group.spins) for group in groups)
     i_tot = any(state.i_tot for group in groups for state in group.states)
-    found = Format(rotation, abs(first.nvib) > 1, spins, 10 if file.header.nline < 0 else 6, i_tot)
-    if i_tot and found.aggregate:
-        raise ValueError(
-            f"more than {found.most} quantum numbers with a total spin of equivalent nuclei, numbered patterns of them: that is read "
-            "but not computed yet; a negative NLINE gives each number a column of its own"
-        )
-    return found
+    return Format(rotation, abs(first.nvib) > 1, spins, 10 if file.header.nline < 0 else 6, i_tot)
 
 
 def quanta_of(group: Group, levels: Levels, form: Format, negative: bool = False) -> Ints:
@@ -143,16 +138,41 @@ def _rotation(group: Group, levels: Levels, v: Ints, form: Format, negative: boo
 
 
 def _pattern_numbers(group: Group, levels: Levels, names: list[str]) -> Ints:
-    """The number of the coupling pattern among those of any F, by rising N - F, then by J_i - J_(i-1), the last spin first."""
+    """The number of the coupling pattern among those of any F: by rising N - F, by I_tot where there is one, then by
+    J_i - J_(i-1), the last spin first."""
     doubled = [levels.quanta[name] * (1 if name in levels.halves else 2) for name in names]
-    chain = np.stack([2 * levels.rotational, *doubled], axis=1)
-    steps = (np.diff(chain, axis=1) + np.array(group.spins)) // 2
-    every = np.stack(np.meshgrid(*(np.arange(spin + 1) for spin in group.spins), indexing="ij"), axis=-1)
-    every = every.reshape(-1, len(group.spins))
-    difference = (np.array(group.spins) - 2 * every).sum(axis=1)  # 2(N - F)
-    order = np.lexsort((*every.T, difference))
-    number = {tuple(every[place].tolist()): place_in_order for place_in_order, place in enumerate(order.tolist())}
-    return np.array([number[tuple(step)] for step in steps.tolist()], dtype=np.int64)
+    chain, spins = [2 * levels.rotational, *doubled], group.spins
+    if not group.states[0].i_tot:
+        return _among(pattern_steps(spins), _steps(chain, spins))
+    total, totals = chain.pop(-2), range(0, spins[-1] + spins[-2] + 1, 2)
+    every = np.concatenate([np.insert(pattern_steps((*spins[:-2], i_tot)), 1, i_tot, axis=1) for i_tot in totals])
+    every = every[np.lexsort((every[:, 1], every[:, 0]))]  # which leaves the order within one I_tot as it is
+    own = _steps(chain, (*spins[:-2], total))
+    return _among(every, np.insert(own, 1, total, axis=1))
+
+
+def pattern_steps(spins: tuple[int, ...]) -> Ints:
+    """2(N - F) and (J_i - J_(i-1) + S_i) of every coupling pattern of doubled spins, in the order in which SPCAT counts them.
+
+    >>> pattern_steps((1, 1)).tolist()
+    [[-2, 1, 1], [0, 0, 1], [0, 1, 0], [2, 0, 0]]
+    """
+    every = np.stack(np.meshgrid(*(np.arange(spin + 1) for spin in spins), indexing="ij"), axis=-1).reshape(
+        -1, len(spins)
+    )
+    difference = (np.array(spins, dtype=np.int64) - 2 * every).sum(axis=1)
+    return np.column_stack((difference, every))[np.lexsort((*every.T, difference))]
+
+
+def _steps(chain: list[Ints], spins: Sequence[Ints | int]) -> Ints:
+    """The same of levels, from their doubled N, J, F1, ... F."""
+    steps = [(after - before + spin) // 2 for before, after, spin in zip(chain, chain[1:], spins, strict=False)]
+    return np.column_stack((chain[0] - chain[-1], *steps))
+
+
+def _among(every: Ints, own: Ints) -> Ints:
+    number = {tuple(row): place for place, row in enumerate(every.tolist())}
+    return np.array([number[tuple(row)] for row in own.tolist()], dtype=np.int64)
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Ints
+from rotor.formats.spcat.codes import AXES
 from rotor.formats.spcat.file_effect import CodedLine, FileEffect, Vector, coded_lines
 from rotor.formats.spcat.l_doubled import Pair, named_by_l, pairs_of
+from rotor.formats.spcat.l_spins import named_by_l_with_spins
 from rotor.formats.spcat.states import StateOptions, states_of
 from rotor.formats.spcat.text.int_file import Dipole, IntensityFile
 from rotor.formats.spcat.text.par import Options, ParameterFile
@@ -58,7 +60,11 @@ class Group:
         if self.spins or self.effect.others:
             every = range(max(twice_f[0], sum(self.spins) % 2), twice_f[1] + 1, 2)
             exist = None if self.top.kind == "linear" else self._exist
+            if self.effect.pairs:  # which of its levels exist is known once they are named by l
+                exist = None
             levels = levels_of_f(self.top, (self.effect,), every, None, executor, exist)
+            if self.effect.pairs:
+                levels = named_by_l_with_spins(levels, self.effect.pairs, str(levels.representation))
         else:
             levels = solve_levels(
                 self.top, twice_f[1] // 2, jmin=twice_f[0] // 2, effects=(self.effect,), executor=executor
@@ -197,8 +203,12 @@ def _group(
     coupled = tuple(
         Spin(f"I{place}", twice, total="I_tot" if place >= paired else "") for place, twice in enumerate(spins, 1)
     )
-    effect = FileEffect(usable, numbers, coupled, moments, limits, others, first.ixx, pairs)
-    _ = effect.couplings(_ANY_TOP) if pairs else ()  # what is not allowed between l-doubled states is said now
+    effect = FileEffect(
+        usable, numbers, coupled, moments, limits, others, first.ixx, pairs, AXES["IIIl" if oblate else "Ir"]
+    )
+    _ = (
+        (*effect.spin_terms(_ANY_TOP), *effect.couplings(_ANY_TOP)) if pairs else ()
+    )  # what is not allowed between l-doubled states is said now
     top = Top(_STANDS_FOR[kind, oblate], dipole_abc_debye=moments.get((0, 0), (0.0, 0.0, 0.0)), name=title)
     kmax = states[0].kmax if as_spcat and kind in ("prolate", "oblate") else _EVERY_K
     return Group(tuple(states), top, effect, oblate, kmax)

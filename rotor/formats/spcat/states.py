@@ -130,8 +130,6 @@ def _state(v: int, line: Options, first: Options, swapped: bool) -> StateOptions
     iax, spins = abs(line.iax), doubled_spins(line.spind)
     if iax not in (0, 1, 2, 3, *_FOLDS):
         raise ValueError(f"IAX = {line.iax} of state {v}: expected an axis or fold of weights, 1 to 11")
-    if code and spins:
-        raise ValueError(f"EWT = {line.ewt} of state {v}: l-doubled states with spins are read but not computed yet")
     if line.iax < 0 and iax in _FOLDS and _FOLDS[iax].n > 2:
         raise ValueError(
             f"IAX = {line.iax} of state {v}: a total spin of {_FOLDS[iax].n} equivalent nuclei is read but not computed yet"
@@ -169,10 +167,13 @@ def is_plain(parameters: ParameterFile, intensities: IntensityFile | None) -> bo
         return False
     if first.spind < 0 and first.knmax and first.wtpl != first.wtmn:  # the two levels of one K weigh differently
         return False
+    if min(first.wtpl, first.wtmn) < 0 or (first.iax in _FOLDS and first.wtpl != first.wtmn):
+        return False
     digits = [split_code(parameter.code) for parameter in parameters.parameters]
     orthorhombic = all(
         not (d.i1 or d.i2 or d.ns) and (d.typ < 12 or d.typ >= 80) and (d.v1, d.v2) in ((0, 0), (9, 9)) for d in digits
     )
     energies = any(not any(d[:8]) for d in digits)
+    mixed = any(d.typ == 4 and d.ksq for d in digits) and any(d.typ > 4 for d in digits)  # terms of both reductions
     own = intensities is None or all(dipole.code in (1, 2, 3) for dipole in intensities.dipoles)
-    return orthorhombic and own and not energies
+    return orthorhombic and own and not energies and not mixed

@@ -6,8 +6,6 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
-NOTHING_CHEAPER = "exact: nothing cheaper"
-
 
 @dataclass(frozen=True)
 class Setting:

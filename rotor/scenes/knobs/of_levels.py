@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rotor.arrays import Floats
-from rotor.scenes.knobs.knob import NOTHING_CHEAPER, Knob, Knobs, Measure, Setting
+from rotor.scenes.choice import NOTHING_CHEAPER
+from rotor.scenes.knobs.knob import Knob, Knobs, Measure, Setting
 
 if TYPE_CHECKING:
     from rotor.quantum.levels import Levels

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rotor.scenes.knobs.knob import NOTHING_CHEAPER, Knob, Knobs, Measure, ladder
+from rotor.scenes.choice import NOTHING_CHEAPER
+from rotor.scenes.knobs.knob import Knob, Knobs, Measure, ladder
 
 if TYPE_CHECKING:
     from rotor.fluid.request import FluidRequest
