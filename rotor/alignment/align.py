@@ -227,7 +227,7 @@ def _carried(
     problem: Problem, pilot: Pilot, executor: Executor | None, progress: Callable[[int, int], None] | None
 ) -> AlignmentTrace:
     """All blocks, and the trace that they make together."""
-    space, before = pilot.space, bool(problem.free_times(-1).any())
+    space, before = pilot.space, problem.begins_before
     if pilot.whole and pilot.task is not None and pilot.outcome is not None:
         return _trace(problem, space, [pilot.task], [pilot.outcome], pilot, before)
     tasks = list(tasks_of(problem, space, pilot.plan, before))
@@ -289,6 +289,6 @@ def _signal(
         out[here] = found.at(problem.times[here] - start)
     for index, window in enumerate(problem.windows):
         here = problem.times_in(window)
-        if here.any():
+        if here.stop > here.start:
             out[here] = remainder + sum(outcome.samples[index][place] for outcome in outcomes)
     return out, found
