@@ -64,7 +64,7 @@ class Problem:
     @property
     def begins_before(self) -> bool:
         """Whether some of the times lie before the first window."""
-        return self.free_times(-1).stop > 0
+        return bool(self.free_times(-1).stop)
 
     def times_in(self, window: Window) -> slice:
         """Which times lie inside a window."""

@@ -63,7 +63,7 @@ class Splitting:
     @cached_property
     def nodes(self) -> Floats:
         """When each kick acts, in steps; those at the ends just inside, since the pulse may jump there."""
-        return np.clip(np.concatenate([[0.0], np.cumsum(self.drifts)]), _INSIDE, 1 - _INSIDE)
+        return np.asarray(np.clip(np.concatenate([[0.0], np.cumsum(self.drifts)]), _INSIDE, 1 - _INSIDE))
 
     @cached_property
     def different_drifts(self) -> tuple[Floats, Ints]:
@@ -200,9 +200,9 @@ def kick_plan(window: Window, grid: Grid, rule: Splitting) -> KickPlan:
 
 def _different(values: Floats) -> tuple[Floats, Ints]:
     """Each value once, rising, and which of them each is; `np.unique` for few of them takes longer than a step."""
-    known = {value: 0 for value in values.tolist()}
-    place = {value: number for number, value in enumerate(sorted(known))}
-    return np.array(list(place)), np.array([place[value] for value in values.tolist()])
+    listed = values.tolist()
+    place = {value: number for number, value in enumerate(sorted(set(listed)))}
+    return np.array(list(place)), np.array([place[value] for value in listed])
 
 
 def _merged(table: Floats) -> Floats:

@@ -202,7 +202,7 @@ def _stark(request: Any) -> Plan:
             ("method", "exact blocks of one |M| (and K, or D2 species), every field diagonalised"),
             (
                 "error",
-                f"{facts['accuracy_mhz']:.1e} MHz at the ends of the fields: by which energies move with a higher J max",
+                f"{facts['accuracy_mhz']:.1e} MHz at the ends of the fields: by which energies move with a higher J max, and round-off",
             ),
         ),
         counts={"fields": len(fields), "states": len(fields) * facts["curves"]},

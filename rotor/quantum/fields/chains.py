@@ -4,7 +4,8 @@ Energies at some fields, by LAPACK, are joined by curves of fifth order through 
 
     E' = ⟨i|H'|i⟩,   E'' = ⟨i|H''|i⟩ + 2 Σ_j |⟨j|H'|i⟩|²/(E_i - E_j).
 
-At every other field they are improved with the eigenvectors of a twisted factorisation, T - λ = N D N^T with N lower triangular above row k and upper triangular below it,
+At every other field they are improved with the eigenvectors of a twisted factorisation, T - λ = N D N^T with N lower triangular
+above row k and upper triangular below it,
 
     z_k = 1,   z_i = -b_i z_(i+1)/d⁺_i (i < k),   z_i = -b_(i-1) z_(i-1)/d⁻_i (i > k),   λ ← λ + γ_k/|z|²,
 
@@ -74,7 +75,8 @@ def _swept(main: Floats, beside: Floats, energies: Floats, rank: Ints, gaps: Flo
     for sweep in range(SWEEPS):
         moved = flat[moving] - OFF_ZERO * scale
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            found, change, below = twisted(*(bands if not sweep else (one[:, moving] for one in bands)), moved)
+            of_moving = tuple(one[:, moving] for one in bands) if sweep else bands
+            found, change, below = twisted(of_moving[0], of_moving[1], moved)
         flat[moving] = moved + change
         if sweep:
             vectors[:, moving] = found
@@ -118,13 +120,12 @@ def _between_anchors(padded: Floats, fields: Floats, of: Ints, rank: Ints) -> tu
     at, count = fields[places], int(rank.max()) + 1
     powers = at[:, None] ** np.arange(padded.shape[1])
     values, every = np.linalg.eigh(np.einsum("fp,cpij->cfij", powers, padded))
-    vectors = every[..., :count]
     slopes, bends = _derivatives(padded, at, values, every, count)
     gaps = np.diff(values[..., : count + 1], axis=2).min(axis=1)  # (chains, count) to the next state above
     gaps = np.minimum(gaps, np.concatenate([gaps[:, :1], gaps[:, : gaps.shape[1] - 1]], axis=1)[:, : gaps.shape[1]])
     gaps = np.concatenate([gaps, gaps[:, -1:]], axis=1)[:, :count]
-    each = (one[of, :, rank].T for one in (values, slopes, bends))
-    return _joined(at, *each, fields), gaps[of, rank]
+    heights, rises, curves = (one[of, :, rank].T for one in (values, slopes, bends))
+    return _joined(at, heights, rises, curves, fields), gaps[of, rank]
 
 
 def _derivatives(padded: Floats, at: Floats, values: Floats, vectors: Floats, count: int) -> tuple[Floats, Floats]:
