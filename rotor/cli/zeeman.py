@@ -28,6 +28,7 @@ from rotor.cli.shared.output import (
     show_facts,
     show_table,
 )
+from rotor.cli.shared.save_scene import save_scene, save_scene_option
 from rotor.cli.shared.sources import with_sources
 
 if TYPE_CHECKING:
@@ -91,6 +92,7 @@ class Outputs:
     parquet: str | None = file_option(".parquet", help="Write the map as Parquet.")
     plot: str | None = file_option(".png", ".pdf", ".svg", help="Draw the map (.png, .pdf, .svg).")
     json: str | None = json_option()
+    save_scene: str | None = save_scene_option()
 
 
 @grouped(given=("dipole", "dipole_abc", "spin_weights", "calculator", "hessian", "state_constants"))
@@ -113,7 +115,7 @@ def command(context: typer.Context, given: Input, options: Options, outputs: Out
     content["files"] = files.names
     text = lambda: json_with_rows(answer.states, "states", content)  # noqa: E731
     show = with_sources(lambda: _show(answer, content), top, ("constants",), given.sources)
-    deliver(files, _writers(answer, content), text, show)
+    deliver(files, _writers(answer, content) | save_scene("zeeman", request, outputs, given), text, show)
 
 
 def _settings(options: Options) -> dict[str, Any]:
