@@ -30,6 +30,7 @@ from rotor.cli.shared.output import (
 )
 from rotor.cli.shared.plot_options import ViewOptions, view_of
 from rotor.cli.shared.report import model_facts
+from rotor.cli.shared.save_scene import save_scene, save_scene_option
 from rotor.cli.shared.sources import with_sources
 
 if TYPE_CHECKING:
@@ -94,6 +95,7 @@ class Outputs:
     parquet: str | None = file_option(".parquet", help="Write the map as Parquet.")
     plot: str | None = file_option(".png", ".pdf", ".svg", help="Draw the map (.png, .pdf, .svg).")
     json: str | None = json_option()
+    save_scene: str | None = save_scene_option()
 
 
 @grouped(
@@ -121,7 +123,7 @@ def command(context: typer.Context, given: Input, options: Options, outputs: Out
     show = with_sources(
         lambda: _show(answer, content), top, ("constants",), given.sources, lambda: model_facts(content)
     )
-    deliver(files, _writers(answer, content, view), text, show)
+    deliver(files, _writers(answer, content, view) | save_scene("zeeman", request, outputs, given), text, show)
 
 
 def _settings(options: Options) -> dict[str, Any]:
