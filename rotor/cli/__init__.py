@@ -145,7 +145,7 @@ def _run(arguments: list[str]) -> int:
     words = [word for word in arguments[:2] if word != "--debug"]
     verbs = words[:1] if words[:1] and words[0] in VERBS else VERBS  # what is not asked for is not loaded
     command = typer.main.get_command(_application(verbs))
-    provenance = shlex.join(["rotor", *arguments])
+    provenance = _printable(shlex.join(["rotor", *arguments]))
     try:
         with command.make_context("rotor", [*arguments] or ["--help"], obj=provenance) as context:
             command.invoke(context)
@@ -153,6 +153,11 @@ def _run(arguments: list[str]) -> int:
         return 0
     except typer.Exit as end:
         return end.exit_code
+
+
+def _printable(text: str) -> str:
+    """Text that UTF-8 can write: bytes of a file's name that the locale could not read are read as UTF-8, or shown as �."""
+    return text.encode("utf-8", "surrogateescape").decode("utf-8", "replace")
 
 
 def _text_of_use(error: Exception) -> str:
