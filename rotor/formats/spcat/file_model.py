@@ -17,8 +17,8 @@ from rotor.arrays import Ints
 from rotor.formats.spcat.codes import AXES
 from rotor.formats.spcat.file_effect import CodedLine, FileEffect, Vector, coded_lines
 from rotor.formats.spcat.l_doubled import Pair, named_by_l, pairs_of
-from rotor.formats.spcat.labels import named_by
 from rotor.formats.spcat.l_spins import named_by_l_with_spins
+from rotor.formats.spcat.labels import named_by
 from rotor.formats.spcat.states import StateOptions, states_of
 from rotor.formats.spcat.symmetry import forbidden, l_values, some_weights_agree, symmetric_part
 from rotor.formats.spcat.text.int_file import Dipole, IntensityFile

@@ -30,7 +30,7 @@ BY_DIAG = (1, 2, 4, 5)  # those that need another naming than that of levels
 
 
 class Functions(NamedTuple):
-    """The functions of a block: names v, Ka, Kc, pattern (n, columns), K (n,), group of v and pattern, Wang block, amplitudes (n, states)."""
+    """The functions of a block: names v, Ka, Kc, pattern (n, columns), K, group, Wang block (n,), amplitudes (n, states)."""
 
     names: Ints
     k: Ints
@@ -84,7 +84,9 @@ def places(functions: Functions, energies: Floats, diag: int) -> Ints:
         if diag == 4:
             found[states] = _by_k2(functions, members, states, shares, energies)
         else:
-            found[states[np.argsort(energies[states], kind="stable")]] = members[np.argsort(diagonal[members], kind="stable")]
+            found[states[np.argsort(energies[states], kind="stable")]] = members[
+                np.argsort(diagonal[members], kind="stable")
+            ]
     return found
 
 
@@ -136,4 +138,6 @@ def _joined(pieces: list[tuple[int, WangBlock, Ints | None, Floats]], representa
         groups.append(np.full(basis.size, known.setdefault(key, len(known))))
         wangs.append(np.full(basis.size, place))
     amplitudes = np.concatenate([vectors for *_, vectors in pieces])
-    return Functions(np.concatenate(names), np.concatenate(ks), np.concatenate(groups), np.concatenate(wangs), amplitudes)
+    return Functions(
+        np.concatenate(names), np.concatenate(ks), np.concatenate(groups), np.concatenate(wangs), amplitudes
+    )
