@@ -56,6 +56,8 @@ def read_fit(par: str | os.PathLike[str], lin: str | os.PathLike[str] | None = N
 
     Raises ValueError, with file, line or the name of the option, for what cannot be read or is not supported.
     """
+    if not Path(par).exists():
+        raise ValueError(f"{par}: no such file")
     beside = Path(lin) if lin is not None else Path(par).with_suffix(".lin")
     if not beside.exists():
         raise ValueError(
@@ -168,7 +170,7 @@ def _kmax(file: ParameterFile, constants: Constants) -> int | None:
 
 
 def _assigned(lines: LineList, names: Sequence[str], header: Header, source: str) -> tuple[Assignments, list[str]]:
-    """Lines up to NLINE, wavenumbers times CAL, blends as the file marks them."""
+    """Lines up to NLINE, wavenumbers over CAL, blends as the file marks them."""
     lines = with_defaults(lines, names)
     notes = [note_of_defaults(lines)] if lines.defaulted else []
     blends = lines.blends()
@@ -182,10 +184,11 @@ def _assigned(lines: LineList, names: Sequence[str], header: Header, source: str
     upper, lower = lines.states()
     _refuse_width(lines, names, used)
     wavenumber = lines.error < 0
-    frequency = lines.frequency_mhz * np.where(wavenumber, header.cal, 1.0)
+    scale = np.where(wavenumber, header.cal, 1.0)  # SPFIT multiplies what it calculates in cm⁻¹ by CAL
+    frequency, error = lines.frequency_mhz / scale, lines.error_mhz / scale
     k = len(names)
     return assignments(
-        names, upper[used][:, :k], lower[used][:, :k], frequency[used], lines.error_mhz[used],
+        names, upper[used][:, :k], lower[used][:, :k], frequency[used], error[used],
         weight=lines.weight[used], blend=blends[used], wavenumber=wavenumber[used], source=source,
     ), notes  # fmt: skip
 

@@ -144,12 +144,10 @@ def _with_labels(group: Group, form: Format, labels: Ints, names: Sequence[str],
     twice = 2 * total - sum(group.spins) % 2
     every = np.unique(twice)
     size = len(group.states) * int(np.prod([spin + 1 for spin in group.spins]))
-    if (
-        group.spins
-        and size * int(every.max() + 1) > _LARGE
-        and (found := _contracted(group, form, labels, here, every, names, values))
-    ):
-        return [found]
+    if group.spins and size * int(every.max() + 1) > _LARGE:
+        contracted = _contracted(group, form, labels, here, every, names, values)
+        if contracted is not None:
+            return [contracted]
     pieces = np.split(every, np.flatnonzero(np.diff(np.cumsum((size * (every + 1.0)) ** 2) // _MOST_ELEMENTS)) + 1)
     found = [
         _of_some_f(group, form, labels, here[np.isin(twice, some)], some.tolist(), names, values) for some in pieces
@@ -157,15 +155,18 @@ def _with_labels(group: Group, form: Format, labels: Ints, names: Sequence[str],
     return [one for one in found if one is not None]
 
 
-def _contracted(group, form, labels, here, every, names, values):
+def _contracted(
+    group: Group, form: Format, labels: Ints, here: Ints, every: Ints, names: Sequence[str], values: Floats
+) -> _Solved | None:
+    """The labels at the places `here`, each among the functions near it; None where the blocks had better be solved whole."""
     levels, plan = unmixed_levels(group.top, (group.effect,), every.tolist())
     rows = _rows_of(group, levels, form, labels[here])
     found = rows >= 0
+    if not found.any():
+        return None
     columns, start = _columns_of(group, names, values)
     own = tuple(group.effect.parameters(group.top))
-    blocks = (
-        contracted_levels(group.top, (group.effect,), plan, levels, rows[found], own, start) if found.any() else None
-    )
+    blocks = contracted_levels(group.top, (group.effect,), plan, levels, rows[found], own, start)
     return None if blocks is None else _Solved(here[found], columns, blocks)
 
 
