@@ -174,3 +174,16 @@ def test_a_crowd_in_a_field_is_of_order_two_and_keeps_its_energy():
 def test_refusals_of_blocks(make, message):
     with pytest.raises(ValueError, match=message):
         make()
+
+
+@pytest.mark.parametrize("angle", [1e-9, 1e-4, 0.1, 0.5, 0.999999, 1.000001, 3.0])
+def test_the_series_of_a_turn(angle):
+    """Cosine, sine and (1 - (θ/2) cot(θ/2))/θ² on both sides of the angle below which they are summed, in extended precision."""
+    from rotor.classical.integrators._attitude_kernels import turn_of
+
+    cosine, half_sinc, factor = turn_of.py_func((0.6 * angle, 0.0, 0.8 * angle))
+    half = np.longdouble(angle) / 2
+    assert cosine == pytest.approx(float(np.cos(half)), rel=1e-15, abs=3e-16)  # round-off, and that of |u|
+    assert half_sinc == pytest.approx(float(np.sin(half) / (2 * half)), rel=1e-15)
+    exact = (1 - half / np.tan(half)) / (2 * half) ** 2 if angle > 0.05 else 1 / 12 + (2 * half) ** 2 / 720
+    assert factor == pytest.approx(float(exact), rel=2e-15)  # 1 - x cot x loses a digit at 0.1, next term 1e-13 at 1e-4

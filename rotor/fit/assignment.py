@@ -92,7 +92,7 @@ def _refuse_numbers(lines: Assignments) -> None:
         if bad.any():
             first = int(np.argmax(bad))
             raise ValueError(
-                f"line {first + 1}, {lines.text(first)}: {name} is {values[first]!r}; a finite number"
+                f"line {first + 1}, {lines.text(first)}: {name} is {values[first]:g}; a finite number"
                 f"{' of 0 or more' if name != 'frequency_mhz' else ''} is needed"
             )
 

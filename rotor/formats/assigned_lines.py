@@ -10,6 +10,8 @@ spins, where the file has them, are put together at their mean by intensity.
 from __future__ import annotations
 
 import csv
+import io
+import math
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -90,11 +92,7 @@ def _of_lin(path: str | os.PathLike[str], names: Sequence[str]) -> tuple[Assignm
 
 
 def _of_csv(path: str | os.PathLike[str], names: Sequence[str]) -> Assignments:
-    with open(path, encoding="utf-8-sig", newline="") as handle:
-        reader = csv.DictReader(row for row in handle if row.strip() and not row.lstrip().startswith("#"))
-        columns = [name.strip() for name in reader.fieldnames or ()]
-        reader.fieldnames = columns
-        rows = list(reader)
+    columns, rows = _table_of(path)
     labels = [f"{name}_{side}" for side in ("upper", "lower") for name in names]
     known = {*labels, *_FREQUENCY, *_ERROR, "weight", "blend", "comment"}
     _refuse_columns(path, columns, labels, known)
@@ -119,6 +117,18 @@ def _of_csv(path: str | os.PathLike[str], names: Sequence[str]) -> Assignments:
     )  # fmt: skip
 
 
+def _table_of(path: str | os.PathLike[str]) -> tuple[list[str], list[dict[str, str]]]:
+    """Names of the columns and the rows of a .csv file, without blank lines and comments."""
+    try:
+        text = Path(path).read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise ValueError(f"{path}: a .csv file is UTF-8 text: {error}") from None
+    reader = csv.DictReader(row for row in io.StringIO(text) if row.strip() and not row.lstrip().startswith("#"))
+    columns = [name.strip() for name in reader.fieldnames or ()]
+    reader.fieldnames = columns
+    return columns, list(reader)
+
+
 def _refuse_columns(
     path: str | os.PathLike[str], columns: Sequence[str], labels: Sequence[str], known: set[str]
 ) -> None:
@@ -138,9 +148,12 @@ def _real(path: object, line: int, name: str, row: Mapping[str, str], default: f
     if not text and default is not None:
         return default
     try:
-        return float(text)
+        number = float(text)
     except ValueError:
-        raise ValueError(f"{path}, line {line} of the table: {name} reads {text!r}; a number is needed") from None
+        number = math.nan
+    if not math.isfinite(number):
+        raise ValueError(f"{path}, line {line} of the table: {name} reads {text!r}; a finite number is needed")
+    return number
 
 
 def _whole(path: object, line: int, name: str, row: Mapping[str, str]) -> int:

@@ -25,6 +25,7 @@ from rotor.scenes.sections import (
     EmissionObservables,
     EmissionOutputs,
     EmittingMolecule,
+    FieldEffects,
     FluidConditions,
     FluidNumerics,
     FluidOutputs,
@@ -33,6 +34,7 @@ from rotor.scenes.sections import (
     GasObservables,
     LevelsObservables,
     LevelsOutputs,
+    MagneticSection,
     MoleculeSection,
     PulseSection,
     QuantumEffects,
@@ -51,6 +53,9 @@ from rotor.scenes.sections import (
     TumbleConditions,
     TumbleNumerics,
     VibrationSection,
+    ZeemanConditions,
+    ZeemanNumerics,
+    ZeemanObservables,
     said,
 )
 
@@ -186,7 +191,21 @@ class StarkScene(Scene, frozen=True, tag="stark"):
     accuracy: Annotated[str | float | None, said("of the energies", "1 kHz")] = None
     conditions: StarkConditions = StarkConditions()
     observables: StarkObservables = StarkObservables()
+    effects: FieldEffects = FieldEffects()
     numerics: StarkNumerics = StarkNumerics()
+    outputs: TableOutputs = TableOutputs()
+
+
+class ZeemanScene(Scene, frozen=True, tag="zeeman"):
+    """Levels of a molecule in a static magnetic field."""
+
+    molecule: Annotated[str | MoleculeSection, said("a name, a file, SMILES:..., or a table")]
+    accuracy: Annotated[str | float | None, said("of the energies", "1 Hz")] = None
+    magnetic: MagneticSection = MagneticSection()
+    conditions: ZeemanConditions = ZeemanConditions()
+    observables: ZeemanObservables = ZeemanObservables()
+    effects: FieldEffects = FieldEffects()
+    numerics: ZeemanNumerics = ZeemanNumerics()
     outputs: TableOutputs = TableOutputs()
 
 
@@ -232,6 +251,7 @@ AnyScene = (
     | GasScene
     | FluidScene
     | StarkScene
+    | ZeemanScene
     | AlignScene
     | FitScene
     | EmissionScene
@@ -245,6 +265,7 @@ KINDS: Mapping[str, type[Scene]] = {
     "gas": GasScene,
     "fluid": FluidScene,
     "stark": StarkScene,
+    "zeeman": ZeemanScene,
     "align": AlignScene,
     "fit": FitScene,
     "emission": EmissionScene,

@@ -11,7 +11,15 @@ from numba import njit
 from rotor.arrays import Floats
 from rotor.geometry._kernels import conjugate, cross, exponential, product, quaternion_at, turned, vector_at
 
-SERIES_BELOW = 1e-2  # rad: below this angle (1 - (θ/2) cot(θ/2))/θ² is summed as a series
+COSINE = tuple((-1) ** n / math.factorial(2 * n) for n in range(9))
+SINE = tuple(0.5 * (-1) ** n / math.factorial(2 * n + 1) for n in range(8))
+BERNOULLI = (
+    1 / 12, 1 / 720, 1 / 30240, 1 / 1209600, 1 / 47900160, 691 / 1307674368000, 1 / 74724249600, 3617 / 10670622842880000,
+    43867 / 5109094217170944000, 174611 / 802857662698291200000, 77683 / 14101100039391805440000,
+)  # fmt: skip  # |B_2k|/(2k)! for k = 1, 2, ...
+SERIES_BELOW = (
+    1.0  # rad: below this angle cosine, sine and (1 - (θ/2) cot(θ/2))/θ² are summed as series, without a call
+)
 
 
 @njit(cache=True, nogil=True)
@@ -33,22 +41,38 @@ def lever(attitude: Floats, arm: Floats, force: Floats) -> Floats:
 
 
 @njit(cache=True, inline="always")
-def ahead(q: Any, u: Any) -> Any:
-    """q exp(u)."""
-    half = 0.5 * math.sqrt(u[0] * u[0] + u[1] * u[1] + u[2] * u[2])
-    half_sinc = 0.5 * math.sin(half) / half if half > 0.0 else 0.5
-    return product(q, exponential(math.cos(half), half_sinc, u))
+def turn_of(u: Any) -> Any:
+    """cos(θ/2), sin(θ/2)/θ and (1 - (θ/2) cot(θ/2))/θ² of a rotation vector, θ = |u|.
+
+    With y = θ²/4 the series are Σ (-y)^n/(2n)!, ½ Σ (-y)^n/(2n+1)! and Σ |B_2k|/(2k)! θ^(2k-2), B_2k Bernoulli's numbers; the terms
+    left out are below 1e-17 at θ = 1. They are summed in halves that do not wait for each other.
+    """
+    square = u[0] * u[0] + u[1] * u[1] + u[2] * u[2]
+    if square < SERIES_BELOW**2:
+        c, s, b, y, y2, t2 = COSINE, SINE, BERNOULLI, 0.25 * square, 0.0625 * square * square, square * square
+        y4, t4 = y2 * y2, t2 * t2
+        cosine = (c[4] + c[5] * y) + (c[6] + c[7] * y) * y2 + c[8] * y4
+        cosine = (c[0] + c[1] * y) + (c[2] + c[3] * y) * y2 + cosine * y4
+        half_sinc = (s[4] + s[5] * y) + (s[6] + s[7] * y) * y2
+        half_sinc = (s[0] + s[1] * y) + (s[2] + s[3] * y) * y2 + half_sinc * y4
+        factor = (b[4] + b[5] * square) + (b[6] + b[7] * square) * t2 + ((b[8] + b[9] * square) + b[10] * t2) * t4
+        factor = (b[0] + b[1] * square) + (b[2] + b[3] * square) * t2 + factor * t4
+        return cosine, half_sinc, factor
+    half = 0.5 * math.sqrt(square)
+    cosine, sine = math.cos(half), math.sin(half)
+    return cosine, 0.5 * sine / half, (1.0 - half * cosine / sine) / square
 
 
 @njit(cache=True, inline="always")
-def turning_of(u: Any, omega: Any) -> Any:
-    """du/dt = ω + ½ u x ω + (1 - (θ/2) cot(θ/2))/θ² u x (u x ω), θ = |u|."""
-    square = u[0] * u[0] + u[1] * u[1] + u[2] * u[2]
-    if square > SERIES_BELOW**2:
-        half = 0.5 * math.sqrt(square)
-        factor = (1.0 - half * math.cos(half) / math.sin(half)) / square
-    else:
-        factor = 1.0 / 12.0 + square / 720.0 + square * square / 30240.0
+def ahead(q: Any, u: Any) -> Any:
+    """q exp(u)."""
+    cosine, half_sinc, _ = turn_of(u)
+    return product(q, exponential(cosine, half_sinc, u))
+
+
+@njit(cache=True, inline="always")
+def turning_of(u: Any, omega: Any, factor: Any) -> Any:
+    """du/dt = ω + ½ u x ω + f u x (u x ω), f = (1 - (θ/2) cot(θ/2))/θ², θ = |u|: the last of `turn_of`."""
     a = cross(u, omega)
     b = cross(u, a)
     return (
@@ -72,7 +96,9 @@ def placed(attitude: Floats, change: Floats, space: Floats, here: Floats, moment
 def turning(change: Floats, omega: Floats, out: Floats) -> None:
     """out[:, 3:] = du/dt of `turning_of` for u = change[:, 3:]."""
     for i in range(change.shape[0]):
-        out[i, 3], out[i, 4], out[i, 5] = turning_of((change[i, 3], change[i, 4], change[i, 5]), vector_at(omega, i))
+        u = (change[i, 3], change[i, 4], change[i, 5])
+        _, _, factor = turn_of(u)
+        out[i, 3], out[i, 4], out[i, 5] = turning_of(u, vector_at(omega, i), factor)
 
 
 @njit(cache=True, nogil=True)

@@ -40,7 +40,7 @@ def swing(p: Any, k: int, time: float) -> Any:
     return math.cos(p[k, 3] * time + p[k, 4]) if p[k, 3] != 0.0 or p[k, 4] != 0.0 else 1.0
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def torque_at(codes: Any, p: Floats, time: float, q: Any, omega: Any) -> Any:
     """Sum of the torques in body axes on a body of attitude q that turns at omega (looked at by drag alone).
 

@@ -52,7 +52,9 @@ class Compared:
 
 
 def refuse_without_molecule(options: CompareOptions) -> None:
-    """--temperature and --isotope belong to a molecule that is predicted."""
+    """--temperature and --isotope belong to a molecule that is predicted, --as-spcat to an .int file."""
+    if options.as_spcat and not (options.compare or "").lower().endswith(".int"):
+        raise ValueError("--as-spcat: expected with --compare and an .int file to predict")
     given = {"--temperature": options.temperature, "--isotope": options.isotope}
     name = next((name for name, value in given.items() if value), None)
     if name is None:

@@ -20,7 +20,7 @@ from rotor.quantum.moments import Moment
 from rotor.quantum.spins import Scheme, Spin
 from rotor.quantum.spins.operators import EVERY_STATE
 from rotor.quantum.spins.terms import SpinTerm
-from rotor.quantum.states import Coupling, State
+from rotor.quantum.states import Coupling, OperatorOfJ, State
 from rotor.tops.operators import Operators
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ Vector = tuple[float, float, float]
 class CodedLine(NamedTuple):
     """One parameter line: its name, value, operator, and the two states, lower first; None for every state.
 
-    reversed_: the code has V2 > V1.
+    reversed_: the code has V2 > V1. typ: TYP of the code.
     """
 
     name: str
@@ -40,6 +40,7 @@ class CodedLine(NamedTuple):
     operator: CodedOperator
     states: tuple[int, int] | None
     reversed_: bool = False
+    typ: int = 0
 
 
 def coded_lines(
@@ -96,6 +97,7 @@ def coded_lines(
                 operator,
                 None if low == wild else (low, high),
                 digits.v2 > digits.v1,
+                digits.typ,
             )
         )
     return found
@@ -180,6 +182,8 @@ class FileEffect(QuantumEffect):
         if operator.plain is not None and states[0] == states[1]:
             return []  # among the operators of both components
         of = operator.of_j or plain_of_j(operator.plain or {})
+        if operator.odd and states[0] == states[1] and self.axes[2] == "c":
+            of = _turned_round(of)  # -i stands between states of an oblate basis, not within a pair
         try:
             return couplings_with_pairs(line.name, of, operator.odd, states, line.reversed_, self.pairs)
         except ValueError as error:
@@ -232,3 +236,7 @@ class FileEffect(QuantumEffect):
     def size_mhz(self, top: Top, j: int) -> float:
         """Not estimated: a file's Hamiltonian is one piece."""
         return 0.0
+
+
+def _turned_round(of: OperatorOfJ) -> OperatorOfJ:
+    return lambda j, representation: -1.0 * of(j, representation)

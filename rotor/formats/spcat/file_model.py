@@ -19,6 +19,7 @@ from rotor.formats.spcat.file_effect import CodedLine, FileEffect, Vector, coded
 from rotor.formats.spcat.l_doubled import Pair, named_by_l, pairs_of
 from rotor.formats.spcat.l_spins import named_by_l_with_spins
 from rotor.formats.spcat.states import StateOptions, states_of
+from rotor.formats.spcat.symmetry import forbidden, l_values, some_weights_agree, symmetric_part
 from rotor.formats.spcat.text.int_file import Dipole, IntensityFile
 from rotor.formats.spcat.text.par import Options, ParameterFile
 from rotor.quantum.levels import Levels
@@ -96,7 +97,7 @@ class Group:
         total = np.zeros(len(levels), dtype=np.int64)
         for place, state in enumerate(self.states):
             for ka, kc, k, alike in _components(levels, n, self.oblate):
-                own = state.weights(ka, kc, k, quanta.get("i_tot", 0))
+                own = np.where(k <= self.axial_kmax, state.weights(ka, kc, k, quanta.get("i_tot", 0)), 0)
                 total += np.where((v == place) & alike, np.maximum(own, 0), 0)
         return total
 
@@ -122,8 +123,11 @@ def groups_of(file: ParameterFile, intensities: IntensityFile, *, as_spcat: bool
     doubled = pairs_of(states)
     members = frozenset(v for pair in doubled for v in pair)
     lines = coded_lines(file.parameters, len(states), first.nvib < 0, members)
+    lines = allowed(lines, states, doubled, first.nvib < 0)[0]
     dipoles, others = dipoles_of(intensities.dipoles, len(states))
     dipoles = _of_both_components(dipoles, doubled)
+    if not others and not any(_has_elements(pair, mu, states, doubled) for pair, mu in dipoles.items()):
+        dipoles |= {(high, low): (-a, -b, -c) for (low, high), (a, b, c) in dipoles.items() if low != high}
     pairs = [line.states for line in lines if line.states] + list(dipoles) + [code.states for _, code in others]
     _refuse_missing_spins(lines, states)
     light = (dipoles, others)
@@ -131,6 +135,64 @@ def groups_of(file: ParameterFile, intensities: IntensityFile, *, as_spcat: bool
         _group([states[v] for v in numbers], lines, light, first, as_spcat, file.title, doubled)
         for numbers in _connected(len(states), [*pairs, *doubled])
     ]
+
+
+def left_out(file: ParameterFile) -> list[str]:
+    """A sentence for every parameter that the declared symmetry forbids."""
+    states, oblate = states_of(file), file.options[0].nvib < 0
+    doubled = pairs_of(states)
+    members = frozenset(v for pair in doubled for v in pair)
+    return allowed(coded_lines(file.parameters, len(states), oblate, members), states, doubled, oblate)[1]
+
+
+def _has_elements(pair: tuple[int, int], mu: Vector, states: tuple[StateOptions, ...], doubled: list[Pair]) -> bool:
+    """Whether a dipole is of one state and joins levels of one weight. Without such a dipole the program takes those between
+    states times i, so that they change their sign with the order of the states."""
+    low, high = pair
+    if low != high or low in {v for both in doubled for v in both}:
+        return low == high
+    return any(value and some_weights_agree(20 * axis, states[low], states[low]) for axis, value in enumerate(mu, 1))
+
+
+def allowed(
+    lines: list[CodedLine], states: tuple[StateOptions, ...], doubled: list[Pair], oblate: bool
+) -> tuple[list[CodedLine], list[str]]:
+    """The parameter lines that the declared symmetry allows, as SPCAT takes them, and why the others are left out.
+
+    Parameters
+    ----------
+    lines : list of CodedLine
+        All parameters that compute.
+    states : tuple of StateOptions
+        All states of the file.
+    doubled : list of Pair
+        The l-doubled ones.
+    oblate : bool
+        Whether z is the c axis.
+
+    Returns
+    -------
+    lines : list of CodedLine
+        Those that act.
+    reasons : list of str
+        A sentence for each that is left out.
+    """
+    l_of = l_values(states, doubled)
+    found, reasons = list[CodedLine](), list[str]()
+    for line in lines:
+        concerned = [(v, v) for v in range(len(states))] if line.states is None else [line.states]
+        why = []
+        for low, high in concerned:
+            del_l = abs(l_of.get(low, 0) - l_of.get(high, 0)) * (-1 if line.reversed_ else 1)
+            own = states[low], states[high]
+            why.append(forbidden(line.typ, *own, del_l, oblate, bool({low, high} & set(l_of))))
+        if all(why):
+            reasons.append(f"parameter {line.name.partition('#')[0]} is left out, as SPCAT does: {why[0]}")
+            continue
+        folded = line.typ in (1, 2, 3) and max(states[v].fold for pair in concerned for v in pair) > 2
+        axes = AXES["IIIl" if oblate else "Ir"]
+        found.append(line._replace(operator=symmetric_part(line.operator, axes)) if folded else line)
+    return found, reasons
 
 
 def _of_both_components(dipoles: Dipoles, pairs: list[Pair]) -> Dipoles:

@@ -56,6 +56,8 @@ def read_fit(par: str | os.PathLike[str], lin: str | os.PathLike[str] | None = N
 
     Raises ValueError, with file, line or the name of the option, for what cannot be read or is not supported.
     """
+    if not Path(par).exists():
+        raise ValueError(f"{par}: no such file")
     beside = Path(lin) if lin is not None else Path(par).with_suffix(".lin")
     if not beside.exists():
         raise ValueError(

@@ -53,8 +53,8 @@ def spin_terms_with_pairs(
     firsts, seconds = {pair.first: pair for pair in pairs}, {pair.second: pair for pair in pairs}
     sign = -1.0 if reversed_ else 1.0
     odd = term.rotor.odd
-    if low == high:
-        return _within(term, odd, firsts.get(low))
+    if low == high:  # in an oblate basis the sign of what is odd is another between states than within a pair
+        return _within(_at(term, term.bra, term.ket, -1.0) if odd and axes[2] == "c" else term, odd, firsts.get(low))
     if odd:
         raise ValueError("an odd spin operator between l-doubled states is read but not computed yet")
     if (low in firsts and firsts[low].second == high) or (high in firsts and firsts[high].second == low):
@@ -62,15 +62,19 @@ def spin_terms_with_pairs(
         turned = 0.5 * sign * (1.0 if x in firsts else -1.0)
         return [_at(term, x, x, 0.5), _at(term, y, y, -0.5), *_at_turned(term, x, y, turned, axes)]
     if low in firsts and high in firsts:
-        return [_at(term, *sorted((a, b))) for a, b in zip(firsts[low], firsts[high], strict=True)]
+        return [_at(term, *_in_order(a, b)) for a, b in zip(firsts[low], firsts[high], strict=True)]
     if low in seconds or high in seconds:
         raise ValueError(
             "a spin operator of the state with K l ≤ 0 is read but not computed yet; name the one with K l > 0"
         )
     pair = firsts[low] if low in firsts else firsts[high]
     other = high if low in firsts else low
-    first, second = sorted((other, pair.first)), sorted((other, pair.second))
-    return [_at(term, *first, 1 / sqrt(2.0)), *_at_turned(term, *second, sign / sqrt(2.0), axes)]
+    with_x, with_y = _in_order(other, pair.first), _in_order(other, pair.second)
+    return [_at(term, *with_x, 1 / sqrt(2.0)), *_at_turned(term, *with_y, sign / sqrt(2.0), axes)]
+
+
+def _in_order(one: int, other: int) -> tuple[int, int]:
+    return min(one, other), max(one, other)
 
 
 def _at(term: SpinTerm, bra: int, ket: int, factor: float = 1.0) -> SpinTerm:

@@ -79,15 +79,29 @@ class StateOptions:
         (n,) array of int
             WTPL, WTMN or EWT, by the axis of the file.
         """
-        odd = {1: ka % 2, 2: (ka + kc) % 2, 3: kc % 2}.get(self.iax, (ka + kc) % 2)
-        even = (odd + i_tot) % 2 == 0
-        weight = np.where(even, self.plus, self.minus)
+        weight = self.class_weight(ka, kc, i_tot)
         fold = _FOLDS.get(self.iax)
         if fold is None:
             return weight
         class_of = (k - self.l_code) % fold.n
         paired = np.where(np.isin(class_of, fold.paired), self.e_weight, 0)
         return np.where(class_of == fold.alone, weight, paired)
+
+    def class_weight(self, ka: Ints, kc: Ints, i_tot: Ints | int = 0) -> Ints:
+        """WTPL or WTMN by the parities of Ka and Kc, (n,), E levels apart."""
+        odd = {1: ka % 2, 2: (ka + kc) % 2, 3: kc % 2}.get(self.iax, (ka + kc) % 2)
+        return np.where((odd + i_tot) % 2 == 0, self.plus, self.minus)
+
+    def block_weights(self, ka: Ints, kc: Ints, k: Ints) -> Ints:
+        """Weights of the A (or B) and of the E levels in the Wang block of a level, (n, 2), 0 where there are none; n-fold axis."""
+        fold, own = _FOLDS[self.iax], np.where((ka + kc) % 2 == 0, self.plus, self.minus)
+        steps = np.arange(0, 2 * fold.n, 2)  # K that stand in one Wang block, modulo n
+        classes = (k[:, None] - self.l_code + steps) % fold.n
+        alone = (classes == fold.alone).any(axis=1)
+        paired = np.isin(classes, fold.paired).any(axis=1) | (
+            self.iax == 7
+        )  # which names both kinds of blocks of a 4-fold axis
+        return np.stack([np.where(alone, own, 0), np.where(paired, self.e_weight, 0)], axis=1)
 
     def is_e(self, k: Ints) -> NDArray[np.bool_]:
         """Which levels are of E species, whose K is not signed."""
