@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,7 +47,7 @@ class Light:
         cosine = math.cos(math.radians(self.angle_degrees))
         return 3 * cosine**2, 1.5 * (1 - cosine**2)
 
-    def strength(self, of_axes: Sequence[NDArray[np.generic]], field: Vector) -> Floats:
+    def strength(self, of_axes: Sequence[NDArray[Any]], field: Vector) -> Floats:
         """From elements of μ_X, μ_Y and μ_Z, arrays of one shape; field: of length 1."""
         if self.direction is not None:
             return 3 * _square(of_axes, self.direction)
@@ -64,7 +65,7 @@ class Light:
         return names.get(self.angle_degrees, f"{self.angle_degrees}° to the field")
 
 
-def _square(of_axes: Sequence[NDArray[np.generic]], vector: Vector) -> Floats:
+def _square(of_axes: Sequence[NDArray[Any]], vector: Vector) -> Floats:
     x, y, z = (part * axis for part, axis in zip(vector, of_axes, strict=True))
     return np.asarray(np.abs(x + y + z) ** 2)
 
