@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from rotor.quantum.spins import Spin
 from rotor.spectra.fields.light import light_of
 from rotor.spectra.fields.lines import field_lines
 from rotor.spectra.lines import line_list
+from rotor.thermo.field_mixture import field_mixture
 from rotor.tops.top import Top
 from rotor.units import MHZ_PER_DEBYE_KV_PER_CM
 
@@ -155,6 +157,18 @@ def test_sum_rule_of_isotropic_light():
         found = field_lines(ROD, [field], j_highest=2, light="isotropic", effects=effects, jmax=4, tolerance_mhz=1e9)
         totals.append(found.strength_debye2.sum())
     assert totals[1] == pytest.approx(totals[0], rel=1e-3)  # what mixes with J = 3: (μE/6B)²
+
+
+def test_executors_change_nothing():
+    effects = with_nucleus(2, np.diag([-4.0, 2.0, 2.0]))
+    with ThreadPoolExecutor(2) as pool:
+        ours, spread = (
+            field_lines(ROD, [0.1], j_highest=1, effects=effects, jmax=3, tolerance_mhz=1e9, executor=one)
+            for one in (None, pool)
+        )
+        plain, mixed = (field_mixture(ROD, [1.0], 1.0, executor=one) for one in (None, pool))
+    assert (ours.strength_debye2 == spread.strength_debye2).all()
+    assert (plain.mu_eff_debye == mixed.mu_eff_debye).all()
 
 
 def test_lights():
