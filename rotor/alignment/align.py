@@ -187,6 +187,11 @@ def align(
         raise ValueError(
             f"J max {jmax}: the ensemble itself has J up to {ensemble.jmax}; give at least {ensemble.jmax + EDGE}"
         )
+    if given is None and jmax > HIGHEST_J:
+        raise ValueError(
+            f"the pulses need J up to about {jmax}; states up to J = {HIGHEST_J} are propagated: lower the intensity, the duration or the "
+            "temperature"
+        )
     while True:
         pilot = pilot_of(problem, jmax)
         if pilot.edge <= 0.3 * tolerance:
