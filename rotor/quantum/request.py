@@ -57,7 +57,7 @@ class LevelsRequest:
             raise ValueError(f"kmax: the levels of a {self.top.kind} top have no K; give J alone")
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class SelectedLevels(Table):
     """Energy levels in order of their rows, energies in three units from the lowest level that exists.
 

@@ -50,7 +50,7 @@ if TYPE_CHECKING:
 DEFAULT_MIN_LGINT = -12.0
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Lines(TransitionTable):
     """Lines as columns of equal length, rising in frequency unless they were asked for unsorted.
 

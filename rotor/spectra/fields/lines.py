@@ -39,7 +39,7 @@ DEFAULT_TOLERANCE_MHZ = 1e-4
 LEAST_STRENGTH = 1e-10  # of the strongest line: what round-off leaves of forbidden ones is below
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class FieldLines(Table):
     """Lines in a field as columns of equal length: all fields of one pair of states after each other.
 
