@@ -39,7 +39,7 @@ DEFAULT_TOLERANCE = 1e-6
 HIGHEST_J = 600
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class AlignmentTrace(Table):
     """Cosines against time, and how they were found.
 

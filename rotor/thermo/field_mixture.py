@@ -92,7 +92,7 @@ def populations_in_field(
     return Populations([one / q[:, None] for one in factors], q)
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class FieldMixture(Table):
     """Means of a thermal mixture against the field.
 

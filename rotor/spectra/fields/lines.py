@@ -45,7 +45,7 @@ SAME_MHZ = 1e-6  # energies of states that coincide differ by round-off alone
 LEAST_STRENGTH = 1e-10  # of the strongest line: what round-off leaves of forbidden ones is below
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class FieldLines(Table):
     """Lines in a field as columns of equal length: all fields of one pair of states after each other.
 
