@@ -4,7 +4,8 @@
 
 All commands take their turn in every round, so that a change of the machine's speed meets all alike; the median of the rounds
 counts (seven unless given), as a ratio to the imports alone. "First" runs have an empty cache of compiled code. The last rows
-are of one process: making a list in memory. Results go to benchmarks/results/start.json.
+are of one process: making a list in memory. SPCAT makes the same lists in the first two rounds where it is on the PATH; else its column
+has the seconds of its own process on a quiet machine of this kind. Results go to benchmarks/results/start.json.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from __future__ import annotations
 import json
 import os
 import platform
+import shutil
 import statistics
 import subprocess
 import sys
@@ -21,6 +23,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
+SPCAT = shutil.which("spcat") or ""
+SPCAT_ROUNDS = 2  # half a minute for its longest list
 RESULTS = Path(__file__).parent / "results" / "start.json"
 BASE = 'python -c "import numpy, typer, rich.table"'
 TOP = ["--constants", "A=8572 B=3640 C=2790 MHz", "--dipole-abc", "1.201,1.916,0.365", "--q", "93882.35", "--top", "0"]
@@ -76,6 +80,14 @@ CASES = (
     Case("first: J ≤ 100 all lines", _list(100, "none"), beyond="J ≤ 100 all lines, .cat", seconds=2.0),
     Case("first: rotor tumble water", ("-m", "rotor", *TUMBLE), beyond="rotor tumble water", seconds=2.0),
 )
+SPCAT_INT = "rigid top\n 0 1 93882.35 0 {jmax} {cut} -99 99999999.0 300.0\n 1 1.201\n 2 1.916\n 3 0.365\n"
+SPCAT_VAR = """rigid top
+   3    0    0    0    0.0000E+000    1.0000E+003    1.0000E+000 1.0000000000
+a 1 1 0 {jmax} 0 1 1 1 0 1 0
+        10000   8.572000000000000E+03 1.00000000E-037 /A
+        20000   3.640000000000000E+03 1.00000000E-037 /B
+        30000   2.790000000000000E+03 1.00000000E-037 /C
+"""
 MEMORY = {"J ≤ 200 above 1e-12, in memory": ("-12", 0.22), "J ≤ 200 all lines, in memory": ("None", None)}
 
 
@@ -96,6 +108,18 @@ def run(case: Case, folder: Path) -> float:
         return time.perf_counter() - started
 
 
+def run_spcat(case: Case, folder: Path) -> float:
+    """Seconds of SPCAT for the same list: all lines, or those above the cut."""
+    jmax, cut = (case.arguments[case.arguments.index(option) + 1] for option in ("--jmax", "--min-lgint"))
+    texts = {"int": SPCAT_INT, "var": SPCAT_VAR}
+    for suffix, text in texts.items():
+        filled = text.format(jmax=jmax, cut="-99" if cut == "none" else cut)
+        (folder / f"list.{suffix}").write_text(filled, encoding="utf-8")
+    started = time.perf_counter()
+    subprocess.run([SPCAT, "list"], capture_output=True, check=True, cwd=folder)
+    return time.perf_counter() - started
+
+
 def in_memory(cut: str) -> float:
     """Seconds of the best of three lists to J = 200 in one process."""
     environment = _environment()
@@ -104,9 +128,10 @@ def in_memory(cut: str) -> float:
     return float(done.stdout)
 
 
-def measured(rounds: int) -> tuple[dict[str, list[float]], dict[str, list[float]]]:
-    """Seconds of every process in every round, after one round that fills the cache of compiled code."""
+def measured(rounds: int) -> tuple[dict[str, list[float]], dict[str, list[float]], dict[str, list[float]]]:
+    """Seconds of every process in every round, after one round that fills the cache of compiled code: ours, lists, SPCAT's."""
     times: dict[str, list[float]] = {case.name: [] for case in CASES}
+    peer: dict[str, list[float]] = {case.name: [] for case in CASES if SPCAT and case.spcat_s is not None}
     lists: dict[str, list[float]] = {name: [] for name in MEMORY}
     with tempfile.TemporaryDirectory() as name:
         for turn in range(-1, rounds):
@@ -114,14 +139,16 @@ def measured(rounds: int) -> tuple[dict[str, list[float]], dict[str, list[float]
                 if turn >= 0 or not case.beyond:
                     seconds = run(case, Path(name))
                     times[case.name] += [seconds] if turn >= 0 else []
+                if 0 <= turn < SPCAT_ROUNDS and case.name in peer:
+                    peer[case.name].append(run_spcat(case, Path(name)))
             for title, (cut, _) in MEMORY.items():
                 lists[title] += [in_memory(cut)] if turn >= 0 else []
-    return times, lists
+    return times, lists, peer
 
 
 def main(rounds: int) -> None:
     """Measure, print a table with the goals, write the figures."""
-    times, lists = measured(rounds)
+    times, lists, peer = measured(rounds)
     medians = {name: statistics.median(values) for name, values in times.items()}
     rows = []
     print(f"{'what':36} {'median s':>8} {'best':>6} {'ratio':>6} {'goal':>6}  {'SPCAT s':>7}")
@@ -135,11 +162,14 @@ def main(rounds: int) -> None:
         if case.beyond and case.seconds is not None:
             row["longer_s"] = medians[case.name] - medians[case.beyond]
             goal, reached = f"+{row['longer_s']:.1f}", row["longer_s"] <= case.seconds
+        theirs = ""
         if case.spcat_s is not None:
-            row["spcat_s"] = case.spcat_s
+            seconds = statistics.median(peer[case.name]) if case.name in peer else case.spcat_s
+            row["spcat_s"], theirs = seconds, f"{seconds:.3f}"
+            row["spcat_here"] = case.name in peer
         rows.append(row)
         print(f"{case.name:36} {row['median_s']:8.3f} {row['best_s']:6.3f} {ratio:6.2f} {goal:>6}{' ' if reached else '!'} "
-              f"{'' if case.spcat_s is None else case.spcat_s:>7}", flush=True)  # fmt: skip
+              f"{theirs:>7}", flush=True)  # fmt: skip
     for title, values in lists.items():
         row = {"what": title, "median_s": statistics.median(values), "best_s": min(values)}
         if MEMORY[title][1] is not None:

@@ -6,7 +6,8 @@ of `data/molecules/NAME.toml` (all of FITS without names). `docs/make_library.py
 It is the fit of `rotor fit`: weighted least squares, blends as one frequency, of lines that the catalogue marks as measured (a
 negative tag) within the J and K of the file's [catalogue], none with an error below `least_mhz`, from the constants that the file has.
 Where lines leave constants open, level energies of the catalogue count too (cm⁻¹ with four decimals, taken at 0.9 MHz). Standard
-errors are multiplied by the reduced chi where that is above 1.
+errors are multiplied by the reduced chi where that is above 1. Of molecules without a catalogue among the reference files, the
+lines are those of `data/lines/NAME.csv`, whose source stands in FITS.
 """
 
 from __future__ import annotations
@@ -30,16 +31,21 @@ from rotor.tops.constants import Constants
 from rotor.units import MHZ_PER_CM
 
 MOLECULES = Path(__file__).with_name("molecules")
+LINES = Path(__file__).with_name("lines")
 ROUNDING_MHZ = 0.9
 
 
 @dataclass(frozen=True)
 class Fitted:
-    """What is particular to a fit: smallest error of a line in MHz, highest J and K of level energies that count, a remark."""
+    """What is particular to a fit: smallest error of a line in MHz, highest J and K of level energies that count, a remark.
+
+    `lines` is where the lines of `data/lines/NAME.csv` are from; without it they are those of the catalogue.
+    """
 
     least_mhz: float = 0.0
     energies: tuple[int, int] | None = None
     note: str = ""
+    lines: str = ""
 
 
 FITS = {
@@ -49,13 +55,28 @@ FITS = {
     "SO2": Fitted(), "c-C2H4O": Fitted(energies=(20, 20)), "CH2OHCHO": Fitted(energies=(20, 15)),
     "HCONH2": Fitted(energies=(20, 15)), "HCOOH": Fitted(energies=(20, 15)), "HNCO": Fitted(0.03),
     "H2S": Fitted(0.05, (10, 10)), "D2O": Fitted(0.02, (12, 6)), "HDO": Fitted(0.1, (10, 6)), "H2O": Fitted(0.1),
+    "H2": Fitted(
+        lines="S0(0) to S0(5) of E. Roueff et al., Astron. Astrophys. 630 (2019) A58, table 2, as the package pdrtpy 3.0.1 has it",
+        note="four terms of a slowly converging series, taken at 0.0001 cm-1",
+    ),
+    "HCl": Fitted(
+        lines="1H35Cl, centroids of the quadrupole splitting of 35Cl, of JPL's list as LAMDA has it (HCl rotation-hyperfine "
+        "spectrum, version 3 of May 2012), read in the tests of the program pythonradex (commit 84cd8ce1)",
+    ),
+    "O3": Fitted(
+        lines="the vibrational ground state, J <= 14, Ka <= 5, of P. W. Rosenkranz's list of 2022 (catalogued frequencies to "
+        "0.01 MHz) as the package pyrtlib 1.2.0 has it; five of its lines that no level of the ground state explains left out",
+        note="the list's other 74 lines of J <= 20, Ka <= 6 are met within 0.6 MHz",
+    ),
 }  # fmt: skip
 
 
 def observations(name: str, file: MoleculeFile, shared: Path) -> tuple[Assignments, Assignments | None]:
     """The measured lines of a molecule, and its level energies as lines from the lowest level, None where they do not count."""
-    assert file.catalogue is not None
     assert file.constants is not None
+    if FITS[name].lines:
+        return read_assigned_lines(LINES / f"{name}.csv", QUANTA[file.constants.kind])[0], None
+    assert file.catalogue is not None
     folders = (shared / "reference" / one for one in ("catalogues", "library_lines"))
     path = next(one for folder in folders if (one := folder / f"{file.catalogue.tag}.cat.gz").is_file())
     names = QUANTA[file.constants.kind]
@@ -132,10 +153,13 @@ def rewritten(text: str, name: str, fit: Fit, chi: float, energies: int) -> str:
 
 def _source(old: str, name: str, lines: int, chi: float, energies: int) -> str:
     """What the file says of its constants: the catalogue and the range as it said before, the rest of the fit made now."""
+    one = FITS[name]
+    if one.lines:
+        text = f"fitted by data/make_constants.py to the {lines} lines of data/lines/{name}.csv: {one.lines}; reduced chi {chi:.2g}"
+        return text + (f"; {one.note}" if one.note else "")
     catalogue = re.search(r"of (c\d+ of \w+ \([^)]*\))", old)
     span = re.search(r"with (J <= \d+(?:, Ka? <= \d+)?)", old)
     assert catalogue is not None
-    one = FITS[name]
     text = f"fitted by data/make_constants.py to the {lines} measured lines of {catalogue[1]}"
     text += f" with {span[1]}" if span else ""
     text += ", weighted by their errors" + (f", none below {one.least_mhz:g} MHz" if one.least_mhz else "")
@@ -169,6 +193,8 @@ def _with_measures(path: Path, shared: Path) -> str:
     library = sys.modules["make_library"] = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(library)
     file, text = read_molecule_file(path), path.read_text(encoding="utf-8")
+    if file.catalogue is None:
+        return text
     off = library.residuals(file, library.measured_lines(file, shared))
     text = re.sub(r"rms_mhz = .*", f"rms_mhz = {np.sqrt(np.mean(off**2)):.3g}", text)
     missed = float(library.served(file, shared)[1].max())

@@ -2,4 +2,5 @@
 
 from rotor.cli import main
 
-main()
+if __name__ == "__main__":  # not where something only imports every module of the package
+    main()

@@ -84,6 +84,7 @@ _ALIASES = {
     "kg m2": "kg*m2", "kg m^2": "kg*m2", "kg m²": "kg*m2", "g cm2": "g*cm2", "g cm^2": "g*cm2", "g cm²": "g*cm2",
     "W/cm^2": "W/cm2", "W/cm²": "W/cm2", "TW/cm^2": "TW/cm2", "TW/cm²": "TW/cm2", "J/cm^2": "J/cm2", "J/cm²": "J/cm2",
 }  # fmt: skip
+MOST_POINTS = 10_000_000  # of a grid: 80 MB of numbers
 _NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(\S.*?)?\s*$")
 
 
@@ -178,6 +179,8 @@ def parse_grid(text: str, unit: str) -> NDArray[np.float64]:
         return np.array([n * _factor_or_one(u or shared, unit, text) for n, u in numbers])
 
     first, last, count = _bounds(text, unit)
-    if count is None or not count.strip().isdecimal() or int(count) < 2:
+    if count is None or not count.strip().isdecimal() or float(count) < 2:
         raise ValueError(f"{text!r}: a grid is start:stop:count with a whole count of 2 or more, or a comma list")
+    if float(count) > MOST_POINTS:
+        raise ValueError(f"{text!r:.60}: a grid has at most {MOST_POINTS} points; ask for fewer")
     return np.linspace(first, last, int(count))

@@ -34,7 +34,7 @@ def test_an_engine_fills_the_same_table(call, folder, engine: str) -> None:
     for key in ("settings", "start", "molecules", "box_angstrom", "degrees"):
         assert ours[key] == theirs[key]
     for key in ("potential_ev", "translation_ev", "rotation_ev", "total_ev"):
-        mine, its = ([row[key] for row in told["record"]] for told in (ours, theirs))
+        mine, its = ([row[key] for row in content["record"]] for content in (ours, theirs))
         # energies of single precision, constants of 8 digits, and drifts that differ at order h²
         assert np.allclose(its, mine, rtol=0, atol=2e-4)
     assert call("fluid", "a.traj", "--cutoff", "4", "--steps", "2", "--engine", engine)[0] == 0

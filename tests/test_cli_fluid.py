@@ -15,21 +15,21 @@ VAPOUR = ("fluid", "water", "--molecules", "27", "--density", "0.3", "--cutoff",
 def test_a_box_is_made_and_run(call, folder):
     code, out, err = call(*VAPOUR, "--steps", "20", "--every", "5", "--csv", "a.csv", "--json", "-")
     assert (code, err) == (0, "")
-    told = json.loads(out)
-    assert told["degrees"] == {"translation": 78, "rotation": 81, "removed": 3, "total": 159}
-    assert told["molecules"][0]["name"] == "OH2"
-    assert told["molecules"][0]["rotational_degrees"] == 3
-    assert told["density_g_cm3"] == pytest.approx(0.3, rel=1e-12)  # by its making
-    assert told["settings"]["step_fs"] == 1.0
-    assert told["thermometer"] == "mixed"
-    assert "27 molecules on a lattice at 0.3 g/cm³" in told["start"]
-    assert [row["time_ps"] for row in told["record"]] == [0.0, 0.005, 0.01, 0.015, 0.02]
+    answer = json.loads(out)
+    assert answer["degrees"] == {"translation": 78, "rotation": 81, "removed": 3, "total": 159}
+    assert answer["molecules"][0]["name"] == "OH2"
+    assert answer["molecules"][0]["rotational_degrees"] == 3
+    assert answer["density_g_cm3"] == pytest.approx(0.3, rel=1e-12)  # by its making
+    assert answer["settings"]["step_fs"] == 1.0
+    assert answer["thermometer"] == "mixed"
+    assert "27 molecules on a lattice at 0.3 g/cm³" in answer["start"]
+    assert [row["time_ps"] for row in answer["record"]] == [0.0, 0.005, 0.01, 0.015, 0.02]
     rows = np.genfromtxt("a.csv", delimiter=",", names=True)
     assert rows.dtype.names == tuple(FluidRecord.__dataclass_fields__)
-    assert rows["total_ev"].tolist() == [row["total_ev"] for row in told["record"]]  # to the last bit
-    assert told["files"] == ["a.csv"]
+    assert rows["total_ev"].tolist() == [row["total_ev"] for row in answer["record"]]  # to the last bit
+    assert answer["files"] == ["a.csv"]
     provenance = json.loads(Path("a.csv.provenance.json").read_text())
-    assert provenance["settings"] == told["settings"]
+    assert provenance["settings"] == answer["settings"]
     assert provenance["command"].startswith("rotor fluid water --molecules 27")
 
 

@@ -27,22 +27,22 @@ KEYS = {
 
 def test_the_same_request_gives_the_same_answer(call):
     arguments = ("--j", "1:6", "--k", "1:2", "--max-energy", "200cm-1", "--json", "-")
-    told = json.loads(call("levels", "H2CO", *arguments)[1])
+    content = json.loads(call("levels", "H2CO", *arguments)[1])
     request = LevelsRequest(rotor.read("H2CO"), jmin=1, jmax=6, kmin=1, kmax=2, max_energy_mhz=200 * 29979.2458)
     answer = answer_levels(request)
     facts = plain({**answer.facts(), "levels": rows_of(answer.table)})
-    assert {key: told[key] for key in facts} == facts
-    assert len(told["levels"]) == told["level_count"] > 10
+    assert {key: content[key] for key in facts} == facts
+    assert len(content["levels"]) == content["level_count"] > 10
 
 
 def test_the_contract(call):
-    told = json.loads(call("levels", "water", "--json", "-")[1])
+    content = json.loads(call("levels", "water", "--json", "-")[1])
     info = json.loads(call("info", "water", "--json", "-")[1])
-    assert set(told) == KEYS | set(info) - {"partition_function"}
-    assert set(told["levels"][0]) == {
+    assert set(content) == KEYS | set(info) - {"partition_function"}
+    assert set(content["levels"][0]) == {
         "j", "ka", "kc", "energy_mhz", "energy_cm", "energy_k", "weight", "degeneracy",
     }  # fmt: skip
-    assert told["jmax"] == 10
+    assert content["jmax"] == 10
 
 
 @pytest.mark.parametrize(("unit", "energy"), [("MHz", "12.0000"), ("cm-1", "0.000400"), ("K", "0.000576")])

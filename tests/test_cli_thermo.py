@@ -189,7 +189,7 @@ def test_a_temperature_far_too_high_is_refused_soon(call, folder):
     assert (out, err.count("\n")) == ("", 1)
 
 
-@pytest.mark.skipif(not Path("/proc/self").exists(), reason="a folder where nobody can make a file: /proc of Linux")
+@pytest.mark.skipif(not Path("/proc/self").exists(), reason="a folder where no user can make a file: /proc of Linux")
 def test_a_folder_that_takes_no_file_is_named_with_its_option(call, folder):
     code, out, err = call("thermo", "water", "--temperature", "100", "--csv", "/proc/w.csv")
     assert (code, out) == (2, "")

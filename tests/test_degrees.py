@@ -14,12 +14,11 @@ from rotor.statistics.degrees_of_freedom import atomic_degrees, count_degrees, r
 WATER, CARBON_DIOXIDE, ATOM = (0.61457, 1.15512, 1.76968), (0.0, 43.2, 43.2), (0.0, 0.0, 0.0)
 
 
-def bent(angle_rad: float) -> np.ndarray:
-    """Moments of OCO bent by an angle."""
+def bent(angle_rad: float, masses: tuple[float, ...] = (12.0, 15.9949, 15.9949), bonds: float = 1.0) -> np.ndarray:
+    """Moments of OCO, or of another molecule with its middle atom first and a ratio of its bonds, bent by an angle."""
     half = 0.5 * angle_rad
     arm = 1.16 * np.array([math.cos(half), math.sin(half), 0.0])
-    positions = np.array([[0.0, 0.0, 0.0], arm, arm * [-1.0, 1.0, 1.0]])
-    masses = np.array([12.0, 15.9949, 15.9949])
+    positions = np.array([[0.0, 0.0, 0.0], arm, bonds * arm * [-1.0, 1.0, 1.0]])
     return np.asarray(principal_frame(point_masses(masses, positions), masses, positions).moments)
 
 
@@ -46,6 +45,10 @@ def test_a_linear_triatomic_has_five_degrees_not_six():
 
 def test_a_bend_of_a_milliradian_is_linear_by_our_rule_and_said():
     """Some programs take it as linear in silence."""
+    others = {"OCS": ((12.0, 15.9949, 31.9721), 1.56 / 1.16), "HCN": ((12.0, 1.0078, 14.0031), 1.15 / 1.06)}
+    moments = [bent(1e-3), *(bent(1e-3, *one) for one in others.values())]
+    ratios = [one.min() / one.max() for one in moments]
+    assert 4.8e-8 < min(ratios) < max(ratios) < 8.5e-8  # what docs/gas.md states
     box = count_degrees([bent(1e-3)])
     assert box.rotation == 2
     assert "is below 1e-06: 2 rotational degrees" in box.notes[0]

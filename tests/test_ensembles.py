@@ -194,12 +194,12 @@ def test_a_stepper_meets_the_exact_motion_with_an_error_of_step_squared():
 
 def test_streaming_does_not_depend_on_threads_and_says_how_far_it_is():
     args = {"vector": (1, 0, 0), "molecules": PIECE + 500}
-    told: list[int] = []
-    alone = free_gas_correlations(TOPS["prolate"], KT, TIMES[:5], rng=rng(), progress=told.append, **args)
+    seen: list[int] = []
+    alone = free_gas_correlations(TOPS["prolate"], KT, TIMES[:5], rng=rng(), progress=seen.append, **args)
     with ThreadPoolExecutor(2) as pool:
         together = free_gas_correlations(TOPS["prolate"], KT, TIMES[:5], rng=rng(), executor=pool, **args)
     assert np.array_equal(alone.c1, together.c1)
-    assert told == [PIECE, 500]
+    assert seen == [PIECE, 500]
     assert list(alone.columns) == ["t", "c1", "c1_error"]
     assert alone.c2 is None
     assert len(alone) == 5

@@ -85,6 +85,24 @@ def ocs_stark_map(result):
     assert np.isclose(ground[np.flatnonzero(np.unique(field) == at)[0]], expected, rtol=2e-3)
 
 
+def formic_acid_zeeman(result):
+    """1(0,1) rotates about b and c alike: E = E0 - (g_bb + g_cc)/2 μ_N B M, and -B²/2 of χ_ZZ, the same for M and -M."""
+    states = result.table
+    up, down = (states.energy_mhz[states.curve("1 0 1", m)] for m in (1, -1))
+    moment = (-0.0903 - 0.0270) / 2 * 7.6225932
+    assert np.allclose(
+        up - down, -2 * moment * states.fields, atol=2e-5
+    )  # 1(0,1) takes 1e-5 of J_a² from asymmetry and field
+    middle = states.energy_mhz[states.curve("1 0 1", 0)]
+    for energies, share in (
+        (middle, 3 / 5),
+        ((up + down) / 2, 1 / 5),
+    ):  # of Φ_Za² in |J = 1, K_a = 0, M⟩; b and c have the rest
+        chi = -18.8 * share - (16.8 + 24.2) * (1 - share) / 2
+        expected = -0.5 * 0.0250607 * chi * states.fields**2
+        assert np.allclose(energies - energies[0], expected, atol=2e-5)  # six digits of the unit, 1.6 MHz
+
+
 def ocs_alignment(result):
     times, cosine = column(result, "t_ps"), column(result, "cos2theta")
     period = 1e6 / (2 * result.request.top.constants["B"])

@@ -6,17 +6,21 @@ that labels, ties, units, blends and searches of such files work together, from 
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from fit_kinds import ERROR_MHZ, Kind, lin_text, lines_of, parameter_file, start_of, write_case
 
+from rotor.fit.assignment import assignments, merged
+from rotor.fit.choose import suggest_lines
 from rotor.fit.fit import fit_lines
 from rotor.formats.spcat.fit_input import fitted_file, read_fit, spfit_input
 from rotor.formats.spcat.fit_states import FileLevels
 from rotor.formats.spcat.text.lin import read_lin
 from rotor.formats.spcat.text.par import read_par
+from rotor.formats.spcat.unmeasured import unmeasured_lines
 from rotor.formats.spcat.unresolved import excluded_parameters
 
 THREE = """10099 14500.1 A
@@ -220,26 +224,44 @@ TWO_CHLORINES = Kind(
 
 
 def test_lines_of_unresolved_structure_leave_out_the_last_parameters():
-    """F below 0: no parameter of spins has a derivative; SPFIT's way, to first order, differs by the second order, 1 kHz here."""
-    import rotor.formats.spcat.fit_states as fit_states
-
+    """F below 0: E - Σ p ∂E/∂p of the last NXPAR parameters, which have no derivative; without spins but for the second order."""
     file = parameter_file(TWO_CHLORINES)
     values = np.array([p.value for p in file.parameters])
-    labels = np.array([[4, 0, 4, 4, -4], [5, 1, 5, 5, -5], [4, 0, 4, 4, 4], [4, 0, 4, 4, -1]])
+    labels = np.array([[4, 0, 4, 4, -4], [5, 1, 5, 5, -5], [4, 0, 4, 4, 4], [5, 1, 5, 5, 5], [4, 0, 4, 4, -1]])
     energies, slopes = FileLevels.of(file, labels).levels(values)
-    plain = read_par(b"x\n 4 1 1\na 1 1 0 20\n10000 9500.5\n20000 3600.1\n30000 2780.2\n200 -1e-3\n")
-    alone = FileLevels.of(plain, labels[:2, :3]).levels(values[:4])[0]
-    assert energies[:2] == pytest.approx(alone, rel=1e-13)  # round-off
-    assert energies[3] == energies[0]  # F = -1 is minus F1
-    assert not slopes[[0, 1, 3], 4:].any()
-    assert slopes[2, 4:].all()
+    whole, of_whole = FileLevels.of(file, labels[2:4]).levels(values)
+    assert energies[:2] == pytest.approx(whole - of_whole[:, 4:] @ values[4:], rel=1e-14)  # round-off
+    assert energies[4] == energies[0]  # F = -1 is minus F1
+    assert not slopes[[0, 1, 4], 4:].any()
+    assert slopes[2:4, 4:].all()
     assert excluded_parameters(file).tolist() == [4, 5, 6, 7]
 
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(fit_states, "inner_file", lambda file, form: None)
-        first_order, other = FileLevels.of(file, labels[:2]).levels(values)
-    assert 0 < np.abs(first_order - energies[:2]).max() < 0.1  # χ²/(4B) is 0.3 MHz, times squares of angular factors
-    assert other[:, :3] == pytest.approx(slopes[:2, :3], rel=1e-3)
+    plain = read_par(b"x\n 4 1 1\na 1 1 0 20\n10000 9500.5\n20000 3600.1\n30000 2780.2\n200 -1e-3\n")
+    alone, other = FileLevels.of(plain, labels[:2, :3]).levels(values[:4])
+    assert 0 < np.abs(alone - energies[:2]).max() < 0.1  # χ²/(4B) is 0.3 MHz, times squares of angular factors
+    assert other[:, :3] == pytest.approx(slopes[:2, :3], rel=1e-3)  # the second order of the same
+
+
+def test_levels_of_large_blocks_are_those_of_the_whole_matrix(monkeypatch):
+    """Two chlorines, two states with Coriolis coupling, N = 13: each level among the functions near it, or all diagonalised."""
+    import rotor.quantum.estimates.contracted as contracted
+
+    text = TWO_CHLORINES.parameters.replace("10000 ", "10099 ").replace("20000 ", "20099 ").replace("30000 ", "30099 ")
+    text = re.sub(r"(?m)^(-?[12]{2}00\d00)00 ", r"\g<1>99 ", text).replace("200 -1e-3", "299 -1e-3")  # of both states
+    file = parameter_file(replace(TWO_CHLORINES, options="a 44 2 0 20 0 3 1 1 0 1 0", parameters=text + _TWO_STATES))
+    values = np.array([p.value for p in file.parameters])
+    labels = np.array([[n, ka, n - ka, v, n + 1, n + 2] for n in (13,) for ka in (0, 1, 9) for v in (0, 1)])
+    monkeypatch.setattr(contracted, "_LARGE", 100)
+    model = FileLevels.of(file, labels)
+    assert isinstance(model.solved[0].blocks, contracted.ContractedLevels)
+    found, slopes = model.levels(values)
+    monkeypatch.setattr(contracted, "_LARGE", 10**9)
+    whole, of_whole = FileLevels.of(file, labels).levels(values)
+    assert found == pytest.approx(whole, abs=contracted.TOLERANCE_MHZ)  # what is left out is below it
+    assert np.abs(slopes - of_whole).max(axis=0) == pytest.approx(0, abs=1e-6 * np.abs(of_whole).max())  # v²/W²
+
+
+_TWO_STATES = "11 590000.0 E\n200001 -1048.0 Ga\n10011 -30.0 dA\n"
 
 
 def test_a_file_with_resolved_and_unresolved_lines_is_fitted(tmp_path):
@@ -264,3 +286,25 @@ def test_a_file_with_resolved_and_unresolved_lines_is_fitted(tmp_path):
     assert fit.weighted_rms == pytest.approx(1.0, abs=0.4)  # 93 normal errors
     for one, given in zip(fitted_file(asked, fit, variances=True).parameters, file.parameters, strict=True):
         assert abs(one.value - given.value) < 4 * one.error  # 4 σ
+
+
+def test_a_suggested_line_of_a_file_with_spins_does_what_was_said_of_it(tmp_path):
+    """Lines that are not among the measured ones, of their kinds; the first one, measured, reduces the error as foretold."""
+    write_case(tmp_path, "case", replace(TWO_CHLORINES, nxpar=0), 1e-4)
+    asked = read_fit(tmp_path / "case.par")
+    fit = fit_lines(asked.lines, None, asked.parameters, asked.options, model=asked.model)
+    upper, lower = unmeasured_lines(asked.file, asked.lines)
+    pairs = {(*u, *d) for u, d in zip(upper.tolist(), lower.tolist(), strict=True)}
+    measured = {(*u, *d) for u, d in zip(asked.lines.upper.tolist(), asked.lines.lower.tolist(), strict=True)}
+    assert not pairs & measured
+    assert {tuple(u - d) for u, d in zip(upper, lower, strict=True)} <= {
+        tuple(change) for change in asked.lines.upper - asked.lines.lower
+    }
+    best = suggest_lines(fit, "X-1", upper, lower, error_mhz=ERROR_MHZ, model=asked.model)[0]
+    more = assignments(asked.lines.names, [best.upper], [best.lower], best.frequency_mhz, ERROR_MHZ)
+    again = fit_lines(merged(asked.lines, more)[0], None, asked.parameters, asked.options, model=asked.model)
+    column = asked.parameters.names.index("X-1")
+    assert best.error_ratio < 1
+    assert again.errors[column] / fit.errors[column] == pytest.approx(
+        best.error_ratio, rel=1e-4
+    )  # constants move a little

@@ -117,11 +117,11 @@ def test_drift_is_the_slope_and_white_noise_has_its_textbook_error() -> None:
     assert drift_per_ns(t, 2.0 * t)[0] == pytest.approx(2000.0, rel=1e-9)
 
 
-@pytest.mark.parametrize(("call", "told"), [
+@pytest.mark.parametrize(("call", "message"), [
     (lambda: pair_distribution(np.zeros((3, 3)), [1.0] * 3, 0.5), "a path of shape"),
     (lambda: pair_distribution(np.zeros((1, 1, 3)), [1.0] * 3, 0.5), "two points or more"),
     (lambda: pair_distribution(np.zeros((1, 2, 3)), [4.0, 5.0, 6.0], 2.1), "at most half of the shortest edge, 2 Å"),
 ])  # fmt: skip
-def test_what_is_refused(call, told: str) -> None:
-    with pytest.raises(ValueError, match=told):
+def test_what_is_refused(call, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
         call()

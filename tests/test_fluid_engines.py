@@ -135,15 +135,15 @@ def test_a_scene_has_whole_molecules_isotopologues_and_momentum_at_rest() -> Non
     assert engine_input_of(atoms, settings_for("spce", ensemble="langevin")).degrees.total == 6 * 64
 
 
-@pytest.mark.parametrize(("edit", "told"), [
+@pytest.mark.parametrize(("edit", "message"), [
     (lambda a: a.set_cell([12, 12, 13, 90, 90, 80]), "rectangular cell"),
     (lambda a: a.set_pbc(False), "rectangular cell"),
     (lambda a: a.set_cell([11.9, 14.1, 20.0]), "at most half"),
 ])  # fmt: skip
-def test_boxes_that_engines_are_not_handed(edit, told: str) -> None:
+def test_boxes_that_engines_do_not_take(edit, message: str) -> None:
     atoms = WATER.copy()
     edit(atoms)
-    with pytest.raises(ValueError, match=told):
+    with pytest.raises(ValueError, match=message):
         engine_input_of(atoms, settings_for("spce"))
 
 

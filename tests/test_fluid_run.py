@@ -32,7 +32,7 @@ def box(molecules=27, seed=3):
 
 
 def stop_after(step):
-    """What a run is told to, and what ends it there as a signal would."""
+    """What a run is asked to do, and what ends it there as a signal would."""
 
     def progress(now, steps, speed):
         if now >= step:

@@ -250,7 +250,7 @@ def test_hessian_on_the_command_line(tmp_path, capsys):
     assert run(["info", "water", "--hessian", "calculator"]) == 2
     assert run(["info", "--constants", "B=1", "--hessian", "h.txt"]) == 2
     assert run(["info", "water", "--hessian", str(tmp_path / "none.txt")]) == 2
-    told = capsys.readouterr().err
-    assert "needs --calculator NAME" in told
-    assert "--hessian: bare constants" in told
-    assert "none.txt: No such file" in told
+    errors = capsys.readouterr().err
+    assert "needs --calculator NAME" in errors
+    assert "--hessian: bare constants" in errors
+    assert "none.txt: No such file" in errors

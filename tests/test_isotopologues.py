@@ -27,7 +27,7 @@ from rotor.tops.top import Top
 
 @pytest.mark.parametrize("name", ["H2O", "C2H4", "CH3Cl", "CO2", "NH3", "H2O2", "C2H6"])
 def test_abundances_of_a_family_are_those_of_all_placements(name):
-    """Placements of every isotope on every atom, told apart by their distances and masses, not by symmetry operations."""
+    """Placements of every isotope on every atom, distinguished by their distances and masses, not by symmetry operations."""
     molecule = g2_molecule(name)
     options = [list(natural_isotopes(s)) for s in molecule.symbols]
     distances = np.linalg.norm(molecule.positions_angstrom[:, None] - molecule.positions_angstrom, axis=2).round(4)

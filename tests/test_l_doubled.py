@@ -126,7 +126,7 @@ def test_lines_of_a_degenerate_state():
     ("options", "parameters", "says"),
     [
         ("s -1 2 0 20 0 6 2 2 -1 1 1\ns -1 1 0 20 0 6 2 2 0 101 1\n", COMMON[:2], "come in pairs"),
-        (OPTIONS, (*COMMON, (600012, 3.0)), "time reversal"),
+        (OPTIONS, (*COMMON, (600021, 3.0)), "time reversal"),
         (OPTIONS, (*COMMON, (400002, 3.0)), "K l ≤ 0"),
         (OPTIONS.replace("6 2 2", "10 2 2").replace("101", "301").replace("201", "301"), COMMON, "not of E species"),
     ],

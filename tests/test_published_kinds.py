@@ -50,7 +50,7 @@ TEXTS = {
     "18 states, two digits for each": (_eighteen_states(), (0, 2, 8)),
     # letter and blanks left to their defaults, two option lines, oblate basis by NVIB < 0 in both
     "option fields by commas, an option line for each state, NVIB negative": (
-        "a 1,-2,,12,,1,1,1,-1\na 1,-1,,,,1,3,3\n"
+        "a 1,-2,,12,,1,3,3,-1\na 1,-1,,,,1,3,3\n"
         "10099 8545.8\n20099 8545.1\n30099 4272.9\n20011 -12.0\n11 5400.0\n60001 820.0\n610001 -3.4\n40099 0.04\n",
         (2, 8, 12),
     ),
@@ -174,8 +174,8 @@ def test_option_fields_by_commas_are_those_in_full():
         -2,
         0,
         12,
-        1,
-        1,
+        3,
+        3,
         -1,
     )
     assert (second.nvib, second.knmin, second.knmax, second.iax, second.wtpl, second.wtmn) == (

@@ -25,7 +25,7 @@ from rotor.thermo.thermal_tumble import thermal_tumble
 OF_COMMAND = {"rotor_version", "command", "input", "files", "strongest", "patterns"}  # keys that no request has
 
 
-def told(call, *arguments: str) -> dict:
+def answer_of(call, *arguments: str) -> dict:
     code, out, err = call(*arguments, "--json", "-")
     assert code == 0, err
     return json.loads(out)
@@ -40,7 +40,7 @@ def assert_same(command: Mapping, facts: Mapping, but: frozenset[str] = frozense
 
 
 def test_spectrum(call):
-    command = told(
+    command = answer_of(
         call, "spectrum", "OCS", "--temperature", "150", "--range", "10:400GHz", "--min-lgint", "-6.5", "--jmax", "40",
         "--vibration", "859,520x2,2062", "--pressure", "2mbar", "--path", "1m", "--fwhm", "3MHz",
     )  # fmt: skip
@@ -66,7 +66,7 @@ def test_spectrum_of_constants_with_a_given_q(call):
         "--vibrational-factor",
         "1.5",
     )
-    command = told(call, "spectrum", *arguments, "--min-lgint", "none", "--jmax", "5")
+    command = answer_of(call, "spectrum", *arguments, "--min-lgint", "none", "--jmax", "5")
     top = rotor.Top.from_constants("A=9.2 B=3 C=2.5 GHz", dipole_abc_debye=(1, 0, 2), source="given (--constants)",
                                    dipole_source="given in principal axes (--dipole-abc)")  # fmt: skip
     answer = answer_spectrum(SpectrumRequest(top, q=1000, vibrational_factor=1.5, min_lgint=None, jmax=5))
@@ -74,13 +74,13 @@ def test_spectrum_of_constants_with_a_given_q(call):
 
 
 def test_raman(call):
-    command = told(call, "raman", "CO2", "--laser", "488", "--temperature", "500K", "--min-relative", "1e-3")
+    command = answer_of(call, "raman", "CO2", "--laser", "488", "--temperature", "500K", "--min-relative", "1e-3")
     answer = answer_raman(RamanRequest(rotor.read("CO2"), temperature_k=500, laser_nm=488, min_relative=1e-3))
     assert_same(command, {**answer.facts(), "lines": rows_of(answer.lines)})
 
 
 def test_thermo(call):
-    command = told(
+    command = answer_of(
         call, "thermo", "water", "--species", "ortho", "--temperature", "100:300K:5", "--gas", "--pressure", "1atm",
         "--vibration", "1595,3657,3756",
     )  # fmt: skip
@@ -94,7 +94,7 @@ def test_thermo(call):
 
 
 def test_tumble_of_a_molecule(call):
-    command = told(call, "tumble", "water", "--temperature", "100", "--times", "0:2ps:21")
+    command = answer_of(call, "tumble", "water", "--temperature", "100", "--times", "0:2ps:21")
     request = thermal_tumble(rotor.read("water"), temperature_k=100, times_ps=np.linspace(0, 2, 21))
     answer = answer_tumble(request)
     facts = {**answer.facts(), "motion": rows_of(answer.table)}
@@ -104,7 +104,7 @@ def test_tumble_of_a_molecule(call):
 
 
 def test_tumble_of_a_body(call):
-    command = told(call, "tumble", "--moments", "0.6,0.8,1.0", "--angular-momentum", "1.8,0.4,-0.9")
+    command = answer_of(call, "tumble", "--moments", "0.6,0.8,1.0", "--angular-momentum", "1.8,0.4,-0.9")
     answer = answer_tumble(TumbleRequest((0.6, 0.8, 1.0), (1.8, 0.4, -0.9), source="given (--angular-momentum)"))
     facts = {
         **answer.facts(),
@@ -117,7 +117,9 @@ def test_tumble_of_a_body(call):
 
 
 def test_gas(call):
-    command = told(call, "gas", "OCS", "--molecules", "2000", "--temperature", "200", "--seed", "5", "--times", "0:1:6")
+    command = answer_of(
+        call, "gas", "OCS", "--molecules", "2000", "--temperature", "200", "--seed", "5", "--times", "0:1:6"
+    )
     request = GasRequest(rotor.read("OCS"), 2000, 200.0, seed=5, times_ps=tuple(np.linspace(0, 1, 6).tolist()))
     answer = answer_gas(request)
     assert_same(command, {**answer.facts(), "correlation": rows_of(answer.correlations)})
@@ -125,7 +127,7 @@ def test_gas(call):
 
 
 def test_fluid(call):
-    command = told(
+    command = answer_of(
         call, "fluid", "water", "--molecules", "27", "--density", "0.5", "--ensemble", "langevin", "--steps", "20",
         "--cutoff", "5", "--seed", "3", "--temperature", "320",
     )  # fmt: skip

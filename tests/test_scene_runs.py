@@ -17,7 +17,16 @@ import pytest
 import rotor
 from rotor.quantum.effects.watson import Rigid
 from rotor.scenes.run import run_scene
-from rotor.scenes.scene import AlignScene, FluidScene, GasScene, LevelsScene, SpectrumScene, StarkScene, TumbleScene
+from rotor.scenes.scene import (
+    AlignScene,
+    FluidScene,
+    GasScene,
+    LevelsScene,
+    SpectrumScene,
+    StarkScene,
+    TumbleScene,
+    ZeemanScene,
+)
 from rotor.scenes.scene_file import parse_scene, read_scene, write_scene
 from rotor.scenes.sections import (
     AlignConditions,
@@ -27,6 +36,7 @@ from rotor.scenes.sections import (
     GaussianSection,
     LevelsObservables,
     LevelsOutputs,
+    MagneticSection,
     MoleculeSection,
     QuantumEffects,
     SpectrumConditions,
@@ -36,6 +46,8 @@ from rotor.scenes.sections import (
     StarkObservables,
     TumbleConditions,
     VibrationSection,
+    ZeemanConditions,
+    ZeemanObservables,
 )
 from rotor.scenes.sweep import points, run_sweep
 
@@ -67,6 +79,10 @@ SAVED = [  # a verb with its options; --csv a.csv goes with each
     ("stark", "OCS --field 10,20 --states J<=1 --intensity|1e9 W/cm2|--tilt 45"),
     ("gas", "OCS --molecules 500 --temperature 200 --seed 5"),
     ("stark", "OCS --field 0:77.7kV/cm:5 --states J<=1 --intensity|1e10 W/cm2|--diabatic-gap 5"),
+    ("stark", "HC3N --field 0,0.3 --states J<=1 --m 1 --spin-constants|chi_aa(14N)=-4.3 MHz|"),
+    ("zeeman", "OCS --g -0.02 --magnetisability 1.5,-2.5 --field 0:2T:3 --states J<=1"),
+    ("zeeman", "--constants|A=10 B=6 C=4 GHz|--g 0.6,-0.2,0.3,0.05,0,0 --field 0,33.3 --states J<=1 --tolerance 1e-5"),
+    ("zeeman", "HC3N --g -0.01 --field 0:200G:3 --states J<=1 --spin-constants|chi_aa(14N)=-4.3 MHz|--nuclear-g 14N=0.4"),
     ("align", "OCS --pulse|1e12 W/cm2, 0.3 ps|--kick|1e-2 J/cm2, 5 ps|--polarization elliptical:0.3 --temperature 0 --points 51"),
     ("align", "--constants|B=6081.492 MHz|--anisotropy 4.04 --switched|1e11 W/cm2, 1, 2, 0.5|--temperature 0 --until 20ps --points 31"),
     ("align", "OCS --thz|100 kV/cm, 1 ps, 0.3 THz|--observable costheta --observable cos2theta --state j=1 --m 0 --until 20 --points 31"),
@@ -158,6 +174,12 @@ SHORT = {
     "gas": GasScene(molecule="CO", observables=GasObservables(times=[0.0, 1.0])),
     "stark": StarkScene(
         molecule="OCS", conditions=StarkConditions(field=[0, 10]), observables=StarkObservables(jmax=1)
+    ),
+    "zeeman": ZeemanScene(
+        molecule="OCS",
+        magnetic=MagneticSection(g=[-0.03]),
+        conditions=ZeemanConditions(field=[0, 1]),
+        observables=ZeemanObservables(jmax=1),
     ),
     "align": AlignScene(
         molecule="OCS",

@@ -1,4 +1,4 @@
-"""Streamed lists: the same lines as in memory, whatever the pieces; killed and taken up again; told from other lists."""
+"""Streamed lists: the same lines as in memory, whatever the pieces; killed and taken up again; distinguished from other lists."""
 
 from __future__ import annotations
 

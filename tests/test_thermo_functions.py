@@ -447,3 +447,12 @@ def test_impossible_input():
         thermodynamic_functions(top, [10.0], pressure_bar=1.0)
     with pytest.raises(ValueError, match="finite pressure above 0"):
         thermodynamic_functions(rotor.read("CO"), [10.0], pressure_bar=0.0)
+
+
+def test_a_series_that_turns_over_is_refused_before_thousands_of_levels_are_solved():
+    """The 15 constants of ammonia serve to J of some 20; from J = 58 on its lowest level of each J falls."""
+    seen: list[int] = []
+    top = rotor.read("NH3")
+    with pytest.raises(ValueError, match="beyond the reach of the distortion constants"):
+        level_sums(top, [top.spin_weights], [1e6], progress=lambda j, last: seen.append(j))
+    assert 50 < max(seen) < 100

@@ -33,6 +33,21 @@ DRAWN = {
     "align": (("align", "OCS", *PULSE), 1, ("5:20ps", "0.2:0.6"), (5, 20), (0.2, 0.6)),
     "gas": (("gas", *GAS), 1, ("0:2ps", "-1:1"), (0, 2), (-1, 1)),
     "fluid": (("fluid", *BOX), 0, ("1:3fs", "0:900"), (0.001, 0.003), (0, 900)),
+    "zeeman": (
+        ("zeeman", "OCS", "--g", "-0.03", "--field", "0:5T:6", "--states", "1"),
+        0,
+        ("1:4T", "-1:2"),
+        (1, 4),
+        (-1, 2),
+    ),
+    "spectrum": (("spectrum", "CO", "--range", "0:2THz"), 0, ("0:1THz", "0:0.01"), (0, 1000), (0, 0.01)),
+    "emission": (
+        ("emission", "HC3N", "--range", "225:230GHz", "--column", "1e14"),
+        0,
+        ("226:229GHz", "0:3"),
+        (226, 229),
+        (0, 3),
+    ),
     "cat": (("cat", "a.cat"), 0, ("1:20GHz", "-9:0"), (1, 20), (-9, 0)),
 }
 
@@ -95,6 +110,11 @@ def test_scales(call, folder, figures, command, axis, scale):
             ("raman", "N2", "--plot", "a.png", "--plot-scale", "log", "--plot-vertical", "0:1"),
             "the vertical limits 0:1: a logarithmic axis",
         ),
+        (
+            ("spectrum", "CO", "--plot", "a.png", "--plot-scale", "log", "--plot-vertical", "0:1"),
+            "the vertical limits 0:1: a logarithmic axis",
+        ),
+        (("zeeman", "OCS", "--g", "1", "--plot-title", "x"), "--plot-title: expected with --plot"),
         (
             ("cat", "a.cat", "--plot", "a.png", "--compare", "OCS", "--plot-vertical", "0:1"),
             "--plot-vertical: a comparison",

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from field_matrices import contracted_vectors, rigid, states
 
+import rotor
 from rotor.quantum.effects.zeeman import zeeman_map
+from rotor.quantum.fields.zeeman_request import ZeemanRequest, answer_zeeman, magnetic_limits
+from rotor.tops.magnetic import MagneticTensors, tensor_for
+from rotor.tops.spins.spin_constants import SpinConstants
 from rotor.tops.top import Top
 from rotor.units import NUCLEAR_MAGNETON_MHZ_PER_T
 
@@ -73,3 +79,23 @@ def test_bad_g_tensors_are_refused():
         zeeman_map(Top.from_constants("A=10 B=6 MHz"), [1.0], [0.1, 0.2, 0.3])
     with pytest.raises(ValueError, match="one number, three"):
         zeeman_map(Top.from_constants("A=10 B=6 C=4 MHz"), [1.0], [[0.1, 0.2]])
+
+
+def test_what_of_the_field_is_left_out_is_said():
+    """The largest moment of a nucleus, μ = g I μ_N with 2.7928 of the proton, and a magnetisability that is not given."""
+    hc3n, g = (
+        replace(rotor.read("HC3N"), spin_constants=SpinConstants.parse("chi_aa(14N)=-4.3 MHz")),
+        np.diag([0.0, -0.01, -0.01]),
+    )
+    found = {}
+    for spins, chi in ((False, None), (True, tensor_for("linear", [-1.0]))):
+        top = replace(hc3n, magnetic=MagneticTensors(g, chi))
+        request = ZeemanRequest(top, (-0.5, 0.25), j_highest=1, hyperfine=spins)
+        found[spins] = {one.name: one.size_mhz for one in magnetic_limits(request)}
+        listed = answer_zeeman(request).facts()["limits"]
+        assert {one["name"] for one in listed} >= found[spins].keys()
+        sizes = [one["size_mhz"] for one in listed if one["size_mhz"] is not None]
+        assert sizes == sorted(sizes, reverse=True)
+    proton = 2.7928473 * NUCLEAR_MAGNETON_MHZ_PER_T * 0.5
+    assert found[False] == {"magnetic moments of nuclei": pytest.approx(proton, rel=1e-4), "magnetisability": None}
+    assert found[True] == {}

@@ -8,13 +8,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rotor.alignment.pulse import RAD_PER_PS_MHZ, Kick, Pulse
+from rotor.alignment.pulse import RAD_PER_PS_ANGSTROM3_W_PER_CM2, RAD_PER_PS_MHZ, GaussianPulse, Kick, Pulse
 from rotor.alignment.timeline import Channel, Window
 from rotor.arrays import Floats
 from rotor.quantum.fields.blocks import Contraction
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
+
+_DIAGONAL = (np.arange(3), np.arange(3))
+ISOTROPIC = 1e-14  # of a polarizability: an anisotropy below it is round-off
 
 
 def acted_on(top: Top, acts_on: str) -> Floats:
@@ -34,16 +37,22 @@ def acted_on(top: Top, acts_on: str) -> Floats:
         return dipole
     if top.polarizability_abc_angstrom3 is None:
         raise ValueError(f"the polarizability of {name} is not known: give one, in principal axes (Å³)")
-    tensor = np.array(top.polarizability_abc_angstrom3)
-    tensor = tensor - np.eye(3) * np.trace(tensor) / 3
-    if not np.abs(tensor).max() > 0:
+    whole = np.array(top.polarizability_abc_angstrom3)
+    tensor = _traceless(whole)
+    if not np.abs(tensor).max() > ISOTROPIC * np.abs(whole).max():
         raise ValueError(f"the polarizability of {name} is isotropic: no light turns it")
-    return np.asarray(tensor)
+    return tensor
+
+
+def _traceless(tensor: Floats) -> Floats:
+    out = tensor.copy()
+    out[_DIAGONAL] -= out[_DIAGONAL].sum() / 3
+    return out
 
 
 def contraction_of(top: Top, channel: Channel) -> Contraction:
     body, space = acted_on(top, channel.acts_on), np.array(channel.space)
-    return Contraction(body, space - np.eye(3) * np.trace(space) / 3 if space.ndim == 2 else space)
+    return Contraction(body, _traceless(space) if space.ndim == 2 else space)
 
 
 def contractions_of(top: Top, windows: Sequence[Window]) -> tuple[tuple[Contraction, ...], ...]:
@@ -96,6 +105,9 @@ def _spread(body: Floats) -> float:
 
 
 def _peak_and_area(pulse: Pulse) -> tuple[float, float]:
+    if isinstance(pulse, GaussianPulse):
+        peak = RAD_PER_PS_ANGSTROM3_W_PER_CM2 * pulse.peak_w_per_cm2
+        return peak, peak * pulse.fwhm_ps * math.sqrt(math.pi / (4 * math.log(2)))
     first, last = pulse.window_ps
     times = np.linspace(first, last, 1001)
     strength = np.abs(pulse.strength(times))

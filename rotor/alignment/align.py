@@ -39,7 +39,7 @@ DEFAULT_TOLERANCE = 1e-6
 HIGHEST_J = 600
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class AlignmentTrace(Table):
     """Cosines against time, and how they were found.
 
@@ -187,6 +187,11 @@ def align(
         raise ValueError(
             f"J max {jmax}: the ensemble itself has J up to {ensemble.jmax}; give at least {ensemble.jmax + EDGE}"
         )
+    if given is None and jmax > HIGHEST_J:
+        raise ValueError(
+            f"the pulses need J up to about {jmax}; states up to J = {HIGHEST_J} are propagated: lower the intensity, the duration or the "
+            "temperature"
+        )
     while True:
         pilot = pilot_of(problem, jmax)
         if pilot.edge <= 0.3 * tolerance:
@@ -240,7 +245,7 @@ def _carried(
     problem: Problem, pilot: Pilot, executor: Executor | None, progress: Callable[[int, int], None] | None
 ) -> AlignmentTrace:
     """All blocks, and the trace that they make together."""
-    space, before = pilot.space, bool(problem.free_times(-1).any())
+    space, before = pilot.space, problem.begins_before
     if pilot.whole and pilot.task is not None and pilot.outcome is not None:
         return _trace(problem, space, [pilot.task], [pilot.outcome], pilot, before)
     tasks = list(tasks_of(problem, space, pilot.plan, before))
@@ -302,6 +307,6 @@ def _signal(
         out[here] = found.at(problem.times[here] - start)
     for index, window in enumerate(problem.windows):
         here = problem.times_in(window)
-        if here.any():
+        if here.stop > here.start:
             out[here] = remainder + sum(outcome.samples[index][place] for outcome in outcomes)
     return out, found

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,7 @@ from rotor.alignment.observables import Coherences, Observable
 from rotor.alignment.pulse import RAD_PER_PS_MHZ, Pulse
 from rotor.alignment.timeline import Window
 from rotor.arrays import Floats, Ints
-from rotor.quantum.fields.blocks import AxialBlock, Contraction, FieldBlock, FieldSpace
+from rotor.quantum.fields.blocks import AxialBlock, Contraction, FieldBlock, FieldSpace, FreeLevels
 from rotor.quantum.fields.space import field_space
 
 if TYPE_CHECKING:
@@ -39,6 +39,7 @@ class Problem:
     observables: tuple[Observable, ...]
     tolerance: float
     contractions: tuple[tuple[Contraction, ...], ...]
+    known: dict[str, Any] = field(default_factory=dict)  # populations of the levels last asked for
 
     def space(self, jmax: int) -> FieldSpace:
         """The states up to J max and their blocks."""
@@ -50,17 +51,31 @@ class Problem:
             return (0,)
         return range(self.ensemble.jmax + 1) if self.ensemble.m is None else (self.ensemble.m,)
 
-    def free_times(self, after: int) -> NDArray[np.bool_]:
-        """Which times lie between window `after` (-1: before the first) and the next."""
-        start = self.windows[after].stop_ps if after >= 0 else -np.inf
-        stop = self.windows[after + 1].start_ps if after + 1 < len(self.windows) else np.inf
-        return (self.times > start if after >= 0 and self.windows[after].is_kick else self.times >= start) & (
-            self.times <= stop
-        )
+    def free_times(self, after: int) -> slice:
+        """Which times lie between window `after` (-1: before the first) and the next; the time of a kick is before it."""
+        first, last = 0, len(self.times)
+        if after >= 0:
+            side: Literal["left", "right"] = "right" if self.windows[after].is_kick else "left"
+            first = int(np.searchsorted(self.times, self.windows[after].stop_ps, side))
+        if after + 1 < len(self.windows):
+            last = int(np.searchsorted(self.times, self.windows[after + 1].start_ps, "right"))
+        return slice(first, max(first, last))
 
-    def times_in(self, window: Window) -> NDArray[np.bool_]:
+    @property
+    def begins_before(self) -> bool:
+        """Whether some of the times lie before the first window."""
+        return bool(self.free_times(-1).stop)
+
+    def times_in(self, window: Window) -> slice:
         """Which times lie inside a window."""
-        return (self.times > window.start_ps) & (self.times < window.stop_ps)
+        first = int(np.searchsorted(self.times, window.start_ps, "right"))
+        return slice(first, max(first, int(np.searchsorted(self.times, window.stop_ps))))
+
+    def populations(self, levels: FreeLevels) -> Floats:
+        """Of one state of each level (n,), made once for all blocks."""
+        if self.known.get("levels") is not levels:
+            self.known.update(levels=levels, populations=self.ensemble.populations(levels))
+        return np.asarray(self.known["populations"])
 
 
 @dataclass(frozen=True)
@@ -124,7 +139,8 @@ def run(task: Task) -> Outcome:
         free.append(_all_coherences(task, states))
     now = task.plan.windows[0].start_ps
     for window, passage, operators in zip(task.plan.windows, task.plan.passages, task.operators, strict=True):
-        states = np.exp(-1j * task.energies * (window.start_ps - now))[:, None] * states
+        if window.start_ps > now:
+            states = np.exp(-1j * task.energies * (window.start_ps - now))[:, None] * states
         states, leaked, found = _through(task, window, passage, operators, states)
         now = window.stop_ps
         samples.append(found)
@@ -211,7 +227,7 @@ def task_of(problem: Problem, block: FieldBlock, plan: Plan, before: bool) -> Ta
         Energies in rad/ps, matrices, and the populated columns with their weights; None where nothing in it is
         populated.
     """
-    population = problem.ensemble.populations(block.levels)[block.rows] * block.copies
+    population = problem.populations(block.levels)[block.rows] * block.copies
     if problem.ensemble.m is not None:
         population = population * (block.abs_m == problem.ensemble.m) / (2 if problem.ensemble.m else 1)
     columns = np.flatnonzero(population)

@@ -150,6 +150,10 @@ class Coherences:
     amplitudes: Complexes
     constant: float
 
+    def less(self, other: Coherences) -> Coherences:
+        """The difference from another state of the same block."""
+        return Coherences(self.first, self.second, self.amplitudes - other.amplitudes, self.constant - other.constant)
+
 
 class Pattern(NamedTuple):
     """Where above its diagonal a matrix is not zero: places and rows of the levels (n,) each, the elements, and the diagonal."""

@@ -60,16 +60,16 @@ class Splitting:
     kicks: Floats
     gradients: Floats
 
-    @property
+    @cached_property
     def nodes(self) -> Floats:
-        """When each kick acts, in steps."""
-        return np.concatenate([[0.0], np.cumsum(self.drifts)])
+        """When each kick acts, in steps; those at the ends just inside, since the pulse may jump there."""
+        return np.asarray(np.clip(np.concatenate([[0.0], np.cumsum(self.drifts)]), _INSIDE, 1 - _INSIDE))
 
     @cached_property
     def different_drifts(self) -> tuple[Floats, Ints]:
         """Each duration of a drift once, and which of them each drift has."""
         shares, which = np.unique(self.drifts, return_inverse=True)
-        return shares, which
+        return shares, which.ravel()
 
 
 SPLITTINGS = ("gradient", "nystrom 4", "nystrom 6")
@@ -170,23 +170,21 @@ def kick_plan(window: Window, grid: Grid, rule: Splitting) -> KickPlan:
     ends of a step are evaluated just inside it, since the pulse may jump there.
     """
     stages = len(rule.drifts)
-    steps = np.repeat(grid.steps, grid.counts)
-    starts = np.concatenate(
-        [s + h * np.arange(n) for s, h, n in zip(grid.starts, grid.steps, grid.counts, strict=True)]
-    )
-    times = starts[:, None] + steps[:, None] * np.clip(rule.nodes, _INSIDE, 1 - _INSIDE)
+    steps, last = np.repeat(grid.steps, grid.counts), np.cumsum(grid.counts)
+    number = np.arange(len(steps)) - np.repeat(last - grid.counts, grid.counts)  # of each step in its stretch
+    starts = np.repeat(grid.starts, grid.counts) + steps * number
+    times = starts[:, None] + np.multiply.outer(steps, rule.nodes)
     strength = window.channels[0].strength(times.ravel()).reshape(times.shape)
     areas = _merged(strength * rule.kicks * steps[:, None])
     gradients = _merged(strength**2 * rule.gradients * steps[:, None] ** 3) if rule.gradients.any() else None
 
-    lengths, kind = np.unique(np.round(grid.steps, 13), return_inverse=True)
+    lengths, kind = _different(np.round(grid.steps, 13))
     shares, share = rule.different_drifts
     durations = np.multiply.outer(lengths, shares).ravel()
-    which = np.add.outer(np.repeat(kind.ravel(), grid.counts) * len(shares), share.ravel()).ravel()
-    last = np.cumsum(grid.counts) * stages - 1
+    which = np.add.outer(np.repeat(kind, grid.counts) * len(shares), share).ravel()
     piece = max(1, len(steps) // CHECKS) * stages
     marks, observed = np.zeros((2, len(areas) - 1), dtype=bool)
-    observed[last[grid.sampled]] = True
+    observed[last[grid.sampled] * stages - 1] = True
     marks[piece - 1 :: piece] = True
     marks |= observed
     return KickPlan(
@@ -198,6 +196,13 @@ def kick_plan(window: Window, grid: Grid, rule: Splitting) -> KickPlan:
         observed[marks],
         len(steps),
     )
+
+
+def _different(values: Floats) -> tuple[Floats, Ints]:
+    """Each value once, rising, and which of them each is; `np.unique` for few of them takes longer than a step."""
+    listed = values.tolist()
+    place = {value: number for number, value in enumerate(sorted(set(listed)))}
+    return np.array(list(place)), np.array([place[value] for value in listed])
 
 
 def _merged(table: Floats) -> Floats:
@@ -234,7 +239,7 @@ def decompose(matrix: Any) -> Decomposed:
     """Of a Hermitian matrix, dense or sparse; LAPACK's tridiagonal solver where it has one band."""
     matrix = matrix if isinstance(matrix, np.ndarray) else matrix.toarray()
     size = len(matrix)
-    if size > 2 and not matrix[np.triu_indices(size, 2)].any() and not np.iscomplexobj(matrix):
+    if size > 2 and not np.iscomplexobj(matrix) and _is_tridiagonal(matrix):
         from scipy.linalg.lapack import dstevd
 
         values, vectors, info = dstevd(np.diag(matrix).copy(), np.diag(matrix, 1).copy())
@@ -242,6 +247,11 @@ def decompose(matrix: Any) -> Decomposed:
             return Decomposed(values, vectors)
     values, vectors = np.linalg.eigh(matrix)
     return Decomposed(values, vectors)
+
+
+def _is_tridiagonal(matrix: Floats) -> bool:
+    beside = np.count_nonzero(np.diagonal(matrix, 1)) + np.count_nonzero(np.diagonal(matrix, -1))
+    return int(np.count_nonzero(matrix)) == np.count_nonzero(np.diagonal(matrix)) + beside
 
 
 def split_through(

@@ -19,7 +19,8 @@ LARGEST_SPLIT = 700  # states of a block whose operator is still diagonalised
 MOST_STEPS = 200_000
 PILOT_COLUMNS = 64
 PILOT_TIMES = 256
-USUAL_TOLERANCE = 1e-8  # that 16 steps of a short pulse give
+USUAL_STEPS = 15  # of the coarser of two runs; the finer one serves
+USUAL_TOLERANCE = 1e-9  # that twice as many steps of a short pulse give
 ASYMPTOTIC = 1e-4  # error of a cosine below which it falls as the order of the method says
 
 
@@ -37,15 +38,24 @@ class Pilot:
     whole: bool = False  # whether task and outcome are all there is
 
 
-def _plan_of(problem: Problem, steps: Sequence[int], rule: str | None, factor: int = 1) -> Plan:
-    """Passages with about so many steps a window, `factor` times as many; a Magnus method where `rule` is None."""
+def _grids(problem: Problem, steps: Sequence[int]) -> list[propagate.Grid | None]:
+    """About so many steps a window, None for a kick."""
+    lengths = [(window.stop_ps - window.start_ps) / count for window, count in zip(problem.windows, steps, strict=True)]
+    return [
+        None if window.is_kick else propagate.grid_of(window, length, problem.times)
+        for window, length in zip(problem.windows, lengths, strict=True)
+    ]
+
+
+def _plan_of(problem: Problem, grids: Sequence[propagate.Grid | None], rule: str | None, factor: int = 1) -> Plan:
+    """Passages with `factor` times the steps of grids; a Magnus method where `rule` is None."""
     out: list[propagate.KickPlan | propagate.Grid | float] = []
-    for window, count in zip(problem.windows, steps, strict=True):
-        if window.is_kick:
+    for window, coarse in zip(problem.windows, grids, strict=True):
+        if coarse is None:
             kick = window.channels[0].pulses[0]
             out.append(kick.area if isinstance(kick, Kick) else 0.0)
             continue
-        grid = propagate.grid_of(window, (window.stop_ps - window.start_ps) / count, problem.times).refined(factor)
+        grid = coarse if factor == 1 else coarse.refined(factor)
         splits = rule is not None and len(window.channels) == 1
         out.append(propagate.kick_plan(window, grid, propagate.splitting(rule)) if splits and rule else grid)
     return Plan(problem.windows, tuple(out))
@@ -56,7 +66,7 @@ def pilot_of(problem: Problem, jmax: int) -> Pilot:
     space = problem.space(jmax)
     task, whole = _pilot_task(problem, space)
     if task is None or all(window.is_kick for window in problem.windows):
-        plan = _plan_of(problem, [1] * len(problem.windows), "nystrom 4")
+        plan = _plan_of(problem, _grids(problem, [1] * len(problem.windows)), "nystrom 4")
         outcome = None if task is None else run(replace(task, plan=plan))
         edge = _relative_edge(outcome, task) if outcome and task else 0.0
         return Pilot(plan, (0,) * len(problem.windows), 0.0, edge, space, task, outcome, whole)
@@ -65,7 +75,7 @@ def pilot_of(problem: Problem, jmax: int) -> Pilot:
     if whole:
         rule = "nystrom 4" if problem.tolerance >= 1e-10 else "nystrom 6"
         order = propagate.splitting(rule).order
-        first = max(16, math.ceil(16 * (USUAL_TOLERANCE / problem.tolerance) ** (1 / order)))
+        first = max(USUAL_STEPS, math.ceil(USUAL_STEPS * (USUAL_TOLERANCE / problem.tolerance) ** (1 / order)))
         return replace(_refined(problem, space, task, rule, first, finer_order=order), whole=True)
     rules = propagate.SPLITTINGS if task.gradients is not None else propagate.SPLITTINGS[1:]
     best = _refined(problem, space, task, rules[0])
@@ -87,14 +97,16 @@ def _refined(
 
     The number of steps is doubled; the difference between a run and the next is taken as the error of the first. Of the number that
     is enough and its half, between which the answer lies, the place is taken where log(error) on a straight line meets the goal.
-    finer_order: of a method whose finer run serves as the answer, its error taken as the difference over half of what the order gives.
+    finer_order: of a method whose finer run serves as the answer, its error taken as the difference over half of what the order gives;
+    nothing is left out of the gas then, so that the steps may have what leakage leaves of the tolerance.
     """
-    goal, before, factor = 0.5 * problem.tolerance, 0.0, 1
-    counts = [first] * len(problem.windows)
-    plan = _plan_of(problem, counts, rule)
+    goal, before, factor = (0.7 if finer_order else 0.5) * problem.tolerance, 0.0, 1
+    windows = len(problem.windows)
+    grids = _grids(problem, [first] * windows)
+    plan = _plan_of(problem, grids, rule)
     outcome = run(replace(task, plan=plan))
     while sum(_steps_of(plan)) <= MOST_STEPS:
-        finer = _plan_of(problem, counts, rule, 2 * factor)
+        finer = _plan_of(problem, grids, rule, 2 * factor)
         check = run(replace(task, plan=finer))
         error = _difference(problem, space, task, outcome, check)
         if finer_order and error <= ASYMPTOTIC and (left := error / 2 ** (finer_order - 1)) <= goal < error:
@@ -104,7 +116,7 @@ def _refined(
             edge, mine = _relative_edge(check, task), Pilot(plan, _steps_of(plan), error, 0.0, space, task, outcome)
             if before > error > 0:
                 steps = 0.5 * 2 ** (math.log(before / goal) / math.log(before / error)) * sum(_steps_of(plan))
-                fewer = _plan_of(problem, [math.ceil(steps / len(counts))] * len(counts), rule)
+                fewer = _plan_of(problem, _grids(problem, [math.ceil(steps / windows)] * windows), rule)
                 if steps <= sum(_steps_of(fewer)) and _cost(fewer) < _cost(plan):
                     mine = Pilot(fewer, _steps_of(fewer), goal, 0.0, space, task)
             mine = replace(mine, edge=edge)
@@ -133,7 +145,7 @@ def _pilot_task(problem: Problem, space: FieldSpace) -> tuple[Task | None, bool]
     """The populated block of lowest M with the largest population, with a few of its columns; and whether that is all there is."""
     m = problem.m_values(space)[0]
     plan = Plan(problem.windows, ())  # to be replaced
-    before = bool(problem.free_times(-1).any())
+    before = problem.begins_before
     tasks = [task for block in space.blocks(m) if (task := task_of(problem, block, plan, before)) is not None]
     if not tasks:
         return None, False
@@ -156,8 +168,9 @@ def _difference(problem: Problem, space: FieldSpace, task: Task, first: Outcome,
     times = np.linspace(0.0, period, PILOT_TIMES)
     worst = 0.0
     for place in range(len(problem.observables)):
-        signals = [observe.harmonics([one.free[-1][place]], energies, 0.0).at(times) for one in (first, second)]
-        worst = max(worst, float(np.abs(signals[0] - signals[1]).max()))
+        change = first.free[-1][place].less(second.free[-1][place])
+        signal = observe.harmonics([change], energies, 0.0).at(times)
+        worst = max(worst, float(np.abs(signal).max()))
         pairs = zip(first.samples, second.samples, strict=True)
         worst = max([worst, *(float(np.abs(a[place] - b[place]).max(initial=0.0)) for a, b in pairs)])
     return worst / float(task.weights.sum())

@@ -19,7 +19,7 @@ from typing import cast
 import typer
 
 from rotor.cli.shared import process
-from rotor.cli.shared.options import PlainCommand, PlainGroup
+from rotor.cli.shared.options import PlainCommand, PlainGroup, folded
 from rotor.cli.shared.output import ComputationError
 
 VERBS = {  # and what the list of verbs says of each, short enough for 80 columns
@@ -85,7 +85,7 @@ def _application(verbs: Iterable[str] = VERBS) -> typer.Typer:
         context_settings={"help_option_names": ["-h", "--help"]},
     )
 
-    @app.callback(help="A molecule goes in, a rotational spectrum comes out.", epilog=EXAMPLES)
+    @app.callback(help="A molecule goes in, a rotational spectrum comes out.", epilog=folded(EXAMPLES))
     def start(
         version: bool = typer.Option(
             False, "--version", is_eager=True, help="Print the version and stop.", callback=_print_version
@@ -96,7 +96,7 @@ def _application(verbs: Iterable[str] = VERBS) -> typer.Typer:
 
     for verb in verbs:
         module = import_module(f"rotor.cli.{FILES.get(verb, verb)}")
-        app.command(verb, cls=PlainCommand, short_help=VERBS[verb], epilog=module.EXAMPLES)(module.command)
+        app.command(verb, cls=PlainCommand, short_help=VERBS[verb], epilog=folded(module.EXAMPLES))(module.command)
     return app
 
 
@@ -119,10 +119,12 @@ def _terminated(number: int, frame: object) -> None:
 def run(arguments: Sequence[str] | None = None) -> int:
     """Carry out a command and return its exit code; every error is one line on standard error, unless --debug is given."""
     arguments = sys.argv[1:] if arguments is None else list(arguments)
+    if "--debug" in arguments:  # an option of the command, which one adds at the end
+        arguments = ["--debug", *(word for word in arguments if word != "--debug")]
     try:
         return _run(arguments)
     except _ERROR_OF_USE as error:
-        return _fail(WRONG_INPUT, error.format_message(), arguments)  # type: ignore[attr-defined]
+        return _fail(WRONG_INPUT, _text_of_use(error), arguments)
     except ComputationError as error:
         return _fail(NO_ANSWER, str(error), arguments)
     except BrokenPipeError:  # the reader of the pipe has closed it: nothing more is written, at exit neither
@@ -145,7 +147,7 @@ def _run(arguments: list[str]) -> int:
     words = [word for word in arguments[:2] if word != "--debug"]
     verbs = words[:1] if words[:1] and words[0] in VERBS else VERBS  # what is not asked for is not loaded
     command = typer.main.get_command(_application(verbs))
-    provenance = shlex.join(["rotor", *arguments])
+    provenance = _printable(shlex.join(["rotor", *arguments]))
     try:
         with command.make_context("rotor", [*arguments] or ["--help"], obj=provenance) as context:
             command.invoke(context)
@@ -153,6 +155,20 @@ def _run(arguments: list[str]) -> int:
         return 0
     except typer.Exit as end:
         return end.exit_code
+
+
+def _printable(text: str) -> str:
+    """Text that UTF-8 can write: bytes of a file's name that the locale could not read are read as UTF-8, or shown as �."""
+    return text.encode("utf-8", "surrogateescape").decode("utf-8", "replace")
+
+
+def _text_of_use(error: Exception) -> str:
+    """What the parser of the command line says; of words that no argument takes, what would do."""
+    text = str(error.format_message())  # type: ignore[attr-defined]
+    extra = text.removeprefix("Got unexpected extra argument(s) ").removeprefix("Got unexpected extra argument ")
+    if extra == text:
+        return text
+    return f"{extra.strip('()')}: more than the command takes; an option begins with --, --help shows what there is"
 
 
 def _code_of(error: ValueError | OSError) -> int:

@@ -41,6 +41,7 @@ def command(context: typer.Context, options: Options) -> None:
     files, source, target = Files(), options.source, options.target
     files.ask("TARGET", target, (".toml", ".par", ".var"))
     files.ask_json(options.json)
+    _refuse_overwriting(source, target)
     top = top_with_errors(source)
 
     from rotor.cli.shared.report import describe
@@ -49,6 +50,17 @@ def command(context: typer.Context, options: Options) -> None:
     done = f"{source} → {target}: {top.constants.text()}"
     writers = {"TARGET": writer_of(top, source, target, options.kmax)}
     deliver(files, writers, lambda: json_text(content), lambda: print(done))
+
+
+def _refuse_overwriting(source: str, target: str) -> None:
+    """Neither the source nor the .var, .par and .int beside it, which are read with it, is written over."""
+    path = Path(source)
+    if not path.is_file():
+        return
+    beside = [path.with_suffix(suffix) for suffix in (".var", ".par", ".int")]
+    read = [path, *(beside if path.suffix.lower() == ".int" else [])]
+    if Path(target).resolve() in {one.resolve() for one in read}:
+        raise ValueError(f"TARGET {target}: is an input of this command; write the result under another name")
 
 
 def top_with_errors(source: str) -> Top:

@@ -48,7 +48,7 @@ NAMES = {
 class Options:
     """The molecules, the source, and what of it is looked at."""
 
-    sources: list[str] | None = argument(None, metavar="SOURCE...", help="Molecules: names, files, SMILES:...")
+    sources: list[str] | None = argument(None, metavar="SOURCE", help="Molecules: names, files, SMILES:...")
     isotope: list[str] | None = option(
         None, metavar="1=2H", help="Another isotope, by atom number or element, of a single molecule; repeatable."
     )

@@ -121,7 +121,8 @@ def _facts(top: Top, content: dict[str, Any]) -> list[tuple[str, str]]:
             ("point group", f"{content['point_group']}, rotational symmetry number {number}{_near_text(content)}")
         )
     if top.constants.representation:
-        facts.append(("reduction", report.form_text(top.constants)))
+        heading = "reduction" if top.constants.reduction else "representation"
+        facts.append((heading, report.form_text(top.constants)))
     dipole = report.vector_text(top.dipole_abc_debye)
     weights = report.weights_text(content["spin_weights"])
     facts += [

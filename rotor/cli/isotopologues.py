@@ -75,7 +75,8 @@ def _family(
     family: list[Isotopologue] = []
     if min_abundance is not None or not (each or site):
         least = MIN_ABUNDANCE if min_abundance is None else min_abundance
-        family += inputs.parsed("--min-abundance", str(least), lambda _: isotopologues(parent, min_abundance=least))
+        with inputs.fields_as_options(least="--min-abundance: least"):
+            family += isotopologues(parent, min_abundance=least)
     for text in each:
         family += inputs.parsed("--each", text, lambda value: single_substitutions(parent, *_substitution(value)))
     if site:

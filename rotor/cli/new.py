@@ -39,6 +39,8 @@ def command(context: typer.Context, options: Options) -> None:
     text = _schema() if options.kind is None else template(options.kind)
     files = Files()
     files.ask("--out", options.out, (".toml", ".json"))
+    if options.out is not None and Path(options.out).exists():
+        raise ValueError(f"--out {options.out}: is there already; remove it, or give another name")
     if not files.paths:
         print(text, end="")
     files.write({"--out": lambda path: write_text(Path(path), text)})

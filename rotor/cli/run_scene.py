@@ -61,9 +61,10 @@ class Options:
 @grouped()
 def command(context: typer.Context, options: Options) -> None:
     """Run a scene: write the files that it names, and report; a sweep goes on where it stopped."""
+    from rotor.cli.shared.workers import MOST_WORKERS
     from rotor.scenes.scene_file import read_scene
 
-    require_whole("--workers", options.workers, 1)
+    require_whole("--workers", options.workers, 1, MOST_WORKERS)
     if not Path(options.out).is_dir():
         raise ValueError(f"--out {options.out}: there is no such folder; make it first")
     scene = read_scene(options.scene)

@@ -166,7 +166,9 @@ def _settings(options: Options, usual_k: str) -> dict[str, Any]:
         return parse_range(text, "MHz")
 
     settings: dict[str, Any] = {
-        "temperature_k": inputs.positive("--temperature", options.temperature or usual_k, "K"),
+        "temperature_k": inputs.positive(
+            "--temperature", usual_k if options.temperature is None else options.temperature, "K"
+        ),
         "jmax": options.jmax,
         "min_lgint": inputs.cut("--min-lgint", options.min_lgint),
         "q": options.q,

@@ -28,9 +28,13 @@ from rotor.cli.shared.output import (
     show_facts,
     show_table,
 )
+from rotor.cli.shared.plot_options import ViewOptions, view_of
+from rotor.cli.shared.report import model_facts
+from rotor.cli.shared.save_scene import save_scene, save_scene_option
 from rotor.cli.shared.sources import with_sources
 
 if TYPE_CHECKING:
+    from rotor.plots.view import View
     from rotor.quantum.fields.field_map import FieldMap
     from rotor.quantum.fields.zeeman_request import ZeemanAnswer
     from rotor.tops.magnetic import Tensor
@@ -91,10 +95,13 @@ class Outputs:
     parquet: str | None = file_option(".parquet", help="Write the map as Parquet.")
     plot: str | None = file_option(".png", ".pdf", ".svg", help="Draw the map (.png, .pdf, .svg).")
     json: str | None = json_option()
+    save_scene: str | None = save_scene_option()
 
 
-@grouped(given=("dipole", "dipole_abc", "spin_weights", "calculator", "hessian", "state_constants"))
-def command(context: typer.Context, given: Input, options: Options, outputs: Outputs) -> None:
+@grouped(
+    given=("dipole", "dipole_abc", "spin_weights", "calculator", "hessian", "state_constants"), picture=("plot_scale",)
+)
+def command(context: typer.Context, given: Input, options: Options, outputs: Outputs, picture: ViewOptions) -> None:
     """Levels in a static magnetic field: energies, labels and magnetic moments of every M, with nuclear spins where asked."""
     from rotor.cli.shared.workers import working
     from rotor.quantum.fields.zeeman_request import ZeemanRequest, answer_zeeman
@@ -102,6 +109,7 @@ def command(context: typer.Context, given: Input, options: Options, outputs: Out
     settings = _settings(options)
     settings["hyperfine"] = given.spin_constants is not None if options.hyperfine is None else options.hyperfine
     files = Files.of(outputs)
+    view = view_of(picture, files, "T")
     refuse_picture_of_one_field(files, settings["fields_tesla"])
     top = _with_tensors(inputs.read_top(given), options)
     with inputs.fields_as_options(**NAMES):
@@ -112,8 +120,10 @@ def command(context: typer.Context, given: Input, options: Options, outputs: Out
     content = content_of(answer, given, context.obj)
     content["files"] = files.names
     text = lambda: json_with_rows(answer.states, "states", content)  # noqa: E731
-    show = with_sources(lambda: _show(answer, content), top, ("constants",), given.sources)
-    deliver(files, _writers(answer, content), text, show)
+    show = with_sources(
+        lambda: _show(answer, content), top, ("constants",), given.sources, lambda: model_facts(content)
+    )
+    deliver(files, _writers(answer, content, view) | save_scene("zeeman", request, outputs, given), text, show)
 
 
 def _settings(options: Options) -> dict[str, Any]:
@@ -171,7 +181,7 @@ def _tensor(top: Top, text: str) -> Tensor:
     return tensor_for(top.kind, numbers)
 
 
-def _writers(answer: ZeemanAnswer, content: dict[str, Any]) -> dict[str, Writer]:
+def _writers(answer: ZeemanAnswer, content: dict[str, Any], view: View) -> dict[str, Writer]:
     provenance = {name: content[name] for name in ("command", "input", "g_abc", "magnetisability_abc", "nuclear_g")}
 
     def table(path: Path) -> None:
@@ -184,7 +194,8 @@ def _writers(answer: ZeemanAnswer, content: dict[str, Any]) -> dict[str, Writer]
         from rotor.plots.zeeman import plot_zeeman
 
         title, made_by = name_of_top(answer.request.top), {"command": provenance["command"]}
-        plot_zeeman(answer.states, path, title=title, spins=len(answer.request.spin_g), provenance=made_by)
+        spins = len(answer.request.spin_g)
+        plot_zeeman(answer.states, path, title=title, spins=spins, view=view, provenance=made_by)
 
     return {"--csv": table, "--parquet": table, "--plot": draw}
 

@@ -10,6 +10,8 @@ spins, where the file has them, are put together at their mean by intensity.
 from __future__ import annotations
 
 import csv
+import io
+import math
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -90,11 +92,7 @@ def _of_lin(path: str | os.PathLike[str], names: Sequence[str]) -> tuple[Assignm
 
 
 def _of_csv(path: str | os.PathLike[str], names: Sequence[str]) -> Assignments:
-    with open(path, encoding="utf-8-sig", newline="") as handle:
-        reader = csv.DictReader(row for row in handle if row.strip() and not row.lstrip().startswith("#"))
-        columns = [name.strip() for name in reader.fieldnames or ()]
-        reader.fieldnames = columns
-        rows = list(reader)
+    columns, rows = _table_of(path)
     labels = [f"{name}_{side}" for side in ("upper", "lower") for name in names]
     known = {*labels, *_FREQUENCY, *_ERROR, "weight", "blend", "comment"}
     _refuse_columns(path, columns, labels, known)
@@ -119,6 +117,18 @@ def _of_csv(path: str | os.PathLike[str], names: Sequence[str]) -> Assignments:
     )  # fmt: skip
 
 
+def _table_of(path: str | os.PathLike[str]) -> tuple[list[str], list[dict[str, str]]]:
+    """Names of the columns and the rows of a .csv file, without blank lines and comments."""
+    try:
+        text = Path(path).read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise ValueError(f"{path}: a .csv file is UTF-8 text: {error}") from None
+    reader = csv.DictReader(row for row in io.StringIO(text) if row.strip() and not row.lstrip().startswith("#"))
+    columns = [name.strip() for name in reader.fieldnames or ()]
+    reader.fieldnames = columns
+    return columns, list(reader)
+
+
 def _refuse_columns(
     path: str | os.PathLike[str], columns: Sequence[str], labels: Sequence[str], known: set[str]
 ) -> None:
@@ -138,9 +148,12 @@ def _real(path: object, line: int, name: str, row: Mapping[str, str], default: f
     if not text and default is not None:
         return default
     try:
-        return float(text)
+        number = float(text)
     except ValueError:
-        raise ValueError(f"{path}, line {line} of the table: {name} reads {text!r}; a number is needed") from None
+        number = math.nan
+    if not math.isfinite(number):
+        raise ValueError(f"{path}, line {line} of the table: {name} reads {text!r}; a finite number is needed")
+    return number
 
 
 def _whole(path: object, line: int, name: str, row: Mapping[str, str]) -> int:
@@ -222,6 +235,8 @@ def write_assigned_lines(lines: Assignments, path: str | os.PathLike[str]) -> No
         return write_lin(_as_lin(lines), path)
     if not text.endswith(".csv"):
         raise ValueError(f"{path}: assigned lines are written as .lin or .csv")
+    if lines.widths_mhz:
+        raise ValueError(f"{path}: a .csv has no place for the widths of blends; write a .lin")
     labels = [f"{name}_{side}" for side in ("upper", "lower") for name in lines.names]
     wave = bool(lines.wavenumber.all()) and len(lines) > 0
     unit = MHZ_PER_CM if wave else 1.0
@@ -242,10 +257,21 @@ def write_assigned_lines(lines: Assignments, path: str | os.PathLike[str]) -> No
     return None
 
 
+def _with_widths(lines: Assignments) -> Assignments:
+    """Lines in order of their blends, and behind each blend of known width one more, whose error is the width."""
+    last = np.flatnonzero(np.append(np.diff(lines.blend) != 0, True))
+    wide = [i for i in last.tolist() if int(lines.blend[i]) in lines.widths_mhz]
+    rows = np.sort(np.concatenate([np.arange(len(lines)), np.array(wide, dtype=np.int64)]), kind="stable")
+    found = lines.take(rows)
+    second = np.flatnonzero(np.append(False, rows[1:] == rows[:-1]))
+    found.error_mhz[second] = [lines.widths_mhz[int(lines.blend[i])] for i in wide]
+    return found
+
+
 def _as_lin(lines: Assignments):  # type: ignore[no-untyped-def]
     from dataclasses import replace
 
-    ordered = lines.take(np.argsort(lines.blend, kind="stable"))
+    ordered = _with_widths(lines.take(np.argsort(lines.blend, kind="stable")))
     made = line_list(ordered.upper, ordered.lower, ordered.frequency_mhz, ordered.error_mhz, ordered.weight)
     unit = np.where(ordered.wavenumber, 1 / MHZ_PER_CM, 1.0)
     sign = np.where(ordered.wavenumber, -1.0, 1.0)

@@ -24,13 +24,18 @@ def load(source: str | os.PathLike[str] | bytes) -> tuple[bytes, str]:
 
     Raises ValueError for a packed file that is damaged, or grows to more than 4 GB or a hundred times its size.
     """
+    name = name_of(source)
     if isinstance(source, bytes):
-        text, name = source, "the text given"
+        text = source
     else:
-        name = os.fspath(source)
         with open(source, "rb") as handle:
             text = handle.read()
     return (unpacked(text, name) if text[:2] == _GZIP else text), name
+
+
+def name_of(source: str | os.PathLike[str] | bytes) -> str:
+    """What messages call a file, or bytes that are given instead of one."""
+    return "the text given" if isinstance(source, bytes) else os.fspath(source)
 
 
 def unpacked(packed: bytes, name: str) -> bytes:

@@ -11,6 +11,7 @@ import numpy as np
 from rotor.plots.names import SPACE, Peak, name_peaks
 from rotor.plots.picture import GREY, PALETTE, checked_suffix, name_of_top, new_figure, save, styled
 from rotor.plots.spectrum import UNITS, thinned
+from rotor.plots.view import Limits, View, show_part
 from rotor.spectra.emission_request import EmissionAnswer
 
 MOST_TRIED = 100  # lines, from the brightest down, for which a name is tried
@@ -28,7 +29,7 @@ def plot_emission(
     provenance : mapping, optional
         Written into the metadata of the file.
     options :
-        title, unit, range_mhz and log, as in `emission_figure`.
+        title, unit, range_mhz, log and vertical, as in `emission_figure`.
 
     Raises
     ------
@@ -46,6 +47,7 @@ def emission_figure(
     unit: str | None = None,
     range_mhz: tuple[float, float] | None = None,
     log: bool | None = None,
+    vertical: Limits | None = None,
 ) -> Any:
     """A matplotlib figure of T_B against the observed frequency.
 
@@ -61,11 +63,18 @@ def emission_figure(
         Frequencies shown, those of the request by default.
     log : bool, optional
         Whether T_B is on a logarithmic axis.
+    vertical : (2,), optional
+        Lowest and highest T_B shown, in K.
 
     Returns
     -------
     matplotlib.figure.Figure
         One panel.
+
+    Raises
+    ------
+    ValueError
+        A logarithmic axis from 0 or less.
     """
     mhz = UNITS[unit or "GHz"]
     first, last = range_mhz or answer.request.range_mhz
@@ -89,6 +98,7 @@ def emission_figure(
             axes.set_ylim(1e-5 * float(peak.max()), 30 * float(peak.max()))
         elif peak.max() > 0:
             axes.set_ylim(min(1.1 * float(peak.min()), 0.0), SPACE * float(peak.max()))
+        show_part(axes, View(vertical=vertical))
         axes.set_xlabel("Wavenumber (cm⁻¹)" if unit == "cm-1" else f"Frequency ({unit or 'GHz'})")
         axes.set_ylabel("Brightness temperature (K)")
         axes.set_title(_title(answer) if title is None else title, loc="left")

@@ -15,6 +15,7 @@ from rotor.arrays import Floats, Ints
 from rotor.checks import require_one_of
 from rotor.plots.names import leave_or_remove
 from rotor.plots.picture import BLUE, GREY, MOST_VECTOR_STICKS, checked_suffix, name_of_top, new_figure, save, styled
+from rotor.plots.view import Limits, View, show_part
 from rotor.quantum.quanta import line_text
 from rotor.spectra.lines import Lines
 from rotor.spectra.spectrum import Spectrum, line_widths
@@ -50,13 +51,14 @@ def plot_spectrum(
     labels: int = 12,
     unit: str | None = None,
     log: bool | None = None,
+    vertical: Limits | None = None,
     provenance: Mapping[str, Any] | None = None,
 ) -> None:
     """Draw lines as sticks, or a spectrum as a curve, into a .png, .pdf or .svg file.
 
     Parameters
     ----------
-    thing, range_mhz, title, labels, unit, log :
+    thing, range_mhz, title, labels, unit, log, vertical :
         As in `spectrum_figure`.
     path : path
         Its suffix chooses the format.
@@ -69,7 +71,9 @@ def plot_spectrum(
         A suffix that is no picture, a spectrum without lines or with nothing in the range, an unknown unit.
     """
     checked_suffix(path)
-    figure = spectrum_figure(thing, range_mhz=range_mhz, title=title, labels=labels, unit=unit, log=log)
+    figure = spectrum_figure(
+        thing, range_mhz=range_mhz, title=title, labels=labels, unit=unit, log=log, vertical=vertical
+    )
     lines = thing if isinstance(thing, Lines) else thing.lines
     save(figure, path, title or _title(thing, lines), {**(provenance or {}), **_facts(thing, lines)})
 
@@ -82,6 +86,7 @@ def spectrum_figure(
     labels: int = 12,
     unit: str | None = None,
     log: bool | None = None,
+    vertical: Limits | None = None,
 ) -> Any:
     """A matplotlib figure of lines as sticks, or of a spectrum as a curve.
 
@@ -99,6 +104,8 @@ def spectrum_figure(
         Of the frequency axis; else the one that gives numbers below 2000.
     log : bool, optional
         Whether the axis of intensity is logarithmic; else it is where fewer than ten lines would be seen on a linear one.
+    vertical : (2,), optional
+        Lowest and highest intensity shown, in the unit of the axis.
 
     Returns
     -------
@@ -108,7 +115,7 @@ def spectrum_figure(
     Raises
     ------
     ValueError
-        A spectrum without lines or with nothing in the range, an unknown unit.
+        A spectrum without lines or with nothing in the range, an unknown unit, a logarithmic axis from 0 or less.
     """
     if unit is not None:
         require_one_of("unit", unit, UNITS)
@@ -120,8 +127,11 @@ def spectrum_figure(
         x = _frequency_axis(thing, lines, heights, range_mhz, unit)
         _draw(axes, thing, x)
         _scale(axes, thing, lines, heights, x, log)
+        show_part(axes, View(vertical=vertical))
         _inscribe(axes, thing, lines, x, title)
         if lines is not None and labels:
+            if vertical is None:
+                _leave_space(figure, axes, thing, lines, heights, x)
             _name_lines(figure, axes, thing, lines, heights, x, labels)
     return figure
 
@@ -252,9 +262,9 @@ def _name_lines(
 ) -> None:
     """Name the strongest lines from the strongest down, upright above them, wherever there is space."""
     figure.canvas.draw()  # places the axes, so that sizes in pixels are known
-    rows = np.flatnonzero(x.inside(lines.frequency_mhz) & _stands_out(thing, lines, heights))
-    rows = rows[np.argsort(-lines.intensity_nm2_mhz[rows], kind="stable")][: 15 * most]
-    _leave_space(axes, lines, rows, heights, x)
+    low, high = axes.get_ylim()
+    rows = _strongest_first(thing, lines, heights, x)
+    rows = rows[(heights[rows] > low) & (heights[rows] <= high)][: 15 * most]
     drawn = _drawn_points(axes, thing, x)
     places = axes.transData.transform(np.stack([lines.frequency_mhz[rows] / x.mhz, heights[rows]], axis=1))
     taken: list[Any] = []
@@ -266,10 +276,18 @@ def _name_lines(
         leave_or_remove(_label(axes, lines, row, heights[row], x), axes, taken, drawn)
 
 
-def _leave_space(axes: Any, lines: Lines, rows: Ints, heights: Floats, x: _Axis) -> None:
+def _strongest_first(thing: Lines | Spectrum, lines: Lines, heights: Floats, x: _Axis) -> Ints:
+    """Rows of the lines that can be seen as such between the ends shown, the strongest first."""
+    rows = np.flatnonzero(x.inside(lines.frequency_mhz) & _stands_out(thing, lines, heights))
+    return rows[np.argsort(-lines.intensity_nm2_mhz[rows], kind="stable")]
+
+
+def _leave_space(figure: Any, axes: Any, thing: Lines | Spectrum, lines: Lines, heights: Floats, x: _Axis) -> None:
     """Raise the upper limit of a linear axis until the name of the strongest line stands inside."""
+    rows = _strongest_first(thing, lines, heights, x)
     if not len(rows) or axes.get_yscale() == "log":
         return
+    figure.canvas.draw()  # places the axes, so that sizes in pixels are known
     name = _label(axes, lines, int(rows[0]), heights[rows[0]], x)
     box, top = name.get_window_extent(), axes.get_ylim()[1]
     name.remove()

@@ -9,17 +9,36 @@ from typing import Any
 import numpy as np
 
 from rotor.plots.picture import checked_suffix, joined, new_figure, save_described, styled
+from rotor.plots.view import WHOLE, View, show_part
 from rotor.quantum.fields.field_map import FieldMap
 
 PANELS = 9  # levels drawn at most: the first ones
 PANEL_INCHES = (2.6, 2.3)
 
 
-def zeeman_figure(field_map: FieldMap, title: str = "", spins: int = 0) -> Any:
-    """A matplotlib figure of a map of levels in a magnetic field, of two fields or more.
+def zeeman_figure(field_map: FieldMap, title: str = "", spins: int = 0, view: View = WHOLE) -> Any:
+    """A matplotlib figure of a map of levels in a magnetic field.
 
-    One panel for each level of the free top without its spins; `spins` is how many quantum numbers at the end of a label are theirs.
-    Raises ValueError for a map of one field.
+    Parameters
+    ----------
+    field_map : FieldMap
+        Of two fields or more.
+    title : str
+        Above the picture.
+    spins : int
+        Quantum numbers of spins at the end of a label.
+    view : View
+        Fields (T) and shifts (MHz) shown in every panel; its title is not used here.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        One panel for each level of the free top without its spins.
+
+    Raises
+    ------
+    ValueError
+        For a map of one field.
     """
     if len(field_map.fields) < 2:
         raise ValueError("a picture of a map needs two fields or more")
@@ -31,6 +50,7 @@ def zeeman_figure(field_map: FieldMap, title: str = "", spins: int = 0) -> Any:
         panels = figure.subplots(rows, columns, sharex=True, squeeze=False)
         for axes, (label, curves) in zip(panels.ravel(), levels.items(), strict=False):
             _panel(axes, field_map, label, curves)
+            show_part(axes, view)
         for axes in panels.ravel()[len(levels) :]:
             axes.set_visible(False)
         figure.supxlabel("magnetic field (T); blue: M < 0, red: M > 0", fontsize=10)
@@ -45,6 +65,7 @@ def plot_zeeman(
     *,
     title: str = "",
     spins: int = 0,
+    view: View = WHOLE,
     provenance: Mapping[str, Any] | None = None,
 ) -> None:
     """Draw `zeeman_figure` into a .png, .pdf or .svg file.
@@ -59,6 +80,8 @@ def plot_zeeman(
         Above the picture.
     spins : int
         Quantum numbers of spins at the end of a label.
+    view : View
+        Fields (T) and shifts (MHz) shown, and another title.
     provenance : mapping, optional
         Further facts for the metadata.
 
@@ -68,7 +91,8 @@ def plot_zeeman(
         For a map of one field, and for a suffix that is no picture.
     """
     checked_suffix(path)
-    figure = zeeman_figure(field_map, title, spins)
+    title = title if view.title is None else view.title
+    figure = zeeman_figure(field_map, title, spins, view)
     save_described(figure, path, title, joined(provenance, field_map.provenance))
 
 

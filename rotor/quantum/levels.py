@@ -22,6 +22,8 @@ from rotor.tops.spins.spin_weights import SpinWeights
 if TYPE_CHECKING:
     from rotor.quantum.effect import QuantumEffect
 
+FEW_LEVELS = 64  # among which one is found by looking at all
+
 
 class Block(Protocol):
     """States solved together: energies (n,) in MHz, rising, at the rows `start` ... of the levels."""
@@ -54,7 +56,7 @@ class SolvedBlock:
         return np.asarray((self.vectors**2).T @ (k * k).astype(float))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Levels(Table):
     """Energy levels as columns of equal length.
 
@@ -141,7 +143,13 @@ class Levels(Table):
         >>> solve_levels(Top.from_constants("A=10 B=6 C=4 MHz"), 4).find(j=4, ka=1, kc=3)
         23
         """
-        row = int(self.rows_of(**{name: [value] for name, value in quanta.items()})[0])
+        if len(self) <= FEW_LEVELS and set(quanta) == set(self.quanta):
+            here = np.ones(len(self), dtype=bool)
+            for name, value in quanta.items():
+                here &= self.quanta[name] == value
+            row = int(here.argmax()) if here.any() else -1
+        else:
+            row = int(self.rows_of(**{name: [value] for name, value in quanta.items()})[0])
         if row < 0:
             label = ", ".join(f"{name} = {value}" for name, value in quanta.items())
             raise ValueError(f"no level with {label} among {len(self)} levels up to {self._total} = {self.jmax}")

@@ -3,7 +3,7 @@
 | kind | accuracy of | what is chosen | error stated |
 |---|---|---|---|
 | spectrum, levels, raman | frequencies, energies, shifts, "1 kHz" | spins, left out if smaller; method of several | rounding, and these |
-| stark | energies, "1 kHz" | tolerance, and with it J max of the basis | by which energies move with a higher J max |
+| stark, zeeman | energies, "1 kHz" | tolerance, and with it J max of the basis | by which energies move with a higher J max, round-off |
 | align | cosines, 1e-4 | the loosest tolerance: steps, J max, populations | step error, edge population, population left out |
 | thermo | Q, U and C_v, "0.1 %" | levels summed, or the classical limit with corrections | of the sums |
 | tumble | attitude, "1e-6 rad" | see `rotor.scenes.accuracy_motion`; free motion is exact | from finer steps |
@@ -31,7 +31,16 @@ ROUNDING = 8 * float(
 EXACT, FOR_METHOD = "exact", 0.9  # the usual method of spins; the part of an accuracy that another one may take
 LOOSEST_COSINE = 0.05
 LOOSER = (1e3, 1e2, 1e1, 1.0)  # tolerances of cosines that are tried, times the accuracy
-UNITS = {"spectrum": "MHz", "levels": "MHz", "raman": "MHz", "stark": "MHz", "align": "", "thermo": "", "tumble": "rad"}
+UNITS = {
+    "spectrum": "MHz",
+    "levels": "MHz",
+    "raman": "MHz",
+    "stark": "MHz",
+    "zeeman": "MHz",
+    "align": "",
+    "thermo": "",
+    "tumble": "rad",
+}
 SAMPLED = {"gas": ("K", "%", ""), "fluid": ("K", "%")}  # units, of which each is the accuracy of something else
 
 
@@ -271,6 +280,7 @@ _CHOICES: dict[str, Callable[[Any, Any, float], Choice]] = {
     "gas": _gas,
     "fluid": _fluid,
     "stark": _stark,
+    "zeeman": _tolerance("tolerance_mhz", "1e-6 MHz", 1e-9),
     "align": _align,
     "thermo": _tolerance("relative_error", 1e-6, 1e-13),
     "tumble": _tumble,
@@ -280,6 +290,7 @@ _ERRORS: dict[str, Callable[[Any], float]] = {
     "levels": lambda answer: _levels_error(answer.request.top, answer.table.levels),
     "raman": lambda answer: _levels_error(answer.lines.top, answer.lines.levels),
     "stark": lambda answer: float(answer.states.accuracy_mhz),
+    "zeeman": lambda answer: float(answer.states.accuracy_mhz),
     "align": lambda answer: float(answer.trace.error_estimate),
     "thermo": lambda answer: float(answer.functions.relative_error.max()),
     "tumble": _tumble_error,

@@ -103,7 +103,7 @@ def knobs_of(scene: Scene, folder: str | os.PathLike[str] = ".") -> Knobs:
 
 _FILES = {
     "levels": "of_levels", "spectrum": "of_levels", "raman": "of_levels", "thermo": "of_fields", "stark": "of_fields",
-    "align": "of_fields", "tumble": "of_motion", "gas": "of_motion", "fluid": "of_motion", "fit": "of_measured",
+    "zeeman": "of_fields", "align": "of_fields", "tumble": "of_motion", "gas": "of_motion", "fluid": "of_motion", "fit": "of_measured",
     "emission": "of_measured",
 }  # fmt: skip
 

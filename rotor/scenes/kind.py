@@ -137,6 +137,16 @@ def effects_of(top: Top, asked: QuantumEffects, molecule: MoleculeSection) -> tu
     return found if asked.distortion else tuple(one for one in found if not isinstance(one, Centrifugal))
 
 
+def hyperfine_of(asked: bool | None, molecule: MoleculeSection) -> bool:
+    """Whether spins take part: as asked for, by default where the scene itself gives their constants."""
+    return molecule.spin_constants is not None if asked is None else asked
+
+
+def saved_hyperfine(hyperfine: bool, top: Top) -> bool | None:
+    """The key that says so again; None of a top without spins."""
+    return hyperfine if hyperfine or top.spin_constants is not None else None
+
+
 def saved_effects(effects: Iterable[QuantumEffect], top: Top) -> QuantumEffects:
     """The table that asks for these effects of a top.
 

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 SHORT_J = (12, 30)  # of the calibration; a J that is not above the second is timed itself
 SETTLING_STEPS = 50  # of a box, after which its forces are nearly those of a fluid
-SHORT_FIELDS, SHORT_GAS, SHORT_STEPS = (2, 20), (500, 2000), (5, 20)  # likewise
+SHORT_GAS, SHORT_STEPS = (500, 2000), (5, 20)  # likewise
 MILLIBAR = 1e-3  # of a gas whose pressure is not given
 BYTES_A_MOLECULE = 136  # momentum, attitude, place, velocity and energies of a molecule that is not being moved
 STEPS = "Runge-Kutta of order 8, adaptive"
@@ -204,38 +204,10 @@ def _levels(request: Any) -> Plan:
     )
 
 
-def _stark(request: Any) -> Plan:
-    from rotor.quantum.effects.watson import SEMI_RIGID
-    from rotor.quantum.fields.stark_request import answer_stark
+def _in_field(request: Any) -> Plan:
+    from rotor.scenes.plan_in_fields import plan_in_field
 
-    top, fields = request.top, request.fields_kv_per_cm
-    ends = tuple(dict.fromkeys((min(fields), max(fields))))
-    found = answer_stark(replace(request, fields_kv_per_cm=ends, diabatic_gap_mhz=None))
-    lasting = sorted(fields, key=abs, reverse=True)  # the highest fields need the largest basis
-
-    def short(n: int) -> Any:
-        return answer_stark(replace(request, fields_kv_per_cm=tuple(lasting[:n]), diabatic_gap_mhz=None)).states.columns
-
-    seconds = extrapolated(short, float, SHORT_FIELDS, len(fields))
-    facts, j = found.facts(), max(request.j_highest, 1)
-    spins = [one for one in left_out.of_levels(top, j, SEMI_RIGID) if one.name != "Stark shift of a stray field"]
-    return Plan(
-        kind="stark",
-        effects=(*effect_texts(top, j, SEMI_RIGID), f"dipole in the field, up to {max(map(abs, fields)):g} kV/cm"),
-        good=("M",) if not request.tilted else (),
-        parts=(
-            ("basis", f"J to {facts['jmax']}: the tolerance of {request.tolerance_mhz:g} MHz at the highest field"),
-            ("method", "exact blocks of one |M| (and K, or D2 species), every field diagonalised"),
-            (
-                "error",
-                f"{facts['accuracy_mhz']:.1e} MHz at the ends of the fields: by which energies move with a higher J max",
-            ),
-        ),
-        counts={"fields": len(fields), "states": len(fields) * facts["curves"]},
-        seconds=seconds,
-        memory_mb=extrapolated_mb(short, float, SHORT_FIELDS, len(fields)),
-        left_out=tuple(spins),
-    )
+    return plan_in_field(request)
 
 
 def _gas(request: Any) -> Plan:
@@ -440,6 +412,6 @@ def _emission(request: Any) -> Plan:
 
 
 _PLANS: dict[str, Callable[[Any], Plan]] = {
-    "spectrum": _spectrum, "levels": _levels, "raman": _raman, "thermo": _thermo, "stark": _stark, "align": _align,
-    "tumble": _tumble, "gas": _gas, "fluid": _fluid, "fit": _fit, "emission": _emission,
+    "spectrum": _spectrum, "levels": _levels, "raman": _raman, "thermo": _thermo, "stark": _in_field, "zeeman": _in_field,
+    "align": _align, "tumble": _tumble, "gas": _gas, "fluid": _fluid, "fit": _fit, "emission": _emission,
 }  # fmt: skip

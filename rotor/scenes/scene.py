@@ -26,6 +26,7 @@ from rotor.scenes.sections import (
     EmissionObservables,
     EmissionOutputs,
     EmittingMolecule,
+    FieldEffects,
     FluidConditions,
     FluidNumerics,
     FluidOutputs,
@@ -34,6 +35,7 @@ from rotor.scenes.sections import (
     GasObservables,
     LevelsObservables,
     LevelsOutputs,
+    MagneticSection,
     MoleculeSection,
     PulseSection,
     QuantumEffects,
@@ -52,6 +54,9 @@ from rotor.scenes.sections import (
     TumbleConditions,
     TumbleNumerics,
     VibrationSection,
+    ZeemanConditions,
+    ZeemanNumerics,
+    ZeemanObservables,
     said,
 )
 from rotor.scenes.verbs import VERBS
@@ -202,7 +207,21 @@ class StarkScene(Scene, frozen=True, tag="stark"):
     accuracy: Annotated[str | float | None, said("of the energies", "1 kHz")] = None
     conditions: StarkConditions = StarkConditions()
     observables: StarkObservables = StarkObservables()
+    effects: FieldEffects = FieldEffects()
     numerics: StarkNumerics = StarkNumerics()
+    outputs: TableOutputs = TableOutputs()
+
+
+class ZeemanScene(Scene, frozen=True, tag="zeeman"):
+    """Levels of a molecule in a static magnetic field."""
+
+    molecule: Annotated[str | MoleculeSection, said("a name, a file, SMILES:..., or a table")]
+    accuracy: Annotated[str | float | None, said("of the energies", "1 Hz")] = None
+    magnetic: MagneticSection = MagneticSection()
+    conditions: ZeemanConditions = ZeemanConditions()
+    observables: ZeemanObservables = ZeemanObservables()
+    effects: FieldEffects = FieldEffects()
+    numerics: ZeemanNumerics = ZeemanNumerics()
     outputs: TableOutputs = TableOutputs()
 
 
@@ -248,6 +267,7 @@ AnyScene = (
     | GasScene
     | FluidScene
     | StarkScene
+    | ZeemanScene
     | AlignScene
     | FitScene
     | EmissionScene
@@ -261,6 +281,7 @@ KINDS: Mapping[str, type[Scene]] = {
     "gas": GasScene,
     "fluid": FluidScene,
     "stark": StarkScene,
+    "zeeman": ZeemanScene,
     "align": AlignScene,
     "fit": FitScene,
     "emission": EmissionScene,

@@ -276,7 +276,7 @@ class StarkObservables(Section, frozen=True):
     """Which states."""
 
     jmax: Annotated[int, said("levels of the free molecule up to this J")] = 2
-    m: Annotated[list[int] | None, said("|M| of the states; by default all", [0, 1])] = None
+    m: Annotated[list[float] | None, said("|M| of the states, |M_F| with spins; by default all", [0, 1])] = None
     diabatic_gap: Annotated[Quantity | None, said("labels that pass crossings with a smaller gap (MHz)", "10 MHz")] = (
         None
     )
@@ -287,6 +287,44 @@ class StarkNumerics(Section, frozen=True):
 
     jmax: Annotated[int | None, said("highest J of the basis; by default what the tolerance needs", 30)] = None
     tolerance: Annotated[Quantity, said("of the energies, the basis being finite (MHz)")] = "1e-4 MHz"
+
+
+class FieldEffects(Section, frozen=True):
+    """What the Hamiltonian consists of besides the semi-rigid rotor and the field."""
+
+    hyperfine: Annotated[bool | None, said("spins of nuclei; by default where spin_constants are given", True)] = None
+
+
+class MagneticSection(Section, frozen=True):
+    """What a magnetic field acts on; by default what the file of the molecule has in its table [magnetic]."""
+
+    g: Annotated[
+        list[float] | None,
+        said("rotational g: aa, bb, cc[, ab, ac, bc]; along and across the axis; or one of a linear top", [-0.03]),
+    ] = None
+    magnetisability: Annotated[list[float] | None, said("likewise (1e-6 erg/(G² mol))", [-3.0, 2.0, -7.0])] = None
+    nuclear_g: Annotated[dict[str, float] | None, said("of spins; by default that of the isotope", {"14N": 0.4038})] = (
+        None
+    )
+
+
+class ZeemanConditions(Section, frozen=True):
+    """The fields."""
+
+    field: Annotated[Grid, said("static magnetic fields along Z (T)")] = "0:5T:51"
+
+
+class ZeemanObservables(Section, frozen=True):
+    """Which states."""
+
+    jmax: Annotated[int, said("levels of the free molecule up to this J")] = 2
+
+
+class ZeemanNumerics(Section, frozen=True):
+    """Knobs."""
+
+    jmax: Annotated[int | None, said("highest J of the basis; by default what the tolerance needs", 12)] = None
+    tolerance: Annotated[Quantity, said("of the energies, the basis being finite (MHz)")] = "1e-6 MHz"
 
 
 class GaussianSection(Section, frozen=True, tag="gaussian", tag_field="shape"):

@@ -22,6 +22,9 @@ STARTS: dict[str, dict[str, Any]] = {
         "conditions.steps": 20_000, "outputs.csv": "fluid.csv", "outputs.checkpoint": "fluid.npz",
     },
     "stark": {"molecule.source": "OCS", "conditions.field": "0:200kV/cm:201", "outputs.csv": "stark.csv"},
+    "zeeman": {
+        "molecule.source": "OCS", "magnetic.g": [-0.03], "conditions.field": "0:5T:51", "outputs.csv": "zeeman.csv",
+    },
     "align": {
         "molecule.source": "OCS", "pulses.shape": "gaussian", "pulses.peak": "1e13 W/cm2", "pulses.fwhm": "1 ps",
         "conditions.temperature": "1 K", "outputs.csv": "align.csv",

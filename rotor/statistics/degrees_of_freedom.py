@@ -47,7 +47,7 @@ def rotating_axes(moments: ArrayLike, linear_below: float = LINEAR_BELOW) -> NDA
     """Which principal axes a body can turn about, (..., 3), from its moments (..., 3); an atom has three moments of 0.
 
     An axis counts when its moment is at least `linear_below` times the largest of the body: a ratio, so that small
-    moments in any unit still turn. A triatomic bent by 1e-3 rad (a ratio of 3e-7) is linear by this rule.
+    moments in any unit still turn. A triatomic bent by 1e-3 rad (a ratio of 5e-8 to 8e-8) is linear by this rule.
 
     >>> rotating_axes([[0.0, 2.0, 2.0], [1e-30, 2e-30, 3e-30], [0.0, 0.0, 0.0]]).sum(axis=-1)
     array([2, 3, 0])

@@ -26,7 +26,7 @@ Progress = Callable[["Iteration"], None]
 CONVERGED, STALLED, EXHAUSTED, INTERRUPTED = "converged", "stalled", "too many iterations", "interrupted"
 FIRST_DAMPING, MOST_DAMPING = 1e-4, 1e12  # λ where D p has columns of length 1
 _FLOOR = 10.0  # times the tolerance, below which a step that does not come nearer says that round-off is reached
-_NOISE = 1e-8  # of χ², below which round-off of the residuals hides whether a step has decreased it: the linear model decides
+_NOISE = 1e-7  # of χ², below which round-off of the residuals hides whether a step has decreased it: the linear model decides
 ROUND_OFF = 1e-13  # singular values below this part of the largest carry no information
 
 

@@ -16,6 +16,7 @@ Where the classical limit with its corrections is as good as what was asked, and
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -229,9 +230,10 @@ class _Ladder:
         energies = lower = levels.energy_mhz
         if self.semi_rigid:
             energies, lower = trusted_energies_mhz(self.top, levels)
-        rotational = levels.rotational
-        for j in range(first, last + 1):
-            here = rotational == j
+        order = np.argsort(levels.rotational, kind="stable")
+        starts = np.searchsorted(levels.rotational[order], np.arange(first, last + 2))
+        for start, stop in itertools.pairwise(starts.tolist()):
+            here = order[start:stop]
             kelvin, low = energies[here] / units.MHZ_PER_K, lower[here] / units.MHZ_PER_K
             self._by_j.append(Shell(kelvin, plain[here], spin[:, here], low if (low < kelvin).any() else None))
 
@@ -294,6 +296,9 @@ def _summed(ladder: _Ladder, s: int, temperatures: Floats, enough: tuple[float, 
         tails[:, going], before[:, going] = _tail(smooth, before[:, going]), smooth
         if j < max(3, ground_j + 2):
             continue
+        if not ladder.semi_rigid and shell.kelvin.min() < ladder.at(j - 1).kelvin.min():  # the series has turned over
+            tails[:, going] = ENDLESS
+            break
         errors = relative_errors(moments[:, going], tails[:, going])[:kinds]
         done = errors.max(axis=0) < enough[0]
         done |= doubts[0, going] > enough[1] * moments[0, going]

@@ -22,6 +22,7 @@ from rotor.units import parse_quantity
 
 _GREEK = {"Δ": "Delta", "∆": "Delta", "δ": "delta", "Φ": "Phi", "φ": "phi", "ϕ": "phi"}
 _WITHOUT_K = {"DJ": "D", "HJ": "H", "LJ": "L"}  # what linear and spherical tops call them
+LEAST_MHZ, MOST_MHZ = 1e-12, 1e12  # far below that of any body of atoms, far above that of H2 (1.8e6 MHz)
 _SETTINGS = ("reduction", "representation", "kind", "uncertainties", "sources")
 
 
@@ -105,6 +106,9 @@ class Constants:
         }
         for field, thing in content.items():
             object.__setattr__(self, field, thing)
+
+    def __hash__(self) -> int:
+        return hash((self.kind, self.reduction, self.representation, frozenset(self.values.items())))
 
     def __repr__(self) -> str:
         form = ", ".join(filter(None, (self.reduction and f"{self.reduction}-reduction", self.representation)))
@@ -339,6 +343,10 @@ def _refuse_disorder(kind: str, values: Mapping[str, float]) -> None:
     for name, value in rigid.items():
         if value <= 0:
             raise ValueError(f"{name} = {value!r} MHz: a rotational constant is positive")
+        if not LEAST_MHZ <= value <= MOST_MHZ:
+            raise ValueError(
+                f"{name} = {value!r} MHz: expected a rotational constant from {LEAST_MHZ:g} to {MOST_MHZ:g} MHz; check the unit"
+            )
     if list(rigid.values()) != sorted(rigid.values(), reverse=True):
         given = ", ".join(f"{name} = {value!r}" for name, value in rigid.items())
         raise ValueError(f"{given} MHz: the names follow the order {' >= '.join(rigid)}; exchange them")

@@ -75,7 +75,10 @@ def _items(text: str) -> list[re.Match[str]]:
 
 def _factor(unit: str) -> Decimal:
     """MHz per unit, as the decimal number that is meant."""
-    return Decimal(repr(parse_quantity(f"1 {unit}", "MHz")))
+    try:
+        return Decimal(repr(parse_quantity(f"1 {unit}", "MHz")))
+    except ValueError as error:
+        raise ValueError(str(error).removeprefix(f"{f'1 {unit}'!r}: ")) from None
 
 
 def _product(number: Decimal, factor: Decimal) -> float:

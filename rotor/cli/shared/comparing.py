@@ -41,6 +41,11 @@ class CompareOptions:
         False, "--as-spcat", help="OTHER, an .int, is predicted with its KNMAX as SPCAT takes it, see rotor spectrum."
     )
 
+    @property
+    def other(self) -> str:
+        """What it is compared with: the file or the molecule, with its isotopes."""
+        return ", ".join([self.compare or "", *(self.isotope or [])])
+
 
 @dataclass(frozen=True)
 class Compared:
@@ -52,7 +57,9 @@ class Compared:
 
 
 def refuse_without_molecule(options: CompareOptions) -> None:
-    """--temperature and --isotope belong to a molecule that is predicted."""
+    """--temperature and --isotope belong to a molecule that is predicted, --as-spcat to an .int file."""
+    if options.as_spcat and not (options.compare or "").lower().endswith(".int"):
+        raise ValueError("--as-spcat: expected with --compare and an .int file to predict")
     given = {"--temperature": options.temperature, "--isotope": options.isotope}
     name = next((name for name, value in given.items() if value), None)
     if name is None:

@@ -37,9 +37,10 @@ def content_of(answer: StarkAnswer | ZeemanAnswer, given: Input, command: str) -
 
 
 def accuracy_fact(content: dict[str, Any]) -> tuple[str, str]:
-    """J max, how far energies still move, and the population at the edge, as a line of the report."""
-    accuracy = f"J max {content['jmax']}; energies move by {content['accuracy_mhz']:.1e} MHz with a higher one"
-    return "accuracy", f"{accuracy}, edge population {content['edge_population']:.1e}"
+    """J max, how exact energies are, and the population at the edge, as a line of the report."""
+    accuracy = f"J max {content['jmax']}; energies to {content['accuracy_mhz']:.1e} MHz"
+    rounding = f"round-off {content['round_off_mhz']:.1e} MHz of it"
+    return "accuracy", f"{accuracy}, {rounding}; edge population {content['edge_population']:.1e}"
 
 
 def table_of_states(states: FieldMap, names: tuple[str, ...], row_of: Callable[[slice], list[str]]) -> Table:

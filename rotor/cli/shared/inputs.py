@@ -21,7 +21,8 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 
 USUAL_LEAST_MHZ = 100.0  # of the largest constant of a molecule: below it MHz without a unit are pointed out
-MOST_KELVIN = 1e6
+LEAST_KELVIN, MOST_KELVIN = 1e-9, 1e6  # colder or hotter there is no gas of molecules
+MOST_TEMPERATURES = 100_000
 MOST_LOG10 = 300  # of an intensity that a double can hold
 MOST_TIMES = 10_000_000
 
@@ -96,12 +97,18 @@ def quantity(name: str, text: str, unit: str) -> float:
     """A number with an optional unit, in `unit`."""
     from rotor.units import parse_quantity
 
-    return parsed(name, text, lambda value: parse_quantity(value, unit))
+    found = parsed(name, text, lambda value: parse_quantity(value, unit))
+    if unit == "K" and found > MOST_KELVIN:
+        raise ValueError(f"{name}: {text!r}: expected a temperature up to {MOST_KELVIN:g} K; no molecule lasts beyond")
+    return found
 
 
 def positive(name: str, text: str, unit: str) -> float:
     """The same, above zero."""
-    return require_positive(name, quantity(name, text, unit), unit)
+    found = require_positive(name, quantity(name, text, unit), unit)
+    if unit == "K" and found < LEAST_KELVIN:
+        raise ValueError(f"{name}: {text!r}: expected a temperature of {LEAST_KELVIN:g} K or more")
+    return found
 
 
 def highest_j(text: str) -> int:
@@ -138,6 +145,10 @@ def temperatures(name: str, text: str) -> list[float]:
         raise ValueError(f"{name}: {text!r}: temperatures are above 0 K")
     if max(found, default=0.0) > MOST_KELVIN:
         raise ValueError(f"{name}: {text!r}: expected temperatures up to {MOST_KELVIN:g} K; no molecule lasts beyond")
+    if min(found, default=1.0) < LEAST_KELVIN:
+        raise ValueError(f"{name}: {text!r}: expected temperatures of {LEAST_KELVIN:g} K or more")
+    if len(found) > MOST_TEMPERATURES:
+        raise ValueError(f"{name}: {text!r}: at most {MOST_TEMPERATURES} temperatures in one table; ask for fewer")
     return found
 
 

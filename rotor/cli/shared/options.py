@@ -12,8 +12,11 @@ def command(context: typer.Context, given: Input, options: Options) -> None: ...
 from __future__ import annotations
 
 import inspect
+import os
+import shlex
 from collections.abc import Callable, Sequence
 from dataclasses import MISSING, Field, field, fields, is_dataclass
+from pathlib import Path
 from typing import Any, get_args, get_type_hints
 
 import typer
@@ -50,6 +53,43 @@ def name_of(one: Field[Any]) -> str:
     return declared[0] if declared else "--" + one.name.rstrip("_").replace("_", "-")
 
 
+def refuse_overwriting(groups: Sequence[Any]) -> None:
+    """ValueError where a file that one option writes is a file that another option, or the source, names as what is read.
+
+    groups: all options of a command. Options of pictures are texts; they name no file.
+    """
+    written = [asked for group in groups for asked in files_asked(group) if asked[1] is not None]
+    outputs = [(name, Path(path)) for name, path, _ in written if path is not None]
+    outputs += [("--json", Path(group.json)) for group in groups if getattr(group, "json", None)]
+    if not outputs:
+        return
+    inputs = {os.path.realpath(text) for group in groups for text in _texts_read(group) if _is_file(text)}
+    for name, path in outputs:
+        if os.path.realpath(path) in inputs:
+            raise ValueError(f"{name} {path}: is an input of this command; write the result under another name")
+
+
+def _texts_read(group: Any) -> list[str]:
+    """The values of a group that may name files to read."""
+    values = [
+        getattr(group, one.name)
+        for one in fields(group)
+        if "suffixes" not in one.metadata and one.name != "json" and not one.name.startswith("plot_")
+    ]
+    return [text for value in values for text in (value if isinstance(value, list) else [value]) if _named(text)]
+
+
+def _named(value: Any) -> bool:
+    return isinstance(value, str) and bool(value)
+
+
+def _is_file(text: str) -> bool:
+    try:
+        return Path(text).is_file()
+    except (OSError, ValueError):  # a text that no path can be: too long, or with a zero byte
+        return False
+
+
 def files_asked(group: Any) -> list[tuple[str, str | None, Sequence[str]]]:
     """Option, path and suffixes of every field of a group that names a file to write."""
     return [
@@ -80,6 +120,7 @@ def grouped(**omitted: Sequence[str]) -> Callable[[Command], Command]:
                 name: group(**{one.name: _value(one, types[name][one.name], values[one.name]) for one in chosen[name]})
                 for name, group in groups.items()
             }
+            refuse_overwriting(list(made.values()))
             command(context, **made)
 
         parameters = [inspect.Parameter("context", inspect.Parameter.KEYWORD_ONLY, annotation=typer.Context)]
@@ -93,6 +134,14 @@ def grouped(**omitted: Sequence[str]) -> Callable[[Command], Command]:
     return decorate
 
 
+def _shown_name(one: Field[Any]) -> str:
+    """`--range` of an option, `SOURCE` of what stands without a name."""
+    parameter = one.metadata["parameter"]
+    if isinstance(parameter, typer.models.ArgumentInfo):
+        return parameter.metavar or one.name.upper()
+    return name_of(one)
+
+
 def _parameter(one: Field[Any], kind: Any) -> inspect.Parameter:
     assert one.default is not MISSING, f"{one.name}: an option has a default"
     return inspect.Parameter(
@@ -100,13 +149,43 @@ def _parameter(one: Field[Any], kind: Any) -> inspect.Parameter:
     )
 
 
+def folded(examples: str, width: int = 76) -> str:
+    """Examples with commands that are longer than a line continued on the next one, as a shell takes them.
+
+    >>> print(folded("  rotor levels water --jmax 4 --plot terms.png", width=30))
+      rotor levels water \\
+          --jmax 4 --plot terms.png
+    """
+    return "\n".join(_folded_line(line, width) for line in examples.split("\n"))
+
+
+def _folded_line(line: str, width: int) -> str:
+    if len(line) <= width:
+        return line
+    words = shlex.split(line, posix=False)
+    indent = line[: len(line) - len(line.lstrip())]
+    rows, row = [], indent + words[0]
+    for number, word in enumerate(words[1:], 1):
+        with_value = word.startswith("-") and number + 1 < len(words)  # an option stays beside its value
+        needed = len(word) + (1 + len(words[number + 1]) if with_value and not words[number + 1].startswith("-") else 0)
+        if len(row) + 1 + needed > width - 2:
+            rows.append(row + " \\")
+            row = indent + "    " + word
+        else:
+            row += " " + word
+    return "\n".join([*rows, row])
+
+
 def _value(one: Field[Any], kind: Any, given: Any) -> Any:
     """The value of a field from what stands on the command line: text, whole or decimal number, truth, or texts."""
     kinds = get_args(kind) or (kind,)
     if given is None and kinds == (str,):
-        raise ValueError(f"{one.name.upper()} is missing; --help shows what the command takes")
+        raise ValueError(f"{_shown_name(one)} is missing; --help shows what the command takes")
     if given is None or isinstance(given, bool):
         return given
+    texts = given if isinstance(given, (list, tuple)) else [given]
+    if given != one.default and any(isinstance(text, str) and not text.strip() for text in texts):
+        raise ValueError(f"{_shown_name(one)}: the text given is empty; expected one that is not, or leave it out")
     if list[str] in kinds:
         return list(given) or None
     for number, name in ((int, "a whole number"), (float, "a number")):

@@ -22,6 +22,7 @@ class PlotOptions:
     plot_unit: str | None = option(None, metavar="UNIT", help="Of the picture's frequency axis: MHz, GHz, THz or cm-1.")
     plot_title: str | None = option(None, metavar="TEXT", help="Of the picture, instead of name and temperature.")
     plot_range: str | None = option(None, metavar="A:B", help="Frequencies that the picture shows (MHz).")
+    plot_vertical: str | None = option(None, metavar="A:B", help="Of its vertical axis, in the unit of the axis.")
     plot_scale: str | None = option(None, metavar="NAME", help="Of the picture's intensities: linear or log.")
 
 
@@ -48,7 +49,7 @@ def view_of(given: ViewOptions, files: Files, unit: str = "") -> View:
 
 
 def settings_of(given: PlotOptions, files: Files) -> dict[str, Any]:
-    """What `spectrum_figure` takes, from the texts of the options; refused without --plot."""
+    """What `spectrum_figure` and `emission_figure` take, from the texts of the options; refused without --plot."""
     _refuse_without_plot(given, files)
     settings: dict[str, Any] = {}
     if given.plot_unit is not None:
@@ -57,6 +58,8 @@ def settings_of(given: PlotOptions, files: Files) -> dict[str, Any]:
         settings["title"] = _title(given.plot_title)
     if given.plot_range is not None:
         settings["range_mhz"] = _limits("--plot-range", given.plot_range, "MHz")
+    if given.plot_vertical is not None:
+        settings["vertical"] = _limits("--plot-vertical", given.plot_vertical, "")
     if given.plot_scale is not None:
         settings["log"] = SCALES[require_one_of("--plot-scale", given.plot_scale, SCALES)]
     return settings

@@ -12,6 +12,17 @@ def begin() -> None:
     """The process is that of the command."""
     global _OWN
     _OWN = True
+    _open_missing_streams()
+
+
+def _open_missing_streams() -> None:
+    """A standard stream that was closed before the start is the null device.
+
+    Otherwise the next file that is opened would take its number, and what is printed would go there or fail.
+    """
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):  # in the order of their numbers
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: SIM115  # for as long as the process lives
 
 
 def leave_compiler_out() -> None:

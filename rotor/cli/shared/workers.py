@@ -7,6 +7,8 @@ from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from contextlib import contextmanager
 from typing import Any
 
+MOST_WORKERS = 256
+
 
 @contextmanager
 def working(workers: int, what: str) -> Iterator[Executor | None]:
@@ -17,8 +19,8 @@ def working(workers: int, what: str) -> Iterator[Executor | None]:
     import multiprocessing
     import sys
 
-    if not 1 <= workers <= 256:
-        raise ValueError(f"--workers: {workers}: a whole number from 1 to 256 is expected")
+    if not 1 <= workers <= MOST_WORKERS:
+        raise ValueError(f"--workers: {workers}: a whole number from 1 to {MOST_WORKERS} is expected")
     terminal = sys.stderr.isatty()
     if workers == 1:
         with progress_bar(what) if terminal else _nothing() as advance:

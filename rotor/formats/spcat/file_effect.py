@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 from rotor.formats.spcat.codes import AXES, split_code
 from rotor.formats.spcat.l_doubled import Pair, couplings_with_pairs
+from rotor.formats.spcat.l_spins import spin_terms_with_pairs
 from rotor.formats.spcat.operators import CodedOperator, operator_of, plain_of_j
 from rotor.formats.spcat.text.par import Parameter
 from rotor.quantum.effect import QuantumEffect
@@ -19,7 +20,7 @@ from rotor.quantum.moments import Moment
 from rotor.quantum.spins import Scheme, Spin
 from rotor.quantum.spins.operators import EVERY_STATE
 from rotor.quantum.spins.terms import SpinTerm
-from rotor.quantum.states import Coupling, State
+from rotor.quantum.states import Coupling, OperatorOfJ, State
 from rotor.tops.operators import Operators
 
 if TYPE_CHECKING:
@@ -31,7 +32,7 @@ Vector = tuple[float, float, float]
 class CodedLine(NamedTuple):
     """One parameter line: its name, value, operator, and the two states, lower first; None for every state.
 
-    reversed_: the code has V2 > V1.
+    reversed_: the code has V2 > V1. typ: TYP of the code.
     """
 
     name: str
@@ -39,6 +40,7 @@ class CodedLine(NamedTuple):
     operator: CodedOperator
     states: tuple[int, int] | None
     reversed_: bool = False
+    typ: int = 0
 
 
 def coded_lines(
@@ -95,6 +97,7 @@ def coded_lines(
                 operator,
                 None if low == wild else (low, high),
                 digits.v2 > digits.v1,
+                digits.typ,
             )
         )
     return found
@@ -106,7 +109,7 @@ class FileEffect(QuantumEffect):
 
     lines: with the file's numbers of states. numbers: the states taken, in their order here. coupled: the spins by place. moments:
     dipoles in debye by pairs of numbers here. limits: least and largest K of states, by number here. others: moments of other kinds.
-    ixx: which sums of angular momenta are conserved, bit by bit from N on. pairs: l-doubled states, by number here.
+    ixx: which sums of angular momenta are conserved, bit by bit from N on. pairs: l-doubled states, by number here. axes: those at x, y, z.
     """
 
     name: ClassVar[str] = ""
@@ -120,6 +123,7 @@ class FileEffect(QuantumEffect):
     others: tuple[Moment, ...] = ()
     ixx: int = 0
     pairs: tuple[Pair, ...] = ()
+    axes: str = AXES["Ir"]
 
     @cached_property
     def _own(self) -> tuple[tuple[CodedLine, tuple[int, int] | None], ...]:
@@ -178,6 +182,8 @@ class FileEffect(QuantumEffect):
         if operator.plain is not None and states[0] == states[1]:
             return []  # among the operators of both components
         of = operator.of_j or plain_of_j(operator.plain or {})
+        if operator.odd and states[0] == states[1] and self.axes[2] == "c":
+            of = _turned_round(of)  # -i stands between states of an oblate basis, not within a pair
         try:
             return couplings_with_pairs(line.name, of, operator.odd, states, line.reversed_, self.pairs)
         except ValueError as error:
@@ -195,8 +201,20 @@ class FileEffect(QuantumEffect):
             if o.rotor is not None:
                 names = tuple(self.coupled[place - 1].name for place in o.spins)
                 bra, ket = states or (EVERY_STATE, EVERY_STATE)
-                found.append(SpinTerm(line.name, names, o.rotor, 1.0, o.n2, o.nz2, o.ns, bra, ket))
+                if o.odd and bra == ket:  # of an l-doubled pair, between its components
+                    ket = next(pair.second if bra == pair.first else pair.first for pair in self.pairs if bra in pair)
+                found += self._at_pairs(
+                    line, states, SpinTerm(line.name, names, o.rotor, 1.0, o.n2, o.nz2, o.ns, bra, ket)
+                )
         return tuple(found)
+
+    def _at_pairs(self, line: CodedLine, states: tuple[int, int] | None, term: SpinTerm) -> list[SpinTerm]:
+        if not states or set(states).isdisjoint(v for pair in self.pairs for v in pair):
+            return [term]
+        try:
+            return spin_terms_with_pairs(term, states, line.reversed_, self.pairs, self.axes)
+        except ValueError as error:
+            raise ValueError(f"parameter {line.name.partition('#')[0]}: {error}") from None
 
     def dipoles(self, top: Top) -> dict[tuple[int, int], Vector]:
         """The dipoles of the .int file."""
@@ -218,3 +236,7 @@ class FileEffect(QuantumEffect):
     def size_mhz(self, top: Top, j: int) -> float:
         """Not estimated: a file's Hamiltonian is one piece."""
         return 0.0
+
+
+def _turned_round(of: OperatorOfJ) -> OperatorOfJ:
+    return lambda j, representation: -1.0 * of(j, representation)

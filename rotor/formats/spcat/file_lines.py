@@ -7,6 +7,7 @@ QNFMT = 100 Q + 10 H + NQN: Q is the kind of quanta, H in binary which of the la
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -78,13 +79,7 @@ def format_of(file: ParameterFile, groups: list[Group]) -> Format:
     rotation = 3 if first.spind > 0 else 1 if linear else 2
     spins = max(len(group.spins) for group in groups)
     i_tot = any(state.i_tot for group in groups for state in group.states)
-    found = Format(rotation, abs(first.nvib) > 1, spins, 10 if file.header.nline < 0 else 6, i_tot)
-    if i_tot and found.aggregate:
-        raise ValueError(
-            f"more than {found.most} quantum numbers with a total spin of equivalent nuclei, numbered patterns of them: that is read "
-            "but not computed yet; a negative NLINE gives each number a column of its own"
-        )
-    return found
+    return Format(rotation, abs(first.nvib) > 1, spins, 10 if file.header.nline < 0 else 6, i_tot)
 
 
 def quanta_of(group: Group, levels: Levels, form: Format, negative: bool = False) -> Ints:
@@ -127,7 +122,7 @@ def _rotation(group: Group, levels: Levels, v: Ints, form: Format, negative: boo
         return []
     if form.rotation == 3:
         if "kc" in quanta:
-            return [quanta["ka"], quanta["kc"]]
+            return _ka_kc(group, levels, v)
         n = levels.rotational  # linear, in a file with the quanta of asymmetric tops
         return [np.zeros_like(n), n]
     if "kc" in quanta:
@@ -136,23 +131,62 @@ def _rotation(group: Group, levels: Levels, v: Ints, form: Format, negative: boo
     else:
         k = quanta.get("k", np.zeros(len(levels), dtype=np.int64))
         odd = np.full(len(levels), negative)
-    e_level = np.zeros(len(levels), dtype=bool)
+    return [np.where(odd & ~_unsigned(group, v, k), -k, k)]
+
+
+def _unsigned(group: Group, v: Ints, k: Ints) -> NDArray[np.bool_]:
+    """Which levels are of E species or l-doubled: the sign of K, or the parity of the other K, says nothing of them."""
+    found = np.zeros(len(k), dtype=bool)
     for place, state in enumerate(group.states):
-        e_level |= (v == place) & state.is_e(k)
-    return [np.where(odd & ~e_level, -k, k)]
+        found |= (v == place) & state.is_e(k)
+    return found
+
+
+def _ka_kc(group: Group, levels: Levels, v: Ints) -> list[Ints]:
+    """Ka and Kc; of E species the K that is not along the axis is N - K, and N - K + 1 in the first state of an l-doubled pair."""
+    n, ka, kc = levels.rotational, levels.quanta["ka"], levels.quanta["kc"]
+    along = kc if group.oblate else ka
+    firsts = [pair.first for pair in group.effect.pairs]
+    other = np.where(_unsigned(group, v, along), n - along + np.isin(v, firsts), ka if group.oblate else kc)
+    return [other, along] if group.oblate else [along, other]
 
 
 def _pattern_numbers(group: Group, levels: Levels, names: list[str]) -> Ints:
-    """The number of the coupling pattern among those of any F, by rising N - F, then by J_i - J_(i-1), the last spin first."""
+    """The number of the coupling pattern among those of any F: by rising N - F, by I_tot where there is one, then by
+    J_i - J_(i-1), the last spin first."""
     doubled = [levels.quanta[name] * (1 if name in levels.halves else 2) for name in names]
-    chain = np.stack([2 * levels.rotational, *doubled], axis=1)
-    steps = (np.diff(chain, axis=1) + np.array(group.spins)) // 2
-    every = np.stack(np.meshgrid(*(np.arange(spin + 1) for spin in group.spins), indexing="ij"), axis=-1)
-    every = every.reshape(-1, len(group.spins))
-    difference = (np.array(group.spins) - 2 * every).sum(axis=1)  # 2(N - F)
-    order = np.lexsort((*every.T, difference))
-    number = {tuple(every[place].tolist()): place_in_order for place_in_order, place in enumerate(order.tolist())}
-    return np.array([number[tuple(step)] for step in steps.tolist()], dtype=np.int64)
+    chain, spins = [2 * levels.rotational, *doubled], group.spins
+    if not group.states[0].i_tot:
+        return _among(pattern_steps(spins), _steps(chain, spins))
+    total, totals = chain.pop(-2), range(0, spins[-1] + spins[-2] + 1, 2)
+    every = np.concatenate([np.insert(pattern_steps((*spins[:-2], i_tot)), 1, i_tot, axis=1) for i_tot in totals])
+    every = every[np.lexsort((every[:, 1], every[:, 0]))]  # which leaves the order within one I_tot as it is
+    own = _steps(chain, (*spins[:-2], total))
+    return _among(every, np.insert(own, 1, total, axis=1))
+
+
+def pattern_steps(spins: tuple[int, ...]) -> Ints:
+    """2(N - F) and (J_i - J_(i-1) + S_i) of every coupling pattern of doubled spins, in the order in which SPCAT counts them.
+
+    >>> pattern_steps((1, 1)).tolist()
+    [[-2, 1, 1], [0, 0, 1], [0, 1, 0], [2, 0, 0]]
+    """
+    every = np.stack(np.meshgrid(*(np.arange(spin + 1) for spin in spins), indexing="ij"), axis=-1).reshape(
+        -1, len(spins)
+    )
+    difference = (np.array(spins, dtype=np.int64) - 2 * every).sum(axis=1)
+    return np.column_stack((difference, every))[np.lexsort((*every.T, difference))]
+
+
+def _steps(chain: list[Ints], spins: Sequence[Ints | int]) -> Ints:
+    """The same of levels, from their doubled N, J, F1, ... F."""
+    steps = [(after - before + spin) // 2 for before, after, spin in zip(chain, chain[1:], spins, strict=False)]
+    return np.column_stack((chain[0] - chain[-1], *steps))
+
+
+def _among(every: Ints, own: Ints) -> Ints:
+    number = {tuple(row): place for place, row in enumerate(every.tolist())}
+    return np.array([number[tuple(row)] for row in own.tolist()], dtype=np.int64)
 
 
 @dataclass(frozen=True)
@@ -197,7 +231,9 @@ def transitions_of(group: Group, levels: Levels, request: Request, q: float) -> 
         levels, dict(group.effect.moments), cut=_wide_cut(levels, request, q), moments=group.effect.others
     )
     exists = (levels.weight[found.lower] > 0) & (levels.weight[found.upper] > 0)
-    if not any(state.fold for state in group.states):  # with weights of E species, one that is equal is enough
+    if any(state.fold > 2 for state in group.states):
+        exists &= share_a_weight(group, levels, found.upper, found.lower)
+    else:
         exists &= equally_weighted(levels, found.upper, found.lower)
     if exists.all():
         return found
@@ -210,9 +246,38 @@ def _wide_cut(levels: Levels, request: Request, q: float) -> IntensityCut | None
     """A cut that no line of the file is below, None where STR0 is below all numbers."""
     kt, least = request.temperature_k * units.MHZ_PER_K, _NEARLY * 10.0**request.str0
     with np.errstate(over="ignore"):  # far below zero and cold: every line passes
-        populated = LGINT_NM2_MHZ / q * (levels.weight // levels.components) * np.exp(-levels.energy_mhz / kt)
+        populated = (
+            LGINT_NM2_MHZ / q * np.max(levels.weight // levels.components, initial=0) * np.exp(-levels.energy_mhz / kt)
+        )
     population = np.asarray(populated, dtype=float)
     return IntensityCut(population, kt, least) if least > 0 and np.isfinite(population).all() else None
+
+
+def share_a_weight(group: Group, levels: Levels, upper: Indices, lower: Indices) -> NDArray[np.bool_]:
+    """Which transitions of a top with an n-fold axis join blocks that have a weight in common, of A, B or E species: the
+    program makes no lines between others, and all lines between those."""
+    if levels.kind in ("prolate", "oblate"):  # where both weights are one
+        return np.ones(len(upper), dtype=bool)
+    quanta = levels.quanta
+    along, v = quanta["kc"] if group.oblate else quanta["ka"], quanta.get("v", np.zeros(len(levels), dtype=np.int64))
+    weights = np.zeros((len(levels), 2), dtype=np.int64)
+    for place, state in enumerate(group.states):
+        weights[v == place] = state.block_weights(quanta["ka"], quanta["kc"], along)[v == place]
+    high, low = weights[upper], weights[lower]
+    return np.asarray(((high[:, :, None] == low[:, None, :]) & (high[:, :, None] > 0)).any(axis=(1, 2)))
+
+
+def weights_of_lines(group: Group, levels: Levels, found: Transitions) -> Ints:
+    """The nuclear-spin weight of each line: that of its level in the later block, by F, state and species, one component of ±K."""
+    weight = levels.weight // levels.components
+    if (weight[found.upper] == weight[found.lower]).all() or "kc" not in levels.quanta:
+        return np.asarray(weight[found.lower])
+    ka, kc = levels.quanta["ka"] % 2, levels.quanta["kc"] % 2
+    species = np.array([[0, 1], [3, 2]])[(kc, ka) if group.oblate else (ka, kc)]
+    species = np.where(species == 1, 3, np.where(species == 3, 1, species))
+    v = levels.quanta.get("v", np.zeros(len(levels), dtype=np.int64))
+    order = (levels.multiplicity * (len(group.states) + 1) + v) * 4 + species
+    return np.asarray(np.where(order[found.upper] > order[found.lower], weight[found.upper], weight[found.lower]))
 
 
 def equally_weighted(levels: Levels, upper: Indices, lower: Indices) -> NDArray[np.bool_]:
@@ -267,14 +332,14 @@ def lines_of(
         Frequencies and lower energies in MHz, intensities in nm² MHz.
     """
     count = np.maximum(levels.components[found.upper], levels.components[found.lower])
-    weight = (levels.weight // levels.components)[found.lower]
+    weight = weights_of_lines(group, levels, found)
     energy, kt = levels.energy_mhz[found.lower], request.temperature_k * units.MHZ_PER_K
     below = np.exp(-energy / kt) * -np.expm1(-found.frequency_mhz / kt)
     intensity = LGINT_NM2_MHZ / q * found.frequency_mhz * found.strength_debye2 / count * weight * below
     chosen = np.flatnonzero(within(request, found.frequency_mhz, intensity))
     up, low = found.upper[chosen], found.lower[chosen]
     error = np.zeros(len(chosen)) if spread is None else np.linalg.norm(spread[up] - spread[low], axis=1)
-    g_upper = levels.multiplicity[up] * weight[chosen]
+    g_upper = levels.multiplicity[up] * (levels.weight // levels.components)[up]
     columns = (found.frequency_mhz[chosen], intensity[chosen], energy[chosen], g_upper, error)
     pair = levels.components[up], levels.components[low]
     count = np.maximum(*pair)

@@ -14,9 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Ints
+from rotor.formats.spcat.codes import AXES
 from rotor.formats.spcat.file_effect import CodedLine, FileEffect, Vector, coded_lines
 from rotor.formats.spcat.l_doubled import Pair, named_by_l, pairs_of
+from rotor.formats.spcat.l_spins import named_by_l_with_spins
+from rotor.formats.spcat.labels import named_by
 from rotor.formats.spcat.states import StateOptions, states_of
+from rotor.formats.spcat.symmetry import forbidden, l_values, some_weights_agree, symmetric_part
 from rotor.formats.spcat.text.int_file import Dipole, IntensityFile
 from rotor.formats.spcat.text.par import Options, ParameterFile
 from rotor.quantum.levels import Levels
@@ -36,7 +40,7 @@ Dipoles = dict[tuple[int, int], Vector]
 class Group:
     """States that are solved together: their options by number here, the top that stands for their symmetry, the effect.
 
-    axial_kmax: the largest K of a symmetric top whose K is good.
+    axial_kmax: the largest K of a symmetric top whose K is good. diag: how levels are named.
     """
 
     states: tuple[StateOptions, ...]
@@ -44,6 +48,7 @@ class Group:
     effect: FileEffect
     oblate: bool
     axial_kmax: int = _EVERY_K
+    diag: int = 0
 
     @property
     def spins(self) -> tuple[int, ...]:
@@ -58,13 +63,19 @@ class Group:
         if self.spins or self.effect.others:
             every = range(max(twice_f[0], sum(self.spins) % 2), twice_f[1] + 1, 2)
             exist = None if self.top.kind == "linear" else self._exist
+            if self.effect.pairs:  # which of its levels exist is known once they are named by l
+                exist = None
             levels = levels_of_f(self.top, (self.effect,), every, None, executor, exist)
+            if self.effect.pairs:
+                levels = named_by_l_with_spins(levels, self.effect.pairs, str(levels.representation))
         else:
             levels = solve_levels(
                 self.top, twice_f[1] // 2, jmin=twice_f[0] // 2, effects=(self.effect,), executor=executor
             )
             if self.effect.pairs:
                 levels = named_by_l(levels, self.effect.pairs, str(levels.representation))
+        if not self.effect.pairs:
+            levels = named_by(levels, self.diag, self.oblate)
         return replace(levels, weight=self._weights(levels))
 
     def has_levels(self, twice_f: tuple[int, int]) -> bool:
@@ -90,7 +101,7 @@ class Group:
         total = np.zeros(len(levels), dtype=np.int64)
         for place, state in enumerate(self.states):
             for ka, kc, k, alike in _components(levels, n, self.oblate):
-                own = state.weights(ka, kc, k, quanta.get("i_tot", 0))
+                own = np.where(k <= self.axial_kmax, state.weights(ka, kc, k, quanta.get("i_tot", 0)), 0)
                 total += np.where((v == place) & alike, np.maximum(own, 0), 0)
         return total
 
@@ -116,8 +127,11 @@ def groups_of(file: ParameterFile, intensities: IntensityFile, *, as_spcat: bool
     doubled = pairs_of(states)
     members = frozenset(v for pair in doubled for v in pair)
     lines = coded_lines(file.parameters, len(states), first.nvib < 0, members)
+    lines = allowed(lines, states, doubled, first.nvib < 0)[0]
     dipoles, others = dipoles_of(intensities.dipoles, len(states))
     dipoles = _of_both_components(dipoles, doubled)
+    if not others and not any(_has_elements(pair, mu, states, doubled) for pair, mu in dipoles.items()):
+        dipoles |= {(high, low): (-a, -b, -c) for (low, high), (a, b, c) in dipoles.items() if low != high}
     pairs = [line.states for line in lines if line.states] + list(dipoles) + [code.states for _, code in others]
     _refuse_missing_spins(lines, states)
     light = (dipoles, others)
@@ -125,6 +139,64 @@ def groups_of(file: ParameterFile, intensities: IntensityFile, *, as_spcat: bool
         _group([states[v] for v in numbers], lines, light, first, as_spcat, file.title, doubled)
         for numbers in _connected(len(states), [*pairs, *doubled])
     ]
+
+
+def left_out(file: ParameterFile) -> list[str]:
+    """A sentence for every parameter that the declared symmetry forbids."""
+    states, oblate = states_of(file), file.options[0].nvib < 0
+    doubled = pairs_of(states)
+    members = frozenset(v for pair in doubled for v in pair)
+    return allowed(coded_lines(file.parameters, len(states), oblate, members), states, doubled, oblate)[1]
+
+
+def _has_elements(pair: tuple[int, int], mu: Vector, states: tuple[StateOptions, ...], doubled: list[Pair]) -> bool:
+    """Whether a dipole is of one state and joins levels of one weight. Without such a dipole the program takes those between
+    states times i, so that they change their sign with the order of the states."""
+    low, high = pair
+    if low != high or low in {v for both in doubled for v in both}:
+        return low == high
+    return any(value and some_weights_agree(20 * axis, states[low], states[low]) for axis, value in enumerate(mu, 1))
+
+
+def allowed(
+    lines: list[CodedLine], states: tuple[StateOptions, ...], doubled: list[Pair], oblate: bool
+) -> tuple[list[CodedLine], list[str]]:
+    """The parameter lines that the declared symmetry allows, as SPCAT takes them, and why the others are left out.
+
+    Parameters
+    ----------
+    lines : list of CodedLine
+        All parameters that compute.
+    states : tuple of StateOptions
+        All states of the file.
+    doubled : list of Pair
+        The l-doubled ones.
+    oblate : bool
+        Whether z is the c axis.
+
+    Returns
+    -------
+    lines : list of CodedLine
+        Those that act.
+    reasons : list of str
+        A sentence for each that is left out.
+    """
+    l_of = l_values(states, doubled)
+    found, reasons = list[CodedLine](), list[str]()
+    for line in lines:
+        concerned = [(v, v) for v in range(len(states))] if line.states is None else [line.states]
+        why = []
+        for low, high in concerned:
+            del_l = abs(l_of.get(low, 0) - l_of.get(high, 0)) * (-1 if line.reversed_ else 1)
+            own = states[low], states[high]
+            why.append(forbidden(line.typ, *own, del_l, oblate, bool({low, high} & set(l_of))))
+        if all(why):
+            reasons.append(f"parameter {line.name.partition('#')[0]} is left out, as SPCAT does: {why[0]}")
+            continue
+        folded = line.typ in (1, 2, 3) and max(states[v].fold for pair in concerned for v in pair) > 2
+        axes = AXES["IIIl" if oblate else "Ir"]
+        found.append(line._replace(operator=symmetric_part(line.operator, axes)) if folded else line)
+    return found, reasons
 
 
 def _of_both_components(dipoles: Dipoles, pairs: list[Pair]) -> Dipoles:
@@ -197,11 +269,15 @@ def _group(
     coupled = tuple(
         Spin(f"I{place}", twice, total="I_tot" if place >= paired else "") for place, twice in enumerate(spins, 1)
     )
-    effect = FileEffect(usable, numbers, coupled, moments, limits, others, first.ixx, pairs)
-    _ = effect.couplings(_ANY_TOP) if pairs else ()  # what is not allowed between l-doubled states is said now
+    effect = FileEffect(
+        usable, numbers, coupled, moments, limits, others, first.ixx, pairs, AXES["IIIl" if oblate else "Ir"]
+    )
+    _ = (
+        (*effect.spin_terms(_ANY_TOP), *effect.couplings(_ANY_TOP)) if pairs else ()
+    )  # what is not allowed between l-doubled states is said now
     top = Top(_STANDS_FOR[kind, oblate], dipole_abc_debye=moments.get((0, 0), (0.0, 0.0, 0.0)), name=title)
     kmax = states[0].kmax if as_spcat and kind in ("prolate", "oblate") else _EVERY_K
-    return Group(tuple(states), top, effect, oblate, kmax)
+    return Group(tuple(states), top, effect, oblate, kmax, first.diag)
 
 
 # the symmetry alone counts: the file's own operators are the whole Hamiltonian

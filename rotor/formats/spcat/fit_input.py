@@ -56,6 +56,8 @@ def read_fit(par: str | os.PathLike[str], lin: str | os.PathLike[str] | None = N
 
     Raises ValueError, with file, line or the name of the option, for what cannot be read or is not supported.
     """
+    if not Path(par).exists():
+        raise ValueError(f"{par}: no such file")
     beside = Path(lin) if lin is not None else Path(par).with_suffix(".lin")
     if not beside.exists():
         raise ValueError(
@@ -168,26 +170,35 @@ def _kmax(file: ParameterFile, constants: Constants) -> int | None:
 
 
 def _assigned(lines: LineList, names: Sequence[str], header: Header, source: str) -> tuple[Assignments, list[str]]:
-    """Lines up to NLINE, wavenumbers times CAL, blends as the file marks them."""
+    """Lines up to NLINE, wavenumbers over CAL, blends as the file marks them."""
     lines = with_defaults(lines, names)
     notes = [note_of_defaults(lines)] if lines.defaulted else []
     blends = lines.blends()
     used = np.arange(len(lines)) < abs(header.nline)
     if not used.all():
         notes.append(f"NLINE = {abs(header.nline)}: {len(lines) - int(used.sum())} lines behind it do not count")
-    widths = used & (blends < 0)
-    if widths.any():
-        notes.append(f"{int(widths.sum())} lines that give the width of a blend do not count")
+    widths = _widths(lines, blends, used, header)
     used &= blends >= 0
     upper, lower = lines.states()
     _refuse_width(lines, names, used)
     wavenumber = lines.error < 0
-    frequency = lines.frequency_mhz * np.where(wavenumber, header.cal, 1.0)
+    scale = np.where(wavenumber, header.cal, 1.0)  # SPFIT multiplies what it calculates in cm⁻¹ by CAL
+    frequency, error = lines.frequency_mhz / scale, lines.error_mhz / scale
     k = len(names)
     return assignments(
-        names, upper[used][:, :k], lower[used][:, :k], frequency[used], lines.error_mhz[used],
+        names, upper[used][:, :k], lower[used][:, :k], frequency[used], error[used],
         weight=lines.weight[used], blend=blends[used], wavenumber=wavenumber[used], source=source,
+        widths_mhz=widths,
     ), notes  # fmt: skip
+
+
+def _widths(lines: LineList, blends: Ints, used: np.ndarray, header: Header) -> dict[int, float]:
+    """The widths of blends: the error of the line of the same frequency behind them."""
+    found = {}
+    for i in np.flatnonzero(used & (blends < 0)).tolist():
+        scale = header.cal if lines.error[i] < 0 else 1.0
+        found[int(blends[:i][blends[:i] >= 0][-1])] = float(lines.error_mhz[i] / scale)
+    return found
 
 
 def _refuse_width(lines: LineList, names: Sequence[str], used: np.ndarray) -> None:

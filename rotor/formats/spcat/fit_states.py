@@ -20,16 +20,18 @@ from rotor.formats.spcat.l_doubled import functions_of_l, named_by_l
 from rotor.formats.spcat.predict_states import line_names
 from rotor.formats.spcat.text.int_file import IntensityFile, Request
 from rotor.formats.spcat.text.par import ParameterFile
-from rotor.formats.spcat.unresolved import HIGHEST_SEARCHED, excluded_parameters, inner_file, refuse_far_f, spelled_out
+from rotor.formats.spcat.unresolved import HIGHEST_SEARCHED, excluded_parameters, refuse_far_f, spelled_out
+from rotor.quantum.estimates.contracted import ContractedLevels, contracted_levels
 from rotor.quantum.estimates.effect_units import unit_levels
 from rotor.quantum.estimates.unit_blocks import UnitBlocks
 from rotor.quantum.labelled import LevelModel
 from rotor.quantum.levels import Levels
-from rotor.quantum.spins.levels import levels_of_f
+from rotor.quantum.spins.levels import levels_of_f, unmixed_levels
 from rotor.quantum.wang.rotation import solve_rotation
 
 _NO_REQUEST = IntensityFile("", Request(), ())
 _MOST_ELEMENTS = 1e7  # of vectors over all functions of the F that are solved at a time
+_LARGE = 400  # functions of an F from which on blocks may be contracted
 _AT_ZERO = 1e-30  # MHz: a free parameter that starts at 0 must not be left out of the Hamiltonian
 
 
@@ -61,18 +63,14 @@ class _Solved:
 
     rows: Ints
     columns: Ints
-    blocks: UnitBlocks
-
-    def at(self, places: Ints) -> _Solved:
-        """The same for labels that stand at these places of a longer list."""
-        return replace(self, rows=places[self.rows])
+    blocks: UnitBlocks | ContractedLevels
 
 
 @dataclass(frozen=True)
 class FileLevels(LevelModel):
     """Energies of the labelled levels of a file; names: its parameter lines as code#place.
 
-    reduced : levels with F below 0 whose spins cannot be left out. excluded : the parameters that are taken off them
+    reduced : levels with F below 0. excluded : the parameters that are taken off them
     """
 
     names: tuple[str, ...]
@@ -89,18 +87,11 @@ class FileLevels(LevelModel):
         """
         groups = groups_for_fit(file)
         form = format_of(file, groups)
-        none = np.zeros(0, dtype=np.int64)
-        reduced = np.flatnonzero(labels[:, -1] < 0) if form.spins else none
-        inner = inner_file(file, form) if len(reduced) else None
-        if inner is None:
-            parts = _searched(file, groups, form, labels, reduced)
-            return cls(line_names(file), len(labels), tuple(parts), reduced, excluded_parameters(file))
-        refuse_far_f(labels[reduced], form, names_of_quanta(form), max(sum(group.spins) for group in groups))
-        own = np.flatnonzero(labels[:, -1] >= 0)
-        parts = [part.at(own) for part in _searched(file, groups, form, labels[own], none)] if len(own) else []
-        for part in cls.of(inner.file, labels[reduced][:, : inner.width]).solved:
-            parts.append(replace(part.at(reduced), columns=inner.columns[part.columns]))
-        return cls(line_names(file), len(labels), tuple(parts), none, none)
+        reduced = np.flatnonzero(labels[:, -1] < 0) if form.spins else np.zeros(0, dtype=np.int64)
+        if len(reduced):
+            refuse_far_f(labels[reduced], form, names_of_quanta(form), max(sum(group.spins) for group in groups))
+        parts = _searched(file, groups, form, labels, reduced)
+        return cls(line_names(file), len(labels), tuple(parts), reduced, excluded_parameters(file))
 
     def levels(self, values_mhz: Floats) -> tuple[Floats, Floats]:
         """See `LevelModel`."""
@@ -132,7 +123,7 @@ def _searched(file: ParameterFile, groups: Sequence[Group], form: Format, labels
         positive[lost, -1] += 1
 
 
-def _levels(group: Group, angular: Sequence[int]) -> Levels:
+def levels_in_blocks(group: Group, angular: Sequence[int]) -> Levels:
     """The levels of the doubled F, or J, that are listed, in blocks."""
     if group.spins:
         return levels_of_f(group.top, (group.effect,), angular, None, None)
@@ -153,11 +144,45 @@ def _with_labels(group: Group, form: Format, labels: Ints, names: Sequence[str],
     twice = 2 * total - sum(group.spins) % 2
     every = np.unique(twice)
     size = len(group.states) * int(np.prod([spin + 1 for spin in group.spins]))
+    if group.spins and size * int(every.max() + 1) > _LARGE:
+        contracted = _contracted(group, form, labels, here, every, names, values)
+        if contracted is not None:
+            return [contracted]
     pieces = np.split(every, np.flatnonzero(np.diff(np.cumsum((size * (every + 1.0)) ** 2) // _MOST_ELEMENTS)) + 1)
     found = [
         _of_some_f(group, form, labels, here[np.isin(twice, some)], some.tolist(), names, values) for some in pieces
     ]
     return [one for one in found if one is not None]
+
+
+def _contracted(
+    group: Group, form: Format, labels: Ints, here: Ints, every: Ints, names: Sequence[str], values: Floats
+) -> _Solved | None:
+    """The labels at the places `here`, each among the functions near it; None where the blocks had better be solved whole."""
+    levels, plan = unmixed_levels(group.top, (group.effect,), every.tolist())
+    rows = _rows_of(group, levels, form, labels[here])
+    found = rows >= 0
+    if not found.any():
+        return None
+    columns, start = _columns_of(group, names, values)
+    own = tuple(group.effect.parameters(group.top))
+    blocks = contracted_levels(group.top, (group.effect,), plan, levels, rows[found], own, start)
+    return None if blocks is None else _Solved(here[found], columns, blocks)
+
+
+def _rows_of(group: Group, levels: Levels, form: Format, labels: Ints) -> Ints:
+    """The row of each label among the levels, -1 where there is none."""
+    rows_by_label: dict[tuple[int, ...], int] = {}
+    for negative in (True, False):
+        for row, label in enumerate(map(tuple, quanta_of(group, levels, form, negative).tolist())):
+            rows_by_label.setdefault(label, row)
+    return np.array([_row(rows_by_label, tuple(label), form) for label in labels.tolist()])
+
+
+def _columns_of(group: Group, names: Sequence[str], values: Floats) -> tuple[Ints, Floats]:
+    """Which parameters a group has, and their values."""
+    columns = np.array([names.index(name) for name in group.effect.parameters(group.top)])
+    return columns, np.where(values == 0, _AT_ZERO, values)[columns]
 
 
 def _of_some_f(
@@ -170,18 +195,14 @@ def _of_some_f(
     values: Floats,
 ) -> _Solved | None:
     """The labels at the places `here` among the levels of some doubled F; None without any."""
-    levels = _levels(group, angular)
-    rows_by_label: dict[tuple[int, ...], int] = {}
-    for negative in (True, False):
-        for row, label in enumerate(map(tuple, quanta_of(group, levels, form, negative).tolist())):
-            rows_by_label.setdefault(label, row)
-    rows = np.array([_row(rows_by_label, tuple(label), form) for label in labels[here].tolist()])
+    levels = levels_in_blocks(group, angular)
+    rows = _rows_of(group, levels, form, labels[here])
     found = rows >= 0
     if not found.any():
         return None
     own = tuple(group.effect.parameters(group.top))
-    columns = np.array([names.index(name) for name in own])
-    pairs, start = group.effect.pairs, np.where(values == 0, _AT_ZERO, values)[columns]
+    columns, start = _columns_of(group, names, values)
+    pairs = group.effect.pairs
     functions = partial(functions_of_l, pairs=pairs, representation=str(levels.representation)) if pairs else None
     blocks = unit_levels(group.top, levels, rows[found], own, start, functions)
     return _Solved(here[found], columns, blocks)

@@ -31,8 +31,9 @@ from rotor.formats.spcat.states import StateOptions
 from rotor.quantum.coupled import CoupledBlock, Part
 from rotor.quantum.levels import Levels
 from rotor.quantum.spins.blocks import assigned
+from rotor.quantum.spins.operators import AxialState, Basis
 from rotor.quantum.states import Coupling, OperatorOfJ
-from rotor.quantum.wang.basis import names_of
+from rotor.quantum.wang.basis import WangBlock, names_of
 from rotor.quantum.wang.j_operators import JOperator, between_blocks, j_z
 
 
@@ -188,24 +189,43 @@ def functions_of_l(block: CoupledBlock, pairs: Sequence[Pair], representation: s
 
     Those of states that are not l-doubled are the basis; of a pair they are |K, l⟩ ± |-K, -l⟩ with K l > 0 and with K l < 0.
     """
+    return functions_of_parts(block.parts, len(block.vectors), pairs, representation)
+
+
+def functions_of_parts(
+    places: Sequence[tuple[int, Basis, int]], size: int, pairs: Sequence[Pair], representation: str
+) -> tuple[Floats, Ints]:
+    """The same over `size` functions, from the state, the Wang block and the first place of each part."""
     functions, names = list[Floats](), list[tuple[int, int, int]]()
     second = {pair.first: pair.second for pair in pairs}
     members = {v for pair in pairs for v in pair}
-    for part in block.parts:
+    parts = [Part(v, _wang(basis), start) for v, basis, start in places]
+    for part in parts:
         for place, (k, ka, kc) in enumerate(zip(part.basis.k.tolist(), *_by_k(part, representation), strict=True)):
-            own = np.zeros(len(block.vectors))
+            own = np.zeros(size)
             own[part.start + place] = 1.0
             if part.v not in members:
                 functions.append(own)
                 names.append((part.v, ka, kc))
             elif part.v in second:
-                for v, function in _of_l(own, k, part, block.parts, second[part.v], representation):
+                for v, function in _of_l(own, k, part, parts, second[part.v], representation):
                     functions.append(function)
                     names.append((v, ka, kc))
             elif k == 0:
                 functions.append(own)
                 names.append((part.v, ka, kc))
+    if len(functions) < size:
+        raise ValueError(_UNCOUPLED)
     return np.array(functions), np.array(names)
+
+
+_UNCOUPLED = "l-doubled states without a coupling of their components; give -2Aζ (TYP 20) for them"
+
+
+def _wang(basis: Basis) -> WangBlock:
+    if isinstance(basis, AxialState):
+        raise ValueError(_UNCOUPLED)
+    return basis
 
 
 def _names_of_block(block: CoupledBlock, pairs: Sequence[Pair], representation: str) -> tuple[Ints, Floats]:
@@ -237,4 +257,4 @@ def _of_l(
             other = np.zeros_like(own)
             other[partner.start + at] = np.sign(element)
             return [(part.v, (own + other) / sqrt(2.0)), (second, (own - other) / sqrt(2.0))]
-    raise ValueError("l-doubled states without a coupling of their components; give -2Aζ (TYP 20) for them")
+    raise ValueError(_UNCOUPLED)

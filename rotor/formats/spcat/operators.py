@@ -3,7 +3,7 @@
 | field | meaning here |
 |---|---|
 | TYP 0; 1, 2, 3; 3 + n | 1; Na², Nb², Nc²; N₊^2n + N₋^2n |
-| TYP 20, 40, 60 | Na, Nb, Nc, between states with the factor i |
+| TYP 20, 40, 60 | Na, Nb, Nc, between states with the factor i, in an oblate basis -i |
 | TYP 21, 41, 61 | NbNc + NcNb, NaNc + NcNa, NaNb + NbNa |
 | TYP 20 + n, 40 + n, 60 + n, 11 + n | tensors of rank L made of N alone, see `_tensor_of_n`; of odd L between states with the factor i |
 | I1 | one N is replaced by that spin: Σ c_ij ½{φ_pi, N_j} S_p; TYP 20, 40, 60: φ_a·S, between states |
@@ -113,12 +113,13 @@ def order_of(typ: int) -> int:
 
 
 def _of_j(d: Digits, axes: str) -> OperatorOfJ:
-    """With half anticommutators of the powers, and the factor i of what is odd under time reversal."""
+    """With half anticommutators of the powers, and the factor i, in an oblate basis -i, of what is odd under time reversal."""
     powers, odd = ParameterName("", d.nsq, d.ksq), order_of(d.typ) % 2
+    factor = (1j if axes[2] == "a" else -1j) if odd else 1.0
 
     def operator(j: int, representation: str) -> JOperator:
         found = _tensor_of_n(d.typ, components(j, representation), axes[2])
-        return with_powers((1j if odd else 1.0) * found, powers)
+        return with_powers(factor * found, powers)
 
     return operator
 
@@ -174,7 +175,8 @@ def _with_spins(d: Digits, spins: tuple[int, ...], axes: str) -> CodedOperator:
     if d.typ in ODD:
         if len(spins) == 2:
             raise ValueError(f"a vector product of two spins {NOT_YET}")
-        vector: Vector = tuple(float(axis == ODD[d.typ]) for axis in "abc")  # type: ignore[assignment]
+        sign = 1.0 if axes[2] == "a" else -1.0  # as of Na, Nb, Nc between states
+        vector: Vector = tuple(sign * float(axis == ODD[d.typ]) for axis in "abc")  # type: ignore[assignment]
         return replace(powered, rotor=Cosines(vector), odd=True)
     matrix = _matrix(d.typ, axes)
     return replace(powered, rotor=CosinesWithN(matrix) if len(spins) == 1 else Cosines(matrix))

@@ -25,7 +25,7 @@ from rotor.formats.spcat.file_lines import (
     transitions_of,
     within,
 )
-from rotor.formats.spcat.file_model import Group, groups_of
+from rotor.formats.spcat.file_model import Group, groups_of, left_out
 from rotor.formats.spcat.text.catalogue import Catalogue
 from rotor.formats.spcat.text.egy import LevelList
 from rotor.formats.spcat.text.int_file import IntensityFile, Request
@@ -264,6 +264,7 @@ def _notes(parameters: ParameterFile, groups: list[Group], request: Request, as_
     found, notes = len(parameters.parameters), []
     if parameters.header.npar > found:
         notes.append(f"NPAR = {parameters.header.npar}, but {found} parameters stand in the file: those are used")
+    notes += left_out(parameters)
     for group in groups:
         highest = request.fend + sum(group.spins) // 2
         for state in group.states:

@@ -79,15 +79,29 @@ class StateOptions:
         (n,) array of int
             WTPL, WTMN or EWT, by the axis of the file.
         """
-        odd = {1: ka % 2, 2: (ka + kc) % 2, 3: kc % 2}.get(self.iax, (ka + kc) % 2)
-        even = (odd + i_tot) % 2 == 0
-        weight = np.where(even, self.plus, self.minus)
+        weight = self.class_weight(ka, kc, i_tot)
         fold = _FOLDS.get(self.iax)
         if fold is None:
             return weight
         class_of = (k - self.l_code) % fold.n
         paired = np.where(np.isin(class_of, fold.paired), self.e_weight, 0)
         return np.where(class_of == fold.alone, weight, paired)
+
+    def class_weight(self, ka: Ints, kc: Ints, i_tot: Ints | int = 0) -> Ints:
+        """WTPL or WTMN by the parities of Ka and Kc, (n,), E levels apart."""
+        odd = {1: ka % 2, 2: (ka + kc) % 2, 3: kc % 2}.get(self.iax, (ka + kc) % 2)
+        return np.where((odd + i_tot) % 2 == 0, self.plus, self.minus)
+
+    def block_weights(self, ka: Ints, kc: Ints, k: Ints) -> Ints:
+        """Weights of the A (or B) and of the E levels in the Wang block of a level, (n, 2), 0 where there are none; n-fold axis."""
+        fold, own = _FOLDS[self.iax], np.where((ka + kc) % 2 == 0, self.plus, self.minus)
+        steps = np.arange(0, 2 * fold.n, 2)  # K that stand in one Wang block, modulo n
+        classes = (k[:, None] - self.l_code + steps) % fold.n
+        alone = (classes == fold.alone).any(axis=1)
+        paired = np.isin(classes, fold.paired).any(axis=1) | (
+            self.iax == 7
+        )  # which names both kinds of blocks of a 4-fold axis
+        return np.stack([np.where(alone, own, 0), np.where(paired, self.e_weight, 0)], axis=1)
 
     def is_e(self, k: Ints) -> NDArray[np.bool_]:
         """Which levels are of E species, whose K is not signed."""
@@ -130,8 +144,6 @@ def _state(v: int, line: Options, first: Options, swapped: bool) -> StateOptions
     iax, spins = abs(line.iax), doubled_spins(line.spind)
     if iax not in (0, 1, 2, 3, *_FOLDS):
         raise ValueError(f"IAX = {line.iax} of state {v}: expected an axis or fold of weights, 1 to 11")
-    if code and spins:
-        raise ValueError(f"EWT = {line.ewt} of state {v}: l-doubled states with spins are read but not computed yet")
     if line.iax < 0 and iax in _FOLDS and _FOLDS[iax].n > 2:
         raise ValueError(
             f"IAX = {line.iax} of state {v}: a total spin of {_FOLDS[iax].n} equivalent nuclei is read but not computed yet"
@@ -169,10 +181,13 @@ def is_plain(parameters: ParameterFile, intensities: IntensityFile | None) -> bo
         return False
     if first.spind < 0 and first.knmax and first.wtpl != first.wtmn:  # the two levels of one K weigh differently
         return False
+    if min(first.wtpl, first.wtmn) < 0 or (first.iax in _FOLDS and first.wtpl != first.wtmn):
+        return False
     digits = [split_code(parameter.code) for parameter in parameters.parameters]
     orthorhombic = all(
         not (d.i1 or d.i2 or d.ns) and (d.typ < 12 or d.typ >= 80) and (d.v1, d.v2) in ((0, 0), (9, 9)) for d in digits
     )
     energies = any(not any(d[:8]) for d in digits)
+    mixed = any(d.typ == 4 and d.ksq for d in digits) and any(d.typ > 4 for d in digits)  # terms of both reductions
     own = intensities is None or all(dipole.code in (1, 2, 3) for dipole in intensities.dipoles)
-    return orthorhombic and own and not energies
+    return orthorhombic and own and not energies and not mixed

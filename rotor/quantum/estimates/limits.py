@@ -112,7 +112,12 @@ def model_limits(top: Top, j: int, effects: Sequence[QuantumEffect]) -> list[Lim
     found = [*_of_constants(top, j), *(_of_nuclei(top, j, effects))]
     if top.molecule is not None:
         found += _of_geometry(top, top.molecule, present)
-    return sorted(found, key=_rank)
+    return largest_first(found)
+
+
+def largest_first(limits: Sequence[Limit]) -> list[Limit]:
+    """Limits by their size; those not estimated last, but electron spin first."""
+    return sorted(limits, key=_rank)
 
 
 def _rank(limit: Limit) -> float:
@@ -122,12 +127,27 @@ def _rank(limit: Limit) -> float:
     return -limit.size_mhz
 
 
-def limit_facts(top: Top, j: int, effects: Sequence[QuantumEffect]) -> dict[str, Any]:
-    """Sizes of effects and what is left out at one J, by the keys of docs/command_line.md."""
+def limit_facts(top: Top, j: int, effects: Sequence[QuantumEffect], further: Sequence[Limit] = ()) -> dict[str, Any]:
+    """Sizes of effects and what is left out at one J, by the keys of docs/command_line.md.
+
+    Parameters
+    ----------
+    top : Top
+    j : int
+        At which sizes are estimated.
+    effects : sequence of QuantumEffect
+        Those of the calculation.
+    further : sequence of Limit
+        What else it leaves out.
+
+    Returns
+    -------
+    dict
+    """
     return {
         "sizes_at_j": j,
         "effects": [size._asdict() for size in model_sizes(top, j, effects)],
-        "limits": [asdict(limit) for limit in model_limits(top, j, effects)],
+        "limits": [asdict(limit) for limit in largest_first([*model_limits(top, j, effects), *further])],
         "splitting_nuclei": [asdict(one) for one in splitting_nuclei(top)],
     }
 

@@ -27,14 +27,9 @@ class BlockStates(NamedTuple):
     vectors: Matrix
 
 
-def free_order(block: FieldBlock) -> Ints:
-    """Places of the states of a block in order of their free energies, J deciding between equal ones."""
-    return np.lexsort((block.j, np.round(block.energies_mhz, 9)))
-
-
 def followed(block: FieldBlock, j_highest: int) -> int:
     """How many of the lowest states of a block hold all free levels up to J = `j_highest`."""
-    order = free_order(block)
+    order = block.free_order
     return int(np.flatnonzero(block.j[order] <= j_highest)[-1]) + 1
 
 
@@ -89,7 +84,7 @@ def states_of(
     BlockStates
         Energies (f, states) in MHz, and the states that they belong to.
     """
-    count, order = count_of(request, block), free_order(block)
+    count, order = count_of(request, block), block.free_order
     places = enough_states(problem, order, count, fields, request.tolerance_mhz)
     energies, vectors = solve_fields(problem.terms(places), fields, count, with_vectors, request.tolerance_mhz)
     return BlockStates(block, block.rows[order[:count]], energies, places, vectors)

@@ -145,6 +145,11 @@ class FieldBlock(ABC):
         """Energies of the free top (n,)."""
         return self.levels.energy_mhz[self.rows]
 
+    @cached_property
+    def free_order(self) -> Ints:
+        """Places of the states in order of their free energies, J deciding between equal ones (n,)."""
+        return np.lexsort((self.j, np.round(self.energies_mhz, 9)))
+
     @property
     def abs_m(self) -> Ints:
         """|M| of the states (n,)."""

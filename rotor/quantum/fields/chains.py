@@ -1,7 +1,11 @@
 """The lowest states of real tridiagonal matrices at many fields at once: a linear or symmetric top in a static field.
 
-Energies at some fields, by LAPACK, are joined by cubics through energies and slopes. At every other field they are improved with the
-eigenvectors of a twisted factorisation, T - λ = N D N^T with N lower triangular above row k and upper triangular below it,
+Energies at some fields, by LAPACK, are joined by curves of fifth order through energies, slopes and curvatures,
+
+    E' = ⟨i|H'|i⟩,   E'' = ⟨i|H''|i⟩ + 2 Σ_j |⟨j|H'|i⟩|²/(E_i - E_j).
+
+At every other field they are improved with the eigenvectors of a twisted factorisation, T - λ = N D N^T with N lower triangular
+above row k and upper triangular below it,
 
     z_k = 1,   z_i = -b_i z_(i+1)/d⁺_i (i < k),   z_i = -b_(i-1) z_(i-1)/d⁻_i (i > k),   λ ← λ + γ_k/|z|²,
 
@@ -22,8 +26,9 @@ from rotor.arrays import Floats, Ints
 Chain = tuple[tuple[Floats, ...], int]  # H_n (n, n) of a chain, and how many of its lowest states
 
 ANCHORS = 13  # fields that LAPACK solves, of many
+DENSER = 1.5  # power by which they are denser where the field is weak and energies bend most
 SWEEPS = 4  # of the Rayleigh quotient at most
-CONVERGED = 1e-9  # of the smallest gap: the last change of an energy; what is left of it is the third power
+CONVERGED = 1e-8  # of the smallest gap: the last change of an energy; what is left of it is the third power
 OFF_ZERO = (
     1e-15  # of the largest element: by which energies are moved before a sweep, so that no pivot is 0 at zero field
 )
@@ -54,16 +59,35 @@ def chain_states(chains: Sequence[Chain], fields: Floats) -> list[tuple[Floats, 
     main = np.diagonal(padded, 0, 2, 3).transpose(2, 1, 0)[..., of]  # (n, powers, states)
     beside = np.diagonal(padded, 1, 2, 3).transpose(2, 1, 0)[..., of]
     main, beside = (np.matmul(powers, one) for one in (main, beside))  # (n, fields, states)
-    for _ in range(SWEEPS):
+    vectors = _swept(main, beside, energies, rank, gaps, scale)
+    return None if vectors is None else _apart(chains, energies, vectors)
+
+
+def _swept(main: Floats, beside: Floats, energies: Floats, rank: Ints, gaps: Floats, scale: float) -> Floats | None:
+    """Eigenvectors (n, fields, states), the energies (fields, states) improved in place; None where that went astray.
+
+    Where an energy has stood still it is left out of the next sweep.
+    """
+    shape, flat = energies.shape, energies.reshape(-1)
+    bands = main.reshape(len(main), -1), beside.reshape(len(beside), -1)
+    ranks, least = np.tile(rank, shape[0]), np.tile(CONVERGED * gaps, shape[0]) + 2 * OFF_ZERO * scale
+    vectors, moving = np.empty_like(bands[0]), np.arange(flat.size)
+    for sweep in range(SWEEPS):
+        moved = flat[moving] - OFF_ZERO * scale
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            moved = energies - OFF_ZERO * scale
-            vectors, change, below = twisted(main, beside, moved)
-        energies, change = moved + change, change - OFF_ZERO * scale
-        if not np.isfinite(vectors).all():
+            of_moving = tuple(one[:, moving] for one in bands) if sweep else bands
+            found, change, below = twisted(of_moving[0], of_moving[1], moved)
+        flat[moving] = moved + change
+        if sweep:
+            vectors[:, moving] = found
+        else:
+            vectors = found
+        still = np.abs(change - OFF_ZERO * scale) <= least[moving]
+        if not ((below == ranks[moving]) | (below == ranks[moving] + 1) | ~still).all():
             return None
-        if (np.abs(change) <= CONVERGED * gaps + 2 * OFF_ZERO * scale).all():
-            right = ((below == rank) | (below == rank + 1)).all()
-            return _apart(chains, energies, vectors) if right else None
+        moving = moving[~still]
+        if not len(moving):
+            return vectors.reshape(-1, *shape) if np.isfinite(vectors).all() else None
     return None
 
 
@@ -91,59 +115,76 @@ def _padded(chains: Sequence[tuple[Floats, ...]], size: int, strongest: float) -
 
 
 def _between_anchors(padded: Floats, fields: Floats, of: Ints, rank: Ints) -> tuple[Floats, Floats]:
-    """Energies (fields, states) from cubics through energies and slopes at a few fields, and the least gap there (states,)."""
-    places = np.unique(np.linspace(0, len(fields) - 1, ANCHORS).astype(int))
+    """Energies (fields, states) from curves through those at a few fields, and the least gap there (states,)."""
+    places = np.unique(((len(fields) - 1) * np.linspace(0, 1, ANCHORS) ** DENSER).astype(int))
     at, count = fields[places], int(rank.max()) + 1
     powers = at[:, None] ** np.arange(padded.shape[1])
     values, every = np.linalg.eigh(np.einsum("fp,cpij->cfij", powers, padded))
-    vectors = every[..., :count]
-    slopes = sum(
-        n * at[:, None] ** (n - 1) * (vectors * (padded[:, None, n] @ vectors)).sum(axis=2)
-        for n in range(1, padded.shape[1])
-    )
+    slopes, bends = _derivatives(padded, at, values, every, count)
     gaps = np.diff(values[..., : count + 1], axis=2).min(axis=1)  # (chains, count) to the next state above
     gaps = np.minimum(gaps, np.concatenate([gaps[:, :1], gaps[:, : gaps.shape[1] - 1]], axis=1)[:, : gaps.shape[1]])
     gaps = np.concatenate([gaps, gaps[:, -1:]], axis=1)[:, :count]
-    return _cubics(at, values[of, :, rank].T, np.asarray(slopes)[of, :, rank].T, fields), gaps[of, rank]
+    heights, rises, curves = (one[of, :, rank].T for one in (values, slopes, bends))
+    return _joined(at, heights, rises, curves, fields), gaps[of, rank]
 
 
-def _cubics(at: Floats, values: Floats, slopes: Floats, fields: Floats) -> Floats:
-    """Cubic Hermite curves through values and slopes (points, states) at `at`, (fields, states)."""
+def _derivatives(padded: Floats, at: Floats, values: Floats, vectors: Floats, count: int) -> tuple[Floats, Floats]:
+    """dE/dx and d²E/dx² of the lowest states (chains, points, count) from all states of each chain."""
+    powers = np.arange(padded.shape[1])
+    first = (powers * at[:, None] ** np.maximum(powers - 1, 0)) @ padded.reshape(*padded.shape[:2], -1)
+    second = (powers * (powers - 1) * at[:, None] ** np.maximum(powers - 2, 0)) @ padded.reshape(*padded.shape[:2], -1)
+    low, turned = vectors[..., :count], vectors.swapaxes(2, 3)
+    coupling = turned @ (first.reshape(vectors.shape) @ low)  # (chains, points, n, count)
+    above = values[..., None, :count] - values[..., :, None]
+    above[..., np.arange(count), np.arange(count)] = np.inf
+    slopes = np.diagonal(coupling, axis1=2, axis2=3)
+    bends = 2 * (coupling**2 / np.where(above == 0, np.inf, above)).sum(axis=2)
+    if second.any():
+        bends = bends + (low * (second.reshape(vectors.shape) @ low)).sum(axis=2)
+    return slopes, bends
+
+
+def _joined(at: Floats, values: Floats, slopes: Floats, bends: Floats, fields: Floats) -> Floats:
+    """Curves of fifth order through values, slopes and curvatures (points, states) at `at`, (fields, states)."""
     place = np.clip(np.searchsorted(at, fields, "right") - 1, 0, len(at) - 2)
     width = (at[place + 1] - at[place])[:, None]
     t = (fields - at[place])[:, None] / width
-    rise = (values[place + 1] - values[place]) / width
-    first, last = slopes[place], slopes[place + 1]
-    curve = first + t * (3 * rise - 2 * first - last + t * (first + last - 2 * rise))
-    return np.asarray(values[place] + t * width * curve)
+    start, bend = slopes[place] * width, bends[place] * width**2 / 2
+    rise = values[place + 1] - values[place] - start - bend
+    steeper = slopes[place + 1] * width - start - 2 * bend
+    rounder = bends[place + 1] * width**2 / 2 - bend
+    third = 10 * rise - 4 * steeper + rounder
+    fourth = 7 * steeper - 15 * rise - 2 * rounder
+    fifth = 6 * rise - 3 * steeper + rounder
+    return np.asarray(values[place] + t * (start + t * (bend + t * (third + t * (fourth + t * fifth)))))
 
 
 def twisted(main: Floats, beside: Floats, energies: Floats) -> tuple[Floats, Floats, Ints]:
-    """Normalised vectors (n, f, s), corrections of energies (f, s), and how many energies lie below each (f, s).
+    """Normalised vectors (n, s), corrections of energies (s,), and how many energies lie below each (s,).
 
-    main: (n, f, s). beside: (n - 1, f, s). energies: (f, s), approximate; at the energy of a free state itself a pivot is 0.
+    main: (n, s). beside: (n - 1, s). energies: (s,), approximate; at the energy of a free state itself a pivot is 0.
     """
-    size = len(main)
-    shifted, squares = main - energies, beside**2
+    size, step = len(main), np.empty_like(energies)
+    shifted = main - energies
     down, up = shifted.copy(), shifted.copy()
-    step = np.empty_like(energies)
-    for i in range(1, size):
-        np.divide(squares[i - 1], down[i - 1], out=step)
-        down[i] -= step
-        np.divide(squares[size - 1 - i], up[size - i], out=step)
-        up[size - 1 - i] -= step
+    to_lower, to_upper = np.empty_like(beside), np.empty_like(beside)  # -z_i/z_(i+1) and -z_(i+1)/z_i
+    for i in range(size - 1):
+        np.divide(beside[i], down[i], out=to_lower[i])
+        down[i + 1] -= np.multiply(to_lower[i], beside[i], out=step)
+        k = size - 2 - i
+        np.divide(beside[k], up[k + 1], out=to_upper[k])
+        up[k] -= np.multiply(to_upper[k], beside[k], out=step)
     gamma = down + up - shifted
-    place = np.abs(gamma).argmin(axis=0)
-    rows = np.arange(size)[:, None, None]
-    vectors = (rows == place).astype(np.float64)
-    upwards = np.where(rows[1:] > place, -beside / up[1:], 0.0)
-    downwards = np.where(rows[:-1] < place, -beside / down[:-1], 0.0)
-    for i in range(1, size):
-        np.multiply(upwards[i - 1], vectors[i - 1], out=step)
-        vectors[i] += step
-    for i in range(size - 2, -1, -1):
-        np.multiply(downwards[i], vectors[i + 1], out=step)
-        vectors[i] += step
-    lengths = (vectors**2).sum(axis=0)
-    change = np.take_along_axis(gamma, place[None], axis=0)[0] / lengths
-    return vectors / np.sqrt(lengths), change, np.count_nonzero(down < 0, axis=0)
+    place, states = np.abs(gamma).argmin(axis=0), np.arange(len(energies))
+
+    vectors, lower = np.zeros_like(shifted), np.zeros_like(shifted)
+    vectors[place, states] = lower[place, states] = 1.0
+    for i in range(size - 1):
+        vectors[i + 1] -= np.multiply(to_upper[i], vectors[i], out=step)
+        k = size - 2 - i
+        lower[k] -= np.multiply(to_lower[k], lower[k + 1], out=step)
+    vectors += lower
+    vectors[place, states] = 1.0
+    lengths = np.einsum("ns,ns->s", vectors, vectors)
+    vectors /= np.sqrt(lengths)
+    return vectors, gamma[place, states] / lengths, np.count_nonzero(down < 0, axis=0)

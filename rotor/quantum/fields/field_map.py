@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.fields.block_states import BlockStates, block_states, count_of, enough_states, free_order, states_of
+from rotor.quantum.fields.block_states import BlockStates, block_states, count_of, enough_states, states_of
 from rotor.quantum.fields.blocks import AxialBlock, FieldBlock
 from rotor.quantum.fields.chains import TOGETHER
 from rotor.quantum.fields.map_request import BlockProblem, MapRequest, over
@@ -42,17 +42,19 @@ Of = TypeVar("Of")
 EDGE = 2  # the highest values of J whose population is leakage
 HIGHEST_J = 300
 STEP_J = 6
+ROUND_OFF = 2 * float(np.finfo(np.float64).eps)  # of the norm of a matrix
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class FieldMap(Table):
     """States in a field as columns of equal length: all fields of one state after each other.
 
     field: (n,) in the unit that `field_name` names. m, rank: M, and the order in energy inside its exact block. block: which block.
     energy_mhz: E/h. label: the free level of that rank. slope: -dE/dfield, in `slope_name`. cosines: expectation values by name.
     edge_population: of the two highest J. copies: states that coincide (M and -M). diabatic_label: or None. free_row, free_mhz,
-    weight: of the level in the free top, the spin weight that of one state. jmax: of the basis. accuracy_mhz: by which energies still
-    moved when J max was raised, moved_mhz: that of each state, at the highest field.
+    weight: of the level in the free top, the spin weight that of one state. jmax: of the basis. moved_mhz: by how much the energy of
+    each state still moved when J max was raised, at the highest field. round_off_mhz: of each energy, a few units in the last
+    place of the largest one of its matrix.
     """
 
     field_name: str
@@ -71,8 +73,8 @@ class FieldMap(Table):
     free_mhz: Floats
     weight: Floats
     jmax: int
-    accuracy_mhz: float
     moved_mhz: Floats
+    round_off_mhz: Floats
     diabatic_label: NDArray[np.str_] | None = None
 
     def __len__(self) -> int:
@@ -92,9 +94,15 @@ class FieldMap(Table):
             "block": self.block,
             "edge_population": self.edge_population,
             "copies": self.copies,
-            "accuracy_mhz": self.moved_mhz,
+            "accuracy_mhz": self.moved_mhz + self.round_off_mhz,
         }
         return out if self.diabatic_label is None else {**out, "diabatic_label": self.diabatic_label}
+
+    @property
+    def accuracy_mhz(self) -> float:
+        """The largest error of an energy that is known: what J max leaves, and round-off."""
+        here = np.isfinite(self.moved_mhz)
+        return float((self.moved_mhz + self.round_off_mhz)[here].max(initial=0.0))
 
     @property
     def provenance(self) -> dict[str, Any]:
@@ -102,6 +110,7 @@ class FieldMap(Table):
         return {
             "jmax": self.jmax,
             "accuracy_mhz": self.accuracy_mhz,
+            "round_off_mhz": float(self.round_off_mhz.max(initial=0.0)),
             "edge_population": float(self.edge_population.max(initial=0.0)),
         }
 
@@ -127,7 +136,10 @@ class FieldMap(Table):
 
 
 class _Solved(NamedTuple):
-    """Of one block: energies, slopes -dE/dx in MHz, edge populations (fields, states), cosines by name, and the free rows (states,)."""
+    """Of one block: energies, slopes -dE/dx in MHz, edge populations (fields, states), cosines by name, and the free rows (states,).
+
+    round_off: of an energy, MHz.
+    """
 
     energies: Floats
     slopes: Floats
@@ -135,6 +147,7 @@ class _Solved(NamedTuple):
     cosines: dict[str, Floats]
     rows: Ints
     block: FieldBlock
+    round_off: float
 
 
 def field_map(request: MapRequest, jmax: int | None = None, executor: Executor | None = None) -> FieldMap:
@@ -209,6 +222,11 @@ def converged_jmax(
                 f"J max {jmax} is too small: with {more} energies at the highest field move by {worst:.3g} MHz, more than "
                 f"{request.tolerance_mhz:g}; give a higher J max, or none and it is chosen"
             )
+        least = max(_round_off(request.problem(block), ends) for block in _blocks(request, more))
+        if worst <= least:
+            raise ValueError(
+                f"tolerance_mhz: {request.tolerance_mhz:g}: energies at the highest field have a round-off of {least:.1e} MHz; give more"
+            )
         jmax, before = more, after
         if jmax > HIGHEST_J:
             raise ValueError(f"the field needs J beyond {HIGHEST_J}: it is too strong for this top")
@@ -272,7 +290,7 @@ def _solve_blocks(request: MapRequest, blocks: Sequence[FieldBlock]) -> list[_So
     """All blocks in this process, in one go where they are chains."""
     parts = []
     for block in blocks:
-        problem, count, order = request.problem(block), count_of(request, block), free_order(block)
+        problem, count, order = request.problem(block), count_of(request, block), block.free_order
         places = enough_states(problem, order, count, request.fields, request.tolerance_mhz)
         parts.append((block, problem, block.rows[order[:count]], places, (problem.terms(places), count)))
     found = solve_together([part[-1] for part in parts], request.fields, request.tolerance_mhz)
@@ -295,7 +313,15 @@ def _measured(request: MapRequest, block: FieldBlock, problem: BlockProblem, fou
     slopes = -derivatives(problem.terms(found.places), fields, vectors)
     cosines = {name: expectation(over(made(), found.places), vectors) for name, made in problem.observables.items()}
     edge = (np.abs(vectors[:, block.j[found.places] > block.levels.j.max() - EDGE]) ** 2).sum(axis=1)
-    return _Solved(found.energies, slopes, edge, cosines, found.rows, block)
+    return _Solved(found.energies, slopes, edge, cosines, found.rows, block, _round_off(problem, fields))
+
+
+def _round_off(problem: BlockProblem, fields: Floats) -> float:
+    """Of eigenvalues at any field: LAPACK's are those of a matrix that is off by a few last places of |H|, and move by no more."""
+    strongest = float(np.abs(fields).max())
+    given = (problem.fixed, problem.slope, problem.curvature)
+    norms = [strongest**n * np.abs(one).sum(axis=1).max() for n, one in enumerate(given) if one is not None]
+    return ROUND_OFF * float(sum(norms))
 
 
 def _tabulated(request: MapRequest, jmax: int, moved: Floats, executor: Executor | None) -> FieldMap:
@@ -335,8 +361,8 @@ def _tabulated(request: MapRequest, jmax: int, moved: Floats, executor: Executor
         free_mhz=repeated(lambda one, rank: one.block.levels.energy_mhz[one.rows[rank]]),
         weight=repeated(lambda one, rank: one.block.levels.weight[one.rows[rank]]),
         jmax=jmax,
-        accuracy_mhz=float(moved.max(initial=0.0)),
         moved_mhz=np.repeat(_accuracy(request, rows, moved), len(fields)),
+        round_off_mhz=repeated(lambda one, rank: one.round_off),
         diabatic_label=_diabatic_labels(solved, named, rows),
     )
 
@@ -378,7 +404,7 @@ def _diabatic_labels(
 def _small(request: MapRequest, block: FieldBlock, count: int) -> Terms:
     """The Hamiltonian of a block in a basis for its lowest states at all fields."""
     problem = request.problem(block)
-    terms = problem.terms(enough_states(problem, free_order(block), count, request.fields, request.tolerance_mhz))
+    terms = problem.terms(enough_states(problem, block.free_order, count, request.fields, request.tolerance_mhz))
     if len(terms[0]) <= DENSE:
         return terms
     fields = np.linspace(request.fields[0], request.fields[-1], SPANNED)

@@ -10,13 +10,16 @@ from typing import TYPE_CHECKING, Any
 
 from rotor.checks import require_positive, require_whole
 from rotor.molecules.nuclei import isotope
+from rotor.quantum.effects.of_top import effects_of
 from rotor.quantum.effects.stark import checked_j
 from rotor.quantum.effects.zeeman import DEFAULT_TOLERANCE_MHZ, HIGHEST_TESLA, checked_g, zeeman_map
+from rotor.quantum.estimates.limits import Limit, limit_facts
 from rotor.quantum.fields.field_map import FieldMap
 from rotor.quantum.fields.map_request import checked_fields
 from rotor.table import TextOf
 from rotor.tops.facts import top_facts
 from rotor.tops.magnetic import MagneticTensors
+from rotor.units import NUCLEAR_MAGNETON_MHZ_PER_T
 
 if TYPE_CHECKING:
     from rotor.quantum.effect import QuantumEffect
@@ -62,8 +65,6 @@ class ZeemanRequest:
     @property
     def effects(self) -> tuple[QuantumEffect, ...]:
         """The Hamiltonian with spins where they are asked for, else nothing beyond what is always there."""
-        from rotor.quantum.effects.of_top import effects_of
-
         return effects_of(self.top, True) if self.hyperfine else ()
 
     @property
@@ -120,7 +121,35 @@ class ZeemanAnswer(TextOf):
             "tolerance_mhz": request.tolerance_mhz,
             **self.states.provenance,
             "curves": len(self.states.curves()),
+            **limit_facts(
+                request.top,
+                max(request.j_highest, 1),
+                effects_of(request.top, request.hyperfine),
+                magnetic_limits(request),
+            ),
         }
+
+
+def magnetic_limits(request: ZeemanRequest) -> list[Limit]:
+    """What of the field a request leaves out: moments of the nuclei without their spins, the magnetisability that is not known.
+
+    >>> from rotor.tops.magnetic import MagneticTensors, tensor_for
+    >>> from rotor.tops.top import Top
+    >>> rod = Top.from_constants("B=6000 MHz", magnetic=MagneticTensors(tensor_for("linear", [-0.03])))
+    >>> [one.name for one in magnetic_limits(ZeemanRequest(rod, (0.0, 1.0)))]
+    ['magnetisability']
+    """
+    found, strongest = [], max(abs(field) for field in request.fields_tesla)
+    nuclei = () if request.top.molecule is None else request.top.molecule.nuclei
+    moments = {one.label: abs(one.g_factor or 0.0) * one.spin for one in nuclei if one.spin > 0}
+    if moments and not request.hyperfine:
+        size = max(moments.values()) * NUCLEAR_MAGNETON_MHZ_PER_T * strongest
+        text = f"{', '.join(sorted(moments))}: energies in {strongest:g} T, not lines between states of one orientation"
+        found.append(Limit("magnetic moments of nuclei", size, text))
+    if request.magnetic.magnetisability is None:
+        text = f"levels shift with the square of the field, up to {strongest:g} T"
+        found.append(Limit("magnetisability", None, text))
+    return found
 
 
 def answer_zeeman(request: ZeemanRequest, executor: Executor | None = None) -> ZeemanAnswer:

@@ -212,22 +212,57 @@ def _families(
 
 def solve_f(plan: Plan, twice_f: int, exist: Exist | None = None) -> list[SpinBlock]:
     """The blocks of one F, those left out in which no level exists by `exist` (see `levels_of_f`)."""
-    scheme = plan.shared.scheme
-    every = scheme.patterns(twice_f)
-    where, first = np.unique(np.column_stack([every[:, 0] // 2, scheme.classes(every)]), axis=0, return_index=True)
-    stops = [*first[1:].tolist(), len(every)]
-    rows = {tuple(own): slice(a, b) for own, a, b in zip(where.tolist(), first.tolist(), stops, strict=True)}
+    every = plan.shared.scheme.patterns(twice_f)
     known = plan.shared.cache.pop(("coupling", twice_f), None) or _couplings(plan, {twice_f: [every]})[twice_f]
     out = []
-    for family in plan.families:
-        members = [(i, rows[place]) for i, own in family if (place := (plan.blocks[i].n, own)) in rows]
-        parts = _parts(plan, members)
-        if not members:
-            continue
+    for parts in _parts_of_f(plan, every):
         names = names_of_parts(parts, every)
         if exist is None or exist(names[0]).any():
             out.append(_solved(plan, twice_f, every, parts, known, names))
     return out
+
+
+def _parts_of_f(plan: Plan, every: Ints) -> Iterator[tuple[SpinPart, ...]]:
+    """The parts of every block of an F whose patterns these are."""
+    where, first = np.unique(
+        np.column_stack([every[:, 0] // 2, plan.shared.scheme.classes(every)]), axis=0, return_index=True
+    )
+    stops = [*first[1:].tolist(), len(every)]
+    rows = {tuple(own): slice(a, b) for own, a, b in zip(where.tolist(), first.tolist(), stops, strict=True)}
+    for family in plan.families:
+        members = [(i, rows[place]) for i, own in family if (place := (plan.blocks[i].n, own)) in rows]
+        if members:
+            yield _parts(plan, members)
+
+
+def functions_of_f(plan: Plan, twice_f: int) -> list[SpinBlock]:
+    """The functions of the blocks of one F, each named after its state of the rotation, with the energy of that; no vectors."""
+    every = plan.shared.scheme.patterns(twice_f)
+    if ("coupling", twice_f) not in plan.shared.cache:
+        plan.shared.cache["coupling", twice_f] = _couplings(plan, {twice_f: [every]})[twice_f]
+    out = []
+    for parts in _parts_of_f(plan, every):
+        energies = np.concatenate([np.tile(part.rotor.energies_mhz, part.repeats) for part in parts])
+        labels = np.concatenate([_labels_of_functions(part, every[part.patterns]) for part in parts])
+        ones = np.ones(len(energies))
+        out.append(SpinBlock(twice_f, every, parts, energies, np.zeros((0, 0)), labels, ones, plan.shared))
+    return out
+
+
+def _labels_of_functions(part: SpinPart, own_patterns: Ints) -> Ints:
+    names = named_states(part.rotor, part.rotor.vectors)
+    return np.concatenate([np.column_stack([names, np.tile(one, (len(names), 1))]) for one in own_patterns])
+
+
+def named_states(rotor: RotorBlock, vectors: Floats) -> Ints:
+    """v, Ka, Kc (n, 3) of states (n, n) of the rotation: of the part that has most of each, in order of energy."""
+    shares = np.stack([(vectors[part.place] ** 2).sum(axis=0) for part in rotor.parts])
+    of_state = assigned(shares, np.array([len(part.names) for part in rotor.parts]))
+    labels = np.empty((len(of_state), 3), dtype=np.int64)
+    labels[np.argsort(of_state, kind="stable")] = np.concatenate(
+        [np.column_stack([np.full(len(part.names), part.v), part.names]) for part in rotor.parts]
+    )
+    return labels
 
 
 def prepare(plan: Plan, every_f: Iterable[int]) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 from rotor.arrays import Ints
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.levels import Levels, weights_of_levels
-from rotor.quantum.spins.blocks import Exist, Shared, SpinBlock, plan_of, prepare, solve_f
+from rotor.quantum.spins.blocks import Exist, Plan, Shared, SpinBlock, functions_of_f, plan_of, prepare, solve_f
 from rotor.quantum.spins.operators import AxialState
 from rotor.quantum.spins.scheme import scheme_of
 from rotor.quantum.spins.simplify import simplified
@@ -91,6 +91,33 @@ def levels_of_f(
         solved = [_within(block, n_range) for block in solved]
     blocks = tuple(_placed(solved))
     return _table(top, effects, plan.shared, blocks, highest if n_range is None else n_range[1])
+
+
+def unmixed_levels(top: Top, effects: tuple[QuantumEffect, ...], every_f: Sequence[int]) -> tuple[Levels, Plan]:
+    """The functions of all F in `every_f`, states of the rotation times coupling patterns, as levels that the spins do not move.
+
+    Parameters
+    ----------
+    top : Top
+        Constants, kind and spin weights.
+    effects : tuple of QuantumEffect
+        What the Hamiltonian consists of.
+    every_f : sequence of int
+        Total angular momenta, doubled.
+
+    Returns
+    -------
+    levels : Levels
+        Named as levels are, without vectors; each block in the order of its functions.
+    plan : Plan
+        The rotation, what acts between its blocks, and the coefficients of coupling of these F.
+    """
+    total = scheme_of(top, effects).total
+    highest = max((f + total) // 2 for f in every_f)
+    plan = plan_of(top, effects, min(max(0, (f - total) // 2) for f in every_f), highest, None)
+    prepare(plan, every_f)
+    blocks = tuple(_placed(block for f in every_f for block in functions_of_f(plan, f)))
+    return _table(top, effects, plan.shared, blocks, highest), plan
 
 
 def _within(block: SpinBlock, n_range: tuple[int, int]) -> SpinBlock:

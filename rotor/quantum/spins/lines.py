@@ -209,7 +209,7 @@ class ParameterOperator:
         if key not in self._known:
             found = operators_between(up.rotor, low.rotor, self._channels, self._shared.representation)
             if up.number == low.number and (own := self._rotation(up.rotor)) is not None:
-                found[_ALONE] = found[_ALONE] + own if _ALONE in found else own
+                found[ALONE] = found[ALONE] + own if ALONE in found else own
             self._known[key] = found
         return self._known[key]
 
@@ -241,7 +241,7 @@ class ParameterOperator:
                 yield coupling.bra, coupling.ket, coupling.operator(n, representation)
 
 
-_ALONE = Channel((), 0)
+ALONE = Channel((), 0)
 
 
 def _add_between(total: Floats, block: RotorBlock, bra: int, ket: int, operator: JOperator) -> None:

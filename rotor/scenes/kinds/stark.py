@@ -12,12 +12,12 @@ from rotor.scenes import kind
 from rotor.scenes.kind import Kind, Where, Writer
 from rotor.scenes.molecule import top_of, with_dipole
 from rotor.scenes.scene import StarkScene, molecule_of
-from rotor.scenes.sections import MoleculeSection, StarkConditions, StarkNumerics, StarkObservables
+from rotor.scenes.sections import FieldEffects, MoleculeSection, StarkConditions, StarkNumerics, StarkObservables
 
 _NAMES = {
     "fields_kv_per_cm": "conditions.field", "intensity_w_per_cm2": "conditions.intensity", "m_values": "observables.m",
     "j_highest": "observables.jmax", "diabatic_gap_mhz": "observables.diabatic_gap", "jmax": "numerics.jmax",
-    "direction": "conditions.direction",
+    "direction": "conditions.direction", "hyperfine": "effects.hyperfine",
     "tolerance_mhz": "numerics.tolerance",
 }  # fmt: skip
 
@@ -41,6 +41,7 @@ def request(scene: StarkScene, folder: Where = ".") -> StarkRequest:
             jmax=scene.numerics.jmax,
             tolerance_mhz=kind.quantity("numerics.tolerance", scene.numerics.tolerance, "MHz"),
             diabatic_gap_mhz=gap,
+            hyperfine=kind.hyperfine_of(scene.effects.hyperfine, molecule),
         )
 
 
@@ -93,10 +94,6 @@ def writers(found: StarkAnswer, scene: StarkScene) -> Mapping[str, Writer]:
 def saved(asked: StarkRequest, molecule: MoleculeSection | None) -> StarkScene:
     """The scene of a request."""
     assert molecule is not None
-    if asked.hyperfine:
-        raise ValueError(
-            "a scene of levels in a field has no spins: leave out the hyperfine structure, or run without a scene"
-        )
     return StarkScene(
         molecule=molecule,
         conditions=StarkConditions(
@@ -106,9 +103,10 @@ def saved(asked: StarkRequest, molecule: MoleculeSection | None) -> StarkScene:
         ),
         observables=StarkObservables(
             jmax=asked.j_highest,
-            m=None if asked.m_values is None else [int(m) for m in asked.m_values],
+            m=None if asked.m_values is None else [float(m) for m in asked.m_values],
             diabatic_gap=None if asked.diabatic_gap_mhz is None else f"{asked.diabatic_gap_mhz!r} MHz",
         ),
+        effects=FieldEffects(hyperfine=kind.saved_hyperfine(asked.hyperfine, asked.top)),
         numerics=StarkNumerics(jmax=asked.jmax, tolerance=f"{asked.tolerance_mhz!r} MHz"),
     )
 

@@ -68,6 +68,30 @@ def stark(request: Any) -> Knobs:
     return Knobs(tuple(knobs))
 
 
+def zeeman(request: Any) -> Knobs:
+    """Of a scene of levels in a magnetic field."""
+    from rotor.quantum.fields.zeeman_request import answer_zeeman
+
+    measure = Measure(
+        "energy", "MHz", lambda found, reference: _apart(found.states.energy_mhz, reference.states.energy_mhz)
+    )
+    jmax = int(answer_zeeman(request).states.jmax)
+    beyond = replace(request, jmax=jmax + MORE_J)
+    if request.jmax is not None:
+        knob = Knob(
+            "numerics.jmax",
+            (measure,),
+            (Setting(str(jmax), request, True),),
+            beyond,
+            f"J max {jmax + MORE_J}",
+            answer_zeeman,
+        )
+        return Knobs((knob,))
+    settings = ladder(TOLERANCES_MHZ, request.tolerance_mhz, lambda one: replace(request, tolerance_mhz=one))
+    against = f"J max {jmax + MORE_J}"
+    return Knobs((Knob("numerics.tolerance", (measure,), settings, beyond, against, answer_zeeman),))
+
+
 def _energies(asked: tuple[Any, int]) -> Any:
     """Energies of all states of a map with one J max of the basis, however small: a map itself refuses one that is too small."""
     from rotor.quantum.effects.stark import map_request

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from rotor.formats.atomic_write import open_atomic
+from rotor.formats.packed import name_of
 from rotor.formats.spcat.text.freeform import Line, encode, number, read_lines, read_words, whole
 
 
@@ -68,7 +69,7 @@ def read_int(source: str | os.PathLike[str] | bytes) -> IntensityFile:
     """
     lines = read_lines(source)
     if len(lines) < 2:
-        name = lines[0].file if lines else "the text given"
+        name = lines[0].file if lines else name_of(source)
         raise ValueError(
             f"{name}: {len(lines)} lines; expected a title, a line FLAGS TAG QROT FBGN FEND ... and dipoles"
         )

@@ -9,6 +9,7 @@ from functools import partial
 from typing import Any
 
 from rotor.formats.atomic_write import open_atomic
+from rotor.formats.packed import name_of
 from rotor.formats.spcat.text.freeform import Line, encode, number, read_lines, read_words, spell, whole
 
 _LETTER = re.compile(r"[ \t]*([A-Za-z])?")
@@ -94,7 +95,7 @@ def read_par(source: str | os.PathLike[str] | bytes) -> ParameterFile:
     """
     lines = read_lines(source)
     if len(lines) < 3:
-        name = lines[0].file if lines else "the text given"
+        name = lines[0].file if lines else name_of(source)
         raise ValueError(f"{name}: {len(lines)} lines; expected a title, limits, options and parameters")
     header = _header(lines[1])
     options = [_options(lines[2])]

@@ -1,0 +1,154 @@
+"""l-doubled states with spins: what a spin parameter stands for over the two real states x and y, and names of levels.
+
+The table of `l_doubled` holds for the operators of N in spin terms too. i(O↑ - O↓) of a tensor with components q = ±1 or ±2 alone is
+the tensor turned about z by 90° or 45°, so that xz becomes yz and xx - yy becomes xy + yx.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from math import sqrt
+
+import numpy as np
+
+from rotor.arrays import Floats, Ints
+from rotor.formats.spcat.l_doubled import Pair, functions_of_parts
+from rotor.quantum.levels import Levels
+from rotor.quantum.spins.blocks import SpinBlock, assigned
+from rotor.quantum.spins.operators import Cosines, CosinesWithN, Matrix, Rotor
+from rotor.quantum.spins.rotor import RotorBlock
+from rotor.quantum.spins.terms import SpinTerm
+
+
+def spin_terms_with_pairs(
+    term: SpinTerm, states: tuple[int, int], reversed_: bool, pairs: Sequence[Pair], axes: str
+) -> list[SpinTerm]:
+    """A spin term of a file over real states, where one of its states at least is l-doubled.
+
+    Parameters
+    ----------
+    term : SpinTerm
+        As it is for other states.
+    states : (int, int)
+        Lower number first.
+    reversed_ : bool
+        V2 > V1 in the code, Δk Δl < 0.
+    pairs : sequence of Pair
+        The l-doubled states of the file.
+    axes : str
+        Those at x, y, z: bca or bac.
+
+    Returns
+    -------
+    list of SpinTerm
+        As the table at the head of `l_doubled`.
+
+    Raises
+    ------
+    ValueError
+        For what this package does not compute between such states.
+    """
+    low, high = states
+    firsts, seconds = {pair.first: pair for pair in pairs}, {pair.second: pair for pair in pairs}
+    sign = -1.0 if reversed_ else 1.0
+    odd = term.rotor.odd
+    if low == high:  # in an oblate basis the sign of what is odd is another between states than within a pair
+        return _within(_at(term, term.bra, term.ket, -1.0) if odd and axes[2] == "c" else term, odd, firsts.get(low))
+    if odd:
+        raise ValueError("an odd spin operator between l-doubled states is read but not computed yet")
+    if (low in firsts and firsts[low].second == high) or (high in firsts and firsts[high].second == low):
+        x, y = sorted(states)
+        turned = 0.5 * sign * (1.0 if x in firsts else -1.0)
+        return [_at(term, x, x, 0.5), _at(term, y, y, -0.5), *_at_turned(term, x, y, turned, axes)]
+    if low in firsts and high in firsts:
+        return [_at(term, *_in_order(a, b)) for a, b in zip(firsts[low], firsts[high], strict=True)]
+    if low in seconds or high in seconds:
+        raise ValueError(
+            "a spin operator of the state with K l ≤ 0 is read but not computed yet; name the one with K l > 0"
+        )
+    pair = firsts[low] if low in firsts else firsts[high]
+    other = high if low in firsts else low
+    with_x, with_y = _in_order(other, pair.first), _in_order(other, pair.second)
+    return [_at(term, *with_x, 1 / sqrt(2.0)), *_at_turned(term, *with_y, sign / sqrt(2.0), axes)]
+
+
+def _in_order(one: int, other: int) -> tuple[int, int]:
+    return min(one, other), max(one, other)
+
+
+def _at(term: SpinTerm, bra: int, ket: int, factor: float = 1.0) -> SpinTerm:
+    return replace(term, bra=bra, ket=ket, factor=term.factor * factor)
+
+
+def _within(term: SpinTerm, odd: bool, pair: Pair | None) -> list[SpinTerm]:
+    if pair is None:  # of the second state: passed over
+        return []
+    x, y = sorted(pair)
+    if odd:
+        return [_at(term, x, y, -1.0 if x == pair.first else 1.0)]
+    return [_at(term, x, x), _at(term, y, y)]
+
+
+def _at_turned(term: SpinTerm, bra: int, ket: int, factor: float, axes: str) -> list[SpinTerm]:
+    turned = turned_rotor(term.rotor, axes)
+    return [] if turned is None else [replace(_at(term, bra, ket, factor), rotor=turned)]
+
+
+def turned_rotor(rotor: Rotor, axes: str) -> Rotor | None:
+    """i(O↑ - O↓) of a tensor, None where it has neither.
+
+    >>> turned_rotor(Cosines(((0, 0, 0), (0, 1.0, 0), (0, 0, -1.0))), "bca").components  # bb - cc becomes bc + cb
+    ((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, 1.0, 0.0))
+    """
+    if not isinstance(rotor, Cosines | CosinesWithN) or (rotor.rank == 1 and isinstance(rotor, Cosines)):
+        return None
+    x, y, z = ("abc".index(axis) for axis in axes)
+    c, found = np.array(rotor.components, dtype=float), np.zeros((3, 3))
+    stretched = (c[x, x] - c[y, y]) / 2
+    found[x, y] = found[y, x] = stretched
+    found[x, x], found[y, y] = -(c[x, y] + c[y, x]) / 2, (c[x, y] + c[y, x]) / 2
+    found[y, z], found[z, y], found[x, z], found[z, x] = c[x, z], c[z, x], -c[y, z], -c[z, y]
+    if not found.any():
+        return None
+    found += 0.0  # no minus zeros
+    components: Matrix = tuple(tuple(float(value) for value in row) for row in found)  # type: ignore[assignment]
+    return type(rotor)(components)
+
+
+def named_by_l_with_spins(levels: Levels, pairs: Sequence[Pair], representation: str) -> Levels:
+    """The same levels with v of a pair by the sign of K l, and names by the function |K, l⟩ ± |-K, -l⟩ with the largest share."""
+    labels, mixing = [], []
+    known: dict[int, tuple[Floats, Ints]] = {}
+    for block in levels.blocks:
+        for part in block.parts:
+            if part.number not in known:
+                known[part.number] = _functions(part.rotor, pairs, representation)
+        own, shares = _names_of_block(block, known)
+        labels.append(own)
+        mixing.append(shares)
+    table = np.concatenate(labels)
+    quanta = {**levels.quanta, "v": table[:, 0], "n": table[:, 3] // 2, "ka": table[:, 1], "kc": table[:, 2]}
+    sums = [name for name in levels.quanta if name not in ("v", "n", "ka", "kc")]
+    for column, name in enumerate(sums, 4):
+        quanta[name] = table[:, column] if name in levels.halves else table[:, column] // 2
+    return replace(levels, quanta=quanta, mixing=np.concatenate(mixing))
+
+
+def _names_of_block(block: SpinBlock, known: dict[int, tuple[Floats, Ints]]) -> tuple[Ints, Floats]:
+    names, shares = list[Ints](), list[Floats]()
+    for part in block.parts:
+        functions, own = known[part.number]
+        rows = block.vectors[part.place].reshape(part.repeats, len(part.rotor.energies_mhz), -1)
+        inside = np.einsum("fr,prn->pfn", functions @ part.rotor.vectors, rows)
+        for pattern, of_pattern in zip(block.patterns[part.patterns], inside, strict=True):
+            names.append(np.hstack([own, np.broadcast_to(pattern, (len(own), len(pattern)))]))
+            shares.append(of_pattern**2)
+    table = np.concatenate(shares)
+    of_state = assigned(table, np.ones(len(table), dtype=np.int64))
+    return np.concatenate(names)[of_state], np.asarray(table[of_state, np.arange(len(of_state))])
+
+
+def _functions(rotor: RotorBlock, pairs: Sequence[Pair], representation: str) -> tuple[Floats, Ints]:
+    places = [(part.v, part.basis, part.place.start) for part in rotor.parts]
+    return functions_of_parts(places, len(rotor.vectors), pairs, representation)

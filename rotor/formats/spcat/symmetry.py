@@ -1,0 +1,107 @@
+"""What the symmetry that option lines declare forbids: such parameters, or parts of them, SPCAT leaves out with a warning in its .out.
+
+An n-fold axis (IAX 6 to 11) allows Δk - Δl = 0, ±n, ... only. Operators that connect levels of unequal nuclear-spin weights alone
+are left out too, and so are those between states whose axes differ.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from rotor.formats.spcat.l_doubled import Pair
+from rotor.formats.spcat.operators import CodedOperator
+from rotor.formats.spcat.states import StateOptions
+from rotor.quantum.spins.operators import Cosines, CosinesWithN, Matrix
+
+_SPECIES = ((0, 0), (0, 1), (1, 1), (1, 0))  # A, Ba, Bb, Bc by parities of Ka and Kc
+
+
+def delta_k(typ: int, oblate: bool) -> int:
+    """The change of K of an operator, by the TYP of its code, the part of Nb², Nc² with ΔK = 2 apart.
+
+    >>> [delta_k(typ, False) for typ in (1, 4, 5, 20, 21, 40, 41, 42, 61)]
+    [0, 2, 4, 0, 2, 1, 1, 3, 1]
+    """
+    if typ < 4 or typ >= 80:
+        return 0
+    if typ < 20:
+        return 2 * (typ - 3) if typ < 12 else 2 * (typ - 11)
+    axis, order = typ // 20, typ % 20 + 1
+    axis = {1: 3, 3: 1}.get(axis, axis) if oblate else axis
+    return order - (axis // 2 + order) % 2
+
+
+def l_values(states: Sequence[StateOptions], pairs: Sequence[Pair]) -> dict[int, int]:
+    """l of the l-doubled states by number: that of the state with K l > 0 is positive."""
+    found: dict[int, int] = {}
+    for pair in pairs:
+        size = min(states[pair.first].l_code, states[pair.second].l_code)
+        found |= {pair.first: size, pair.second: -size}
+    return found
+
+
+def forbidden(typ: int, low: StateOptions, high: StateOptions, del_l: int, oblate: bool, doubled: bool) -> str:
+    """Why an operator between two states, or within one, has no elements; nothing where it has some.
+
+    Parameters
+    ----------
+    typ : int
+        TYP of its code.
+    low, high : StateOptions
+        Of the two states; the same twice within one state.
+    del_l : int
+        |Δl|, negative where Δk Δl < 0.
+    oblate : bool
+        Whether z is the c axis.
+    doubled : bool
+        Whether one of the states is l-doubled: the species of such levels are not looked at.
+
+    Returns
+    -------
+    str
+        The reason.
+    """
+    if (low.fold, low.i_tot) != (high.fold, high.i_tot):
+        return "the axes of the two states differ"
+    if low.fold > 2 and (delta_k(typ, oblate) - del_l) % low.fold:
+        return f"its Δk - Δl is no multiple of {low.fold}"
+    if not (low.i_tot or doubled) and not some_weights_agree(typ, low, high):
+        return "it connects levels of unequal nuclear-spin weights"
+    return ""
+
+
+def some_weights_agree(typ: int, low: StateOptions, high: StateOptions) -> bool:
+    """Whether an operator by its TYP (20, 40, 60: of the species of Na, Nb, Nc) joins levels of one weight."""
+    turn = {1: (0, 1), 2: (1, 1), 3: (1, 0)}.get(typ // 20, (0, 0))  # species of the operator
+    for species in _SPECIES:
+        other = (species[0] ^ turn[0], species[1] ^ turn[1])
+        ours, theirs = (_weights(state, *own) for state, own in ((low, species), (high, other)))
+        agree = bool(set(ours) & set(theirs) - {0}) if low.fold > 2 else ours[0] == theirs[0]
+        if agree:
+            return True
+    return False
+
+
+def _weights(state: StateOptions, ka: int, kc: int) -> list[int]:
+    """Of A (or B) and of E levels in the Wang block of a species, whichever axis K is along."""
+    one, other = np.array([ka]), np.array([kc])
+    if state.fold < 3:
+        return [int(state.class_weight(one, other)[0])]
+    along = {int(k): state.block_weights(one, other, np.array([k]))[0] for k in (ka, kc)}
+    return sorted({int(weight) for found in along.values() for weight in found})
+
+
+def symmetric_part(operator: CodedOperator, axes: str) -> CodedOperator:
+    """Of Nb² and Nc², with a spin or without, the part that an axis of more than two folds along z leaves: without ΔK = 2."""
+    if operator.plain is not None:
+        return replace(operator, plain={powers: value for powers, value in operator.plain.items() if powers[2] == 0})
+    if not isinstance(operator.rotor, Cosines | CosinesWithN):
+        return operator
+    x, y, _ = ("abc".index(axis) for axis in axes)
+    c = np.array(operator.rotor.components, dtype=float)
+    c[x, x] = c[y, y] = (c[x, x] + c[y, y]) / 2
+    components: Matrix = tuple(tuple(float(value) for value in row) for row in c)  # type: ignore[assignment]
+    return replace(operator, rotor=type(operator.rotor)(components))
