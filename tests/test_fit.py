@@ -13,8 +13,9 @@ from rotor.fit.parameters import parameters, with_names
 from rotor.fit.publication import publication_table, value_text
 from rotor.fit.report import decisive, report_text
 from rotor.fit.search import robust
-from rotor.formats.assigned_lines import read_assigned_lines
+from rotor.formats.assigned_lines import read_assigned_lines, write_assigned_lines
 from rotor.formats.spcat.text.cat import read_cat
+from rotor.formats.spcat.text.lin import read_lin
 from rotor.quantum.estimates.uncertainty import level_errors
 from rotor.quantum.solve import solve_levels
 from rotor.spectra.lines import line_list
@@ -220,6 +221,38 @@ def test_a_blend_is_one_frequency_the_weighted_mean():
     assert fit.constants["B"] == pytest.approx(b, rel=1e-10)  # exact data
     assert fit.blended_mhz[2:] == pytest.approx(mean, rel=1e-12)
     assert fit.calculated_mhz[2:] == pytest.approx(ends[2:], rel=1e-10)
+
+
+def test_a_blend_of_known_width_weighs_how_far_its_components_lie_apart(tmp_path):
+    """χ² = (obs - mean)²/σ² + Σ w (calc - mean)²/width², w of the sum 1; the width stands in a .lin behind the blend."""
+    upper, lower = (
+        [[1, 0, 1], [2, 0, 2], [2, 1, 2], [3, 1, 2], [3, 2, 2]],
+        [[0, 0, 0], [1, 0, 1], [1, 1, 1], [2, 1, 1], [2, 2, 1]],
+    )
+    start = Constants(A=9000.0, B=3000.0, C=2500.0)
+    seen = [5500.0, 11000.0, 10500.0, 17000.0, 17000.0]
+    lines = assignments(
+        ASYMMETRIC, upper, lower, seen, 0.5, weight=[1, 1, 1, 1, 3], blend=[0, 1, 2, 3, 3], widths_mhz={3: 40.0}
+    )
+    fit = fit_lines(lines, start, parameters(start, ["A", "B", "C"]), FitOptions(poor_rms=1e9))
+    calculated = fit.calculated_mhz
+    mean = calculated[3:] @ [0.25, 0.75]
+    expected = [*(seen[:3] - calculated[:3]) / 0.5, (17000 - mean) / 0.5]
+    expected += [np.sqrt(0.25) * (mean - calculated[3]) / 40, np.sqrt(0.75) * (mean - calculated[4]) / 40]
+    assert fit.residuals == pytest.approx(expected, abs=1e-9)  # round-off
+    assert fit.weighted_rms == pytest.approx(
+        np.sqrt(np.mean(np.square(expected))), rel=1e-12
+    )  # SPFIT counts the components
+    assert (
+        np.abs(fit.minimum.jacobian.T @ fit.residuals).max() < 1e-3 * np.abs(fit.minimum.jacobian).max()
+    )  # at a minimum
+
+    write_assigned_lines(lines, tmp_path / "blend.lin")
+    back = read_lin(tmp_path / "blend.lin", 3)
+    assert back.blends().tolist() == [0, 1, 2, 3, 3, -1]
+    assert back.error_mhz[-1] == 40.0
+    with pytest.raises(ValueError, match=r"a \.csv has no place for the widths"):
+        write_assigned_lines(lines, tmp_path / "blend.csv")
 
 
 def test_ties_keep_ratios_and_differences():

@@ -13,11 +13,14 @@ import numpy as np
 import pytest
 from fit_kinds import ERROR_MHZ, Kind, lin_text, lines_of, parameter_file, start_of, write_case
 
+from rotor.fit.assignment import assignments, merged
+from rotor.fit.choose import suggest_lines
 from rotor.fit.fit import fit_lines
 from rotor.formats.spcat.fit_input import fitted_file, read_fit, spfit_input
 from rotor.formats.spcat.fit_states import FileLevels
 from rotor.formats.spcat.text.lin import read_lin
 from rotor.formats.spcat.text.par import read_par
+from rotor.formats.spcat.unmeasured import unmeasured_lines
 from rotor.formats.spcat.unresolved import excluded_parameters
 
 THREE = """10099 14500.1 A
@@ -283,3 +286,25 @@ def test_a_file_with_resolved_and_unresolved_lines_is_fitted(tmp_path):
     assert fit.weighted_rms == pytest.approx(1.0, abs=0.4)  # 93 normal errors
     for one, given in zip(fitted_file(asked, fit, variances=True).parameters, file.parameters, strict=True):
         assert abs(one.value - given.value) < 4 * one.error  # 4 σ
+
+
+def test_a_suggested_line_of_a_file_with_spins_does_what_was_said_of_it(tmp_path):
+    """Lines that are not among the measured ones, of their kinds; the first one, measured, reduces the error as foretold."""
+    write_case(tmp_path, "case", replace(TWO_CHLORINES, nxpar=0), 1e-4)
+    asked = read_fit(tmp_path / "case.par")
+    fit = fit_lines(asked.lines, None, asked.parameters, asked.options, model=asked.model)
+    upper, lower = unmeasured_lines(asked.file, asked.lines)
+    pairs = {(*u, *d) for u, d in zip(upper.tolist(), lower.tolist(), strict=True)}
+    measured = {(*u, *d) for u, d in zip(asked.lines.upper.tolist(), asked.lines.lower.tolist(), strict=True)}
+    assert not pairs & measured
+    assert {tuple(u - d) for u, d in zip(upper, lower, strict=True)} <= {
+        tuple(change) for change in asked.lines.upper - asked.lines.lower
+    }
+    best = suggest_lines(fit, "X-1", upper, lower, error_mhz=ERROR_MHZ, model=asked.model)[0]
+    more = assignments(asked.lines.names, [best.upper], [best.lower], best.frequency_mhz, ERROR_MHZ)
+    again = fit_lines(merged(asked.lines, more)[0], None, asked.parameters, asked.options, model=asked.model)
+    column = asked.parameters.names.index("X-1")
+    assert best.error_ratio < 1
+    assert again.errors[column] / fit.errors[column] == pytest.approx(
+        best.error_ratio, rel=1e-4
+    )  # constants move a little

@@ -117,7 +117,7 @@ def command(context: typer.Context, given: Options) -> None:
         del files.paths["--out .toml"]
         note("spins or several states: no .toml is written, the .par and .var have everything")
     trials = _trials(fit, options, given.try_)
-    suggestions = _suggestions(fit, given.suggest)
+    suggestions = _suggestions(request, fit, given.suggest)
     spread = _bootstrap(request, fit, options, given.bootstrap, given.seed)
     if not fit.converged and fit.minimum.status != "interrupted":
         for name in ("--out .toml", "--out .par", "--out .var"):
@@ -289,16 +289,21 @@ def _trials(fit: Fit, options: FitOptions, text: str | None) -> list[Trial]:
     return try_constants(fit, _names(text), options) if text is not None else []
 
 
-def _suggestions(fit: Fit, name: str | None) -> list[Suggestion]:
-    """The best twenty of all lines that the dipole's selection rules allow for J up to the highest measured."""
+def _suggestions(request: FitRequest, fit: Fit, name: str | None) -> list[Suggestion]:
+    """The best twenty of all lines of the kinds that were measured, for J up to the highest measured."""
     if name is None:
         return []
     import numpy as np
 
     from rotor.fit.choose import suggest_lines
 
-    upper, lower = _unmeasured(fit)
     error = float(np.median(fit.lines.error_mhz[fit.used]))
+    if request.spfit is not None and fit.constants is None:
+        from rotor.formats.spcat.unmeasured import unmeasured_lines
+
+        upper, lower = unmeasured_lines(request.spfit.file, fit.lines)
+        return suggest_lines(fit, name, upper, lower, error_mhz=error, model=request.model)[:20]
+    upper, lower = _unmeasured(fit)
     return suggest_lines(fit, fit.named.own_name(name), upper, lower, error_mhz=error)[:20]
 
 

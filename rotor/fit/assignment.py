@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -23,6 +23,7 @@ class Assignments(Table):
     weight (n,) : share within its blend. blend (n,) : lines of one number are one measured frequency, the mean of their
     calculated ones by weight; a line alone has a number of its own
     source : where the lines are from. comments : by line, what was written beside it
+    widths_mhz : by the number of a blend, how far its components may lie apart (rms): a standard error about 0
     """
 
     names: tuple[str, ...]
@@ -35,6 +36,7 @@ class Assignments(Table):
     wavenumber: NDArray[np.bool_]
     source: str = ""
     comments: tuple[str, ...] = ()
+    widths_mhz: dict[int, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         n, k = len(self.frequency_mhz), len(self.names)
@@ -107,6 +109,7 @@ def assignments(
     wavenumber: ArrayLike = False,
     source: str = "",
     comments: Sequence[str] = (),
+    widths_mhz: Mapping[int, float] | None = None,
 ) -> Assignments:
     """Assigned lines from labels (n, k) and numbers (n,), or one number for all.
 
@@ -123,6 +126,8 @@ def assignments(
     wavenumber : (n,) array of bool
         Which lines were measured in cm⁻¹.
     source, comments : where from; what was written beside each line
+    widths_mhz : mapping, optional
+        By the number of a blend how far its components may lie apart (rms).
 
     Returns
     -------
@@ -144,14 +149,19 @@ def assignments(
     n = len(frequency)
     labels = [np.asarray(side, dtype=np.int64).reshape(n, -1) if n else np.zeros((0, len(names)), np.int64)
               for side in (upper, lower)]  # fmt: skip
-    groups = np.arange(n) if blend is None else np.unique(np.asarray(blend), return_inverse=True)[1].reshape(-1)
+    numbers, groups = np.unique(np.arange(n) if blend is None else np.asarray(blend), return_inverse=True)
+    widths = (
+        {place: widths_mhz[number] for place, number in enumerate(numbers.tolist()) if number in widths_mhz}
+        if widths_mhz
+        else {}
+    )
     return Assignments(
         tuple(names), labels[0], labels[1], frequency,
         np.broadcast_to(np.asarray(error_mhz, dtype=float), (n,)).copy(),
         np.broadcast_to(np.asarray(weight, dtype=float), (n,)).copy(),
-        groups.astype(np.int64),
+        groups.reshape(-1).astype(np.int64),
         np.broadcast_to(np.asarray(wavenumber, dtype=bool), (n,)).copy(),
-        source, tuple(comments),
+        source, tuple(comments), widths,
     )  # fmt: skip
 
 
@@ -183,7 +193,10 @@ def merged(first: Assignments, second: Assignments, *, same_within_mhz: float = 
     comments = [text for one in (first, more) for text in (one.comments or ("",) * len(one))]
     source = " and ".join(dict.fromkeys(filter(None, (first.source, second.source))))
     blend = np.concatenate([first.blend, more.blend + shift])
-    return Assignments(first.names, **joined, blend=blend, source=source, comments=tuple(comments)), notes
+    widths = first.widths_mhz | {number + shift: width for number, width in more.widths_mhz.items()}
+    return Assignments(
+        first.names, **joined, blend=blend, source=source, comments=tuple(comments), widths_mhz=widths
+    ), notes
 
 
 def _key(lines: Assignments, i: int) -> tuple[int, ...]:

@@ -77,8 +77,11 @@ class Fit:
 
     @property
     def weighted_rms(self) -> float:
-        """√(Σ ((obs - calc)/σ)² / lines that counted), blends as one: what SPFIT calls RMS ERROR."""
-        r = self.residuals[: len(self.groups)]
+        """√(Σ ((obs - calc)/σ)² / lines that counted), blends as one: what SPFIT calls RMS ERROR.
+
+        Of a blend of known width its components count too.
+        """
+        r = self.residuals[: len(self.residuals) - int(np.isfinite(self.parameters.prior).sum())]
         return float(np.sqrt(r @ r / len(r))) if len(r) else float("nan")
 
     @property

@@ -27,6 +27,7 @@ _ROUGH = 10.0  # standard errors within which a stage has converged
 _FIRST_ITERATIONS = 12  # of a direct search, after which it must have made way
 _WAY = 0.01  # of the weighted rms at the start, below which it has
 _LATELY = 6  # iterations in which it must halve the weighted rms after these
+_NONE = np.zeros(0, dtype=np.int64)
 _AT_ZERO_MHZ = 1e-30  # how far a constant that starts at 0 may move in these stages
 
 
@@ -170,13 +171,36 @@ class Search:
         residuals = (self.lines.frequency_mhz[group.first] - group.mean(calculated)) / sigma
         rows = group.mean(jacobian)
         rows /= sigma[:, None]
+        spread, of_spread = self._apart(calculated, jacobian)
         known = np.flatnonzero(np.isfinite(self.parameters.prior))
-        if not len(known):
-            return residuals, rows
         prior = self.parameters.prior[known]
         behind = np.zeros((len(known), len(values)))
         behind[np.arange(len(known)), known] = 1 / prior
-        return np.concatenate([residuals, (self.parameters.start - values)[known] / prior]), np.vstack([rows, behind])
+        if not len(known) and not len(spread):
+            return residuals, rows
+        held = (self.parameters.start - values)[known] / prior
+        return np.concatenate([residuals, spread, held]), np.vstack([rows, of_spread, behind])
+
+    def _apart(self, calculated: Floats, jacobian: Floats) -> tuple[Floats, Floats]:
+        """√w (mean - calculated)/width of the components of blends of a known width, and the derivatives of the negative.
+
+        With the mean's own residual they make (obs - mean)²/σ² + Σ w (calculated - mean)²/width², w of the sum 1.
+        """
+        group, places = self.group, self.wide
+        if not len(places):
+            return np.zeros(0), np.zeros((0, jacobian.shape[1]))
+        rows = group.order[places]
+        of_group = np.searchsorted(group.starts, places, side="right") - 1
+        widths = np.array([self.lines.widths_mhz[number] for number in self.lines.blend[rows].tolist()])
+        factor = np.sqrt(group.shares[places]) / widths
+        means, of_means = group.mean(calculated)[of_group], group.mean(jacobian)[of_group]
+        return factor * (means - calculated[rows]), factor[:, None] * (jacobian[rows] - of_means)
+
+    @property
+    def wide(self) -> Ints:
+        """Places, in the order of the groups, of the components of blends whose width is known."""
+        numbers = self.lines.blend[self.group.order]
+        return np.flatnonzero(np.isin(numbers, list(self.lines.widths_mhz))) if self.lines.widths_mhz else _NONE
 
     @property
     def group(self) -> Grouping:

@@ -235,6 +235,8 @@ def write_assigned_lines(lines: Assignments, path: str | os.PathLike[str]) -> No
         return write_lin(_as_lin(lines), path)
     if not text.endswith(".csv"):
         raise ValueError(f"{path}: assigned lines are written as .lin or .csv")
+    if lines.widths_mhz:
+        raise ValueError(f"{path}: a .csv has no place for the widths of blends; write a .lin")
     labels = [f"{name}_{side}" for side in ("upper", "lower") for name in lines.names]
     wave = bool(lines.wavenumber.all()) and len(lines) > 0
     unit = MHZ_PER_CM if wave else 1.0
@@ -255,10 +257,21 @@ def write_assigned_lines(lines: Assignments, path: str | os.PathLike[str]) -> No
     return None
 
 
+def _with_widths(lines: Assignments) -> Assignments:
+    """Lines in order of their blends, and behind each blend of known width one more, whose error is the width."""
+    last = np.flatnonzero(np.append(np.diff(lines.blend) != 0, True))
+    wide = [i for i in last.tolist() if int(lines.blend[i]) in lines.widths_mhz]
+    rows = np.sort(np.concatenate([np.arange(len(lines)), np.array(wide, dtype=np.int64)]), kind="stable")
+    found = lines.take(rows)
+    second = np.flatnonzero(np.append(False, rows[1:] == rows[:-1]))
+    found.error_mhz[second] = [lines.widths_mhz[int(lines.blend[i])] for i in wide]
+    return found
+
+
 def _as_lin(lines: Assignments):  # type: ignore[no-untyped-def]
     from dataclasses import replace
 
-    ordered = lines.take(np.argsort(lines.blend, kind="stable"))
+    ordered = _with_widths(lines.take(np.argsort(lines.blend, kind="stable")))
     made = line_list(ordered.upper, ordered.lower, ordered.frequency_mhz, ordered.error_mhz, ordered.weight)
     unit = np.where(ordered.wavenumber, 1 / MHZ_PER_CM, 1.0)
     sign = np.where(ordered.wavenumber, -1.0, 1.0)

@@ -177,9 +177,7 @@ def _assigned(lines: LineList, names: Sequence[str], header: Header, source: str
     used = np.arange(len(lines)) < abs(header.nline)
     if not used.all():
         notes.append(f"NLINE = {abs(header.nline)}: {len(lines) - int(used.sum())} lines behind it do not count")
-    widths = used & (blends < 0)
-    if widths.any():
-        notes.append(f"{int(widths.sum())} lines that give the width of a blend do not count")
+    widths = _widths(lines, blends, used, header)
     used &= blends >= 0
     upper, lower = lines.states()
     _refuse_width(lines, names, used)
@@ -190,7 +188,17 @@ def _assigned(lines: LineList, names: Sequence[str], header: Header, source: str
     return assignments(
         names, upper[used][:, :k], lower[used][:, :k], frequency[used], error[used],
         weight=lines.weight[used], blend=blends[used], wavenumber=wavenumber[used], source=source,
+        widths_mhz=widths,
     ), notes  # fmt: skip
+
+
+def _widths(lines: LineList, blends: Ints, used: np.ndarray, header: Header) -> dict[int, float]:
+    """The widths of blends: the error of the line of the same frequency behind them."""
+    found = {}
+    for i in np.flatnonzero(used & (blends < 0)).tolist():
+        scale = header.cal if lines.error[i] < 0 else 1.0
+        found[int(blends[:i][blends[:i] >= 0][-1])] = float(lines.error_mhz[i] / scale)
+    return found
 
 
 def _refuse_width(lines: LineList, names: Sequence[str], used: np.ndarray) -> None:

@@ -123,7 +123,7 @@ def _searched(file: ParameterFile, groups: Sequence[Group], form: Format, labels
         positive[lost, -1] += 1
 
 
-def _levels(group: Group, angular: Sequence[int]) -> Levels:
+def levels_in_blocks(group: Group, angular: Sequence[int]) -> Levels:
     """The levels of the doubled F, or J, that are listed, in blocks."""
     if group.spins:
         return levels_of_f(group.top, (group.effect,), angular, None, None)
@@ -195,7 +195,7 @@ def _of_some_f(
     values: Floats,
 ) -> _Solved | None:
     """The labels at the places `here` among the levels of some doubled F; None without any."""
-    levels = _levels(group, angular)
+    levels = levels_in_blocks(group, angular)
     rows = _rows_of(group, levels, form, labels[here])
     found = rows >= 0
     if not found.any():

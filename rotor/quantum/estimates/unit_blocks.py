@@ -12,6 +12,7 @@ at the start, state n stays state n; where they do not, the names are made anew.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -27,7 +28,8 @@ Namer = Callable[[Floats, Floats, Floats], Ints]  # matrix, energies, vectors ->
 class UnitBlock:
     """One block: size, places (row, column, row ≥ column) of elements, their factors (elements, columns), which parameters.
 
-    sub_blocks (functions,) : the number of the sub-block of each function. namer : names of all states, where they must be made
+    members (sub-blocks, functions) : 1 where a function is in a sub-block. twice (elements,) : 2 off the diagonal
+    namer : names of all states, where they must be made
     """
 
     size: int
@@ -35,7 +37,8 @@ class UnitBlock:
     columns: Ints
     factors: Floats
     parameters: Ints
-    sub_blocks: Ints
+    members: Floats
+    twice: Floats
     namer: Namer
 
     def matrix(self, values_mhz: Floats) -> Floats:
@@ -46,8 +49,7 @@ class UnitBlock:
 
     def slopes(self, vectors: Floats) -> Floats:
         """⟨n|O_i|n⟩ (states, parameters of the block) of states in columns."""
-        twice = np.where(self.rows == self.columns, 1.0, 2.0)
-        weights = vectors[self.rows] * vectors[self.columns] * twice[:, None]
+        weights = vectors[self.rows] * vectors[self.columns] * self.twice[:, None]
         return np.asarray(weights.T @ self.factors)
 
 
@@ -77,7 +79,9 @@ def unit_block(units: dict[int, Elements], sub_blocks: Ints, namer: Namer) -> Un
     for column, i in enumerate(parameters):
         factors[np.searchsorted(places, units[i].places), column] = units[i].values
     rows, columns = np.divmod(places, size)
-    return UnitBlock(size, rows, columns, factors, np.array(parameters, dtype=np.int64), sub_blocks, namer)
+    members = (sub_blocks[None, :] == np.arange(sub_blocks.max(initial=0) + 1)[:, None]).astype(float)
+    twice = np.where(rows == columns, 1.0, 2.0)
+    return UnitBlock(size, rows, columns, factors, np.array(parameters, dtype=np.int64), members, twice, namer)
 
 
 @dataclass
@@ -146,18 +150,16 @@ class UnitBlocks:
 def _solved(block: UnitBlock, values_mhz: Floats) -> tuple[Floats, Floats, Floats]:
     """Matrix, energies and vectors; a number is taken off the diagonal for the sake of digits, and added to the energies."""
     matrix = block.matrix(values_mhz)
-    if not np.isfinite(matrix).all():
-        raise ValueError("a block of the Hamiltonian is not finite with these constants")
     zero = float(matrix[0, 0])
-    matrix[np.diag_indices(block.size)] -= zero
+    matrix.ravel()[:: block.size + 1] -= zero
+    if not math.isfinite(float(matrix.sum())):
+        raise ValueError("a block of the Hamiltonian is not finite with these constants")
     energies, vectors = np.linalg.eigh(matrix)
     return matrix, energies + zero, vectors
 
 
 def _leading(block: UnitBlock, vectors: Floats) -> Ints:
     """The sub-block with the largest share of each state, (n,)."""
-    count = int(block.sub_blocks.max(initial=0)) + 1
-    if count == 1:
+    if len(block.members) == 1:
         return np.zeros(block.size, dtype=np.int64)
-    member = (block.sub_blocks[None, :] == np.arange(count)[:, None]).astype(float)
-    return np.asarray((member @ vectors**2).argmax(axis=0))
+    return np.asarray((block.members @ vectors**2).argmax(axis=0))

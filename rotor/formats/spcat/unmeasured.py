@@ -1,0 +1,96 @@
+"""Lines that a .par file could have beside the measured ones: of the same kinds, frequencies and N, for advice on what to measure."""
+
+from __future__ import annotations
+
+from math import prod
+
+import numpy as np
+
+from rotor.arrays import Floats, Ints
+from rotor.fit.assignment import Assignments
+from rotor.formats.spcat.file_lines import Format, format_of, quanta_of
+from rotor.formats.spcat.file_model import Group
+from rotor.formats.spcat.fit_states import groups_for_fit, levels_in_blocks
+from rotor.formats.spcat.text.par import ParameterFile
+from rotor.quantum.spins.levels import unmixed_levels
+
+_WIDER = 0.01  # of the lowest and highest frequency: how far beyond them a line may lie
+_MOST_NUMBERS = 2**62  # that an integer holds
+
+
+def unmeasured_lines(file: ParameterFile, measured: Assignments) -> tuple[Ints, Ints]:
+    """Labels (n, k) of both states of the lines whose quantum numbers change as those of a measured line do.
+
+    The states are the same as the measured line's (v), N is at most the highest measured, the frequency within the measured range,
+    where spins do not count. Raises ValueError where a file has so many quantum numbers that labels cannot be counted.
+
+    Parameters
+    ----------
+    file : ParameterFile
+        Near the fitted one.
+    measured : Assignments
+        Those with F below 0 and energies from zero are left out.
+    """
+    groups = groups_for_fit(file)
+    form = format_of(file, groups)
+    highest = int(max(measured.upper[:, 0].max(), measured.lower[:, 0].max()))
+    found = [_labels_of(group, form, highest) for group in groups]
+    labels, first = np.unique(np.concatenate([one[0] for one in found]), axis=0, return_index=True)
+    energies = np.concatenate([one[1] for one in found])[first]
+
+    plain = ~measured.from_zero & (
+        measured.upper.min(axis=1) >= 0 if form.rotation != 2 else measured.upper[:, -1] >= 0
+    )
+    seen = measured.take(plain)
+    v = form.rotation if form.states else 0
+    state = seen.lower[:, v] if form.states else np.zeros(len(seen), dtype=np.int64)
+    changes = np.unique(np.column_stack([state, seen.upper - seen.lower]), axis=0)
+    number = _Numbering(np.concatenate([labels, seen.upper, seen.lower]), changes[:, 1:])
+    known = set(zip(number.of(seen.upper).tolist(), number.of(seen.lower).tolist(), strict=True))
+    rows = number.of(labels)
+    order = np.argsort(rows)
+    low_mhz = float(seen.frequency_mhz.min()) * (1 - _WIDER)
+    high_mhz = float(seen.frequency_mhz.max()) * (1 + _WIDER)
+    pairs = []
+    for change in changes:
+        lower = np.flatnonzero(labels[:, v] == change[0]) if form.states else np.arange(len(labels))
+        goal = number.of(labels[lower] + change[1:])
+        place = np.minimum(np.searchsorted(rows[order], goal), len(rows) - 1)
+        upper = order[place]
+        frequency = energies[upper] - energies[lower]
+        chosen = (rows[upper] == goal) & (frequency > low_mhz) & (frequency < high_mhz)
+        new = [(i, k) for i, k in zip(upper[chosen].tolist(), lower[chosen].tolist(), strict=True)
+               if (int(rows[i]), int(rows[k])) not in known]  # fmt: skip
+        pairs += new
+    table = np.array(pairs, dtype=np.int64).reshape(-1, 2)
+    return labels[table[:, 0]], labels[table[:, 1]]
+
+
+def _labels_of(group: Group, form: Format, highest: int) -> tuple[Ints, Floats]:
+    """Labels (n, k) with N up to the highest, and where the levels lie without what the spins do, MHz."""
+    if group.spins:
+        total = sum(group.spins)
+        levels, _ = unmixed_levels(group.top, (group.effect,), list(range(total % 2, 2 * highest + total + 1, 2)))
+    else:
+        levels = levels_in_blocks(group, range(0, 2 * highest + 1, 2))
+    tables = [
+        quanta_of(group, levels, form, negative) for negative in ((False, True) if form.rotation == 2 else (False,))
+    ]
+    labels = np.concatenate(tables)
+    inside = labels[:, 0] <= highest
+    return labels[inside], np.tile(levels.energy_mhz, len(tables))[inside]
+
+
+class _Numbering:
+    """One whole number for each label, so that labels are found by a search."""
+
+    def __init__(self, labels: Ints, changes: Ints) -> None:
+        self._least = labels.min(axis=0) + np.minimum(changes.min(axis=0, initial=0), 0)
+        spans = labels.max(axis=0) + np.maximum(changes.max(axis=0, initial=0), 0) - self._least + 1
+        if prod(spans.tolist()) > _MOST_NUMBERS:
+            raise ValueError("so many quantum numbers cannot be counted: no line can be suggested for this file")
+        self._steps = np.array([prod(spans[i + 1 :].tolist()) for i in range(len(spans))], dtype=np.int64)
+
+    def of(self, labels: Ints) -> Ints:
+        """Numbers (n,) of labels (n, k)."""
+        return np.asarray((labels.astype(np.int64) - self._least) @ self._steps)
