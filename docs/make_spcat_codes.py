@@ -113,7 +113,7 @@ def option_rows() -> list[str]:
         ("EWT1: with spins", "s -3 2 0 20 0 6 1 1 -1 101 0\ns -3 1 0 20 0 6 1 1 0 201 0"),
     ]  # fmt: skip
     rows = [f"| {name} | {option_answer(line)} |" for name, line in cases]
-    rows.append("| DIAG | labels are those of full projection (1) whatever it says |")
+    rows.append("| DIAG 0 to 5: the names of levels | yes |")
     return [*rows, "| IXX: elements with ΔN ≠ 0, ΔJ ≠ 0, ... left out | yes |"]
 
 

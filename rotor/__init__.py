@@ -10,9 +10,10 @@ Functions of a top take whatever `rotor.read` takes instead: `rotor.line_list("w
 are loaded when first used, so that `import rotor` does no work.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import cache, wraps
 from importlib import import_module
+from inspect import signature
 from typing import TYPE_CHECKING, Any
 
 from rotor.version import version
@@ -146,7 +147,7 @@ def __getattr__(name: str) -> Any:
     if name in _MODULES:
         found = getattr(import_module(_MODULES[name]), name)
         return _taking_words(found) if name in _OF_TOPS else found
-    raise AttributeError(f"module 'rotor' has no attribute {name!r}")
+    raise AttributeError(f"module 'rotor' has no attribute {name!r}{_near(name, _MODULES)}")
 
 
 @cache
@@ -158,12 +159,33 @@ def _taking_words(function: Callable[..., Any]) -> Callable[..., Any]:
         from rotor.formats import read
         from rotor.tops.top import Top
 
+        _refuse_arguments(function, (top, *args), options)
         found = top if isinstance(top, Top) else read(top)
         if not isinstance(found, Top):
             raise ValueError(f"{top}: holds a {type(found).__name__}, not a molecule or constants")
         return function(found, *args, **options)
 
     return call
+
+
+def _refuse_arguments(function: Callable[..., Any], args: tuple[Any, ...], options: dict[str, Any]) -> None:
+    """TypeError, with the names that would do, for arguments that the function does not take."""
+    taken = signature(function)
+    try:
+        taken.bind(*args, **options)
+    except TypeError as error:
+        unknown = next((name for name in options if name not in taken.parameters), None)
+        names = [name for name in taken.parameters if name not in ("top", *options)]
+        which = _near(unknown, names) if unknown else ""
+        raise TypeError(f"{function.__name__}(): {error}{which or '; by name it takes ' + ', '.join(names)}") from None
+
+
+def _near(name: str, known: Iterable[str]) -> str:
+    """The names that are like one that is not known, as the end of a message."""
+    from difflib import get_close_matches
+
+    found = get_close_matches(name, known, n=3)
+    return f"; did you mean {', '.join(found)}?" if found else ""
 
 
 def __dir__() -> list[str]:

@@ -12,8 +12,11 @@ def require_positive(name: str, value: float, unit: str = "") -> float:
     >>> require_positive("temperature_k", 300.0)
     300.0
     """
+    of = f"{' ' if unit else ''}{unit}"
+    if isinstance(value, str):
+        raise ValueError(f"{name}: {value!r}: expected a number above 0{of}, not a text")
     if not (math.isfinite(value) and value > 0):
-        raise ValueError(f"{name}: {value:g}: expected a finite number above 0{' ' if unit else ''}{unit}")
+        raise ValueError(f"{name}: {value:g}: expected a finite number above 0{of}")
     return value
 
 
@@ -36,6 +39,8 @@ def require_whole(name: str, value: int | None, least: int, most: int | None = N
     ValueError
         With name, value and bounds.
     """
+    if value is not None and not hasattr(value, "__index__"):
+        raise ValueError(f"{name}: {value!r}: expected a whole number, of type int")
     if value is not None and (value < least or (most is not None and value > most)):
         bounds = f"of {least} or more" if most is None else f"from {least} to {most}"
         raise ValueError(f"{name}: {value}: expected a whole number {bounds}")
@@ -73,3 +78,9 @@ def require_one_of(name: str, value: str, known: Collection[str]) -> str:
     if value not in known:
         raise ValueError(f"{name}: {value!r}: expected one of {', '.join(known)}")
     return value
+
+
+def require_top(value: object) -> None:
+    """Refuse what is no top, such as its name; a top is known by its constants, since nothing is imported here."""
+    if not hasattr(value, "constants"):
+        raise ValueError(f"top: {value!r:.60}: expected a Top; rotor.read makes one of a name, a file or a molecule")

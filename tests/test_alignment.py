@@ -400,3 +400,22 @@ def test_planar_cosine_of_an_asymmetric_top_goes_over_into_that_of_a_symmetric_o
     for name in traces[0]:
         assert np.abs(traces[0][name] - traces[1][name]).max() < 1e-3  # both tolerances and the phases
     assert traces[0]["cos2theta_2d"].max() > 0.6
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (lambda: DipolePulse(1e7, 1.0), "field 1e.07 kV/cm: a number up to 100000"),  # 1e12 V/m
+        (lambda: align(OCS, GaussianPulse(1e16, 1.0), [10.0], state={"j": 0}), "the pulses need J up to about 14"),
+    ],
+)
+def test_what_would_run_for_ever_is_refused_at_once(make, said):
+    with pytest.raises(ValueError, match=said):
+        make()
+
+
+def test_progress_counts_blocks():
+    seen = []
+    align(OCS, GaussianPulse(1e12, 0.1), [1.0, 2.0], temperature_k=1.0, progress=lambda *counts: seen.append(counts))
+    assert [done for done, _ in seen] == list(range(1, len(seen) + 1))
+    assert seen[-1][0] == seen[-1][1] > 1

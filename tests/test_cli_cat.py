@@ -173,6 +173,7 @@ def test_a_prediction_has_the_temperature_and_the_range_of_the_catalogue(call, t
 def test_another_isotope_is_compared(call, tmp_path):
     assert call("spectrum", "OCS", "--isotope", "S=34S", "--jmax", "5", "--cat", "heavy.cat")[0] == 0
     _, out, _ = call("cat", "heavy.cat", "--compare", "OCS", "--isotope", "S=34S", "--json", "-")
+    assert json.loads(out)["compared"]["other"] == "OCS, S=34S"
     assert json.loads(out)["compared"]["frequency_mhz"]["largest"] < 1.01e-4  # four decimals
 
 

@@ -42,6 +42,7 @@ def test_debug_shows_where_a_mistake_was_found(call):
     assert code == 2
     assert err.startswith("Traceback")
     assert "\nerror: 'no-such-molecule' is no file here" in err
+    assert call("spectrum", "no-such-molecule", "--debug") == (2, "", err)  # where one adds it after an error
 
 
 @pytest.mark.parametrize(("words", "found"), [("rotor spec", "spectrum"), ("rotor levels --uni", "--unit")])

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import importlib.metadata
 import importlib.util
 import json
+import re
 import sys
 from pathlib import Path
 from types import ModuleType
@@ -100,3 +102,33 @@ def test_figures_in_the_text_are_those_that_the_benchmarks_wrote():
     for page, text in (("speed.md", ","), ("classical.md", " (up to 15 on a busy machine) and")):
         stated = f"{one / 1000:.0f} ms for one body{text} {most:.0f} to {many:.0f} µs each for many"
         assert stated in (DOCS / page).read_text(encoding="utf-8")
+
+
+@pytest.mark.slow
+def test_the_sizes_of_dependencies_are_those_of_the_installed_files():
+    """Of the releases in constraints.txt that are installed here; others may weigh something else."""
+    root = DOCS.parent
+    pinned = dict(row.split("==") for row in (root / "constraints.txt").read_text("utf-8").split() if "==" in row)
+    rows = [row.split("|")[1:3] for row in (root / "README.md").read_text("utf-8").splitlines() if row.startswith("| ")]
+    compared = 0
+    for names, sizes in rows:
+        packages = [name for name in names.strip().split(", ") if name in pinned]
+        stated = re.findall(r"(?:^|, )(?:(\w+) )?(\d+)(?=,|$)", sizes.strip())
+        own = [float(size) for name, size in stated if not name]
+        for name, size in [*zip(packages, own, strict=False), *((n, float(s)) for n, s in stated if n in pinned)]:
+            if installed(name, pinned[name]) is not None and name not in ("rich", "pydantic"):  # with what they need
+                assert installed(name, pinned[name]) == pytest.approx(size, abs=0.6 + 0.02 * size), name  # whole MB
+                compared += 1
+    assert compared >= 8 or importlib.metadata.version("numpy") != pinned["numpy"]
+
+
+def installed(name: str, version: str) -> float | None:
+    """MB of the files of a distribution with what pip compiled; None where it is not there or is another release."""
+    try:
+        found = importlib.metadata.distribution(name)
+    except importlib.metadata.PackageNotFoundError:
+        return None
+    if found.version != version:
+        return None
+    files = (Path(str(found.locate_file(one))) for one in found.files or [])
+    return sum(one.stat().st_size for one in files if one.is_file()) / 1e6

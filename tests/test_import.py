@@ -99,3 +99,15 @@ def test_a_short_motion_compiles_nothing(folder):
     first = subprocess.run(words, capture_output=True, text=True, check=True, env=environment)
     assert not (folder / "cache").exists() or not list((folder / "cache").rglob("*.nbi"))
     assert '"motion"' in first.stdout
+
+
+def test_no_module_is_in_a_circle_of_imports():
+    """Deferred imports and those for types counted too; the order is one from the command line down to the units."""
+    from graphlib import TopologicalSorter
+
+    import grimp
+
+    graph = grimp.build_graph("rotor", cache_dir=None)
+    below = {module: graph.find_modules_directly_imported_by(module) for module in graph.modules}
+    order = list(TopologicalSorter(below).static_order())  # raises CycleError, which names the circle
+    assert order.index("rotor.scenes.scene") < order.index("rotor.scenes.run")

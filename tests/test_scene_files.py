@@ -125,6 +125,7 @@ def test_nothing_of_the_physics_is_loaded_by_a_scene_alone():
         "rotor.scenes.scene",
         "rotor.scenes.scene_file",
         "rotor.scenes.sections",
+        "rotor.scenes.verbs",
         "rotor.version",
     ]
 

@@ -306,3 +306,25 @@ def test_buckminsterfullerene_of_ase_is_near_ih():
         top.with_symmetry_within(0.5)
     with pytest.raises(ValueError, match="has constants of its own"):
         rotor.read("water").with_symmetry_within(0.005)
+
+
+def test_tops_and_requests_are_compared_by_content():
+    """A copy is equal and has the same hash; one number changed is another top; a list of tops can be searched."""
+    import copy
+    import pickle
+
+    water = rotor.read("water")
+    again = pickle.loads(pickle.dumps(water))
+    assert water == again == copy.deepcopy(water) == rotor.read("water")
+    assert hash(water) == hash(again)
+    other = replace(water, dipole_abc_debye=(0.0, 1.0, 0.0))
+    assert water != other
+    assert water != "water"
+    assert [other, water].index(again) == 1
+    assert {water: 1}[again] == 1
+    assert rotor.SpectrumRequest(water, jmax=3) == rotor.SpectrumRequest(again, jmax=3)
+    turned = rotor.read("water", isotopes={2: "D"})
+    assert turned not in (water, other)
+    levels = rotor.solve_levels(water, 2)
+    assert levels in [levels]
+    assert levels != rotor.solve_levels(water, 2)  # tables are compared column by column, by their reader

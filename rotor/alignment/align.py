@@ -39,7 +39,7 @@ DEFAULT_TOLERANCE = 1e-6
 HIGHEST_J = 600
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class AlignmentTrace(Table):
     """Cosines against time, and how they were found.
 
@@ -186,6 +186,11 @@ def align(
     if jmax < ensemble.jmax + EDGE:
         raise ValueError(
             f"J max {jmax}: the ensemble itself has J up to {ensemble.jmax}; give at least {ensemble.jmax + EDGE}"
+        )
+    if given is None and jmax > HIGHEST_J:
+        raise ValueError(
+            f"the pulses need J up to about {jmax}; states up to J = {HIGHEST_J} are propagated: lower the intensity, the duration or the "
+            "temperature"
         )
     while True:
         pilot = pilot_of(problem, jmax)

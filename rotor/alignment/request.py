@@ -84,7 +84,7 @@ class AlignRequest:
         return np.linspace(*self.ends_ps, self.points)
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class AlignmentTable(Table):
     """Quantum cosines against time, and those of a classical gas in columns with the suffix _classical."""
 

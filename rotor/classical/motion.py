@@ -15,7 +15,7 @@ from rotor.geometry.rotations import continuous
 from rotor.table import Table
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class MotionTable(Table):
     """One body at n times.
 

@@ -119,6 +119,8 @@ def _terminated(number: int, frame: object) -> None:
 def run(arguments: Sequence[str] | None = None) -> int:
     """Carry out a command and return its exit code; every error is one line on standard error, unless --debug is given."""
     arguments = sys.argv[1:] if arguments is None else list(arguments)
+    if "--debug" in arguments:  # an option of the command, which one adds at the end
+        arguments = ["--debug", *(word for word in arguments if word != "--debug")]
     try:
         return _run(arguments)
     except _ERROR_OF_USE as error:

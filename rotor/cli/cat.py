@@ -91,7 +91,7 @@ def command(
     if comparing.compare is not None:
         compared = beside(lines, file, comparing, lambda other: _chosen(other, options))
         found = compared.comparison
-        content["compared"] = comparison_record(compared, comparing.compare, top_lines)
+        content["compared"] = comparison_record(compared, comparing.other, top_lines)
     content["files"] = files.names
     content["lines"] = [line_record(lines, row) for row in range(len(lines))]
 

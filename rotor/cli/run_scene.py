@@ -28,8 +28,7 @@ from rotor.cli.shared.output import (
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
-    from rotor.scenes.run import SceneResult
-    from rotor.scenes.scene import Scene
+    from rotor.scenes.scene import Scene, SceneResult
     from rotor.scenes.sweep import SweepResult
     from rotor.table import Table as Columns
 

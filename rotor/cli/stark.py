@@ -103,7 +103,7 @@ class Sample:
     light: str = option(
         "parallel",
         metavar="NAME",
-        help="Of --lines: parallel, perpendicular, isotropic, or the angle with the field (degrees).",
+        help="Of --lines: parallel, perpendicular, isotropic, the angle with the field (degrees), or a direction X,Y,Z.",
     )
     temperature: str = option("300", metavar="T", help="Of --lines, --spectrum and --mixture (K).")
     populations: str = option(
@@ -214,7 +214,7 @@ def _sample(sample: Sample) -> dict[str, Any]:
     named = sample.light in ("parallel", "perpendicular", "isotropic")
     range_ = sample.range_
     return {
-        "light": sample.light if named else parsed("--light", sample.light, _angle),
+        "light": sample.light if named else parsed("--light", sample.light, _light),
         "temperature_k": quantity("--temperature", sample.temperature, "K"),
         "populations": sample.populations,
         "line": None if sample.line is None else parsed("--line", sample.line, _line),
@@ -224,11 +224,16 @@ def _sample(sample: Sample) -> dict[str, Any]:
     }
 
 
-def _angle(text: str) -> float:
+def _light(text: str) -> float | tuple[float, ...]:
     try:
-        return float(text)
+        numbers = tuple(float(part) for part in text.split(","))
     except ValueError:
-        raise ValueError(f"{text!r}: expected parallel, perpendicular, isotropic, or an angle in degrees") from None
+        numbers = ()
+    if len(numbers) not in (1, 3):
+        raise ValueError(
+            f"{text!r}: expected parallel, perpendicular, isotropic, an angle in degrees, or a direction such as 1,0,1"
+        )
+    return numbers if len(numbers) == 3 else numbers[0]
 
 
 def _line(text: str) -> tuple[str, str]:

@@ -21,7 +21,7 @@ YEH_HUMMER_XI = 2.837297  # of a cubic cell; I.-C. Yeh and G. Hummer, J. Phys. C
 M2_PER_S = 1e-8  # 1 Å²/ps in m²/s
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class PairDistribution(Table):
     """r_angstrom: (bins,) middles of shells. g: (bins,). coordination: (bins,) neighbours up to the end of each shell."""
 

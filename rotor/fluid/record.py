@@ -10,7 +10,7 @@ from rotor.arrays import Floats
 from rotor.table import Table
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class FluidRecord(Table):
     """Energies, temperatures and pressure at n times; all arrays (n,).
 

@@ -55,6 +55,8 @@ def read(source: Any, *, isotopes: Isotopes | None = None) -> Any:
         return _with_isotopes(source, isotopes)
     if isinstance(source, Constants):
         return _with_isotopes(Top.from_constants(source), isotopes)
+    if isinstance(source, str) and not source.strip():
+        raise ValueError("an empty text names no molecule: give a path, 'SMILES:...' or a name")
     if isinstance(source, str) and source != "-" and not source.startswith("SMILES:"):
         source = _meaning(source)
     if isinstance(source, Path):

@@ -27,7 +27,7 @@ _ODD_MOMENTS = (
 )  # fmt: skip
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Body:
     """A rigid body by its mass, centre of mass (3,) and inertia tensor (3, 3) about it; any coherent units.
 
@@ -138,7 +138,7 @@ def hemisphere(mass: float, radius: float) -> Body:
     return Body(mass, np.array([0, 0, -3 * radius / 8]), np.diag([across, across, 0.4 * mass * radius**2]))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PrincipalFrame:
     """Moments (3,) in increasing order, and the axes a, b, c as rows (3, 3), right-handed, in the frame of the input."""
 

@@ -120,7 +120,7 @@ def twist_log(q: ArrayLike, position: ArrayLike) -> Floats:
     return np.concatenate(np.broadcast_arrays(omega, velocity), axis=-1)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Screw:
     """A turn by `angle` (rad) about the line through `point` (3,) along `axis` (3,), and a shift along it.
 

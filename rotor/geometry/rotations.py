@@ -22,7 +22,7 @@ ORTHOGONALITY_TOLERANCE = 1e-6  # largest |RᵀR - 1| that `from_matrix` takes f
 POLE = 1e-8  # sin(θ/2) or cos(θ/2) below which the first and last Euler angle are known to fewer than 8 digits
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class NearestRotation:
     """The rotation nearest to a matrix, how far the matrix was from it, and whether another is as near.
 
@@ -36,7 +36,7 @@ class NearestRotation:
     unique: NDArray[np.bool_]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class EulerAngles:
     """Angles of R = R_z(phi) R_y(theta) R_z(chi), in radians, theta within [0, π], the others within [-π, π].
 

@@ -11,7 +11,7 @@ from rotor.arrays import Floats
 from rotor.geometry.rotations import from_matrix, nearest_rotation
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Superposition:
     """target ≈ rotation mobile + translation, in the sense of weighted least squares.
 
@@ -31,7 +31,7 @@ class Superposition:
         return np.asarray(points @ np.swapaxes(self.rotation, -1, -2) + self.translation[..., None, :])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Polar:
     """gradient = rotation @ stretch = left_stretch @ rotation; rotation proper, both stretches symmetric (..., 3, 3).
 
@@ -45,7 +45,7 @@ class Polar:
     unique: NDArray[np.bool_]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class FlowGradient:
     """Strain rate (..., 3, 3), symmetric; vorticity (..., 3) = curl v; angular velocity (..., 3) = ½ curl v."""
 

@@ -8,7 +8,7 @@ one, so that the sum of all these overlaps is largest.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -19,7 +19,7 @@ from rotor.quantum.effect import k_limits_of
 from rotor.quantum.levels import Levels, weights_of_levels
 from rotor.quantum.states import Coupling, State
 from rotor.quantum.wang.basis import WangBlock, limited, names_of, wang_blocks
-from rotor.quantum.wang.j_operators import Complexes, JOperator, between_blocks
+from rotor.quantum.wang.j_operators import JOperator, between_blocks
 from rotor.quantum.wang.wang_matrix import JMatrix, block_bands, scalar_energy
 from rotor.tops.operators import Operators
 
@@ -253,20 +253,34 @@ def _blocks_of_state(model: Model, v: int, j: int) -> list[WangBlock]:
 def _edges(model: Model, vertices: list[tuple[int, WangBlock]], j: int) -> dict[tuple[int, int], Floats]:
     """What connects two vertices, both ways round, and a vertex with itself; nothing for what round-off alone leaves."""
     found: dict[tuple[int, int], Floats] = {}
-    for value, coupling in model.couplings:
-        operator = value * coupling.operator(j, model.representation)
-        largest = max((float(np.abs(band).max(initial=0.0)) for band in operator.bands.values()), default=0.0)
-        for i, (bra, up) in enumerate(vertices):
-            for k, (ket, low) in enumerate(vertices):
-                if (bra, ket) != (coupling.bra, coupling.ket) or not largest:
-                    continue
-                between = between_blocks(up, low, operator)
+    of_state = {v: [i for i, (own, _) in enumerate(vertices) if own == v] for v in model.states}
+    for (bra, ket), couplings in _by_states(model.couplings).items():
+        operators = [value * coupling.operator(j, model.representation) for value, coupling in couplings]
+        whole = operators[0]
+        for operator in operators[1:]:
+            whole = whole + operator
+        largest = max((float(np.abs(band).max(initial=0.0)) for band in whole.bands.values()), default=0.0)
+        if not largest:
+            continue
+        for i in of_state[bra]:
+            for k in of_state[ket]:
+                up, low = vertices[i][1], vertices[k][1]
+                between = between_blocks(up, low, whole)
                 if np.abs(between).max() <= _NOTHING * largest:
                     continue
-                _refuse_imaginary(coupling, between, largest)
+                if np.abs(between.imag).max() > _NOTHING * largest:
+                    _refuse_imaginary(couplings, operators, up, low, largest)
                 _add(found, (i, k), between.real)
                 if bra != ket:
                     _add(found, (k, i), between.real.T)
+    return found
+
+
+def _by_states(couplings: Iterable[tuple[float, Coupling]]) -> dict[tuple[int, int], list[tuple[float, Coupling]]]:
+    """Couplings by the states that they connect."""
+    found: dict[tuple[int, int], list[tuple[float, Coupling]]] = {}
+    for value, coupling in couplings:
+        found.setdefault((coupling.bra, coupling.ket), []).append((value, coupling))
     return found
 
 
@@ -274,12 +288,16 @@ def _add(found: dict[tuple[int, int], Floats], key: tuple[int, int], matrix: Flo
     found[key] = found[key] + matrix if key in found else matrix
 
 
-def _refuse_imaginary(coupling: Coupling, between: Complexes, largest: float) -> None:
-    if np.abs(between.imag).max() > _NOTHING * largest:
-        raise ValueError(
-            f"{coupling.name}: the operator is not invariant under time reversal; an odd power of J is Hermitian and allowed "
-            "between two states only, with the factor i"
-        )
+def _refuse_imaginary(
+    couplings: list[tuple[float, Coupling]], operators: list[JOperator], up: WangBlock, low: WangBlock, largest: float
+) -> None:
+    """ValueError with the name of the coupling, of those between two states, that has an imaginary element."""
+    for (_, coupling), operator in zip(couplings, operators, strict=True):
+        if np.abs(between_blocks(up, low, operator).imag).max() > _NOTHING * largest:
+            raise ValueError(
+                f"{coupling.name}: the operator is not invariant under time reversal; an odd power of J is Hermitian and allowed "
+                "between two states only, with the factor i"
+            )
 
 
 def _connected(count: int, edges: dict[tuple[int, int], Floats]) -> list[list[int]]:

@@ -56,7 +56,7 @@ class SolvedBlock:
         return np.asarray((self.vectors**2).T @ (k * k).astype(float))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Levels(Table):
     """Energy levels as columns of equal length.
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from rotor import units
 from rotor.arrays import Floats, Ints
-from rotor.checks import require_positive, require_whole
+from rotor.checks import require_positive, require_top, require_whole
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.estimates.convergence import warnings_of
@@ -47,6 +47,7 @@ class LevelsRequest:
     effects: tuple[QuantumEffect, ...] = SEMI_RIGID
 
     def __post_init__(self) -> None:
+        require_top(self.top)
         require_whole("jmin", self.jmin, 0)
         require_whole("jmax", self.jmax, self.jmin)
         require_whole("kmin", self.kmin, 0)
@@ -57,7 +58,7 @@ class LevelsRequest:
             raise ValueError(f"kmax: the levels of a {self.top.kind} top have no K; give J alone")
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class SelectedLevels(Table):
     """Energy levels in order of their rows, energies in three units from the lowest level that exists.
 

@@ -1,1 +1,24 @@
 """Scenes: what to simulate, written in one file; read, planned and run."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rotor.scenes.verbs import VERBS
+
+
+def _run(*given: Any, **named: Any) -> Any:
+    """`rotor.scenes.run.run_scene`, loaded when a scene is run."""
+    from rotor.scenes.run import run_scene
+
+    return run_scene(*given, **named)
+
+
+def _plan(*given: Any) -> Any:
+    """`rotor.scenes.plan.plan_of`, likewise."""
+    from rotor.scenes.plan import plan_of
+
+    return plan_of(*given)
+
+
+VERBS.update(run=_run, plan=_plan)

@@ -6,12 +6,12 @@ import os
 import time
 from collections.abc import Mapping
 from concurrent.futures import Executor
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rotor.scenes.kind import Kind, Writer, kind_of
-from rotor.scenes.scene import Scene, within
+from rotor.scenes.scene import Scene, SceneResult, within
 
 if TYPE_CHECKING:
     from rotor.scenes.choice import Choice, Reached
@@ -24,20 +24,6 @@ SUFFIXES: Mapping[str, tuple[str, ...]] = {
     "report": (".fit",), "toml": (".toml",), "par": (".par",), "var": (".var",), "table": (".txt", ".md", ".tex"),
     "save_lines": (".lin", ".csv"),
 }  # fmt: skip  # of every output that is a file
-
-
-@dataclass(frozen=True)
-class SceneResult:
-    """What came of a scene. request, answer: of the library. table: the rows. files: written. seconds: of the
-    answer. reached: the error, where the scene asks for an accuracy."""
-
-    scene: Scene
-    request: Any
-    answer: Any
-    table: Table
-    files: tuple[Path, ...]
-    seconds: float
-    reached: Reached | None = None
 
 
 def run_scene(

@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from concurrent.futures import Executor
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -58,10 +59,12 @@ from rotor.scenes.sections import (
     ZeemanObservables,
     said,
 )
+from rotor.scenes.verbs import VERBS
 
 if TYPE_CHECKING:
+    from rotor.scenes.choice import Reached
     from rotor.scenes.plan_parts import Plan
-    from rotor.scenes.run import SceneResult
+    from rotor.table import Table
 
 SCHEMA = 1
 
@@ -89,15 +92,27 @@ class Scene(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_
         executor: Executor | None = None,
     ) -> SceneResult:
         """Run the scene, see `rotor.scenes.run.run_scene`."""
-        from rotor.scenes.run import run_scene
-
-        return run_scene(self, folder=folder, out=out, executor=executor)
+        found: SceneResult = VERBS["run"](self, folder=folder, out=out, executor=executor)
+        return found
 
     def plan(self, *, folder: str | os.PathLike[str] = ".") -> Plan:
         """What the scene will do and leave out, see `rotor.scenes.plan.plan_of`."""
-        from rotor.scenes.plan import plan_of
+        found: Plan = VERBS["plan"](self, folder)
+        return found
 
-        return plan_of(self, folder)
+
+@dataclass(frozen=True)
+class SceneResult:
+    """What came of a scene. request, answer: of the library. table: the rows. files: written. seconds: of the
+    answer. reached: the error, where the scene asks for an accuracy."""
+
+    scene: Scene
+    request: Any
+    answer: Any
+    table: Table
+    files: tuple[Path, ...]
+    seconds: float
+    reached: Reached | None = None
 
 
 class SpectrumScene(Scene, frozen=True, tag="spectrum"):

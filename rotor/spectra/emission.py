@@ -69,7 +69,7 @@ class Source:
             )
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Emission(Table):
     """Optical depth and brightness temperature (n,) on a grid of frequencies (n,), and the source they belong to."""
 

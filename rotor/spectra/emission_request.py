@@ -75,7 +75,7 @@ class EmissionRequest:
         return tuple(found)
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class EmissionLines(Table):
     """Lines of all molecules, (n,) each, rising in frequency; T_B and its integral of each line by itself.
 

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from rotor import units
 from rotor.arrays import Floats, Ints
+from rotor.checks import require_whole
 from rotor.quantum.levels import Levels
 
 if TYPE_CHECKING:
@@ -110,6 +111,7 @@ def largest(values: Floats, count: int) -> Ints:
     >>> largest(np.array([1.0, 3.0, 2.0, 3.0]), 3).tolist()
     [1, 3, 2]
     """
+    require_whole("count", count, 0)
     if 0 < count < len(values):
         least = np.partition(values, len(values) - count)[len(values) - count]
         rows = np.flatnonzero(values >= least)

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from rotor import units
 from rotor.arrays import Floats, Ints
+from rotor.checks import require_positive, require_whole
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.estimates.convergence import warnings_of
@@ -50,7 +51,7 @@ if TYPE_CHECKING:
 DEFAULT_MIN_LGINT = -12.0
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Lines(TransitionTable):
     """Lines as columns of equal length, rising in frequency unless they were asked for unsorted.
 
@@ -233,9 +234,9 @@ class Lines(TransitionTable):
             out = {"frequency_mhz": out["frequency_mhz"], "error_mhz": error} | out
         return out | self.levels.quanta_columns(self.upper, "upper") | self.levels.quanta_columns(self.lower, "lower")
 
-    def __getitem__(self, chosen: NDArray[Any] | slice) -> Lines:
-        """The same as `where`: lines[mask], lines[:10]."""
-        return self.where(chosen)
+    def __getitem__(self, chosen: NDArray[Any] | slice | int) -> Lines:
+        """The same as `where`: lines[mask], lines[:10]; lines[3] is a list of one line."""
+        return self.where(np.array([chosen]) if isinstance(chosen, int) else chosen)
 
     def _title(self) -> str:
         name = self.top.name or "a top"
@@ -327,8 +328,13 @@ def line_list(
     >>> [round(float(f), 3) for f in lines.frequency_mhz]
     [115271.936, 230543.872]
     """
-    if not (math.isfinite(temperature_k) and temperature_k > 0):
-        raise ValueError(f"temperature {temperature_k} K: a temperature is above 0 K")
+    require_positive("temperature_k", temperature_k, "K")
+    require_whole("jmax", jmax, 0)
+    if min_lgint is not None and math.isnan(min_lgint):
+        raise ValueError("min_lgint: nan: expected a number, or None for every allowed line")
+    first, last = range_mhz
+    if not first < last:
+        raise ValueError(f"range_mhz: {first:g} to {last:g} MHz: expected a range that rises")
     dipole = _dipole_of(top)
     least = -math.inf if min_lgint is None else min_lgint
     given = partition_of(top, temperature_k, q, vibrational_factor, vibrations, effects)

@@ -45,7 +45,7 @@ DEFAULT_LASER_NM = 532.0
 DEFAULT_MIN_RELATIVE = 1e-6
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class RamanLines(TransitionTable):
     """Raman lines as columns of equal length, rising in shift.
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rotor.arrays import Floats, Ints
-from rotor.checks import require_one_of, require_positive, require_whole
+from rotor.checks import require_one_of, require_positive, require_top, require_whole
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.estimates.limits import limit_facts, populated_j
@@ -76,6 +76,7 @@ class SpectrumRequest:
     effects: tuple[QuantumEffect, ...] = SEMI_RIGID
 
     def __post_init__(self) -> None:
+        require_top(self.top)
         require_positive("temperature_k", self.temperature_k)
         require_whole("jmax", self.jmax, 0)
         require_positive("vibrational_factor", self.vibrational_factor)

@@ -29,7 +29,7 @@ _STEP = 0.1  # a resolving grid goes in steps of a fortieth of the width at a ce
 _BACKGROUND = 2001  # and has so many even points
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Spectrum(Table):
     """Intensity on a grid of frequencies.
 

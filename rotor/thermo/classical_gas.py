@@ -16,7 +16,7 @@ import numpy as np
 
 from rotor import units
 from rotor.arrays import Floats
-from rotor.checks import require_between, require_positive, require_whole
+from rotor.checks import require_between, require_positive, require_top, require_whole
 from rotor.classical.gas.correlations import ShortTime, plateau, short_time
 from rotor.classical.gas.ensembles import Correlations, Ensemble, free_gas_correlations, thermal_ensemble
 from rotor.quantum.effects.of_top import effects_of
@@ -53,6 +53,7 @@ class GasRequest:
     times_ps: tuple[float, ...] | None = None
 
     def __post_init__(self) -> None:
+        require_top(self.top)
         require_whole("molecules", self.molecules, 2, MOST_MOLECULES)
         require_whole("seed", self.seed, 0)
         require_positive("temperature_k", self.temperature_k, "K")

@@ -17,7 +17,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from rotor.arrays import Floats
 from rotor.checks import require_between, require_one_of, require_positive
+from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.stark import checked_direction, stark_map
+from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.fields.block_states import BlockStates
 from rotor.quantum.fields.field_map import FieldMap
 from rotor.table import Table
@@ -40,7 +42,11 @@ class Populations(NamedTuple):
 
 
 def populations_in_field(
-    top: Top, solved: Sequence[BlockStates], temperature_k: float, populations: str
+    top: Top,
+    solved: Sequence[BlockStates],
+    temperature_k: float,
+    populations: str,
+    effects: Sequence[QuantumEffect] = (),
 ) -> Populations:
     """Populations of the states of blocks that hold every M.
 
@@ -54,6 +60,8 @@ def populations_in_field(
         Of the gas.
     populations : str
         "adiabatic": each state has the population of the level it comes from; else equilibrium in the field.
+    effects : sequence of QuantumEffect, optional
+        The Hamiltonian of a top with spins.
 
     Returns
     -------
@@ -67,13 +75,16 @@ def populations_in_field(
     """
     kt = temperature_k * MHZ_PER_K
     ground = lowest_level_k(top, [top.spin_weights])[0] * MHZ_PER_K
+    if effects:
+        levels = solved[0].block.levels
+        ground = float(levels.energy_mhz[levels.weight > 0].min())
     free, factors = [], []
     for one in solved:
         levels = one.block.levels
         weight = levels.weight[one.rows]
         free.append(np.broadcast_to(weight * np.exp(-(levels.energy_mhz[one.rows] - ground) / kt), one.energies.shape))
         factors.append(weight * np.exp(-(one.energies - ground) / kt))
-    q = np.full(len(solved[0].energies), partition_function(top, temperature_k).q)
+    q = np.full(len(solved[0].energies), partition_function(top, temperature_k, effects=tuple(effects) or SEMI_RIGID).q)
     if populations == "adiabatic":
         return Populations([one / q[:, None] for one in free], q)
     for one, before, now in zip(solved, free, factors, strict=True):
@@ -81,7 +92,7 @@ def populations_in_field(
     return Populations([one / q[:, None] for one in factors], q)
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class FieldMixture(Table):
     """Means of a thermal mixture against the field.
 

@@ -57,7 +57,7 @@ class IdealGas:
     gibbs_j_per_mol_k: Floats
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class ThermoFunctions(Table):
     """Thermodynamic functions of a top at n temperatures; every array is (n,).
 

@@ -36,7 +36,7 @@ class PartitionFunction:
     source: str
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class PartitionFunctions(Table):
     """Q at n temperatures, every array (n,); `[i]` and a loop give each as a `PartitionFunction`.
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from rotor.checks import require_positive
+from rotor.checks import require_positive, require_top
 from rotor.quantum.effects.of_top import effects_of
 from rotor.quantum.estimates.limits import limit_facts, populated_j
 from rotor.table import TextOf
@@ -44,6 +44,7 @@ class ThermoRequest:
     relative_error: float = 1e-6
 
     def __post_init__(self) -> None:
+        require_top(self.top)
         if not len(self.temperatures_k):
             raise ValueError("temperatures_k: expected at least one temperature")
         for temperature in self.temperatures_k:

@@ -107,6 +107,9 @@ class Constants:
         for field, thing in content.items():
             object.__setattr__(self, field, thing)
 
+    def __hash__(self) -> int:
+        return hash((self.kind, self.reduction, self.representation, frozenset(self.values.items())))
+
     def __repr__(self) -> str:
         form = ", ".join(filter(None, (self.reduction and f"{self.reduction}-reduction", self.representation)))
         rigid = ", ".join(f"{name} {self.values[name]:.10g}" for name in self.values if name in "ABC")

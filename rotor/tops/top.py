@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rotor import units
-from rotor.arrays import Floats
+from rotor.arrays import Floats, same
 from rotor.geometry.inertia import EQUAL_MOMENTS, LINEAR_BELOW, Body, PrincipalFrame, point_masses, principal_frame
 from rotor.tops.allowed import (
     allowed_dipole,
@@ -52,7 +52,7 @@ SYMMETRIC_WITHIN = 1e-3  # of the shortest distance between nuclei: displacement
 NO_WEIGHTS = SpinWeights()
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Top:
     """A rigid or semi-rigid rotor.
 
@@ -110,6 +110,12 @@ class Top:
         if self.symmetry is not None and self.frame is not None and self.kind == "asymmetric":
             refuse_forbidden_couplings(states, self.symmetry, self.frame)
         refuse_forbidden_state_dipoles(states, self.kind, self.spin_weights, self.dipole_abc_debye)
+
+    def __eq__(self, other: object) -> bool:
+        return same(self, other) if isinstance(other, Top) else NotImplemented
+
+    def __hash__(self) -> int:
+        return hash(self.constants)
 
     def __repr__(self) -> str:
         formula = self.molecule.formula if self.molecule is not None else ""

@@ -21,7 +21,7 @@ SMALLEST_MOMENT = (
 SMALLEST_PART = 1e-120  # of |L|: a smaller component, not zero, would underflow when squared
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class FreeMotion:
     """A torque-free motion of one body or of many, ready to be asked for any time.
 

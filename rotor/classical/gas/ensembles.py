@@ -74,7 +74,7 @@ class Ensemble:
         return replace(self, momentum=momentum, attitude=attitude)
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Correlations(Table):
     """C1 and C2 at n times with the standard errors of their means; c1 or c2 is None where it was not asked for.
 

@@ -41,6 +41,11 @@ class CompareOptions:
         False, "--as-spcat", help="OTHER, an .int, is predicted with its KNMAX as SPCAT takes it, see rotor spectrum."
     )
 
+    @property
+    def other(self) -> str:
+        """What it is compared with: the file or the molecule, with its isotopes."""
+        return ", ".join([self.compare or "", *(self.isotope or [])])
+
 
 @dataclass(frozen=True)
 class Compared:

@@ -18,6 +18,7 @@ from rotor.formats.spcat.codes import AXES
 from rotor.formats.spcat.file_effect import CodedLine, FileEffect, Vector, coded_lines
 from rotor.formats.spcat.l_doubled import Pair, named_by_l, pairs_of
 from rotor.formats.spcat.l_spins import named_by_l_with_spins
+from rotor.formats.spcat.labels import named_by
 from rotor.formats.spcat.states import StateOptions, states_of
 from rotor.formats.spcat.symmetry import forbidden, l_values, some_weights_agree, symmetric_part
 from rotor.formats.spcat.text.int_file import Dipole, IntensityFile
@@ -39,7 +40,7 @@ Dipoles = dict[tuple[int, int], Vector]
 class Group:
     """States that are solved together: their options by number here, the top that stands for their symmetry, the effect.
 
-    axial_kmax: the largest K of a symmetric top whose K is good.
+    axial_kmax: the largest K of a symmetric top whose K is good. diag: how levels are named.
     """
 
     states: tuple[StateOptions, ...]
@@ -47,6 +48,7 @@ class Group:
     effect: FileEffect
     oblate: bool
     axial_kmax: int = _EVERY_K
+    diag: int = 0
 
     @property
     def spins(self) -> tuple[int, ...]:
@@ -72,6 +74,8 @@ class Group:
             )
             if self.effect.pairs:
                 levels = named_by_l(levels, self.effect.pairs, str(levels.representation))
+        if not self.effect.pairs:
+            levels = named_by(levels, self.diag, self.oblate)
         return replace(levels, weight=self._weights(levels))
 
     def has_levels(self, twice_f: tuple[int, int]) -> bool:
@@ -273,7 +277,7 @@ def _group(
     )  # what is not allowed between l-doubled states is said now
     top = Top(_STANDS_FOR[kind, oblate], dipole_abc_debye=moments.get((0, 0), (0.0, 0.0, 0.0)), name=title)
     kmax = states[0].kmax if as_spcat and kind in ("prolate", "oblate") else _EVERY_K
-    return Group(tuple(states), top, effect, oblate, kmax)
+    return Group(tuple(states), top, effect, oblate, kmax, first.diag)
 
 
 # the symmetry alone counts: the file's own operators are the whole Hamiltonian

@@ -119,8 +119,12 @@ def turned_rotor(rotor: Rotor, axes: str) -> Rotor | None:
 def named_by_l_with_spins(levels: Levels, pairs: Sequence[Pair], representation: str) -> Levels:
     """The same levels with v of a pair by the sign of K l, and names by the function |K, l⟩ ± |-K, -l⟩ with the largest share."""
     labels, mixing = [], []
+    known: dict[int, tuple[Floats, Ints]] = {}
     for block in levels.blocks:
-        own, shares = _names_of_block(block, pairs, representation)
+        for part in block.parts:
+            if part.number not in known:
+                known[part.number] = _functions(part.rotor, pairs, representation)
+        own, shares = _names_of_block(block, known)
         labels.append(own)
         mixing.append(shares)
     table = np.concatenate(labels)
@@ -131,10 +135,10 @@ def named_by_l_with_spins(levels: Levels, pairs: Sequence[Pair], representation:
     return replace(levels, quanta=quanta, mixing=np.concatenate(mixing))
 
 
-def _names_of_block(block: SpinBlock, pairs: Sequence[Pair], representation: str) -> tuple[Ints, Floats]:
+def _names_of_block(block: SpinBlock, known: dict[int, tuple[Floats, Ints]]) -> tuple[Ints, Floats]:
     names, shares = list[Ints](), list[Floats]()
     for part in block.parts:
-        functions, own = _functions(part.rotor, pairs, representation)
+        functions, own = known[part.number]
         rows = block.vectors[part.place].reshape(part.repeats, len(part.rotor.energies_mhz), -1)
         inside = np.einsum("fr,prn->pfn", functions @ part.rotor.vectors, rows)
         for pattern, of_pattern in zip(block.patterns[part.patterns], inside, strict=True):

@@ -17,6 +17,7 @@ from rotor import units
 from rotor.formats.line_tables import catalogue
 from rotor.formats.spcat.codes import is_linear
 from rotor.formats.spcat.file_lines import LEAST_MHZ, equally_weighted
+from rotor.formats.spcat.labels import BY_DIAG
 from rotor.formats.spcat.model import FOLD, common_weight, top_of
 from rotor.formats.spcat.predict_states import predicted
 from rotor.formats.spcat.states import is_plain
@@ -123,7 +124,9 @@ def predict(
         )
     if not (own_q or (math.isfinite(request.qrot) and request.qrot > 0)):
         raise ValueError(f"QROT = {request.qrot}: a partition function is a number above 0")
-    if not is_plain(parameters, intensities) or (as_spcat and options.knmax < request.fend and not is_linear(options)):
+    others_names = options.diag in BY_DIAG and options.spind > 0 and not is_linear(options)
+    left_out = as_spcat and options.knmax < request.fend and not is_linear(options)
+    if not is_plain(parameters, intensities) or left_out or others_names:
         made, of_states, q, levels, notes = predicted(parameters, intensities, own_q=own_q, as_spcat=as_spcat)
         return Prediction(made, of_states, q, request, tuple(notes), levels)
 

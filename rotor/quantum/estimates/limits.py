@@ -128,7 +128,22 @@ def _rank(limit: Limit) -> float:
 
 
 def limit_facts(top: Top, j: int, effects: Sequence[QuantumEffect], further: Sequence[Limit] = ()) -> dict[str, Any]:
-    """Sizes of effects and what is left out at one J, with `further` limits, by the keys of docs/command_line.md."""
+    """Sizes of effects and what is left out at one J, by the keys of docs/command_line.md.
+
+    Parameters
+    ----------
+    top : Top
+    j : int
+        At which sizes are estimated.
+    effects : sequence of QuantumEffect
+        Those of the calculation.
+    further : sequence of Limit
+        What else it leaves out.
+
+    Returns
+    -------
+    dict
+    """
     return {
         "sizes_at_j": j,
         "effects": [size._asdict() for size in model_sizes(top, j, effects)],

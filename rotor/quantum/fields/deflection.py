@@ -20,7 +20,7 @@ from rotor.units import MHZ_PER_K
 EVEN_WITHIN = 1e-9  # of the step
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class DeflectionTable(Table):
     """Effective dipoles in D against even fields, one column for each state, such as `mu_eff_debye 1 0 1 M1`.
 

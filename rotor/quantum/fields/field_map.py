@@ -45,7 +45,7 @@ STEP_J = 6
 ROUND_OFF = 2 * float(np.finfo(np.float64).eps)  # of the norm of a matrix
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class FieldMap(Table):
     """States in a field as columns of equal length: all fields of one state after each other.
 

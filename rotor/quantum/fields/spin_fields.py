@@ -144,7 +144,7 @@ class SpinSpace(FieldSpace):
         edges = [(a, b, 0) for a, b in self._edges(nodes, m)]
         out: list[FieldBlock] = []
         for members, _, _ in coloured_components(nodes, edges):
-            k = _k_of(self.solved[members[0]]) or 0
+            k = axial_k(self.solved[members[0]]) or 0
             both = 2 if k else 1
             if self.magnet is not None:
                 out.append(self._block(m, both, members))
@@ -157,7 +157,7 @@ class SpinSpace(FieldSpace):
     def _block(self, twice_m: int, copies: int, members: list[int]) -> SpinFieldBlock:
         solved = [self.solved[i] for i in members]
         rows = np.concatenate([np.arange(one.start, one.start + len(one.energies_mhz)) for one in solved])
-        k = _k_of(solved[0])
+        k = axial_k(solved[0])
         first = min(members)
         name = f"k={k}" if k is not None else f"from F block {first}"
         m = twice_m / 2 if twice_m % 2 else twice_m // 2
@@ -197,11 +197,11 @@ class SpinSpace(FieldSpace):
         size = _along_z(contraction)
 
         def make(up: SpinBlock, low: SpinBlock) -> NDArray[Any]:
-            if _k_of(up) != _k_of(low):
+            if axial_k(up) != axial_k(low):
                 return np.zeros((len(up.energies_mhz), len(low.energies_mhz)))
             found = amplitudes(up, low, tensors)
-            if _k_of(up) is not None:
-                return found / np.sqrt(2.0) if _k_of(up) else found  # that of one sign of K
+            if axial_k(up) is not None:
+                return found / np.sqrt(2.0) if axial_k(up) else found  # that of one sign of K
             return 1j * found if contraction.rank % 2 else found
 
         def scaled(up: SpinBlock, low: SpinBlock) -> NDArray[Any] | None:
@@ -222,10 +222,15 @@ def _along_z(contraction: Contraction) -> float:
     return float((2 * space[2, 2] - space[0, 0] - space[1, 1]) / np.sqrt(6))
 
 
-def _k_of(block: SpinBlock) -> int | None:
+def axial_k(block: SpinBlock) -> int | None:
     """|K| of a block where K is good, None where functions are those of Wang."""
     basis = block.parts[0].rotor.parts[0].basis
     return basis.axial_k if isinstance(basis, AxialState) else None
+
+
+def axial_k_of(block: SpinFieldBlock) -> int | None:
+    """|K| of the states of a block of the field, None where functions are those of Wang."""
+    return axial_k(block.space.solved[block.members[0]])
 
 
 def _moment(space: SpinSpace, magnet: Magnet, up: SpinBlock, low: SpinBlock) -> Floats:

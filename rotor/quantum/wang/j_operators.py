@@ -11,11 +11,15 @@ J_m∓ raises and lowers k). In a left-handed representation the frame x, -y, z 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rotor.arrays import Ints
 from rotor.quantum.wang.basis import WangBlock
 from rotor.tops.operators import axes_of
 
@@ -105,7 +109,8 @@ def lowering(j: int) -> JOperator:
     return JOperator(j, {-1: np.sqrt((j * (j + 1.0) - k * (k - 1)).clip(0)).astype(np.complex128)})
 
 
-def components(j: int, representation: str) -> dict[str, JOperator]:
+@lru_cache(maxsize=128)
+def components(j: int, representation: str) -> Mapping[str, JOperator]:
     """Ja, Jb, Jc of one J in |J k⟩ of a representation.
 
     >>> operators = components(2, "IIIr")
@@ -116,7 +121,7 @@ def components(j: int, representation: str) -> dict[str, JOperator]:
     up, down = raising(j), lowering(j)
     sense = -1.0 if representation.endswith("l") else 1.0
     along_x, along_y = 0.5 * (up + down), sense * 0.5j * (up - down)
-    return dict(zip(axes_of(representation), (along_x, along_y, j_z(j)), strict=True))
+    return MappingProxyType(dict(zip(axes_of(representation), (along_x, along_y, j_z(j)), strict=True)))
 
 
 def phase(block: WangBlock) -> complex:
@@ -133,22 +138,27 @@ def between_blocks(up: WangBlock, low: WangBlock, operator: JOperator) -> Comple
 
     |K s⟩ = (|K⟩ + s|-K⟩)/√2 for K > 0, |0⟩ for K = 0.
     """
-    j, k = operator.j, low.k
     out = np.zeros((up.size, low.size), dtype=np.complex128)
-    bands = {
-        q: band for q, band in operator.bands.items() if (low.first_k + q - up.first_k) % 2 == 0
-    }  # K in steps of 2
-    if not bands:
-        return out
+    for q, band in operator.bands.items():
+        if (low.first_k + q - up.first_k) % 2 == 0:  # K in steps of 2
+            for rows, columns, at, factor in _places(up, low, q):
+                out[rows, columns] += band[at] * factor  # a column occurs once
+    return out
+
+
+@lru_cache(maxsize=4096)
+def _places(up: WangBlock, low: WangBlock, q: int) -> tuple[tuple[Ints, Ints, Ints, Complexes], ...]:
+    """Of k and of -k: where the elements of a band stand between two blocks, where in the band, and their factors."""
+    j, k, found = low.j, low.k, []
+    turn = np.conj(phase(up)) * phase(low)
     for side in (1, -1):
         columns = np.flatnonzero(k > 0) if side < 0 else np.arange(low.size)
         amplitude = np.where(k[columns] == 0, 1.0, np.sqrt(0.5)) * (low.sign if side < 0 else 1)
-        for q, band in bands.items():
-            target = side * k[columns] + q
-            place = (np.abs(target) - up.first_k) // 2
-            inside = (np.abs(target) >= up.first_k) & (place < up.size)
-            chosen, goal = columns[inside], target[inside]
-            back = np.where(goal == 0, 1.0, np.sqrt(0.5)) * np.where(goal < 0, up.sign, 1)
-            values = band[side * k[chosen] + j] * amplitude[inside] * back
-            out[place[inside], chosen] += values  # a column occurs once
-    return np.asarray(np.conj(phase(up)) * phase(low) * out)
+        target = side * k[columns] + q
+        place = (np.abs(target) - up.first_k) // 2
+        inside = (np.abs(target) >= up.first_k) & (place < up.size)
+        chosen, goal = columns[inside], target[inside]
+        back = np.where(goal == 0, 1.0, np.sqrt(0.5)) * np.where(goal < 0, up.sign, 1)
+        if len(chosen):
+            found.append((place[inside], chosen, side * k[chosen] + j, turn * amplitude[inside] * back))
+    return tuple(found)

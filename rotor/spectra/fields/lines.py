@@ -6,16 +6,18 @@ for the part across it. The strength is scaled so that its mean over all directi
     S(β) = 3 Σ [cos²β |⟨μ_Z⟩|² + ½ sin²β |⟨μ_±1⟩|²],      isotropic light: Σ [|⟨μ_Z⟩|² + |⟨μ_±1⟩|²]
 
 (β between polarization and field; the sum is over the pairs that coincide, M with -M). Circular light along the field is like light
-across it.
+across it. Where a field at an angle with the light of a laser mixes M, every pair of states is a line, and the polarization may be
+any direction (`rotor.spectra.fields.light`); with spins the states are |F τ M_F⟩.
 Intensities are those of `intensity`: 8π³/3hc ν S (p″ - p′), with p the population of one state.
 """
 
 from __future__ import annotations
 
-import math
+from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
 from functools import partial
+from itertools import combinations_with_replacement
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -23,10 +25,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from rotor.arrays import Floats, Ints
 from rotor.checks import require_one_of, require_positive
-from rotor.quantum.effects.stark import map_request
+from rotor.quantum.effect import QuantumEffect
+from rotor.quantum.effects.stark import Z, checked_direction, map_request
 from rotor.quantum.fields.block_states import BlockStates, block_states
 from rotor.quantum.fields.field_map import converged_jmax, each_block
+from rotor.quantum.fields.map_request import MapRequest
+from rotor.quantum.fields.tilted_blocks import TiltedBlock
 from rotor.quantum.fields.transitions import BlockPair, dipole_elements, pairs_of_blocks
+from rotor.spectra.fields.light import Light, LightText, Vector, light_of
 from rotor.spectra.intensity import INTENSITY_NM2_MHZ
 from rotor.table import Table
 from rotor.thermo.field_mixture import POPULATIONS, Populations, populations_in_field
@@ -34,18 +40,18 @@ from rotor.thermo.field_mixture import POPULATIONS, Populations, populations_in_
 if TYPE_CHECKING:
     from rotor.tops.top import Top
 
-LIGHT = {"parallel": 0.0, "perpendicular": 90.0, "isotropic": None}
 DEFAULT_TOLERANCE_MHZ = 1e-4
+SAME_MHZ = 1e-6  # energies of states that coincide differ by round-off alone
 LEAST_STRENGTH = 1e-10  # of the strongest line: what round-off leaves of forbidden ones is below
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class FieldLines(Table):
     """Lines in a field as columns of equal length: all fields of one pair of states after each other.
 
     frequency_mhz: E′ - E″, the upper state being the higher one at the last field: below 0 where they have crossed. shift_mhz: from the
     line of the free top. strength_debye2, intensity_nm2_mhz: for the light given, all coinciding pairs together. upper, lower: labels of
-    the free levels; upper_m, lower_m: |M|. lower_mhz: E″.
+    the free levels; upper_m, lower_m: |M|, |M_F| with spins, -1 where M is mixed. lower_mhz: E″.
     """
 
     top: Top
@@ -125,15 +131,17 @@ def field_lines(
     fields_kv_per_cm: ArrayLike,
     *,
     j_highest: int = 2,
-    light: str | float = "parallel",
+    light: LightText = "parallel",
     temperature_k: float = 300.0,
     populations: str = "equilibrium",
     intensity_w_per_cm2: float = 0.0,
+    direction: Sequence[float] = Z,
+    effects: Sequence[QuantumEffect] = (),
     jmax: int | None = None,
     tolerance_mhz: float = DEFAULT_TOLERANCE_MHZ,
     executor: Executor | None = None,
 ) -> FieldLines:
-    """The lines between the states of a top in a static field along Z.
+    """The lines between the states of a top in a static field.
 
     Parameters
     ----------
@@ -143,14 +151,19 @@ def field_lines(
         Each once, in rising order.
     j_highest : int
         Both states belong to free levels up to this J.
-    light : str or float
-        Polarization: "parallel" or "perpendicular" to the field, "isotropic", or the angle with the field in degrees.
+    light : str, float or (3,)
+        Polarization: "parallel" or "perpendicular" to the static field, "isotropic", the angle with the field in degrees (at every
+        azimuth alike), or components along X, Y, Z.
     temperature_k : float
         Of the populations.
     populations : str
         "equilibrium" in the field, or "adiabatic": those of the free top, each state followed into the field, as in a beam.
     intensity_w_per_cm2 : float
-        Of a laser along the field, far from resonance.
+        Of a laser along Z, far from resonance.
+    direction : (3,)
+        Of the static field, any length; at an angle with Z it mixes M.
+    effects : sequence of QuantumEffect
+        The Hamiltonian of a top with spins, as in `stark_map`.
     jmax : int, optional
         Of the basis; by default chosen.
     tolerance_mhz : float
@@ -169,30 +182,34 @@ def field_lines(
 
     Notes
     -----
-    Q is that of the free top, corrected in equilibrium by the states that are followed; hyperfine structure is neglected.
+    Q is that of the free top, corrected in equilibrium by the states that are followed. States of mixed M that coincide share the
+    strengths of their lines in an arbitrary way: such lines are added up where they coincide at every field.
 
     >>> from rotor.tops.top import Top
     >>> found = field_lines(Top.from_constants("B=6000 MHz", dipole_abc_debye=(0.7, 0, 0)), [0.0, 1.0], j_highest=1)
     >>> found.frequency_mhz.round(2).tolist(), round(float(found.strength_debye2[0]), 4)  # S μ² = 0.49 D²
     ([12000.0, 12005.52], 0.49)
     """
-    angle = checked_light(light)
+    seen, unit = light_of(light), checked_direction(direction)
     require_positive("temperature_k", temperature_k, "K")
     require_one_of("populations", populations, POPULATIONS)
-    request = map_request(top, fields_kv_per_cm, j_highest, None, intensity_w_per_cm2, tolerance_mhz=tolerance_mhz)
+    request = map_request(
+        top, fields_kv_per_cm, j_highest, None, intensity_w_per_cm2, direction, tolerance_mhz, effects=effects
+    )
     jmax, moved = converged_jmax(request, jmax, executor)
-    solved = each_block(request, jmax, partial(block_states, request, fields=request.fields), executor)
-    found = populations_in_field(top, solved, temperature_k, populations)
-    parts = []
-    for pair in pairs_of_blocks([one.block for one in solved]):
-        factor = polarization_factors(angle)[pair.q] * pair.copies
-        if factor > 1e-30:  # the cosine of 90 degrees is not quite 0
-            parts.append(_lines_of(top, solved, pair, factor, found, j_highest))
-    columns = _strong(_joined(parts), len(request.fields))
-    text = light if isinstance(light, str) else f"{light:g}° to the field"
+    solved = _solved(request, jmax, bool(effects), executor)
+    found = populations_in_field(top, solved, temperature_k, populations, effects)
+    seen = seen if isinstance(solved[0].block, TiltedBlock) else seen.about(unit)
+    parts = [
+        _lines_of(solved, pair, strength, found, j_highest) for pair, strength in _strengths(top, solved, seen, unit)
+    ]
+    columns = _joined(parts)
+    if effects or isinstance(solved[0].block, TiltedBlock):
+        columns = merged(columns, len(request.fields))
+    columns = _strong(columns, len(request.fields))
     return FieldLines(
         top=top,
-        light=text,
+        light=light_of(light).text,
         temperature_k=temperature_k,
         populations=populations,
         field_kv_per_cm=np.tile(request.fields, len(columns["upper"]) // len(request.fields)),
@@ -203,25 +220,44 @@ def field_lines(
     )
 
 
-def checked_light(light: str | float) -> float | None:
-    """The angle of a polarization with the field in degrees, None for isotropic light; ValueError for others."""
-    if isinstance(light, str) and light in LIGHT:
-        return LIGHT[light]
-    try:
-        angle = float(light)
-    except ValueError:
-        angle = math.nan
-    if not math.isfinite(angle):
-        raise ValueError(f"light {light!r}: expected one of {', '.join(LIGHT)}, or an angle with the field in degrees")
-    return angle
+def _solved(request: MapRequest, jmax: int, spins: bool, executor: Executor | None) -> list[BlockStates]:
+    """The states of all blocks; with spins M_F and -M_F apart."""
+    if not spins:
+        return each_block(request, jmax, partial(block_states, request, fields=request.fields), executor)
+    from rotor.quantum.fields.mixed_transitions import signed_states
+
+    both = each_block(request, jmax, partial(signed_states, request, fields=request.fields), executor)
+    return [one for pair in both for one in pair]
 
 
-def polarization_factors(angle_degrees: float | None) -> tuple[float, float]:
-    """What |⟨μ_Z⟩|² and |⟨μ_1⟩|² are multiplied by: (1, 1) for isotropic light, (3 cos²β, 1.5 sin²β) for linear."""
-    if angle_degrees is None:
-        return 1.0, 1.0
-    cosine = math.cos(math.radians(angle_degrees))
-    return 3 * cosine**2, 1.5 * (1 - cosine**2)
+def _strengths(top: Top, solved: list[BlockStates], light: Light, unit: Vector) -> Iterator[tuple[BlockPair, Floats]]:
+    """Pairs of blocks and S (fields, up, low) of their states in D²."""
+    from rotor.quantum.fields.mixed_transitions import elements_of_mixed, elements_with_spins, pairs_with_spins
+    from rotor.quantum.fields.spin_fields import SpinFieldBlock
+
+    dipole, blocks = top.dipole_abc_debye, [one.block for one in solved]
+    assert dipole is not None
+    if isinstance(blocks[0], TiltedBlock):
+        for low, up in combinations_with_replacement(range(len(blocks)), 2):
+            axes = elements_of_mixed(blocks[up], blocks[low], dipole)  # type: ignore[arg-type]
+            if any(one.any() for one in axes):
+                between = [_between(solved[up], solved[low], one) for one in axes]
+                yield BlockPair(up, low, 0, 1), light.strength(between, unit)
+        return
+    spins = isinstance(blocks[0], SpinFieldBlock)
+    for pair in pairs_with_spins(blocks) if spins else pairs_of_blocks(blocks):
+        factor = light.factors[pair.q] * pair.copies
+        if factor > 1e-30:  # the cosine of 90 degrees is not quite 0
+            make: Any = elements_with_spins if spins else dipole_elements
+            elements = make(blocks[pair.up], blocks[pair.low], dipole)
+            if elements.any():
+                yield pair, factor * np.abs(_between(solved[pair.up], solved[pair.low], elements)) ** 2
+
+
+def _between(up: BlockStates, low: BlockStates, elements: NDArray[Any]) -> NDArray[Any]:
+    """Elements between the states in the field (fields, up, low) from those between free ones."""
+    held = elements[np.ix_(up.places, low.places)]
+    return np.asarray(np.einsum("fis,ik,fkt->fst", up.vectors.conj(), held, low.vectors, optimize=True))
 
 
 class _Part(NamedTuple):
@@ -236,14 +272,10 @@ class _Part(NamedTuple):
 
 
 def _lines_of(
-    top: Top, solved: list[BlockStates], pair: BlockPair, factor: float, found: Populations, j_highest: int
+    solved: list[BlockStates], pair: BlockPair, strength: Floats, found: Populations, j_highest: int
 ) -> _Part:
-    """Every pair of states of two blocks, its squares times `factor`."""
+    """Every pair of states of two blocks with its strength (fields, up, low)."""
     up, low = solved[pair.up], solved[pair.low]
-    assert top.dipole_abc_debye is not None
-    elements = dipole_elements(up.block, low.block, top.dipole_abc_debye)[np.ix_(up.places, low.places)]
-    moved = np.einsum("fis,ik,fkt->fst", up.vectors.conj(), elements, low.vectors, optimize=True)
-    strength = factor * np.abs(moved) ** 2
     ours = [one.block.levels.j[one.rows] <= j_highest for one in (up, low)]
     first, second = np.nonzero(np.multiply.outer(*ours) & (_above(len(ours[0])) if pair.up == pair.low else True))
     frequency = up.energies[:, first] - low.energies[:, second]
@@ -275,7 +307,8 @@ def _names(
             for one, of in zip(sides, states, strict=True)
         ]
         out.append(np.where(turned, labels[other], labels[this]))
-        out.append(np.where(turned, sides[other].block.m, sides[this].block.m))
+        m_values = [one.block.m if isinstance(one.block, TiltedBlock) else abs(one.block.m) for one in sides]
+        out.append(np.where(turned, m_values[other], m_values[this]))
     return out[0], out[1], out[2], out[3]
 
 
@@ -302,3 +335,28 @@ def _strong(columns: dict[str, NDArray[Any]], fields: int) -> dict[str, NDArray[
     strength = columns["strength_debye2"].reshape(-1, fields)
     allowed = np.repeat(strength.max(axis=1) > LEAST_STRENGTH * strength.max(initial=0.0), fields)
     return {name: column[allowed] for name, column in columns.items()}
+
+
+def merged(columns: dict[str, NDArray[Any]], fields: int) -> dict[str, NDArray[Any]]:
+    """Lines of equal labels and |M| that coincide, with their lower states, at every field, as one: strengths and intensities added."""
+    names = ("upper", "upper_m", "lower", "lower_m")
+    keys = [np.unique(columns[name], return_inverse=True)[1].reshape(-1, fields)[:, 0] for name in names]
+    place = np.stack(
+        [columns[name].reshape(-1, fields) for name in ("lower_mhz", "frequency_mhz")]
+    )  # (2, lines, fields)
+    first: list[int] = []  # of each group
+    groups: dict[tuple[int, ...], list[int]] = {}
+    number = np.zeros(place.shape[1], dtype=np.int64)
+    for line, key in enumerate(zip(*(key.tolist() for key in keys), strict=True)):
+        known = groups.setdefault(key, [])
+        same = [one for one in known if np.abs(place[:, first[one]] - place[:, line]).max() <= SAME_MHZ]
+        if not same:
+            known.append(len(first))
+            first.append(line)
+        number[line] = (same or known[-1:])[0]
+    out = {name: column.reshape(-1, fields)[first].ravel() for name, column in columns.items()}
+    for name in ("strength_debye2", "intensity_nm2_mhz"):
+        total = np.zeros((len(first), fields))
+        np.add.at(total, number, columns[name].reshape(-1, fields))
+        out[name] = total.ravel()
+    return out

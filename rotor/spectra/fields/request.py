@@ -11,6 +11,7 @@ import numpy as np
 
 from rotor.checks import require_one_of, require_positive
 from rotor.quantum.fields.stark_request import StarkRequest
+from rotor.spectra.fields.light import LightText, light_of
 from rotor.table import Table
 from rotor.thermo.field_mixture import POPULATIONS, field_mixture
 
@@ -28,14 +29,14 @@ FIELDS_OF_SPREAD = 41
 class FieldRequest:
     """Lines, spectra and mixtures in the fields of a `StarkRequest`; every field is checked when the request is made.
 
-    light: "parallel", "perpendicular", "isotropic" or an angle with the field in degrees. temperature_k, populations: as in
+    light: "parallel", "perpendicular", "isotropic", an angle with the field in degrees, or a direction. temperature_k, populations: as in
     `field_lines`. line: labels of two free levels, lines between others are left out; None: all. linewidth_mhz, range_mhz: of the
     spectrum at the highest field; None: from the first line to the last. spread: standard deviation of the field over the sample, a
     fraction of the field; 0: the same everywhere.
     """
 
     stark: StarkRequest
-    light: str | float = "parallel"
+    light: LightText = "parallel"
     temperature_k: float = 300.0
     populations: str = "equilibrium"
     line: tuple[str, str] | None = None
@@ -44,9 +45,7 @@ class FieldRequest:
     spread: float = 0.0
 
     def __post_init__(self) -> None:
-        from rotor.spectra.fields.lines import checked_light
-
-        checked_light(self.light)
+        light_of(self.light)
         require_positive("temperature_k", self.temperature_k, "K")
         require_one_of("populations", self.populations, POPULATIONS)
         require_positive("linewidth_mhz", self.linewidth_mhz, "MHz")
@@ -65,10 +64,6 @@ def _lines_at(request: FieldRequest, fields: Any, executor: Executor | None) -> 
     from rotor.spectra.fields.lines import field_lines
 
     stark = request.stark
-    if stark.hyperfine:
-        raise ValueError("lines of states with spins in a field are not computed: leave out the hyperfine structure")
-    if stark.tilted:
-        raise ValueError("lines need states with a good M: leave out the angle between field and light")
     found = field_lines(
         stark.top,
         fields,
@@ -77,6 +72,8 @@ def _lines_at(request: FieldRequest, fields: Any, executor: Executor | None) -> 
         temperature_k=request.temperature_k,
         populations=request.populations,
         intensity_w_per_cm2=stark.intensity_w_per_cm2,
+        direction=stark.direction,
+        effects=stark.effects,
         jmax=stark.jmax,
         tolerance_mhz=stark.tolerance_mhz,
         executor=executor,

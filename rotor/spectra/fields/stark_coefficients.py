@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 POWERS = 4
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class StarkCoefficients(Table):
     """Coefficients of shifts against the field, one row for each state or line.
 

@@ -1,0 +1,143 @@
+"""Names of levels by the ways that DIAG of an option line chooses (H. M. Pickett, documentation of SPFIT and SPCAT, "DIAG").
+
+| DIAG | states go to | and there in order of |
+|---|---|---|
+| 0 | the Wang block of one state v and one coupling pattern, by the largest shares | energy, as K rises |
+| 1 | one function each, by the largest shares | |
+| 2 | as 0 | energy, as the diagonal elements rise |
+| 3 | all functions of one v and pattern | energy, as K, then the other K rises |
+| 4 | as 3 | ⟨K²⟩, those of one K by energy |
+| 5 | as 3 | energy, as the diagonal elements rise |
+
+0 and 3 are the names that levels have already: 3 differs from 0 only where a block holds several Wang blocks of one v and pattern.
+In an oblate basis energy falls as K rises.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from rotor.arrays import Floats, Ints
+from rotor.quantum.coupled import CoupledBlock
+from rotor.quantum.levels import Levels
+from rotor.quantum.spins.blocks import SpinBlock, assigned
+from rotor.quantum.wang.basis import WangBlock, names_of
+
+BY_DIAG = (1, 2, 4, 5)  # those that need another naming than that of levels
+
+
+class Functions(NamedTuple):
+    """The functions of a block: names v, Ka, Kc, pattern (n, columns), K, group, Wang block (n,), amplitudes (n, states)."""
+
+    names: Ints
+    k: Ints
+    pattern: Ints
+    wang: Ints
+    amplitudes: Floats
+
+
+def named_by(levels: Levels, diag: int, oblate: bool) -> Levels:
+    """The same levels of an asymmetric top with the names that a DIAG of 1, 2, 4 or 5 gives; others as they are."""
+    if diag not in BY_DIAG or "kc" not in levels.quanta or not levels.blocks:
+        return levels
+    tables, shares = [], []
+    for block in levels.blocks:
+        functions = functions_of(block, str(levels.representation))
+        energies = -block.energies_mhz if oblate else block.energies_mhz
+        at = places(functions, energies, diag)
+        tables.append(functions.names[at])
+        shares.append(_shares_of_groups(functions, at, diag))
+    table = np.concatenate(tables)
+    quanta = {**levels.quanta, "ka": table[:, 1], "kc": table[:, 2]}
+    if "v" in quanta:
+        quanta["v"] = table[:, 0]
+    if table.shape[1] > 3:
+        quanta["n"] = table[:, 3] // 2
+        for column, name in enumerate([name for name in quanta if name not in ("v", "n", "ka", "kc")], 4):
+            quanta[name] = table[:, column] if name in levels.halves else table[:, column] // 2
+    return replace(levels, quanta=quanta, mixing=np.concatenate(shares))
+
+
+def _shares_of_groups(functions: Functions, at: Ints, diag: int) -> Floats:
+    """The share of each state in the group that it is named after."""
+    of_function = np.arange(len(at)) if diag == 1 else functions.wang if diag == 2 else functions.pattern
+    inside = of_function[:, None] == of_function[at][None, :]
+    return np.asarray((functions.amplitudes**2 * inside).sum(axis=0))
+
+
+def places(functions: Functions, energies: Floats, diag: int) -> Ints:
+    """The function that names each state, (states,)."""
+    shares = functions.amplitudes**2
+    if diag == 1:
+        return assigned(shares, np.ones(len(shares), dtype=np.int64))
+    groups = functions.wang if diag == 2 else functions.pattern
+    count = int(groups.max()) + 1
+    of_group = np.stack([shares[groups == g].sum(axis=0) for g in range(count)])
+    of_state = assigned(of_group, np.bincount(groups, minlength=count))
+    diagonal = shares @ energies
+    found = np.empty(len(energies), dtype=np.int64)
+    for g in range(count):
+        members, states = np.flatnonzero(groups == g), np.flatnonzero(of_state == g)
+        if diag == 4:
+            found[states] = _by_k2(functions, members, states, shares, energies)
+        else:
+            found[states[np.argsort(energies[states], kind="stable")]] = members[
+                np.argsort(diagonal[members], kind="stable")
+            ]
+    return found
+
+
+def _by_k2(functions: Functions, members: Ints, states: Ints, shares: Floats, energies: Floats) -> Ints:
+    """⟨K²⟩ of the part of each state in the group, over its size; states of one K by energy."""
+    own = shares[np.ix_(members, states)]
+    k2 = (functions.k[members].astype(float) ** 2) @ own / own.sum(axis=0)
+    by_k2, by_tau = np.argsort(k2, kind="stable"), np.lexsort((functions.wang[members], functions.k[members]))
+    ks, found = functions.k[members][by_tau], np.empty(len(states), dtype=np.int64)
+    for k in np.unique(ks):
+        run = np.flatnonzero(ks == k)
+        here = by_k2[run]
+        found[here[np.argsort(energies[states[here]], kind="stable")]] = members[by_tau[run]]
+    return found
+
+
+def functions_of(block: object, representation: str) -> Functions:
+    """The functions |N K ±⟩ of a solved block, with every coupling pattern, in order of parts, patterns and K."""
+    if isinstance(block, SpinBlock):
+        return _of_spin_block(block, representation)
+    if isinstance(block, CoupledBlock):
+        wangs = [(part.v, part.basis, block.vectors[part.place]) for part in block.parts]
+    else:
+        wangs = [(0, block.basis, block.vectors)]  # type: ignore[attr-defined]
+    return _joined([(v, basis, None, vectors) for v, basis, vectors in wangs], representation)
+
+
+def _of_spin_block(block: SpinBlock, representation: str) -> Functions:
+    pieces = []
+    for part in block.parts:
+        rows = block.vectors[part.place].reshape(part.repeats, len(part.rotor.energies_mhz), -1)
+        for own in part.rotor.parts:
+            assert isinstance(own.basis, WangBlock)
+            inside = np.einsum("kr,prn->pkn", part.rotor.vectors[own.place], rows)
+            patterns = block.patterns[part.patterns]
+            pieces += [(own.v, own.basis, pattern, each) for pattern, each in zip(patterns, inside, strict=True)]
+    return _joined(pieces, representation)
+
+
+def _joined(pieces: list[tuple[int, WangBlock, Ints | None, Floats]], representation: str) -> Functions:
+    names, ks, groups, wangs, known = [], [], [], [], dict[tuple[int, ...], int]()
+    for place, (v, basis, pattern, _) in enumerate(pieces):
+        ka, kc = names_of(basis, representation)
+        order = np.argsort(kc if representation == "IIIl" else ka, kind="stable")
+        own = [] if pattern is None else [np.full(basis.size, value) for value in pattern]
+        names.append(np.column_stack([np.full(basis.size, v), ka[order], kc[order], *own]))
+        ks.append(np.sort(basis.k))
+        key = (v, *(() if pattern is None else tuple(pattern.tolist())))
+        groups.append(np.full(basis.size, known.setdefault(key, len(known))))
+        wangs.append(np.full(basis.size, place))
+    amplitudes = np.concatenate([vectors for *_, vectors in pieces])
+    return Functions(
+        np.concatenate(names), np.concatenate(ks), np.concatenate(groups), np.concatenate(wangs), amplitudes
+    )
