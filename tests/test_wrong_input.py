@@ -79,6 +79,8 @@ def test_no_file_that_is_read_is_written_over(files, words, said):
         (["info", "--constants", "B=10 K/m"], "--constants: unit 'K/m' is not a known unit"),
         (["tumble", "--moments", "1e300,1e300,1e300", "--omega", "1,1,1"], "moments lie between 1e-100 and 1e+100"),
         (["tumble", "--moments", "1,2,3", "--omega", "1e200,1,1"], "up to 1e+100 in size"),
+        (["thermo", "CO", "--vibration", "1e-300"], "expected finite ones of 0.001 cm-1 or more"),
+        (["thermo", "CO", "--vibration", "100x1e9"], "unit 'e9' is not a known unit; the default is 'cm-1'"),
         (["isotopologues", "a.var"], "error: isotopes cannot be changed"),
         (["isotopologues", "CO", "--min-abundance", "2"], "--min-abundance: least abundance 2"),
         (["fit", "missing.par"], "error: missing.par: no such file"),
