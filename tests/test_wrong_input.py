@@ -81,6 +81,11 @@ def test_no_file_that_is_read_is_written_over(files, words, said):
         (["tumble", "--moments", "1,2,3", "--omega", "1e200,1,1"], "up to 1e+100 in size"),
         (["thermo", "CO", "--vibration", "1e-300"], "expected finite ones of 0.001 cm-1 or more"),
         (["thermo", "CO", "--vibration", "100x1e9"], "unit 'e9' is not a known unit; the default is 'cm-1'"),
+        (
+            ["levels", "CO", "--spin-constants", "chi_aa(14N)=5"],
+            "1 spin is called after 14N, and CO has 1 of 12C, 1 of 16O",
+        ),
+        (["spectrum", "HCN", "--spin-constants", "C_aa(1H_1)=5 C_aa(1H_2)=5"], "2 spins are called after 1H"),
         (["isotopologues", "a.var"], "error: isotopes cannot be changed"),
         (["isotopologues", "CO", "--min-abundance", "2"], "--min-abundance: least abundance 2"),
         (["fit", "missing.par"], "error: missing.par: no such file"),

@@ -240,7 +240,7 @@ def read_top(given: Input) -> Top:
         table = weights("--spin-weights", given.spin_weights)
         top = parsed("--spin-weights", given.spin_weights, lambda _: top.with_weights(table, "given (--spin-weights)"))
     if given.spin_constants is not None:
-        top = replace(top, spin_constants=_spin_constants(given.spin_constants, given.spins))
+        top = replace(top, spin_constants=_spin_constants(given.spin_constants, given.spins, top))
     elif given.spins is not None:
         raise ValueError("--spins: says how large the spins of --spin-constants are; give those too")
     if given.state_constants is not None:
@@ -260,10 +260,15 @@ def _with_states(top: Top, text: str) -> Top:
     return parsed("--state-constants", text, read)
 
 
-def _spin_constants(text: str, spins: str | None) -> SpinConstants:
-    from rotor.tops.spins.spin_constants import SpinConstants
+def _spin_constants(text: str, spins: str | None, top: Top) -> SpinConstants:
+    from rotor.tops.spins.spin_constants import SpinConstants, refuse_other_nuclei
 
-    return parsed("--spin-constants", text, lambda value: SpinConstants.parse(value, spins, "given (--spin-constants)"))
+    def read(value: str) -> SpinConstants:
+        constants = SpinConstants.parse(value, spins, "given (--spin-constants)")
+        refuse_other_nuclei(constants, top.molecule)
+        return constants
+
+    return parsed("--spin-constants", text, read)
 
 
 def _refuse_contradictions(given: Input) -> None:
