@@ -22,6 +22,7 @@ def files(call):
         Path(f"a{suffix}").write_bytes((CASE / f"ocs{suffix}").read_bytes())
     Path("a.cat").write_bytes((CASE / "sample.cat").read_bytes())
     Path("s.toml").write_text(SCENE)
+    Path("hot.toml").write_text(f'{SCENE}[conditions]\ntemperature = "1e300 K"\n'.replace("levels", "gas"))
     Path("m.toml").write_text('name = "x"\n[constants]\nunit = "MHz"\nsource = "test"\nB = 6000.0\n')
     Path("nan.csv").write_text(LINES.format("nan"))
     Path("bytes.csv").write_bytes(b"\xff\xfe\x00")
@@ -95,6 +96,7 @@ def test_no_file_that_is_read_is_written_over(files, words, said):
             "nan.csv, line 1 of the table: frequency_mhz reads 'nan'",
         ),
         (["cat", "a.cat", "--as-spcat"], "--as-spcat: expected with --compare and an .int file"),
+        (["plan", "hot.toml"], "conditions.temperature: '1e300 K': expected a temperature up to 1e+06 K"),
         (["run", "s.toml", "--workers", "100000"], "--workers: 100000: expected a whole number from 1 to 256"),
     ],
 )
