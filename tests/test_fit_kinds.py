@@ -188,17 +188,24 @@ def test_the_true_constants_come_back(tmp_path, name):
 @pytest.mark.parametrize("share", [0.01, 0.03, 0.1])
 @pytest.mark.parametrize("name", KINDS)
 def test_starts_up_to_ten_per_cent_off(tmp_path, name, share):
-    """Of three states in resonance 5 of 8 starts find the way back, of all others every one; the rest says so, see below."""
     check(tmp_path, KINDS[name], share, seed=2 if name in FAST[0] else 1)
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("share", [0.03, 0.1])
+@pytest.mark.parametrize("seed", [1, 2, 3, 4])
+def test_three_states_in_resonance_are_found_from_far_off(tmp_path, share, seed):
+    """From two of these eight starts the program of the field finds the way; from three a sign must be turned."""
+    check(tmp_path, KINDS[FAST[0]], share, seed)
+
+
+@pytest.mark.slow
 def test_a_start_that_does_not_find_the_way_back_says_so(tmp_path):
-    write_case(tmp_path, "case", KINDS[FAST[0]], 0.1, seed=3)
+    write_case(tmp_path, "case", KINDS[FAST[0]], 0.1, seed=12)
     asked = read_fit(tmp_path / "case.par")
     fit = fit_lines(asked.lines, None, asked.parameters, asked.options, model=asked.model)
     assert not fit.converged
-    assert "does not describe the lines" in fit.reason
+    assert "weighted rms" in fit.reason
 
 
 @pytest.mark.slow

@@ -22,6 +22,7 @@ from rotor.formats.spcat.text.int_file import read_int
 from rotor.formats.spcat.text.lin import read_lin
 from rotor.formats.spcat.text.par import read_par
 from rotor.formats.spcat.variances import variance_factor
+from rotor.quantum.estimates.contracted import ContractedLevels
 
 # weighted rms, rms of lines in MHz and of those in cm-1, as SPFIT printed them
 FITS = {
@@ -263,3 +264,17 @@ def test_lines_of_a_file_with_spins_are_drawn_anew():
     assert spread[0] < 1e-15  # held by its a-priori error
     ratio = spread[1:] / fit.scaled_errors[1:]
     assert 0.3 < np.median(ratio) < 3.0  # deviations of 12 samples are good to a fifth, 23 lines to another
+
+
+@pytest.mark.slow
+@pytest.mark.oracle
+def test_levels_of_two_chlorines_and_two_states_are_spfits():
+    """ClClO2 with all spins: blocks of some 1,000 functions, F below 0, frequencies as SPFIT prints them."""
+    asked = read_fit(KINDS / "clclo2_spins" / "clclo2.par")
+    model = asked.model(np.unique(np.concatenate([asked.lines.upper, asked.lines.lower]), axis=0))
+    assert isinstance(model.solved[0].blocks, ContractedLevels)
+    labels, places = np.unique(np.concatenate([asked.lines.upper, asked.lines.lower]), axis=0, return_inverse=True)
+    energies, _ = model.levels(asked.parameters.constants_of(asked.parameters.start))
+    calculated = energies[places.reshape(-1)[: len(asked.lines)]] - energies[places.reshape(-1)[len(asked.lines) :]]
+    assert len(labels) > 100
+    assert calculated == pytest.approx(asked.lines.frequency_mhz, abs=1e-5)  # five decimals are printed

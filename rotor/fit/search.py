@@ -27,6 +27,8 @@ _ROUGH = 10.0  # standard errors within which a stage has converged
 _FIRST_ITERATIONS = 12  # of a direct search, after which it must have made way
 _WAY = 0.01  # of the weighted rms at the start, below which it has
 _LATELY = 6  # iterations in which it must halve the weighted rms after these
+_TURNED = 5  # parameters whose other sign is tried
+_TURNED_ITERATIONS = 8  # after which it must have made way
 _NONE = np.zeros(0, dtype=np.int64)
 _AT_ZERO_MHZ = 1e-30  # how far a constant that starts at 0 may move in these stages
 
@@ -248,7 +250,7 @@ def with_rejection(
 
 
 def _searched(search: Search, progress: Progress | None) -> Minimum:
-    """A direct search; where it makes no way for some iterations, or ends far from the lines, one by rising J."""
+    """A direct search; where it makes no way for some iterations, or ends far from the lines, one by rising J, then other signs."""
     options = search.options
 
     def hopeless(taken: Sequence[Iteration]) -> bool:
@@ -260,8 +262,36 @@ def _searched(search: Search, progress: Progress | None) -> Minimum:
 
     limit = options.most_iterations
     first = _minimised(search, search.parameters.start, progress, limit, hopeless)
-    poor = first.rms > options.poor_rms and first.status != INTERRUPTED
-    return _by_stages(search, first, progress) if poor and len(first.iterations) < limit else first
+    for further in (_by_stages, _with_a_sign_turned):
+        if first.rms > options.poor_rms and first.status != INTERRUPTED and len(first.iterations) < limit:
+            first = further(search, first, progress)
+    return first
+
+
+def _with_a_sign_turned(search: Search, first: Minimum, progress: Progress | None) -> Minimum:
+    """The better of a minimum that does not describe the lines and those that are reached from it with the sign of one parameter turned.
+
+    The sign of a coupling between states counts only in products with others, so that a search may end with one of them turned.
+    Tried are the few that went furthest from their start, counted in its size.
+    """
+
+    def hopeless(taken: Sequence[Iteration]) -> bool:
+        return len(taken) >= _TURNED_ITERATIONS and min(one.rms_after for one in taken) > search.options.poor_rms
+
+    start, reached = search.parameters.start, first.parameters
+    moved = np.abs(reached - start) / np.maximum(np.abs(start), _AT_ZERO_MHZ)
+    for place in np.argsort(-moved, kind="stable")[:_TURNED].tolist():
+        turned = reached.copy()
+        turned[place] *= -1
+        left = search.options.most_iterations - len(first.iterations)
+        try:
+            second = _continued(first, _minimised(search, turned, progress, max(left, 0), hopeless))
+        except ValueError:  # out of the bounds of the model
+            continue
+        first = second if second.rms < first.rms else replace(first, iterations=second.iterations)
+        if first.rms <= search.options.poor_rms:
+            break
+    return first
 
 
 def _continued(first: Minimum, second: Minimum) -> Minimum:

@@ -95,23 +95,28 @@ class LineList:
     def blends(self) -> NDArray[np.int64]:
         """Which blend each line belongs to, (n,), counted from 0; a line alone is a blend of one.
 
-        Lines of one frequency and error that follow each other are one blend. A line of the same frequency behind a
-        blend, with an error at least twice as large, is no line: it says how wide the blend may be, and has -1.
+        As in SPFIT (`linein`): a line is in the blend of the one before it where their frequencies differ by less than 1e-8 and
+        their errors by less than 1e-7, both in the unit of the file. A line of the same frequency behind a blend, with an error
+        more than twice as large, is no line: it says how wide the blend may be, and has -1.
 
         >>> lines = np.array([[5.0, 0.1], [5.0, 0.1], [5.0, 0.3], [7.0, 0.1]])
         >>> LineList(np.zeros((4, 12), dtype=np.int16), lines[:, 0], lines[:, 1], np.ones(4)).blends()
         array([ 0,  0, -1,  1])
         """
         groups = np.empty(len(self), dtype=np.int64)
-        first, blend = 0, -1
+        near = np.abs(np.diff(self.frequency)) < 1e-14 * np.abs(self.frequency[1:]) + 1e-8
+        alike = np.abs(np.diff(self.error)) < 1e-7
+        count, blend = 0, -1  # lines of the present blend, 0 behind its width
         for i in range(len(self)):
-            alike = i > 0 and self.frequency[i] == self.frequency[first]
-            if alike and self.error[i] == self.error[first]:
+            follows = count > 0 and bool(near[i - 1])
+            if follows and alike[i - 1]:
+                count += 1
                 groups[i] = blend
-            elif alike and i - first > 1 and abs(self.error[i]) >= 2 * abs(self.error[first]):
+            elif follows and count > 1 and self.error[i] * self.error[i - 1] > 2 * self.error[i - 1] ** 2:
+                count = 0
                 groups[i] = -1
             else:
-                first, blend = i, blend + 1
+                count, blend = 1, blend + 1
                 groups[i] = blend
         return groups
 
