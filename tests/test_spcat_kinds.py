@@ -140,3 +140,14 @@ def test_low_orders_are_cartesian_products():
             alone = operator_of(split_code(typ * 10000), axes).of_j(5, representation)
             factor = 1j if representation == "Ir" else -1j
             np.testing.assert_allclose(alone.matrix, factor * of[axis].matrix, atol=1e-14)  # round-off
+
+
+def test_the_energy_of_one_k():
+    """802000 is the energy of K = 2 and 802100 the same times N(N+1), in a symmetric top, whose energies are B N(N+1) + (A - B) K²."""
+    values = ("100 9000.0", "1000 100000.0", "802000 50.0", "802100 0.5")
+    text = "a case\n 4 1 1 0 0 1e6 1 1\na 1 1 0 9 0 1 1 1 0 1 0\n" + "".join(f"{value} 0\n" for value in values)
+    (group,) = groups_of(read_par(text.encode()), IntensityFile("", Request(), ()))
+    levels = group.levels((0, 8))
+    square, k = levels.rotational * (levels.rotational + 1.0), levels.quanta["ka"]
+    expected = 9000.0 * square + 1e5 * k**2 + (k == 2) * (50.0 + 0.5 * square)
+    np.testing.assert_allclose(levels.energy_mhz, expected, atol=1e-8)  # a few units in the last place of 2e6 MHz

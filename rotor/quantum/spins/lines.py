@@ -19,9 +19,10 @@ from rotor.quantum.levels import Levels
 from rotor.quantum.spins.blocks import Shared, SpinBlock, SpinPart, coefficients_of, operators_between, product
 from rotor.quantum.spins.coupling import patterns, recoupling, stacks, tensor_coefficients
 from rotor.quantum.spins.operators import AxialState, Scalar, tensor_elements
-from rotor.quantum.spins.rotor import Channel, RotorBlock, channels_of
+from rotor.quantum.spins.rotor import Channel, RotorBlock, RotorPart, channels_of
 from rotor.quantum.spins.scheme import Scheme
-from rotor.quantum.tensors import Tensors, rank_of, tensor_between
+from rotor.quantum.tensors import BodyTensor, Tensors, rank_of, tensor_between
+from rotor.quantum.tensors import acting_on as body_acting_on
 from rotor.quantum.wang.basis import WangBlock
 from rotor.quantum.wang.j_operators import JOperator, between_blocks
 
@@ -103,14 +104,23 @@ def _rotor_element(up: RotorBlock, low: RotorBlock, tensors: Tensors) -> Floats 
     total: Floats | None = None
     for left in up.parts:
         for right in low.parts:
-            found = tensor_elements(left.basis, right.basis, tensor_between(tensors, left.v, right.v))
-            if found is not None and found.any():
-                moved = up.vectors[left.place].T @ found @ low.vectors[right.place]
+            acted = _acted(left, right, low.vectors[right.place], tensor_between(tensors, left.v, right.v))
+            if acted is not None and acted.any():
+                moved = up.vectors[left.place].T @ acted
                 total = moved if total is None else total + moved
     basis = up.parts[0].basis
     if total is not None and isinstance(basis, AxialState) and (basis.axial_k or low.parts[0].basis.k[0]):
         return np.asarray(np.sqrt(2.0) * total)
     return total
+
+
+def _acted(left: RotorPart, right: RotorPart, vectors: Floats, tensor: BodyTensor | None) -> Floats | None:
+    """A tensor times columns over the functions of `right`, over those of `left`; None where it does not act."""
+    up, low = left.basis, right.basis
+    if isinstance(up, WangBlock) and isinstance(low, WangBlock) and tensor is not None:
+        return None if tensor.between(up, low) is None else body_acting_on(vectors, up, low, tensor)
+    found = tensor_elements(up, low, tensor)
+    return None if found is None else np.asarray(found @ vectors)
 
 
 def _coefficients(up: SpinBlock, low: SpinBlock, rank: int) -> Floats:
