@@ -84,6 +84,7 @@ _ALIASES = {
     "kg m2": "kg*m2", "kg m^2": "kg*m2", "kg m²": "kg*m2", "g cm2": "g*cm2", "g cm^2": "g*cm2", "g cm²": "g*cm2",
     "W/cm^2": "W/cm2", "W/cm²": "W/cm2", "TW/cm^2": "TW/cm2", "TW/cm²": "TW/cm2", "J/cm^2": "J/cm2", "J/cm²": "J/cm2",
 }  # fmt: skip
+LEAST_KELVIN, MOST_KELVIN = 1e-9, 1e6  # colder or hotter there is no gas of molecules
 MOST_POINTS = 10_000_000  # of a grid: 80 MB of numbers
 _NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(\S.*?)?\s*$")
 

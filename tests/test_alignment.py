@@ -405,7 +405,7 @@ def test_planar_cosine_of_an_asymmetric_top_goes_over_into_that_of_a_symmetric_o
 @pytest.mark.parametrize(
     ("make", "said"),
     [
-        (lambda: DipolePulse(1e7, 1.0), "field 1e.07 kV/cm: a number up to 100000"),  # 1e12 V/m
+        (lambda: DipolePulse(1e7, 1.0), "field 1e.07 kV/cm: a number up to 1e.06"),  # 1e12 V/m
         (lambda: align(OCS, GaussianPulse(1e16, 1.0), [10.0], state={"j": 0}), "the pulses need J up to about 14"),
     ],
 )

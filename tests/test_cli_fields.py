@@ -307,3 +307,23 @@ def test_wrong_input_of_zeeman(call, arguments, message):
     assert message in err
     assert err.count("\n") == 1
     assert not list(Path().glob("*.png"))
+
+
+def test_m_of_three_dipole_components_has_its_sign(call):
+    """M and -M are blocks of their own; "mixed" is for fields at an angle alone."""
+    given = (
+        "stark",
+        "--constants",
+        "A=10 B=6 C=4 GHz",
+        "--dipole-abc",
+        "1,0.7,-0.4",
+        "--field",
+        "0,5",
+        "--states",
+        "J<=1",
+    )
+    code, out, err = call(*given)
+    assert code == 0, err
+    assert "mixed" not in out
+    assert any(line.split()[3:4] == ["-1"] for line in out.splitlines())
+    assert "mixed" in call(*given, "--tilt", "30")[1]

@@ -10,7 +10,8 @@ from scipy.integrate import solve_ivp
 from scipy.special import ellipk, fresnel
 
 import rotor
-from rotor.scenes.run import SceneResult, run_scene
+from rotor.scenes.run import run_scene
+from rotor.scenes.scene import SceneResult
 from rotor.scenes.scene_file import read_scene
 from rotor.scenes.sweep import SweepResult, run_sweep
 
@@ -136,8 +137,8 @@ def driven_chaos(result):
 def rattleback(result):
     times, rate = column(result, "t"), -column(result, "w3")
     k = np.flatnonzero(rate[:-1] * rate[1:] < 0.0)[0]
-    stop = times[k] + 0.005 * rate[k] / (rate[k] - rate[k + 1])
-    assert abs(stop - 2.390) < 2e-3  # the published figure has three decimals; interpolation over 5 ms
+    stop = times[k] + 0.02 * rate[k] / (rate[k] - rate[k + 1])
+    assert abs(stop - 2.390) < 2e-3  # the published figure has three decimals; interpolation over 20 ms
     assert rate[-1] > 1.0  # it has turned back
 
 

@@ -15,10 +15,12 @@ from rotor.classical.driven import answer_driven
 from rotor.classical.gas.ensembles import thermal_ensemble
 from rotor.fluid.request import answer_fluid
 from rotor.geometry.rotations import distance
-from rotor.scenes.accuracy import asked_of
+from rotor.quantum.spins.method import used_method
+from rotor.scenes.accuracy import asked_of, unit_of
 from rotor.scenes.accuracy_sampled import conserved_bound_k, force_error, made_of
 from rotor.scenes.effect_sections import DriveSection, LinearDragSection
 from rotor.scenes.kind import kind_of
+from rotor.scenes.knobs.of_levels import line_error
 from rotor.scenes.knobs.of_motion import answer_followed, conserved_k, followed
 from rotor.scenes.run import run_scene
 from rotor.scenes.scene import (
@@ -145,6 +147,33 @@ def test_spins_are_taken_where_they_are_larger_than_what_is_asked_for():
     exact = run_scene(SpectrumScene(molecule=plain, conditions=JET, numerics=few, accuracy="1 kHz"))
     assert exact.reached.how == "exact: nothing cheaper"
     assert exact.reached.error < 1e-9
+
+
+TWO = MoleculeSection(
+    constants="A=9.2 B=3 C=2.5 GHz",
+    dipole_abc=[1, 0, 0],
+    spin_constants="chi_aa(35Cl_1)=-40 MHz, chi_bb-cc(35Cl_1)=5 MHz, chi_aa(14N)=-4.2 MHz",
+)
+
+
+@pytest.mark.parametrize(("asked", "method"), [("20 MHz", "first-order"), ("1 kHz", "exact")])
+def test_several_spins_by_the_cheapest_method(asked, method):
+    """What is stated covers the difference from exact lines; what is too much to be left out stays."""
+    few = BasisNumerics(jmax=2)
+    scene = SpectrumScene(molecule=TWO, conditions=JET, numerics=few, accuracy=asked)
+    result = run_scene(scene)
+    exact = run_scene(SpectrumScene(molecule=TWO, conditions=JET, numerics=few))
+    assert used_method(result.table.levels).method == method
+    assert line_error(result.answer.lines, exact.answer.lines) <= result.reached.error <= result.reached.asked
+    assert "orders of distortion" in dict(scene.plan().parts)
+
+
+def test_two_percent_of_a_correlation_function():
+    """C1 and C2 are 1 at first: 2 % of them is 0.02; without times a percentage is of the heat capacity."""
+    seen = GasObservables(times=[0.0, 0.1])
+    curves, plain = (GasScene(molecule="water", accuracy="2 %", **more) for more in ({"observables": seen}, {}))
+    assert (asked_of(curves), unit_of(curves)) == (0.02, "")
+    assert (asked_of(plain), unit_of(plain)) == (2.0, "%")
 
 
 def test_the_rounding_that_is_stated_bounds_the_true_one():

@@ -12,6 +12,7 @@ import pytest
 import rotor
 from rotor.quantum.effects.of_top import spin_effects
 from rotor.quantum.effects.watson import SEMI_RIGID, operators_by_name
+from rotor.quantum.estimates.beyond import next_order
 from rotor.quantum.estimates.limits import populated_j
 from rotor.quantum.solve import solve_levels
 from rotor.scenes import left_out
@@ -66,14 +67,14 @@ def next_order_over_real(name: str, order: int) -> float:
     top = rotor.read(name)
     j = populated_j(top, 300.0)
     without, with_it = truncated(top, order - 2), truncated(top, order)
-    estimate = left_out.next_order(without, j, SEMI_RIGID).size
+    estimate = next_order(without, j, SEMI_RIGID).size_mhz
     change = solve_levels(without, j, jmin=j).energy_mhz - solve_levels(with_it, j, jmin=j).energy_mhz
     return estimate / float(np.abs(change).max())
 
 
 @pytest.mark.parametrize(("name", "order"), HELD)
 def test_the_next_order_of_distortion(name, order):
-    assert 1 / 3 < next_order_over_real(name, order) < 3  # the factor that the table of left_out.py claims
+    assert 1 / 3 < next_order_over_real(name, order) < 3  # the factor that the head of beyond.py claims
 
 
 @pytest.mark.parametrize(("name", "order"), MISSED)

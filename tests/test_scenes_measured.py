@@ -54,6 +54,12 @@ def test_seconds_of_the_plans(program):
         assert max(one.plan_seconds, one.run_seconds) < 1.0 or 1 / 3 < one.plan_seconds / one.run_seconds < 3
 
 
+def test_memory_of_the_plans(program):
+    """Within a factor of 3 of the peak where that is over 1 MB."""
+    for one in program.read_results():
+        assert max(one.plan_mb, one.run_mb) < 1.0 or 1 / 3 < one.plan_mb / one.run_mb < 3, one.scene
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["hydrogen_heat_capacity", "driven_chaos", "rigid_water", "water_gas"])
 def test_a_scene_measured_again(program, name):

@@ -110,7 +110,7 @@ def test_texts(text, energies, degeneracies):
 
 @pytest.mark.parametrize(
     ("text", "said"),
-    [("", "expected "), ("667,,1388", "expected "), ("-5", "expected "), ("0", "above 0 cm-1"), ("667x0", "above 0 for each"),
+    [("", "expected "), ("667,,1388", "expected "), ("-5", "expected "), ("0", "0.001 cm-1 or more"), ("667x0", "above 0 for each"),
      ("667 D", "unit 'D'"), ("667x1.5", "expected "), ("667 1388", "expected "), ("1e999", "not a finite number")],
 )  # fmt: skip
 def test_texts_that_mean_nothing(text, said):

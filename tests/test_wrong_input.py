@@ -22,6 +22,7 @@ def files(call):
         Path(f"a{suffix}").write_bytes((CASE / f"ocs{suffix}").read_bytes())
     Path("a.cat").write_bytes((CASE / "sample.cat").read_bytes())
     Path("s.toml").write_text(SCENE)
+    Path("hot.toml").write_text(f'{SCENE}[conditions]\ntemperature = "1e300 K"\n'.replace("levels", "gas"))
     Path("m.toml").write_text('name = "x"\n[constants]\nunit = "MHz"\nsource = "test"\nB = 6000.0\n')
     Path("nan.csv").write_text(LINES.format("nan"))
     Path("bytes.csv").write_bytes(b"\xff\xfe\x00")
@@ -79,6 +80,13 @@ def test_no_file_that_is_read_is_written_over(files, words, said):
         (["info", "--constants", "B=10 K/m"], "--constants: unit 'K/m' is not a known unit"),
         (["tumble", "--moments", "1e300,1e300,1e300", "--omega", "1,1,1"], "moments lie between 1e-100 and 1e+100"),
         (["tumble", "--moments", "1,2,3", "--omega", "1e200,1,1"], "up to 1e+100 in size"),
+        (["thermo", "CO", "--vibration", "1e-300"], "expected finite ones of 0.001 cm-1 or more"),
+        (["thermo", "CO", "--vibration", "100x1e9"], "unit 'e9' is not a known unit; the default is 'cm-1'"),
+        (
+            ["levels", "CO", "--spin-constants", "chi_aa(14N)=5"],
+            "1 spin is called after 14N, and CO has 1 of 12C, 1 of 16O",
+        ),
+        (["spectrum", "HCN", "--spin-constants", "C_aa(1H_1)=5 C_aa(1H_2)=5"], "2 spins are called after 1H"),
         (["isotopologues", "a.var"], "error: isotopes cannot be changed"),
         (["isotopologues", "CO", "--min-abundance", "2"], "--min-abundance: least abundance 2"),
         (["fit", "missing.par"], "error: missing.par: no such file"),
@@ -88,6 +96,7 @@ def test_no_file_that_is_read_is_written_over(files, words, said):
             "nan.csv, line 1 of the table: frequency_mhz reads 'nan'",
         ),
         (["cat", "a.cat", "--as-spcat"], "--as-spcat: expected with --compare and an .int file"),
+        (["plan", "hot.toml"], "conditions.temperature: '1e300 K': expected a temperature up to 1e+06 K"),
         (["run", "s.toml", "--workers", "100000"], "--workers: 100000: expected a whole number from 1 to 256"),
     ],
 )

@@ -31,7 +31,7 @@ Axis = tuple[complex, complex, complex]
 
 Z_AXIS: Axis = (0.0, 0.0, 1.0)
 HIGHEST_W_PER_CM2 = 1e17  # far beyond any intensity that a molecule survives
-HIGHEST_KV_PER_CM = 1e5  # 1 V/Å: molecules are ionised below it
+HIGHEST_KV_PER_CM = 1e6  # 10 V/Å: molecules are ionised below 1 V/Å; models of kicks may go beyond that
 # 2π I/(cħ) in rad/ps for 1 Å³ and 1 W/cm²; Å³ → m³ 1e-30, W/cm² → W/m² 1e4, 1/s → 1/ps 1e-12
 RAD_PER_PS_ANGSTROM3_W_PER_CM2 = (
     2 * math.pi * 1e-30 * 1e4 / (units.SPEED_OF_LIGHT_M_PER_S * units.PLANCK_J_S / (2 * math.pi)) * 1e-12

@@ -22,7 +22,7 @@ class Options:
     """Which scene."""
 
     kind: str | None = argument(
-        help="spectrum, levels, raman, thermo, tumble, gas, fluid, stark, align, fit or emission."
+        help="spectrum, levels, raman, thermo, tumble, gas, fluid, stark, zeeman, align, fit or emission."
     )
     schema: bool = option(False, "--schema", help="The JSON Schema of scene files instead, for editors.")
     out: str | None = file_option(".toml", ".json", help="Write it into a file.")

@@ -54,7 +54,7 @@ def _show(scene: Scene, plan: Plan) -> None:
         *plan.parts,
         *((name, f"{count:,}") for name, count in plan.counts.items()),
         ("seconds", f"{plan.seconds:.2g} of the processor, without start-up and compilation"),
-        ("memory", f"{plan.memory_mb:.2g} MB for the results"),
+        ("memory", f"{plan.memory_mb:.2g} MB at the most, in use at one time"),
     ]
     facts += [("left out" if not number else "", _text(one)) for number, one in enumerate(plan.left_out)]
     show_facts(facts)

@@ -310,22 +310,22 @@ def _show(top: Top, states: FieldMap, content: dict[str, Any]) -> None:
     print(heading(top))
     show_facts(_facts(top, content))
     print()
-    show_table(_table(states))
+    show_table(_table(states, mixed=bool(content["field_direction"][0] or content["field_direction"][1])))
 
 
-def _table(states: FieldMap) -> Table:
-    """The first states, by M and block."""
+def _table(states: FieldMap, mixed: bool) -> Table:
+    """The first states, by M and block; M has a sign where three components of the dipole act."""
     first, last = states.fields[0], states.fields[-1]
 
     def row(rows: slice) -> list[str]:
         at, end = rows.start, rows.stop - 1
         numbers = (states.energy_mhz[at], states.energy_mhz[end], states.slope[end], states.cosines["costheta"][end])
-        m = "mixed" if states.m[at] < 0 else str(states.m[at])
+        m = "mixed" if mixed else f"{states.m[at]:g}"
         return [str(states.label[at]), m, *(f"{value:.6f}" for value in numbers)]
 
     names = (
         "state",
-        "|M|",
+        "M",
         f"E at {first:g} kV/cm (MHz)",
         f"E at {last:g} kV/cm (MHz)",
         "μ_eff there (D)",

@@ -18,10 +18,10 @@ from rotor.geometry.rigid_motions import Screw, compose, screw_of
 from rotor.geometry.rotations import conjugate, rotate
 from rotor.geometry.superposition import superpose
 
-ROUNDS = 50
+ROUNDS = 50  # of fitting a motion and counting again which points follow it; a part is settled after a few
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class RigidPart:
     """Points that moved as one body. members: indices. q, position: the motion, x -> q x q* + position. rmsd: of the fit."""
 
@@ -31,7 +31,7 @@ class RigidPart:
     rmsd: float
 
     def screw_against(self, fixed: RigidPart) -> Screw:
-        """The screw of this part as seen from another one, in the coordinates before the motion."""
+        """The screw motion of this part relative to another part, in the coordinates before the motion."""
         back = conjugate(fixed.q)
         return screw_of(*compose(back, -rotate(back, fixed.position), self.q, self.position))
 

@@ -24,9 +24,11 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Ints
 
+# in which tables and files list them
 ORDER = ("v", "n", "j", "k", "ka", "kc", "irrep", "i_tot", "f1", "f2", "f3", "f4", "f5", "f6", "f7", "f8", "f", "m")
 _HEADINGS = {"ka": "Ka", "kc": "Kc", "i_tot": "I", "irrep": "irrep", "v": "v"}
 
+# how a picture writes sums with spins, in TeX
 _SUBSCRIPTED = {f"f{i}": f"F_{i}" for i in range(1, 9)} | {"i_tot": "I"}
 
 Quanta = Mapping[str, NDArray[Any]]
@@ -42,7 +44,7 @@ def heading(name: str) -> str:
 
 
 def headings(names: Iterable[str]) -> str:
-    """The headings of several quantum numbers, blank between them.
+    """The headings of several quantum numbers with a space between them.
 
     >>> headings(("j", "ka", "kc"))
     'J Ka Kc'
@@ -134,7 +136,7 @@ def line_text(quanta: Quanta, upper: int, lower: int, halves: Collection[str] = 
 
 
 def of_rotation(quanta: Quanta) -> dict[str, NDArray[Any]]:
-    """Quantum numbers without those of sums with spins, which levels with n have.
+    """The quantum numbers of the rotation alone: of levels with n, those of sums with spins are left out; others have none.
 
     >>> list(of_rotation({"n": np.array([1]), "k": np.array([0]), "f1": np.array([3]), "f": np.array([2])}))
     ['n', 'k']

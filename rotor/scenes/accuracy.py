@@ -2,7 +2,7 @@
 
 | kind | accuracy of | what is chosen | error stated |
 |---|---|---|---|
-| spectrum, levels, raman | frequencies, energies, shifts, "1 kHz" | spins with known constants, left out if smaller | rounding, and these |
+| spectrum, levels, raman | frequencies, energies, shifts, "1 kHz" | spins, left out if smaller; method of several | rounding, and these |
 | stark, zeeman | energies, "1 kHz" | tolerance, and with it J max of the basis | by which energies move with a higher J max, round-off |
 | align | cosines, 1e-4 | the loosest tolerance: steps, J max, populations | step error, edge population, population left out |
 | thermo | Q, U and C_v, "0.1 %" | levels summed, or the classical limit with corrections | of the sums |
@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -25,12 +25,10 @@ from rotor.scenes.choice import NOTHING_CHEAPER, Choice, Reached
 from rotor.scenes.kind import quantity
 from rotor.scenes.scene import Scene
 
-if TYPE_CHECKING:
-    from rotor.quantum.effect import QuantumEffect
-
 ROUNDING = 8 * float(
     np.finfo(np.float64).eps
 )  # of an eigenvalue, relative to the largest: a few units in the last place
+EXACT, FOR_METHOD = "exact", 0.9  # the usual method of spins; the part of an accuracy that another one may take
 LOOSEST_COSINE = 0.05
 LOOSER = (1e3, 1e2, 1e1, 1.0)  # tolerances of cosines that are tried, times the accuracy
 UNITS = {
@@ -57,7 +55,7 @@ def asked_of(scene: Scene) -> float | None:
     if given is None:
         return None
     if scene.kind in SAMPLED:
-        return _sampled(scene.kind, given)
+        return _sampled(scene, given)
     text, scale = str(given).strip(), 1.0
     if text.endswith("%"):
         text, scale = text[:-1], 0.01
@@ -82,7 +80,13 @@ def unit_of(scene: Scene) -> str:
     if scene.kind not in SAMPLED:
         return UNITS[scene.kind]
     text = str(getattr(scene, "accuracy", "")).strip()
-    return "%" if text.endswith("%") else "" if _is_number(text) else "K"
+    return "" if _of_curves(scene, text) else "%" if text.endswith("%") else "K"
+
+
+def _of_curves(scene: Any, text: str) -> bool:
+    """Whether an accuracy is that of C1 and C2: a number, or a percentage where their times are asked for; both are 1 at first."""
+    percent = text.endswith("%") and scene.kind == "gas" and scene.observables.times is not None
+    return percent or _is_number(text)
 
 
 def _is_number(text: str) -> bool:
@@ -93,19 +97,19 @@ def _is_number(text: str) -> bool:
     return True
 
 
-def _sampled(kind: str, given: str | float) -> float:
+def _sampled(scene: Scene, given: str | float) -> float:
     """The accuracy of a gas or fluid in K, percent, or as a number.
 
     Raises ValueError for a unit that the kind has not.
     """
     text = str(given).strip()
-    if _is_number(text) and "" not in SAMPLED[kind]:
+    if _is_number(text) and "" not in SAMPLED[scene.kind]:
         raise ValueError(f"accuracy: {given!r}: expected a unit: K of the conserved energy, or % of the forces")
     percent = text.endswith("%")
     value = quantity("accuracy", text.removesuffix("%"), "" if percent or _is_number(text) else "K")
     if not value > 0.0:
         raise ValueError(f"accuracy: {given!r}: expected more than 0")
-    return value
+    return 0.01 * value if percent and _of_curves(scene, text) else value
 
 
 def chosen(scene: Scene, request: Any) -> Choice:
@@ -151,20 +155,46 @@ def _fluid(scene: Any, request: Any, asked: float) -> Choice:
 
 
 def _spectrum(scene: Any, request: Any, asked: float) -> Choice:
-    """Spins whose constants are known are taken where they are larger than what was asked for."""
-    if scene.effects.hyperfine is not None or request.top.spin_constants is None:
+    """Spins whose constants are known are taken where they are larger than what was asked for, several by the cheapest method.
+
+    All orders of distortion that the constants have are taken: of J ≤ 40 of water, 13 ms, the orders above J⁴ are 3 ms, and those
+    above are not small beside 1 kHz.
+    """
+    top, present = request.top, request.effects
+    has_spins = any(effect.spins(top) for effect in present)
+    if top.spin_constants is None or not (has_spins or scene.effects.hyperfine is None):
         return Choice(request, NOTHING_CHEAPER)
+    size = _spin_size(top)
+    if size <= asked and not has_spins:
+        return Choice(request, f"spins of nuclei left out, {size:.2g} MHz")
+    if len(top.spin_constants.twice) > 1 and scene.effects.hyperfine_method == EXACT:
+        return _cheapest_method(request, size, asked)
+    if has_spins:
+        return Choice(request, "with spins of nuclei: exact, nothing cheaper")
     from rotor.quantum.effects.of_top import effects_of
 
-    size = _spin_size(request.top, request.effects)
-    if size <= asked:
-        return Choice(request, f"spins of nuclei left out, {size:.2g} MHz")
-    if any(effect.spins(request.top) for effect in request.effects):
-        return Choice(request, "with spins of nuclei: exact, nothing cheaper")
-    return Choice(replace(request, effects=effects_of(request.top, True)), f"with spins of nuclei, {size:.2g} MHz")
+    return Choice(
+        replace(request, effects=effects_of(top, True)), f"with spins of nuclei, {size:.2g} MHz: exact, nothing cheaper"
+    )
 
 
-def _spin_size(top: Any, present: tuple[QuantumEffect, ...]) -> float:
+def _cheapest_method(request: Any, size: float, asked: float) -> Choice:
+    """Spins by the cheapest method that is estimated to be within what was asked for; the estimate is in the error stated.
+
+    One nucleus is exact at no more cost (docs/accuracy.md).
+    """
+    from rotor.quantum.effects.of_top import effects_of
+    from rotor.quantum.effects.watson import Centrifugal
+
+    tolerance = FOR_METHOD * asked
+    taken = effects_of(request.top, True, "auto", tolerance)
+    if not any(isinstance(one, Centrifugal) for one in request.effects):
+        taken = tuple(one for one in taken if not isinstance(one, Centrifugal))
+    how = f"with spins of nuclei, {size:.2g} MHz, by the cheapest method to {tolerance:g} MHz"
+    return Choice(replace(request, effects=taken), how)
+
+
+def _spin_size(top: Any) -> float:
     """The largest size of known couplings of spins at J = 1."""
     from rotor.quantum.effects.of_top import spin_effects
 
@@ -172,11 +202,15 @@ def _spin_size(top: Any, present: tuple[QuantumEffect, ...]) -> float:
 
 
 def _levels_error(top: Any, levels: Any) -> float:
-    """Rounding of the largest energy, and the size of known spins that are left out."""
+    """Rounding of the largest energy, the size of known spins that are left out, and the estimate of the method of others."""
+    from rotor.quantum.spins.method import used_method
+
     rounding = ROUNDING * float(np.abs(levels.energy_mhz).max(initial=0.0))
     has_spins = any(effect.spins(top) for effect in levels.effects)
-    left = 0.0 if has_spins or top.spin_constants is None else _spin_size(top, levels.effects)
-    return rounding + left
+    if has_spins:
+        used = used_method(levels)
+        return rounding + (used.estimate_mhz if used else 0.0)
+    return rounding + (0.0 if top.spin_constants is None else _spin_size(top))
 
 
 def _tolerance(name: str, default: Any, least: float) -> Callable[[Any, Any, float], Choice]:

@@ -4,7 +4,7 @@
 |---|---|---|---|
 | gas, "1 K" | temperature of the kinetic energy | molecules: z T √(2/fN) | the same |
 | gas, "1 %" | heat capacity var(E)/kT² | molecules: z √((2 + 12/f)/N) | the same |
-| gas, 0.02 | C1 and C2 at each time | molecules: z s/√N, s of a small gas | from the spread in the run |
+| gas with times, "2 %" or 0.02 | C1 and C2 at each time | molecules: z s/√N, s of a small gas | from the spread in the run |
 | fluid, "0.5 K" | conserved energy, 2E/k per degree | the step, by short runs of the box | bound of these, and of the run |
 | fluid, "0.1 %" | forces of Ewald's sum | its tolerance, by forces in the box | where the run ends |
 

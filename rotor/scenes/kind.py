@@ -63,9 +63,12 @@ def kind_of(scene: Scene) -> Kind:
 
 def quantity(name: str, value: float | str, unit: str) -> float:
     """A number in `unit`; a ValueError names the field."""
-    from rotor.units import parse_quantity
+    from rotor.units import MOST_KELVIN, parse_quantity
 
-    return named(name, lambda: parse_quantity(value, unit))
+    found = named(name, lambda: parse_quantity(value, unit))
+    if unit == "K" and found > MOST_KELVIN:
+        raise ValueError(f"{name}: {value!r}: expected a temperature up to {MOST_KELVIN:g} K; no molecule lasts beyond")
+    return found
 
 
 def grid(name: str, value: Grid | None, unit: str) -> tuple[float, ...] | None:

@@ -1,23 +1,19 @@
 """How large is what a scene leaves out: each effect with its size, its formula and where that is from.
 
+What a Hamiltonian leaves out is the core's: distortion of the next order, couplings of spins, geometry in place of constants, internal
+rotation, inversion, electron spin (`rotor.quantum.estimates.limits` and `beyond`). The conditions of a scene add these:
+
 | left out | size |
 |---|---|
-| distortion of the next order | c s_n²/s_(n-1), s the sizes of the last two orders at one J (`order_sizes_mhz`): a geometric series |
-| nuclear quadrupole, spin-rotation, spin-spin | constants known: `size_mhz`, of quadrupoles half; else `rotor.quantum.estimates.limits` |
 | Doppler width | ν √(8 ln2 kT/mc²), full width at half maximum (`rotor.spectra.profiles`) |
 | pressure width | 2 n ⟨v⟩ σ/2π, σ = π (4 Å)² + π μ²/(2 · 4πε₀ ħ⟨v⟩): a hard core, and V. Weisskopf's radius of dipoles |
 | Stark shift of a stray field | linear, J = 0: (μE)²/6hB, second order; symmetric, J = K = 1: μE KM/J(J+1), first order |
 | the same of an asymmetric top | J = M = 1: two levels that a component couples |
-| geometry in place of constants, internal rotation, inversion, electron spin | `rotor.quantum.estimates.limits` |
 | quantum corrections of a classical gas | a/T of ln Q (`rotor.thermo.classical_limit`) |
 | centrifugal distortion of a classical gas | d T of ln Q (there) |
 | quantum corrections of a fluid | ħ²/24(kT)³ (⟨F²⟩/m + Σ⟨T²⟩/I) of A/NkT (J. G. Powles and G. Rickayzen, Mol. Phys. 38, 1875 (1979)) |
 | step of a fluid | h²/12 Σ⟨T²⟩/I of the rotational energy (`rotor.fluid.motion.thermometers`) |
 | box of a fluid | N^(-1/3) of the diffusion (S. A. Khrapak, J. Phys. Chem. B (2024), arXiv:2402.09348), a short form of Yeh and Hummer's |
-
-c of the next order: 0.3 of a linear top from the quartic to the sextic order, 3 of other tops there, 1 of every higher order. A
-harmonic diatomic molecule has 2, and anharmonicity takes most of it away (Dunham's H = 2D(12B² - αω)/3ω²); these values were chosen
-on the library, where they hold within a factor of 3 for 25 of 30 orders (tests/test_scene_plans.py names the others).
 """
 
 from __future__ import annotations
@@ -38,7 +34,6 @@ if TYPE_CHECKING:
 STRAY_KV_PER_CM = 1e-3  # 1 V/cm
 COLLISION_M = 4e-10  # a diameter of small molecules
 HBAR_J_S = units.PLANCK_J_S / (2 * math.pi)
-FACTORS = {"linear": 0.3, "other": 3.0, "higher": 1.0}  # c of the table
 
 
 @dataclass(frozen=True)
@@ -53,43 +48,17 @@ class LeftOut:
 
 def of_levels(top: Top, j: int, effects: Sequence[QuantumEffect]) -> list[LeftOut]:
     """What levels and lines of one J leave out, largest first, in MHz; what is not estimated comes last."""
-    from rotor.quantum.estimates.limits import model_limits
+    from rotor.quantum.estimates.limits import every_limit
 
-    names = {effect.name for effect in effects}
-    found = [next_order(top, j, effects), stray_field(top), *_known_spins(top, j, names)]
-    for limit in model_limits(top, j, effects):
-        known = top.spin_constants is not None and limit.name == "nuclear quadrupole"
-        if limit.name != "centrifugal distortion" and not known:
-            found.append(LeftOut(limit.name, limit.size_mhz, "MHz", f"at J = {j}: {limit.text}"))
-        elif limit.name == "centrifugal distortion" and found[0] is None:
-            found[0] = LeftOut(limit.name, limit.size_mhz, "MHz", f"at J = {j}: {limit.text}")
-    return largest_first([one for one in found if one is not None])
+    limits = every_limit(top, j, effects)
+    found = [LeftOut(one.name, one.size_mhz, "MHz", f"at J = {j}: {one.text}") for one in limits]
+    field = stray_field(top)
+    return largest_first(found if field is None else [*found, field])
 
 
 def largest_first(found: Sequence[LeftOut]) -> list[LeftOut]:
     """By size; what is not estimated comes last."""
     return sorted(found, key=lambda one: (one.size is None, -(one.size or 0.0)))
-
-
-def next_order(top: Top, j: int, effects: Sequence[QuantumEffect]) -> LeftOut | None:
-    """The order of distortion beyond the highest that the calculation has; None of rigid constants.
-
-    >>> from rotor.quantum.effects.watson import SEMI_RIGID
-    >>> from rotor.tops.top import Top
-    >>> one = next_order(Top.from_constants("B=6000 D=0.001 MHz"), 20, SEMI_RIGID)
-    >>> f"{one.size:.2e}"  # 0.3 D²/B (J(J+1))³
-    '3.70e-03'
-    """
-    from rotor.quantum.estimates.convergence import order_sizes_mhz
-
-    sizes = list(order_sizes_mhz(top, j, effects=effects).items())
-    if len(sizes) < 2 or not sizes[-2][1]:
-        return None
-    (_, before), (order, last) = sizes[-2:]
-    which = "higher" if order > 4 else "linear" if top.kind == "linear" else "other"
-    name = f"centrifugal distortion of order J^{order + 2}"
-    basis = f"at J = {j}: {FACTORS[which]:g} times the order J^{order} ({last:.2g} MHz) squared over the order before"
-    return LeftOut(name, FACTORS[which] * last**2 / before, "MHz", basis)
 
 
 def stray_field(top: Top) -> LeftOut | None:
@@ -124,22 +93,6 @@ def _asymmetric_stray_field(top: Top) -> LeftOut:
     which = "abc"[sizes.index(max(sizes))]
     basis = f"of J = M = 1 in 1 V/cm, two levels that μ_{which} couples; near degeneracies of higher J have more"
     return LeftOut("Stark shift of a stray field", max(sizes), "MHz", basis)
-
-
-def _known_spins(top: Top, j: int, present: set[str]) -> list[LeftOut | None]:
-    """Couplings of spins whose constants are known and which the calculation has not."""
-    if top.spin_constants is None:
-        return []
-    from rotor.quantum.effects.of_top import spin_effects
-
-    absent = [effect for effect in spin_effects(top) if effect.name not in present]
-    halves = {"nuclear quadrupole": 0.5}  # of χ: J = 1 of I = 1 is shifted by χ/2 at most, higher J by χ/4
-    return [
-        LeftOut(
-            one.name, halves.get(one.name, 1.0) * one.size_mhz(top, j), "MHz", f"at J = {j}, from the constants known"
-        )
-        for one in absent
-    ]
 
 
 def doppler(top: Top, frequency_mhz: float, temperature_k: float) -> LeftOut | None:

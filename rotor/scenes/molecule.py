@@ -131,12 +131,12 @@ def _with_spins(top: Top, molecule: MoleculeSection) -> Top:
         if molecule.spins is not None:
             raise ValueError("molecule.spins: says how large the spins of spin_constants are; give those too")
         return top
-    from rotor.tops.spins.spin_constants import SpinConstants
+    from rotor.tops.spins.spin_constants import SpinConstants, refuse_other_nuclei
 
     text, spins = molecule.spin_constants, molecule.spins
-    return replace(
-        top, spin_constants=named("molecule.spin_constants", lambda: SpinConstants.parse(text, spins, GIVEN))
-    )
+    constants = named("molecule.spin_constants", lambda: SpinConstants.parse(text, spins, GIVEN))
+    named("molecule.spin_constants", lambda: refuse_other_nuclei(constants, top.molecule))
+    return replace(top, spin_constants=constants)
 
 
 def with_tensor(top: Top, numbers: list[float]) -> Top:

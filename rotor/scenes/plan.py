@@ -1,7 +1,8 @@
 """What a scene will do, before it is done: method, basis, counts, time and memory - and what it leaves out, by size.
 
 Seconds come from a short calibration: the same request to a lower J (or fewer molecules, fields, steps), scaled by the work that
-is left. They are processor time without start-up and compilation, within a factor of 3 where they are above 1 s.
+is left. They are processor time without start-up and compilation, within a factor of 3 where they are above 1 s. Memory is the peak
+of what Python and NumPy have in use in the same short runs, and grows with what the answer holds.
 """
 
 from __future__ import annotations
@@ -16,7 +17,16 @@ from typing import TYPE_CHECKING, Any
 from rotor.scenes import left_out
 from rotor.scenes.choice import Choice
 from rotor.scenes.kind import kind_of
-from rotor.scenes.plan_parts import Plan, effect_texts, extrapolated, good_numbers, level_parts, timed
+from rotor.scenes.plan_parts import (
+    Plan,
+    effect_texts,
+    extrapolated,
+    extrapolated_mb,
+    good_numbers,
+    level_parts,
+    peak_mb,
+    timed,
+)
 from rotor.scenes.scene import Scene
 
 if TYPE_CHECKING:
@@ -26,8 +36,9 @@ SHORT_J = (12, 30)  # of the calibration; a J that is not above the second is ti
 SETTLING_STEPS = 50  # of a box, after which its forces are nearly those of a fluid
 SHORT_GAS, SHORT_STEPS = (500, 2000), (5, 20)  # likewise
 MILLIBAR = 1e-3  # of a gas whose pressure is not given
-BYTES_A_LINE = 100  # columns of a line in memory
+BYTES_A_MOLECULE = 136  # momentum, attitude, place, velocity and energies of a molecule that is not being moved
 STEPS = "Runge-Kutta of order 8, adaptive"
+OF_LEVELS = ("spectrum", "levels", "raman")
 LONG_SEARCH = 10.0  # seconds; a shorter one is made twice, as its first time has imports and compilation in it
 SEARCHED = 5  # motions that the search of a tolerance takes: three to seven in the example scenes
 BEGINNINGS = 20  # of a driven motion, one of which is made to count its steps
@@ -70,8 +81,10 @@ def plan_of(scene: Scene, folder: str | os.PathLike[str] = ".") -> Plan:
 
     found: list[Choice] = []
     search = timed(lambda: found.append(chosen(scene, request)), LONG_SEARCH)
-    plan = _PLANS[scene.kind](found[-1].request)
-    return replace(plan, parts=(*plan.parts, ("accuracy", found[-1].how)), seconds=plan.seconds + search)
+    plan, parts = _PLANS[scene.kind](found[-1].request), [("accuracy", found[-1].how)]
+    if scene.kind in OF_LEVELS:
+        parts.append(("orders of distortion", "all that the constants have: fewer save milliseconds at the most"))
+    return replace(plan, parts=(*plan.parts, *parts), seconds=plan.seconds + search)
 
 
 def _searched(scene: Scene, request: Any) -> Plan:
@@ -138,14 +151,13 @@ def _spectrum(request: Any) -> Plan:
         q = request.q or partition_function(top, kelvin).q
         jmax, why = jmax_for_cut(top, dipole, kelvin, q * request.vibrational_factor, cut), "what the cut needs"
     j = min(populated_j(top, kelvin), max(jmax, 1))
-    spins = math.prod(spin.twice + 1 for effect in request.effects for spin in effect.spins(top))
     lines = allowed_lines(top, jmax)
-    seconds = extrapolated(
-        lambda j: answer_spectrum(replace(request, jmax=j)),
-        lambda j: (j + 1.0) ** (3 if top.kind == "asymmetric" else 1),
-        (max(SHORT_J[0], jmax // 3), max(SHORT_J[1], jmax // 2)),
-        jmax,
-    )
+    sizes, growing = (max(SHORT_J[0], jmax // 3), max(SHORT_J[1], jmax // 2)), 1 if top.kind == "linear" else 2
+
+    def short(j: int) -> Any:
+        return answer_spectrum(replace(request, jmax=j))
+
+    seconds = extrapolated(short, lambda j: (j + 1.0) ** (3 if top.kind == "asymmetric" else 1), sizes, jmax)
     _, b, c = top.rotational_constants_mhz
     absent = left_out.of_levels(top, j, request.effects)
     pressure = request.layer.pressure_bar if request.layer else MILLIBAR
@@ -161,7 +173,7 @@ def _spectrum(request: Any) -> Plan:
         parts=(("J max", f"{jmax}: {why}"), *level_parts(top, jmax, request.effects)),
         counts={"allowed lines of one state, without spins, before range and cut": lines},
         seconds=seconds,
-        memory_mb=lines * BYTES_A_LINE * spins / 1e6,
+        memory_mb=extrapolated_mb(short, lambda j: (j + 1.0) ** growing, sizes, jmax),
         left_out=tuple(absent),
     )
 
@@ -172,7 +184,11 @@ def _levels(request: Any) -> Plan:
     top, jmax = request.top, request.jmax
     plain = replace(request, jmin=0, kmin=None, kmax=None, max_energy_mhz=None)
     power = 3 if top.kind == "asymmetric" else 1
-    seconds = extrapolated(lambda j: answer_levels(replace(plain, jmax=j)), lambda j: (j + 1.0) ** power, SHORT_J, jmax)
+
+    def short(j: int) -> Any:
+        return answer_levels(replace(plain, jmax=j)).table.columns
+
+    seconds = extrapolated(short, lambda j: (j + 1.0) ** power, SHORT_J, jmax)
     count = (jmax + 1) ** 2 - request.jmin**2 if top.kind == "asymmetric" else jmax + 1 - request.jmin
     if top.kind in ("prolate", "oblate"):
         count = (jmax + 1) * (jmax + 2) // 2 - request.jmin * (request.jmin + 1) // 2
@@ -183,7 +199,7 @@ def _levels(request: Any) -> Plan:
         parts=tuple(level_parts(top, jmax, request.effects)),
         counts={"levels": count},
         seconds=seconds,
-        memory_mb=count * 8 * (jmax + 2) / 2e6 if top.kind == "asymmetric" else count * 50e-6,
+        memory_mb=extrapolated_mb(short, lambda j: (j + 1.0) ** power, SHORT_J, jmax),
         left_out=tuple(left_out.of_levels(top, max(jmax, 1), request.effects)),
     )
 
@@ -195,18 +211,22 @@ def _in_field(request: Any) -> Plan:
 
 
 def _gas(request: Any) -> Plan:
+    from rotor.classical.gas.ensembles import PIECE
     from rotor.thermo.classical_gas import answer_gas
 
-    seconds = extrapolated(lambda n: answer_gas(replace(request, molecules=n)), float, SHORT_GAS, request.molecules)
-    points = len(request.times_ps or ())
+    def short(n: int) -> Any:
+        return answer_gas(replace(request, molecules=n))
+
+    points, together = len(request.times_ps or ()), min(request.molecules, PIECE)
+    rest = BYTES_A_MOLECULE * (request.molecules - together) / 1e6
     return Plan(
         kind="gas",
         effects=("free rotation of rigid molecules", "free flight"),
         good=("energy and angular momentum of every molecule",),
         parts=(("method", "exact free motion of every molecule (theta functions); no step"),),
         counts={"molecules": request.molecules, "times": points},
-        seconds=seconds,
-        memory_mb=request.molecules * 20 * 8 / 1e6,
+        seconds=extrapolated(short, float, SHORT_GAS, request.molecules),
+        memory_mb=extrapolated_mb(short, float, SHORT_GAS, together) + rest,
         left_out=tuple(left_out.of_classical_gas(request.top, request.temperature_k)),
     )
 
@@ -226,7 +246,7 @@ def _raman(request: Any) -> Plan:
         parts=(("J max", f"{lines.jmax}: {found[-1].jmax_source}"), *level_parts(top, lines.jmax, request.effects)),
         counts={"lines": len(lines)},
         seconds=seconds,
-        memory_mb=len(lines) * BYTES_A_LINE / 1e6,
+        memory_mb=peak_mb(lambda: answer_raman(request)),
         left_out=tuple(left_out.of_levels(top, j, request.effects)),
     )
 
@@ -250,7 +270,7 @@ def _thermo(request: Any) -> Plan:
         parts=(("method", f"{summed}, to {request.relative_error:g} of Q, U and C_v"),),
         counts={"temperatures": len(request.temperatures_k)},
         seconds=seconds,
-        memory_mb=len(request.temperatures_k) * BYTES_A_LINE / 1e6,
+        memory_mb=peak_mb(lambda: answer_thermo(request)),
         left_out=(*left_out.of_levels(top, j, SEMI_RIGID), *vibration),
     )
 
@@ -276,7 +296,7 @@ def _align(request: Any) -> Plan:
         ),
         counts={"initial states": trace.states, "times": request.points},
         seconds=seconds,
-        memory_mb=trace.states * (trace.jmax + 1) * 16 / 1e6,
+        memory_mb=peak_mb(lambda: answer_align(replace(coarse, points=request.points))),
         left_out=tuple(left_out.of_levels(request.top, j, SEMI_RIGID)),
     )
 
@@ -288,7 +308,8 @@ def _tumble(request: Any) -> Plan:
         conserved = ("energy", "angular momentum in space")
         parts = (("method", "the exact free motion (theta functions): no step, round-off alone"),)
         seconds, count = timed(lambda: answer_tumble(request)), len(request.times or ()) or 201
-        return Plan("tumble", ("free rotation",), conserved, parts, {"times": count}, seconds, count * 1e-4, ())
+        memory = peak_mb(lambda: answer_tumble(request).table.columns)
+        return Plan("tumble", ("free rotation",), conserved, parts, {"times": count}, seconds, memory, ())
     return _driven(request)
 
 
@@ -317,7 +338,8 @@ def _seconds_of_steps(request: Any, steps: int) -> float:
 def _driven(request: Any) -> Plan:
     from rotor.classical.driven import answer_driven
 
-    answer = answer_driven(_beginning(request, 1 / BEGINNINGS))
+    beginning = _beginning(request, 1 / BEGINNINGS)
+    answer = answer_driven(beginning)
     steps = math.ceil(answer.motion.steps * BEGINNINGS)
     good = ("energy",) if all(effect.conserves_energy for effect in request.effects) else ()
     local = request.step is None
@@ -334,7 +356,7 @@ def _driven(request: Any) -> Plan:
         parts=(("method", STEPS if local else f"splitting of order {request.order}, step {request.step:g}"),),
         counts={"steps": steps, "times": len(request.times)},
         seconds=_seconds_of_steps(request, steps),
-        memory_mb=len(request.times) * 13 * 8 / 1e6,
+        memory_mb=peak_mb(lambda: answer_driven(beginning).table.columns) * len(request.times) / len(beginning.times),
         left_out=(left_out.LeftOut("error of the steps", error, "rad", basis),),
     )
 
@@ -363,7 +385,7 @@ def _fluid(request: Any) -> Plan:
         ),
         counts={"atoms": len(made.box), "steps": settings.steps},
         seconds=seconds,
-        memory_mb=len(made.box) * 2e-3,
+        memory_mb=peak_mb(lambda: short(min(SETTLING_STEPS, settings.steps))),
         left_out=tuple(_left_out_of_fluid(short(min(SETTLING_STEPS, settings.steps)).atoms, settings)),
     )
 

@@ -8,10 +8,9 @@ from typing import Any
 
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.scenes import left_out
-from rotor.scenes.plan_parts import Plan, effect_texts, extrapolated
+from rotor.scenes.plan_parts import Plan, effect_texts, extrapolated, extrapolated_mb
 
 SHORT_FIELDS = (2, 20)  # of the calibration
-BYTES_A_STATE = 100  # columns of a state in memory
 
 
 @dataclass(frozen=True)
@@ -38,7 +37,10 @@ def plan_in_field(request: Any) -> Plan:
 
     facts = at(tuple(dict.fromkeys((min(fields), max(fields))))).facts()
     lasting = sorted(fields, key=abs, reverse=True)  # the highest fields need the largest basis
-    seconds = extrapolated(lambda n: at(tuple(lasting[:n])), float, SHORT_FIELDS, len(fields))
+
+    def short(n: int) -> Any:
+        return at(tuple(lasting[:n])).states.columns
+
     good = () if getattr(request, "tilted", False) else ("M_F" if request.hyperfine else "M",)
     return Plan(
         kind=case.kind,
@@ -53,8 +55,8 @@ def plan_in_field(request: Any) -> Plan:
             ),
         ),
         counts={"fields": len(fields), "states": len(fields) * facts["curves"]},
-        seconds=seconds,
-        memory_mb=len(fields) * facts["curves"] * BYTES_A_STATE / 1e6,
+        seconds=extrapolated(short, float, SHORT_FIELDS, len(fields)),
+        memory_mb=extrapolated_mb(short, float, SHORT_FIELDS, len(fields)),
         left_out=tuple(one for one in left_out.of_levels(top, j, effects) if one.name != case.own),
     )
 

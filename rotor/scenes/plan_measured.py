@@ -9,14 +9,13 @@ from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.estimates.limits import populated_j
 from rotor.scenes import left_out
 from rotor.scenes.left_out import LeftOut
-from rotor.scenes.plan_parts import Plan, effect_texts, timed
+from rotor.scenes.plan_parts import Plan, effect_texts, peak_mb, timed
 
 if TYPE_CHECKING:
     from rotor.formats.fit_request import FitRequest
     from rotor.tops.top import Top
 
 SHORT_ITERATIONS, USUAL_ITERATIONS = 1, 6  # of the calibration; of fits whose start is near (tests/test_scene_fit.py)
-BYTES_A_NUMBER = 8
 
 
 def plan_of_fit(request: Any) -> Plan:
@@ -48,7 +47,7 @@ def plan_of_fit(request: Any) -> Plan:
         ),
         counts={"lines": len(lines), "blended": blends, "parameters": len(free)},
         seconds=least + step * (USUAL_ITERATIONS - SHORT_ITERATIONS),
-        memory_mb=3 * len(lines) * len(free) * BYTES_A_NUMBER / 1e6,
+        memory_mb=peak_mb(lambda: limited(SHORT_ITERATIONS)),
         left_out=() if top is None else _absent(request, top, j),
     )
 
@@ -92,6 +91,6 @@ def plan_of_emission(request: Any) -> Plan:
         ),
         counts={"molecules": len(request.tops), "lines": len(answer.lines), "points": len(answer.spectrum)},
         seconds=seconds,
-        memory_mb=len(answer.spectrum) * (2 + 2 * len(request.tops)) * BYTES_A_NUMBER / 1e6,
+        memory_mb=peak_mb(lambda: answer_emission(request)),
         left_out=tuple(sorted(absent, key=lambda one: (one.size is None, -(one.size or 0.0)))),
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+import tracemalloc
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
@@ -76,6 +77,50 @@ def extrapolated(call: Callable[[int], Any], work: Callable[[int], float], sizes
         return seconds
     rate = max(seconds - timed(lambda: call(first)), 0.0) / (work(second) - work(first))
     return seconds + rate * (work(size) - work(second))
+
+
+def peak_mb(call: Callable[[], Any]) -> float:
+    """The most memory that a call has in use at one time beyond what was there, of Python and NumPy; made before, so without imports."""
+    mine = not tracemalloc.is_tracing()
+    if mine:
+        tracemalloc.start()
+    try:
+        before = tracemalloc.get_traced_memory()[0]
+        tracemalloc.reset_peak()
+        call()
+        return (tracemalloc.get_traced_memory()[1] - before) / 1e6
+    finally:
+        if mine:
+            tracemalloc.stop()
+
+
+def extrapolated_mb(
+    call: Callable[[int], Any], work: Callable[[int], float], sizes: tuple[int, int], size: int
+) -> float:
+    """Peak memory in MB of a call of one size from those of two smaller ones.
+
+    Parameters
+    ----------
+    call : callable
+        Does what is measured, for a size.
+    work : callable
+        What the growing part is in proportion to, of a size.
+    sizes : (int, int)
+        The two sizes that are measured, the smaller first.
+    size : int
+        The size that is asked for.
+
+    Returns
+    -------
+    float
+        MB.
+    """
+    first, second = (min(one, size) for one in sizes)
+    most = peak_mb(lambda: call(second))
+    if first == second:
+        return most * work(size) / work(second)
+    rate = max(most - peak_mb(lambda: call(first)), 0.0) / (work(second) - work(first))
+    return most + rate * (work(size) - work(second))
 
 
 def level_parts(top: Top, jmax: int, effects: Sequence[QuantumEffect]) -> list[tuple[str, str]]:

@@ -180,7 +180,8 @@ class GasScene(Scene, frozen=True, tag="gas"):
 
     molecule: Annotated[str | MoleculeSection, said("a name, a file, SMILES:..., or a table")]
     accuracy: Annotated[
-        str | float | None, said("of temperature (K), heat capacity (%), or C1 and C2 (a number)", "1 K")
+        str | float | None,
+        said("of temperature (K), heat capacity (%), or of C1 and C2 where times are given (%)", "1 K"),
     ] = None
     conditions: GasConditions = GasConditions()
     observables: GasObservables = GasObservables()

@@ -17,12 +17,14 @@ from numpy.typing import ArrayLike
 from rotor import units
 from rotor.arrays import Floats
 
+LEAST_CM = 1e-3  # of an energy: below it nothing vibrates, and kT over it would not be a number
+
 
 @dataclass(frozen=True)
 class VibrationalStates:
     """Vibrational states behind a partition function, by their energies above the ground state.
 
-    energies_cm: in cm⁻¹, all above 0. degeneracies: of each, 1 unless given. harmonic: the energies are fundamentals, and
+    energies_cm: in cm⁻¹, each 0.001 or more. degeneracies: of each, 1 unless given. harmonic: the energies are fundamentals, and
     all their overtones and combinations are added as those of harmonic oscillators; else they are states, each listed.
 
     Neglected either way: that each state has rotational constants of its own, some per cent of the factor less 1.
@@ -35,9 +37,9 @@ class VibrationalStates:
     def __post_init__(self) -> None:
         energies = tuple(float(energy) for energy in self.energies_cm)
         degeneracies = tuple(self.degeneracies) or (1,) * len(energies)
-        if not energies or not all(math.isfinite(e) and e > 0 for e in energies):
+        if not energies or not all(math.isfinite(e) and e >= LEAST_CM for e in energies):
             raise ValueError(
-                f"vibrational energies {list(energies)}: expected finite ones above 0 cm-1 (not the ground state)"
+                f"vibrational energies {list(energies)}: expected finite ones of {LEAST_CM:g} cm-1 or more (not the ground state)"
             )
         if len(degeneracies) != len(energies) or not all(int(g) == g and g > 0 for g in degeneracies):
             raise ValueError(
@@ -59,9 +61,9 @@ class VibrationalStates:
                 f"{text!r}: expected energies such as '667.4x2, 1388, 2349 cm-1', x and a degeneracy after each"
             )
         unit = next((item["unit"] for item in reversed(items) if item and item["unit"]), "cm-1")
-        mhz = [units.parse_quantity(f"{item['energy']} {item['unit'] or unit}", "MHz") for item in items if item]
+        energies = (units.parse_quantity(f"{item['energy']} {item['unit'] or unit}", "cm-1") for item in items if item)
         degeneracies = tuple(int(item["times"] or 1) for item in items if item)
-        return cls(tuple(x / units.MHZ_PER_CM for x in mhz), degeneracies, harmonic)
+        return cls(tuple(energies), degeneracies, harmonic)
 
     @property
     def text(self) -> str:

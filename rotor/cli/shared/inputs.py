@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 
 USUAL_LEAST_MHZ = 100.0  # of the largest constant of a molecule: below it MHz without a unit are pointed out
-LEAST_KELVIN, MOST_KELVIN = 1e-9, 1e6  # colder or hotter there is no gas of molecules
 MOST_TEMPERATURES = 100_000
 MOST_LOG10 = 300  # of an intensity that a double can hold
 MOST_TIMES = 10_000_000
@@ -95,7 +94,7 @@ def parsed(name: str, text: str, parse: Callable[[str], T]) -> T:
 
 def quantity(name: str, text: str, unit: str) -> float:
     """A number with an optional unit, in `unit`."""
-    from rotor.units import parse_quantity
+    from rotor.units import MOST_KELVIN, parse_quantity
 
     found = parsed(name, text, lambda value: parse_quantity(value, unit))
     if unit == "K" and found > MOST_KELVIN:
@@ -105,6 +104,8 @@ def quantity(name: str, text: str, unit: str) -> float:
 
 def positive(name: str, text: str, unit: str) -> float:
     """The same, above zero."""
+    from rotor.units import LEAST_KELVIN
+
     found = require_positive(name, quantity(name, text, unit), unit)
     if unit == "K" and found < LEAST_KELVIN:
         raise ValueError(f"{name}: {text!r}: expected a temperature of {LEAST_KELVIN:g} K or more")
@@ -138,7 +139,7 @@ def fields_as_options(**names: str) -> Iterator[None]:
 
 def temperatures(name: str, text: str) -> list[float]:
     """A grid or list of temperatures in K, refused unless all are above 0 K."""
-    from rotor.units import parse_grid
+    from rotor.units import LEAST_KELVIN, MOST_KELVIN, parse_grid
 
     found: list[float] = parsed(name, text, lambda value: parse_grid(value, "K").tolist())
     if not all(0 < t < float("inf") for t in found):
@@ -240,7 +241,7 @@ def read_top(given: Input) -> Top:
         table = weights("--spin-weights", given.spin_weights)
         top = parsed("--spin-weights", given.spin_weights, lambda _: top.with_weights(table, "given (--spin-weights)"))
     if given.spin_constants is not None:
-        top = replace(top, spin_constants=_spin_constants(given.spin_constants, given.spins))
+        top = replace(top, spin_constants=_spin_constants(given.spin_constants, given.spins, top))
     elif given.spins is not None:
         raise ValueError("--spins: says how large the spins of --spin-constants are; give those too")
     if given.state_constants is not None:
@@ -260,10 +261,15 @@ def _with_states(top: Top, text: str) -> Top:
     return parsed("--state-constants", text, read)
 
 
-def _spin_constants(text: str, spins: str | None) -> SpinConstants:
-    from rotor.tops.spins.spin_constants import SpinConstants
+def _spin_constants(text: str, spins: str | None, top: Top) -> SpinConstants:
+    from rotor.tops.spins.spin_constants import SpinConstants, refuse_other_nuclei
 
-    return parsed("--spin-constants", text, lambda value: SpinConstants.parse(value, spins, "given (--spin-constants)"))
+    def read(value: str) -> SpinConstants:
+        constants = SpinConstants.parse(value, spins, "given (--spin-constants)")
+        refuse_other_nuclei(constants, top.molecule)
+        return constants
+
+    return parsed("--spin-constants", text, read)
 
 
 def _refuse_contradictions(given: Input) -> None:

@@ -254,8 +254,22 @@ def _wide_cut(levels: Levels, request: Request, q: float) -> IntensityCut | None
 
 
 def share_a_weight(group: Group, levels: Levels, upper: Indices, lower: Indices) -> NDArray[np.bool_]:
-    """Which transitions of a top with an n-fold axis join blocks that have a weight in common, of A, B or E species: the
-    program makes no lines between others, and all lines between those."""
+    """Which transitions of a top with an n-fold axis the program makes: all between blocks that have a weight in common.
+
+    Parameters
+    ----------
+    group : Group
+        The connected states.
+    levels : Levels
+        Their levels.
+    upper, lower : (n,) arrays of int
+        Rows of the levels of each transition.
+
+    Returns
+    -------
+    (n,) array of bool
+        Whether a weight of A or B species or of E species is that of one of these in the other block.
+    """
     if levels.kind in ("prolate", "oblate"):  # where both weights are one
         return np.ones(len(upper), dtype=bool)
     quanta = levels.quanta

@@ -195,7 +195,26 @@ def functions_of_l(block: CoupledBlock, pairs: Sequence[Pair], representation: s
 def functions_of_parts(
     places: Sequence[tuple[int, Basis, int]], size: int, pairs: Sequence[Pair], representation: str
 ) -> tuple[Floats, Ints]:
-    """The same over `size` functions, from the state, the Wang block and the first place of each part."""
+    """The same as `functions_of_l`, of any part of a basis.
+
+    Parameters
+    ----------
+    places : sequence of (int, WangBlock, int)
+        State, Wang block and first place of each part.
+    size : int
+        Number of functions.
+    pairs : sequence of Pair
+        l-doubled states.
+    representation : str
+        Which principal axes are x, y, z.
+
+    Returns
+    -------
+    functions : (size, size) array
+        In rows.
+    names : (size, 3) array of int
+        v, Ka, Kc.
+    """
     functions, names = list[Floats](), list[tuple[int, int, int]]()
     second = {pair.first: pair.second for pair in pairs}
     members = {v for pair in pairs for v in pair}

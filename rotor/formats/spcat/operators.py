@@ -6,6 +6,7 @@
 | TYP 20, 40, 60 | Na, Nb, Nc, between states with the factor i, in an oblate basis -i |
 | TYP 21, 41, 61 | NbNc + NcNb, NaNc + NcNa, NaNb + NbNa |
 | TYP 20 + n, 40 + n, 60 + n, 11 + n | tensors of rank L made of N alone, see `_tensor_of_n`; of odd L between states with the factor i |
+| TYP 80 + n | the energy of K = 10 n + KSQ alone, with N^2NSQ |
 | I1 | one N is replaced by that spin: Σ c_ij ½{φ_pi, N_j} S_p; TYP 20, 40, 60: φ_a·S, between states |
 | I1 = I2 | two N are: (Ia² - I²/3)/(2I(2I-1)), ... |
 | I1 ≠ I2 | I1·I2 with TYP 0, else the traceless tensor I1a I2a - I1·I2/3, ... |
@@ -21,6 +22,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from math import sqrt
 
+import numpy as np
+
 from rotor.formats.spcat.codes import Digits
 from rotor.quantum.effects.interactions import with_powers
 from rotor.quantum.effects.spin_effect import ParameterName, matrix_of
@@ -35,7 +38,7 @@ REFUSED = {
     "ex": "a term of an Euler series",
     "ff": "a Fourier term of internal rotation, or a constant of one K",
     "commutator": "a commutator of a spin term with Nz²",
-    "own": "the energy of one K",
+    "own": "the energy of one K with a spin",
     "series": "a constant of an Euler or Fourier series",
     "szsz": "N_z S_z together with another operator",
 }
@@ -71,9 +74,21 @@ def operator_of(digits: Digits, axes: str) -> CodedOperator:
         spins, typ, ns = (1,), "abc".index(axes[2]) + 1, ns - 5
     if spins or ns:
         return _with_spins(digits._replace(typ=typ, ns=ns), spins, axes)
+    if 80 <= typ < 90:
+        return CodedOperator(of_j=_of_one_k(10 * (typ - 80) + digits.ksq, digits.nsq))
     if 12 <= typ < 80:
         return CodedOperator(of_j=_of_j(digits, axes), odd=order_of(typ) % 2 == 1)
     return CodedOperator(plain=_plain(digits, axes))
+
+
+def _of_one_k(own: int, n2: int) -> OperatorOfJ:
+    """N^2p of the functions with |K| = 10 (TYP - 80) + KSQ alone."""
+
+    def operator(j: int, representation: str) -> JOperator:
+        of_k = (np.abs(np.arange(-j, j + 1)) == own).astype(np.complex128)
+        return JOperator(j, {0: (j * (j + 1.0)) ** n2 * of_k})
+
+    return operator
 
 
 def _refuse(d: Digits) -> None:
@@ -81,7 +96,7 @@ def _refuse(d: Digits) -> None:
         "ex": d.ex > 0,
         "ff": d.ff > 0,
         "commutator": d.i1 == 0 and d.i2 > 0,
-        "own": 80 <= d.typ < 90,
+        "own": 80 <= d.typ < 90 and bool(d.i1 or d.i2 or d.ns),
         "series": d.typ >= 90,
         "szsz": d.ns > 4 and (d.typ != 0 or d.i1 > 0 or d.i2 > 0),
     }

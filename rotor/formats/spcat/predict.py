@@ -122,6 +122,10 @@ def predict(
             f"FBGN = {request.fbgn}, FEND = {request.fend}: F runs from FBGN to FEND, from 0 to {QUANTUM_RANGE[1]}, the "
             "highest that two characters of a catalogue can say"
         )
+    if request.flags >= 1000:
+        raise ValueError(
+            f"FLAGS = {request.flags}: constants and frequencies in cm⁻¹ are read but not computed yet; expected below 1000, in MHz"
+        )
     if not (own_q or (math.isfinite(request.qrot) and request.qrot > 0)):
         raise ValueError(f"QROT = {request.qrot}: a partition function is a number above 0")
     others_names = options.diag in BY_DIAG and options.spind > 0 and not is_linear(options)

@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -29,6 +29,7 @@ from rotor import units
 from rotor.arrays import Floats, Ints
 from rotor.molecules.molecule import FEW_ATOMS
 from rotor.quantum.effect import EffectSize, QuantumEffect, effect_sizes
+from rotor.quantum.estimates.beyond import Limit, known_couplings, next_order
 from rotor.quantum.spins.splittings import Splitting, splitting_nuclei
 
 if TYPE_CHECKING:
@@ -44,26 +45,6 @@ ELECTRON_SPIN = "electron spin"
 OF_SPINS = frozenset({"nuclear quadrupole", "magnetic coupling of nuclear spins", ELECTRON_SPIN})
 AMMONIA_MHZ = 24_000.0  # the splitting of NH3, see docs/limitations.md
 FLAT_DEGREES = 355.0  # sum of the three angles at a nitrogen that is not pyramidal
-
-
-@dataclass(frozen=True)
-class Limit:
-    """Something that a calculation leaves out. size_mhz: for a line at the J in question; None: not estimated.
-
-    at_most: whether the size is the largest that it can have, not an estimate.
-    """
-
-    name: str
-    size_mhz: float | None
-    text: str
-    at_most: bool = False
-
-    @property
-    def sentence(self) -> str:
-        """Name, size and what it does, as a report prints them."""
-        known = "not estimated" if self.size_mhz is None else f"about {float(f'{self.size_mhz:.1g}'):g} MHz"
-        size = f"at most {known}" if self.at_most else known
-        return f"{self.name}: {size}; {self.text}"
 
 
 def populated_j(top: Top, temperature_k: float) -> int:
@@ -113,6 +94,17 @@ def model_limits(top: Top, j: int, effects: Sequence[QuantumEffect]) -> list[Lim
     if top.molecule is not None:
         found += _of_geometry(top, top.molecule, present)
     return largest_first(found)
+
+
+def every_limit(top: Top, j: int, effects: Sequence[QuantumEffect]) -> list[Limit]:
+    """`model_limits` with what the constants themselves say, however small it is (`rotor.quantum.estimates.beyond`).
+
+    Known couplings of spins take the place of estimated ones.
+    """
+    couplings, further = known_couplings(top, j, effects), next_order(top, j, effects)
+    known = {one.name for one in couplings}
+    found = [*couplings, *(one for one in model_limits(top, j, effects) if one.name not in known)]
+    return largest_first(found if further is None else [*found, further])
 
 
 def largest_first(limits: Sequence[Limit]) -> list[Limit]:

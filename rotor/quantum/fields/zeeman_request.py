@@ -13,7 +13,8 @@ from rotor.molecules.nuclei import isotope
 from rotor.quantum.effects.of_top import effects_of
 from rotor.quantum.effects.stark import checked_j
 from rotor.quantum.effects.zeeman import DEFAULT_TOLERANCE_MHZ, HIGHEST_TESLA, checked_g, zeeman_map
-from rotor.quantum.estimates.limits import Limit, limit_facts
+from rotor.quantum.estimates.beyond import Limit
+from rotor.quantum.estimates.limits import limit_facts
 from rotor.quantum.fields.field_map import FieldMap
 from rotor.quantum.fields.map_request import checked_fields
 from rotor.table import TextOf

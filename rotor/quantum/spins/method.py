@@ -45,15 +45,15 @@ class HyperfineMethod(QuantumEffect):
         require_positive("tolerance_mhz", self.tolerance_mhz)
 
     def parameters(self, top: Top) -> dict[str, float]:
-        """None: it is a choice."""
+        """An empty mapping: a choice of method has no constants."""
         return {}
 
     def size_mhz(self, top: Top, j: int) -> float:
-        """None."""
+        """0: a choice of method adds nothing to the energy."""
         return 0.0
 
     def spins(self, top: Top) -> tuple[Spin, ...]:
-        """Those of the effects that it is about."""
+        """The spins that the effects with this method couple."""
         return self.coupled
 
 

@@ -9,14 +9,18 @@ Names are those of `rotor.quantum.effects`: hyperfine, spin_rotation, spin_spin.
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import hypot
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rotor.molecules.nuclei import isotope
 from rotor.units import parse_quantity
+
+if TYPE_CHECKING:
+    from rotor.molecules.molecule import Molecule
 
 _ITEM = re.compile(
     r"(?P<name>[A-Za-z][\w-]*\([^()]*\))\s*=\s*(?P<number>[-+−]?[\d.]+(?:[eEdD][-+]?\d+)?)(?P<gap>\s*)(?P<unit>[A-Za-z][\w-]*(?![\w(-]))?"
@@ -150,6 +154,25 @@ def without_trace(
                 f"{tensor}_bb-cc({spins}": hypot(*spread.values()),
             }
     return out, left
+
+
+def refuse_other_nuclei(constants: SpinConstants, molecule: Molecule | None) -> None:
+    """ValueError where a spin is called after an isotope that the molecule has not, or has not so often.
+
+    Without a molecule, and of spins with names of their own, there is nothing to compare.
+    """
+    if molecule is None:
+        return
+    called = [match[1] for match in map(_ISOTOPE.fullmatch, constants.twice) if match]
+    asked = Counter((one.symbol, one.mass_number) for one in map(isotope, called))
+    there = Counter((one.symbol, one.mass_number) for one in molecule.nuclei)
+    for (symbol, number), count in asked.items():
+        if count > there[symbol, number]:
+            has = ", ".join(f"{n} of {a}{s}" for (s, a), n in there.items())
+            raise ValueError(
+                f"{count} {'spin is' if count == 1 else 'spins are'} called after {number}{symbol}, and "
+                f"{molecule.formula} has {has}; give another isotope with --isotope, or the spin another name and its size"
+            )
 
 
 def _named(values: Mapping[str, float]) -> list[str]:

@@ -1,0 +1,76 @@
+"""What the constants of a top say of what a calculation with them leaves out: the next order of distortion, known couplings of spins.
+
+The next order is c s_n²/s_(n-1), s the sizes of the last two orders at one J (`order_sizes_mhz`), a geometric series, with c = 0.3 of a
+linear top from the quartic to the sextic order, 3 of other tops there, 1 of every higher order. A harmonic diatomic molecule has 2, and
+anharmonicity takes most of it away (Dunham's H = 2D(12B² - αω)/3ω²); these values were chosen on the library, where they hold within a
+factor of 3 for 25 of 30 orders (tests/test_scene_plans.py names the others).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from rotor.quantum.effect import QuantumEffect
+
+if TYPE_CHECKING:
+    from rotor.tops.top import Top
+
+FACTORS = {"linear": 0.3, "other": 3.0, "higher": 1.0}  # c
+OF_CHI = 0.5  # of χ: J = 1 of I = 1 is shifted by χ/2 at most, higher J by χ/4
+
+
+@dataclass(frozen=True)
+class Limit:
+    """Something that a calculation leaves out. size_mhz: for a line at the J in question; None: not estimated.
+
+    at_most: whether the size is the largest that it can have, not an estimate.
+    """
+
+    name: str
+    size_mhz: float | None
+    text: str
+    at_most: bool = False
+
+    @property
+    def sentence(self) -> str:
+        """Name, size and what it does, as a report prints them."""
+        known = "not estimated" if self.size_mhz is None else f"about {float(f'{self.size_mhz:.1g}'):g} MHz"
+        size = f"at most {known}" if self.at_most else known
+        return f"{self.name}: {size}; {self.text}"
+
+
+def next_order(top: Top, j: int, effects: Sequence[QuantumEffect]) -> Limit | None:
+    """The order of distortion beyond the highest that the calculation has; None of rigid constants.
+
+    >>> from rotor.quantum.effects.watson import SEMI_RIGID
+    >>> from rotor.tops.top import Top
+    >>> one = next_order(Top.from_constants("B=6000 D=0.001 MHz"), 20, SEMI_RIGID)
+    >>> f"{one.size_mhz:.2e}"  # 0.3 D²/B (J(J+1))³
+    '3.70e-03'
+    """
+    from rotor.quantum.estimates.convergence import order_sizes_mhz
+
+    sizes = list(order_sizes_mhz(top, j, effects=effects).items())
+    if len(sizes) < 2 or not sizes[-2][1]:
+        return None
+    (_, before), (order, last) = sizes[-2:]
+    which = "higher" if order > 4 else "linear" if top.kind == "linear" else "other"
+    text = f"{FACTORS[which]:g} times the order J^{order} ({last:.2g} MHz) squared over the order before"
+    return Limit(f"centrifugal distortion of order J^{order + 2}", FACTORS[which] * last**2 / before, text)
+
+
+def known_couplings(top: Top, j: int, effects: Sequence[QuantumEffect]) -> list[Limit]:
+    """Couplings of spins whose constants are known and which the calculation has not."""
+    if top.spin_constants is None:
+        return []
+    from rotor.quantum.effects.of_top import spin_effects
+
+    present = {effect.name for effect in effects}
+    parts = {"nuclear quadrupole": OF_CHI}
+    return [
+        Limit(one.name, parts.get(one.name, 1.0) * one.size_mhz(top, j), "from the constants known")
+        for one in spin_effects(top)
+        if one.name not in present
+    ]
