@@ -22,11 +22,12 @@ from rotor.fit.parameters import parameters as parameters_of
 from rotor.fit.search import FitOptions as FitOptions
 from rotor.fit.search import Search, round_off, too_few, with_rejection
 from rotor.quantum.labelled import LevelModel, level_model
-from rotor.statistics.least_squares import Minimum, Progress
+from rotor.statistics.least_squares import EXHAUSTED, Minimum, Progress
 from rotor.statistics.regression import Regression, regression
 from rotor.tops.constants import Constants
 from rotor.tops.covariance import Covariance
 
+NEARLY_THERE = 0.01  # standard errors: a next step below it is no news where no more iterations are allowed
 CHANGED_STATE = 0.5  # overlap below which a level is another state than it was at the start
 
 
@@ -306,17 +307,22 @@ def _verdict(fit: Fit, disorder: str, options: FitOptions) -> tuple[bool, str]:
     rms, minimum = fit.weighted_rms, fit.minimum
     if disorder:
         return False, f"the constants that were reached are no set of constants: {disorder}"
-    if not minimum.converged:
+    near = minimum.status == EXHAUSTED and minimum.distance <= NEARLY_THERE
+    if not (minimum.converged or near):
         return False, f"{minimum.reason}; weighted rms {rms:.4g}"
     if rms > options.poor_rms:
         return False, (
             f"a minimum was reached, but it does not describe the lines: weighted rms {rms:.4g}, above {options.poor_rms:g}; "
             "check assignments, the start, and which constants are free"
         )
+    reason = minimum.reason
+    if near:
+        count = len(minimum.iterations)
+        reason = f"ended after {count} iterations, as many as allowed: the next step would be {minimum.distance:.1e} standard errors"
     if len(fit.statistics.undetermined):
         named = "; ".join(one.text for one in fit.statistics.undetermined)
-        return True, f"{minimum.reason}; not determined by these lines and left at the start: {named}"
-    return True, minimum.reason
+        return True, f"{reason}; not determined by these lines and left at the start: {named}"
+    return True, reason
 
 
 def _notes(fit: Fit) -> list[str]:
