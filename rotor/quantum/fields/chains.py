@@ -28,7 +28,7 @@ Chain = tuple[tuple[Floats, ...], int]  # H_n (n, n) of a chain, and how many of
 ANCHORS = 13  # fields that LAPACK solves, of many
 DENSER = 1.5  # power by which they are denser where the field is weak and energies bend most
 SWEEPS = 4  # of the Rayleigh quotient at most
-CONVERGED = 1e-8  # of the smallest gap: the last change of an energy; what is left of it is the third power
+CONVERGED = 1e-8  # of the smallest gap: the last change of an energy, and by how much vectors are wrong; of the energy the square is left
 OFF_ZERO = (
     1e-15  # of the largest element: by which energies are moved before a sweep, so that no pivot is 0 at zero field
 )
@@ -174,10 +174,13 @@ def twisted(main: Floats, beside: Floats, energies: Floats) -> tuple[Floats, Flo
         k = size - 2 - i
         np.divide(beside[k], up[k + 1], out=to_upper[k])
         up[k] -= np.multiply(to_upper[k], beside[k], out=step)
-    gamma = down + up - shifted
-    place, states = np.abs(gamma).argmin(axis=0), np.arange(len(energies))
+    gamma = np.subtract(np.add(down, up, out=up), shifted, out=up)
+    place, states = np.abs(gamma, out=shifted).argmin(axis=0), np.arange(len(energies))
+    change = gamma[place, states]
 
-    vectors, lower = np.zeros_like(shifted), np.zeros_like(shifted)
+    vectors, lower = up, shifted  # the same memory: to clear more of it would take as long as a sweep
+    vectors.fill(0.0)
+    lower.fill(0.0)
     vectors[place, states] = lower[place, states] = 1.0
     for i in range(size - 1):
         vectors[i + 1] -= np.multiply(to_upper[i], vectors[i], out=step)
@@ -187,4 +190,4 @@ def twisted(main: Floats, beside: Floats, energies: Floats) -> tuple[Floats, Flo
     vectors[place, states] = 1.0
     lengths = np.einsum("ns,ns->s", vectors, vectors)
     vectors /= np.sqrt(lengths)
-    return vectors, gamma[place, states] / lengths, np.count_nonzero(down < 0, axis=0)
+    return vectors, change / lengths, np.count_nonzero(down < 0, axis=0)
