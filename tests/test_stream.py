@@ -178,7 +178,7 @@ def test_a_pool_that_forks_is_refused(tmp_path):
         ("a.cat", {"jmax": 0}, "J max = 0"),
         ("a.cat", {"piece_lines": 0}, "piece_lines = 0"),
         ("a.cat", {"memory_mb": 5}, "memory_mb = 5"),
-        ("a.cat", {"temperature_k": -1.0}, "temperature -1"),
+        ("a.cat", {"temperature_k": -1.0}, "temperature_k: -1"),
     ],
 )
 def test_what_cannot_be_streamed_is_refused(tmp_path, path, settings, words):

@@ -165,6 +165,8 @@ def _printable(text: str) -> str:
 def _text_of_use(error: Exception) -> str:
     """What the parser of the command line says; of words that no argument takes, what would do."""
     text = str(error.format_message())  # type: ignore[attr-defined]
+    if text.startswith("No such command") and text.endswith("."):  # with a guess it ends with a question
+        return f"{text.rstrip('.')}; --help lists the commands"
     extra = text.removeprefix("Got unexpected extra argument(s) ").removeprefix("Got unexpected extra argument ")
     if extra == text:
         return text

@@ -46,6 +46,9 @@ Examples:
 _WORTH_MEASURING = 1e-2  # S μ² of a line with μ = 1 D, below which it is not suggested
 
 
+MOST_SAMPLES = 100_000  # of a bootstrap: each is a fit
+
+
 @dataclass(frozen=True)
 class Options:
     """What is read, what is fitted and how, and what is written."""
@@ -95,7 +98,8 @@ def command(context: typer.Context, given: Options) -> None:
     os.environ.setdefault(
         "OPENBLAS_NUM_THREADS", "1"
     )  # before numpy is loaded: on small blocks threads only wait for each other
-    require_whole("--bootstrap", given.bootstrap, 0)
+    require_whole("--bootstrap", given.bootstrap, 0, MOST_SAMPLES)
+    require_whole("--seed", given.seed, 0)
     require_whole("--iterations", given.iterations, 1)
     files = _files(given)
     _refuse_unsaved(given)

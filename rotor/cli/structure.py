@@ -221,7 +221,7 @@ def _writers(file: FamilyFile, answer: Answer, content: dict[str, Any]) -> dict[
 
 def _show(file: FamilyFile, answer: Answer) -> None:
     family = file.family
-    print(f"{family.name}: {len(family.species)} isotopologues of a {family.top.kind} top")
+    print(f"{family.name}: {len(family.species)} isotopologues, {family.top.kind} top")
     if answer.substitution:
         show_table(_coordinates_table(answer.substitution))
         show_table(_values_table("rs", answer.substitution.values))

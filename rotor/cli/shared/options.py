@@ -212,6 +212,15 @@ class PlainCommand(typer.core.TyperCommand):
         """The parameters, --help among them."""
         return [_unconverted(one) for one in super().get_params(ctx)]
 
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """The arguments, refused where an option that has one value is given twice: none is dropped silently."""
+        single = {text for one in self.params if not one.multiple for text in (*one.opts, *one.secondary_opts)}
+        given = [word.partition("=")[0] for word in args if word.startswith("--")]
+        twice = next((word for word in given if word in single and given.count(word) > 1), None)
+        if twice is not None:
+            raise ValueError(f"{twice}: given more than once; it has one value")
+        return super().parse_args(ctx, args)
+
 
 class PlainGroup(typer.core.TyperGroup):
     """The same for what stands before a verb."""
