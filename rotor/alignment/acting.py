@@ -31,13 +31,13 @@ def acted_on(top: Top, acts_on: str) -> Floats:
             f"{name} is a spherical top: its polarizability is isotropic and it has no dipole, so no pulse turns it"
         )
     if acts_on == "dipole":
-        dipole = np.array(top.dipole_abc_debye if top.dipole_abc_debye is not None else (0.0, 0.0, 0.0))
+        dipole = np.array(top.dipole_abc_debye if top.dipole_abc_debye is not None else (0.0, 0.0, 0.0), dtype=float)
         if not dipole.any():
             raise ValueError(f"{name} has no dipole that is known and not 0; a field that acts on it needs one")
         return dipole
     if top.polarizability_abc_angstrom3 is None:
         raise ValueError(f"the polarizability of {name} is not known: give one, in principal axes (Å³)")
-    whole = np.array(top.polarizability_abc_angstrom3)
+    whole = np.array(top.polarizability_abc_angstrom3, dtype=float)
     tensor = _traceless(whole)
     if not np.abs(tensor).max() > ISOTROPIC * np.abs(whole).max():
         raise ValueError(f"the polarizability of {name} is isotropic: no light turns it")

@@ -22,6 +22,7 @@ from rotor.classical.motion import InvariantDrift, MotionTable, invariant_drift,
 from rotor.table import TextOf
 
 PERIODS, TURNS, POINTS = 2, 10, 201
+LARGEST = 1e100  # of moments, their inverses and angular momenta: L²/I stays a number
 Three = tuple[float, float, float]
 
 
@@ -66,6 +67,7 @@ class TumbleRequest:
         if moments.shape != (3,):
             raise ValueError(f"moments: {self.moments}: expected the three moments of one body")
         momentum = checked_momentum(self.angular_momentum, moments)
+        _refuse_sizes(moments, momentum)
         if momentum.shape != (3,) or not momentum.any():
             raise ValueError(
                 f"angular_momentum: {self.angular_momentum}: expected three components, one of them not 0; a body at rest "
@@ -207,3 +209,12 @@ def _chosen_times(motion: FreeMotion, units: Units) -> tuple[Floats, str]:
         span = TURNS * 2.0 * math.pi / float(motion.turning_rate)
         source = f"{TURNS} turns about L, {POINTS} points, as the motion in the body has no period"
     return np.linspace(0.0, span * units.time_factor, POINTS), source
+
+
+def _refuse_sizes(moments: Floats, momentum: Floats) -> None:
+    if np.any((moments != 0.0) & ((moments < 1 / LARGEST) | (moments > LARGEST))):
+        raise ValueError(
+            f"principal moments lie between {1 / LARGEST:g} and {LARGEST:g}, or are 0; got {moments.tolist()}; take other units"
+        )
+    if np.any(np.abs(momentum) > LARGEST):
+        raise ValueError(f"components of an angular momentum are up to {LARGEST:g} in size; take other units")

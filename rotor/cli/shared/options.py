@@ -154,7 +154,8 @@ def folded(examples: str, width: int = 76) -> str:
 
     >>> print(folded("  rotor levels water --jmax 4 --plot terms.png", width=30))
       rotor levels water \\
-          --jmax 4 --plot terms.png
+          --jmax 4 \\
+          --plot terms.png
     """
     return "\n".join(_folded_line(line, width) for line in examples.split("\n"))
 

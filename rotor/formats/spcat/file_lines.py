@@ -169,7 +169,7 @@ def pattern_steps(spins: tuple[int, ...]) -> Ints:
     """2(N - F) and (J_i - J_(i-1) + S_i) of every coupling pattern of doubled spins, in the order in which SPCAT counts them.
 
     >>> pattern_steps((1, 1)).tolist()
-    [[-2, 1, 1], [0, 0, 1], [0, 1, 0], [2, 0, 0]]
+    [[-2, 1, 1], [0, 1, 0], [0, 0, 1], [2, 0, 0]]
     """
     every = np.stack(np.meshgrid(*(np.arange(spin + 1) for spin in spins), indexing="ij"), axis=-1).reshape(
         -1, len(spins)
