@@ -66,7 +66,8 @@ def traces(long: bool) -> list[dict[str, Any]]:
     for name, top, pulse, settings, goal in cases:
         first = pulse.window_ps[0 if "state" in settings else 1]
         times = np.linspace(first, 2 * PERIOD, 4001)
-        milliseconds, trace = best(lambda: align(top, pulse, times, **settings), 3 if goal > 400 else 10)  # noqa: B023
+        calls = 3 if goal > 400 else 10 if goal > 10 else 200
+        milliseconds, trace = best(lambda: align(top, pulse, times, **settings), calls)  # noqa: B023
         out.append(
             {
                 "case": name,
@@ -85,7 +86,7 @@ def maps() -> list[dict[str, Any]]:
     cases = [("Stark map, OCS, J ≤ 2", OCS, 1e-6, 3.0), ("Stark map, indole, J ≤ 2", INDOLE, 1e-3, 2500.0)]
     out = []
     for name, top, tolerance, goal in cases:
-        milliseconds, found = best(lambda: stark_map(top, fields, tolerance_mhz=tolerance), 3)  # noqa: B023
+        milliseconds, found = best(lambda: stark_map(top, fields, tolerance_mhz=tolerance), 3 if goal > 400 else 50)  # noqa: B023
         out.append(
             {"case": name, "ms": milliseconds, "goal_ms": goal, "jmax": found.jmax, "states": len(found.curves())}
         )
