@@ -113,7 +113,7 @@ figure, (left, right) = plt.subplots(1, 2, figsize=(7, 2.6), layout="constrained
 for mixture, name in ((gas, "gas, in equilibrium"), (beam, "beam, adiabatic")):
     left.plot(mixture.field_kv_per_cm, mixture.cosines["costheta"], label=name)
 left.set(xlabel="field (kV/cm)", ylabel="⟨cosθ⟩", title="OCS at 2 K")
-left.legend(frameon=False)
+left.legend(frameon=False, loc="lower right", fontsize=8)
 share = table.populations(2.0)
 for name, moment, population in zip(table.states, table.mu_eff_debye, share, strict=True):
     label = name.replace(" M", ", |M| = ")
@@ -177,7 +177,7 @@ fine = np.logspace(-1, 2, 200)
 left.semilogx(fine, [obl_cv(0, 0, np.sqrt(omega)) / omega for omega in fine], "k-", lw=0.8, label="spheroidal function")
 left.semilogx(omegas, np.array(energies) / omegas, "o", ms=4, label="stark_map")
 left.set(xlabel="Δω", ylabel="E / (B Δω)", title="Ground state in the field of a laser")
-left.legend(frameon=False)
+left.legend(frameon=False, loc="upper right", fontsize=8)
 right.semilogx(omegas, aligned, "o-", ms=4)
 right.axhline(1 / 3, color="black", lw=0.5, ls="--")
 right.set(xlabel="Δω", ylabel="⟨cos²θ⟩", title="Alignment; dashed: free, 1/3")
@@ -202,7 +202,7 @@ figure, axes = plt.subplots(figsize=(5.5, 2.6), layout="constrained")
 for rows in components.curves():
     if components.label[rows.start] == "1 1":
         shifts = components.energy_mhz[rows] - components.free_mhz[rows]
-        axes.plot(components.field[rows], shifts, label=f"M = {components.m[rows.start]:+d}")
+        axes.plot(components.field[rows], shifts, label=f"M = {components.m[rows.start]}")
 axes.set(xlabel="magnetic field (T)", ylabel="shift (MHz)", title="J = K = 1 of a symmetric top, made-up g and χ")
 axes.legend(frameon=False, fontsize=8)
 
