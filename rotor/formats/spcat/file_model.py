@@ -272,9 +272,9 @@ def _group(
     effect = FileEffect(
         usable, numbers, coupled, moments, limits, others, first.ixx, pairs, AXES["IIIl" if oblate else "Ir"]
     )
-    _ = (
-        (*effect.spin_terms(_ANY_TOP), *effect.couplings(_ANY_TOP)) if pairs else ()
-    )  # what is not allowed between l-doubled states is said now
+    if pairs:  # raises for what is not allowed between l-doubled states, before any level is solved
+        effect.spin_terms(_ANY_TOP)
+        effect.couplings(_ANY_TOP)
     top = Top(_STANDS_FOR[kind, oblate], dipole_abc_debye=moments.get((0, 0), (0.0, 0.0, 0.0)), name=title)
     kmax = states[0].kmax if as_spcat and kind in ("prolate", "oblate") else _EVERY_K
     return Group(tuple(states), top, effect, oblate, kmax, first.diag)
