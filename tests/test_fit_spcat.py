@@ -197,7 +197,9 @@ def test_levels_that_a_file_does_not_have_are_refused():
 
 
 @pytest.mark.oracle
-@pytest.mark.parametrize("name", FITS)
+@pytest.mark.parametrize(
+    "name", [pytest.param(one, marks=pytest.mark.slow) if one == "ch3cn_MeCN" else one for one in FITS]
+)
 def test_errors_of_predicted_lines_are_those_of_spcat(shared: Path, name: str):
     """From errors and correlations of the .var: one state, several states, spins; hyperfine components too."""
     results = next((shared / "reference" / "fits").glob(f"*/{name}.par")).parent / "v2008_results"
