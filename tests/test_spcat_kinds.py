@@ -31,10 +31,10 @@ MADE = {
 
 @cache
 def _predicted(name: str) -> Catalogue:
-    parameters, wanted = (read(KINDS / name / f"{name}{s}") for read, s in ((read_par, ".var"), (read_int, ".int")))
-    first, last = RANGES.get(name, (wanted.request.fbgn, wanted.request.fend))
-    request = replace(wanted.request, fbgn=first, fend=last)
-    return predict(parameters, replace(wanted, request=request), as_spcat=True).catalogue
+    parameters, asked = (read(KINDS / name / f"{name}{s}") for read, s in ((read_par, ".var"), (read_int, ".int")))
+    first, last = RANGES.get(name, (asked.request.fbgn, asked.request.fend))
+    request = replace(asked.request, fbgn=first, fend=last)
+    return predict(parameters, replace(asked, request=request), as_spcat=True).catalogue
 
 
 def _by_label(lines: Catalogue) -> dict[tuple[int, ...], list[int]]:

@@ -71,12 +71,7 @@ def extrapolated(call: Callable[[int], Any], work: Callable[[int], float], sizes
     float
         Processor time.
     """
-    first, second = (min(one, size) for one in sizes)
-    seconds = timed(lambda: call(second))
-    if second == size:
-        return seconds
-    rate = max(seconds - timed(lambda: call(first)), 0.0) / (work(second) - work(first))
-    return seconds + rate * (work(size) - work(second))
+    return _extrapolated(timed, call, work, sizes, size)
 
 
 def peak_mb(call: Callable[[], Any]) -> float:
@@ -115,11 +110,19 @@ def extrapolated_mb(
     float
         MB.
     """
+    return _extrapolated(peak_mb, call, work, sizes, size)
+
+
+def _extrapolated(
+    measure: Callable[[Callable[[], Any]], float], call: Callable[[int], Any], work: Callable[[int], float],
+    sizes: tuple[int, int], size: int,
+) -> float:  # fmt: skip
+    """What a call of one size takes by a measure, from two smaller ones; a call that is no larger is measured itself."""
     first, second = (min(one, size) for one in sizes)
-    most = peak_mb(lambda: call(second))
-    if first == second:
-        return most * work(size) / work(second)
-    rate = max(most - peak_mb(lambda: call(first)), 0.0) / (work(second) - work(first))
+    most = measure(lambda: call(second))
+    if second == size:
+        return most
+    rate = max(most - measure(lambda: call(first)), 0.0) / (work(second) - work(first))
     return most + rate * (work(size) - work(second))
 
 

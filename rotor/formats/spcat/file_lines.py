@@ -287,8 +287,7 @@ def weights_of_lines(group: Group, levels: Levels, found: Transitions) -> Ints:
     if (weight[found.upper] == weight[found.lower]).all() or "kc" not in levels.quanta:
         return np.asarray(weight[found.lower])
     ka, kc = levels.quanta["ka"] % 2, levels.quanta["kc"] % 2
-    species = np.array([[0, 1], [3, 2]])[(kc, ka) if group.oblate else (ka, kc)]
-    species = np.where(species == 1, 3, np.where(species == 3, 1, species))
+    species = np.array([[0, 3], [1, 2]])[(kc, ka) if group.oblate else (ka, kc)]
     v = levels.quanta.get("v", np.zeros(len(levels), dtype=np.int64))
     order = (levels.multiplicity * (len(group.states) + 1) + v) * 4 + species
     return np.asarray(np.where(order[found.upper] > order[found.lower], weight[found.upper], weight[found.lower]))

@@ -81,9 +81,7 @@ def levels_of_f(
     Levels
         Energies in MHz with eigenvectors and labels.
     """
-    total = scheme_of(top, effects).total
-    lowest = min(max(0, (f - total) // 2) for f in every_f)
-    highest = max((f + total) // 2 for f in every_f)
+    lowest, highest = _range_of_n(top, effects, every_f)
     plan = simplified(plan_of(top, effects, lowest, highest, executor), effects, every_f)
     prepare(plan, every_f)
     solved = [block for f in every_f for block in solve_f(plan, f, exist)]
@@ -112,12 +110,17 @@ def unmixed_levels(top: Top, effects: tuple[QuantumEffect, ...], every_f: Sequen
     plan : Plan
         The rotation, what acts between its blocks, and the coefficients of coupling of these F.
     """
-    total = scheme_of(top, effects).total
-    highest = max((f + total) // 2 for f in every_f)
-    plan = plan_of(top, effects, min(max(0, (f - total) // 2) for f in every_f), highest, None)
+    lowest, highest = _range_of_n(top, effects, every_f)
+    plan = plan_of(top, effects, lowest, highest, None)
     prepare(plan, every_f)
     blocks = tuple(_placed(block for f in every_f for block in functions_of_f(plan, f)))
     return _table(top, effects, plan.shared, blocks, highest), plan
+
+
+def _range_of_n(top: Top, effects: tuple[QuantumEffect, ...], every_f: Sequence[int]) -> tuple[int, int]:
+    """The lowest and the highest N that couple with the spins to one of the F, which are doubled."""
+    total = scheme_of(top, effects).total
+    return min(max(0, (f - total) // 2) for f in every_f), max((f + total) // 2 for f in every_f)
 
 
 def _within(block: SpinBlock, n_range: tuple[int, int]) -> SpinBlock:
