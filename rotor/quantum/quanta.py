@@ -27,7 +27,27 @@ from numpy.typing import NDArray
 from rotor.arrays import Ints
 
 # in which tables and files list them
-ORDER = ("v", "n", "j", "k", "ka", "kc", "irrep", "i_sym", "i_tot", "f1", "f2", "f3", "f4", "f5", "f6", "f7", "f8", "f", "m")
+ORDER = (
+    "v",
+    "n",
+    "j",
+    "k",
+    "ka",
+    "kc",
+    "irrep",
+    "i_sym",
+    "i_tot",
+    "f1",
+    "f2",
+    "f3",
+    "f4",
+    "f5",
+    "f6",
+    "f7",
+    "f8",
+    "f",
+    "m",
+)
 _HEADINGS = {"ka": "Ka", "kc": "Kc", "i_tot": "I", "i_sym": "Γ", "irrep": "irrep", "v": "v"}
 
 # how a picture writes sums with spins, in TeX

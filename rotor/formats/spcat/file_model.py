@@ -18,9 +18,9 @@ from rotor.formats.spcat.codes import AXES
 from rotor.formats.spcat.file_effect import CodedLine, FileEffect, Vector, coded_lines
 from rotor.formats.spcat.l_doubled import Pair, named_by_l, pairs_of
 from rotor.formats.spcat.l_spins import named_by_l_with_spins
-from rotor.formats.spcat.labels import named_by
+from rotor.formats.spcat.labels import BY_DIAG, named_by
 from rotor.formats.spcat.states import StateOptions, states_of
-from rotor.formats.spcat.symmetry import forbidden, l_values, some_weights_agree, symmetric_part
+from rotor.formats.spcat.symmetry import forbidden, halved_across, l_values, some_weights_agree, symmetric_part
 from rotor.formats.spcat.text.int_file import Dipole, IntensityFile
 from rotor.formats.spcat.text.par import Options, ParameterFile
 from rotor.quantum.levels import Levels
@@ -91,8 +91,8 @@ class Group:
             return np.asarray(ka <= self.axial_kmax)
         found = np.zeros(len(labels), dtype=bool)
         for place, state in enumerate(self.states):
-            i_tot = labels[:, -2] // 2 if state.i_tot else 0
-            found |= (v == place) & (state.weights(ka, kc, kc if self.oblate else ka, i_tot) > 0)
+            odd = state.odd_spins({"i_tot": labels[:, -2] // 2, "i_sym": labels[:, -3] // 2}) if state.i_tot else 0
+            found |= (v == place) & (state.weights(ka, kc, kc if self.oblate else ka, odd) > 0)
         return found
 
     def _weights(self, levels: Levels) -> Ints:
@@ -101,7 +101,7 @@ class Group:
         total = np.zeros(len(levels), dtype=np.int64)
         for place, state in enumerate(self.states):
             for ka, kc, k, alike in _components(levels, n, self.oblate):
-                own = np.where(k <= self.axial_kmax, state.weights(ka, kc, k, quanta.get("i_tot", 0)), 0)
+                own = np.where(k <= self.axial_kmax, state.weights(ka, kc, k, state.odd_spins(quanta)), 0)
                 total += np.where((v == place) & alike, np.maximum(own, 0), 0)
         return total
 
@@ -189,14 +189,20 @@ def allowed(
         for low, high in concerned:
             del_l = abs(l_of.get(low, 0) - l_of.get(high, 0)) * (-1 if line.reversed_ else 1)
             own = states[low], states[high]
-            why.append(forbidden(line.typ, *own, del_l, oblate, bool({low, high} & set(l_of))))
+            why.append(forbidden(line.typ, *own, del_l, oblate, bool({low, high} & set(l_of)), line.operator.spins))
         if all(why):
             reasons.append(f"parameter {line.name.partition('#')[0]} is left out, as SPCAT does: {why[0]}")
             continue
-        folded = line.typ in (1, 2, 3) and max(states[v].fold for pair in concerned for v in pair) > 2
+        folded = line.typ in (1, 2, 3) and any(_turns_alone(states[v], line) for pair in concerned for v in pair)
         axes = AXES["IIIl" if oblate else "Ir"]
         found.append(line._replace(operator=symmetric_part(line.operator, axes)) if folded else line)
     return found, reasons
+
+
+def _turns_alone(state: StateOptions, line: CodedLine) -> bool:
+    """Whether an axis of more than two folds turns an operator onto itself: it touches none of three equivalent spins."""
+    touches = state.equivalent == 3 and max(line.operator.spins, default=0) > len(state.spins) - 3
+    return state.fold > 2 and not touches
 
 
 def _of_both_components(dipoles: Dipoles, pairs: list[Pair]) -> Dipoles:
@@ -249,11 +255,11 @@ def _group(
     oblate = first.nvib < 0
     numbers = tuple(state.number for state in states)
     spins = states[0].spins
-    if any((state.spins, state.i_tot) != (spins, states[0].i_tot) for state in states):
+    if any((state.spins, state.equivalent) != (spins, states[0].equivalent) for state in states):
         raise ValueError(f"states {numbers} are connected and have different spins: that is read but not computed yet")
     here = {v: place for place, v in enumerate(numbers)}
     moments = {(here[b], here[a]): mu for (a, b), mu in light[0].items() if a in here and b in here}
-    others = tuple(
+    beside = tuple(
         moment_of(dipole, code, (here[code.states[1]], here[code.states[0]]), len(spins))
         for dipole, code in light[1]
         if set(code.states) <= set(here)
@@ -262,15 +268,18 @@ def _group(
     usable = tuple(
         line for line in own if max((*line.operator.spins, 1 if line.operator.ns else 0), default=0) <= len(spins)
     )
+    if states[0].equivalent == 3:
+        usable = tuple(_of_three(line, len(spins), AXES["IIIl" if oblate else "Ir"]) for line in usable)
     pairs = tuple(Pair(here[pair.first], here[pair.second]) for pair in doubled if pair.first in here)
     kind = _kind(states, usable, oblate, first.spind < 0)
     limits = {} if kind in ("linear", "prolate", "oblate") else _limits(states, as_spcat)
-    paired = len(spins) - 1 if states[0].i_tot else len(spins) + 1  # the first of two equivalent ones
+    others = len(spins) - states[0].equivalent  # which are not coupled to a total
     coupled = tuple(
-        Spin(f"I{place}", twice, total="I_tot" if place >= paired else "") for place, twice in enumerate(spins, 1)
+        Spin(f"I{place}", twice, total="I_tot" if place > others else "") for place, twice in enumerate(spins, 1)
     )
+    _check_three(states[0], others, first)
     effect = FileEffect(
-        usable, numbers, coupled, moments, limits, others, first.ixx, pairs, AXES["IIIl" if oblate else "Ir"]
+        usable, numbers, coupled, moments, limits, beside, first.ixx, pairs, AXES["IIIl" if oblate else "Ir"]
     )
     if pairs:  # raises for what is not allowed between l-doubled states, before any level is solved
         effect.spin_terms(_ANY_TOP)
@@ -278,6 +287,22 @@ def _group(
     top = Top(_STANDS_FOR[kind, oblate], dipole_abc_debye=moments.get((0, 0), (0.0, 0.0, 0.0)), name=title)
     kmax = states[0].kmax if as_spcat and kind in ("prolate", "oblate") else _EVERY_K
     return Group(tuple(states), top, effect, oblate, kmax, first.diag)
+
+
+def _of_three(line: CodedLine, spins: int, axes: str) -> CodedLine:
+    """A line with the factors that the program has for three equivalent spins."""
+    touches = max(line.operator.spins, default=0) > spins - 3
+    return line._replace(operator=halved_across(line.operator, axes)) if touches else line
+
+
+def _check_three(state: StateOptions, others: int, first: Options) -> None:
+    """ValueError for options that are not computed with a total spin of three."""
+    if state.equivalent < 3:
+        return
+    if first.diag in BY_DIAG:
+        raise ValueError(f"DIAG = {first.diag} with a total spin of three nuclei {NOT_YET}; expected 0 or 3")
+    if first.ixx >> (others + 1):
+        raise ValueError(f"IXX = {first.ixx}: a total spin of three nuclei that is taken for conserved {NOT_YET}")
 
 
 # the symmetry alone counts: the file's own operators are the whole Hamiltonian
@@ -306,7 +331,7 @@ def _kind(states: list[StateOptions], lines: tuple[CodedLine, ...], oblate: bool
     axis = "c" if oblate else "a"
     good = all(n == 0 for _, _, n in plain) and all(is_axial(rotor, axis) for rotor in rotors)
     whole = alone and states[0].kmin == 0 and states[0].kmax > 0 and states[0].plus == states[0].minus
-    if symmetric and whole and good and not any(line.operator.of_j for line in lines):
+    if symmetric and whole and good and states[0].equivalent < 3 and not any(line.operator.of_j for line in lines):
         return "oblate" if oblate else "prolate"
     return "asymmetric"
 

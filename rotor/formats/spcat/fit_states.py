@@ -49,8 +49,10 @@ def names_of_quanta(form: Format) -> tuple[str, ...]:
     """
     rotation = {1: ("n",), 2: ("n", "k"), 3: ("n", "ka", "kc")}[form.rotation]
     spins = [f"f{i}" for i in range(1, form.spins)] + ["f"] if form.spins else []
-    if form.i_tot and len(spins) > 1:
+    if form.equivalent and len(spins) > 1:
         spins[-2] = "i_tot"
+    if form.equivalent == 3:
+        spins[-3] = "i_sym"
     if form.aggregate:
         spins = ["pattern", "f"]
     names = (*rotation, *(["v"] if form.states else []), *spins)

@@ -117,7 +117,9 @@ def unmixed_levels(top: Top, effects: tuple[QuantumEffect, ...], every_f: Sequen
     lowest, highest = _range_of_n(top, effects, every_f)
     plan = plan_of(top, effects, lowest, highest, None)
     if plan.shared.scheme.equivalent == 3:
-        raise ValueError("functions of three equivalent nuclei are no products of a state of the rotation and a pattern")
+        raise ValueError(
+            "functions of three equivalent nuclei are no products of a state of the rotation and a pattern"
+        )
     prepare(plan, every_f)
     blocks = tuple(_placed(block for f in every_f for block in functions_of_f(plan, f)))
     return _table(top, effects, plan.shared, blocks, highest), plan

@@ -81,7 +81,7 @@ class Scheme:
         nuclei = len(self.spins) - len(electrons)
         sums = [*electrons, *(f"f{i + 1}" for i in range(nuclei - 1)), *(["f"] if nuclei else [])]
         of_total: list[str] = {0: [], 2: ["i_tot", "f"], 3: ["i_sym", "i_tot", "f"]}[self.equivalent]
-        return tuple([*sums[: len(sums) - self.equivalent], *of_total])
+        return (*sums[: len(sums) - self.equivalent], *of_total)
 
     @property
     def half(self) -> tuple[bool, ...]:
@@ -89,7 +89,7 @@ class Scheme:
         halves = [bool(total % 2) for total in accumulate(self.twice)]
         last = halves[-1:]
         of_total = {0: [], 2: [False, *last], 3: [False, sum(self.twice[-3:]) % 2 == 1, *last]}[self.equivalent]
-        return tuple([*halves[: len(halves) - self.equivalent], *of_total])
+        return (*halves[: len(halves) - self.equivalent], *of_total)
 
     @property
     def conserved_columns(self) -> list[int]:

@@ -28,7 +28,9 @@ def simplified(plan: Plan, effects: Sequence[QuantumEffect], every_f: Sequence[i
     if asked is None:
         return plan
     if plan.shared.scheme.equivalent == 3 and asked.method not in (EXACT, "auto"):
-        raise ValueError(f"method {asked.method} with a total spin of three nuclei: they are computed by the exact one alone")
+        raise ValueError(
+            f"method {asked.method} with a total spin of three nuclei: they are computed by the exact one alone"
+        )
     if asked.method == EXACT or plan.shared.scheme.equivalent == 3:
         return plan.with_method(Used(EXACT, 0.0, asked.tolerance_mhz), plan.operators)
     other_n, same_n = largest_shifts(plan, every_f)

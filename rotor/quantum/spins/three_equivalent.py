@@ -28,6 +28,7 @@ from rotor.quantum.wang.j_operators import phase
 from rotor.tops.operators import axes_of
 
 _ZERO = 1e-12  # of the largest element: what connects less is round-off of sums that cancel
+_ROUND_OFF = 1e-13  # of coefficients, sums of products of a few numbers of size 1
 _ALONE = Channel((), 0)
 
 
@@ -149,16 +150,20 @@ def _functions(plan: Plan, every: Ints, parts: list[SpinPart], rows: list[Row]) 
                     sizes.append(len(chosen))
             start += basis.size
     table = np.array(columns, dtype=float).reshape(-1, 7)
-    a, p, c, b, q, d, sub = (table[:, k] for k in range(7))
-    ints = [each.astype(np.int64) for each in (a, b, p, q, sub)]
-    return Functions((ints[0], ints[1]), (ints[2], ints[3]), (c, d), ints[4], np.concatenate(names), np.array(sizes))
+    places = [table[:, column].astype(np.int64) for column in (0, 3, 1, 4, 6)]
+    factors = table[:, 2], table[:, 5]
+    return Functions(
+        (places[0], places[1]), (places[2], places[3]), factors, places[4], np.concatenate(names), np.array(sizes)
+    )
 
 
 def _along(plan: Plan) -> int:
     """Which of Ka and Kc is K: 0 or 1."""
     axis = axes_of(plan.shared.representation)[2]
     if axis == "b":
-        raise ValueError(f"representation {plan.shared.representation}: the threefold axis is a or c, the z of the basis")
+        raise ValueError(
+            f"representation {plan.shared.representation}: the threefold axis is a or c, the z of the basis"
+        )
     return 0 if axis == "a" else 1
 
 
@@ -188,11 +193,19 @@ def _matrix(plan: Plan, every: Ints, parts: list[SpinPart], rows: list[Row], fun
             if i != k:  # c(p', p) = (-1)^(N'-N) c(p, p'), and the product is symmetric
                 turned = (-1.0) ** (parts[i].rotor.n - parts[k].rotor.n) * element.T
                 rotor[starts[k] : starts[k + 1], starts[i] : starts[i + 1]] = turned
-        coupling = coefficients_of(plan.shared.scheme, channel, every)
+        coupling = _coupling(plan, channel, every)
         for r, p, c in zip(functions.wang, functions.pattern, functions.factor, strict=True):
             for s, q, d in zip(functions.wang, functions.pattern, functions.factor, strict=True):
                 total += np.outer(c, d) * coupling[np.ix_(p, q)] * rotor[np.ix_(r, s)]
     return (total + total.T) / 2
+
+
+def _coupling(plan: Plan, channel: Channel, every: Ints) -> Floats:
+    """The coefficients of a channel without round-off: rotational energies times it would connect what symmetry keeps apart."""
+    if channel == _ALONE:
+        return np.eye(len(every))
+    found = coefficients_of(plan.shared.scheme, channel, every)
+    return np.where(np.abs(found) > _ROUND_OFF, found, 0.0)
 
 
 def _connected(matrix: Floats, sub_block: Ints) -> list[Ints]:
@@ -250,7 +263,11 @@ def _in_products(
     table = np.array([(row.block, row.place) for row in rows])
     halves = [(table[r[members]], p[members], c[members]) for r, p, c in _halves(functions)]
     used = np.unique(np.concatenate([place[c != 0.0, 0] for place, _, c in halves]))
-    out, start, base = [], 0, np.zeros((len(parts), 3), dtype=np.int64)  # start, first pattern, size of the solved block
+    out, start, base = (
+        [],
+        0,
+        np.zeros((len(parts), 3), dtype=np.int64),
+    )  # start, first pattern, size of the solved block
     for i in used.tolist():
         part, size = parts[i], parts[i].place.stop - parts[i].place.start
         out.append(part._replace(place=slice(start, start + size)))

@@ -116,4 +116,6 @@ def recoupling_of_three(spins: tuple[int, ...], one_by_one: Ints, total: Ints) -
 def _recoupled(j1: Ints, j2: int, j12: Ints, j3: int, j: Ints, j23: int) -> Floats:
     """⟨((j1 j2)j12 j3)j|(j1 (j2 j3)j23)j⟩, all doubled: (-1)^(j1+j2+j3+j) √((2j12+1)(2j23+1)) {j1 j2 j12; j3 j j23}."""
     sign = np.where((j1 + j2 + j3 + j) // 2 % 2, -1.0, 1.0)
-    return np.asarray(sign * np.sqrt((j12 + 1.0) * (j23 + 1.0)) * six_j(j1 / 2, j2 / 2, j12 / 2, j3 / 2, j / 2, j23 / 2))
+    return np.asarray(
+        sign * np.sqrt((j12 + 1.0) * (j23 + 1.0)) * six_j(j1 / 2, j2 / 2, j12 / 2, j3 / 2, j / 2, j23 / 2)
+    )
