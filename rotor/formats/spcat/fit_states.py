@@ -146,7 +146,7 @@ def _with_labels(group: Group, form: Format, labels: Ints, names: Sequence[str],
     twice = 2 * total - sum(group.spins) % 2
     every = np.unique(twice)
     size = len(group.states) * int(np.prod([spin + 1 for spin in group.spins]))
-    if group.spins and size * int(every.max() + 1) > _LARGE:
+    if group.spins and group.states[0].equivalent < 3 and size * int(every.max() + 1) > _LARGE:
         contracted = _contracted(group, form, labels, here, every, names, values)
         if contracted is not None:
             return [contracted]

@@ -28,6 +28,8 @@ from rotor.quantum.spins.blocks import (
 from rotor.quantum.spins.lines import ParameterOperator
 from rotor.quantum.spins.operators import Scalar
 from rotor.quantum.spins.rotor import Channel
+from rotor.quantum.spins.three_equivalent import labels_of_functions
+from rotor.quantum.spins.three_spins import Allowed
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
@@ -182,7 +184,9 @@ class _SpinUnits:
         for place, operator in enumerate(self._operators):
             matrix = self._matrix(operator, parts, block)
             if matrix is not None:
-                units[place] = elements_of(matrix)
+                units[place] = elements_of(_of_allowed(matrix, block.allowed) if block.allowed else matrix)
+        if block.allowed:
+            return unit_block(units, block.allowed.sub_block, _namer_of_allowed(block.allowed))
         return unit_block(units, _sub_blocks(parts, parts[-1].place.stop), _namer(parts, block.patterns))
 
     def _matrix(self, operator: ParameterOperator, parts: tuple[SpinPart, ...], block: SpinBlock) -> Floats | None:
@@ -196,6 +200,19 @@ class _SpinUnits:
                     out = np.zeros((parts[-1].place.stop,) * 2) if out is None else out
                     out[up.place, low.place] += product(self._coefficients[key][up.patterns, low.patterns], element)
         return out
+
+
+def _of_allowed(matrix: Floats, allowed: Allowed) -> Floats:
+    """A matrix, of which the lower triangle is read, between the functions that exchange allows."""
+    whole = np.tril(matrix) + np.tril(matrix, -1).T
+    return np.asarray(allowed.products.T @ whole @ allowed.products)
+
+
+def _namer_of_allowed(allowed: Allowed) -> Namer:
+    def namer(matrix: Floats, energies: Floats, vectors: Floats) -> Ints:
+        return labels_of_functions(vectors, allowed.sub_block, allowed.names, allowed.sizes)[0]
+
+    return namer
 
 
 def _in_functions(part: SpinPart) -> SpinPart:

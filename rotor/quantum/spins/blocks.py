@@ -35,6 +35,7 @@ from rotor.quantum.spins.rotor import (
     valued_terms,
 )
 from rotor.quantum.spins.scheme import Scheme, scheme_of
+from rotor.quantum.spins.three_spins import Allowed
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -78,9 +79,8 @@ class Shared:
 class SpinBlock:
     """States of one F solved together: energies (n,) in MHz, rising, and eigenvectors (functions, n) over the parts.
 
-    patterns: all coupling patterns of the F, doubled.
-    labels: (n, columns) v, Ka (K of an axial top), Kc, then the doubled pattern N, J ... F of every state. mixing: (n,) the share
-    of the sub-block that names it. start: row of the first state.
+    patterns: all coupling patterns of the F, doubled. labels: (n, columns) v, Ka (K of an axial top), Kc, the doubled pattern N, J ... F
+    of states. mixing: (n,) shares of the sub-blocks that name them. start: row of the first state. allowed: the functions that are there.
     """
 
     twice_f: int
@@ -92,6 +92,7 @@ class SpinBlock:
     mixing: Floats
     shared: Shared
     start: int = 0
+    allowed: Allowed | None = None
 
 
 class Plan(NamedTuple):

@@ -22,7 +22,7 @@ import numpy as np
 from rotor.arrays import Floats, Ints
 from rotor.quantum.spins.blocks import Exist, Plan, SpinBlock, SpinPart, assigned, coefficients_of
 from rotor.quantum.spins.rotor import Channel, RotorBlock, RotorPart
-from rotor.quantum.spins.three_spins import EVEN_E, ODD_E, STEP
+from rotor.quantum.spins.three_spins import EVEN_E, ODD_E, STEP, Allowed
 from rotor.quantum.wang.basis import WangBlock
 from rotor.quantum.wang.j_operators import phase
 from rotor.tops.operators import axes_of
@@ -245,21 +245,48 @@ def _solved(
         raise ValueError("a block of the Hamiltonian overflows: N max is too high for these constants")
     zero = own[0, 0]  # taken out of the matrix for the sake of digits
     energies, vectors = np.linalg.eigh(own - zero * np.eye(len(own)))
-    subs, sub = np.unique(functions.sub_block[members], return_inverse=True)
-    shares = np.zeros((len(subs), len(members)))
-    np.add.at(shares, sub, vectors**2)
-    of_state = assigned(shares, named[1])
-    labels = np.empty_like(named[0])
-    labels[np.argsort(of_state, kind="stable")] = named[0]
-    mixing = shares[of_state, np.arange(len(of_state))]
-    used, products = _in_products(parts, rows, functions, members, vectors)
-    return SpinBlock(twice_f, every, used, energies + zero, products, labels, mixing, plan.shared)
+    sub = np.unique(functions.sub_block[members], return_inverse=True)[1]
+    labels, mixing = labels_of_functions(vectors, sub, *named)
+    used, products = _in_products(parts, rows, functions, members)
+    allowed = Allowed(products, sub, *named)
+    return SpinBlock(
+        twice_f, every, used, energies + zero, products @ vectors, labels, mixing, plan.shared, allowed=allowed
+    )
+
+
+def labels_of_functions(vectors: Floats, sub_block: Ints, names: Ints, sizes: Ints) -> tuple[Ints, Floats]:
+    """What states are called, and the shares of the sub-blocks that give the names.
+
+    Parameters
+    ----------
+    vectors : (functions, n) array
+        Of states with rising energies.
+    sub_block : (functions,) array of int
+        Numbers of the sub-blocks, from 0.
+    names : (functions, columns) array of int
+        v, Ka, Kc and pattern of the levels that the sub-blocks name, one after another.
+    sizes : (sub-blocks,) array of int
+        How many each names.
+
+    Returns
+    -------
+    labels : (n, columns) array of int
+        Names of the states.
+    mixing : (n,) array
+        Shares, pure numbers.
+    """
+    shares = np.zeros((len(sizes), vectors.shape[1]))
+    np.add.at(shares, sub_block, vectors**2)
+    of_state = assigned(shares, sizes)
+    labels = np.empty_like(names)
+    labels[np.argsort(of_state, kind="stable")] = names
+    return labels, np.asarray(shares[of_state, np.arange(len(of_state))])
 
 
 def _in_products(
-    parts: list[SpinPart], rows: list[Row], functions: Functions, members: Ints, vectors: Floats
+    parts: list[SpinPart], rows: list[Row], functions: Functions, members: Ints
 ) -> tuple[tuple[SpinPart, ...], Floats]:
-    """The parts that take part, and vectors over their products of rotation and pattern."""
+    """The parts that take part, and the functions over their products of rotation and pattern."""
     table = np.array([(row.block, row.place) for row in rows])
     halves = [(table[r[members]], p[members], c[members]) for r, p, c in _halves(functions)]
     used = np.unique(np.concatenate([place[c != 0.0, 0] for place, _, c in halves]))
@@ -273,11 +300,11 @@ def _in_products(
         out.append(part._replace(place=slice(start, start + size)))
         base[i] = start, part.patterns.start, len(part.rotor.energies_mhz)
         start += size
-    products = np.zeros((start, vectors.shape[1]))
+    products = np.zeros((start, len(members)))
     for place, p, c in halves:
-        chosen = c != 0.0
+        chosen = np.flatnonzero(c)
         at = base[place[chosen, 0]]
-        products[at[:, 0] + (p[chosen] - at[:, 1]) * at[:, 2] + place[chosen, 1]] = c[chosen, None] * vectors[chosen]
+        products[at[:, 0] + (p[chosen] - at[:, 1]) * at[:, 2] + place[chosen, 1], chosen] = c[chosen]
     return tuple(out), products
 
 

@@ -36,6 +36,19 @@ class SymmetricFunctions(NamedTuple):
     amplitudes: Floats
 
 
+class Allowed(NamedTuple):
+    """The functions of a block that exchange allows: in columns over its products of rotation and pattern, (products, n).
+
+    sub_block: the number of the sub-block of each, from 0, rising. names, sizes: v, Ka, Kc and pattern that these give, as
+    `blocks.names_of_parts` has them.
+    """
+
+    products: Floats
+    sub_block: Ints
+    names: Ints
+    sizes: Ints
+
+
 def cyclic_exchange(twice_i: int, twice_total: int) -> tuple[Ints, Floats]:
     """The doubled I_23 that couple with a third spin I to the total, and P over them.
 
