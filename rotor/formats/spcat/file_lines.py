@@ -250,7 +250,7 @@ def share_a_weight(group: Group, levels: Levels, upper: Indices, lower: Indices)
 
 
 def weights_of_lines(group: Group, levels: Levels, found: Transitions) -> Ints:
-    """The nuclear-spin weight of each line: that of its level in the later block, by F, state and species, one component of ±K."""
+    """The nuclear-spin weight of each line: that of its level in the later block, by F, first state and species, one component of ±K."""
     weight = levels.weight // levels.components
     if (weight[found.upper] == weight[found.lower]).all() or "kc" not in levels.quanta:
         return np.asarray(weight[found.lower])
@@ -258,6 +258,9 @@ def weights_of_lines(group: Group, levels: Levels, found: Transitions) -> Ints:
     species = np.array([[0, 3], [1, 2]])[(kc, ka) if group.oblate else (ka, kc)]
     v = levels.quanta.get("v", np.zeros(len(levels), dtype=np.int64))
     order = (levels.multiplicity * (len(group.states) + 1) + v) * 4 + species
+    for block in levels.blocks:  # which comes where its first state and species do
+        rows = slice(block.start, block.start + len(block.energies_mhz))
+        order[rows] = order[rows].min()
     return np.asarray(np.where(order[found.upper] > order[found.lower], weight[found.upper], weight[found.lower]))
 
 

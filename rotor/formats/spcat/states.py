@@ -91,8 +91,13 @@ class StateOptions:
         if fold is None or self.equivalent == 3:  # with their spins all levels are of A species
             return weight
         class_of = (k - self.l_code) % fold.n
-        paired = np.where(np.isin(class_of, fold.paired), self.e_weight, 0)
+        paired = np.where(np.isin(class_of, fold.paired) & self._has_e(weight), self.e_weight, 0)
         return np.where(class_of == fold.alone, weight, paired)
+
+    def _has_e(self, weight: Ints) -> NDArray[np.bool_]:
+        """Whether E levels stand in Wang blocks of such a weight: of a threefold axis those of weight 0 are left out as a whole, so that
+        half of the E levels are there, with twice their weight in the file."""
+        return np.asarray((weight > 0) | (self.fold != 3))
 
     def odd_spins(self, quanta: Mapping[str, Ints]) -> Ints | int:
         """Of levels by their quantum numbers: odd I_tot of two equivalent spins, functions of species A2 of three."""
@@ -112,7 +117,7 @@ class StateOptions:
         paired = np.isin(classes, fold.paired).any(axis=1) | (
             self.iax == 7
         )  # which names both kinds of blocks of a 4-fold axis
-        return np.stack([np.where(alone, own, 0), np.where(paired, self.e_weight, 0)], axis=1)
+        return np.stack([np.where(alone, own, 0), np.where(paired & self._has_e(own), self.e_weight, 0)], axis=1)
 
     def is_e(self, k: Ints) -> NDArray[np.bool_]:
         """Which levels are of E species, whose K is not signed."""
