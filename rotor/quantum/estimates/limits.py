@@ -4,6 +4,7 @@
 |---|---|---|
 | a nucleus of spin 1 or more | nuclear quadrupole coupling | 234.96 MHz/barn · |Q|: a field gradient of one atomic unit |
 | constants of a geometry alone | error of the geometry, centrifugal distortion | δB/B · 2B(J+1); 4D(J+1)³, D = 4B³/ν² with ν = 500 cm⁻¹ |
+| the same | vibration-rotation difference, B_e - B_0 | δB/B (`zero_point`) · 2B(J+1) |
 | a methyl group beside atoms off its axis | internal rotation | A - E difference of lines (`internal_rotation`); at most F |
 | a pyramidal nitrogen with two hydrogens | inversion | at most about 24 GHz, that of ammonia |
 | an odd number of electrons, an odd electronic state | electron spin | not estimated |
@@ -41,6 +42,7 @@ COMPUTE = "its constants are known, add the effects of spins"  # the command lin
 HIGHEST_J = 20  # A - E differences change little with J; those of higher J are estimated at this one
 LOW_BARRIER = 10.0  # s = 4 V3/9F below which the torsional levels of E species depend on K as much as the rotation
 ELECTRON_SPIN = "electron spin"
+ZERO_POINT = "vibration-rotation difference"
 OF_SPINS = frozenset({"nuclear quadrupole", "magnetic coupling of nuclear spins", ELECTRON_SPIN})
 AMMONIA_MHZ = 24_000.0  # the splitting of NH3, see docs/limitations.md
 FLAT_DEGREES = 355.0  # sum of the three angles at a nitrogen that is not pyramidal
@@ -152,6 +154,8 @@ def _of_constants(top: Top, j: int) -> list[Limit]:
         relative = top.molecule.uncertainty
         text = f"A, B, C follow from a geometry good to {100 * relative:.2g} %, and all frequencies with them"
         found.append(Limit("error of the geometry", relative * 2 * b * (j + 1), text))
+    if of_geometry and top.molecule is not None:
+        found += _zero_point(top.molecule, 2 * b * (j + 1))
     if rigid and top.kind != "spherical":
         d = 4 * b**3 / (VIBRATION_CM * units.MHZ_PER_CM) ** 2
         text = (
@@ -159,6 +163,16 @@ def _of_constants(top: Top, j: int) -> list[Limit]:
         )
         found.append(Limit("centrifugal distortion", 4 * d * (j + 1) ** 3, text))
     return found
+
+
+def _zero_point(molecule: Molecule, line_mhz: float) -> list[Limit]:
+    """What zero-point vibration does to lines of about one frequency; nothing where no atoms are bonded."""
+    from rotor.quantum.estimates.methyl_groups import bonded_atoms
+    from rotor.quantum.estimates.zero_point import relative_difference
+
+    relative = relative_difference(molecule, bonded_atoms(molecule))
+    text = f"A, B, C of an equilibrium geometry are about {100 * relative:.1g} % off those of the ground state; not of r0, rs or rz"
+    return [Limit(ZERO_POINT, relative * line_mhz, text)] if relative else []
 
 
 def _largest(top: Top) -> float:
