@@ -288,7 +288,12 @@ def _align(request: Any) -> Plan:
         effects=(*effect_texts(request.top, j, SEMI_RIGID), *(f"pulse on the {one.acts_on}" for one in request.pulses)),
         good=("M",) if all(one.axis == (0, 0, 1) for one in request.pulses) else (),
         parts=(
-            ("basis", f"J to {trace.jmax} at least, for a tolerance of {coarse.tolerance:g}"),
+            (
+                "basis",
+                f"J to {request.jmax}"
+                if request.jmax
+                else f"J to {trace.jmax} at least, for a tolerance of {coarse.tolerance:g}",
+            ),
             (
                 "method",
                 f"{trace.method} during the pulses, exact phases after them; steps halved until the cosines agree",
