@@ -191,7 +191,7 @@ def _growth(middle: float, end: float) -> float:
     """
     if middle > 0.0 and end > middle * 2.0**CHAOTIC:
         return float(min((end / middle) ** (2.0 * (BEGINNINGS - 1)), 1e300))
-    return BEGINNINGS**REGULAR
+    return float(BEGINNINGS**REGULAR)
 
 
 def choose_tolerance(scene: Any, request: DrivenRequest, asked: float) -> Choice:
