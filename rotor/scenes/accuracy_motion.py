@@ -170,9 +170,9 @@ def _of_beginning(request: DrivenRequest, asked: float) -> tuple[int, str]:
     middle = int(np.searchsorted(np.abs(np.array(motions.request.times) - request.times[0]), 0.5 * _span(motions)))
     grown = math.log10(_growth(float(np.max(apart[: middle + 1])), float(np.max(apart))))
     part = f"from the first {100 / BEGINNINGS:g} % of the time, in which errors grow {{}}"
-    wanted = math.log10(asked) - grown
+    needed = math.log10(asked) - grown
     try:
-        decade = _loosest(motions, 10.0**wanted)[0] if wanted > -FINEST_REFERENCE else FINEST
+        decade = _loosest(motions, 10.0**needed)[0] if needed > -FINEST_REFERENCE else FINEST
     except ValueError:  # the part cannot be that exact
         decade = FINEST
     kind = "exponentially" if grown > REGULAR * math.log10(BEGINNINGS) else "as the square of the time at the most"
