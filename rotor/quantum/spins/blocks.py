@@ -15,6 +15,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
+from functools import cached_property
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -22,6 +24,7 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum.effect import QuantumEffect
+from rotor.quantum.spins.contraction import Stack, operators_of_stacks, stacks_of
 from rotor.quantum.spins.coupling import coefficients, n_dot_s, patterns, recoupling, stacks
 from rotor.quantum.spins.method import FIRST_ORDER, Used
 from rotor.quantum.spins.operators import AxialState
@@ -66,10 +69,12 @@ class SpinPart(NamedTuple):
 
 @dataclass(frozen=True)
 class Shared:
-    """What all blocks of a calculation share: the scheme, the representation, and elements that were computed once."""
+    """What all blocks of a calculation share: the scheme, the representation, the blocks of the rotation in stacks where their
+    functions are those of Wang blocks, and elements that were computed once."""
 
     scheme: Scheme
     representation: str
+    stacks: list[Stack] | None = field(default=None, repr=False, compare=False)
     cache: dict[Any, Any] = field(default_factory=dict, repr=False, compare=False)
     used: Used | None = None
 
@@ -93,8 +98,17 @@ class SpinBlock:
     shared: Shared
     start: int = 0
 
+    @cached_property
+    def by_number(self) -> dict[int, list[SpinPart]]:
+        """The parts by the number of their block of the rotation."""
+        found: dict[int, list[SpinPart]] = {}
+        for part in self.parts:
+            found.setdefault(part.number, []).append(part)
+        return found
 
-class Plan(NamedTuple):
+
+@dataclass(frozen=True)
+class Plan:
     """Solved rotation, operators of every channel by pairs of blocks (i ≥ k), and which blocks are connected.
 
     families: members (block, class), the class 1 of functions that change sign with the exchange of two equivalent spins.
@@ -104,6 +118,11 @@ class Plan(NamedTuple):
     blocks: list[RotorBlock]
     operators: dict[tuple[int, int], dict[Channel, Floats]]
     families: list[list[tuple[int, int]]]
+
+    @cached_property
+    def grouped(self) -> dict[tuple[int, int], list[tuple[Floats, list[Channel]]]]:
+        """Each matrix between two blocks once, with the channels that share it."""
+        return {pair: _by_operator(found) for pair, found in self.operators.items()}
 
     def with_method(self, used: Used, operators: dict[tuple[int, int], dict[Channel, Floats]]) -> Plan:
         """The same rotation with some of the operators, and what that is called."""
@@ -133,13 +152,34 @@ def plan_of(top: Top, effects: tuple[QuantumEffect, ...], nmin: int, nmax: int, 
     channels = channels_of(terms, scheme)
     firsts = _alike(channels)
     distinct = {first: channels[first] for first in firsts.values()}
-    operators = {}
     reach = 0 if "n" in scheme.conserved else 2
-    for i, k in _near(blocks, reach):
-        if found := operators_between(blocks[i], blocks[k], distinct, representation):
-            operators[i, k] = {channel: found[first] for channel, first in firsts.items() if first in found}
+    stacks = None if _are_axial(blocks) else stacks_of(blocks)
+    if stacks is None:
+        between = {(i, k): operators_between(blocks[i], blocks[k], distinct, representation) for i, k in _near(blocks, reach)}
+    else:
+        between = _operators(stacks, reach, distinct, representation)
+    operators = {
+        pair: {channel: found[first] for channel, first in firsts.items() if first in found}
+        for pair, found in between.items()
+        if found
+    }
     families = _families(len(blocks), operators, 2 if scheme.paired else 1)
-    return Plan(Shared(scheme, representation), blocks, operators, families)
+    return Plan(Shared(scheme, representation, stacks), blocks, operators, families)
+
+
+def _are_axial(blocks: list[RotorBlock]) -> bool:
+    return isinstance(blocks[0].parts[0].basis, AxialState)
+
+
+def _operators(
+    stacks: list[Stack], reach: int, channels: Channels, representation: str
+) -> dict[tuple[int, int], dict[Channel, Floats]]:
+    """`operators_between` of all blocks whose N differ by `reach` at most."""
+    out: dict[tuple[int, int], dict[Channel, Floats]] = {}
+    for channel, pieces in channels.items():
+        for pair, operator in operators_of_stacks(stacks, min(reach, channel.rank), pieces, representation).items():
+            out.setdefault(pair, {})[channel] = operator
+    return out
 
 
 def _alike(channels: Channels) -> dict[Channel, Channel]:
@@ -224,11 +264,9 @@ def solve_f(plan: Plan, twice_f: int, exist: Exist | None = None) -> list[SpinBl
 
 def _parts_of_f(plan: Plan, every: Ints) -> Iterator[tuple[SpinPart, ...]]:
     """The parts of every block of an F whose patterns these are."""
-    where, first = np.unique(
-        np.column_stack([every[:, 0] // 2, plan.shared.scheme.classes(every)]), axis=0, return_index=True
-    )
-    stops = [*first[1:].tolist(), len(every)]
-    rows = {tuple(own): slice(a, b) for own, a, b in zip(where.tolist(), first.tolist(), stops, strict=True)}
+    n, classes = every[:, 0] // 2, plan.shared.scheme.classes(every)
+    bounds = [0, *(np.flatnonzero((n[1:] != n[:-1]) | (classes[1:] != classes[:-1])) + 1).tolist(), len(every)]
+    rows = {(int(n[a]), int(classes[a])): slice(a, b) for a, b in pairwise(bounds)}
     for family in plan.families:
         members = [(i, rows[place]) for i, own in family if (place := (plan.blocks[i].n, own)) in rows]
         if members:
@@ -313,18 +351,27 @@ def _solved(
         labels, mixing = labels_of(parts, names, vectors)
         return SpinBlock(twice_f, every, parts, energies, vectors, labels, mixing, plan.shared)
     zero = float(parts[0].rotor.energies_mhz[0])  # taken out of the matrix for the sake of digits
-    diagonal = [np.tile(part.rotor.energies_mhz - zero, part.repeats) for part in parts]
-    matrix = np.diag(np.concatenate(diagonal))
-    for a, up in enumerate(parts):
-        for low in parts[: a + 1]:
-            for operator, of_it in _by_operator(plan.operators.get((up.number, low.number), {})):
-                factors = sum(known[channel][up.patterns, low.patterns] for channel in of_it)
-                matrix[up.place, low.place] += product(np.asarray(factors), operator)
+    matrix = _matrix(plan, parts, known)
+    matrix.flat[:: len(matrix) + 1] += np.concatenate([np.tile(p.rotor.energies_mhz - zero, p.repeats) for p in parts])
     if not np.isfinite(matrix).all():
         raise ValueError("a block of the Hamiltonian overflows: N max is too high for these constants")
     energies, vectors = np.linalg.eigh(matrix)  # reads the lower triangle
     labels, mixing = labels_of(parts, names, vectors)
     return SpinBlock(twice_f, every, parts, energies + zero, vectors, labels, mixing, plan.shared)
+
+
+def _matrix(plan: Plan, parts: tuple[SpinPart, ...], known: dict[Channel, Floats]) -> Floats:
+    """What couples the functions of one block, lower triangle."""
+    size = parts[-1].place.stop
+    matrix, grouped = np.zeros((size, size)), plan.grouped
+    for a, up in enumerate(parts):
+        for low in parts[: a + 1]:
+            for operator, of_it in grouped.get((up.number, low.number), ()):
+                factors = known[of_it[0]][up.patterns, low.patterns]
+                for channel in of_it[1:]:
+                    factors = factors + known[channel][up.patterns, low.patterns]
+                matrix[up.place, low.place] += product(factors, operator) if factors.size > 1 else factors * operator
+    return matrix
 
 
 def _by_operator(operators: dict[Channel, Floats]) -> list[tuple[Floats, list[Channel]]]:
@@ -387,20 +434,23 @@ def _of_exchange(scheme: Scheme, channel: Channel, every: Ints) -> Floats:
 def labels_of(parts: tuple[SpinPart, ...], named: tuple[Ints, Ints], vectors: Floats) -> tuple[Ints, Floats]:
     """Names (n, 3 + pattern) of the states of a block, energies rising, and the shares of the sub-blocks that give them."""
     names, sizes = named
-    shares: list[Floats] = []
-    for part in parts:
-        states = len(part.rotor.energies_mhz)
-        rows = vectors[part.place].reshape(part.repeats, states, -1)
-        for own in part.rotor.parts:
-            inside = (
-                rows if len(part.rotor.parts) == 1 else np.einsum("kr,prn->pkn", part.rotor.vectors[own.place], rows)
-            )
-            shares.append(np.einsum("pkn,pkn->pn", inside, inside))
-    table = np.concatenate(shares)
+    inside = vectors
+    if any(len(part.rotor.parts) > 1 for part in parts):
+        inside = np.concatenate([_over_functions(part, vectors) for part in parts])
+    table = np.add.reduceat(inside * inside, np.cumsum(sizes) - sizes, axis=0)
     of_state = assigned(table, sizes)
     labels = np.empty_like(names)
     labels[np.argsort(of_state, kind="stable")] = names
     return labels, np.asarray(table[of_state, np.arange(len(of_state))])
+
+
+def _over_functions(part: SpinPart, vectors: Floats) -> Floats:
+    """Vectors over the functions of the rotation, by Wang blocks, then patterns; of one Wang block the states serve as well."""
+    rows = vectors[part.place]
+    if len(part.rotor.parts) == 1:
+        return rows
+    each = np.matmul(part.rotor.vectors, rows.reshape(part.repeats, len(part.rotor.energies_mhz), -1))
+    return np.concatenate([each[:, own.place].reshape(-1, rows.shape[1]) for own in part.rotor.parts])
 
 
 def names_of_parts(parts: tuple[SpinPart, ...], every: Ints) -> tuple[Ints, Ints]:

@@ -1,0 +1,312 @@
+"""Operators of the rotation contracted to the eigenstates of many solved blocks at once.
+
+Blocks with the same states v and Wang functions in them, which differ in N alone, stand in one stack, padded with zeros to one shape.
+Elements between two stacks whose N differ by one number are one array, by the formulas of `tensors` and `operators` for all these
+N, and are contracted by one product of matrices. Pair by pair the same is `rotor.in_both_orders`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from rotor.arrays import Floats, Ints
+from rotor.quantum.spins.operators import Cosines, CosinesWithN, Rotor, axis_tensor, tensor_of
+from rotor.quantum.spins.rotor import Piece, RotorBlock, acts
+from rotor.quantum.tensors import BodyTensor, Tensors, closed_coupling, overlap, rank_of, tensor_between
+from rotor.quantum.wang.basis import WangBlock
+
+_SMALL = 16  # functions up to which blocks of all sizes share a stack; of larger ones the largest has half as many again at most
+MOST_RANK = 2  # up to which there are closed forms for many N at once
+
+
+class Section(NamedTuple):
+    """The functions of one state and one kind of Wang block in a stack: the block of the largest N, the rows, all blocks."""
+
+    v: int
+    basis: WangBlock
+    rows: slice
+    every: tuple[WangBlock, ...]
+
+
+class Stack(NamedTuple):
+    """Solved blocks of rising N: their numbers, N, eigenvectors (blocks, rows, states) with zeros beyond a block, and how many states
+    each has."""
+
+    numbers: Ints
+    n: Ints
+    sections: tuple[Section, ...]
+    vectors: Floats
+    sizes: list[int]
+
+
+class Pairs(NamedTuple):
+    """Blocks of two stacks, the N' and N of each pair: places in the stacks and N as columns."""
+
+    up: Ints
+    low: Ints
+    m: Ints
+    n: Ints
+
+    def turned(self) -> Pairs:
+        """The other way round."""
+        return Pairs(self.low, self.up, self.n, self.m)
+
+
+Element = Callable[[Section, Section, Pairs], Floats | None]
+"""Elements (pairs, functions', functions) between two sections, None where they are zero."""
+
+
+def stacks_of(blocks: Sequence[RotorBlock]) -> list[Stack]:
+    """All blocks, whose functions are those of Wang blocks, in stacks of like shapes."""
+    alike: dict[tuple[tuple[int, int, int], ...], list[int]] = {}
+    for number, block in enumerate(blocks):
+        key = tuple((part.v, part.basis.first_k, part.basis.sign) for part in block.parts)  # type: ignore[union-attr]
+        alike.setdefault(key, []).append(number)
+    return [_stack(blocks, some) for members in alike.values() for some in _of_like_size(blocks, members)]
+
+
+def _of_like_size(blocks: Sequence[RotorBlock], members: list[int]) -> Iterator[list[int]]:
+    some: list[int] = []
+    for number in sorted(members, key=lambda number: blocks[number].n):
+        if some and len(blocks[number].energies_mhz) > max(_SMALL, 1.5 * len(blocks[some[0]].energies_mhz)):
+            yield some
+            some = []
+        some.append(number)
+    yield some
+
+
+def _stack(blocks: Sequence[RotorBlock], numbers: list[int]) -> Stack:
+    own = [blocks[number] for number in numbers]
+    sections, start = [], 0
+    for parts in zip(*(block.parts for block in own), strict=True):
+        every = tuple(part.basis for part in parts)
+        largest = max(every, key=lambda basis: basis.size)
+        sections.append(Section(parts[0].v, largest, slice(start, start + largest.size), every))
+        start += largest.size
+    sizes = [len(block.energies_mhz) for block in own]
+    vectors = np.zeros((len(own), start, max(sizes)))
+    for place, (block, states) in enumerate(zip(own, sizes, strict=True)):
+        for part, section in zip(block.parts, sections, strict=True):
+            first = section.rows.start
+            vectors[place, first : first + part.basis.size, :states] = block.vectors[part.place]
+    return Stack(np.array(numbers), np.array([block.n for block in own]), tuple(sections), vectors, sizes)
+
+
+def operators_of_stacks(
+    stacks: Sequence[Stack], reach: int, pieces: Sequence[Piece], representation: str
+) -> dict[tuple[int, int], Floats]:
+    """Σ value ⟨r'‖X‖r⟩ by the numbers of two blocks (i ≥ k) whose N differ by `reach` at most, where it is not zero.
+
+    Parameters
+    ----------
+    stacks : sequence of Stack
+        All blocks.
+    reach : int
+        Largest difference of N.
+    pieces : sequence of Piece
+        Operators with their values in MHz, conjugates of those between different states not among them.
+    representation : str
+        Which principal axes are x, y, z.
+
+    Returns
+    -------
+    dict of (int, int) to (n', n) array
+        In MHz, as `rotor.in_both_orders` gives them.
+    """
+
+    def element(left: Section, right: Section, pairs: Pairs) -> Floats | None:
+        return _of_pieces(pieces, left, right, pairs, representation)
+
+    return dict(_between_all(stacks, reach, element))
+
+
+def tensor_elements_of_stacks(stacks: Sequence[Stack], tensors: Tensors) -> dict[tuple[int, int], Floats]:
+    """⟨r'‖T‖r⟩ by the numbers of two blocks, both ways round, where it is not zero.
+
+    Parameters
+    ----------
+    stacks : sequence of Stack
+        All blocks.
+    tensors : mapping of (int, int) to BodyTensor
+        By pairs of states, all of one rank.
+
+    Returns
+    -------
+    dict of (int, int) to (n', n) array
+        In the unit of the tensors.
+    """
+    rank = rank_of(tensors)
+
+    def element(left: Section, right: Section, pairs: Pairs) -> Floats | None:
+        tensor = tensor_between(tensors, left.v, right.v)
+        return None if tensor is None else _of_tensor(tensor, left.basis, right.basis, pairs)
+
+    found = dict(_between_all(stacks, rank, element))
+    n_of = {number: n for stack in stacks for number, n in zip(stack.numbers.tolist(), stack.n.tolist(), strict=True)}
+    turned = {(k, i): (-1.0) ** (n_of[i] - n_of[k] + rank) * x.T for (i, k), x in found.items() if i != k}
+    return found | turned
+
+
+def _between_all(
+    stacks: Sequence[Stack], reach: int, element: Element
+) -> Iterator[tuple[tuple[int, int], Floats]]:
+    for up in stacks:
+        for low in stacks:
+            for rise in range(reach + 1):
+                pairs = _pairs(up, low, rise)
+                if len(pairs.up):
+                    yield from _contracted(up, low, pairs, element)
+
+
+def _pairs(up: Stack, low: Stack, rise: int) -> Pairs:
+    """The blocks whose N differ by `rise`; of one N, those with the number of the first not below that of the second."""
+    _, a, b = np.intersect1d(up.n, low.n + rise, assume_unique=True, return_indices=True)
+    ordered = up.numbers[a] >= low.numbers[b]
+    a, b = a[ordered], b[ordered]
+    return Pairs(a, b, up.n[a][:, None], low.n[b][:, None])
+
+
+def _contracted(
+    up: Stack, low: Stack, pairs: Pairs, element: Element
+) -> Iterator[tuple[tuple[int, int], Floats]]:
+    """Matrices between the states of each pair of blocks, those that are zero left out."""
+    total: Floats | None = None
+    for left in up.sections:
+        for right in low.sections:
+            found = element(left, right, pairs)
+            if found is not None:
+                if total is None:
+                    total = np.zeros((len(pairs.up), up.vectors.shape[1], low.vectors.shape[1]))
+                total[:, left.rows, right.rows] += found
+    if total is None:
+        return
+    moved = np.matmul(total, low.vectors[pairs.low])
+    matrices = np.matmul(up.vectors[pairs.up].transpose(0, 2, 1), moved)
+    acting = matrices.any(axis=(1, 2)).tolist()
+    for a, b, matrix, acts_here in zip(pairs.up.tolist(), pairs.low.tolist(), matrices, acting, strict=True):
+        if acts_here:
+            yield (int(up.numbers[a]), int(low.numbers[b])), matrix[: up.sizes[a], : low.sizes[b]]
+
+
+def _of_pieces(
+    pieces: Sequence[Piece], left: Section, right: Section, pairs: Pairs, representation: str
+) -> Floats | None:
+    """The sum of all pieces and, of those between different states, of their Hermitian conjugates."""
+    sign, found = (-1.0) ** int(pairs.m[0, 0] - pairs.n[0, 0]), list[Floats]()
+    for piece in pieces:
+        if acts(piece, left.v, right.v):
+            there = _of_piece(piece, left, right, pairs, representation)
+            found += [] if there is None else [there]
+        if piece.bra != piece.ket and acts(piece, right.v, left.v):
+            back = _of_piece(piece, right, left, pairs.turned(), representation)
+            found += [] if back is None else [sign * back.transpose(0, 2, 1)]
+    return np.asarray(sum(found)) if found else None
+
+
+def _of_piece(piece: Piece, left: Section, right: Section, pairs: Pairs, representation: str) -> Floats | None:
+    """value ½(bra + ket) of N^2p, times ½(bra + ket) of Nz^2q, times the element of the operator."""
+    found = _of_rotor(piece.rotor, left, right, pairs, representation)
+    if found is None:
+        return None
+    m, n = pairs.m[:, :, None].astype(float), pairs.n[:, :, None].astype(float)
+    factor = piece.value * ((m * (m + 1.0)) ** piece.n2 + (n * (n + 1.0)) ** piece.n2) / 2
+    if piece.nz2:
+        bra, ket = (section.basis.k.astype(float) ** (2 * piece.nz2) for section in (left, right))
+        factor = factor * ((bra[:, None] + ket) / 2)
+    return np.asarray(factor * found)
+
+
+def _of_rotor(rotor: Rotor, left: Section, right: Section, pairs: Pairs, representation: str) -> Floats | None:
+    if isinstance(rotor, Cosines):
+        tensor = tensor_of(rotor.components, rotor.rank, representation)
+        found = None if tensor is None else _of_tensor(tensor, left.basis, right.basis, pairs)
+        return -found if found is not None and rotor.rank == 1 else found
+    if isinstance(rotor, CosinesWithN):
+        return _of_cosines_with_n(rotor, left, right, pairs, representation)
+    return _one_by_one(rotor, left, right, pairs, representation)
+
+
+def _of_cosines_with_n(
+    rotor: CosinesWithN, left: Section, right: Section, pairs: Pairs, representation: str
+) -> Floats | None:
+    """See `CosinesWithN.elements`."""
+    m, n = pairs.m[:, :, None].astype(float), pairs.n[:, :, None].astype(float)
+    rise = int(pairs.m[0, 0] - pairs.n[0, 0])
+    if abs(rise) > 1:
+        return None
+    up, low = left.basis, right.basis
+    stretch = np.sqrt(np.maximum(((m + n + 1) ** 2 - 4) * (1 - (m - n) ** 2 / 4) / 6, 0.0))
+    parts = [
+        (stretch, tensor_of(rotor.components, 2, representation)),
+        ((n * (n + 1) - m * (m + 1)) / 2, axis_tensor(rotor.components, representation)),
+    ]
+    found = [(factor, _of_tensor(tensor, up, low, pairs)) for factor, tensor in parts if tensor is not None]
+    acting = [factor * matrix for factor, matrix in found if matrix is not None]
+    scalar = float(np.trace(np.array(rotor.components))) / 3
+    if scalar and not rise and (left.v, up.first_k, up.sign) == (right.v, low.first_k, low.sign):
+        acting.append(scalar * np.sqrt(n * (n + 1.0) * (2 * n + 1)) * np.eye(up.size, low.size))
+    return np.asarray(sum(acting)) if acting else None
+
+
+def _one_by_one(rotor: Rotor, left: Section, right: Section, pairs: Pairs, representation: str) -> Floats | None:
+    """Any operator, pair by pair."""
+    total: Floats | None = None
+    for place, (a, b) in enumerate(zip(pairs.up.tolist(), pairs.low.tolist(), strict=True)):
+        found = rotor.elements(left.every[a], right.every[b], representation)
+        if found is not None:
+            if total is None:
+                total = np.zeros((len(pairs.up), left.basis.size, right.basis.size))
+            total[place, : found.shape[0], : found.shape[1]] = found
+    return total
+
+
+def _of_tensor(tensor: BodyTensor, up: WangBlock, low: WangBlock, pairs: Pairs) -> Floats | None:
+    """`tensors.block_elements` of all pairs: (pairs, up.size, low.size)."""
+    rank, rise = tensor.rank, int(pairs.m[0, 0] - pairs.n[0, 0])
+    if rank > MOST_RANK:
+        raise ValueError(f"a tensor of rank {rank}: expected at most {MOST_RANK} with spins")
+    closes = (pairs.m + pairs.n >= rank)[:, 0]
+    if abs(rise) > rank or not closes.any():
+        return None
+    m, n = pairs.m[closes], pairs.n[closes]
+    by_n = [tensor.signed_parts(up._replace(j=j + rise), low._replace(j=j)) for j in range(4)]  # N modulo 4 counts
+    steps = by_n[0][0]
+    if not steps:
+        return None
+    parts = np.array([own for _, own in by_n])[n[:, 0] % 4]
+    found = np.zeros((len(m), up.size, low.size))
+    for step in steps:
+        source, target = overlap(up, low, step)
+        if source.start < source.stop:
+            rows, columns = np.arange(target.start, target.stop), np.arange(source.start, source.stop)
+            found[:, rows, columns] = _couplings(m, n, rank, step, low.k[source]) * parts[:, rank + step, None]
+    if rank > 1:
+        _add_folded(found, parts, up, low, (m, n))
+    if closes.all():
+        return found
+    out = np.zeros((len(closes), up.size, low.size))
+    out[closes] = found
+    return out
+
+
+def _couplings(m: Ints, n: Ints, rank: int, step: int, k: Ints) -> Floats:
+    """`tensors.coupling` from n (pairs, 1) to m, over K (functions,), times √2 where one of K and K + step is 0."""
+    exists = (np.abs(k) <= n) & (np.abs(k + step) <= m)
+    inside = np.where(exists, k, np.maximum(-n, -m - step)).astype(float)
+    values = closed_coupling(n.astype(float), int(m[0, 0] - n[0, 0]), rank, step, inside)
+    if step:
+        values = values * np.where(k == max(0, -step), np.sqrt(2.0), 1.0)
+    return np.where(exists, values, 0.0)
+
+
+def _add_folded(found: Floats, parts: Floats, up: WangBlock, low: WangBlock, of_pairs: tuple[Ints, Ints]) -> None:
+    """Adds what joins K to -K', as `tensors.bands_between` does: s X(K', -K) of 1 ≤ K, K' and K + K' ≤ rank."""
+    rank, (m, n) = parts.shape[1] // 2, of_pairs
+    for column, k in enumerate(low.k[:rank].tolist()):
+        for row, k_up in enumerate(up.k[:rank].tolist()):
+            if k and k_up and k + k_up <= rank:
+                turned = _couplings(m, n, rank, k + k_up, np.array([-k]))[:, 0]
+                found[:, row, column] += low.sign * turned * parts[:, rank + k + k_up]
