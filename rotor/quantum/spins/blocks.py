@@ -351,8 +351,7 @@ def _solved(
         labels, mixing = labels_of(parts, names, vectors)
         return SpinBlock(twice_f, every, parts, energies, vectors, labels, mixing, plan.shared)
     zero = float(parts[0].rotor.energies_mhz[0])  # taken out of the matrix for the sake of digits
-    matrix = _matrix(plan, parts, known)
-    matrix.flat[:: len(matrix) + 1] += np.concatenate([np.tile(p.rotor.energies_mhz - zero, p.repeats) for p in parts])
+    matrix = _matrix(plan, parts, known, zero)
     if not np.isfinite(matrix).all():
         raise ValueError("a block of the Hamiltonian overflows: N max is too high for these constants")
     energies, vectors = np.linalg.eigh(matrix)  # reads the lower triangle
@@ -360,10 +359,11 @@ def _solved(
     return SpinBlock(twice_f, every, parts, energies + zero, vectors, labels, mixing, plan.shared)
 
 
-def _matrix(plan: Plan, parts: tuple[SpinPart, ...], known: dict[Channel, Floats]) -> Floats:
-    """What couples the functions of one block, lower triangle."""
+def _matrix(plan: Plan, parts: tuple[SpinPart, ...], known: dict[Channel, Floats], zero: float) -> Floats:
+    """The Hamiltonian of one block, energies from `zero` on, in the lower triangle."""
     size = parts[-1].place.stop
     matrix, grouped = np.zeros((size, size)), plan.grouped
+    matrix.flat[:: size + 1] = np.concatenate([np.tile(p.rotor.energies_mhz - zero, p.repeats) for p in parts])
     for a, up in enumerate(parts):
         for low in parts[: a + 1]:
             for operator, of_it in grouped.get((up.number, low.number), ()):

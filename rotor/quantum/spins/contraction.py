@@ -32,14 +32,15 @@ class Section(NamedTuple):
 
 
 class Stack(NamedTuple):
-    """Solved blocks of rising N: their numbers, N, eigenvectors (blocks, rows, states) with zeros beyond a block, and how many states
-    each has."""
+    """Solved blocks of rising N: their numbers, N, eigenvectors (blocks, rows, states) with zeros beyond a block, how many states
+    each has, and its own eigenvectors."""
 
     numbers: Ints
     n: Ints
     sections: tuple[Section, ...]
     vectors: Floats
     sizes: list[int]
+    own: list[Floats]
 
 
 class Pairs(NamedTuple):
@@ -92,7 +93,7 @@ def _stack(blocks: Sequence[RotorBlock], numbers: list[int]) -> Stack:
         for part, section in zip(block.parts, sections, strict=True):
             first = section.rows.start
             vectors[place, first : first + part.basis.size, :states] = block.vectors[part.place]
-    return Stack(np.array(numbers), np.array([block.n for block in own]), tuple(sections), vectors, sizes)
+    return Stack(np.array(numbers), np.array([block.n for block in own]), tuple(sections), vectors, sizes, [block.vectors for block in own])
 
 
 def operators_of_stacks(
@@ -183,12 +184,16 @@ def _contracted(
                 total[:, left.rows, right.rows] += found
     if total is None:
         return
-    moved = np.matmul(total, low.vectors[pairs.low])
-    matrices = np.matmul(up.vectors[pairs.up].transpose(0, 2, 1), moved)
+    turned = np.matmul(up.vectors[pairs.up].transpose(0, 2, 1), total)
+    matrices = np.matmul(turned, low.vectors[pairs.low])
     acting = matrices.any(axis=(1, 2)).tolist()
-    for a, b, matrix, acts_here in zip(pairs.up.tolist(), pairs.low.tolist(), matrices, acting, strict=True):
-        if acts_here:
-            yield (int(up.numbers[a]), int(low.numbers[b])), matrix[: up.sizes[a], : low.sizes[b]]
+    for place, (a, b) in enumerate(zip(pairs.up.tolist(), pairs.low.tolist(), strict=True)):
+        if acting[place]:
+            states = np.s_[: up.sizes[a]], np.s_[: low.sizes[b]]
+            matrix = matrices[place][states]
+            if 1 in matrix.shape and len(up.sections) == len(low.sections) == 1:  # to the last bit of `rotor.contracted`
+                matrix = up.own[a].T @ total[place][states] @ low.own[b]
+            yield (int(up.numbers[a]), int(low.numbers[b])), matrix
 
 
 def _of_pieces(
