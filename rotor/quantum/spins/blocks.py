@@ -5,10 +5,7 @@ times the coupling patterns p of that N, are the basis of an F,
 
     ⟨r' p'|H|r p⟩ = E_r δ + Σ_channels c(p', p) ⟨r'|X|r⟩,
 
-a Kronecker product for each pair of solved blocks. Blocks that no channel connects are solved apart.
-
-A level is named after a sub-block: a Wang block of one state, and one pattern. The names are given one to one, the largest share
-first, and among the levels of one sub-block Ka rises with energy.
+a Kronecker product for each pair of solved blocks. Blocks that no channel connects are solved apart. `parts` names the levels.
 """
 
 from __future__ import annotations
@@ -17,7 +14,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +25,7 @@ from rotor.quantum.spins.contraction import Stack, operators_of_stacks, stacks_o
 from rotor.quantum.spins.coupling import coefficients, n_dot_s, patterns, recoupling, stacks
 from rotor.quantum.spins.method import FIRST_ORDER, Used
 from rotor.quantum.spins.operators import AxialState
+from rotor.quantum.spins.parts import SpinPart, labels_of, named_states, names_of_parts
 from rotor.quantum.spins.rotor import (
     Channel,
     Channels,
@@ -46,25 +44,7 @@ if TYPE_CHECKING:
 
 
 _FEW = 100  # patterns of an F; of more the coefficients are made when they are needed
-_AT_A_TIME = 1000  # entries of a table of shares that are looked at together
 Exist = Callable[[Ints], NDArray[np.bool_]]
-
-
-class SpinPart(NamedTuple):
-    """The states of the solved block `number` with every pattern of its N and class, pattern by pattern.
-
-    patterns: the rows of these patterns among those of the F, which are in the order of N, then of the class.
-    """
-
-    number: int
-    rotor: RotorBlock
-    patterns: slice
-    place: slice
-
-    @property
-    def repeats(self) -> int:
-        """Number of patterns."""
-        return int(self.patterns.stop - self.patterns.start)
 
 
 @dataclass(frozen=True)
@@ -155,7 +135,9 @@ def plan_of(top: Top, effects: tuple[QuantumEffect, ...], nmin: int, nmax: int, 
     reach = 0 if "n" in scheme.conserved else 2
     stacks = None if _are_axial(blocks) else stacks_of(blocks)
     if stacks is None:
-        between = {(i, k): operators_between(blocks[i], blocks[k], distinct, representation) for i, k in _near(blocks, reach)}
+        between = {
+            (i, k): operators_between(blocks[i], blocks[k], distinct, representation) for i, k in _near(blocks, reach)
+        }
     else:
         between = _operators(stacks, reach, distinct, representation)
     operators = {
@@ -292,17 +274,6 @@ def _labels_of_functions(part: SpinPart, own_patterns: Ints) -> Ints:
     return np.concatenate([np.column_stack([names, np.tile(one, (len(names), 1))]) for one in own_patterns])
 
 
-def named_states(rotor: RotorBlock, vectors: Floats) -> Ints:
-    """v, Ka, Kc (n, 3) of states (n, n) of the rotation: of the part that has most of each, in order of energy."""
-    shares = np.stack([(vectors[part.place] ** 2).sum(axis=0) for part in rotor.parts])
-    of_state = assigned(shares, np.array([len(part.names) for part in rotor.parts]))
-    labels = np.empty((len(of_state), 3), dtype=np.int64)
-    labels[np.argsort(of_state, kind="stable")] = np.concatenate(
-        [np.column_stack([np.full(len(part.names), part.v), part.names]) for part in rotor.parts]
-    )
-    return labels
-
-
 def prepare(plan: Plan, every_f: Iterable[int]) -> None:
     """Coefficients of all channels for many F at once; those of patterns with a total spin are made F by F."""
     scheme = plan.shared.scheme
@@ -429,72 +400,3 @@ def _of_exchange(scheme: Scheme, channel: Channel, every: Ints) -> Floats:
         found = (found + channel.exchange * _one_by_one(scheme, channel._replace(acting=turned), plain)) / 2
     turn = recoupling(scheme.twice, plain, every)
     return np.asarray(turn.T @ found @ turn)
-
-
-def labels_of(parts: tuple[SpinPart, ...], named: tuple[Ints, Ints], vectors: Floats) -> tuple[Ints, Floats]:
-    """Names (n, 3 + pattern) of the states of a block, energies rising, and the shares of the sub-blocks that give them."""
-    names, sizes = named
-    inside = vectors
-    if any(len(part.rotor.parts) > 1 for part in parts):
-        inside = np.concatenate([_over_functions(part, vectors) for part in parts])
-    table = np.add.reduceat(inside * inside, np.cumsum(sizes) - sizes, axis=0)
-    of_state = assigned(table, sizes)
-    labels = np.empty_like(names)
-    labels[np.argsort(of_state, kind="stable")] = names
-    return labels, np.asarray(table[of_state, np.arange(len(of_state))])
-
-
-def _over_functions(part: SpinPart, vectors: Floats) -> Floats:
-    """Vectors over the functions of the rotation, by Wang blocks, then patterns; of one Wang block the states serve as well."""
-    rows = vectors[part.place]
-    if len(part.rotor.parts) == 1:
-        return rows
-    each = np.matmul(part.rotor.vectors, rows.reshape(part.repeats, len(part.rotor.energies_mhz), -1))
-    return np.concatenate([each[:, own.place].reshape(-1, rows.shape[1]) for own in part.rotor.parts])
-
-
-def names_of_parts(parts: tuple[SpinPart, ...], every: Ints) -> tuple[Ints, Ints]:
-    """v, Ka, Kc and the pattern of the levels that the sub-blocks name, (functions, 3 + pattern), and how many each names."""
-    found, sizes = [], []
-    for part in parts:
-        own_patterns = every[part.patterns]
-        for own in part.rotor.parts:
-            names = np.empty((len(own_patterns), len(own.names), 3 + every.shape[1]), dtype=np.int64)
-            names[..., 0] = own.v
-            names[..., 1:3] = own.names
-            names[..., 3:] = own_patterns[:, None, :]
-            found.append(names.reshape(-1, names.shape[-1]))
-            sizes += [len(own.names)] * len(own_patterns)
-    return np.concatenate(found), np.array(sizes)
-
-
-def assigned(shares: Floats, capacity: Ints) -> Ints:
-    """Which sub-block names each state: shares (sub-blocks, states), the largest first, none beyond its capacity.
-
-    >>> assigned(np.array([[0.9, 0.6, 0.0], [0.1, 0.4, 1.0]]), np.array([1, 2])).tolist()
-    [0, 1, 1]
-    """
-    found = shares.argmax(axis=0)
-    if (np.bincount(found, minlength=len(capacity)) == capacity).all():
-        return np.asarray(found)
-    clear = shares[found, np.arange(len(found))] > 0.5  # before all others; where they fit in, they are decided
-    left = capacity - np.bincount(found[clear], minlength=len(capacity))
-    if (left < 0).any():
-        return _largest_first(shares, capacity)
-    rest, subs = np.flatnonzero(~clear), np.flatnonzero(left > 0)
-    found[rest] = subs[_largest_first(shares[np.ix_(subs, rest)], left[subs])]
-    return np.asarray(found)
-
-
-def _largest_first(shares: Floats, capacity: Ints) -> Ints:
-    found, left = np.full(shares.shape[1], -1), capacity.copy()
-    every = np.argsort(-shares, axis=None, kind="stable")
-    for start in range(0, len(every), _AT_A_TIME):
-        subs, states = np.divmod(every[start : start + _AT_A_TIME], shares.shape[1])
-        free = (found[states] < 0) & (left[subs] > 0)  # of what was decided before
-        for sub, state in zip(subs[free].tolist(), states[free].tolist(), strict=True):
-            if found[state] < 0 and left[sub]:
-                found[state], left[sub] = sub, left[sub] - 1
-        if not left.any():
-            break
-    return found

@@ -7,14 +7,14 @@ N, and are contracted by one product of matrices. Pair by pair the same is `roto
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum.spins.operators import Cosines, CosinesWithN, Rotor, axis_tensor, tensor_of
-from rotor.quantum.spins.rotor import Piece, RotorBlock, acts
+from rotor.quantum.spins.rotor import Piece, RotorBlock, RotorPart, acts
 from rotor.quantum.tensors import BodyTensor, Tensors, closed_coupling, overlap, rank_of, tensor_between
 from rotor.quantum.wang.basis import WangBlock
 
@@ -23,12 +23,12 @@ MOST_RANK = 2  # up to which there are closed forms for many N at once
 
 
 class Section(NamedTuple):
-    """The functions of one state and one kind of Wang block in a stack: the block of the largest N, the rows, all blocks."""
+    """The functions of one state and one kind of Wang block in a stack: the block of the largest N, the rows, the parts of all N."""
 
     v: int
     basis: WangBlock
     rows: slice
-    every: tuple[WangBlock, ...]
+    every: tuple[RotorPart, ...]
 
 
 class Stack(NamedTuple):
@@ -51,13 +51,18 @@ class Pairs(NamedTuple):
     m: Ints
     n: Ints
 
+    @property
+    def rise(self) -> int:
+        """N' - N, the same of all."""
+        return int(self.m[0, 0] - self.n[0, 0])
+
     def turned(self) -> Pairs:
         """The other way round."""
         return Pairs(self.low, self.up, self.n, self.m)
 
 
-Element = Callable[[Section, Section, Pairs], Floats | None]
-"""Elements (pairs, functions', functions) between two sections, None where they are zero."""
+Element = tuple[Section, Section, Floats]
+"""Elements (pairs, functions', functions) between two sections."""
 
 
 def stacks_of(blocks: Sequence[RotorBlock]) -> list[Stack]:
@@ -83,9 +88,9 @@ def _stack(blocks: Sequence[RotorBlock], numbers: list[int]) -> Stack:
     own = [blocks[number] for number in numbers]
     sections, start = [], 0
     for parts in zip(*(block.parts for block in own), strict=True):
-        every = tuple(part.basis for part in parts)
-        largest = max(every, key=lambda basis: basis.size)
-        sections.append(Section(parts[0].v, largest, slice(start, start + largest.size), every))
+        largest = max((part.basis for part in parts), key=lambda basis: basis.size)
+        assert isinstance(largest, WangBlock)
+        sections.append(Section(parts[0].v, largest, slice(start, start + largest.size), parts))
         start += largest.size
     sizes = [len(block.energies_mhz) for block in own]
     vectors = np.zeros((len(own), start, max(sizes)))
@@ -93,7 +98,14 @@ def _stack(blocks: Sequence[RotorBlock], numbers: list[int]) -> Stack:
         for part, section in zip(block.parts, sections, strict=True):
             first = section.rows.start
             vectors[place, first : first + part.basis.size, :states] = block.vectors[part.place]
-    return Stack(np.array(numbers), np.array([block.n for block in own]), tuple(sections), vectors, sizes, [block.vectors for block in own])
+    return Stack(
+        np.array(numbers),
+        np.array([block.n for block in own]),
+        tuple(sections),
+        vectors,
+        sizes,
+        [block.vectors for block in own],
+    )
 
 
 def operators_of_stacks(
@@ -118,10 +130,16 @@ def operators_of_stacks(
         In MHz, as `rotor.in_both_orders` gives them.
     """
 
-    def element(left: Section, right: Section, pairs: Pairs) -> Floats | None:
-        return _of_pieces(pieces, left, right, pairs, representation)
-
-    return dict(_between_all(stacks, reach, element))
+    between = [piece for piece in pieces if piece.bra != piece.ket]
+    out: dict[tuple[int, int], Floats] = {}
+    for up, low, pairs in _near(stacks, reach):
+        found = _contracted(up, low, pairs, _of_pieces(pieces, up, low, pairs, representation))
+        back = _contracted(low, up, pairs.turned(), _of_pieces(between, low, up, pairs.turned(), representation))
+        for pair in {**found, **{pair[::-1]: None for pair in back}}:
+            turned = (-1.0) ** pairs.rise * back[pair[::-1]].T if pair[::-1] in back else None
+            there = found.get(pair)
+            out[pair] = there if turned is None else turned if there is None else there + turned  # type: ignore[assignment]
+    return out
 
 
 def tensor_elements_of_stacks(stacks: Sequence[Stack], tensors: Tensors) -> dict[tuple[int, int], Floats]:
@@ -141,25 +159,39 @@ def tensor_elements_of_stacks(stacks: Sequence[Stack], tensors: Tensors) -> dict
     """
     rank = rank_of(tensors)
 
-    def element(left: Section, right: Section, pairs: Pairs) -> Floats | None:
-        tensor = tensor_between(tensors, left.v, right.v)
-        return None if tensor is None else _of_tensor(tensor, left.basis, right.basis, pairs)
+    alike = all(tensors.get((v, w), tensor) == tensor for (w, v), tensor in tensors.items())
+    there: dict[tuple[int, int], Floats] = {}
+    back: dict[tuple[int, int], Floats] = {}
+    for up, low, pairs in _near(stacks, rank):
+        found = _contracted(up, low, pairs, _of_tensors(tensors, up, low, pairs))
+        there |= found
+        if alike:
+            sign = (-1.0) ** (pairs.rise + rank)
+            back |= {(k, i): sign * x.T for (i, k), x in found.items() if i != k}
+        else:
+            turned = pairs.turned()
+            back |= _contracted(low, up, turned, _of_tensors(tensors, low, up, turned))
+    return back | there
 
-    found = dict(_between_all(stacks, rank, element))
-    n_of = {number: n for stack in stacks for number, n in zip(stack.numbers.tolist(), stack.n.tolist(), strict=True)}
-    turned = {(k, i): (-1.0) ** (n_of[i] - n_of[k] + rank) * x.T for (i, k), x in found.items() if i != k}
-    return found | turned
+
+def _of_tensors(tensors: Tensors, up: Stack, low: Stack, pairs: Pairs) -> list[Element]:
+    """Elements of the tensors between all sections that they connect."""
+    return [
+        (left, right, element)
+        for left in up.sections
+        for right in low.sections
+        if (tensor := tensor_between(tensors, left.v, right.v)) is not None
+        and (element := _of_tensor(tensor, left.basis, right.basis, pairs)) is not None
+    ]
 
 
-def _between_all(
-    stacks: Sequence[Stack], reach: int, element: Element
-) -> Iterator[tuple[tuple[int, int], Floats]]:
+def _near(stacks: Sequence[Stack], reach: int) -> Iterator[tuple[Stack, Stack, Pairs]]:
     for up in stacks:
         for low in stacks:
             for rise in range(reach + 1):
                 pairs = _pairs(up, low, rise)
                 if len(pairs.up):
-                    yield from _contracted(up, low, pairs, element)
+                    yield up, low, pairs
 
 
 def _pairs(up: Stack, low: Stack, rise: int) -> Pairs:
@@ -170,45 +202,51 @@ def _pairs(up: Stack, low: Stack, rise: int) -> Pairs:
     return Pairs(a, b, up.n[a][:, None], low.n[b][:, None])
 
 
-def _contracted(
-    up: Stack, low: Stack, pairs: Pairs, element: Element
-) -> Iterator[tuple[tuple[int, int], Floats]]:
-    """Matrices between the states of each pair of blocks, those that are zero left out."""
-    total: Floats | None = None
-    for left in up.sections:
-        for right in low.sections:
-            found = element(left, right, pairs)
-            if found is not None:
-                if total is None:
-                    total = np.zeros((len(pairs.up), up.vectors.shape[1], low.vectors.shape[1]))
-                total[:, left.rows, right.rows] += found
-    if total is None:
-        return
-    turned = np.matmul(up.vectors[pairs.up].transpose(0, 2, 1), total)
-    matrices = np.matmul(turned, low.vectors[pairs.low])
-    acting = matrices.any(axis=(1, 2)).tolist()
+def _contracted(up: Stack, low: Stack, pairs: Pairs, elements: Sequence[Element]) -> dict[tuple[int, int], Floats]:
+    """The sum of elements between the states of each pair of blocks, by their numbers, those that are zero left out."""
+    if not elements:
+        return {}
+    bra, ket = up.vectors[pairs.up].transpose(0, 2, 1), low.vectors[pairs.low]
+    total = sum(np.matmul(np.matmul(bra[:, :, left.rows], x), ket[:, right.rows]) for left, right, x in elements)
+    matrices: Floats = np.asarray(total)
+    acting: list[bool] = matrices.any(axis=(1, 2)).tolist()  # type: ignore[assignment]
+    out = {}
     for place, (a, b) in enumerate(zip(pairs.up.tolist(), pairs.low.tolist(), strict=True)):
         if acting[place]:
-            states = np.s_[: up.sizes[a]], np.s_[: low.sizes[b]]
-            matrix = matrices[place][states]
-            if 1 in matrix.shape and len(up.sections) == len(low.sections) == 1:  # to the last bit of `rotor.contracted`
-                matrix = up.own[a].T @ total[place][states] @ low.own[b]
-            yield (int(up.numbers[a]), int(low.numbers[b])), matrix
+            matrix = matrices[place, : up.sizes[a], : low.sizes[b]]
+            if _has_single(up, a) or _has_single(low, b):
+                matrix = _one_contracted(up, low, (a, b), [(left, right, x[place]) for left, right, x in elements])
+            out[int(up.numbers[a]), int(low.numbers[b])] = matrix
+    return out
 
 
-def _of_pieces(
-    pieces: Sequence[Piece], left: Section, right: Section, pairs: Pairs, representation: str
-) -> Floats | None:
-    """The sum of all pieces and, of those between different states, of their Hermitian conjugates."""
-    sign, found = (-1.0) ** int(pairs.m[0, 0] - pairs.n[0, 0]), list[Floats]()
-    for piece in pieces:
-        if acts(piece, left.v, right.v):
-            there = _of_piece(piece, left, right, pairs, representation)
-            found += [] if there is None else [there]
-        if piece.bra != piece.ket and acts(piece, right.v, left.v):
-            back = _of_piece(piece, right, left, pairs.turned(), representation)
-            found += [] if back is None else [sign * back.transpose(0, 2, 1)]
-    return np.asarray(sum(found)) if found else None
+def _has_single(stack: Stack, place: int) -> bool:
+    """Whether products with a block are products with vectors, which BLAS adds up in another order than those of matrices."""
+    return stack.sizes[place] == 1 or any(section.every[place].basis.size == 1 for section in stack.sections)
+
+
+def _one_contracted(up: Stack, low: Stack, place: tuple[int, int], elements: Sequence[Element]) -> Floats:
+    """The same of one pair, to the last bit of `rotor.contracted`: where levels nearly coincide their states depend on it."""
+    total: Floats | None = None
+    for left, right, element in elements:
+        bra, ket = left.every[place[0]], right.every[place[1]]
+        inside = element[: bra.basis.size, : ket.basis.size]
+        own = up.own[place[0]][bra.place].T @ inside @ low.own[place[1]][ket.place]
+        total = own if total is None else total + own
+    assert total is not None
+    return total
+
+
+def _of_pieces(pieces: Sequence[Piece], up: Stack, low: Stack, pairs: Pairs, representation: str) -> list[Element]:
+    """Elements of every piece between all sections that it connects."""
+    return [
+        (left, right, element)
+        for piece in pieces
+        for left in up.sections
+        for right in low.sections
+        if acts(piece, left.v, right.v)
+        and (element := _of_piece(piece, left, right, pairs, representation)) is not None
+    ]
 
 
 def _of_piece(piece: Piece, left: Section, right: Section, pairs: Pairs, representation: str) -> Floats | None:
@@ -239,7 +277,7 @@ def _of_cosines_with_n(
 ) -> Floats | None:
     """See `CosinesWithN.elements`."""
     m, n = pairs.m[:, :, None].astype(float), pairs.n[:, :, None].astype(float)
-    rise = int(pairs.m[0, 0] - pairs.n[0, 0])
+    rise = pairs.rise
     if abs(rise) > 1:
         return None
     up, low = left.basis, right.basis
@@ -260,7 +298,7 @@ def _one_by_one(rotor: Rotor, left: Section, right: Section, pairs: Pairs, repre
     """Any operator, pair by pair."""
     total: Floats | None = None
     for place, (a, b) in enumerate(zip(pairs.up.tolist(), pairs.low.tolist(), strict=True)):
-        found = rotor.elements(left.every[a], right.every[b], representation)
+        found = rotor.elements(left.every[a].basis, right.every[b].basis, representation)
         if found is not None:
             if total is None:
                 total = np.zeros((len(pairs.up), left.basis.size, right.basis.size))
@@ -270,7 +308,7 @@ def _one_by_one(rotor: Rotor, left: Section, right: Section, pairs: Pairs, repre
 
 def _of_tensor(tensor: BodyTensor, up: WangBlock, low: WangBlock, pairs: Pairs) -> Floats | None:
     """`tensors.block_elements` of all pairs: (pairs, up.size, low.size)."""
-    rank, rise = tensor.rank, int(pairs.m[0, 0] - pairs.n[0, 0])
+    rank, rise = tensor.rank, pairs.rise
     if rank > MOST_RANK:
         raise ValueError(f"a tensor of rank {rank}: expected at most {MOST_RANK} with spins")
     closes = (pairs.m + pairs.n >= rank)[:, 0]

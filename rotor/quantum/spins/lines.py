@@ -17,10 +17,11 @@ import numpy as np
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum.levels import Levels
-from rotor.quantum.spins.blocks import Shared, SpinBlock, SpinPart, coefficients_of, operators_between, product
+from rotor.quantum.spins.blocks import Shared, SpinBlock, coefficients_of, operators_between, product
 from rotor.quantum.spins.contraction import MOST_RANK, tensor_elements_of_stacks
 from rotor.quantum.spins.coupling import patterns, recoupling, stacks, tensor_coefficients
 from rotor.quantum.spins.operators import AxialState, Scalar, tensor_elements
+from rotor.quantum.spins.parts import SpinPart
 from rotor.quantum.spins.rotor import Channel, RotorBlock, RotorPart, channels_of
 from rotor.quantum.spins.scheme import Scheme
 from rotor.quantum.tensors import BodyTensor, Tensors, rank_of, tensor_between
