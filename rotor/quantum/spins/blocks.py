@@ -79,6 +79,11 @@ class SpinBlock:
     start: int = 0
 
     @cached_property
+    def single(self) -> bool:
+        """Whether every part has one pattern."""
+        return all(part.repeats == 1 for part in self.parts)
+
+    @cached_property
     def by_number(self) -> dict[int, list[SpinPart]]:
         """The parts by the number of their block of the rotation."""
         found: dict[int, list[SpinPart]] = {}
@@ -332,16 +337,20 @@ def _solved(
 
 def _matrix(plan: Plan, parts: tuple[SpinPart, ...], known: dict[Channel, Floats], zero: float) -> Floats:
     """The Hamiltonian of one block, energies from `zero` on, in the lower triangle."""
-    size = parts[-1].place.stop
+    size, single = parts[-1].place.stop, all(part.repeats == 1 for part in parts)
     matrix, grouped = np.zeros((size, size)), plan.grouped
     matrix.flat[:: size + 1] = np.concatenate([np.tile(p.rotor.energies_mhz - zero, p.repeats) for p in parts])
     for a, up in enumerate(parts):
         for low in parts[: a + 1]:
             for operator, of_it in grouped.get((up.number, low.number), ()):
+                if single:
+                    factor = sum(known[channel][up.patterns.start, low.patterns.start] for channel in of_it)
+                    matrix[up.place, low.place] += factor * operator
+                    continue
                 factors = known[of_it[0]][up.patterns, low.patterns]
                 for channel in of_it[1:]:
                     factors = factors + known[channel][up.patterns, low.patterns]
-                matrix[up.place, low.place] += product(factors, operator) if factors.size > 1 else factors * operator
+                matrix[up.place, low.place] += product(factors, operator)
     return matrix
 
 

@@ -196,10 +196,20 @@ def _near(stacks: Sequence[Stack], reach: int) -> Iterator[tuple[Stack, Stack, P
 
 def _pairs(up: Stack, low: Stack, rise: int) -> Pairs:
     """The blocks whose N differ by `rise`; of one N, those with the number of the first not below that of the second."""
-    _, a, b = np.intersect1d(up.n, low.n + rise, assume_unique=True, return_indices=True)
-    ordered = up.numbers[a] >= low.numbers[b]
-    a, b = a[ordered], b[ordered]
+    a, b = _alike(up.n, low.n + rise)
+    if not rise and up is not low:
+        ordered = up.numbers[a] > low.numbers[b]
+        a, b = a[ordered], b[ordered]
     return Pairs(a, b, up.n[a][:, None], low.n[b][:, None])
+
+
+def _alike(one: Ints, other: Ints) -> tuple[Ints, Ints]:
+    """Where two rising arrays have the same numbers."""
+    first, last = max(one[0], other[0]), min(one[-1], other[-1])
+    if one[-1] - one[0] + 1 == len(one) and other[-1] - other[0] + 1 == len(other):  # without gaps
+        return np.arange(first - one[0], last - one[0] + 1), np.arange(first - other[0], last - other[0] + 1)
+    _, a, b = np.intersect1d(one, other, assume_unique=True, return_indices=True)
+    return a, b
 
 
 def _contracted(up: Stack, low: Stack, pairs: Pairs, elements: Sequence[Element]) -> dict[tuple[int, int], Floats]:
@@ -311,14 +321,13 @@ def _of_tensor(tensor: BodyTensor, up: WangBlock, low: WangBlock, pairs: Pairs) 
     rank, rise = tensor.rank, pairs.rise
     if rank > MOST_RANK:
         raise ValueError(f"a tensor of rank {rank}: expected at most {MOST_RANK} with spins")
+    if abs(rise) > rank or not (steps := tensor.signed_parts(up._replace(j=rise), low._replace(j=0))[0]):
+        return None
     closes = (pairs.m + pairs.n >= rank)[:, 0]
-    if abs(rise) > rank or not closes.any():
+    if not closes.any():
         return None
-    m, n = pairs.m[closes], pairs.n[closes]
+    m, n = (pairs.m, pairs.n) if closes.all() else (pairs.m[closes], pairs.n[closes])
     by_n = [tensor.signed_parts(up._replace(j=j + rise), low._replace(j=j)) for j in range(4)]  # N modulo 4 counts
-    steps = by_n[0][0]
-    if not steps:
-        return None
     parts = np.array([own for _, own in by_n])[n[:, 0] % 4]
     found = np.zeros((len(m), up.size, low.size))
     for step in steps:

@@ -34,7 +34,6 @@ if TYPE_CHECKING:
     from rotor.tops.top import Top
 
 _FEW = 10_000  # elements between two F; where there are more, they are made when they are needed
-_SINGLE = 4  # coefficients between two parts up to which the whole matrix between two blocks is made
 ROUND_OFF = 1e-13  # of sums of products of a few coefficients of size 1
 
 
@@ -43,11 +42,11 @@ def amplitudes(up: SpinBlock, low: SpinBlock, tensors: Tensors) -> Floats:
     rank = rank_of(tensors)
     t, acting = _coefficients(up, low, rank), _acting(up, low, tensors, rank)
     rows, columns = up.vectors.shape[0], low.vectors.shape[0]
-    if rows * columns <= _FEW and all(target.repeats * source.repeats <= _SINGLE for target, source, _ in acting):
+    if up.single and low.single and rows * columns <= _FEW:
         whole = np.zeros((rows, columns))
         for target, source, element in acting:
-            own = t[target.patterns, source.patterns]
-            whole[target.place, source.place] = product(own, element) if own.size > 1 else own * element
+            factor = t[target.patterns.start, source.patterns.start]
+            np.multiply(element, factor, out=whole[target.place, source.place])
         return np.asarray(up.vectors.T @ (whole @ low.vectors))
     moved = np.zeros((rows, low.vectors.shape[1]))
     for target, source, element in acting:
@@ -86,6 +85,14 @@ class Elements:
     known: dict[tuple[int, int], Floats | None]
     partners: dict[int, list[tuple[int, Floats]]] | None
     pairs: dict[tuple[int, int], list[tuple[SpinPart, SpinPart, Floats]]] = field(default_factory=dict)
+    reached: dict[int, set[int]] = field(default_factory=dict)
+
+    def reached_from(self, up: SpinBlock) -> set[int]:
+        """The numbers of all partners of the parts of a block."""
+        if up.start not in self.reached:
+            partners = self.partners or {}
+            self.reached[up.start] = {number for own in up.by_number for number, _ in partners.get(own, ())}
+        return self.reached[up.start]
 
 
 def _elements(shared: Shared, tensors: Tensors, rank: int) -> Elements:
@@ -110,6 +117,8 @@ def _acting(up: SpinBlock, low: SpinBlock, tensors: Tensors, rank: int) -> list[
         return []
     elements, place = _elements(low.shared, tensors, rank), (up.start, low.start)
     if place not in elements.pairs:
+        if elements.partners is not None and elements.reached_from(up).isdisjoint(low.by_number):
+            return []
         t = _coefficients(up, low, rank) if low.shared.scheme.paired else None
         elements.pairs[place] = [
             (target, source, element)
