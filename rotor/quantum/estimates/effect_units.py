@@ -16,17 +16,10 @@ from rotor.quantum.coupled import CoupledBlock, names_of_states, parameter_matri
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.estimates.unit_blocks import Elements, Namer, UnitBlock, UnitBlocks, elements_of, unit_block
 from rotor.quantum.levels import Levels, SolvedBlock
-from rotor.quantum.spins.blocks import (
-    SpinBlock,
-    SpinPart,
-    assigned,
-    coefficients_of,
-    labels_of,
-    names_of_parts,
-    product,
-)
+from rotor.quantum.spins.blocks import SpinBlock, coefficients_of, product
 from rotor.quantum.spins.lines import ParameterOperator
 from rotor.quantum.spins.operators import Scalar
+from rotor.quantum.spins.parts import SpinPart, assigned, labels_of, names_of_parts
 from rotor.quantum.spins.rotor import Channel
 
 if TYPE_CHECKING:
