@@ -144,7 +144,17 @@ class Search:
     used: NDArray[np.bool_]
 
     def lines_of(self, values: Floats) -> tuple[Floats, Floats, Floats]:
-        """Calculated lines (lines,), derivatives by the parameters (lines, n), and of the levels (levels, n)."""
+        """Calculated lines (lines,), derivatives by the parameters (lines, n), and of the levels (levels, n).
+
+        The last point is not computed a second time: the search ends where it was.
+        """
+        point = values.tobytes()
+        before: tuple[bytes, tuple[Floats, Floats, Floats]] | None = self.__dict__.get("_last")
+        if before is None or before[0] != point:
+            before = self.__dict__["_last"] = (point, self._lines_of(values))
+        return before[1]
+
+    def _lines_of(self, values: Floats) -> tuple[Floats, Floats, Floats]:
         energies, slopes = self.model.levels(self.parameters.constants_of(values))
         slopes = slopes @ self.parameters.matrix
         if self.from_zero:  # the place -1 of such lower levels is the last one
