@@ -260,7 +260,7 @@ def _chunk(blocks: Sequence[_Occurring], units: Sequence[tuple[int, int]], power
     x = np.array([one.basis.j * (one.basis.j + 1.0) for one in blocks])
     block = np.array([b for b, one in enumerate(blocks) for _ in one.rows])
     return _Chunk(
-        units=_unit_diagonals(blocks, size, units),
+        units=unit_diagonals([one.basis for one in blocks], [one.size for one in blocks], units),
         sizes=[one.size for one in blocks],
         x=x,
         rows=np.array([row for one in blocks for row in one.rows]),
@@ -270,17 +270,19 @@ def _chunk(blocks: Sequence[_Occurring], units: Sequence[tuple[int, int]], power
     )
 
 
-def _unit_diagonals(blocks: Sequence[_Occurring], size: int, units: Sequence[tuple[int, int]]) -> tuple[Floats, ...]:
+def unit_diagonals(
+    blocks: Sequence[WangBlock], taken: Sequence[int], units: Sequence[tuple[int, int]]
+) -> tuple[Floats, ...]:
     """Diagonal d of ½[Jz^2q, J₊^2n + J₋^2n]₊ at (block, state, (q, n)), state i with i + d; zero beyond a block.
 
     As in `rotor.quantum.effects.watson`: ⟨K+2n|..|K⟩ on diagonal n, √2 more where K = 0, and ⟨2n-K|..|-K⟩ with the sign of the
-    block on diagonal n - K.
+    block on diagonal n - K. taken: how many of the states of each block.
     """
     order = max((n for _, n in units), default=0)
-    j = np.array([one.basis.j for one in blocks], dtype=float)[:, None]
-    first = np.array([one.basis.first_k for one in blocks])[:, None]
-    sign = np.array([one.basis.sign for one in blocks], dtype=float)[:, None]
-    sizes = np.array([one.size for one in blocks])[:, None]
+    j = np.array([one.j for one in blocks], dtype=float)[:, None]
+    first = np.array([one.first_k for one in blocks])[:, None]
+    sign = np.array([one.sign for one in blocks], dtype=float)[:, None]
+    size, sizes = max(taken), np.array(taken)[:, None]
     index = np.arange(size)[None, :]
     k = (first + 2 * index).astype(float)
 

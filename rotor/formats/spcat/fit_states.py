@@ -23,7 +23,8 @@ from rotor.formats.spcat.text.par import ParameterFile
 from rotor.formats.spcat.unresolved import HIGHEST_SEARCHED, excluded_parameters, refuse_far_f, spelled_out
 from rotor.quantum.estimates.contracted import ContractedLevels, contracted_levels
 from rotor.quantum.estimates.effect_units import unit_levels
-from rotor.quantum.estimates.unit_blocks import UnitBlocks
+from rotor.quantum.estimates.state_units import state_units
+from rotor.quantum.estimates.unit_blocks import UnitBlocks, joined
 from rotor.quantum.labelled import LevelModel
 from rotor.quantum.levels import Levels
 from rotor.quantum.spins.levels import levels_of_f, unmixed_levels
@@ -90,7 +91,7 @@ class FileLevels(LevelModel):
         reduced = np.flatnonzero(labels[:, -1] < 0) if form.spins else np.zeros(0, dtype=np.int64)
         if len(reduced):
             refuse_far_f(labels[reduced], form, names_of_quanta(form), max(sum(group.spins) for group in groups))
-        parts = _searched(file, groups, form, labels, reduced)
+        parts = _together(_searched(file, groups, form, labels, reduced), len(file.parameters))
         return cls(line_names(file), len(labels), tuple(parts), reduced, excluded_parameters(file))
 
     def levels(self, values_mhz: Floats) -> tuple[Floats, Floats]:
@@ -127,6 +128,21 @@ def _searched(file: ParameterFile, groups: Sequence[Group], form: Format, labels
         positive[lost, -1] += 1
 
 
+def _together(parts: Sequence[_Solved], count: int) -> list[_Solved]:
+    """The parts of all groups that are solved block by block as one, so that blocks of one size are worked on together."""
+    some = [(part.blocks, part.rows, part.columns) for part in parts if isinstance(part.blocks, UnitBlocks)]
+    others = [part for part in parts if not isinstance(part.blocks, UnitBlocks)]
+    if not some:
+        return others
+    rows = np.concatenate([rows for _, rows, _ in some])
+    starts = np.cumsum([0, *(len(rows) for _, rows, _ in some)])
+    moved = [
+        (blocks, np.arange(start, stop), columns)
+        for (blocks, _, columns), start, stop in zip(some, starts, starts[1:], strict=False)
+    ]
+    return [_Solved(rows, np.arange(count), joined(moved, len(rows))), *others]
+
+
 def levels_in_blocks(group: Group, angular: Sequence[int]) -> Levels:
     """The levels of the doubled F, or J, that are listed, in blocks."""
     if group.spins:
@@ -145,6 +161,8 @@ def _with_labels(group: Group, form: Format, labels: Ints, names: Sequence[str],
     total = labels[here, -1] if form.spins else labels[here, 0]
     if (total < 0).any():
         raise ValueError(f"F or J below 0 in the labels {labels[here[int(np.argmin(total))]].tolist()}")
+    if _direct(group, form):
+        return _of_states(group, form, labels, here, names, values)
     twice = 2 * total - sum(group.spins) % 2
     every = np.unique(twice)
     size = len(group.states) * int(np.prod([spin + 1 for spin in group.spins]))
@@ -157,6 +175,31 @@ def _with_labels(group: Group, form: Format, labels: Ints, names: Sequence[str],
         _of_some_f(group, form, labels, here[np.isin(twice, some)], some.tolist(), names, values) for some in pieces
     ]
     return [one for one in found if one is not None]
+
+
+def _direct(group: Group, form: Format) -> bool:
+    """Whether the labels are J, Ka, Kc and the state, without spins and K that have no sign."""
+    plain = not (group.spins or form.spins or group.effect.pairs) and form.rotation == 3 and group.top.kind != "linear"
+    return plain and not any(state.is_e(np.arange(state.fold + 1)).any() for state in group.states)
+
+
+def _of_states(
+    group: Group, form: Format, labels: Ints, here: Ints, names: Sequence[str], values: Floats
+) -> list[_Solved]:
+    """The labels at the places `here` of states without spins."""
+    place = {state.number: v for v, state in enumerate(group.states)}
+    v = [place[number] for number in labels[here, 3].tolist()] if form.states else np.zeros(len(here), dtype=np.int64)
+    own = tuple(group.effect.parameters(group.top))
+    columns, start = _columns_of(group, names, values)
+    asked = np.column_stack([labels[here, 0], v, labels[here, 1:3]])
+    blocks = state_units(group.top, (group.effect,), own, asked, start)
+    found = np.sort(blocks.found)
+    if not len(found):
+        return []
+    order = np.full(len(here), -1)
+    order[found] = np.arange(len(found))
+    every = np.arange(len(columns))
+    return [_Solved(here[found], columns, joined([(blocks, order, every)], len(found)))]
 
 
 def _contracted(

@@ -14,7 +14,15 @@ import numpy as np
 from rotor.arrays import Floats, Ints
 from rotor.quantum.coupled import CoupledBlock, names_of_states, parameter_matrix
 from rotor.quantum.effect import QuantumEffect
-from rotor.quantum.estimates.unit_blocks import Elements, Namer, UnitBlock, UnitBlocks, elements_of, unit_block
+from rotor.quantum.estimates.unit_blocks import (
+    Elements,
+    Namer,
+    UnitBlock,
+    UnitBlocks,
+    elements_of,
+    tracked_blocks,
+    unit_block,
+)
 from rotor.quantum.levels import Levels, SolvedBlock
 from rotor.quantum.spins.blocks import (
     SpinBlock,
@@ -87,7 +95,7 @@ def unit_levels(
         asked = _quanta(levels)[rows[own]] if functions else _names(block)[rows[own] - block.start]
         return own, np.array([state_of[tuple(name)] for name in asked.tolist()])
 
-    return UnitBlocks(units, len(rows), find, values_mhz)
+    return tracked_blocks(units, len(rows), find, values_mhz)
 
 
 def _quanta(levels: Levels) -> Ints:
