@@ -17,6 +17,7 @@ import numpy as np
 from rotor.arrays import Floats, Ints
 from rotor.quantum.effect import k_limits_of
 from rotor.quantum.levels import Levels, weights_of_levels
+from rotor.quantum.one_to_one import one_to_one
 from rotor.quantum.states import Coupling, State
 from rotor.quantum.wang.basis import WangBlock, limited, names_of, wang_blocks
 from rotor.quantum.wang.j_operators import JOperator, between_blocks
@@ -363,19 +364,6 @@ def names_of_states(
     overlaps = np.concatenate(functions) ** 2
     of_state = one_to_one(overlaps) if len(parts) > 1 else np.arange(vectors.shape[1])
     return np.concatenate(names)[of_state], overlaps[of_state, np.arange(vectors.shape[1])]
-
-
-def one_to_one(overlaps: Floats) -> Ints:
-    """Which function names each state: (n,) rows of `overlaps` (functions, states), each once, their sum largest."""
-    clear = overlaps.argmax(axis=0)
-    if len(set(clear.tolist())) == len(clear):
-        return np.asarray(clear)
-    from scipy.optimize import linear_sum_assignment
-
-    rows, columns = linear_sum_assignment(overlaps, maximize=True)
-    out = np.empty(len(rows), dtype=np.int64)
-    out[columns] = rows
-    return out
 
 
 def parameter_matrix(

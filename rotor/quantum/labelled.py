@@ -256,7 +256,6 @@ def _chunks(blocks: Sequence[_Occurring], units: Sequence[tuple[int, int]], powe
 
 
 def _chunk(blocks: Sequence[_Occurring], units: Sequence[tuple[int, int]], powers: Sequence[int]) -> _Chunk:
-    size = blocks[-1].size
     x = np.array([one.basis.j * (one.basis.j + 1.0) for one in blocks])
     block = np.array([b for b, one in enumerate(blocks) for _ in one.rows])
     return _Chunk(

@@ -27,6 +27,7 @@ from rotor.quantum.wang.rotation import representation_of
 if TYPE_CHECKING:
     from rotor.tops.top import Top
 
+_LOOKED_AT = 3  # J at which all pairs of Wang blocks are tried
 Vertex = tuple[int, WangBlock]
 
 
@@ -151,15 +152,15 @@ def state_units(
     }
     elements = _elements({block for some in vertices.values() for _, block in some}, terms.powers)
 
-    blocks, inside = list[UnitBlock](), list[Ints]()
-    for j, rows in of_j.items():
-        mix, links = terms.mix(j, len(names)), _linked(terms.links, vertices[j], j, representation)
+    blocks, inside, joining = list[UnitBlock](), list[Ints](), _Joining(terms.links, representation)
+    for j, rows in sorted(of_j.items(), reverse=True):
+        mix, links = terms.mix(j, len(names)), joining.elements(vertices[j], j)
         asked = {(int(v), "eo"[ka % 2] + "eo"[kc % 2]) for _, v, ka, kc in labels[rows].tolist()}
         for members in connected_parts(len(vertices[j]), dict.fromkeys((i, k) for i, k, _ in links)):
             own = {(vertices[j][i][0], vertices[j][i][1].species) for i in members}
             if own & asked:
                 parts = parts_of([vertices[j][i] for i in members])
-                place = {i: part for i, part in zip(members, parts, strict=True)}
+                place = dict(zip(members, parts, strict=True))
                 found = [_shifted(elements[part.basis], part, terms.first[part.v]) for part in parts]
                 found += [_between(one, place[i], place[k]) for i, k, one in links if i in place]
                 blocks.append(_block(found, parts, mix, representation))
@@ -198,27 +199,43 @@ def _elements(blocks: set[WangBlock], powers: Sequence[tuple[int, int]]) -> dict
     return out
 
 
-def _linked(
-    links: Sequence[_Link], vertices: Sequence[Vertex], j: int, representation: str
-) -> list[tuple[int, int, _Elements]]:
-    """Elements between two vertices, those of the bra in rows, or within one, for every link; none for round-off of zero."""
-    found = list[tuple[int, int, _Elements]]()
-    for link in links:
-        operator = link.operator(j, representation)
-        largest = max((float(np.abs(band).max(initial=0.0)) for band in operator.bands.values()), default=0.0)
-        for i, (bra, up) in enumerate(vertices):
-            for k, (ket, low) in enumerate(vertices):
-                if (bra, ket) != (link.bra, link.ket):
-                    continue
-                between = between_blocks(up, low, operator)
-                size = np.abs(between)
-                if size.max() > NOTHING * largest:
-                    if np.abs(between.imag).max() > NOTHING * largest:
-                        raise ValueError("a coupling is not invariant under time reversal")
-                    rows, columns = np.nonzero(size)
-                    units = np.full(len(rows), link.unit)
-                    found.append((i, k, _Elements(rows, columns, units, between.real[rows, columns])))
-    return found
+class _Joining:
+    """What links connect. Between which kinds of Wang blocks, E±, O± of two states, is found at the highest three J, which come first."""
+
+    def __init__(self, links: Sequence[_Link], representation: str) -> None:
+        self._links, self._representation, self._looked = links, representation, 0
+        self._kinds: set[tuple[int, int, int, int, int]] = set()
+
+    def elements(self, vertices: Sequence[Vertex], j: int) -> list[tuple[int, int, _Elements]]:
+        """Elements between two vertices, those of the bra in rows, or within one, for every link; none for round-off of zero."""
+        found = list[tuple[int, int, _Elements]]()
+        everywhere, self._looked = self._looked < _LOOKED_AT, self._looked + 1
+        of_state: dict[int, list[tuple[int, WangBlock, int]]] = {}
+        for i, (v, block) in enumerate(vertices):
+            of_state.setdefault(v, []).append((i, block, 2 * (block.first_k % 2) + (block.sign > 0)))
+        for link in self._links:
+            operator = link.operator(j, self._representation)
+            for i, up, of_up in of_state.get(link.bra, ()):
+                for k, low, of_low in of_state.get(link.ket, ()):
+                    kind = (link.unit, link.bra, of_up, link.ket, of_low)
+                    if (everywhere or kind in self._kinds) and (one := _linked(link, operator, up, low)):
+                        self._kinds.add(kind)
+                        found.append((i, k, one))
+        return found
+
+
+def _linked(link: _Link, operator: JOperator, up: WangBlock, low: WangBlock) -> _Elements | None:
+    between = between_blocks(up, low, operator)
+    size = np.abs(between)
+    least = NOTHING * max((float(np.abs(band).max(initial=0.0)) for band in operator.bands.values()), default=0.0)
+    if not size.max() > least:
+        return None
+    if np.abs(between.imag).max() > least:
+        raise ValueError(
+            f"parameter of states {link.bra} and {link.ket}: the operator is not invariant under time reversal"
+        )
+    rows, columns = np.nonzero(size)
+    return _Elements(rows, columns, np.full(len(rows), link.unit), between.real[rows, columns])
 
 
 def _shifted(elements: _Elements, part: Part, first: int) -> _Elements:
