@@ -359,7 +359,7 @@ def round_off(search: Search, slopes: Floats) -> Floats:
 
 def too_few(lines: Assignments, used: NDArray[np.bool_], parameters: Parameters) -> str:
     """What is wrong with fewer measured frequencies than free constants; empty where they are enough."""
-    count = len(np.unique(lines.blend[used])) + int(np.isfinite(parameters.prior).sum())
+    count = len(set(lines.blend[used].tolist())) + int(np.isfinite(parameters.prior).sum())
     if count >= len(parameters.names):
         return ""
     return f"{len(parameters.names)} free constants for {count} measured frequencies; hold some, or add lines"

@@ -20,7 +20,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from rotor.arrays import Floats, Ints
+from rotor.arrays import Floats, Ints, distinct
 from rotor.quantum.effects.watson import operators_by_name
 from rotor.quantum.wang.basis import WangBlock, ka_kc, wang_blocks
 from rotor.tops.constants import Constants
@@ -342,7 +342,7 @@ def _tridiagonal(bands: Sequence[Floats], sizes: Sequence[int], energies: Floats
 def _banded(bands: Sequence[Floats], sizes: Sequence[int], energies: Floats, vectors: Floats) -> None:
     """Blocks of one size at a time, by LAPACK's dense routine."""
     unlike = np.asarray(sizes)
-    for n in np.unique(unlike).tolist():
+    for n in distinct(unlike).tolist():
         chosen = np.flatnonzero(unlike == n)
         matrices = np.zeros((len(chosen), n, n))
         for d, band in enumerate(bands[:n]):

@@ -13,7 +13,7 @@ from functools import partial
 
 import numpy as np
 
-from rotor.arrays import Floats, Ints
+from rotor.arrays import Floats, Ints, distinct
 from rotor.formats.spcat.file_lines import Format, format_of, quanta_of
 from rotor.formats.spcat.file_model import Group, groups_of
 from rotor.formats.spcat.l_doubled import functions_of_l, named_by_l
@@ -119,7 +119,10 @@ def _searched(file: ParameterFile, groups: Sequence[Group], form: Format, labels
     names, values = line_names(file), np.array([p.value for p in file.parameters])
     while True:
         parts = [part for group in groups for part in _with_labels(group, form, positive, names, values)]
-        lost = np.setdiff1d(np.arange(len(labels)), np.concatenate([part.rows for part in parts]) if parts else [])
+        there = np.zeros(len(labels), dtype=bool)
+        for part in parts:
+            there[part.rows] = True
+        lost = np.flatnonzero(~there)
         if not len(lost):
             return parts
         if not np.isin(lost, reduced).all() or (positive[lost, -1] >= HIGHEST_SEARCHED).any():
@@ -164,7 +167,7 @@ def _with_labels(group: Group, form: Format, labels: Ints, names: Sequence[str],
     if _direct(group, form):
         return _of_states(group, form, labels, here, names, values)
     twice = 2 * total - sum(group.spins) % 2
-    every = np.unique(twice)
+    every = distinct(twice)
     size = len(group.states) * int(np.prod([spin + 1 for spin in group.spins]))
     if group.spins and size * int(every.max() + 1) > _LARGE:
         contracted = _contracted(group, form, labels, here, every, names, values)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rotor.arrays import Floats, Ints
+from rotor.arrays import Floats, Ints, distinct
 from rotor.quantum.coupled import CoupledBlock, names_of_states, parameter_matrix
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.estimates.unit_blocks import (
@@ -82,7 +82,7 @@ def unit_levels(
         raise ValueError("levels of a closed form have no blocks; solve them in blocks")
     starts = np.array([block.start for block in levels.blocks])
     of_row = np.searchsorted(starts, rows, side="right") - 1
-    numbers = np.unique(of_row).tolist()
+    numbers = distinct(of_row).tolist()
     blocks = [levels.blocks[number] for number in numbers]
     makers = _Makers(top, levels, names, blocks, functions)
     units = [makers.unit(block) for block in blocks]

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rotor.arrays import Floats, Ints
+from rotor.arrays import Floats, Ints, distinct
 from rotor.quantum.coupled import NOTHING, Part, connected_parts, names_of_states, parts_of
 from rotor.quantum.effect import QuantumEffect, k_limits_of
 from rotor.quantum.estimates.unit_blocks import UnitBlock, UnitBlocks, members_of, tracked_blocks
@@ -144,7 +144,7 @@ def state_units(
     """
     representation, limits = representation_of(top), k_limits_of(top, effects)
     terms = _Terms.of(top, effects, names, representation)
-    of_j = {j: np.flatnonzero(labels[:, 0] == j) for j in np.unique(labels[:, 0][labels[:, 0] >= 0]).tolist()}
+    of_j = {j: np.flatnonzero(labels[:, 0] == j) for j in distinct(labels[:, 0][labels[:, 0] >= 0]).tolist()}
     whole = {j: wang_blocks(j, representation) for j in of_j}
     vertices = {
         j: [(v, cut) for v in sorted(terms.first) for block in whole[j] if (cut := _within(block, limits.get(v)))]
@@ -215,19 +215,22 @@ class _Joining:
             of_state.setdefault(v, []).append((i, block, 2 * (block.first_k % 2) + (block.sign > 0)))
         for link in self._links:
             operator = link.operator(j, self._representation)
+            least = NOTHING * max(
+                (float(np.abs(band).max(initial=0.0)) for band in operator.bands.values()), default=0.0
+            )
             for i, up, of_up in of_state.get(link.bra, ()):
                 for k, low, of_low in of_state.get(link.ket, ()):
                     kind = (link.unit, link.bra, of_up, link.ket, of_low)
-                    if (everywhere or kind in self._kinds) and (one := _linked(link, operator, up, low)):
+                    if (everywhere or kind in self._kinds) and (one := _linked(link, operator, up, low, least)):
                         self._kinds.add(kind)
                         found.append((i, k, one))
         return found
 
 
-def _linked(link: _Link, operator: JOperator, up: WangBlock, low: WangBlock) -> _Elements | None:
+def _linked(link: _Link, operator: JOperator, up: WangBlock, low: WangBlock, least: float) -> _Elements | None:
+    """Elements between two Wang blocks; None where all are below `least`."""
     between = between_blocks(up, low, operator)
     size = np.abs(between)
-    least = NOTHING * max((float(np.abs(band).max(initial=0.0)) for band in operator.bands.values()), default=0.0)
     if not size.max() > least:
         return None
     if np.abs(between.imag).max() > least:

@@ -8,19 +8,19 @@ Blocks of one size stand side by side, padded, so that new constants cost some p
 
 more products for the states that have a label. A state is named by the sub-block (a Wang block of one state v, and one pattern of
 coupling) that has most of it, and within a sub-block by the order of energy. As long as those shares point to the same sub-blocks as
-at the start, state n stays state n; where they do not, the names are made anew.
+at the start, state n stays state n; where they do not, the names are made anew, once for each way in which they point.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
-from rotor.arrays import Floats, Ints
+from rotor.arrays import Floats, Ints, distinct
 
 Namer = Callable[[Floats, Floats, Floats], Ints]  # matrix, energies, vectors -> names (n, columns) of the states
 
@@ -67,7 +67,7 @@ def unit_block(units: dict[int, Elements], sub_blocks: Ints, namer: Namer) -> Un
     """From the unit matrix of every parameter, by its number, that acts in the block."""
     parameters, size = sorted(units), len(sub_blocks)
     diagonal = np.arange(size) * (size + 1)
-    places = np.unique(np.concatenate([diagonal, *(units[i].places for i in parameters)]))
+    places = distinct(np.concatenate([diagonal, *(units[i].places for i in parameters)]))
     factors = np.zeros((len(places), len(parameters)))
     for column, i in enumerate(parameters):
         factors[np.searchsorted(places, units[i].places), column] = units[i].values
@@ -218,13 +218,17 @@ def tracked_blocks(
 
 @dataclass(frozen=True)
 class _Labelled:
-    """A stack with the labels in it: rows (blocks, labels), the place behind all where padded; states (blocks, labels)."""
+    """A stack with the labels in it: rows (blocks, labels), the place behind all where padded; states (blocks, labels).
+
+    renamed : states of the labels where the shares of a block point to other sub-blocks than at the start, by block and those
+    """
 
     stack: _Stack
     tracked: tuple[Tracked, ...]
     rows: Ints
     states: Ints
     leading: Ints
+    renamed: dict[tuple[int, bytes], Ints] = field(default_factory=dict)
 
     @classmethod
     def of(cls, tracked: Sequence[Tracked]) -> _Labelled:
@@ -243,19 +247,27 @@ class _Labelled:
 
     def _states(self, solved: _Solved) -> Ints:
         """The states that have the labels now; names are made anew only where a state is mostly in another sub-block."""
-        moved = (self.stack.leading(solved.vectors) != self.leading).any(axis=1)
+        leading = self.stack.leading(solved.vectors)
+        moved = (leading != self.leading).any(axis=1)
         if not moved.any():
             return self.states
         states = self.states.copy()
         for b in np.flatnonzero(moved).tolist():
-            one = self.tracked[b]
-            made = one.block.namer(solved.matrices[b], solved.energies[b], solved.vectors[b])
-            names = {tuple(name): state for state, name in enumerate(made.tolist())}
-            found = [names.get(tuple(name), -1) for name in one.names.tolist()]
-            if min(found) < 0:
-                raise ValueError("a labelled level has no state of its name with these constants")
-            states[b, : len(found)] = found
+            one, key = self.tracked[b], (b, leading[b].tobytes())
+            if key not in self.renamed:
+                made = one.block.namer(solved.matrices[b], solved.energies[b], solved.vectors[b])
+                self.renamed[key] = _states_of(made, one.names)
+            states[b, : len(one.rows)] = self.renamed[key]
         return states
+
+
+def _states_of(made: Ints, names: Ints) -> Ints:
+    """Which states have the names, of the names of all."""
+    of_name = {tuple(name): state for state, name in enumerate(made.tolist())}
+    found = [of_name.get(tuple(name), -1) for name in names.tolist()]
+    if min(found) < 0:
+        raise ValueError("a labelled level has no state of its name with these constants")
+    return np.array(found)
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rotor.arrays import distinct
 from rotor.formats.atomic_write import open_atomic
 from rotor.formats.spcat.text.fields import BLANK, read_whole
 from rotor.formats.spcat.text.freeform import Line, encode, number, read_lines, read_words
@@ -93,7 +94,7 @@ class LineList:
             upper[:, :count], lower[:, :count] = self.quanta[:, :count], self.quanta[:, count : 2 * count]
             return upper, lower
         counts = (self.quanta != BLANK).sum(axis=1) // 2
-        for count in np.unique(counts).tolist():
+        for count in distinct(counts).tolist():
             rows = counts == count
             upper[rows, :count] = self.quanta[rows, :count]
             lower[rows, :count] = self.quanta[rows, count : 2 * count]
