@@ -156,6 +156,13 @@ def levels_in_blocks(group: Group, angular: Sequence[int]) -> Levels:
     return named_by_l(levels, pairs, str(levels.representation)) if pairs else levels
 
 
+def _named_functions(group: Group, angular: Sequence[int]) -> Levels:
+    """Levels in blocks for their names alone: with spins the functions, which have the names of the states and need not be solved."""
+    if group.spins:
+        return unmixed_levels(group.top, (group.effect,), angular)[0]
+    return levels_in_blocks(group, angular)
+
+
 def _with_labels(group: Group, form: Format, labels: Ints, names: Sequence[str], values: Floats) -> list[_Solved]:
     """The labels that lie in the group, found in its levels by the quantum numbers that the file prints; some F at a time."""
     here = _of_group(group, form, labels)
@@ -245,7 +252,7 @@ def _of_some_f(
     values: Floats,
 ) -> _Solved | None:
     """The labels at the places `here` among the levels of some doubled F; None without any."""
-    levels = levels_in_blocks(group, angular)
+    levels = _named_functions(group, angular)
     rows = _rows_of(group, levels, form, labels[here])
     found = rows >= 0
     if not found.any():
