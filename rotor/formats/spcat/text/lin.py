@@ -211,7 +211,7 @@ def note_of_defaults(lines: LineList) -> str:
 
 def _plain(line: Line) -> Line:
     """The line without its end and a byte order mark."""
-    return line._replace(text=line.body.removeprefix("\ufeff"))
+    return Line(line.body.removeprefix("\ufeff"), line.number, line.file)
 
 
 def read_measured(line: Line, width: int = QUANTA_FIELDS) -> Measured:
@@ -254,7 +254,11 @@ def _lacks_some(fields: tuple[int, ...], per_state: int) -> bool:
 
 def _fields(line: Line, width: int) -> tuple[int, ...]:
     """The fields of three columns up to the last quantum number, blank ones among them; an annotation behind a blank ends them."""
-    text, quanta = line.text[: 3 * width], list[int]()
+    text, quanta = line.text[: 3 * width].rstrip(" "), list[int]()
+    try:
+        return tuple([_field(text[column : column + 3]) for column in range(0, len(text), 3)])
+    except ValueError:  # what is wrong, or where an annotation begins
+        pass
     for column in range(0, len(text), 3):
         part = text[column : column + 3]
         try:
