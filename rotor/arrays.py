@@ -21,7 +21,8 @@ def distinct(values: NDArray[Any]) -> NDArray[Any]:
     ([1, 3], [])
     """
     rising = np.sort(values, axis=None)
-    return rising[np.concatenate([rising[:1] == rising[:1], rising[1:] != rising[:-1]])]
+    first = np.concatenate([np.ones(min(len(rising), 1), dtype=bool), rising[1:] != rising[:-1]])
+    return np.asarray(rising[first])
 
 
 def same(one: Any, other: Any) -> bool:

@@ -301,7 +301,7 @@ def _refuse_imaginary(
             )
 
 
-def connected_parts(count: int, edges: dict[tuple[int, int], Floats]) -> list[list[int]]:
+def connected_parts(count: int, edges: Iterable[tuple[int, int]]) -> list[list[int]]:
     """The connected parts of the graph, each in rising order."""
     group = list(range(count))
     for i, k in edges:

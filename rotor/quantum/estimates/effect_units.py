@@ -196,7 +196,7 @@ class _SpinUnits:
     def _matrix(self, operator: ParameterOperator, parts: tuple[SpinPart, ...], block: SpinBlock) -> Floats | None:
         out: Floats | None = None
         for a, up in enumerate(parts):
-            for low in parts[: a + 1]:
+            for low in (part for part in parts[: a + 1] if operator.connects(up, part)):
                 for channel, element in operator.elements(up, low).items():
                     key = (channel, block.twice_f)
                     if key not in self._coefficients:

@@ -156,7 +156,7 @@ def state_units(
     for j, rows in sorted(of_j.items(), reverse=True):
         mix, links = terms.mix(j, len(names)), joining.elements(vertices[j], j)
         asked = {(int(v), "eo"[ka % 2] + "eo"[kc % 2]) for _, v, ka, kc in labels[rows].tolist()}
-        for members in connected_parts(len(vertices[j]), dict.fromkeys((i, k) for i, k, _ in links)):
+        for members in connected_parts(len(vertices[j]), [(i, k) for i, k, _ in links]):
             own = {(vertices[j][i][0], vertices[j][i][1].species) for i in members}
             if own & asked:
                 parts = parts_of([vertices[j][i] for i in members])
@@ -185,17 +185,21 @@ def _elements(blocks: set[WangBlock], powers: Sequence[tuple[int, int]]) -> dict
     diagonals = unit_diagonals(every, [block.size for block in every], powers[1:])
     size = max(block.size for block in every)
     ones = np.arange(size)[None, :] < np.array([block.size for block in every])[:, None]
-    found = [(*np.nonzero(ones), 0, 0, np.ones(int(ones.sum())))]
+    of_block, functions = np.nonzero(ones)
+    found = [(of_block, functions, np.zeros_like(functions), np.zeros_like(functions))]
+    given = [np.ones(len(functions))]
     for d, values in enumerate(diagonals):
-        b, i, unit = np.nonzero(values)
-        found.append((b, i, d, unit + 1, values[b, i, unit]))
-    b, i, d, unit, value = (np.concatenate([np.broadcast_to(one[k], one[0].shape) for one in found]) for k in range(5))
+        places = np.nonzero(values)
+        found.append((places[0], places[1], np.full_like(places[0], d), places[2] + 1))
+        given.append(values[places])
+    b, i, d_of, unit = (np.concatenate(column) for column in zip(*found, strict=True))
+    value = np.concatenate(given)
     order = np.argsort(b, kind="stable")
     bounds = np.searchsorted(b[order], np.arange(len(every) + 1))
     out = {}
     for number, block in enumerate(every):
         chosen = order[bounds[number] : bounds[number + 1]]
-        out[block] = _Elements(i[chosen] + d[chosen], i[chosen], unit[chosen], value[chosen])
+        out[block] = _Elements(i[chosen] + d_of[chosen], i[chosen], unit[chosen], value[chosen])
     return out
 
 

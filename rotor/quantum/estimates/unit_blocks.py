@@ -7,14 +7,14 @@ Blocks of one size stand side by side, padded, so that new constants cost some p
     ∂E_n/∂c_i = ⟨n|O_i|n⟩ = Σ_u M_ui Σ_(r,c) U_u(r, c) v_r v_c
 
 more products for the states that have a label. A state is named by the sub-block (a Wang block of one state v, and one pattern of
-coupling) that has most of it, and within a sub-block by the order of energy. As long as those shares point to the same sub-blocks as
-at the start, state n stays state n; where they do not, the names are made anew, once for each way in which they point.
+coupling) that has most of it, and within a sub-block by the order of energy. As long as these are what they were at the start, state n
+stays state n; where they are not, the names are made anew.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -59,7 +59,9 @@ def elements_of(matrix: Floats) -> Elements:
     >>> elements_of(np.array([[1.0, 9.0], [0.0, 2.0]])).places.tolist()
     [0, 3]
     """
-    places = np.flatnonzero(np.tril(matrix))
+    places = np.flatnonzero(matrix)
+    rows, columns = np.divmod(places, matrix.shape[1])
+    places = places[rows >= columns]
     return Elements(places, matrix.ravel()[places])
 
 
@@ -78,7 +80,7 @@ def unit_block(units: dict[int, Elements], sub_blocks: Ints, namer: Namer) -> Un
 
 def members_of(sub_blocks: Ints) -> Floats:
     """1 where a function (columns) is in a sub-block (rows), from the number of the sub-block of every function."""
-    return (sub_blocks[None, :] == np.arange(sub_blocks.max(initial=0) + 1)[:, None]).astype(float)
+    return np.asarray(sub_blocks[None, :] == np.arange(sub_blocks.max(initial=0) + 1)[:, None], dtype=float)
 
 
 @dataclass(frozen=True)
@@ -218,17 +220,13 @@ def tracked_blocks(
 
 @dataclass(frozen=True)
 class _Labelled:
-    """A stack with the labels in it: rows (blocks, labels), the place behind all where padded; states (blocks, labels).
-
-    renamed : states of the labels where the shares of a block point to other sub-blocks than at the start, by block and those
-    """
+    """A stack with the labels in it: rows (blocks, labels), the place behind all where padded; states (blocks, labels)."""
 
     stack: _Stack
     tracked: tuple[Tracked, ...]
     rows: Ints
     states: Ints
     leading: Ints
-    renamed: dict[tuple[int, bytes], Ints] = field(default_factory=dict)
 
     @classmethod
     def of(cls, tracked: Sequence[Tracked]) -> _Labelled:
@@ -239,6 +237,10 @@ class _Labelled:
         leading = np.stack([one.leading for one in tracked])
         return cls(_Stack.of([one.block for one in tracked]), tuple(tracked), rows, states, leading)
 
+    @cached_property
+    def _at_start(self) -> Ints:
+        return self._ranks(self.leading)
+
     def levels(self, values_mhz: Floats) -> tuple[Floats, Floats]:
         """Energies (blocks, labels) and derivatives (blocks, labels, parameters of the blocks)."""
         solved = self.stack.solved(values_mhz)
@@ -248,17 +250,26 @@ class _Labelled:
     def _states(self, solved: _Solved) -> Ints:
         """The states that have the labels now; names are made anew only where a state is mostly in another sub-block."""
         leading = self.stack.leading(solved.vectors)
-        moved = (leading != self.leading).any(axis=1)
+        moved = ((self._ranks(leading) != self._at_start) & (self.rows >= 0)).any(axis=1)
         if not moved.any():
             return self.states
         states = self.states.copy()
         for b in np.flatnonzero(moved).tolist():
-            one, key = self.tracked[b], (b, leading[b].tobytes())
-            if key not in self.renamed:
-                made = one.block.namer(solved.matrices[b], solved.energies[b], solved.vectors[b])
-                self.renamed[key] = _states_of(made, one.names)
-            states[b, : len(one.rows)] = self.renamed[key]
+            one = self.tracked[b]
+            made = one.block.namer(solved.matrices[b], solved.energies[b], solved.vectors[b])
+            states[b, : len(one.rows)] = _states_of(made, one.names)
         return states
+
+    def _ranks(self, leading: Ints) -> Ints:
+        """The sub-blocks of the labelled states and their places by energy in these, as one number each (blocks, labels).
+
+        What becomes of states above, such as doublets that nothing splits, has no bearing.
+        """
+        if self.stack.members.shape[1] == 1:
+            return np.zeros_like(self.states)
+        own = np.take_along_axis(leading, self.states, axis=1)
+        below = np.arange(self.stack.size) < self.states[:, :, None]
+        return np.asarray(own * self.stack.size + ((leading[:, None, :] == own[:, :, None]) & below).sum(axis=2))
 
 
 def _states_of(made: Ints, names: Ints) -> Ints:

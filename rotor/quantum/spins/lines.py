@@ -206,6 +206,10 @@ class ParameterOperator:
         ]
         self._couplings = [one for effect in effects for one in effect.couplings(top) if one.name == name]
 
+    def connects(self, up: SpinPart, low: SpinPart) -> bool:
+        """Whether there may be elements between two parts: an operator of the rotation alone has them within one solved block."""
+        return bool(self._channels) or up.number == low.number
+
     def expectations(self, block: SpinBlock) -> Floats:
         """⟨i|∂H/∂c|i⟩ of every state of a block, (n,)."""
         total = np.zeros(len(block.energies_mhz))
