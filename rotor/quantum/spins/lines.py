@@ -251,6 +251,17 @@ class ParameterOperator:
         terms = [term for effect in effects for term in effect.spin_terms(top) if term.name == name]
         self._channels = channels_of([(term.factor, term) for term in terms], shared.scheme)
         self._known: dict[tuple[int, int], dict[Channel, Floats]] = {}
+        self._own = [
+            (state, operators)
+            for effect in effects
+            for state, terms in ({0: effect.operators(top)} | {one.v: one.terms for one in effect.states(top)}).items()
+            if (operators := terms.get(name))
+        ]
+        self._couplings = [one for effect in effects for one in effect.couplings(top) if one.name == name]
+
+    def connects(self, up: SpinPart, low: SpinPart) -> bool:
+        """Whether there may be elements between two parts: an operator of the rotation alone has them within one solved block."""
+        return bool(self._channels) or up.number == low.number
 
     def expectations(self, block: SpinBlock) -> Floats:
         """⟨i|∂H/∂c|i⟩ of every state of a block, (n,)."""
@@ -270,7 +281,9 @@ class ParameterOperator:
         """Elements between the states of the rotation of two parts, by channel."""
         key = (up.number, low.number)
         if key not in self._known:
-            found = operators_between(up.rotor, low.rotor, self._channels, self._shared.representation)
+            found: dict[Channel, Floats] = {}
+            if self._channels:
+                found = operators_between(up.rotor, low.rotor, self._channels, self._shared.representation)
             if up.number == low.number and (own := self._rotation(up.rotor)) is not None:
                 found[ALONE] = found[ALONE] + own if ALONE in found else own
             self._known[key] = found
@@ -280,28 +293,27 @@ class ParameterOperator:
         """The derivative of the Hamiltonian of the rotation over the states of a block."""
         size = sum(part.basis.size for part in block.parts)
         total = np.zeros((size, size))
-        for effect in self._effects:
-            own = {0: effect.operators(self._top)} | {state.v: state.terms for state in effect.states(self._top)}
+        for v, operators in self._own:
             for part in block.parts:
-                if operators := own.get(part.v, {}).get(self._name):
+                if part.v == v:
                     matrix = Scalar(tuple(operators.items())).elements(
                         part.basis, part.basis, self._shared.representation
                     )
                     assert matrix is not None
                     total[part.place, part.place] += matrix
-            for bra, ket, operator in self._operators_of_j(effect, block.n):
-                _add_between(total, block, bra, ket, operator)
+        for bra, ket, operator in self._operators_of_j(block.n):
+            _add_between(total, block, bra, ket, operator)
         return block.vectors.T @ total @ block.vectors if total.any() else None
 
-    def _operators_of_j(self, effect: QuantumEffect, n: int) -> Iterator[tuple[int, int, JOperator]]:
+    def _operators_of_j(self, n: int) -> Iterator[tuple[int, int, JOperator]]:
         representation = self._shared.representation
-        if self._name in effect.parameters(self._top):
-            operator = effect.j_operator(self._top, self._name, n, representation)
-            if operator is not None:
-                yield 0, 0, operator
-        for coupling in effect.couplings(self._top):
-            if coupling.name == self._name:
-                yield coupling.bra, coupling.ket, coupling.operator(n, representation)
+        for effect in self._effects:
+            if self._name in effect.parameters(self._top):
+                operator = effect.j_operator(self._top, self._name, n, representation)
+                if operator is not None:
+                    yield 0, 0, operator
+        for coupling in self._couplings:
+            yield coupling.bra, coupling.ket, coupling.operator(n, representation)
 
 
 ALONE = Channel((), 0)
