@@ -288,9 +288,11 @@ def _chosen(request: FitRequest, candidates: Sequence[str], by_order: bool) -> t
 
 
 def _trials(fit: Fit, options: FitOptions, text: str | None) -> list[Trial]:
+    if text is None:
+        return []
     from rotor.fit.choose import try_constants
 
-    return try_constants(fit, _names(text), options) if text is not None else []
+    return try_constants(fit, _names(text), options)
 
 
 def _suggestions(request: FitRequest, fit: Fit, name: str | None) -> list[Suggestion]:

@@ -13,14 +13,16 @@ and third nuclei. What is odd under all half turns across the axis may mix A1 wi
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.spins.blocks import Exist, Plan, SpinBlock, SpinPart, assigned, coefficients_of
+from rotor.quantum.spins.blocks import Exist, Plan, SpinBlock, coefficients_of
+from rotor.quantum.spins.contraction import stacks_of
+from rotor.quantum.spins.parts import SpinPart, assigned
 from rotor.quantum.spins.rotor import Channel, RotorBlock, RotorPart
 from rotor.quantum.spins.three_spins import EVEN_E, ODD_E, STEP, Allowed
 from rotor.quantum.wang.basis import WangBlock
@@ -71,7 +73,7 @@ def in_wang_functions(plan: Plan) -> Plan:
         found = turned.setdefault((number, number), {})
         found[_ALONE] = own + found[_ALONE] if _ALONE in found else own
         blocks.append(RotorBlock(block.n, block.parts, np.diag(own).copy(), np.eye(len(own))))
-    return plan._replace(blocks=blocks, operators=turned)
+    return replace(plan, shared=replace(plan.shared, stacks=stacks_of(blocks)), blocks=blocks, operators=turned)
 
 
 def solve_three(plan: Plan, twice_f: int, exist: Exist | None = None) -> list[SpinBlock]:
