@@ -10,7 +10,7 @@ from itertools import groupby
 from pathlib import Path
 
 from rotor.formats.spcat.codes import AXES, split_code
-from rotor.formats.spcat.file_model import moment_of, split_dipole
+from rotor.formats.spcat.dipole_codes import moment_of, split_dipole
 from rotor.formats.spcat.l_doubled import pairs_of
 from rotor.formats.spcat.operators import operator_of
 from rotor.formats.spcat.states import states_of

@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rotor.formats.spcat.file_model import groups_of, left_out, moment_of, split_dipole
+from rotor.formats.spcat.dipole_codes import moment_of, split_dipole
+from rotor.formats.spcat.file_model import groups_of, left_out
 from rotor.formats.spcat.operators import operator_of
 from rotor.formats.spcat.predict import predict
 from rotor.formats.spcat.text.cat import format_lines, read_cat

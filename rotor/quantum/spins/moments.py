@@ -21,7 +21,7 @@ from rotor.quantum.levels import Levels
 from rotor.quantum.moments import Moment
 from rotor.quantum.spins.blocks import SpinBlock, product
 from rotor.quantum.spins.coupling import moment_coefficients, patterns
-from rotor.quantum.spins.operators import AxialState, tensor_elements
+from rotor.quantum.spins.operators import AxialState, CosinesWithN, tensor_elements
 from rotor.quantum.spins.parts import SpinPart
 from rotor.quantum.spins.rotor import RotorBlock, RotorPart
 from rotor.quantum.spins.scheme import Scheme
@@ -106,6 +106,8 @@ class SpinMoments:
         if moment.electric:
             found = tensor_elements(up, low, self._tensor(moment.along_abc, 1))
             return None if found is None else found * _factor(moment.powers, left, right)
+        if moment.tensor is not None and not moment.spin:
+            return CosinesWithN(moment.tensor).elements(up, low, self.representation)
         if moment.tensor is not None:
             return tensor_elements(up, low, self._tensor(moment.tensor, 2))
         if up != low:
