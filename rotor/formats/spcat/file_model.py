@@ -20,7 +20,14 @@ from rotor.formats.spcat.l_doubled import Pair, named_by_l, pairs_of
 from rotor.formats.spcat.l_spins import named_by_l_with_spins
 from rotor.formats.spcat.labels import BY_DIAG, named_by
 from rotor.formats.spcat.states import StateOptions, states_of
-from rotor.formats.spcat.symmetry import forbidden, halved_across, l_values, some_weights_agree, symmetric_part
+from rotor.formats.spcat.symmetry import (
+    exchange_of,
+    forbidden,
+    halved_across,
+    l_values,
+    some_weights_agree,
+    symmetric_part,
+)
 from rotor.formats.spcat.text.int_file import Dipole, IntensityFile
 from rotor.formats.spcat.text.par import Options, ParameterFile
 from rotor.quantum.levels import Levels
@@ -266,6 +273,14 @@ def _group(
     usable = tuple(
         line for line in own if max((*line.operator.spins, 1 if line.operator.ns else 0), default=0) <= len(spins)
     )
+    if states[0].equivalent == 2 and not doubled:
+        of = {state.number: state for state in states}
+        usable = tuple(
+            line._replace(
+                exchange=exchange_of(line.typ, *((of[v] for v in line.states) if line.states else states[:1] * 2))
+            )
+            for line in usable
+        )
     if states[0].equivalent == 3:
         usable = tuple(_of_three(line, len(spins), AXES["IIIl" if oblate else "Ir"]) for line in usable)
     pairs = tuple(Pair(here[pair.first], here[pair.second]) for pair in doubled if pair.first in here)

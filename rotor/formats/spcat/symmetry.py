@@ -77,28 +77,38 @@ def forbidden(
         return "" if named else "of three equivalent spins the first is named, or the first and the second"
     if low.fold > 2 and (delta_k(typ, oblate) - del_l) % low.fold:
         return f"its Δk - Δl is no multiple of {low.fold}"
-    if not (low.i_tot or doubled) and not some_weights_agree(typ, low, high):
+    on_total = low.equivalent == 2 and max(spins, default=0) > len(low.spins) - 2
+    if not (on_total or doubled) and not some_weights_agree(typ, low, high):
         return "it connects levels of unequal nuclear-spin weights"
     return ""
 
 
-def some_weights_agree(typ: int, low: StateOptions, high: StateOptions) -> bool:
-    """Whether an operator by its TYP (20, 40, 60: of the species of Na, Nb, Nc) joins levels of one weight."""
+def exchange_of(typ: int, low: StateOptions, high: StateOptions) -> int:
+    """The part of an operator with one of two equivalent spins that joins levels of one weight: 1 the even one, -1 the odd one, 0 both."""
+    even, odd = (some_weights_agree(typ, low, high, turned) for turned in (0, 1))
+    return int(even) - int(odd)
+
+
+def some_weights_agree(typ: int, low: StateOptions, high: StateOptions, odd_spins: int = 0) -> bool:
+    """Whether an operator by its TYP (20, 40, 60: of the species of Na, Nb, Nc) joins levels of one weight.
+
+    odd_spins: 1 where it changes the sign of the function of equivalent spins too.
+    """
     turn = {1: (0, 1), 2: (1, 1), 3: (1, 0)}.get(typ // 20, (0, 0))  # species of the operator
     for species in _SPECIES:
         other = (species[0] ^ turn[0], species[1] ^ turn[1])
-        ours, theirs = (_weights(state, *own) for state, own in ((low, species), (high, other)))
+        ours, theirs = _weights(low, *species), _weights(high, *other, odd_spins)
         agree = bool(set(ours) & set(theirs) - {0}) if low.fold > 2 else ours[0] == theirs[0]
         if agree:
             return True
     return False
 
 
-def _weights(state: StateOptions, ka: int, kc: int) -> list[int]:
+def _weights(state: StateOptions, ka: int, kc: int, odd_spins: int = 0) -> list[int]:
     """Of A (or B) and of E levels in the Wang block of a species, whichever axis K is along."""
     one, other = np.array([ka]), np.array([kc])
     if state.fold < 3:
-        return [int(state.class_weight(one, other)[0])]
+        return [int(state.class_weight(one, other, odd_spins)[0])]
     along = {int(k): state.block_weights(one, other, np.array([k]))[0] for k in (ka, kc)}
     return sorted({int(weight) for found in along.values() for weight in found})
 
