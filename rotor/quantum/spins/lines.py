@@ -42,11 +42,14 @@ def amplitudes(up: SpinBlock, low: SpinBlock, tensors: Tensors) -> Floats:
     rank = rank_of(tensors)
     t, acting = _coefficients(up, low, rank), _acting(up, low, tensors, rank)
     rows, columns = up.vectors.shape[0], low.vectors.shape[0]
-    if up.single and low.single and rows * columns <= _FEW:
-        whole = np.zeros((rows, columns))
+    if rows * columns <= _FEW:
+        whole, single = np.zeros((rows, columns)), up.single and low.single
         for target, source, element in acting:
-            factor = t[target.patterns.start, source.patterns.start]
-            np.multiply(element, factor, out=whole[target.place, source.place])
+            if single:
+                factor = t[target.patterns.start, source.patterns.start]
+                np.multiply(element, factor, out=whole[target.place, source.place])
+            else:
+                whole[target.place, source.place] = product(t[target.patterns, source.patterns], element)
         return np.asarray(up.vectors.T @ (whole @ low.vectors))
     moved = np.zeros((rows, low.vectors.shape[1]))
     for target, source, element in acting:

@@ -37,9 +37,7 @@ def named_states(rotor: RotorBlock, vectors: Floats) -> Ints:
     shares = np.stack([(vectors[part.place] ** 2).sum(axis=0) for part in rotor.parts])
     of_state = assigned(shares, np.array([len(part.names) for part in rotor.parts]))
     labels = np.empty((len(of_state), 3), dtype=np.int64)
-    labels[np.argsort(of_state, kind="stable")] = np.concatenate(
-        [np.column_stack([np.full(len(part.names), part.v), part.names]) for part in rotor.parts]
-    )
+    labels[np.argsort(of_state, kind="stable")] = np.concatenate(rotor.names)
     return labels
 
 
@@ -67,17 +65,14 @@ def _over_functions(part: SpinPart, vectors: Floats) -> Floats:
 
 def names_of_parts(parts: tuple[SpinPart, ...], every: Ints) -> tuple[Ints, Ints]:
     """v, Ka, Kc and the pattern of the levels that the sub-blocks name, (functions, 3 + pattern), and how many each names."""
-    found, sizes = [], []
+    found, sizes, rows = list[Ints](), list[int](), list[Ints]()
     for part in parts:
-        own_patterns = every[part.patterns]
-        for own in part.rotor.parts:
-            names = np.empty((len(own_patterns), len(own.names), 3 + every.shape[1]), dtype=np.int64)
-            names[..., 0] = own.v
-            names[..., 1:3] = own.names
-            names[..., 3:] = own_patterns[:, None, :]
-            found.append(names.reshape(-1, names.shape[-1]))
-            sizes += [len(own.names)] * len(own_patterns)
-    return np.concatenate(found), np.array(sizes)
+        numbers = np.arange(part.patterns.start, part.patterns.stop)
+        for own, names in zip(part.rotor.parts, part.rotor.names, strict=True):
+            found += [names] * len(numbers)
+            rows.append(numbers.repeat(len(names)))
+            sizes += [len(own.names)] * len(numbers)
+    return np.concatenate([np.concatenate(found), every[np.concatenate(rows)]], axis=1), np.array(sizes)
 
 
 def assigned(shares: Floats, capacity: Ints) -> Ints:
