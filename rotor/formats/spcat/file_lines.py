@@ -26,7 +26,6 @@ from rotor.quantum.levels import Levels
 from rotor.spectra.intensity import LGINT_NM2_MHZ, IntensityCut
 from rotor.spectra.transitions import Transitions, all_transitions
 
-
 Quanta = NDArray[np.int16]
 
 
