@@ -5,6 +5,7 @@ Names are given one to one, the largest share first; among the levels of one sub
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -25,6 +26,11 @@ class SpinPart(NamedTuple):
     rotor: RotorBlock
     patterns: slice
     place: slice
+
+    @property
+    def sub_blocks(self) -> int:
+        """Number of sub-blocks, Wang blocks times patterns."""
+        return len(self.rotor.parts) * self.repeats
 
     @property
     def repeats(self) -> int:
@@ -63,16 +69,19 @@ def _over_functions(part: SpinPart, vectors: Floats) -> Floats:
     return np.concatenate([each[:, own.place].reshape(-1, rows.shape[1]) for own in part.rotor.parts])
 
 
-def names_of_parts(parts: tuple[SpinPart, ...], every: Ints) -> tuple[Ints, Ints]:
+def names_of_parts(parts: Sequence[SpinPart], every: Ints) -> tuple[Ints, Ints]:
     """v, Ka, Kc and the pattern of the levels that the sub-blocks name, (functions, 3 + pattern), and how many each names."""
-    found, sizes, rows = list[Ints](), list[int](), list[Ints]()
+    found, sizes, rows = list[Ints](), list[int](), list[int]()
     for part in parts:
-        numbers = np.arange(part.patterns.start, part.patterns.stop)
-        for own, names in zip(part.rotor.parts, part.rotor.names, strict=True):
-            found += [names] * len(numbers)
-            rows.append(numbers.repeat(len(names)))
-            sizes += [len(own.names)] * len(numbers)
-    return np.concatenate([np.concatenate(found), every[np.concatenate(rows)]], axis=1), np.array(sizes)
+        for names in part.rotor.names:
+            for row in range(part.patterns.start, part.patterns.stop):
+                found.append(names)
+                rows.append(row)
+                sizes.append(len(names))
+    out = np.empty((sum(sizes), 3 + every.shape[1]), dtype=np.int64)
+    np.concatenate(found, out=out[:, :3])
+    out[:, 3:] = every[rows].repeat(sizes, axis=0)
+    return out, np.array(sizes)
 
 
 def assigned(shares: Floats, capacity: Ints) -> Ints:
