@@ -22,7 +22,7 @@ from rotor.fit.parameters import parameters as parameters_of
 from rotor.fit.search import FitOptions as FitOptions
 from rotor.fit.search import Search, round_off, too_few, with_rejection
 from rotor.quantum.labelled import LevelModel, level_model
-from rotor.statistics.least_squares import EXHAUSTED, Minimum, Progress
+from rotor.statistics.least_squares import BENT, EXHAUSTED, Minimum, Progress
 from rotor.statistics.regression import Regression, regression
 from rotor.tops.constants import Constants
 from rotor.tops.covariance import Covariance
@@ -325,6 +325,13 @@ def _verdict(fit: Fit, disorder: str, options: FitOptions) -> tuple[bool, str]:
     return True, reason
 
 
+def _bent(fit: Fit) -> list[str]:
+    """The parameters that the linear model would move most, in units of the lengths of their columns."""
+    statistics = fit.statistics
+    moved = np.abs((fit.residuals @ statistics.left) @ statistics.inverse) * statistics.scale
+    return [fit.parameters.names[i] for i in np.flatnonzero(moved > moved.max(initial=0.0) / 2)]
+
+
 def _notes(fit: Fit) -> list[str]:
     lines, notes = fit.lines, list[str]()
     for i, why in fit.left_out.items():
@@ -343,6 +350,11 @@ def _notes(fit: Fit) -> list[str]:
     for i in reversed_.tolist():
         notes.append(
             f"line {i + 1}, {lines.text(i)}: calculated with the opposite sign; are upper and lower exchanged?"
+        )
+    if fit.minimum.converged and fit.minimum.distance > BENT * max(1.0, fit.minimum.rms):
+        notes.append(
+            f"χ² is not quadratic within the standard errors, which are those of the linear model: {', '.join(_bent(fit))} may be "
+            "known better or worse than they say; hold one of these, or add lines"
         )
     if np.isfinite(fit.statistics.condition) and fit.statistics.condition > 1e5:
         notes.append(f"condition number {fit.statistics.condition:.1e}: some constants are nearly interchangeable")
