@@ -15,6 +15,7 @@ import math
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -98,18 +99,20 @@ def _of_csv(path: str | os.PathLike[str], names: Sequence[str]) -> Assignments:
     _refuse_columns(path, columns, labels, known)
     unit = next(name for name in _FREQUENCY if name in columns)
     error = next((name for name in _ERROR if name in columns), None)
+    _refuse_rows(path, rows)
     numbers = [[_whole(path, i, name, row) for name in labels] for i, row in enumerate(rows, 1)]
     quanta = np.array(numbers, dtype=np.int64).reshape(len(rows), len(labels))
-    bad = np.flatnonzero(quanta[:, len(names)] < 0)
-    if len(bad):
-        lower = " ".join(map(str, quanta[bad[0], len(names) :].tolist()))
-        raise ValueError(f"{path}, line {bad[0] + 1} of the list: there is no level {lower}; {names[0]} is 0 or more")
+    for i, row in enumerate(quanta.tolist(), 1):
+        for side in (row[: len(names)], row[len(names) :]):
+            if side[0] < 0:
+                label = " ".join(map(str, side))
+                raise ValueError(f"{path}, line {i} of the table: there is no level {label}; {names[0]} is 0 or more")
     frequency = np.array([_real(path, i, unit, row) for i, row in enumerate(rows, 1)]) * _FREQUENCY[unit]
-    errors = [_real(path, i, error, row, 0.0) if error else 0.0 for i, row in enumerate(rows, 1)]
+    errors = [_size(path, i, error, row, 0.0) if error else 0.0 for i, row in enumerate(rows, 1)]
     return assignments(
         names, quanta[:, : len(names)], quanta[:, len(names) :], frequency,
         np.array(errors) * (_ERROR[error] if error else 1.0),
-        weight=np.array([_real(path, i, "weight", row, 1.0) for i, row in enumerate(rows, 1)]),
+        weight=np.array([_size(path, i, "weight", row, 1.0) for i, row in enumerate(rows, 1)]),
         blend=_blends([(row.get("blend") or "").strip() for row in rows]),
         wavenumber=unit == "wavenumber_cm",
         source=Path(path).name,
@@ -129,6 +132,13 @@ def _table_of(path: str | os.PathLike[str]) -> tuple[list[str], list[dict[str, s
     return columns, list(reader)
 
 
+def _refuse_rows(path: object, rows: Sequence[Mapping[str | None, Any]]) -> None:
+    """ValueError for a row with more values than columns."""
+    for i, row in enumerate(rows, 1):
+        if None in row:
+            raise ValueError(f"{path}, line {i} of the table: {len(row[None])} values more than there are columns")
+
+
 def _refuse_columns(
     path: str | os.PathLike[str], columns: Sequence[str], labels: Sequence[str], known: set[str]
 ) -> None:
@@ -139,6 +149,12 @@ def _refuse_columns(
         raise ValueError(
             f"{path}: {what}; columns are {', '.join(labels)}, a frequency, an error, weight, blend, comment"
         )
+    twice = next((name for name in columns if columns.count(name) > 1), None)
+    if twice is not None:
+        raise ValueError(f"{path}: the column {twice} stands twice; give it once")
+    errors = [name for name in _ERROR if name in columns]
+    if len(errors) > 1:
+        raise ValueError(f"{path}: columns {' and '.join(errors)}; give one error of a line")
     if len([name for name in _FREQUENCY if name in columns]) != 1:
         raise ValueError(f"{path}: one column of {', '.join(_FREQUENCY)} is needed")
 
@@ -154,6 +170,14 @@ def _real(path: object, line: int, name: str, row: Mapping[str, str], default: f
     if not math.isfinite(number):
         raise ValueError(f"{path}, line {line} of the table: {name} reads {text!r}; a finite number is needed")
     return number
+
+
+def _size(path: object, line: int, name: str, row: Mapping[str, str], default: float) -> float:
+    """A number of 0 or more."""
+    value = _real(path, line, name, row, default)
+    if value < 0:
+        raise ValueError(f"{path}, line {line} of the table: {name} = {value:g}; a number of 0 or more is needed")
+    return value
 
 
 def _whole(path: object, line: int, name: str, row: Mapping[str, str]) -> int:

@@ -161,7 +161,9 @@ def minimise(
                 damping = _relaxed(damping, gain, first)
                 continue
             damping = max(10.0 * damping, first)
-            if damping > MOST_DAMPING or (damping > first and predicted < _NOTHING * state.rms**2 * len(state.residuals)):
+            if damping > MOST_DAMPING or (
+                damping > first and predicted < _NOTHING * state.rms**2 * len(state.residuals)
+            ):
                 if linear.weakest >= _FINER * first:
                     return state.ended(_without_decrease(linear, state, taken), linear, taken)
                 damping = first = linear.weakest
