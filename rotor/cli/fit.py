@@ -302,10 +302,10 @@ def _chosen(request: FitRequest, candidates: Sequence[str], by_order: bool) -> t
     if request.spfit is not None:
         raise ValueError("--choose: start from a line list and constants, whose free ones are the base of the model")
     assert request.constants is not None  # a list of lines has constants to start from
-    free = [name for name in candidates if name in request.parameters.names]
-    if free:
+    idle = [name for name in candidates if name in request.parameters.names]
+    if idle:
         raise ValueError(
-            f"--choose: {', '.join(free)} is free already, part of the base of the model; choose from others"
+            f"--choose: {', '.join(idle)} is free already, part of the base of the model; choose from others"
         )
     with inputs.named("--choose"):
         with_names(request.constants, candidates)

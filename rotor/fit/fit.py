@@ -246,7 +246,10 @@ def _with_levels(
         lost = np.isin(upper, error.places) | np.isin(lower, error.places)
         if not options.leave_out_missing or lost.all():
             raise ValueError(f"{_named(lines, int(np.argmax(lost)))}: {error}") from None
-        notes = [f"{_named(lines, i)}, is left out: it has a level that does not exist" for i in np.flatnonzero(lost)]
+        notes = [
+            f"{_named(lines, i)}, is left out: it has a level that does not exist"
+            for i in np.flatnonzero(lost).tolist()
+        ]
     rest, made, more = _with_levels(lines.take(~lost), model, options)
     return rest, made, notes + more
 

@@ -132,7 +132,7 @@ def _table_of(path: str | os.PathLike[str]) -> tuple[list[str], list[dict[str, s
     return columns, list(reader)
 
 
-def _refuse_rows(path: object, rows: Sequence[Mapping[str | None, Any]]) -> None:
+def _refuse_rows(path: object, rows: Sequence[Mapping[Any, Any]]) -> None:
     """ValueError for a row with more values than columns."""
     for i, row in enumerate(rows, 1):
         if None in row:

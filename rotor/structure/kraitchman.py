@@ -147,7 +147,9 @@ def kraitchman(
     errors = np.array([parent_errors, substituted_errors], dtype=float)
     used = _used_moments(both, shape, pair)
     if not np.isfinite(both[used]).all():
-        needed = ", ".join(axis for axis, counts in zip("ABC", used.any(axis=0), strict=True) if counts)
+        needed = ", ".join(
+            axis for axis, counts in zip("ABC", np.atleast_1d(used.any(axis=0)).tolist(), strict=True) if counts
+        )
         raise ValueError(
             f"the equations of shape {shape!r} need {needed} of both isotopologues; one of them is missing"
         )
