@@ -171,6 +171,17 @@ def test_exact_moser_veselov_is_the_free_motion(moments, momentum):
     assert distance(end.attitude[-1], q) < 1e-9
 
 
+@pytest.mark.parametrize("small", [1e-9, 1e-11, 1e-12, 1e-13, 0.0])
+def test_turns_all_but_about_one_axis_have_exact_moments(small: float):
+    """The two unknowns of the map are then hardly separate, condition numbers 1/small."""
+    for moments, momentum in (([1.0, 1.0, 0.5], [0.0, small, 1.0]), ([1.0, 0.8, 0.5], [1.0, small, 0.0])):
+        end = integrate(MoserVeselov(0.1, 0), moments, momentum, [0.0, 10.0]).momentum[-1]
+        exact = free_motion(np.array(moments), np.array(momentum)).at(np.array([0.0, 10.0]))[0][-1]
+        assert (
+            np.abs(end - exact).max() < 2.5e-13
+        )  # a hundred roundings; of singular values below 1e-13 the motion, twice `small`
+
+
 def test_series_of_modified_moments_approaches_the_exact_ones():
     exact = exact_modified_moments(MOMENTS[None], MOMENTUM[None], 0.2)
     series = [modified_moments(MOMENTS[None], MOMENTUM[None], 0.2, order) for order in (2, 4, 6, 8)]

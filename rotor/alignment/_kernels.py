@@ -5,6 +5,14 @@ from numba import njit
 from numpy.typing import NDArray
 
 
+@njit(cache=True, error_model="numpy")
+def _copy(source: NDArray[np.complex128], target: NDArray[np.complex128]) -> None:
+    """Plain loops: an assignment of slices compiles the texts of its errors with it, for four seconds."""
+    for i in range(source.shape[0]):
+        for c in range(source.shape[1]):
+            target[i, c] = source[i, c]
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
 def kick_and_drift(
     states: NDArray[np.complex128],
@@ -39,7 +47,7 @@ def kick_and_drift(
                 moved[i, 0] = real + 1j * imag
         else:
             np.dot(drift, states, moved)
-        states[:, :] = moved
+        _copy(moved, states)
         if marks[stage]:
-            snapshots[taken] = states
+            _copy(states, snapshots[taken])
             taken += 1

@@ -54,5 +54,5 @@ def upright(directions: Floats) -> Floats:
     """Rotations (n, 4) that take unit vectors (n, 3) to the third axis."""
     out = np.empty((directions.shape[0], 4))
     for i in range(directions.shape[0]):
-        out[i] = to_third(vector_at(directions, i))
+        out[i, 0], out[i, 1], out[i, 2], out[i, 3] = to_third(vector_at(directions, i))
     return out

@@ -36,7 +36,7 @@ def _nearest(hi: float, lo: float) -> Any:
     return -1.0 if odd else 1.0, rest - more
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True)
 def _circulating(r: float, c: Any) -> Any:
     """L in its frame and (α, β) for z = πr, by the series in q and q²."""
     z = math.pi * r
@@ -59,7 +59,7 @@ def _circulating(r: float, c: Any) -> Any:
     return m1, m2, m3, w, x, y, k
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True)
 def _near_separatrix(v: float, c: Any) -> Any:
     """L in its frame and (α, β) for v = πu/2K', by the transformed series, everything scaled by e^-|v|."""
     side = -1.0 if v < 0.0 else 1.0
@@ -109,7 +109,8 @@ def evaluate(rows: Rows, times: Floats, momentum: Floats, attitude: Floats) -> N
             _, turn = _nearest(hi, lo)
             half_turn = 2.0 * math.pi * turn
             if kind == STEADY:
-                momentum[b, i] = rows.momentum0[b]
+                for k in range(3):
+                    momentum[b, i, k] = rows.momentum0[b, k]
                 _placed(rows.left[b], rows.right[b], 1.0, 0.0, 0.0, 0.0, half_turn, attitude[b, i])
                 continue
             hi, lo = _phase(t, rate[0], rate[1], rate[2], rate[3])

@@ -27,7 +27,7 @@ def seen_from_body(attitude: Floats, vector: Floats) -> Floats:
     """One vector (3,) of space in the axes of each body, (n, 3) for attitudes (n, 4)."""
     out, v = np.empty((attitude.shape[0], 3)), (vector[0], vector[1], vector[2])
     for i in range(attitude.shape[0]):
-        out[i] = turned(conjugate(quaternion_at(attitude, i)), v)
+        out[i, 0], out[i, 1], out[i, 2] = turned(conjugate(quaternion_at(attitude, i)), v)
     return out
 
 
@@ -36,7 +36,7 @@ def lever(attitude: Floats, arm: Floats, force: Floats) -> Floats:
     """arm x force in body axes (n, 3), for an arm (3,) of the body and a force (3,) of space."""
     out, a, f = np.empty((attitude.shape[0], 3)), (arm[0], arm[1], arm[2]), (force[0], force[1], force[2])
     for i in range(attitude.shape[0]):
-        out[i] = cross(a, turned(conjugate(quaternion_at(attitude, i)), f))
+        out[i, 0], out[i, 1], out[i, 2] = cross(a, turned(conjugate(quaternion_at(attitude, i)), f))
     return out
 
 
@@ -87,9 +87,9 @@ def placed(attitude: Floats, change: Floats, space: Floats, here: Floats, moment
     """here = attitude exp(u), and L in body axes, from change (n, 6) = (change of L in space, u)."""
     for i in range(attitude.shape[0]):
         q = ahead(quaternion_at(attitude, i), (change[i, 3], change[i, 4], change[i, 5]))
-        here[i] = q
+        here[i, 0], here[i, 1], here[i, 2], here[i, 3] = q
         now = (space[i, 0] + change[i, 0], space[i, 1] + change[i, 1], space[i, 2] + change[i, 2])
-        momentum[i] = turned(conjugate(q), now)
+        momentum[i, 0], momentum[i, 1], momentum[i, 2] = turned(conjugate(q), now)
 
 
 @njit(cache=True, nogil=True)

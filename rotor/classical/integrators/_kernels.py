@@ -16,7 +16,7 @@ from numba import njit
 
 from rotor.arrays import Floats
 from rotor.classical._kernels import symmetric_steps
-from rotor.geometry._kernels import conjugate, half_third_row, matrix, product, to_third
+from rotor.geometry._kernels import conjugate, half_third_row, matrix, product, quaternion_at, to_third
 
 ONE = (1.0,)  # fractions of a step of order 2
 LANES = 128
@@ -88,7 +88,9 @@ def advance_blocks(blocks: Any, step: float, steps: int, rates: Floats, axes: Fl
             row[4 * LANES + i], row[5 * LANES + i] = size[i] * rates[body, 0], size[i] * rates[body, 1]
             half = 0.5 * size[i] * rates[body, 2] * step * steps
             about_l = (math.cos(half), 0.0, 0.0, math.sin(half))
-            left[i] = product(product(attitude[body], conjugate(tilt)), about_l)
+            left[i, 0], left[i, 1], left[i, 2], left[i, 3] = product(
+                product(quaternion_at(attitude, body), conjugate(tilt)), about_l
+            )
         symmetric_steps(block_turns, row, ONE, step, steps)
         for i in range(count):
             body = begin + i
@@ -99,4 +101,6 @@ def advance_blocks(blocks: Any, step: float, steps: int, rates: Floats, axes: Fl
                 size[i] * l2,
                 size[i] * l3,
             )
-            new_attitude[body] = product(left[i], q)
+            new_attitude[body, 0], new_attitude[body, 1], new_attitude[body, 2], new_attitude[body, 3] = product(
+                quaternion_at(left, i), q
+            )

@@ -72,7 +72,7 @@ def _turn_attitude(row: Any, lost: Any, cosine: float, x: float, y: float, z: fl
     _add(row, lost, 6, change[3])
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True)
 def _turn(row: Any, lost: Any, k: int, a: int, b: int, angle: float) -> None:
     """The body turns by `angle` about its axis k of (k, a, b) = a cyclic order of (0, 1, 2)."""
     s, c = math.sin(0.5 * angle), math.cos(0.5 * angle)
@@ -81,7 +81,7 @@ def _turn(row: Any, lost: Any, k: int, a: int, b: int, angle: float) -> None:
     _turn_attitude(row, lost, c, x, y, z)
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True)
 def _turn_about(row: Any, lost: Any, x: float, y: float, z: float) -> None:
     """The body turns by the rotation vector (x, y, z), L staying where it is in the body."""
     half = 0.5 * math.sqrt(x * x + y * y + z * z)

@@ -159,8 +159,14 @@ def _on_grid(scaled: Floats) -> Floats:
 
 
 def _least_squares(matrix: Floats, expected: Floats) -> Floats:
-    """Solutions (n, 2) of small systems; the pseudo-inverse serves a sphere, where S and D are not separate."""
-    return np.asarray(np.einsum("nij,nj->ni", np.linalg.pinv(matrix, rcond=1e-13), expected))
+    """Solutions (n, 2) of small systems, S and D not being separate in a sphere or a turn about one axis.
+
+    By projection on the left singular vectors: the pseudo-inverse, multiplied out, would lose the digits of the condition number.
+    """
+    left, sizes, right = np.linalg.svd(matrix, full_matrices=False)
+    along = np.einsum("nij,ni->nj", left, expected)
+    found = sizes > 1e-13 * sizes[:, :1]
+    return np.asarray(np.einsum("nj,nji->ni", np.where(found, along, 0.0) / np.where(found, sizes, 1.0), right))
 
 
 def _check_turn(momentum: Floats, moments: Floats, step: float) -> None:

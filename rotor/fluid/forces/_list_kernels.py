@@ -28,13 +28,23 @@ def _sorted_into_bins(centres: Floats, low: Floats, width: Floats, bins: Integer
             places[m, c] = min(max(int((centres[m, c] - low[c]) / width[c]), 0), bins[c] - 1)
         cells[m] = (places[m, 0] * bins[1] + places[m, 1]) * bins[2] + places[m, 2]
         starts[cells[m] + 1] += 1
-    starts = np.cumsum(starts)
+    for cell in range(1, len(starts)):
+        starts[cell] += starts[cell - 1]
     fill, order, rank = starts.copy(), np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64)
     for m in range(n):
         order[fill[cells[m]]] = m
         rank[m] = fill[cells[m]]
         fill[cells[m]] += 1
     return places, starts, order, rank
+
+
+@njit(cache=True)
+def _longer(array: Any, more: int) -> Any:
+    """The same numbers with space for more behind them."""
+    out = np.empty(len(array) + more, dtype=array.dtype)
+    for i in range(len(array)):
+        out[i] = array[i]
+    return out
 
 
 @njit(cache=True)
@@ -83,7 +93,7 @@ def _along_column(
         start, stop = starts[column + first - image_z * bins[2]], starts[column + last - image_z * bins[2] + 1]
         start = rank + 1 if own and image_z == 0 else start
         if found + stop - start > len(mine):
-            mine = np.concatenate((mine, np.empty(len(mine) + stop - start, dtype=np.int64)))
+            mine = _longer(mine, len(mine) + stop - start)
         x, y, z = here[0] - image_x * box[0], here[1] - image_y * box[1], here[2] - image_z * box[2]
         code = ((image_x + IMAGES) * 5 + image_y + IMAGES) * 5 + image_z + IMAGES
         found = _keep_near(there, order, start, stop, x, y, z, range2, code, found, mine)
@@ -120,19 +130,25 @@ def neighbour_list(
     box is 0 along directions that do not repeat; low, width, bins (3) divide the cell or the space that holds the molecules.
     """
     n, range2 = len(centres), farthest**2
+    nothing: Any = np.int64(
+        0
+    )  # a literal 0 has a type of its own, for which the functions called are compiled once more
     places, first, order, rank = _sorted_into_bins(centres, low, width, bins)
-    there = centres[order]
-    steps = np.array([int(np.ceil(farthest / width[c])) for c in range(2)])
+    there = np.empty((n, 3))
+    for p in range(n):
+        for c in range(3):
+            there[p, c] = centres[order[p], c]
+    steps_x, steps_y = int(np.ceil(farthest / width[0])), int(np.ceil(farthest / width[1]))
     starts = np.zeros(n * species + 1, dtype=np.int64)
-    entries, mine, used = np.empty(n * 64 + 1024, dtype=np.uint64), np.empty(1024, dtype=np.int64), 0
+    entries, mine, used = np.empty(n * 64 + 1024, dtype=np.uint64), np.empty(1024, dtype=np.int64), nothing
     for m in range(n):
-        found, here = 0, centres[m]
-        for raw_x in range(places[m, 0], places[m, 0] + steps[0] + 1):
+        found, here = nothing, centres[m]
+        for raw_x in range(places[m, 0], places[m, 0] + steps_x + 1):
             gap_x = _gap2(here[0], low[0] + raw_x * width[0], width[0])
             if abs(_image(raw_x, bins[0], box[0])) > IMAGES or gap_x > range2:
                 continue
             ahead = raw_x > places[m, 0]
-            for raw_y in range(places[m, 1] - steps[1] if ahead else places[m, 1], places[m, 1] + steps[1] + 1):
+            for raw_y in range(places[m, 1] - steps_y if ahead else places[m, 1], places[m, 1] + steps_y + 1):
                 left = range2 - gap_x - _gap2(here[1], low[1] + raw_y * width[1], width[1])
                 if abs(_image(raw_y, bins[1], box[1])) > IMAGES or left < 0.0:
                     continue
@@ -141,7 +157,7 @@ def neighbour_list(
                     box, low, width, bins, range2, found, mine,
                 )  # fmt: skip
         if used + found > len(entries):
-            entries = np.concatenate((entries, np.empty(len(entries) + found, dtype=np.uint64)))
+            entries = _longer(entries, len(entries) + found)
         used = _by_kind(mine, found, kinds, species, entries, used, starts[m * species + 1 : (m + 1) * species + 1])
     return starts, entries[:used]
 

@@ -357,8 +357,13 @@ def pair_forces(
     dispersion and of charges, Σ F ⊗ d (6) with d between centres of the lists.
     """
     species = len(counts)
-    rows, arms = np.empty(int(np.max(counts)) * RUNS * LANES), np.empty(3 * LANES)
-    base, begins = np.empty(LANES, dtype=np.uint64), (3 * first_site).astype(np.uint64)
+    most = 0
+    for count in counts:
+        most = max(most, count)
+    rows, arms = np.empty(most * RUNS * LANES), np.empty(3 * LANES)
+    base, begins = np.empty(LANES, dtype=np.uint64), np.empty(len(first_site), dtype=np.uint64)
+    for m in range(len(first_site)):
+        begins[m] = np.uint64(3 * first_site[m])
     for m in range(first, last):
         for other in range(species):
             pair = kinds[m] * species + other
