@@ -23,7 +23,7 @@ from rotor.formats.assigned_lines import QUANTA
 from rotor.formats.spcat.codes import HELD_BELOW, constants_and_matrix
 from rotor.formats.spcat.model import parameter_file
 from rotor.formats.spcat.states import is_plain
-from rotor.formats.spcat.text.lin import LineList, note_of_defaults, read_lin, with_defaults
+from rotor.formats.spcat.text.lin import LineList, note_of_defaults, note_of_remarks, read_lin, with_defaults
 from rotor.formats.spcat.text.par import Header, Parameter, ParameterFile, read_par
 from rotor.formats.spcat.variances import FREE_ABOVE
 from rotor.quantum.labelled import LevelModel
@@ -211,6 +211,7 @@ def _assigned(lines: LineList, names: Sequence[str], header: Header, source: str
     lines = with_defaults(lines, names)
     notes = [note_of_defaults(lines)] if lines.defaulted else []
     blends = lines.blends()
+    notes += note_of_remarks(lines, blends)
     used = np.arange(len(lines)) < abs(header.nline)
     if len(lines) and not used.any():
         raise ValueError(f"NLINE = {header.nline}: no line counts; give as many as the .lin file has, {len(lines)}")

@@ -21,6 +21,7 @@ from rotor.units import MHZ_PER_CM
 
 QUANTA_FIELDS = 12  # at least
 MOST_QUANTA = 10  # of a state
+_REMARK_FROM = 2  # numbers: words in place of the weight are a remark
 NO_ERROR_MHZ = 0.01  # of a line that states none, as in SPFIT
 _ROTATION = ("j", "n", "k", "ka", "kc", "v")
 
@@ -160,7 +161,9 @@ def read_lin(source: str | os.PathLike[str] | bytes, per_state: int = 0) -> Line
         row[: len(known)] = known
     columns = np.array([line[1:] for line in measured], dtype=np.float64).reshape(-1, 3)
     rest = "".join(line.text for line in lines[end if texts else 0 :])
-    without_error = frozenset(i for i, line in enumerate(listed) if len(read_words(_plain(line), 3 * width, 3)[0]) < 2)
+    without_error = frozenset(
+        i for i, line in enumerate(listed) if len(read_words(_plain(line), 3 * width, 3, _REMARK_FROM)[0]) < 2
+    )
     return LineList(
         quanta,
         columns[:, 0],
@@ -191,6 +194,25 @@ def with_defaults(lines: LineList, names: Sequence[str]) -> LineList:
     return replace(lines, quanta=quanta, per_state=0, defaulted=lines.defaulted | set(changed))
 
 
+def note_of_remarks(lines: LineList, blends: NDArray[np.int64]) -> list[str]:
+    """What a user must know of blended lines that have words where the weight may stand; in other lines it has no bearing."""
+    counts = np.bincount(blends[blends >= 0], minlength=1)
+    shared = np.flatnonzero((blends >= 0) & (counts[blends] > 1)).tolist()
+    width = lines.fields
+    found = []
+    for i in shared:
+        body = lines.texts.get(i, "").rstrip("\r\n").rpartition("\n")[2]
+        words, at = read_words(Line(body, i, ""), 3 * width, 3, _REMARK_FROM)
+        if len(words) == _REMARK_FROM and at < len(body) and body[at] != "/":
+            found.append(i)
+    if not found:
+        return []
+    return [
+        f"{len(found)} blended lines have words where their weight may stand, the first is line {found[0] + 1}: their weight is 1, "
+        "where SPFIT takes the next digits; write the weight, or / before the words"
+    ]
+
+
 def note_of_defaults(lines: LineList) -> str:
     """What a user must know of lines that lack something."""
     return (
@@ -207,7 +229,7 @@ def read_measured(line: Line, width: int = QUANTA_FIELDS) -> Measured:
     """The numbers of one line of the file with so many fields of quantum numbers."""
     plain = _plain(line)
     fields = _fields(plain, width)
-    words, _ = read_words(plain, 3 * width, 3)
+    words, _ = read_words(plain, 3 * width, 3, _REMARK_FROM)
     frequency = number(line, words, 0, f"the frequency (from column {3 * width + 1} on)")
     error = number(line, words, 1, "the error of the frequency", NO_ERROR_MHZ)
     quanta = fields[: _leading(fields)]
