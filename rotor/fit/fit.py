@@ -342,7 +342,8 @@ def _changed(search: Search, values: Floats, labels: Ints) -> tuple[str, ...]:
 
 def _verdict(fit: Fit, disorder: str, options: FitOptions) -> tuple[bool, str]:
     """Whether the fit is a result, and the sentence that says so or says why not."""
-    rms, minimum = fit.weighted_rms, fit.minimum
+    minimum = fit.minimum
+    rms = fit.weighted_rms if options.loss == "squares" else minimum.rms  # of what was made least
     if disorder:
         return False, f"the constants that were reached are no set of constants: {disorder}"
     near = minimum.status == EXHAUSTED and minimum.distance <= NEARLY_THERE
