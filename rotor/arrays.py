@@ -14,6 +14,17 @@ Ints = NDArray[np.int64]
 Indices = NDArray[np.int32]
 
 
+def distinct(values: NDArray[Any]) -> NDArray[Any]:
+    """The values of an array, each once, rising. `np.unique` does the same, but loads numpy.ma for it, 30 ms.
+
+    >>> distinct(np.array([3, 1, 3])).tolist(), distinct(np.array([])).tolist()
+    ([1, 3], [])
+    """
+    rising = np.sort(values, axis=None)
+    first = np.concatenate([np.ones(min(len(rising), 1), dtype=bool), rising[1:] != rising[:-1]])
+    return np.asarray(rising[first])
+
+
 def same(one: Any, other: Any) -> bool:
     """Whether two values are equal: arrays by shape and elements, dataclasses field by field, mappings and sequences likewise.
 

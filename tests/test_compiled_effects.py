@@ -12,6 +12,7 @@ from rotor.classical.effects.drive import PeriodicDrive
 from rotor.classical.effects.gravity import GravityAboutPivot
 from rotor.classical.effects.gyrostat import SpinningRotor
 from rotor.classical.effects.ideal_fluid import FluidImpulse
+from rotor.classical.effects.rolling import RollingEllipsoid
 from rotor.classical.effects.torques import ConstantTorque, TimedTorque
 from rotor.classical.integrators import lie_runge_kutta, splitting
 from rotor.classical.integrators._torque_kernels import torque_at
@@ -38,6 +39,10 @@ EVERY = OF_PLACE | {
     "linear drag": LinearDrag([[0.1, 0.3, 0.0], [-0.2, 0.2, 0.0], [0.0, 0.1, 0.3]]),
     "quadratic drag": QuadraticDrag([0.1, 0.2, 0.3]),
 }
+
+ROLLING = RollingEllipsoid(
+    1.1, [0.9, 0.6, 0.4], [0.0, 0.3, -5.0], [0.0, 0.02, 0.1], [0.9950041652780258, 0.0, 0.0, 0.09983341664682815]
+)
 
 
 class Doubled(ConstantTorque):
@@ -91,6 +96,33 @@ def test_the_lie_group_method_is_that_of_the_plain_form(options, monkeypatch):
         assert np.allclose(
             one, other, rtol=0, atol=1e-12
         )  # steps chosen from sums in another order: 1e-16/step², times 100
+
+
+def test_a_body_that_rolls_is_that_of_the_plain_form(monkeypatch):
+    """Inertia and torque of the contact, with other torques and an inner momentum; about 1e3 smaller numbers than their parts."""
+    effects = [ROLLING, EVERY["linear drag"], EVERY["drive"], SpinningRotor([0.2, 0.0, 0.5])]
+    compiled, plain = both(LieRungeKutta(1e-9), effects, monkeypatch, uniform(2, rng=np.random.default_rng(5)))
+    assert compiled.steps == plain.steps > 10
+    for one, other in ((compiled.momentum, plain.momentum), (compiled.attitude, plain.attitude)):
+        assert np.allclose(
+            one, other, rtol=0, atol=1e-12
+        )  # steps chosen from sums in another order: 1e-16/step², times 100
+
+
+def test_rolling_without_other_effects_conserves_energy_when_compiled(monkeypatch):
+    monkeypatch.setattr(lie_runge_kutta, "PLAIN_STEPS", 0)
+    motion = integrate(LieRungeKutta(1e-12), MOMENTS, MOMENTUM, np.linspace(0, 4, 5), effects=[ROLLING])
+    assert np.ptp(motion.energy) < 1e-10 * abs(motion.energy[0])  # some hundred steps of 1e-12
+
+
+def test_a_change_of_the_inertia_alone_is_not_compiled():
+    class Heavier(RollingEllipsoid):
+        def inertia(self, time, attitude):
+            return 2.0 * super().inertia(time, attitude)
+
+    like = (1.1, [0.9, 0.6, 0.4], [0.0, 0.3, -5.0])
+    assert system_of(MOMENTS, [RollingEllipsoid(*like)]).compiled is not None
+    assert system_of(MOMENTS, [Heavier(*like)]).compiled is None
 
 
 def test_a_linear_rotor_in_a_field_is_compiled_too(monkeypatch):

@@ -92,28 +92,6 @@ def test_largest_first_and_unknown_spin_before_all(source):
     assert ("electron spin" in dict(found)) == (source == "NO") == (found[0][1] is None)
 
 
-def test_a_free_methyl_group_bounds_internal_rotation():
-    """F of methanol from moments written out: I_m about the axis through C, and the whole with it."""
-    molecule = rotor.read("CH3OH").molecule
-    x, mass = molecule.positions_angstrom, molecule.masses_u
-    hydrogens = [i for i, s in enumerate(molecule.symbols) if s == "H" and np.linalg.norm(x[i] - x[0]) < 1.3]
-    assert molecule.symbols[0] == "C"
-    axis = x[0] - x[hydrogens].mean(axis=0)
-    axis /= np.linalg.norm(axis)
-    turned = np.cross(axis, x - x[0])  # velocity of each atom as the group turns
-    group = np.zeros(len(x))
-    group[hydrogens] = 1.0
-    centre = mass @ x / mass.sum()
-    tensor = sum(m * (r @ r * np.eye(3) - np.outer(r, r)) for m, r in zip(mass, x - centre, strict=True))
-    own = float(mass * group @ np.sum(np.cross(axis, x - x[hydrogens].mean(axis=0)) ** 2, axis=1))
-    coupling = np.sum((mass * group)[:, None] * np.cross(x - centre, turned), axis=0)  # L of the group at unit speed
-    free = 505379.008 / (own - coupling @ np.linalg.solve(tensor, coupling))
-    (size,) = [limits("CH3OH")["internal rotation"]]
-    assert size == pytest.approx(free, rel=1e-3)  # the group of the geometry is not exactly C3v
-    text = {one.name: one for one in model_limits(rotor.read("CH3OH"), 3, SEMI_RIGID)}["internal rotation"].sentence
-    assert text.startswith("internal rotation: at most about 800000 MHz; a methyl group turns")
-
-
 def test_the_size_of_distortion_is_that_of_a_harmonic_diatomic_molecule():
     """Lines ν = 2B(J+1) - 4D(J+1)³ with D = 4B³/ω²."""
     b = 57_600.0

@@ -10,7 +10,9 @@ import pytest
 
 import rotor
 from rotor import units
-from rotor.alignment.request import answer_align
+from rotor.alignment.basis import least_jmax
+from rotor.alignment.pulse import GaussianPulse
+from rotor.alignment.request import AlignRequest, answer_align
 from rotor.classical.driven import answer_driven
 from rotor.classical.gas.ensembles import thermal_ensemble
 from rotor.fluid.request import answer_fluid
@@ -57,6 +59,7 @@ from rotor.scenes.sections import (
     TumbleNumerics,
 )
 from rotor.thermo.classical_gas import answer_gas
+from rotor.tops.top import Top
 
 
 @pytest.mark.parametrize("asked", ["1 MHz", "1 kHz"])
@@ -84,12 +87,40 @@ def test_the_loosest_tolerance_of_cosines_is_taken():
     pulse, when = [GaussianSection(peak=1e12, fwhm=1.0)], AlignConditions(temperature=1.0, points=1001)
     scene = AlignScene(molecule="OCS", pulses=pulse, conditions=when, accuracy=1e-5)
     result = run_scene(scene)
-    request = replace(result.request, tolerance=1e-8)
+    request = replace(result.request, tolerance=1e-8, jmax=None)
     true = answer_align(request).trace.cosines["cos2theta"]
     looser = answer_align(replace(request, tolerance=10 * result.request.tolerance)).trace.cosines["cos2theta"]
     assert result.request.tolerance > 1e-5
     assert np.abs(result.table.columns["cos2theta"] - true).max() <= result.reached.error <= 1e-5
     assert np.abs(looser - true).max() > 1e-5
+
+
+def test_the_smallest_j_max_of_cosines_is_taken():
+    """With one J less the truncation alone, of a run without the search, is more than what was asked for."""
+    pulse, when = [GaussianSection(peak=1e12, fwhm=1.0)], AlignConditions(temperature=0, points=201)
+    result = run_scene(AlignScene(molecule="OCS", pulses=pulse, conditions=when, accuracy=1e-5))
+    request, trace = result.request, result.answer.trace
+    free = answer_align(replace(request, jmax=None)).trace
+    assert request.jmax == trace.jmax < free.jmax
+    less = answer_align(replace(request, jmax=request.jmax - 1, tolerance=0.05)).trace
+    fine = answer_align(replace(request, jmax=None, tolerance=1e-8)).trace
+    assert np.abs(trace.cosines["cos2theta"] - fine.cosines["cos2theta"]).max() <= result.reached.error <= 1e-5
+    moved = np.abs(less.cosines["cos2theta"] - fine.cosines["cos2theta"]).max()
+    assert max(less.edge_population, moved) > 1e-5
+
+
+@pytest.mark.parametrize("allowed", [2e-5, 1e-8])
+def test_the_truncation_that_is_estimated_covers_the_true_one(allowed):
+    """A gas at 1 K of an asymmetric top, all blocks: its cosines with the J max of one block."""
+    pulse = (GaussianPulse(3e11, 1.0),)
+    rod = Top.from_constants("A=30 B=6 C=5 GHz", polarizability_abc_angstrom3=((8, 0, 0), (0, 4, 0), (0, 0, 4)))
+    request = AlignRequest(rod, pulse, temperature_k=1.0, until_ps=30.0, points=51, tolerance=1e-4)
+    trace = answer_align(request).trace
+    jmax, estimate = least_jmax(trace, allowed)
+    assert estimate <= allowed
+    less = answer_align(replace(request, jmax=jmax)).trace.cosines["cos2theta"]
+    apart = np.abs(less - trace.cosines["cos2theta"]).max()
+    assert apart <= allowed + 2 * trace.step_error  # both have steps of their own
 
 
 def test_a_partition_function():

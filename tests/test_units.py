@@ -19,6 +19,7 @@ def test_the_edition_is_codata_2022():
     """u of 2022 is 1.66053906892e-27 kg; 2018 had ...660."""
     assert units.CODATA_EDITION == "2022"
     assert codata("atomic mass constant") == units.ATOMIC_MASS_KG == 1.66053906892e-27
+    assert codata("electron mass") == units.ELECTRON_MASS_KG
 
 
 def test_constants():

@@ -116,7 +116,12 @@ class AlignmentTrace(Table):
         Halving a step of order 4 or more shows 15/16 of its error or more. What is left out counts as isotropic, while it moves
         no further than the gas that is followed: the higher J are, the less a pulse turns them.
         """
-        return self.step_error * 16 / 15 + self.edge_population + self.ensemble.left_out * self.moved
+        return truncation_apart(self) + self.edge_population
+
+
+def truncation_apart(trace: AlignmentTrace) -> float:
+    """The error of the cosines by steps and by populations left out, without that of the truncated basis."""
+    return trace.step_error * 16 / 15 + trace.ensemble.left_out * trace.moved
 
 
 def align(
@@ -195,7 +200,7 @@ def align(
     while True:
         pilot = pilot_of(problem, jmax)
         if pilot.edge <= 0.3 * tolerance:
-            trace = _carried(problem, pilot, executor, progress)
+            trace = carried(problem, pilot, executor, progress)
             if trace.edge_population <= tolerance:
                 return trace
             pilot = replace(pilot, edge=trace.edge_population)
@@ -241,10 +246,30 @@ def _ensemble(
     return thermal(top, temperature_k, tolerance) if temperature_k else ground_level(top)
 
 
-def _carried(
-    problem: Problem, pilot: Pilot, executor: Executor | None, progress: Callable[[int, int], None] | None
+def carried(
+    problem: Problem,
+    pilot: Pilot,
+    executor: Executor | None = None,
+    progress: Callable[[int, int], None] | None = None,
 ) -> AlignmentTrace:
-    """All blocks, and the trace that they make together."""
+    """All blocks, and the trace that they make together.
+
+    Parameters
+    ----------
+    problem : Problem
+        What is asked for.
+    pilot : Pilot
+        Of it: the steps and the basis.
+    executor : Executor, optional
+        Blocks are spread over it.
+    progress : callable, optional
+        Called with the number of blocks done and of all.
+
+    Returns
+    -------
+    AlignmentTrace
+        Whatever population is at the edge of the basis.
+    """
     space, before = pilot.space, problem.begins_before
     if pilot.whole and pilot.task is not None and pilot.outcome is not None:
         return _trace(problem, space, [pilot.task], [pilot.outcome], pilot, before)

@@ -64,11 +64,11 @@ def _plan_of(problem: Problem, grids: Sequence[propagate.Grid | None], rule: str
 def pilot_of(problem: Problem, jmax: int) -> Pilot:
     """Steps that are fine enough for the tolerance, found on the block M = 0 that holds most of the gas."""
     space = problem.space(jmax)
-    task, whole = _pilot_task(problem, space)
+    task, whole = pilot_task(problem, space)
     if task is None or all(window.is_kick for window in problem.windows):
         plan = _plan_of(problem, _grids(problem, [1] * len(problem.windows)), "nystrom 4")
         outcome = None if task is None else run(replace(task, plan=plan))
-        edge = _relative_edge(outcome, task) if outcome and task else 0.0
+        edge = relative_edge(outcome, task) if outcome and task else 0.0
         return Pilot(plan, (0,) * len(problem.windows), 0.0, edge, space, task, outcome, whole)
     if len(task.rows) > LARGEST_SPLIT or all(len(window.channels) > 1 for window in problem.windows):
         return replace(_refined(problem, space, task, None), whole=whole)
@@ -110,10 +110,10 @@ def _refined(
         check = run(replace(task, plan=finer))
         error = _difference(problem, space, task, outcome, check)
         if finer_order and error <= ASYMPTOTIC and (left := error / 2 ** (finer_order - 1)) <= goal < error:
-            edge = _relative_edge(check, task)
+            edge = relative_edge(check, task)
             return Pilot(finer, _steps_of(finer), left, edge, space, task, check)
         if error <= goal:
-            edge, mine = _relative_edge(check, task), Pilot(plan, _steps_of(plan), error, 0.0, space, task, outcome)
+            edge, mine = relative_edge(check, task), Pilot(plan, _steps_of(plan), error, 0.0, space, task, outcome)
             if before > error > 0:
                 steps = 0.5 * 2 ** (math.log(before / goal) / math.log(before / error)) * sum(_steps_of(plan))
                 fewer = _plan_of(problem, _grids(problem, [math.ceil(steps / windows)] * windows), rule)
@@ -141,7 +141,7 @@ def _cost(plan: Plan) -> int:
     return sum(0 if isinstance(one, float) else one.stages for one in plan.passages)
 
 
-def _pilot_task(problem: Problem, space: FieldSpace) -> tuple[Task | None, bool]:
+def pilot_task(problem: Problem, space: FieldSpace) -> tuple[Task | None, bool]:
     """The populated block of lowest M with the largest population, with a few of its columns; and whether that is all there is."""
     m = problem.m_values(space)[0]
     plan = Plan(problem.windows, ())  # to be replaced
@@ -157,7 +157,7 @@ def _pilot_task(problem: Problem, space: FieldSpace) -> tuple[Task | None, bool]
     return task, whole
 
 
-def _relative_edge(outcome: Outcome, task: Task) -> float:
+def relative_edge(outcome: Outcome, task: Task) -> float:
     return float(outcome.edge.max(initial=0.0) / task.weights.sum())
 
 

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from rotor.arrays import Floats
 from rotor.classical.effect import AddedInertia, ClassicalEffect, InertiaChange, InnerMomentum, Torque
 from rotor.classical.euler import checked_moments, gyroscopic_rate, inverse_moments, kinetic_energy
-from rotor.classical.torque_form import SystemForm, system_form
+from rotor.classical.torque_form import SystemForm, rolling_forms, system_form
 from rotor.geometry.rotations import IDENTITY
 
 
@@ -48,8 +48,15 @@ class System:
 
     @cached_property
     def compiled(self) -> SystemForm | None:
-        """All effects for compiled integrators; None where one of them has to be called at every step."""
-        return None if self.added or self.inertia else system_form(self.torques, self.inner)
+        """All effects but those that add inertia, for compiled integrators; None where one effect has to be called at every step."""
+        if self.inertia or (self.added and self.rolling is None):
+            return None
+        return system_form([one for one in self.torques if not isinstance(one, AddedInertia)], self.inner)
+
+    @cached_property
+    def rolling(self) -> Floats | None:
+        """Parameters of bodies that roll, for compiled integrators; None where nothing does, or another effect adds inertia."""
+        return rolling_forms(self.added) if self.added else None
 
     def inverse(self, time: float) -> Floats:
         """1/I_i (n, 3) at `time`, 0 for the axis of a linear rotor."""

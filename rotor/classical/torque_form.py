@@ -8,6 +8,7 @@
 | `INDUCED` | (M e) x e, e = Rᵀ f | M by rows, f of space |
 | `LINEAR` | -C ω | C by rows |
 | `QUADRATIC` | -c \\|ω\\| ω | c |
+| `ROLLING` | that of `effects/rolling.py`, with its inertia | m, m g, μ of space, c, S² by rows |
 
 R takes body axes to space. An effect says its form in `compiled_form`; its `torque` is the plain form of the same, and one
 without a compiled form is called at every step. The kernels are `integrators/_torque_kernels.py`.
@@ -24,8 +25,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from rotor.arrays import Floats
 
-BODY_FIXED, SPACE_FIXED, LEVER, INDUCED, LINEAR, QUADRATIC = range(6)
-WIDTH = 12  # parameters of the longest form
+BODY_FIXED, SPACE_FIXED, LEVER, INDUCED, LINEAR, QUADRATIC, ROLLING = range(7)
+WIDTH = 12  # parameters of the longest form but that of rolling, which has arrays of its own
 
 
 class TorqueForm(NamedTuple):
@@ -66,6 +67,15 @@ def own_form(effect: Any, plain: str) -> Any:
         if plain in vars(kind):
             return effect.compiled_form() if "compiled_form" in vars(kind) else None
     return None
+
+
+def rolling_forms(added: Iterable[Any]) -> Floats | None:
+    """Parameters (k, 17) of bodies that roll, from effects that add inertia; None where one of them adds another one."""
+    effects = list(added)
+    forms = [(own_form(one, "inertia"), own_form(one, "torque")) for one in effects]
+    if any(form is None or form.code != ROLLING for pair in forms for form in pair):
+        return None
+    return np.array([form.parameters for form, _ in forms])
 
 
 def system_form(torques: Iterable[Any], inner: Iterable[Any]) -> SystemForm | None:

@@ -317,10 +317,10 @@ def _chosen(request: FitRequest, candidates: Sequence[str], by_order: bool) -> t
 
 
 def _trials(fit: Fit, options: FitOptions, text: str | None) -> list[Trial]:
-    from rotor.fit.choose import try_constants
-
     if text is None:
         return []
+    from rotor.fit.choose import try_constants
+
     with inputs.named("--try"):
         return try_constants(fit, _names("--try", text), options)
 

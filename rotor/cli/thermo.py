@@ -182,14 +182,17 @@ def _facts(functions: ThermoFunctions, content: dict[str, Any]) -> list[tuple[st
         ("spin weights", weights),
         ("species", _species_text(functions, content)),
         ("Θ_rot", _theta_text(content["rotational_temperatures_k"])),
-        (
-            "classical Q",
-            f"good to {content['classical_tolerance']:.0%} of C_v above {content['classical_above_k']:.4g} K (rigid top, equilibrium)",
-        ),
+        ("classical Q", _onset_text(content["classical_tolerance"], content["classical_above_k"])),
         ("corrected", f"classical Q times exp of the logarithm of 1 {series}, to that order"),
         ("sums", f"{_summed_to(content['jmax'])}, Q, U and C_v to {content['relative_error']:.0e} of themselves"),
         ("vibration", content["vibrations"] or "left out: no states given"),
     ]
+
+
+def _onset_text(tolerance: float, above_k: float | None) -> str:
+    if above_k is None:
+        return f"where it is good to {tolerance:.0%} of C_v is not known: no sum over levels reaches so far"
+    return f"good to {tolerance:.0%} of C_v above {above_k:.4g} K (rigid top, equilibrium)"
 
 
 def _summed_to(jmax: int) -> str:

@@ -207,8 +207,7 @@ def duplicates(lines: Assignments) -> list[tuple[int, int]]:
     """Pairs of lines with the same labels, by position; a line measured twice is no mistake, but must be known."""
     seen: dict[tuple[int, ...], int] = {}
     out = []
-    for i in range(len(lines)):
-        key = _key(lines, i)
+    for i, key in enumerate(map(tuple, np.concatenate([lines.upper, lines.lower], axis=1).tolist())):
         if key in seen:
             out.append((seen[key], i))
         seen.setdefault(key, i)

@@ -216,7 +216,7 @@ def weighted_derivatives(fit: Fit, names: Sequence[str], options: FitOptions | N
 def _labels(lines: Assignments) -> tuple[Ints, Ints, Ints]:
     """The levels that occur, and for each line the places of its upper and lower one among them, -1 for the zero of energy."""
     there = np.concatenate([np.ones(len(lines), dtype=bool), ~lines.from_zero])
-    labels, found = np.unique(np.concatenate([lines.upper, lines.lower])[there], axis=0, return_inverse=True)
+    labels, found = _distinct_rows(np.concatenate([lines.upper, lines.lower])[there])
     places = np.full(2 * len(lines), -1, dtype=np.int64)
     places[there] = found.reshape(-1)
     return labels, places[: len(lines)], places[len(lines) :]
@@ -257,6 +257,16 @@ def _with_levels(
 def _named(lines: Assignments, i: int) -> str:
     """A line by its place and labels."""
     return f"{lines.source or 'the lines'}: line {i + 1}, {lines.text(i)} at {lines.frequency_mhz[i]:.4f} MHz"
+
+
+def _distinct_rows(rows: Ints) -> tuple[Ints, Ints]:
+    """The rows of an array, each once, in order, and the place of each among them; rows of small numbers by one number each."""
+    spans = rows.max(axis=0, initial=0) - rows.min(axis=0, initial=0) + 1
+    if not len(rows) or np.prod(spans.astype(float)) > 2.0**62:
+        return np.unique(rows, axis=0, return_inverse=True)
+    keys = np.ravel_multi_index(tuple((rows - rows.min(axis=0, initial=0)).T), tuple(spans.tolist()))
+    _, first, found = np.unique(keys, return_index=True, return_inverse=True)
+    return rows[first], found
 
 
 def _errors_of(lines: Assignments, options: FitOptions) -> tuple[dict[int, str], Floats]:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from rotor.fit.assignment import Assignments
 from rotor.fit.fit import Fit
 from rotor.fit.publication import value_text
 
@@ -125,29 +126,41 @@ def _start(fit: Fit) -> list[str]:
 
 
 def _lines(fit: Fit) -> list[str]:
-    lines, width = fit.lines, max((len(fit.lines.text(i)) for i in range(len(fit.lines))), default=0)
+    lines = fit.lines
+    texts = _texts(lines)
+    width = max(map(len, texts), default=0)
     head = f"{'':>6} {'upper - lower':<{width}} {'observed':>16} {'calculated':>16} {'obs-calc':>12} {'error':>10}"
     out = [f"{head} {'est.error':>10} {'/error':>8}  MHz, lines in cm-1 marked c"]
     blended = np.bincount(lines.blend[fit.used], minlength=int(lines.blend.max(initial=0)) + 1) > 1
+    in_blend = (blended[lines.blend] & fit.used).tolist()
     leverages = dict(zip(fit.groups.tolist(), fit.statistics.leverages.tolist(), strict=False))
-    for i in range(len(lines)):
-        mark = "c" if lines.wavenumber[i] else " "
-        unit = 29979.2458 if lines.wavenumber[i] else 1.0
-        error = lines.error_mhz[i]
-        difference = fit.difference_mhz[i]
-        ratio = f"{difference / error:8.2f}" if error > 0 else f"{'-':>8}"
+    unit = np.where(lines.wavenumber, 29979.2458, 1.0)
+    difference, error = fit.difference_mhz, lines.error_mhz
+    numbers = (lines.frequency_mhz, fit.calculated_mhz, difference, error, fit.calculated_errors_mhz)
+    columns = [(column / unit).tolist() for column in numbers]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratios = np.where(error > 0, difference / error, np.nan).tolist()
+    marks = np.where(lines.wavenumber, "c", " ").tolist()
+    for i, (seen, calculated, off, stated, estimated) in enumerate(zip(*columns, strict=True)):
+        ratio = f"{ratios[i]:8.2f}" if stated > 0 else f"{'-':>8}"
         text = (
-            f"{i + 1:5d}: {lines.text(i):<{width}} {lines.frequency_mhz[i] / unit:16.5f} {fit.calculated_mhz[i] / unit:16.5f} "
-            f"{difference / unit:12.5f} {error / unit:10.5f} {fit.calculated_errors_mhz[i] / unit:10.5f} {ratio} {mark}"
+            f"{i + 1:5d}: {texts[i]:<{width}} {seen:16.5f} {calculated:16.5f} {off:12.5f} {stated:10.5f} {estimated:10.5f} "
+            f"{ratio} {marks[i]}"
         )
-        if blended[lines.blend[i]] and fit.used[i]:
-            text += f" blend, mean {fit.blended_mhz[i] / unit:.5f}, weight {lines.weight[i]:g}"
+        if in_blend[i]:
+            text += f" blend, mean {fit.blended_mhz[i] / unit[i]:.5f}, weight {lines.weight[i]:g}"
         if i in fit.left_out:
             text += f" DOES NOT COUNT: {fit.left_out[i]}"
         elif leverages.get(i, 0.0) > 0.9:
             text += f" leverage {leverages[i]:.2f}"
         out.append(text.rstrip())
     return out
+
+
+def _texts(lines: Assignments) -> list[str]:
+    """The labels of every line, as `Assignments.text` has them."""
+    sides = ([" ".join(map(str, row)) for row in side.tolist()] for side in (lines.upper, lines.lower))
+    return [" - ".join(pair) for pair in zip(*sides, strict=True)]
 
 
 def _end(fit: Fit) -> list[str]:

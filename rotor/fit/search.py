@@ -146,7 +146,17 @@ class Search:
     used: NDArray[np.bool_]
 
     def lines_of(self, values: Floats) -> tuple[Floats, Floats, Floats]:
-        """Calculated lines (lines,), derivatives by the parameters (lines, n), and of the levels (levels, n)."""
+        """Calculated lines (lines,), derivatives by the parameters (lines, n), and of the levels (levels, n).
+
+        The last point is not computed a second time: the search ends where it was.
+        """
+        point = values.tobytes()
+        before: tuple[bytes, tuple[Floats, Floats, Floats]] | None = self.__dict__.get("_last")
+        if before is None or before[0] != point:
+            before = self.__dict__["_last"] = (point, self._lines_of(values))
+        return before[1]
+
+    def _lines_of(self, values: Floats) -> tuple[Floats, Floats, Floats]:
         energies, slopes = self.model.levels(self.parameters.constants_of(values))
         slopes = slopes @ self.parameters.matrix
         if self.from_zero:  # the place -1 of such lower levels is the last one
@@ -351,7 +361,7 @@ def round_off(search: Search, slopes: Floats) -> Floats:
 
 def too_few(lines: Assignments, used: NDArray[np.bool_], parameters: Parameters) -> str:
     """What is wrong with fewer measured frequencies than free constants; empty where they are enough."""
-    count = len(np.unique(lines.blend[used])) + int(np.isfinite(parameters.prior).sum())
+    count = len(set(lines.blend[used].tolist())) + int(np.isfinite(parameters.prior).sum())
     if count >= len(parameters.names):
         return ""
     return f"{len(parameters.names)} free constants for {count} measured frequencies; free fewer, or add lines"

@@ -17,6 +17,7 @@ import numpy as np
 from rotor.arrays import Floats, Ints
 from rotor.quantum.effect import k_limits_of
 from rotor.quantum.levels import Levels, weights_of_levels
+from rotor.quantum.one_to_one import one_to_one
 from rotor.quantum.states import Coupling, State
 from rotor.quantum.wang.basis import WangBlock, limited, names_of, wang_blocks
 from rotor.quantum.wang.j_operators import JOperator, between_blocks
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
     from rotor.quantum.effect import QuantumEffect
     from rotor.tops.top import Top
 
-_NOTHING = 1e-13  # of an operator's largest element: what is smaller between two blocks is round-off of zero
+NOTHING = 1e-13  # of an operator's largest element: what is smaller between two blocks is round-off of zero
 
 
 class Part(NamedTuple):
@@ -225,14 +226,14 @@ def _placed(solved: Iterator[CoupledBlock]) -> Iterator[CoupledBlock]:
 
 def solve_coupled(model: Model, j: int) -> list[CoupledBlock]:
     """The coupled blocks of one J."""
-    vertices = [(v, basis) for v in sorted(model.states) for basis in _blocks_of_state(model, v, j)]
+    vertices = [(v, basis) for v in sorted(model.states) for basis in blocks_of_state(model, v, j)]
     edges = _edges(model, vertices, j)
     diagonal = {v: JMatrix(operators, j) for v, operators in model.states.items()}
     scalars = {v: scalar_energy(operators, j) for v, operators in model.states.items()}
     zero = scalars[0]  # taken out of the matrices for the sake of digits
     out = []
-    for members in _connected(len(vertices), edges):
-        parts = _parts([vertices[i] for i in members])
+    for members in connected_parts(len(vertices), edges):
+        parts = parts_of([vertices[i] for i in members])
         matrix = np.zeros((parts[-1].place.stop,) * 2)
         for part in parts:
             matrix[part.place, part.place] = _dense(block_bands(diagonal[part.v], part.basis))
@@ -245,7 +246,7 @@ def solve_coupled(model: Model, j: int) -> list[CoupledBlock]:
     return out
 
 
-def _blocks_of_state(model: Model, v: int, j: int) -> list[WangBlock]:
+def blocks_of_state(model: Model, v: int, j: int) -> list[WangBlock]:
     whole = wang_blocks(j, model.representation)
     return [part for b in whole if (part := limited(b, *model.limits[v]))] if v in model.limits else whole
 
@@ -266,9 +267,9 @@ def _edges(model: Model, vertices: list[tuple[int, WangBlock]], j: int) -> dict[
             for k in of_state[ket]:
                 up, low = vertices[i][1], vertices[k][1]
                 between = between_blocks(up, low, whole)
-                if np.abs(between).max() <= _NOTHING * largest:
+                if np.abs(between).max() <= NOTHING * largest:
                     continue
-                if np.abs(between.imag).max() > _NOTHING * largest:
+                if np.abs(between.imag).max() > NOTHING * largest:
                     _refuse_imaginary(couplings, operators, up, low, largest)
                 _add(found, (i, k), between.real)
                 if bra != ket:
@@ -293,14 +294,14 @@ def _refuse_imaginary(
 ) -> None:
     """ValueError with the name of the coupling, of those between two states, that has an imaginary element."""
     for (_, coupling), operator in zip(couplings, operators, strict=True):
-        if np.abs(between_blocks(up, low, operator).imag).max() > _NOTHING * largest:
+        if np.abs(between_blocks(up, low, operator).imag).max() > NOTHING * largest:
             raise ValueError(
                 f"{coupling.name}: the operator is not invariant under time reversal; an odd power of J is Hermitian and allowed "
                 "between two states only, with the factor i"
             )
 
 
-def _connected(count: int, edges: dict[tuple[int, int], Floats]) -> list[list[int]]:
+def connected_parts(count: int, edges: Iterable[tuple[int, int]]) -> list[list[int]]:
     """The connected parts of the graph, each in rising order."""
     group = list(range(count))
     for i, k in edges:
@@ -309,7 +310,7 @@ def _connected(count: int, edges: dict[tuple[int, int], Floats]) -> list[list[in
     return [[i for i in range(count) if group[i] == g] for g in dict.fromkeys(group)]
 
 
-def _parts(members: list[tuple[int, WangBlock]]) -> tuple[Part, ...]:
+def parts_of(members: list[tuple[int, WangBlock]]) -> tuple[Part, ...]:
     starts = np.cumsum([0, *(basis.size for _, basis in members)])
     return tuple(Part(v, basis, int(start)) for (v, basis), start in zip(members, starts, strict=False))
 
@@ -363,19 +364,6 @@ def names_of_states(
     overlaps = np.concatenate(functions) ** 2
     of_state = one_to_one(overlaps) if len(parts) > 1 else np.arange(vectors.shape[1])
     return np.concatenate(names)[of_state], overlaps[of_state, np.arange(vectors.shape[1])]
-
-
-def one_to_one(overlaps: Floats) -> Ints:
-    """Which function names each state: (n,) rows of `overlaps` (functions, states), each once, their sum largest."""
-    clear = overlaps.argmax(axis=0)
-    if len(set(clear.tolist())) == len(clear):
-        return np.asarray(clear)
-    from scipy.optimize import linear_sum_assignment
-
-    rows, columns = linear_sum_assignment(overlaps, maximize=True)
-    out = np.empty(len(rows), dtype=np.int64)
-    out[columns] = rows
-    return out
 
 
 def parameter_matrix(

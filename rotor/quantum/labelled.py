@@ -14,18 +14,18 @@ so that it never changes its state by accident; `overlaps` says where a state ha
 from __future__ import annotations
 
 import os
+import sys
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from rotor.arrays import Floats, Ints
+from rotor.arrays import Floats, Ints, distinct
 from rotor.quantum.effects.watson import operators_by_name
 from rotor.quantum.wang.basis import WangBlock, ka_kc, wang_blocks
 from rotor.tops.constants import Constants
 
-_FEW = 1000  # levels below which scipy.linalg is not loaded for them
 _MOST_PADDED = 1 << 22  # matrix elements of blocks that are worked on together: 32 MB
 
 
@@ -183,7 +183,7 @@ class WangBlocks(LevelModel):
         for chunk in self.chunks:
             weights = self._weights(coefficients, chunk.x)
             bands = [np.einsum("bkt,bt->bk", unit, weights) for unit in chunk.units]
-            solved, vectors = _diagonalised(bands, chunk.sizes, self.count < _FEW)
+            solved, vectors = _diagonalised(bands, chunk.sizes)
             energies[chunk.rows] = solved[chunk.block, chunk.rank]
             expected = np.ones((len(chunk.rows), chunk.units[0].shape[2] + 1))
             expected[:, :-1] = _expectations(chunk, vectors)
@@ -201,7 +201,7 @@ class WangBlocks(LevelModel):
             for values in (before_mhz, after_mhz):
                 weights = self._weights(self.factors @ values, chunk.x)
                 bands = [np.einsum("bkt,bt->bk", unit, weights) for unit in chunk.units]
-                both.append(_diagonalised(bands, chunk.sizes, self.count < _FEW)[1][chunk.block, :, chunk.rank])
+                both.append(_diagonalised(bands, chunk.sizes)[1][chunk.block, :, chunk.rank])
             out[chunk.rows] = np.einsum("lk,lk->l", *both) ** 2
         return out
 
@@ -267,11 +267,10 @@ def _chunks(blocks: Sequence[_Occurring], units: Sequence[tuple[int, int]], powe
 
 
 def _chunk(blocks: Sequence[_Occurring], units: Sequence[tuple[int, int]], powers: Sequence[int]) -> _Chunk:
-    size = blocks[-1].size
     x = np.array([one.basis.j * (one.basis.j + 1.0) for one in blocks])
     block = np.array([b for b, one in enumerate(blocks) for _ in one.rows])
     return _Chunk(
-        units=_unit_diagonals(blocks, size, units),
+        units=unit_diagonals([one.basis for one in blocks], [one.size for one in blocks], units),
         sizes=[one.size for one in blocks],
         x=x,
         rows=np.array([row for one in blocks for row in one.rows]),
@@ -281,17 +280,19 @@ def _chunk(blocks: Sequence[_Occurring], units: Sequence[tuple[int, int]], power
     )
 
 
-def _unit_diagonals(blocks: Sequence[_Occurring], size: int, units: Sequence[tuple[int, int]]) -> tuple[Floats, ...]:
+def unit_diagonals(
+    blocks: Sequence[WangBlock], taken: Sequence[int], units: Sequence[tuple[int, int]]
+) -> tuple[Floats, ...]:
     """Diagonal d of ½[Jz^2q, J₊^2n + J₋^2n]₊ at (block, state, (q, n)), state i with i + d; zero beyond a block.
 
     As in `rotor.quantum.effects.watson`: ⟨K+2n|..|K⟩ on diagonal n, √2 more where K = 0, and ⟨2n-K|..|-K⟩ with the sign of the
-    block on diagonal n - K.
+    block on diagonal n - K. taken: how many of the states of each block.
     """
     order = max((n for _, n in units), default=0)
-    j = np.array([one.basis.j for one in blocks], dtype=float)[:, None]
-    first = np.array([one.basis.first_k for one in blocks])[:, None]
-    sign = np.array([one.basis.sign for one in blocks], dtype=float)[:, None]
-    sizes = np.array([one.size for one in blocks])[:, None]
+    j = np.array([one.j for one in blocks], dtype=float)[:, None]
+    first = np.array([one.first_k for one in blocks])[:, None]
+    sign = np.array([one.sign for one in blocks], dtype=float)[:, None]
+    size, sizes = max(taken), np.array(taken)[:, None]
     index = np.arange(size)[None, :]
     k = (first + 2 * index).astype(float)
 
@@ -317,17 +318,17 @@ def _element(j: Floats, k: Floats, q: int, n: int) -> Floats:
     return np.asarray(0.5 * ((k + 2 * n) ** (2 * q) + k ** (2 * q)) * np.sqrt(squared))
 
 
-def _diagonalised(bands: Sequence[Floats], sizes: Sequence[int], few: bool = False) -> tuple[Floats, Floats]:
+def _diagonalised(bands: Sequence[Floats], sizes: Sequence[int]) -> tuple[Floats, Floats]:
     """Eigenvalues (blocks, size), rising, and eigenvectors (blocks, size, size) in columns, padded with zeros.
 
-    few : tridiagonal blocks are solved by numpy's dense routine too, which needs no scipy.linalg: loading that takes longer than a
-    whole fit of a few hundred levels. Only where BLAS has one thread: several of them wait for each other on small blocks
+    Tridiagonal blocks too are solved by numpy's dense routine where scipy.linalg is not loaded: loading it takes as long as 500 iterations
+    of a fit to 5,000 lines gain by it. Only where BLAS has one thread: several of them wait for each other on small blocks.
     """
     if not all(np.isfinite(band).all() for band in bands):
         raise ValueError("a block of the Hamiltonian is not finite with these constants")
     count, size = bands[0].shape
     energies, vectors = np.zeros((count, size)), np.zeros((count, size, size))
-    if len(bands) <= 2 and not (few and os.environ.get("OPENBLAS_NUM_THREADS") == "1"):
+    if len(bands) <= 2 and ("scipy.linalg" in sys.modules or os.environ.get("OPENBLAS_NUM_THREADS") != "1"):
         _tridiagonal(bands, sizes, energies, vectors)
     else:
         _banded(bands, sizes, energies, vectors)
@@ -352,7 +353,7 @@ def _tridiagonal(bands: Sequence[Floats], sizes: Sequence[int], energies: Floats
 def _banded(bands: Sequence[Floats], sizes: Sequence[int], energies: Floats, vectors: Floats) -> None:
     """Blocks of one size at a time, by LAPACK's dense routine."""
     unlike = np.asarray(sizes)
-    for n in np.unique(unlike).tolist():
+    for n in distinct(unlike).tolist():
         chosen = np.flatnonzero(unlike == n)
         matrices = np.zeros((len(chosen), n, n))
         for d, band in enumerate(bands[:n]):

@@ -13,6 +13,7 @@ what a method does not hold is solved by another one, or refused.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -39,6 +40,7 @@ def solve_levels(
     effects: Sequence[QuantumEffect] = SEMI_RIGID,
     vectors: bool = True,
     executor: Executor | None = None,
+    below_mhz: float = math.inf,
 ) -> Levels:
     """All levels of a top with rotational angular momentum from `jmin` to `jmax`.
 
@@ -49,6 +51,7 @@ def solve_levels(
     effects : what the Hamiltonian consists of; the levels remember it
     vectors : False leaves the eigenvectors of an asymmetric top out
     executor : any `concurrent.futures.Executor`; J are spread over it
+    below_mhz : without vectors, levels above it may be left out, which is faster; those up to it are all there
 
     Returns
     -------
@@ -82,7 +85,7 @@ def solve_levels(
         from rotor.quantum.spins.levels import spin_levels
 
         return spin_levels(top, effects, jmin, jmax, executor)
-    found = solve_rotation(top, effects, jmin, jmax, vectors, executor)
+    found = solve_rotation(top, effects, jmin, jmax, vectors, executor, below_mhz=below_mhz)
     if top.level_table is None or not _is_own(top, effects):
         return found
     return with_tabulated_energies(found, top.level_table)

@@ -222,41 +222,41 @@ def coupling(j_low: int, j_up: int, rank: int, q: int, k: ArrayLike) -> Floats:
 def _existing(j: int, j_up: int, rank: int, q: int, k: Floats) -> Floats:
     """`coupling` for k and k + q that exist."""
     if rank <= 2:
-        return _closed(j, j_up, rank, q, k)
+        return closed_coupling(j, j_up - j, rank, q, k)
     root = np.sqrt((2.0 * j_up + 1) * (2 * j + 1))
     return np.asarray(np.where((j_up - k - q) % 2, -root, root) * three_j(j_up, rank, j, -k - q, q, k))
 
 
-def _closed(j: int, j_up: int, rank: int, q: int, k: Floats) -> Floats:
-    """Rank 0, 1 or 2, for k and k + q that exist."""
-    if j_up < j:
-        return _sign(j_up - j - q) * _closed(j_up, j, rank, -q, k + q)
+def closed_coupling(j: int | Floats, rise: int, rank: int, q: int, k: Floats) -> Floats:
+    """`coupling` of rank 0, 1 or 2 to J' = J + `rise`, for k and k + q that exist; J may be an array like k."""
+    if rise < 0:
+        return _sign(rise - q) * closed_coupling(j + rise, -rise, rank, -q, k + q)
     if q < 0:
-        return _sign(j_up - j - rank) * _closed(j, j_up, rank, -q, -k)
+        return _sign(rise - rank) * closed_coupling(j, rise, rank, -q, -k)
     if rank == 0:
-        return np.full(k.shape, np.sqrt(2 * j + 1.0))
+        return np.sqrt(2 * j + 1.0) + np.zeros(k.shape)
     if rank == 1:
-        return _vector_up(j, k, q) if j_up > j else _vector_level(j, k, q)
-    return (_tensor_level, _tensor_one_up, _tensor_two_up)[j_up - j](j, k, q)
+        return _vector_up(j, k, q) if rise else _vector_level(j, k, q)
+    return (_tensor_level, _tensor_one_up, _tensor_two_up)[rise](j, k, q)
 
 
 def _sign(power: int) -> float:
     return -1.0 if power % 2 else 1.0
 
 
-def _vector_up(j: int, k: Floats, q: int) -> Floats:
+def _vector_up(j: int | Floats, k: Floats, q: int) -> Floats:
     if q == 0:
         return np.asarray(np.sqrt((j - k + 1) * (j + k + 1) / (j + 1)))
     return np.asarray(np.sqrt((j + k + 1) * (j + k + 2) / (2 * (j + 1))))
 
 
-def _vector_level(j: int, k: Floats, q: int) -> Floats:
+def _vector_level(j: int | Floats, k: Floats, q: int) -> Floats:
     if q == 0:
         return np.asarray(k * np.sqrt((2 * j + 1) / (j * (j + 1))))
     return np.asarray(-np.sqrt((j - k) * (j + k + 1) * ((2 * j + 1) / (2 * j * (j + 1)))))
 
 
-def _tensor_two_up(j: int, k: Floats, q: int) -> Floats:
+def _tensor_two_up(j: int | Floats, k: Floats, q: int) -> Floats:
     if q == 0:
         above = 1.5 * (j - k + 1) * (j - k + 2) * (j + k + 1) * (j + k + 2)
     elif q == 1:
@@ -266,7 +266,7 @@ def _tensor_two_up(j: int, k: Floats, q: int) -> Floats:
     return np.asarray(np.sqrt(above / ((j + 1.0) * (2 * j + 3) * (j + 2))))
 
 
-def _tensor_one_up(j: int, k: Floats, q: int) -> Floats:
+def _tensor_one_up(j: int | Floats, k: Floats, q: int) -> Floats:
     norm = 2.0 * j * (j + 1) * (j + 2)
     if q == 0:
         return np.asarray(k * np.sqrt(6 * (j - k + 1) * (j + k + 1) / norm))
@@ -275,7 +275,7 @@ def _tensor_one_up(j: int, k: Floats, q: int) -> Floats:
     return np.asarray(-np.sqrt((j - k) * (j + k + 1) * (j + k + 2) * (j + k + 3) / norm))
 
 
-def _tensor_level(j: int, k: Floats, q: int) -> Floats:
+def _tensor_level(j: int | Floats, k: Floats, q: int) -> Floats:
     norm = (2 * j - 1) * 2.0 * j * (j + 1) * (2 * j + 3) / (2 * j + 1)
     if q == 0:
         return np.asarray((3 * k * k - j * (j + 1)) * np.sqrt(2 / norm))
@@ -326,7 +326,7 @@ def bands_between(up: WangBlock, low: WangBlock, tensor: BodyTensor) -> list[Ban
     rank, (steps, parts) = tensor.rank, tensor.signed_parts(up, low)
     out = []
     for step in steps:
-        source, target = _overlap(up, low, step)
+        source, target = overlap(up, low, step)
         if source.start >= source.stop:
             continue
         elements = _wang_coupling(low.j, up.j, rank, step)[low.first_k :: 2][source] * parts[rank + step]
@@ -336,7 +336,7 @@ def bands_between(up: WangBlock, low: WangBlock, tensor: BodyTensor) -> list[Ban
     return out
 
 
-def _overlap(up: WangBlock, low: WangBlock, step: int) -> tuple[slice, slice]:
+def overlap(up: WangBlock, low: WangBlock, step: int) -> tuple[slice, slice]:
     """Which K of `low` land on which K of `up` when K changes by `step`."""
     first = (up.first_k - step - low.first_k) // 2  # place in `low` that lands on place 0 of `up`
     start, stop = max(first, 0), min(low.size, first + up.size)

@@ -4,7 +4,7 @@
 |---|---|---|---|
 | spectrum, levels, raman | frequencies, energies, shifts, "1 kHz" | spins, left out if smaller; method of several | rounding, and these |
 | stark, zeeman | energies, "1 kHz" | tolerance, and with it J max of the basis | by which energies move with a higher J max, round-off |
-| align | cosines, 1e-4 | the loosest tolerance: steps, J max, populations | step error, edge population, population left out |
+| align | cosines, 1e-4 | the loosest tolerance (steps, populations), the smallest J max | steps, edge of the basis, populations |
 | thermo | Q, U and C_v, "0.1 %" | levels summed, or the classical limit with corrections | of the sums |
 | tumble | attitude, "1e-6 rad" | see `rotor.scenes.accuracy_motion`; free motion is exact | from finer steps |
 | gas, fluid | see `rotor.scenes.accuracy_sampled` | | |
@@ -228,23 +228,41 @@ def _tolerance(name: str, default: Any, least: float) -> Callable[[Any, Any, flo
 
 
 def _align(scene: Any, request: Any, asked: float) -> Choice:
-    """The loosest tolerance, in decades, whose error as it is found by a run is what was asked for.
+    """The loosest tolerance, in decades, whose error as it is found by a run is what was asked for, and then the smallest J max.
 
-    A tolerance bounds each source of error; what a run finds is often a hundred times less. J max follows from the tolerance: a lower
-    one saves less time than its search takes (OCS at 1 K: 18 in place of 24, a twelfth).
+    A tolerance bounds each source of error; what a run finds is often a hundred times less.
     """
     from rotor.alignment.request import answer_align
 
-    if request.jmax is not None:
-        return _tolerance("tolerance", 1e-6, 1e-11)(scene, request, asked)
     found = _tolerance("tolerance", 1e-6, 1e-11)(scene, request, asked)
     for looser in LOOSER:
         tried = replace(request, tolerance=min(looser * asked, LOOSEST_COSINE), classical_molecules=0)
         trace = answer_align(tried).trace
-        if trace.error_estimate <= asked:
-            how = f"tolerance {tried.tolerance:g}, and J max {trace.jmax} from it"
-            return Choice(replace(request, tolerance=tried.tolerance), how)
+        if trace.error_estimate > asked:
+            continue
+        if request.jmax is not None:
+            return Choice(replace(request, tolerance=tried.tolerance), f"tolerance {tried.tolerance:g}")
+        return _least_basis(request, tried.tolerance, trace, asked)
     return found
+
+
+def _least_basis(request: Any, tolerance: float, trace: Any, asked: float) -> Choice:
+    """The smallest J max that is within what the other errors leave, looked for on one block and confirmed by a run."""
+    from rotor.alignment.align import truncation_apart
+    from rotor.alignment.basis import least_jmax
+    from rotor.alignment.request import answer_align
+
+    first, truncation = least_jmax(trace, asked - truncation_apart(trace))
+    for jmax in range(first, trace.jmax):
+        smaller = replace(request, tolerance=tolerance, jmax=jmax)
+        try:
+            found = answer_align(replace(smaller, classical_molecules=0)).trace
+        except ValueError:  # more at the edge than the tolerance allows
+            continue
+        error = truncation_apart(found) + max(found.edge_population, truncation)
+        if error <= asked:
+            return Choice(smaller, f"tolerance {tolerance:g}, and J max {jmax}", error)
+    return Choice(replace(request, tolerance=tolerance), f"tolerance {tolerance:g}, and J max {trace.jmax} from it")
 
 
 def _tumble(scene: Any, request: Any, asked: float) -> Choice:

@@ -1,11 +1,18 @@
 """Accuracy of a driven motion: the loosest tolerance of its steps whose attitudes are within what was asked for.
 
 The error of a tolerance t is the largest difference of an attitude, at all times asked for, from a motion of finer steps. A finer
-motion is one of t/100, or of t/10⁴, ... until it takes more steps: steps also end at every time asked for, and where these are
-dense, several tolerances give the same steps, whose difference of 0 says nothing. Where no tolerance takes more, the sum of what
-the control of the steps lets pass, their number times the finest tolerance, is added: the local error per step is below it
+motion is one of t/100, or of t/10⁴, ... until it takes half as many steps more (10^(2/8) = 1.8 times as many are usual): steps also
+end at every time asked for, and where these are dense, several tolerances give the same steps, whose difference of 0 says nothing; and a
+wobble smaller than the tolerance is wrong in all motions that do not see it. Where the number of steps did not go as usual, the next finer
+motion counts too. Where no tolerance takes so many, the sum of what the control of the steps lets pass, their number times the finest
+tolerance, is added: the local error per step is below it
 (E. Hairer, S. P. Nørsett, G. Wanner, Solving Ordinary Differential Equations I, section II.4). The finer motion has an error of its
 own: the difference is taken 1.1 times.
+
+The search makes some five motions. Of a long motion, the first part alone is searched, to the accuracy divided by how much the error will
+still grow: as the square of the time, as phases do whose rate drifts, or exponentially where the second half of that part shows it. The
+run then takes that tolerance and one finer motion beside it, which gives the error that is stated; only where that is more than what was
+asked for, a finer tolerance follows.
 """
 
 from __future__ import annotations
@@ -17,6 +24,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rotor.scenes.choice import Choice
+from rotor.scenes.motion_steps import BEGINNINGS, beginning, expected_steps
 
 if TYPE_CHECKING:
     from rotor.classical.driven import DrivenRequest
@@ -27,6 +35,10 @@ FINER = 2  # decades of a reference
 OF_REFERENCE = (
     1.1  # a reference a hundred times finer has a tenth of the error at most: 15 times less was the least seen
 )
+MORE_STEPS, MOST_STEPS = 1.5, 2.4  # of a finer motion, times those of the coarse one: 10^(2/8) = 1.8 is usual
+LONG_STEPS, LONG_PLAIN_STEPS = 1_000_000, 4000  # of a motion, compiled or not: about a second
+REGULAR = 2.0  # the power of the time with which the error of a regular motion grows at the most
+CHAOTIC = 4.0  # a power that is seen beyond which the growth is taken as exponential
 
 
 @dataclass(frozen=True)
@@ -50,16 +62,22 @@ class _Motions:
 
     def error(self, decade: int) -> float:
         """The largest error of an attitude in radians, see the head of this module."""
+        coarse = self.at(decade)
+        for finer in (*range(decade + FINER, FINEST_REFERENCE, FINER), FINEST_REFERENCE):
+            more = self.at(finer).steps / coarse.steps
+            if more < MORE_STEPS:
+                continue
+            usual = finer == decade + FINER and more < MOST_STEPS
+            beyond = finer if usual else min(finer + FINER, FINEST_REFERENCE)
+            return OF_REFERENCE * max(self._apart(coarse, finer), self._apart(coarse, beyond))
+        unseen = self.at(FINEST_REFERENCE).steps * tolerance_of(FINEST_REFERENCE)
+        return unseen + OF_REFERENCE * self._apart(coarse, FINEST_REFERENCE)
+
+    def _apart(self, one: Motion, decade: int) -> float:
+        """The largest angle between the attitudes of a motion and those of one of some tolerance."""
         from rotor.geometry.rotations import distance
 
-        coarse, unseen = self.at(decade), 0.0
-        for finer in (*range(decade + FINER, FINEST_REFERENCE, FINER), FINEST_REFERENCE):
-            fine = self.at(finer)
-            if fine.steps > coarse.steps:
-                break
-        else:
-            unseen = fine.steps * tolerance_of(FINEST_REFERENCE)
-        return unseen + OF_REFERENCE * float(np.max(distance(coarse.attitude, fine.attitude)))
+        return float(np.max(distance(one.attitude, self.at(decade).attitude)))
 
 
 def tolerance_of(decade: int) -> float:
@@ -71,13 +89,113 @@ def tolerance_of(decade: int) -> float:
     return float(f"1e-{decade}")
 
 
-def likely_tolerance(asked: float) -> float:
-    """A tolerance amid those that a search for an accuracy tries."""
-    return tolerance_of(min(max(round(-math.log10(asked)), LOOSEST) + FINER, FINEST))
+def likely_decade(asked: float) -> int:
+    """A decade of tolerances amid those that a search for an accuracy tries."""
+    return min(max(round(-math.log10(asked)), LOOSEST) + FINER, FINEST)
+
+
+@dataclass(frozen=True)
+class Planned:
+    """A tolerance that is known before a run.
+
+    decade: of it. how: in words. error, steps: of the whole motion, None where a part alone was made.
+    """
+
+    decade: int
+    how: str
+    error: float | None = None
+    steps: int | None = None
+
+    @property
+    def tolerance(self) -> float:
+        """Of a step."""
+        return tolerance_of(self.decade)
+
+
+def planned_tolerance(scene: Any, request: DrivenRequest, asked: float) -> Planned:
+    """The loosest tolerance, in decades, that reaches an accuracy in radians, by the whole motion or, of a long one, by its first part.
+
+    Parameters
+    ----------
+    scene : TumbleScene
+        Without a tolerance or step of its own.
+    request : DrivenRequest
+        That of the scene.
+    asked : float
+        In radians, of the attitude at every time.
+
+    Returns
+    -------
+    Planned
+        The same for a plan and for a run.
+
+    Raises
+    ------
+    ValueError
+        Where a knob is given by hand as well, and where double precision does not reach it.
+    """
+    from rotor.classical.driven import DEFAULT_TOLERANCE
+
+    if scene.numerics.tolerance != DEFAULT_TOLERANCE or scene.numerics.step is not None:
+        raise ValueError("accuracy and numerics: give one of them")
+    if _is_long(request, asked):
+        return Planned(*_of_beginning(request, asked))
+    motions = _Motions(request)
+    decade, error = _loosest(motions, asked)
+    return Planned(decade, _words(decade), error, motions.at(decade).steps)
+
+
+def _words(decade: int) -> str:
+    return f"tolerance {tolerance_of(decade):g} of a step" + (
+        ", nothing cheaper: the loosest there is" if decade == LOOSEST else ""
+    )
+
+
+def _is_long(request: DrivenRequest, asked: float) -> bool:
+    """Whether a motion takes so many steps that a search by whole motions would not be short, by those of its beginning."""
+    from rotor.classical.system import system_of
+
+    steps = expected_steps(replace(request, tolerance=tolerance_of(likely_decade(asked))))
+    is_compiled = system_of(request.moments, request.effects).compiled is not None
+    return steps > (LONG_STEPS if is_compiled else LONG_PLAIN_STEPS)
+
+
+def _of_beginning(request: DrivenRequest, asked: float) -> tuple[int, str]:
+    """The decade that the first part of a motion asks for, and how it was found."""
+    from rotor.geometry.rotations import distance
+
+    motions = _Motions(beginning(request, 1 / BEGINNINGS, 0.5))
+    likely = likely_decade(asked)
+    apart = distance(motions.at(likely).attitude, motions.at(min(likely + FINER, FINEST_REFERENCE)).attitude)
+    middle = int(np.searchsorted(np.abs(np.array(motions.request.times) - request.times[0]), 0.5 * _span(motions)))
+    grown = math.log10(_growth(float(np.max(apart[: middle + 1])), float(np.max(apart))))
+    part = f"from the first {100 / BEGINNINGS:g} % of the time, in which errors grow {{}}"
+    needed = math.log10(asked) - grown
+    try:
+        decade = _loosest(motions, 10.0**needed)[0] if needed > -FINEST_REFERENCE else FINEST
+    except ValueError:  # the part cannot be that exact
+        decade = FINEST
+    kind = "exponentially" if grown > REGULAR * math.log10(BEGINNINGS) else "as the square of the time at the most"
+    return decade, f"{_words(decade)}, {part.format(kind)}"
+
+
+def _span(motions: _Motions) -> float:
+    return abs(motions.request.times[-1] - motions.request.times[0])
+
+
+def _growth(middle: float, end: float) -> float:
+    """How much larger an error is at the end of a motion than at that of its first part, by its values in the middle and there.
+
+    >>> _growth(1e-9, 4e-9), _growth(0.0, 0.0)  # as the square, 20² times
+    (400.0, 400.0)
+    """
+    if middle > 0.0 and end > middle * 2.0**CHAOTIC:
+        return float(min((end / middle) ** (2.0 * (BEGINNINGS - 1)), 1e300))
+    return float(BEGINNINGS**REGULAR)
 
 
 def choose_tolerance(scene: Any, request: DrivenRequest, asked: float) -> Choice:
-    """The request with the loosest tolerance, in decades, that reaches an accuracy in radians.
+    """The request with the tolerance that a plan names, and the error that is found with it.
 
     Parameters
     ----------
@@ -91,29 +209,32 @@ def choose_tolerance(scene: Any, request: DrivenRequest, asked: float) -> Choice
     Returns
     -------
     Choice
-        With the error that was found.
+        With the error that was found; of a finer tolerance where that of the plan misses.
 
     Raises
     ------
     ValueError
         Where a knob is given by hand as well, and where double precision does not reach it.
     """
-    from rotor.classical.driven import DEFAULT_TOLERANCE
-
-    if scene.numerics.tolerance != DEFAULT_TOLERANCE or scene.numerics.step is not None:
-        raise ValueError("accuracy and numerics: give one of them")
+    planned = planned_tolerance(scene, request, asked)
+    if planned.error is not None:
+        return Choice(replace(request, tolerance=planned.tolerance), planned.how, planned.error)
     motions = _Motions(request)
-    decade, error = _loosest(motions, asked)
-    how = f"tolerance {tolerance_of(decade):g} of a step"
-    how += ", nothing cheaper: the loosest there is" if decade == LOOSEST else ""
-    return Choice(replace(request, tolerance=tolerance_of(decade)), how, error)
+    error, decade = motions.error(planned.decade), planned.decade
+    if error > asked and decade < FINEST:
+        decade, error = _loosest(motions, asked, misses=decade)
+        how = f"tolerance {tolerance_of(decade):g} of a step, finer than the plan's {planned.tolerance:g}, which missed"
+        return Choice(replace(request, tolerance=tolerance_of(decade)), how, error)
+    if error > asked:
+        raise ValueError(_refusal(asked, error))
+    return Choice(replace(request, tolerance=planned.tolerance), planned.how, error)
 
 
-def _loosest(motions: _Motions, asked: float) -> tuple[int, float]:
-    """The lowest decade whose error is what was asked for at the most, and that error; the one below it has more."""
-    decade = min(max(round(-math.log10(asked)), LOOSEST), FINEST)
+def _loosest(motions: _Motions, asked: float, misses: int = LOOSEST - 1) -> tuple[int, float]:
+    """The lowest decade whose error is what was asked for at the most, and that error; the one below it, or `misses`, has more."""
+    decade = min(max(round(-math.log10(asked)), misses + 1), FINEST)
     errors: dict[int, float] = {}
-    misses, reaches = LOOSEST - 1, FINEST + 1
+    reaches = FINEST + 1
     while reaches > misses + 1:
         error = errors[decade] = motions.error(decade)
         apart = max(
@@ -124,8 +245,12 @@ def _loosest(motions: _Motions, asked: float) -> tuple[int, float]:
         else:
             misses, decade = decade, min(decade + apart, reaches - 1)
     if reaches > FINEST:
-        raise ValueError(
-            f"accuracy: {asked:g} rad cannot be given: steps to {tolerance_of(FINEST):g} still differ by {errors[FINEST]:.2g} rad at "
-            "the end, the motion is chaotic or too long for double precision; ask for less, or for a shorter time"
-        )
+        raise ValueError(_refusal(asked, errors[FINEST]))
     return reaches, errors[reaches]
+
+
+def _refusal(asked: float, error: float) -> str:
+    return (
+        f"accuracy: {asked:g} rad cannot be given: steps to {tolerance_of(FINEST):g} still differ by {error:.2g} rad at "
+        "the end, the motion is chaotic or too long for double precision; ask for less, or for a shorter time"
+    )

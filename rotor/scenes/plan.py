@@ -11,13 +11,13 @@ import math
 import os
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from rotor.scenes import left_out
 from rotor.scenes.choice import Choice
 from rotor.scenes.kind import kind_of
 from rotor.scenes.plan_parts import (
+    LONG_SEARCH,
     Plan,
     effect_texts,
     extrapolated,
@@ -37,12 +37,7 @@ SETTLING_STEPS = 50  # of a box, after which its forces are nearly those of a fl
 SHORT_GAS, SHORT_STEPS = (500, 2000), (5, 20)  # likewise
 MILLIBAR = 1e-3  # of a gas whose pressure is not given
 BYTES_A_MOLECULE = 136  # momentum, attitude, place, velocity and energies of a molecule that is not being moved
-STEPS = "Runge-Kutta of order 8, adaptive"
 OF_LEVELS = ("spectrum", "levels", "raman")
-LONG_SEARCH = 10.0  # seconds; a shorter one is made twice, as its first time has imports and compilation in it
-SEARCHED = 5  # motions that the search of a tolerance takes: three to seven in the example scenes
-BEGINNINGS = 20  # of a driven motion, one of which is made to count its steps
-SOME_STEPS = 1000  # beyond those that are made one by one
 
 
 def plan_of(scene: Scene, folder: str | os.PathLike[str] = ".") -> Plan:
@@ -76,7 +71,9 @@ def plan_of(scene: Scene, folder: str | os.PathLike[str] = ".") -> Plan:
     if getattr(scene, "accuracy", None) is None:
         return _PLANS[scene.kind](request)
     if hasattr(request, "tolerance") and scene.kind == "tumble":
-        return _searched(scene, request)
+        from rotor.scenes.plan_of_motion import plan_with_accuracy
+
+        return plan_with_accuracy(scene, request)
     from rotor.scenes.accuracy import chosen
 
     found: list[Choice] = []
@@ -85,18 +82,6 @@ def plan_of(scene: Scene, folder: str | os.PathLike[str] = ".") -> Plan:
     if scene.kind in OF_LEVELS:
         parts.append(("orders of distortion", "all that the constants have: fewer save milliseconds at the most"))
     return replace(plan, parts=(*plan.parts, *parts), seconds=plan.seconds + search)
-
-
-def _searched(scene: Scene, request: Any) -> Plan:
-    """The plan of a driven motion whose tolerance is found by the motion itself when it is run: one of a likely tolerance."""
-    from rotor.scenes.accuracy import asked_of
-    from rotor.scenes.accuracy_motion import likely_tolerance
-
-    asked = asked_of(scene)
-    assert asked is not None
-    plan = _PLANS[scene.kind](replace(request, tolerance=likely_tolerance(asked)))
-    how = f"the loosest tolerance that reaches it, found when the scene is run, by about {SEARCHED} motions"
-    return replace(plan, parts=(*plan.parts, ("accuracy", how)), seconds=(SEARCHED + 1) * plan.seconds)
 
 
 def allowed_lines(top: Top, jmax: int) -> int:
@@ -288,7 +273,12 @@ def _align(request: Any) -> Plan:
         effects=(*effect_texts(request.top, j, SEMI_RIGID), *(f"pulse on the {one.acts_on}" for one in request.pulses)),
         good=("M",) if all(one.axis == (0, 0, 1) for one in request.pulses) else (),
         parts=(
-            ("basis", f"J to {trace.jmax} at least, for a tolerance of {coarse.tolerance:g}"),
+            (
+                "basis",
+                f"J to {request.jmax}"
+                if request.jmax
+                else f"J to {trace.jmax} at least, for a tolerance of {coarse.tolerance:g}",
+            ),
             (
                 "method",
                 f"{trace.method} during the pulses, exact phases after them; steps halved until the cosines agree",
@@ -302,63 +292,9 @@ def _align(request: Any) -> Plan:
 
 
 def _tumble(request: Any) -> Plan:
-    from rotor.classical.tumble import TumbleRequest, answer_tumble
+    from rotor.scenes.plan_of_motion import plan_of_motion
 
-    if isinstance(request, TumbleRequest):
-        conserved = ("energy", "angular momentum in space")
-        parts = (("method", "the exact free motion (theta functions): no step, round-off alone"),)
-        seconds, count = timed(lambda: answer_tumble(request)), len(request.times or ()) or 201
-        memory = peak_mb(lambda: answer_tumble(request).table.columns)
-        return Plan("tumble", ("free rotation",), conserved, parts, {"times": count}, seconds, memory, ())
-    return _driven(request)
-
-
-def _beginning(request: Any, share: float) -> Any:
-    """The request for the first part of its time alone; steps end at the times asked for, so these stay."""
-    first, last = request.times[0], request.times[-1]
-    end = first + share * (last - first)
-    return replace(request, times=(*(t for t in request.times if abs(t - first) < abs(end - first)), end))
-
-
-def _seconds_of_steps(request: Any, steps: int) -> float:
-    """Processor time of a driven motion: its first steps are made one by one and the further ones compiled, so two parts are timed."""
-    from rotor.classical.driven import answer_driven
-    from rotor.classical.system import system_of
-
-    some = SOME_STEPS if request.step is None or request.order > 2 else 4 * SOME_STEPS
-    # times as many for the second part: compiled steps are so much cheaper
-    more = 2 if system_of(request.moments, request.effects).compiled is None else 50
-    if steps < more * some:
-        return timed(lambda: answer_driven(request))
-    share = some / steps
-    near, far = (timed(partial(answer_driven, _beginning(request, part))) for part in (share, more * share))
-    return near + (steps / some - 1) / (more - 1) * max(far - near, 0.0)
-
-
-def _driven(request: Any) -> Plan:
-    from rotor.classical.driven import answer_driven
-
-    beginning = _beginning(request, 1 / BEGINNINGS)
-    answer = answer_driven(beginning)
-    steps = math.ceil(answer.motion.steps * BEGINNINGS)
-    good = ("energy",) if all(effect.conserves_energy for effect in request.effects) else ()
-    local = request.step is None
-    error = steps * request.tolerance if local else None
-    basis = (
-        f"{steps} steps, each to {request.tolerance:g} of |L| and of a radian; chaos makes it grow"
-        if local
-        else "halve numerics.step"
-    )
-    return Plan(
-        kind="tumble",
-        effects=tuple(type(effect).__name__ for effect in request.effects),
-        good=good,
-        parts=(("method", STEPS if local else f"splitting of order {request.order}, step {request.step:g}"),),
-        counts={"steps": steps, "times": len(request.times)},
-        seconds=_seconds_of_steps(request, steps),
-        memory_mb=peak_mb(lambda: answer_driven(beginning).table.columns) * len(request.times) / len(beginning.times),
-        left_out=(left_out.LeftOut("error of the steps", error, "rad", basis),),
-    )
+    return plan_of_motion(request)
 
 
 def _fluid(request: Any) -> Plan:

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from rotor.quantum.effect import QuantumEffect
     from rotor.tops.top import Top
 
+LONG_SEARCH = 10.0  # seconds; a shorter one is made twice, as its first time has imports and compilation in it
 ENERGY = "energies are eigenvalues of the truncated Hamiltonian"
 
 

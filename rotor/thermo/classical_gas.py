@@ -24,7 +24,7 @@ from rotor.quantum.estimates.limits import OF_SPINS, model_limits, model_sizes, 
 from rotor.statistics.degrees_of_freedom import count_degrees
 from rotor.statistics.equipartition import Equipartition, equipartition
 from rotor.table import TextOf
-from rotor.thermo.classical_onset import classical_above_k
+from rotor.thermo.classical_onset import classical_above_if_known
 from rotor.tops.facts import top_facts
 
 if TYPE_CHECKING:
@@ -114,9 +114,9 @@ class GasAnswer(TextOf):
         """What a classical gas of free rigid tops leaves out: quantum mechanics, distortion, and what the molecule shows signs of."""
         top = self.request.top
         j, effects = populated_j(top, self.request.temperature_k), effects_of(top, hyperfine=False)
-        quantum = (
-            f"quantum mechanics: the heat capacity is classical within 1 % above {classical_above_k(top, 0.01):.3g} K"
-        )
+        above_k = classical_above_if_known(top, 0.01)
+        where = "" if above_k is None else f": the heat capacity is classical within 1 % above {above_k:.3g} K"
+        quantum = f"quantum mechanics{where}"
         sizes = [one for one in model_sizes(top, j, effects) if one.present and one.name == "centrifugal distortion"]
         distortion = [f"{one.name}: {one.size_mhz:.2g} MHz of a level at J = {j}" for one in sizes]
         seen = [limit.sentence for limit in model_limits(top, j, effects) if limit.name not in OF_SPINS]

@@ -21,7 +21,8 @@ def classical_above_k(top: Top, tolerance: float = 0.01) -> float:
 
     Above it the classical n R/2 is good to that; distortion, which both could have, is left out of both. The spin weights
     count, all species in equilibrium. Looked for at 40 temperatures a decade from 0.01 to 10 times the largest finite Θ,
-    higher where it differs there, and then bisected to 1e-6. A linear molecule of Θ, its C_v/R being 1 + (Θ/T)²/45 + ..., parts at 1.93 Θ.
+    higher where it differs there, and then between two of them to 1e-6. ValueError where no sum reaches so far. A linear
+    molecule of Θ, its C_v/R being 1 + (Θ/T)²/45 + ..., parts at 1.93 Θ.
 
     >>> from rotor.tops.top import Top
     >>> round(classical_above_k(Top.from_constants("B=20836.619 MHz")), 2)  # Θ = 1 K
@@ -42,11 +43,18 @@ def classical_above_k(top: Top, tolerance: float = 0.01) -> float:
         higher = grid[-1] * np.logspace(0.025, 0.5, 20)
         grid, apart = np.append(grid, higher), np.append(apart, beyond(higher))
     last = np.flatnonzero(apart)[-1]
-    low, high = float(grid[last]), float(grid[last + 1])
-    while high - low > 1e-6 * low:
-        middle = (high + low) / 2
-        low, high = (middle, high) if beyond(np.array([middle]))[0] else (low, middle)
-    return low
+    while grid[last + 1] - grid[last] > 1e-6 * grid[last]:
+        grid = np.linspace(grid[last], grid[last + 1], 50)
+        last = np.flatnonzero([True, *beyond(grid[1:-1]), False])[-1]
+    return float(grid[last])
+
+
+def classical_above_if_known(top: Top, tolerance: float = 0.01) -> float | None:
+    """The same; None where no sum over levels reaches so far."""
+    try:
+        return classical_above_k(top, tolerance)
+    except ValueError:
+        return None
 
 
 def _rigid(top: Top) -> Top:

@@ -28,7 +28,7 @@ from numpy.typing import ArrayLike
 from rotor import units
 from rotor.arrays import Floats, Ints
 from rotor.quantum.effect import QuantumEffect
-from rotor.quantum.effects.watson import SEMI_RIGID
+from rotor.quantum.effects.watson import SEMI_RIGID, centrifugal_operators
 from rotor.quantum.levels import Levels, weights_of_levels
 from rotor.quantum.solve import solve_levels
 from rotor.thermo.classical_limit import classical_limit
@@ -43,6 +43,10 @@ if TYPE_CHECKING:
 STRIDE = 8  # J are solved by so many at a time
 LONG_SUM = 60  # J above which the classical limit with corrections is taken where it is as good as what was asked
 MOST_J = {"asymmetric": 1000}  # the longest sum, of other kinds J 4000: both take some seconds
+MOST_J_DISTORTED = {
+    "asymmetric": 600
+}  # with distortion, whose levels are all solved, and up to two simpler forms of them
+HIGHEST_KT = 80.0  # energy over kT above which rigid levels are left out: e⁻⁸⁰ of 10⁹ states is 1e-26
 JMAX_LIMIT = 4000
 AT_WORST = 0.1  # estimated relative error above which a sum is refused
 LOWEST_X, HIGHEST_X = -300.0, 1e4  # levels that do not exist may lie below the lowest that does; e³⁰⁰ is enough
@@ -90,6 +94,7 @@ def level_sums(
     *,
     energies: bool = True,
     at_worst: float = AT_WORST,
+    refuse: bool = True,
     progress: Progress | None = None,
     effects: Sequence[QuantumEffect] = SEMI_RIGID,
 ) -> list[LevelSums]:
@@ -108,6 +113,8 @@ def level_sums(
         Whether U and C_v count for the error.
     at_worst : float
         Estimated error up to which a sum is given at all.
+    refuse : bool
+        False gives the sums with a larger error too, for a caller that looks at the errors; see `refusal`.
     progress : callable, optional
         Called as `progress(j, last)` whenever more levels are solved, with the J that the sum is expected to end at.
     effects : sequence of QuantumEffect
@@ -122,7 +129,7 @@ def level_sums(
     Raises
     ------
     ValueError
-        A temperature not above 0 K; an error above `at_worst`.
+        A temperature not above 0 K; an error above `at_worst`, unless `refuse` is False.
 
     Examples
     --------
@@ -134,14 +141,14 @@ def level_sums(
     """
     temperatures, kinds = checked_temperatures(temperatures_k), 3 if energies else 1
     ladder = _Ladder(top, tuple(weights), tuple(effects), progress)
-    longest = MOST_J.get(top.kind, JMAX_LIMIT)
+    longest = ladder.longest
     expected = _last_j(top, temperatures, relative_error)
+    errors = np.array([classical_limit(top, one).errors(temperatures)[:kinds].max(axis=0) for one in weights])
+    limit_serves = (expected > LONG_SUM) & (errors <= relative_error) | (expected > longest) & (errors <= at_worst)
+    limit_serves &= ladder.semi_rigid
+    ladder.reach(temperatures[~limit_serves.all(axis=0)].max(initial=0.0))
     found = []
-    for s, one in enumerate(weights):
-        errors = classical_limit(top, one).errors(temperatures)[:kinds].max(axis=0)
-        classical = (expected > LONG_SUM) & (errors <= relative_error)
-        classical |= (expected > longest) & (errors <= at_worst)
-        classical &= ladder.semi_rigid
+    for s, classical in enumerate(limit_serves):
         parts = np.zeros((7, len(temperatures)))
         parts[:, classical] = _expanded(ladder, s, temperatures[classical])
         if not classical.all():
@@ -150,7 +157,8 @@ def level_sums(
             enough = (relative_error, 2 * at_worst)
             parts[:, ~classical] = _summed(ladder, s, temperatures[~classical], enough, kinds)
         found.append(_as_sums(temperatures, ladder.ground[s][0], parts))
-        _refuse_inexact(found[-1], kinds, at_worst)
+        if refuse:
+            _refuse_inexact(found[-1], kinds, at_worst)
     return found
 
 
@@ -176,11 +184,16 @@ def _refuse_inexact(sums: LevelSums, kinds: int, at_worst: float) -> None:
     for t, error in zip(sums.temperatures_k[worst > at_worst].tolist(), worst[worst > at_worst].tolist(), strict=True):
         good = sums.temperatures_k[worst <= at_worst]
         others = f"; of those asked for the sum can be had up to {good.max():g} K" if len(good) else ""
-        error = f"{error:.1e} of it" if error < 1 else "all of it"
-        raise ValueError(
-            f"Q({t:g} K): the levels that count lie beyond the reach of the distortion constants or of a sum (estimated "
-            f"error {error}, above {at_worst:g}); lower the temperature, or give Q{others}"
-        )
+        raise ValueError(refusal(t, error, at_worst) + others)
+
+
+def refusal(temperature_k: float, error: float, at_worst: float = AT_WORST) -> str:
+    """Why a sum with this estimated relative error is not given, and what to do."""
+    how_much = f"{error:.1e} of it" if error < 1 else "all of it"
+    return (
+        f"Q({temperature_k:g} K): the levels that count lie beyond the reach of the distortion constants or of a sum "
+        f"(estimated error {how_much}, above {at_worst:g}); lower the temperature, or give Q"
+    )
 
 
 class Shell(NamedTuple):
@@ -207,11 +220,20 @@ class _Ladder:
     ) -> None:
         self.top, self.weights, self._effects, self._progress = top, weights, effects, progress
         self.semi_rigid = effects == SEMI_RIGID and top.states is None
+        self._rigid = self.semi_rigid and top.level_table is None and not centrifugal_operators(top.constants)
+        self.longest = (MOST_J if self._rigid else MOST_J_DISTORTED).get(top.kind, JMAX_LIMIT)
+        self._below_mhz = math.inf
         self._by_j: list[Shell] = []
         self.last = 0
         others = [] if top.states is None else list(top.states.weights.values())
         self.heaviest = [max(heaviest_component(each) for each in (one, *others)) for one in weights]
         self.ground = [self._lowest(s) for s in range(len(weights))]
+
+    def reach(self, hottest_k: float) -> None:
+        """Levels that do not count at this temperature, and J that are not solved yet, are left out from here on."""
+        if self._rigid:
+            ground = max(energy for energy, _ in self.ground)
+            self._below_mhz = (ground + HIGHEST_KT * hottest_k) * units.MHZ_PER_K
 
     def at(self, j: int) -> Shell:
         """The levels of one J."""
@@ -224,13 +246,16 @@ class _Ladder:
         last = first + max(STRIDE, first // 8) - 1
         if self._progress is not None:
             self._progress(first, max(self.last, first))
-        levels = solve_levels(self.top, last, jmin=first, effects=self._effects, vectors=False)
+        levels = solve_levels(
+            self.top, last, jmin=first, effects=self._effects, vectors=False, below_mhz=self._below_mhz
+        )
         plain = levels.states.astype(np.float64)
         spin = np.array([levels.multiplicity * self._weights(levels, one) for one in self.weights], dtype=float)
         energies = lower = levels.energy_mhz
         if self.semi_rigid:
             energies, lower = trusted_energies_mhz(self.top, levels)
         order = np.argsort(levels.rotational, kind="stable")
+        order = order[energies[order] <= self._below_mhz]
         starts = np.searchsorted(levels.rotational[order], np.arange(first, last + 2))
         for start, stop in itertools.pairwise(starts.tolist()):
             here = order[start:stop]
@@ -281,7 +306,7 @@ def _summed(ladder: _Ladder, s: int, temperatures: Floats, enough: tuple[float, 
 
     enough: the relative error asked for, and that of untrusted levels from which on there is no hope.
     """
-    longest = MOST_J.get(ladder.top.kind, JMAX_LIMIT)
+    longest = ladder.longest
     ground, ground_j = ladder.ground[s]
     n = len(temperatures)
     moments, doubts, tails = np.zeros((3, n)), np.zeros((3, n)), np.zeros((3, n))

@@ -140,6 +140,7 @@ def partition_functions(
     relative_error: float = 1e-6,
     effects: Sequence[QuantumEffect] = SEMI_RIGID,
     *,
+    refuse: bool = True,
     progress: Progress | None = None,
 ) -> PartitionFunctions:
     """Q at several temperatures from one set of levels; see `partition_function`.
@@ -154,6 +155,8 @@ def partition_functions(
         Asked of Q.
     effects : sequence of QuantumEffect, optional
         What the Hamiltonian consists of.
+    refuse : bool, optional
+        False gives sums with an error above 10 % too, for a caller that looks at the errors.
     progress : callable, optional
         Called as `progress(j, last)` whenever more levels are solved; see `level_sums`.
 
@@ -165,14 +168,14 @@ def partition_functions(
     Raises
     ------
     ValueError
-        For an error above 10 %, and for a temperature not above 0 K.
+        For an error above 10 %, unless `refuse` is False, and for a temperature not above 0 K.
     """
     temperatures = checked_temperatures(temperatures_k)
     weights = [top.spin_weights]
     spinless, factor = without_spins(top, effects)
-    sums = level_sums(top, weights, temperatures, relative_error, energies=False, progress=progress, effects=spinless)[
-        0
-    ]
+    sums = level_sums(
+        top, weights, temperatures, relative_error, energies=False, refuse=refuse, progress=progress, effects=spinless
+    )[0]
     return PartitionFunctions(temperatures, factor * sums.q, sums.jmax, sums.error_q, _sources(sums, relative_error))
 
 

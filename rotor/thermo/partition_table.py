@@ -6,11 +6,13 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from rotor.thermo.classical_limit import classical_partition_function
-from rotor.thermo.level_sums import Progress
+from rotor.thermo.level_sums import AT_WORST, Progress, refusal
 from rotor.thermo.partition import PartitionFunction, partition_function, partition_functions
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
+
+_KEYS = ("temperature_k", "q", "classical", "jmax", "relative_error", "source")
 
 
 def partition_facts(top: Top, partition: PartitionFunction) -> dict[str, Any]:
@@ -35,20 +37,27 @@ def partition_table(
     [3.97, 108.79]
     """
     try:
-        return [partition_facts(top, one) for one in partition_functions(top, temperatures_k, progress=progress)]
-    except ValueError:  # one of them is out of reach: each for itself
-        return [_partition_row(top, temperature) for temperature in temperatures_k]
+        found = partition_functions(top, temperatures_k, refuse=False, progress=progress)
+        return [_unless_refused(partition_facts(top, one)) for one in found]
+    except ValueError:  # levels of one of them cannot be solved: each for itself
+        return [_row_alone(top, temperature) for temperature in temperatures_k]
 
 
-def _partition_row(top: Top, temperature_k: float) -> dict[str, Any]:
+def _unless_refused(facts: dict[str, Any]) -> dict[str, Any]:
+    """The facts of one temperature, without a sum whose error is too large for it to mean anything."""
+    if facts["relative_error"] <= AT_WORST:
+        return facts
+    return _without_sum(facts, refusal(facts["temperature_k"], facts["relative_error"]))
+
+
+def _row_alone(top: Top, temperature_k: float) -> dict[str, Any]:
     try:
         return partition_facts(top, partition_function(top, temperature_k))
     except ValueError as error:
-        return {
-            "temperature_k": temperature_k,
-            "q": None,
-            "classical": classical_partition_function(top, temperature_k),
-            "jmax": None,
-            "relative_error": None,
-            "source": str(error),
-        }
+        known = {"temperature_k": temperature_k, "classical": classical_partition_function(top, temperature_k)}
+        return _without_sum(known, str(error))
+
+
+def _without_sum(facts: dict[str, Any], reason: str) -> dict[str, Any]:
+    unknown = {"q": None, "jmax": None, "relative_error": None, "source": reason}
+    return {name: unknown.get(name, facts.get(name)) for name in _KEYS}

@@ -12,7 +12,7 @@ from rotor.quantum.effects.of_top import effects_of
 from rotor.quantum.estimates.limits import limit_facts, populated_j
 from rotor.table import TextOf
 from rotor.thermo.classical_limit import classical_limit, rotational_temperatures_k
-from rotor.thermo.classical_onset import classical_above_k
+from rotor.thermo.classical_onset import classical_above_if_known
 from rotor.thermo.functions import ThermoFunctions, species_names, thermodynamic_functions
 from rotor.thermo.level_sums import Progress
 from rotor.thermo.vibration import VibrationalStates
@@ -70,9 +70,9 @@ class ThermoAnswer(TextOf):
     functions: ThermoFunctions
 
     @cached_property
-    def classical_above_k(self) -> float:
-        """The temperature above which the heat capacity is classical within 1 %."""
-        return classical_above_k(self.request.top, CLASSICAL_TOLERANCE)
+    def classical_above_k(self) -> float | None:
+        """The temperature above which the heat capacity is classical within 1 %; None where no sum over levels reaches so far."""
+        return classical_above_if_known(self.request.top, CLASSICAL_TOLERANCE)
 
     def facts(self) -> dict[str, Any]:
         """Everything about the answer but its table, by the keys of docs/command_line.md."""

@@ -159,7 +159,7 @@ MUTATIONS = (
     ),
     Mutation(
         18, "rotor/quantum/estimates/unit_blocks.py",
-        "        if (leading == one.leading).all():", "        if True:",
+        "        if not moved.any():", "        if True:",
         "tests/test_fit_spcat.py::test_labels_follow_their_states_where_energies_cross",
     ),
     Mutation(

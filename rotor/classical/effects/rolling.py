@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike
 from rotor.arrays import Floats
 from rotor.classical.effect import AddedInertia, Torque
 from rotor.classical.effects.torques import checked_vector, from_body
+from rotor.classical.torque_form import ROLLING, TorqueForm, torque_form
 from rotor.geometry.rotations import IDENTITY, to_matrix, vector_product
 
 
@@ -82,6 +83,11 @@ class RollingEllipsoid(Torque, AddedInertia):
         x_rate = (stretched_rate - stretched * height_rate / height) / height
         bend = vector_product(x_rate, vector_product(x, omega))
         return np.asarray(self.__dict__["_weight"] * vector_product(down, x) - self.mass * bend)
+
+    def compiled_form(self) -> TorqueForm:
+        """The torque and the inertia."""
+        own = self.__dict__
+        return torque_form(ROLLING, self.mass, own["_weight"], own["_vertical"], self.centre, own["_squares"])
 
     def potential_energy(self, time: float, attitude: Floats) -> Floats:
         """m g x·μ, of the height of the mass centre above the plane."""

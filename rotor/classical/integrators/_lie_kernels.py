@@ -14,6 +14,7 @@ from numba import njit
 
 from rotor.arrays import Floats
 from rotor.classical.integrators._attitude_kernels import ahead, turn_of, turning_of
+from rotor.classical.integrators._rolling_kernels import rolling_omega, rolling_torque
 from rotor.classical.integrators._torque_kernels import torque_at
 from rotor.geometry._kernels import conjugate, exponential, product, turned
 
@@ -56,6 +57,25 @@ def _rate(form: Any, inverse: Floats, time: float, state: Any, change: Any, out:
         out[stage, i, k], out[stage, i, 3 + k] = torque[k], rate[k]
 
 
+@njit(cache=True)
+def _rolling_rate(
+    forms: Any, inverse: Floats, time: float, state: Any, change: Any, out: Any, stage: int, i: int
+) -> None:
+    """The same of a body that rolls; forms: the parameters of its contacts beside those of `_rate`."""
+    rolling, (codes, parameters, inner) = forms
+    u = (change[i, 3], change[i, 4], change[i, 5])
+    cosine, half_sinc, factor = turn_of(u)
+    q = product((state[i, 3], state[i, 4], state[i, 5], state[i, 6]), exponential(cosine, half_sinc, u))
+    m = turned(conjugate(q), (state[i, 0] + change[i, 0], state[i, 1] + change[i, 1], state[i, 2] + change[i, 2]))
+    relative = m[0] - inner[0], m[1] - inner[1], m[2] - inner[2]
+    omega = rolling_omega(rolling, q, relative, (inverse[i, 0], inverse[i, 1], inverse[i, 2]))
+    own, others = rolling_torque(rolling, q, omega), torque_at(codes, parameters, time, q, omega)
+    torque = turned(q, (own[0] + others[0], own[1] + others[1], own[2] + others[2]))
+    rate = turning_of(u, omega, factor)
+    for k in range(3):
+        out[stage, i, k], out[stage, i, 3 + k] = torque[k], rate[k]
+
+
 @njit(cache=True, fastmath={"contract"})
 def _error(slopes: Floats, h: float, third: Floats, fifth: Floats, state: Floats, change: Floats) -> float:
     """The estimate |h| |e5|²/√(|e5|² + 0.01 |e3|²) of the worst body, momenta over |L| + |change of L|."""
@@ -80,14 +100,23 @@ def _error(slopes: Floats, h: float, third: Floats, fifth: Floats, state: Floats
 
 
 @njit(cache=True, fastmath={"contract"})
-def _stepped(form: Any, inverse: Floats, tableau: Any, time: float, h: float, state: Floats, work: Any) -> float:
-    """One step: work[1] (n, 6) is then the change of L in space and u, and the error estimate is returned."""
+def _stepped(
+    form: Any, rolling: Any, inverse: Floats, tableau: Any, time: float, h: float, state: Floats, work: Any
+) -> float:
+    """One step: work[1] (n, 6) is then the change of L in space and u, and the error estimate is returned.
+
+    rolling: None where nothing rolls; the branch is taken when this is compiled.
+    """
     a, b, c, third, fifth = tableau
     slopes, change = work
     for stage in range(STAGES):
         _carried(slopes, a, stage, stage, h, change)
-        for i in range(state.shape[0]):
-            _rate(form, inverse, time + c[stage] * h, state, change, slopes, stage, i)
+        if rolling is None:
+            for i in range(state.shape[0]):
+                _rate(form, inverse, time + c[stage] * h, state, change, slopes, stage, i)
+        else:
+            for i in range(state.shape[0]):
+                _rolling_rate((rolling, form), inverse, time + c[stage] * h, state, change, slopes, stage, i)
     _carried(slopes, b, 0, STAGES, h, change)
     return _error(slopes, h, third, fifth, state, change)
 
@@ -112,7 +141,9 @@ def _next_factor(error: float, control: Any) -> Any:
 
 
 @njit(cache=True, nogil=True)
-def to_time(form: Any, inverse: Floats, tableau: Any, control: Any, span: Any, state: Floats, step: float) -> Any:
+def to_time(
+    form: Any, rolling: Any, inverse: Floats, tableau: Any, control: Any, span: Any, state: Floats, step: float
+) -> Any:
     """Carry state (n, 7), L in space and attitude, from span[0] to span[1]; the next step, the count and the time reached.
 
     The time is short of span[1] where no step is short enough (span[2]: the smallest). control[0]: tolerance, 0 for a step that
@@ -124,7 +155,7 @@ def to_time(form: Any, inverse: Floats, tableau: Any, control: Any, span: Any, s
     while (end - time) * forward > smallest:
         last = step >= abs(end - time) * (1.0 - 1e-12)
         h = end - time if last else forward * step
-        error = _stepped(form, inverse, tableau, time, h, state, work)
+        error = _stepped(form, rolling, inverse, tableau, time, h, state, work)
         steps += 1
         if control[0] > 0.0:
             error /= control[0]
@@ -140,7 +171,9 @@ def to_time(form: Any, inverse: Floats, tableau: Any, control: Any, span: Any, s
 
 
 @njit(cache=True, nogil=True)
-def to_times(form: Any, inverse: Floats, tableau: Any, control: Any, times: Any, path: Floats, step: float) -> Any:
+def to_times(
+    form: Any, rolling: Any, inverse: Floats, tableau: Any, control: Any, times: Any, path: Floats, step: float
+) -> Any:
     """Fill path (t, n, 7), L in body axes and attitude, from its first rows, which hold L in space; count and time reached.
 
     times: (times (t,), the smallest step of each interval (t - 1,)).
@@ -151,7 +184,9 @@ def to_times(form: Any, inverse: Floats, tableau: Any, control: Any, times: Any,
         for k in range(7):
             state[i, k] = path[0, i, k]
     for j in range(grid.shape[0] - 1):
-        step, steps, time = to_time(form, inverse, tableau, control, (grid[j], grid[j + 1], smallest[j]), state, step)
+        step, steps, time = to_time(
+            form, rolling, inverse, tableau, control, (grid[j], grid[j + 1], smallest[j]), state, step
+        )
         total += steps
         if time != grid[j + 1]:
             return total, time

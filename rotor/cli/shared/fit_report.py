@@ -83,6 +83,7 @@ def _trial_record(trial: Trial) -> dict[str, Any]:
 def _line_records(fit: Fit) -> list[dict[str, Any]]:
     lines = fit.lines
     leverage = dict(zip(fit.groups.tolist(), fit.statistics.leverages.tolist(), strict=False))
+    difference = fit.difference_mhz
     return [
         {
             "upper": lines.upper[i],
@@ -90,7 +91,7 @@ def _line_records(fit: Fit) -> list[dict[str, Any]]:
             "frequency_mhz": lines.frequency_mhz[i],
             "error_mhz": lines.error_mhz[i],
             "calculated_mhz": fit.calculated_mhz[i],
-            "difference_mhz": fit.difference_mhz[i],
+            "difference_mhz": difference[i],
             "calculated_error_mhz": fit.calculated_errors_mhz[i],
             "blend": lines.blend[i],
             "used": bool(fit.used[i]),

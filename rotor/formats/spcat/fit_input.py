@@ -23,6 +23,7 @@ from rotor.formats.assigned_lines import QUANTA
 from rotor.formats.spcat.codes import HELD_BELOW, constants_and_matrix
 from rotor.formats.spcat.model import parameter_file
 from rotor.formats.spcat.states import is_plain
+from rotor.formats.spcat.text.fields import BLANK
 from rotor.formats.spcat.text.lin import LineList, note_of_defaults, note_of_remarks, read_lin, with_defaults
 from rotor.formats.spcat.text.par import Header, Parameter, ParameterFile, read_par
 from rotor.formats.spcat.variances import FREE_ABOVE
@@ -243,8 +244,9 @@ def _widths(lines: LineList, blends: Ints, used: np.ndarray, header: Header) -> 
 
 def _refuse_width(lines: LineList, names: Sequence[str], used: np.ndarray) -> None:
     """ValueError for a line with fewer or more quantum numbers than the top has."""
+    counts = (lines.quanta != BLANK).sum(axis=1) // 2
     for i in np.flatnonzero(used).tolist():
-        count = len(lines.measured(i).quanta) // 2
+        count = int(counts[i])
         if count != len(names):
             raise ValueError(
                 f"line {i + 1} of the line list has {count} quantum numbers for each state; these constants have "

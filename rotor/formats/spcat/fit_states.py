@@ -13,7 +13,7 @@ from functools import partial
 
 import numpy as np
 
-from rotor.arrays import Floats, Ints
+from rotor.arrays import Floats, Ints, distinct
 from rotor.formats.spcat.file_lines import Format, format_of, quanta_of
 from rotor.formats.spcat.file_model import Group, groups_of
 from rotor.formats.spcat.l_doubled import functions_of_l, named_by_l
@@ -23,7 +23,8 @@ from rotor.formats.spcat.text.par import ParameterFile
 from rotor.formats.spcat.unresolved import HIGHEST_SEARCHED, excluded_parameters, refuse_far_f, spelled_out
 from rotor.quantum.estimates.contracted import ContractedLevels, contracted_levels
 from rotor.quantum.estimates.effect_units import unit_levels
-from rotor.quantum.estimates.unit_blocks import UnitBlocks
+from rotor.quantum.estimates.state_units import state_units
+from rotor.quantum.estimates.unit_blocks import UnitBlocks, joined
 from rotor.quantum.labelled import LevelModel, MissingLevelsError
 from rotor.quantum.levels import Levels
 from rotor.quantum.spins.levels import levels_of_f, unmixed_levels
@@ -90,7 +91,7 @@ class FileLevels(LevelModel):
         reduced = np.flatnonzero(labels[:, -1] < 0) if form.spins else np.zeros(0, dtype=np.int64)
         if len(reduced):
             refuse_far_f(labels, reduced, form, names_of_quanta(form), max(sum(group.spins) for group in groups))
-        parts = _searched(file, groups, form, labels, reduced)
+        parts = _together(_searched(file, groups, form, labels, reduced), len(file.parameters))
         return cls(line_names(file), len(labels), tuple(parts), reduced, excluded_parameters(file))
 
     def levels(self, values_mhz: Floats) -> tuple[Floats, Floats]:
@@ -106,6 +107,10 @@ class FileLevels(LevelModel):
             slopes[rows, columns] = 0.0
         return energies, slopes
 
+    def overlaps(self, before_mhz: Floats, after_mhz: Floats) -> Floats:
+        """1: levels are called by what they mostly are, whatever the constants are."""
+        return np.ones(self.count)
+
 
 def _searched(file: ParameterFile, groups: Sequence[Group], form: Format, labels: Ints, reduced: Ints) -> list[_Solved]:
     """The labels in the levels of the groups; those of `reduced` have F below 0."""
@@ -114,7 +119,10 @@ def _searched(file: ParameterFile, groups: Sequence[Group], form: Format, labels
     names, values = line_names(file), np.array([p.value for p in file.parameters])
     while True:
         parts = [part for group in groups for part in _with_labels(group, form, positive, names, values)]
-        lost = np.setdiff1d(np.arange(len(labels)), np.concatenate([part.rows for part in parts]) if parts else [])
+        there = np.zeros(len(labels), dtype=bool)
+        for part in parts:
+            there[part.rows] = True
+        lost = np.flatnonzero(~there)
         if not len(lost):
             return parts
         none = lost[~np.isin(lost, reduced) | (positive[lost, -1] >= HIGHEST_SEARCHED)]
@@ -124,6 +132,21 @@ def _searched(file: ParameterFile, groups: Sequence[Group], form: Format, labels
                 f"there is no level {first} ({', '.join(names_of_quanta(form))}) in this model", none
             )
         positive[lost, -1] += 1
+
+
+def _together(parts: Sequence[_Solved], count: int) -> list[_Solved]:
+    """The parts of all groups that are solved block by block as one, so that blocks of one size are worked on together."""
+    some = [(part.blocks, part.rows, part.columns) for part in parts if isinstance(part.blocks, UnitBlocks)]
+    others = [part for part in parts if not isinstance(part.blocks, UnitBlocks)]
+    if not some:
+        return others
+    rows = np.concatenate([rows for _, rows, _ in some])
+    starts = np.cumsum([0, *(len(rows) for _, rows, _ in some)])
+    moved = [
+        (blocks, np.arange(start, stop), columns)
+        for (blocks, _, columns), start, stop in zip(some, starts, starts[1:], strict=False)
+    ]
+    return [_Solved(rows, np.arange(count), joined(moved, len(rows))), *others]
 
 
 def levels_in_blocks(group: Group, angular: Sequence[int]) -> Levels:
@@ -136,6 +159,13 @@ def levels_in_blocks(group: Group, angular: Sequence[int]) -> Levels:
     return named_by_l(levels, pairs, str(levels.representation)) if pairs else levels
 
 
+def _named_functions(group: Group, angular: Sequence[int]) -> Levels:
+    """Levels in blocks for their names alone: with spins the functions, which have the names of the states and need not be solved."""
+    if group.spins:
+        return unmixed_levels(group.top, (group.effect,), angular)[0]
+    return levels_in_blocks(group, angular)
+
+
 def _with_labels(group: Group, form: Format, labels: Ints, names: Sequence[str], values: Floats) -> list[_Solved]:
     """The labels that lie in the group, found in its levels by the quantum numbers that the file prints; some F at a time."""
     here = _of_group(group, form, labels)
@@ -145,8 +175,10 @@ def _with_labels(group: Group, form: Format, labels: Ints, names: Sequence[str],
     if (total < 0).any():
         first = " ".join(map(str, labels[here[int(np.argmin(total))]].tolist()))
         raise MissingLevelsError(f"there is no level {first}: F or J is below 0", here[total < 0])
+    if _direct(group, form):
+        return _of_states(group, form, labels, here, names, values)
     twice = 2 * total - sum(group.spins) % 2
-    every = np.unique(twice)
+    every = distinct(twice)
     size = len(group.states) * int(np.prod([spin + 1 for spin in group.spins]))
     if group.spins and size * int(every.max() + 1) > _LARGE:
         contracted = _contracted(group, form, labels, here, every, names, values)
@@ -157,6 +189,31 @@ def _with_labels(group: Group, form: Format, labels: Ints, names: Sequence[str],
         _of_some_f(group, form, labels, here[np.isin(twice, some)], some.tolist(), names, values) for some in pieces
     ]
     return [one for one in found if one is not None]
+
+
+def _direct(group: Group, form: Format) -> bool:
+    """Whether the labels are J, Ka, Kc and the state, without spins and K that have no sign."""
+    plain = not (group.spins or form.spins or group.effect.pairs) and form.rotation == 3 and group.top.kind != "linear"
+    return plain and not any(state.is_e(np.arange(state.fold + 1)).any() for state in group.states)
+
+
+def _of_states(
+    group: Group, form: Format, labels: Ints, here: Ints, names: Sequence[str], values: Floats
+) -> list[_Solved]:
+    """The labels at the places `here` of states without spins."""
+    place = {state.number: v for v, state in enumerate(group.states)}
+    v = [place[number] for number in labels[here, 3].tolist()] if form.states else np.zeros(len(here), dtype=np.int64)
+    own = tuple(group.effect.parameters(group.top))
+    columns, start = _columns_of(group, names, values)
+    asked = np.column_stack([labels[here, 0], v, labels[here, 1:3]])
+    blocks = state_units(group.top, (group.effect,), own, asked, start)
+    found = np.sort(blocks.found)
+    if not len(found):
+        return []
+    order = np.full(len(here), -1)
+    order[found] = np.arange(len(found))
+    every = np.arange(len(columns))
+    return [_Solved(here[found], columns, joined([(blocks, order, every)], len(found)))]
 
 
 def _contracted(
@@ -199,7 +256,7 @@ def _of_some_f(
     values: Floats,
 ) -> _Solved | None:
     """The labels at the places `here` among the levels of some doubled F; None without any."""
-    levels = levels_in_blocks(group, angular)
+    levels = _named_functions(group, angular)
     rows = _rows_of(group, levels, form, labels[here])
     found = rows >= 0
     if not found.any():

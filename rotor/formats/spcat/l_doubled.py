@@ -30,8 +30,8 @@ from rotor.arrays import Floats, Ints
 from rotor.formats.spcat.states import StateOptions
 from rotor.quantum.coupled import CoupledBlock, Part
 from rotor.quantum.levels import Levels
-from rotor.quantum.spins.blocks import assigned
 from rotor.quantum.spins.operators import AxialState, Basis
+from rotor.quantum.spins.parts import assigned
 from rotor.quantum.states import Coupling, OperatorOfJ
 from rotor.quantum.wang.basis import WangBlock, names_of
 from rotor.quantum.wang.j_operators import JOperator, between_blocks, j_z

@@ -15,8 +15,9 @@ import numpy as np
 from rotor.arrays import Floats, Ints
 from rotor.formats.spcat.l_doubled import Pair, functions_of_parts
 from rotor.quantum.levels import Levels
-from rotor.quantum.spins.blocks import SpinBlock, assigned
+from rotor.quantum.spins.blocks import SpinBlock
 from rotor.quantum.spins.operators import Cosines, CosinesWithN, Matrix, Rotor
+from rotor.quantum.spins.parts import assigned
 from rotor.quantum.spins.rotor import RotorBlock
 from rotor.quantum.spins.terms import SpinTerm
 

@@ -23,7 +23,8 @@ import numpy as np
 from rotor.arrays import Floats, Ints
 from rotor.quantum.coupled import CoupledBlock
 from rotor.quantum.levels import Levels
-from rotor.quantum.spins.blocks import SpinBlock, assigned
+from rotor.quantum.spins.blocks import SpinBlock
+from rotor.quantum.spins.parts import assigned
 from rotor.quantum.wang.basis import WangBlock, names_of
 
 BY_DIAG = (1, 2, 4, 5)  # those that need another naming than that of levels

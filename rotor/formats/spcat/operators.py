@@ -20,6 +20,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from math import sqrt
 
 import numpy as np
@@ -133,10 +134,15 @@ def _of_j(d: Digits, axes: str) -> OperatorOfJ:
     factor = (1j if axes[2] == "a" else -1j) if odd else 1.0
 
     def operator(j: int, representation: str) -> JOperator:
-        found = _tensor_of_n(d.typ, components(j, representation), axes[2])
-        return with_powers(factor * found, powers)
+        return with_powers(factor * _tensor_of_j(d.typ, j, representation, axes[2]), powers)
 
     return operator
+
+
+@lru_cache(maxsize=1024)
+def _tensor_of_j(typ: int, j: int, representation: str, z: str) -> JOperator:
+    """`_tensor_of_n` of one J, for the many parameters of one TYP."""
+    return _tensor_of_n(typ, components(j, representation), z)
 
 
 def _tensor_of_n(typ: int, of: Mapping[str, JOperator], z: str) -> JOperator:

@@ -25,8 +25,9 @@ import numpy as np
 from rotor.arrays import Floats, Ints
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.levels import Levels
-from rotor.quantum.spins.blocks import Plan, SpinBlock, SpinPart, assigned, named_states
+from rotor.quantum.spins.blocks import Plan, SpinBlock
 from rotor.quantum.spins.lines import ALONE, ParameterOperator
+from rotor.quantum.spins.parts import SpinPart, assigned, named_states
 from rotor.quantum.spins.rotor import Channel, RotorBlock
 
 if TYPE_CHECKING:

@@ -11,22 +11,23 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rotor.arrays import Floats, Ints
+from rotor.arrays import Floats, Ints, distinct
 from rotor.quantum.coupled import CoupledBlock, names_of_states, parameter_matrix
 from rotor.quantum.effect import QuantumEffect
-from rotor.quantum.estimates.unit_blocks import Elements, Namer, UnitBlock, UnitBlocks, elements_of, unit_block
-from rotor.quantum.levels import Levels, SolvedBlock
-from rotor.quantum.spins.blocks import (
-    SpinBlock,
-    SpinPart,
-    assigned,
-    coefficients_of,
-    labels_of,
-    names_of_parts,
-    product,
+from rotor.quantum.estimates.unit_blocks import (
+    Elements,
+    Namer,
+    UnitBlock,
+    UnitBlocks,
+    elements_of,
+    tracked_blocks,
+    unit_block,
 )
+from rotor.quantum.levels import Levels, SolvedBlock
+from rotor.quantum.spins.blocks import SpinBlock, coefficients_of, product
 from rotor.quantum.spins.lines import ParameterOperator
 from rotor.quantum.spins.operators import Scalar
+from rotor.quantum.spins.parts import SpinPart, assigned, labels_of, names_of_parts
 from rotor.quantum.spins.rotor import Channel
 
 if TYPE_CHECKING:
@@ -74,7 +75,7 @@ def unit_levels(
         raise ValueError("levels of a closed form have no blocks; solve them in blocks")
     starts = np.array([block.start for block in levels.blocks])
     of_row = np.searchsorted(starts, rows, side="right") - 1
-    numbers = np.unique(of_row).tolist()
+    numbers = distinct(of_row).tolist()
     blocks = [levels.blocks[number] for number in numbers]
     makers = _Makers(top, levels, names, blocks, functions)
     units = [makers.unit(block) for block in blocks]
@@ -87,7 +88,7 @@ def unit_levels(
         asked = _quanta(levels)[rows[own]] if functions else _names(block)[rows[own] - block.start]
         return own, np.array([state_of[tuple(name)] for name in asked.tolist()])
 
-    return UnitBlocks(units, len(rows), find, values_mhz)
+    return tracked_blocks(units, len(rows), find, values_mhz)
 
 
 def _quanta(levels: Levels) -> Ints:
@@ -188,7 +189,7 @@ class _SpinUnits:
     def _matrix(self, operator: ParameterOperator, parts: tuple[SpinPart, ...], block: SpinBlock) -> Floats | None:
         out: Floats | None = None
         for a, up in enumerate(parts):
-            for low in parts[: a + 1]:
+            for low in (part for part in parts[: a + 1] if operator.connects(up, part)):
                 for channel, element in operator.elements(up, low).items():
                     key = (channel, block.twice_f)
                     if key not in self._coefficients:

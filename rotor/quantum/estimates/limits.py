@@ -4,16 +4,15 @@
 |---|---|---|
 | a nucleus of spin 1 or more | nuclear quadrupole coupling | 234.96 MHz/barn · |Q|: a field gradient of one atomic unit |
 | constants of a geometry alone | error of the geometry, centrifugal distortion | δB/B · 2B(J+1); 4D(J+1)³, D = 4B³/ν² with ν = 500 cm⁻¹ |
-| a methyl group beside atoms off its axis | internal rotation | at most F = ħ²/2 I_red, that of a free group |
+| the same | vibration-rotation difference, B_e - B_0 | δB/B (`zero_point`) · 2B(J+1) |
+| a methyl group beside atoms off its axis | internal rotation | A - E difference of lines (`internal_rotation`); at most F |
 | a pyramidal nitrogen with two hydrogens | inversion | at most about 24 GHz, that of ammonia |
 | an odd number of electrons, an odd electronic state | electron spin | not estimated |
 | nuclei with spin | spin-rotation and spin-spin coupling | not estimated |
 
 D = 4B³/ν² holds exactly for a harmonic diatomic molecule (A. Kratzer, Z. Phys. 3 (1920) 289), for others in order of magnitude.
 The unit of the field gradient is e/(4π ε0 a0³); gradients at nuclei of bonded atoms are of this order, several times as large at
-heavy halogens. I_red = I_m (1 - I_m Σ_g λ_g²/I_g), I_m the moment of the methyl group about its axis and λ_g the cosines of this axis
-in the principal frame: the energy F p² of a group that turns freely against the rest, whose levels m = 0 (A) and m = ±1 (E) are F
-apart. tests/test_limits.py has I_red from the kinetic energy of the atoms.
+heavy halogens. A group without a barrier has the levels F m², m = 0 of A and m = ±1 of E species, F apart.
 """
 
 from __future__ import annotations
@@ -26,22 +25,24 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rotor import units
-from rotor.arrays import Floats, Ints
-from rotor.molecules.molecule import FEW_ATOMS
+from rotor.arrays import Ints
 from rotor.quantum.effect import EffectSize, QuantumEffect, effect_sizes
 from rotor.quantum.estimates.beyond import Limit, known_couplings, next_order
+from rotor.quantum.estimates.internal_rotation import LineShifts, line_shifts
 from rotor.quantum.spins.splittings import Splitting, splitting_nuclei
 
 if TYPE_CHECKING:
     from rotor.molecules.molecule import Molecule
     from rotor.quantum.effects.hyperfine import NuclearQuadrupole
+    from rotor.quantum.estimates.methyl_groups import MethylGroup
     from rotor.tops.top import Top
 
 VIBRATION_CM = 500.0  # a wavenumber of vibration, for distortion that was not computed
 COMPUTE = "its constants are known, add the effects of spins"  # the command line names its option in place of this
-CH_ANGSTROM, NEIGHBOUR_ANGSTROM = 1.3, 1.7  # bonds of hydrogen to carbon or nitrogen, and of nitrogen to heavier atoms
-OFF_AXIS = 0.05  # sine of the angle from which an atom is off the axis of a methyl group
+HIGHEST_J = 20  # A - E differences change little with J; those of higher J are estimated at this one
+LOW_BARRIER = 10.0  # s = 4 V3/9F below which the torsional levels of E species depend on K as much as the rotation
 ELECTRON_SPIN = "electron spin"
+ZERO_POINT = "vibration-rotation difference"
 OF_SPINS = frozenset({"nuclear quadrupole", "magnetic coupling of nuclear spins", ELECTRON_SPIN})
 AMMONIA_MHZ = 24_000.0  # the splitting of NH3, see docs/limitations.md
 FLAT_DEGREES = 355.0  # sum of the three angles at a nitrogen that is not pyramidal
@@ -92,7 +93,7 @@ def model_limits(top: Top, j: int, effects: Sequence[QuantumEffect]) -> list[Lim
     present = {effect.name for effect in effects}
     found = [*_of_constants(top, j), *(_of_nuclei(top, j, effects))]
     if top.molecule is not None:
-        found += _of_geometry(top, top.molecule, present)
+        found += _of_geometry(top, top.molecule, j, present)
     return largest_first(found)
 
 
@@ -153,6 +154,8 @@ def _of_constants(top: Top, j: int) -> list[Limit]:
         relative = top.molecule.uncertainty
         text = f"A, B, C follow from a geometry good to {100 * relative:.2g} %, and all frequencies with them"
         found.append(Limit("error of the geometry", relative * 2 * b * (j + 1), text))
+    if of_geometry and top.molecule is not None:
+        found += _zero_point(top.molecule, 2 * b * (j + 1))
     if rigid and top.kind != "spherical":
         d = 4 * b**3 / (VIBRATION_CM * units.MHZ_PER_CM) ** 2
         text = (
@@ -160,6 +163,16 @@ def _of_constants(top: Top, j: int) -> list[Limit]:
         )
         found.append(Limit("centrifugal distortion", 4 * d * (j + 1) ** 3, text))
     return found
+
+
+def _zero_point(molecule: Molecule, line_mhz: float) -> list[Limit]:
+    """What zero-point vibration does to lines of about one frequency; nothing where no atoms are bonded."""
+    from rotor.quantum.estimates.methyl_groups import bonded_atoms
+    from rotor.quantum.estimates.zero_point import relative_difference
+
+    relative = relative_difference(molecule, bonded_atoms(molecule))
+    text = f"A, B, C of an equilibrium geometry are about {100 * relative:.1g} % off those of the ground state; not of r0, rs or rz"
+    return [Limit(ZERO_POINT, relative * line_mhz, text)] if relative else []
 
 
 def _largest(top: Top) -> float:
@@ -195,13 +208,13 @@ def _split_text(nuclei: Sequence[Splitting]) -> str:
     return "; ".join(texts)
 
 
-def _of_geometry(top: Top, molecule: Molecule, present: set[str]) -> list[Limit]:
+def _of_geometry(top: Top, molecule: Molecule, j: int, present: set[str]) -> list[Limit]:
     """Motions of large amplitude, and unpaired electrons, that the geometry shows."""
-    found, bonds = [], _neighbours(molecule)
-    if tops := _internal_rotors(molecule, bonds):
-        what = "a methyl group turns" if len(tops) == 1 else f"{len(tops)} methyl groups turn"
-        text = f"{what} against the rest: lines of A and of E species are apart, by less the higher the barrier"
-        found.append(Limit("internal rotation", max(tops), text, at_most=True))
+    from rotor.quantum.estimates.methyl_groups import bonded_atoms, methyl_groups
+
+    found, bonds = [], bonded_atoms(molecule)
+    if groups := methyl_groups(molecule, bonds):
+        found.append(_internal_rotation(top, groups, j))
     if _pyramidal_nitrogens(molecule, bonds) and "interacting states" not in present:
         text = "nitrogen is pyramidal: its levels are pairs that this leaves out; the size is ammonia's, heavier groups have less"
         found.append(Limit("inversion", AMMONIA_MHZ, text, at_most=True))
@@ -211,74 +224,49 @@ def _of_geometry(top: Top, molecule: Molecule, present: set[str]) -> list[Limit]
     return found
 
 
-def _neighbours(molecule: Molecule) -> list[Ints]:
-    """Atoms bonded to each atom, by distance alone: hydrogen within 1.3 Å, others within 1.7 Å."""
-    x = molecule.positions_angstrom
-    hydrogen = np.array([symbol == "H" for symbol in molecule.symbols])
-    found: list[list[int]] = [[] for _ in x]
-    pairs = _pairs_within(x, NEIGHBOUR_ANGSTROM)
-    apart = np.linalg.norm(x[pairs[:, 0]] - x[pairs[:, 1]], axis=1)
-    reach = np.where(hydrogen[pairs].any(axis=1), CH_ANGSTROM, NEIGHBOUR_ANGSTROM)
-    for first, second in pairs[apart < reach].tolist():
-        found[first].append(second)
-        found[second].append(first)
-    return [np.array(sorted(near), dtype=np.int64) for near in found]
+def _internal_rotation(top: Top, groups: Sequence[MethylGroup], j: int) -> Limit:
+    """That of the group with the lowest barrier, counted in its F; a bound where no barrier of a similar molecule is known."""
+    what = "a methyl group turns" if len(groups) == 1 else f"{len(groups)} methyl groups turn"
+    unknown = [one.rotor.f_mhz for one in groups if one.barrier is None]
+    if unknown:
+        text = f"{what} against the rest: lines of A and of E species are apart, by less the higher the barrier"
+        return Limit("internal rotation", max(unknown), text, at_most=True)
+    least = min(groups, key=lambda one: one.rotor.barrier_mhz / one.rotor.f_mhz)
+    here = min(j, HIGHEST_J)
+    shifts = line_shifts(top.rotational_constants_mhz, least.rotor, here)
+    return Limit("internal rotation", *_rotor_text(top, what, least, shifts, here))
 
 
-def _pairs_within(x: Floats, reach: float) -> Ints:
-    """Pairs (m, 2) of points nearer than a reach, Å."""
-    if len(x) > FEW_ATOMS:
-        from scipy.spatial import cKDTree
+def _rotor_text(top: Top, what: str, group: MethylGroup, shifts: LineShifts, j: int) -> tuple[float, str]:
+    """Size and what it is of: the barrier, of which molecule, where it is unsafe or so low that no E line fits a rigid top.
 
-        return np.asarray(cKDTree(x).query_pairs(reach, output_type="ndarray"), dtype=np.int64)
-    apart = np.linalg.norm(x[:, None] - x[None], axis=-1)
-    return np.argwhere(np.triu(apart < reach, k=1))
-
-
-def _internal_rotors(molecule: Molecule, bonds: Sequence[Ints]) -> list[float]:
-    """F in MHz of each methyl group whose turning is not that of the whole: other atoms lie off its axis."""
-    found: list[tuple[Floats, list[int]]] = []
-    x = molecule.positions_angstrom
-    for carbon, near in enumerate(bonds):
-        hydrogens = [i for i in near.tolist() if molecule.symbols[i] == "H"]
-        if molecule.symbols[carbon] != "C" or len(hydrogens) != 3:
-            continue
-        axis = x[carbon] - x[hydrogens].mean(axis=0)
-        if len(x) > len(hydrogens) + 2 and _any_off_axis(x, [carbon, *hydrogens], axis):
-            found.append((axis / np.linalg.norm(axis), hydrogens))
-    return _free_rotation_mhz(molecule, found)
-
-
-def _free_rotation_mhz(molecule: Molecule, groups: Sequence[tuple[Floats, list[int]]]) -> list[float]:
-    """F = ħ²/2 I_red in MHz of groups, each with its unit axis and its atoms off it."""
-    if not groups:
-        return []
-    from rotor.geometry.inertia import point_masses, principal_frame
-
-    x, mass = molecule.positions_angstrom, molecule.masses_u
-    frame, found = principal_frame(point_masses(mass, x)), []
-    for axis, atoms in groups:
-        off = x[atoms] - x[atoms].mean(axis=0)
-        off -= np.outer(off @ axis, axis)
-        own = float(mass[atoms] @ np.sum(off**2, axis=1))
-        share = own * float(np.sum((frame.axes @ axis) ** 2 / frame.moments))
-        found.append(units.ROTATIONAL_MHZ_U_ANGSTROM2 / (own * (1.0 - share)))
-    return found
-
-
-def _any_off_axis(x: Floats, group: list[int], axis: Floats) -> bool:
-    """Whether some atom that is not of the group lies off the axis through its first atom; a thousand atoms at a time."""
-    for start in range(0, len(x), 1000):
-        rest = np.setdiff1d(np.arange(start, min(start + 1000, len(x))), group)
-        if len(rest) and (_sines(x[rest] - x[group[0]], axis) > OFF_AXIS).any():
-            return True
-    return False
-
-
-def _sines(vectors: Floats, axis: Floats) -> Floats:
-    """Sines of the angles (n,) of vectors (n, 3) with an axis (3,)."""
-    lengths = np.linalg.norm(vectors, axis=1) * np.linalg.norm(axis)
-    return np.asarray(np.linalg.norm(np.cross(vectors, axis), axis=1) / lengths)
+    Parameters
+    ----------
+    top : Top
+        Its dipole says whether lines with the same or with another K are the strong ones.
+    what : str
+        How many groups turn.
+    group : MethylGroup
+    shifts : LineShifts
+        Of that group.
+    j : int
+        Of which lower level.
+    """
+    barrier, rotor = group.barrier, group.rotor
+    sizes = [("within one K", shifts.typical_same_mhz), ("between two K", shifts.typical_other_mhz)]
+    along = int(np.argmax(np.abs(rotor.rho)))
+    if top.dipole_abc_debye is not None and any(top.dipole_abc_debye) and not top.dipole_abc_debye[along]:
+        sizes.reverse()
+    source = (
+        "not known" if barrier is None else f"{barrier.v3_cm:g} cm-1, that of a similar molecule ({barrier.molecule})"
+    )
+    unsafe = "" if barrier is None or barrier.safe else ", unsafe: it varies much among such molecules"
+    low = ", so low that no line of the E species fits a rigid top" if rotor.reduced_barrier < LOW_BARRIER else ""
+    (first, size), (second, other) = sizes
+    return size, (
+        f"{what} against the rest: half of the A and E lines of J = {j} {first} are farther apart, {second} than "
+        f"{other:.1g} MHz; barrier {source}{unsafe}{low}"
+    )
 
 
 def _pyramidal_nitrogens(molecule: Molecule, bonds: Sequence[Ints]) -> int:

@@ -1,34 +1,38 @@
 """Blocks of a Hamiltonian that is linear in its parameters, H_b = Σ c_i O_i,b: made once, solved again and again.
 
 The unit matrices O_i,b over the functions of a block are taken as their elements that are not zero, the same places for all
-parameters, so that new constants cost one product of a matrix and a vector a block, one diagonalisation, and
+parameters. Parameters that multiply one matrix times a number each (B, D_J and H_J at one J) share its elements, O_i = Σ_u M_ui U_u.
+Blocks of one size stand side by side, padded, so that new constants cost some products of arrays, one diagonalisation a block, and
 
-    ∂E_n/∂c_i = ⟨n|O_i|n⟩ = Σ_(r,c) O_i(r, c) v_r v_c
+    ∂E_n/∂c_i = ⟨n|O_i|n⟩ = Σ_u M_ui Σ_(r,c) U_u(r, c) v_r v_c
 
-another product for the states that have a label. A state is named by the sub-block (a Wang block of one state v, and one pattern of
-coupling) that has most of it, and within a sub-block by the order of energy. As long as those shares point to the same sub-blocks as
-at the start, state n stays state n; where they do not, the names are made anew.
+more products for the states that have a label. A state is named by the sub-block (a Wang block of one state v, and one pattern of
+coupling) that has most of it, and within a sub-block by the order of energy. As long as these are what they were at the start, state n
+stays state n; where they are not, the names are made anew.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
-from rotor.arrays import Floats, Ints
+from rotor.arrays import Floats, Ints, distinct
 
 Namer = Callable[[Floats, Floats, Floats], Ints]  # matrix, energies, vectors -> names (n, columns) of the states
+
+_AT_ONCE = 1 << 18  # numbers of the largest array of blocks side by side: 2 MB, which stays in the cache of a core
 
 
 @dataclass(frozen=True)
 class UnitBlock:
-    """One block: size, places (row, column, row ≥ column) of elements, their factors (elements, columns), which parameters.
+    """One block: size, places (row, column, row ≥ column) of elements, their factors (elements, units), which parameters.
 
-    members (sub-blocks, functions) : 1 where a function is in a sub-block. twice (elements,) : 2 off the diagonal
+    mix (units, parameters) : how much of each unit matrix a parameter has
+    members (sub-blocks, functions) : 1 where a function is in a sub-block
     namer : names of all states, where they must be made
     """
 
@@ -36,21 +40,10 @@ class UnitBlock:
     rows: Ints
     columns: Ints
     factors: Floats
+    mix: Floats
     parameters: Ints
     members: Floats
-    twice: Floats
     namer: Namer
-
-    def matrix(self, values_mhz: Floats) -> Floats:
-        """H (size, size), lower triangle."""
-        out = np.zeros((self.size, self.size))
-        out[self.rows, self.columns] = self.factors @ values_mhz[self.parameters]
-        return out
-
-    def slopes(self, vectors: Floats) -> Floats:
-        """⟨n|O_i|n⟩ (states, parameters of the block) of states in columns."""
-        weights = vectors[self.rows] * vectors[self.columns] * self.twice[:, None]
-        return np.asarray(weights.T @ self.factors)
 
 
 class Elements(NamedTuple):
@@ -66,7 +59,9 @@ def elements_of(matrix: Floats) -> Elements:
     >>> elements_of(np.array([[1.0, 9.0], [0.0, 2.0]])).places.tolist()
     [0, 3]
     """
-    places = np.flatnonzero(np.tril(matrix))
+    places = np.flatnonzero(matrix)
+    rows, columns = np.divmod(places, matrix.shape[1])
+    places = places[rows >= columns]
     return Elements(places, matrix.ravel()[places])
 
 
@@ -74,19 +69,101 @@ def unit_block(units: dict[int, Elements], sub_blocks: Ints, namer: Namer) -> Un
     """From the unit matrix of every parameter, by its number, that acts in the block."""
     parameters, size = sorted(units), len(sub_blocks)
     diagonal = np.arange(size) * (size + 1)
-    places = np.unique(np.concatenate([diagonal, *(units[i].places for i in parameters)]))
+    places = distinct(np.concatenate([diagonal, *(units[i].places for i in parameters)]))
     factors = np.zeros((len(places), len(parameters)))
     for column, i in enumerate(parameters):
         factors[np.searchsorted(places, units[i].places), column] = units[i].values
     rows, columns = np.divmod(places, size)
-    members = (sub_blocks[None, :] == np.arange(sub_blocks.max(initial=0) + 1)[:, None]).astype(float)
-    twice = np.where(rows == columns, 1.0, 2.0)
-    return UnitBlock(size, rows, columns, factors, np.array(parameters, dtype=np.int64), members, twice, namer)
+    numbers = np.array(parameters, dtype=np.int64)
+    return UnitBlock(size, rows, columns, factors, np.eye(len(parameters)), numbers, members_of(sub_blocks), namer)
 
 
-@dataclass
-class _Tracked:
-    """Labels in a block: their places among all, the states that have them, and the sub-blocks of all states at that time."""
+def members_of(sub_blocks: Ints) -> Floats:
+    """1 where a function (columns) is in a sub-block (rows), from the number of the sub-block of every function."""
+    return np.asarray(sub_blocks[None, :] == np.arange(sub_blocks.max(initial=0) + 1)[:, None], dtype=float)
+
+
+@dataclass(frozen=True)
+class _Solved:
+    """Blocks side by side: matrices (lower triangles, less `zero` on the diagonal), energies, vectors."""
+
+    matrices: Floats
+    energies: Floats
+    vectors: Floats
+
+
+@dataclass(frozen=True)
+class _Stack:
+    """Blocks of one size side by side, padded with elements that are 0.
+
+    places (blocks, elements) : in all matrices one behind the other, the place behind them where padded. twice : 2 off the diagonal
+    rows, columns, factors, mix, parameters, members : as of the blocks; padded parameters are the one behind all, whose value is 0
+    """
+
+    size: int
+    places: Ints
+    rows: Ints
+    columns: Ints
+    twice: Floats
+    factors: Floats
+    mix: Floats
+    parameters: Ints
+    members: Floats
+
+    @classmethod
+    def of(cls, blocks: Sequence[UnitBlock]) -> _Stack:
+        count, size = len(blocks), blocks[0].size
+        most, units = max(len(b.rows) for b in blocks), max(b.factors.shape[1] for b in blocks)
+        acting, parts = max(len(b.parameters) for b in blocks), max(len(b.members) for b in blocks)
+        places = np.full((count, most), count * size * size)
+        rows, columns = np.zeros((2, count, most), dtype=np.int64)
+        factors, mix = np.zeros((count, most, units)), np.zeros((count, units, acting))
+        parameters, members = np.full((count, acting), -1), np.zeros((count, parts, size))
+        for b, block in enumerate(blocks):
+            n = len(block.rows)
+            places[b, :n] = (b * size + block.rows) * size + block.columns
+            rows[b, :n], columns[b, :n] = block.rows, block.columns
+            factors[b, :n, : block.factors.shape[1]] = block.factors
+            mix[b, : block.mix.shape[0], : block.mix.shape[1]] = block.mix
+            parameters[b, : len(block.parameters)] = block.parameters
+            members[b, : len(block.members)] = block.members
+        twice = np.where(rows == columns, 1.0, 2.0)
+        return cls(size, places, rows, columns, twice, factors, mix, parameters, members)
+
+    def solved(self, values_mhz: Floats) -> _Solved:
+        """A number is taken off each diagonal for the sake of digits, and added to the energies."""
+        count, size = len(self.rows), self.size
+        values = np.append(values_mhz, 0.0)[self.parameters]
+        of_units = self.mix @ values[:, :, None]
+        whole = np.zeros(count * size * size + 1)
+        whole[self.places] = (self.factors @ of_units)[:, :, 0]
+        matrices = whole[:-1].reshape(count, size, size)
+        zero = matrices[:, 0, 0].copy()
+        matrices.reshape(count, -1)[:, :: size + 1] -= zero[:, None]
+        if not np.isfinite(whole[:-1].sum()):
+            raise ValueError("a block of the Hamiltonian is not finite with these constants")
+        energies, vectors = np.linalg.eigh(matrices)
+        return _Solved(matrices, energies + zero[:, None], vectors)
+
+    def leading(self, vectors: Floats) -> Ints:
+        """The sub-block with the largest share of each state, (blocks, size)."""
+        if self.members.shape[1] == 1:
+            return np.zeros(vectors.shape[:2], dtype=np.int64)
+        return np.asarray((self.members @ vectors**2).argmax(axis=1))
+
+    def slopes(self, vectors: Floats, states: Ints) -> Floats:
+        """⟨n|O_i|n⟩ (blocks, states, parameters of the blocks) of some states (blocks, states)."""
+        chosen = np.take_along_axis(vectors, states[:, None, :], axis=2)
+        block = np.arange(len(states))[:, None]
+        weights = chosen[block, self.rows]
+        weights *= chosen[block, self.columns]
+        weights *= self.twice[:, :, None]
+        return np.asarray(weights.transpose(0, 2, 1) @ self.factors @ self.mix)
+
+
+@dataclass(frozen=True)
+class Tracked:
+    """Labels in a block: their places among all, the names and the states that they have, and the sub-blocks of all states then."""
 
     block: UnitBlock
     rows: Ints
@@ -95,71 +172,148 @@ class _Tracked:
     leading: Ints
 
 
+def _stacks(blocks: Sequence[UnitBlock]) -> list[Ints]:
+    """Positions of the blocks that are worked on together: of one size, of like numbers of elements, of bounded memory."""
+    order = sorted(range(len(blocks)), key=lambda i: (blocks[i].size, len(blocks[i].rows), blocks[i].factors.shape[1]))
+    out, some = list[Ints](), list[int]()
+    for i in order:
+        block = blocks[i]
+        width = max(block.factors.shape[1], block.size)
+        if some and (block.size != blocks[some[0]].size or (len(some) + 1) * len(block.rows) * width > _AT_ONCE):
+            out.append(np.array(some))
+            some = []
+        some.append(i)
+    return [*out, np.array(some)] if some else out
+
+
+def tracked_blocks(
+    blocks: Sequence[UnitBlock], count: int, find: Callable[[int, Ints], tuple[Ints, Ints]], values_mhz: Floats
+) -> UnitBlocks:
+    """Labels looked for in the blocks solved at some values.
+
+    Parameters
+    ----------
+    blocks : sequence of UnitBlock
+    count : int
+        Number of labels.
+    find : callable
+        Number of a block and names (n, columns) of its states to places of labels in it, and which states.
+    values_mhz : (parameters,) array
+
+    Returns
+    -------
+    UnitBlocks
+        Blocks in which labels lie.
+    """
+    tracked = []
+    for numbers in _stacks(blocks):
+        stack = _Stack.of([blocks[i] for i in numbers.tolist()])
+        solved = stack.solved(values_mhz)
+        leading = stack.leading(solved.vectors)
+        for place, i in enumerate(numbers.tolist()):
+            names = blocks[i].namer(solved.matrices[place], solved.energies[place], solved.vectors[place])
+            rows, states = find(i, names)
+            if len(rows):
+                tracked.append(Tracked(blocks[i], rows, names[states], states, leading[place]))
+    return UnitBlocks(count, tuple(tracked))
+
+
+@dataclass(frozen=True)
+class _Labelled:
+    """A stack with the labels in it: rows (blocks, labels), the place behind all where padded; states (blocks, labels)."""
+
+    stack: _Stack
+    tracked: tuple[Tracked, ...]
+    rows: Ints
+    states: Ints
+    leading: Ints
+
+    @classmethod
+    def of(cls, tracked: Sequence[Tracked]) -> _Labelled:
+        most = max(len(one.rows) for one in tracked)
+        rows, states = np.full((len(tracked), most), -1), np.zeros((len(tracked), most), dtype=np.int64)
+        for b, one in enumerate(tracked):
+            rows[b, : len(one.rows)], states[b, : len(one.rows)] = one.rows, one.states
+        leading = np.stack([one.leading for one in tracked])
+        return cls(_Stack.of([one.block for one in tracked]), tuple(tracked), rows, states, leading)
+
+    @cached_property
+    def _at_start(self) -> Ints:
+        return self._ranks(self.leading)
+
+    def levels(self, values_mhz: Floats) -> tuple[Floats, Floats]:
+        """Energies (blocks, labels) and derivatives (blocks, labels, parameters of the blocks)."""
+        solved = self.stack.solved(values_mhz)
+        states = self._states(solved)
+        return np.take_along_axis(solved.energies, states, axis=1), self.stack.slopes(solved.vectors, states)
+
+    def _states(self, solved: _Solved) -> Ints:
+        """The states that have the labels now; names are made anew only where a state is mostly in another sub-block."""
+        leading = self.stack.leading(solved.vectors)
+        moved = ((self._ranks(leading) != self._at_start) & (self.rows >= 0)).any(axis=1)
+        if not moved.any():
+            return self.states
+        states = self.states.copy()
+        for b in np.flatnonzero(moved).tolist():
+            one = self.tracked[b]
+            made = one.block.namer(solved.matrices[b], solved.energies[b], solved.vectors[b])
+            states[b, : len(one.rows)] = _states_of(made, one.names)
+        return states
+
+    def _ranks(self, leading: Ints) -> Ints:
+        """The sub-blocks of the labelled states and their places by energy in these, as one number each (blocks, labels).
+
+        What becomes of states above, such as doublets that nothing splits, has no bearing.
+        """
+        if self.stack.members.shape[1] == 1:
+            return np.zeros_like(self.states)
+        own = np.take_along_axis(leading, self.states, axis=1)
+        below = np.arange(self.stack.size) < self.states[:, :, None]
+        return np.asarray(own * self.stack.size + ((leading[:, None, :] == own[:, :, None]) & below).sum(axis=2))
+
+
+def _states_of(made: Ints, names: Ints) -> Ints:
+    """Which states have the names, of the names of all."""
+    of_name = {tuple(name): state for state, name in enumerate(made.tolist())}
+    found = [of_name.get(tuple(name), -1) for name in names.tolist()]
+    if min(found) < 0:
+        raise ValueError("a labelled level has no state of its name with these constants")
+    return np.array(found)
+
+
+@dataclass(frozen=True)
 class UnitBlocks:
     """Blocks with the labels that lie in them; `levels` gives energies and derivatives, in the order of the labels."""
 
-    def __init__(
-        self,
-        blocks: Sequence[UnitBlock],
-        count: int,
-        find: Callable[[int, Ints], tuple[Ints, Ints]],
-        values_mhz: Floats,
-    ) -> None:
-        """Labels are looked for in the blocks solved at `values_mhz`.
-
-        count : labels. find : number of a block and names (n, columns) of its states to places of labels in it, and which states
-        """
-        self.count = count
-        self._tracked: list[_Tracked] = []
-        for number, block in enumerate(blocks):
-            matrix, energies, vectors = _solved(block, values_mhz)
-            names = block.namer(matrix, energies, vectors)
-            rows, states = find(number, names)
-            if len(rows):
-                leading = _leading(block, vectors)
-                self._tracked.append(_Tracked(block, rows, names[states], states, leading))
+    count: int
+    tracked: tuple[Tracked, ...]
 
     @property
     def found(self) -> Ints:
         """Places of the labels that were found."""
-        return np.concatenate([one.rows for one in self._tracked]) if self._tracked else np.zeros(0, dtype=np.int64)
+        return np.concatenate([one.rows for one in self.tracked]) if self.tracked else np.zeros(0, dtype=np.int64)
+
+    @cached_property
+    def _labelled(self) -> list[_Labelled]:
+        numbers = _stacks([one.block for one in self.tracked])
+        return [_Labelled.of([self.tracked[i] for i in some.tolist()]) for some in numbers]
 
     def levels(self, values_mhz: Floats) -> tuple[Floats, Floats]:
         """Energies (count,) and derivatives (count, parameters); nan for labels that are not in these blocks."""
-        energies = np.full(self.count, np.nan)
-        slopes = np.zeros((self.count, len(values_mhz)))
-        for one in self._tracked:
-            matrix, solved, vectors = _solved(one.block, values_mhz)
-            states = self._states(one, matrix, solved, vectors)
-            energies[one.rows] = solved[states]
-            slopes[one.rows[:, None], one.block.parameters] = one.block.slopes(vectors[:, states])
-        return energies, slopes
-
-    def _states(self, one: _Tracked, matrix: Floats, energies: Floats, vectors: Floats) -> Ints:
-        """The states that have the labels now; names are made anew only where a state is mostly in another sub-block."""
-        leading = _leading(one.block, vectors)
-        if (leading == one.leading).all():
-            return one.states
-        names = {tuple(name): state for state, name in enumerate(one.block.namer(matrix, energies, vectors).tolist())}
-        found = [names.get(tuple(name), -1) for name in one.names.tolist()]
-        if min(found) < 0:
-            raise ValueError("a labelled level has no state of its name with these constants")
-        return np.array(found)
+        energies = np.full(self.count + 1, np.nan)  # padded labels and parameters go to the last place
+        slopes = np.zeros((self.count + 1, len(values_mhz) + 1))
+        for one in self._labelled:
+            found, derived = one.levels(values_mhz)
+            energies[one.rows] = found
+            slopes[one.rows[:, :, None], one.stack.parameters[:, None, :]] = derived
+        return energies[:-1], slopes[:-1, :-1]
 
 
-def _solved(block: UnitBlock, values_mhz: Floats) -> tuple[Floats, Floats, Floats]:
-    """Matrix, energies and vectors; a number is taken off the diagonal for the sake of digits, and added to the energies."""
-    matrix = block.matrix(values_mhz)
-    zero = float(matrix[0, 0])
-    matrix.ravel()[:: block.size + 1] -= zero
-    if not math.isfinite(float(matrix.sum())):
-        raise ValueError("a block of the Hamiltonian is not finite with these constants")
-    energies, vectors = np.linalg.eigh(matrix)
-    return matrix, energies + zero, vectors
-
-
-def _leading(block: UnitBlock, vectors: Floats) -> Ints:
-    """The sub-block with the largest share of each state, (n,)."""
-    if len(block.members) == 1:
-        return np.zeros(block.size, dtype=np.int64)
-    return np.asarray((block.members @ vectors**2).argmax(axis=0))
+def joined(parts: Sequence[tuple[UnitBlocks, Ints, Ints]], count: int) -> UnitBlocks:
+    """Several sets of blocks as one of so many labels: each with the places of its labels and of its parameters among all."""
+    tracked = list[Tracked]()
+    for blocks, rows, columns in parts:
+        for one in blocks.tracked:
+            block = replace(one.block, parameters=columns[one.block.parameters])
+            tracked.append(replace(one, block=block, rows=rows[one.rows]))
+    return UnitBlocks(count, tuple(tracked))

@@ -25,11 +25,12 @@ from rotor.arrays import Floats, Ints
 from rotor.quantum.fields.blocks import Contraction, FieldBlock, FieldSpace, FreeLevels
 from rotor.quantum.fields.wang_blocks import coloured_components
 from rotor.quantum.spins import scheme_of
-from rotor.quantum.spins.blocks import SpinBlock, SpinPart, product
+from rotor.quantum.spins.blocks import SpinBlock, product
 from rotor.quantum.spins.coupling import moment_coefficients, patterns, recoupling
 from rotor.quantum.spins.levels import spin_levels
 from rotor.quantum.spins.lines import amplitudes
 from rotor.quantum.spins.operators import AxialState, CosinesWithN
+from rotor.quantum.spins.parts import SpinPart
 from rotor.quantum.tensors import BodyTensor, body_tensor
 from rotor.quantum.wigner import three_j
 

@@ -5,26 +5,27 @@ times the coupling patterns p of that N, are the basis of an F,
 
     ⟨r' p'|H|r p⟩ = E_r δ + Σ_channels c(p', p) ⟨r'|X|r⟩,
 
-a Kronecker product for each pair of solved blocks. Blocks that no channel connects are solved apart.
-
-A level is named after a sub-block: a Wang block of one state, and one pattern. The names are given one to one, the largest share
-first, and among the levels of one sub-block Ka rises with energy.
+a Kronecker product for each pair of solved blocks. Blocks that no channel connects are solved apart. `parts` names the levels.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from functools import cached_property
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum.effect import QuantumEffect
+from rotor.quantum.spins.contraction import Stack, operators_of_stacks, stacks_of
 from rotor.quantum.spins.coupling import coefficients, n_dot_s, patterns, recoupling, stacks
 from rotor.quantum.spins.method import FIRST_ORDER, Used
 from rotor.quantum.spins.operators import AxialState
+from rotor.quantum.spins.parts import SpinPart, labels_of, named_states, names_of_parts
 from rotor.quantum.spins.rotor import (
     Channel,
     Channels,
@@ -43,33 +44,17 @@ if TYPE_CHECKING:
 
 
 _FEW = 100  # patterns of an F; of more the coefficients are made when they are needed
-_AT_A_TIME = 1000  # entries of a table of shares that are looked at together
 Exist = Callable[[Ints], NDArray[np.bool_]]
-
-
-class SpinPart(NamedTuple):
-    """The states of the solved block `number` with every pattern of its N and class, pattern by pattern.
-
-    patterns: the rows of these patterns among those of the F, which are in the order of N, then of the class.
-    """
-
-    number: int
-    rotor: RotorBlock
-    patterns: slice
-    place: slice
-
-    @property
-    def repeats(self) -> int:
-        """Number of patterns."""
-        return int(self.patterns.stop - self.patterns.start)
 
 
 @dataclass(frozen=True)
 class Shared:
-    """What all blocks of a calculation share: the scheme, the representation, and elements that were computed once."""
+    """What all blocks of a calculation share: the scheme, the representation, the blocks of the rotation in stacks where their
+    functions are those of Wang blocks, and elements that were computed once."""
 
     scheme: Scheme
     representation: str
+    stacks: list[Stack] | None = field(default=None, repr=False, compare=False)
     cache: dict[Any, Any] = field(default_factory=dict, repr=False, compare=False)
     used: Used | None = None
 
@@ -93,8 +78,22 @@ class SpinBlock:
     shared: Shared
     start: int = 0
 
+    @cached_property
+    def single(self) -> bool:
+        """Whether every part has one pattern."""
+        return all(part.repeats == 1 for part in self.parts)
 
-class Plan(NamedTuple):
+    @cached_property
+    def by_number(self) -> dict[int, list[SpinPart]]:
+        """The parts by the number of their block of the rotation."""
+        found: dict[int, list[SpinPart]] = {}
+        for part in self.parts:
+            found.setdefault(part.number, []).append(part)
+        return found
+
+
+@dataclass(frozen=True)
+class Plan:
     """Solved rotation, operators of every channel by pairs of blocks (i ≥ k), and which blocks are connected.
 
     families: members (block, class), the class 1 of functions that change sign with the exchange of two equivalent spins.
@@ -104,6 +103,11 @@ class Plan(NamedTuple):
     blocks: list[RotorBlock]
     operators: dict[tuple[int, int], dict[Channel, Floats]]
     families: list[list[tuple[int, int]]]
+
+    @cached_property
+    def grouped(self) -> dict[tuple[int, int], list[tuple[Floats, list[Channel]]]]:
+        """Each matrix between two blocks once, with the channels that share it."""
+        return {pair: _by_operator(found) for pair, found in self.operators.items()}
 
     def with_method(self, used: Used, operators: dict[tuple[int, int], dict[Channel, Floats]]) -> Plan:
         """The same rotation with some of the operators, and what that is called."""
@@ -133,13 +137,36 @@ def plan_of(top: Top, effects: tuple[QuantumEffect, ...], nmin: int, nmax: int, 
     channels = channels_of(terms, scheme)
     firsts = _alike(channels)
     distinct = {first: channels[first] for first in firsts.values()}
-    operators = {}
     reach = 0 if "n" in scheme.conserved else 2
-    for i, k in _near(blocks, reach):
-        if found := operators_between(blocks[i], blocks[k], distinct, representation):
-            operators[i, k] = {channel: found[first] for channel, first in firsts.items() if first in found}
+    stacks = None if _are_axial(blocks) else stacks_of(blocks)
+    if stacks is None:
+        between = {
+            (i, k): operators_between(blocks[i], blocks[k], distinct, representation) for i, k in _near(blocks, reach)
+        }
+    else:
+        between = _operators(stacks, reach, distinct, representation)
+    operators = {
+        pair: {channel: found[first] for channel, first in firsts.items() if first in found}
+        for pair, found in between.items()
+        if found
+    }
     families = _families(len(blocks), operators, 2 if scheme.paired else 1)
-    return Plan(Shared(scheme, representation), blocks, operators, families)
+    return Plan(Shared(scheme, representation, stacks), blocks, operators, families)
+
+
+def _are_axial(blocks: list[RotorBlock]) -> bool:
+    return isinstance(blocks[0].parts[0].basis, AxialState)
+
+
+def _operators(
+    stacks: list[Stack], reach: int, channels: Channels, representation: str
+) -> dict[tuple[int, int], dict[Channel, Floats]]:
+    """`operators_between` of all blocks whose N differ by `reach` at most."""
+    out: dict[tuple[int, int], dict[Channel, Floats]] = {}
+    for channel, pieces in channels.items():
+        for pair, operator in operators_of_stacks(stacks, min(reach, channel.rank), pieces, representation).items():
+            out.setdefault(pair, {})[channel] = operator
+    return out
 
 
 def _alike(channels: Channels) -> dict[Channel, Channel]:
@@ -224,11 +251,9 @@ def solve_f(plan: Plan, twice_f: int, exist: Exist | None = None) -> list[SpinBl
 
 def _parts_of_f(plan: Plan, every: Ints) -> Iterator[tuple[SpinPart, ...]]:
     """The parts of every block of an F whose patterns these are."""
-    where, first = np.unique(
-        np.column_stack([every[:, 0] // 2, plan.shared.scheme.classes(every)]), axis=0, return_index=True
-    )
-    stops = [*first[1:].tolist(), len(every)]
-    rows = {tuple(own): slice(a, b) for own, a, b in zip(where.tolist(), first.tolist(), stops, strict=True)}
+    n, classes = every[:, 0] // 2, plan.shared.scheme.classes(every)
+    bounds = [0, *(np.flatnonzero((n[1:] != n[:-1]) | (classes[1:] != classes[:-1])) + 1).tolist(), len(every)]
+    rows = {(int(n[a]), int(classes[a])): slice(a, b) for a, b in pairwise(bounds)}
     for family in plan.families:
         members = [(i, rows[place]) for i, own in family if (place := (plan.blocks[i].n, own)) in rows]
         if members:
@@ -252,17 +277,6 @@ def functions_of_f(plan: Plan, twice_f: int) -> list[SpinBlock]:
 def _labels_of_functions(part: SpinPart, own_patterns: Ints) -> Ints:
     names = named_states(part.rotor, part.rotor.vectors)
     return np.concatenate([np.column_stack([names, np.tile(one, (len(names), 1))]) for one in own_patterns])
-
-
-def named_states(rotor: RotorBlock, vectors: Floats) -> Ints:
-    """v, Ka, Kc (n, 3) of states (n, n) of the rotation: of the part that has most of each, in order of energy."""
-    shares = np.stack([(vectors[part.place] ** 2).sum(axis=0) for part in rotor.parts])
-    of_state = assigned(shares, np.array([len(part.names) for part in rotor.parts]))
-    labels = np.empty((len(of_state), 3), dtype=np.int64)
-    labels[np.argsort(of_state, kind="stable")] = np.concatenate(
-        [np.column_stack([np.full(len(part.names), part.v), part.names]) for part in rotor.parts]
-    )
-    return labels
 
 
 def prepare(plan: Plan, every_f: Iterable[int]) -> None:
@@ -313,18 +327,31 @@ def _solved(
         labels, mixing = labels_of(parts, names, vectors)
         return SpinBlock(twice_f, every, parts, energies, vectors, labels, mixing, plan.shared)
     zero = float(parts[0].rotor.energies_mhz[0])  # taken out of the matrix for the sake of digits
-    diagonal = [np.tile(part.rotor.energies_mhz - zero, part.repeats) for part in parts]
-    matrix = np.diag(np.concatenate(diagonal))
-    for a, up in enumerate(parts):
-        for low in parts[: a + 1]:
-            for operator, of_it in _by_operator(plan.operators.get((up.number, low.number), {})):
-                factors = sum(known[channel][up.patterns, low.patterns] for channel in of_it)
-                matrix[up.place, low.place] += product(np.asarray(factors), operator)
+    matrix = _matrix(plan, parts, known, zero)
     if not np.isfinite(matrix).all():
         raise ValueError("a block of the Hamiltonian overflows: N max is too high for these constants")
     energies, vectors = np.linalg.eigh(matrix)  # reads the lower triangle
     labels, mixing = labels_of(parts, names, vectors)
     return SpinBlock(twice_f, every, parts, energies + zero, vectors, labels, mixing, plan.shared)
+
+
+def _matrix(plan: Plan, parts: tuple[SpinPart, ...], known: dict[Channel, Floats], zero: float) -> Floats:
+    """The Hamiltonian of one block, energies from `zero` on, in the lower triangle."""
+    size, single = parts[-1].place.stop, all(part.repeats == 1 for part in parts)
+    matrix, grouped = np.zeros((size, size)), plan.grouped
+    matrix.flat[:: size + 1] = np.concatenate([np.tile(p.rotor.energies_mhz - zero, p.repeats) for p in parts])
+    for a, up in enumerate(parts):
+        for low in parts[: a + 1]:
+            for operator, of_it in grouped.get((up.number, low.number), ()):
+                if single:
+                    factor = sum(known[channel][up.patterns.start, low.patterns.start] for channel in of_it)
+                    matrix[up.place, low.place] += factor * operator
+                    continue
+                factors = known[of_it[0]][up.patterns, low.patterns]
+                for channel in of_it[1:]:
+                    factors = factors + known[channel][up.patterns, low.patterns]
+                matrix[up.place, low.place] += product(factors, operator)
+    return matrix
 
 
 def _by_operator(operators: dict[Channel, Floats]) -> list[tuple[Floats, list[Channel]]]:
@@ -382,69 +409,3 @@ def _of_exchange(scheme: Scheme, channel: Channel, every: Ints) -> Floats:
         found = (found + channel.exchange * _one_by_one(scheme, channel._replace(acting=turned), plain)) / 2
     turn = recoupling(scheme.twice, plain, every)
     return np.asarray(turn.T @ found @ turn)
-
-
-def labels_of(parts: tuple[SpinPart, ...], named: tuple[Ints, Ints], vectors: Floats) -> tuple[Ints, Floats]:
-    """Names (n, 3 + pattern) of the states of a block, energies rising, and the shares of the sub-blocks that give them."""
-    names, sizes = named
-    shares: list[Floats] = []
-    for part in parts:
-        states = len(part.rotor.energies_mhz)
-        rows = vectors[part.place].reshape(part.repeats, states, -1)
-        for own in part.rotor.parts:
-            inside = (
-                rows if len(part.rotor.parts) == 1 else np.einsum("kr,prn->pkn", part.rotor.vectors[own.place], rows)
-            )
-            shares.append(np.einsum("pkn,pkn->pn", inside, inside))
-    table = np.concatenate(shares)
-    of_state = assigned(table, sizes)
-    labels = np.empty_like(names)
-    labels[np.argsort(of_state, kind="stable")] = names
-    return labels, np.asarray(table[of_state, np.arange(len(of_state))])
-
-
-def names_of_parts(parts: tuple[SpinPart, ...], every: Ints) -> tuple[Ints, Ints]:
-    """v, Ka, Kc and the pattern of the levels that the sub-blocks name, (functions, 3 + pattern), and how many each names."""
-    found, sizes = [], []
-    for part in parts:
-        own_patterns = every[part.patterns]
-        for own in part.rotor.parts:
-            names = np.empty((len(own_patterns), len(own.names), 3 + every.shape[1]), dtype=np.int64)
-            names[..., 0] = own.v
-            names[..., 1:3] = own.names
-            names[..., 3:] = own_patterns[:, None, :]
-            found.append(names.reshape(-1, names.shape[-1]))
-            sizes += [len(own.names)] * len(own_patterns)
-    return np.concatenate(found), np.array(sizes)
-
-
-def assigned(shares: Floats, capacity: Ints) -> Ints:
-    """Which sub-block names each state: shares (sub-blocks, states), the largest first, none beyond its capacity.
-
-    >>> assigned(np.array([[0.9, 0.6, 0.0], [0.1, 0.4, 1.0]]), np.array([1, 2])).tolist()
-    [0, 1, 1]
-    """
-    found = shares.argmax(axis=0)
-    if (np.bincount(found, minlength=len(capacity)) == capacity).all():
-        return np.asarray(found)
-    clear = shares[found, np.arange(len(found))] > 0.5  # before all others; where they fit in, they are decided
-    left = capacity - np.bincount(found[clear], minlength=len(capacity))
-    if (left < 0).any():
-        return _largest_first(shares, capacity)
-    rest, subs = np.flatnonzero(~clear), np.flatnonzero(left > 0)
-    found[rest] = subs[_largest_first(shares[np.ix_(subs, rest)], left[subs])]
-    return np.asarray(found)
-
-
-def _largest_first(shares: Floats, capacity: Ints) -> Ints:
-    found, left = np.full(shares.shape[1], -1), capacity.copy()
-    every = np.argsort(-shares, axis=None, kind="stable")
-    for start in range(0, len(every), _AT_A_TIME):
-        subs, states = np.divmod(every[start : start + _AT_A_TIME], shares.shape[1])
-        free = (found[states] < 0) & (left[subs] > 0)  # of what was decided before
-        for sub, state in zip(subs[free].tolist(), states[free].tolist(), strict=True):
-            if found[state] < 0 and left[sub]:
-                found[state], left[sub] = sub, left[sub] - 1
-        if not left.any():
-            break
-    return found

@@ -10,15 +10,18 @@ see `coupling.tensor_coefficients`. Elements of the rotation are computed once f
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum.levels import Levels
-from rotor.quantum.spins.blocks import Shared, SpinBlock, SpinPart, coefficients_of, operators_between, product
+from rotor.quantum.spins.blocks import Shared, SpinBlock, coefficients_of, operators_between, product
+from rotor.quantum.spins.contraction import MOST_RANK, tensor_elements_of_stacks
 from rotor.quantum.spins.coupling import patterns, recoupling, stacks, tensor_coefficients
 from rotor.quantum.spins.operators import AxialState, Scalar, tensor_elements
+from rotor.quantum.spins.parts import SpinPart
 from rotor.quantum.spins.rotor import Channel, RotorBlock, RotorPart, channels_of
 from rotor.quantum.spins.scheme import Scheme
 from rotor.quantum.tensors import BodyTensor, Tensors, rank_of, tensor_between
@@ -36,9 +39,17 @@ ROUND_OFF = 1e-13  # of sums of products of a few coefficients of size 1
 
 def amplitudes(up: SpinBlock, low: SpinBlock, tensors: Tensors) -> Floats:
     """Real reduced elements between all states of two blocks, (n_up, n_low); their squares are line strengths."""
-    rank, moved = rank_of(tensors), np.zeros((up.vectors.shape[0], low.vectors.shape[1]))
-    t = _coefficients(up, low, rank)
-    for target, source, element in _acting(up, low, tensors, rank):
+    rank = rank_of(tensors)
+    t, acting = _coefficients(up, low, rank), _acting(up, low, tensors, rank)
+    rows, columns = up.vectors.shape[0], low.vectors.shape[0]
+    if up.single and low.single and rows * columns <= _FEW:
+        whole = np.zeros((rows, columns))
+        for target, source, element in acting:
+            factor = t[target.patterns.start, source.patterns.start]
+            np.multiply(element, factor, out=whole[target.place, source.place])
+        return np.asarray(up.vectors.T @ (whole @ low.vectors))
+    moved = np.zeros((rows, low.vectors.shape[1]))
+    for target, source, element in acting:
         moved[target.place] += acting_on(low.vectors[source.place], t[target.patterns, source.patterns], element)
     return np.asarray(up.vectors.T @ moved)
 
@@ -63,38 +74,80 @@ def connected(up: SpinBlock, low: SpinBlock, tensors: Tensors) -> bool:
     return bool(_acting(up, low, tensors, rank))
 
 
+@dataclass(frozen=True)
+class Elements:
+    """Elements of some tensors between the blocks of the rotation, and between which parts of pairs of spin blocks they act.
+
+    known: by numbers of blocks, None where they are zero. partners: of every block those with an element, where all are known.
+    """
+
+    tensors: Tensors
+    known: dict[tuple[int, int], Floats | None]
+    partners: dict[int, list[tuple[int, Floats]]] | None
+    pairs: dict[tuple[int, int], list[tuple[SpinPart, SpinPart, Floats]]] = field(default_factory=dict)
+    reached: dict[int, set[int]] = field(default_factory=dict)
+
+    def reached_from(self, up: SpinBlock) -> set[int]:
+        """The numbers of all partners of the parts of a block."""
+        if up.start not in self.reached:
+            partners = self.partners or {}
+            self.reached[up.start] = {number for own in up.by_number for number, _ in partners.get(own, ())}
+        return self.reached[up.start]
+
+
+def _elements(shared: Shared, tensors: Tensors, rank: int) -> Elements:
+    """All of them at once where the rotation stands in stacks; else they are made when they are needed."""
+    found: Elements | None = shared.cache.get(id(tensors))  # it holds the tensors: their id stays theirs
+    if found is None:
+        if shared.stacks is None or rank > MOST_RANK:
+            found = Elements(tensors, {}, None)
+        else:
+            known = tensor_elements_of_stacks(shared.stacks, tensors)
+            partners: dict[int, list[tuple[int, Floats]]] = {}
+            for (i, k), element in known.items():
+                partners.setdefault(i, []).append((k, element))
+            found = Elements(tensors, dict(known), partners)
+        shared.cache[id(tensors)] = found
+    return found
+
+
 def _acting(up: SpinBlock, low: SpinBlock, tensors: Tensors, rank: int) -> list[tuple[SpinPart, SpinPart, Floats]]:
     """Pairs of parts between which the tensors act, with the element of the rotation."""
     if not abs(up.twice_f - low.twice_f) <= 2 * rank <= up.twice_f + low.twice_f:
         return []
-    _, pairs, known = low.shared.cache.setdefault(
-        id(tensors), (tensors, {}, {})
-    )  # it holds the tensors: their id stays theirs
-    place = (up.start, low.start)
-    if place not in pairs:
-        pairs[place] = list(_parts_between(up, low, tensors, rank, known))
-    acting: list[tuple[SpinPart, SpinPart, Floats]] = pairs[place]
-    return acting
+    elements, place = _elements(low.shared, tensors, rank), (up.start, low.start)
+    if place not in elements.pairs:
+        if elements.partners is not None and elements.reached_from(up).isdisjoint(low.by_number):
+            return []
+        t = _coefficients(up, low, rank) if low.shared.scheme.paired else None
+        elements.pairs[place] = [
+            (target, source, element)
+            for target, source, element in _parts_between(up, low, elements, rank)
+            if t is None or t[target.patterns, source.patterns].any()
+        ]
+    return elements.pairs[place]
 
 
 def _parts_between(
-    up: SpinBlock, low: SpinBlock, tensors: Tensors, rank: int, known: dict[tuple[int, int], Floats | None]
+    up: SpinBlock, low: SpinBlock, elements: Elements, rank: int
 ) -> Iterator[tuple[SpinPart, SpinPart, Floats]]:
-    t = _coefficients(up, low, rank) if low.shared.scheme.paired else None
+    if elements.partners is not None:
+        sources = low.by_number
+        for target in up.parts:
+            for number, found in elements.partners.get(target.number, ()):
+                for source in sources.get(number, ()):
+                    yield target, source, found
+        return
     by_n: dict[int, list[SpinPart]] = {}
     for source in low.parts:
         by_n.setdefault(source.rotor.n, []).append(source)
     for target in up.parts:
         n, number = target.rotor.n, target.number
         for source in (part for near in range(n - rank, n + rank + 1) for part in by_n.get(near, ())):
-            if t is not None and not t[target.patterns, source.patterns].any():
-                continue
             key = (number, source.number)
-            element = (
-                known[key]
-                if key in known
-                else known.setdefault(key, _rotor_element(target.rotor, source.rotor, tensors))
-            )
+            if key not in elements.known:
+                elements.known[key] = _rotor_element(target.rotor, source.rotor, elements.tensors)
+            element = elements.known[key]
             if element is not None:
                 yield target, source, element
 
@@ -198,6 +251,17 @@ class ParameterOperator:
         terms = [term for effect in effects for term in effect.spin_terms(top) if term.name == name]
         self._channels = channels_of([(term.factor, term) for term in terms], shared.scheme)
         self._known: dict[tuple[int, int], dict[Channel, Floats]] = {}
+        self._own = [
+            (state, operators)
+            for effect in effects
+            for state, terms in ({0: effect.operators(top)} | {one.v: one.terms for one in effect.states(top)}).items()
+            if (operators := terms.get(name))
+        ]
+        self._couplings = [one for effect in effects for one in effect.couplings(top) if one.name == name]
+
+    def connects(self, up: SpinPart, low: SpinPart) -> bool:
+        """Whether there may be elements between two parts: an operator of the rotation alone has them within one solved block."""
+        return bool(self._channels) or up.number == low.number
 
     def expectations(self, block: SpinBlock) -> Floats:
         """⟨i|∂H/∂c|i⟩ of every state of a block, (n,)."""
@@ -217,7 +281,9 @@ class ParameterOperator:
         """Elements between the states of the rotation of two parts, by channel."""
         key = (up.number, low.number)
         if key not in self._known:
-            found = operators_between(up.rotor, low.rotor, self._channels, self._shared.representation)
+            found: dict[Channel, Floats] = {}
+            if self._channels:
+                found = operators_between(up.rotor, low.rotor, self._channels, self._shared.representation)
             if up.number == low.number and (own := self._rotation(up.rotor)) is not None:
                 found[ALONE] = found[ALONE] + own if ALONE in found else own
             self._known[key] = found
@@ -227,28 +293,27 @@ class ParameterOperator:
         """The derivative of the Hamiltonian of the rotation over the states of a block."""
         size = sum(part.basis.size for part in block.parts)
         total = np.zeros((size, size))
-        for effect in self._effects:
-            own = {0: effect.operators(self._top)} | {state.v: state.terms for state in effect.states(self._top)}
+        for v, operators in self._own:
             for part in block.parts:
-                if operators := own.get(part.v, {}).get(self._name):
+                if part.v == v:
                     matrix = Scalar(tuple(operators.items())).elements(
                         part.basis, part.basis, self._shared.representation
                     )
                     assert matrix is not None
                     total[part.place, part.place] += matrix
-            for bra, ket, operator in self._operators_of_j(effect, block.n):
-                _add_between(total, block, bra, ket, operator)
+        for bra, ket, operator in self._operators_of_j(block.n):
+            _add_between(total, block, bra, ket, operator)
         return block.vectors.T @ total @ block.vectors if total.any() else None
 
-    def _operators_of_j(self, effect: QuantumEffect, n: int) -> Iterator[tuple[int, int, JOperator]]:
+    def _operators_of_j(self, n: int) -> Iterator[tuple[int, int, JOperator]]:
         representation = self._shared.representation
-        if self._name in effect.parameters(self._top):
-            operator = effect.j_operator(self._top, self._name, n, representation)
-            if operator is not None:
-                yield 0, 0, operator
-        for coupling in effect.couplings(self._top):
-            if coupling.name == self._name:
-                yield coupling.bra, coupling.ket, coupling.operator(n, representation)
+        for effect in self._effects:
+            if self._name in effect.parameters(self._top):
+                operator = effect.j_operator(self._top, self._name, n, representation)
+                if operator is not None:
+                    yield 0, 0, operator
+        for coupling in self._couplings:
+            yield coupling.bra, coupling.ket, coupling.operator(n, representation)
 
 
 ALONE = Channel((), 0)

@@ -19,9 +19,10 @@ import numpy as np
 from rotor.arrays import Floats
 from rotor.quantum.levels import Levels
 from rotor.quantum.moments import Moment
-from rotor.quantum.spins.blocks import SpinBlock, SpinPart, product
+from rotor.quantum.spins.blocks import SpinBlock, product
 from rotor.quantum.spins.coupling import moment_coefficients, patterns, recoupling
 from rotor.quantum.spins.operators import AxialState, tensor_elements
+from rotor.quantum.spins.parts import SpinPart
 from rotor.quantum.spins.rotor import RotorBlock, RotorPart
 from rotor.quantum.spins.scheme import Scheme
 from rotor.quantum.tensors import BodyTensor, body_tensor

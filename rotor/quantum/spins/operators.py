@@ -122,7 +122,7 @@ class Cosines:
 
     def elements(self, up: Basis, low: Basis, representation: str) -> Floats | None:
         """The real reduced matrix; of a vector that of i times it, Hermitian and invariant under time reversal."""
-        found = tensor_elements(up, low, _tensor(self.components, self.rank, representation))
+        found = tensor_elements(up, low, tensor_of(self.components, self.rank, representation))
         return -found if found is not None and self.rank == 1 else found  # i (i E)
 
 
@@ -141,8 +141,8 @@ class CosinesWithN:
             return None
         stretch = sqrt(max(((m + n + 1) ** 2 - 4) * (1 - (m - n) ** 2 / 4) / 6, 0.0))
         found = [
-            (stretch, tensor_elements(up, low, _tensor(self.components, 2, representation))),
-            ((n * (n + 1) - m * (m + 1)) / 2, tensor_elements(up, low, _axis(self.components, representation))),
+            (stretch, tensor_elements(up, low, tensor_of(self.components, 2, representation))),
+            ((n * (n + 1) - m * (m + 1)) / 2, tensor_elements(up, low, axis_tensor(self.components, representation))),
             (float(np.trace(c)) / 3, sqrt(n * (n + 1.0) * (2 * n + 1)) * np.eye(low.size) if up == low else None),
         ]
         acting = [factor * matrix for factor, matrix in found if matrix is not None and factor]
@@ -153,18 +153,18 @@ Rotor = Scalar | Cosines | CosinesWithN
 
 
 @lru_cache(maxsize=256)
-def _tensor(components: Vector | Matrix, rank: int, representation: str) -> BodyTensor | None:
+def tensor_of(components: Vector | Matrix, rank: int, representation: str) -> BodyTensor | None:
     parts = np.array(components, dtype=float)
     if rank == 2:
         parts = (parts + parts.T) / 2 - np.eye(3) * np.trace(parts) / 3
     return body_tensor(parts, rank, representation) if parts.any() else None
 
 
-def _axis(components: Matrix, representation: str) -> BodyTensor | None:
+def axis_tensor(components: Matrix, representation: str) -> BodyTensor | None:
     """The vector of the antisymmetric part."""
     c = np.array(components, dtype=float)
     c = (c - c.T) / 2
-    return _tensor((float(c[1, 2]), float(c[2, 0]), float(c[0, 1])), 1, representation)
+    return tensor_of((float(c[1, 2]), float(c[2, 0]), float(c[0, 1])), 1, representation)
 
 
 def is_axial(rotor: Rotor, axis: str) -> bool:

@@ -200,7 +200,7 @@ def contracted(up: RotorBlock, low: RotorBlock, pieces: Sequence[Piece], represe
     for piece in pieces:
         for left in up.parts:
             for right in low.parts:
-                if not _acts(piece, left.v, right.v):
+                if not acts(piece, left.v, right.v):
                     continue
                 found = piece.rotor.elements(left.basis, right.basis, representation)
                 if found is None or not found.any():
@@ -211,7 +211,8 @@ def contracted(up: RotorBlock, low: RotorBlock, pieces: Sequence[Piece], represe
     return total
 
 
-def _acts(piece: Piece, left: int, right: int) -> bool:
+def acts(piece: Piece, left: int, right: int) -> bool:
+    """Whether a piece acts from the state `right` to the state `left`."""
     return left == right if piece.bra == EVERY_STATE else (left, right) == (piece.bra, piece.ket)
 
 

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -19,7 +20,7 @@ from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.levels import Levels, SolvedBlock, weights_of_levels
 from rotor.quantum.wang.basis import WangBlock, limited, names_of, wang_blocks
 from rotor.quantum.wang.spherical_top import DIMENSION, is_cubic, scalar_and_tensor, tensor_eigenvalues
-from rotor.quantum.wang.wang_matrix import JMatrix, block_bands, diagonalise, scalar_energy
+from rotor.quantum.wang.wang_matrix import JMatrix, block_bands, diagonalise, lowest_energies, scalar_energy
 from rotor.tops.operators import AXIAL_REPRESENTATION, Operators
 from rotor.tops.spins.spin_weights import SpinWeights
 
@@ -27,6 +28,8 @@ if TYPE_CHECKING:
     from concurrent.futures import Executor
 
     from rotor.tops.top import Top
+
+_NONE: Floats = np.zeros((0, 0))  # stands for eigenvectors that were not asked for
 
 
 def hamiltonian(top: Top, effects: Sequence[QuantumEffect] = SEMI_RIGID) -> Operators:
@@ -53,6 +56,7 @@ def solve_rotation(
     vectors: bool = True,
     executor: Executor | None = None,
     in_blocks: bool = False,
+    below_mhz: float = math.inf,
 ) -> Levels:
     """Levels of the rotation, and of states v, without spins; see `solve_levels`.
 
@@ -70,6 +74,8 @@ def solve_rotation(
         J are spread over it.
     in_blocks : bool, optional
         Solve symmetric tops in Wang blocks too, so that the levels have eigenvectors.
+    below_mhz : float, optional
+        Without vectors, levels above it may be left out; the others are all there.
 
     Returns
     -------
@@ -90,7 +96,7 @@ def solve_rotation(
         if len(model.states) > 1 or model.couplings:
             return coupled_levels(top, effects, model, jmin, jmax, executor)
         if top.kind == "asymmetric" or in_blocks or limits or not _closed_form_holds(top.kind, operators):
-            return _in_wang_blocks(top, effects, operators, jmin, jmax, vectors, executor, limits.get(0))
+            return _in_wang_blocks(top, effects, operators, jmin, jmax, vectors, executor, limits.get(0), below_mhz)
     if top.kind in ("prolate", "oblate"):
         return _symmetric(top, effects, operators, jmin, jmax)
     if top.kind == "spherical":
@@ -230,16 +236,20 @@ def _in_wang_blocks(
     vectors: bool,
     executor: Executor | None,
     limits: tuple[int, int] | None = None,
+    below_mhz: float = math.inf,
 ) -> Levels:
     representation = representation_of(top)
-    pieces = [(operators, j, representation, vectors, limits) for j in range(jmin, jmax + 1)]
+    pieces = [(operators, j, representation, vectors, limits, below_mhz) for j in range(jmin, jmax + 1)]
     solved = executor.map(_solve_j, *zip(*pieces, strict=True)) if executor else (_solve_j(*piece) for piece in pieces)
     blocks = tuple(_placed(block for of_one_j in solved for block in of_one_j))
 
     labels = [names_of(b.basis, representation) for b in blocks]
-    sizes = [b.basis.size for b in blocks]
+    sizes = [len(b.energies_mhz) for b in blocks]
     j = np.repeat([b.basis.j for b in blocks], sizes)
-    quanta = {"j": j, "ka": np.concatenate([ka for ka, _ in labels]), "kc": np.concatenate([kc for _, kc in labels])}
+    ka, kc = (
+        np.concatenate([one[:size] for one, size in zip(of, sizes, strict=True)]) for of in zip(*labels, strict=True)
+    )
+    quanta = {"j": j, "ka": ka, "kc": kc}
     return Levels(
         kind=top.kind,
         representation=representation,
@@ -257,7 +267,9 @@ def _in_wang_blocks(
 def _weights_of_blocks(top: Top, blocks: tuple[SolvedBlock, ...], quanta: dict[str, NDArray[np.int64]]) -> Ints:
     """Spin weights; of an asymmetric top one number a block."""
     if top.kind == "asymmetric":
-        return np.repeat([top.spin_weights.of_ka_kc(b.basis.species) for b in blocks], [b.basis.size for b in blocks])
+        return np.repeat(
+            [top.spin_weights.of_ka_kc(b.basis.species) for b in blocks], [len(b.energies_mhz) for b in blocks]
+        )
     ones = np.ones(len(quanta["j"]), dtype=np.int64)
     bare = Levels(top.kind, None, int(quanta["j"].max()), ones.astype(float), dict(quanta), ones, ones, ones)
     return weights_of_levels(bare, top.spin_weights)
@@ -267,17 +279,21 @@ def _placed(solved: Iterator[tuple[WangBlock, Floats, Floats]]) -> Iterator[Solv
     start = 0
     for basis, energies, vectors in solved:
         yield SolvedBlock(basis, energies, vectors, start)
-        start += basis.size
+        start += len(energies)
 
 
 def _solve_j(
-    operators: Operators, j: int, representation: str, vectors: bool = True, limits: tuple[int, int] | None = None
-) -> list[tuple[WangBlock, Floats, Floats]]:
+    operators: Operators, j: int, representation: str, vectors: bool = True, limits: tuple[int, int] | None = None,
+    below_mhz: float = math.inf,
+) -> list[tuple[WangBlock, Floats, Floats]]:  # fmt: skip
     """The Wang blocks of one J solved: (block, energies in MHz, eigenvectors) in the order ee, eo, oe, oo; K within `limits`."""
     scalar, of_j = scalar_energy(operators, j), JMatrix(operators, j)
     out = []
     whole = wang_blocks(j, representation)
     for block in whole if limits is None else [part for b in whole if (part := limited(b, *limits))]:
+        if below_mhz < math.inf and not vectors:
+            out.append((block, lowest_energies(block_bands(of_j, block), below_mhz - scalar) + scalar, _NONE))
+            continue
         energies, states = diagonalise(block_bands(of_j, block), vectors)
         out.append((block, energies + scalar, states))
     return out

@@ -19,6 +19,7 @@ from rotor.arrays import Floats
 from rotor.quantum.wang.basis import WangBlock
 from rotor.tops.operators import Operators
 
+FEW = 20  # of so many eigenvalues a bisection to one takes no longer than the finding of all
 SMALL = 100  # rows of a tridiagonal block up to which scipy.linalg, 0.2 s to load, is not loaded for it
 
 
@@ -125,6 +126,41 @@ def diagonalise(bands: list[Floats], vectors: bool = True) -> tuple[Floats, Floa
     if info:
         raise ValueError(f"LAPACK dstevd did not converge on a block of size {size} (info = {info})")
     return energies, states
+
+
+def lowest_energies(bands: list[Floats], below: float) -> Floats:
+    """Eigenvalues up to `below`, rising; also higher ones where finding all takes no longer. Raises as `diagonalise` does.
+
+    A few of a large tridiagonal matrix are bisected for (LAPACK's dstebz); wide bands are made tridiagonal (dsbevd).
+    """
+    size = len(bands[0])
+    if size <= SMALL or len(bands) == 1 or not all(np.isfinite(band).all() for band in bands):
+        return diagonalise(bands, vectors=False)[0]
+    if len(bands) > 2:
+        return _of_wide_bands(bands)
+    from scipy.linalg.lapack import dstebz
+
+    lowest = -2.0 * (
+        np.abs(bands[0]).max() + np.abs(bands[1]).max()
+    )  # below the discs of Gershgorin, 2|e| wide on each side
+    if below <= lowest:
+        return np.zeros(0)
+    rough, *_ = dstebz(bands[0], bands[1], 1, lowest, below, 1, size, below - lowest, b"E")  # their number, at once
+    if rough * FEW > size:
+        return diagonalise(bands, vectors=False)[0]
+    count, energies, _, _, info = dstebz(bands[0], bands[1], 1, lowest, below, 1, size, 0.0, b"E")
+    if info:
+        raise ValueError(f"LAPACK dstebz did not converge on a block of size {size} (info = {info})")
+    return np.sort(energies[:count])
+
+
+def _of_wide_bands(bands: list[Floats]) -> Floats:
+    from scipy.linalg import eig_banded
+
+    rows = np.zeros((len(bands), len(bands[0])))
+    for n, band in enumerate(bands):
+        rows[n, : len(band)] = band
+    return np.asarray(eig_banded(rows, lower=True, eigvals_only=True, check_finite=False))
 
 
 def _diagonal(band: Floats, vectors: bool) -> tuple[Floats, Floats]:

@@ -5,11 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from rotor.scenes.knobs.knob import Knob, Knobs, Measure, Setting, ladder
+
+if TYPE_CHECKING:
+    from rotor.alignment.align import AlignmentTrace
 
 ERRORS = (1e-1, 1e-2, 1e-3, 1e-4, 1e-6, 1e-8, 1e-10)  # of a partition function, relative
 FINEST_SUM = 1e-13
@@ -119,22 +122,28 @@ def _apart(one: Any, other: Any) -> float:
 
 def align(request: Any) -> Knobs:
     """Of a scene of alignment."""
+    from rotor.alignment.basis import trace_with
     from rotor.alignment.request import answer_align
 
-    def error(found: Any, reference: Any) -> float:
-        return max(_apart(found.trace.cosines[name], true) for name, true in reference.trace.cosines.items())
+    def error(found: AlignmentTrace, reference: AlignmentTrace) -> float:
+        return max(_apart(found.cosines[name], true) for name, true in reference.cosines.items())
+
+    def of_tolerance(one: float) -> Any:
+        return plain if one == request.tolerance else replace(free, tolerance=one)
 
     plain = replace(request, classical_molecules=0)
-    finest = replace(plain, tolerance=max(1e-2 * min(*TOLERANCES, request.tolerance), FINEST_TOLERANCE))
+    free = replace(plain, jmax=None)  # a J max that serves one tolerance is too small for a finer one
+    finest = replace(free, tolerance=max(1e-2 * min(*TOLERANCES, request.tolerance), FINEST_TOLERANCE))
     measure = Measure("cosine", "", error)
-    settings = ladder(TOLERANCES, request.tolerance, lambda one: replace(plain, tolerance=one))
+    settings = ladder(TOLERANCES, request.tolerance, of_tolerance)
     against = f"a tolerance of {finest.tolerance:g}"
-    knobs = [Knob("numerics.tolerance", (measure,), settings, finest, against, answer_align)]
-    jmax = answer_align(plain).trace.jmax
-    values = sorted({max(2, round(share * jmax)) for share in SHARES_OF_J})
-    basis = tuple(Setting(str(j), replace(plain, jmax=j), j == jmax) for j in values)
-    beyond = replace(plain, jmax=jmax + MORE_J)
-    knobs.append(Knob("numerics.jmax", (measure,), basis, beyond, f"J max {jmax + MORE_J}", answer_align))
+    knobs = [Knob("numerics.tolerance", (measure,), settings, finest, against, lambda asked: answer_align(asked).trace)]
+    own = answer_align(plain).trace
+    shares = {round(share * own.jmax) for share in SHARES_OF_J} | {own.jmax - 1}
+    values = sorted(j for j in shares if j >= own.ensemble.jmax)
+    basis = tuple(Setting(str(j), j, j == own.jmax) for j in values)
+    beyond = own.jmax + MORE_J
+    knobs.append(Knob("numerics.jmax", (measure,), basis, beyond, f"J max {beyond}", partial(trace_with, own)))
     if request.classical_molecules:
         knobs.append(_classical(request))
     return Knobs(tuple(knobs))

@@ -6,14 +6,18 @@ state whose first number is below 0 is none: the line is an energy from the zero
 
 from __future__ import annotations
 
+import math
 import os
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rotor.arrays import distinct
 from rotor.formats.atomic_write import open_atomic
 from rotor.formats.spcat.text.fields import BLANK, read_whole
 from rotor.formats.spcat.text.freeform import Line, encode, number, read_lines, read_words
@@ -23,6 +27,10 @@ QUANTA_FIELDS = 12  # at least
 MOST_QUANTA = 10  # of a state
 _REMARK_FROM = 2  # numbers: words in place of the weight are a remark
 NO_ERROR_MHZ = 0.01  # of a line that states none, as in SPFIT
+_NUMBER, _BETWEEN, _END = r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)", r"(?:[ \t]*,[ \t]*|[ \t]+)", r"[ \t]*(?:/|$)"
+_AS_USUAL = re.compile(  # one to three numbers and nothing that must be looked at again
+    rf"[ \t]*{_NUMBER}(?:{_END}|{_BETWEEN}{_NUMBER}(?:{_END}|{_BETWEEN}{_NUMBER}(?=[ \t,/]|$)))", re.ASCII
+)
 _ROTATION = ("j", "n", "k", "ka", "kc", "v")
 
 
@@ -87,7 +95,7 @@ class LineList:
             upper[:, :count], lower[:, :count] = self.quanta[:, :count], self.quanta[:, count : 2 * count]
             return upper, lower
         counts = (self.quanta != BLANK).sum(axis=1) // 2
-        for count in np.unique(counts).tolist():
+        for count in distinct(counts).tolist():
             rows = counts == count
             upper[rows, :count] = self.quanta[rows, :count]
             lower[rows, :count] = self.quanta[rows, count : 2 * count]
@@ -105,11 +113,13 @@ class LineList:
         array([ 0,  0, -1,  1])
         """
         groups = np.empty(len(self), dtype=np.int64)
-        near = np.abs(np.diff(self.frequency)) < 1e-14 * np.abs(self.frequency[1:]) + 1e-8
-        alike = np.abs(np.diff(self.error)) < 1e-7
+        near = (np.abs(np.diff(self.frequency)) < 1e-14 * np.abs(self.frequency[1:]) + 1e-8).tolist()
+        if not any(near):
+            return np.arange(len(self), dtype=np.int64)
+        alike = (np.abs(np.diff(self.error)) < 1e-7).tolist()
         count, blend = 0, -1  # lines of the present blend, 0 behind its width
         for i in range(len(self)):
-            follows = count > 0 and bool(near[i - 1])
+            follows = count > 0 and near[i - 1]
             if follows and alike[i - 1]:
                 count += 1
                 groups[i] = blend
@@ -143,7 +153,8 @@ def read_lin(source: str | os.PathLike[str] | bytes, per_state: int = 0) -> Line
     if texts:
         texts[0] = "".join(line.text for line in lines[:first]) + texts[0]
     width = max(QUANTA_FIELDS, 2 * per_state)
-    fields = [_fields(line, width) for line in listed]
+    plain = [_plain(line) for line in listed]
+    fields = [_fields(line, width) for line in plain]
     missing = next((i for i, row in enumerate(fields) if _lacks_some(row, per_state)), None)
     if missing is not None:
         per_state = per_state or max((_leading(row) // 2 for row in fields if _leading(row) % 2 == 0), default=0)
@@ -154,16 +165,13 @@ def read_lin(source: str | os.PathLike[str] | bytes, per_state: int = 0) -> Line
                 f"{count} quantum numbers; expected as many for the upper state as for the lower, "
                 "or other lines, or the constants of a fit, that show how many are missing",
             )
-    measured = [read_measured(line, width) for line in listed]
-    quanta = np.full((len(measured), width), BLANK, dtype=np.int16)
-    for row, found, line in zip(quanta, fields, measured, strict=True):
-        known = line.quanta if missing is None else found[: 2 * per_state]
-        row[: len(known)] = known
-    columns = np.array([line[1:] for line in measured], dtype=np.float64).reshape(-1, 3)
+    measured = [_numbers(line, width) for line in plain]
+    count = width if missing is None else 2 * per_state
+    known = [row[: _leading(row) if missing is None else count] for row in fields]
+    quanta = np.array([row + (BLANK,) * (width - len(row)) for row in known], dtype=np.int16).reshape(-1, width)
+    columns = np.array([numbers for numbers, _ in measured], dtype=np.float64).reshape(-1, 3)
     rest = "".join(line.text for line in lines[end if texts else 0 :])
-    without_error = frozenset(
-        i for i, line in enumerate(listed) if len(read_words(_plain(line), 3 * width, 3, _REMARK_FROM)[0]) < 2
-    )
+    without_error = frozenset(i for i, (_, words) in enumerate(measured) if words < 2)
     return LineList(
         quanta,
         columns[:, 0],
@@ -222,18 +230,30 @@ def note_of_defaults(lines: LineList) -> str:
 
 
 def _plain(line: Line) -> Line:
-    return line._replace(text=line.body.removeprefix("\ufeff"))
+    """The line without its end and a byte order mark."""
+    return Line(line.body.removeprefix("\ufeff"), line.number, line.file)
 
 
 def read_measured(line: Line, width: int = QUANTA_FIELDS) -> Measured:
     """The numbers of one line of the file with so many fields of quantum numbers."""
     plain = _plain(line)
     fields = _fields(plain, width)
-    words, _ = read_words(plain, 3 * width, 3, _REMARK_FROM)
+    return Measured(fields[: _leading(fields)], *_numbers(plain, width)[0])
+
+
+def _numbers(line: Line, width: int) -> tuple[tuple[float, float, float], int]:
+    """Frequency, error and weight behind so many fields of quantum numbers, and how many of them are written."""
+    body = line.body
+    if found := _AS_USUAL.match(body, 3 * width):
+        texts = [text for text in found.groups() if text is not None]
+        values = [float(text) for text in texts]
+        if all(map(math.isfinite, values)):
+            frequency, error, weight = (*values, *(NO_ERROR_MHZ, 1.0)[len(values) - 1 :])
+            return (frequency, error, weight), len(values)
+    words, _ = read_words(line, 3 * width, 3, _REMARK_FROM)
     frequency = number(line, words, 0, f"the frequency (from column {3 * width + 1} on)")
     error = number(line, words, 1, "the error of the frequency", NO_ERROR_MHZ)
-    quanta = fields[: _leading(fields)]
-    return Measured(quanta, frequency, error, number(line, words, 2, "the weight", 1.0))
+    return (frequency, error, number(line, words, 2, "the weight", 1.0)), len(words)
 
 
 def _leading(fields: tuple[int, ...]) -> int:
@@ -254,14 +274,15 @@ def _lacks_some(fields: tuple[int, ...], per_state: int) -> bool:
 
 def _fields(line: Line, width: int) -> tuple[int, ...]:
     """The fields of three columns up to the last quantum number, blank ones among them; an annotation behind a blank ends them."""
-    text, quanta = _plain(line).text[: 3 * width], list[int]()
+    text, quanta = line.text[: 3 * width].rstrip(" "), list[int]()
+    try:
+        return tuple([_field(text[column : column + 3]) for column in range(0, len(text), 3)])
+    except ValueError:  # what is wrong, or where an annotation begins
+        pass
     for column in range(0, len(text), 3):
         part = text[column : column + 3]
-        if not part.strip(" "):
-            quanta.append(BLANK)
-            continue
         try:
-            quanta.append(read_whole(part))
+            quanta.append(_field(part))
         except ValueError as error:
             if BLANK in quanta:
                 break
@@ -269,6 +290,11 @@ def _fields(line: Line, width: int) -> tuple[int, ...]:
     while quanta and quanta[-1] == BLANK:
         quanta.pop()
     return tuple(quanta)
+
+
+@lru_cache(maxsize=4096)
+def _field(part: str) -> int:
+    return read_whole(part) if part.strip(" ") else BLANK
 
 
 def format_lin(lines: LineList) -> bytes:
@@ -295,7 +321,7 @@ def _line_text(lines: LineList, index: int) -> str:
 def _stored(text: str, index: int, per_state: int, width: int) -> Measured:
     """The numbers of a line as it was read, blank fields among them where lines lack quantum numbers."""
     line = Line(text.rstrip("\r\n").rpartition("\n")[2], index, "stored text")
-    found, fields = read_measured(line, width), _fields(line, width)[: 2 * per_state]
+    found, fields = read_measured(line, width), _fields(_plain(line), width)[: 2 * per_state]
     return found._replace(quanta=fields + (BLANK,) * (2 * per_state - len(fields))) if per_state else found
 
 

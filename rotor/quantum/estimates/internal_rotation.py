@@ -1,0 +1,179 @@
+"""How far internal rotation of one threefold group sets lines of its A and E species apart.
+
+A group of C3v symmetry turns by α against the rest. With the moment I_α of the group about its axis, the cosines λ_g of this axis in
+the principal frame and the moments I_g of the whole molecule, the kinetic energy ½ ωᵀIω + I_α α' λ·ω + ½ I_α α'² makes
+
+    H = A P_a² + B P_b² + C P_c² + F (p - ρ·P)² + V3/2 (1 - cos 3α),
+    r = 1 - Σ_g λ_g² I_α/I_g,    F = ħ²/(2 r I_α),    ρ_g = λ_g I_α/I_g
+
+(C. C. Lin and J. D. Swalen, Rev. Mod. Phys. 31 (1959) 841, as cited by the reviews that were read; derived here). The axes are turned
+so that z is along ρ. Then the part of the torsion depends on the K of P_z alone,
+
+    h(K, σ) = F (p - |ρ| K)² + V3/2 (1 - cos 3α)    on    exp i(3k + σ)α,    σ = 0 of A, 1 of E,
+
+its lowest states |K, σ⟩ are found for each K, and ⟨K'|H_rot|K⟩ is multiplied by the overlap ⟨K', σ|K, σ⟩. Left out are excited
+torsional states, which change A - E differences of methyl formate by less than 1e-4 of themselves, the dependence of A, B, C on α,
+and other groups of the molecule. How this compares with measured lines is in docs/limitations.md.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rotor import units
+from rotor.arrays import Floats
+
+A_SPECIES, E_SPECIES = 0, 1  # σ
+_WAVES = 16  # |k| of exp i(3k + σ)α: enough for |ρ| K up to 21 and V3 of a thousand F
+
+
+@dataclass(frozen=True)
+class InternalRotor:
+    """One threefold group: F and V3 in MHz, ρ (3,) along a, b, c."""
+
+    f_mhz: float
+    barrier_mhz: float
+    rho: tuple[float, float, float]
+
+    @property
+    def reduced_barrier(self) -> float:
+        """s = 4 V3/9F."""
+        return 4 * self.barrier_mhz / (9 * self.f_mhz)
+
+
+def rotor_of_moments(own: float, cosines: Floats, moments: Floats, barrier_mhz: float) -> InternalRotor:
+    """F = ħ²/2rI_α and ρ_g = λ_g I_α/I_g of a group.
+
+    Parameters
+    ----------
+    own : float
+        I_α, its moment about its axis, u Å².
+    cosines : (3,) array
+        λ_g of its axis to the principal axes.
+    moments : (3,) array
+        I_g of the whole molecule, u Å².
+    barrier_mhz : float
+        V3.
+
+    Returns
+    -------
+    InternalRotor
+
+    Examples
+    --------
+    >>> rotor_of_moments(3.0, np.array([1.0, 0, 0]), np.array([6.0, 50, 50]), 0.0).rho  # half of the molecule turns
+    (0.5, 0.0, 0.0)
+    """
+    rho = cosines * own / moments
+    free = units.ROTATIONAL_MHZ_U_ANGSTROM2 / (own * (1.0 - float(cosines @ rho)))
+    return InternalRotor(free, barrier_mhz, (float(rho[0]), float(rho[1]), float(rho[2])))
+
+
+def torsional_states(rotor: InternalRotor, k: Floats, species: int) -> tuple[Floats, Floats]:
+    """Energies (n,) in MHz and vectors (n, waves) of the lowest torsional state at each K (n,).
+
+    >>> free = InternalRotor(150_000.0, 0.0, (0.0, 0.0, 0.0))
+    >>> torsional_states(free, np.zeros(1), E_SPECIES)[0].tolist()  # F m² of m = 1
+    [150000.0]
+    """
+    m = 3.0 * np.arange(-_WAVES, _WAVES + 1) + species
+    shift = float(np.linalg.norm(rotor.rho)) * k
+    matrix = np.zeros((len(k), len(m), len(m)))
+    rows = np.arange(len(m))
+    matrix[:, rows, rows] = rotor.f_mhz * (m[None, :] - shift[:, None]) ** 2 + rotor.barrier_mhz / 2
+    matrix[:, rows[1:], rows[:-1]] = matrix[:, rows[:-1], rows[1:]] = -rotor.barrier_mhz / 4
+    energies, vectors = np.linalg.eigh(matrix)
+    return energies[:, 0], _same_signs(vectors[:, :, 0])
+
+
+def _same_signs(vectors: Floats) -> Floats:
+    """Rows with signs that make the overlaps of neighbours positive."""
+    turned = np.where(np.sum(vectors[1:] * vectors[:-1], axis=1) < 0, -1.0, 1.0)
+    return np.asarray(vectors * np.cumprod(np.concatenate([[1.0], turned]))[:, None])
+
+
+def _rho_frame(rho: tuple[float, float, float]) -> Floats:
+    """Rows x, y, z of axes with z along ρ, from a, b, c; z along a where there is none."""
+    length = float(np.linalg.norm(rho))
+    z = np.array(rho) / length if length else np.array([1.0, 0.0, 0.0])
+    x = np.eye(3)[int(np.argmin(np.abs(z)))]
+    x = x - (x @ z) * z
+    x /= np.linalg.norm(x)
+    return np.stack([x, np.cross(z, x), z])
+
+
+def species_levels(constants_mhz: tuple[float, float, float], rotor: InternalRotor, j: int, species: int) -> Floats:
+    """Energies (2J+1,) in MHz of one species of the torsional ground state, above the foot of the potential.
+
+    In the order of ⟨P_z²⟩, which is that of Ka: first K = 0, then pairs, of each the lower one first.
+
+    Parameters
+    ----------
+    constants_mhz : tuple of float
+        A, B, C of the whole molecule.
+    rotor : InternalRotor
+    j : int
+    species : int
+        A_SPECIES or E_SPECIES.
+
+    Returns
+    -------
+    (2J+1,) array
+        MHz.
+
+    Notes
+    -----
+    Excited torsional states are left out, and ⟨K', σ|K, σ⟩ multiplies ⟨K'|H_rot|K⟩; see the head of this module.
+
+    Examples
+    --------
+    >>> levels = species_levels((9.0, 4.0, 3.0), InternalRotor(150_000.0, 1e7, (0.0, 0.0, 0.0)), 1, A_SPECIES)
+    >>> (levels - levels[0]).round(6).tolist()  # above 1(0,1): B - C of 1(1,1) with A - B
+    [0.0, 5.0, 6.0]
+    """
+    frame = _rho_frame(rotor.rho)
+    tensor = frame @ np.diag(constants_mhz) @ frame.T
+    k = np.arange(-j, j + 1.0)
+    step = 0.5 * np.sqrt(j * (j + 1) - k[:-1] * (k[:-1] + 1))
+    p_z, p_x = np.diag(k), np.diag(step, 1) + np.diag(step, -1)
+    p = (p_x, 1j * (p_z @ p_x - p_x @ p_z), p_z)
+    rotation = sum(tensor[a, b] * (p[a] @ p[b] + p[b] @ p[a]) / 2 for a in range(3) for b in range(3))
+    energies, vectors = torsional_states(rotor, k, species)
+    found, states = np.linalg.eigh(rotation * (vectors @ vectors.T) + np.diag(energies))
+    by_k = found[np.argsort(k**2 @ np.abs(states) ** 2, kind="stable")]
+    return np.concatenate([by_k[:1], np.sort(by_k[1:].reshape(j, 2), axis=1).ravel()])
+
+
+@dataclass(frozen=True)
+class LineShifts:
+    """E less A in MHz of lines J+1 ← J. same (2J+1,): Ka as it was, Kc + 1; other (2J+1,): Ka + 1."""
+
+    same: Floats
+    other: Floats
+
+    @property
+    def typical_same_mhz(self) -> float:
+        """Half of the lines with the same Ka are farther apart."""
+        return float(np.median(np.abs(self.same)))
+
+    @property
+    def typical_other_mhz(self) -> float:
+        """Half of the lines with another Ka are farther apart."""
+        return float(np.median(np.abs(self.other)))
+
+
+def line_shifts(constants_mhz: tuple[float, float, float], rotor: InternalRotor, j: int) -> LineShifts:
+    """How far lines of the E species are from those of the A species.
+
+    >>> high = InternalRotor(150_000.0, 1e8, (0.1, 0.0, 0.0))
+    >>> bool(np.abs(line_shifts((30_000.0, 9_000.0, 8_000.0), high, 3).same).max() < 1e-3)
+    True
+    """
+    same, other = [], []
+    for species in (A_SPECIES, E_SPECIES):
+        lower, upper = (species_levels(constants_mhz, rotor, one, species) for one in (j, j + 1))
+        same.append(upper[: len(lower)] - lower)
+        other.append(upper[2:] - lower)
+    return LineShifts(same[1] - same[0], other[1] - other[0])

@@ -1,0 +1,212 @@
+"""Methyl groups that turn against the rest of a molecule, by its geometry alone, and the barrier of a similar molecule.
+
+The barrier V3 is taken by the atom that bears the group and what is bonded to it. Each is that of one molecule, and of others of
+the same kind within a factor of about 2 (marked ~: more); the A - E difference of lines goes about as exp(-1.3 √(V3/F)), so that a
+barrier that is half too high makes it some four to ten times too small. A group beside an atom that the table has not is reported
+with F, the size without a barrier, as a bound.
+
+| group | V3, cm⁻¹ | of | where it was read |
+|---|---|---|---|
+| CH3-OH | 373.9 | methanol with ¹⁷O | 2 · 186.94207, Astron. Astrophys. 2024, aa51011-24, table A.1 |
+| CH3-O-C=O | 370.9 | methyl formate | Astron. Astrophys. 500 (2009) 1109, table 2 |
+| CH3-O- other | 879 | methyl propargyl ether | 2512 cal/mol, J. Mol. Struct. 32 (1976) 191, abstract |
+| CH3-S-C=O | 127.5 | S-methyl thioformate | Astron. Astrophys. 644 (2020) A102, abstract |
+| CH3-S-C other | 753 | dimethyl sulfide | 736.17 in Ar-(CH3)2S is 97.8 % of it, J. Mol. Spectrosc. 257 (2009) 11, abstract |
+| CH3-SH | 445 | methanethiol | from 0.653 cm⁻¹, the amplitude over K, Int. Symp. Mol. Spectrosc. 2016, hdl 2142/91207 |
+| CH3-NH2, amines | 691 | methylamine | abstract of K. Takagi and T. Kojima, J. Phys. Soc. Japan, as paperexplained.cn has it |
+| CH3-CH=O | 407.6 | acetaldehyde | Astron. Astrophys. 579 (2015) A46, table 1 |
+| CH3-C(=O)O | 170 | acetic acid | 138.45 in its monohydrate is 18.7 % less, Int. Symp. Mol. Spectrosc. 63 (2008), abstract p101 |
+| CH3-C(=O)C ~ | 302 | 2-acetyl-5-methylthiophene | Phys. Chem. Chem. Phys. 2023, d2cp03897h, abstract |
+| CH3-C=C | 688 | propene | NIST, Hydrocarbon Spectral Database, C3H6 |
+| CH3-CH=C= | 429 | methyl ketene | Astron. Astrophys. 619 (2018), aa33267-18, table A.2 |
+| CH3-C≡ | 1.0 | 2-butynoic acid | J. Mol. Spectrosc. 267 (2011) 186, abstract |
+| CH3- on a ring of six ~ | 0 | toluene: V6 = 4.88, V3 = 0 | 13.94 cal/mol, abstract of H. D. Rudolph et al. 1967 |
+| CH3- on a ring of five ~ | 248 | 2,5-dimethylthiophene | with 35 to 439 of others, scite.ai report on 2-methylthiazole |
+| CH3-C sp³ | 1108 | propane | NIST, Hydrocarbon Spectral Database, C3H8 |
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rotor.arrays import Floats, Ints
+from rotor.molecules.molecule import FEW_ATOMS, Molecule
+from rotor.quantum.estimates.internal_rotation import InternalRotor, rotor_of_moments
+from rotor.units import MHZ_PER_CM
+
+OFF_AXIS = 0.05  # sine of the angle from which an atom is off the axis of a methyl group
+RADII_ANGSTROM = {"H": 0.31, "B": 0.84, "C": 0.76, "N": 0.71, "O": 0.66, "F": 0.57, "Si": 1.11, "P": 1.07, "S": 1.05,
+                  "Cl": 1.02, "Ge": 1.20, "As": 1.19, "Se": 1.20, "Br": 1.20, "I": 1.39}  # fmt: skip
+OTHER_RADIUS = 1.3
+BONDED = 1.2  # of the sum of two covalent radii (B. Cordero et al., Dalton Trans. 2008, 2832, as ASE's data has them)
+FLAT_DEGREES = 350.0  # sum of three angles from which a nitrogen is taken for flat
+
+
+@dataclass(frozen=True)
+class Barrier:
+    """V3 of a kind of group, in cm⁻¹, and the molecule it is of. safe: whether others of the kind have nearly the same."""
+
+    v3_cm: float
+    molecule: str
+    safe: bool = True
+
+
+@dataclass(frozen=True)
+class MethylGroup:
+    """A group that turns against the rest: its F and ρ with the barrier (0 where it is not known), and that barrier."""
+
+    rotor: InternalRotor
+    barrier: Barrier | None
+
+
+def bonded_atoms(molecule: Molecule) -> list[Ints]:
+    """Atoms bonded to each atom, by distance: nearer than 1.2 times the sum of covalent radii."""
+    x = molecule.positions_angstrom
+    radii = np.array([RADII_ANGSTROM.get(symbol, OTHER_RADIUS) for symbol in molecule.symbols])
+    found: list[list[int]] = [[] for _ in x]
+    pairs = _pairs_within(x, 2 * BONDED * float(radii.max(initial=0.0)))
+    apart = np.linalg.norm(x[pairs[:, 0]] - x[pairs[:, 1]], axis=1)
+    for first, second in pairs[apart < BONDED * radii[pairs].sum(axis=1)].tolist():
+        found[first].append(second)
+        found[second].append(first)
+    return [np.array(sorted(near), dtype=np.int64) for near in found]
+
+
+def _pairs_within(x: Floats, reach: float) -> Ints:
+    """Pairs (m, 2) of points nearer than a reach, Å."""
+    if len(x) > FEW_ATOMS:
+        from scipy.spatial import cKDTree
+
+        return np.asarray(cKDTree(x).query_pairs(reach, output_type="ndarray"), dtype=np.int64)
+    apart = np.linalg.norm(x[:, None] - x[None], axis=-1)
+    return np.argwhere(np.triu(apart < reach, k=1))
+
+
+def methyl_groups(molecule: Molecule, bonds: Sequence[Ints]) -> list[MethylGroup]:
+    """CH3 and CD3 whose turning is not that of the whole: other atoms lie off their axis. Three unlike hydrogens are left out."""
+    x, mass = molecule.positions_angstrom, molecule.masses_u
+    found: list[tuple[int, list[int], Floats]] = []
+    for carbon, near in enumerate(bonds):
+        hydrogens = [i for i in near.tolist() if molecule.symbols[i] == "H"]
+        if molecule.symbols[carbon] != "C" or len(hydrogens) != 3 or np.ptp(mass[hydrogens]):
+            continue
+        axis = x[carbon] - x[hydrogens].mean(axis=0)
+        if len(x) > len(hydrogens) + 2 and _any_off_axis(x, [carbon, *hydrogens], axis):
+            found.append((carbon, hydrogens, axis / np.linalg.norm(axis)))
+    return _with_moments(molecule, bonds, found) if found else []
+
+
+def _with_moments(
+    molecule: Molecule, bonds: Sequence[Ints], groups: Sequence[tuple[int, list[int], Floats]]
+) -> list[MethylGroup]:
+    """F, ρ and the barrier of groups, each by its carbon, its hydrogens and its axis."""
+    from rotor.geometry.inertia import point_masses, principal_frame
+
+    x, mass = molecule.positions_angstrom, molecule.masses_u
+    frame, made = principal_frame(point_masses(mass, x)), []
+    for carbon, hydrogens, axis in groups:
+        off = x[hydrogens] - x[hydrogens].mean(axis=0)
+        off -= np.outer(off @ axis, axis)
+        own = float(mass[hydrogens] @ np.sum(off**2, axis=1))
+        barrier = barrier_beside(molecule, bonds, carbon)
+        height = 0.0 if barrier is None else barrier.v3_cm * MHZ_PER_CM
+        made.append(MethylGroup(rotor_of_moments(own, frame.axes @ axis, frame.moments, height), barrier))
+    return made
+
+
+def barrier_beside(molecule: Molecule, bonds: Sequence[Ints], carbon: int) -> Barrier | None:
+    """The barrier of a similar molecule, by the atom that bears the methyl group of a carbon."""
+    symbols = molecule.symbols
+    bearers = [i for i in bonds[carbon].tolist() if symbols[i] != "H"]
+    if len(bearers) != 1:
+        return None
+    bearer = bearers[0]
+    others = [i for i in bonds[bearer].tolist() if i != carbon]
+    if symbols[bearer] == "C":
+        return _beside_carbon(molecule, bonds, bearer, others)
+    if symbols[bearer] in "OS" and len(others) == 1:
+        return _beside_chalcogen(symbols, bonds, bearer, others[0])
+    if symbols[bearer] == "N" and len(others) == 2 and not _flat(molecule.positions_angstrom, bearer, bonds[bearer]):
+        return Barrier(691.0, "methylamine")
+    return None
+
+
+def _beside_chalcogen(symbols: Sequence[str], bonds: Sequence[Ints], bearer: int, other: int) -> Barrier | None:
+    """Alcohols, esters, ethers; thiols, thioesters and sulfides."""
+    acyl = symbols[other] == "C" and _doubly_bonded_oxygen(symbols, bonds, other)
+    if symbols[bearer] == "S":
+        if symbols[other] != "C":
+            return Barrier(445.0, "methanethiol") if symbols[other] == "H" else None
+        return Barrier(127.5, "S-methyl thioformate") if acyl else Barrier(753.0, "dimethyl sulfide")
+    if symbols[other] == "H":
+        return Barrier(373.9, "methanol")
+    if symbols[other] != "C":
+        return None
+    return Barrier(370.9, "methyl formate") if acyl else Barrier(879.0, "methyl propargyl ether")
+
+
+def _beside_carbon(molecule: Molecule, bonds: Sequence[Ints], bearer: int, others: list[int]) -> Barrier | None:
+    symbols = molecule.symbols
+    if len(others) == 3:
+        return Barrier(1108.0, "propane")
+    if len(others) == 1:
+        return Barrier(1.0, "2-butynoic acid")
+    if len(others) != 2:
+        return None
+    if _doubly_bonded_oxygen(symbols, bonds, bearer):
+        return _of_acyl([symbols[i] for i in others if not (symbols[i] == "O" and len(bonds[i]) == 1)])
+    size = _ring(bonds, bearer, others)
+    if size in (5, 6):
+        return Barrier(0.0, "toluene", False) if size == 6 else Barrier(248.0, "2,5-dimethylthiophene", False)
+    if sorted(symbols[i] for i in others) not in (["C", "H"], ["C", "C"]):
+        return None
+    cumulated = any(symbols[i] == "C" and len(bonds[i]) == 2 for i in others)
+    return Barrier(429.0, "methyl ketene") if cumulated else Barrier(688.0, "propene")
+
+
+def _of_acyl(others: list[str]) -> Barrier | None:
+    """By the atom beside the oxygen and the methyl group."""
+    kinds = {"H": Barrier(407.6, "acetaldehyde"), "O": Barrier(170.0, "acetic acid"),
+             "C": Barrier(302.0, "2-acetyl-5-methylthiophene", False)}  # fmt: skip
+    return kinds.get(others[0]) if len(others) == 1 else None
+
+
+def _doubly_bonded_oxygen(symbols: Sequence[str], bonds: Sequence[Ints], carbon: int) -> bool:
+    """Whether a carbon with three neighbours has an oxygen that is bonded to it alone."""
+    return len(bonds[carbon]) == 3 and any(symbols[i] == "O" and len(bonds[i]) == 1 for i in bonds[carbon].tolist())
+
+
+def _ring(bonds: Sequence[Ints], atom: int, neighbours: list[int]) -> int:
+    """Atoms in the smallest ring of at most six through an atom and two of its neighbours; 0: none."""
+    start, goal = neighbours
+    seen, front = {atom, start}, {start}
+    for size in range(3, 7):
+        front = {j for i in front for j in bonds[i].tolist()} - seen
+        if goal in front:
+            return size
+        seen |= front
+    return 0
+
+
+def _flat(x: Floats, atom: int, near: Ints) -> bool:
+    a, b, c = (v / np.linalg.norm(v) for v in x[near] - x[atom])
+    cosines = np.clip([a @ b, b @ c, a @ c], -1.0, 1.0)
+    return bool(np.degrees(np.arccos(cosines)).sum() > FLAT_DEGREES)
+
+
+def _any_off_axis(x: Floats, group: list[int], axis: Floats) -> bool:
+    """Whether some atom that is not of the group lies off the axis through its first atom; a thousand atoms at a time."""
+    for start in range(0, len(x), 1000):
+        rest = np.setdiff1d(np.arange(start, min(start + 1000, len(x))), group)
+        if len(rest) and (_sines(x[rest] - x[group[0]], axis) > OFF_AXIS).any():
+            return True
+    return False
+
+
+def _sines(vectors: Floats, axis: Floats) -> Floats:
+    """Sines of the angles (n,) of vectors (n, 3) with an axis (3,)."""
+    lengths = np.linalg.norm(vectors, axis=1) * np.linalg.norm(axis)
+    return np.asarray(np.linalg.norm(np.cross(vectors, axis), axis=1) / lengths)

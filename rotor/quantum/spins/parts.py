@@ -1,0 +1,112 @@
+"""The parts of a block of one F, and what its levels are called: after a sub-block, a Wang block of one state and one pattern.
+
+Names are given one to one, the largest share first; among the levels of one sub-block Ka rises with energy.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rotor.arrays import Floats, Ints
+from rotor.quantum.spins.rotor import RotorBlock
+
+_AT_A_TIME = 1000  # entries of a table of shares that are looked at together
+
+
+class SpinPart(NamedTuple):
+    """The states of the solved block `number` with every pattern of its N and class, pattern by pattern.
+
+    patterns: the rows of these patterns among those of the F, which are in the order of N, then of the class.
+    """
+
+    number: int
+    rotor: RotorBlock
+    patterns: slice
+    place: slice
+
+    @property
+    def repeats(self) -> int:
+        """Number of patterns."""
+        return int(self.patterns.stop - self.patterns.start)
+
+
+def named_states(rotor: RotorBlock, vectors: Floats) -> Ints:
+    """v, Ka, Kc (n, 3) of states (n, n) of the rotation: of the part that has most of each, in order of energy."""
+    shares = np.stack([(vectors[part.place] ** 2).sum(axis=0) for part in rotor.parts])
+    of_state = assigned(shares, np.array([len(part.names) for part in rotor.parts]))
+    labels = np.empty((len(of_state), 3), dtype=np.int64)
+    labels[np.argsort(of_state, kind="stable")] = np.concatenate(
+        [np.column_stack([np.full(len(part.names), part.v), part.names]) for part in rotor.parts]
+    )
+    return labels
+
+
+def labels_of(parts: tuple[SpinPart, ...], named: tuple[Ints, Ints], vectors: Floats) -> tuple[Ints, Floats]:
+    """Names (n, 3 + pattern) of the states of a block, energies rising, and the shares of the sub-blocks that give them."""
+    names, sizes = named
+    inside = vectors
+    if any(len(part.rotor.parts) > 1 for part in parts):
+        inside = np.concatenate([_over_functions(part, vectors) for part in parts])
+    table = np.add.reduceat(inside * inside, np.cumsum(sizes) - sizes, axis=0)
+    of_state = assigned(table, sizes)
+    labels = np.empty_like(names)
+    labels[np.argsort(of_state, kind="stable")] = names
+    return labels, np.asarray(table[of_state, np.arange(len(of_state))])
+
+
+def _over_functions(part: SpinPart, vectors: Floats) -> Floats:
+    """Vectors over the functions of the rotation, by Wang blocks, then patterns; of one Wang block the states serve as well."""
+    rows = vectors[part.place]
+    if len(part.rotor.parts) == 1:
+        return rows
+    each = np.matmul(part.rotor.vectors, rows.reshape(part.repeats, len(part.rotor.energies_mhz), -1))
+    return np.concatenate([each[:, own.place].reshape(-1, rows.shape[1]) for own in part.rotor.parts])
+
+
+def names_of_parts(parts: tuple[SpinPart, ...], every: Ints) -> tuple[Ints, Ints]:
+    """v, Ka, Kc and the pattern of the levels that the sub-blocks name, (functions, 3 + pattern), and how many each names."""
+    found, sizes = [], []
+    for part in parts:
+        own_patterns = every[part.patterns]
+        for own in part.rotor.parts:
+            names = np.empty((len(own_patterns), len(own.names), 3 + every.shape[1]), dtype=np.int64)
+            names[..., 0] = own.v
+            names[..., 1:3] = own.names
+            names[..., 3:] = own_patterns[:, None, :]
+            found.append(names.reshape(-1, names.shape[-1]))
+            sizes += [len(own.names)] * len(own_patterns)
+    return np.concatenate(found), np.array(sizes)
+
+
+def assigned(shares: Floats, capacity: Ints) -> Ints:
+    """Which sub-block names each state: shares (sub-blocks, states), the largest first, none beyond its capacity.
+
+    >>> assigned(np.array([[0.9, 0.6, 0.0], [0.1, 0.4, 1.0]]), np.array([1, 2])).tolist()
+    [0, 1, 1]
+    """
+    found = shares.argmax(axis=0)
+    if (np.bincount(found, minlength=len(capacity)) == capacity).all():
+        return np.asarray(found)
+    clear = shares[found, np.arange(len(found))] > 0.5  # before all others; where they fit in, they are decided
+    left = capacity - np.bincount(found[clear], minlength=len(capacity))
+    if (left < 0).any():
+        return _largest_first(shares, capacity)
+    rest, subs = np.flatnonzero(~clear), np.flatnonzero(left > 0)
+    found[rest] = subs[_largest_first(shares[np.ix_(subs, rest)], left[subs])]
+    return np.asarray(found)
+
+
+def _largest_first(shares: Floats, capacity: Ints) -> Ints:
+    found, left = np.full(shares.shape[1], -1), capacity.copy()
+    every = np.argsort(-shares, axis=None, kind="stable")
+    for start in range(0, len(every), _AT_A_TIME):
+        subs, states = np.divmod(every[start : start + _AT_A_TIME], shares.shape[1])
+        free = (found[states] < 0) & (left[subs] > 0)  # of what was decided before
+        for sub, state in zip(subs[free].tolist(), states[free].tolist(), strict=True):
+            if found[state] < 0 and left[sub]:
+                found[state], left[sub] = sub, left[sub] - 1
+        if not left.any():
+            break
+    return found

@@ -1,0 +1,61 @@
+"""How many steps a driven motion will take, by those of its first part.
+
+Where the second half of that part takes clearly more steps than the first, as of a body that is spun up, they are taken to grow on in
+proportion to the time. Motions of few steps are made and counted.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rotor.classical.driven import DrivenRequest
+
+BEGINNINGS = 20  # of a motion, one of which is made to count its steps, and searched where the motion is long
+SOME_STEPS = 1000  # beyond those that are made one by one
+MORE_COMPILED, MORE_PLAIN = 50, 2  # times as many for a second part that is timed: compiled steps are so much cheaper
+ENOUGH_STEPS, CLEARLY = (
+    200,
+    1.5,
+)  # of half a first part, and times as many in the other half, from which a trend is read
+
+
+def beginning(request: DrivenRequest, share: float, *more: float) -> DrivenRequest:
+    """The request for the first part of its time alone; steps end at the times asked for, so these stay. more: further shares of it."""
+    first, last = request.times[0], request.times[-1]
+    end = first + share * (last - first)
+    inner = {t for t in request.times if abs(t - first) < abs(end - first)}
+    inner |= {first + part * (end - first) for part in more}
+    return replace(request, times=(*sorted(inner, reverse=last < first), end))
+
+
+def some_steps(request: DrivenRequest) -> tuple[int, int]:
+    """How many steps are timed first, and how many times as many after it."""
+    from rotor.classical.system import system_of
+
+    some = SOME_STEPS if request.step is None or request.order > 2 else 4 * SOME_STEPS
+    return some, MORE_PLAIN if system_of(request.moments, request.effects).compiled is None else MORE_COMPILED
+
+
+def steps_of(request: DrivenRequest, share: float) -> int:
+    """Steps of the first part of a motion."""
+    from rotor.classical.driven import answer_driven
+
+    return answer_driven(request if share == 1.0 else beginning(request, share)).motion.steps
+
+
+def expected_steps(request: DrivenRequest) -> int:
+    """How many steps a motion will take: counted where they are few, else by its first part; see the head of this module."""
+    part, (some, more) = 1 / BEGINNINGS, some_steps(request)
+    whole = steps_of(request, part)
+    if whole * BEGINNINGS < some * more:
+        return steps_of(request, 1.0)
+    first = steps_of(request, part / 2)
+    second = whole - first
+    if first < ENOUGH_STEPS or second < CLEARLY * first:
+        return whole * BEGINNINGS
+    # rates r1, r2 in the middles of both halves, at p/4 and 3p/4: ∫ r1 + (r2 - r1)(t - p/4)/(p/2) dt from 0 to 1
+    r1, r2 = (2 * count / part for count in (first, second))
+    return math.ceil(r1 + (r2 - r1) * (0.5 - part / 4) / (part / 2))

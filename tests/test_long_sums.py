@@ -1,0 +1,92 @@
+"""Sums over levels of absurd constants: one of A, B, C orders of magnitude from the others, cut files, mistyped units."""
+
+from importlib import import_module
+
+import numpy as np
+import pytest
+
+import rotor
+from rotor.quantum.solve import solve_levels
+from rotor.quantum.wang import wang_matrix
+from rotor.quantum.wang.rotation import hamiltonian
+from rotor.quantum.wang.wang_matrix import JMatrix, block_bands, diagonalise, lowest_energies
+from rotor.thermo.level_sums import level_sums
+from rotor.thermo.partition import partition_functions
+from rotor.thermo.partition_table import partition_table
+from rotor.thermo.request import ThermoRequest, answer_thermo
+from rotor.tops.top import Top
+
+sums_module = import_module("rotor.thermo.level_sums")
+table_module = import_module("rotor.thermo.partition_table")
+
+CUT_SHORT = "A=60778.5498 B=10318.0735 C=8.7997 MHz"  # C of SO2 read from a file that ends in the middle of the number
+
+
+def of(constants: str) -> Top:
+    return Top.from_constants(constants)
+
+
+def one_block(constants: str, j: int) -> list[np.ndarray]:
+    top = of(constants)
+    return block_bands(JMatrix(hamiltonian(top), j), solve_levels(top, j, jmin=j).blocks[0].basis)
+
+
+@pytest.mark.parametrize("constants", [CUT_SHORT, "A=1e9 B=10 C=9 MHz", "A=8572 B=3640 C=2790 MHz"])
+def test_energies_up_to_a_bound_are_those_of_the_whole_block(constants, monkeypatch):
+    monkeypatch.setattr(wang_matrix, "SMALL", 10)
+    bands = one_block(constants, 120)
+    whole = diagonalise(bands, vectors=False)[0]
+    for place in (0, 1, 3, 40):
+        below = 0.5 * (whole[place] + whole[place + 1])
+        found = lowest_energies(bands, below)
+        assert len(found) >= place + 1
+        assert (
+            np.abs(found - whole[: len(found)]).max() < 1e-13 * np.abs(whole).max()
+        )  # both to round-off of the largest
+    assert len(lowest_energies(bands, whole[0] - 1e-3 * np.abs(whole).max())) in (0, len(whole))
+
+
+def test_wide_blocks_are_solved_as_bands(monkeypatch):
+    bands = one_block("A=60778 B=10318 C=8.8 MHz DJ=1e-6 DJK=1e-6 DK=1e-6 d1=1e-7 d2=1e-7", 60)
+    assert len(bands) > 2
+    dense = diagonalise(bands, vectors=False)[0]
+    monkeypatch.setattr(wang_matrix, "SMALL", 10)
+    assert (
+        np.abs(lowest_energies(bands, np.inf) - dense).max() < 1e-13 * np.abs(dense).max()
+    )  # round-off of the largest
+
+
+def test_levels_left_out_of_a_sum_do_not_count(monkeypatch):
+    """The same Q, U and C_v with every level, where most are left out: e^-80 of what was taken is no more than 1e-26."""
+    top, temperatures = of("A=60778 B=10318 C=300 MHz"), [2.0, 10.0]
+    monkeypatch.setattr(wang_matrix, "SMALL", 8)
+    few = level_sums(top, [top.spin_weights], temperatures, 1e-9)[0]
+    monkeypatch.setattr(sums_module, "HIGHEST_KT", 1e9)
+    every = level_sums(top, [top.spin_weights], temperatures, 1e-9)[0]
+    assert few.jmax.tolist() == every.jmax.tolist()
+    for name in ("q", "energy_over_rt", "cv_over_r"):
+        assert getattr(few, name) == pytest.approx(getattr(every, name), rel=1e-12)  # round-off of energies over kT
+
+
+def test_a_table_of_q_sums_once_where_one_temperature_is_out_of_reach(monkeypatch):
+    monkeypatch.setattr(sums_module, "MOST_J", {"asymmetric": 40})
+    monkeypatch.setattr(table_module, "partition_function", None)  # none by itself
+    top = of(CUT_SHORT)
+    rows = partition_table(top, [0.5, 30.0, 1.0])
+    assert [row["q"] is None for row in rows] == [False, True, False]
+    assert rows[1]["source"].startswith("Q(30 K): the levels that count lie beyond the reach")
+    assert rows[1]["jmax"] is rows[1]["relative_error"] is None
+    assert rows[1]["classical"] > 1000
+    alone = partition_functions(top, [0.5, 1.0])
+    assert [rows[0]["q"], rows[2]["q"]] == pytest.approx(alone.q.tolist(), rel=1e-14)  # the same sums
+    with pytest.raises(ValueError, match=r"Q\(30 K\).*can be had up to 1 K"):
+        partition_functions(top, [0.5, 30.0, 1.0])
+
+
+def test_an_onset_that_no_sum_reaches_is_said_and_not_an_error(monkeypatch):
+    monkeypatch.setattr(sums_module, "MOST_J", {"asymmetric": 40})
+    answer = answer_thermo(ThermoRequest(of(CUT_SHORT), (0.5,)))
+    assert answer.classical_above_k is None
+    assert answer.facts()["classical_above_k"] is None
+    with pytest.raises(ValueError, match="beyond the reach"):
+        rotor.thermo.classical_above_k(of(CUT_SHORT))

@@ -1,0 +1,71 @@
+"""Plans of driven motions: the tolerance that a plan names is the one of the run, and what the run states covers what is found."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from rotor.classical.driven import answer_driven
+from rotor.geometry.rotations import distance
+from rotor.scenes import accuracy_motion, motion_steps
+from rotor.scenes.effect_sections import ConstantTorqueSection, DriveSection, LinearDragSection, RotorSection
+from rotor.scenes.kind import kind_of
+from rotor.scenes.plan import plan_of
+from rotor.scenes.run import run_scene
+from rotor.scenes.scene import TumbleScene
+from rotor.scenes.sections import BodySection, TumbleConditions
+
+BODY = BodySection(moments=[1.0, 2.0, 3.0], angular_velocity=[0.2, 1.0, 0.1])
+DRIVEN = [
+    DriveSection(amplitude=[0.1, 0.0, 0.2], angular_frequency=1.3),
+    LinearDragSection(coefficients=[0.1, 0.1, 0.1]),
+]
+REGULAR = TumbleScene(body=BODY, effects=DRIVEN, conditions=TumbleConditions(times="0:60:13"), accuracy="1e-7 rad")
+
+
+def found_error(result) -> float:
+    """Of the attitudes, beside those of the finest tolerance."""
+    fine = answer_driven(replace(result.request, tolerance=1e-13)).motion
+    return float(distance(result.answer.motion.attitude, fine.attitude).max())
+
+
+@pytest.mark.parametrize("long", [False, True])
+def test_the_run_takes_the_tolerance_of_its_plan(long, monkeypatch):
+    """Found by whole motions, or by the first part of a motion that counts as long here."""
+    monkeypatch.setattr(accuracy_motion, "LONG_STEPS", 10 if long else 10**6)
+    plan, result = plan_of(REGULAR), run_scene(REGULAR)
+    assert dict(plan.parts)["accuracy"] == result.reached.how
+    assert f"tolerance {result.request.tolerance:g} of a step" in dict(plan.parts)["method"]
+    assert ("first 5 %" in result.reached.how) == long
+    assert plan.counts["steps"] == pytest.approx(result.answer.motion.steps, rel=0.3 if long else 0.0)
+    assert found_error(result) <= result.reached.error <= 1e-7
+
+
+def test_a_first_part_that_says_too_little_is_corrected_by_the_run(monkeypatch):
+    """As if errors did not grow at all: the tolerance of the plan misses, the run says so and takes a finer one."""
+    monkeypatch.setattr(accuracy_motion, "LONG_STEPS", 10)
+    monkeypatch.setattr(accuracy_motion, "_growth", lambda middle, end: 1e-2)
+    result = run_scene(REGULAR)
+    assert "finer than the plan's" in result.reached.how
+    assert found_error(result) <= result.reached.error <= 1e-7
+
+
+def test_a_wobble_below_the_tolerance_is_in_the_error_that_is_stated():
+    """All tolerances from 1e-5 to 1e-8 do not see it and agree among themselves; their error is its size, 1e-5 rad."""
+    body = BodySection(moments=[1.0, 1.2, 1.5], angular_velocity=[1e-5, 0.0, 0.3])
+    when = TumbleConditions(times="0:40000:101")
+    scene = TumbleScene(body=body, effects=[RotorSection(momentum=[0, 0, 0.7])], conditions=when, accuracy="1e-5 rad")
+    result = run_scene(scene)
+    assert found_error(result) <= result.reached.error <= 1e-5
+
+
+def test_steps_of_a_body_that_is_spun_up_are_expected_to_grow(monkeypatch):
+    """Its rate grows with the time, so that the first twentieth of the time has a four hundredth of the steps."""
+    body = BodySection(moments=[100.0, 100.0, 180.0], angular_velocity=[0.0, 0.0, 0.0])
+    when = TumbleConditions(times="0:3000:3")
+    scene = TumbleScene(body=body, effects=[ConstantTorqueSection(vector=[0.05, 0.0, 2.0])], conditions=when)
+    request = kind_of(scene).request(scene, ".")
+    monkeypatch.setattr(motion_steps, "MORE_COMPILED", 0)
+    monkeypatch.setattr(motion_steps, "ENOUGH_STEPS", 10)
+    assert 0.5 < motion_steps.expected_steps(request) / answer_driven(request).motion.steps < 2.0

@@ -1,0 +1,90 @@
+"""Operators of the rotation contracted for many N at once, against the same pair by pair."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rotor.quantum.effects.interactions import InteractingStates
+from rotor.quantum.effects.watson import SEMI_RIGID
+from rotor.quantum.spins.contraction import operators_of_stacks, stacks_of, tensor_elements_of_stacks
+from rotor.quantum.spins.lines import _rotor_element
+from rotor.quantum.spins.operators import Cosines, CosinesWithN, Scalar
+from rotor.quantum.spins.rotor import Piece, in_both_orders, solved_rotor
+from rotor.quantum.tensors import body_tensor
+from rotor.tops.constants import Constants
+from rotor.tops.top import Top
+
+TOP = Top(Constants(A=9400.0, B=3100.0, C=2500.0, DeltaJK=-2.0, deltaK=0.3), dipole_abc_debye=(1.2, 0.7, 0.4))
+STATES = InteractingStates(
+    {"E[1]": 2e4, "A[1]": 9300.0, "B[1]": 3110.0, "C[1]": 2490.0, "G_c[0,1]": 300.0, "F_ab[0,1]": 4.0}
+)
+RNG = np.random.default_rng(5)
+
+
+def _matrix() -> tuple[tuple[float, float, float], ...]:
+    return tuple(tuple(float(x) for x in row) for row in RNG.standard_normal((3, 3)))
+
+
+def _blocks(effects: tuple) -> tuple[list, str]:
+    return solved_rotor(TOP, (*SEMI_RIGID, *effects), [], 0, 7, None)
+
+
+PIECES = {
+    "quadrupole with every element": [Piece(-57.0, Cosines(_matrix()), -1, -1, 0, 0)],
+    "spin-rotation, antisymmetric part too": [Piece(3.0, CosinesWithN(_matrix()), -1, -1, 0, 0)],
+    "powers of N² and Nz²": [
+        Piece(2.0, CosinesWithN(_matrix()), 0, 0, 1, 1),
+        Piece(1.0, Cosines(_matrix()), 0, 0, 1, 0),
+    ],
+    "operators of N": [Piece(1.5, Scalar((((1, 1, 0), 2.0), ((0, 0, 1), 0.3))), -1, -1, 0, 0)],
+    "between states": [Piece(7.0, Cosines(_matrix()), 0, 1, 0, 0), Piece(5.0, Cosines((0.3, 0.5, 0.7)), 0, 1, 0, 0)],
+}
+
+
+@pytest.mark.parametrize("name", PIECES)
+@pytest.mark.parametrize("effects", [(), (STATES,)], ids=["one state", "two states"])
+def test_operators_are_those_of_pairs(name, effects):
+    """Every pair of blocks up to ΔN = 2, one by one; of blocks with one Wang function too."""
+    blocks, representation = _blocks(effects)
+    for piece in PIECES[name]:
+        found = operators_of_stacks(stacks_of(blocks), 2, [piece], representation)
+        expected = {}
+        for i, up in enumerate(blocks):
+            for k, low in enumerate(blocks[: i + 1]):
+                acts = abs(up.n - low.n) <= piece.rotor.rank <= up.n + low.n
+                one = in_both_orders(up, low, [piece], representation) if acts else None
+                if one is not None and one.any():
+                    expected[i, k] = one
+        assert found.keys() == expected.keys()
+        largest = max((np.abs(one).max() for one in expected.values()), default=0.0)
+        for pair, one in expected.items():
+            assert np.abs(found[pair] - one).max() <= 1e-14 * largest  # two orders of summation
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0], ids=["alike", "with the sign of the order"])
+def test_dipoles_are_those_of_pairs(sign):
+    """Both ways round; dipoles between states may change their sign with the order of the states."""
+    blocks, representation = _blocks((STATES,))
+    along = np.array([1.2, 0.7, 0.4])
+    tensors = {(v, w): body_tensor((1 + v + w) * along, 1, representation) for v, w in ((0, 0), (1, 1), (0, 1))}
+    tensors[1, 0] = body_tensor(sign * 2 * along, 1, representation)
+    found = tensor_elements_of_stacks(stacks_of(blocks), tensors)
+    count = 0
+    for i, up in enumerate(blocks):
+        for k, low in enumerate(blocks):
+            one = _rotor_element(up, low, tensors) if abs(up.n - low.n) <= 1 <= up.n + low.n else None
+            assert (one is None) == ((i, k) not in found)
+            if one is not None:
+                count += 1
+                assert np.abs(found[i, k] - one).max() < 1e-13  # elements of up to 30, two orders of summation
+    assert count > 40
+
+
+def test_large_blocks_have_stacks_of_their_own():
+    blocks, _ = solved_rotor(TOP, SEMI_RIGID, [], 0, 80, None)
+    stacks = stacks_of(blocks)
+    assert sorted(number for stack in stacks for number in stack.numbers.tolist()) == list(range(len(blocks)))
+    for stack in stacks:
+        assert max(stack.sizes) <= max(16, 1.5 * min(stack.sizes))
+        assert (np.diff(stack.n) > 0).all()

@@ -1,0 +1,96 @@
+"""Unit matrices of several states made without a solution: the levels and derivatives of those that are made from solved levels."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rotor.formats.spcat import fit_states
+from rotor.formats.spcat.fit_states import FileLevels
+from rotor.formats.spcat.text.par import read_par
+from rotor.quantum.estimates.unit_blocks import UnitBlocks
+
+THREE = """three states
+  17  100   20    0    0.0  1.0E+06  1.0 1.0
+{options}
+10099 14500.1 1E+36 /A
+20099 4200.2 1E+36 /B
+30099 3300.3 1E+36 /C
+299 -1.1e-3 1E+36 /-DJ
+1199 -6.2e-3 1E+36 /-DJK
+40199 -3.1e-4 1E+36 /d1
+40399 -3.1e-8 1E+36 /hJ
+50099 1e-5 1E+36 /d2
+60000 2e-8 1E+36 /J+^6
+11 900.0 1E+36 /E1
+22 4100.0 1E+36 /E2
+10011 -55.5 1E+36 /dA1
+30022 -1.5 1E+36 /dC2
+200012 900.0 1E+36 /Ga12
+12 850.0 1E+36 /W12
+400002 510.0 1E+36 /Gb
+610000 12.0 1E+36 /Fab
+"""
+OPTIONS = {
+    "prolate": "a 1 3 0 40 0 1 1 1 0 1 0",
+    "oblate": "a 1 -3 0 40 0 1 1 1 0 1 0",
+    "K up to 4": "a 1 3 0 4 0 1 1 1 0 1 0",
+    "K of state 2 from 2 to 3": "a 1 3 0 40 0 1 1 1 -1 1 0\na 1 2 2 3 0 1 1 1 0 1 0",
+}
+
+
+def models(
+    options: str, labels: np.ndarray, monkeypatch: pytest.MonkeyPatch
+) -> tuple[FileLevels, FileLevels, np.ndarray]:
+    file = read_par(THREE.format(options=options).encode())
+    direct = FileLevels.of(file, labels)
+    with monkeypatch.context() as patched:
+        patched.setattr(fit_states, "_direct", lambda group, form: False)
+        solved = FileLevels.of(file, labels)
+    return direct, solved, np.array([p.value for p in file.parameters])
+
+
+@pytest.mark.parametrize("name", OPTIONS)
+def test_levels_are_those_of_the_solved_blocks(name, monkeypatch):
+    rng = np.random.default_rng(2)
+    n = np.array([0, 1, 2, 3, 3, 5, 7, 8, 8, 8, 12])
+    ka = np.minimum(rng.integers(0, 4, len(n)), n)
+    kc = n - ka if "oblate" not in name else n - ka + (ka > 0)
+    labels = np.column_stack([n, ka, kc, np.where(ka < 2, [0, 1] * 5 + [0], 2 * (ka < 4))])
+    labels[labels[:, 0] == 3, 3] = [1, 0]
+    direct, solved, values = models(OPTIONS[name], labels, monkeypatch)
+    for point in (values, values * (1 + 0.01 * rng.normal(size=len(values)))):
+        energies, slopes = direct.levels(point)
+        found, of_found = solved.levels(point)
+        assert energies == pytest.approx(found, rel=1e-12)  # round-off of matrices of 20 rows
+        assert np.abs(slopes - of_found).max(axis=0) == pytest.approx(0, abs=1e-9 * np.abs(of_found).max())  # the same
+    used = np.abs(slopes).max(axis=0) > 0
+    assert used.sum() >= 14
+
+
+def test_levels_that_a_state_does_not_have_are_named():
+    file = read_par(THREE.format(options=OPTIONS["K of state 2 from 2 to 3"]).encode())
+    for label in ([5, 1, 5, 2], [5, 6, 0, 0], [5, 1, 2, 0], [5, 1, 5, 3]):
+        text = " ".join(map(str, label))
+        with pytest.raises(ValueError, match=f"there is no level {text} "):
+            FileLevels.of(file, np.array([[3, 1, 3, 0], label]))
+
+
+def test_blocks_of_many_sizes_give_what_each_gives_alone(monkeypatch):
+    """Side by side and padded, or one at a time."""
+    from rotor.quantum.estimates import unit_blocks
+
+    labels = np.array([[n, ka, n - ka, v] for n in range(3, 9) for ka in range(3) for v in range(3)])
+    text = THREE.format(options=OPTIONS["prolate"])  # less what connects all blocks of one J
+    without = "\n".join(row for row in text.splitlines() if not row.startswith(("400002", "610000", "12 ")))
+    file = read_par(without.replace("  17 ", "  14 ").encode())
+    values = np.array([p.value for p in file.parameters])
+    together = FileLevels.of(file, labels).levels(values)
+    monkeypatch.setattr(unit_blocks, "_AT_ONCE", 1)
+    model = FileLevels.of(file, labels)
+    blocks = model.solved[0].blocks
+    assert isinstance(blocks, UnitBlocks)
+    alone = model.levels(values)
+    assert len(blocks._labelled) == len(blocks.tracked) > 12
+    assert np.array_equal(together[0], alone[0])
+    assert together[1] == pytest.approx(alone[1], abs=1e-12 * np.abs(alone[1]).max())  # order of sums
