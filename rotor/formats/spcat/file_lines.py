@@ -353,10 +353,10 @@ def lines_of(
     up, low = found.upper[chosen], found.lower[chosen]
     error = np.zeros(len(chosen)) if spread is None else np.linalg.norm(spread[up] - spread[low], axis=1)
     g_upper = levels.multiplicity[up] * (levels.weight // levels.components)[up]
-    columns = (found.frequency_mhz[chosen], intensity[chosen], energy[chosen], g_upper, error)
+    columns = (found.frequency_mhz[chosen], intensity[chosen], energy[chosen], error)
     index, upper, lower = _one_component_each(group, levels, form, up, low)
-    frequency, strength, energy, g, error = (column[index] for column in columns)
-    return GroupLines(frequency, strength, energy, g, upper, lower, error)
+    frequency, strength, energy, error = (column[index] for column in columns)
+    return GroupLines(frequency, strength, energy, g_upper[index], upper, lower, error)
 
 
 def _one_component_each(

@@ -130,7 +130,9 @@ def diagonalise(bands: list[Floats], vectors: bool = True) -> tuple[Floats, Floa
 
 
 def _are_finite(bands: list[Floats]) -> bool:
-    return all(math.isfinite(band.dot(band)) or bool(np.isfinite(band).all()) for band in bands)  # squares overflow sooner
+    return all(
+        math.isfinite(band.dot(band)) or bool(np.isfinite(band).all()) for band in bands
+    )  # squares overflow sooner
 
 
 def lowest_energies(bands: list[Floats], below: float) -> Floats:
