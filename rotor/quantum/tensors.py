@@ -329,7 +329,7 @@ def bands_between(up: WangBlock, low: WangBlock, tensor: BodyTensor) -> list[Ban
         source, target = overlap(up, low, step)
         if source.start >= source.stop:
             continue
-        elements = _wang_coupling(low.j, up.j, rank, step)[low.first_k :: 2][source] * parts[rank + step]
+        elements = wang_coupling(low.j, up.j, rank, step)[low.first_k :: 2][source] * parts[rank + step]
         for place, value in _folded(up, low, rank, step, parts) if rank > 1 else ():
             elements[place - source.start] += value
         out.append(Band(source, target, elements))
@@ -344,7 +344,7 @@ def overlap(up: WangBlock, low: WangBlock, step: int) -> tuple[slice, slice]:
 
 
 @lru_cache(maxsize=2048)  # some 16 MB at J = 1000; a dipole needs 6 tables for every J
-def _wang_coupling(j_low: int, j_up: int, rank: int, step: int) -> Floats:
+def wang_coupling(j_low: int, j_up: int, rank: int, step: int) -> Floats:
     """`coupling` for K = 0 ... J, times √2 where one of K and K + step is 0."""
     first, last = max(0, -step), min(j_low, j_up - step)
     out = np.zeros(j_low + 1)
