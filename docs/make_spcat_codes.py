@@ -51,9 +51,9 @@ CHECKED = """
 535 inputs of the kinds that published fits have, 16 of them published files, were computed here and by the program itself (its public C
 source, gcc -O2; it repeats 22 reference catalogues of 2008 line by line), and compared by quantum numbers, frequencies, intensities,
 degeneracies and energies of levels: 1 to 18 states in either basis, up to five spins with and without a total spin of two or three, more
-than six quanta, weights by IAX 1 to 11, E species, l-doubled states with and without spins, energies of one K, KNMIN, KNMAX, DIAG, IXX, VSYM,
-option lines of each state, moments of other kinds. 491 are equal, six of them to the program in long double alone, 8 are refused by name, and
-these differ:
+than six quanta, weights by IAX 1 to 11, E species, l-doubled states with and without spins, energies of one K, KNMIN, KNMAX, DIAG, IXX,
+VSYM, option lines of each state, moments of other kinds. 491 are equal, six of them to the program in long double alone, 8 are refused
+by name, and these differ:
 
 | inputs | what differs |
 |---|---|
@@ -71,8 +71,8 @@ reference case three_states_fermi_coriolis), and here other LAPACK drivers give 
 
 I_tot of three nuclei (IAX -6): a parameter names the first of them, or the first and the second for the pair across from it; with
 ΔK = 1 or 2 its value is twice that of a nucleus coupled by itself, with ΔK = 0 the same. Levels here are those of three nuclei coupled
-one by one with tensors turned by 120°, of the species that exchange allows (tests write out every spin function). For spins of 3/2 and more its
-elements between unequal totals are wrong: a loop of its source (setzitot, spinit.c) steps by the size of the other total. With that step
+one by one with tensors turned by 120°, of the species that exchange allows (tests write out every spin function). For spins of 3/2 and
+more its elements between unequal totals are wrong: a loop of its source (setzitot, spinit.c) steps by the size of the other total. With that step
 set right the energies of CHCl3-like levels with F = 1 agree to 1e-6 cm⁻¹; beyond, some of its names go to levels of forbidden
 species, since it names by the order of energy in blocks that hold those too.
 

@@ -92,7 +92,19 @@ def exchange_of(typ: int, low: StateOptions, high: StateOptions) -> int:
 def some_weights_agree(typ: int, low: StateOptions, high: StateOptions, odd_spins: int = 0) -> bool:
     """Whether an operator by its TYP (20, 40, 60: of the species of Na, Nb, Nc) joins levels of one weight.
 
-    odd_spins: 1 where it changes the sign of the function of equivalent spins too.
+    Parameters
+    ----------
+    typ : int
+        TYP of its code.
+    low, high : StateOptions
+        Of the two states; the same twice within one state.
+    odd_spins : int, optional
+        1 where it changes the sign of the function of equivalent spins too.
+
+    Returns
+    -------
+    bool
+        Whether two such levels have one weight.
     """
     turn = {1: (0, 1), 2: (1, 1), 3: (1, 0)}.get(typ // 20, (0, 0))  # species of the operator
     for species in _SPECIES:
