@@ -71,10 +71,10 @@ reference case three_states_fermi_coriolis), and here other LAPACK drivers give 
 
 I_tot of three nuclei (IAX -6): a parameter names the first of them, or the first and the second for the pair across from it; with
 ΔK = 1 or 2 its value is twice that of a nucleus coupled by itself, with ΔK = 0 the same. Levels here are those of three nuclei coupled
-one by one with tensors turned by 120°, of the species that exchange allows (tests write out every spin function). For spins of 3/2 and
-more its elements between unequal totals are wrong: a loop of its source (setzitot, spinit.c) steps by the size of the other total. With that step
-set right the energies of CHCl3-like levels with F = 1 agree to 1e-6 cm⁻¹; beyond, some of its names go to levels of forbidden
-species, since it names by the order of energy in blocks that hold those too.
+one by one with tensors turned by 120°, of the species that exchange allows (tests write out every spin function). For spins of 3/2
+and more elements between unequal totals are wrong in the program: a loop of its source (setzitot, spinit.c) steps by the size of the
+other total. With that step set right the energies of CHCl3-like levels with F = 1 agree to 1e-6 cm⁻¹; beyond, some of its names go to
+levels of forbidden species, since it names by the order of energy in blocks that hold those too.
 
 An operator that the declared symmetry forbids (Δk - Δl no multiple of the fold of the axis, levels of unequal weights, axes that differ) is
 left out, as the program does, with a note. Dipoles between states have the phase i where no state has a dipole of its own. In an

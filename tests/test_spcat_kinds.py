@@ -27,7 +27,8 @@ MADE = {
     "l_doubled_quad": 194, "patterns_of_i_tot": 822, "three_states_oblate": 877, "dipoles_between": 657, "threefold_weights": 72,
     "threefold_asymmetric_quanta": 52, "forbidden_coupling": 654, "water_diag1": 339, "water_diag5": 398, "two_quadrupoles_i_tot": 1005,
     "eighteen_states": 958, "oblate_spin_orbit": 238, "three_protons_i_tot": 247, "methyl_i_tot": 215, "inversion_i_tot": 215,
-    "deuterons_i_tot": 323, "forbidden_three_i_tot": 292, "l_doubled_weights": 419, "inversion_weights": 100,
+    "deuterons_i_tot": 323, "forbidden_three_i_tot": 292, "l_doubled_weights": 419, "inversion_weights": 100, "one_of_two_i_tot": 208,
+    "moment_of_n": 92,
 }  # fmt: skip
 
 
