@@ -97,6 +97,9 @@ def test_not_converged_is_exit_code_1_with_the_reason_and_no_constants_written(c
     assert "NOT CONVERGED" in (folder / "new.fit").read_text(encoding="utf-8")
 
 
+BD = ("--constants", "B=57000 D=0.17 MHz", "--free", "B,D")
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -105,17 +108,39 @@ def test_not_converged_is_exit_code_1_with_the_reason_and_no_constants_written(c
         (("co.csv", "--constants", "B=57000 MHz"), "--free: name the constants to fit"),
         (("co.csv", "--constants", "B=57000 MHz", "--free", "B,"), "names parted by commas"),
         (("co.csv", "--constants", "B=57000 MHz", "--free", "B,B"), "B is named twice"),
-        (("co.csv", "--constants", "B=57000 MHz", "--free", "B,Q"), "'Q' is not a rotational constant"),
         (("co.csv", "--constants", "B=57000 MHz", "--free", "B", "--prior", "B"), "--prior 'B': name=error"),
-        (("co.csv", "--constants", "B=57000 MHz", "--free", "B", "--loss", "l1"), "loss 'l1'"),
         (("co.csv", "--constants", "B=57000 MHz", "--free", "B", "--lin", "x.lin"), "--lin goes with a .par file"),
         (("co.txt", "--constants", "B=57000 MHz", "--free", "B"), "assigned lines are read from"),
         (("empty.csv", "--constants", "B=57000 MHz", "--free", "B"), "no lines in it"),
         (("co.csv", "--constants", "A=6 B=5 C=4 GHz", "--free", "B"), "no column ka_upper"),
         (("co.csv", "--constants", "B=57000 MHz", "--free", "B", "--out", "no/folder"), "there is no folder"),
         (("zero.csv", "--constants", "B=57000 MHz", "--free", "B"), "every line has an error of 0"),
-        (("one.csv", "--constants", "B=57000 D=0.1 MHz", "--free", "B,D"), "2 free constants for 1 measured"),
-        (("bad.csv", "--constants", "B=57000 MHz", "--free", "B"), "there is no level -1"),
+        (("co.csv", "--constants", "B=57000 MHz", "--free", "B,Q"), "--free: 'Q' is not a rotational constant"),
+        (("co.csv", "--constants", "B=57000 MHz", "--free", "B,A"), "--free: kind 'linear' needs B alone"),
+        (("co.csv", *BD, "--prior", "B=1", "--prior", "B=2"), "--prior 'B=2': B has an a-priori error already"),
+        (("co.csv", *BD, "--prior", "H=1"), "--prior: H is not in the set"),
+        (("co.csv", *BD, "--tie", "H=2*B"), "--tie 'H=2*B': H is not in the set"),
+        (("co.csv", *BD, "--tie", "D=1..2*B"), "--tie 'D=1..2*B': write 'X = 2.5*Y'"),
+        (("co.csv", *BD, "--tie", "D=2*B"), "--tie 'D=2*B': D must not be free"),
+        (("co.csv", *BD, "--loss", "l1"), "--loss 'l1'"),
+        (("co.csv", *BD, "--reject", "-1"), "--reject = -1"),
+        (("co.csv", *BD, "--poor-rms", "0"), "--poor-rms = 0"),
+        (("co.csv", *BD, "--try", "Q"), "--try: 'Q' is not a rotational constant"),
+        (("co.csv", *BD, "--choose", "B"), "--choose: B is free already"),
+        (("co.csv", *BD, "--suggest", "H"), "--suggest: H is not among the free"),
+        (("co.csv", *BD, "--merge", "empty.csv"), "--merge: empty.csv: no lines"),
+        (("co.csv", "--start", "co.csv", "--free", "B"), "--start co.csv: a list of lines has no constants"),
+        (("one.csv", "--constants", "B=57000 D=0.1 MHz", "--free", "B,D"), "one.csv: 2 free constants for 1 measured"),
+        (("bad.csv", "--constants", "B=57000 MHz", "--free", "B"), "line 1 of the table: there is no level -1"),
+        (("same.csv", *BD), "line 1, 1 - 1 at 0.0000 MHz: upper and lower state are one level"),
+        (("long.csv", *BD), "line 1 of the table: 1 values more"),
+        (("negative.csv", *BD), "line 1 of the table: error_mhz = -0.1"),
+        (
+            ("water.csv", "--constants", "A=9 B=5 C=4 GHz", "--free", "B"),
+            "line 1, 3 2 3 - 2 1 1 at 183310.0000 MHz: there is no level 3 2 3",
+        ),
+        (("co.par", "--lin", "none.lin"), "--lin: none.lin: no such file"),
+        (("held.par", "--lin", "co.lin"), "no parameter is free"),
         (("co.par", "--out", "co"), "co.par is an input"),
         (("alone.par",), "there are no measured lines beside alone.par"),
     ],
@@ -131,6 +156,12 @@ def test_wrong_input_is_one_line_and_nothing_is_written(call, folder, arguments,
     (folder / "zero.csv").write_text(head + "1,0,115271.2,0\n2,1,230538.0,0\n")
     (folder / "one.csv").write_text(head + "1,0,115271.2,0.1\n")
     (folder / "bad.csv").write_text(head + "0,-1,115271.2,0.1\n")
+    (folder / "same.csv").write_text(head + "1,1,0,0.1\n2,1,230538.0,0.1\n")
+    (folder / "long.csv").write_text(head + "1,0,115271.2,0.1,7\n")
+    (folder / "negative.csv").write_text(head + "1,0,115271.2,-0.1\n")
+    asymmetric = "j_upper,ka_upper,kc_upper,j_lower,ka_lower,kc_lower,frequency_mhz,error_mhz\n"
+    (folder / "water.csv").write_text(asymmetric + "3,2,3,2,1,1,183310,0.1\n")
+    (folder / "held.par").write_text(PAR.replace("E+035", "E-037"))
     before = {path.name: path.read_bytes() for path in folder.iterdir()}
     code, _, err = call("fit", *arguments)
     assert code == 2
@@ -138,12 +169,50 @@ def test_wrong_input_is_one_line_and_nothing_is_written(call, folder, arguments,
     assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
 
 
+def test_no_degree_of_freedom_is_said_and_there_are_no_errors_from_the_scatter(call, folder):
+    (folder / "two.csv").write_text("j_upper,j_lower,frequency_mhz,error_mhz\n1,0,115271.2,0.1\n2,1,230538.0,0.1\n")
+    code, out, err = call("fit", "two.csv", *BD, "--out", "two", "--json", "two.json")
+    assert code == 0, err
+    assert "0 degrees of freedom" in out.splitlines()[0]
+    assert "sqrt(chi2/degrees of freedom) undefined" in out
+    assert "nan" not in out + (folder / "two.fit").read_text(encoding="utf-8")
+    content = json.loads((folder / "two.json").read_text(encoding="utf-8"))
+    assert content["parameters"][0]["scaled_error"] is None
+    assert content["parameters"][0]["error"] > 0
+    (folder / "co.lin").write_text(
+        "  1  0                              115271.2 0.1\n  2  1                              230538.0 0.1\n"
+    )
+    (folder / "co.par").write_text(PAR.replace("   3  31", "   2   2", 1).replace("1.0000E+000", "-1.0", 1))
+    assert call("fit", "co.par", "--out", "new")[0] == 0
+    assert all(math.isfinite(p.error) for p in read_par(folder / "new.var").parameters)
+
+
+def test_lines_of_a_par_file_with_no_such_level_are_left_out_by_name(call, folder):
+    """As SPFIT does ("Bad Line"); in other lists they are an error."""
+    (folder / "co.par").write_text(PAR)
+    write_lines(folder / "co.lin")
+    text = (folder / "co.lin").read_text()
+    (folder / "co.lin").write_text(text.replace("  2  1 ", " -2 -1 ", 1))
+    code, out, err = call("fit", "co.par")
+    assert code == 0, err
+    assert "line 2, -2 - -1 at 23053" in err
+    assert "is left out" in err
+    assert "lines 24, of which 24 count" in out
+
+
 def test_spfits_options_are_honoured_or_refused_by_name(call, folder):
     write_lines(folder / "co.lin")
-    for old, new, words in (("   20    0 ", "   20   99 ", "NXPAR = 99"), ("1.0000E+006", "0.0", "ERRTST = 0")):
+    for old, new, exit_code, words in (
+        ("   20    0 ", "   20   99 ", 2, "co.par: NXPAR = 99"),
+        ("1.0000E+006", "0.0", 0, "ERRTST = 0: 1e+06 is taken"),
+        (" 1.0000000000", " -1.0", 2, "CAL = -1"),
+        ("  31   20", "   0   20", 2, "NLINE = 0: no line counts"),
+        ("             300", "             200", 2, "parameter 200 stands twice and both are free"),
+        ("1.600000000000000E-007 1.00000000E+035 /H", "1.723E-007 -1.0 /H", 0, "a-priori errors below 0: H are held"),
+    ):
         (folder / "co.par").write_text(PAR.replace(old, new, 1))
         code, _, err = call("fit", "co.par")
-        assert code == 2
+        assert code == exit_code, (words, err)
         assert words in err
     (folder / "co.par").write_text(PAR.replace("  31   20", "  10   20", 1))
     code, out, err = call("fit", "co.par")

@@ -190,7 +190,8 @@ def test_a_misassigned_line_is_reported_not_dropped():
     plain = fit_lines(changed, TRUE, parameters(TRUE, list(TRUE.values)))
     assert plain.used.all()
     assert not plain.converged
-    bent = fit_lines(changed, TRUE, parameters(TRUE, list(TRUE.values)), FitOptions(loss="cauchy", poor_rms=1e4))
+    bent = fit_lines(changed, TRUE, parameters(TRUE, list(TRUE.values)), FitOptions(loss="cauchy"))
+    assert bent.converged  # √(Σ ρ/n) is judged; the plain weighted rms is far above 10
     assert np.argmax(np.abs(bent.residuals)) == 17
     out = fit_lines(changed, TRUE, parameters(TRUE, list(TRUE.values)), FitOptions(reject_above=200.0))
     assert np.flatnonzero(~out.used).tolist() == [17]
@@ -265,8 +266,17 @@ def test_a_blend_of_known_width_weighs_how_far_its_components_lie_apart(tmp_path
     back = read_lin(tmp_path / "blend.lin", 3)
     assert back.blends().tolist() == [0, 1, 2, 3, 3, -1]
     assert back.error_mhz[-1] == 40.0
-    with pytest.raises(ValueError, match=r"a \.csv has no place for the widths"):
-        write_assigned_lines(lines, tmp_path / "blend.csv")
+    write_assigned_lines(lines, tmp_path / "blend.csv")
+    again, _ = read_assigned_lines(tmp_path / "blend.csv", ASYMMETRIC)
+    assert again.widths_mhz == {3: 40.0}
+    assert fit_lines(again, start, parameters(start, ["A", "B", "C"]), FitOptions(poor_rms=1e9)).residuals.tolist() == (
+        fit.residuals.tolist()
+    )
+    text = (tmp_path / "blend.csv").read_text(encoding="utf-8")
+    for old, new, words in (("3,40.0\n", "7,40.0\n", "that of a blend"), ("3,40.0\n", "3,41.0\n", "another width_mhz")):
+        (tmp_path / "blend.csv").write_text(text.replace(old, new, 1), encoding="utf-8")
+        with pytest.raises(ValueError, match=words):
+            read_assigned_lines(tmp_path / "blend.csv", ASYMMETRIC)
 
 
 def test_ties_keep_ratios_and_differences():

@@ -6,7 +6,10 @@ import importlib.util
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+
+from rotor.formats.assigned_lines import read_assigned_lines
 
 SCRIPT = Path(__file__).parents[1] / "docs" / "make_fitted_catalogues.py"
 
@@ -45,3 +48,19 @@ def test_a_row_made_anew_is_that_of_the_page(shared, make, label):
     found = cells(make.row(label, shared))
     assert found[:7] == written[:7]
     assert float(found[7]) == pytest.approx(float(written[7]), abs=0.011)  # two decimals, one unit of the last
+
+
+@pytest.mark.oracle
+def test_no_smooth_model_meets_the_lines_of_hnco(shared, make):
+    """The figures that the page gives: ladders of Ka and parity, each with a polynomial in J(J + 1) of its own."""
+    lines, _ = read_assigned_lines(shared / "reference/library_lines/c043002.cat.gz", ("j", "ka", "kc"))
+    worst = "34 1 34 - 35 0 35"
+    for power, coefficients, rms in ((3, 32, 3.36), (8, 54, 2.97)):
+        found = make.ladders(lines, power)
+        assert found[:2] == (coefficients, pytest.approx(rms, abs=0.005))  # two decimals are written
+        assert 19 < found[2][worst] < 22.5
+    text = [lines.text(i) for i in range(len(lines))]
+    without = lines.take(np.array([one != worst for one in text]))
+    assert make.ladders(without, 4)[1] == pytest.approx(1.17, abs=0.005)  # the same
+    more = {worst, "10 1 9 - 9 1 8", "9 1 9 - 8 1 8", "2 1 2 - 1 1 1", "8 1 8 - 7 1 7"}
+    assert make.ladders(lines.take(np.array([one not in more for one in text])), 3)[1] == pytest.approx(0.85, abs=0.005)

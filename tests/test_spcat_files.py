@@ -13,7 +13,7 @@ from rotor.formats.spcat.text.cat import format_lines, read_cat
 from rotor.formats.spcat.text.egy import format_egy, read_egy, write_egy
 from rotor.formats.spcat.text.fields import BLANK
 from rotor.formats.spcat.text.int_file import Dipole, IntensityFile, Request, format_int, read_int, write_int
-from rotor.formats.spcat.text.lin import LineList, format_lin, line_list, read_lin, write_lin
+from rotor.formats.spcat.text.lin import LineList, format_lin, line_list, note_of_remarks, read_lin, write_lin
 from rotor.formats.spcat.text.par import Header, Options, Parameter, ParameterFile, format_par, read_par, write_par
 
 SAMPLES = Path(__file__).parent / "oracles" / "spcat"
@@ -256,14 +256,25 @@ def test_a_new_line_list_reads_back(tmp_path):
         (b"  1  0  2" + b" " * 27 + b" 5.0 0.1\n", "line 1, column 10: 3 quantum numbers"),
         (b"  1  x" + b" " * 30 + b" 5.0 0.1\n", "line 1, column 4: quantum number reads '  x'"),
         (
-            b"  1  0" + b" " * 30 + b" 5.0 0.1 Smith 1973\n",
-            "column 46: 'Smith' is no number.* a comment begins",
+            b"  1  0" + b" " * 30 + b" 5.0 0.1 O.5\n",
+            "column 46: 'O.5' is no number.* a comment begins",
         ),
     ],
 )
 def test_an_unreadable_line_is_refused(text, words):
     with pytest.raises(ValueError, match=words):
         read_lin(text)
+
+
+def test_words_behind_the_error_of_a_line_are_a_remark():
+    """Without a slash too; in a blend, where the weight counts, that is said, since SPFIT takes the digits of the words for it."""
+    line = b"  1  0" + b" " * 30 + b" 5.0 0.1 Smith 1973, v=0\n"
+    read = read_lin(line)
+    assert (read.frequency.tolist(), read.error.tolist(), read.weight.tolist()) == ([5.0], [0.1], [1.0])
+    assert format_lin(read) == line
+    assert note_of_remarks(read, read.blends()) == []
+    blend = read_lin(line + b"  2  1" + line[6:])
+    assert "2 blended lines have words where their weight may stand" in note_of_remarks(blend, blend.blends())[0]
 
 
 def test_lines_that_do_not_fit_are_refused():

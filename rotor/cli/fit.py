@@ -113,7 +113,7 @@ def command(context: typer.Context, given: Options) -> None:
     if given.all_orders and given.choose is None:
         raise ValueError("--all-orders goes with --choose, which names the constants to choose from")
     if given.choose is not None:
-        answer, steps = _chosen(request, _names(given.choose), not given.all_orders)
+        answer, steps = _chosen(request, _names("--choose", given.choose), not given.all_orders)
     else:
         answer = _fitted(request)
     fit = answer.fit
@@ -186,10 +186,14 @@ def _refuse_overwriting(files: Files, read: Sequence[str | None]) -> None:
             raise ValueError(f"{name.split()[0]}: {path} is an input; write the result under another name")
 
 
-def _names(text: str) -> list[str]:
+def _names(option: str, text: str) -> list[str]:
+    """The names of a list, each once."""
     names = [name.strip() for name in text.split(",")]
     if not all(names):
-        raise ValueError(f"{text!r}: names parted by commas are needed, such as A,B,C,DeltaJ")
+        raise ValueError(f"{option}: {text!r}: names parted by commas are needed, such as A,B,C,DeltaJ")
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice:
+        raise ValueError(f"{option}: {text!r}: {twice} is named twice; once is enough")
     return names
 
 
@@ -202,7 +206,8 @@ def read_request(given: Options) -> FitRequest:
 
     request = _of_spfit(given) if given.source.lower().endswith(".par") else _of_lines(given)
     if given.more is not None:
-        request = with_more_lines(request, given.more)
+        with inputs.named("--merge"):
+            request = with_more_lines(request, given.more)
     return replace(request, options=_options(request.options, given))
 
 
@@ -216,7 +221,8 @@ def _of_spfit(given: Options) -> FitRequest:
     unused = [name for name, value in others.items() if value]
     if unused:
         raise ValueError(f"{', '.join(unused)}: a .par file says itself what is free and where the fit starts")
-    return fit_of_spfit(given.source, given.lin)
+    with inputs.fields_as_options(lin="--lin"):
+        return fit_of_spfit(given.source, given.lin)
 
 
 def _of_lines(given: Options) -> FitRequest:
@@ -226,11 +232,26 @@ def _of_lines(given: Options) -> FitRequest:
         raise ValueError("--lin goes with a .par file; give the lines as the source otherwise")
     if (given.start is None) == (given.constants is None):
         raise ValueError("either --start or --constants says where the fit starts; give one of them")
+    if given.start is not None and given.start.lower().endswith((".csv", ".lin")):
+        raise ValueError(
+            f"--start {given.start}: a list of lines has no constants; give a .toml, .var or the name of a molecule"
+        )
     top = inputs.read_top(Input(given.start, given.constants))
-    names = None if given.free is None else _names(given.free)
-    priors = dict(_prior(text) for text in given.prior or [])
-    with inputs.fields_as_options(free="--free"):
+    names = None if given.free is None else _names("--free", given.free)
+    priors = _priors(given.prior or [])
+    with inputs.fields_as_options(free="--free", tie="--tie", priors_mhz="--prior"):
         return fit_of_lines(given.source, top, names, ties=given.tie or [], priors_mhz=priors, start=given.start)
+
+
+def _priors(texts: Sequence[str]) -> dict[str, float]:
+    """A-priori errors by name, each named once."""
+    found = dict[str, float]()
+    for text in texts:
+        name, value = _prior(text)
+        if name in found:
+            raise ValueError(f"--prior {text!r}: {name} has an a-priori error already; give one")
+        found[name] = value
+    return found
 
 
 def _prior(text: str) -> tuple[str, float]:
@@ -248,7 +269,8 @@ def _options(options: FitOptions, given: Options) -> FitOptions:
         changes["most_iterations"] = given.iterations
     if given.default_error is not None:
         changes["default_error_mhz"] = inputs.positive("--default-error", given.default_error, "MHz")
-    return replace(options, **changes)
+    with inputs.fields_as_options(loss="--loss", reject_above="--reject", poor_rms="--poor-rms"):
+        return replace(options, **changes)
 
 
 # What is done
@@ -276,12 +298,19 @@ def _progress() -> Any:
 
 def _chosen(request: FitRequest, candidates: Sequence[str], by_order: bool) -> tuple[FitAnswer, list[Trial]]:
     from rotor.fit.choose import choose_constants
-    from rotor.fit.parameters import parameters
+    from rotor.fit.parameters import parameters, with_names
     from rotor.formats.fit_request import answer_fit
 
     if request.spfit is not None:
         raise ValueError("--choose: start from a line list and constants, whose free ones are the base of the model")
     assert request.constants is not None  # a list of lines has constants to start from
+    idle = [name for name in candidates if name in request.parameters.names]
+    if idle:
+        raise ValueError(
+            f"--choose: {', '.join(idle)} is free already, part of the base of the model; choose from others"
+        )
+    with inputs.named("--choose"):
+        with_names(request.constants, candidates)
     fit, steps = choose_constants(
         request.lines, request.constants, request.parameters.names, candidates, request.options, by_order=by_order
     )
@@ -294,7 +323,8 @@ def _trials(fit: Fit, options: FitOptions, text: str | None) -> list[Trial]:
         return []
     from rotor.fit.choose import try_constants
 
-    return try_constants(fit, _names(text), options)
+    with inputs.named("--try"):
+        return try_constants(fit, _names("--try", text), options)
 
 
 def _suggestions(request: FitRequest, fit: Fit, name: str | None) -> list[Suggestion]:
@@ -306,6 +336,8 @@ def _suggestions(request: FitRequest, fit: Fit, name: str | None) -> list[Sugges
     from rotor.fit.choose import suggest_lines
 
     error = float(np.median(fit.lines.error_mhz[fit.used]))
+    if name not in fit.parameters.names:
+        raise ValueError(f"--suggest: {name} is not among the free parameters {', '.join(fit.parameters.names)}")
     if request.spfit is not None and fit.constants is None:
         from rotor.formats.spcat.unmeasured import unmeasured_lines
 

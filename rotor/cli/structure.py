@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from rotor.cli.shared.inputs import json_option
+from rotor.cli.shared.inputs import fields_as_options, json_option
 from rotor.cli.shared.options import argument, file_option, grouped, option
 from rotor.cli.shared.output import (
     ComputationError,
@@ -78,7 +78,8 @@ def command(context: typer.Context, given: Options) -> None:
     from rotor.formats.family_file import read_family
 
     file = read_family(source)
-    answer = answered(file, chosen, given.weights, given.leave_out, given.pair)
+    with fields_as_options(weights="--weights", leave_out="--leave-out", pair="--pair"):
+        answer = answered(file, chosen, given.weights, given.leave_out, given.pair)
     for text in _notes(answer):
         note(text)
     content = record(file, answer, source, context.obj)

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,8 +22,8 @@ from rotor.fit.parameters import Parameters, with_names
 from rotor.fit.parameters import parameters as parameters_of
 from rotor.fit.search import FitOptions as FitOptions
 from rotor.fit.search import Search, round_off, too_few, with_rejection
-from rotor.quantum.labelled import LevelModel, level_model
-from rotor.statistics.least_squares import EXHAUSTED, Minimum, Progress
+from rotor.quantum.labelled import LevelModel, MissingLevelsError, level_model
+from rotor.statistics.least_squares import BENT, EXHAUSTED, Minimum, Progress
 from rotor.statistics.regression import Regression, regression
 from rotor.tops.constants import Constants
 from rotor.tops.covariance import Covariance
@@ -78,7 +79,7 @@ class Fit:
 
     @property
     def weighted_rms(self) -> float:
-        """√(Σ ((obs - calc)/σ)² / lines that counted), blends as one: what SPFIT calls RMS ERROR.
+        """√(Σ ((obs - calc)/σ)² / lines that counted), blends as one: what SPFIT calls RMS ERROR, less the part of a-priori values.
 
         Of a blend of known width its components count too.
         """
@@ -162,7 +163,7 @@ def fit_lines(
     Raises
     ------
     ValueError
-        No lines, all errors 0, labels that no level has, more free parameters than measured frequencies.
+        No lines, all errors 0, labels that no level has, a line from a level to itself, more free parameters than measured frequencies.
 
     Notes
     -----
@@ -180,22 +181,21 @@ def fit_lines(
     options = options or FitOptions()
     if not len(lines):
         raise ValueError("there are no lines to fit to")
+    lines, made, missing = _with_levels(lines, model or _of_constants(constants, options), options)
     left_out, sigma = _errors_of(lines, options)
-    if model is None and constants is None:
-        raise ValueError("either constants or a model of the levels is needed")
     labels, upper, lower = _labels(lines)
-    made = model(labels) if model else level_model(constants, labels, kmax=options.kmax)  # type: ignore[arg-type]
     if made.names != parameters.constant_names:
         raise ValueError(f"parameters for {parameters.constant_names}, but the levels depend on {made.names}")
 
     used = np.ones(len(lines), dtype=bool)
     used[list(left_out)] = False
     if few := too_few(lines, used, parameters):
-        raise ValueError(few)
+        raise ValueError(f"{lines.source or 'the lines'}: {few}")
     search = Search(lines, made, parameters, options, upper, lower, sigma, used)
     search, minimum, rejected = with_rejection(search, options, progress)
     left_out |= rejected
-    return _finished(search, minimum, constants, left_out, labels)
+    fit = _finished(search, minimum, constants, left_out, labels)
+    return replace(fit, notes=(*missing, *fit.notes))
 
 
 def weighted_derivatives(fit: Fit, names: Sequence[str], options: FitOptions | None = None) -> Floats:
@@ -222,6 +222,43 @@ def _labels(lines: Assignments) -> tuple[Ints, Ints, Ints]:
     return labels, places[: len(lines)], places[len(lines) :]
 
 
+def _of_constants(constants: Constants | None, options: FitOptions) -> Callable[[Ints], LevelModel]:
+    """What makes the model of the constants, from labels."""
+    if constants is None:
+        raise ValueError("either constants or a model of the levels is needed")
+    return partial(level_model, constants, kmax=options.kmax)
+
+
+def _with_levels(
+    lines: Assignments, model: Callable[[Ints], LevelModel], options: FitOptions
+) -> tuple[Assignments, LevelModel, list[str]]:
+    """The lines whose two levels there are, their model, and what was left out.
+
+    A label that no level has is an error, or, with `leave_out_missing`, its lines are left out.
+    """
+    labels, upper, lower = _labels(lines)
+    one = np.flatnonzero(upper == lower)
+    if len(one):
+        raise ValueError(f"{_named(lines, int(one[0]))}: upper and lower state are one level, which makes no line")
+    try:
+        return lines, model(labels), []
+    except MissingLevelsError as error:
+        lost = np.isin(upper, error.places) | np.isin(lower, error.places)
+        if not options.leave_out_missing or lost.all():
+            raise ValueError(f"{_named(lines, int(np.argmax(lost)))}: {error}") from None
+        notes = [
+            f"{_named(lines, i)}, is left out: it has a level that does not exist"
+            for i in np.flatnonzero(lost).tolist()
+        ]
+    rest, made, more = _with_levels(lines.take(~lost), model, options)
+    return rest, made, notes + more
+
+
+def _named(lines: Assignments, i: int) -> str:
+    """A line by its place and labels."""
+    return f"{lines.source or 'the lines'}: line {i + 1}, {lines.text(i)} at {lines.frequency_mhz[i]:.4f} MHz"
+
+
 def _distinct_rows(rows: Ints) -> tuple[Ints, Ints]:
     """The rows of an array, each once, in order, and the place of each among them; rows of small numbers by one number each."""
     spans = rows.max(axis=0, initial=0) - rows.min(axis=0, initial=0) + 1
@@ -237,7 +274,8 @@ def _errors_of(lines: Assignments, options: FitOptions) -> tuple[dict[int, str],
     zero = lines.error_mhz == 0
     if zero.all() and options.default_error_mhz is None:
         raise ValueError(
-            "every line has an error of 0: give errors in the file, or one for all of them (default_error_mhz, --default-error)"
+            f"{lines.source or 'the lines'}: every line has an error of 0: give errors in the file, or one for all of them "
+            "(default_error_mhz, --default-error)"
         )
     if options.default_error_mhz is not None:
         return {}, np.where(zero, options.default_error_mhz, lines.error_mhz)
@@ -314,7 +352,8 @@ def _changed(search: Search, values: Floats, labels: Ints) -> tuple[str, ...]:
 
 def _verdict(fit: Fit, disorder: str, options: FitOptions) -> tuple[bool, str]:
     """Whether the fit is a result, and the sentence that says so or says why not."""
-    rms, minimum = fit.weighted_rms, fit.minimum
+    minimum = fit.minimum
+    rms = fit.weighted_rms if options.loss == "squares" else minimum.rms  # of what was made least
     if disorder:
         return False, f"the constants that were reached are no set of constants: {disorder}"
     near = minimum.status == EXHAUSTED and minimum.distance <= NEARLY_THERE
@@ -326,6 +365,11 @@ def _verdict(fit: Fit, disorder: str, options: FitOptions) -> tuple[bool, str]:
             "check assignments, the start, and which constants are free"
         )
     reason = minimum.reason
+    if not fit.degrees_of_freedom:
+        reason += (
+            "; 0 degrees of freedom: as many frequencies as they determine constants, so that nothing checks these, and there "
+            "are no errors from the scatter"
+        )
     if near:
         count = len(minimum.iterations)
         reason = f"ended after {count} iterations, as many as allowed: the next step would be {minimum.distance:.1e} standard errors"
@@ -333,6 +377,41 @@ def _verdict(fit: Fit, disorder: str, options: FitOptions) -> tuple[bool, str]:
         named = "; ".join(one.text for one in fit.statistics.undetermined)
         return True, f"{reason}; not determined by these lines and left at the start: {named}"
     return True, reason
+
+
+def _of_twice(lines: Assignments, pairs: Sequence[tuple[int, int]]) -> str:
+    """What is to be known of lines that stand twice."""
+    first, second = np.array(pairs).T
+    apart = np.abs(lines.frequency_mhz[first] - lines.frequency_mhz[second])
+    worst = int(np.argmax(apart))
+    return (
+        f"{len(pairs)} lines stand twice in the list, the first: {lines.text(int(second[0]))}; the largest difference is "
+        f"{apart[worst]:.4g} MHz, of {lines.text(int(second[worst]))}"
+    )
+
+
+def _unlikely(lines: Assignments) -> list[str]:
+    """Lines of one state without spins that no dipole makes: J changes by more than 1, or Ka and Kc both by even numbers."""
+    if lines.names[:1] != ("j",) or "v" in lines.names or lines.names[-1] == "f":
+        return []
+    there = ~lines.from_zero
+    change = np.abs(lines.upper - lines.lower)
+    far = there & (change[:, 0] > 1)
+    even = there & (change[:, 1:] % 2 == 0).all(axis=1) if lines.names == ("j", "ka", "kc") else np.zeros_like(far)
+    out = []
+    for rows, why in ((far, "J changes by more than 1"), (even & ~far, "Ka and Kc both change by even numbers")):
+        some = np.flatnonzero(rows)
+        if len(some):
+            first = f"line {some[0] + 1}, {lines.text(int(some[0]))}"
+            out.append(f"{len(some)} lines that no dipole moment makes, {first}: {why}; are the labels right?")
+    return out
+
+
+def _bent(fit: Fit) -> list[str]:
+    """The parameters that the linear model would move most, in units of the lengths of their columns."""
+    statistics = fit.statistics
+    moved = np.abs((fit.residuals @ statistics.left) @ statistics.inverse) * statistics.scale
+    return [fit.parameters.names[i] for i in np.flatnonzero(moved > moved.max(initial=0.0) / 2)]
 
 
 def _notes(fit: Fit) -> list[str]:
@@ -346,13 +425,19 @@ def _notes(fit: Fit) -> list[str]:
         )
     twice = duplicates(lines)
     if twice:
-        notes.append(f"{len(twice)} lines stand twice in the list, the first: {lines.text(twice[0][1])}")
+        notes.append(_of_twice(lines, twice))
+    notes += _unlikely(lines)
     reversed_ = np.flatnonzero(
         fit.used & (np.abs(lines.frequency_mhz + fit.calculated_mhz) < 1e-3 * np.abs(lines.frequency_mhz))
     )
     for i in reversed_.tolist():
         notes.append(
             f"line {i + 1}, {lines.text(i)}: calculated with the opposite sign; are upper and lower exchanged?"
+        )
+    if fit.minimum.converged and fit.minimum.distance > BENT * max(1.0, fit.minimum.rms):
+        notes.append(
+            f"χ² is not quadratic within the standard errors, which are those of the linear model: {', '.join(_bent(fit))} may be "
+            "known better or worse than they say; hold one of these, or add lines"
         )
     if np.isfinite(fit.statistics.condition) and fit.statistics.condition > 1e5:
         notes.append(f"condition number {fit.statistics.condition:.1e}: some constants are nearly interchangeable")

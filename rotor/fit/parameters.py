@@ -16,7 +16,9 @@ from rotor.arrays import Floats
 from rotor.tops.constants import Constants
 from rotor.units import parse_quantity
 
-_TIE = re.compile(r"\s*(\w+)\s*=\s*(?:([+-]?[\d.]+(?:[eE][+-]?\d+)?)\s*\*\s*)?(\w+)\s*(?:([+-])\s*(.+))?\s*$")
+_TIE = re.compile(
+    r"\s*(\w+)\s*=\s*(?:([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*\*\s*)?(\w+)\s*(?:([+-])\s*(.+))?\s*$"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,12 +92,12 @@ def parameters(
     [9.5, 3.5, 2.5]
     """
     names, values = tuple(constants.values), np.array(list(constants.values.values()))
-    chosen = [_known(name, constants) for name in free]
+    chosen = [_known(name, constants, "free") for name in free]
     twice = next((name for name in chosen if chosen.count(name) > 1), None)
     if twice:
-        raise ValueError(f"{twice} is named twice among the free constants; once is enough")
+        raise ValueError(f"free: {twice} is named twice among the free constants; once is enough")
     if not chosen:
-        raise ValueError("no constant is free; name those that are to be fitted, such as --free A,B,C")
+        raise ValueError("free: no constant is free; name those that are to be fitted, such as A,B,C")
 
     base, matrix = values.copy(), np.zeros((len(names), len(chosen)))
     for column, name in enumerate(chosen):
@@ -126,10 +128,10 @@ def with_names(constants: Constants, names: Sequence[str]) -> Constants:
     return constants.replace(**dict.fromkeys(missing, 0.0)) if missing else constants
 
 
-def _known(name: str, constants: Constants) -> str:
+def _known(name: str, constants: Constants, where: str) -> str:
     if name not in constants:
         raise ValueError(
-            f"{name} is not in the set of constants to start from, which has {', '.join(constants.values)}"
+            f"{where}: {name} is not in the set of constants to start from, which has {', '.join(constants.values)}"
         )
     return constants.own_name(name)
 
@@ -141,19 +143,22 @@ def _tie(text: str, constants: Constants) -> tuple[str, float, str, float]:
         raise ValueError(
             f"tie {text!r}: write 'X = 2.5*Y' (a ratio) or 'X = Y - 300' (a difference, in MHz or with a unit)"
         )
-    left, right = _known(match[1], constants), _known(match[3], constants)
+    left, right = (_known(match[i], constants, f"tie {text!r}") for i in (1, 3))
     if left == right:
         raise ValueError(f"tie {text!r}: {left} cannot follow itself")
-    shift = parse_quantity(match[5], "MHz") if match[5] else 0.0
+    try:
+        shift = parse_quantity(match[5], "MHz") if match[5] else 0.0
+    except ValueError as error:
+        raise ValueError(f"tie {text!r}: {error}") from None
     return left, float(match[2] or 1.0), right, -shift if match[4] == "-" else shift
 
 
 def _priors(chosen: Sequence[str], priors_mhz: Mapping[str, float], constants: Constants) -> Floats:
-    known = {_known(name, constants): value for name, value in priors_mhz.items()}
+    known = {_known(name, constants, "priors_mhz"): value for name, value in priors_mhz.items()}
     lost = [name for name in known if name not in chosen]
     if lost:
-        raise ValueError(f"a-priori error of {', '.join(lost)}, which is not free")
+        raise ValueError(f"priors_mhz: a-priori error of {', '.join(lost)}, which is not free")
     for name, value in known.items():
         if not (np.isfinite(value) and value > 0):
-            raise ValueError(f"a-priori error of {name}: {value!r} MHz; a standard error is above 0")
+            raise ValueError(f"priors_mhz: a-priori error of {name}: {value!r} MHz; a standard error is above 0")
     return np.array([known.get(name, np.inf) for name in chosen])

@@ -93,6 +93,8 @@ def publication_table(fit: Fit, form: str = "text", *, scaled: bool = False, dig
     """
     if form not in FORMS:
         raise ValueError(f"form {form!r}: one of {', '.join(FORMS)} is needed")
+    if scaled and not fit.degrees_of_freedom:
+        raise ValueError("scaled: with 0 degrees of freedom there are no errors from the scatter; take the stated ones")
     factor = fit.reduced_chi if scaled else 1.0
     rows = []
     for name, value, error in _numbers(fit):

@@ -70,7 +70,8 @@ def statistics_text(fit: Fit) -> list[str]:
     out = [
         f"lines {len(fit.lines)}, of which {int(fit.used.sum())} count in {len(fit.groups)} measured frequencies",
         f"free parameters {len(fit.parameters.names)}, degrees of freedom {fit.degrees_of_freedom}",
-        f"weighted rms {fit.weighted_rms:.5f}; sqrt(chi2/degrees of freedom) {fit.reduced_chi:.5f}",
+        f"weighted rms {fit.weighted_rms:.5f}; sqrt(chi2/degrees of freedom) {scatter_text(fit.reduced_chi, '.5f')}",
+        *_with_priors(fit),
         *([f"rms of lines in MHz {rms:.6f} MHz"] if math.isfinite(rms) else []),
         *([f"rms of lines in cm-1 {infrared:.6f} cm-1"] if math.isfinite(infrared) else []),
         f"condition number of the column-scaled Jacobian {condition:.3e}",
@@ -78,6 +79,25 @@ def statistics_text(fit: Fit) -> list[str]:
     out += [f"not determined by these lines: {one.text} (left at the start)" for one in fit.statistics.undetermined]
     out += [f"far off, {text}" for text in far_off(fit)]
     return out + [f"decisive, {text}" for text in decisive(fit)]
+
+
+def scatter_text(value: float, form: str) -> str:
+    """A number that follows from the scatter of the lines; undefined with 0 degrees of freedom.
+
+    >>> scatter_text(1.25, ".3f"), scatter_text(float("nan"), ".3f")
+    ('1.250', 'undefined')
+    """
+    return "undefined" if math.isnan(value) else format(value, form)
+
+
+def _with_priors(fit: Fit) -> list[str]:
+    """The weighted rms as SPFIT counts it where there are a-priori values: with their part in χ², over the lines alone."""
+    known = int(np.isfinite(fit.parameters.prior).sum())
+    if not known:
+        return []
+    lines = len(fit.residuals) - known
+    rms = math.sqrt(float(fit.residuals @ fit.residuals) / max(lines, 1))
+    return [f"{known} a-priori values; with their part in chi2 the weighted rms is {rms:.5f} (RMS ERROR of SPFIT)"]
 
 
 def far_off(fit: Fit, errors: float = FAR_OFF) -> list[str]:
@@ -150,7 +170,10 @@ def _end(fit: Fit) -> list[str]:
         value, error = float(fit.values[i]), float(errors[i])
         shown = value_text(value, error) if math.isfinite(error) else f"{value!r} (not determined)"
         change = value - float(fit.parameters.start[i])
-        out.append(f"{i + 1:5d}  {name:<16}{shown:>28}  {error:12.4E}  {float(scaled[i]):12.4E}  {change:12.4E}")
+        out.append(
+            f"{i + 1:5d}  {name:<16}{shown:>28}  {error:12.4E}  "
+            f"{scatter_text(float(scaled[i]), '12.4E'):>12}  {change:12.4E}"
+        )
     return out
 
 

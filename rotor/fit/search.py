@@ -43,6 +43,7 @@ class FitOptions:
     poor_rms : weighted rms above which the fit has failed
     tolerance, most_iterations : of the search, see `rotor.statistics.least_squares.minimise`
     kmax : cut of the basis of an asymmetric top, as SPFIT's KNMAX; None for the whole basis
+    leave_out_missing : lines with a level that does not exist are left out, and named, as SPFIT does; else they are an error
     """
 
     reject_above: float | None = None
@@ -52,6 +53,7 @@ class FitOptions:
     tolerance: float = 1e-4
     most_iterations: int = 100
     kmax: int | None = None
+    leave_out_missing: bool = False
 
     def __post_init__(self) -> None:
         if self.loss not in LOSSES:
@@ -362,4 +364,4 @@ def too_few(lines: Assignments, used: NDArray[np.bool_], parameters: Parameters)
     count = len(set(lines.blend[used].tolist())) + int(np.isfinite(parameters.prior).sum())
     if count >= len(parameters.names):
         return ""
-    return f"{len(parameters.names)} free constants for {count} measured frequencies; hold some, or add lines"
+    return f"{len(parameters.names)} free constants for {count} measured frequencies; free fewer, or add lines"

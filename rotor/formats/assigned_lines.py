@@ -2,7 +2,8 @@
 
 A .csv has a column for each quantum number of both states (`j_upper`, `ka_upper`, `kc_upper`, `j_lower`, ...), a frequency
 (`frequency_mhz`, `frequency_ghz` or `wavenumber_cm`), its error (`error_mhz`, `error_khz`, `error_ghz` or `error_cm`), and, where
-needed, `weight`, `blend` (one text or number for the lines of one measured frequency) and `comment`. Of a catalogue the lines
+needed, `weight`, `blend` (one text or number for the lines of one measured frequency), `width_mhz` (how far the components of a
+blend may lie apart, rms, at one of its lines or at all) and `comment`. Of a catalogue the lines
 measured in a laboratory are taken (a negative tag); those of one frequency and error are one blend by intensity, and components of
 spins, where the file has them, are put together at their mean by intensity.
 """
@@ -13,15 +14,24 @@ import csv
 import io
 import math
 import os
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from rotor.fit.assignment import Assignments, assignments
 from rotor.formats.atomic_write import open_atomic
 from rotor.formats.spcat.text.fields import BLANK
-from rotor.formats.spcat.text.lin import line_list, note_of_defaults, read_lin, with_defaults, write_lin
+from rotor.formats.spcat.text.lin import (
+    line_list,
+    note_of_defaults,
+    note_of_remarks,
+    read_lin,
+    with_defaults,
+    write_lin,
+)
 from rotor.units import MHZ_PER_CM
 
 SUFFIXES = (".lin", ".csv", ".cat", ".cat.gz")
@@ -34,6 +44,7 @@ QUANTA = {
 }
 _WITH_STATES = 10  # QNFMT // 100 from which a vibrational quantum number is among those of a state
 _FREQUENCY = {"frequency_mhz": 1.0, "frequency_ghz": 1e3, "wavenumber_cm": MHZ_PER_CM}
+_WIDTH = {"width_mhz": 1.0, "width_khz": 1e-3}
 _ERROR = {"error_mhz": 1.0, "error_khz": 1e-3, "error_ghz": 1e3, "error_cm": MHZ_PER_CM}
 
 
@@ -75,6 +86,7 @@ def _of_lin(path: str | os.PathLike[str], names: Sequence[str]) -> tuple[Assignm
     blends = lines.blends()
     used = blends >= 0
     notes = [note_of_defaults(lines)] if lines.defaulted else []
+    notes += note_of_remarks(lines, blends)
     if not used.all():
         notes.append(f"{int((~used).sum())} lines that give the width of a blend do not count")
     for i in np.flatnonzero(used).tolist():
@@ -94,23 +106,27 @@ def _of_lin(path: str | os.PathLike[str], names: Sequence[str]) -> tuple[Assignm
 def _of_csv(path: str | os.PathLike[str], names: Sequence[str]) -> Assignments:
     columns, rows = _table_of(path)
     labels = [f"{name}_{side}" for side in ("upper", "lower") for name in names]
-    known = {*labels, *_FREQUENCY, *_ERROR, "weight", "blend", "comment"}
+    known = {*labels, *_FREQUENCY, *_ERROR, *_WIDTH, "weight", "blend", "comment"}
     _refuse_columns(path, columns, labels, known)
     unit = next(name for name in _FREQUENCY if name in columns)
     error = next((name for name in _ERROR if name in columns), None)
+    _refuse_rows(path, rows)
     numbers = [[_whole(path, i, name, row) for name in labels] for i, row in enumerate(rows, 1)]
     quanta = np.array(numbers, dtype=np.int64).reshape(len(rows), len(labels))
-    bad = np.flatnonzero(quanta[:, len(names)] < 0)
-    if len(bad):
-        lower = " ".join(map(str, quanta[bad[0], len(names) :].tolist()))
-        raise ValueError(f"{path}, line {bad[0] + 1} of the list: there is no level {lower}; {names[0]} is 0 or more")
+    for i, row in enumerate(quanta.tolist(), 1):
+        for side in (row[: len(names)], row[len(names) :]):
+            if side[0] < 0:
+                label = " ".join(map(str, side))
+                raise ValueError(f"{path}, line {i} of the table: there is no level {label}; {names[0]} is 0 or more")
+    blends = _blends([(row.get("blend") or "").strip() for row in rows])
     frequency = np.array([_real(path, i, unit, row) for i, row in enumerate(rows, 1)]) * _FREQUENCY[unit]
-    errors = [_real(path, i, error, row, 0.0) if error else 0.0 for i, row in enumerate(rows, 1)]
+    errors = [_size(path, i, error, row, 0.0) if error else 0.0 for i, row in enumerate(rows, 1)]
     return assignments(
         names, quanta[:, : len(names)], quanta[:, len(names) :], frequency,
         np.array(errors) * (_ERROR[error] if error else 1.0),
-        weight=np.array([_real(path, i, "weight", row, 1.0) for i, row in enumerate(rows, 1)]),
-        blend=_blends([(row.get("blend") or "").strip() for row in rows]),
+        weight=np.array([_size(path, i, "weight", row, 1.0) for i, row in enumerate(rows, 1)]),
+        blend=blends,
+        widths_mhz=_widths(path, rows, columns, blends),
         wavenumber=unit == "wavenumber_cm",
         source=Path(path).name,
         comments=[(row.get("comment") or "").strip() for row in rows] if "comment" in columns else (),
@@ -129,6 +145,30 @@ def _table_of(path: str | os.PathLike[str]) -> tuple[list[str], list[dict[str, s
     return columns, list(reader)
 
 
+def _widths(
+    path: object, rows: Sequence[Mapping[str, str]], columns: Sequence[str], blends: Sequence[int]
+) -> dict[int, float]:
+    """The width of each blend that states one, by its number."""
+    found, counts = dict[int, float](), Counter(blends)
+    for name in (one for one in _WIDTH if one in columns):
+        for i, (row, blend) in enumerate(zip(rows, blends, strict=True), 1):
+            width = _size(path, i, name, row, 0.0) * _WIDTH[name]
+            if width and counts[blend] < 2:
+                raise ValueError(
+                    f"{path}, line {i} of the table: a {name} is that of a blend; name the blend of two lines or more"
+                )
+            if width and found.setdefault(blend, width) != width:
+                raise ValueError(f"{path}, line {i} of the table: another {name} of this blend stands before; give one")
+    return found
+
+
+def _refuse_rows(path: object, rows: Sequence[Mapping[Any, Any]]) -> None:
+    """ValueError for a row with more values than columns."""
+    for i, row in enumerate(rows, 1):
+        if None in row:
+            raise ValueError(f"{path}, line {i} of the table: {len(row[None])} values more than there are columns")
+
+
 def _refuse_columns(
     path: str | os.PathLike[str], columns: Sequence[str], labels: Sequence[str], known: set[str]
 ) -> None:
@@ -137,8 +177,14 @@ def _refuse_columns(
     if missing or strange:
         what = f"no column {', '.join(missing)}" if missing else f"unknown column {', '.join(map(repr, strange))}"
         raise ValueError(
-            f"{path}: {what}; columns are {', '.join(labels)}, a frequency, an error, weight, blend, comment"
+            f"{path}: {what}; columns are {', '.join(labels)}, a frequency, an error, weight, blend, width_mhz, comment"
         )
+    twice = next((name for name in columns if columns.count(name) > 1), None)
+    if twice is not None:
+        raise ValueError(f"{path}: the column {twice} stands twice; give it once")
+    errors = [name for name in _ERROR if name in columns]
+    if len(errors) > 1:
+        raise ValueError(f"{path}: columns {' and '.join(errors)}; give one error of a line")
     if len([name for name in _FREQUENCY if name in columns]) != 1:
         raise ValueError(f"{path}: one column of {', '.join(_FREQUENCY)} is needed")
 
@@ -154,6 +200,14 @@ def _real(path: object, line: int, name: str, row: Mapping[str, str], default: f
     if not math.isfinite(number):
         raise ValueError(f"{path}, line {line} of the table: {name} reads {text!r}; a finite number is needed")
     return number
+
+
+def _size(path: object, line: int, name: str, row: Mapping[str, str], default: float) -> float:
+    """A number of 0 or more."""
+    value = _real(path, line, name, row, default)
+    if value < 0:
+        raise ValueError(f"{path}, line {line} of the table: {name} = {value:g}; a number of 0 or more is needed")
+    return value
 
 
 def _whole(path: object, line: int, name: str, row: Mapping[str, str]) -> int:
@@ -235,8 +289,6 @@ def write_assigned_lines(lines: Assignments, path: str | os.PathLike[str]) -> No
         return write_lin(_as_lin(lines), path)
     if not text.endswith(".csv"):
         raise ValueError(f"{path}: assigned lines are written as .lin or .csv")
-    if lines.widths_mhz:
-        raise ValueError(f"{path}: a .csv has no place for the widths of blends; write a .lin")
     labels = [f"{name}_{side}" for side in ("upper", "lower") for name in lines.names]
     wave = bool(lines.wavenumber.all()) and len(lines) > 0
     unit = MHZ_PER_CM if wave else 1.0
@@ -246,6 +298,7 @@ def write_assigned_lines(lines: Assignments, path: str | os.PathLike[str]) -> No
         "error_cm" if wave else "error_mhz",
         "weight",
         "blend",
+        *(["width_mhz"] if lines.widths_mhz else []),
     ]
     with open_atomic(path, "w", encoding="utf-8", newline="") as handle:
         writer = csv.writer(handle, lineterminator="\n")
@@ -253,6 +306,8 @@ def write_assigned_lines(lines: Assignments, path: str | os.PathLike[str]) -> No
         for i in range(len(lines)):
             numbers = [lines.frequency_mhz[i] / unit, lines.error_mhz[i] / unit, lines.weight[i]]
             row = [*lines.upper[i].tolist(), *lines.lower[i].tolist(), *map(float, numbers), int(lines.blend[i])]
+            if lines.widths_mhz:
+                row.append(lines.widths_mhz.get(int(lines.blend[i]), ""))
             writer.writerow([*row, *([lines.comments[i]] if lines.comments else [])])
     return None
 

@@ -137,6 +137,8 @@ def _constants(
     if "start" not in one:
         raise ValueError(f'{place}: lines need start constants, such as start = "B=6062 D=0.0013 MHz"')
     try:
+        if not (folder / one["lines"]).is_file():
+            raise ValueError(f"{one['lines']}: no such file beside the family")
         fit = _fitted(folder / one["lines"], Constants.parse(one["start"]), options)
     except (ValueError, OSError) as error:
         raise ValueError(f"{place}, lines: {error}") from None
@@ -158,6 +160,6 @@ def _rigid(table: Mapping[str, float]) -> dict[str, float]:
 
 def _coordinates(molecule: Molecule, table: Mapping[str, Any]) -> tuple[Named, ...]:
     for name, atoms in table.items():
-        if not isinstance(atoms, list) or not all(isinstance(atom, int) for atom in atoms):
+        if not isinstance(atoms, list) or not all(type(atom) is int for atom in atoms):
             raise ValueError(f"{name} = {atoms!r}: a list of atom numbers is needed, such as [1, 2]")
     return tuple(named(molecule, name, atoms) for name, atoms in table.items())

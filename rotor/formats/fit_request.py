@@ -163,7 +163,10 @@ def fit_of_lines(
     names = list(top.constants.uncertainties) if free is None else list(free)
     if not names:
         raise ValueError("free: name the constants to fit, such as A,B,C,DeltaJ; those of the start have no errors")
-    begin = with_names(top.constants, names)
+    try:
+        begin = with_names(top.constants, names)
+    except ValueError as error:
+        raise ValueError(f"free: {error}") from None
     priors = dict(priors_mhz or {})
     made = parameters(begin, names, ties=ties, priors_mhz=priors)
     title = " ".join(top.name.split()) or Path(lines).name

@@ -29,6 +29,14 @@ from rotor.tops.constants import Constants
 _MOST_PADDED = 1 << 22  # matrix elements of blocks that are worked on together: 32 MB
 
 
+class MissingLevelsError(ValueError):
+    """Labels that no level has: their places (n,) among those asked for."""
+
+    def __init__(self, text: str, places: Ints) -> None:
+        super().__init__(text)
+        self.places = places
+
+
 class LevelModel(ABC):
     """Energies of labelled levels as a function of constants.
 
@@ -64,8 +72,10 @@ def level_model(constants: Constants, labels: Ints, *, kmax: int | None = None) 
 
     Raises
     ------
+    MissingLevelsError
+        For labels that no level has, with the first of them.
     ValueError
-        For labels that no level has, with the first of them, and for tetrahedral splittings of a spherical top.
+        For tetrahedral splittings of a spherical top.
     """
     labels = np.atleast_2d(np.asarray(labels, dtype=np.int64))
     width = {"linear": 1, "spherical": 1, "prolate": 2, "oblate": 2}.get(constants.kind, 3)
@@ -92,7 +102,8 @@ def _refuse_labels(kind: str, labels: Ints) -> None:
         bad = bad | (ka < 0) | (kc < 0) | ((ka + kc != j) & (ka + kc != j + 1)) | (ka > j) | (kc > j)
         rule = "Ka and Kc run from 0 to J and add up to J or J + 1"
     if bad.any():
-        raise ValueError(f"there is no level {' '.join(map(str, labels[np.argmax(bad)].tolist()))}: {rule}")
+        first = " ".join(map(str, labels[np.argmax(bad)].tolist()))
+        raise MissingLevelsError(f"there is no level {first}: {rule}", np.flatnonzero(bad))
 
 
 @dataclass(frozen=True)

@@ -131,6 +131,14 @@ class IntensityCut:
     kt_mhz: float
     least: float
 
+    @property
+    def needed(self) -> Floats:
+        """ν S in MHz D², (levels,), below which a line with this lower state is too weak, whatever its photon factor."""
+        if not self.least:
+            return np.zeros(len(self.population))
+        with np.errstate(divide="ignore", over="ignore"):  # of no population: a line with that state reaches no cut
+            return np.asarray(self.least / self.population)
+
     def keeps(self, frequency_mhz: Floats, strength: Floats, population: Floats) -> NDArray[np.bool_]:
         """Which lines are strong enough."""
         scaled = frequency_mhz * strength * population

@@ -26,6 +26,9 @@ Progress = Callable[["Iteration"], None]
 CONVERGED, STALLED, EXHAUSTED, INTERRUPTED = "converged", "stalled", "too many iterations", "interrupted"
 FIRST_DAMPING, MOST_DAMPING = 1e-4, 1e12  # λ where D p has columns of length 1
 _FLOOR = 10.0  # times the tolerance, below which a step that does not come nearer says that round-off is reached
+BENT = 0.01  # standard errors that seem to be left at a minimum, above which the linear model does not hold there
+_NOTHING = 1e-9  # of χ², below which round-off of the residuals hides what a damped step does
+_FINER = 0.01  # of the least λ tried so far, below which a smaller one is worth a try
 _NOISE = 1e-7  # of χ², below which round-off of the residuals hides whether a step has decreased it: the linear model decides
 ROUND_OFF = 1e-13  # singular values below this part of the largest carry no information
 
@@ -131,6 +134,7 @@ def minimise(
     blind = np.zeros(len(point)) if floor is None else floor
     state = _State.at(point, *_evaluated(evaluate, point))
     scale, damping, taken, before = state.norms, 0.0, list[Iteration](), math.inf
+    first = FIRST_DAMPING  # the least λ above 0, until nothing between it and the largest leads on
     try:
         while True:
             scale = np.maximum(scale, state.norms)
@@ -154,27 +158,48 @@ def minimise(
             if progress:
                 progress(taken[-1])
             if good:
-                damping = _relaxed(damping, gain)
+                damping = _relaxed(damping, gain, first)
                 continue
-            damping = max(10.0 * damping, FIRST_DAMPING)
-            if damping > MOST_DAMPING:
-                return state.ended(_without_decrease(linear, state, tolerance), linear, taken)
+            damping = max(10.0 * damping, first)
+            if damping > MOST_DAMPING or (
+                damping > first and predicted < _NOTHING * state.rms**2 * len(state.residuals)
+            ):
+                if linear.weakest >= _FINER * first:
+                    return state.ended(_without_decrease(linear, state, taken), linear, taken)
+                damping = first = linear.weakest
     except KeyboardInterrupt:
         return state.ended(INTERRUPTED, _Linear.of(state, scale, blind), taken)
 
 
-def _relaxed(damping: float, gain: float) -> float:
+def _relaxed(damping: float, gain: float, first: float) -> float:
     """λ after a step that was taken: less where the linear model foretold its gain, more where it did not."""
     if gain < 0.25:
-        return max(4.0 * damping, FIRST_DAMPING)
+        return max(4.0 * damping, first)
     if gain > 0.75:
         damping /= 10.0
-    return damping if damping >= FIRST_DAMPING else 0.0
+    return damping if damping >= first else 0.0
 
 
-def _without_decrease(linear: _Linear, state: _State, tolerance: float) -> str:
-    """No step decreases χ²: round-off has been reached if what is left to gain is small, else the search has stalled."""
-    return CONVERGED if linear.distance < 100 * tolerance * max(1.0, state.rms) else STALLED
+def _without_decrease(linear: _Linear, state: _State, taken: Sequence[Iteration]) -> str:
+    """No step decreases χ²: a minimum has been reached if what is left to gain is small, else the search has stalled."""
+    left = min(linear.distance, math.sqrt(_left_to_gain(taken, len(state.residuals))))
+    return CONVERGED if left < BENT * max(1.0, state.rms) else STALLED
+
+
+def _left_to_gain(taken: Sequence[Iteration], count: int) -> float:
+    """By how much χ² may still fall, from the steps that were refused at the last point; count : residuals.
+
+    A step that promises P and gains G gains 2 P t - (2 P - G) t² after its part t, to second order: at most P²/(2 P - G). Where χ²
+    bends more than the linear model knows, G is far below 0 and that is far below P.
+    """
+    left = 0.0
+    for one in reversed(taken):
+        if one.taken:
+            break
+        gain = (one.rms_before**2 - one.rms_after**2) * count
+        if one.predicted > 0 and math.isfinite(gain):
+            left = max(left, one.predicted**2 / max(2 * one.predicted - gain, one.predicted))
+    return left
 
 
 def _evaluated(evaluate: Evaluate, point: Floats) -> tuple[Floats, Floats]:
@@ -224,7 +249,8 @@ class _State:
     def ended(self, status: str, linear: _Linear, iterations: list[Iteration]) -> Minimum:
         count = len(iterations)
         reasons = {
-            CONVERGED: f"converged after {count} iterations: the next step would be {linear.distance:.1e} standard errors",
+            CONVERGED: f"converged after {count} iterations: the next step would be {linear.distance:.1e} standard errors"
+            + (", of which χ² allows none: it bends upwards" if linear.distance > BENT * max(1.0, self.rms) else ""),
             STALLED: f"no step decreases the residuals, although {linear.distance:.1e} standard errors seem to be left",
             EXHAUSTED: f"{count} iterations were not enough: the next step would be {linear.distance:.1e} standard errors",
             INTERRUPTED: f"interrupted after {count} iterations: the next step would be {linear.distance:.1e} standard errors",
@@ -267,6 +293,12 @@ class _Linear:
     def distance(self) -> float:
         """√(δᵀ JᵀJ δ) of the undamped step."""
         return float(np.linalg.norm(self.z[self.s > 0]))
+
+    @property
+    def weakest(self) -> float:
+        """Half the square of the smallest singular value: with it as λ the combination known least moves by two thirds of its step."""
+        used = self.s[self.s > 0]
+        return float(used.min()) ** 2 / 2 if len(used) else math.inf
 
     def step(self, damping: float) -> tuple[Floats, float]:
         """The step δ and the decrease of χ² that it promises, |r|² - |r - J δ|²."""

@@ -16,6 +16,7 @@ from rotor.units import ROTATIONAL_MHZ_U_ANGSTROM2
 
 AXES = "abc"
 CONSTANTS = "ABC"
+_FAR_OF_PARENT, _FAR = 3.0, 1.5  # factors between constants measured and those of the geometry that are a mistake
 PLANAR_WITHIN_ANGSTROM = 1e-4  # of the plane: atoms so near lie in it
 
 
@@ -130,7 +131,8 @@ def family(
     ------
     ValueError
         No species, a first one that is not the parent, one isotopologue twice, constants that are none of A, B, C or not
-        above 0, errors or corrections without their constant, and constants that a kind of top does not have.
+        above 0 or far from what the geometry gives, errors or corrections without their constant, and constants that a kind of
+        top does not have.
 
     Examples
     --------
@@ -153,6 +155,7 @@ def family(
         source = sources[i] if sources else ""
         found.append(Species(label, changed, dict(constants), dict(errors), dict(corrections), axes, source))
     _refuse_family(found, molecule)
+    _refuse_far(found)
     return Family(name or molecule.name or molecule.formula, tuple(found), top)
 
 
@@ -171,6 +174,27 @@ def _refuse_constants(
             raise ValueError(f"{name}: {what} of {', '.join(lost)}, but no such constant is given")
     if kind == "linear" and "B" not in constants:
         raise ValueError(f"{name}: a linear molecule has B; {', '.join(constants)} given")
+
+
+def _refuse_far(found: Sequence[Species]) -> None:
+    """ValueError for constants that the start geometry, scaled to the parent's, cannot have: another unit, a digit too many."""
+    parent = _measured_to_rigid(found[0])
+    for one in found:
+        ratios = _measured_to_rigid(one)
+        for name, ratio in ratios.items():
+            expected, most = (1.0, _FAR_OF_PARENT) if one is found[0] else (parent.get(name, 1.0), _FAR)
+            if not 1 / most < ratio / expected < most:
+                rigid = one.constants_mhz[name] / ratio * expected
+                raise ValueError(
+                    f"{one.name}: {name} = {one.constants_mhz[name]:g} MHz, where the geometry"
+                    f"{'' if one is found[0] else ' and the parent'} give about {rigid:.6g}; check digits, unit and isotopes"
+                )
+
+
+def _measured_to_rigid(species: Species) -> dict[str, float]:
+    """Measured constants over those of the start geometry, where both have them."""
+    rigid = Top.from_molecule(species.molecule).constants.values
+    return {name: value / rigid[name] for name, value in species.constants_mhz.items() if rigid.get(name)}
 
 
 def _refuse_family(found: Sequence[Species], molecule: Molecule) -> None:

@@ -25,6 +25,7 @@ from numpy.typing import ArrayLike, NDArray
 from rotor.arrays import Floats
 
 COSTAIN_ANGSTROM2 = 0.0015
+PAIRS = ("ab", "ac", "bc")
 SHAPES = {"asymmetric": (0, 1, 2), "planar": (0, 1), "linear": (0,), "symmetric": (0, 1)}
 _STEP = 1e-6  # of a moment, for derivatives by central differences
 
@@ -146,7 +147,12 @@ def kraitchman(
     errors = np.array([parent_errors, substituted_errors], dtype=float)
     used = _used_moments(both, shape, pair)
     if not np.isfinite(both[used]).all():
-        raise ValueError(f"moments {both.tolist()}: those that shape {shape!r} uses must be finite")
+        needed = ", ".join(
+            axis for axis, counts in zip("ABC", np.atleast_1d(used.any(axis=0)).tolist(), strict=True) if counts
+        )
+        raise ValueError(
+            f"the equations of shape {shape!r} need {needed} of both isotopologues; one of them is missing"
+        )
 
     squares = _squares(both, mu, shape, pair)
     spread = np.zeros(3)
@@ -163,8 +169,8 @@ def kraitchman(
 def _refuse(shape: str, pair: str, mass_u: float, change_u: float) -> None:
     if shape not in SHAPES:
         raise ValueError(f"shape {shape!r}: one of {', '.join(SHAPES)} is needed")
-    if pair not in ("ab", "ac", "bc"):
-        raise ValueError(f"pair {pair!r}: ab, ac or bc says which two moments of a planar molecule count")
+    if pair not in PAIRS:
+        raise ValueError(f"pair {pair!r}: one of {', '.join(PAIRS)} says which two moments of a planar molecule count")
     if not (np.isfinite([mass_u, change_u]).all() and mass_u > 0 and mass_u + change_u > 0 and change_u):
         raise ValueError(
             f"mass {mass_u!r} u changed by {change_u!r} u: a mass above 0 and a change other than 0 are needed"

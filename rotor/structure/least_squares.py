@@ -129,6 +129,13 @@ def _refuse_settings(method: str, weights: str, coordinates: Sequence[Named], he
         raise ValueError(f"method {method!r}: one of {', '.join(METHODS)} is needed")
     if weights not in WEIGHTS:
         raise ValueError(f"weights {weights!r}: 'equal' or 'errors' is needed")
+    once: dict[object, str] = {}
+    for each in coordinates:
+        for image in each.alike:
+            if once.setdefault(image, each.name) != each.name:
+                raise ValueError(
+                    f"{once[image]} and {each.name} are the same coordinate, or equal by symmetry; give one"
+                )
     both = {one for each in coordinates for one in each.alike} & {one for each in held for one in each.alike}
     if both:
         raise ValueError(f"atoms {sorted(both)[0]}: the same coordinate is both fitted and held")
@@ -257,7 +264,13 @@ def _observations(
     """(species, axis) of every moment that is used, the moments and their errors."""
     strays = [axis for axis in leave_out if axis not in AXES]
     if strays:
-        raise ValueError(f"axes {', '.join(strays)} to leave out: a, b and c there are")
+        raise ValueError(f"leave_out: axes {', '.join(strays)}: a, b and c there are")
+    twice = [axis for axis in AXES if list(leave_out).count(axis) > 1]
+    if twice:
+        raise ValueError(f"leave_out: axis {twice[0]} is named twice; once is enough")
+    idle = [axis for axis in leave_out if not any(np.isfinite(one.moments[AXES.index(axis)]) for one in family.species)]
+    if idle:
+        raise ValueError(f"leave_out: axis {idle[0]}: no isotopologue has a moment about it")
     rows, observed, errors = [], list[float](), list[float]()
     for s, species in enumerate(family.species):
         moments = species.equilibrium_moments if method == "re" else species.moments

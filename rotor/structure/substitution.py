@@ -17,7 +17,7 @@ from rotor.molecules.molecule import Molecule
 from rotor.molecules.symmetry.point_group import symmetry_of
 from rotor.structure.coordinates import Named, bonds_and_angles
 from rotor.structure.family import PLANAR_WITHIN_ANGSTROM, Family, Species
-from rotor.structure.kraitchman import Substituted, kraitchman
+from rotor.structure.kraitchman import PAIRS, Substituted, kraitchman
 from rotor.tops.top import Top
 
 ON_AXIS_ANGSTROM = 1e-3  # of the figure axis of a symmetric top: an atom so near is on it
@@ -72,6 +72,8 @@ def substitution_structure(
     pair : which two moments serve for a planar molecule. coordinates : bonds and angles to give; those of the start geometry
     if there are none. Raises ValueError where no isotopologue has one atom replaced.
     """
+    if pair not in PAIRS:
+        raise ValueError(f"pair {pair!r}: one of {', '.join(PAIRS)} says which two moments of a planar molecule count")
     ours = family.frame_positions(family.parent)
     atoms, notes = [], list[str]()
     for species in family.species[1:]:
@@ -79,7 +81,10 @@ def substitution_structure(
         if atom is None:
             notes.append(f"{species.name}: more than one atom is replaced; it takes no part in r_s")
             continue
-        atoms.append(_substituted(family, species, atom, ours, pair))
+        try:
+            atoms.append(_substituted(family, species, atom, ours, pair))
+        except ValueError as error:
+            raise ValueError(f"{family.name}, {species.name}: {error}") from None
         notes += _doubts(atoms[-1])
     if not atoms:
         raise ValueError(f"{family.name}: r_s needs isotopologues with one atom replaced, and there is none")

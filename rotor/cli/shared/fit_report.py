@@ -103,6 +103,7 @@ def _line_records(fit: Fit) -> list[dict[str, Any]]:
 
 def parameter_table(fit: Fit, spread: Sequence[float]) -> Table:
     from rotor.fit.publication import value_text
+    from rotor.fit.report import scatter_text
 
     columns = ["parameter", "value (MHz)", "error", "from scatter", *(["bootstrap"] if spread else [])]
     rows = []
@@ -111,7 +112,11 @@ def parameter_table(fit: Fit, spread: Sequence[float]) -> Table:
         text = (
             value_text(float(fit.values[i]), error) if error < float("inf") else f"{fit.values[i]!r} (not determined)"
         )
-        numbers = [f"{error:.3g}", f"{float(fit.scaled_errors[i]):.3g}", *([f"{spread[i]:.3g}"] if spread else [])]
+        numbers = [
+            f"{error:.3g}",
+            scatter_text(float(fit.scaled_errors[i]), ".3g"),
+            *([f"{spread[i]:.3g}"] if spread else []),
+        ]
         rows.append([name, text, *numbers])
     return Table("", columns, rows, frozenset({"parameter"}))
 

@@ -137,6 +137,16 @@ def fields_as_options(**names: str) -> Iterator[None]:
         raise ValueError(words.sub(lambda found: names[found[0]], str(error))) from None
 
 
+@contextmanager
+def named(option: str) -> Iterator[None]:
+    """Inside, a ValueError that names no option names this one."""
+    try:
+        yield
+    except ValueError as error:
+        text = str(error)
+        raise ValueError(text if text.startswith("--") else f"{option}: {text}") from None
+
+
 def temperatures(name: str, text: str) -> list[float]:
     """A grid or list of temperatures in K, refused unless all are above 0 K."""
     from rotor.units import LEAST_KELVIN, MOST_KELVIN, parse_grid

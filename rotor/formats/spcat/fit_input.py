@@ -24,12 +24,14 @@ from rotor.formats.spcat.codes import HELD_BELOW, constants_and_matrix
 from rotor.formats.spcat.model import parameter_file
 from rotor.formats.spcat.states import is_plain
 from rotor.formats.spcat.text.fields import BLANK
-from rotor.formats.spcat.text.lin import LineList, note_of_defaults, read_lin, with_defaults
+from rotor.formats.spcat.text.lin import LineList, note_of_defaults, note_of_remarks, read_lin, with_defaults
 from rotor.formats.spcat.text.par import Header, Parameter, ParameterFile, read_par
 from rotor.formats.spcat.variances import FREE_ABOVE
 from rotor.quantum.labelled import LevelModel
 from rotor.tops.constants import Constants
 from rotor.tops.top import Top
+
+_NO_ERRTST = 1e6  # what SPFIT takes for an ERRTST of 0 or less
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,12 +62,22 @@ def read_fit(par: str | os.PathLike[str], lin: str | os.PathLike[str] | None = N
     if not Path(par).exists():
         raise ValueError(f"{par}: no such file")
     beside = Path(lin) if lin is not None else Path(par).with_suffix(".lin")
+    if lin is not None and not beside.exists():
+        raise ValueError(f"lin: {lin}: no such file")
     if not beside.exists():
         raise ValueError(
             f"{beside}: there are no measured lines beside {Path(par).name}; SPFIT's lines stand in a .lin file"
         )
     file = read_par(par)
-    return spfit_input(file, read_lin(beside, len(_quanta_names(file))), Path(beside).name)
+    try:
+        names = _quanta_names(file)
+    except ValueError as error:
+        raise ValueError(f"{par}: {error}") from None
+    lines = read_lin(beside, len(names))
+    try:
+        return spfit_input(file, lines, Path(beside).name)
+    except ValueError as error:
+        raise ValueError(f"{par}: {error}") from None
 
 
 def _quanta_names(file: ParameterFile) -> tuple[str, ...]:
@@ -82,6 +94,7 @@ def spfit_input(file: ParameterFile, lines: LineList, source: str = "") -> Spfit
     """The same from files that have been read."""
     _refuse_options(file.header)
     held, ties = _roles(file.parameters)
+    _refuse_twice(file.parameters, held)
     columns, ratios, free = _columns(file.parameters, held, ties)
     spread = np.zeros((len(file.parameters), len(free)))
     for row, (column, ratio) in enumerate(zip(columns, ratios, strict=True)):
@@ -107,9 +120,23 @@ def spfit_input(file: ParameterFile, lines: LineList, source: str = "") -> Spfit
         matrix=matrix @ spread,
     )
     assigned, notes = _assigned(lines, quanta, file.header, source)
-    options = FitOptions(reject_above=file.header.errtst, most_iterations=max(abs(file.header.nitr), 1), kmax=kmax)
+    if not free:
+        raise ValueError(
+            "no parameter is free: every a-priori error is below 1e-30; give one that is to be fitted 1e36"
+        )
+    options = FitOptions(
+        reject_above=_largest_error(file.header),
+        most_iterations=max(abs(file.header.nitr), 1),
+        kmax=kmax,
+        leave_out_missing=True,
+    )
     notes += _notes(file, options, model is None, assigned)
     return SpfitInput(file, assigned, constants, parameters, options, columns, ratios, tuple(notes), model)
+
+
+def _largest_error(header: Header) -> float:
+    """ERRTST; 1e6 where it is 0 or less, as SPFIT takes it."""
+    return header.errtst if header.errtst > 0 else _NO_ERRTST
 
 
 def _refuse_options(header: Header) -> None:
@@ -118,21 +145,31 @@ def _refuse_options(header: Header) -> None:
             f"NXPAR = {header.nxpar}: so many parameters at the end of the list are left out for lines with F below 0; from 0 to "
             f"NPAR = {header.npar}"
         )
-    if not header.errtst > 0:
-        raise ValueError(f"ERRTST = {header.errtst:g}: the largest |obs - calc|/error of a line that counts is above 0")
     if not header.cal > 0:
         raise ValueError(f"CAL = {header.cal:g}: the factor of wavenumbers is above 0")
 
 
 def _roles(parameters: Sequence[Parameter]) -> tuple[list[bool], list[bool]]:
-    """Which parameters are held (an a-priori error below 1e-30), and which keep their ratio to the one before."""
+    """Which parameters are held (an a-priori error below 1e-30, or below 0), and which keep their ratio to the one before."""
     if parameters and parameters[0].constrained:
         raise ValueError(f"parameter -{parameters[0].code}: the first one has none before it to keep a ratio to")
     ties = [p.constrained for p in parameters]
-    held = [
-        not tied and p.error is not None and abs(p.error) < HELD_BELOW for p, tied in zip(parameters, ties, strict=True)
-    ]
+    held = [not tied and p.error is not None and p.error < HELD_BELOW for p, tied in zip(parameters, ties, strict=True)]
     return held, ties
+
+
+def _refuse_twice(parameters: Sequence[Parameter], held: Sequence[bool]) -> None:
+    """ValueError for two free parameters of one code and no a-priori error: nothing tells them apart."""
+    free = [
+        p.code
+        for p, fixed in zip(parameters, held, strict=True)
+        if not fixed and not p.constrained and _prior(p) == np.inf
+    ]
+    twice = next((code for code in free if free.count(code) > 1), None)
+    if twice is not None:
+        raise ValueError(
+            f"parameter {twice} stands twice and both are free; leave one out, hold it, or tie it (-{twice})"
+        )
 
 
 def _columns(
@@ -154,7 +191,7 @@ def _columns(
 
 
 def _prior(parameter: Parameter) -> float:
-    error = abs(parameter.error) if parameter.error else np.inf
+    error = parameter.error if parameter.error else np.inf
     return error if error < FREE_ABOVE else np.inf
 
 
@@ -175,7 +212,10 @@ def _assigned(lines: LineList, names: Sequence[str], header: Header, source: str
     lines = with_defaults(lines, names)
     notes = [note_of_defaults(lines)] if lines.defaulted else []
     blends = lines.blends()
+    notes += note_of_remarks(lines, blends)
     used = np.arange(len(lines)) < abs(header.nline)
+    if len(lines) and not used.any():
+        raise ValueError(f"NLINE = {header.nline}: no line counts; give as many as the .lin file has, {len(lines)}")
     if not used.all():
         notes.append(f"NLINE = {abs(header.nline)}: {len(lines) - int(used.sum())} lines behind it do not count")
     widths = _widths(lines, blends, used, header)
@@ -220,6 +260,11 @@ def _notes(file: ParameterFile, options: FitOptions, plain: bool, lines: Assignm
         notes.append(
             f"NPAR = {file.header.npar}, but {len(file.parameters)} parameters stand in the file: those are used"
         )
+    below = [p.label or str(p.code) for p in file.parameters if not p.constrained and (p.error or 0.0) < 0]
+    if below:
+        notes.append(f"a-priori errors below 0: {', '.join(below)} are held, as SPFIT does")
+    if not file.header.errtst > 0:
+        notes.append(f"ERRTST = {file.header.errtst:g}: {_NO_ERRTST:g} is taken, as SPFIT does")
     if file.header.thresh:
         notes.append("THRESH, the first damping, is chosen by the search itself; the result does not depend on it")
     unresolved = (
@@ -240,8 +285,10 @@ def _notes(file: ParameterFile, options: FitOptions, plain: bool, lines: Assignm
 
 
 def error_factor(fit: Fit, header: Header) -> float:
-    """What SPFIT multiplies parameter errors by: FRAC, or, where it is below 0, -FRAC times √(χ²/degrees of freedom)."""
-    return header.frac if header.frac >= 0 else -header.frac * fit.reduced_chi
+    """What SPFIT multiplies parameter errors by: FRAC, or, where it is below 0, -FRAC times √(χ²/degrees of freedom), one at least."""
+    if header.frac >= 0:
+        return header.frac
+    return float(-header.frac * np.sqrt(fit.residuals @ fit.residuals / max(fit.degrees_of_freedom, 1)))
 
 
 def fitted_file(asked: SpfitInput, fit: Fit, *, variances: bool) -> ParameterFile:

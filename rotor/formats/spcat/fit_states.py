@@ -25,7 +25,7 @@ from rotor.quantum.estimates.contracted import ContractedLevels, contracted_leve
 from rotor.quantum.estimates.effect_units import unit_levels
 from rotor.quantum.estimates.state_units import state_units
 from rotor.quantum.estimates.unit_blocks import UnitBlocks, joined
-from rotor.quantum.labelled import LevelModel
+from rotor.quantum.labelled import LevelModel, MissingLevelsError
 from rotor.quantum.levels import Levels
 from rotor.quantum.spins.levels import levels_of_f, unmixed_levels
 from rotor.quantum.wang.rotation import solve_rotation
@@ -90,7 +90,7 @@ class FileLevels(LevelModel):
         form = format_of(file, groups)
         reduced = np.flatnonzero(labels[:, -1] < 0) if form.spins else np.zeros(0, dtype=np.int64)
         if len(reduced):
-            refuse_far_f(labels[reduced], form, names_of_quanta(form), max(sum(group.spins) for group in groups))
+            refuse_far_f(labels, reduced, form, names_of_quanta(form), max(sum(group.spins) for group in groups))
         parts = _together(_searched(file, groups, form, labels, reduced), len(file.parameters))
         return cls(line_names(file), len(labels), tuple(parts), reduced, excluded_parameters(file))
 
@@ -125,9 +125,12 @@ def _searched(file: ParameterFile, groups: Sequence[Group], form: Format, labels
         lost = np.flatnonzero(~there)
         if not len(lost):
             return parts
-        if not np.isin(lost, reduced).all() or (positive[lost, -1] >= HIGHEST_SEARCHED).any():
-            first = " ".join(map(str, labels[int(lost[0])].tolist()))
-            raise ValueError(f"there is no level {first} ({', '.join(names_of_quanta(form))}) in this model")
+        none = lost[~np.isin(lost, reduced) | (positive[lost, -1] >= HIGHEST_SEARCHED)]
+        if len(none):
+            first = " ".join(map(str, labels[none[0]].tolist()))
+            raise MissingLevelsError(
+                f"there is no level {first} ({', '.join(names_of_quanta(form))}) in this model", none
+            )
         positive[lost, -1] += 1
 
 
@@ -170,7 +173,8 @@ def _with_labels(group: Group, form: Format, labels: Ints, names: Sequence[str],
         return []
     total = labels[here, -1] if form.spins else labels[here, 0]
     if (total < 0).any():
-        raise ValueError(f"F or J below 0 in the labels {labels[here[int(np.argmin(total))]].tolist()}")
+        first = " ".join(map(str, labels[here[int(np.argmin(total))]].tolist()))
+        raise MissingLevelsError(f"there is no level {first}: F or J is below 0", here[total < 0])
     if _direct(group, form):
         return _of_states(group, form, labels, here, names, values)
     twice = 2 * total - sum(group.spins) % 2

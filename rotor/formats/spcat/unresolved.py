@@ -14,6 +14,7 @@ import numpy as np
 from rotor.arrays import Ints
 from rotor.formats.spcat.file_lines import Format
 from rotor.formats.spcat.text.par import ParameterFile
+from rotor.quantum.labelled import MissingLevelsError
 
 HIGHEST_SEARCHED = 9  # F up to which a level with F below 0 is looked for where |F| has none
 
@@ -31,13 +32,15 @@ def spelled_out(labels: Ints, form: Format) -> Ints:
     return np.where((labels[:, -1] == -1) & (before < 0), before, labels[:, -1])
 
 
-def refuse_far_f(labels: Ints, form: Format, names: tuple[str, ...], twice_spins: int) -> None:
+def refuse_far_f(labels: Ints, reduced: Ints, form: Format, names: tuple[str, ...], twice_spins: int) -> None:
     """Refuse labels with F below 0 whose |F| no coupling of N with the spins gives.
 
     Parameters
     ----------
     labels : (n, quanta) array
-        Quantum numbers by line, N first.
+        Quantum numbers by level, N first.
+    reduced : (m,) array
+        Places of those with F below 0.
     form : Format
         Of the quantum numbers of the file.
     names : tuple of str
@@ -47,10 +50,12 @@ def refuse_far_f(labels: Ints, form: Format, names: tuple[str, ...], twice_spins
 
     Raises
     ------
-    ValueError
-        With the first such label.
+    MissingLevelsError
+        With the first such label, and the places of all.
     """
-    far = np.abs(-spelled_out(labels, form) - labels[:, 0]) > (twice_spins + 1) // 2
-    if far.any():
-        first = " ".join(map(str, labels[int(np.argmax(far))].tolist()))
-        raise ValueError(f"there is no level {first} ({', '.join(names)}): F and N differ by more than the spins")
+    some = labels[reduced]
+    far = reduced[np.abs(-spelled_out(some, form) - some[:, 0]) > (twice_spins + 1) // 2]
+    if len(far):
+        first = " ".join(map(str, labels[far[0]].tolist()))
+        text = f"there is no level {first} ({', '.join(names)}): F and N differ by more than the spins"
+        raise MissingLevelsError(text, far)

@@ -59,7 +59,7 @@ def constants_covariance(file: ParameterFile) -> Covariance | None:
 
 
 def _estimated(parameter: Parameter) -> float:
-    error = abs(parameter.error or 0.0)
+    error = parameter.error or 0.0
     return error if HELD_BELOW <= error < FREE_ABOVE and not parameter.constrained else 0.0
 
 

@@ -12,6 +12,7 @@ from rotor.formats.packed import load
 
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?", re.ASCII)
 _WHOLE = re.compile(r"[+-]?\d+(?:\.0*)?\Z", re.ASCII)
+_REMARK = re.compile(r"(?![OoIl]\.?\d)[^\d.+\-,/\s]")
 _GAP = " \t\r\n"
 
 
@@ -67,9 +68,31 @@ class Word(NamedTuple):
     column: int
 
 
-def read_words(line: Line, start: int, count: int) -> tuple[list[Word], int]:
+def read_words(line: Line, start: int, count: int, remark_from: int | None = None) -> tuple[list[Word], int]:
     """At most `count` numbers from column `start` on, and where what follows them begins.
 
+    Parameters
+    ----------
+    line : Line
+    start : int
+        Column, from 0.
+    count : int
+        How many numbers at most.
+    remark_from : int, optional
+        Behind so many numbers words may stand in place of a number, without a slash before them: they end the list. A letter that
+        looks like a digit (O.5, l0) is no such word.
+
+    Returns
+    -------
+    (list of Word, int)
+
+    Raises
+    ------
+    ValueError
+        With file, line and column, for what is no number.
+
+    Notes
+    -----
     Numbers are separated by blanks or a comma; two commas in a row leave a default; a slash ends the list. Anything
     else where a number may stand is an error: the field's programs skip it in silence and take the next digits,
     those of a comment for instance.
@@ -87,6 +110,8 @@ def read_words(line: Line, start: int, count: int) -> tuple[list[Word], int]:
             pending_comma = True
             at += 1
             continue
+        if remark_from is not None and len(words) >= remark_from and _REMARK.match(text, at):
+            break
         match = _NUMBER.match(text, at)
         if not match or not _ends(text, match.end()):
             wrong = re.split(r"[\s,/]", text[at:], maxsplit=1)[0]

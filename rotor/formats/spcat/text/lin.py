@@ -25,6 +25,7 @@ from rotor.units import MHZ_PER_CM
 
 QUANTA_FIELDS = 12  # at least
 MOST_QUANTA = 10  # of a state
+_REMARK_FROM = 2  # numbers: words in place of the weight are a remark
 NO_ERROR_MHZ = 0.01  # of a line that states none, as in SPFIT
 _NUMBER, _BETWEEN, _END = r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)", r"(?:[ \t]*,[ \t]*|[ \t]+)", r"[ \t]*(?:/|$)"
 _AS_USUAL = re.compile(  # one to three numbers and nothing that must be looked at again
@@ -201,6 +202,25 @@ def with_defaults(lines: LineList, names: Sequence[str]) -> LineList:
     return replace(lines, quanta=quanta, per_state=0, defaulted=lines.defaulted | set(changed))
 
 
+def note_of_remarks(lines: LineList, blends: NDArray[np.int64]) -> list[str]:
+    """What a user must know of blended lines that have words where the weight may stand; in other lines it has no bearing."""
+    counts = np.bincount(blends[blends >= 0], minlength=1)
+    shared = np.flatnonzero((blends >= 0) & (counts[blends] > 1)).tolist()
+    width = lines.fields
+    found = []
+    for i in shared:
+        body = lines.texts.get(i, "").rstrip("\r\n").rpartition("\n")[2]
+        words, at = read_words(Line(body, i, ""), 3 * width, 3, _REMARK_FROM)
+        if len(words) == _REMARK_FROM and at < len(body) and body[at] != "/":
+            found.append(i)
+    if not found:
+        return []
+    return [
+        f"{len(found)} blended lines have words where their weight may stand, the first is line {found[0] + 1}: their weight is 1, "
+        "where SPFIT takes the next digits; write the weight, or / before the words"
+    ]
+
+
 def note_of_defaults(lines: LineList) -> str:
     """What a user must know of lines that lack something."""
     return (
@@ -230,7 +250,7 @@ def _numbers(line: Line, width: int) -> tuple[tuple[float, float, float], int]:
         if all(map(math.isfinite, values)):
             frequency, error, weight = (*values, *(NO_ERROR_MHZ, 1.0)[len(values) - 1 :])
             return (frequency, error, weight), len(values)
-    words, _ = read_words(line, 3 * width, 3)
+    words, _ = read_words(line, 3 * width, 3, _REMARK_FROM)
     frequency = number(line, words, 0, f"the frequency (from column {3 * width + 1} on)")
     error = number(line, words, 1, "the error of the frequency", NO_ERROR_MHZ)
     return (frequency, error, number(line, words, 2, "the weight", 1.0)), len(words)
