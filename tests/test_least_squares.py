@@ -159,6 +159,6 @@ def test_a_narrow_curved_valley_is_followed_to_its_end():
         x, y = p
         return np.array([300 * (y - x * x), 1 - x]), np.array([[600 * x, -300.0], [1.0, 0.0]])
 
-    found = minimise(valley, np.array([-1.2, 1.0]), most_iterations=1000)
+    found = minimise(valley, np.array([-1.2, 1.0]), most_iterations=700)
     assert found.converged
     assert found.parameters == pytest.approx([1.0, 1.0], abs=1e-6)  # of a step below 1e-4 standard errors at rms 0
