@@ -17,6 +17,7 @@ from rotor.quantum.levels import Levels, SolvedBlock
 from rotor.quantum.stacked_blocks import Product, Stack, Vector, stacks_by_j
 from rotor.quantum.tensors import BodyTensor
 
+SMALLEST_MHZ = 1e-30  # in place of 0 between states that all have one energy
 ROUND_OFF = 1e-9  # of a threshold, by which a line that is compared exactly later may miss it
 
 Found = tuple[Indices, Indices, Floats]  # rows of both states, and S in D²
@@ -40,9 +41,9 @@ def strong_lines(
     highest_mhz : float
         Frequency above which lines do not count.
 
-    Yields
-    ------
-    (n,) arrays
+    Returns
+    -------
+    iterator of tuples of (n,) arrays
         Row of one state, row of the other, S in D².
     """
     vector, most = Vector(dipole), sum(abs(part) ** 2 for part in dipole.components)
@@ -99,14 +100,14 @@ def _parts(up: SolvedBlock, products: list[Product], counts: Mapping[int, int]) 
 
 
 class _Memory:
-    """Arrays used again and again: products of one block, what of them is kept, and the numbers of all levels."""
+    """Arrays used again and again: products of one block, which of them may suffice, and the numbers of all levels."""
 
     def __init__(self, levels: int) -> None:
         self.rows = np.arange(levels, dtype=np.int32)
         self._elements, self._keep, self._other = np.empty(0), np.empty(0, np.bool_), np.empty(0, np.bool_)
 
     def of(self, shape: tuple[int, int]) -> tuple[Floats, NDArray[np.bool_], NDArray[np.bool_]]:
-        """Room for elements, and twice for whether one is kept."""
+        """An array for elements, and two for whether they suffice."""
         size = shape[0] * shape[1]
         if len(self._elements) < size:
             self._elements, self._keep, self._other = np.empty(size), np.empty(size, np.bool_), np.empty(size, np.bool_)
@@ -134,7 +135,8 @@ def _found(
 
     lowest = min([energy[start], *(one.low.energies_mhz[a] for one, a, _ in products)])  # of each block, energies rise
     highest = max([energy[stop - 1], *(one.low.energies_mhz[b - 1] for one, _, b in products)])
-    scale = (1 - ROUND_OFF) / min(highest - lowest, highest_mhz)
+    span = max(min(highest - lowest, highest_mhz), SMALLEST_MHZ)
+    scale = (1 - ROUND_OFF) / span
     np.greater_equal(strength, scale * needed[start:stop, None], out=keep)
     np.greater_equal(strength, scale * needed[others], out=other)
     np.logical_or(keep, other, out=keep)
