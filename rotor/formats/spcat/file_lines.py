@@ -408,11 +408,11 @@ def as_catalogue(lines: list[tuple[GroupLines, int]], form: Format, tag: int, dr
     """
     joined = {name: np.concatenate([getattr(each, name) for each, _ in lines]) for name in _COLUMNS}
     qnfmt = np.concatenate([np.full(len(each.frequency_mhz), code) for each, code in lines])
-    order = np.argsort(joined["frequency_mhz"], kind="stable")
+    order = _rising(joined["frequency_mhz"])
     width = max(6, form.width)
     quanta = {}
     for name in ("upper", "lower"):
-        table = np.full((len(order), width), BLANK, dtype=np.int16)
+        table = np.full((len(qnfmt), width), BLANK, dtype=np.int16)
         table[:, : form.width] = joined[name][order]
         quanta[name] = table
     with np.errstate(divide="ignore"):
@@ -425,6 +425,13 @@ def as_catalogue(lines: list[tuple[GroupLines, int]], form: Format, tag: int, dr
         "g_upper": joined["g_upper"][order],
     }
     return catalogue_of(numbers, quanta["upper"], quanta["lower"], qnfmt[order].astype(np.int32), tag, linear=dr == 2)
+
+
+def _rising(frequency_mhz: Floats) -> Ints | slice:
+    """What puts frequencies in order, those that are equal as they stand."""
+    if (frequency_mhz[1:] >= frequency_mhz[:-1]).all():
+        return slice(None)
+    return np.argsort(frequency_mhz, kind="stable")
 
 
 def as_level_list(solved: list[tuple[Group, Levels]], form: Format) -> LevelList:
