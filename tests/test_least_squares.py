@@ -61,8 +61,9 @@ def test_it_does_not_say_that_it_has_converged_when_it_has_not():
 
 @pytest.mark.parametrize(("seed", "start"), [(2, 1.0), (6, 1.0), (11, 1e4), (17, 1e4)])
 def test_a_square_that_should_be_negative_ends_at_zero_and_a_wrong_slope_does_not(seed, start):
-    """p₁² is best below 0: χ² bends upwards about p₁ = 0, where the slope by p₁ is none; residuals have the round-off of a spectrum. From 1e4 the
-    column of p₁ was so long that only dampings far below the usual ones still move it."""
+    """p₁² is best below 0: χ² bends upwards about p₁ = 0, where the slope by p₁ is none; residuals have the round-off of a spectrum.
+
+    From 1e4 the column of p₁ was so long that only dampings far below the usual ones still move it."""
     rng, x = np.random.default_rng(seed), np.linspace(0, 1, 50)
     data = 3 * x - 0.3 * x**2 + rng.normal(size=50)
 
