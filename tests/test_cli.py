@@ -422,6 +422,10 @@ def test_no_answer_is_another_exit_code(call, folder):
     )
     assert (code, out) == (1, "")
     assert err.startswith("error: lines above 10^-12 nm² MHz at 3000 K reach to J = 29481, more than 600; give J max")
+    assert "a largest constant of 1 MHz is small for a molecule: numbers without a unit are MHz, so write GHz" in err
+    _, _, err = call("spectrum", "--constants", "B=200 MHz", "--dipole-abc", "1,0,0", "--temperature", "3000")
+    assert "reach to J" in err
+    assert "GHz" not in err
     assert call("spectrum", "CH4", "--plot", "a.png")[0] == 1
     assert not list(folder.iterdir())
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pytest
 from ase import Atoms
@@ -11,13 +14,19 @@ from scipy.stats import norm
 
 import rotor
 from rotor import units
+from rotor.classical.driven import DrivenRequest, answer_driven
+from rotor.classical.effects.gravity import GravityAboutPivot
 from rotor.fluid.analysis import Diffusion, yeh_hummer_correction
 from rotor.fluid.motion.bodies import bodies_of
+from rotor.geometry.rotations import distance
 from rotor.quantum.estimates.convergence import warnings_of
 from rotor.quantum.solve import solve_levels
 from rotor.scenes import left_out
+from rotor.scenes.kind import kind_of
 from rotor.scenes.plan import plan_of
+from rotor.scenes.plan_steps import step_error
 from rotor.scenes.scene import FluidScene, LevelsScene, SpectrumScene
+from rotor.scenes.scene_file import read_scene
 from rotor.scenes.sections import (
     FluidConditions,
     FluidNumerics,
@@ -26,6 +35,7 @@ from rotor.scenes.sections import (
     SpectrumObservables,
 )
 
+SCENES = Path(__file__).resolve().parents[1] / "examples" / "scenes"
 ATM_PER_BAR, TORR_PER_BAR = 1 / 1.01325, 760 / 1.01325
 MEASURED = [  # half widths at half maximum, MHz per bar
     (
@@ -161,3 +171,46 @@ def test_the_sizes_of_a_plan_are_those_of_the_equilibrated_fluid():
         sizes.append({one.name: one.size for one in found if one.size is not None})
     for name in ("quantum mechanics of nuclei", "finite step"):
         assert 1 / 3 < planned[name] / np.mean([one[name] for one in sizes]) < 3
+
+
+def driven(name: str, **changes) -> DrivenRequest:
+    scene = read_scene(SCENES / f"{name}.toml")
+    fields = {one: getattr(scene, one) for one in scene.__struct_fields__}
+    return replace(kind_of(scene).request(type(scene)(**{**fields, "accuracy": None}), SCENES), **changes)
+
+
+@pytest.mark.parametrize(
+    ("name", "tolerance"),
+    [
+        ("satellite_body_torque", 1e-4),
+        ("satellite_body_torque", 1e-9),
+        ("unbalanced_wheel", 1e-6),
+        ("driven_chaos", 1e-9),
+    ],
+)
+def test_the_error_of_the_steps_of_a_driven_motion(name, tolerance):
+    request = driven(name, tolerance=tolerance)
+    motion = answer_driven(request).motion
+    truth = answer_driven(driven(name, tolerance=1e-13)).motion
+    real = float(distance(motion.attitude, truth.attitude).max())
+    assert 1 / 3 < step_error(request, motion.steps).size / real < 3  # 0.90 to 0.99
+
+
+@pytest.mark.parametrize("step", [0.1, 0.02])
+def test_the_error_of_a_fixed_step(step):
+    weight = GravityAboutPivot(1.0, (0.0, 0.1, 1.0), (0.0, 0.0, -1.0))
+    request = DrivenRequest((1.0, 1.2, 0.5), (0.0, 5.0), (weight,), angular_velocity=(0.3, 0.1, 4.0), step=step)
+    motion = answer_driven(request).motion
+    truth = answer_driven(replace(request, step=None, tolerance=1e-13)).motion
+    real = float(distance(motion.attitude, truth.attitude).max())
+    assert 1 / 3 < step_error(request, motion.steps).size / real < 3  # a quarter of the step has 1/256 of the error
+
+
+def test_the_error_of_many_steps_is_a_bound():
+    request = driven("satellite_body_torque", tolerance=1e-9)
+    limit = step_error(request, 10**6)
+    assert limit.size == pytest.approx(1e-3)  # steps times tolerance
+    assert limit.basis.startswith("at most")
+    dense = step_error(driven("dual_spin_satellite", tolerance=1e-6), 400)
+    assert dense.basis.startswith("at most")  # its times are so dense that no tolerance takes more steps
+    assert dense.size < 1e-11

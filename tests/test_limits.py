@@ -9,13 +9,13 @@ import pytest
 from scipy import constants
 
 import rotor
-from rotor.molecules.nuclei import isotope
+from rotor.molecules.nuclei import data_folder, isotope
 from rotor.quantum.effects.hyperfine import NuclearQuadrupole
 from rotor.quantum.effects.watson import SEMI_RIGID
-from rotor.quantum.estimates.limits import VIBRATION_CM, model_limits, model_sizes, populated_j
+from rotor.quantum.estimates.limits import VIBRATION_CM, VIBRATION_POWER, model_limits, model_sizes, populated_j
 from rotor.quantum.solve import solve_levels
 from rotor.quantum.spins import Spin
-from rotor.quantum.spins.splittings import GRADIENT_MHZ_PER_BARN
+from rotor.quantum.spins.splittings import GRADIENT_MHZ_PER_BARN, GRADIENTS, splitting_nuclei
 from rotor.units import MHZ_PER_CM
 
 
@@ -70,17 +70,34 @@ def test_an_effect_of_the_calculation_is_not_left_out():
     assert left_out == {"rigid rotor": True, "centrifugal distortion": True, "nuclear quadrupole": False}
 
 
-@pytest.mark.oracle
-@pytest.mark.parametrize(
-    ("case", "label", "quadrupole_barn"), [("hcn_quad", "14N", 0.02044), ("vinylcl35_quad", "35Cl", -0.0817)]
-)
-def test_estimated_couplings_are_of_the_right_order(shared, case, label, quadrupole_barn):
-    """The reference inputs hold 1.5 χ_aa; the estimate has the order of χ_aa."""
-    known = {one.label: one.quadrupole_barn for one in (isotope("N", 14), isotope("Cl", 35))}
-    assert known[label] == pytest.approx(quadrupole_barn, rel=0.01)  # rounded here
-    record = json.loads((shared / "reference" / "spcat" / case / "case.json").read_text(encoding="utf-8"))
-    chi = next(one["value"] for one in record["parameters"] if one["label"].startswith("1.5")) / 1.5
-    assert 0.1 < abs(quadrupole_barn) * GRADIENT_MHZ_PER_BARN / abs(chi) < 10  # an order of magnitude, as the text says
+# |χ_zz| in MHz along the bond: deuterium of DCO+, DCOOH, HCOOD (J. Chem. Phys. 1974, 100, abstract), CH3OD; nitrogen of HCN, CH3CN,
+# NH3, HCONH2, CH2CHCN (files of the library), HOCN, ICN; 17O of HCO+; chlorine of CH3Cl (library), CH2BrCl; bromine of CH3Br,
+# CH3CH2Br, 2-bromopropane, CH2Br2, HOBr; iodine of CH3I, CF3I (abstract of the pure quadrupole spectra), ICN, CH2ICN, IN3. Without
+# a source: measured values in the tables of W. C. Bailey, nqcc.wcbailey.net
+COUPLINGS = {
+    ("H", 2): [0.151, 0.166, 0.272, 0.303], ("N", 14): [4.707, 4.223, 4.090, 3.851, 3.789, 2.913, 3.80], ("O", 17): [4.597],
+    ("Cl", 35): [74.752, 75.19], ("Br", 79): [577.13, 544.03, 522.33, 595.74, 915.66],
+    ("I", 127): [1934.13, 2142.5, 2420.85, 2086.0, 2748.08],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("symbol", "number"), list(COUPLINGS))
+def test_estimated_couplings(symbol, number):
+    nucleus = isotope(symbol, number)
+    estimate = abs(GRADIENTS[symbol] * nucleus.quadrupole_barn) * GRADIENT_MHZ_PER_BARN
+    ratios = estimate / np.array(COUPLINGS[symbol, number])
+    assert ratios.min() > 1 / 2  # claimed in docs/scenes.md; 3 is asked for
+    assert ratios.max() < 2
+
+
+@pytest.mark.parametrize(("source", "nucleus"), [("SMILES:CBr", "79Br"), ("SMILES:CI", "127I"), ("SMILES:CN", "14N")])
+def test_unknown_couplings_are_those_of_covalent_bonds(source, nucleus):
+    one = next(one for one in splitting_nuclei(rotor.read(source)) if one.nucleus == nucleus)
+    assert not one.known
+    expected = np.mean(COUPLINGS[one.nucleus.lstrip("0123456789"), int(one.nucleus.rstrip("BrIN"))])
+    assert 1 / 2 < abs(one.chi_mhz) / expected < 2  # as above
+    limit = next(one for one in model_limits(rotor.read(source), 3, SEMI_RIGID) if one.name == "nuclear quadrupole")
+    assert "covalent bonds" in limit.text
 
 
 @pytest.mark.parametrize("source", ["CH3OH", "CH3CHO", "NO", "NH3"])
@@ -96,11 +113,31 @@ def test_the_size_of_distortion_is_that_of_a_harmonic_diatomic_molecule():
     """Lines ν = 2B(J+1) - 4D(J+1)³ with D = 4B³/ω²."""
     b = 57_600.0
     top = rotor.Top.from_constants(f"B={b} MHz")
-    d = 4 * b**3 / (VIBRATION_CM * MHZ_PER_CM) ** 2
+    d = 4 * b**3 / (VIBRATION_CM * (b / MHZ_PER_CM) ** VIBRATION_POWER * MHZ_PER_CM) ** 2
     real = rotor.Top.from_constants(f"B={b} D={d} MHz")
     moved = solve_levels(top, 8).energy_mhz - solve_levels(real, 8).energy_mhz
     limit = {one.name: one.size_mhz for one in model_limits(top, 7, SEMI_RIGID)}["centrifugal distortion"]
     assert limit == pytest.approx(moved[8] - moved[7], rel=1e-9)  # differences of large numbers
+
+
+def distortion_over_real(name: str) -> float | None:
+    """The size for the rigid constants of a molecule of the library over that of its own D, D_J or ΔJ; None where it has none."""
+    top = rotor.read(name)
+    known = [top.constants[one] for one in ("D", "DJ", "DeltaJ") if one in top.constants.values]
+    if not known or not known[0] or top.kind == "spherical":
+        return None
+    a, b, c = top.rotational_constants_mhz
+    text = f"B={b} MHz" if top.kind == "linear" else f"A={a} B={b} C={c} MHz"
+    sizes = {one.name: one.size_mhz for one in model_limits(rotor.Top.from_constants(text), 7, SEMI_RIGID)}
+    return sizes["centrifugal distortion"] / (4 * abs(known[0]) * 8**3)
+
+
+def test_distortion_of_rigid_constants():
+    names = sorted(path.stem for path in (data_folder() / "molecules").glob("*.toml"))
+    found = {name: ratio for name in names if (ratio := distortion_over_real(name)) is not None}
+    assert len(found) > 40
+    beyond = [name for name, ratio in found.items() if not 1 / 3 < ratio < 3]
+    assert beyond == ["CH2OHCHO"]  # 0.28: its molecules are soft
 
 
 def test_the_most_populated_j():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import sys
 from collections.abc import Sequence
@@ -98,6 +99,7 @@ def command(context: typer.Context, given: Options) -> None:
     os.environ.setdefault(
         "OPENBLAS_NUM_THREADS", "1"
     )  # before numpy is loaded: on small blocks threads only wait for each other
+    gc.set_threshold(100_000)  # what is read and made lives to the end: looking for garbage would take 5 % of a run
     require_whole("--bootstrap", given.bootstrap, 0, MOST_SAMPLES)
     require_whole("--seed", given.seed, 0)
     require_whole("--iterations", given.iterations, 1)

@@ -217,7 +217,7 @@ def _nuclei_table(top: Top, content: dict[str, Any]) -> Table | None:
     for one in content["splitting_nuclei"]:
         own = top.spin_constants.of(one["nucleus"]) if one["known"] and top.spin_constants else {}
         constants = ", ".join(f"{name} {value:.6g}" for name, value in own.items())
-        said = constants or "not known; the size is that of a field gradient of one atomic unit"
+        said = constants or "not known; the size is that of covalent bonds of this element"
         about = "" if one["known"] else "about "
         rows.append([one["nucleus"], f"{one['spin']:g}", f"{about}{one['splitting_mhz']:.3g}", said])
     if not rows:

@@ -75,6 +75,7 @@ class Outputs:
 @grouped(given=("dipole", "dipole_abc"), picture=("plot_scale",))
 def command(context: typer.Context, given: Input, options: Options, outputs: Outputs, picture: ViewOptions) -> None:
     """Energy levels: quantum numbers, energies, degeneracies, term diagram."""
+    from rotor.quantum.effects.of_top import effects_of
     from rotor.quantum.request import LevelsRequest, answer_levels
 
     require_whole("--top", options.top_levels, 0)
@@ -82,7 +83,10 @@ def command(context: typer.Context, given: Input, options: Options, outputs: Out
     settings, files = _settings(options), Files.of(outputs)
     view = view_of(picture, files)
     with inputs.fields_as_options(**NAMES):
-        request = LevelsRequest(inputs.read_top(given), **settings)
+        top = inputs.read_top(given)
+        if given.spin_constants is not None:
+            settings["effects"] = effects_of(top, hyperfine=True)
+        request = LevelsRequest(top, **settings)
     with answering():
         answer = answer_levels(request)
     for warning in answer.warnings:
@@ -157,7 +161,7 @@ def _facts(answer: LevelsAnswer, content: dict[str, Any]) -> list[tuple[str, str
 
     top, request = answer.request.top, answer.request
     weights = report.weights_text(content["spin_weights"])
-    asked = f"J from {request.jmin} to {request.jmax}"
+    asked = f"{'N' if 'n' in content['quantum_numbers'] else 'J'} from {request.jmin} to {request.jmax}"
     if request.kmin is not None or request.kmax is not None:
         asked += f", K from {request.kmin or 0} to {request.jmax if request.kmax is None else request.kmax}"
     if request.max_energy_mhz is not None:

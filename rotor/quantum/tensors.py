@@ -228,7 +228,24 @@ def _existing(j: int, j_up: int, rank: int, q: int, k: Floats) -> Floats:
 
 
 def closed_coupling(j: int | Floats, rise: int, rank: int, q: int, k: Floats) -> Floats:
-    """`coupling` of rank 0, 1 or 2 to J' = J + `rise`, for k and k + q that exist; J may be an array like k."""
+    """`coupling` of rank 0, 1 or 2 to J' = J + `rise`, for k and k + q that exist.
+
+    Parameters
+    ----------
+    j : int or (n,) array
+        J of the lower function, one for all k or one for each.
+    rise : int
+        J' - J.
+    rank, q : int
+        Rank and component along the axis of the body.
+    k : (n,) array
+        K of the lower function.
+
+    Returns
+    -------
+    (n,) array
+        Without units.
+    """
     if rise < 0:
         return _sign(rise - q) * closed_coupling(j + rise, -rise, rank, -q, k + q)
     if q < 0:
@@ -329,7 +346,7 @@ def bands_between(up: WangBlock, low: WangBlock, tensor: BodyTensor) -> list[Ban
         source, target = overlap(up, low, step)
         if source.start >= source.stop:
             continue
-        elements = _wang_coupling(low.j, up.j, rank, step)[low.first_k :: 2][source] * parts[rank + step]
+        elements = wang_coupling(low.j, up.j, rank, step)[low.first_k :: 2][source] * parts[rank + step]
         for place, value in _folded(up, low, rank, step, parts) if rank > 1 else ():
             elements[place - source.start] += value
         out.append(Band(source, target, elements))
@@ -344,8 +361,21 @@ def overlap(up: WangBlock, low: WangBlock, step: int) -> tuple[slice, slice]:
 
 
 @lru_cache(maxsize=2048)  # some 16 MB at J = 1000; a dipole needs 6 tables for every J
-def _wang_coupling(j_low: int, j_up: int, rank: int, step: int) -> Floats:
-    """`coupling` for K = 0 ... J, times √2 where one of K and K + step is 0."""
+def wang_coupling(j_low: int, j_up: int, rank: int, step: int) -> Floats:
+    """`coupling` for K = 0 ... J, times √2 where one of K and K + step is 0.
+
+    Parameters
+    ----------
+    j_low, j_up : int
+        J of the lower and of the upper block.
+    rank, step : int
+        Rank of the tensor, and by how much K changes.
+
+    Returns
+    -------
+    (J + 1,) array
+        Without units; shared and read-only.
+    """
     first, last = max(0, -step), min(j_low, j_up - step)
     out = np.zeros(j_low + 1)
     if first <= last:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from rotor.scenes import left_out
 from rotor.scenes.motion_steps import BEGINNINGS, beginning, expected_steps, some_steps, steps_of
 from rotor.scenes.plan_parts import LONG_SEARCH, Plan, peak_mb, timed
+from rotor.scenes.plan_steps import step_error
 
 if TYPE_CHECKING:
     from rotor.classical.driven import DrivenRequest
@@ -62,13 +62,6 @@ def plan_with_accuracy(scene: Scene, request: DrivenRequest) -> Plan:
 
 def _driven(request: DrivenRequest, known_steps: int | None = None) -> Plan:
     steps = expected_steps(request) if known_steps is None else known_steps
-    local = request.step is None
-    size = steps * request.tolerance if local else None
-    basis = (
-        f"{steps} steps, each to {request.tolerance:g} of |L| and of a radian; chaos makes it grow"
-        if local
-        else "halve numerics.step"
-    )
     return Plan(
         kind="tumble",
         effects=tuple(type(effect).__name__ for effect in request.effects),
@@ -77,7 +70,7 @@ def _driven(request: DrivenRequest, known_steps: int | None = None) -> Plan:
         counts={"steps": steps, "times": len(request.times)},
         seconds=_seconds_of_steps(request, steps),
         memory_mb=_memory_mb(request),
-        left_out=(left_out.LeftOut("error of the steps", size, "rad", basis),),
+        left_out=(step_error(request, steps),),
     )
 
 

@@ -29,6 +29,7 @@ INTENSITY_NM2_MHZ = EINSTEIN_PER_MHZ3 * units.SPEED_OF_LIGHT_M_PER_S**2 / (8 * m
 
 JMAX_DEFAULT_LIMIT = 600
 USUAL_CUT = -12.0
+SUSPECT_BELOW_MHZ = 100.0  # A of a molecule is larger, in MHz; smaller ones may have lost their unit
 
 
 def jmax_for_cut(top: Top, dipole_abc: tuple[float, float, float], temperature_k: float, q: float, cut: float) -> int:
@@ -74,9 +75,12 @@ def jmax_for_cut(top: Top, dipole_abc: tuple[float, float, float], temperature_k
         if j > 1 and LGINT_NM2_MHZ * frequency * (j + 1) * dipole2 * photon * population < least and c * j * j > kt_mhz:
             break
     if j > JMAX_DEFAULT_LIMIT:
+        largest_mhz = f"a largest constant of {a:g} MHz is small for a molecule"
+        unit = f"; {largest_mhz}: numbers without a unit are MHz, so write GHz or cm-1 behind them where that is meant"
         raise ValueError(
             f"lines above 10^{math.log10(least):g} nm² MHz at {temperature_k:g} K reach to J = {j}, more than "
             f"{JMAX_DEFAULT_LIMIT}; give J max yourself, a lower temperature or a higher cut"
+            + (unit if a < SUSPECT_BELOW_MHZ else "")
         )
     return j
 
@@ -130,6 +134,14 @@ class IntensityCut:
     population: Floats
     kt_mhz: float
     least: float
+
+    @property
+    def needed(self) -> Floats:
+        """ν S in MHz D², (levels,), below which a line with this lower state is too weak, whatever its photon factor."""
+        if not self.least:
+            return np.zeros(len(self.population))
+        with np.errstate(divide="ignore", over="ignore"):  # of no population: a line with that state reaches no cut
+            return np.asarray(self.least / self.population)
 
     def keeps(self, frequency_mhz: Floats, strength: Floats, population: Floats) -> NDArray[np.bool_]:
         """Which lines are strong enough."""

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor import units
-from rotor.arrays import Floats, Ints
+from rotor.arrays import Floats, Ints, rising_order
 from rotor.checks import require_positive, require_whole
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.watson import SEMI_RIGID
@@ -213,7 +213,7 @@ class Lines(TransitionTable):
 
     def sorted(self) -> Lines:
         """The same lines, rising in frequency."""
-        return self.where(np.argsort(self.frequency_mhz))
+        return self.where(rising_order(self.frequency_mhz))
 
     def strongest(self, count: int) -> Lines:
         """The `count` most intense lines, strongest first."""

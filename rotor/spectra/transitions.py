@@ -6,7 +6,7 @@ Nothing weak is left out here but what an `IntensityCut` or a range of frequenci
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,15 +17,20 @@ from rotor.arrays import Floats, Indices
 from rotor.quantum.levels import Block, Levels, SolvedBlock
 from rotor.quantum.moments import Moment
 from rotor.quantum.reduced import amplitudes, connected_pairs, pairs_where, wang_columns
+from rotor.quantum.stacked_blocks import are_whole
 from rotor.quantum.tensors import body_tensor
 from rotor.spectra.intensity import IntensityCut
+from rotor.spectra.strong_lines import strong_lines
 from rotor.tops.operators import FIGURE_AXIS
 
 EVERYTHING = (0.0, float("inf"))
 LONG_LIST = 30_000_000  # lines from which the compiled loop is loaded: the compiler takes 0.6 s, the plain loop 20 ns a line more
 COMPILED = "rotor.spectra._kernels"
 
+BATCH = 30_000  # lines that are looked at together
+
 Vector = tuple[float, float, float]
+Rows = tuple[Indices, Indices, Floats]  # of both states of lines, and S in D²
 Amplitudes = Callable[[Any, Sequence[Any]], Floats]  # of a block with others, side by side: (n_up, sum of n_low)
 Pair = tuple[Block, Block]  # two blocks with an allowed transition, the one of higher or equal J first
 
@@ -74,13 +79,17 @@ def all_transitions(
         )
 
     blocks, some_without = _blocks_with_weight(levels)
+    solved = [block for block in blocks if isinstance(block, SolvedBlock)]
+    if cut is not None and solved and len(solved) == len(blocks) and are_whole(solved) and not moments:
+        vector = body_tensor(dipoles[0, 0], 1, levels.representation)
+        strong = strong_lines(levels, solved, vector, cut.needed, range_mhz[1])
+        found = _joined([_with_frequencies(levels, *batch, range_mhz, cut) for batch in _batches(strong)])
+        return _rows(found, levels.weight[found.lower] > 0) if some_without else found
     pairs, between = _acting(levels, blocks, dipoles, moments)
     if cut is None and range_mhz == EVERYTHING and not any(up is low for up, low in pairs):
         found = _every_pair(pairs, between)
     else:
-        bounded = cut is not None and bool(blocks) and isinstance(blocks[0], SolvedBlock)
-        most = sum(mu * mu for mu in dipoles[0, 0]) if bounded else None
-        found = _chosen(levels, pairs, between, most, range_mhz, cut)
+        found = _chosen(levels, pairs, between, range_mhz, cut)
     return _rows(found, levels.weight[found.lower] > 0) if some_without else found
 
 
@@ -107,6 +116,8 @@ def _side_by_side(of_pair: Callable[[Any, Any], Floats]) -> Amplitudes:
 
 def _blocks_with_weight(levels: Levels) -> tuple[list[Block], bool]:
     """Blocks in which a level exists by its spin weight, and whether one of them also holds levels that do not."""
+    if levels.weight.all():
+        return list(levels.blocks), False
     weights = [(block, levels.weight[block.start : block.start + len(block.energies_mhz)]) for block in levels.blocks]
     with_some = [(block, weight) for block, weight in weights if (weight > 0).any()]
     return [block for block, _ in with_some], any((weight <= 0).any() for _, weight in with_some)
@@ -173,39 +184,52 @@ def _fill_pair(
 
 
 def _chosen(
-    levels: Levels, pairs: list[Pair], between: Amplitudes, most: float | None, range_mhz: tuple[float, float],
-    cut: IntensityCut | None,
-) -> Transitions:  # fmt: skip
-    """The lines of all pairs in a range and above a cut. most: μ² in D², which bounds strengths between Wang blocks; None: no bound.
+    levels: Levels, pairs: list[Pair], between: Amplitudes, range_mhz: tuple[float, float], cut: IntensityCut | None
+) -> Transitions:
+    """The lines of all pairs in a range and above a cut.
 
     With the photon factor, at most 1, left out, a line can only reach the cut where ν S reaches the least over the larger of both
     populations; what is found so is looked at once more.
     """
-    needed = np.full(len(levels), -np.inf)  # of ν S, for a line with this lower state
-    if cut is not None:
-        with np.errstate(divide="ignore", over="ignore"):  # of no population: a line with that state reaches no cut
-            needed = cut.least / cut.population
-    counts = {} if most is None else _reaching(levels, needed, most)
-    pieces = []
-    for up, lows in _by_upper(pairs):
-        for ups, parts in _parts(up, lows, counts):
-            rows = np.concatenate([np.arange(part.start, part.start + len(part.energies_mhz)) for part in parts])
-            amplitude = between(ups, parts)
-            keep = _candidates(levels, ups, rows, amplitude, needed, range_mhz)
-            places = np.flatnonzero(np.tril(keep, -1) if up is lows[0] else keep)  # both ways round stand there
-            i, k = np.divmod(places, len(rows))
-            pieces.append((i + ups.start, rows[k], amplitude.ravel()[places]))
-    if not pieces:
-        return _joined([])
+    needed = np.full(len(levels), -np.inf) if cut is None else cut.needed
+    candidates = (_candidates(levels, up, lows, between(up, lows), needed, range_mhz) for up, lows in _by_upper(pairs))
+    return _joined([_with_frequencies(levels, *batch, range_mhz, cut) for batch in _batches(candidates)])
 
-    first, second, amplitude = (np.concatenate(column) for column in zip(*pieces, strict=True))
+
+def _batches(pieces: Iterable[Rows]) -> Iterator[Rows]:
+    """Small pieces put together to some thousand lines each, so that what is computed of them stays in fast memory."""
+    waiting: list[Rows] = []
+    count = 0
+    for piece in pieces:
+        waiting.append(piece)
+        count += len(piece[0])
+        if count > BATCH:
+            yield _side_to_side(waiting)
+            waiting, count = [], 0
+    if waiting:
+        yield _side_to_side(waiting)
+
+
+def _side_to_side(pieces: list[Rows]) -> Rows:
+    first, second, strength = (np.concatenate(column) for column in zip(*pieces, strict=True))
+    return first, second, strength
+
+
+def _with_frequencies(
+    levels: Levels, first: Indices, second: Indices, strength: Floats, range_mhz: tuple[float, float],
+    cut: IntensityCut | None,
+) -> Transitions:  # fmt: skip
+    """Lines between rows of levels, in whatever order of both, those that are in the range and reach the cut."""
     difference = levels.energy_mhz[first] - levels.energy_mhz[second]
     falls = difference < 0
-    upper, lower = np.where(falls, second, first).astype(np.int32), np.where(falls, first, second).astype(np.int32)
-    found = Transitions(np.abs(difference), amplitude * amplitude, upper, lower)
+    upper, lower = np.where(falls, second, first), np.where(falls, first, second)
+    found = Transitions(np.abs(difference), strength, upper, lower)
     if cut is None:
         return found
-    return _rows(found, cut.keeps(found.frequency_mhz, found.strength_debye2, cut.population[lower]))
+    keep = cut.keeps(found.frequency_mhz, strength, cut.population[lower])
+    if range_mhz != EVERYTHING:
+        keep &= (found.frequency_mhz >= range_mhz[0]) & (found.frequency_mhz <= range_mhz[1])
+    return _rows(found, keep)
 
 
 def _by_upper(pairs: list[Pair]) -> Iterator[tuple[Block, list[Block]]]:
@@ -220,61 +244,20 @@ def _by_upper(pairs: list[Pair]) -> Iterator[tuple[Block, list[Block]]]:
 
 
 def _candidates(
-    levels: Levels, up: Block, rows: NDArray[np.int64], amplitude: Floats, needed: Floats,
-    range_mhz: tuple[float, float],
-) -> NDArray[np.bool_]:  # fmt: skip
-    """Which of all states of a block and of other `rows` make a line in the range that may reach the cut, (n_up, rows)."""
+    levels: Levels, up: Block, lows: list[Block], amplitude: Floats, needed: Floats, range_mhz: tuple[float, float]
+) -> Rows:
+    """The lines between all states of a block and of others in the range that may reach the cut."""
+    rows = np.concatenate([np.arange(low.start, low.start + len(low.energies_mhz), dtype=np.int32) for low in lows])
     frequency = np.subtract.outer(up.energies_mhz, levels.energy_mhz[rows])
     np.abs(frequency, out=frequency)
+    strength = amplitude * amplitude
     of_up = needed[up.start : up.start + len(up.energies_mhz)]
-    keep: NDArray[np.bool_] = frequency * (amplitude * amplitude) >= np.minimum.outer(of_up, needed[rows])
+    keep = frequency * strength >= np.minimum.outer(of_up, needed[rows])
     if range_mhz != EVERYTHING:
         keep &= (frequency >= range_mhz[0]) & (frequency <= range_mhz[1])
-    return keep
-
-
-def _reaching(levels: Levels, needed: Floats, most: float) -> dict[int, int]:
-    """How many of the states of each Wang block, from the lowest on, may be the lower state of a line that reaches the cut.
-
-    Over all upper states of one lower state the strengths add up to (2J+1) μ² (the sum rule of direction cosines), so that one is
-    not larger; ν is at most the distance to the highest level of J - 1, J and J + 1.
-    """
-    starts = np.array([block.start for block in levels.blocks])
-    j, sizes = levels.quanta["j"], np.diff(np.append(starts, len(levels)))
-    highest = np.full(j.max() + 3, -np.inf)  # of J - 1, from J = -1 on
-    np.maximum.at(highest, j + 1, levels.energy_mhz)
-    highest = np.maximum(np.maximum(highest[:-2], highest[1:-1]), highest[2:])
-    reaches = (highest[j] - levels.energy_mhz) * (2 * j + 1) * most >= needed
-    last = np.maximum.reduceat(np.where(reaches, np.arange(1, len(levels) + 1), 0), starts)
-    counts = np.clip(last - starts, 0, sizes)
-    return dict(zip(starts.tolist(), counts.tolist(), strict=True))
-
-
-def _parts(up: Block, lows: list[Block], counts: Mapping[int, int]) -> Iterator[tuple[Block, list[Block]]]:
-    """The parts of blocks between which a line may reach the cut: all with the lowest states of one side, or of the other.
-
-    counts: of the lowest states by block, as `_reaching` gives them; blocks that are not in it are taken whole.
-    """
-    all_up = len(up.energies_mhz)
-    of_up = counts.get(up.start, all_up)
-    if of_up == all_up:
-        yield up, lows
-        return
-    sizes = [len(low.energies_mhz) for low in lows]
-    splits = [min(counts.get(low.start, size), size) for low, size in zip(lows, sizes, strict=True)]
-    lowest = [_states(low, 0, split) for low, split in zip(lows, splits, strict=True) if split]
-    if lowest:
-        yield up, lowest
-    others = [_states(low, split, size) for low, split, size in zip(lows, splits, sizes, strict=True) if split < size]
-    if of_up and others:
-        yield _states(up, 0, of_up), others
-
-
-def _states(block: Any, first: int, last: int) -> Any:
-    """The states `first` to `last` of a Wang block."""
-    if last - first == len(block.energies_mhz):
-        return block
-    return SolvedBlock(block.basis, block.energies_mhz[first:last], block.vectors[:, first:last], block.start + first)
+    places = np.flatnonzero(np.tril(keep, -1) if up is lows[0] else keep)  # both ways round stand there
+    i, k = np.divmod(places, len(rows))
+    return (i + up.start).astype(np.int32), rows[k], strength.ravel()[places]
 
 
 def _closed_form(

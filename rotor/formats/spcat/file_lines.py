@@ -26,6 +26,8 @@ from rotor.quantum.levels import Levels
 from rotor.spectra.intensity import LGINT_NM2_MHZ, IntensityCut
 from rotor.spectra.transitions import Transitions, all_transitions
 
+Quanta = NDArray[np.int16]
+
 
 @dataclass(frozen=True)
 class Format:
@@ -197,8 +199,8 @@ class GroupLines:
     intensity: Floats
     energy_lower_mhz: Floats
     g_upper: Ints
-    upper: Ints
-    lower: Ints
+    upper: Quanta
+    lower: Quanta
     error_mhz: Floats
 
 
@@ -235,11 +237,9 @@ def transitions_of(group: Group, levels: Levels, request: Request, q: float) -> 
         exists &= share_a_weight(group, levels, found.upper, found.lower)
     else:
         exists &= equally_weighted(levels, found.upper, found.lower)
-    if exists.all():
-        return found
-    return Transitions(
-        *(getattr(found, name)[exists] for name in ("frequency_mhz", "strength_debye2", "upper", "lower"))
-    )
+    order = np.argsort(found.frequency_mhz, kind="stable")  # what is in order is put in order quickly later on
+    rows = order if exists.all() else order[exists[order]]
+    return Transitions(*(getattr(found, name)[rows] for name in ("frequency_mhz", "strength_debye2", "upper", "lower")))
 
 
 def _wide_cut(levels: Levels, request: Request, q: float) -> IntensityCut | None:
@@ -347,16 +347,27 @@ def lines_of(
     count = np.maximum(levels.components[found.upper], levels.components[found.lower])
     weight = weights_of_lines(group, levels, found)
     energy, kt = levels.energy_mhz[found.lower], request.temperature_k * units.MHZ_PER_K
-    below = np.exp(-energy / kt) * -np.expm1(-found.frequency_mhz / kt)
+    below = np.exp(-levels.energy_mhz / kt)[found.lower] * -np.expm1(-found.frequency_mhz / kt)
     intensity = LGINT_NM2_MHZ / q * found.frequency_mhz * found.strength_debye2 / count * weight * below
     chosen = np.flatnonzero(within(request, found.frequency_mhz, intensity))
     up, low = found.upper[chosen], found.lower[chosen]
     error = np.zeros(len(chosen)) if spread is None else np.linalg.norm(spread[up] - spread[low], axis=1)
     g_upper = levels.multiplicity[up] * (levels.weight // levels.components)[up]
-    columns = (found.frequency_mhz[chosen], intensity[chosen], energy[chosen], g_upper, error)
-    pair = levels.components[up], levels.components[low]
+    columns = (found.frequency_mhz[chosen], intensity[chosen], energy[chosen], error)
+    index, upper, lower = _one_component_each(group, levels, form, up, low)
+    frequency, strength, energy, error = (column[index] for column in columns)
+    return GroupLines(frequency, strength, energy, g_upper[index], upper, lower, error)
+
+
+def _one_component_each(
+    group: Group, levels: Levels, form: Format, up: Indices, low: Indices
+) -> tuple[Ints, Quanta, Quanta]:
+    """Which transition each line of one component of ±K belongs to, and the quantum numbers of its levels, (lines, width)."""
+    plus = quanta_of(group, levels, form).astype(np.int16)
+    if (levels.components == 1).all():
+        return np.arange(len(up)), plus[up], plus[low]
+    pair, minus = (levels.components[up], levels.components[low]), quanta_of(group, levels, form, True).astype(np.int16)
     count = np.maximum(*pair)
-    plus, minus = (quanta_of(group, levels, form, negative) for negative in (False, True))
     twice = np.flatnonzero((pair[0] == 2) & (pair[1] == 2))
     rest = np.flatnonzero(count == 1)
     mixed = np.flatnonzero((count == 2) & (np.minimum(*pair) == 1))
@@ -368,9 +379,7 @@ def lines_of(
         (mixed, minus[up[mixed]], minus[low[mixed]]),
     ]
     index = np.concatenate([piece[0] for piece in pieces])
-    upper, lower = (np.concatenate([piece[i] for piece in pieces]) for i in (1, 2))
-    frequency, strength, energy, g, error = (column[index] for column in columns)
-    return GroupLines(frequency, strength, energy, g, upper, lower, error)
+    return index, np.concatenate([piece[1] for piece in pieces]), np.concatenate([piece[2] for piece in pieces])
 
 
 def as_catalogue(lines: list[tuple[GroupLines, int]], form: Format, tag: int, dr: int) -> Catalogue:

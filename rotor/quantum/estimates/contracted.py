@@ -17,7 +17,7 @@ of the length v; W is chosen so that this is below `TOLERANCE_MHZ`. Where V is t
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -343,7 +343,7 @@ def _units(
 
 def _in_functions(number: int, rotor: RotorBlock) -> SpinPart:
     every = slice(0, 1)
-    return SpinPart(number, rotor._replace(vectors=np.eye(len(rotor.energies_mhz))), every, every)
+    return SpinPart(number, replace(rotor, vectors=np.eye(len(rotor.energies_mhz))), every, every)
 
 
 def _window(levels: ContractedLevels, values_mhz: Floats) -> float:

@@ -7,6 +7,7 @@ basis, one matrix for each parameter (`unit_blocks`).
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -200,7 +201,7 @@ class _SpinUnits:
 
 
 def _in_functions(part: SpinPart) -> SpinPart:
-    return part._replace(rotor=part.rotor._replace(vectors=np.eye(len(part.rotor.energies_mhz))))
+    return part._replace(rotor=replace(part.rotor, vectors=np.eye(len(part.rotor.energies_mhz))))
 
 
 def _sub_blocks(parts: tuple[SpinPart, ...], size: int) -> Ints:

@@ -161,15 +161,25 @@ class _Stack:
         return np.asarray(weights.transpose(0, 2, 1) @ self.factors @ self.mix)
 
 
+class AtStart(NamedTuple):
+    """What labels of a block had when they were looked for: parameters of the block, energies, derivatives by them, sub-blocks of all
+    its states."""
+
+    values_mhz: Floats
+    energies: Floats
+    slopes: Floats
+    leading: Ints
+
+
 @dataclass(frozen=True)
 class Tracked:
-    """Labels in a block: their places among all, the names and the states that they have, and the sub-blocks of all states then."""
+    """Labels in a block: their places among all, the names and the states that they have."""
 
     block: UnitBlock
     rows: Ints
     names: Ints
     states: Ints
-    leading: Ints
+    start: AtStart
 
 
 def _stacks(blocks: Sequence[UnitBlock]) -> list[Ints]:
@@ -205,17 +215,32 @@ def tracked_blocks(
     UnitBlocks
         Blocks in which labels lie.
     """
-    tracked = []
+    tracked = list[Tracked]()
     for numbers in _stacks(blocks):
         stack = _Stack.of([blocks[i] for i in numbers.tolist()])
         solved = stack.solved(values_mhz)
+        named = [
+            blocks[i].namer(solved.matrices[place], solved.energies[place], solved.vectors[place])
+            for place, i in enumerate(numbers.tolist())
+        ]
+        found = [find(i, names) for i, names in zip(numbers.tolist(), named, strict=True)]
+        slopes = stack.slopes(solved.vectors, _padded([states for _, states in found], 0))
         leading = stack.leading(solved.vectors)
-        for place, i in enumerate(numbers.tolist()):
-            names = blocks[i].namer(solved.matrices[place], solved.energies[place], solved.vectors[place])
-            rows, states = find(i, names)
+        for place, (rows, states) in enumerate(found):
             if len(rows):
-                tracked.append(Tracked(blocks[i], rows, names[states], states, leading[place]))
+                block = blocks[numbers[place]]
+                own = slopes[place, : len(rows), : len(block.parameters)]
+                start = AtStart(values_mhz[block.parameters], solved.energies[place, states], own, leading[place])
+                tracked.append(Tracked(block, rows, named[place][states], states, start))
     return UnitBlocks(count, tuple(tracked))
+
+
+def _padded(rows: Sequence[Ints], fill: int) -> Ints:
+    """Arrays of whole numbers as the rows of one."""
+    out = np.full((len(rows), max(map(len, rows))), fill)
+    for place, row in enumerate(rows):
+        out[place, : len(row)] = row
+    return out
 
 
 @dataclass(frozen=True)
@@ -230,11 +255,8 @@ class _Labelled:
 
     @classmethod
     def of(cls, tracked: Sequence[Tracked]) -> _Labelled:
-        most = max(len(one.rows) for one in tracked)
-        rows, states = np.full((len(tracked), most), -1), np.zeros((len(tracked), most), dtype=np.int64)
-        for b, one in enumerate(tracked):
-            rows[b, : len(one.rows)], states[b, : len(one.rows)] = one.rows, one.states
-        leading = np.stack([one.leading for one in tracked])
+        rows, states = _padded([one.rows for one in tracked], -1), _padded([one.states for one in tracked], 0)
+        leading = np.stack([one.start.leading for one in tracked])
         return cls(_Stack.of([one.block for one in tracked]), tuple(tracked), rows, states, leading)
 
     @cached_property
@@ -300,6 +322,8 @@ class UnitBlocks:
 
     def levels(self, values_mhz: Floats) -> tuple[Floats, Floats]:
         """Energies (count,) and derivatives (count, parameters); nan for labels that are not in these blocks."""
+        if all(np.array_equal(one.start.values_mhz, values_mhz[one.block.parameters]) for one in self.tracked):
+            return self._levels_at_start(len(values_mhz))
         energies = np.full(self.count + 1, np.nan)  # padded labels and parameters go to the last place
         slopes = np.zeros((self.count + 1, len(values_mhz) + 1))
         for one in self._labelled:
@@ -307,6 +331,13 @@ class UnitBlocks:
             energies[one.rows] = found
             slopes[one.rows[:, :, None], one.stack.parameters[:, None, :]] = derived
         return energies[:-1], slopes[:-1, :-1]
+
+    def _levels_at_start(self, parameters: int) -> tuple[Floats, Floats]:
+        energies, slopes = np.full(self.count, np.nan), np.zeros((self.count, parameters))
+        for one in self.tracked:
+            energies[one.rows] = one.start.energies
+            slopes[one.rows[:, None], one.block.parameters] = one.start.slopes
+        return energies, slopes
 
 
 def joined(parts: Sequence[tuple[UnitBlocks, Ints, Ints]], count: int) -> UnitBlocks:

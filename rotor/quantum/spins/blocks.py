@@ -241,11 +241,15 @@ def solve_f(plan: Plan, twice_f: int, exist: Exist | None = None) -> list[SpinBl
     """The blocks of one F, those left out in which no level exists by `exist` (see `levels_of_f`)."""
     every = plan.shared.scheme.patterns(twice_f)
     known = plan.shared.cache.pop(("coupling", twice_f), None) or _couplings(plan, {twice_f: [every]})[twice_f]
-    out = []
-    for parts in _parts_of_f(plan, every):
-        names = names_of_parts(parts, every)
-        if exist is None or exist(names[0]).any():
-            out.append(_solved(plan, twice_f, every, parts, known, names))
+    blocks = list(_parts_of_f(plan, every))
+    names, sizes = names_of_parts([part for parts in blocks for part in parts], every)
+    there = np.ones(len(names), dtype=bool) if exist is None else exist(names)
+    out, start, first = [], 0, 0
+    for parts in blocks:
+        stop, last = start + parts[-1].place.stop, first + sum(part.sub_blocks for part in parts)
+        if there[start:stop].any():
+            out.append(_solved(plan, twice_f, every, parts, known, (names[start:stop], sizes[first:last])))
+        start, first = stop, last
     return out
 
 
@@ -337,20 +341,21 @@ def _solved(
 
 def _matrix(plan: Plan, parts: tuple[SpinPart, ...], known: dict[Channel, Floats], zero: float) -> Floats:
     """The Hamiltonian of one block, energies from `zero` on, in the lower triangle."""
-    size, single = parts[-1].place.stop, all(part.repeats == 1 for part in parts)
-    matrix, grouped = np.zeros((size, size)), plan.grouped
+    size, grouped = parts[-1].place.stop, plan.grouped
+    matrix = np.zeros((size, size))
     matrix.flat[:: size + 1] = np.concatenate([np.tile(p.rotor.energies_mhz - zero, p.repeats) for p in parts])
+    single = all(part.repeats == 1 for part in parts)
+    of_single = {channel: table.tolist() for channel, table in known.items()} if single else {}
     for a, up in enumerate(parts):
         for low in parts[: a + 1]:
             for operator, of_it in grouped.get((up.number, low.number), ()):
                 if single:
-                    factor = sum(known[channel][up.patterns.start, low.patterns.start] for channel in of_it)
-                    matrix[up.place, low.place] += factor * operator
-                    continue
-                factors = known[of_it[0]][up.patterns, low.patterns]
-                for channel in of_it[1:]:
-                    factors = factors + known[channel][up.patterns, low.patterns]
-                matrix[up.place, low.place] += product(factors, operator)
+                    one = [of_single[channel][up.patterns.start][low.patterns.start] for channel in of_it]
+                    element = operator * sum(one)
+                else:
+                    factors = sum(known[channel][up.patterns, low.patterns] for channel in of_it)
+                    element = product(np.asarray(factors), operator)
+                matrix[up.place, low.place] += element
     return matrix
 
 

@@ -42,11 +42,14 @@ def amplitudes(up: SpinBlock, low: SpinBlock, tensors: Tensors) -> Floats:
     rank = rank_of(tensors)
     t, acting = _coefficients(up, low, rank), _acting(up, low, tensors, rank)
     rows, columns = up.vectors.shape[0], low.vectors.shape[0]
-    if up.single and low.single and rows * columns <= _FEW:
-        whole = np.zeros((rows, columns))
+    if rows * columns <= _FEW:
+        whole, of_single = np.zeros((rows, columns)), t.tolist() if up.single and low.single else None
         for target, source, element in acting:
-            factor = t[target.patterns.start, source.patterns.start]
-            np.multiply(element, factor, out=whole[target.place, source.place])
+            if of_single:
+                factor = of_single[target.patterns.start][source.patterns.start]
+                np.multiply(element, factor, out=whole[target.place, source.place])
+            else:
+                whole[target.place, source.place] = product(t[target.patterns, source.patterns], element)
         return np.asarray(up.vectors.T @ (whole @ low.vectors))
     moved = np.zeros((rows, low.vectors.shape[1]))
     for target, source, element in acting:
@@ -74,6 +77,9 @@ def connected(up: SpinBlock, low: SpinBlock, tensors: Tensors) -> bool:
     return bool(_acting(up, low, tensors, rank))
 
 
+Acting = list[tuple[SpinPart, SpinPart, Floats]]
+
+
 @dataclass(frozen=True)
 class Elements:
     """Elements of some tensors between the blocks of the rotation, and between which parts of pairs of spin blocks they act.
@@ -84,7 +90,7 @@ class Elements:
     tensors: Tensors
     known: dict[tuple[int, int], Floats | None]
     partners: dict[int, list[tuple[int, Floats]]] | None
-    pairs: dict[tuple[int, int], list[tuple[SpinPart, SpinPart, Floats]]] = field(default_factory=dict)
+    pairs: dict[tuple[int, int], Acting] = field(default_factory=dict)
     reached: dict[int, set[int]] = field(default_factory=dict)
 
     def reached_from(self, up: SpinBlock) -> set[int]:
@@ -111,7 +117,7 @@ def _elements(shared: Shared, tensors: Tensors, rank: int) -> Elements:
     return found
 
 
-def _acting(up: SpinBlock, low: SpinBlock, tensors: Tensors, rank: int) -> list[tuple[SpinPart, SpinPart, Floats]]:
+def _acting(up: SpinBlock, low: SpinBlock, tensors: Tensors, rank: int) -> Acting:
     """Pairs of parts between which the tensors act, with the element of the rotation."""
     if not abs(up.twice_f - low.twice_f) <= 2 * rank <= up.twice_f + low.twice_f:
         return []
@@ -119,37 +125,34 @@ def _acting(up: SpinBlock, low: SpinBlock, tensors: Tensors, rank: int) -> list[
     if place not in elements.pairs:
         if elements.partners is not None and elements.reached_from(up).isdisjoint(low.by_number):
             return []
-        t = _coefficients(up, low, rank) if low.shared.scheme.paired else None
-        elements.pairs[place] = [
-            (target, source, element)
-            for target, source, element in _parts_between(up, low, elements, rank)
-            if t is None or t[target.patterns, source.patterns].any()
-        ]
+        found = _parts_between(up, low, elements, rank)
+        if low.shared.scheme.paired:
+            t = _coefficients(up, low, rank)
+            found = [(target, source, x) for target, source, x in found if t[target.patterns, source.patterns].any()]
+        elements.pairs[place] = found
     return elements.pairs[place]
 
 
-def _parts_between(
-    up: SpinBlock, low: SpinBlock, elements: Elements, rank: int
-) -> Iterator[tuple[SpinPart, SpinPart, Floats]]:
+def _parts_between(up: SpinBlock, low: SpinBlock, elements: Elements, rank: int) -> Acting:
     if elements.partners is not None:
-        sources = low.by_number
-        for target in up.parts:
-            for number, found in elements.partners.get(target.number, ()):
-                for source in sources.get(number, ()):
-                    yield target, source, found
-        return
-    by_n: dict[int, list[SpinPart]] = {}
-    for source in low.parts:
-        by_n.setdefault(source.rotor.n, []).append(source)
-    for target in up.parts:
-        n, number = target.rotor.n, target.number
-        for source in (part for near in range(n - rank, n + rank + 1) for part in by_n.get(near, ())):
-            key = (number, source.number)
-            if key not in elements.known:
-                elements.known[key] = _rotor_element(target.rotor, source.rotor, elements.tensors)
-            element = elements.known[key]
-            if element is not None:
-                yield target, source, element
+        sources, partners = low.by_number, elements.partners
+        return [
+            (target, source, found)
+            for target in up.parts
+            for number, found in partners.get(target.number, ())
+            if number in sources
+            for source in sources[number]
+        ]
+    near = ((a, b) for a in up.parts for b in low.parts if abs(a.rotor.n - b.rotor.n) <= rank)
+    every = ((target, source, _known(elements, target, source)) for target, source in near)
+    return [(target, source, found) for target, source, found in every if found is not None]
+
+
+def _known(elements: Elements, target: SpinPart, source: SpinPart) -> Floats | None:
+    key = (target.number, source.number)
+    if key not in elements.known:
+        elements.known[key] = _rotor_element(target.rotor, source.rotor, elements.tensors)
+    return elements.known[key]
 
 
 def _rotor_element(up: RotorBlock, low: RotorBlock, tensors: Tensors) -> Floats | None:

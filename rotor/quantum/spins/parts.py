@@ -5,6 +5,7 @@ Names are given one to one, the largest share first; among the levels of one sub
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -27,6 +28,11 @@ class SpinPart(NamedTuple):
     place: slice
 
     @property
+    def sub_blocks(self) -> int:
+        """Number of sub-blocks, Wang blocks times patterns."""
+        return len(self.rotor.parts) * self.repeats
+
+    @property
     def repeats(self) -> int:
         """Number of patterns."""
         return int(self.patterns.stop - self.patterns.start)
@@ -37,9 +43,7 @@ def named_states(rotor: RotorBlock, vectors: Floats) -> Ints:
     shares = np.stack([(vectors[part.place] ** 2).sum(axis=0) for part in rotor.parts])
     of_state = assigned(shares, np.array([len(part.names) for part in rotor.parts]))
     labels = np.empty((len(of_state), 3), dtype=np.int64)
-    labels[np.argsort(of_state, kind="stable")] = np.concatenate(
-        [np.column_stack([np.full(len(part.names), part.v), part.names]) for part in rotor.parts]
-    )
+    labels[np.argsort(of_state, kind="stable")] = np.concatenate(rotor.names)
     return labels
 
 
@@ -65,19 +69,19 @@ def _over_functions(part: SpinPart, vectors: Floats) -> Floats:
     return np.concatenate([each[:, own.place].reshape(-1, rows.shape[1]) for own in part.rotor.parts])
 
 
-def names_of_parts(parts: tuple[SpinPart, ...], every: Ints) -> tuple[Ints, Ints]:
+def names_of_parts(parts: Sequence[SpinPart], every: Ints) -> tuple[Ints, Ints]:
     """v, Ka, Kc and the pattern of the levels that the sub-blocks name, (functions, 3 + pattern), and how many each names."""
-    found, sizes = [], []
+    found, sizes, rows = list[Ints](), list[int](), list[int]()
     for part in parts:
-        own_patterns = every[part.patterns]
-        for own in part.rotor.parts:
-            names = np.empty((len(own_patterns), len(own.names), 3 + every.shape[1]), dtype=np.int64)
-            names[..., 0] = own.v
-            names[..., 1:3] = own.names
-            names[..., 3:] = own_patterns[:, None, :]
-            found.append(names.reshape(-1, names.shape[-1]))
-            sizes += [len(own.names)] * len(own_patterns)
-    return np.concatenate(found), np.array(sizes)
+        for names in part.rotor.names:
+            for row in range(part.patterns.start, part.patterns.stop):
+                found.append(names)
+                rows.append(row)
+                sizes.append(len(names))
+    out = np.empty((sum(sizes), 3 + every.shape[1]), dtype=np.int64)
+    np.concatenate(found, out=out[:, :3])
+    out[:, 3:] = every[rows].repeat(sizes, axis=0)
+    return out, np.array(sizes)
 
 
 def assigned(shares: Floats, capacity: Ints) -> Ints:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -38,13 +39,19 @@ class RotorPart(NamedTuple):
     names: Ints  # Ka and Kc of the functions in order of energy, (size, 2); K and 0 of |N K⟩
 
 
-class RotorBlock(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class RotorBlock:
     """States of one N solved together: energies (n,) in MHz, eigenvectors (n, n) in columns over the parts."""
 
     n: int
     parts: tuple[RotorPart, ...]
     energies_mhz: Floats
     vectors: Floats
+
+    @cached_property
+    def names(self) -> list[Ints]:
+        """v, Ka and Kc of the functions of each part in order of energy, (size, 3)."""
+        return [np.column_stack([np.full(len(part.names), part.v), part.names]) for part in self.parts]
 
 
 class Channel(NamedTuple):

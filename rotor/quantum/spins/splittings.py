@@ -1,11 +1,15 @@
-"""Nuclei that split lines, and by how much: from known constants, or from a field gradient of one atomic unit.
+"""Nuclei that split lines, and by how much: from known constants, or from a typical field gradient.
 
 To first order a level J = 1 with one nucleus of spin I lies at -χ_gg Y(F) with Casimir's function
 
     Y = [¾ C(C+1) - I(I+1)J(J+1)] / [2(2J-1)(2J+3) I(2I-1)],    C = F(F+1) - I(I+1) - J(J+1)
 
 (W. Gordy and R. L. Cook, Microwave Molecular Spectra, 3rd ed., eq. 9.20), χ_gg along the axis g about which J = 1 does not turn. The
-size that is given is the distance of the outermost components for the largest of the three.
+size that is given is the distance of the outermost components for the largest of the three. Where χ is not known, it is that of the
+gradient in covalent bonds of the element, `GRADIENTS`, in atomic units e/(4π ε0 a0³), between those of these molecules: D 0.25 to 0.45
+(C-D of DCOOH, O-D of HCOOD and CH3OD), O 0.8 (HCO⁺), N 0.6 to 1 (HOCN, ICN, HCONH2, NH3, CH3CN, HCN), Cl 3.9 (CH3Cl, CH2BrCl), Br 7
+to 12 (2-bromopropane, CH3CH2Br, CH3Br, CH2Br2, HOBr), I 12 to 17 (CH3I, CH2ICN, CF3I, ICN, IN3); tests/test_limits.py has them and
+where they were read. Other elements count with 1. In ionic molecules such as KCl the halogens have far less.
 """
 
 from __future__ import annotations
@@ -23,11 +27,12 @@ if TYPE_CHECKING:
 GRADIENT_MHZ_PER_BARN = (
     234.964778  # eQV/h of a field gradient V of one atomic unit; CODATA 2022, checked in tests/test_limits.py
 )
+GRADIENTS = {"H": 0.35, "N": 0.8, "O": 0.8, "Cl": 3.9, "Br": 8.0, "I": 13.0}
 
 
 @dataclass(frozen=True)
 class Splitting:
-    """One nucleus that splits lines. known: whether its constants are; else they are those of a unit field gradient."""
+    """One nucleus that splits lines. known: whether its constants are; else they are those of a typical field gradient."""
 
     nucleus: str
     spin: float
@@ -72,7 +77,7 @@ def splitting_nuclei(top: Top) -> list[Splitting]:
         labels: dict[str, Splitting] = {}
         for atom, one in enumerate(top.molecule.nuclei, start=1):
             if one.spin >= 1 and one.quadrupole_barn and atom not in known:
-                chi_mhz = GRADIENT_MHZ_PER_BARN * one.quadrupole_barn
+                chi_mhz = GRADIENT_MHZ_PER_BARN * GRADIENTS.get(one.symbol, 1.0) * one.quadrupole_barn
                 labels.setdefault(one.label, _splitting(one.label, round(2 * one.spin), chi_mhz, False))
         found += labels.values()
     return sorted(found, key=lambda one: -one.splitting_mhz)

@@ -10,6 +10,7 @@ with the phases of J∓ (body-fixed) real and positive.
 
 from __future__ import annotations
 
+import math
 import sys
 
 import numpy as np
@@ -113,7 +114,7 @@ def diagonalise(bands: list[Floats], vectors: bool = True) -> tuple[Floats, Floa
     size = len(bands[0])
     if size == 1:
         return bands[0], np.ones((1, 1))
-    if not all(np.isfinite(band).all() for band in bands):
+    if not _are_finite(bands):
         raise ValueError("a block of the Hamiltonian overflows: J max is too high for these distortion constants")
     if len(bands) == 1:
         return _diagonal(bands[0], vectors)
@@ -128,13 +129,19 @@ def diagonalise(bands: list[Floats], vectors: bool = True) -> tuple[Floats, Floa
     return energies, states
 
 
+def _are_finite(bands: list[Floats]) -> bool:
+    return all(
+        math.isfinite(band.dot(band)) or bool(np.isfinite(band).all()) for band in bands
+    )  # squares overflow sooner
+
+
 def lowest_energies(bands: list[Floats], below: float) -> Floats:
     """Eigenvalues up to `below`, rising; also higher ones where finding all takes no longer. Raises as `diagonalise` does.
 
     A few of a large tridiagonal matrix are bisected for (LAPACK's dstebz); wide bands are made tridiagonal (dsbevd).
     """
     size = len(bands[0])
-    if size <= SMALL or len(bands) == 1 or not all(np.isfinite(band).all() for band in bands):
+    if size <= SMALL or len(bands) == 1 or not _are_finite(bands):
         return diagonalise(bands, vectors=False)[0]
     if len(bands) > 2:
         return _of_wide_bands(bands)
