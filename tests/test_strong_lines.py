@@ -8,7 +8,7 @@ import pytest
 from rotor.quantum import stacked_blocks
 from rotor.quantum.reduced import connected_wang_blocks, wang_amplitudes
 from rotor.quantum.solve import solve_levels
-from rotor.quantum.stacked_blocks import Vector, are_whole, groups_of
+from rotor.quantum.stacked_blocks import Memory, Vector, are_whole, groups_of
 from rotor.quantum.tensors import body_tensor
 from rotor.spectra import strong_lines, transitions
 from rotor.spectra.intensity import intensity_cut
@@ -69,11 +69,11 @@ def test_every_pair_of_blocks_is_there_once_with_its_elements(most_j, step, monk
     monkeypatch.setattr(stacked_blocks, "MOST_J", most_j)
     levels = solve_levels(Top.from_constants(TOPS["prolate, Ir"]), 9)
     dipole = body_tensor((1.2, 1.9, 0.4), 1, "Ir")
-    of_start, found = {block.start: block for block in levels.blocks}, {}
-    for group in groups_of(levels.blocks):
+    memory, of_start, found = Memory(), {block.start: block for block in levels.blocks}, {}
+    for group in groups_of(levels.blocks, memory):
         every = np.arange(1, len(group.js))
         for places in [every[first::step] for first in range(min(step, len(every)))]:
-            for slot, (moved, low, low_slot, low_places) in Vector(dipole).products(group, places):
+            for slot, (moved, low, low_slot, low_places) in Vector(dipole, memory).products(group, places):
                 for g, (up_at, low_at) in enumerate(zip(places, low_places, strict=True)):
                     sizes = group.counts[slot][up_at], group.counts[low_slot][low_at]
                     elements = moved[g].T @ low[g]

@@ -12,12 +12,14 @@ A line list needs squares of elements only. So thousands of small products becom
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum.levels import SolvedBlock
@@ -37,13 +39,28 @@ class Group:
     """The blocks of consecutive J, those of the J before them first.
 
     js: (g,) the J. columns: by parity of K, (g, size, 2, size): K = parity, parity + 2, ..., sign + and -, states; 0 where there is
-    none. starts, counts: by slot, (g,) row of the first state, and how many states there are.
+    none. starts, counts: by slot, (g,) row of the first state, and how many states there are. turn: which of two places in memory.
     """
 
     js: list[int]
     columns: dict[int, Floats]
     starts: dict[Slot, Ints]
     counts: dict[Slot, Ints]
+    turn: bool
+
+
+class Memory:
+    """Arrays used again and again. Fresh ones of this size come from the system, page by page, which takes longer than their use."""
+
+    def __init__(self) -> None:
+        self._arrays: dict[Any, NDArray[Any]] = {}
+
+    def room(self, name: Any, shape: tuple[int, ...], kind: type = float) -> NDArray[Any]:
+        """The array of this name in a shape, with whatever stood there."""
+        size = math.prod(shape)
+        if name not in self._arrays or len(self._arrays[name]) < size:
+            self._arrays[name] = np.empty(size + size // 4, kind)
+        return self._arrays[name][:size].reshape(shape)
 
 
 class Product(NamedTuple):
@@ -64,31 +81,52 @@ def are_whole(blocks: Iterable[SolvedBlock]) -> bool:
     )
 
 
-def groups_of(blocks: Sequence[SolvedBlock]) -> Iterator[Group]:
-    """All J of whole blocks, rising, in groups; each begins with the last J of the one before."""
+def groups_of(blocks: Sequence[SolvedBlock], memory: Memory) -> Iterator[Group]:
+    """All J of whole blocks, rising, in groups; each begins with the last J of the one before, and lasts until the next but one."""
     of_j: dict[int, list[SolvedBlock]] = {}
     for block in blocks:
         of_j.setdefault(block.basis.j, []).append(block)
     j, last = min(of_j, default=0), max(of_j, default=-1)
+    group = None
     while j <= last:
         stop = min(j + MOST_J, last + 1)
         while stop > j + 1 and (stop - j) * (stop // 2) ** 2 > MOST_ELEMENTS:
             stop -= 1
-        js = list(range(j - 1, stop))
-        yield _group(js, [(g, block) for g, one in enumerate(js) for block in of_j.get(one, [])])
+        group = _group(list(range(j - 1, stop)), of_j, group, memory)
+        yield group
         j = stop
 
 
-def _group(js: list[int], placed: list[tuple[int, SolvedBlock]]) -> Group:
-    slots = [(parity, side) for parity in (0, 1) for side in (0, 1)]
+def _group(js: list[int], of_j: dict[int, list[SolvedBlock]], before: Group | None, memory: Memory) -> Group:
+    turn = before is not None and not before.turn
     sizes = [(js[-1] - parity) // 2 + 1 for parity in (0, 1)]
-    columns = {parity: np.zeros((len(js), sizes[parity], 2, sizes[parity])) for parity in (0, 1)}
-    starts, counts = ({slot: np.zeros(len(js), np.int64) for slot in slots} for _ in range(2))
-    for g, block in placed:
-        first_k, size, side = block.basis.first_k, block.basis.size, (1 - block.basis.sign) // 2
-        columns[first_k % 2][g, first_k // 2 : first_k // 2 + size, side, :size] = block.vectors
-        starts[first_k % 2, side][g], counts[first_k % 2, side][g] = block.start, size
-    return Group(js, columns, starts, counts)
+    columns = {p: memory.room(("columns", turn, p), (len(js), sizes[p], 2, sizes[p])) for p in (0, 1)}
+    starts, counts = ({(p, side): np.zeros(len(js), np.int64) for p in (0, 1) for side in (0, 1)} for _ in range(2))
+    for g, j in enumerate(js):
+        if g == 0 and before is not None:
+            _repeat(columns, starts, counts, before)
+            continue
+        of_slot = {(b.basis.first_k % 2, (1 - b.basis.sign) // 2): b for b in of_j.get(j, [])}
+        for slot in starts:
+            here, block = columns[slot[0]][g, :, slot[1]], of_slot.get(slot)
+            if block is None:
+                here[...] = 0.0
+                continue
+            first, size = block.basis.first_k // 2, block.basis.size
+            here[first : first + size, :size] = block.vectors
+            here[:first], here[first + size :], here[:, size:] = 0.0, 0.0, 0.0
+            starts[slot][g], counts[slot][g] = block.start, size
+    return Group(js, columns, starts, counts, turn)
+
+
+def _repeat(columns: dict[int, Floats], starts: dict[Slot, Ints], counts: dict[Slot, Ints], before: Group) -> None:
+    """The last J of the group before as the first of this one, where it stands in the right order in memory already."""
+    for parity, known in before.columns.items():
+        size, here = known.shape[1], columns[parity][0]
+        here[:size, :, :size] = known[-1]
+        here[size:], here[:, :, size:] = 0.0, 0.0
+    for slot in starts:
+        starts[slot][0], counts[slot][0] = before.starts[slot][-1], before.counts[slot][-1]
 
 
 @dataclass(frozen=True)
@@ -96,6 +134,7 @@ class Vector:
     """A vector by what its components along z, x and y make of stacked blocks."""
 
     tensor: BodyTensor
+    memory: Memory
 
     @cached_property
     def sizes(self) -> tuple[float, float, float]:
@@ -130,18 +169,19 @@ class Vector:
                     yield from self._across(group, places, rise, parity)
 
     def _along(self, group: Group, places: Ints, rise: int, parity: int) -> Iterator[tuple[Slot, Product]]:
-        moved = _shifted(group, places, rise, parity, 0)
+        moved = self._shifted(group, places, rise, parity, 0)
         moved *= self.sizes[0]
         change = self.changes[rise, parity, True]
         for side in (0, 1) if rise else (0,):  # within J, + with - is - with +
             yield (parity, side), _product(group, places - rise, moved, side, (parity, side ^ change))
 
     def _across(self, group: Group, places: Ints, rise: int, parity: int) -> Iterator[tuple[Slot, Product]]:
-        raised, lowered = (_shifted(group, places, rise, parity, step) for step in (1, -1))
+        raised, lowered = (self._shifted(group, places, rise, parity, step) for step in (1, -1))
         _, real, imaginary = self.sizes
         change = self.changes[rise, parity, False]
         if real:
-            moved = raised - lowered
+            moved = self.memory.room(("along x", rise, parity), raised.shape)
+            np.subtract(raised, lowered, out=moved)
             moved *= real
             for side in (0, 1):
                 yield (parity, side), _product(group, places - rise, moved, side, (1 - parity, side ^ change))
@@ -150,6 +190,23 @@ class Vector:
             raised *= imaginary
             for side in (0, 1):
                 yield (parity, side), _product(group, places - rise, raised, side, (1 - parity, side ^ change ^ 1))
+
+    def _shifted(self, group: Group, places: Ints, rise: int, parity: int, step: int) -> Floats:
+        """c(K) U(K + step) over the K of the lower blocks, (g, size, 2, n_up); 0 where K + step is beyond the upper ones."""
+        ups = _at(group.columns[parity], places)
+        low_parity = parity ^ (step % 2)
+        size, offset = group.columns[low_parity].shape[1], (low_parity + step - parity) // 2
+        first, last = max(0, -offset), min(size, ups.shape[1] - offset)
+        coupling = np.zeros((len(places), size))
+        for row, place in zip(coupling, places.tolist(), strict=True):
+            j_up, j_low = group.js[place], group.js[place] - rise
+            if j_low >= 0 and j_up > 0:
+                own = wang_coupling(j_low, j_up, 1, step)[low_parity::2]
+                row[: len(own)] = own
+        out = self.memory.room(("moved", rise, parity, step), (len(places), size, *ups.shape[2:]))
+        out[:, :first], out[:, last:] = 0.0, 0.0
+        np.multiply(ups[:, first + offset : last + offset], coupling[:, first:last, None, None], out=out[:, first:last])
+        return out
 
 
 def _product(group: Group, places: Ints, moved: Floats, side: int, low: Slot) -> Product:
@@ -160,21 +217,3 @@ def _at(columns: Floats, places: Ints) -> Floats:
     """The blocks at evenly spaced places, without a copy."""
     step = int(places[1] - places[0]) if len(places) > 1 else 1
     return columns[places[0] : places[-1] + 1 : step]
-
-
-def _shifted(group: Group, places: Ints, rise: int, parity: int, step: int) -> Floats:
-    """c(K) U(K + step) over the K of the lower blocks, (g, size, 2, n_up); 0 where K + step is beyond the upper ones."""
-    ups = _at(group.columns[parity], places)
-    low_parity = parity ^ (step % 2)
-    size, offset = group.columns[low_parity].shape[1], (low_parity + step - parity) // 2
-    first, last = max(0, -offset), min(size, ups.shape[1] - offset)
-    coupling = np.zeros((len(places), size))
-    for row, place in zip(coupling, places.tolist(), strict=True):
-        j_up, j_low = group.js[place], group.js[place] - rise
-        if j_low >= 0 and j_up > 0:
-            own = wang_coupling(j_low, j_up, 1, step)[low_parity::2]
-            row[: len(own)] = own
-    out = np.empty((len(places), size, *ups.shape[2:]))
-    out[:, :first], out[:, last:] = 0.0, 0.0
-    np.multiply(ups[:, first + offset : last + offset], coupling[:, first:last, None, None], out=out[:, first:last])
-    return out

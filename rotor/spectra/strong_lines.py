@@ -10,14 +10,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Indices, Ints
 from rotor.quantum.levels import Levels, SolvedBlock
-from rotor.quantum.stacked_blocks import Group, Product, Slot, Vector, groups_of
+from rotor.quantum.stacked_blocks import Group, Memory, Product, Slot, Vector, groups_of
 from rotor.quantum.tensors import BodyTensor
 
 ROUND_OFF = 1e-9  # of a threshold, by which a line that is compared exactly later may miss it
@@ -48,12 +46,13 @@ def strong_lines(
     (n,) arrays
         Row of one state, row of the other, S in D².
     """
-    vector, most = Vector(dipole), sum(abs(part) ** 2 for part in dipole.components)
-    bounds = _Bounds.of(levels, needed, highest_mhz, reaching(levels, needed, most))
+    memory, most = Memory(), sum(abs(part) ** 2 for part in dipole.components)
+    bounds = _Bounds.of(levels, needed, highest_mhz, reaching(levels, needed, most), memory)
+    vector = Vector(dipole, memory)
     whole = len(blocks) == len(levels.blocks)
     lower = {block.basis.j for block in blocks if bounds.reaching[block.start]}
     near = lower.union(*({j - 1, j + 1} for j in lower))
-    for group in groups_of([block for block in blocks if block.basis.j in near]):
+    for group in groups_of([block for block in blocks if block.basis.j in near], memory):
         every, scale = np.arange(1, len(group.js)), bounds.scale(group)
         for places in (every,) if whole else (every[::2], every[1::2]):  # missing species have other signs at J + 1
             products: dict[Slot, list[Product]] = {}
@@ -82,27 +81,17 @@ def reaching(levels: Levels, needed: Floats, most: float) -> Ints:
 
 @dataclass(frozen=True)
 class _Bounds:
-    """What a line needs, with one row more, for states that are not there: energies in MHz, ν S in MHz D², states that reach.
-
-    memory: for the elements of a product and twice for whether one is kept, used again and again.
-    """
+    """What a line needs, with one row more, for states that are not there: energies in MHz, ν S in MHz D², states that reach."""
 
     energy: Floats
     needed: Floats
     reaching: Ints
     highest_mhz: float
-    memory: dict[str, NDArray[Any]]
+    memory: Memory
 
     @staticmethod
-    def of(levels: Levels, needed: Floats, highest_mhz: float, reaching: Ints) -> _Bounds:
-        return _Bounds(levels.energy_mhz, np.append(needed, np.inf), np.append(reaching, 0), highest_mhz, {})
-
-    def room(self, name: str, shape: tuple[int, ...], kind: type) -> NDArray[Any]:
-        """An array of this shape with whatever stood there."""
-        size = math.prod(shape)
-        if name not in self.memory or len(self.memory[name]) < size:
-            self.memory[name] = np.empty(size, kind)
-        return self.memory[name][:size].reshape(shape)
+    def of(levels: Levels, needed: Floats, highest_mhz: float, reaching: Ints, memory: Memory) -> _Bounds:
+        return _Bounds(levels.energy_mhz, np.append(needed, np.inf), np.append(reaching, 0), highest_mhz, memory)
 
     def rows(self, group: Group, slot: Slot, places: Ints) -> Ints:
         """Rows (g, n) in the levels of the states of a slot; one beyond the last where there is none."""
@@ -147,7 +136,9 @@ def _among(
     shape = (*ups.shape, others.shape[1])
     if not math.prod(shape):
         return
-    strength, keep, other = (bounds.room(*one) for one in (("s", shape, float), ("k", shape, bool), ("o", shape, bool)))
+    strength, keep, other = (
+        bounds.memory.room(*one) for one in (("s", shape, float), ("k", shape, bool), ("o", shape, bool))
+    )
     at = 0
     for one, (first, last) in zip(products, parts, strict=True):
         here = slice(at, at + last - first)
