@@ -54,13 +54,14 @@ def strong_lines(
     near = lower.union(*({j - 1, j + 1} for j in lower))
     for group in groups_of([block for block in blocks if block.basis.j in near], memory):
         every, scale = np.arange(1, len(group.js)), bounds.scale(group)
+        rows = {slot: bounds.rows(group, slot) for slot in group.starts}
         for places in (every,) if whole else (every[::2], every[1::2]):  # missing species have other signs at J + 1
             products: dict[Slot, list[Product]] = {}
             for slot, product in vector.products(group, places) if len(places) else ():
-                if (group.counts[slot][places] * group.counts[product.low_slot][product.low_places]).any():
+                if (whole and group.js[0] > 1) or _are_there(group, slot, places, product):
                     products.setdefault(slot, []).append(product)
             for slot, lows in products.items():
-                yield from _found(group, places, slot, lows, bounds, scale)
+                yield from _found(rows[slot][places], rows, lows, bounds, scale)
 
 
 def reaching(levels: Levels, needed: Floats, most: float) -> Ints:
@@ -93,10 +94,10 @@ class _Bounds:
     def of(levels: Levels, needed: Floats, highest_mhz: float, reaching: Ints, memory: Memory) -> _Bounds:
         return _Bounds(levels.energy_mhz, np.append(needed, np.inf), np.append(reaching, 0), highest_mhz, memory)
 
-    def rows(self, group: Group, slot: Slot, places: Ints) -> Ints:
+    def rows(self, group: Group, slot: Slot) -> Ints:
         """Rows (g, n) in the levels of the states of a slot; one beyond the last where there is none."""
-        states = np.arange(group.columns[slot[0]].shape[-1])
-        starts, counts = group.starts[slot][places, None], group.counts[slot][places, None]
+        starts, counts = group.starts[slot][:, None], group.counts[slot][:, None]
+        states = np.arange(counts.max())
         return np.where(states < counts, starts + states, len(self.energy))
 
     def scale(self, group: Group) -> float:
@@ -107,20 +108,25 @@ class _Bounds:
         return (1 - ROUND_OFF) / highest if highest > 0 else math.inf
 
 
+def _are_there(group: Group, slot: Slot, places: Ints, product: Product) -> bool:
+    """Whether both blocks of a product have states at some place."""
+    there = group.counts[slot][places] * group.counts[product.low_slot][product.low_places]
+    return bool(there.any())
+
+
 def _found(
-    group: Group, places: Ints, slot: Slot, products: list[Product], bounds: _Bounds, scale: float
+    ups: Ints, rows: dict[Slot, Ints], products: list[Product], bounds: _Bounds, scale: float
 ) -> Iterator[Found]:
     """The lines of the states of one slot with those of lower slots whose strengths may suffice.
 
     All states of one side with the lowest ones of the other can make lines that reach the cut, and the other way round.
     """
-    ups = bounds.rows(group, slot, places)
-    lows = [bounds.rows(group, one.low_slot, one.low_places) for one in products]
-    all_up, of_up = ups.shape[1], int(bounds.reaching[ups].max())
-    if of_up >= group.counts[slot][places].max():
+    lows = [rows[one.low_slot][one.low_places] for one in products]
+    all_up, of_up = ups.shape[1], int(bounds.reaching[ups].max(initial=0))
+    if of_up >= all_up:
         yield from _among(ups, lows, products, all_up, [(0, low.shape[1]) for low in lows], bounds, scale)
         return
-    splits = [int(bounds.reaching[low].max()) for low in lows]
+    splits = [int(bounds.reaching[low].max(initial=0)) for low in lows]
     yield from _among(ups, lows, products, all_up, [(0, split) for split in splits], bounds, scale)
     others = [(split, low.shape[1]) for low, split in zip(lows, splits, strict=True)]
     yield from _among(ups, lows, products, of_up, others, bounds, scale)
