@@ -51,7 +51,9 @@ def strong_lines(
     memory = _Memory(len(levels))
     below: dict[int, Stack] = {}
     before = -2
-    for j, stacks in stacks_by_j(blocks):
+    lower = {block.basis.j for block in blocks if counts[block.start]}
+    near = lower.union(*({j - 1, j + 1} for j in lower))
+    for j, stacks in stacks_by_j([block for block in blocks if block.basis.j in near]):
         of_up: dict[int, tuple[SolvedBlock, list[Product]]] = {}
         for lows in (below, stacks) if before == j - 1 else (stacks,):
             for up, product in vector.products(stacks, lows):
