@@ -61,7 +61,7 @@ def iteration_ms(lines: Assignments, free: Parameters, model: LevelModel, repeat
     used = np.ones(len(lines), dtype=bool)
     search = Search(lines, model, free, FitOptions(), upper, lower, lines.error_mhz, used)
 
-    points = cycle([free.start, free.start * (1 + 1e-12)])  # the last point is not computed again
+    points = cycle([free.start * (1 + 1e-12), free.start * (1 - 1e-12)])  # the last point is not computed again
 
     def one() -> None:
         point = next(points)

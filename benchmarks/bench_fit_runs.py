@@ -199,7 +199,7 @@ def iteration(folder: Path) -> float:
     start = asked.parameters.start
     search = Search(asked.lines, model, asked.parameters, asked.options, upper, lower, asked.lines.error_mhz, used)
 
-    points = cycle([start, start * (1 + 1e-12)])  # the last point is not computed again
+    points = cycle([start * (1 + 1e-12), start * (1 - 1e-12)])  # neither the start nor the last point is computed again
 
     def one() -> None:
         point = next(points)

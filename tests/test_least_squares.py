@@ -152,3 +152,15 @@ def test_a_parameter_whose_column_is_round_off_is_not_moved():
     assert found.converged
     assert found.parameters[1] == 7.0
     assert found.parameters[0] == pytest.approx(data.mean(), rel=1e-12)  # round-off
+
+
+def test_a_narrow_curved_valley_is_followed_to_its_end():
+    """r = (300 (y - x²), 1 - x): an undamped step leaves the valley, and one with λ = 1e-4 hardly moves."""
+
+    def valley(p):
+        x, y = p
+        return np.array([300 * (y - x * x), 1 - x]), np.array([[600 * x, -300.0], [1.0, 0.0]])
+
+    found = minimise(valley, np.array([-1.2, 1.0]), most_iterations=700)
+    assert found.converged
+    assert found.parameters == pytest.approx([1.0, 1.0], abs=1e-6)  # of a step below 1e-4 standard errors at rms 0

@@ -158,6 +158,8 @@ def minimise(
             if progress:
                 progress(taken[-1])
             if good:
+                if damping == first and gain > 0.75 and len(taken) > 1 and taken[-2].damping == 0:
+                    first /= 10.0  # the undamped step goes too far, this one not far enough
                 damping = _relaxed(damping, gain, first)
                 continue
             damping = max(10.0 * damping, first)

@@ -194,10 +194,15 @@ class _SpinUnits:
                 for channel, element in operator.elements(up, low).items():
                     key = (channel, block.twice_f)
                     if key not in self._coefficients:
-                        self._coefficients[key] = coefficients_of(self._shared.scheme, channel, block.patterns)
+                        self._coefficients[key] = self._coupling(channel, block)
                     out = np.zeros((parts[-1].place.stop,) * 2) if out is None else out
                     out[up.place, low.place] += product(self._coefficients[key][up.patterns, low.patterns], element)
         return out
+
+    def _coupling(self, channel: Channel, block: SpinBlock) -> Floats:
+        """Coefficients over the patterns of an F; those of the Hamiltonian are there since its plan was made."""
+        known = self._shared.cache.get(("coupling", block.twice_f), {})
+        return known[channel] if channel in known else coefficients_of(self._shared.scheme, channel, block.patterns)
 
 
 def _in_functions(part: SpinPart) -> SpinPart:
