@@ -10,7 +10,7 @@ from itertools import groupby
 from pathlib import Path
 
 from rotor.formats.spcat.codes import AXES, split_code
-from rotor.formats.spcat.file_model import moment_of, split_dipole
+from rotor.formats.spcat.dipole_codes import moment_of, split_dipole
 from rotor.formats.spcat.l_doubled import pairs_of
 from rotor.formats.spcat.operators import operator_of
 from rotor.formats.spcat.states import states_of
@@ -48,23 +48,33 @@ OPTIONS = """
 CHECKED = """
 ## Beside the compiled program
 
-263 inputs of the kinds that published fits have, 16 of them published files, were computed here and by the program itself (its public C
+535 inputs of the kinds that published fits have, 16 of them published files, were computed here and by the program itself (its public C
 source, gcc -O2; it repeats 22 reference catalogues of 2008 line by line), and compared by quantum numbers, frequencies, intensities,
-degeneracies and energies of levels: 1 to 18 states in either basis, up to five spins with and without a total spin, more than six quanta,
-weights by IAX 1 to 11, E species, l-doubled states with and without spins, energies of one K, KNMIN, KNMAX, DIAG, IXX, VSYM, moments of
-other kinds. 236 are equal, 8 are refused by name, and these differ:
+degeneracies and energies of levels: 1 to 18 states in either basis, up to five spins with and without a total spin of two or three, more
+than six quanta, weights by IAX 1 to 11, E species, l-doubled states with and without spins, energies of one K, KNMIN, KNMAX, DIAG, IXX,
+VSYM, option lines of each state, moments of other kinds. 491 are equal, six of them to the program in long double alone, 8 are refused
+by name, and these differ:
 
 | inputs | what differs |
 |---|---|
-| 6 | shares of strength within levels of one block that nearly or exactly coincide, such as K doublets where no symmetry parts them |
-| 2 | DIAG 4 where a block has several Wang blocks: the program's sort by ⟨K²⟩ exchanges states without their ⟨K²⟩ |
-| 4 | a moment of N (SYM 0, I1 = 0): the program has another operator, with which g(N + S) of one g makes lines, as J cannot |
-| 5 | [N², φ] (TYP 5) with φ across the axis of K: the program turns the phase of one species; here it is the commutator |
+| 15 | shares of strength, and names, of levels of one block that nearly or exactly coincide or are half and half of two names |
+| 3 | DIAG 4, and once 2, where a block has several Wang blocks: the program's sort by ⟨K²⟩ exchanges states without their ⟨K²⟩ |
+| 5 | [N², φ] (TYP 5) where its phase decides: the program then computes φ without N' (N' + 1) - N (N + 1); here it is the commutator |
 | 1 | degenerate states of IAX 7 with odd l: the program exchanges the weights of A and B species |
-| 1 | WTPL ≠ WTMN with l-doubled states: the weights of some lines |
+| 12 | three equivalent nuclei: eight with spins of 3/2, four with levels that the program exchanges with forbidden ones (below) |
+
+A moment of N (SYM 0, I1 = 0) is N here, and with `--as-spcat` what the program has in its place, ½(2 φ_z N_z - φ_x N_x - φ_y N_y): g(N + S)
+of one g makes lines then, as J cannot.
 
 In the first row round-off decides: the program in long double differs from itself in some of these lines (in 9,700 of the 67,000 of the
 reference case three_states_fermi_coriolis), and here other LAPACK drivers give other shares.
+
+I_tot of three nuclei (IAX -6): a parameter names the first of them, or the first and the second for the pair across from it; with
+ΔK = 1 or 2 its value is twice that of a nucleus coupled by itself, with ΔK = 0 the same. Levels here are those of three nuclei coupled
+one by one with tensors turned by 120°, of the species that exchange allows (tests write out every spin function). For spins of 3/2
+and more elements between unequal totals are wrong in the program: a loop of its source (setzitot, spinit.c) steps by the size of the
+other total. With that step set right the energies of CHCl3-like levels with F = 1 agree to 1e-6 cm⁻¹; beyond, some of its names go to
+levels of forbidden species, since it names by the order of energy in blocks that hold those too.
 
 An operator that the declared symmetry forbids (Δk - Δl no multiple of the fold of the axis, levels of unequal weights, axes that differ) is
 left out, as the program does, with a note. Dipoles between states have the phase i where no state has a dipole of its own. In an
@@ -134,7 +144,9 @@ def option_rows() -> list[str]:
         ("KNMIN, KNMAX; above KNMAX K is left out with --as-spcat alone", "a 1 1 1 1 0 1 1 1 0 1 0"),
         *((f"IAX {n}", f"a 1 1 0 20 0 {n} 1 1 0 1 0") for n in range(1, 12)),
         *((f"IAX -{n} with two spins of one size: I_tot", f"a 22 1 0 20 0 -{n} 1 1 0 1 0") for n in (1, 2, 3)),
-        ("IAX -6: I_tot of three spins", "a 222 1 0 20 0 -6 1 1 0 1 0"),
+        ("IAX -6 with three spins of one size: I_tot", "a 222 1 0 20 0 -6 1 1 0 0 0"),
+        ("IAX -6: EWT for levels of E species", "a 222 1 0 20 0 -6 1 1 0 1 0"),
+        ("IAX -7, -8: I_tot of four spins", "a 2222 1 0 20 0 -7 1 1 0 0 0"),
         ("EWT1: l-doubled pairs of E species", "s -1 2 0 20 0 6 1 1 -1 101 0\ns -1 0 0 20 0 6 1 1 -1 101 0\ns -1 1 0 20 0 6 1 1 0 201 0"),
         ("EWT1: with spins", "s -3 2 0 20 0 6 1 1 -1 101 0\ns -3 1 0 20 0 6 1 1 0 201 0"),
     ]  # fmt: skip

@@ -63,6 +63,18 @@ E_AXES = """s -1 3 0 20 0 6 2 2 -1 1 1
 s -1 1 0 20 0 6 2 2 -1 101 1
 s -1 2 0 20 0 6 2 2 0 201 1"""
 KINDS = {
+    "three equivalent nuclei of one total spin": Kind(
+        "s -3332 -1 0 20 0 -6 1 1 0 0 0",
+        """100 7100.1 B
+1000 -2900.0 C-B
+200 -1e-3 -DJ
+10000000 0.33 C_H
+220030000 -0.21 1.5Xcc_D
+220040000 0.09 X-_D
+20030000 0.021 Ccc_D
+""",
+        "3 1.0", 4, 120, held="C-B",
+    ),
     "three states with Coriolis and Fermi terms": Kind(
         "a 1 3 0 40 0 1 1 1 0 1 0", THREE, "001 1.0\n111 1.0\n221 1.0\n002 .7\n112 .7\n222 .7", 12, 200, held="W12 E1 E2",
     ),

@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rotor.formats.spcat.file_model import groups_of, moment_of, split_dipole
+from rotor.formats.spcat.dipole_codes import moment_of, split_dipole
+from rotor.formats.spcat.file_model import groups_of, left_out
 from rotor.formats.spcat.operators import operator_of
 from rotor.formats.spcat.predict import predict
 from rotor.formats.spcat.text.cat import format_lines, read_cat
@@ -25,7 +26,9 @@ RANGES = {"h2coh": (6, 10), "o2": (0, 75), "fso3": (0, 9), "oc33s": (0, 22), "co
 MADE = {
     "l_doubled_quad": 194, "patterns_of_i_tot": 822, "three_states_oblate": 877, "dipoles_between": 657, "threefold_weights": 72,
     "threefold_asymmetric_quanta": 52, "forbidden_coupling": 654, "water_diag1": 339, "water_diag5": 398, "two_quadrupoles_i_tot": 1005,
-    "eighteen_states": 958, "oblate_spin_orbit": 238,
+    "eighteen_states": 958, "oblate_spin_orbit": 238, "three_protons_i_tot": 247, "methyl_i_tot": 215, "inversion_i_tot": 215,
+    "deuterons_i_tot": 323, "forbidden_three_i_tot": 292, "l_doubled_weights": 419, "inversion_weights": 100, "one_of_two_i_tot": 208,
+    "moment_of_n": 92,
 }  # fmt: skip
 
 
@@ -154,3 +157,29 @@ def test_the_energy_of_one_k():
     square, k = levels.rotational * (levels.rotational + 1.0), levels.quanta["ka"]
     expected = 9000.0 * square + 1e5 * k**2 + (k == 2) * (50.0 + 0.5 * square)
     np.testing.assert_allclose(levels.energy_mhz, expected, atol=1e-8)  # a few units in the last place of 2e6 MHz
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        ("s -22 -1 0 20 0 -6 1 1 0 0 0", "couples three spins"),
+        ("s -2322 -1 0 20 0 -6 1 1 0 0 0", "of several sizes"),
+        ("s -2222 -1 0 20 0 -7 1 1 0 0 0", "a total spin of 4 equivalent nuclei"),
+        ("s -222 -1 0 20 0 -6 1 1 0 2 0", "levels of E species do not exist"),
+        ("s -222 -1 0 20 0 -6 1 1 0 100 0", "l-doubled state with a total spin of three"),
+        ("s -222 -1 0 20 0 -6 1 1 0 0 1", "DIAG = 1"),
+        ("s -222 -1 0 20 2 -6 1 1 0 0 0", "IXX = 2"),
+    ],
+)
+def test_totals_of_three_that_do_not_compute_are_named(options, says):
+    file = read_par(f"a case\n 1 0 0 0\n{options}\n 100 1.0 0\n".encode())
+    with pytest.raises(ValueError, match=says):
+        groups_of(file, IntensityFile("", Request(), ()))
+
+
+def test_terms_of_three_nuclei_that_spcat_leaves_out_are_noted():
+    file = read_par((KINDS / "forbidden_three_i_tot" / "forbidden_three_i_tot.var").read_bytes())
+    notes = left_out(file)
+    assert len(notes) == 4
+    assert sum("the first is named, or the first and the second" in note for note in notes) == 3
+    assert sum("no multiple of 3" in note for note in notes) == 1

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 MAX_QUANTA = 9  # the last digit of QNFMT counts them
 _BEFORE_SPINS = ("n", "j", "k", "ka", "kc", "v")
-_IN_A_CATALOGUE = (*_BEFORE_SPINS, "i_tot", *(f"f{i}" for i in range(1, 9)), "f")
+_IN_A_CATALOGUE = (*_BEFORE_SPINS, "i_sym", "i_tot", *(f"f{i}" for i in range(1, 9)), "f")
 PIECE = 1 << 15  # lines of a long list that are made into text at once
 
 Settings = Mapping[str, Any]

@@ -1,7 +1,8 @@
 """Moments that make lines besides the dipole of a state: dipoles that depend on the rotation, and magnetic moments.
 
     electric    Σ_i μ_i φ_pi, with half anticommutators or commutators of N² and Nz² (Herman-Wallis corrections)
-    magnetic    g μB N_p, g μB S_p of one spin, or g μB Σ_ij c_ij φ_pi S_j (j along the molecule), c symmetric and traceless
+    magnetic    g μB N_p, g μB S_p of one spin, or g μB Σ_ij c_ij φ_pi S_j (j along the molecule), c symmetric and traceless;
+                g μB Σ_ij c_ij ½{φ_pi, N_j}
 
 p is a direction in space, i and j are a, b, c. Electric and magnetic moments do not interfere in a level of good parity: their
 strengths are added.

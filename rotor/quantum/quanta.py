@@ -9,6 +9,8 @@
 | `irrep` | irreducible representation of a spherical top's level |
 | `f1`, `f2`, ... `f` | angular momenta after each spin is coupled, the last one `f` |
 | `i_tot` | total spin of equivalent nuclei |
+| `i_sym` | species of the spin function of three of them: A1 0, A2 1, E 2 where K = 3n + 2 and 4 where K = 3n + 1; 6 more for each
+  further function of one species and total |
 | `m` | projection on the field |
 
 A half-integer quantum number is stored as twice its value; `Levels.halves` names those columns.
@@ -25,11 +27,31 @@ from numpy.typing import NDArray
 from rotor.arrays import Ints
 
 # in which tables and files list them
-ORDER = ("v", "n", "j", "k", "ka", "kc", "irrep", "i_tot", "f1", "f2", "f3", "f4", "f5", "f6", "f7", "f8", "f", "m")
-_HEADINGS = {"ka": "Ka", "kc": "Kc", "i_tot": "I", "irrep": "irrep", "v": "v"}
+ORDER = (
+    "v",
+    "n",
+    "j",
+    "k",
+    "ka",
+    "kc",
+    "irrep",
+    "i_sym",
+    "i_tot",
+    "f1",
+    "f2",
+    "f3",
+    "f4",
+    "f5",
+    "f6",
+    "f7",
+    "f8",
+    "f",
+    "m",
+)
+_HEADINGS = {"ka": "Ka", "kc": "Kc", "i_tot": "I", "i_sym": "Γ", "irrep": "irrep", "v": "v"}
 
 # how a picture writes sums with spins, in TeX
-_SUBSCRIPTED = {f"f{i}": f"F_{i}" for i in range(1, 9)} | {"i_tot": "I"}
+_SUBSCRIPTED = {f"f{i}": f"F_{i}" for i in range(1, 9)} | {"i_tot": "I", "i_sym": r"\Gamma_I"}
 
 Quanta = Mapping[str, NDArray[Any]]
 

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
@@ -32,7 +32,8 @@ Vector = tuple[float, float, float]
 class CodedLine(NamedTuple):
     """One parameter line: its name, value, operator, and the two states, lower first; None for every state.
 
-    reversed_: the code has V2 > V1. typ: TYP of the code.
+    reversed_: the code has V2 > V1. typ: TYP of the code. exchange: of an operator with one of two equivalent spins the part that acts,
+    1 the one that is even under their exchange, -1 the odd one, 0 both.
     """
 
     name: str
@@ -41,6 +42,7 @@ class CodedLine(NamedTuple):
     states: tuple[int, int] | None
     reversed_: bool = False
     typ: int = 0
+    exchange: int = 0
 
 
 def coded_lines(
@@ -203,10 +205,22 @@ class FileEffect(QuantumEffect):
                 bra, ket = states or (EVERY_STATE, EVERY_STATE)
                 if o.odd and bra == ket:  # of an l-doubled pair, between its components
                     ket = next(pair.second if bra == pair.first else pair.first for pair in self.pairs if bra in pair)
-                found += self._at_pairs(
-                    line, states, SpinTerm(line.name, names, o.rotor, 1.0, o.n2, o.nz2, o.ns, bra, ket)
-                )
+                term = SpinTerm(line.name, names, o.rotor, 1.0, o.n2, o.nz2, o.ns, bra, ket)
+                for part in self._by_exchange(term, line.exchange):
+                    found += self._at_pairs(line, states, part)
         return tuple(found)
+
+    def _by_exchange(self, term: SpinTerm, exchange: int) -> list[SpinTerm]:
+        """The part of a term that is even, or odd, under the exchange of the last two spins."""
+        last = [spin.name for spin in self.coupled[-2:]]
+        touched = set(term.spins) & set(last)
+        if not exchange or not touched:
+            return [term]
+        if len(touched) == 2:  # the product of both, which is even
+            return [term] if exchange > 0 else []
+        other = {last[0]: last[1], last[1]: last[0]}
+        turned = tuple(other.get(name, name) for name in term.spins)
+        return [replace(term, factor=term.factor / 2), replace(term, spins=turned, factor=exchange * term.factor / 2)]
 
     def _at_pairs(self, line: CodedLine, states: tuple[int, int] | None, term: SpinTerm) -> list[SpinTerm]:
         if not states or set(states).isdisjoint(v for pair in self.pairs for v in pair):

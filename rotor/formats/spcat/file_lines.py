@@ -7,7 +7,6 @@ QNFMT = 100 Q + 10 H + NQN: Q is the kind of quanta, H in binary which of the la
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +15,7 @@ from numpy.typing import NDArray
 from rotor import units
 from rotor.arrays import Floats, Indices, Ints, rising_order
 from rotor.formats.spcat.file_model import Group
+from rotor.formats.spcat.pattern_numbers import pattern_numbers
 from rotor.formats.spcat.states import is_odd
 from rotor.formats.spcat.text.catalogue import Catalogue, catalogue_of
 from rotor.formats.spcat.text.egy import LevelList
@@ -31,13 +31,16 @@ Quanta = NDArray[np.int16]
 
 @dataclass(frozen=True)
 class Format:
-    """How a file's levels are called: columns of rotation (1, 2 or 3), whether v is listed, spins at most, columns at most."""
+    """How a file's levels are called: columns of rotation (1, 2 or 3), whether v is listed, spins at most, columns at most.
+
+    equivalent: how many spins are coupled to a total, 0, 2 or 3.
+    """
 
     rotation: int
     states: bool
     spins: int
     most: int = 6
-    i_tot: bool = False
+    equivalent: int = 0
 
     @property
     def before_spins(self) -> int:
@@ -60,10 +63,13 @@ class Format:
         >>> Format(3, True, 1).qnfmt((2,)), Format(3, False, 2).qnfmt((3, 3)), Format(1, False, 0).qnfmt(())
         (1405, 325, 101)
         """
-        code = 1000 * self.states + 100 * self.before_spins + self.width + 2000 * (self.i_tot and not self.aggregate)
+        code = 1000 * self.states + 100 * self.before_spins + self.width
+        code += {0: 0, 2: 2000, 3: 6000}[0 if self.aggregate else self.equivalent]
         odd = np.cumsum(spins) % 2 if spins else np.zeros(0, dtype=np.int64)
-        if self.i_tot and len(odd) > 1:
+        if self.equivalent == 2 and len(odd) > 1:
             odd[-2] = 0
+        if self.equivalent == 3 and len(odd) > 2:
+            odd[-3:-1] = 0, sum(spins[-3:]) % 2
         total = int(odd[-1]) if len(odd) else 0
         if self.aggregate:
             return code + 4000 + 10 * total
@@ -80,8 +86,8 @@ def format_of(file: ParameterFile, groups: list[Group]) -> Format:
     linear = all(state.linear for group in groups for state in group.states)
     rotation = 3 if first.spind > 0 else 1 if linear else 2
     spins = max(len(group.spins) for group in groups)
-    i_tot = any(state.i_tot for group in groups for state in group.states)
-    return Format(rotation, abs(first.nvib) > 1, spins, 10 if file.header.nline < 0 else 6, i_tot)
+    equivalent = max(state.equivalent for group in groups for state in group.states)
+    return Format(rotation, abs(first.nvib) > 1, spins, 10 if file.header.nline < 0 else 6, equivalent)
 
 
 def quanta_of(group: Group, levels: Levels, form: Format, negative: bool = False) -> Ints:
@@ -111,7 +117,7 @@ def quanta_of(group: Group, levels: Levels, form: Format, negative: bool = False
     names = [name for name in quanta if name not in ("v", "n", "k", "ka", "kc")] if group.spins else []
     totals = [(quanta[name] + 1) // 2 if name in levels.halves else quanta[name] for name in names] or [n]
     if form.aggregate:
-        columns += [_pattern_numbers(group, levels, names), totals[-1]]
+        columns += [pattern_numbers(group, levels, names), totals[-1]]
     elif form.spins:
         columns += totals + [totals[-1]] * (form.spins - len(totals))
     return np.stack(columns, axis=1)
@@ -151,44 +157,6 @@ def _ka_kc(group: Group, levels: Levels, v: Ints) -> list[Ints]:
     firsts = [pair.first for pair in group.effect.pairs]
     other = np.where(_unsigned(group, v, along), n - along + np.isin(v, firsts), ka if group.oblate else kc)
     return [other, along] if group.oblate else [along, other]
-
-
-def _pattern_numbers(group: Group, levels: Levels, names: list[str]) -> Ints:
-    """The number of the coupling pattern among those of any F: by rising N - F, by I_tot where there is one, then by
-    J_i - J_(i-1), the last spin first."""
-    doubled = [levels.quanta[name] * (1 if name in levels.halves else 2) for name in names]
-    chain, spins = [2 * levels.rotational, *doubled], group.spins
-    if not group.states[0].i_tot:
-        return _among(pattern_steps(spins), _steps(chain, spins))
-    total, totals = chain.pop(-2), range(0, spins[-1] + spins[-2] + 1, 2)
-    every = np.concatenate([np.insert(pattern_steps((*spins[:-2], i_tot)), 1, i_tot, axis=1) for i_tot in totals])
-    every = every[np.lexsort((every[:, 1], every[:, 0]))]  # which leaves the order within one I_tot as it is
-    own = _steps(chain, (*spins[:-2], total))
-    return _among(every, np.insert(own, 1, total, axis=1))
-
-
-def pattern_steps(spins: tuple[int, ...]) -> Ints:
-    """2(N - F) and (J_i - J_(i-1) + S_i) of every coupling pattern of doubled spins, in the order in which SPCAT counts them.
-
-    >>> pattern_steps((1, 1)).tolist()
-    [[-2, 1, 1], [0, 1, 0], [0, 0, 1], [2, 0, 0]]
-    """
-    every = np.stack(np.meshgrid(*(np.arange(spin + 1) for spin in spins), indexing="ij"), axis=-1).reshape(
-        -1, len(spins)
-    )
-    difference = (np.array(spins, dtype=np.int64) - 2 * every).sum(axis=1)
-    return np.column_stack((difference, every))[np.lexsort((*every.T, difference))]
-
-
-def _steps(chain: list[Ints], spins: Sequence[Ints | int]) -> Ints:
-    """The same of levels, from their doubled N, J, F1, ... F."""
-    steps = [(after - before + spin) // 2 for before, after, spin in zip(chain, chain[1:], spins, strict=False)]
-    return np.column_stack((chain[0] - chain[-1], *steps))
-
-
-def _among(every: Ints, own: Ints) -> Ints:
-    number = {tuple(row): place for place, row in enumerate(every.tolist())}
-    return np.array([number[tuple(row)] for row in own.tolist()], dtype=np.int64)
 
 
 @dataclass(frozen=True)
@@ -233,7 +201,7 @@ def transitions_of(group: Group, levels: Levels, request: Request, q: float) -> 
         levels, dict(group.effect.moments), cut=_wide_cut(levels, request, q), moments=group.effect.others
     )
     exists = (levels.weight[found.lower] > 0) & (levels.weight[found.upper] > 0)
-    if any(state.fold > 2 for state in group.states):
+    if any(state.fold > 2 and state.equivalent < 3 for state in group.states):
         exists &= share_a_weight(group, levels, found.upper, found.lower)
     else:
         exists &= equally_weighted(levels, found.upper, found.lower)
@@ -282,7 +250,7 @@ def share_a_weight(group: Group, levels: Levels, upper: Indices, lower: Indices)
 
 
 def weights_of_lines(group: Group, levels: Levels, found: Transitions) -> Ints:
-    """The nuclear-spin weight of each line: that of its level in the later block, by F, state and species, one component of ±K."""
+    """The nuclear-spin weight of each line: that of its level in the later block, by F, first state and species, one component of ±K."""
     weight = levels.weight // levels.components
     if (weight[found.upper] == weight[found.lower]).all() or "kc" not in levels.quanta:
         return np.asarray(weight[found.lower])
@@ -290,6 +258,9 @@ def weights_of_lines(group: Group, levels: Levels, found: Transitions) -> Ints:
     species = np.array([[0, 3], [1, 2]])[(kc, ka) if group.oblate else (ka, kc)]
     v = levels.quanta.get("v", np.zeros(len(levels), dtype=np.int64))
     order = (levels.multiplicity * (len(group.states) + 1) + v) * 4 + species
+    for block in levels.blocks:  # which comes where its first state and species do
+        rows = slice(block.start, block.start + len(block.energies_mhz))
+        order[rows] = order[rows].min()
     return np.asarray(np.where(order[found.upper] > order[found.lower], weight[found.upper], weight[found.lower]))
 
 

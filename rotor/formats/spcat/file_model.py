@@ -8,23 +8,29 @@ from __future__ import annotations
 from collections.abc import Iterable
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Ints
 from rotor.formats.spcat.codes import AXES
+from rotor.formats.spcat.dipole_codes import NOT_YET, DipoleCode, Dipoles, dipoles_of, moment_of
 from rotor.formats.spcat.file_effect import CodedLine, FileEffect, Vector, coded_lines
 from rotor.formats.spcat.l_doubled import Pair, named_by_l, pairs_of
 from rotor.formats.spcat.l_spins import named_by_l_with_spins
-from rotor.formats.spcat.labels import named_by
+from rotor.formats.spcat.labels import BY_DIAG, named_by
 from rotor.formats.spcat.states import StateOptions, states_of
-from rotor.formats.spcat.symmetry import forbidden, l_values, some_weights_agree, symmetric_part
+from rotor.formats.spcat.symmetry import (
+    exchange_of,
+    forbidden,
+    halved_across,
+    l_values,
+    some_weights_agree,
+    symmetric_part,
+)
 from rotor.formats.spcat.text.int_file import Dipole, IntensityFile
 from rotor.formats.spcat.text.par import Options, ParameterFile
 from rotor.quantum.levels import Levels
-from rotor.quantum.moments import DEBYE_PER_BOHR_MAGNETON, Moment
 from rotor.quantum.solve import solve_levels
 from rotor.quantum.spins.levels import levels_of_f
 from rotor.quantum.spins.operators import is_axial
@@ -33,7 +39,6 @@ from rotor.tops.constants import Constants
 from rotor.tops.top import Top
 
 _EVERY_K = 10**6
-Dipoles = dict[tuple[int, int], Vector]
 
 
 @dataclass(frozen=True)
@@ -91,8 +96,8 @@ class Group:
             return np.asarray(ka <= self.axial_kmax)
         found = np.zeros(len(labels), dtype=bool)
         for place, state in enumerate(self.states):
-            i_tot = labels[:, -2] // 2 if state.i_tot else 0
-            found |= (v == place) & (state.weights(ka, kc, kc if self.oblate else ka, i_tot) > 0)
+            odd = state.odd_spins({"i_tot": labels[:, -2] // 2, "i_sym": labels[:, -3] // 2}) if state.i_tot else 0
+            found |= (v == place) & (state.weights(ka, kc, kc if self.oblate else ka, odd) > 0)
         return found
 
     def _weights(self, levels: Levels) -> Ints:
@@ -101,7 +106,7 @@ class Group:
         total = np.zeros(len(levels), dtype=np.int64)
         for place, state in enumerate(self.states):
             for ka, kc, k, alike in _components(levels, n, self.oblate):
-                own = np.where(k <= self.axial_kmax, state.weights(ka, kc, k, quanta.get("i_tot", 0)), 0)
+                own = np.where(k <= self.axial_kmax, state.weights(ka, kc, k, state.odd_spins(quanta)), 0)
                 total += np.where((v == place) & alike, np.maximum(own, 0), 0)
         return total
 
@@ -189,14 +194,20 @@ def allowed(
         for low, high in concerned:
             del_l = abs(l_of.get(low, 0) - l_of.get(high, 0)) * (-1 if line.reversed_ else 1)
             own = states[low], states[high]
-            why.append(forbidden(line.typ, *own, del_l, oblate, bool({low, high} & set(l_of))))
+            why.append(forbidden(line.typ, *own, del_l, oblate, bool({low, high} & set(l_of)), line.operator.spins))
         if all(why):
             reasons.append(f"parameter {line.name.partition('#')[0]} is left out, as SPCAT does: {why[0]}")
             continue
-        folded = line.typ in (1, 2, 3) and max(states[v].fold for pair in concerned for v in pair) > 2
+        folded = line.typ in (1, 2, 3) and any(_turns_alone(states[v], line) for pair in concerned for v in pair)
         axes = AXES["IIIl" if oblate else "Ir"]
         found.append(line._replace(operator=symmetric_part(line.operator, axes)) if folded else line)
     return found, reasons
+
+
+def _turns_alone(state: StateOptions, line: CodedLine) -> bool:
+    """Whether an axis of more than two folds turns an operator onto itself: it touches none of three equivalent spins."""
+    touches = state.equivalent == 3 and max(line.operator.spins, default=0) > len(state.spins) - 3
+    return state.fold > 2 and not touches
 
 
 def _of_both_components(dipoles: Dipoles, pairs: list[Pair]) -> Dipoles:
@@ -249,12 +260,12 @@ def _group(
     oblate = first.nvib < 0
     numbers = tuple(state.number for state in states)
     spins = states[0].spins
-    if any((state.spins, state.i_tot) != (spins, states[0].i_tot) for state in states):
+    if any((state.spins, state.equivalent) != (spins, states[0].equivalent) for state in states):
         raise ValueError(f"states {numbers} are connected and have different spins: that is read but not computed yet")
     here = {v: place for place, v in enumerate(numbers)}
     moments = {(here[b], here[a]): mu for (a, b), mu in light[0].items() if a in here and b in here}
-    others = tuple(
-        moment_of(dipole, code, (here[code.states[1]], here[code.states[0]]), len(spins))
+    beside = tuple(
+        moment_of(dipole, code, (here[code.states[1]], here[code.states[0]]), len(spins), oblate, as_spcat)
         for dipole, code in light[1]
         if set(code.states) <= set(here)
     )
@@ -262,15 +273,26 @@ def _group(
     usable = tuple(
         line for line in own if max((*line.operator.spins, 1 if line.operator.ns else 0), default=0) <= len(spins)
     )
+    if states[0].equivalent == 2 and not doubled:
+        of = {state.number: state for state in states}
+        usable = tuple(
+            line._replace(
+                exchange=exchange_of(line.typ, *((of[v] for v in line.states) if line.states else states[:1] * 2))
+            )
+            for line in usable
+        )
+    if states[0].equivalent == 3:
+        usable = tuple(_of_three(line, len(spins), AXES["IIIl" if oblate else "Ir"]) for line in usable)
     pairs = tuple(Pair(here[pair.first], here[pair.second]) for pair in doubled if pair.first in here)
     kind = _kind(states, usable, oblate, first.spind < 0)
     limits = {} if kind in ("linear", "prolate", "oblate") else _limits(states, as_spcat)
-    paired = len(spins) - 1 if states[0].i_tot else len(spins) + 1  # the first of two equivalent ones
+    others = len(spins) - states[0].equivalent  # which are not coupled to a total
     coupled = tuple(
-        Spin(f"I{place}", twice, total="I_tot" if place >= paired else "") for place, twice in enumerate(spins, 1)
+        Spin(f"I{place}", twice, total="I_tot" if place > others else "") for place, twice in enumerate(spins, 1)
     )
+    _check_three(states[0], others, first)
     effect = FileEffect(
-        usable, numbers, coupled, moments, limits, others, first.ixx, pairs, AXES["IIIl" if oblate else "Ir"]
+        usable, numbers, coupled, moments, limits, beside, first.ixx, pairs, AXES["IIIl" if oblate else "Ir"]
     )
     if pairs:  # raises for what is not allowed between l-doubled states, before any level is solved
         effect.spin_terms(_ANY_TOP)
@@ -278,6 +300,22 @@ def _group(
     top = Top(_STANDS_FOR[kind, oblate], dipole_abc_debye=moments.get((0, 0), (0.0, 0.0, 0.0)), name=title)
     kmax = states[0].kmax if as_spcat and kind in ("prolate", "oblate") else _EVERY_K
     return Group(tuple(states), top, effect, oblate, kmax, first.diag)
+
+
+def _of_three(line: CodedLine, spins: int, axes: str) -> CodedLine:
+    """A line with the factors that the program has for three equivalent spins."""
+    touches = max(line.operator.spins, default=0) > spins - 3
+    return line._replace(operator=halved_across(line.operator, axes)) if touches else line
+
+
+def _check_three(state: StateOptions, others: int, first: Options) -> None:
+    """ValueError for options that are not computed with a total spin of three."""
+    if state.equivalent < 3:
+        return
+    if first.diag in BY_DIAG:
+        raise ValueError(f"DIAG = {first.diag} with a total spin of three nuclei {NOT_YET}; expected 0 or 3")
+    if first.ixx >> (others + 1):
+        raise ValueError(f"IXX = {first.ixx}: a total spin of three nuclei that is taken for conserved {NOT_YET}")
 
 
 # the symmetry alone counts: the file's own operators are the whole Hamiltonian
@@ -306,7 +344,7 @@ def _kind(states: list[StateOptions], lines: tuple[CodedLine, ...], oblate: bool
     axis = "c" if oblate else "a"
     good = all(n == 0 for _, _, n in plain) and all(is_axial(rotor, axis) for rotor in rotors)
     whole = alone and states[0].kmin == 0 and states[0].kmax > 0 and states[0].plus == states[0].minus
-    if symmetric and whole and good and not any(line.operator.of_j for line in lines):
+    if symmetric and whole and good and states[0].equivalent < 3 and not any(line.operator.of_j for line in lines):
         return "oblate" if oblate else "prolate"
     return "asymmetric"
 
@@ -318,104 +356,3 @@ def _limits(states: list[StateOptions], as_spcat: bool) -> dict[int, tuple[int, 
         if state.kmin > 0 or kmax < _EVERY_K:
             found[place] = (state.kmin, kmax)
     return found
-
-
-class DipoleCode(NamedTuple):
-    """The fields of a dipole's code, FC TYP I1 V2 V1 SYM: TYP with FC as its second digit, the states lower first."""
-
-    typ: int
-    spin: int
-    states: tuple[int, int]
-    axis: int
-
-
-def split_dipole(code: int, states: int) -> DipoleCode:
-    """The fields of a code in a file with so many states.
-
-    >>> split_dipole(50001, 1), split_dipole(113, 2)
-    (DipoleCode(typ=5, spin=0, states=(0, 0), axis=1), DipoleCode(typ=0, spin=0, states=(1, 1), axis=3))
-    """
-    step = 10 ** (1 if states <= 9 else 2 if states <= 99 else 3)
-    rest, axis = divmod(abs(code), 10)
-    rest, v1 = divmod(rest, step)
-    rest, v2 = divmod(rest, step)
-    rest, spin = divmod(rest, 10)
-    second, typ = divmod(rest, 10)
-    low, high = sorted((v1, v2))
-    return DipoleCode(typ + 10 * second, spin, (low, high), axis)
-
-
-def dipoles_of(dipoles: Iterable[Dipole], states: int) -> tuple[Dipoles, list[tuple[Dipole, DipoleCode]]]:
-    """(μa, μb, μc) in D by pairs of states, lower first, lines of one code added; and the lines of other kinds."""
-    found: dict[tuple[int, int], list[float]] = {}
-    others = []
-    for dipole in dipoles:
-        code = split_dipole(dipole.code, states)
-        if code.states[1] >= states:
-            continue
-        if code.typ or code.spin or code.axis not in (1, 2, 3):
-            others.append((dipole, code))
-        else:
-            found.setdefault(code.states, [0.0, 0.0, 0.0])[code.axis - 1] += dipole.value
-    return {pair: (mu[0], mu[1], mu[2]) for pair, mu in found.items()}, others
-
-
-_POWERS = {3: "J", 4: "K", 5: "[J]", 9: "JJ", 10: "[[J]]"}  # TYP of electric moments
-NOT_YET = "is read but not computed yet"
-
-
-def moment_of(dipole: Dipole, code: DipoleCode, states: tuple[int, int], spins: int) -> Moment:
-    """A moment that makes lines of another kind than a plain component of the dipole does.
-
-    | TYP, I1, SYM | moment |
-    |---|---|
-    | 3, 4, 5, 9, 10; 0; 1, 2, 3 | {N², φ}/2, {Nz², φ}/2, [N², φ]/2, {N⁴, φ}/2, [N², [N², φ]]/4, in D |
-    | 0; 0 or a spin; 0 | N, or that spin, in Bohr magnetons |
-    | 1; a spin; 0 | S ½(3 Nz² - N²), in Bohr magnetons, as the program computes it (documented: φ_z S_z - ½ φ_x S_x - ½ φ_y S_y) |
-
-    Parameters
-    ----------
-    dipole : Dipole
-        The line of the .int file, its value in D or Bohr magnetons.
-    code : DipoleCode
-        Its code in parts.
-    states : (int, int)
-        As numbered in its group.
-    spins : int
-        How many spins SPIND names.
-
-    Returns
-    -------
-    Moment
-        In debye.
-
-    Raises
-    ------
-    ValueError
-        With what it stands for, for any other code.
-    """
-    if code.spin > spins:
-        raise ValueError(f"dipole {dipole.code}: spin {code.spin} is not among the {spins} that SPIND names")
-    if code.axis == 0 and code.states[0] == code.states[1]:
-        magnetons = dipole.value * DEBYE_PER_BOHR_MAGNETON
-        spin = f"I{code.spin}" if code.spin else ""
-        if code.typ == 0:
-            return Moment(magnetons, states, spin=spin)
-        if code.typ == 1 and spin:
-            return Moment(magnetons, states, powers="3K-J", spin=spin)
-    if code.axis in (1, 2, 3) and code.spin == 0 and code.typ in _POWERS:
-        along = (float(code.axis == 1), float(code.axis == 2), float(code.axis == 3))
-        return Moment(dipole.value, states, along, _POWERS[code.typ])
-    raise ValueError(f"dipole {dipole.code}: {_meaning(code)} {NOT_YET}")
-
-
-def _meaning(code: DipoleCode) -> str:
-    kinds = {1: "a moment of second order", 2: "a moment of second order", 6: "a moment of third order"}
-    kinds |= {7: "a moment times a cosine of internal rotation", 8: "a moment times a sine of internal rotation"}
-    what = kinds.get(code.typ, f"a moment of TYP {code.typ}")
-    if code.axis == 0 and code.typ in (0, *_POWERS):
-        between = code.states[0] != code.states[1]
-        what = "a magnetic moment between two states" if between else "a magnetic moment with powers of N² or Nz²"
-    elif code.typ in (0, *_POWERS):
-        what = "a moment along an axis"
-    return what + (f" that acts on spin {code.spin}" if code.spin else "")

@@ -50,8 +50,10 @@ def names_of_quanta(form: Format) -> tuple[str, ...]:
     """
     rotation = {1: ("n",), 2: ("n", "k"), 3: ("n", "ka", "kc")}[form.rotation]
     spins = [f"f{i}" for i in range(1, form.spins)] + ["f"] if form.spins else []
-    if form.i_tot and len(spins) > 1:
+    if form.equivalent and len(spins) > 1:
         spins[-2] = "i_tot"
+    if form.equivalent == 3:
+        spins[-3] = "i_sym"
     if form.aggregate:
         spins = ["pattern", "f"]
     names = (*rotation, *(["v"] if form.states else []), *spins)
@@ -180,7 +182,7 @@ def _with_labels(group: Group, form: Format, labels: Ints, names: Sequence[str],
     twice = 2 * total - sum(group.spins) % 2
     every = distinct(twice)
     size = len(group.states) * int(np.prod([spin + 1 for spin in group.spins]))
-    if group.spins and size * int(every.max() + 1) > _LARGE:
+    if group.spins and group.states[0].equivalent < 3 and size * int(every.max() + 1) > _LARGE:
         contracted = _contracted(group, form, labels, here, every, names, values)
         if contracted is not None:
             return [contracted]

@@ -187,7 +187,8 @@ def named_by_l(levels: Levels, pairs: Sequence[Pair], representation: str) -> Le
 def functions_of_l(block: CoupledBlock, pairs: Sequence[Pair], representation: str) -> tuple[Floats, Ints]:
     """The functions (n, n), in rows, by which the states of a block are called, and their names v, Ka, Kc (n, 3).
 
-    Those of states that are not l-doubled are the basis; of a pair they are |K, l⟩ ± |-K, -l⟩ with K l > 0 and with K l < 0.
+    Those of states that are not l-doubled are the basis; of a pair they are |K, l⟩ ± |-K, -l⟩ with K l > 0 and with K l < 0. Half a turn
+    across the axis changes the sign of y, so that of the two functions with K = 0 that of y has the other species, Ka + Kc = N + 1.
     """
     return functions_of_parts(block.parts, len(block.vectors), pairs, representation)
 
@@ -232,7 +233,7 @@ def functions_of_parts(
                     names.append((v, ka, kc))
             elif k == 0:
                 functions.append(own)
-                names.append((part.v, ka, kc))
+                names.append((part.v, ka + 1, kc) if representation == "IIIl" else (part.v, ka, kc + 1))
     if len(functions) < size:
         raise ValueError(_UNCOUPLED)
     return np.array(functions), np.array(names)

@@ -6,6 +6,7 @@ differs there (H. M. Pickett, documentation of SPFIT and SPCAT, "line 3, option 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -17,6 +18,7 @@ from rotor.formats.spcat.codes import split_code
 from rotor.formats.spcat.text.int_file import IntensityFile
 from rotor.formats.spcat.text.par import Options, ParameterFile
 
+_NOT_YET = "is read but not computed yet"
 SPECIES = {"ee": "A", "eo": "a", "oo": "b", "oe": "c"}  # of the rotational function, by parities of Ka and Kc
 
 
@@ -38,7 +40,7 @@ _FOLDS = {
 class StateOptions:
     """Of one state: doubled spins in the order of coupling, range of K, axis and weights, weight of E levels, l.
 
-    i_tot: the last two spins are coupled to a total first.
+    i_tot: the last two spins, or with a threefold axis the last three, are coupled to a total first.
     """
 
     number: int
@@ -58,11 +60,16 @@ class StateOptions:
         return _FOLDS[self.iax].n if self.iax in _FOLDS else 0
 
     @property
+    def equivalent(self) -> int:
+        """How many of the last spins are coupled to a total first: 0, 2 or 3."""
+        return (3 if self.fold == 3 else 2) if self.i_tot else 0
+
+    @property
     def linear(self) -> bool:
         """Whether K = 0 alone is in the basis."""
         return self.kmin == self.kmax == 0
 
-    def weights(self, ka: Ints, kc: Ints, k: Ints, i_tot: Ints | int = 0) -> Ints:
+    def weights(self, ka: Ints, kc: Ints, k: Ints, odd_spins: Ints | int = 0) -> Ints:
         """Nuclear-spin weight of one component of levels, as the file has it; zero or less where a level does not exist.
 
         Parameters
@@ -71,26 +78,35 @@ class StateOptions:
             Labels.
         k : (n,) array of int
             K along the axis of the basis.
-        i_tot : (n,) array of int or int, optional
-            The total spin; where it is odd the two weights change places.
+        odd_spins : (n,) array of int or int, optional
+            Odd where half a turn across the axis changes the sign of the function of equivalent spins: the two weights change places.
 
         Returns
         -------
         (n,) array of int
             WTPL, WTMN or EWT, by the axis of the file.
         """
-        weight = self.class_weight(ka, kc, i_tot)
+        weight = self.class_weight(ka, kc, odd_spins)
         fold = _FOLDS.get(self.iax)
-        if fold is None:
+        if fold is None or self.equivalent == 3:  # with their spins all levels are of A species
             return weight
         class_of = (k - self.l_code) % fold.n
-        paired = np.where(np.isin(class_of, fold.paired), self.e_weight, 0)
+        paired = np.where(np.isin(class_of, fold.paired) & self._has_e(weight), self.e_weight, 0)
         return np.where(class_of == fold.alone, weight, paired)
 
-    def class_weight(self, ka: Ints, kc: Ints, i_tot: Ints | int = 0) -> Ints:
+    def _has_e(self, weight: Ints) -> NDArray[np.bool_]:
+        """Whether E levels stand in Wang blocks of such a weight: of a threefold axis those of weight 0 are left out as a whole, so that
+        half of the E levels are there, with twice their weight in the file."""
+        return np.asarray((weight > 0) | (self.fold != 3))
+
+    def odd_spins(self, quanta: Mapping[str, Ints]) -> Ints | int:
+        """Of levels by their quantum numbers: odd I_tot of two equivalent spins, functions of species A2 of three."""
+        return np.asarray(quanta["i_sym"] % 6 == 1, dtype=np.int64) if self.equivalent == 3 else quanta.get("i_tot", 0)
+
+    def class_weight(self, ka: Ints, kc: Ints, odd_spins: Ints | int = 0) -> Ints:
         """WTPL or WTMN by the parities of Ka and Kc, (n,), E levels apart."""
         odd = {1: ka % 2, 2: (ka + kc) % 2, 3: kc % 2}.get(self.iax, (ka + kc) % 2)
-        return np.where((odd + i_tot) % 2 == 0, self.plus, self.minus)
+        return np.where((odd + odd_spins) % 2 == 0, self.plus, self.minus)
 
     def block_weights(self, ka: Ints, kc: Ints, k: Ints) -> Ints:
         """Weights of the A (or B) and of the E levels in the Wang block of a level, (n, 2), 0 where there are none; n-fold axis."""
@@ -101,12 +117,12 @@ class StateOptions:
         paired = np.isin(classes, fold.paired).any(axis=1) | (
             self.iax == 7
         )  # which names both kinds of blocks of a 4-fold axis
-        return np.stack([np.where(alone, own, 0), np.where(paired, self.e_weight, 0)], axis=1)
+        return np.stack([np.where(alone, own, 0), np.where(paired & self._has_e(own), self.e_weight, 0)], axis=1)
 
     def is_e(self, k: Ints) -> NDArray[np.bool_]:
         """Which levels are of E species, whose K is not signed."""
         fold = _FOLDS.get(self.iax)
-        if fold is None or fold.n < 3:
+        if fold is None or fold.n < 3 or self.equivalent == 3:
             return np.zeros(np.shape(k), dtype=bool)
         return np.asarray((k - self.l_code) % fold.n % (fold.n / 2) != 0)
 
@@ -144,14 +160,8 @@ def _state(v: int, line: Options, first: Options, swapped: bool) -> StateOptions
     iax, spins = abs(line.iax), doubled_spins(line.spind)
     if iax not in (0, 1, 2, 3, *_FOLDS):
         raise ValueError(f"IAX = {line.iax} of state {v}: expected an axis or fold of weights, 1 to 11")
-    if line.iax < 0 and iax in _FOLDS and _FOLDS[iax].n > 2:
-        raise ValueError(
-            f"IAX = {line.iax} of state {v}: a total spin of {_FOLDS[iax].n} equivalent nuclei is read but not computed yet"
-        )
-    if line.iax < 0 and len(spins) > 1 and spins[-1] != spins[-2]:
-        raise ValueError(
-            f"IAX = {line.iax} of state {v} couples the last two spins to a total; they are of two sizes in SPIND = {line.spind}"
-        )
+    if line.iax < 0:
+        _check_total(v, line, spins, (code % 10, weight))
     kmax = line.knmax if 0 <= line.knmax <= 359 else 359
     plus, minus = (line.wtmn, line.wtpl) if swapped else (line.wtpl, line.wtmn)
     return StateOptions(
@@ -166,6 +176,32 @@ def _state(v: int, line: Options, first: Options, swapped: bool) -> StateOptions
         code % 10,
         line.iax < 0 and len(spins) > 1,
     )
+
+
+def _check_total(v: int, line: Options, spins: tuple[int, ...], e_species: tuple[int, int]) -> None:
+    """ValueError for a total spin that is not computed: other than of two or three, of unequal ones, with levels of E species."""
+    fold = _FOLDS[-line.iax].n if -line.iax in _FOLDS else 2
+    if fold > 3:
+        raise ValueError(
+            f"IAX = {line.iax} of state {v}: a total spin of {fold} equivalent nuclei is read but not computed yet"
+        )
+    if fold == 3 and len(spins) < 3:
+        raise ValueError(
+            f"IAX = {line.iax} of state {v} couples three spins to a total; SPIND = {line.spind} names {len(spins)}"
+        )
+    if len(spins) > 1 and len(set(spins[-fold:])) > 1:
+        raise ValueError(
+            f"IAX = {line.iax} of state {v} couples the last {'two' if fold == 2 else 'three'} spins to a total; they are of "
+            f"several sizes in SPIND = {line.spind}"
+        )
+    if fold == 3 and e_species[0]:
+        raise ValueError(
+            f"EWT = {line.ewt} of state {v}: an l-doubled state with a total spin of three nuclei {_NOT_YET}"
+        )
+    if fold == 3 and e_species[1]:
+        raise ValueError(
+            f"EWT = {line.ewt} of state {v}: with a total spin of three nuclei levels of E species do not exist; their weight is 0"
+        )
 
 
 def is_odd(ka: Ints, kc: Ints) -> NDArray[np.bool_]:

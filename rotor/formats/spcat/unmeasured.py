@@ -70,6 +70,8 @@ def _labels_of(group: Group, form: Format, highest: int) -> tuple[Ints, Floats]:
     """Labels (n, k) with N up to the highest, and where the levels lie without what the spins do, MHz."""
     if group.spins:
         total = sum(group.spins)
+        if group.states[0].equivalent == 3:
+            raise ValueError("no line is suggested with a total spin of three nuclei; leave --suggest out")
         levels, _ = unmixed_levels(group.top, (group.effect,), list(range(total % 2, 2 * highest + total + 1, 2)))
     else:
         levels = levels_in_blocks(group, range(0, 2 * highest + 1, 2))

@@ -30,6 +30,8 @@ from rotor.quantum.spins.lines import ParameterOperator
 from rotor.quantum.spins.operators import Scalar
 from rotor.quantum.spins.parts import SpinPart, assigned, labels_of, names_of_parts
 from rotor.quantum.spins.rotor import Channel
+from rotor.quantum.spins.three_equivalent import labels_of_functions
+from rotor.quantum.spins.three_spins import Allowed
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
@@ -184,7 +186,9 @@ class _SpinUnits:
         for place, operator in enumerate(self._operators):
             matrix = self._matrix(operator, parts, block)
             if matrix is not None:
-                units[place] = elements_of(matrix)
+                units[place] = elements_of(_of_allowed(matrix, block.allowed) if block.allowed else matrix)
+        if block.allowed:
+            return unit_block(units, block.allowed.sub_block, _namer_of_allowed(block.allowed))
         return unit_block(units, _sub_blocks(parts, parts[-1].place.stop), _namer(parts, block.patterns))
 
     def _matrix(self, operator: ParameterOperator, parts: tuple[SpinPart, ...], block: SpinBlock) -> Floats | None:
@@ -203,6 +207,19 @@ class _SpinUnits:
         """Coefficients over the patterns of an F; those of the Hamiltonian are there since its plan was made."""
         known = self._shared.cache.get(("coupling", block.twice_f), {})
         return known[channel] if channel in known else coefficients_of(self._shared.scheme, channel, block.patterns)
+
+
+def _of_allowed(matrix: Floats, allowed: Allowed) -> Floats:
+    """A matrix, of which the lower triangle is read, between the functions that exchange allows."""
+    whole = np.tril(matrix) + np.tril(matrix, -1).T
+    return np.asarray(allowed.products.T @ whole @ allowed.products)
+
+
+def _namer_of_allowed(allowed: Allowed) -> Namer:
+    def namer(matrix: Floats, energies: Floats, vectors: Floats) -> Ints:
+        return labels_of_functions(vectors, allowed.sub_block, allowed.names, allowed.sizes)[0]
+
+    return namer
 
 
 def _in_functions(part: SpinPart) -> SpinPart:

@@ -26,7 +26,7 @@ from rotor.quantum.fields.blocks import Contraction, FieldBlock, FieldSpace, Fre
 from rotor.quantum.fields.wang_blocks import coloured_components
 from rotor.quantum.spins import scheme_of
 from rotor.quantum.spins.blocks import SpinBlock, product
-from rotor.quantum.spins.coupling import moment_coefficients, patterns, recoupling
+from rotor.quantum.spins.coupling import moment_coefficients, patterns
 from rotor.quantum.spins.levels import spin_levels
 from rotor.quantum.spins.lines import amplitudes
 from rotor.quantum.spins.operators import AxialState, CosinesWithN
@@ -261,11 +261,8 @@ def _coefficients(space: SpinSpace, up: SpinBlock, low: SpinBlock, place: int | 
         scheme = low.shared.scheme
         bra, ket = patterns(scheme.twice, up.twice_f), patterns(scheme.twice, low.twice_f)
         found = moment_coefficients(scheme.twice, 1 if place is None else 0, place, bra, ket)
-        if scheme.paired:
-            left, right = (
-                recoupling(scheme.twice, one, scheme.patterns(f)) for one, f in ((bra, up.twice_f), (ket, low.twice_f))
-            )
-            found = left.T @ found @ right
+        if scheme.equivalent:
+            found = scheme.recoupling(up.twice_f)[1].T @ found @ scheme.recoupling(low.twice_f)[1]
         space._known[key] = found
     out: Floats = space._known[key]
     return out

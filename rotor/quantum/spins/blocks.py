@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from rotor.arrays import Floats, Ints
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.spins.contraction import Stack, operators_of_stacks, stacks_of
-from rotor.quantum.spins.coupling import coefficients, n_dot_s, patterns, recoupling, stacks
+from rotor.quantum.spins.coupling import coefficients, n_dot_s, stacks
 from rotor.quantum.spins.method import FIRST_ORDER, Used
 from rotor.quantum.spins.operators import AxialState
 from rotor.quantum.spins.parts import SpinPart, labels_of, named_states, names_of_parts
@@ -36,6 +36,7 @@ from rotor.quantum.spins.rotor import (
     valued_terms,
 )
 from rotor.quantum.spins.scheme import Scheme, scheme_of
+from rotor.quantum.spins.three_spins import Allowed
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -63,9 +64,8 @@ class Shared:
 class SpinBlock:
     """States of one F solved together: energies (n,) in MHz, rising, and eigenvectors (functions, n) over the parts.
 
-    patterns: all coupling patterns of the F, doubled.
-    labels: (n, columns) v, Ka (K of an axial top), Kc, then the doubled pattern N, J ... F of every state. mixing: (n,) the share
-    of the sub-block that names it. start: row of the first state.
+    patterns: all coupling patterns of the F, doubled. labels: (n, columns) v, Ka (K of an axial top), Kc, the doubled pattern N, J ... F
+    of states. mixing: (n,) shares of the sub-blocks that name them. start: row of the first state. allowed: the functions that are there.
     """
 
     twice_f: int
@@ -77,6 +77,7 @@ class SpinBlock:
     mixing: Floats
     shared: Shared
     start: int = 0
+    allowed: Allowed | None = None
 
     @cached_property
     def single(self) -> bool:
@@ -111,7 +112,7 @@ class Plan:
 
     def with_method(self, used: Used, operators: dict[tuple[int, int], dict[Channel, Floats]]) -> Plan:
         """The same rotation with some of the operators, and what that is called."""
-        families = _families(len(self.blocks), operators, 2 if self.shared.scheme.paired else 1)
+        families = _families(len(self.blocks), operators, max(self.shared.scheme.equivalent, 1))
         return Plan(replace(self.shared, used=used), self.blocks, operators, families)
 
 
@@ -150,7 +151,7 @@ def plan_of(top: Top, effects: tuple[QuantumEffect, ...], nmin: int, nmax: int, 
         for pair, found in between.items()
         if found
     }
-    families = _families(len(blocks), operators, 2 if scheme.paired else 1)
+    families = _families(len(blocks), operators, max(scheme.equivalent, 1))
     return Plan(Shared(scheme, representation, stacks), blocks, operators, families)
 
 
@@ -286,7 +287,7 @@ def _labels_of_functions(part: SpinPart, own_patterns: Ints) -> Ints:
 def prepare(plan: Plan, every_f: Iterable[int]) -> None:
     """Coefficients of all channels for many F at once; those of patterns with a total spin are made F by F."""
     scheme = plan.shared.scheme
-    if scheme.paired:
+    if scheme.equivalent:
         return
     tables = {f: [scheme.patterns(f)] for f in every_f}
     plan.shared.cache["patterns"] = {f: own for f, (own,) in tables.items()}
@@ -299,7 +300,7 @@ def _couplings(plan: Plan, tables: dict[int, list[Ints]]) -> dict[int, dict[Chan
     """c(p', p) of all channels by F."""
     acting = {channel for operators in plan.operators.values() for channel in operators}
     out: dict[int, dict[Channel, Floats]] = {f: {} for f in tables}
-    if plan.shared.scheme.paired:
+    if plan.shared.scheme.equivalent:
         return {f: {c: coefficients_of(plan.shared.scheme, c, own) for c in acting} for f, (own,) in tables.items()}
     for every, (stack,) in stacks(tables):
         for channel in acting:
@@ -390,7 +391,7 @@ def product(left: Floats, right: Floats) -> Floats:
 
 def coefficients_of(scheme: Scheme, channel: Channel, every: Ints) -> Floats:
     """c(p', p) of a channel between all patterns of an F, with its powers of N·S; every: (..., n, columns)."""
-    found = _of_exchange(scheme, channel, every) if scheme.paired else _one_by_one(scheme, channel, every)
+    found = _with_total(scheme, channel, every) if scheme.equivalent else _one_by_one(scheme, channel, every)
     for column in scheme.conserved_columns:
         found = np.where(every[..., :, None, column] == every[..., None, :, column], found, 0.0)
     if not channel.ns:
@@ -404,13 +405,12 @@ def _one_by_one(scheme: Scheme, channel: Channel, every: Ints) -> Floats:
     return coefficients(scheme.twice, channel.acting, channel.rank, every, every)
 
 
-def _of_exchange(scheme: Scheme, channel: Channel, every: Ints) -> Floats:
-    """Half the sum or the difference of the coefficients with two equivalent spins exchanged, over patterns with their total."""
-    plain = patterns(scheme.twice, int(every[0, -1]))
+def _with_total(scheme: Scheme, channel: Channel, every: Ints) -> Floats:
+    """The coefficients over patterns with a total spin; of two equivalent spins half the sum or the difference with both exchanged."""
+    plain, turn = scheme.recoupling(int(every[0, -1]))
     found = _one_by_one(scheme, channel, plain)
     b = len(scheme.spins) - 1
     turned = tuple(sorted({b: b - 1, b - 1: b}.get(place, place) for place in channel.acting))
-    if turned != channel.acting:
+    if turned != channel.acting and scheme.equivalent == 2:
         found = (found + channel.exchange * _one_by_one(scheme, channel._replace(acting=turned), plain)) / 2
-    turn = recoupling(scheme.twice, plain, every)
     return np.asarray(turn.T @ found @ turn)

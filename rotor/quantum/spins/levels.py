@@ -15,6 +15,7 @@ from rotor.quantum.spins.blocks import Exist, Plan, Shared, SpinBlock, functions
 from rotor.quantum.spins.operators import AxialState
 from rotor.quantum.spins.scheme import scheme_of
 from rotor.quantum.spins.simplify import simplified
+from rotor.quantum.spins.three_equivalent import in_wang_functions, solve_three
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -83,8 +84,11 @@ def levels_of_f(
     """
     lowest, highest = _range_of_n(top, effects, every_f)
     plan = simplified(plan_of(top, effects, lowest, highest, executor), effects, every_f)
+    solve = solve_f
+    if plan.shared.scheme.equivalent == 3:
+        plan, solve = in_wang_functions(plan), solve_three
     prepare(plan, every_f)
-    solved = [block for f in every_f for block in solve_f(plan, f, exist)]
+    solved = [block for f in every_f for block in solve(plan, f, exist)]
     if n_range:
         solved = [_within(block, n_range) for block in solved]
     blocks = tuple(_placed(solved))
@@ -112,6 +116,10 @@ def unmixed_levels(top: Top, effects: tuple[QuantumEffect, ...], every_f: Sequen
     """
     lowest, highest = _range_of_n(top, effects, every_f)
     plan = plan_of(top, effects, lowest, highest, None)
+    if plan.shared.scheme.equivalent == 3:
+        raise ValueError(
+            "functions of three equivalent nuclei are no products of a state of the rotation and a pattern"
+        )
     prepare(plan, every_f)
     blocks = tuple(_placed(block for f in every_f for block in functions_of_f(plan, f)))
     return _table(top, effects, plan.shared, blocks, highest), plan

@@ -19,7 +19,7 @@ from rotor.arrays import Floats, Ints
 from rotor.quantum.levels import Levels
 from rotor.quantum.spins.blocks import Shared, SpinBlock, coefficients_of, operators_between, product
 from rotor.quantum.spins.contraction import MOST_RANK, tensor_elements_of_stacks
-from rotor.quantum.spins.coupling import patterns, recoupling, stacks, tensor_coefficients
+from rotor.quantum.spins.coupling import stacks, tensor_coefficients
 from rotor.quantum.spins.operators import AxialState, Scalar, tensor_elements
 from rotor.quantum.spins.parts import SpinPart
 from rotor.quantum.spins.rotor import Channel, RotorBlock, RotorPart, channels_of
@@ -126,7 +126,7 @@ def _acting(up: SpinBlock, low: SpinBlock, tensors: Tensors, rank: int) -> Actin
         if elements.partners is not None and elements.reached_from(up).isdisjoint(low.by_number):
             return []
         found = _parts_between(up, low, elements, rank)
-        if low.shared.scheme.paired:
+        if low.shared.scheme.equivalent:
             t = _coefficients(up, low, rank)
             found = [(target, source, x) for target, source, x in found if t[target.patterns, source.patterns].any()]
         elements.pairs[place] = found
@@ -190,7 +190,7 @@ def _coefficients(up: SpinBlock, low: SpinBlock, rank: int) -> Floats:
 
 def _of_alike(shared: Shared, rank: int, up: SpinBlock, low: SpinBlock) -> dict[tuple[str, int, int, int], Floats]:
     """t(p', p) between these F and, where patterns are few, between all others of the same distance."""
-    if shared.scheme.paired or "patterns" not in shared.cache or len(up.patterns) * len(low.patterns) > _FEW:
+    if shared.scheme.equivalent or "patterns" not in shared.cache or len(up.patterns) * len(low.patterns) > _FEW:
         only = _tensor_coefficients(shared.scheme, rank, up.patterns, low.patterns)
         return {("tensor", rank, up.twice_f, low.twice_f): only}
     every, step = shared.cache["patterns"], up.twice_f - low.twice_f
@@ -203,11 +203,10 @@ def _of_alike(shared: Shared, rank: int, up: SpinBlock, low: SpinBlock) -> dict[
 
 
 def _tensor_coefficients(scheme: Scheme, rank: int, bra: Ints, ket: Ints) -> Floats:
-    if not scheme.paired:
+    if not scheme.equivalent:
         return tensor_coefficients(scheme.twice, rank, bra, ket)
-    plain = [patterns(scheme.twice, int(own[0, -1])) for own in (bra, ket)]
-    left, right = (recoupling(scheme.twice, one, own) for one, own in zip(plain, (bra, ket), strict=True))
-    found = left.T @ tensor_coefficients(scheme.twice, rank, *plain) @ right
+    (up, left), (low, right) = (scheme.recoupling(int(own[0, -1])) for own in (bra, ket))
+    found = left.T @ tensor_coefficients(scheme.twice, rank, up, low) @ right
     return np.where(np.abs(found) > ROUND_OFF, found, 0.0)
 
 

@@ -20,8 +20,8 @@ from rotor.arrays import Floats
 from rotor.quantum.levels import Levels
 from rotor.quantum.moments import Moment
 from rotor.quantum.spins.blocks import SpinBlock, product
-from rotor.quantum.spins.coupling import moment_coefficients, patterns, recoupling
-from rotor.quantum.spins.operators import AxialState, tensor_elements
+from rotor.quantum.spins.coupling import moment_coefficients, patterns
+from rotor.quantum.spins.operators import AxialState, CosinesWithN, tensor_elements
 from rotor.quantum.spins.parts import SpinPart
 from rotor.quantum.spins.rotor import RotorBlock, RotorPart
 from rotor.quantum.spins.scheme import Scheme
@@ -106,6 +106,8 @@ class SpinMoments:
         if moment.electric:
             found = tensor_elements(up, low, self._tensor(moment.along_abc, 1))
             return None if found is None else found * _factor(moment.powers, left, right)
+        if moment.tensor is not None and not moment.spin:
+            return CosinesWithN(moment.tensor).elements(up, low, self.representation)
         if moment.tensor is not None:
             return tensor_elements(up, low, self._tensor(moment.tensor, 2))
         if up != low:
@@ -157,9 +159,9 @@ def _factor(powers: str, left: RotorPart, right: RotorPart) -> Floats:
 
 
 def _coefficients(scheme: Scheme, rank: int, acting: int | None, up: int, low: int) -> Floats:
-    bra, ket = patterns(scheme.twice, up), patterns(scheme.twice, low)
-    found = moment_coefficients(scheme.twice, rank, acting, bra, ket)
-    if not scheme.paired:
-        return found
-    left, right = (recoupling(scheme.twice, one, scheme.patterns(f)) for one, f in ((bra, up), (ket, low)))
-    return np.asarray(left.T @ found @ right)
+    if not scheme.equivalent:
+        bra, ket = patterns(scheme.twice, up), patterns(scheme.twice, low)
+        return moment_coefficients(scheme.twice, rank, acting, bra, ket)
+    (bra, left), (ket, right) = scheme.recoupling(up), scheme.recoupling(low)
+    found = left.T @ moment_coefficients(scheme.twice, rank, acting, bra, ket) @ right
+    return np.asarray(scheme.count_of(() if acting is None else (acting,)) * found)

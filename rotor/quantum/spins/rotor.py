@@ -170,17 +170,31 @@ def channels_of(terms: Terms, scheme: Scheme) -> Channels:
 
 
 def _by_exchange(channel: Channel, scheme: Scheme) -> list[tuple[Channel, float]]:
-    """A channel as parts that keep or change the symmetry of two equivalent spins: ½(A + B) ± ½(A - B)."""
-    if not scheme.paired:
+    """A channel as parts that keep or change the symmetry of two equivalent spins: ½(A + B) ± ½(A - B); of three, as in `scheme`."""
+    if not scheme.equivalent:
         return [(channel, 1.0)]
-    if channel.ns and len(scheme.spins) == 2:
+    if channel.ns and len(scheme.spins) == scheme.equivalent:
         raise ValueError("powers of N·S1 are those of a spin that is coupled before the equivalent ones")
     b = len(scheme.spins) - 1
+    if scheme.equivalent == 3:
+        return [(_of_three(channel, b - 2), float(scheme.count_of(channel.acting)))]
     a = b - 1
     if set(channel.acting) >= {a, b} or not set(channel.acting) & {a, b}:
         return [(channel._replace(exchange=1), 1.0)]
     of_a = channel._replace(acting=tuple(sorted(a if place == b else place for place in channel.acting)))
     return [(of_a._replace(exchange=1), 1.0), (of_a._replace(exchange=-1), -1.0 if b in channel.acting else 1.0)]
+
+
+def _of_three(channel: Channel, first: int) -> Channel:
+    """The channel of the first of three equivalent spins, or of the pair that lies across from it: the second and the third."""
+    among = tuple(place for place in channel.acting if place >= first)
+    if set(among) <= {first}:
+        return channel
+    if among == (first, first + 1) and channel.acting == among:
+        return channel._replace(acting=(first + 1, first + 2))
+    raise ValueError(
+        "terms of three equivalent spins name the first of them, or the first and the second: a turn by 120° gives the others"
+    )
 
 
 def contracted(up: RotorBlock, low: RotorBlock, pieces: Sequence[Piece], representation: str) -> Floats | None:

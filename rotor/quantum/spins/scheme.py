@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rotor.arrays import Ints
-from rotor.quantum.spins.coupling import patterns, patterns_of_total
+from rotor.arrays import Floats, Ints
+from rotor.quantum.spins.coupling import patterns, patterns_of_total, recoupling
 from rotor.quantum.spins.terms import Spin
+from rotor.quantum.spins.three_spins import patterns_of_three, recoupling_of_three
 
 if TYPE_CHECKING:
     from rotor.quantum.effect import QuantumEffect
@@ -22,14 +23,14 @@ if TYPE_CHECKING:
 class Scheme:
     """Which spins are coupled, and what the angular momenta on the way to F are called.
 
-    paired: whether the last two are coupled to a total spin first. conserved: names of sums between whose values all elements are left
-    out, as in perturbation theory.
+    equivalent: how many, two or three of the last ones, are coupled to a total spin first; else 0. conserved: names of sums between
+    whose values all elements are left out, as in perturbation theory.
     """
 
     spins: tuple[Spin, ...]
     conserved: frozenset[str] = frozenset()
     twice: tuple[int, ...] = field(init=False)
-    paired: bool = field(init=False, default=False)
+    equivalent: int = field(init=False, default=0)
 
     def __post_init__(self) -> None:
         names = [spin.name for spin in self.spins]
@@ -37,15 +38,15 @@ class Scheme:
             raise ValueError(f"spins {', '.join(names)}: every spin has a name of its own")
         object.__setattr__(self, "twice", tuple(spin.twice for spin in self.spins))
         together = [spin.total for spin in self.spins if spin.total]
-        pair = self.spins[-2:]
+        last = self.spins[-max(len(together), 1) :]
         if together and (
-            len(together) != 2 or len({(s.total, s.twice, s.electron) for s in pair}) > 1 or pair[0].electron
+            len(together) not in (2, 3) or len({(s.total, s.twice, s.electron) for s in last}) > 1 or last[0].electron
         ):
             raise ValueError(
-                "spins that are coupled to a total are two nuclei of one size, and the last ones: "
+                "spins that are coupled to a total are two nuclei or three of one size, and the last ones: "
                 f"{', '.join(spin.name for spin in self.spins)}"
             )
-        object.__setattr__(self, "paired", bool(together))
+        object.__setattr__(self, "equivalent", len(together))
 
     @property
     def total(self) -> int:
@@ -54,11 +55,18 @@ class Scheme:
 
     def patterns(self, twice_f: int) -> Ints:
         """The coupling patterns of one F, doubled: N, ..., F."""
-        return patterns_of_total(self.twice, twice_f) if self.paired else patterns(self.twice, twice_f)
+        of = {0: patterns, 2: patterns_of_total, 3: patterns_of_three}[self.equivalent]
+        return of(self.twice, twice_f)
+
+    def recoupling(self, twice_f: int) -> tuple[Ints, Floats]:
+        """The patterns of one F coupled one by one, and their amplitudes in those with a total spin, (one by one, total)."""
+        plain = patterns(self.twice, twice_f)
+        of = recoupling_of_three if self.equivalent == 3 else recoupling
+        return plain, of(self.twice, plain, self.patterns(twice_f))
 
     def classes(self, every: Ints) -> Ints:
         """Of patterns, 1 where two equivalent spins have a function that changes sign with their exchange, else 0."""
-        if not self.paired:
+        if self.equivalent != 2:
             return np.zeros(len(every), dtype=np.int64)
         return np.asarray((self.twice[-1] + self.twice[-2] - every[:, -2]) // 2 % 2)
 
@@ -72,18 +80,26 @@ class Scheme:
         electrons = [f"j{i + 1}" if i else "j" for i, spin in enumerate(self.spins) if spin.electron]
         nuclei = len(self.spins) - len(electrons)
         sums = [*electrons, *(f"f{i + 1}" for i in range(nuclei - 1)), *(["f"] if nuclei else [])]
-        return tuple([*sums[:-2], "i_tot", "f"] if self.paired else sums)
+        of_total: list[str] = {0: [], 2: ["i_tot", "f"], 3: ["i_sym", "i_tot", "f"]}[self.equivalent]
+        return (*sums[: len(sums) - self.equivalent], *of_total)
 
     @property
     def half(self) -> tuple[bool, ...]:
         """Which of them are half-integers."""
         halves = [bool(total % 2) for total in accumulate(self.twice)]
-        return tuple([*halves[:-2], False, halves[-1]] if self.paired else halves)
+        last = halves[-1:]
+        of_total = {0: [], 2: [False, *last], 3: [False, sum(self.twice[-3:]) % 2 == 1, *last]}[self.equivalent]
+        return (*halves[: len(halves) - self.equivalent], *of_total)
 
     @property
     def conserved_columns(self) -> list[int]:
         """Columns of the patterns that are conserved."""
         return [column for column, name in enumerate(("n", *self.names)) if name in self.conserved]
+
+    def count_of(self, acting: tuple[int, ...]) -> int:
+        """How many equal operators, turned by 120° each, one that acts on these places stands for: 3 with one of three equivalent
+        spins, else 1."""
+        return 3 if self.equivalent == 3 and max(acting, default=-1) >= len(self.spins) - 3 else 1
 
     def place(self, name: str) -> int:
         """The place of a spin by its name."""

@@ -27,7 +27,11 @@ def simplified(plan: Plan, effects: Sequence[QuantumEffect], every_f: Sequence[i
     asked = next((effect for effect in effects if isinstance(effect, HyperfineMethod)), None)
     if asked is None:
         return plan
-    if asked.method == EXACT:
+    if plan.shared.scheme.equivalent == 3 and asked.method not in (EXACT, "auto"):
+        raise ValueError(
+            f"method {asked.method} with a total spin of three nuclei: they are computed by the exact one alone"
+        )
+    if asked.method == EXACT or plan.shared.scheme.equivalent == 3:
         return plan.with_method(Used(EXACT, 0.0, asked.tolerance_mhz), plan.operators)
     other_n, same_n = largest_shifts(plan, every_f)
     estimates = {FIRST_ORDER: 2 * (other_n + same_n), N_DIAGONAL: 2 * other_n, EXACT: 0.0}

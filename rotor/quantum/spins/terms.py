@@ -14,8 +14,9 @@ from rotor.quantum.spins.operators import (
 class Spin:
     """One spin: its name, as parameters have it, twice its size (2I, a whole number), and whether it is an electron's.
 
-    Spins are coupled in the order in which effects first name them, electrons' before nuclei's. total: the two nuclei that have
-    one name here, such as "I", are equivalent: they are coupled to a total spin first, and last to the rest.
+    Spins are coupled in the order in which effects first name them, electrons' before nuclei's. total: the two or three nuclei
+    that have one name here, such as "I", are equivalent: they are coupled to a total spin first, and last to the rest. Of three, on
+    a threefold axis, the terms name the first alone, or the first and the second (see `three_equivalent`).
     """
 
     name: str

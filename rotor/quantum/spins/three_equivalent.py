@@ -1,0 +1,314 @@
+"""Levels of each F with three equivalent nuclei on a threefold axis: the functions that the exchange of nuclei allows, and no others.
+
+A turn by 120° about the axis together with the cyclic exchange of the three spins leaves every function of a molecule unchanged (A1
+and A2 of D3; levels of E do not exist). Of |N K⟩ with K = 0, 3, 6, ... these are the functions W_s(K) of Wang times spin functions of
+species A1 and A2; of other K, with the functions x and y of species E (`three_spins`),
+
+    [W_s(K) x + o W_-s(K) y]/√2,     o = 1 or -1 as a turn takes W_s(K) to + or -sin(2πK/3) W_-s(K)
+
+(H. M. Pickett, J. Mol. Spectrosc. 228, 659 (2004), in real functions). Between such functions the sum of an operator over the three
+nuclei is three times that of the first nucleus, X·I_1, so that the tensor of one nucleus says all; likewise for the pair of the second
+and third nuclei. What is odd under all half turns across the axis may mix A1 with A2, as in a molecule with the axis alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import sqrt
+from typing import NamedTuple
+
+import numpy as np
+
+from rotor.arrays import Floats, Ints
+from rotor.quantum.spins.blocks import Exist, Plan, SpinBlock, coefficients_of
+from rotor.quantum.spins.contraction import stacks_of
+from rotor.quantum.spins.parts import SpinPart, assigned
+from rotor.quantum.spins.rotor import Channel, RotorBlock, RotorPart
+from rotor.quantum.spins.three_spins import EVEN_E, ODD_E, STEP, Allowed
+from rotor.quantum.wang.basis import WangBlock
+from rotor.quantum.wang.j_operators import phase
+from rotor.tops.operators import axes_of
+
+_ZERO = 1e-12  # of the largest element: what connects less is round-off of sums that cancel
+_ROUND_OFF = 1e-13  # of coefficients, sums of products of a few numbers of size 1
+_ALONE = Channel((), 0)
+
+
+class Row(NamedTuple):
+    """Where a Wang function stands: number of the solved block, place in it; v, N, K and sign s."""
+
+    block: int
+    place: int
+    v: int
+    n: int
+    k: int
+    sign: int
+
+
+@dataclass(frozen=True)
+class Functions:
+    """The functions of one F, (n,) each: their first and second products of a Wang function and a pattern, by rows of either, and the
+    factors of these, of which the second may be 0; and the sub-block that names them.
+
+    names, sizes: of all sub-blocks, as `blocks.names_of_parts` has them.
+    """
+
+    wang: tuple[Ints, Ints]
+    pattern: tuple[Ints, Ints]
+    factor: tuple[Floats, Floats]
+    sub_block: Ints
+    names: Ints
+    sizes: Ints
+
+
+def in_wang_functions(plan: Plan) -> Plan:
+    """The plan with the rotation left in Wang functions, since K is what the axis sees; its energies are operators then."""
+    blocks, operators = [], dict(plan.operators)
+    turned = {
+        pair: {c: plan.blocks[pair[0]].vectors @ x @ plan.blocks[pair[1]].vectors.T for c, x in found.items()}
+        for pair, found in operators.items()
+    }
+    for number, block in enumerate(plan.blocks):
+        own = (block.vectors * block.energies_mhz) @ block.vectors.T
+        found = turned.setdefault((number, number), {})
+        found[_ALONE] = own + found[_ALONE] if _ALONE in found else own
+        blocks.append(RotorBlock(block.n, block.parts, np.diag(own).copy(), np.eye(len(own))))
+    return replace(plan, shared=replace(plan.shared, stacks=stacks_of(blocks)), blocks=blocks, operators=turned)
+
+
+def solve_three(plan: Plan, twice_f: int, exist: Exist | None = None) -> list[SpinBlock]:
+    """The blocks of one F, those left out in which no level exists by `exist` (see `levels.levels_of_f`)."""
+    every = plan.shared.scheme.patterns(twice_f)
+    parts = _parts(plan, every)
+    rows = _rows(parts)
+    functions = _functions(plan, every, parts, rows)
+    if not len(functions.sub_block):
+        return []
+    matrix = _matrix(plan, every, parts, rows, functions)
+    out = []
+    for members in _connected(matrix, functions.sub_block):
+        names = _names(functions, members)
+        if exist is None or exist(names[0]).any():
+            out.append(_solved(plan, twice_f, every, parts, rows, functions, members, matrix, names))
+    return out
+
+
+def _parts(plan: Plan, every: Ints) -> list[SpinPart]:
+    """All solved blocks whose N couples to the F, each with all patterns of that N."""
+    found, start = [], 0
+    for number, block in enumerate(plan.blocks):
+        own = np.flatnonzero(every[:, 0] == 2 * block.n)
+        if len(own):
+            stop = start + len(own) * len(block.energies_mhz)
+            found.append(SpinPart(number, block, slice(int(own[0]), int(own[-1]) + 1), slice(start, stop)))
+            start = stop
+    return found
+
+
+def _rows(parts: list[SpinPart]) -> list[Row]:
+    """Every Wang function of the parts, part by part."""
+    out = []
+    for place, part in enumerate(parts):
+        for own in part.rotor.parts:
+            basis = _wang(own)
+            for at, k in enumerate(basis.k.tolist(), own.place.start):
+                out.append(Row(place, at, own.v, basis.j, k, basis.sign))
+    return out
+
+
+def _wang(part: RotorPart) -> WangBlock:
+    if not isinstance(part.basis, WangBlock):
+        raise ValueError("three equivalent nuclei need functions with K and a sign; a linear molecule has none")
+    return part.basis
+
+
+def _functions(plan: Plan, every: Ints, parts: list[SpinPart], rows: list[Row]) -> Functions:
+    partner = {(row.v, row.n, row.k, row.sign): place for place, row in enumerate(rows)}
+    row_of = {tuple(pattern): place for place, pattern in enumerate(every.tolist())}
+    columns: list[tuple[int, int, float, int, int, float, int]] = []
+    names: list[Ints] = []
+    sizes: list[int] = []
+    start = 0
+    for part in parts:
+        for own in part.rotor.parts:
+            basis, along = _wang(own), own.names[:, _along(plan)]
+            orientation = 1.0 if phase(basis) == 1.0 else -1.0
+            for p in range(part.patterns.start, part.patterns.stop):
+                kind = int(every[p, -3]) % STEP
+                if kind == ODD_E:
+                    continue
+                for residue in (1, 2) if kind == EVEN_E else (0,):
+                    chosen = np.flatnonzero(basis.k % 3 == residue)
+                    for at in (chosen + start).tolist():
+                        if not residue:
+                            columns.append((at, p, 1.0, at, p, 0.0, len(sizes)))
+                            continue
+                        row, other = rows[at], every[p].copy()
+                        other[-3] += ODD_E - EVEN_E
+                        o = orientation if residue == 1 else -orientation
+                        second = partner[row.v, row.n, row.k, -row.sign]
+                        columns.append((at, p, sqrt(0.5), second, row_of[tuple(other)], o * sqrt(0.5), len(sizes)))
+                    names.append(_names_of_sub_block(own, along % 3 == residue, every[p], residue))
+                    sizes.append(len(chosen))
+            start += basis.size
+    table = np.array(columns, dtype=float).reshape(-1, 7)
+    places = [table[:, column].astype(np.int64) for column in (0, 3, 1, 4, 6)]
+    factors = table[:, 2], table[:, 5]
+    return Functions(
+        (places[0], places[1]), (places[2], places[3]), factors, places[4], np.concatenate(names), np.array(sizes)
+    )
+
+
+def _along(plan: Plan) -> int:
+    """Which of Ka and Kc is K: 0 or 1."""
+    axis = axes_of(plan.shared.representation)[2]
+    if axis == "b":
+        raise ValueError(
+            f"representation {plan.shared.representation}: the threefold axis is a or c, the z of the basis"
+        )
+    return 0 if axis == "a" else 1
+
+
+def _names_of_sub_block(part: RotorPart, chosen: Ints, pattern: Ints, residue: int) -> Ints:
+    """v, Ka, Kc and the pattern, in which x stands for E with K = 3n + 2 and y for E with K = 3n + 1."""
+    own = part.names[np.asarray(chosen, dtype=bool)]
+    named = pattern.copy()
+    if residue == 1:
+        named[-3] += ODD_E - EVEN_E
+    return np.column_stack([np.full(len(own), part.v), own, np.tile(named, (len(own), 1))])
+
+
+def _matrix(plan: Plan, every: Ints, parts: list[SpinPart], rows: list[Row], functions: Functions) -> Floats:
+    """The Hamiltonian over the functions: Σ_channels c(p', p) X(r', r), each product of two sums."""
+    total = np.zeros((len(functions.sub_block), len(functions.sub_block)))
+    by_channel: dict[Channel, list[tuple[int, int]]] = {}
+    for i, up in enumerate(parts):
+        for k, low in enumerate(parts):
+            for channel in plan.operators.get((up.number, low.number), {}):
+                by_channel.setdefault(channel, []).append((i, k))
+    starts = np.cumsum([0, *(len(part.rotor.energies_mhz) for part in parts)])
+    for channel, pairs in by_channel.items():
+        rotor = np.zeros((len(rows), len(rows)))
+        for i, k in pairs:
+            element = plan.operators[parts[i].number, parts[k].number][channel]
+            rotor[starts[i] : starts[i + 1], starts[k] : starts[k + 1]] = element
+            if i != k:  # c(p', p) = (-1)^(N'-N) c(p, p'), and the product is symmetric
+                turned = (-1.0) ** (parts[i].rotor.n - parts[k].rotor.n) * element.T
+                rotor[starts[k] : starts[k + 1], starts[i] : starts[i + 1]] = turned
+        coupling = _coupling(plan, channel, every)
+        for r, p, c in zip(functions.wang, functions.pattern, functions.factor, strict=True):
+            for s, q, d in zip(functions.wang, functions.pattern, functions.factor, strict=True):
+                total += np.outer(c, d) * coupling[np.ix_(p, q)] * rotor[np.ix_(r, s)]
+    return (total + total.T) / 2
+
+
+def _coupling(plan: Plan, channel: Channel, every: Ints) -> Floats:
+    """The coefficients of a channel without round-off: rotational energies times it would connect what symmetry keeps apart."""
+    if channel == _ALONE:
+        return np.eye(len(every))
+    found = coefficients_of(plan.shared.scheme, channel, every)
+    return np.where(np.abs(found) > _ROUND_OFF, found, 0.0)
+
+
+def _connected(matrix: Floats, sub_block: Ints) -> list[Ints]:
+    """The functions of each part of the matrix that is connected, sub-blocks as a whole."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    scale = float(np.abs(matrix - np.diag(np.diag(matrix))).max(initial=0.0))
+    i, k = np.nonzero(np.abs(matrix) > _ZERO * scale)
+    count = int(sub_block.max()) + 1
+    graph = coo_array((np.ones(len(i)), (sub_block[i], sub_block[k])), shape=(count, count))
+    _, component = connected_components(graph, directed=False)
+    of_function = component[sub_block]
+    return [np.flatnonzero(of_function == one) for one in np.unique(of_function)]
+
+
+def _names(functions: Functions, members: Ints) -> tuple[Ints, Ints]:
+    subs = np.unique(functions.sub_block[members])
+    stops = np.cumsum(functions.sizes)
+    names = [functions.names[stops[sub] - functions.sizes[sub] : stops[sub]] for sub in subs]
+    return np.concatenate(names), functions.sizes[subs]
+
+
+def _solved(
+    plan: Plan,
+    twice_f: int,
+    every: Ints,
+    parts: list[SpinPart],
+    rows: list[Row],
+    functions: Functions,
+    members: Ints,
+    matrix: Floats,
+    named: tuple[Ints, Ints],
+) -> SpinBlock:
+    own = matrix[np.ix_(members, members)]
+    if not np.isfinite(own).all():
+        raise ValueError("a block of the Hamiltonian overflows: N max is too high for these constants")
+    zero = own[0, 0]  # taken out of the matrix for the sake of digits
+    energies, vectors = np.linalg.eigh(own - zero * np.eye(len(own)))
+    sub = np.unique(functions.sub_block[members], return_inverse=True)[1]
+    labels, mixing = labels_of_functions(vectors, sub, *named)
+    used, products = _in_products(parts, rows, functions, members)
+    allowed = Allowed(products, sub, *named)
+    return SpinBlock(
+        twice_f, every, used, energies + zero, products @ vectors, labels, mixing, plan.shared, allowed=allowed
+    )
+
+
+def labels_of_functions(vectors: Floats, sub_block: Ints, names: Ints, sizes: Ints) -> tuple[Ints, Floats]:
+    """What states are called, and the shares of the sub-blocks that give the names.
+
+    Parameters
+    ----------
+    vectors : (functions, n) array
+        Of states with rising energies.
+    sub_block : (functions,) array of int
+        Numbers of the sub-blocks, from 0.
+    names : (functions, columns) array of int
+        v, Ka, Kc and pattern of the levels that the sub-blocks name, one after another.
+    sizes : (sub-blocks,) array of int
+        How many each names.
+
+    Returns
+    -------
+    labels : (n, columns) array of int
+        Names of the states.
+    mixing : (n,) array
+        Shares, pure numbers.
+    """
+    shares = np.zeros((len(sizes), vectors.shape[1]))
+    np.add.at(shares, sub_block, vectors**2)
+    of_state = assigned(shares, sizes)
+    labels = np.empty_like(names)
+    labels[np.argsort(of_state, kind="stable")] = names
+    return labels, np.asarray(shares[of_state, np.arange(len(of_state))])
+
+
+def _in_products(
+    parts: list[SpinPart], rows: list[Row], functions: Functions, members: Ints
+) -> tuple[tuple[SpinPart, ...], Floats]:
+    """The parts that take part, and the functions over their products of rotation and pattern."""
+    table = np.array([(row.block, row.place) for row in rows])
+    halves = [(table[r[members]], p[members], c[members]) for r, p, c in _halves(functions)]
+    used = np.unique(np.concatenate([place[c != 0.0, 0] for place, _, c in halves]))
+    out, start, base = (
+        [],
+        0,
+        np.zeros((len(parts), 3), dtype=np.int64),
+    )  # start, first pattern, size of the solved block
+    for i in used.tolist():
+        part, size = parts[i], parts[i].place.stop - parts[i].place.start
+        out.append(part._replace(place=slice(start, start + size)))
+        base[i] = start, part.patterns.start, len(part.rotor.energies_mhz)
+        start += size
+    products = np.zeros((start, len(members)))
+    for place, p, c in halves:
+        chosen = np.flatnonzero(c)
+        at = base[place[chosen, 0]]
+        products[at[:, 0] + (p[chosen] - at[:, 1]) * at[:, 2] + place[chosen, 1], chosen] = c[chosen]
+    return tuple(out), products
+
+
+def _halves(functions: Functions) -> list[tuple[Ints, Ints, Floats]]:
+    return list(zip(functions.wang, functions.pattern, functions.factor, strict=True))
