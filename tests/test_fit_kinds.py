@@ -245,6 +245,25 @@ TWO_CHLORINES = Kind(
 )  # fmt: skip
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("turned", [1, -1])
+def test_wrong_lines_that_are_rejected_do_not_send_the_search_elsewhere(tmp_path, turned):
+    """A single χ_ab counts by its square: the search keeps the sign of the start, though the wrong lines make the first rms large."""
+    write_case(tmp_path, "x", KINDS["chlorine and nitrogen, half-integer F"], 1e-6)
+    asked = read_fit(tmp_path / "x.par")
+    seen = asked.lines.frequency_mhz.copy()
+    seen[::50] += 3.0  # 150 errors: a weighted rms of 20 until they are out
+    lines, options = replace(asked.lines, frequency_mhz=seen), replace(asked.options, reject_above=8.0)
+    place = asked.parameters.names.index("Xab_Cl")
+    start = asked.parameters.start.copy()
+    start[place] *= turned
+    fit = fit_lines(lines, None, asked.parameters.moved(start), options, model=asked.model)
+    assert fit.converged, fit.reason
+    assert sorted(fit.left_out) == list(range(0, len(lines), 50))
+    assert np.sign(fit.values[place]) == turned
+    assert len(fit.minimum.iterations) < 20  # nothing else is tried
+
+
 def test_lines_of_unresolved_structure_leave_out_the_last_parameters():
     """F below 0: E - Σ p ∂E/∂p of the last NXPAR parameters, which have no derivative; without spins but for the second order."""
     file = parameter_file(TWO_CHLORINES)

@@ -29,6 +29,7 @@ _WAY = 0.01  # of the weighted rms at the start, below which it has
 _LATELY = 6  # iterations in which it must halve the weighted rms after these
 _TURNED = 5  # parameters whose other sign is tried
 _TURNED_ITERATIONS = 8  # after which it must have made way
+_BETTER = 0.99  # of the weighted rms, below which the other sign is taken
 _NONE = np.zeros(0, dtype=np.int64)
 _AT_ZERO_MHZ = 1e-30  # how far a constant that starts at 0 may move in these stages
 
@@ -275,9 +276,18 @@ def _searched(search: Search, progress: Progress | None) -> Minimum:
     limit = options.most_iterations
     first = _minimised(search, search.parameters.start, progress, limit, hopeless)
     for further in (_by_stages, _with_a_sign_turned):
-        if first.rms > options.poor_rms and first.status != INTERRUPTED and len(first.iterations) < limit:
+        if _is_poor(search, first) and first.status != INTERRUPTED and len(first.iterations) < limit:
             first = further(search, first, progress)
     return first
+
+
+def _is_poor(search: Search, found: Minimum) -> bool:
+    """Whether the lines are not described: by all of them, or by those that rejection would leave, where it leaves half and more."""
+    limit, size = search.options.reject_above, np.abs(found.residuals[: len(search.group.first)])
+    if limit is not None and found.converged and 2 * int((size <= limit).sum()) >= len(size):
+        size = size[size <= limit]
+        return bool(np.sqrt(size @ size / max(len(size), 1)) > search.options.poor_rms)
+    return found.rms > search.options.poor_rms
 
 
 def _with_a_sign_turned(search: Search, first: Minimum, progress: Progress | None) -> Minimum:
@@ -300,7 +310,8 @@ def _with_a_sign_turned(search: Search, first: Minimum, progress: Progress | Non
             second = _continued(first, _minimised(search, turned, progress, max(left, 0), hopeless))
         except ValueError:  # out of the bounds of the model
             continue
-        first = second if second.rms < first.rms else replace(first, iterations=second.iterations)
+        better = second.rms < _BETTER * first.rms  # else the lines do not know the sign
+        first = second if better else replace(first, iterations=second.iterations)
         if first.rms <= search.options.poor_rms:
             break
     return first
