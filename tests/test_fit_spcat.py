@@ -269,7 +269,9 @@ def test_a_radical_with_three_protons_ends_at_spfits_minimum():
     for mine, other in zip(ours, theirs, strict=True):
         if not other.constrained and other.error > 1e-30:
             assert abs(mine.value - other.value) < 1e-4 * other.error  # the search ends at 1e-4
-            assert mine.error == pytest.approx(other.error, rel=1e-5)  # it changes by 3.6e-4 within 0.0044 standard errors
+            assert mine.error == pytest.approx(
+                other.error, rel=1e-5
+            )  # it changes by 3.6e-4 within 0.0044 standard errors
             compared += 1
     assert compared == 22
 
