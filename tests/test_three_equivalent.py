@@ -3,7 +3,7 @@ plain coupling of three nuclei with tensors turned by 120°."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -24,7 +24,9 @@ from rotor.quantum.spins.levels import unmixed_levels
 from rotor.quantum.spins.method import HyperfineMethod
 from rotor.quantum.spins.three_spins import patterns_of_three, recoupling_of_three, symmetric_functions
 from rotor.spectra.transitions import all_transitions
+from rotor.thermo.partition import partition_function
 from rotor.tops.constants import Constants
+from rotor.tops.spins.spin_weights import SpinWeights
 from rotor.tops.top import Top
 
 PROLATE = Top(Constants(A=9400.0, B=3100.0), dipole_abc_debye=(1.2, 0.0, 0.0))
@@ -261,6 +263,15 @@ def test_names_and_lines():
             assert ours == pytest.approx(weight * rigid.strength_debye2[row].sum(), rel=1e-5)  # mixing of N, K
 
 
+def test_partition_function():
+    """Of the functions of spins 1/2 four belong to A1, two to each function of E: the weights 4, 2, 2 of K modulo 3."""
+    effects, weights = (*SEMI_RIGID, _effects(1)[0]), SpinWeights.from_mapping({"0": 4, "1": 2, "2": 2})
+    with_spins = partition_function(PROLATE, 1.0, effects=effects)
+    without = partition_function(replace(PROLATE, spin_weights=weights, symmetry_checked=False), 1.0)
+    # weights are reduced by their common divisor 2; shifts of 3 MHz with a mean of 0, kT = 20.8 GHz
+    assert with_spins.q == pytest.approx(2 * without.q, rel=1e-6)
+
+
 def test_derivatives():
     effects, step = _effects(2)[:2], 1e-3
     levels = solve_levels(PROLATE, 1, effects=(*SEMI_RIGID, *effects))
@@ -283,6 +294,8 @@ def test_what_is_refused():
         Scheme((three[0], three[1], Spin("X3", 3, total="I")))
     with pytest.raises(ValueError, match="name the first of them"):
         solve_levels(PROLATE, 1, effects=(*SEMI_RIGID, NuclearQuadrupole({"chi_aa(X2)": 1.0}, tuple(three))))
+    with pytest.raises(ValueError, match="the constants have none"):
+        solve_levels(Top(Constants(A=9.0, B=3.0, C=2.0)), 2, effects=(*SEMI_RIGID, *_effects(1)))
     with pytest.raises(ValueError, match="exact one alone"):
         solve_levels(PROLATE, 1, effects=(*SEMI_RIGID, *_effects(2), HyperfineMethod("first-order", 1.0, tuple(three))))
     with pytest.raises(ValueError, match="no products"):

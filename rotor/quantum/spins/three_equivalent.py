@@ -31,6 +31,7 @@ from rotor.tops.operators import axes_of
 
 _ZERO = 1e-12  # of the largest element: what connects less is round-off of sums that cancel
 _ROUND_OFF = 1e-13  # of coefficients, sums of products of a few numbers of size 1
+_OF_THE_AXIS = 1e-9  # of the largest element: round-off of products of eigenvectors is below
 _ALONE = Channel((), 0)
 
 
@@ -62,7 +63,10 @@ class Functions:
 
 
 def in_wang_functions(plan: Plan) -> Plan:
-    """The plan with the rotation left in Wang functions, since K is what the axis sees; its energies are operators then."""
+    """The plan with the rotation left in Wang functions, since K is what the axis sees; its energies are operators then.
+
+    Raises ValueError for a rotation without a threefold axis.
+    """
     blocks, operators = [], dict(plan.operators)
     turned = {
         pair: {c: plan.blocks[pair[0]].vectors @ x @ plan.blocks[pair[1]].vectors.T for c, x in found.items()}
@@ -70,10 +74,22 @@ def in_wang_functions(plan: Plan) -> Plan:
     }
     for number, block in enumerate(plan.blocks):
         own = (block.vectors * block.energies_mhz) @ block.vectors.T
+        _check_axis(block, own)
         found = turned.setdefault((number, number), {})
         found[_ALONE] = own + found[_ALONE] if _ALONE in found else own
         blocks.append(RotorBlock(block.n, block.parts, np.diag(own).copy(), np.eye(len(own))))
     return replace(plan, shared=replace(plan.shared, stacks=stacks_of(blocks)), blocks=blocks, operators=turned)
+
+
+def _check_axis(block: RotorBlock, matrix: Floats) -> None:
+    """ValueError where the rotation connects K with K' other than ±K + 3n."""
+    k = np.concatenate([_wang(part).k for part in block.parts])
+    apart = ((k[:, None] - k) % 3 != 0) & ((k[:, None] + k) % 3 != 0)
+    if np.abs(matrix[apart]).max(initial=0.0) > _OF_THE_AXIS * np.abs(matrix).max():
+        raise ValueError(
+            "three equivalent nuclei lie about a threefold axis, and the constants have none: expected a symmetric top about its a "
+            "or c axis, such as B = C"
+        )
 
 
 def solve_three(plan: Plan, twice_f: int, exist: Exist | None = None) -> list[SpinBlock]:
