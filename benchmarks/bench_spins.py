@@ -1,10 +1,11 @@
-"""Spectra with nuclear spins and with several states, whole processes and in memory, beside SPCAT where it is on the PATH.
+"""Spectra with nuclear spins and with several states, in memory and whole processes, beside SPCAT where it is on the PATH.
 
-    python benchmarks/bench_spins.py [--rounds 5] [--json benchmarks/results/spins.json] [--picture docs/pictures/hyperfine_methods.png]
+    python benchmarks/bench_spins.py [--rounds 7] [--json benchmarks/results/spins.json] [--picture docs/pictures/hyperfine_methods.png]
 
 Cases of SPCAT's files stand in tests/oracles: vinyl chloride with 35Cl, CH2Cl2 with two 35Cl, formamide with 14N, and two states that
-Coriolis terms couple. Four such states up to J = 30 and five nuclei (two 14N, three H with spin-rotation) up to N = 10 are made here.
-Every program is timed in each of several rounds and the best of each counts. Times of one run may be compared with each other only.
+Coriolis terms couple; the first and the third also up to F = 30. Four such states up to J = 30 and five nuclei (two 14N, three H with
+spin-rotation) up to N = 10 are made here. In each round every program runs once, one after the other; the median of the rounds
+counts. Times of one run may be compared with each other only.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import json
 import platform
 import resource
 import shutil
+import statistics
 import subprocess
 import sys
 import tempfile
@@ -36,6 +38,7 @@ from rotor.tops.top import Top
 
 ORACLES = Path(__file__).resolve().parents[1] / "tests" / "oracles"
 FILES = ("vinylcl35_quad", "ch2cl2_2quad", "formamide_quad", "two_state_coriolis")
+TO_F_30 = ("vinylcl35_quad", "formamide_quad")
 NUCLEI = (
     "chi_aa(14N_1)=-4.2 chi_bb-cc(14N_1)=0.3 chi_ab(14N_1)=1.5 chi_aa(14N_2)=1.9 chi_bb-cc(14N_2)=5.7 chi_ab(14N_2)=0.5 "
     "C_aa(1H_1)=0.01 C_bb(1H_1)=0.005 C_aa(1H_2)=0.012 C_bb(1H_2)=0.004 C_aa(1H_3)=0.009 C_cc(1H_3)=0.003 MHz"
@@ -43,14 +46,17 @@ NUCLEI = (
 METHODS = ("first-order", "N-diagonal", "exact")
 
 
-def best(run: Callable[[], Any], rounds: int) -> tuple[float, Any]:
-    """Seconds of the fastest round, and what the last one returned."""
-    seconds, found = [], None
-    for _ in range(rounds):
-        start = time.perf_counter()
-        found = run()
-        seconds.append(time.perf_counter() - start)
-    return min(seconds), found
+def timed(run: Callable[[], Any]) -> tuple[float, Any]:
+    """Seconds of a run, and what it returned."""
+    start = time.perf_counter()
+    found = run()
+    return time.perf_counter() - start, found
+
+
+def median(run: Callable[[], Any], rounds: int) -> tuple[float, Any]:
+    """The median of the seconds of some rounds, and what the last one returned."""
+    every = [timed(run) for _ in range(rounds)]
+    return statistics.median(seconds for seconds, _ in every), every[-1][1]
 
 
 def five_nuclei() -> Top:
@@ -87,46 +93,78 @@ def spectrum_of_five(nmax: int) -> Any:
     return line_list(top, jmax=nmax, temperature_k=3.0, effects=effects_of(top, True), min_lgint=-6.0)
 
 
-def whole_process(case: str) -> None:
+def write_four_states(folder: Path, jmax: int) -> None:
+    """The same four states as files four.var and four.int of SPCAT."""
+    rows = [(f"{11 * v:02d}", 150_000.0 * v) for v in range(1, 4)]
+    for v in range(4):
+        of_axes = (9000.0 + 20 * v, 3000.0 - 3 * v, 2300.0 - 2 * v)
+        rows += [(f"{axis}00{11 * v:02d}", value) for axis, value in zip("123", of_axes, strict=True)]
+    for v in range(1, 4):
+        rows += [(f"6000{v - 1}{v}", 300.0), (f"6100{v - 1}{v}", 1.0)]
+    lines = [f"{code:>13s} {value:22.15E} 1.0E-37 /x" for code, value in rows]
+    head = ["four states", f" {len(rows)} 0 0 0 0.0 1.0E+3 1.0 1.0", f"a 1 4 0 {jmax} 0 1 1 1 0 1 0"]
+    (folder / "four.var").write_text("\n".join([*head, *lines, ""]), encoding="ascii")
+    dipoles = [f" {f'{v}{v}{axis}' if v else axis} {mu}" for v in range(4) for axis, mu in ((1, 1.0), (2, 0.5))]
+    head = ["four states", f"21 99001 1.0E+05 0 {jmax} -8 -12 9999.99 300.0"]
+    (folder / "four.int").write_text("\n".join([*head, *dipoles, ""]), encoding="ascii")
+
+
+def write_to_f_30(case: str, folder: Path) -> None:
+    """The files of a case with FEND = 30 and KNMAX = 32, so that no K is left out."""
+    for suffix, line, place, value in ((".int", 1, 4, "30"), (".var", 2, 4, "32")):
+        rows = (ORACLES / case / f"{case}{suffix}").read_text(encoding="ascii").splitlines()
+        fields = rows[line].split()
+        fields[place] = value
+        rows[line] = " ".join(fields)
+        (folder / f"{case}{suffix}").write_text("\n".join([*rows, ""]), encoding="ascii")
+
+
+def whole_process(path: Path) -> None:
     with tempfile.TemporaryDirectory() as folder:
-        command = [
-            sys.executable,
-            "-m",
-            "rotor",
-            "spectrum",
-            str(ORACLES / case / f"{case}.int"),
-            "--cat",
-            f"{folder}/a.cat",
-        ]
+        command = [sys.executable, "-m", "rotor", "spectrum", str(path), "--cat", f"{folder}/a.cat"]
         subprocess.run(command, check=True, capture_output=True)
 
 
-def spcat(program: str, case: str) -> None:
+def spcat(program: str, path: Path) -> None:
     """The compiled program on a copy of the same files."""
     with tempfile.TemporaryDirectory() as folder:
         for suffix in (".int", ".var"):
-            shutil.copy(ORACLES / case / f"{case}{suffix}", folder)
-        subprocess.run([program, case], cwd=folder, check=True, capture_output=True)
+            shutil.copy(path.with_suffix(suffix), folder)
+        subprocess.run([program, path.stem], cwd=folder, check=True, capture_output=True)
+
+
+def beside_spcat(path: Path, rounds: int) -> dict[str, Any]:
+    """Median seconds of one input in memory, as a whole process, and of SPCAT, round by round."""
+    programs: dict[str, Callable[[], Any]] = {
+        "in memory": partial(predict_file, path),
+        "whole process": partial(whole_process, path),
+    }
+    if program := shutil.which("spcat"):
+        programs["SPCAT, whole process"] = partial(spcat, program, path)
+    found = predict_file(path)  # what is loaded and kept once is not part of a round
+    times: dict[str, list[float]] = {name: [] for name in programs}
+    for _ in range(rounds):
+        for name, run in programs.items():
+            times[name].append(timed(run)[0])
+    row: dict[str, Any] = {"lines": len(found.lines)} | {name: statistics.median(own) for name, own in times.items()}
+    if program:
+        row["in memory / SPCAT"] = row["in memory"] / row["SPCAT, whole process"]
+    return row
 
 
 def measure(rounds: int) -> dict[str, dict[str, Any]]:
     """Seconds by case and program."""
-    program, out = shutil.which("spcat"), {}
-    for case in FILES:
-        inside, found = best(lambda case=case: predict_file(ORACLES / case / f"{case}.int"), rounds)
-        out[case] = {
-            "lines": len(found.lines),
-            "in memory": inside,
-            "whole process": best(partial(whole_process, case), rounds)[0],
-        }
-        if program:
-            out[case]["SPCAT, whole process"] = best(partial(spcat, program, case), rounds)[0]
-    for name, run in (
-        ("four states, J <= 30", partial(four_states, 30)),
-        ("five nuclei, N <= 10", partial(spectrum_of_five, 10)),
-    ):
-        seconds, found = best(run, max(1, rounds // 2))
-        out[name] = {"lines": len(found), "in memory": seconds}
+    out = {case: beside_spcat(ORACLES / case / f"{case}.int", rounds) for case in FILES}
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        for case in TO_F_30:
+            write_to_f_30(case, folder)
+            out[f"{case}, F <= 30"] = beside_spcat(folder / f"{case}.int", rounds)
+        write_four_states(folder, 30)
+        out["four states, J <= 30"] = beside_spcat(folder / "four.int", rounds)
+    out["four states, J <= 30"]["in memory, line_list"] = median(partial(four_states, 30), rounds)[0]
+    seconds, found = median(partial(spectrum_of_five, 10), max(1, rounds // 2))
+    out["five nuclei, N <= 10"] = {"lines": len(found), "in memory": seconds}
     out["five nuclei, N <= 10"]["GB"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
     return out
 
@@ -146,7 +184,7 @@ def methods(rounds: int) -> dict[str, dict[str, tuple[float, float]]]:
         exact, _ = sorted_energies(top, nmax, "exact")
         own = {}
         for method in METHODS:
-            seconds, (found, _) = best(partial(sorted_energies, top, nmax, method), rounds)
+            seconds, (found, _) = median(partial(sorted_energies, top, nmax, method), rounds)
             own[method] = (seconds, float(np.abs(found - exact).max()))
         out[name] = own
     return out
@@ -177,7 +215,7 @@ def picture(found: dict[str, dict[str, tuple[float, float]]], path: Path) -> Non
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--rounds", type=int, default=5)
+    parser.add_argument("--rounds", type=int, default=7)
     parser.add_argument("--json", type=Path)
     parser.add_argument("--picture", type=Path)
     options = parser.parse_args()

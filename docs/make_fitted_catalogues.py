@@ -83,7 +83,8 @@ Why some cannot be lower:
 
 - **D2O** does not converge as a Watson series: built order by order the model ends at 38. With all orders open 28 effective constants
   describe the 67 lines within their errors, but terms of tenth order come before those of sixth, no constant has a physical value
-  and nothing beyond the lines is predicted by it. The library takes the levels of D2O from a table of energies instead.
+  and nothing beyond the lines is predicted by it. The same search ends at 134 in A reduction and at 108 in III^l (S). The library takes
+  the levels of D2O from a table of energies instead.
 - **HNCO** is quasilinear, and no smooth model meets these lines. With one polynomial in J(J + 1) for each ladder (Ka and parity) and no
   Hamiltonian at all (`ladders` in the script of this page) the rms is 3.36 with third powers (32 coefficients) and still 2.97 with
   eighth (54): 34(1,34) - 35(0,35) is 20 to 22 errors off in each, 0.6 MHz, and its neighbours -9 to -12. Watson's constants leave 4.30

@@ -362,7 +362,7 @@ def test_a_j_max_too_small_is_refused_and_the_one_chosen_is_enough():
         (lambda: align(OCS, GaussianPulse(1e12, 1.0), [5.0], temperature_k=-3.0), "temperature"),
         (lambda: align(OCS, GaussianPulse(1e12, 1.0), [5.0], temperature_k=3.0, state=GROUND), "not both"),
         (lambda: align(OCS, GaussianPulse(1e12, 1.0), [5.0], m=0), "belongs to one state"),
-        (lambda: align(OCS, GaussianPulse(1e12, 1.0), [5.0], state={"j": 1}, m=2), "M = 2"),
+        (lambda: align(OCS, GaussianPulse(1e12, 1.0), [5.0], state={"j": 1}, m=2), "m: 2 of J = 1"),
         (lambda: align(OCS, GaussianPulse(1e12, 1.0), [5.0], tolerance=1.0), "tolerance"),
         (lambda: align(OCS, DipolePulse(10.0, 1.0), [5.0]), "no dipole"),
         (lambda: align(OCS, GaussianPulse(1e12, 1.0), [5.0], observables=["cosine"]), "known are"),

@@ -215,10 +215,12 @@ def test_spfits_options_are_honoured_or_refused_by_name(call, folder):
         assert code == exit_code, (words, err)
         assert words in err
     (folder / "co.par").write_text(PAR.replace("  31   20", "  10   20", 1))
+    (folder / "co.lin").write_text((folder / "co.lin").read_text() + "what follows was not fitted\n")
     code, out, err = call("fit", "co.par")
     assert code == 0
     assert "NLINE = 10: 15 lines behind it do not count" in err
     assert "lines 10, of which 10 count" in out
+    write_lines(folder / "co.lin")
     tied = PAR.replace("             300", "            -300")
     (folder / "co.par").write_text(tied)
     call("fit", "co.par", "--json", "tied.json")

@@ -255,6 +255,25 @@ def test_fits_of_a_triplet_and_of_a_bent_state_come_out_as_spfit_has_them(tmp_pa
     assert len(whole) == (name == "o2")
 
 
+@pytest.mark.slow
+@pytest.mark.oracle
+def test_a_radical_with_three_protons_ends_at_spfits_minimum():
+    """Where SPFIT ends when its iterations go on: 22 parameters, total spin of two protons, ten quantum numbers, blends, ties."""
+    asked = read_fit(KINDS / "h2coh" / "fit.par", KINDS / "h2coh" / "fit.lin")
+    fit = fit_lines(asked.lines, None, asked.parameters, asked.options, model=asked.model)
+    assert fit.converged, fit.reason
+    assert fit.used.all()
+    assert fit.weighted_rms == pytest.approx(0.71369, abs=5e-6)  # five decimals are printed
+    ours, theirs = fitted_file(asked, fit, variances=True).parameters, read_par(KINDS / "h2coh" / "fit.var").parameters
+    compared = 0
+    for mine, other in zip(ours, theirs, strict=True):
+        if not other.constrained and other.error > 1e-30:
+            assert abs(mine.value - other.value) < 1e-4 * other.error  # the search ends at 1e-4
+            assert mine.error == pytest.approx(other.error, rel=1e-5)  # it changes by 3.6e-4 within 0.0044 standard errors
+            compared += 1
+    assert compared == 22
+
+
 def test_lines_of_a_file_with_spins_are_drawn_anew():
     """The bootstrap with the file's own levels; a-priori errors of 1e18 MHz are none."""
     folder = KINDS / "oc33s"

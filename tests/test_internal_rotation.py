@@ -73,6 +73,26 @@ def test_dimethyl_ether_with_the_barrier_of_another_ether(upper, lower, measured
     assert 1 / FACTOR < (e - a) / measured < FACTOR  # 1.12 to 1.18
 
 
+# methanethiol in MHz: 4(0) - 3(0) of A and E, 4(-1) - 3(-1) of E; Jones et al. (2008) as cited in ACES-CMZ/reduction_ACES on GitHub,
+# aces/data/tables/linelist.csv (commit 20a8e2c6)
+A_0, E_0, E_1 = 101139.16, 101139.65, 101029.75
+
+
+def test_lines_of_methanethiol():
+    """Two lines of the E species lie together whose A species are 1 GHz apart; the lines of K = 0 are below what the model holds."""
+    top, group = first_group("CH3SH")
+    a, e = (
+        species_levels(top.rotational_constants_mhz, group.rotor, 4, species)[:7]
+        - species_levels(top.rotational_constants_mhz, group.rotor, 3, species)
+        for species in (A_SPECIES, E_SPECIES)
+    )
+    assert 1 / FACTOR < (e[1] - e[0]) / (E_1 - E_0) < FACTOR  # 0.90
+    assert abs(a[1] - a[0]) > 5 * abs(E_1 - E_0)  # of A species: 1 GHz
+    assert abs(e[0] - a[0]) > FACTOR * (
+        E_0 - A_0
+    )  # 6.0 of 0.5: where A, B, C vary with α as much; if it holds, say so above
+
+
 def test_the_constant_a_of_propene():
     """A of the A species alone is 46290.523, of A and E with internal rotation 46280.33 MHz (NIST, Hydrocarbon Spectral Database)."""
     _, group = first_group("C3H6_Cs")

@@ -346,21 +346,50 @@ def test_a_killed_sweep_goes_on(folder):
     assert result.columns["rows"].tolist() == [(j + 1) ** 2 for j in range(20, 60)]
 
 
-HEAVY = ("rotor.fluid", "rotor.alignment", "rotor.classical", "rotor.quantum.effects.stark", "rotor.quantum.spins.blocks", "rotor.spectra",
-         "rotor.thermo.functions", "matplotlib", "ase", "rdkit", "qutip", "numba", "duckdb")  # fmt: skip
+HEAVY = ("rotor.fluid", "rotor.alignment", "rotor.fit", "rotor.structure", "rotor.classical", "rotor.classical.gas", "rotor.spectra.raman",
+         "rotor.classical.effects.drag", "rotor.classical.effects.rolling", "rotor.spectra.emission", "rotor.quantum.effects.stark",
+         "rotor.quantum.effects.zeeman", "rotor.quantum.spins.blocks", "rotor.spectra", "rotor.thermo.functions", "matplotlib", "ase",
+         "rdkit", "qutip", "numba", "duckdb", "pandas", "polars", "openmm", "dask")  # fmt: skip
 LOADED = {  # of HEAVY, what a kind has a use for
     "spectrum": {"rotor.spectra", "rotor.thermo.functions"},
     "levels": set(),
+    "raman": {"rotor.spectra", "rotor.spectra.raman"},
     "stark": {"rotor.quantum.effects.stark"},
+    "zeeman": {"rotor.quantum.effects.stark", "rotor.quantum.effects.zeeman"},
     "thermo": {"rotor.thermo.functions"},
     "tumble": {"rotor.classical", "numba"},
+    "driven": {"rotor.classical", "rotor.classical.effects.drag", "numba"},
+    "gas": {"rotor.classical", "rotor.classical.gas", "numba"},
+    "align": {"rotor.alignment", "numba"},
+    "emission": {"rotor.spectra", "rotor.spectra.emission"},
+    "fit": {"rotor.fit"},
+    "fluid": {"rotor.fluid", "rotor.classical", "rotor.classical.gas", "ase", "numba"},
 }  # fmt: skip
-MOLECULE = {"tumble": "[body]\nmoments = [1.0, 2.0, 3.0]\nangular_velocity = [1.0, 2.0, 3.0]"}
+OCS = 'molecule = "OCS"\n'
+BODY = "[body]\nmoments = [1.0, 2.0, 3.0]\nangular_velocity = [1.0, 2.0, 3.0]\n"
+OF_KIND = {
+    "raman": 'molecule = "N2"\n',
+    "zeeman": OCS + "[magnetic]\ng = [-0.02]\n[conditions]\nfield = [0.0, 1.0]\n",
+    "tumble": BODY,
+    "driven": BODY + '[[effects]]\neffect = "linear drag"\ncoefficients = [0.1, 0.1, 0.1]\n[conditions]\ntimes = "0:1:3"\n',
+    "gas": OCS + "[numerics]\nmolecules = 100\n",
+    "align": OCS + '[[pulses]]\nshape = "gaussian"\npeak = "1e11 W/cm2"\nfwhm = 0.3\n[conditions]\ntemperature = 0\npoints = 11\n',
+    "emission": '[[molecules]]\nsource = "CO"\n[conditions]\nrange = "100:120GHz"\n',
+    "fit": '[molecule]\nconstants = "B=57600 D=0.18 MHz"\n[lines]\nsource = "l.csv"\n[parameters]\nfree = ["B", "D"]\n',
+    "fluid": '[conditions]\nmolecules = 8\nsteps = 1\n[numerics]\ncutoff = "3 Å"\n',
+}  # fmt: skip
+LINES_OF_CO = (
+    "frequency_mhz,error_mhz,j_upper,j_lower\n115271.2018,0.0005,1,0\n230538.0,0.0005,2,1\n345795.9899,0.0005,3,2\n"
+)
 
 
-@pytest.mark.parametrize("kind", LOADED)
-def test_modules_of_absent_effects_are_not_imported(kind):
-    text = f'schema = 1\nkind = "{kind}"\n' + MOLECULE.get(kind, 'molecule = "OCS"\n')
+@pytest.mark.parametrize(
+    "kind", [one if one != "fluid" else pytest.param(one, marks=pytest.mark.slow) for one in LOADED]
+)
+def test_modules_of_absent_effects_are_not_imported(kind, folder):
+    """Of every kind of scene; no effect that it does not ask for is loaded."""
+    (folder / "l.csv").write_text(LINES_OF_CO)
+    text = f'schema = 1\nkind = "{"tumble" if kind == "driven" else kind}"\n' + OF_KIND.get(kind, OCS)
     code = (
         "import sys\nfrom rotor.scenes.scene_file import parse_scene\n"
         f"parse_scene({text!r}).run()\n"

@@ -17,7 +17,7 @@ from rotor.molecules.symmetry.point_group import symmetry_of
 from rotor.structure.coordinates import bonds_and_angles, moved_to, named, symmetric_displacements, symmetric_geometry
 from rotor.structure.family import family
 from rotor.structure.kraitchman import kraitchman, planar_moments
-from rotor.structure.least_squares import fit_structure
+from rotor.structure.least_squares import STUDENT, fit_structure
 from rotor.structure.substitution import substitution_structure
 from rotor.tops.top import Top
 from rotor.units import ROTATIONAL_MHZ_U_ANGSTROM2
@@ -256,6 +256,64 @@ def test_vibrational_terms_are_recovered_when_they_are_there():
     true = {one.name: one.value(water.positions_angstrom) for one in bonds_and_angles(water)}
     for value in found.values:
         assert value.value == pytest.approx(true[value.name], rel=2e-3)
+
+
+def test_the_rm_structure_of_a_diatomic_is_the_closed_form():
+    """I = μ r² + c √(μ r²) is linear in r² and c r: a straight line of I/√μ against √μ through three B_0 = B_e - α/2, α ~ μ^(-3/2)."""
+    rod = Molecule(("C", "O"), [[0, 0, 0], [0, 0, 1.1283]])
+    constants = {}
+    for name in ("", "C=13C", "O=18O"):
+        changed = rod.with_isotopes(name) if name else rod
+        equilibrium = ROTATIONAL_MHZ_U_ANGSTROM2 / Top.from_molecule(changed).moments_u_angstrom2[2]
+        constants[name] = equilibrium - 0.5 * 0.009 * equilibrium**1.5 / 57898.0**0.5
+    together = family(rod, [(name or "CO", name, {"B": b}, {}) for name, b in constants.items()])
+    mu = np.array([np.prod(one.molecule.masses_u) / one.molecule.masses_u.sum() for one in together.species])
+    moments = np.array([one.moments[1] for one in together.species])
+    slope, offset = np.linalg.lstsq(np.stack([mu, np.sqrt(mu)], axis=1), moments)[0]
+    found = fit_structure(together, "rm1")
+    assert found.values[0].value == pytest.approx(np.sqrt(slope), abs=1e-9)  # digits of the constants
+    assert found.vibrational[0].value == pytest.approx(offset / np.sqrt(slope), abs=1e-8)  # the same
+    assert found.values[0].value == pytest.approx(
+        1.12832, abs=3e-4
+    )  # r_e of CO; r_m of a diatomic leaves out higher terms
+    assert any("1 degree of freedom" in text for text in found.notes)
+    wide = fit_structure(together, "rm2")  # d has the same mass factor as c √I: no isotopologue tells them apart
+    assert set(wide.undetermined[0].names) == {"c_b", "d_b"}
+
+
+def test_the_rm2_terms_of_a_linear_molecule_come_back():
+    """Moments made with I + c √I + d (m₁ m₂ m₃/M)^(1/4): every number returns, since nothing is left to misfit."""
+    chain = Molecule(("O", "C", "S"), [[0, 0, 1.1562], [0, 0, 0], [0, 0, -1.5614]])
+    measured = []
+    for isotopes in ("", "C=13C", "S=34S", "O=18O", "S=33S", "O=17O", "C=13C,O=18O", "C=13C,S=34S"):
+        changed = chain.with_isotopes(isotopes) if isotopes else chain
+        rigid = Top.from_molecule(changed).moments_u_angstrom2[2]
+        masses = changed.masses_u
+        moment = rigid + 0.02 * np.sqrt(rigid) + 0.03 * (np.prod(masses) / masses.sum()) ** 0.25
+        measured.append((isotopes or "OCS", isotopes, {"B": ROTATIONAL_MHZ_U_ANGSTROM2 / moment}, {}))
+    found = fit_structure(family(chain, measured), "rm2")
+    lengths = sorted(one.value for one in found.values)
+    assert lengths == pytest.approx([1.1562, 1.5614], abs=1e-5)  # 1e-9 of the moments times the condition
+    assert [one.value for one in found.vibrational] == pytest.approx([0.02, 0.03], abs=2e-4)  # the same
+
+
+def test_few_degrees_of_freedom_have_the_t_of_student():
+    from scipy.special import stdtrit
+
+    for free, factor in STUDENT.items():
+        assert factor == pytest.approx(stdtrit(free, (1 + 0.682689) / 2), abs=0.005)  # two decimals
+
+
+def test_a_constant_that_the_geometry_cannot_have_is_refused():
+    rod = Molecule(("C", "O"), [[0, 0, 0], [0, 0, 1.13]])
+    for second, words in (
+        (551010.1, "13CO: B = 551010 MHz, where the geometry and the parent give about 55"),
+        (57.6, r"13CO: B = 57\.6"),
+    ):
+        with pytest.raises(ValueError, match=words):
+            family(rod, [("CO", "", {"B": 57635.968}, {}), ("13CO", "C=13C", {"B": second}, {})])
+    with pytest.raises(ValueError, match=r"CO: B = 57\.636 MHz, where the geometry gives about"):
+        family(rod, [("CO", "", {"B": 57.636}, {})])
 
 
 def test_semi_experimental_structures_use_the_corrections():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -60,13 +61,13 @@ def test_an_asymmetric_top_against_the_full_matrix(g):
     full = np.linalg.eigvalsh(rigid(basis, 6.0, 4.0, 10.0) - strength * total)
 
     top = Top.from_constants("A=10 B=6 C=4 MHz")
-    from rotor.quantum.effects.zeeman import Magnet, _problem, _space
+    from rotor.quantum.effects.zeeman import _moment, _problem, _space
 
     ours = []
     space = _space(top, g, (), 3)
     for m in range(-3, 4):
         for block in space.blocks(m):
-            problem = _problem(Magnet(g, {}), None, block)
+            problem = _problem(partial(_moment, g), None, block)
             matrix = problem.fixed + strength / NUCLEAR_MAGNETON_MHZ_PER_T * problem.slope
             ours += np.repeat(np.linalg.eigvalsh(matrix), block.copies).tolist()
     assert np.sort(ours) == pytest.approx(full, abs=1e-6)  # QuTiP's alternating sums

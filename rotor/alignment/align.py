@@ -120,8 +120,10 @@ class AlignmentTrace(Table):
 
 
 def truncation_apart(trace: AlignmentTrace) -> float:
-    """The error of the cosines by steps and by populations left out, without that of the truncated basis."""
-    return trace.step_error * 16 / 15 + trace.ensemble.left_out * trace.moved
+    """The error of the cosines by steps, by populations left out and by rounded phases, without that of the truncated basis."""
+    farthest = RAD_PER_PS_MHZ * float(np.abs(trace.levels.energy_mhz).max()) * float(np.abs(trace.t_ps).max())
+    rounded = float(np.finfo(np.float64).eps) * farthest
+    return trace.step_error * 16 / 15 + (trace.ensemble.left_out + rounded) * trace.moved
 
 
 def align(
@@ -242,7 +244,7 @@ def _ensemble(
             raise ValueError("give a temperature or a state, not both")
         return one_level(top, state, m)
     if m is not None:
-        raise ValueError(f"M = {m} belongs to one state: give the state too")
+        raise ValueError(f"m: {m} belongs to one state: give the state too")
     return thermal(top, temperature_k, tolerance) if temperature_k else ground_level(top)
 
 

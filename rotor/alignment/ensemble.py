@@ -69,13 +69,13 @@ def one_level(top: Top, state: Mapping[str, int], m: int | None = None) -> Ensem
 
     j = int(state.get("j", -1))
     if not 0 <= j <= MOST_J:
-        raise ValueError(f"state {dict(state)}: J from 0 to {MOST_J} is expected among its quantum numbers")
+        raise ValueError(f"state: {dict(state)}: expected J from 0 to {MOST_J} among its quantum numbers")
     levels = solve_levels(one_state(top, "alignment"), j)
     row = levels.find(**dict(state))
     if levels.weight[row] == 0:
-        raise ValueError(f"state {dict(state)}: its nuclear-spin weight is 0, so that it does not exist")
+        raise ValueError(f"state: {dict(state)}: its nuclear-spin weight is 0, so that it does not exist")
     if m is not None and not 0 <= m <= j:
-        raise ValueError(f"M = {m} of J = {j}: from 0 to J is expected (M and -M are alike)")
+        raise ValueError(f"m: {m} of J = {j}: expected 0 to J (M and -M are alike)")
     return Ensemble(0.0, float(levels.energy_mhz[row]), 1.0, 0.0, 0.0, j, dict(state), m)
 
 

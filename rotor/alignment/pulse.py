@@ -306,6 +306,10 @@ class DipolePulse(Pulse):
             raise ValueError(
                 f"field {self.peak_kv_per_cm:g} kV/cm: a number up to {HIGHEST_KV_PER_CM:g} kV/cm is expected; check the unit"
             )
+        if not (math.isfinite(self.frequency_thz) and self.frequency_thz >= 0.0):
+            raise ValueError(
+                f"frequency {self.frequency_thz:g} THz: expected a finite number of 0 or more; the phase turns the field round"
+            )
         checked_duration(self.fwhm_ps, "width of a pulse")
         _checked_time(self.centre_ps)
         axis = polarization(self.axis)

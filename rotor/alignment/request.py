@@ -18,12 +18,14 @@ from rotor.quantum.effects.of_top import effects_of
 from rotor.quantum.estimates.limits import limit_facts
 from rotor.table import Table, TextOf
 from rotor.tops.facts import top_facts
+from rotor.units import MOST_POINTS
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
 
 LONGEST_PS = 100.0  # after the pulses, of a top without revivals, where no last time is given
 DEFAULT_POINTS = 2001
+FARTHEST_PS = 1e9  # a phase of 2π 1 THz times it has an error of 1e-6
 
 
 @dataclass(frozen=True)
@@ -55,7 +57,7 @@ class AlignRequest:
             raise ValueError("no pulse: give at least one")
         if not (np.isfinite(self.temperature_k) and self.temperature_k >= 0):
             raise ValueError(f"temperature_k: {self.temperature_k}: expected a finite number of 0 or more")
-        require_whole("points", self.points, 2)
+        require_whole("points", self.points, 2, MOST_POINTS)
         require_whole("jmax", self.jmax, 2)
         require_whole("classical_molecules", self.classical_molecules, 0)
         require_whole("seed", self.seed, 0)
@@ -63,6 +65,12 @@ class AlignRequest:
         for pulse in self.pulses:
             acted_on(self.top, pulse.acts_on)
         first, last = self.ends_ps
+        for name, time in (("from_ps", first), ("until_ps", last)):
+            if not abs(time) <= FARTHEST_PS:
+                raise ValueError(
+                    f"{name}: {time:g} ps: expected a time within {FARTHEST_PS:g} ps; farther away the phases of double precision mean "
+                    "nothing"
+                )
         if not first < last:
             raise ValueError(f"until_ps: {last:g} ps is not after the first time, {first:g} ps")
         end = max(pulse.window_ps[1] for pulse in self.pulses)

@@ -45,6 +45,7 @@ Examples:
 NAMES = {
     "temperature_k": "--temperature", "from_ps": "--from", "until_ps": "--until", "points": "--points", "jmax": "--jmax",
     "classical_molecules": "--classical", "seed": "--seed", "tolerance": "--tolerance",
+    "state": "--state", "m": "--m",
 }  # fmt: skip  # field of the request -> option
 
 

@@ -245,7 +245,7 @@ def _coordinates_table(found: SubstitutionStructure) -> Table:
     rows = []
     for one in found.atoms:
         cells = [
-            f"i·{math.sqrt(-square):.4f}" if square < 0 else f"{value:.5f}({round(error * 1e5)})"
+            f"i·{math.sqrt(-square):.4f}" if square < 0 else f"{round(value, 5) + 0.0:.5f}({round(error * 1e5)})"
             for value, square, error in zip(
                 one.coordinates_angstrom.tolist(),
                 one.found.squares_angstrom2.tolist(),

@@ -8,7 +8,7 @@ import re
 from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import Executor
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -44,7 +44,7 @@ class Kind:
     request: of a scene in a folder; checks everything that can be checked beforehand. answer: of a request, for a scene with
     files that grow in a folder. table: of an answer. writers: by the name of an output, what writes it, besides csv, parquet
     and json, which the table itself becomes. grows: outputs that the answer itself writes. saved: the scene that a request is
-    the answer to, its molecule given.
+    the answer to, its molecule given. names: keys of the scene by the fields of the request, for errors.
     """
 
     request: Callable[[Any, Where], Any]
@@ -53,6 +53,7 @@ class Kind:
     saved: Callable[[Any, MoleculeSection | None], Scene]
     writers: Callable[[Any, Any], Mapping[str, Writer]] = _no_writers
     grows: frozenset[str] = frozenset()
+    names: Mapping[str, str] = field(default_factory=dict)
 
 
 def kind_of(scene: Scene) -> Kind:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from rotor.scenes import left_out
 from rotor.scenes.choice import Choice
-from rotor.scenes.kind import kind_of
+from rotor.scenes.kind import fields, kind_of
 from rotor.scenes.plan_parts import (
     LONG_SEARCH,
     Plan,
@@ -67,7 +67,13 @@ def plan_of(scene: Scene, folder: str | os.PathLike[str] = ".") -> Plan:
     """
     if scene.sweep:
         raise ValueError("sweep: a plan is of one point; plan the scene without its sweep")
-    request = kind_of(scene).request(scene, folder)
+    kind = kind_of(scene)
+    request = kind.request(scene, folder)
+    with fields(**kind.names):
+        return _plan(scene, request)
+
+
+def _plan(scene: Scene, request: Any) -> Plan:
     if getattr(scene, "accuracy", None) is None:
         return _PLANS[scene.kind](request)
     if hasattr(request, "tolerance") and scene.kind == "tumble":
@@ -81,7 +87,51 @@ def plan_of(scene: Scene, folder: str | os.PathLike[str] = ".") -> Plan:
     plan, parts = _PLANS[scene.kind](found[-1].request), [("accuracy", found[-1].how)]
     if scene.kind in OF_LEVELS:
         parts.append(("orders of distortion", "all that the constants have: fewer save milliseconds at the most"))
+        parts.append(("rounding", f"{_checked_rounding(scene, found[-1].request):.1e} MHz of the highest energy"))
     return replace(plan, parts=(*plan.parts, *parts), seconds=plan.seconds + search)
+
+
+def _checked_rounding(scene: Scene, request: Any) -> float:
+    """Rounding of the rotational energies of the highest J in MHz; ValueError where it is clearly more than the accuracy asked for.
+
+    A run leaves out levels beyond the reach of the distortion constants, so that its rounding may be a little less.
+    """
+    from rotor.quantum.request import LevelsRequest, answer_levels
+    from rotor.scenes.accuracy import ROUNDING, asked_of
+
+    j, asked = _highest_j(scene.kind, request), asked_of(scene)
+    assert asked is not None
+    levels = answer_levels(LevelsRequest(request.top, jmin=j, jmax=j)).table.levels
+    rounding = ROUNDING * float(abs(levels.energy_mhz).max(initial=0.0))
+    if rounding > 2.0 * asked:
+        raise ValueError(
+            f"accuracy: {asked:g} MHz cannot be given: rounding of energies at J = {j} is {rounding:.2g} MHz"
+        )
+    return rounding
+
+
+def _highest_j(kind: str, request: Any) -> int:
+    if kind == "levels":
+        return int(request.jmax)
+    if kind == "spectrum":
+        return _jmax_of_spectrum(request)[0]
+    from rotor.spectra.raman_request import answer_raman
+
+    return int(answer_raman(request).lines.jmax)
+
+
+def _jmax_of_spectrum(request: Any) -> tuple[int, str]:
+    """J max of a list of lines, and why."""
+    from rotor.spectra.intensity import jmax_for_cut
+    from rotor.thermo import partition_function
+
+    if request.jmax is not None:
+        return request.jmax, "given"
+    top, kelvin = request.top, request.temperature_k
+    cut = -math.inf if request.min_lgint is None else request.min_lgint
+    q = request.q or partition_function(top, kelvin).q
+    dipole = top.dipole_abc_debye or (0.0, 0.0, 0.0)
+    return jmax_for_cut(top, dipole, kelvin, q * request.vibrational_factor, cut), "what the cut needs"
 
 
 def allowed_lines(top: Top, jmax: int) -> int:
@@ -124,25 +174,18 @@ def _flipped(species: str, flip: tuple[bool, bool]) -> str:
 
 def _spectrum(request: Any) -> Plan:
     from rotor.quantum.estimates.limits import populated_j
-    from rotor.spectra.intensity import jmax_for_cut
     from rotor.spectra.request import answer_spectrum
-    from rotor.thermo import partition_function
 
     top, kelvin = request.top, request.temperature_k
-    cut = -math.inf if request.min_lgint is None else request.min_lgint
-    dipole = top.dipole_abc_debye or (0.0, 0.0, 0.0)
-    jmax, why = request.jmax, "given"
-    if jmax is None:
-        q = request.q or partition_function(top, kelvin).q
-        jmax, why = jmax_for_cut(top, dipole, kelvin, q * request.vibrational_factor, cut), "what the cut needs"
+    jmax, why = _jmax_of_spectrum(request)
     j = min(populated_j(top, kelvin), max(jmax, 1))
-    lines = allowed_lines(top, jmax)
     sizes, growing = (max(SHORT_J[0], jmax // 3), max(SHORT_J[1], jmax // 2)), 1 if top.kind == "linear" else 2
 
     def short(j: int) -> Any:
         return answer_spectrum(replace(request, jmax=j))
 
     seconds = extrapolated(short, lambda j: (j + 1.0) ** (3 if top.kind == "asymmetric" else 1), sizes, jmax)
+    lines = allowed_lines(top, jmax)  # after the calibration, which refuses a J that no list has
     _, b, c = top.rotational_constants_mhz
     absent = left_out.of_levels(top, j, request.effects)
     pressure = request.layer.pressure_bar if request.layer else MILLIBAR

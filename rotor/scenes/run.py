@@ -10,7 +10,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rotor.scenes.kind import Kind, Writer, kind_of
+from rotor.scenes.kind import Kind, Writer, fields, kind_of
 from rotor.scenes.scene import Scene, SceneResult, within
 
 if TYPE_CHECKING:
@@ -70,7 +70,8 @@ def run_scene(
     if getattr(scene, "accuracy", None) is not None:
         from rotor.scenes.accuracy import chosen
 
-        choice = chosen(scene, request)
+        with fields(**kind.names):
+            choice = chosen(scene, request)
         request = choice.request
     answer = kind.answer(request, scene, out, executor)
     seconds = time.perf_counter() - start

@@ -11,7 +11,7 @@ import math
 import os
 import re
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, get_args, get_type_hints
 
@@ -19,6 +19,10 @@ import msgspec
 
 from rotor.scenes.scene import KINDS, SCHEMA, AnyScene, Scene
 
+_TYPES = {
+    "int": "a whole number", "float": "a number", "str": "a text", "bool": "true or false", "array": "a list", "object": "a table",
+    "null": "nothing",
+}  # fmt: skip  # of msgspec, in words
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 
 
@@ -58,7 +62,7 @@ def scene_of(content: Mapping[str, Any], where: str = "scene") -> Scene:
     """
     kind = _kind_of(content, where)
     rest = {key: value for key, value in content.items() if key != "kind"}
-    _refuse_unknown_keys(rest, kind, where, "")
+    _refuse_unknown_keys(rest, kind, where, "", kind.__struct_fields__)
     try:
         found: Scene = msgspec.convert(content, kind)
     except msgspec.ValidationError as error:
@@ -77,17 +81,34 @@ def _kind_of(content: Mapping[str, Any], where: str) -> type[Scene]:
     return KINDS[kind]
 
 
-def _refuse_unknown_keys(content: Mapping[str, Any], kind: Any, where: str, place: str) -> None:
+def _refuse_unknown_keys(
+    content: Mapping[str, Any], kind: Any, where: str, place: str, outermost: Sequence[str]
+) -> None:
+    """Refuse keys that a table of a scene has not; outermost: those of the scene itself, which stand before its first table."""
     hints = get_type_hints(kind)
     for key, value in content.items():
         if kind.__struct_config__.tag_field == key:
             continue
         if key not in kind.__struct_fields__:
             of = f"[{place}]" if place else "a scene of this kind"
-            raise ValueError(f"{where}: {of} has no key {key!r}{_nearest(key, kind.__struct_fields__)}")
+            belongs = place and key in outermost and not isinstance(value, Mapping)
+            near = "; it stands before the first table" if belongs else _nearest(key, kind.__struct_fields__)
+            raise ValueError(f"{where}: {of} has no key {key!r}{near}")
         inside = f"{place}.{key}" if place else key
+        _refuse_unknown_tags(hints[key], value, where, inside)
         for one, item in _tables_in(hints[key], value):
-            _refuse_unknown_keys(item, one, where, inside)
+            _refuse_unknown_keys(item, one, where, inside, outermost)
+
+
+def _refuse_unknown_tags(hint: Any, value: Any, where: str, place: str) -> None:
+    """Refuse an effect or a shape of a pulse that there is not, with the nearest."""
+    known = {one.__struct_config__.tag: one.__struct_config__.tag_field for one in structures_in(hint)}
+    for number, item in enumerate(value if isinstance(value, list) else ()):
+        for word in {word for word in known.values() if word is not None and isinstance(item, Mapping)}:
+            if isinstance(item.get(word), str) and item[word] not in known:
+                raise ValueError(
+                    f"{where}: {place}[{number}].{word}: {item[word]!r} is none{_nearest(item[word], known)}"
+                )
 
 
 def _tables_in(hint: Any, value: Any) -> list[tuple[Any, Mapping[str, Any]]]:
@@ -121,10 +142,22 @@ def _said(error: msgspec.ValidationError) -> str:
     """The words of msgspec with the key first: "Expected `int`, got `str` - at `$.numerics.jmax`"."""
     text = str(error)
     found = re.fullmatch(r"(.*) - at `\$\.?(.*)`", text)
-    return f"{found[2]}: {_lower(found[1])}" if found else _lower(text)
+    return f"{found[2]}: {_plain(found[1])}" if found else _plain(text)
 
 
-def _lower(text: str) -> str:
+def _plain(text: str) -> str:
+    """What msgspec says, with the words of a scene file: "Expected `int | null`, got `str`" is "expected a whole number, found a text".
+
+    >>> _plain("Object missing required field `pulses`")
+    "the key 'pulses' is missing"
+    """
+    if missing := re.fullmatch(r"Object missing required field `(.*)`", text):
+        return f"the key {missing[1]!r} is missing"
+    if types := re.fullmatch(r"Expected `(.*)`, got `(.*)`", text):
+        allowed = [_TYPES.get(one, one) for one in types[1].split(" | ") if one != "null"]
+        decimal = types[2] == "float" and "float" not in types[1]
+        found = "a number with a decimal point" if decimal else _TYPES.get(types[2], types[2])
+        return f"expected {' or '.join(allowed)}, found {found}"
     return text[:1].lower() + text[1:].replace("`", "")
 
 

@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import Executor, as_completed
 from copy import deepcopy
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,8 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from rotor.scenes.kind import kind_of
+from rotor.scenes.molecule import named
 from rotor.scenes.run import SUFFIXES, output_paths, run_scene
 from rotor.scenes.scene import Scene
 from rotor.scenes.scene_file import parse_scene, scene_of, scene_text
@@ -178,6 +181,8 @@ def run_sweep(
     every = points(scene)
     done = _read_record(record)
     missing = [point for point in every if not _is_done(done.get(point.key))]
+    for point in missing:
+        named(f"sweep {_text(point.values)}", partial(kind_of(point.scene).request, point.scene, folder))
     arguments = [(scene_text(point.scene), dict(point.values), os.fspath(folder), os.fspath(out)) for point in missing]
     for made in _computed(arguments, executor):
         done[made["key"]] = made

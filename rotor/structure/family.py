@@ -187,7 +187,7 @@ def _refuse_far(found: Sequence[Species]) -> None:
                 rigid = one.constants_mhz[name] / ratio * expected
                 raise ValueError(
                     f"{one.name}: {name} = {one.constants_mhz[name]:g} MHz, where the geometry"
-                    f"{'' if one is found[0] else ' and the parent'} give about {rigid:.6g}; check digits, unit and isotopes"
+                    f"{' gives' if one is found[0] else ' and the parent give'} about {rigid:.6g}; check digits, unit and isotopes"
                 )
 
 

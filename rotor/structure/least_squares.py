@@ -31,6 +31,11 @@ from rotor.tops.top import Top
 
 METHODS = ("r0", "rm1", "rm2", "re")
 WEIGHTS = ("equal", "errors")
+STUDENT = {
+    1: 1.84,
+    2: 1.32,
+    3: 1.20,
+}  # |t| of 68.27 % by degrees of freedom: what a standard error from so few is worth
 _FAR = 0.5  # Å that no atom may move in one step
 
 
@@ -120,7 +125,7 @@ def fit_structure(
         raise ValueError(
             f"{family.name}: {count} unknowns for {len(problem.observed)} moments; hold coordinates or add isotopologues"
         )
-    minimum = minimise(problem.evaluate, np.zeros(count), tolerance=1e-6, most_iterations=200)
+    minimum = minimise(problem.evaluate, np.zeros(count), tolerance=1e-9, most_iterations=200)
     return _result(problem, minimum)
 
 
@@ -371,7 +376,7 @@ def _result(problem: _Problem, minimum: Minimum) -> FittedStructure:
         condition=linear.condition,
         undetermined=linear.undetermined,
         minimum=minimum,
-        notes=_notes(problem, linear.condition),
+        notes=_notes(problem, linear.condition, free),
     )
 
 
@@ -397,8 +402,13 @@ def _in_parent_frame(family: Family, x: Floats) -> Molecule:
     return Molecule(family.molecule.symbols, places, family.molecule.mass_numbers, name=family.name)
 
 
-def _notes(problem: _Problem, condition: float) -> tuple[str, ...]:
+def _notes(problem: _Problem, condition: float, free: int) -> tuple[str, ...]:
     notes = []
+    if free in STUDENT:
+        notes.append(
+            f"errors from the scatter of {free} degree{'s' if free > 1 else ''} of freedom: for 68 % confidence they count "
+            f"{STUDENT[free]} times (Student's t)"
+        )
     if len(problem.observed) == problem.count:
         notes.append("as many unknowns as moments: nothing is left to judge the fit by, and no errors follow")
     if condition > 1e4:

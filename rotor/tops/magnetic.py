@@ -65,6 +65,8 @@ def tensor_for(kind: str, numbers: Sequence[float]) -> Tensor:
     >>> tensor_for("linear", [-0.03])
     ((0.0, 0.0, 0.0), (0.0, -0.03, 0.0), (0.0, 0.0, -0.03))
     """
+    if not np.isfinite(numbers).all():
+        raise ValueError(f"{', '.join(f'{x:g}' for x in numbers)}: expected finite numbers")
     if len(numbers) == 1 and kind == "linear":
         return tensor_of([0.0, numbers[0], numbers[0]])
     if len(numbers) == 1 and kind == "spherical":

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor import units
-from rotor.arrays import Floats, Indices, Ints
+from rotor.arrays import Floats, Indices, Ints, rising_order
 from rotor.formats.spcat.file_model import Group
 from rotor.formats.spcat.states import is_odd
 from rotor.formats.spcat.text.catalogue import Catalogue, catalogue_of
@@ -237,7 +237,7 @@ def transitions_of(group: Group, levels: Levels, request: Request, q: float) -> 
         exists &= share_a_weight(group, levels, found.upper, found.lower)
     else:
         exists &= equally_weighted(levels, found.upper, found.lower)
-    order = np.argsort(found.frequency_mhz, kind="stable")  # what is in order is put in order quickly later on
+    order = rising_order(found.frequency_mhz)  # what is in order is put in order quickly later on
     rows = order if exists.all() else order[exists[order]]
     return Transitions(*(getattr(found, name)[rows] for name in ("frequency_mhz", "strength_debye2", "upper", "lower")))
 
@@ -408,11 +408,11 @@ def as_catalogue(lines: list[tuple[GroupLines, int]], form: Format, tag: int, dr
     """
     joined = {name: np.concatenate([getattr(each, name) for each, _ in lines]) for name in _COLUMNS}
     qnfmt = np.concatenate([np.full(len(each.frequency_mhz), code) for each, code in lines])
-    order = np.argsort(joined["frequency_mhz"], kind="stable")
+    order = _rising(joined["frequency_mhz"])
     width = max(6, form.width)
     quanta = {}
     for name in ("upper", "lower"):
-        table = np.full((len(order), width), BLANK, dtype=np.int16)
+        table = np.full((len(qnfmt), width), BLANK, dtype=np.int16)
         table[:, : form.width] = joined[name][order]
         quanta[name] = table
     with np.errstate(divide="ignore"):
@@ -425,6 +425,13 @@ def as_catalogue(lines: list[tuple[GroupLines, int]], form: Format, tag: int, dr
         "g_upper": joined["g_upper"][order],
     }
     return catalogue_of(numbers, quanta["upper"], quanta["lower"], qnfmt[order].astype(np.int32), tag, linear=dr == 2)
+
+
+def _rising(frequency_mhz: Floats) -> Ints | slice:
+    """What puts frequencies in order, those that are equal as they stand."""
+    if (frequency_mhz[1:] >= frequency_mhz[:-1]).all():
+        return slice(None)
+    return rising_order(frequency_mhz)
 
 
 def as_level_list(solved: list[tuple[Group, Levels]], form: Format) -> LevelList:

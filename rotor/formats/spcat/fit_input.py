@@ -73,7 +73,7 @@ def read_fit(par: str | os.PathLike[str], lin: str | os.PathLike[str] | None = N
         names = _quanta_names(file)
     except ValueError as error:
         raise ValueError(f"{par}: {error}") from None
-    lines = read_lin(beside, len(names))
+    lines = read_lin(beside, len(names), abs(file.header.nline))
     try:
         return spfit_input(file, lines, Path(beside).name)
     except ValueError as error:

@@ -200,7 +200,7 @@ def _lines(
         given_partition=PartitionFunction(t, q * above, None, math.nan, "given"),
     )
     chosen = within(request, lines.frequency_mhz, lines.intensity_nm2_mhz / levels.components[lines.lower])
-    return lines.where(chosen).sorted()
+    return (lines if chosen.all() else lines.where(chosen)).sorted()
 
 
 def _joined(tables: list[tuple[Group, Levels]], form: Format) -> Levels:

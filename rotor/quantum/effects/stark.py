@@ -279,7 +279,7 @@ def checked_direction(direction: Sequence[float]) -> tuple[float, float, float]:
 def checked_j(j_highest: int) -> int:
     """A J from 0 to 100, or ValueError."""
     if not 0 <= j_highest <= 100:
-        raise ValueError(f"states up to J = {j_highest}: a whole number from 0 to 100 is expected")
+        raise ValueError(f"j_highest: states up to J = {j_highest}: expected a whole number from 0 to 100")
     return int(j_highest)
 
 
@@ -288,7 +288,7 @@ def checked_m(m_values: Sequence[float] | None, j_highest: int) -> tuple[int, ..
     values = tuple(range(j_highest + 1)) if m_values is None else tuple(sorted({int(m) for m in m_values}))
     if not values or not all(0 <= m <= j_highest for m in values) or any(m % 1 for m in m_values or ()):
         raise ValueError(
-            f"M of {list(m_values or ())}: whole numbers from 0 to J = {j_highest} are expected (M and -M coincide)"
+            f"m_values: {list(m_values or ())}: expected whole numbers from 0 to J = {j_highest} (M and -M coincide)"
         )
     return values
 
@@ -300,7 +300,7 @@ def acting(
     name = top.name or "this top"
     if not 0 <= intensity_w_per_cm2 <= HIGHEST_W_PER_CM2:
         raise ValueError(
-            f"intensity {intensity_w_per_cm2:g} W/cm²: a number from 0 to {HIGHEST_W_PER_CM2:g} is expected"
+            f"intensity_w_per_cm2: {intensity_w_per_cm2:g} W/cm²: expected a number from 0 to {HIGHEST_W_PER_CM2:g}"
         )
     if top.kind == "spherical":
         raise ValueError(

@@ -18,7 +18,7 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
 from functools import cached_property, partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -37,7 +37,6 @@ from rotor.quantum.fields.map_request import (
     checked_tolerance_mhz,
 )
 from rotor.quantum.fields.space import axial_levels
-from rotor.quantum.fields.spin_fields import Magnet, SpinFieldBlock, spin_field_space
 from rotor.quantum.fields.wang_blocks import WangBlockInField, WangSpace, coloured_components, wang_space
 from rotor.quantum.reduced import wang_amplitudes
 from rotor.quantum.tensors import BodyTensor, body_tensor
@@ -45,9 +44,11 @@ from rotor.quantum.wang.j_operators import between_blocks, components
 from rotor.units import AVOGADRO_PER_MOL, NUCLEAR_MAGNETON_MHZ_PER_T, PLANCK_J_S
 
 if TYPE_CHECKING:
+    from rotor.quantum.fields.spin_fields import Magnet, SpinFieldBlock
     from rotor.quantum.levels import SolvedBlock
     from rotor.tops.top import Top
 
+Moment = Callable[[FieldBlock], Floats]  # magnetic moment along Z in the states of a block
 HIGHEST_TESLA = 1000.0
 DEFAULT_TOLERANCE_MHZ = 1e-6
 MHZ_PER_T2 = 1e-11 / (AVOGADRO_PER_MOL * PLANCK_J_S)  # of 1e-6 erg/(G² mol), which is 1e-5 J/(T² mol)
@@ -116,17 +117,21 @@ def zeeman_map(
     if nuclei and not effects:
         raise ValueError("nuclear_g: give the effects that have these spins too")
     square = None if magnetisability is None else Contraction(_axial_tensor(top, magnetisability, "χ"), np.outer(Z, Z))
-    magnet = Magnet(tensor, nuclei)
     contractions = () if square is None else (square,)
     space: Callable[[int], FieldSpace] = partial(_space, top, tensor, contractions)
+    moment: Moment = partial(_moment, tensor)
     m_values = tuple(range(-j_highest, j_highest + 1))
     if effects:
+        from rotor.quantum.fields.spin_fields import Magnet, spin_field_space
+
+        magnet = Magnet(tensor, nuclei)
         space = partial(spin_field_space, top, effects=tuple(effects), contractions=contractions, magnet=magnet)
+        moment = partial(_moment_with_spins, magnet)
         positive = doubled_m(top, effects, None, j_highest)
         m_values = tuple(sorted({*positive, *(-m for m in positive)}))
     request = MapRequest(
         space=KnownSpaces(space),
-        problem=partial(_problem, magnet, square),
+        problem=partial(_problem, moment, square),
         fields=checked_fields(fields_tesla, "T", HIGHEST_TESLA),
         j_highest=j_highest,
         m_values=m_values,
@@ -212,13 +217,18 @@ def _space(top: Top, g: Floats, contractions: tuple[Contraction, ...], jmax: int
     return _MagneticSpace(free.levels, jmax, free, g)
 
 
-def _problem(magnet: Magnet, square: Contraction | None, block: FieldBlock) -> BlockProblem:
-    if isinstance(block, SpinFieldBlock):
-        moment = block.moment(magnet)
-    else:
-        moment = axial_moment(block, magnet.g) if isinstance(block, AxialBlock) else _wang_moment(block, magnet.g)
+def _problem(moment: Moment, square: Contraction | None, block: FieldBlock) -> BlockProblem:
     curvature = None if square is None else -0.5 * MHZ_PER_T2 * block.dense(square)
-    return BlockProblem(np.diag(block.energies_mhz), -NUCLEAR_MAGNETON_MHZ_PER_T * moment, {}, curvature)
+    return BlockProblem(np.diag(block.energies_mhz), -NUCLEAR_MAGNETON_MHZ_PER_T * moment(block), {}, curvature)
+
+
+def _moment(g: Floats, block: FieldBlock) -> Floats:
+    """That of the rotation, in nuclear magnetons (n, n)."""
+    return axial_moment(block, g) if isinstance(block, AxialBlock) else _wang_moment(block, g)
+
+
+def _moment_with_spins(magnet: Magnet, block: FieldBlock) -> Floats:
+    return cast("SpinFieldBlock", block).moment(magnet)
 
 
 def axial_moment(block: AxialBlock, g: Floats) -> Floats:

@@ -159,7 +159,10 @@ def _of_constants(top: Top, j: int) -> list[Limit]:
     if rigid and top.kind != "spherical":
         vibration_cm = VIBRATION_CM * (b / units.MHZ_PER_CM) ** VIBRATION_POWER
         d = 4 * b**3 / (vibration_cm * units.MHZ_PER_CM) ** 2
-        text = f"the constants are rigid; as with a vibration of {vibration_cm:.2g} cm-1 a line of J = {j}, K = 0 is lower by so much"
+        text = (
+            f"the constants are rigid; as with a vibration of {_rounded(vibration_cm, 2)} cm-1 a line of J = {j}, K = 0 is "
+            "lower by so much"
+        )
         found.append(Limit("centrifugal distortion", 4 * d * (j + 1) ** 3, text))
     return found
 
@@ -170,8 +173,16 @@ def _zero_point(molecule: Molecule, line_mhz: float) -> list[Limit]:
     from rotor.quantum.estimates.zero_point import relative_difference
 
     relative = relative_difference(molecule, bonded_atoms(molecule))
-    text = f"A, B, C of an equilibrium geometry are about {100 * relative:.1g} % off those of the ground state; not of r0, rs or rz"
+    percent = _rounded(100 * relative, 1)
+    text = (
+        f"A, B, C of an equilibrium geometry are about {percent} % off those of the ground state; not of r0, rs or rz"
+    )
     return [Limit(ZERO_POINT, relative * line_mhz, text)] if relative else []
+
+
+def _rounded(value: float, digits: int) -> str:
+    """To so many digits, without an exponent where that is short."""
+    return f"{float(f'{value:.{digits}g}'):g}"
 
 
 def _largest(top: Top) -> float:
@@ -264,7 +275,7 @@ def _rotor_text(top: Top, what: str, group: MethylGroup, shifts: LineShifts, j: 
     (first, size), (second, other) = sizes
     return size, (
         f"{what} against the rest: half of the A and E lines of J = {j} {first} are farther apart, {second} than "
-        f"{other:.1g} MHz; barrier {source}{unsafe}{low}"
+        f"{_rounded(other, 1)} MHz; barrier {source}{unsafe}{low}"
     )
 
 

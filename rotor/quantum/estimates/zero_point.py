@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 
 F_HYDROGEN, F_OTHER = 1.2, 2.2
 LARGE = 60  # atoms above which the mean over bonds without hydrogen is taken
+MANY_BONDS = 1000  # of a large molecule that are looked at, evenly
 _STEP = 1e-3  # of the displacement, for its derivative
 
 
@@ -58,12 +59,13 @@ def relative_difference(molecule: Molecule, bonds: Sequence[Ints]) -> float:
     >>> f"{relative_difference(water, [np.array([1, 2]), np.array([0]), np.array([0])]):.4f}"  # measured 0.018
     '0.0181'
     """
-    longer = _elongations(molecule, bonds)
-    if not longer:
+    pairs = [(i, k) for i, near in enumerate(bonds) for k in near.tolist() if i < k]
+    if not pairs:
         return 0.0
     if len(molecule.symbols) > LARGE:
-        heavy = [e for (i, k), e in longer.items() if "H" not in (molecule.symbols[i], molecule.symbols[k])]
-        return 2 * float(np.mean(heavy or list(longer.values())))
+        heavy = [one for one in pairs if "H" not in (molecule.symbols[one[0]], molecule.symbols[one[1]])] or pairs
+        return 2 * float(np.mean(list(_elongations(molecule, heavy[:: 1 + len(heavy) // MANY_BONDS]).values())))
+    longer = _elongations(molecule, pairs)
     x, mass = molecule.positions_angstrom, molecule.masses_u
     moved = x + _STEP * _displacement(x, bonds, longer)
     before, after = (principal_frame(point_masses(mass, one)).moments for one in (x, moved))
@@ -71,11 +73,10 @@ def relative_difference(molecule: Molecule, bonds: Sequence[Ints]) -> float:
     return float(np.sqrt(np.mean(((after[turning] / before[turning] - 1) / _STEP) ** 2)))
 
 
-def _elongations(molecule: Molecule, bonds: Sequence[Ints]) -> dict[tuple[int, int], float]:
-    """δr/r of each bond, by its atoms in rising order."""
+def _elongations(molecule: Molecule, pairs: Sequence[tuple[int, int]]) -> dict[tuple[int, int], float]:
+    """δr/r of bonds, by their atoms in rising order."""
     x, mass = molecule.positions_angstrom, molecule.masses_u
     charges = np.array([float(one.element_number) for one in molecule.nuclei])
-    pairs = [(i, k) for i, near in enumerate(bonds) for k in near.tolist() if i < k]
     return {
         (i, k): relative_elongation(charges[[i, k]], mass[[i, k]], float(np.linalg.norm(x[i] - x[k]))) for i, k in pairs
     }

@@ -76,6 +76,9 @@ class KnownSpaces:
         return KnownSpaces, (self._make,)
 
 
+FIELDS = {"kV/cm": "fields_kv_per_cm", "T": "fields_tesla"}  # of requests, by their unit
+
+
 def checked_fields(fields: Any, unit: str, highest: float) -> Floats:
     """Fields (n,) that rise, finite and within ±`highest`; ValueError where they are not."""
     values = np.unique(np.atleast_1d(np.asarray(fields, dtype=np.float64)))
@@ -83,8 +86,8 @@ def checked_fields(fields: Any, unit: str, highest: float) -> Floats:
         raise ValueError(f"fields must be finite numbers of {unit}; got {np.asarray(fields).tolist()!r}")
     if np.abs(values).max() > highest:
         raise ValueError(
-            f"a field of {values[np.argmax(np.abs(values))]:g} {unit} is beyond {highest:g} {unit}, where no molecule holds together; "
-            "check the unit"
+            f"{FIELDS[unit]}: a field of {values[np.argmax(np.abs(values))]:g} {unit} is beyond {highest:g} {unit}, where no molecule "
+            "holds together; check the unit"
         )
     return values
 

@@ -44,7 +44,7 @@ if TYPE_CHECKING:
 _NAMES = {
     "temperature_k": "conditions.temperature", "from_ps": "conditions.first_time", "until_ps": "conditions.last_time",
     "points": "conditions.points", "tolerance": "numerics.tolerance", "jmax": "numerics.jmax", "seed": "numerics.seed",
-    "classical_molecules": "observables.classical_molecules",
+    "classical_molecules": "observables.classical_molecules", "state": "conditions.state", "m": "conditions.m",
 }  # fmt: skip
 _AXES = {"z": (0, 0, 1), "x": (1, 0, 0), "y": (0, 1, 0), "circular": (1, 1j, 0)}
 
@@ -212,4 +212,4 @@ def saved_pulse(pulse: Pulse) -> PulseSection:
     raise ValueError(f"a scene holds no {type(pulse).__name__} of this form")
 
 
-KIND = Kind(request, answer, table, saved, writers)
+KIND = Kind(request, answer, table, saved, writers, names=_NAMES)

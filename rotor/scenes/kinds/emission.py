@@ -130,4 +130,4 @@ def saved_molecules(asked: EmissionRequest, molecules: Sequence[MoleculeSection]
     )
 
 
-KIND = Kind(request, answer, table, saved, writers)
+KIND = Kind(request, answer, table, saved, writers, names=_NAMES)

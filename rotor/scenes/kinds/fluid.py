@@ -21,28 +21,30 @@ if TYPE_CHECKING:
 
 _NAMES = {
     "molecules": "conditions.molecules", "density_g_cm3": "conditions.density", "threads": "numerics.threads",
-    "engine": "numerics.engine",
+    "engine": "numerics.engine", "temperature_k": "conditions.temperature", "step_fs": "numerics.step", "steps": "conditions.steps",
+    "every": "conditions.every", "cutoff_angstrom": "numerics.cutoff", "ewald_tolerance": "numerics.ewald_tolerance",
+    "friction_per_ps": "conditions.friction", "relaxation_fs": "conditions.relaxation", "seed": "numerics.seed",
 }  # fmt: skip
 
 
 def request(scene: FluidScene, folder: Where = ".") -> FluidRequest:
     """The request of a scene."""
     of, how = scene.conditions, scene.numerics
-    settings = Settings(
-        model=of.model,
-        ensemble=of.ensemble,
-        temperature_k=kind.quantity("conditions.temperature", of.temperature, "K"),
-        step_fs=kind.quantity("numerics.step", how.step, "fs"),
-        steps=of.steps,
-        every=of.every,
-        cutoff_angstrom=kind.quantity("numerics.cutoff", how.cutoff, "Å"),
-        electrostatics=how.electrostatics,
-        ewald_tolerance=how.ewald_tolerance,
-        friction_per_ps=of.friction,
-        relaxation_fs=kind.quantity("conditions.relaxation", of.relaxation, "fs"),
-        seed=how.seed,
-    )
     with kind.fields(**_NAMES):
+        settings = Settings(
+            model=of.model,
+            ensemble=of.ensemble,
+            temperature_k=kind.quantity("conditions.temperature", of.temperature, "K"),
+            step_fs=kind.quantity("numerics.step", how.step, "fs"),
+            steps=of.steps,
+            every=of.every,
+            cutoff_angstrom=kind.quantity("numerics.cutoff", how.cutoff, "Å"),
+            electrostatics=how.electrostatics,
+            ewald_tolerance=how.ewald_tolerance,
+            friction_per_ps=of.friction,
+            relaxation_fs=kind.quantity("conditions.relaxation", of.relaxation, "fs"),
+            seed=how.seed,
+        )
         box = _box(of, folder)
         source = "given" if of.box is None else str(of.box)
         return FluidRequest(box, settings, how.engine, how.threads, source)
@@ -125,4 +127,4 @@ def saved(asked: FluidRequest, molecule: MoleculeSection | None) -> FluidScene:
     )
 
 
-KIND = Kind(request, answer, table, saved, grows=frozenset({"csv", "trajectories", "checkpoint"}))
+KIND = Kind(request, answer, table, saved, grows=frozenset({"csv", "trajectories", "checkpoint"}), names=_NAMES)

@@ -97,4 +97,4 @@ def saved(asked: GasRequest, molecule: MoleculeSection | None) -> GasScene:
     )
 
 
-KIND = Kind(request, answer, table, saved, writers)
+KIND = Kind(request, answer, table, saved, writers, names=_NAMES)

@@ -93,4 +93,4 @@ def saved(asked: RamanRequest, molecule: MoleculeSection | None) -> RamanScene:
     )
 
 
-KIND = Kind(request, answer, table, saved, writers)
+KIND = Kind(request, answer, table, saved, writers, names=_NAMES)

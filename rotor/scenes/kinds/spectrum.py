@@ -137,4 +137,4 @@ def saved(asked: SpectrumRequest, molecule: MoleculeSection | None) -> SpectrumS
     )
 
 
-KIND = Kind(request, answer, table, saved, writers)
+KIND = Kind(request, answer, table, saved, writers, names=_NAMES)

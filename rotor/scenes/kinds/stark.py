@@ -111,4 +111,4 @@ def saved(asked: StarkRequest, molecule: MoleculeSection | None) -> StarkScene:
     )
 
 
-KIND = Kind(request, answer, table, saved, writers)
+KIND = Kind(request, answer, table, saved, writers, names=_NAMES)

@@ -91,4 +91,4 @@ def saved(asked: ThermoRequest, molecule: MoleculeSection | None) -> ThermoScene
     )
 
 
-KIND = Kind(request, answer, table, saved, writers)
+KIND = Kind(request, answer, table, saved, writers, names=_NAMES)

@@ -8,6 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from rotor.classical.euler import checked_moments
 from rotor.classical.tumble import COHERENT, SI, Three, TumbleAnswer, TumbleRequest, answer_tumble
 from rotor.scenes import kind
 from rotor.scenes.kind import Kind, Where, Writer
@@ -56,7 +57,7 @@ def _driven(scene: TumbleScene, body: BodySection) -> DrivenRequest:
     with kind.fields(**names, tolerance="numerics.tolerance", step="numerics.step", times="conditions.times"):
         w, x, y, z = body.attitude or (1.0, 0.0, 0.0, 0.0)
         return DrivenRequest(
-            three(body.moments),
+            _moments(body),
             times,
             effects,
             None if body.angular_velocity is None else three(body.angular_velocity),
@@ -76,6 +77,14 @@ def three(numbers: list[float]) -> Three:
     return x, y, z
 
 
+def _moments(body: BodySection) -> Three:
+    def checked() -> Three:
+        checked_moments(three(body.moments))
+        return three(body.moments)
+
+    return named("body.moments", checked)
+
+
 def _of_body(body: BodySection, start: TumbleConditions) -> TumbleRequest:
     if (body.angular_momentum is None) == (body.angular_velocity is None):
         raise ValueError("body: give either angular_momentum or angular_velocity")
@@ -87,7 +96,7 @@ def _of_body(body: BodySection, start: TumbleConditions) -> TumbleRequest:
         raise ValueError(f'body.units: {body.units!r}: expected "SI", or "" for any coherent set')
     times, units = kind.grid("conditions.times", start.times, ""), UNITS[body.units]
     with kind.fields(moments="body.moments", angular_momentum="body.angular_momentum", times="conditions.times"):
-        moments = three(body.moments)
+        moments = _moments(body)
         if body.angular_velocity is not None:
             return TumbleRequest.of_angular_velocity(moments, three(body.angular_velocity), times=times, units=units)
         assert body.angular_momentum is not None

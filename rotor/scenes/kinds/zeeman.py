@@ -141,4 +141,4 @@ def _numbers(tensor: Tensor | None) -> list[float] | None:
     return [aa, bb, cc, *(mixed if any(mixed) else [])]
 
 
-KIND = Kind(request, answer, table, saved, writers)
+KIND = Kind(request, answer, table, saved, writers, names=_NAMES)

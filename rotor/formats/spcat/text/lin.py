@@ -137,17 +137,20 @@ class LineList:
         return Measured(quanta, float(self.frequency[index]), float(self.error[index]), float(self.weight[index]))
 
 
-def read_lin(source: str | os.PathLike[str] | bytes, per_state: int = 0) -> LineList:
+def read_lin(source: str | os.PathLike[str] | bytes, per_state: int = 0, most: int | None = None) -> LineList:
     """The lines in a .lin file, or in the bytes of one.
 
     As in the field's program a blank line ends the list, unless it stands at the beginning; text behind it is preserved; a
     missing error is 0.01 MHz, a missing weight 1. per_state: how many quantum numbers a state has, for lines that lack some;
-    unless given, as many as in the other lines; more than six take more than twelve fields. Raises ValueError with file, line,
+    unless given, as many as in the other lines; more than six take more than twelve fields. most: how many lines count (NLINE):
+    behind these one that is no line ends the list. Raises ValueError with file, line,
     column and the rule that is broken; nothing is skipped in silence.
     """
     lines = read_lines(source)
     first = next((i for i, line in enumerate(lines) if not line.blank), len(lines))
     end = next((i for i, line in enumerate(lines) if i > first and line.blank), len(lines))
+    if most is not None:
+        end = next((i for i in range(first + most, end) if not _is_line(lines[i], per_state)), end)
     listed = lines[first:end]
     texts = {i: line.text for i, line in enumerate(listed)}
     if texts:
@@ -182,6 +185,14 @@ def read_lin(source: str | os.PathLike[str] | bytes, per_state: int = 0) -> Line
         0 if missing is None else per_state,
         without_error,
     )
+
+
+def _is_line(line: Line, per_state: int) -> bool:
+    try:
+        read_measured(line, max(QUANTA_FIELDS, 2 * per_state))
+    except ValueError:
+        return False
+    return True
 
 
 def with_defaults(lines: LineList, names: Sequence[str]) -> LineList:
