@@ -26,6 +26,8 @@ Namer = Callable[[Floats, Floats, Floats], Ints]  # matrix, energies, vectors ->
 
 _AT_ONCE = 1 << 18  # numbers of the largest array of blocks side by side: 2 MB, which stays in the cache of a core
 
+_ALIKE = 1e-13  # of the width of a block: energies that differ less are one, such as doublets of high K
+
 
 @dataclass(frozen=True)
 class UnitBlock:
@@ -145,11 +147,18 @@ class _Stack:
         energies, vectors = np.linalg.eigh(matrices)
         return _Solved(matrices, energies + zero[:, None], vectors)
 
-    def leading(self, vectors: Floats) -> Ints:
-        """The sub-block with the largest share of each state, (blocks, size)."""
-        if self.members.shape[1] == 1:
-            return np.zeros(vectors.shape[:2], dtype=np.int64)
-        return np.asarray((self.members @ vectors**2).argmax(axis=1))
+    def leading(self, solved: _Solved) -> Ints:
+        """The sub-block with the largest share of each state, (blocks, size); of two states that round-off alone tells apart the lower
+        number first, whichever way round they come."""
+        if self.members.shape[1] == 1 or self.size == 1:
+            return np.zeros(solved.energies.shape, dtype=np.int64)
+        found = np.asarray((self.members @ solved.vectors**2).argmax(axis=1))
+        whole = solved.energies[:, -1:] - solved.energies[:, :1]
+        turned = (np.diff(solved.energies, axis=1) <= _ALIKE * whole) & (found[:, :-1] > found[:, 1:])
+        turned[:, 1:] &= ~turned[:, :-1]
+        block, place = np.nonzero(turned)
+        found[block, place], found[block, place + 1] = found[block, place + 1], found[block, place]
+        return found
 
     def slopes(self, vectors: Floats, states: Ints) -> Floats:
         """⟨n|O_i|n⟩ (blocks, states, parameters of the blocks) of some states (blocks, states)."""
@@ -225,7 +234,7 @@ def tracked_blocks(
         ]
         found = [find(i, names) for i, names in zip(numbers.tolist(), named, strict=True)]
         slopes = stack.slopes(solved.vectors, _padded([states for _, states in found], 0))
-        leading = stack.leading(solved.vectors)
+        leading = stack.leading(solved)
         for place, (rows, states) in enumerate(found):
             if len(rows):
                 block = blocks[numbers[place]]
@@ -271,7 +280,7 @@ class _Labelled:
 
     def _states(self, solved: _Solved) -> Ints:
         """The states that have the labels now; names are made anew only where a state is mostly in another sub-block."""
-        leading = self.stack.leading(solved.vectors)
+        leading = self.stack.leading(solved)
         moved = ((self._ranks(leading) != self._at_start) & (self.rows >= 0)).any(axis=1)
         if not moved.any():
             return self.states
