@@ -1,4 +1,4 @@
-"""docs/scenes_measured.md: every scene that asks for an accuracy reached it, and could hardly be coarser; some are measured again."""
+"""docs/scenes_measured.md: every scene that asks for an accuracy reached it and could hardly be coarser; plans of all scenes."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 
 
-def load() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("scenes_measured", ROOT / "benchmarks" / "scenes_measured.py")
+def load(name: str = "scenes_measured") -> ModuleType:
+    spec = importlib.util.spec_from_file_location(name, ROOT / "benchmarks" / f"{name}.py")
     module = sys.modules[spec.name] = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
@@ -58,6 +58,17 @@ def test_memory_of_the_plans(program):
     """Within a factor of 3 of the peak where that is over 1 MB."""
     for one in program.read_results():
         assert max(one.plan_mb, one.run_mb) < 1.0 or 1 / 3 < one.plan_mb / one.run_mb < 3, one.scene
+
+
+def test_plans_of_all_scenes_and_of_longer_ones():
+    """What benchmarks/bench_plans.py stored: seconds above 1 s and memory above 1 MB within a factor of 3."""
+    plans = load("bench_plans")
+    stored = plans.read_results()
+    assert set(stored) == set(plans.cases())
+    assert sum(one.taken_seconds > 1.0 for one in stored.values()) >= 5  # some are as long as that
+    for one in stored.values():
+        assert plans.within(one.planned_seconds, one.taken_seconds, 1.0), one.case
+        assert plans.within(one.planned_mb, one.taken_mb, 1.0), one.case
 
 
 @pytest.mark.slow

@@ -7,6 +7,7 @@ import time
 import tracemalloc
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from rotor.scenes.left_out import LeftOut
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from rotor.tops.top import Top
 
 LONG_SEARCH = 10.0  # seconds; a shorter one is made twice, as its first time has imports and compilation in it
+ENOUGH_SECONDS, LARGER = 0.05, 3  # of a call that is extrapolated; by how much its size grows until it takes so long
 ENERGY = "energies are eigenvalues of the truncated Hamiltonian"
 
 
@@ -41,7 +43,7 @@ class Plan:
         return asdict(self) | {"parts": dict(self.parts), "counts": dict(self.counts)}
 
 
-def timed(call: Callable[[], Any], long: float = 1.0) -> float:
+def timed(call: Callable[[], Any], long: float = 3.0) -> float:
     """Processor time of a call, its second one unless the first takes longer than `long` seconds: without imports and compilation."""
     start = time.process_time()
     call()
@@ -72,7 +74,15 @@ def extrapolated(call: Callable[[int], Any], work: Callable[[int], float], sizes
     float
         Processor time.
     """
-    return _extrapolated(timed, call, work, sizes, size)
+    return _extrapolated(timed, call, work, _enough(call, sizes, size), size)
+
+
+def _enough(call: Callable[[int], Any], sizes: tuple[int, int], size: int) -> tuple[int, int]:
+    """Sizes of which the second takes long enough to be extrapolated: what is done once for many hides in a shorter call."""
+    first, second = sizes
+    while second < size and timed(partial(call, second)) < ENOUGH_SECONDS:
+        first, second = LARGER * first, min(LARGER * second, size)
+    return first, second
 
 
 def peak_mb(call: Callable[[], Any]) -> float:
@@ -111,7 +121,7 @@ def extrapolated_mb(
     float
         MB.
     """
-    return _extrapolated(peak_mb, call, work, sizes, size)
+    return _extrapolated(peak_mb, call, work, _enough(call, sizes, size), size)
 
 
 def _extrapolated(
@@ -123,7 +133,7 @@ def _extrapolated(
     most = measure(lambda: call(second))
     if second == size:
         return most
-    rate = max(most - measure(lambda: call(first)), 0.0) / (work(second) - work(first))
+    rate = max(most - measure(lambda: call(first)), 0.0) / max(work(second) - work(first), 1e-300)
     return most + rate * (work(size) - work(second))
 
 
