@@ -353,8 +353,10 @@ def _matrix(plan: Plan, parts: tuple[SpinPart, ...], known: dict[Channel, Floats
                     one = [of_single[channel][up.patterns.start][low.patterns.start] for channel in of_it]
                     element = operator * sum(one)
                 else:
-                    factors = sum(known[channel][up.patterns, low.patterns] for channel in of_it)
-                    element = product(np.asarray(factors), operator)
+                    factors = known[of_it[0]][up.patterns, low.patterns]
+                    for channel in of_it[1:]:
+                        factors = factors + known[channel][up.patterns, low.patterns]
+                    element = product(factors, operator)
                 matrix[up.place, low.place] += element
     return matrix
 

@@ -13,10 +13,11 @@ Two equivalent spins, the last ones, may be coupled to a total first, I_a + I_b 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from math import sqrt
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum.wigner import nine_j, six_j
@@ -88,14 +89,29 @@ def _passed_on(bra: Ints, ket: Ints, spin: int, rank: int) -> Floats:
     """
     a, b, c, d = bra[..., 0], bra[..., 1], ket[..., 0], ket[..., 1]
     root = np.sqrt((b + 1.0) * (d + 1.0))
-    return _sign(a + spin + d + 2 * rank) * root * six_j(a / 2, b / 2, spin / 2, d / 2, c / 2, rank)
+    near = (np.abs(a - c) <= 2 * rank) & (np.abs(b - d) <= 2 * rank)
+    symbol = _of_distinct(near, (a, b, c, d), lambda a, b, c, d: six_j(a / 2, b / 2, spin / 2, d / 2, c / 2, rank))
+    return _sign(a + spin + d + 2 * rank) * root * symbol
 
 
 def _closed(bra: Ints, ket: Ints, spin: int, rank: int) -> Floats:
     """⟨(j' S)J'|T^K · W^K(S)|(j S)J⟩ over ⟨j'‖T‖j⟩⟨S‖W‖S⟩: (-1)^(j+S+J) {J S j'; K j S}, zero where J' ≠ J."""
     a, b, c, d = bra[..., 0], bra[..., 1], ket[..., 0], ket[..., 1]
-    symbol = six_j(d / 2, spin / 2, a / 2, rank, c / 2, spin / 2)
+    near = (np.abs(a - c) <= 2 * rank) & (b == d)
+    symbol = _of_distinct(near, (a, c, d), lambda a, c, d: six_j(d / 2, spin / 2, a / 2, rank, c / 2, spin / 2))
     return np.where(b == d, _sign(c + spin + d) * symbol, 0.0)
+
+
+def _of_distinct(chosen: NDArray[np.bool_], arguments: Sequence[Ints], symbol: Callable[..., Floats]) -> Floats:
+    """A symbol of doubled arguments where `chosen`, 0 elsewhere: patterns share their first steps, so that few are distinct."""
+    own = [np.broadcast_to(argument, chosen.shape)[chosen] for argument in arguments]
+    code, scale = own[0], 1 + max((int(argument.max(initial=0)) for argument in own), default=0)
+    for argument in own[1:]:
+        code = code * scale + argument
+    _, first, place = np.unique(code, return_index=True, return_inverse=True)
+    out = np.zeros(chosen.shape)
+    out[chosen] = symbol(*(argument[first] for argument in own))[place]
+    return out
 
 
 def _opened(bra: Ints, ket: Ints, spin: int, rank: int) -> Floats:
