@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from rotor.arrays import Floats, Ints
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.spins.contraction import Stack, operators_of_stacks, stacks_of
-from rotor.quantum.spins.coupling import coefficients, n_dot_s, stacks
+from rotor.quantum.spins.coupling import coefficients, for_every_f, n_dot_s
 from rotor.quantum.spins.method import FIRST_ORDER, Used
 from rotor.quantum.spins.operators import AxialState
 from rotor.quantum.spins.parts import SpinPart, labels_of, named_states, names_of_parts
@@ -241,7 +241,7 @@ def _families(
 def solve_f(plan: Plan, twice_f: int, exist: Exist | None = None) -> list[SpinBlock]:
     """The blocks of one F, those left out in which no level exists by `exist` (see `levels_of_f`)."""
     every = plan.shared.scheme.patterns(twice_f)
-    known = plan.shared.cache.pop(("coupling", twice_f), None) or _couplings(plan, {twice_f: [every]})[twice_f]
+    known = plan.shared.cache.pop(("coupling", twice_f), None) or _couplings(plan, {twice_f: every})[twice_f]
     blocks = list(_parts_of_f(plan, every))
     names, sizes = names_of_parts([part for parts in blocks for part in parts], every)
     there = np.ones(len(names), dtype=bool) if exist is None else exist(names)
@@ -269,7 +269,7 @@ def functions_of_f(plan: Plan, twice_f: int) -> list[SpinBlock]:
     """The functions of the blocks of one F, each named after its state of the rotation, with the energy of that; no vectors."""
     every = plan.shared.scheme.patterns(twice_f)
     if ("coupling", twice_f) not in plan.shared.cache:
-        plan.shared.cache["coupling", twice_f] = _couplings(plan, {twice_f: [every]})[twice_f]
+        plan.shared.cache["coupling", twice_f] = _couplings(plan, {twice_f: every})[twice_f]
     out = []
     for parts in _parts_of_f(plan, every):
         energies = np.concatenate([np.tile(part.rotor.energies_mhz, part.repeats) for part in parts])
@@ -289,24 +289,25 @@ def prepare(plan: Plan, every_f: Iterable[int]) -> None:
     scheme = plan.shared.scheme
     if scheme.equivalent:
         return
-    tables = {f: [scheme.patterns(f)] for f in every_f}
-    plan.shared.cache["patterns"] = {f: own for f, (own,) in tables.items()}
+    tables = {f: scheme.patterns(f) for f in every_f}
+    plan.shared.cache["patterns"] = tables
     if max(map(len, plan.shared.cache["patterns"].values()), default=0) <= _FEW:
         found = _couplings(plan, tables)
         plan.shared.cache.update({("coupling", f): own for f, own in found.items()})
 
 
-def _couplings(plan: Plan, tables: dict[int, list[Ints]]) -> dict[int, dict[Channel, Floats]]:
+def _couplings(plan: Plan, tables: dict[int, Ints]) -> dict[int, dict[Channel, Floats]]:
     """c(p', p) of all channels by F."""
+    scheme = plan.shared.scheme
     acting = {channel for operators in plan.operators.values() for channel in operators}
-    out: dict[int, dict[Channel, Floats]] = {f: {} for f in tables}
-    if plan.shared.scheme.equivalent:
-        return {f: {c: coefficients_of(plan.shared.scheme, c, own) for c in acting} for f, (own,) in tables.items()}
-    for every, (stack,) in stacks(tables):
-        for channel in acting:
-            for f, found in zip(every, coefficients_of(plan.shared.scheme, channel, stack), strict=True):
-                out[f][channel] = found
-    return out
+    if scheme.equivalent:
+        return {f: {c: coefficients_of(scheme, c, own) for c in acting} for f, own in tables.items()}
+    both = {f: (own, own) for f, own in tables.items()}
+    found = {
+        channel: for_every_f(both, lambda bra, ket, channel=channel: _between(scheme, channel, bra, ket))  # type: ignore[misc]
+        for channel in acting
+    }
+    return {f: {channel: own[f] for channel, own in found.items()} for f in tables}
 
 
 def _parts(plan: Plan, members: list[tuple[int, slice]]) -> tuple[SpinPart, ...]:
@@ -354,8 +355,10 @@ def _matrix(plan: Plan, parts: tuple[SpinPart, ...], known: dict[Channel, Floats
                     one = [of_single[channel][up.patterns.start][low.patterns.start] for channel in of_it]
                     element = operator * sum(one)
                 else:
-                    factors = sum(known[channel][up.patterns, low.patterns] for channel in of_it)
-                    element = product(np.asarray(factors), operator)
+                    factors = known[of_it[0]][up.patterns, low.patterns]
+                    for channel in of_it[1:]:
+                        factors = factors + known[channel][up.patterns, low.patterns]
+                    element = product(factors, operator)
                 matrix[up.place, low.place] += element
     return matrix
 
@@ -391,14 +394,29 @@ def product(left: Floats, right: Floats) -> Floats:
 
 def coefficients_of(scheme: Scheme, channel: Channel, every: Ints) -> Floats:
     """c(p', p) of a channel between all patterns of an F, with its powers of N·S; every: (..., n, columns)."""
-    found = _with_total(scheme, channel, every) if scheme.equivalent else _one_by_one(scheme, channel, every)
+    if not scheme.equivalent:
+        return _between(scheme, channel, every, every)
+    return _with_conserved_and_powers(scheme, channel, every, every, _with_total(scheme, channel, every))
+
+
+def _between(scheme: Scheme, channel: Channel, bra: Ints, ket: Ints) -> Floats:
+    """The same of any patterns, coupled one by one."""
+    found = coefficients(scheme.twice, channel.acting, channel.rank, bra, ket)
+    return _with_conserved_and_powers(scheme, channel, bra, ket, found)
+
+
+def _with_conserved_and_powers(scheme: Scheme, channel: Channel, bra: Ints, ket: Ints, found: Floats) -> Floats:
     for column in scheme.conserved_columns:
-        found = np.where(every[..., :, None, column] == every[..., None, :, column], found, 0.0)
+        found = np.where(bra[..., :, None, column] == ket[..., None, :, column], found, 0.0)
     if not channel.ns:
         return found
-    n = every[..., 0] / 2.0
-    of_each = (n * (n + 1)) ** channel.n2 * n_dot_s(every, scheme.twice[0]) ** channel.ns
-    return np.asarray(found * (of_each[..., :, None] + of_each[..., None, :]) / 2)
+    left, right = (_powers_of(scheme, channel, patterns) for patterns in (bra, ket))
+    return np.asarray(found * (left[..., :, None] + right[..., None, :]) / 2)
+
+
+def _powers_of(scheme: Scheme, channel: Channel, patterns: Ints) -> Floats:
+    n = patterns[..., 0] / 2.0
+    return np.asarray((n * (n + 1)) ** channel.n2 * n_dot_s(patterns, scheme.twice[0]) ** channel.ns)
 
 
 def _one_by_one(scheme: Scheme, channel: Channel, every: Ints) -> Floats:

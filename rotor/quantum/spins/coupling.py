@@ -13,10 +13,11 @@ Two equivalent spins, the last ones, may be coupled to a total first, I_a + I_b 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from math import sqrt
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum.wigner import nine_j, six_j
@@ -88,14 +89,29 @@ def _passed_on(bra: Ints, ket: Ints, spin: int, rank: int) -> Floats:
     """
     a, b, c, d = bra[..., 0], bra[..., 1], ket[..., 0], ket[..., 1]
     root = np.sqrt((b + 1.0) * (d + 1.0))
-    return _sign(a + spin + d + 2 * rank) * root * six_j(a / 2, b / 2, spin / 2, d / 2, c / 2, rank)
+    near = (np.abs(a - c) <= 2 * rank) & (np.abs(b - d) <= 2 * rank)
+    symbol = _of_distinct(near, (a, b, c, d), lambda a, b, c, d: six_j(a / 2, b / 2, spin / 2, d / 2, c / 2, rank))
+    return _sign(a + spin + d + 2 * rank) * root * symbol
 
 
 def _closed(bra: Ints, ket: Ints, spin: int, rank: int) -> Floats:
     """⟨(j' S)J'|T^K · W^K(S)|(j S)J⟩ over ⟨j'‖T‖j⟩⟨S‖W‖S⟩: (-1)^(j+S+J) {J S j'; K j S}, zero where J' ≠ J."""
     a, b, c, d = bra[..., 0], bra[..., 1], ket[..., 0], ket[..., 1]
-    symbol = six_j(d / 2, spin / 2, a / 2, rank, c / 2, spin / 2)
+    near = (np.abs(a - c) <= 2 * rank) & (b == d)
+    symbol = _of_distinct(near, (a, c, d), lambda a, c, d: six_j(d / 2, spin / 2, a / 2, rank, c / 2, spin / 2))
     return np.where(b == d, _sign(c + spin + d) * symbol, 0.0)
+
+
+def _of_distinct(chosen: NDArray[np.bool_], arguments: Sequence[Ints], symbol: Callable[..., Floats]) -> Floats:
+    """A symbol of doubled arguments where `chosen`, 0 elsewhere: patterns share their first steps, so that few are distinct."""
+    own = [np.broadcast_to(argument, chosen.shape)[chosen] for argument in arguments]
+    code, scale = own[0], 1 + max((int(argument.max(initial=0)) for argument in own), default=0)
+    for argument in own[1:]:
+        code = code * scale + argument
+    _, first, place = np.unique(code, return_index=True, return_inverse=True)
+    out = np.zeros(chosen.shape)
+    out[chosen] = symbol(*(argument[first] for argument in own))[place]
+    return out
 
 
 def _opened(bra: Ints, ket: Ints, spin: int, rank: int) -> Floats:
@@ -212,19 +228,34 @@ def moment_coefficients(spins: tuple[int, ...], rank: int, acting: int | None, b
     return np.asarray(total)
 
 
-_AT_ONCE = 200_000  # elements of a stack: the arrays on the way stay in the cache of the processor
+_AT_ONCE = 200_000  # elements at a time: the arrays on the way stay in the cache of the processor
+_LARGE = 10_000  # elements of a table that is worked on by itself
 
 
-def stacks(tables: Mapping[int, Sequence[Ints]]) -> Iterator[tuple[list[int], list[Ints]]]:
-    """Tables of patterns by F, gathered where they have the same shapes: the F, and each of the tables as one array (F, n, columns)."""
-    groups: dict[tuple[int, ...], list[int]] = {}
-    for f, own in tables.items():
-        groups.setdefault(tuple(len(table) for table in own), []).append(f)
-    for sizes, every in groups.items():
-        step = max(1, _AT_ONCE // (max(sizes) ** 2 + 1))
-        for start in range(0, len(every), step):
-            some = every[start : start + step]
-            yield some, [np.stack([tables[f][place] for f in some]) for place in range(len(sizes))]
+def for_every_f(tables: Mapping[int, tuple[Ints, Ints]], of: Callable[[Ints, Ints], Floats]) -> dict[int, Floats]:
+    """Coefficients `of` patterns of bra and ket, (bra, ket) each, by F: those of many small tables from one call, pair by pair."""
+    out = {f: of(bra, ket) for f, (bra, ket) in tables.items() if len(bra) * len(ket) > _LARGE}
+    some: list[int] = []
+    count = 0
+    for f in (f for f in tables if f not in out):
+        some.append(f)
+        count += len(tables[f][0]) * len(tables[f][1])
+        if count > _AT_ONCE:
+            out |= _pair_by_pair({f: tables[f] for f in some}, of)
+            some, count = [], 0
+    return out | (_pair_by_pair({f: tables[f] for f in some}, of) if some else {})
+
+
+def _pair_by_pair(tables: Mapping[int, tuple[Ints, Ints]], of: Callable[[Ints, Ints], Floats]) -> dict[int, Floats]:
+    bra = np.concatenate([left.repeat(len(right), axis=0) for left, right in tables.values()])
+    ket = np.concatenate([np.tile(right, (len(left), 1)) for left, right in tables.values()])
+    every, start = of(bra[:, None, :], ket[:, None, :]).ravel(), 0
+    out: dict[int, Floats] = {}
+    for f, (left, right) in tables.items():
+        stop = start + len(left) * len(right)
+        out[f] = every[start:stop].reshape(len(left), len(right))
+        start = stop
+    return out
 
 
 def n_dot_s(pattern: Ints, spin: int) -> Floats:

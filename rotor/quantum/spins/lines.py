@@ -19,7 +19,7 @@ from rotor.arrays import Floats, Ints
 from rotor.quantum.levels import Levels
 from rotor.quantum.spins.blocks import Shared, SpinBlock, coefficients_of, operators_between, product
 from rotor.quantum.spins.contraction import MOST_RANK, tensor_elements_of_stacks
-from rotor.quantum.spins.coupling import stacks, tensor_coefficients
+from rotor.quantum.spins.coupling import for_every_f, tensor_coefficients
 from rotor.quantum.spins.operators import AxialState, Scalar, tensor_elements
 from rotor.quantum.spins.parts import SpinPart
 from rotor.quantum.spins.rotor import Channel, RotorBlock, RotorPart, channels_of
@@ -194,12 +194,9 @@ def _of_alike(shared: Shared, rank: int, up: SpinBlock, low: SpinBlock) -> dict[
         only = _tensor_coefficients(shared.scheme, rank, up.patterns, low.patterns)
         return {("tensor", rank, up.twice_f, low.twice_f): only}
     every, step = shared.cache["patterns"], up.twice_f - low.twice_f
-    tables = {f: [every[f + step], own] for f, own in every.items() if f + step in every}
-    out: dict[tuple[str, int, int, int], Floats] = {}
-    for some, (bra, ket) in stacks(tables):
-        found = tensor_coefficients(shared.scheme.twice, rank, bra, ket)
-        out |= {("tensor", rank, f + step, f): own for f, own in zip(some, found, strict=True)}
-    return out
+    tables = {f: (every[f + step], own) for f, own in every.items() if f + step in every}
+    found = for_every_f(tables, lambda bra, ket: tensor_coefficients(shared.scheme.twice, rank, bra, ket))
+    return {("tensor", rank, f + step, f): own for f, own in found.items()}
 
 
 def _tensor_coefficients(scheme: Scheme, rank: int, bra: Ints, ket: Ints) -> Floats:
