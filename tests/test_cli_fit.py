@@ -198,6 +198,9 @@ def test_lines_of_a_par_file_with_no_such_level_are_left_out_by_name(call, folde
     assert "line 2, -2 - -1 at 23053" in err
     assert "is left out" in err
     assert "lines 24, of which 24 count" in out
+    assert call("fit", "co.par", "--out", "new")[0] == 0
+    report = (folder / "new.fit").read_text(encoding="utf-8")
+    assert "    3: 3 - 2" in report  # by its place in the file
 
 
 def test_spfits_options_are_honoured_or_refused_by_name(call, folder):

@@ -59,6 +59,17 @@ def test_it_does_not_say_that_it_has_converged_when_it_has_not():
     assert stalled.status == "stalled"
 
 
+def test_a_search_at_the_edge_of_the_model_has_not_converged():
+    """Steps out of the model say nothing of how χ² bends: 5.7 standard errors are left there."""
+
+    def bounded(p):
+        if p[0] < 0:
+            raise ValueError("p0 is below 0")
+        return np.array([p[0] + 5.0, p[1] - 3.0, 0.1]), np.array([[-1.0, 0.0], [0.0, -1.0], [0.0, 0.0]])
+
+    assert not minimise(bounded, np.array([0.5, 0.0])).converged
+
+
 @pytest.mark.parametrize(("seed", "start"), [(2, 1.0), (6, 1.0), (11, 1e4), (17, 1e4)])
 def test_a_square_that_should_be_negative_ends_at_zero_and_a_wrong_slope_does_not(seed, start):
     """p₁² is best below 0: χ² bends upwards about p₁ = 0, where the slope by p₁ is none; residuals have the round-off of a spectrum.

@@ -111,12 +111,16 @@ class AlignmentTrace(Table):
 
     @property
     def error_estimate(self) -> float:
-        """Of the cosines: steps, leakage and what the ensemble leaves out.
+        """Of the cosines: steps, leakage, rounded phases and what the ensemble leaves out.
 
         Halving a step of order 4 or more shows 15/16 of its error or more. What is left out counts as isotropic, while it moves
         no further than the gas that is followed: the higher J are, the less a pulse turns them.
         """
         return truncation_apart(self) + self.edge_population
+
+
+class BasisTooSmallError(ValueError):
+    """The two highest J hold more of the population than the tolerance allows."""
 
 
 def truncation_apart(trace: AlignmentTrace) -> float:
@@ -207,7 +211,7 @@ def align(
                 return trace
             pilot = replace(pilot, edge=trace.edge_population)
         if given is not None:
-            raise ValueError(
+            raise BasisTooSmallError(
                 f"J max {jmax} is too small for a tolerance of {tolerance:g}: the two highest J hold {pilot.edge:.2g} of the "
                 "population; give a higher J max, or none and it is chosen"
             )

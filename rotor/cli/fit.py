@@ -304,7 +304,8 @@ def _chosen(request: FitRequest, candidates: Sequence[str], by_order: bool) -> t
     if request.spfit is not None:
         raise ValueError("--choose: start from a line list and constants, whose free ones are the base of the model")
     assert request.constants is not None  # a list of lines has constants to start from
-    idle = [name for name in candidates if name in request.parameters.names]
+    own_name = request.constants.own_name
+    idle = [name for name in candidates if own_name(name) in request.parameters.names]
     if idle:
         raise ValueError(
             f"--choose: {', '.join(idle)} is free already, part of the base of the model; choose from others"
@@ -336,7 +337,8 @@ def _suggestions(request: FitRequest, fit: Fit, name: str | None) -> list[Sugges
     from rotor.fit.choose import suggest_lines
 
     error = float(np.median(fit.lines.error_mhz[fit.used]))
-    if name not in fit.parameters.names:
+    own = name if fit.constants is None else fit.constants.own_name(name)
+    if own not in fit.parameters.names:
         raise ValueError(f"--suggest: {name} is not among the free parameters {', '.join(fit.parameters.names)}")
     if request.spfit is not None and fit.constants is None:
         from rotor.formats.spcat.unmeasured import unmeasured_lines

@@ -24,6 +24,7 @@ class Assignments(Table):
     calculated ones by weight; a line alone has a number of its own
     source : where the lines are from. comments : by line, what was written beside it
     widths_mhz : by the number of a blend, how far its components may lie apart (rms): a standard error about 0
+    places (n,) : of each line in its source from 0 on, where some were left out
     """
 
     names: tuple[str, ...]
@@ -37,6 +38,7 @@ class Assignments(Table):
     source: str = ""
     comments: tuple[str, ...] = ()
     widths_mhz: dict[int, float] = field(default_factory=dict)
+    places: Ints | None = None
 
     def __post_init__(self) -> None:
         n, k = len(self.frequency_mhz), len(self.names)
@@ -78,7 +80,11 @@ class Assignments(Table):
         changes: dict[str, Any] = {name: getattr(self, name)[picked] for name in fields}
         if self.comments:
             changes["comments"] = tuple(self.comments[i] for i in picked.tolist())
-        return replace(self, **changes)
+        return replace(self, **changes, places=picked if self.places is None else self.places[picked])
+
+    def number(self, line: int) -> int:
+        """Of one line in its source, from 1 on."""
+        return int(line if self.places is None else self.places[line]) + 1
 
     def text(self, line: int) -> str:
         """The labels of one line as `3 1 2 - 2 1 1`."""

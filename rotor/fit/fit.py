@@ -239,7 +239,10 @@ def _with_levels(
     labels, upper, lower = _labels(lines)
     one = np.flatnonzero(upper == lower)
     if len(one):
-        raise ValueError(f"{_named(lines, int(one[0]))}: upper and lower state are one level, which makes no line")
+        raise ValueError(
+            f"{_named(lines, int(one[0]))}: upper and lower state are one level, which makes "
+            "no line: correct its labels, or take the line out"
+        )
     try:
         return lines, model(labels), []
     except MissingLevelsError as error:
@@ -256,7 +259,7 @@ def _with_levels(
 
 def _named(lines: Assignments, i: int) -> str:
     """A line by its place and labels."""
-    return f"{lines.source or 'the lines'}: line {i + 1}, {lines.text(i)} at {lines.frequency_mhz[i]:.4f} MHz"
+    return f"{lines.source or 'the lines'}: line {lines.number(i)}, {lines.text(i)} at {lines.frequency_mhz[i]:.4f} MHz"
 
 
 def _distinct_rows(rows: Ints) -> tuple[Ints, Ints]:
@@ -365,14 +368,14 @@ def _verdict(fit: Fit, disorder: str, options: FitOptions) -> tuple[bool, str]:
             "check assignments, the start, and which constants are free"
         )
     reason = minimum.reason
+    if near:
+        count = len(minimum.iterations)
+        reason = f"ended after {count} iterations, as many as allowed: the next step would be {minimum.distance:.1e} standard errors"
     if not fit.degrees_of_freedom:
         reason += (
             "; 0 degrees of freedom: as many frequencies as they determine constants, so that nothing checks these, and there "
             "are no errors from the scatter"
         )
-    if near:
-        count = len(minimum.iterations)
-        reason = f"ended after {count} iterations, as many as allowed: the next step would be {minimum.distance:.1e} standard errors"
     if len(fit.statistics.undetermined):
         named = "; ".join(one.text for one in fit.statistics.undetermined)
         return True, f"{reason}; not determined by these lines and left at the start: {named}"
@@ -402,7 +405,7 @@ def _unlikely(lines: Assignments) -> list[str]:
     for rows, why in ((far, "J changes by more than 1"), (even & ~far, "Ka and Kc both change by even numbers")):
         some = np.flatnonzero(rows)
         if len(some):
-            first = f"line {some[0] + 1}, {lines.text(int(some[0]))}"
+            first = f"line {lines.number(int(some[0]))}, {lines.text(int(some[0]))}"
             out.append(f"{len(some)} lines that no dipole moment makes, {first}: {why}; are the labels right?")
     return out
 
@@ -417,7 +420,9 @@ def _bent(fit: Fit) -> list[str]:
 def _notes(fit: Fit) -> list[str]:
     lines, notes = fit.lines, list[str]()
     for i, why in fit.left_out.items():
-        notes.append(f"line {i + 1}, {lines.text(i)} at {lines.frequency_mhz[i]:.4f} MHz, does not count: {why}")
+        notes.append(
+            f"line {lines.number(i)}, {lines.text(i)} at {lines.frequency_mhz[i]:.4f} MHz, does not count: {why}"
+        )
     if fit.changed_states:
         some = ", ".join(fit.changed_states[:5]) + (", ..." if len(fit.changed_states) > 5 else "")
         notes.append(
@@ -432,7 +437,7 @@ def _notes(fit: Fit) -> list[str]:
     )
     for i in reversed_.tolist():
         notes.append(
-            f"line {i + 1}, {lines.text(i)}: calculated with the opposite sign; are upper and lower exchanged?"
+            f"line {lines.number(i)}, {lines.text(i)}: calculated with the opposite sign; are upper and lower exchanged?"
         )
     if fit.minimum.converged and fit.minimum.distance > BENT * max(1.0, fit.minimum.rms):
         notes.append(

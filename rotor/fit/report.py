@@ -105,7 +105,7 @@ def far_off(fit: Fit, errors: float = FAR_OFF) -> list[str]:
     parts = np.abs(fit.residuals[: len(fit.groups)])
     order = [int(i) for i in np.argsort(-parts) if parts[i] > errors]
     return [
-        f"line {fit.groups[i] + 1}, {fit.lines.text(int(fit.groups[i]))}: {fit.residuals[i]:+.1f} errors"
+        f"line {fit.lines.number(int(fit.groups[i]))}, {fit.lines.text(int(fit.groups[i]))}: {fit.residuals[i]:+.1f} errors"
         for i in order[:20]
     ]
 
@@ -114,7 +114,7 @@ def decisive(fit: Fit, leverage: float = 0.9) -> list[str]:
     """Lines without which a combination of parameters would not be determined: leverage near 1."""
     leverages = fit.statistics.leverages[: len(fit.groups)]
     return [
-        f"line {fit.groups[i] + 1}, {fit.lines.text(int(fit.groups[i]))}: leverage {leverages[i]:.3f}; nothing checks it"
+        f"line {fit.lines.number(int(fit.groups[i]))}, {fit.lines.text(int(fit.groups[i]))}: leverage {leverages[i]:.3f}; nothing checks it"
         for i in np.argsort(-leverages)[:10].tolist()
         if leverages[i] > leverage
     ]
@@ -144,7 +144,7 @@ def _lines(fit: Fit) -> list[str]:
     for i, (seen, calculated, off, stated, estimated) in enumerate(zip(*columns, strict=True)):
         ratio = f"{ratios[i]:8.2f}" if stated > 0 else f"{'-':>8}"
         text = (
-            f"{i + 1:5d}: {texts[i]:<{width}} {seen:16.5f} {calculated:16.5f} {off:12.5f} {stated:10.5f} {estimated:10.5f} "
+            f"{lines.number(i):5d}: {texts[i]:<{width}} {seen:16.5f} {calculated:16.5f} {off:12.5f} {stated:10.5f} {estimated:10.5f} "
             f"{ratio} {marks[i]}"
         )
         if in_blend[i]:

@@ -4,7 +4,7 @@
 |---|---|---|---|
 | spectrum, levels, raman | frequencies, energies, shifts, "1 kHz" | spins, left out if smaller; method of several | rounding, and these |
 | stark, zeeman | energies, "1 kHz" | tolerance, and with it J max of the basis | by which energies move with a higher J max, round-off |
-| align | cosines, 1e-4 | the loosest tolerance (steps, populations), the smallest J max | steps, edge of the basis, populations |
+| align | cosines, 1e-4 | the loosest tolerance (steps, populations), the smallest J max | steps, edge, populations, phases |
 | thermo | Q, U and C_v, "0.1 %" | levels summed, or the classical limit with corrections | of the sums |
 | tumble | attitude, "1e-6 rad" | see `rotor.scenes.accuracy_motion`; free motion is exact | from finer steps |
 | gas, fluid | see `rotor.scenes.accuracy_sampled` | | |
@@ -30,6 +30,7 @@ ROUNDING = 8 * float(
 )  # of an eigenvalue, relative to the largest: a few units in the last place
 EXACT, FOR_METHOD = "exact", 0.9  # the usual method of spins; the part of an accuracy that another one may take
 LOOSEST_COSINE = 0.05
+MOST_CONFIRMED = 6  # J max that are confirmed by whole runs of an alignment, before the one of its tolerance is taken
 LOOSER = (1e3, 1e2, 1e1, 1.0)  # tolerances of cosines that are tried, times the accuracy
 UNITS = {
     "spectrum": "MHz",
@@ -131,7 +132,8 @@ def reached(scene: Scene, answer: Any, choice: Choice) -> Reached:
     error = max(own, choice.error)
     if error > asked:
         raise ValueError(
-            f"accuracy: {asked:g} {unit}".rstrip() + f" cannot be given: the error here is {error:.2g} ({choice.how})"
+            f"accuracy: {asked:g} {unit}".rstrip()
+            + f" cannot be given: the error here is {error:.2g} ({choice.how}); ask for less"
         )
     return Reached(asked, error, unit, choice.how)
 
@@ -201,11 +203,16 @@ def _spin_size(top: Any) -> float:
     return max((effect.size_mhz(top, 1) for effect in spin_effects(top)), default=0.0)
 
 
+def rounding_mhz(levels: Any) -> float:
+    """Of the eigenvalues of some levels: that of the largest."""
+    return ROUNDING * float(np.abs(levels.energy_mhz).max(initial=0.0))
+
+
 def _levels_error(top: Any, levels: Any) -> float:
     """Rounding of the largest energy, the size of known spins that are left out, and the estimate of the method of others."""
     from rotor.quantum.spins.method import used_method
 
-    rounding = ROUNDING * float(np.abs(levels.energy_mhz).max(initial=0.0))
+    rounding = rounding_mhz(levels)
     has_spins = any(effect.spins(top) for effect in levels.effects)
     if has_spins:
         used = used_method(levels)
@@ -248,16 +255,16 @@ def _align(scene: Any, request: Any, asked: float) -> Choice:
 
 def _least_basis(request: Any, tolerance: float, trace: Any, asked: float) -> Choice:
     """The smallest J max that is within what the other errors leave, looked for on one block and confirmed by a run."""
-    from rotor.alignment.align import truncation_apart
+    from rotor.alignment.align import BasisTooSmallError, truncation_apart
     from rotor.alignment.basis import least_jmax
     from rotor.alignment.request import answer_align
 
     first, truncation = least_jmax(trace, asked - truncation_apart(trace))
-    for jmax in range(first, trace.jmax):
+    for jmax in range(first, min(first + MOST_CONFIRMED, trace.jmax)):
         smaller = replace(request, tolerance=tolerance, jmax=jmax)
         try:
             found = answer_align(replace(smaller, classical_molecules=0)).trace
-        except ValueError:  # more at the edge than the tolerance allows
+        except BasisTooSmallError:
             continue
         error = truncation_apart(found) + max(found.edge_population, truncation)
         if error <= asked:

@@ -1,13 +1,7 @@
 """Accuracy of a driven motion: the loosest tolerance of its steps whose attitudes are within what was asked for.
 
-The error of a tolerance t is the largest difference of an attitude, at all times asked for, from a motion of finer steps. A finer
-motion is one of t/100, or of t/10⁴, ... until it takes half as many steps more (10^(2/8) = 1.8 times as many are usual): steps also
-end at every time asked for, and where these are dense, several tolerances give the same steps, whose difference of 0 says nothing; and a
-wobble smaller than the tolerance is wrong in all motions that do not see it. Where the number of steps did not go as usual, the next finer
-motion counts too. Where no tolerance takes so many, the sum of what the control of the steps lets pass, their number times the finest
-tolerance, is added: the local error per step is below it
-(E. Hairer, S. P. Nørsett, G. Wanner, Solving Ordinary Differential Equations I, section II.4). The finer motion has an error of its
-own: the difference is taken 1.1 times.
+The error of a tolerance t is the largest difference of an attitude, at all times asked for, from motions of t/100, t/10⁴, ..., see
+`rotor.scenes.plan_steps.error_by_finer`.
 
 The search makes some five motions. Of a long motion, the first part alone is searched, to the accuracy divided by how much the error will
 still grow: as the square of the time, as phases do whose rate drifts, or exponentially where the second half of that part shows it. The
@@ -25,6 +19,7 @@ import numpy as np
 
 from rotor.scenes.choice import Choice
 from rotor.scenes.motion_steps import BEGINNINGS, beginning, expected_steps
+from rotor.scenes.plan_steps import error_by_finer
 
 if TYPE_CHECKING:
     from rotor.classical.driven import DrivenRequest
@@ -32,10 +27,6 @@ if TYPE_CHECKING:
 
 LOOSEST, FINEST, FINEST_REFERENCE = 3, 13, 14  # decades: tolerances of 1e-3, 1e-13 and 1e-14
 FINER = 2  # decades of a reference
-OF_REFERENCE = (
-    1.1  # a reference a hundred times finer has a tenth of the error at most: 15 times less was the least seen
-)
-MORE_STEPS, MOST_STEPS = 1.5, 2.4  # of a finer motion, times those of the coarse one: 10^(2/8) = 1.8 is usual
 LONG_STEPS, LONG_PLAIN_STEPS = 1_000_000, 4000  # of a motion, compiled or not: about a second
 REGULAR = 2.0  # the power of the time with which the error of a regular motion grows at the most
 CHAOTIC = 4.0  # a power that is seen beyond which the growth is taken as exponential
@@ -61,23 +52,10 @@ class _Motions:
         return self.made[decade]
 
     def error(self, decade: int) -> float:
-        """The largest error of an attitude in radians, see the head of this module."""
-        coarse = self.at(decade)
-        for finer in (*range(decade + FINER, FINEST_REFERENCE, FINER), FINEST_REFERENCE):
-            more = self.at(finer).steps / coarse.steps
-            if more < MORE_STEPS:
-                continue
-            usual = finer == decade + FINER and more < MOST_STEPS
-            beyond = finer if usual else min(finer + FINER, FINEST_REFERENCE)
-            return OF_REFERENCE * max(self._apart(coarse, finer), self._apart(coarse, beyond))
-        unseen = self.at(FINEST_REFERENCE).steps * tolerance_of(FINEST_REFERENCE)
-        return unseen + OF_REFERENCE * self._apart(coarse, FINEST_REFERENCE)
-
-    def _apart(self, one: Motion, decade: int) -> float:
-        """The largest angle between the attitudes of a motion and those of one of some tolerance."""
-        from rotor.geometry.rotations import distance
-
-        return float(np.max(distance(one.attitude, self.at(decade).attitude)))
+        """The largest error of an attitude in radians, see `error_by_finer`."""
+        finer = [*range(decade + FINER, FINEST_REFERENCE, FINER), FINEST_REFERENCE]
+        decades = {tolerance_of(one): one for one in finer}
+        return error_by_finer(self.at(decade), list(decades), lambda tolerance: self.at(decades[tolerance]))[0]
 
 
 def tolerance_of(decade: int) -> float:

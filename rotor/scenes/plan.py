@@ -97,15 +97,16 @@ def _checked_rounding(scene: Scene, request: Any) -> float:
     A run leaves out levels beyond the reach of the distortion constants, so that its rounding may be a little less.
     """
     from rotor.quantum.request import LevelsRequest, answer_levels
-    from rotor.scenes.accuracy import ROUNDING, asked_of
+    from rotor.scenes.accuracy import asked_of, rounding_mhz
 
     j, asked = _highest_j(scene.kind, request), asked_of(scene)
     assert asked is not None
     levels = answer_levels(LevelsRequest(request.top, jmin=j, jmax=j)).table.levels
-    rounding = ROUNDING * float(abs(levels.energy_mhz).max(initial=0.0))
+    rounding = rounding_mhz(levels)
     if rounding > 2.0 * asked:
         raise ValueError(
-            f"accuracy: {asked:g} MHz cannot be given: rounding of energies at J = {j} is {rounding:.2g} MHz"
+            f"accuracy: {asked:g} MHz cannot be given: rounding of energies at J = {j} is {rounding:.2g} MHz; ask for "
+            f"{2 * rounding:.1g} MHz or more, or for lower J"
         )
     return rounding
 

@@ -5,21 +5,16 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+from rotor.scenes.left_out import LeftOut
 from rotor.scenes.motion_steps import BEGINNINGS, beginning, expected_steps, some_steps, steps_of
 from rotor.scenes.plan_parts import LONG_SEARCH, Plan, peak_mb, timed
-from rotor.scenes.plan_steps import step_error
+from rotor.scenes.plan_steps import NAME, step_error
 
 if TYPE_CHECKING:
     from rotor.classical.driven import DrivenRequest
     from rotor.scenes.scene import Scene
 
 ORDER = 8  # of the adaptive method: steps go with the tolerance to the power -1/8
-SOME_STEPS = 1000  # beyond those that are made one by one
-MORE_COMPILED, MORE_PLAIN = 50, 2  # times as many for a second part that is timed: compiled steps are so much cheaper
-ENOUGH_STEPS, CLEARLY = (
-    200,
-    1.5,
-)  # of half a first part, and times as many in the other half, from which a trend is read
 
 
 def plan_of_motion(request: Any) -> Plan:
@@ -52,7 +47,7 @@ def plan_with_accuracy(scene: Scene, request: DrivenRequest) -> Plan:
     assert asked is not None
     search = timed(lambda: found.append(planned_tolerance(scene, request, asked)), LONG_SEARCH)
     planned = found[-1]
-    plan = _driven(replace(request, tolerance=planned.tolerance), planned.steps)
+    plan = _driven(replace(request, tolerance=planned.tolerance), planned.steps, planned.error)
     parts = (*plan.parts, ("accuracy", planned.how))
     if planned.steps is not None:
         return replace(plan, parts=parts, seconds=search + plan.seconds)
@@ -60,8 +55,12 @@ def plan_with_accuracy(scene: Scene, request: DrivenRequest) -> Plan:
     return replace(plan, parts=parts, seconds=search + (2.0 + finer) * plan.seconds)
 
 
-def _driven(request: DrivenRequest, known_steps: int | None = None) -> Plan:
+def _driven(request: DrivenRequest, known_steps: int | None = None, known_error: float | None = None) -> Plan:
     steps = expected_steps(request) if known_steps is None else known_steps
+    if known_error is None:
+        error = step_error(request, steps)
+    else:
+        error = LeftOut(NAME, known_error, "rad", f"{steps} steps, found by the search for the accuracy")
     return Plan(
         kind="tumble",
         effects=tuple(type(effect).__name__ for effect in request.effects),
@@ -70,7 +69,7 @@ def _driven(request: DrivenRequest, known_steps: int | None = None) -> Plan:
         counts={"steps": steps, "times": len(request.times)},
         seconds=_seconds_of_steps(request, steps),
         memory_mb=_memory_mb(request),
-        left_out=(step_error(request, steps),),
+        left_out=(error,),
     )
 
 

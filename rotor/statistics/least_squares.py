@@ -192,14 +192,17 @@ def _left_to_gain(taken: Sequence[Iteration], count: int) -> float:
     """By how much χ² may still fall, from the steps that were refused at the last point; count : residuals.
 
     A step that promises P and gains G gains 2 P t - (2 P - G) t² after its part t, to second order: at most P²/(2 P - G). Where χ²
-    bends more than the linear model knows, G is far below 0 and that is far below P.
+    bends more than the linear model knows, G is far below 0 and that is far below P. A step out of the model says nothing of that: all of
+    P may be left.
     """
     left = 0.0
     for one in reversed(taken):
         if one.taken:
             break
         gain = (one.rms_before**2 - one.rms_after**2) * count
-        if one.predicted > 0 and math.isfinite(gain):
+        if not math.isfinite(gain):
+            left = max(left, one.predicted)
+        elif one.predicted > 0:
             left = max(left, one.predicted**2 / max(2 * one.predicted - gain, one.predicted))
     return left
 

@@ -182,12 +182,13 @@ def _refuse_far(found: Sequence[Species]) -> None:
     for one in found:
         ratios = _measured_to_rigid(one)
         for name, ratio in ratios.items():
-            expected, most = (1.0, _FAR_OF_PARENT) if one is found[0] else (parent.get(name, 1.0), _FAR)
+            is_scaled = one is not found[0] and name in parent
+            expected, most = (parent[name], _FAR) if is_scaled else (1.0, _FAR_OF_PARENT)
             if not 1 / most < ratio / expected < most:
                 rigid = one.constants_mhz[name] / ratio * expected
                 raise ValueError(
                     f"{one.name}: {name} = {one.constants_mhz[name]:g} MHz, where the geometry"
-                    f"{' gives' if one is found[0] else ' and the parent give'} about {rigid:.6g}; check digits, unit and isotopes"
+                    f"{' and the parent give' if is_scaled else ' gives'} about {rigid:.6g}; check digits, unit and isotopes"
                 )
 
 

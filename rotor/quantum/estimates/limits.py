@@ -45,7 +45,6 @@ ELECTRON_SPIN = "electron spin"
 ZERO_POINT = "vibration-rotation difference"
 OF_SPINS = frozenset({"nuclear quadrupole", "magnetic coupling of nuclear spins", ELECTRON_SPIN})
 AMMONIA_MHZ = 24_000.0  # the splitting of NH3, see docs/limitations.md
-FLAT_DEGREES = 355.0  # sum of the three angles at a nitrogen that is not pyramidal
 
 
 def populated_j(top: Top, temperature_k: float) -> int:
@@ -267,10 +266,9 @@ def _rotor_text(top: Top, what: str, group: MethylGroup, shifts: LineShifts, j: 
     along = int(np.argmax(np.abs(rotor.rho)))
     if top.dipole_abc_debye is not None and any(top.dipole_abc_debye) and not top.dipole_abc_debye[along]:
         sizes.reverse()
-    source = (
-        "not known" if barrier is None else f"{barrier.v3_cm:g} cm-1, that of a similar molecule ({barrier.molecule})"
-    )
-    unsafe = "" if barrier is None or barrier.safe else ", unsafe: it varies much among such molecules"
+    assert barrier is not None  # without one the size is a bound, in words of its own
+    source = f"{barrier.v3_cm:g} cm-1, that of a similar molecule ({barrier.molecule})"
+    unsafe = "" if barrier.safe else ", unsafe: it varies much among such molecules"
     low = ", so low that no line of the E species fits a rigid top" if rotor.reduced_barrier < LOW_BARRIER else ""
     (first, size), (second, other) = sizes
     return size, (
@@ -281,12 +279,12 @@ def _rotor_text(top: Top, what: str, group: MethylGroup, shifts: LineShifts, j: 
 
 def _pyramidal_nitrogens(molecule: Molecule, bonds: Sequence[Ints]) -> int:
     """Nitrogens with three neighbours, two of them hydrogens, that are not flat."""
+    from rotor.quantum.estimates.methyl_groups import is_flat
+
     count, x = 0, molecule.positions_angstrom
     for atom, near in enumerate(bonds):
         hydrogens = sum(molecule.symbols[i] == "H" for i in near.tolist())
         if molecule.symbols[atom] != "N" or len(near) != 3 or hydrogens < 2:
             continue
-        a, b, c = (v / np.linalg.norm(v) for v in x[near] - x[atom])
-        angles = [math.degrees(math.acos(float(np.clip(u @ v, -1, 1)))) for u, v in ((a, b), (b, c), (a, c))]
-        count += sum(angles) < FLAT_DEGREES
+        count += not is_flat(x, atom, near)
     return count

@@ -42,7 +42,7 @@ RADII_ANGSTROM = {"H": 0.31, "B": 0.84, "C": 0.76, "N": 0.71, "O": 0.66, "F": 0.
                   "Cl": 1.02, "Ge": 1.20, "As": 1.19, "Se": 1.20, "Br": 1.20, "I": 1.39}  # fmt: skip
 OTHER_RADIUS = 1.3
 BONDED = 1.2  # of the sum of two covalent radii (B. Cordero et al., Dalton Trans. 2008, 2832, as ASE's data has them)
-FLAT_DEGREES = 350.0  # sum of three angles from which a nitrogen is taken for flat
+FLAT_DEGREES = 355.0  # sum of three angles from which a nitrogen is taken for flat, here and for inversion
 
 
 @dataclass(frozen=True)
@@ -129,7 +129,7 @@ def barrier_beside(molecule: Molecule, bonds: Sequence[Ints], carbon: int) -> Ba
         return _beside_carbon(molecule, bonds, bearer, others)
     if symbols[bearer] in "OS" and len(others) == 1:
         return _beside_chalcogen(symbols, bonds, bearer, others[0])
-    if symbols[bearer] == "N" and len(others) == 2 and not _flat(molecule.positions_angstrom, bearer, bonds[bearer]):
+    if symbols[bearer] == "N" and len(others) == 2 and not is_flat(molecule.positions_angstrom, bearer, bonds[bearer]):
         return Barrier(691.0, "methylamine")
     return None
 
@@ -191,10 +191,11 @@ def _ring(bonds: Sequence[Ints], atom: int, neighbours: list[int]) -> int:
     return 0
 
 
-def _flat(x: Floats, atom: int, near: Ints) -> bool:
+def is_flat(x: Floats, atom: int, near: Ints) -> bool:
+    """Whether the three angles at an atom add up to nearly 360 degrees."""
     a, b, c = (v / np.linalg.norm(v) for v in x[near] - x[atom])
     cosines = np.clip([a @ b, b @ c, a @ c], -1.0, 1.0)
-    return bool(np.degrees(np.arccos(cosines)).sum() > FLAT_DEGREES)
+    return bool(np.degrees(np.arccos(cosines)).sum() >= FLAT_DEGREES)
 
 
 def _any_off_axis(x: Floats, group: list[int], axis: Floats) -> bool:
