@@ -186,6 +186,7 @@ FAST = (
     "three states with Coriolis and Fermi terms",
     "chlorine and nitrogen, half-integer F",
     "l-doubled states beside the ground state",
+    "three equivalent nuclei of one total spin",
 )
 
 

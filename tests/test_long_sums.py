@@ -46,16 +46,6 @@ def test_energies_up_to_a_bound_are_those_of_the_whole_block(constants, monkeypa
     assert len(lowest_energies(bands, whole[0] - 1e-3 * np.abs(whole).max())) in (0, len(whole))
 
 
-def test_wide_blocks_are_solved_as_bands(monkeypatch):
-    bands = one_block("A=60778 B=10318 C=8.8 MHz DJ=1e-6 DJK=1e-6 DK=1e-6 d1=1e-7 d2=1e-7", 60)
-    assert len(bands) > 2
-    dense = diagonalise(bands, vectors=False)[0]
-    monkeypatch.setattr(wang_matrix, "SMALL", 10)
-    assert (
-        np.abs(lowest_energies(bands, np.inf) - dense).max() < 1e-13 * np.abs(dense).max()
-    )  # round-off of the largest
-
-
 def test_levels_left_out_of_a_sum_do_not_count(monkeypatch):
     """The same Q, U and C_v with every level, where most are left out: e^-80 of what was taken is no more than 1e-26."""
     top, temperatures = of("A=60778 B=10318 C=300 MHz"), [2.0, 10.0]

@@ -28,7 +28,7 @@ MADE = {
     "threefold_asymmetric_quanta": 52, "forbidden_coupling": 654, "water_diag1": 339, "water_diag5": 398, "two_quadrupoles_i_tot": 1005,
     "eighteen_states": 958, "oblate_spin_orbit": 238, "three_protons_i_tot": 247, "methyl_i_tot": 215, "inversion_i_tot": 215,
     "deuterons_i_tot": 323, "forbidden_three_i_tot": 292, "l_doubled_weights": 419, "inversion_weights": 100, "one_of_two_i_tot": 208,
-    "moment_of_n": 92,
+    "moment_of_n": 92, "weights_of_states_i_tot": 583, "unequal_weights_i_tot": 361,
 }  # fmt: skip
 
 

@@ -116,7 +116,7 @@ def _side_by_side(of_pair: Callable[[Any, Any], Floats]) -> Amplitudes:
 
 def _blocks_with_weight(levels: Levels) -> tuple[list[Block], bool]:
     """Blocks in which a level exists by its spin weight, and whether one of them also holds levels that do not."""
-    if levels.weight.all():
+    if (levels.weight > 0).all():
         return list(levels.blocks), False
     weights = [(block, levels.weight[block.start : block.start + len(block.energies_mhz)]) for block in levels.blocks]
     with_some = [(block, weight) for block, weight in weights if (weight > 0).any()]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Floats
 from rotor.thermo.classical_limit import classical_limit, rotational_temperatures_k
-from rotor.thermo.level_sums import level_sums
+from rotor.thermo.level_sums import OutOfReachError, level_sums
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
@@ -53,7 +53,7 @@ def classical_above_if_known(top: Top, tolerance: float = 0.01) -> float | None:
     """The same; None where no sum over levels reaches so far."""
     try:
         return classical_above_k(top, tolerance)
-    except ValueError:
+    except OutOfReachError:
         return None
 
 

@@ -44,7 +44,7 @@ STRIDE = 8  # J are solved by so many at a time
 LONG_SUM = 60  # J above which the classical limit with corrections is taken where it is as good as what was asked
 MOST_J = {"asymmetric": 1000}  # the longest sum, of other kinds J 4000: both take some seconds
 MOST_J_DISTORTED = {
-    "asymmetric": 600
+    "asymmetric": 800
 }  # with distortion, whose levels are all solved, and up to two simpler forms of them
 HIGHEST_KT = 80.0  # energy over kT above which rigid levels are left out: e⁻⁸⁰ of 10⁹ states is 1e-26
 JMAX_LIMIT = 4000
@@ -55,6 +55,10 @@ NOT_SUMMED = -1  # stands for J max where the classical limit was taken
 DIMENSIONS = {"A": 1, "E": 2, "F": 3, "G": 4, "H": 5}
 
 Progress = Callable[[int, int], object]
+
+
+class OutOfReachError(ValueError):
+    """The levels that count at a temperature lie beyond the reach of the constants or of a sum."""
 
 
 @dataclass(frozen=True)
@@ -184,7 +188,7 @@ def _refuse_inexact(sums: LevelSums, kinds: int, at_worst: float) -> None:
     for t, error in zip(sums.temperatures_k[worst > at_worst].tolist(), worst[worst > at_worst].tolist(), strict=True):
         good = sums.temperatures_k[worst <= at_worst]
         others = f"; of those asked for the sum can be had up to {good.max():g} K" if len(good) else ""
-        raise ValueError(refusal(t, error, at_worst) + others)
+        raise OutOfReachError(refusal(t, error, at_worst) + others)
 
 
 def refusal(temperature_k: float, error: float, at_worst: float = AT_WORST) -> str:

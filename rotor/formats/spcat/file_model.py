@@ -5,7 +5,7 @@ Each group of connected states has a top that stands for its symmetry, and the f
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 
@@ -248,6 +248,18 @@ def _refuse_missing_spins(lines: list[CodedLine], states: tuple[StateOptions, ..
             )
 
 
+def _by_exchange(line: CodedLine, of: Mapping[int, StateOptions]) -> list[CodedLine]:
+    """A line with the part of it that joins levels of one weight; one of all states, which differ in it, is one for each state."""
+    if not line.operator.spins:
+        return [line]
+    if line.states:
+        return [line._replace(exchange=exchange_of(line.typ, *(of[v] for v in line.states)))]
+    found = {v: exchange_of(line.typ, state, state) for v, state in of.items()}
+    if len(set(found.values())) == 1:
+        return [line._replace(exchange=next(iter(found.values())))]
+    return [line._replace(states=(v, v), exchange=part) for v, part in found.items()]
+
+
 def _group(
     states: list[StateOptions],
     lines: list[CodedLine],
@@ -275,12 +287,7 @@ def _group(
     )
     if states[0].equivalent == 2 and not doubled:
         of = {state.number: state for state in states}
-        usable = tuple(
-            line._replace(
-                exchange=exchange_of(line.typ, *((of[v] for v in line.states) if line.states else states[:1] * 2))
-            )
-            for line in usable
-        )
+        usable = tuple(part for line in usable for part in _by_exchange(line, of))
     if states[0].equivalent == 3:
         usable = tuple(_of_three(line, len(spins), AXES["IIIl" if oblate else "Ir"]) for line in usable)
     pairs = tuple(Pair(here[pair.first], here[pair.second]) for pair in doubled if pair.first in here)

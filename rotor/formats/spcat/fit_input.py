@@ -76,8 +76,14 @@ def read_fit(par: str | os.PathLike[str], lin: str | os.PathLike[str] | None = N
     lines = read_lin(beside, len(names), abs(file.header.nline))
     try:
         return spfit_input(file, lines, Path(beside).name)
+    except LineWidthError as error:
+        raise ValueError(f"{beside}: {error}") from None
     except ValueError as error:
         raise ValueError(f"{par}: {error}") from None
+
+
+class LineWidthError(ValueError):
+    """A line has fewer or more quantum numbers than its levels."""
 
 
 def _quanta_names(file: ParameterFile) -> tuple[str, ...]:
@@ -248,8 +254,8 @@ def _refuse_width(lines: LineList, names: Sequence[str], used: np.ndarray) -> No
     for i in np.flatnonzero(used).tolist():
         count = int(counts[i])
         if count != len(names):
-            raise ValueError(
-                f"line {i + 1} of the line list has {count} quantum numbers for each state; these constants have "
+            raise LineWidthError(
+                f"line {i + 1} has {count} quantum numbers for each state; these constants have "
                 f"{len(names)} ({', '.join(names)})"
             )
 

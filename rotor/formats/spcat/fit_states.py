@@ -162,8 +162,11 @@ def levels_in_blocks(group: Group, angular: Sequence[int]) -> Levels:
 
 
 def _named_functions(group: Group, angular: Sequence[int]) -> Levels:
-    """Levels in blocks for their names alone: with spins the functions, which have the names of the states and need not be solved."""
-    if group.spins:
+    """Levels in blocks for their names alone: with spins the functions, which have the names of the states and need not be solved.
+
+    Of three equivalent nuclei the levels, solved: their functions are no products.
+    """
+    if group.spins and group.states[0].equivalent < 3:
         return unmixed_levels(group.top, (group.effect,), angular)[0]
     return levels_in_blocks(group, angular)
 

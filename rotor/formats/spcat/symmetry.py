@@ -78,7 +78,8 @@ def forbidden(
     if low.fold > 2 and (delta_k(typ, oblate) - del_l) % low.fold:
         return f"its Δk - Δl is no multiple of {low.fold}"
     on_total = low.equivalent == 2 and max(spins, default=0) > len(low.spins) - 2
-    if not (on_total or doubled) and not some_weights_agree(typ, low, high):
+    turns = (0, 1) if on_total else (0,)  # of the function of two equivalent spins
+    if not doubled and not any(some_weights_agree(typ, low, high, odd) for odd in turns):
         return "it connects levels of unequal nuclear-spin weights"
     return ""
 

@@ -103,7 +103,8 @@ class Elements:
 
 def _elements(shared: Shared, tensors: Tensors, rank: int) -> Elements:
     """All of them at once where the rotation stands in stacks; else they are made when they are needed."""
-    found: Elements | None = shared.cache.get(id(tensors))  # it holds the tensors: their id stays theirs
+    key = ("elements", *sorted(tensors.items(), key=lambda one: one[0]))
+    found: Elements | None = shared.cache.get(key)
     if found is None:
         if shared.stacks is None or rank > MOST_RANK:
             found = Elements(tensors, {}, None)
@@ -113,7 +114,7 @@ def _elements(shared: Shared, tensors: Tensors, rank: int) -> Elements:
             for (i, k), element in known.items():
                 partners.setdefault(i, []).append((k, element))
             found = Elements(tensors, dict(known), partners)
-        shared.cache[id(tensors)] = found
+        shared.cache[key] = found
     return found
 
 

@@ -135,13 +135,11 @@ def _are_finite(bands: list[Floats]) -> bool:
 def lowest_energies(bands: list[Floats], below: float) -> Floats:
     """Eigenvalues up to `below`, rising; also higher ones where finding all takes no longer. Raises as `diagonalise` does.
 
-    A few of a large tridiagonal matrix are bisected for (LAPACK's dstebz); wide bands are made tridiagonal (dsbevd).
+    A few of a large tridiagonal matrix are bisected for (LAPACK's dstebz).
     """
     size = len(bands[0])
-    if size <= SMALL or len(bands) == 1 or not _are_finite(bands):
+    if size <= SMALL or len(bands) != 2 or not _are_finite(bands):
         return diagonalise(bands, vectors=False)[0]
-    if len(bands) > 2:
-        return _of_wide_bands(bands)
     from scipy.linalg.lapack import dstebz
 
     lowest = -2.0 * (
@@ -156,15 +154,6 @@ def lowest_energies(bands: list[Floats], below: float) -> Floats:
     if info:
         raise ValueError(f"LAPACK dstebz did not converge on a block of size {size} (info = {info})")
     return np.sort(energies[:count])
-
-
-def _of_wide_bands(bands: list[Floats]) -> Floats:
-    from scipy.linalg import eig_banded
-
-    rows = np.zeros((len(bands), len(bands[0])))
-    for n, band in enumerate(bands):
-        rows[n, : len(band)] = band
-    return np.asarray(eig_banded(rows, lower=True, eigvals_only=True, check_finite=False))
 
 
 def _diagonal(band: Floats, vectors: bool) -> tuple[Floats, Floats]:
