@@ -44,12 +44,12 @@ def lines_of(constants: Constants, count: int, jmax: int = 60) -> Assignments:
     upper = rng.integers(len(labels), size=40 * count)
     lower = rng.integers(len(labels), size=40 * count)
     change = labels[upper] - labels[lower]
-    near = (np.abs(change[:, 0]) <= 1) & (np.abs(change[:, 1]) <= 1)
+    near = (np.abs(change[:, 0]) <= 1) & (np.abs(change[:, 1]) <= 1) & (upper != lower)
     while near.sum() < count:
         more = rng.integers(len(labels), size=(2, 40 * count))
         upper, lower = np.concatenate([upper[near], more[0]]), np.concatenate([lower[near], more[1]])
         change = labels[upper] - labels[lower]
-        near = (np.abs(change[:, 0]) <= 1) & (np.abs(change[:, 1]) <= 1)
+        near = (np.abs(change[:, 0]) <= 1) & (np.abs(change[:, 1]) <= 1) & (upper != lower)
     up, low = upper[near][:count], lower[near][:count]
     frequency = levels.energy_mhz[up] - levels.energy_mhz[low] + ERROR_MHZ * rng.normal(size=count)
     return assignments(NAMES, labels[up], labels[low], frequency, ERROR_MHZ)

@@ -81,7 +81,7 @@ is J_z^12. "before" is what was known of S-reduced fits without blends, of so ma
 TAIL = """
 Why some cannot be lower:
 
-- **D2O** does not converge as a Watson series: built order by order the model ends at 38. With all orders open 28 effective constants
+- **D2O** does not converge as a Watson series: built order by order the model ends at 38. With all orders open 27 effective constants
   describe the 67 lines within their errors, but terms of tenth order come before those of sixth, no constant has a physical value
   and nothing beyond the lines is predicted by it. The same search ends at 134 in A reduction and at 108 in III^l (S). The library takes
   the levels of D2O from a table of energies instead.
