@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rotor.scenes.choice import Choice
-from rotor.scenes.motion_steps import BEGINNINGS, beginning, expected_steps
+from rotor.scenes.motion_steps import BEGINNINGS, beginning, expected_steps, is_compiled
 from rotor.scenes.plan_steps import error_by_finer
 
 if TYPE_CHECKING:
@@ -131,11 +131,8 @@ def _words(decade: int) -> str:
 
 def _is_long(request: DrivenRequest, asked: float) -> bool:
     """Whether a motion takes so many steps that a search by whole motions would not be short, by those of its beginning."""
-    from rotor.classical.system import system_of
-
     steps = expected_steps(replace(request, tolerance=tolerance_of(likely_decade(asked))))
-    is_compiled = system_of(request.moments, request.effects).compiled is not None
-    return steps > (LONG_STEPS if is_compiled else LONG_PLAIN_STEPS)
+    return steps > (LONG_STEPS if is_compiled(request) else LONG_PLAIN_STEPS)
 
 
 def _of_beginning(request: DrivenRequest, asked: float) -> tuple[int, str]:

@@ -31,12 +31,17 @@ def beginning(request: DrivenRequest, share: float, *more: float) -> DrivenReque
     return replace(request, times=(*sorted(inner, reverse=last < first), end))
 
 
-def some_steps(request: DrivenRequest) -> tuple[int, int]:
-    """How many steps are timed first, and how many times as many after it."""
+def is_compiled(request: DrivenRequest) -> bool:
+    """Whether the steps of a motion run compiled: all of its effects state a compiled form."""
     from rotor.classical.system import system_of
 
+    return system_of(request.moments, request.effects).compiled is not None
+
+
+def some_steps(request: DrivenRequest) -> tuple[int, int]:
+    """How many steps are timed first, and how many times as many after it."""
     some = SOME_STEPS if request.step is None or request.order > 2 else 4 * SOME_STEPS
-    return some, MORE_PLAIN if system_of(request.moments, request.effects).compiled is None else MORE_COMPILED
+    return some, MORE_COMPILED if is_compiled(request) else MORE_PLAIN
 
 
 def steps_of(request: DrivenRequest, share: float) -> int:

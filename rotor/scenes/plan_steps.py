@@ -13,6 +13,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from rotor.scenes.left_out import LeftOut
+from rotor.scenes.motion_steps import is_compiled
 
 if TYPE_CHECKING:
     from rotor.classical.integrators.method import Motion
@@ -28,10 +29,7 @@ OF_REFERENCE = (
 
 def step_error(request: Any, steps: int) -> LeftOut:
     """The largest error of an attitude in radians at the times of a request whose motion has so many steps."""
-    from rotor.classical.system import system_of
-
-    called = system_of(request.moments, request.effects).compiled is None
-    if steps <= (MOST_CALLED if called else MOST_STEPS):
+    if steps <= (MOST_STEPS if is_compiled(request) else MOST_CALLED):
         return _against_finer(request, steps)
     if request.step is not None:
         return LeftOut(NAME, None, "rad", "halve numerics.step")

@@ -130,9 +130,8 @@ def neighbour_list(
     box is 0 along directions that do not repeat; low, width, bins (3) divide the cell or the space that holds the molecules.
     """
     n, range2 = len(centres), farthest**2
-    nothing: Any = np.int64(
-        0
-    )  # a literal 0 has a type of its own, for which the functions called are compiled once more
+    # a literal 0 has a type of its own, for which the functions called are compiled once more
+    nothing: Any = np.int64(0)
     places, first, order, rank = _sorted_into_bins(centres, low, width, bins)
     there = np.empty((n, 3))
     for p in range(n):
