@@ -10,10 +10,11 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
-from rotor.formats.spcat.codes import AXES, split_code
+from rotor.formats.spcat.codes import AXES, Digits, split_code
 from rotor.formats.spcat.l_doubled import Pair, couplings_with_pairs
 from rotor.formats.spcat.l_spins import spin_terms_with_pairs
 from rotor.formats.spcat.operators import CodedOperator, operator_of, plain_of_j
+from rotor.formats.spcat.series import is_constant, is_series, operator_of_series, series_constants
 from rotor.formats.spcat.text.par import Parameter
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.moments import Moment
@@ -76,33 +77,38 @@ def coded_lines(
     """
     wild, axes = 10 ** (1 if states <= 9 else 2 if states <= 99 else 3) - 1, AXES["IIIl" if oblate else "Ir"]
     found: list[CodedLine] = []
+    parameters = tuple(parameters)
+    constants = series_constants(parameters, states)
     for place, parameter in enumerate(parameters, 1):
         digits = split_code(parameter.code, states)
         low, high = sorted((digits.v1, digits.v2))
-        if parameter.value == 0.0 or (high == wild and low != wild):
+        if parameter.value == 0.0 or (high == wild and low != wild) or is_constant(digits):
             continue
         label = f" /{parameter.label}" if parameter.label else ""
         try:
             if states <= high != wild:
                 raise ValueError(f"state {high} does not exist, NVIB = {states} counts from 0")
-            operator = operator_of(digits, axes)
-            if operator.odd and low == high and low not in doubled:
-                raise ValueError(
-                    "time reversal changes the sign of the operator, so that it can connect different states only"
-                )
+            for pair in _pairs(digits, (low, high), states, wild):
+                if pair is not None and is_series(digits):
+                    operator, typ = operator_of_series(digits, axes, constants, pair)
+                else:
+                    operator, typ = operator_of(digits, axes), digits.typ
+                if operator.odd and low == high and low not in doubled:
+                    raise ValueError(
+                        "time reversal changes the sign of the operator, so that it can connect different states only"
+                    )
+                name = f"{parameter.code}#{place}"
+                found.append(CodedLine(name, parameter.value, operator, pair, digits.v2 > digits.v1, typ))
         except ValueError as error:
             raise ValueError(f"parameter {parameter.code}{label}: {error}") from None
-        found.append(
-            CodedLine(
-                f"{parameter.code}#{place}",
-                parameter.value,
-                operator,
-                None if low == wild else (low, high),
-                digits.v2 > digits.v1,
-                digits.typ,
-            )
-        )
     return found
+
+
+def _pairs(digits: Digits, pair: tuple[int, int], states: int, wild: int) -> list[tuple[int, int] | None]:
+    """The states of a parameter line; of a series, whose constants each state has for itself, one after another."""
+    if pair[0] != wild:
+        return [pair]
+    return [(v, v) for v in range(states)] if is_series(digits) else [None]
 
 
 @dataclass(frozen=True, eq=False)
