@@ -147,24 +147,11 @@ def states_of(file: ParameterFile) -> tuple[StateOptions, ...]:
     first = file.options[0]
     digits = str(max(first.vsym, 0))[::-1]
     found = []
-    _refuse_other_phases(file)
     for v in range(max(abs(first.nvib), 1)):
         own = [line for line in file.options[1:] if abs(line.nvib) == v]
         swapped = not file.options[1:] and v < len(digits) and int(digits[v]) % 2 == 1
         found.append(_state(v, own[-1] if own else first, first, swapped))
     return tuple(found)
-
-
-def _refuse_other_phases(file: ParameterFile) -> None:
-    """ValueError for an XOPT that changes operators which the file has."""
-    first = file.options[0]
-    phases, rules = first.xopt % 10, first.xopt // 10
-    if phases and abs(first.nvib) > 1:
-        raise ValueError(f"XOPT = {first.xopt}: phases between states of another kind: that {_NOT_YET}")
-    if rules & 1 and any(abs(line.ewt) >= (100 if first.ewt >= 0 else 1000) for line in file.options):
-        raise ValueError(f"XOPT = {first.xopt}: l-doubled states by other rules: that {_NOT_YET}")
-    if rules & 6 and any(split_code(p.code, max(abs(first.nvib), 1)).ff for p in file.parameters):
-        raise ValueError(f"XOPT = {first.xopt}: Fourier terms of another meaning: that {_NOT_YET}")
 
 
 def _state(v: int, line: Options, first: Options, swapped: bool) -> StateOptions:
@@ -234,7 +221,7 @@ def is_plain(parameters: ParameterFile, intensities: IntensityFile | None) -> bo
         return False
     digits = [split_code(parameter.code) for parameter in parameters.parameters]
     orthorhombic = all(
-        not (d.i1 or d.i2 or d.ns or d.ex or d.ff) and d.typ < 12 and (d.v1, d.v2) in ((0, 0), (9, 9)) for d in digits
+        not (d.i1 or d.i2 or d.ns or d.ff or d.ex) and d.typ < 12 and (d.v1, d.v2) in ((0, 0), (9, 9)) for d in digits
     )
     energies = any(not any(d[:8]) for d in digits)
     mixed = any(d.typ == 4 and d.ksq for d in digits) and any(d.typ > 4 for d in digits)  # terms of both reductions
