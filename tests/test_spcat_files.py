@@ -103,7 +103,7 @@ def test_numbers_in_free_form(line, value):
 @pytest.mark.parametrize("line", ["100", "100 / 7", "100 ,,,3.0"])
 def test_a_parameter_without_a_value_is_refused(line):
     """SPCAT takes such a line for the last one, and the value of the third for 0."""
-    with pytest.raises(ValueError, match="line 4, .* the parameter's value is missing"):
+    with pytest.raises(ValueError, match=r"line 4, .* the parameter's value is missing"):
         read_par(f"t\n1\na 1 1 0 5\n{line}\n".encode())
 
 
