@@ -13,7 +13,6 @@ stays state n; where they are not, the names are made anew.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -23,7 +22,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor.arrays import Floats, Ints, distinct
+from rotor.arrays import Floats, Ints, Workspace, distinct
 
 Namer = Callable[[Floats, Floats, Floats], Ints]  # matrix, energies, vectors -> names (n, columns) of the states
 
@@ -88,20 +87,6 @@ def unit_block(units: dict[int, Elements], sub_blocks: Ints, namer: Namer) -> Un
 def members_of(sub_blocks: Ints) -> Floats:
     """1 where a function (columns) is in a sub-block (rows), from the number of the sub-block of every function."""
     return np.asarray(sub_blocks[None, :] == np.arange(sub_blocks.max(initial=0) + 1)[:, None], dtype=float)
-
-
-class Workspace:
-    """Memory for large arrays that come and go: taken from the system anew each time it would cost as much as what is done with it."""
-
-    def __init__(self) -> None:
-        self._taken = dict[str, Floats]()
-
-    def array(self, name: str, *shape: int) -> Floats:
-        """An array of that shape with anything in it, valid until the next one of that name."""
-        size = math.prod(shape)
-        if name not in self._taken or len(self._taken[name]) < size:
-            self._taken[name] = np.empty(size)
-        return self._taken[name][:size].reshape(shape)
 
 
 class _Solved(NamedTuple):
