@@ -88,8 +88,8 @@ def robust(residuals: Floats, loss: str) -> tuple[Floats, Floats]:
 class Grouping:
     """The measured frequencies that count: for each the position of its first line; order, starts, shares: how blends add.
 
-    plain : no blend among them; each : every line counts, in its order; blended, members, bounds : which of them are blends, the places of their lines in `order`, and where
-    each begins among these
+    plain : no blend among them. each : every line counts, in its order
+    blended, members, bounds : which of them are blends, the places of their lines in `order`, and where each begins among these
     """
 
     first: Ints

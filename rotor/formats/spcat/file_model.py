@@ -122,6 +122,11 @@ def _components(levels: Levels, n: Ints, oblate: bool) -> list[tuple[Ints, Ints,
     return [(other, k, k, alike) if oblate else (k, other, k, alike) for other, alike in pairs]
 
 
+def line_names(file: ParameterFile) -> tuple[str, ...]:
+    """The parameter lines as `file_effect.coded_lines` names them."""
+    return tuple(f"{parameter.code}#{place}" for place, parameter in enumerate(file.parameters, 1))
+
+
 def groups_of(file: ParameterFile, intensities: IntensityFile, *, as_spcat: bool = False) -> list[Group]:
     """The groups of connected states, by their lowest numbers.
 

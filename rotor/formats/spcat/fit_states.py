@@ -14,10 +14,9 @@ from functools import partial
 import numpy as np
 
 from rotor.arrays import Floats, Ints, distinct
-from rotor.formats.spcat.file_lines import Format, format_of, quanta_of
-from rotor.formats.spcat.file_model import Group, groups_of
+from rotor.formats.spcat.file_model import Group, groups_of, line_names
+from rotor.formats.spcat.file_quanta import Format, format_of, quanta_of
 from rotor.formats.spcat.l_doubled import functions_of_l, named_by_l
-from rotor.formats.spcat.predict_states import line_names
 from rotor.formats.spcat.text.int_file import IntensityFile, Request
 from rotor.formats.spcat.text.par import ParameterFile
 from rotor.formats.spcat.unresolved import HIGHEST_SEARCHED, excluded_parameters, refuse_far_f, spelled_out
