@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -84,8 +85,7 @@ def robust(residuals: Floats, loss: str) -> tuple[Floats, Floats]:
     return residuals, np.ones_like(residuals)
 
 
-@dataclass(frozen=True, eq=False)
-class Grouping:
+class Grouping(NamedTuple):
     """The measured frequencies that count: for each the position of its first line; order, starts, shares: how blends add.
 
     plain : no blend among them. each : every line counts, in its order

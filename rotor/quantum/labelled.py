@@ -20,6 +20,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -133,8 +134,7 @@ class ClosedForm(LevelModel):
         return self.slopes @ values_mhz, self.slopes
 
 
-@dataclass(frozen=True, eq=False)
-class _Chunk:
+class _Chunk(NamedTuple):
     """Blocks of like size, in order of size, side by side: unit diagonals units[d] (blocks, size, terms), and what fills their places.
 
     sizes (blocks,); runs: of blocks of one size the first, the one behind the last, and the size
@@ -230,8 +230,7 @@ class WangBlocks(LevelModel):
         return Workspace()
 
 
-@dataclass(frozen=True)
-class _Occurring:
+class _Occurring(NamedTuple):
     """A block in which labels lie, cut at the highest K, with the places of the labels and their ranks."""
 
     basis: WangBlock

@@ -9,7 +9,6 @@ label are made. `effect_units` does the same for levels that have been solved, w
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -49,8 +48,7 @@ class _Link(NamedTuple):
     operator: OperatorOfJ
 
 
-@dataclass(frozen=True)
-class _Terms:
+class _Terms(NamedTuple):
     """What parameters, by their places, multiply.
 
     powers : (q, n) of the unit matrices of every state, the first (0, 0); that of state v has the number first[v] + its place here

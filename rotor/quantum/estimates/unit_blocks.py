@@ -14,7 +14,7 @@ stays state n; where they are not, the names are made anew.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 from typing import NamedTuple
@@ -33,8 +33,7 @@ _LIKE = 1.5  # sizes of blocks that stand side by side
 _ALIKE = 1e-13  # of the width of a block: energies that differ less are one, such as doublets of high K
 
 
-@dataclass(frozen=True)
-class UnitBlock:
+class UnitBlock(NamedTuple):
     """One block: size, places (row, column, row ≥ column) of elements, their factors (elements, units), which parameters.
 
     mix (units, parameters) : how much of each unit matrix a parameter has
@@ -98,8 +97,7 @@ class _Solved(NamedTuple):
     vectors: Floats
 
 
-@dataclass(frozen=True, eq=False)
-class _Stack:
+class _Stack(NamedTuple):
     """Blocks of like size, in order of size, side by side, padded with elements that are 0.
 
     size, sizes : of the largest block, of each
@@ -216,8 +214,7 @@ class AtStart(NamedTuple):
     leading: Ints
 
 
-@dataclass(frozen=True)
-class Tracked:
+class Tracked(NamedTuple):
     """Labels in a block: their places among all, the names and the states that they have."""
 
     block: UnitBlock
@@ -402,6 +399,6 @@ def joined(parts: Sequence[tuple[UnitBlocks, Ints, Ints]], count: int) -> UnitBl
     tracked = list[Tracked]()
     for blocks, rows, columns in parts:
         for one in blocks.tracked:
-            block = replace(one.block, parameters=columns[one.block.parameters])
-            tracked.append(replace(one, block=block, rows=rows[one.rows]))
+            block = one.block._replace(parameters=columns[one.block.parameters])
+            tracked.append(one._replace(block=block, rows=rows[one.rows]))
     return UnitBlocks(count, tuple(tracked))
