@@ -144,8 +144,7 @@ class _Makers:
         sub_blocks = np.repeat(np.arange(len(block.parts)), [part.basis.size for part in block.parts])
 
         def namer(matrix: Floats, energies: Floats, vectors: Floats) -> Ints:
-            whole = np.tril(matrix) + np.tril(matrix, -1).T
-            return names_of_states(block.parts, whole, vectors, self._representation)[0]
+            return names_of_states(block.parts, matrix, vectors, self._representation)[0]  # it reads the lower triangle
 
         return unit_block(units, sub_blocks, namer)
 

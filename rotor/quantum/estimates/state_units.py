@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from rotor.arrays import Floats, Ints, distinct
-from rotor.quantum.coupled import NOTHING, Part, connected_parts, names_of_states, parts_of
+from rotor.quantum.coupled import NOTHING, Part, connected_parts, names_of_functions, names_of_states, parts_of
 from rotor.quantum.effect import QuantumEffect, k_limits_of
 from rotor.quantum.estimates.unit_blocks import UnitBlock, UnitBlocks, members_of, tracked_blocks
 from rotor.quantum.labelled import unit_diagonals
@@ -261,23 +261,29 @@ def _between(elements: _Elements, up: Part, low: Part) -> _Elements:
 def _block(found: Sequence[_Elements], parts: tuple[Part, ...], mix: Floats, representation: str) -> UnitBlock:
     rows, columns, units, values = (np.concatenate(column) for column in zip(*found, strict=True))
     size = parts[-1].place.stop
-    places, of_place = np.unique(rows * size + columns, return_inverse=True)
-    used, of_unit = np.unique(units, return_inverse=True)
+    places, of_place = _numbered(rows * size + columns, size * size)
+    used, of_unit = _numbered(units, len(mix))
     factors = np.zeros((len(places), len(used)))
     np.add.at(factors, (of_place, of_unit), values)
-    parameters = np.flatnonzero(mix[used].any(axis=0))
+    of_used = mix[used]
+    parameters = np.flatnonzero(of_used.any(axis=0))
     sub_blocks = np.repeat(np.arange(len(parts)), [part.basis.size for part in parts])
 
     def namer(matrix: Floats, energies: Floats, vectors: Floats) -> Ints:
-        symmetric = np.tril(matrix) + np.tril(matrix, -1).T
-        return names_of_states(parts, symmetric, vectors, representation)[0]
+        if len(parts) == 1:
+            return names_of_functions(parts, representation)
+        return names_of_states(parts, matrix, vectors, representation)[0]  # of the matrix the lower triangle is read
 
     return UnitBlock(
-        size,
-        *np.divmod(places, size),
-        factors,
-        mix[np.ix_(used, parameters)],
-        parameters,
-        members_of(sub_blocks),
-        namer,
+        size, *np.divmod(places, size), factors, of_used[:, parameters], parameters, members_of(sub_blocks), namer
     )
+
+
+def _numbered(values: Ints, count: int) -> tuple[Ints, Ints]:
+    """The different ones of whole numbers from 0 to `count`, rising, and the place of each value among them."""
+    there = np.zeros(count, dtype=bool)
+    there[values] = True
+    found = np.flatnonzero(there)
+    place = np.empty(count, dtype=np.int64)
+    place[found] = np.arange(len(found))
+    return found, place[values]
