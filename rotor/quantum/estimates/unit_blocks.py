@@ -22,7 +22,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor.arrays import Floats, Ints, Workspace, distinct
+from rotor.arrays import Floats, Ints, Workspace
 
 Namer = Callable[[Floats, Floats, Floats], Ints]  # matrix, energies, vectors -> names (n, columns) of the states
 
@@ -70,17 +70,46 @@ def elements_of(matrix: Floats) -> Elements:
     return Elements(places, matrix.ravel()[places])
 
 
-def unit_block(units: dict[int, Elements], sub_blocks: Ints, namer: Namer) -> UnitBlock:
-    """From the unit matrix of every parameter, by its number, that acts in the block."""
-    parameters, size = sorted(units), len(sub_blocks)
-    diagonal = np.arange(size) * (size + 1)
-    places = distinct(np.concatenate([diagonal, *(units[i].places for i in parameters)]))
-    factors = np.zeros((len(places), len(parameters)))
-    for column, i in enumerate(parameters):
-        factors[np.searchsorted(places, units[i].places), column] = units[i].values
+class WeightedElements(NamedTuple):
+    """Elements of many matrices at once: places as of `Elements`, in any order, and factors (elements, parameters), which add up."""
+
+    places: Ints
+    factors: Floats
+
+
+def unit_block(
+    units: dict[int, Elements], sub_blocks: Ints, namer: Namer, more: WeightedElements | None = None
+) -> UnitBlock:
+    """From the unit matrix of every parameter, by its number, that acts in the block; more: elements of others, by all numbers."""
+    size = len(sub_blocks)
+    given = [np.arange(size) * (size + 1), *(one.places for one in units.values()), *([more.places] if more else [])]
+    places, of_place = numbered(np.concatenate(given), size * size)
+    bounds = np.cumsum([0, *map(len, given)]).tolist()
+    count = more.factors.shape[1] if more else 1 + max(units, default=-1)
+    factors = np.zeros((len(places), count))
+    if more:
+        np.add.at(factors, of_place[bounds[-2] :], more.factors)
+    for column, start, stop in zip(units, bounds[1:], bounds[2:], strict=False):
+        factors[of_place[start:stop], column] = units[column].values
+    numbers = np.flatnonzero(factors.any(axis=0))
     rows, columns = np.divmod(places, size)
-    numbers = np.array(parameters, dtype=np.int64)
-    return UnitBlock(size, rows, columns, factors, np.eye(len(parameters)), numbers, members_of(sub_blocks), namer)
+    return UnitBlock(
+        size, rows, columns, factors[:, numbers], np.eye(len(numbers)), numbers, members_of(sub_blocks), namer
+    )
+
+
+def numbered(values: Ints, count: int) -> tuple[Ints, Ints]:
+    """The different ones of whole numbers from 0 to `count`, rising, and the place of each value among them.
+
+    >>> [found.tolist() for found in numbered(np.array([3, 1, 3]), 4)]
+    [[1, 3], [1, 0, 1]]
+    """
+    there = np.zeros(count, dtype=bool)
+    there[values] = True
+    found = np.flatnonzero(there)
+    place = np.empty(count, dtype=np.int64)
+    place[found] = np.arange(len(found))
+    return found, place[values]
 
 
 def members_of(sub_blocks: Ints) -> Floats:
