@@ -80,7 +80,22 @@ class WeightedElements(NamedTuple):
 def unit_block(
     units: dict[int, Elements], sub_blocks: Ints, namer: Namer, more: WeightedElements | None = None
 ) -> UnitBlock:
-    """From the unit matrix of every parameter, by its number, that acts in the block; more: elements of others, by all numbers."""
+    """From the unit matrix of every parameter that acts in the block.
+
+    Parameters
+    ----------
+    units : dict
+        Unit matrices by the number of the parameter.
+    sub_blocks : (functions,) array
+        The number of the sub-block of every function.
+    namer : callable
+    more : WeightedElements, optional
+        Elements of other parameters, a column for every number.
+
+    Returns
+    -------
+    UnitBlock
+    """
     size = len(sub_blocks)
     given = [np.arange(size) * (size + 1), *(one.places for one in units.values()), *([more.places] if more else [])]
     places, of_place = numbered(np.concatenate(given), size * size)
