@@ -15,7 +15,7 @@ import numpy as np
 from rotor.arrays import Floats, Ints, distinct
 from rotor.quantum.coupled import CoupledBlock, names_of_states, parameter_matrix
 from rotor.quantum.effect import QuantumEffect
-from rotor.quantum.estimates.state_units import wang_elements
+from rotor.quantum.estimates.state_units import WangElements, wang_elements
 from rotor.quantum.estimates.unit_blocks import (
     Elements,
     Namer,
@@ -29,7 +29,7 @@ from rotor.quantum.estimates.unit_blocks import (
 from rotor.quantum.levels import Levels, SolvedBlock
 from rotor.quantum.spins.blocks import SpinBlock, coefficients_of, product
 from rotor.quantum.spins.lines import ParameterOperator
-from rotor.quantum.spins.operators import Scalar
+from rotor.quantum.spins.operators import AxialState, Basis, Scalar
 from rotor.quantum.spins.parts import SpinPart, assigned, labels_of, names_of_parts
 from rotor.quantum.spins.rotor import Channel, RotorBlock
 from rotor.quantum.spins.three_equivalent import labels_of_functions
@@ -220,28 +220,29 @@ class _SpinUnits:
 
 
 class _Rotation:
-    """The parameters whose operators are powers of N², Nz² and N± alone: elements over the Wang blocks of all parts, made at once.
+    """The parameters whose operators are powers of N², Nz² and N± alone: elements over the functions of all parts, made at once.
 
     They are the same for every coupling pattern. names : these parameters
     """
 
-    def __init__(self, names: Sequence[str], own: dict[int, dict[str, Operators]], blocks: set[WangBlock]) -> None:
+    def __init__(self, names: Sequence[str], own: dict[int, dict[str, Operators]], bases: set[Basis]) -> None:
         found = {(q, n) for terms in own.values() for name in names for _, q, n in terms.get(name, {})}
         powers = ((0, 0), *sorted(found - {(0, 0)}))
         self.names = frozenset(names)
         self._all, self._own, self._powers = names, own, {power: i for i, power in enumerate(powers)}
-        self._elements = wang_elements(blocks, powers)
+        wang = {basis for basis in bases if isinstance(basis, WangBlock)}
+        axial = {basis: _axial(basis, powers) for basis in bases if isinstance(basis, AxialState)}
+        self._elements: dict[Basis, WangElements] = {**axial, **(wang_elements(wang, powers) if wang else {})}
         self._known: dict[int, WeightedElements] = {}
 
     @classmethod
     def of(
         cls, top: Top, effects: tuple[QuantumEffect, ...], names: Sequence[str], blocks: Sequence[SpinBlock]
     ) -> _Rotation | None:
-        """None where states are |N K⟩, exchange allows some functions alone, or two effects have parameters of one name."""
-        bases = {own.basis for block in blocks for part in block.parts for own in part.rotor.parts}
-        wang = {basis for basis in bases if isinstance(basis, WangBlock)}
-        if len(wang) < len(bases) or any(block.allowed for block in blocks):
+        """None where exchange allows some functions alone, or two effects have parameters of one name."""
+        if any(block.allowed for block in blocks):
             return None
+        bases = {own.basis for block in blocks for part in block.parts for own in part.rotor.parts}
         others = {term.name for effect in effects for term in effect.spin_terms(top)}
         others |= {one.name for effect in effects for one in effect.couplings(top)}
         representation = blocks[0].shared.representation
@@ -257,7 +258,7 @@ class _Rotation:
                 if own.get(v, {}).keys() & terms.keys():  # of two effects: they add up
                     return None
                 own[v] = own.get(v, {}) | dict(terms)
-        return cls([name if name not in others else "" for name in names], own, wang)
+        return cls([name if name not in others else "" for name in names], own, bases)
 
     def of_parts(self, parts: Sequence[SpinPart]) -> WeightedElements:
         """The elements of a block with spins."""
@@ -277,7 +278,6 @@ class _Rotation:
         """The lower triangle over the functions of a solved block."""
         size, places, factors = len(rotor.energies_mhz), list[Ints](), list[Floats]()
         for part in rotor.parts:
-            assert isinstance(part.basis, WangBlock)
             elements, start = self._elements[part.basis], part.place.start
             mix = np.zeros((len(self._powers), len(self._all)))
             for column, name in enumerate(self._all):
@@ -286,6 +286,14 @@ class _Rotation:
             places.append((start + elements.rows) * size + start + elements.columns)
             factors.append(elements.values[:, None] * mix[elements.units])
         return WeightedElements(np.concatenate(places), np.concatenate(factors))
+
+
+def _axial(state: AxialState, powers: Sequence[tuple[int, int]]) -> WangElements:
+    """Nz^2q of one |N K⟩."""
+    units = np.array([place for place, (_, n) in enumerate(powers) if n == 0])
+    values = np.array([float(state.axial_k) ** (2 * q) for q, n in powers if n == 0])
+    zeros = np.zeros_like(units)
+    return WangElements(zeros, zeros, units, values)
 
 
 def _of_allowed(matrix: Floats, allowed: Allowed) -> Floats:
