@@ -231,8 +231,11 @@ class _Rotation:
         self.names = frozenset(names)
         self._all, self._own, self._powers = names, own, {power: i for i, power in enumerate(powers)}
         wang = {basis for basis in bases if isinstance(basis, WangBlock)}
-        axial = {basis: _axial(basis, powers) for basis in bases if isinstance(basis, AxialState)}
-        self._elements: dict[Basis, WangElements] = {**axial, **(wang_elements(wang, powers) if wang else {})}
+        self._elements: dict[Basis, WangElements] = {
+            basis: _axial(basis, powers) for basis in bases if isinstance(basis, AxialState)
+        }
+        for basis, elements in wang_elements(wang, powers).items():
+            self._elements[basis] = elements
         self._known: dict[int, WeightedElements] = {}
 
     @classmethod

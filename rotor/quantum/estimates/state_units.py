@@ -179,6 +179,8 @@ def _within(block: WangBlock, limits: tuple[int, int] | None) -> WangBlock | Non
 
 def wang_elements(blocks: set[WangBlock], powers: Sequence[tuple[int, int]]) -> dict[WangBlock, WangElements]:
     """The unit matrices of one state, those of `powers`, over every Wang block: lower triangles."""
+    if not blocks:
+        return {}
     every = sorted(blocks)
     diagonals = unit_diagonals(every, [block.size for block in every], powers[1:])
     size = max(block.size for block in every)
