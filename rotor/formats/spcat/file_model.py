@@ -6,8 +6,8 @@ Each group of connected states has a top that stands for its symmetry, and the f
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from concurrent.futures import Executor
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,6 +37,9 @@ from rotor.quantum.spins.operators import is_axial
 from rotor.quantum.spins.terms import Spin
 from rotor.tops.constants import Constants
 from rotor.tops.top import Top
+
+if TYPE_CHECKING:
+    from concurrent.futures import Executor
 
 _EVERY_K = 10**6
 
