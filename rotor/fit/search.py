@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -84,12 +85,11 @@ def robust(residuals: Floats, loss: str) -> tuple[Floats, Floats]:
     return residuals, np.ones_like(residuals)
 
 
-@dataclass(frozen=True, eq=False)
-class Grouping:
+class Grouping(NamedTuple):
     """The measured frequencies that count: for each the position of its first line; order, starts, shares: how blends add.
 
-    plain : no blend among them; blended, members, bounds : which of them are blends, the places of their lines in `order`, and where
-    each begins among these
+    plain : no blend among them. each : every line counts, in its order
+    blended, members, bounds : which of them are blends, the places of their lines in `order`, and where each begins among these
     """
 
     first: Ints
@@ -97,6 +97,7 @@ class Grouping:
     starts: Ints
     shares: Floats
     plain: bool
+    each: bool
     blended: Ints
     members: Ints
     bounds: Ints
@@ -116,10 +117,14 @@ class Grouping:
         blended = np.flatnonzero(counts > 1)
         bounds = np.concatenate([[0], np.cumsum(counts[blended])[:-1]]).astype(np.int64)
         members = np.flatnonzero(np.isin(each, blended))
-        return cls(order[starts], order, starts, shares, len(blended) == 0, blended, members, bounds)
+        first = order[starts]
+        each_line = np.array_equal(first, np.arange(len(lines)))
+        return cls(first, order, starts, shares, len(blended) == 0, each_line, blended, members, bounds)
 
     def mean(self, values: Floats) -> Floats:
-        """The weighted mean over each blend of values (lines, ...)."""
+        """The weighted mean over each blend of values (lines, ...); these themselves where every line stands alone."""
+        if self.plain and self.each:
+            return values
         out = values[self.first]
         if not self.plain:
             shares = self.shares[self.members].reshape(-1, *[1] * (values.ndim - 1))
@@ -159,7 +164,7 @@ class Search:
 
     def _lines_of(self, values: Floats) -> tuple[Floats, Floats, Floats]:
         energies, slopes = self.model.levels(self.parameters.constants_of(values))
-        slopes = slopes @ self.parameters.matrix
+        slopes = self.parameters.slopes_of(slopes)
         if self.from_zero:  # the place -1 of such lower levels is the last one
             energies, slopes = np.append(energies, 0.0), np.vstack([slopes, np.zeros(slopes.shape[1])])
         derivatives = slopes[self.upper]
@@ -184,8 +189,7 @@ class Search:
         group = self.group
         sigma = self.sigma[group.first]
         residuals = (self.lines.frequency_mhz[group.first] - group.mean(calculated)) / sigma
-        rows = group.mean(jacobian)
-        rows /= sigma[:, None]
+        rows = group.mean(jacobian) / sigma[:, None]
         spread, of_spread = self._apart(calculated, jacobian)
         known = np.flatnonzero(np.isfinite(self.parameters.prior))
         prior = self.parameters.prior[known]

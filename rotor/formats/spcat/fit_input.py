@@ -90,7 +90,7 @@ def _quanta_names(file: ParameterFile) -> tuple[str, ...]:
     """The quantum numbers of a state in the .lin file."""
     if is_plain(file, None):
         return QUANTA[constants_and_matrix(file)[0].kind]
-    from rotor.formats.spcat.file_lines import format_of
+    from rotor.formats.spcat.file_quanta import format_of
     from rotor.formats.spcat.fit_states import groups_for_fit, names_of_quanta
 
     return names_of_quanta(format_of(file, groups_for_fit(file)))
@@ -111,8 +111,8 @@ def spfit_input(file: ParameterFile, lines: LineList, source: str = "") -> Spfit
         constants, matrix = constants_and_matrix(file)
         names, kmax = tuple(constants.values), _kmax(file, constants)
     else:
+        from rotor.formats.spcat.file_model import line_names
         from rotor.formats.spcat.fit_states import FileLevels
-        from rotor.formats.spcat.predict_states import line_names
 
         matrix, names = np.eye(len(file.parameters)), line_names(file)
         model = partial(FileLevels.of, file)

@@ -253,9 +253,8 @@ def read_measured(line: Line, width: int = QUANTA_FIELDS) -> Measured:
 
 
 def _numbers(line: Line, width: int) -> tuple[tuple[float, float, float], int]:
-    """Frequency, error and weight behind so many fields of quantum numbers, and how many of them are written."""
-    body = line.body
-    if found := _AS_USUAL.match(body, 3 * width):
+    """Frequency, error and weight behind so many fields of quantum numbers of a plain line, and how many of them are written."""
+    if found := _AS_USUAL.match(line.text, 3 * width):
         texts = [text for text in found.groups() if text is not None]
         values = [float(text) for text in texts]
         if all(map(math.isfinite, values)):
