@@ -5,6 +5,7 @@ Levels keep their label by block and rank, so that no iteration reassigns a line
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -244,18 +245,18 @@ def with_rejection(
 ) -> tuple[Search, Minimum, dict[int, str]]:
     """The search, repeated without the lines that are too far off until the same ones stay out.
 
-    Where no minimum was reached, or too few lines would be left, all lines count: the constants are wrong, not the lines.
+    Where no minimum was reached, or too few lines would be left, all lines count: the constants are wrong, not the lines; unless
+    the start describes half of the lines and more, see `_from_near_lines`.
     """
-    minimum = _searched(search, progress)
-    if options.reject_above is None or not minimum.converged:
+    minimum, may = _searched(search, progress), search.used
+    if options.reject_above is None:
         return search, minimum, {}
-    may = search.used
+    if not minimum.converged or _is_poor(search, minimum):
+        search, minimum = _from_near_lines(search, minimum, progress)
+    if not minimum.converged:
+        return search, minimum, {}
     for _ in range(_REJECTIONS):
-        calculated, _, _ = search.lines_of(minimum.parameters)
-        group = Grouping.of(search.lines, may)
-        means = group.spread_back(group.mean(calculated), calculated)
-        far = np.abs(search.lines.frequency_mhz - means) / search.sigma > options.reject_above
-        used = may & ~far
+        used = may & _near(search, may, minimum.parameters)
         if (used == search.used).all():
             break
         if too_few(search.lines, used, search.parameters):
@@ -264,6 +265,30 @@ def with_rejection(
         minimum = _continued(minimum, _minimised(search, minimum.parameters, progress, options.most_iterations))
     out = np.flatnonzero(may & ~search.used)
     return search, minimum, {int(i): f"more than {options.reject_above:g} errors off" for i in out}
+
+
+def _near(search: Search, may: NDArray[np.bool_], values: Floats) -> NDArray[np.bool_]:
+    """Which lines are no more than `reject_above` errors off, blends among those that may count by their means."""
+    calculated, _, _ = search.lines_of(values)
+    group = Grouping.of(search.lines, may)
+    means = group.spread_back(group.mean(calculated), calculated)
+    off = np.abs(search.lines.frequency_mhz - means) / search.sigma
+    return np.asarray(off <= (search.options.reject_above or math.inf))
+
+
+def _from_near_lines(search: Search, first: Minimum, progress: Progress | None) -> tuple[Search, Minimum]:
+    """The minimum of the lines that the start describes, where these are half of them and more and all together led nowhere.
+
+    SPFIT leaves lines out at the start always. Then lines that constants a little off put far away never come back, so that all
+    lines are tried first here.
+    """
+    start, limit = search.parameters.start, search.options.most_iterations
+    near = search.used & _near(search, search.used, start)
+    if 2 * near.sum() < search.used.sum() or too_few(search.lines, near, search.parameters):
+        return search, first
+    few = replace(search, used=near)
+    found = _continued(first, _minimised(few, start, progress, limit))
+    return (few, found) if found.converged and not _is_poor(few, found) else (search, first)
 
 
 def _searched(search: Search, progress: Progress | None) -> Minimum:
