@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor.arrays import Floats, Indices
+from rotor.arrays import Floats, Indices, Ints
 from rotor.quantum.levels import Block, Levels, SolvedBlock
 from rotor.quantum.moments import Moment
 from rotor.quantum.reduced import amplitudes, connected_pairs, pairs_where, wang_columns
@@ -85,6 +85,8 @@ def all_transitions(
         strong = strong_lines(levels, solved, vector, cut.needed, range_mhz[1])
         found = _joined([_with_frequencies(levels, *batch, range_mhz, cut) for batch in _batches(strong)])
         return _rows(found, levels.weight[found.lower] > 0) if some_without else found
+    if cut is not None and not moments and (many := _of_groups(levels, blocks, dipoles, range_mhz, cut)) is not None:
+        return _rows(many, levels.weight[many.lower] > 0) if some_without else many
     pairs, between = _acting(levels, blocks, dipoles, moments)
     if cut is None and range_mhz == EVERYTHING and not any(up is low for up, low in pairs):
         found = _every_pair(pairs, between)
@@ -194,6 +196,49 @@ def _chosen(
     needed = np.full(len(levels), -np.inf) if cut is None else cut.needed
     candidates = (_candidates(levels, up, lows, between(up, lows), needed, range_mhz) for up, lows in _by_upper(pairs))
     return _joined([_with_frequencies(levels, *batch, range_mhz, cut) for batch in _batches(candidates)])
+
+
+def _of_groups(
+    levels: Levels, blocks: list[Block], dipoles: Mapping[tuple[int, int], Vector], range_mhz: tuple[float, float],
+    cut: IntensityCut,
+) -> Transitions | None:  # fmt: skip
+    """The same of levels with spins that were solved for many F at once, and are looked at so; None for others."""
+    if not blocks or isinstance(blocks[0], SolvedBlock):
+        return None
+    from rotor.quantum.spins.many_f_lines import amplitudes_of_groups, can_be_stacked
+
+    tensors = {states: body_tensor(mu, 1, str(levels.representation)) for states, mu in dipoles.items()}
+    needed = cut.needed
+    if not can_be_stacked(blocks, tensors) or not (needed > 0).all():
+        return None
+    found = amplitudes_of_groups(blocks, tensors, len(levels))  # type: ignore[arg-type]
+    extended = np.append(levels.energy_mhz, 0.0), np.append(needed, np.inf)
+    candidates = (_candidates_of_many(*extended, *of_f, range_mhz) for of_f in found)
+    return _joined([_with_frequencies(levels, *batch, range_mhz, cut) for batch in _batches(candidates)])
+
+
+def _candidates_of_many(
+    energies: Floats,
+    needed: Floats,
+    up: Ints,
+    low: Ints,
+    amplitude: Floats,
+    alike: bool,
+    range_mhz: tuple[float, float],
+) -> Rows:
+    """`_candidates` of rows (F, n_up) and (F, n_low); beyond the levels of an F amplitudes are 0."""
+    frequency = energies[up][:, :, None] - energies[low][:, None, :]
+    np.abs(frequency, out=frequency)
+    strength = amplitude * amplitude
+    keep = frequency * strength >= np.minimum(needed[up][:, :, None], needed[low][:, None, :])
+    if range_mhz != EVERYTHING:
+        keep &= (frequency >= range_mhz[0]) & (frequency <= range_mhz[1])
+    if alike:
+        keep &= up[:, :, None] > low[:, None, :]
+    places = np.flatnonzero(keep)
+    above, k = np.divmod(places, low.shape[1])
+    first, second = up.ravel()[above], low.ravel()[above // up.shape[1] * low.shape[1] + k]
+    return first.astype(np.int32), second.astype(np.int32), strength.ravel()[places]
 
 
 def _batches(pieces: Iterable[Rows]) -> Iterator[Rows]:
