@@ -8,12 +8,12 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor.arrays import Floats, Indices, Ints
+from rotor.arrays import Floats, Indices
 from rotor.quantum.levels import Block, Levels, SolvedBlock
 from rotor.quantum.moments import Moment
 from rotor.quantum.reduced import amplitudes, connected_pairs, pairs_where, wang_columns
@@ -22,6 +22,9 @@ from rotor.quantum.tensors import body_tensor
 from rotor.spectra.intensity import IntensityCut
 from rotor.spectra.strong_lines import strong_lines
 from rotor.tops.operators import FIGURE_AXIS
+
+if TYPE_CHECKING:
+    from rotor.quantum.spins.many_f_lines import Rows as ManyF
 
 EVERYTHING = (0.0, float("inf"))
 LONG_LIST = 30_000_000  # lines from which the compiled loop is loaded: the compiler takes 0.6 s, the plain loop 20 ns a line more
@@ -213,32 +216,36 @@ def _of_groups(
         return None
     found = amplitudes_of_groups(blocks, tensors, len(levels))  # type: ignore[arg-type]
     extended = np.append(levels.energy_mhz, 0.0), np.append(needed, np.inf)
-    candidates = (_candidates_of_many(*extended, *of_f, range_mhz) for of_f in found)
+    candidates = (_candidates_of_many(*extended, of_f, range_mhz) for of_f in found)
     return _joined([_with_frequencies(levels, *batch, range_mhz, cut) for batch in _batches(candidates)])
 
 
 def _candidates_of_many(
     energies: Floats,
     needed: Floats,
-    up: Ints,
-    low: Ints,
-    amplitude: Floats,
-    alike: bool,
+    of_f: ManyF,
     range_mhz: tuple[float, float],
 ) -> Rows:
-    """`_candidates` of rows (F, n_up) and (F, n_low); beyond the levels of an F amplitudes are 0."""
+    """`_candidates` of blocks of many F; beyond the levels of an F amplitudes are 0."""
+    up, low, amplitude, alike = of_f
+    of_up, of_low = needed[up], needed[low]
     frequency = energies[up][:, :, None] - energies[low][:, None, :]
     np.abs(frequency, out=frequency)
-    strength = amplitude * amplitude
-    keep = frequency * strength >= np.minimum(needed[up][:, :, None], needed[low][:, None, :])
+    strength = np.multiply(amplitude, amplitude, out=amplitude)
+    least = min(of_up.min(), of_low.min())
+    keep = frequency * strength >= least
     if range_mhz != EVERYTHING:
         keep &= (frequency >= range_mhz[0]) & (frequency <= range_mhz[1])
     if alike:
         keep &= up[:, :, None] > low[:, None, :]
     places = np.flatnonzero(keep)
     above, k = np.divmod(places, low.shape[1])
-    first, second = up.ravel()[above], low.ravel()[above // up.shape[1] * low.shape[1] + k]
-    return first.astype(np.int32), second.astype(np.int32), strength.ravel()[places]
+    below = above // up.shape[1] * low.shape[1] + k
+    if least < max(of_up.max(), of_low.max()):  # of few states alone
+        exact = np.minimum(of_up.ravel()[above], of_low.ravel()[below])
+        chosen = np.flatnonzero(frequency.ravel()[places] * strength.ravel()[places] >= exact)
+        places, above, below = places[chosen], above[chosen], below[chosen]
+    return up.ravel()[above], low.ravel()[below], strength.ravel()[places]
 
 
 def _batches(pieces: Iterable[Rows]) -> Iterator[Rows]:

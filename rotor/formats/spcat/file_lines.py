@@ -201,7 +201,9 @@ def transitions_of(group: Group, levels: Levels, request: Request, q: float) -> 
     found = all_transitions(
         levels, dict(group.effect.moments), cut=_wide_cut(levels, request, q), moments=group.effect.others
     )
-    exists = (levels.weight[found.lower] > 0) & (levels.weight[found.upper] > 0)
+    exists = np.ones(len(found.lower), dtype=bool)
+    if (levels.weight <= 0).any():
+        exists = (levels.weight[found.lower] > 0) & (levels.weight[found.upper] > 0)
     if any(state.fold > 2 and state.equivalent < 3 for state in group.states):
         exists &= share_a_weight(group, levels, found.upper, found.lower)
     else:

@@ -307,16 +307,17 @@ def prepare(plan: Plan, every_f: Iterable[int]) -> None:
 
 def couplings(plan: Plan, tables: dict[int, Ints]) -> dict[int, dict[Channel, Floats]]:
     """c(p', p) of all channels by F."""
-    scheme = plan.shared.scheme
     acting = {channel for operators in plan.operators.values() for channel in operators}
-    if scheme.equivalent:
-        return {f: {c: coefficients_of(scheme, c, own) for c in acting} for f, own in tables.items()}
-    both = {f: (own, own) for f, own in tables.items()}
-    found = {
-        channel: for_every_f(both, lambda bra, ket, channel=channel: _between(scheme, channel, bra, ket))  # type: ignore[misc]
-        for channel in acting
-    }
+    found = {channel: couplings_of(plan.shared.scheme, channel, tables) for channel in acting}
     return {f: {channel: own[f] for channel, own in found.items()} for f in tables}
+
+
+def couplings_of(scheme: Scheme, channel: Channel, tables: dict[int, Ints]) -> dict[int, Floats]:
+    """c(p', p) of a channel by F, whose patterns these are."""
+    if scheme.equivalent:
+        return {f: coefficients_of(scheme, channel, own) for f, own in tables.items()}
+    both = {f: (own, own) for f, own in tables.items()}
+    return for_every_f(both, lambda bra, ket: _between(scheme, channel, bra, ket))
 
 
 def _parts(plan: Plan, members: list[tuple[int, slice]]) -> tuple[SpinPart, ...]:

@@ -8,6 +8,7 @@ N, and are contracted by one product of matrices. Pair by pair the same is `roto
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -354,14 +355,15 @@ def _of_tensor(tensor: BodyTensor, up: WangBlock, low: WangBlock, pairs: Pairs) 
     m, n = (pairs.m, pairs.n) if closes.all() else (pairs.m[closes], pairs.n[closes])
     by_n = [tensor.signed_parts(up._replace(j=j + rise), low._replace(j=j)) for j in range(4)]  # N modulo 4 counts
     parts = np.array([own for _, own in by_n])[n[:, 0] % 4]
-    found = np.zeros((len(m), up.size, low.size))
+    found, every_n = np.zeros((len(m), up.size, low.size)), tuple(n[:, 0].tolist())
     for step in steps:
         source, target = overlap(up, low, step)
         if source.start < source.stop:
             rows, columns = np.arange(target.start, target.stop), np.arange(source.start, source.stop)
-            found[:, rows, columns] = _couplings(m, n, rank, step, low.k[source]) * parts[:, rank + step, None]
+            first, count = low.first_k + 2 * source.start, source.stop - source.start
+            found[:, rows, columns] = _couplings(every_n, rise, rank, step, first, count) * parts[:, rank + step, None]
     if rank > 1:
-        _add_folded(found, parts, up, low, (m, n))
+        _add_folded(found, parts, up, low, (every_n, rise))
     if closes.all():
         return found
     out = np.zeros((len(closes), up.size, low.size))
@@ -369,21 +371,43 @@ def _of_tensor(tensor: BodyTensor, up: WangBlock, low: WangBlock, pairs: Pairs) 
     return out
 
 
-def _couplings(m: Ints, n: Ints, rank: int, step: int, k: Ints) -> Floats:
-    """`tensors.coupling` from n (pairs, 1) to m, over K (functions,), times √2 where one of K and K + step is 0."""
+@lru_cache(maxsize=512)  # of N up to 100 some 20 MB
+def _couplings(every_n: tuple[int, ...], rise: int, rank: int, step: int, first_k: int, count: int) -> Floats:
+    """`tensors.coupling` from each N to N + rise, over K = first_k, first_k + 2, ..., times √2 where one of K and K + step is 0.
+
+    Parameters
+    ----------
+    every_n : tuple of int
+        N of the lower blocks.
+    rise, rank, step : int
+        By how much N changes, rank of the tensor, by how much K changes.
+    first_k, count : int
+        The lowest K and their number.
+
+    Returns
+    -------
+    (N, K) array
+        0 where there is no such K; shared and read-only.
+    """
+    n, k = np.array(every_n)[:, None], first_k + 2 * np.arange(count)
+    m = n + rise
     exists = (np.abs(k) <= n) & (np.abs(k + step) <= m)
     inside = np.where(exists, k, np.maximum(-n, -m - step)).astype(float)
-    values = closed_coupling(n.astype(float), int(m[0, 0] - n[0, 0]), rank, step, inside)
+    values = closed_coupling(n.astype(float), rise, rank, step, inside)
     if step:
         values = values * np.where(k == max(0, -step), np.sqrt(2.0), 1.0)
-    return np.where(exists, values, 0.0)
+    out = np.where(exists, values, 0.0)
+    out.flags.writeable = False
+    return out
 
 
-def _add_folded(found: Floats, parts: Floats, up: WangBlock, low: WangBlock, of_pairs: tuple[Ints, Ints]) -> None:
+def _add_folded(
+    found: Floats, parts: Floats, up: WangBlock, low: WangBlock, of_pairs: tuple[tuple[int, ...], int]
+) -> None:
     """Adds what joins K to -K', as `tensors.bands_between` does: s X(K', -K) of 1 ≤ K, K' and K + K' ≤ rank."""
-    rank, (m, n) = parts.shape[1] // 2, of_pairs
+    rank, (every_n, rise) = parts.shape[1] // 2, of_pairs
     for column, k in enumerate(low.k[:rank].tolist()):
         for row, k_up in enumerate(up.k[:rank].tolist()):
             if k and k_up and k + k_up <= rank:
-                turned = _couplings(m, n, rank, k + k_up, np.array([-k]))[:, 0]
+                turned = _couplings(every_n, rise, rank, k + k_up, -k, 1)[:, 0]
                 found[:, row, column] += low.sign * turned * parts[:, rank + k + k_up]

@@ -145,7 +145,7 @@ def _placed(blocks: Iterable[SpinBlock]) -> Iterator[SpinBlock]:
     start = 0
     for block in blocks:
         if len(block.energies_mhz):
-            yield replace(block, start=start)
+            yield block if block.start == start else replace(block, start=start)
             start += len(block.energies_mhz)
 
 

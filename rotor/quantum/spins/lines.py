@@ -195,16 +195,16 @@ def _of_alike(shared: Shared, rank: int, up: SpinBlock, low: SpinBlock) -> dict[
         only = _tensor_coefficients(shared.scheme, rank, up.patterns, low.patterns)
         return {("tensor", rank, up.twice_f, low.twice_f): only}
     step = up.twice_f - low.twice_f
-    return {("tensor", rank, f + step, f): own for f, own in coefficients_of_step(shared, rank, step).items()}
+    found = coefficients_of_step(shared.scheme, shared.cache["patterns"], rank, step)
+    return {("tensor", rank, f + step, f): own for f, own in found.items()}
 
 
-def coefficients_of_step(shared: Shared, rank: int, step: int) -> dict[int, Floats]:
+def coefficients_of_step(scheme: Scheme, every: dict[int, Ints], rank: int, step: int) -> dict[int, Floats]:
     """t(p', p) of all F' = F + step by F, doubled, where there are both."""
-    every: dict[int, Ints] = shared.cache["patterns"]
     tables = {f: (every[f + step], own) for f, own in every.items() if f + step in every}
-    if shared.scheme.equivalent:
-        return {f: _tensor_coefficients(shared.scheme, rank, *of_both) for f, of_both in tables.items()}
-    return for_every_f(tables, lambda bra, ket: tensor_coefficients(shared.scheme.twice, rank, bra, ket))
+    if scheme.equivalent:
+        return {f: _tensor_coefficients(scheme, rank, *of_both) for f, of_both in tables.items()}
+    return for_every_f(tables, lambda bra, ket: tensor_coefficients(scheme.twice, rank, bra, ket))
 
 
 def _tensor_coefficients(scheme: Scheme, rank: int, bra: Ints, ket: Ints) -> Floats:

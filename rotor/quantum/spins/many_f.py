@@ -10,14 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum.spins.contraction import Contracted, Stack
 from rotor.quantum.spins.parts import SpinPart
-from rotor.quantum.spins.scheme import Scheme
 
 MOST = 160  # functions of a block up to which many F are done at once: of larger ones each has arithmetic enough for itself
 Tables = dict[tuple[int, int, int], Floats]
@@ -50,7 +49,7 @@ class Group:
     @property
     def columns(self) -> int:
         """Number of columns."""
-        return self.slots[-1].columns.stop
+        return int(self.slots[-1].columns.stop)
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,51 +75,17 @@ class Frame:
         count = len(self.energies_mhz[slot.kind])
         return _places((twice_f[0] + slot.rise) // 2 - self.lowest, twice_f, count)
 
-    def by_f(self, tables: Mapping[int, Floats], step: int) -> Floats:
-        """Coefficients (F, patterns', patterns) with F' = F + step from tables of the patterns that each F has; doubled."""
-        count = len(self.every)
-        out = np.zeros((len(self.twice_f), count, count))
-        for f, table in tables.items():
-            out[(f - self.twice_f[0]) // 2, self.patterns[f + step][:, None], self.patterns[f]] = table
-        return out
-
 
 def _places(first: int, twice_f: Sequence[int], count: int) -> slice | Ints:
     """Places that rise with F from the first on, among so many: a slice where all are there and no F is left out."""
     if first >= 0 and first + len(twice_f) <= count and twice_f[-1] - twice_f[0] == 2 * (len(twice_f) - 1):
         return slice(first, first + len(twice_f))
-    return np.clip(first + (np.asarray(twice_f) - twice_f[0]) // 2, 0, count - 1)
+    return np.asarray(np.clip(first + (np.asarray(twice_f) - twice_f[0]) // 2, 0, count - 1))
 
 
-def frame_of(stacks: Sequence[Stack], patterns: Mapping[int, Ints], scheme: Scheme) -> Frame:
-    """The frame of all F, rising without gaps, whose patterns these are.
-
-    Parameters
-    ----------
-    stacks : sequence of Stack
-        All solved blocks of the rotation.
-    patterns : mapping of int to (n, columns) array
-        Coupling patterns by doubled F, the highest F last.
-    scheme : Scheme
-        Which spins are coupled.
-
-    Returns
-    -------
-    Frame
-    """
-    twice_f = list(patterns)
-    last = patterns[twice_f[-1]]
-    moving = np.ones(last.shape[1], dtype=np.int64)
-    if scheme.equivalent:
-        moving[-2] = 0  # a total of equivalent spins does not rise with F
-    every = last - moving * twice_f[-1]
-    numbers = {tuple(row): place for place, row in enumerate(every.tolist())}
-    places = {}
-    for f, own in patterns.items():
-        if len(own) == len(last):
-            places[f] = np.arange(len(last))
-        else:
-            places[f] = np.array([numbers[tuple(row)] for row in (own - moving * f).tolist()])
+def frame_of(stacks: Sequence[Stack], places: dict[int, Ints], every: Ints) -> Frame:
+    """The frame of all F, rising without gaps, with all solved blocks of the rotation; places, every: see
+    `pattern_tables.PatternTable`."""
     lowest, highest = min(int(stack.n[0]) for stack in stacks), max(int(stack.n[-1]) for stack in stacks)
     count = sum(len(stack.numbers) for stack in stacks)
     kinds, sizes = [0] * count, [0] * count
@@ -129,13 +94,12 @@ def frame_of(stacks: Sequence[Stack], patterns: Mapping[int, Ints], scheme: Sche
     for stack in stacks:
         largest[stack.kind] = max(largest.get(stack.kind, 0), *stack.sizes)
     for stack in stacks:
-        table = energies.setdefault(stack.kind, np.zeros((highest - lowest + 1, largest[stack.kind])))
-        for number, n, size, own in zip(
-            stack.numbers.tolist(), stack.n.tolist(), stack.sizes, stack.energies_mhz, strict=True
-        ):
+        of_kind = energies.setdefault(stack.kind, np.zeros((highest - lowest + 1, largest[stack.kind])))
+        members = zip(stack.numbers.tolist(), stack.n.tolist(), stack.sizes, stack.energies_mhz, strict=True)
+        for number, n, size, own in members:
             kinds[number], sizes[number] = stack.kind, size
-            table[n - lowest, :size] = own
-    return Frame(twice_f, lowest, kinds, sizes, energies, places, np.column_stack([every, scheme.classes(last)]))
+            of_kind[n - lowest, :size] = own
+    return Frame(list(places), lowest, kinds, sizes, energies, places, every)
 
 
 def tables_of(found: Sequence[Contracted], frame: Frame) -> Tables:
@@ -152,16 +116,17 @@ def tables_of(found: Sequence[Contracted], frame: Frame) -> Tables:
 
 Cell = tuple[int, int]
 """2(N - F) and class of patterns."""
+Key = tuple[tuple[Cell, int], ...]
+"""The cell and the kind of each slot."""
 
 
 def groups_of(members: Sequence[tuple[int, Sequence[SpinPart]]], frame: Frame) -> list[tuple[Group, list[int]]]:
     """Blocks, given by their doubled F and parts, in groups, each with the numbers of its blocks."""
-    cells = [tuple(row) for row in frame.every[:, [0, -1]].tolist()]
-    found: list[tuple[tuple[tuple[Cell, int], ...], dict[int, int]]] = []
+    cells: list[Cell] = [(rise, of) for rise, of in frame.every[:, [0, -1]].tolist()]
+    found: list[tuple[Key, dict[int, int]]] = []
     for number in sorted(range(len(members)), key=lambda number: -members[number][0]):
         f, parts = members[number]
-        own = frame.patterns[f]
-        key = tuple((cells[own[part.patterns.start]], frame.kinds[part.number]) for part in parts)
+        key = _key(frame.patterns[f], parts, frame, cells)
         for known, by_f in found:
             if f not in by_f and (key == known or set(key) <= set(known)):
                 by_f[f] = number
@@ -175,7 +140,7 @@ def groups_of(members: Sequence[tuple[int, Sequence[SpinPart]]], frame: Frame) -
 
 
 def _group(
-    key: Sequence[tuple[Cell, int]],
+    key: Key,
     by_f: Mapping[int, int],
     members: Sequence[tuple[int, Sequence[SpinPart]]],
     frame: Frame,
@@ -187,13 +152,20 @@ def _group(
         slots.append(Slot(cell[0], kind, slice(first, first + count), slice(start, start + count)))
         start += count
     twice_f = sorted(by_f)
-    columns, orders = np.zeros((len(twice_f), start), dtype=np.int64), []
+    columns, orders = np.zeros((len(twice_f), start), dtype=np.int64), list[Any]()
+    counts = [slot.columns.stop - slot.columns.start for slot in slots]
     for place, f in enumerate(twice_f):
-        own, order = frame.patterns[f], list[int]()
-        for part in members[by_f[f]][1]:
+        own, parts = frame.patterns[f], members[by_f[f]][1]
+        sizes = [frame.sizes[part.number] for part in parts]
+        if len(own) == len(cells) and _key(own, parts, frame, cells) == key:
+            columns[place] = np.repeat(sizes, counts)
+            orders.append(slice(None))
+            continue
+        order = list[int]()
+        for part, size in zip(parts, sizes, strict=True):
             slot = slots[key.index((cells[own[part.patterns.start]], frame.kinds[part.number]))]
             at = own[part.patterns] + (slot.columns.start - slot.patterns.start)
-            columns[place, at] = frame.sizes[part.number]
+            columns[place, at] = size
             order += at.tolist()
         orders.append(order)
     states = int(columns.max())
@@ -201,6 +173,11 @@ def _group(
     there = np.arange(states) < columns[:, :, None]
     functions = [every[order][there[place, order]] for place, order in enumerate(orders)]
     return Group(tuple(slots), twice_f, states, functions, {f: place for place, f in enumerate(twice_f)})
+
+
+def _key(own: Ints, parts: Sequence[SpinPart], frame: Frame, cells: Sequence[Cell]) -> Key:
+    """Where the columns of a block stand."""
+    return tuple((cells[own[part.patterns.start]], frame.kinds[part.number]) for part in parts)
 
 
 def are_connected(up: Group, low: Group, step: int, tables: Tables) -> bool:

@@ -10,10 +10,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.spins.blocks import Exist, Plan, SpinBlock, couplings, parts_of_f
+from rotor.quantum.spins.blocks import Exist, Plan, SpinBlock, parts_of_f
 from rotor.quantum.spins.many_f import MOST, Frame, Group, Tables, frame_of, groups_of, pieces_between, tables_of
 from rotor.quantum.spins.method import FIRST_ORDER
 from rotor.quantum.spins.parts import SpinPart, labels_of, names_of_tables
+from rotor.quantum.spins.pattern_tables import couplings_by_f, pattern_table
 
 _FEW = 100  # patterns of an F
 Member = tuple[int, tuple[SpinPart, ...]]
@@ -40,27 +41,29 @@ def solve_many_f(plan: Plan, every_f: Sequence[int], exist: Exist | None = None)
     alone = shared.used is not None and shared.used.method == FIRST_ORDER
     if shared.stacks is None or plan.contracted is None or alone or shared.scheme.equivalent == 3:
         return None
-    patterns = {f: own for f in every_f if len(own := shared.scheme.patterns(f))}
-    if not patterns or max(map(len, patterns.values())) > _FEW:
+    table = pattern_table(shared.scheme, every_f[0], every_f[-1])
+    if not 0 < len(table.every) <= _FEW:
         return None
-    members = [(f, parts) for f, own in patterns.items() for parts in parts_of_f(plan, own)]
+    members = [(f, parts) for f, own in table.patterns.items() for parts in parts_of_f(plan, own)]
     if not members or max(parts[-1].place.stop for _, parts in members) > MOST:
         return None
-    members, names, sizes = _existing(members, patterns, exist)
-    frame = frame_of(shared.stacks, patterns, shared.scheme)
-    shared.cache["frame"] = frame
-    shared.cache["patterns"] = patterns
-    known = couplings(plan, patterns)
-    acting = [
-        (tables_of(contracted, frame), sum(frame.by_f({f: own[c] for f, own in known.items()}, 0) for c in channels))
-        for contracted, alike in plan.contracted
-        if (channels := [channel for channel in alike if channel in known[every_f[0]]])
-    ]
-    solved = _solved(members, acting, frame)
-    out = []
-    for (f, parts), (group, energies, vectors), own, count in zip(members, solved, names, sizes, strict=True):
-        labels, mixing = labels_of(parts, (own, count), vectors)
-        out.append(SpinBlock(f, patterns[f], parts, energies, vectors, labels, mixing, shared, group=group))
+    members, names, sizes = _existing(members, table.patterns, exist)
+    frame = frame_of(shared.stacks, table.places, table.every)
+    shared.cache.update(frame=frame, patterns=table.patterns)
+    acting = []
+    for contracted, channels in (found for found in plan.contracted if found[0]):
+        each = [couplings_by_f(shared.scheme, channel, every_f[0], every_f[-1]) for channel in channels]
+        acting.append((tables_of(contracted, frame), each[0] if len(each) == 1 else np.add.reduce(each)))
+    out, start = [], 0
+    for (f, parts), own, of_names in zip(
+        members, _solved(members, acting, frame), zip(names, sizes, strict=True), strict=True
+    ):
+        group, energies, vectors = own
+        labels, mixing = labels_of(parts, of_names, vectors)
+        out.append(
+            SpinBlock(f, table.patterns[f], parts, energies, vectors, labels, mixing, shared, start, group=group)
+        )
+        start += len(energies)
     return out
 
 

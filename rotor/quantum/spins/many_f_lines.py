@@ -7,21 +7,21 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rotor.arrays import Floats, Ints
+from rotor.arrays import Floats, Indices
 from rotor.quantum.spins.blocks import SpinBlock
 from rotor.quantum.spins.contraction import MOST_RANK, tensors_of_stacks
-from rotor.quantum.spins.lines import coefficients_of_step
 from rotor.quantum.spins.many_f import Frame, Group, Tables, are_connected, pieces_between, tables_of
+from rotor.quantum.spins.pattern_tables import tensors_by_f
 from rotor.quantum.tensors import Tensors, rank_of
 
-_SPREAD = 1.4  # largest over smallest size of the blocks whose products are taken in one call: zeros cost time as well
+_ELEMENT, _PRODUCT = 1.5e-4, 2e-6  # what an element costs, and one step of its products, over what a call costs
 
 
 class Rows(NamedTuple):
     """Blocks of rising F: (F, states) rows of levels, those beyond a block counted from `len(levels)`, which is no level."""
 
-    up: Ints
-    low: Ints
+    up: Indices
+    low: Indices
     amplitudes: Floats
     alike: bool
 
@@ -33,7 +33,7 @@ class States(NamedTuple):
     group: Group
     places: dict[int, int]
     vectors: Floats
-    rows: Ints
+    rows: Indices
     sizes: list[int]
     ends: list[int]
 
@@ -67,7 +67,7 @@ def amplitudes_of_groups(blocks: Sequence[SpinBlock], tensors: Tensors, levels: 
     tables = tables_of(tensors_of_stacks(shared.stacks or [], tensors), frame)
     every = [_states(group, own, levels) for group, own in _by_group(blocks)]
     for step in range(0, 2 * rank + 1, 2):
-        coefficients = frame.by_f(coefficients_of_step(shared, rank, step), step)
+        coefficients = tensors_by_f(shared.scheme, rank, step, frame.twice_f[0], frame.twice_f[-1])
         for place, low in enumerate(every):
             for up in every[place:] if step == 0 else every:
                 yield from _between(up, low, step, rank, tables, coefficients, frame)
@@ -84,12 +84,12 @@ def _by_group(blocks: Sequence[SpinBlock]) -> list[tuple[Group, list[SpinBlock]]
 def _states(group: Group, blocks: Sequence[SpinBlock], levels: int) -> States:
     sizes = [len(block.energies_mhz) for block in blocks]
     vectors = np.zeros((len(blocks), group.states * group.columns, max(sizes)))
-    rows = np.full((len(blocks), max(sizes)), levels)
+    rows = np.full((len(blocks), max(sizes)), levels, dtype=np.int32)
     ends = []
     for place, (block, size) in enumerate(zip(blocks, sizes, strict=True)):
         functions = group.functions[group.places[block.twice_f]]
         vectors[place, functions, :size] = block.vectors
-        rows[place, :size] = np.arange(block.start, block.start + size)
+        rows[place, :size] = range(block.start, block.start + size)
         ends.append(int(functions.max()) + 1)
     return States(group, {block.twice_f: place for place, block in enumerate(blocks)}, vectors, rows, sizes, ends)
 
@@ -120,9 +120,12 @@ def _places(places: list[int]) -> slice | list[int]:
 
 
 def _of_like_size(sizes: Sequence[int]) -> Iterator[slice]:
-    """Runs of blocks, the smallest first, in which the largest is little larger than the smallest."""
-    first = 0
-    for last in range(1, len(sizes) + 1):
-        if last == len(sizes) or sizes[last] > _SPREAD * sizes[first]:
+    """Runs of blocks of rising size whose products are taken in one call, as long as its zeros cost less than another call."""
+    first, own = 0, 0.0
+    for last, size in enumerate(sizes):
+        cost = size**2 * (_ELEMENT + size * _PRODUCT)
+        if (last - first) * cost - own > 1.0:
             yield slice(first, last)
-            first = last
+            first, own = last, 0.0
+        own += cost
+    yield slice(first, len(sizes))
