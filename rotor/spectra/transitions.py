@@ -128,7 +128,8 @@ def _blocks_with_weight(levels: Levels) -> tuple[list[Block], bool]:
     return [block for block, _ in with_some], any((weight <= 0).any() for _, weight in with_some)
 
 
-def _rows(lines: Transitions, rows: NDArray[np.bool_]) -> Transitions:
+def _rows(lines: Transitions, chosen: NDArray[np.bool_]) -> Transitions:
+    rows = np.flatnonzero(chosen)
     return Transitions(lines.frequency_mhz[rows], lines.strength_debye2[rows], lines.upper[rows], lines.lower[rows])
 
 
@@ -239,8 +240,8 @@ def _candidates_of_many(
     if alike:
         keep &= up[:, :, None] > low[:, None, :]
     places = np.flatnonzero(keep)
-    above, k = np.divmod(places, low.shape[1])
-    below = above // up.shape[1] * low.shape[1] + k
+    above = places // low.shape[1]
+    below = above // up.shape[1] * low.shape[1] + places - above * low.shape[1]
     if least < max(of_up.max(), of_low.max()):  # of few states alone
         exact = np.minimum(of_up.ravel()[above], of_low.ravel()[below])
         chosen = np.flatnonzero(frequency.ravel()[places] * strength.ravel()[places] >= exact)

@@ -8,7 +8,7 @@ states are fewer, are zeros. Elements of the rotation stand in tables by N, coef
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -185,30 +185,13 @@ def are_connected(up: Group, low: Group, step: int, tables: Tables) -> bool:
     return any((a.kind, b.kind, (step + a.rise - b.rise) // 2) in tables for a in up.slots for b in low.slots)
 
 
-class Piece(NamedTuple):
-    """Where an operator acts between two groups, (F, states', columns', states, columns), and its elements and coefficients there."""
-
-    place: Floats
-    elements: Floats
-    coefficients: Floats
-
-
-def pieces_between(
-    out: Floats,
-    up: Group,
-    low: Group,
-    twice_f: Sequence[int],
-    step: int,
-    tables: Tables,
-    coefficients: Floats,
-    frame: Frame,
-) -> Iterator[Piece]:
-    """c(F) ⟨r'‖X‖r⟩ between two groups, with F' = F + step, as factors, each with its place in `out`.
+def between(
+    up: Group, low: Group, twice_f: Sequence[int], step: int, tables: Tables, coefficients: Floats, frame: Frame
+) -> Floats:
+    """c(F) ⟨r'‖X‖r⟩ between two groups, with F' = F + step.
 
     Parameters
     ----------
-    out : (F, functions', functions) array
-        Of the groups.
     up, low : Group
         Of F' and F.
     twice_f : sequence of int
@@ -222,12 +205,17 @@ def pieces_between(
     frame : Frame
         Of both groups.
 
-    Yields
-    ------
-    Piece
-        Each place once.
+    Returns
+    -------
+    (F, states', columns', states, columns) array
+        Functions are counted as `functions_of` does.
     """
-    view = out.reshape(len(twice_f), up.states, up.columns, low.states, low.columns)
+    # the longest axes last where a slot has several columns: short innermost loops take most of the time
+    alone = up.columns == len(up.slots) and low.columns == len(low.slots)
+    shape = len(twice_f), up.states, up.columns, low.states, low.columns
+    order = (0, 1, 2, 3, 4) if alone else (2, 4, 0, 1, 3)
+    out = np.zeros([shape[axis] for axis in order])
+    view = out.transpose(np.argsort(order).tolist())
     own = coefficients[frame.of_f(twice_f)]
     for right in low.slots:
         places = frame.of_n(twice_f, right)
@@ -236,8 +224,15 @@ def pieces_between(
             if table is not None:
                 element = table[places, : up.states, : low.states]
                 _, rows, columns = element.shape
-                yield Piece(
-                    view[:, :rows, left.columns, :columns, right.columns],
+                np.multiply(
                     element[:, :, None, :, None],
                     own[:, None, left.patterns, None, right.patterns],
+                    out=view[:, :rows, left.columns, :columns, right.columns],
                 )
+    return view
+
+
+def functions_of(elements: Floats) -> Floats:
+    """Elements (F, states', columns', states, columns) as (F, functions', functions); a view where columns come last in memory."""
+    count, states_up, columns_up, states, columns = elements.shape
+    return elements.reshape(count, states_up * columns_up, states * columns)

@@ -5,13 +5,13 @@ Each block is then solved by itself, with the matrix that `blocks` makes of it, 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum.spins.blocks import Exist, Plan, SpinBlock, parts_of_f
-from rotor.quantum.spins.many_f import MOST, Frame, Group, Tables, frame_of, groups_of, pieces_between, tables_of
+from rotor.quantum.spins.many_f import MOST, Frame, Group, Tables, between, frame_of, functions_of, groups_of, tables_of
 from rotor.quantum.spins.method import FIRST_ORDER
 from rotor.quantum.spins.parts import SpinPart, labels_of, names_of_tables
 from rotor.quantum.spins.pattern_tables import couplings_by_f, pattern_table
@@ -91,36 +91,39 @@ def _solved(
     """The group, energies and eigenvectors of every block; blocks of one size are solved in one call."""
     matrices: dict[int, list[tuple[int, Floats]]] = {}
     groups: dict[int, Group] = {}
+    zeros = [float(parts[0].rotor.energies_mhz[0]) for _, parts in members]  # taken out for the sake of digits
     for group, numbers in groups_of(members, frame):
-        zeros = np.array([members[number][1][0].rotor.energies_mhz[0] for number in numbers])
-        every = _hamiltonians(group, acting, frame, zeros)
-        if not np.isfinite(every).all():
-            raise ValueError("a block of the Hamiltonian overflows: N max is too high for these constants")
-        for matrix, own, number in zip(every, group.functions, numbers, strict=True):
+        own_zeros = np.array([zeros[number] for number in numbers])
+        for number, matrix in zip(numbers, _hamiltonians(group, acting, frame, own_zeros), strict=True):
             groups[number] = group
-            matrices.setdefault(len(own), []).append((number, matrix[own[:, None], own]))
+            matrices.setdefault(len(matrix), []).append((number, matrix))
     out: list[tuple[Group, Floats, Floats]] = [None] * len(members)  # type: ignore[list-item]
     for alike in matrices.values():
-        energies, vectors = np.linalg.eigh(np.stack([matrix for _, matrix in alike]))  # reads the lower triangle
+        every = np.stack([matrix for _, matrix in alike])
+        if not np.isfinite(every).all():
+            raise ValueError("a block of the Hamiltonian overflows: N max is too high for these constants")
+        energies, vectors = np.linalg.eigh(every)  # reads the lower triangle
         for (number, _), own, states in zip(alike, energies, vectors, strict=True):
-            zero = float(members[number][1][0].rotor.energies_mhz[0])
-            out[number] = groups[number], own + zero, states
+            out[number] = groups[number], own + zeros[number], states
     return out
 
 
-def _hamiltonians(group: Group, acting: Sequence[tuple[Tables, Floats]], frame: Frame, zeros: Floats) -> Floats:
-    """The Hamiltonians of a group, (F, functions, functions), energies from `zeros` on, in the lower triangle."""
-    count, width = len(group.twice_f), group.states * group.columns
-    out = np.zeros((count, width, width))
-    diagonal = np.zeros((count, group.states, group.columns))
+def _hamiltonians(
+    group: Group, acting: Sequence[tuple[Tables, Floats]], frame: Frame, zeros: Floats
+) -> Iterator[Floats]:
+    """The Hamiltonians of a group, (functions, functions) of each block, energies from `zeros` on, in the lower triangle."""
+    every = [
+        functions_of(between(group, group, group.twice_f, 0, tables, coefficients, frame))
+        for tables, coefficients in acting
+    ]
+    diagonal = np.zeros((len(zeros), group.states, group.columns))
     for slot in group.slots:
-        table = frame.energies_mhz[slot.kind]
-        rows = min(group.states, table.shape[1])
-        own = table[frame.of_n(group.twice_f, slot), :rows]
-        diagonal[:, :rows, slot.columns] = (own - zeros[:, None])[:, :, None]
-    every = np.arange(width)
-    out[:, every, every] = diagonal.reshape(count, width)
-    for tables, coefficients in acting:
-        for piece in pieces_between(out, group, group, group.twice_f, 0, tables, coefficients, frame):
-            np.add(piece.place, piece.elements * piece.coefficients, out=piece.place)
-    return out
+        own = frame.energies_mhz[slot.kind][frame.of_n(group.twice_f, slot), : group.states]
+        diagonal[:, : own.shape[1], slot.columns] = (own - zeros[:, None])[:, :, None]
+    for place, functions in enumerate(group.functions):
+        chosen = functions[:, None], functions
+        matrix = every[0][place][chosen] if every else np.zeros((len(functions), len(functions)))
+        matrix.flat[:: len(functions) + 1] += diagonal[place].ravel()[functions]
+        for one in every[1:]:
+            matrix += one[place][chosen]
+        yield matrix

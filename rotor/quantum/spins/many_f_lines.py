@@ -10,7 +10,7 @@ import numpy as np
 from rotor.arrays import Floats, Indices
 from rotor.quantum.spins.blocks import SpinBlock
 from rotor.quantum.spins.contraction import MOST_RANK, tensors_of_stacks
-from rotor.quantum.spins.many_f import Frame, Group, Tables, are_connected, pieces_between, tables_of
+from rotor.quantum.spins.many_f import Frame, Group, Tables, are_connected, between, functions_of, tables_of
 from rotor.quantum.spins.pattern_tables import tensors_by_f
 from rotor.quantum.tensors import Tensors, rank_of
 
@@ -28,7 +28,7 @@ class Rows(NamedTuple):
 
 class States(NamedTuple):
     """The blocks of a group that are there: places of the doubled F, eigenvectors (F, functions, states), rows of levels (F, states),
-    how many states each has, and how many functions up to its last."""
+    how many states each has, and how many of the rotation."""
 
     group: Group
     places: dict[int, int]
@@ -90,7 +90,7 @@ def _states(group: Group, blocks: Sequence[SpinBlock], levels: int) -> States:
         functions = group.functions[group.places[block.twice_f]]
         vectors[place, functions, :size] = block.vectors
         rows[place, :size] = range(block.start, block.start + size)
-        ends.append(int(functions.max()) + 1)
+        ends.append(int(functions.max()) // group.columns + 1)
     return States(group, {block.twice_f: place for place, block in enumerate(blocks)}, vectors, rows, sizes, ends)
 
 
@@ -101,15 +101,15 @@ def _between(
     twice_f = [f for f in low.places if f + step in up.places and 2 * f + step >= 2 * rank]
     if not twice_f or not are_connected(up.group, low.group, step, tables):
         return
-    whole = np.zeros((len(twice_f), up.vectors.shape[1], low.vectors.shape[1]))
-    for piece in pieces_between(whole, up.group, low.group, twice_f, step, tables, coefficients, frame):
-        np.multiply(piece.elements, piece.coefficients, out=piece.place)
+    whole = between(up.group, low.group, twice_f, step, tables, coefficients, frame)
     lefts, rights = [up.places[f + step] for f in twice_f], [low.places[f] for f in twice_f]
-    for some in _of_like_size([low.ends[place] for place in rights]):
+    for some in _of_like_size([low.sizes[place] for place in rights]):
         left, right = _places(lefts[some]), _places(rights[some])
         height, width = max(up.ends[place] for place in lefts[some]), max(low.ends[place] for place in rights[some])
+        elements = functions_of(whole[some, :height, :, :width])
+        height, width = height * up.group.columns, width * low.group.columns
         ups, lows = max(up.sizes[place] for place in lefts[some]), max(low.sizes[place] for place in rights[some])
-        moved = np.matmul(whole[some, :height, :width], low.vectors[right, :width, :lows])
+        moved = np.matmul(elements, low.vectors[right, :width, :lows])
         found = np.matmul(up.vectors[left, :height, :ups].transpose(0, 2, 1), moved)
         yield Rows(up.rows[left, :ups], low.rows[right, :lows], found, up is low and not step)
 
