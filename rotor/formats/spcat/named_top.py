@@ -21,6 +21,7 @@ from rotor.formats.spcat.dipole_codes import dipoles_of
 from rotor.formats.spcat.file_effect import CodedLine, coded_lines
 from rotor.formats.spcat.file_model import allowed
 from rotor.formats.spcat.model import weights_of
+from rotor.formats.spcat.series import is_constant, is_series
 from rotor.formats.spcat.states import StateOptions, states_of
 from rotor.formats.spcat.text.int_file import IntensityFile
 from rotor.formats.spcat.text.par import Options, Parameter, ParameterFile
@@ -61,7 +62,7 @@ def named_top(file: ParameterFile, intensities: IntensityFile | None = None, *, 
     """
     states, first = states_of(file), file.options[0]
     _refuse(file, states, intensities)
-    lines, left_out = allowed(coded_lines(file.parameters, len(states), first.nvib < 0), states, [], first.nvib < 0)
+    lines, left_out = allowed(coded_lines(file, len(states)), states, [], first.nvib < 0)
     if left_out:
         raise ValueError(f"{left_out[0]}; leave it out of the file, or predict from the files themselves")
     rows = [(line, file.parameters[int(line.name.partition("#")[2]) - 1]) for line in lines]
@@ -92,7 +93,9 @@ def named_top(file: ParameterFile, intensities: IntensityFile | None = None, *, 
 
 def _refuse(file: ParameterFile, states: tuple[StateOptions, ...], intensities: IntensityFile | None) -> None:
     first = file.options[0]
+    digits = [split_code(parameter.code, len(states)) for parameter in file.parameters]
     reasons = {
+        "FF, EX, TYP 90 to 99: a Fourier or Euler series": any(is_series(d) or is_constant(d) for d in digits),
         f"IXX = {first.ixx}: a sum of angular momenta that is held for conserved": first.ixx != 0,
         f"IAX = {first.iax}: a total spin of equivalent nuclei": any(s.i_tot for s in states),
         f"EWT = {first.ewt}: an l-doubled state": any(s.l_code for s in states),
