@@ -144,7 +144,10 @@ def other_rows() -> list[str]:
     rows = [f"| {name} | {operator_answer(code)} |" for name, code in cases]
     file = read_par(b"a case\n 1 0 0 0\na 1 1 0 20\n 200000 1.0 0\n")
     odd = answer(lambda: coded_lines(file, 1))
-    return [*rows, f"| TYP 20, 40, 60 and other operators of odd order within one state that is not l-doubled | {odd} |"]
+    return [
+        *rows,
+        f"| TYP 20, 40, 60 and other operators of odd order within one state that is not l-doubled | {odd} |",
+    ]
 
 
 def option_answer(line: str) -> str:
