@@ -20,7 +20,9 @@ from rotor.fit.fit import Fit, FitOptions, fit_lines
 from rotor.fit.parameters import Parameters, parameters, with_names
 from rotor.fit.report import fit_facts
 from rotor.formats.assigned_lines import QUANTA, read_assigned_lines
-from rotor.formats.spcat.fit_input import SpfitInput, fitted_file, named_file, read_fit
+from rotor.formats.spcat.fit_input import SpfitInput, fitted_file, read_fit
+from rotor.formats.spcat.named_fit import named_file
+from rotor.formats.spcat.text.par import ParameterFile
 from rotor.quantum.labelled import LevelModel
 from rotor.statistics.least_squares import Progress
 from rotor.table import Table
@@ -167,6 +169,11 @@ def fit_of_lines(
         begin = with_names(top.constants, names)
     except ValueError as error:
         raise ValueError(f"free: {error}") from None
+    for tie in ties:  # a constant that follows another need not be in the start
+        try:
+            begin = with_names(begin, [tie.partition("=")[0].strip()] if "=" in tie else [])
+        except ValueError as error:
+            raise ValueError(f"tie {tie!r}: {error}") from None
     priors = dict(priors_mhz or {})
     made = parameters(begin, names, ties=ties, priors_mhz=priors)
     title = " ".join(top.name.split()) or Path(lines).name
@@ -193,9 +200,10 @@ def write_fitted_toml(answer: FitAnswer, path: str | os.PathLike[str]) -> None:
     from rotor.formats.molecules.molecule_writer import write_molecule_file
 
     request, fit = answer.request, answer.fit
+    doubt = "" if fit.converged else f"NOT CONVERGED ({fit.reason}): "
     origin = (
-        f"fitted by rotor to {int(fit.used.sum())} lines of {Path(request.files.source).name}, weighted by their errors; weighted rms "
-        f"{fit.weighted_rms:.4g}; errors from the stated errors of the lines"
+        f"{doubt}fitted by rotor to {int(fit.used.sum())} lines of {Path(request.files.source).name}, weighted by their "
+        f"errors; weighted rms {fit.weighted_rms:.4g}; errors from the stated errors of the lines"
     )
     start = request.files.start or ""
     own = start.lower().endswith(".toml") and Path(start).exists()
@@ -213,11 +221,15 @@ def write_fitted_toml(answer: FitAnswer, path: str | os.PathLike[str]) -> None:
 
 
 def write_fitted_par(answer: FitAnswer, path: str | os.PathLike[str], *, variances: bool) -> None:
-    """The .par file of SPFIT after the fit, or, with variances, the .var file."""
+    """The .par file of SPFIT after the fit, or, with variances, the .var file. Raises ValueError as `fitted_par` does."""
     from rotor.formats.spcat.text.par import write_par
 
+    write_par(fitted_par(answer, variances=variances), path)
+
+
+def fitted_par(answer: FitAnswer, *, variances: bool) -> ParameterFile:
+    """What stands in the .par file after the fit, or in the .var file. ValueError where SPFIT has no such parameters."""
     request, fit = answer.request, answer.fit
     if request.spfit is not None:
-        write_par(fitted_file(request.spfit, fit, variances=variances), path)
-    else:
-        write_par(named_file(fit, request.title, variances=variances), path)
+        return fitted_file(request.spfit, fit, variances=variances)
+    return named_file(fit, request.title, variances=variances)
