@@ -76,10 +76,10 @@ def _one_for_one(
     fit: Fit, given: tuple[Parameter, ...], back: Floats, variances: bool
 ) -> tuple[list[Parameter], Floats]:
     """As many parameters move as constants are free. Parameters, and the free ones (n, n) by the free constants."""
-    moved: list[bool] = back.any(axis=1).tolist()
+    moved = np.atleast_1d(back.any(axis=1))
     made = [
         replace(p, error=_error(fit, row, variances) if moves else _HELD)
-        for p, row, moves in zip(given, back, moved, strict=True)
+        for p, row, moves in zip(given, back, moved.tolist(), strict=True)
     ]
     return made, back[moved]
 
