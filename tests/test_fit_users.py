@@ -192,6 +192,107 @@ def test_a_tied_constant_need_not_be_in_the_start(call, folder, seen):
     assert "--tie 'DeltaQ=2*deltaJ': 'DeltaQ' is not a rotational constant known here" in err
 
 
+def test_the_report_has_what_each_line_moves(call, folder, seen):
+    """DFBETAS by leaving the line out and fitting again; linear, so that a tenth is a wide bound."""
+    import json
+
+    few = seen.take(np.arange(0, len(seen), 9))
+    write_csv(folder / "x.csv", few)
+    start = "A=5213.4471 B=1897.2265 C=1401.8812 DeltaJ=2e-4 DeltaJK=-1.11e-3 deltaJ=5.1e-5 deltaK=9.3e-4 MHz"
+    common = ("fit", "x.csv", "--constants", start, "--free", "A,B,C,DeltaJ")
+    code, out, err = call(*common, "--out", "t", "--json", "t.json")
+    assert code == 0, err
+    content = json.loads((folder / "t.json").read_text(encoding="utf-8"))
+    moved = np.array([line["dfbetas"] for line in content["lines"]])
+    worst = int(np.abs(moved).max(axis=1).argmax())
+    text = (folder / "t.fit").read_text(encoding="utf-8")
+    assert "asymmetric top, A-reduction, Ir" in text
+    assert text.split("INFLUENCE")[1].splitlines()[1].startswith(f"line {worst + 1}, ")
+    write_csv(folder / "less.csv", few.take(np.arange(len(few)) != worst))
+    call("fit", "less.csv", *common[2:], "--json", "less.json")
+    less = json.loads((folder / "less.json").read_text(encoding="utf-8"))
+    for k, (whole, rest) in enumerate(zip(content["parameters"], less["parameters"], strict=True)):
+        change = (whole["value"] - rest["value"]) / (whole["error"] * less["reduced_chi"])
+        assert moved[worst, k] == pytest.approx(change, abs=0.02)  # of a standard error: what is not linear
+    assert ("influential, line" in out) == (np.abs(moved).max() > 1)
+
+
+TWO_STATES = """two states
+   8   30   20    0    0.0E+000    1.0E+006    1.0E+000 1.0
+a    1    2    0   20    0    1    1    1   -1    -1   1
+a    1    1    0   20    0    1    1    1    0    -1   1
+        10099  5.2134471E+03 1.0E+36 /A
+        20000  1.8972265E+03 1.0E+36 /B
+        20011  1.8900000E+03 1.0E+36 /B
+        30099  1.4018812E+03 1.0E+36 /C
+          299 -2.1200000E-04 1.0E+36 /-DJ
+        41099 -9.3000000E-04 1.0E-37 /-dK
+        40199 -5.1000000E-05 1.0E+36 /-dJ
+       -40111  1.0200000E-05 1.0E+36 /-dJ
+"""
+
+
+def test_the_table_of_several_states_has_every_parameter_with_its_state(seen, tmp_path):
+    from rotor.formats.fit_request import answer_fit, fit_of_spfit, report_of, table_of
+
+    (tmp_path / "two.par").write_text(TWO_STATES)
+    rows = []
+    for v, b in ((0, 1897.2265), (1, 1890.0)):
+        deltas = TRUE["deltaJ"] * (0.8 if v else 1.0)
+        for one in lines_with_v(lines_of(TRUE.replace(B=b, DeltaJK=0.0, deltaJ=deltas)), v):
+            rows.append(one)
+    (tmp_path / "two.lin").write_text("".join(rows))
+    header = TWO_STATES.replace("   8   30", f"   8 {len(rows):4d}")
+    (tmp_path / "two.par").write_text(header)
+    answer = answer_fit(fit_of_spfit(str(tmp_path / "two.par")))
+    assert answer.fit.converged
+    assert answer.fit.parameters.names == ("A", "B (20000)", "B (20011)", "C", "-DJ", "-dJ")
+    cells = [[cell.strip() for cell in line.split("|")[1:-1]] for line in table_of(answer, "markdown").splitlines()]
+    by_name = {(row[0], row[1]): row[3] for row in cells if len(row) == 4}
+    assert by_name["δK", "all"] == "0.93 (held)"  # kHz, with the sign of the publication
+    assert by_name["δJ", "1"].startswith("-1")
+    assert by_name["δJ", "1"].endswith("(follows -dJ)")
+    assert float(by_name["B", "1"].partition("(")[0]) == pytest.approx(1890.0, abs=3e-4)  # four standard errors
+    assert by_name["B", "0"].startswith("1897.22")
+    section = report_of(answer).split("PARAMETERS OF THE FILE")[1].splitlines()
+    assert len(section[1 : section.index("")]) == 8
+    assert section[8].split()[1:3] == ["-40111", "-dJ"]
+
+
+def lines_with_v(lines: Assignments, v: int) -> list[str]:
+    """Lines of a .lin file with the state v behind the quantum numbers."""
+    rows = zip(lines.upper.tolist(), lines.lower.tolist(), lines.frequency_mhz.tolist(), strict=True)
+    return [f"{''.join(f'{n:3d}' for n in (*u, v, *low, v)):36s} {f:15.6f} 0.003\n" for u, low, f in rows]
+
+
+def test_the_errors_of_the_table_may_be_those_of_the_scatter(call, folder, seen):
+    write_csv(folder / "x.csv", seen)
+    start = "A=5213 B=1897 C=1402 DeltaJ=2e-4 DeltaJK=-1.11e-3 deltaJ=5.1e-5 deltaK=9.3e-4 MHz"
+    common = (
+        "fit",
+        "x.csv",
+        "--constants",
+        start,
+        "--free",
+        "A,B,C",
+        "--tie",
+        "DeltaJ=1e-7*B",
+        "--default-error",
+        "0.01",
+    )
+    for name in ("stated", "scatter"):
+        assert call(*common, "--poor-rms", "1e9", "--table", f"{name}.tex", "--table-errors", name)[0] == 0
+    stated, scatter = ((folder / f"{name}.tex").read_text(encoding="utf-8") for name in ("stated", "scatter"))
+    assert "scaled by the scatter" in scatter
+    assert "scaled" not in stated
+    assert stated.splitlines()[4] != scatter.splitlines()[4]
+    assert "(follows $B$)" in stated
+    assert "$-1.11$ (held)" in stated  # kHz
+    code, _, err = call(*common, "--table", "x.tex", "--table-errors", "both")
+    assert code == 2
+    assert "--table-errors both: one of stated, scatter is needed" in err
+
+
 def test_what_is_not_written_is_said(call, folder, seen):
     write_csv(folder / "x.csv", lines_of(TRUE, shift=0.0))
     code, _, err = call(

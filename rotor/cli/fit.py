@@ -86,6 +86,9 @@ class Options:
     out: str | None = option(None, metavar="STEM", help="Write STEM.fit (report), .toml, .par and .var.")
     table: str | None = file_option(".txt", ".md", ".tex", help="Table for a publication.")
     save_lines: str | None = file_option(".lin", ".csv", help="The assigned lines, merged.")
+    table_errors: str = option(
+        "stated", metavar="NAME", help="Errors in --table: from the stated errors of the lines, or from their scatter."
+    )
     plot: str | None = file_option(".png", ".pdf", ".svg", help="Residuals against frequency, J and K.")
     json: str | None = json_option()
     save_scene: str | None = save_scene_option()
@@ -101,6 +104,8 @@ def command(context: typer.Context, given: Options) -> None:
     require_whole("--bootstrap", given.bootstrap, 0, MOST_SAMPLES)
     require_whole("--seed", given.seed, 0)
     require_whole("--iterations", given.iterations, 1)
+    if given.table_errors not in ("stated", "scatter"):
+        raise ValueError(f"--table-errors {given.table_errors}: one of stated, scatter is needed")
     files = _files(given)
     _refuse_unsaved(given)
     request = read_request(given)
@@ -124,7 +129,7 @@ def command(context: typer.Context, given: Options) -> None:
     _refuse_par(files, answer)
     content = record(answer, context.obj, steps, extras)
     content["files"] = files.names
-    writers = _writers(answer, content) | _saved(answer, given)
+    writers = _writers(answer, content, scaled=given.table_errors == "scatter") | _saved(answer, given)
     deliver(files, writers, lambda: json_text(content), lambda: _show(request, fit, steps, extras))
     if not fit.converged:
         raise ComputationError(f"not converged: {fit.reason}")
@@ -166,11 +171,9 @@ def _saved(answer: FitAnswer, given: Options) -> dict[str, Writer]:
     """The writer of --save-scene, with files counted from the folder of the scene."""
     if given.save_scene is None:
         return {}
-    left = [
-        name
-        for name, value in (("--try", given.try_), ("--suggest", given.suggest), ("--bootstrap", given.bootstrap))
-        if value
-    ]
+    others = {"--try": given.try_, "--suggest": given.suggest, "--bootstrap": given.bootstrap}
+    left = [name for name, value in others.items() if value]
+    left += ["--table-errors"] if given.table_errors != "stated" else []
     if left:
         note(f"the scene does not repeat {', '.join(left)}")
     from rotor.formats.fit_request import FitFiles
@@ -181,12 +184,12 @@ def _saved(answer: FitAnswer, given: Options) -> dict[str, Writer]:
         str(beside(read.source, folder)), *(beside(one, folder) for one in (read.lin, read.merge, read.start))
     )
     molecule = None if answer.request.spfit is not None else Input(given.start, given.constants)
-    others: dict[str, Any] = (
+    outputs: dict[str, Any] = (
         {} if stem is None else {"report": f"{stem}.fit", "par": f"{stem}.par", "var": f"{stem}.var"}
     )
     if stem is not None and answer.fit.constants is not None:
-        others["toml"] = f"{stem}.toml"
-    return save_scene("fit", replace(answer.request, files=files), given, molecule, **others)
+        outputs["toml"] = f"{stem}.toml"
+    return save_scene("fit", replace(answer.request, files=files), given, molecule, **outputs)
 
 
 def _files(given: Options) -> Files:
@@ -318,11 +321,9 @@ def _progress() -> Any:
 # What goes out
 
 
-def _writers(answer: FitAnswer, content: dict[str, Any]) -> dict[str, Writer]:
-    from rotor.fit.publication import publication_table
-    from rotor.fit.report import report_text
+def _writers(answer: FitAnswer, content: dict[str, Any], *, scaled: bool) -> dict[str, Writer]:
     from rotor.formats.assigned_lines import write_assigned_lines
-    from rotor.formats.fit_request import write_fitted_par, write_fitted_toml
+    from rotor.formats.fit_request import report_of, table_of, write_fitted_par, write_fitted_toml
 
     request, fit = answer.request, answer.fit
 
@@ -333,11 +334,11 @@ def _writers(answer: FitAnswer, content: dict[str, Any]) -> dict[str, Writer]:
 
     form = {".txt": "text", ".md": "markdown", ".tex": "latex"}
     return {
-        "--out .fit": lambda path: write_text(path, report_text(fit, request.title, notes=request.notes)),
+        "--out .fit": lambda path: write_text(path, report_of(answer)),
         "--out .toml": lambda path: write_fitted_toml(answer, path),
         "--out .par": lambda path: write_fitted_par(answer, path, variances=False),
         "--out .var": lambda path: write_fitted_par(answer, path, variances=True),
-        "--table": lambda path: write_text(path, publication_table(fit, form[path.suffix.lower()])),
+        "--table": lambda path: write_text(path, table_of(answer, form[path.suffix.lower()], scaled=scaled)),
         "--save-lines": lambda path: write_assigned_lines(fit.lines, path),
         "--plot": picture,
     }

@@ -18,7 +18,8 @@ from rotor.arrays import Floats, Ints
 from rotor.fit.assignment import Assignments, merged
 from rotor.fit.fit import Fit, FitOptions, fit_lines
 from rotor.fit.parameters import Parameters, parameters, with_names
-from rotor.fit.report import fit_facts
+from rotor.fit.publication import publication_table
+from rotor.fit.report import fit_facts, report_text
 from rotor.formats.assigned_lines import QUANTA, read_assigned_lines
 from rotor.formats.spcat.fit_input import SpfitInput, fitted_file, read_fit
 from rotor.formats.spcat.named_fit import named_file
@@ -28,6 +29,7 @@ from rotor.statistics.least_squares import Progress
 from rotor.table import Table
 from rotor.tops.constants import Constants
 from rotor.tops.top import Top
+from rotor.version import version
 
 
 @dataclass(frozen=True)
@@ -189,6 +191,31 @@ def with_more_lines(request: FitRequest, path: str) -> FitRequest:
     both, found = merged(request.lines, more)
     files = replace(request.files, merge=path)
     return replace(request, lines=both, files=files, notes=(*request.notes, *notes, *found))
+
+
+def report_of(answer: FitAnswer) -> str:
+    """The report of a fit with what it was read from, and of SPFIT's files every parameter."""
+    from rotor.formats.spcat.fit_table import parameter_section
+
+    request, read = answer.request, answer.request.files
+    files = [Path(one).name for one in (read.source, read.lin, read.merge) if one]
+    head = [
+        f"rotor {version()}; read: {', '.join(files)}" + (f"; start: {Path(read.start).name}" if read.start else "")
+    ]
+    loss = request.options.loss
+    if loss != "squares":
+        head.append(f"robust loss {loss}: lines that are far off weigh less")
+    of_file = parameter_section(request.spfit, answer.fit) if request.spfit else ()
+    return report_text(answer.fit, request.title, notes=request.notes, head=head, of_file=of_file)
+
+
+def table_of(answer: FitAnswer, form: str, *, scaled: bool = False) -> str:
+    """The table of a publication; ValueError as `publication_table`."""
+    from rotor.formats.spcat.fit_table import publication_rows
+
+    spfit = answer.request.spfit
+    rows = publication_rows(spfit, answer.fit) if spfit and answer.fit.constants is None else ()
+    return publication_table(answer.fit, form, scaled=scaled, rows=rows)
 
 
 def write_fitted_toml(answer: FitAnswer, path: str | os.PathLike[str]) -> None:

@@ -82,6 +82,9 @@ def _trial_record(trial: Trial) -> dict[str, Any]:
 def _line_records(fit: Fit) -> list[dict[str, Any]]:
     lines = fit.lines
     leverage = dict(zip(fit.groups.tolist(), fit.statistics.leverages.tolist(), strict=False))
+    from rotor.fit.report import dfbetas
+
+    moved = dict(zip(fit.groups.tolist(), dfbetas(fit), strict=True))
     difference = fit.difference_mhz
     return [
         {
@@ -95,6 +98,7 @@ def _line_records(fit: Fit) -> list[dict[str, Any]]:
             "blend": lines.blend[i],
             "used": bool(fit.used[i]),
             "leverage": leverage.get(i),
+            "dfbetas": moved.get(i),
         }
         for i in range(len(lines))
     ]

@@ -116,7 +116,7 @@ def spfit_input(file: ParameterFile, lines: LineList, source: str = "") -> Spfit
         model = partial(FileLevels.of, file)
     values = np.array([p.value for p in file.parameters])
     parameters = Parameters(
-        names=_distinct([file.parameters[i].label or str(file.parameters[i].code) for i in free]),
+        names=_distinct([file.parameters[i] for i in free]),
         start=values[list(free)],
         prior=np.array([_prior(file.parameters[i]) for i in free]),
         constant_names=names,
@@ -199,11 +199,12 @@ def _prior(parameter: Parameter) -> float:
     return error if error < FREE_ABOVE else np.inf
 
 
-def _distinct(names: Sequence[str]) -> tuple[str, ...]:
-    """Names with a number behind those that stand twice."""
+def _distinct(parameters: Sequence[Parameter]) -> tuple[str, ...]:
+    """The labels, with the code behind those that stand twice, and a number where the code does too."""
+    labels = [p.label or str(p.code) for p in parameters]
+    names = [f"{x} ({p.code})" if labels.count(x) > 1 else x for x, p in zip(labels, parameters, strict=True)]
     return tuple(
-        f"{name} ({1 + list(names[:i]).count(name)})" if list(names).count(name) > 1 else name
-        for i, name in enumerate(names)
+        f"{name}, {1 + names[:i].count(name)}" if names.count(name) > 1 else name for i, name in enumerate(names)
     )
 
 
