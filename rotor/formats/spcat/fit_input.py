@@ -88,7 +88,7 @@ def _quanta_names(file: ParameterFile) -> tuple[str, ...]:
     """The quantum numbers of a state in the .lin file."""
     if is_plain(file, None):
         return QUANTA[constants_and_matrix(file)[0].kind]
-    from rotor.formats.spcat.file_lines import format_of
+    from rotor.formats.spcat.file_quanta import format_of
     from rotor.formats.spcat.fit_states import groups_for_fit, names_of_quanta
 
     return names_of_quanta(format_of(file, groups_for_fit(file)))
@@ -109,8 +109,8 @@ def spfit_input(file: ParameterFile, lines: LineList, source: str = "") -> Spfit
         constants, matrix = constants_and_matrix(file)
         names, kmax = tuple(constants.values), _kmax(file, constants)
     else:
+        from rotor.formats.spcat.file_model import line_names
         from rotor.formats.spcat.fit_states import FileLevels
-        from rotor.formats.spcat.predict_states import line_names
 
         matrix, names = np.eye(len(file.parameters)), line_names(file)
         model = partial(FileLevels.of, file)
@@ -308,14 +308,15 @@ def fitted_file(asked: SpfitInput, fit: Fit, *, variances: bool) -> ParameterFil
         made.append(replace(parameter, value=value, error=error))
     leaders = [c for p, c in zip(asked.file.parameters, asked.columns, strict=True) if not p.constrained]
     rest = correlation_text(fit, leaders) if variances else ""
-    return replace(asked.file, parameters=tuple(made), rest=rest)
+    header = replace(asked.file.header, npar=len(made))
+    return replace(asked.file, header=header, parameters=tuple(made), rest=rest)
 
 
 def correlation_text(fit: Fit, columns: Sequence[int]) -> str:
     """What stands at the end of a .var file: the correlations C = V Vᵀ, V upper triangular, column by column, eight in a line.
 
-    columns : of every parameter without a minus sign its place among those of the fit, -1 of one that is held: SPCAT counts these
-    too. The sign of a column has no bearing on C.
+    columns : of every parameter without a minus sign its place among those of the fit, -1 of one that is held, which has none with others:
+    SPCAT reads so many, and takes none where fewer stand there. The sign of a column has no bearing on C.
     """
     correlations = np.nan_to_num(fit.statistics.correlations)
     np.fill_diagonal(correlations, 1.0)
