@@ -170,3 +170,21 @@ def test_the_command_takes_spins_and_states_along(tmp_path, capsys):
     top = rotor.read(tmp_path / "a.toml")
     assert top.states.dipoles[1, 0] == (0.0, 0.0, 1.47)
     assert top.spin_constants.values["chi_bb-cc(14N)"] == pytest.approx(1.5 * 4.08983, rel=1e-12)
+
+
+def test_lines_of_a_file_are_shown_with_its_names(capsys):
+    assert (
+        run(["spectrum", str(ORACLES / "tunnelling_doublet_quad" / "tunnelling_doublet_quad.int"), "--top", "1"]) == 0
+    )
+    shown = capsys.readouterr().out
+    for text in (
+        "dipole between 0 and 1: μa 0, μb 0, μc 0.9 D",
+        "interacting states",
+        "nuclear quadrupole 2.5 MHz",
+        "hyperfine     exact",
+    ):
+        assert text in shown
+    assert (
+        run(["spectrum", str(ORACLES / "kinds" / "o2" / "o2.int"), "--top", "1"]) == 0
+    )  # magnetic moments have no name
+    assert "effects   those of the parameters of the files" in capsys.readouterr().out

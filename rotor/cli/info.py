@@ -129,7 +129,7 @@ def _facts(top: Top, content: dict[str, Any]) -> list[tuple[str, str]]:
         ("dipole", dipole),
         ("polarizability", report.tensor_text(top)),
         ("spin weights", weights),
-        *_states_facts(top),
+        *report.states_facts(top),
         ("mass", f"{top.mass_u:.6f} u" if top.mass_u else "not known"),
         ("inertial defect", f"{round(content['inertial_defect_u_angstrom2'], 9) + 0.0:.6g} u Å²"),
     ]
@@ -169,23 +169,6 @@ def _constants_table(top: Top) -> Table:
         for name, mhz in top.constants.values.items()
     ]
     return Table("", ("constant", "MHz", "± MHz", "cm-1"), rows, frozenset({"constant"}))
-
-
-def _states_facts(top: Top) -> list[tuple[str, str]]:
-    """Names, spin weights and dipoles of several states, and where they are from."""
-    states = top.states
-    if states is None:
-        return []
-    from rotor.cli.shared.report import vector_text, weights_text
-
-    names = [f"{v} ({states.name_of(v)})" if states.names else str(v) for v in range(states.count)]
-    facts = [("states", f"v = {', '.join(names)}")]
-    for v, one in states.weights.items():
-        facts.append(("", f"spin weights of {states.name_of(v)}: {weights_text(one.to_mapping())}"))
-    for (up, low), moment in states.dipoles.items():
-        where = f"in {states.name_of(up)}" if up == low else f"between {states.name_of(low)} and {states.name_of(up)}"
-        facts.append(("", f"dipole {where}: {vector_text(moment)}"))
-    return facts
 
 
 def _states_table(top: Top) -> Table | None:
