@@ -226,7 +226,7 @@ def is_plain(parameters: ParameterFile, intensities: IntensityFile | None) -> bo
         return False
     digits = [split_code(parameter.code) for parameter in parameters.parameters]
     orthorhombic = all(
-        not (d.i1 or d.i2 or d.ns) and (d.typ < 12 or d.typ >= 90) and (d.v1, d.v2) in ((0, 0), (9, 9)) for d in digits
+        not (d.i1 or d.i2 or d.ns or d.ff or d.ex) and d.typ < 12 and (d.v1, d.v2) in ((0, 0), (9, 9)) for d in digits
     )
     energies = any(not any(d[:8]) for d in digits)
     mixed = any(d.typ == 4 and d.ksq for d in digits) and any(d.typ > 4 for d in digits)  # terms of both reductions
