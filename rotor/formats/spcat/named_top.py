@@ -21,6 +21,7 @@ from rotor.formats.spcat.dipole_codes import dipoles_of
 from rotor.formats.spcat.file_effect import CodedLine, coded_lines
 from rotor.formats.spcat.file_model import allowed
 from rotor.formats.spcat.model import weights_of
+from rotor.formats.spcat.series import is_constant, is_series
 from rotor.formats.spcat.states import StateOptions, states_of
 from rotor.formats.spcat.text.int_file import IntensityFile
 from rotor.formats.spcat.text.par import Options, Parameter, ParameterFile
@@ -61,7 +62,7 @@ def named_top(file: ParameterFile, intensities: IntensityFile | None = None, *, 
     """
     states, first = states_of(file), file.options[0]
     _refuse(file, states, intensities)
-    lines, left_out = allowed(coded_lines(file.parameters, len(states), first.nvib < 0), states, [], first.nvib < 0)
+    lines, left_out = allowed(coded_lines(file, len(states)), states, [], first.nvib < 0)
     if left_out:
         raise ValueError(f"{left_out[0]}; leave it out of the file, or predict from the files themselves")
     rows = [(line, file.parameters[int(line.name.partition("#")[2]) - 1]) for line in lines]
@@ -96,6 +97,7 @@ def _refuse(file: ParameterFile, states: tuple[StateOptions, ...], intensities: 
         f"IXX = {first.ixx}: a sum of angular momenta that is held for conserved": first.ixx != 0,
         f"IAX = {first.iax}: a total spin of equivalent nuclei": any(s.i_tot for s in states),
         f"EWT = {first.ewt}: an l-doubled state": any(s.l_code for s in states),
+        f"XOPT = {first.xopt}: NEWLZ, NOFC or G12": first.xopt >= 10,
         "KNMIN: a range of K that does not begin with 0": any(s.kmin for s in states),
         "SPIND: spins that differ from state to state": len({s.spins for s in states}) > 1,
         "KNMAX: linear states beside others": len({s.linear for s in states}) > 1,
@@ -104,6 +106,10 @@ def _refuse(file: ParameterFile, states: tuple[StateOptions, ...], intensities: 
     for what, found in reasons.items():
         if found:
             raise ValueError(f"{what} {NO_NAME}")
+    for parameter in file.parameters:
+        digits = split_code(parameter.code, len(states))
+        if is_series(digits) or is_constant(digits):
+            raise ValueError(f"parameter {parameter.code}: a term of a Fourier or Euler series {NO_NAME}")
 
 
 def _refuse_unlike(constants: list[Constants]) -> None:
