@@ -203,6 +203,13 @@ def _nuclei_table(top: Top, content: dict[str, Any]) -> Table | None:
         said = constants or "not known; the size is that of covalent bonds of this element"
         about = "" if one["known"] else "about "
         rows.append([one["nucleus"], f"{one['spin']:g}", f"{about}{one['splitting_mhz']:.3g}", said])
+    listed = [row[0] for row in rows]
+    known = top.spin_constants.values if top.spin_constants else {}
+    for spins in dict.fromkeys(re.findall(r"\(([^()]*)\)", " ".join(known))):  # electrons, spins of 1/2, pairs
+        if spins not in listed:
+            own = {name.replace(f"({spins})", ""): value for name, value in known.items() if f"({spins})" in name}
+            size = "" if "," in spins or not top.spin_constants else f"{top.spin_constants.twice[spins] / 2:g}"
+            rows.append([spins, size, "", ", ".join(f"{name} {value:.6g}" for name, value in own.items())])
     if not rows:
         return None
     columns = ("nucleus", "spin", "splits J = 1 by (MHz)", "constants (MHz)")
