@@ -100,6 +100,7 @@ class Outputs:
     hitran_id: str | None = option(
         None, metavar="M:I", help="HITRAN's numbers of molecule and isotopologue, such as 5:1."
     )
+    egy: str | None = file_option(".egy", help="Of an .int file: write its levels as SPCAT's list (.egy).")
     csv: str | None = file_option(".csv", help="Write all lines as CSV.")
     parquet: str | None = file_option(".parquet", help="Write all lines as Parquet.")
     profile_csv: str | None = file_option(".csv", help="Write the profile on its grid as CSV.")
@@ -133,6 +134,8 @@ def command(
     hitran = _hitran_numbers(outputs, settings["temperature_k"])
 
     prediction = spcat.prediction_asked(context, given.source, options.as_spcat)
+    if prediction is None and outputs.egy is not None:
+        raise ValueError("--egy: expected with an .int file; levels of anything else are written by rotor levels --egy")
     with inputs.fields_as_options(**NAMES):
         if prediction is not None:
             answer, tag = spcat.answer_of(prediction, shape), prediction.request.tag
@@ -152,6 +155,7 @@ def command(
     writers |= save_scene("spectrum", answer.request, outputs, given, tag=tag)
     if prediction is not None:
         writers["--cat"] = _program_catalogue(prediction, content)
+        writers["--egy"] = _program_levels(prediction, content, str(given.source), options.as_spcat)
     deliver(
         files,
         writers,
@@ -264,6 +268,23 @@ def _program_catalogue(prediction: Prediction, content: dict[str, Any]) -> Write
         write_cat(prediction.catalogue, path)
         record = record_of(prediction.lines, {"command": content["command"], "input": content["input"]})
         write_beside(path, record | {"q": prediction.q, "lines": len(prediction.catalogue)})
+
+    return write
+
+
+def _program_levels(prediction: Prediction, content: dict[str, Any], source: str, as_spcat: bool) -> Writer:
+    """The levels as SPCAT lists them."""
+    from rotor.formats.provenance import record_of, write_beside
+    from rotor.formats.spcat.predict import levels_of_file
+    from rotor.formats.spcat.text.egy import write_egy
+
+    def write(path: Path) -> None:
+        levels = prediction.levels
+        if levels is None:
+            levels = levels_of_file(source, as_spcat=as_spcat)
+        write_egy(levels, path)
+        record = record_of(prediction.lines, {"command": content["command"], "input": content["input"]})
+        write_beside(path, record | {"levels": len(levels)})
 
     return write
 

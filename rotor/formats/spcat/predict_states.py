@@ -17,15 +17,15 @@ from rotor.arrays import Floats, Ints
 from rotor.formats.spcat.codes import constants_of, split_code
 from rotor.formats.spcat.file_lines import (
     LEAST_MHZ,
-    Format,
     as_catalogue,
     as_level_list,
-    format_of,
+    end_to_end,
     lines_of,
     transitions_of,
     within,
 )
-from rotor.formats.spcat.file_model import Group, groups_of, left_out
+from rotor.formats.spcat.file_model import Group, groups_of, left_out, line_names
+from rotor.formats.spcat.file_quanta import Format, format_of
 from rotor.formats.spcat.text.catalogue import Catalogue
 from rotor.formats.spcat.text.egy import LevelList
 from rotor.formats.spcat.text.int_file import IntensityFile, Request
@@ -82,7 +82,7 @@ def predicted(
     form = format_of(parameters, groups)
     q = summed_q(groups, request.temperature_k).q if own_q else request.qrot
     groups = _with_levels(groups, request)
-    solved = [(group, group.levels(f_range(group, request))) for group in groups]
+    solved = _solved(groups, request, form)
     transitions = [transitions_of(group, levels, request, q) for group, levels in solved]
     factor, names = variance_factor(parameters), line_names(parameters)
     spreads = [level_spreads(group, levels, names, factor) for group, levels in solved]
@@ -98,6 +98,46 @@ def predicted(
     return made, lines, q, as_level_list(solved, form), notes
 
 
+def _solved(groups: list[Group], request: Request, form: Format) -> list[tuple[Group, Levels]]:
+    """The levels of every group from FBGN to FEND; those of states above MAXV count as levels that do not exist."""
+    found = [(group, group.levels(f_range(group, request))) for group in groups]
+    if request.maxv < 0 or not form.states:
+        return found
+    return [(group, _up_to(request.maxv, group, levels)) for group, levels in found]
+
+
+def _up_to(maxv: int, group: Group, levels: Levels) -> Levels:
+    return replace(levels, weight=np.where(_file_numbers(group, levels) <= maxv, levels.weight, 0))
+
+
+def levels_of_files(parameters: ParameterFile, intensities: IntensityFile, *, as_spcat: bool = False) -> LevelList:
+    """The levels of an .int file from FBGN to FEND as SPCAT lists them, whether they have names of this package or not.
+
+    Parameters
+    ----------
+    parameters : ParameterFile
+        The .var or .par file.
+    intensities : IntensityFile
+        The .int file.
+    as_spcat : bool, optional
+        Whether K beyond KNMAX is left out of the basis.
+
+    Returns
+    -------
+    LevelList
+        Energies in cm⁻¹ from the zero of the Hamiltonian, degeneracies with the weights of the file.
+
+    Raises
+    ------
+    ValueError
+        As `predict.predict` does.
+    """
+    groups = groups_of(parameters, intensities, as_spcat=as_spcat)
+    form = format_of(parameters, groups)
+    groups = _with_levels(groups, intensities.request)
+    return as_level_list(_solved(groups, intensities.request, form), form)
+
+
 def _with_levels(groups: list[Group], request: Request) -> list[Group]:
     """The groups with levels from FBGN to FEND; ValueError where no group has any."""
     found = [group for group in groups if group.has_levels(f_range(group, request))]
@@ -108,11 +148,6 @@ def _with_levels(groups: list[Group], request: Request) -> list[Group]:
             f"KNMIN, WTPL, WTMN of the states are {limits}"
         )
     return found
-
-
-def line_names(file: ParameterFile) -> tuple[str, ...]:
-    """The parameter lines as `file_effect.coded_lines` names them."""
-    return tuple(f"{parameter.code}#{place}" for place, parameter in enumerate(file.parameters, 1))
 
 
 def level_spreads(group: Group, levels: Levels, names: Sequence[str], factor: Floats | None) -> Floats | None:
@@ -179,21 +214,17 @@ def _lines(
     q: float,
 ) -> Lines:
     """The lines as this package has them: one table of levels for all groups, one line for both components of ±K."""
-    starts = np.cumsum([0, *(len(levels) for _, levels in solved)])
+    starts = np.cumsum([0, *(len(levels) for _, levels in solved[:-1])]).astype(np.int32)
     levels = _joined(solved, form)
     t = request.temperature_k
     above = math.exp(levels.ground_mhz / units.MHZ_PER_K / t)  # Q counts from zero, `Lines` from the lowest level
     lines = Lines(
         top=_shown(parameters, solved[0][0]),
         levels=levels,
-        frequency_mhz=np.concatenate([each.frequency_mhz for each in transitions]),
-        strength_debye2=np.concatenate([each.strength_debye2 for each in transitions]),
-        upper=np.concatenate([each.upper + start for each, start in zip(transitions, starts, strict=False)]).astype(
-            np.int32
-        ),
-        lower=np.concatenate([each.lower + start for each, start in zip(transitions, starts, strict=False)]).astype(
-            np.int32
-        ),
+        frequency_mhz=end_to_end([each.frequency_mhz for each in transitions]),
+        strength_debye2=end_to_end([each.strength_debye2 for each in transitions]),
+        upper=end_to_end([each.upper + start for each, start in zip(transitions, starts, strict=True)]),
+        lower=end_to_end([each.lower + start for each, start in zip(transitions, starts, strict=True)]),
         temperature_k=t,
         min_lgint=request.str0,
         range_mhz=(LEAST_MHZ, request.fqlim_ghz * 1e3),

@@ -119,7 +119,12 @@ def solved_rotor(
         return [_axial_block(*row) for row in rows], "Ir" if top.kind == "prolate" else "IIIr"
     levels = as_tabulated(top, effects, solve_rotation(top, effects, nmin, nmax, True, executor, in_blocks=True))
     representation = str(levels.representation)
-    return [_rotor_block(block, representation) for block in levels.blocks], representation
+    if "ka" not in levels.quanta or not isinstance(levels.blocks[0], SolvedBlock):
+        return [_rotor_block(block, representation) for block in levels.blocks], representation
+    names = np.column_stack(
+        [levels.quanta["ka"], levels.quanta["kc"]]
+    )  # of states in order of energy, as those of functions are
+    return [_of_one_state(block, names) for block in levels.blocks], representation
 
 
 def _all_axial(top: Top, effects: tuple[QuantumEffect, ...], terms: Terms) -> bool:
@@ -137,6 +142,12 @@ def _all_axial(top: Top, effects: tuple[QuantumEffect, ...], terms: Terms) -> bo
 def _axial_block(v: int, n: int, k: int, energy_mhz: float) -> RotorBlock:
     part = RotorPart(v, AxialState(n, k), slice(0, 1), np.array([[k, 0]]))
     return RotorBlock(n, (part,), np.array([energy_mhz]), np.ones((1, 1)))
+
+
+def _of_one_state(block: SolvedBlock, names: Ints) -> RotorBlock:
+    size = block.basis.size
+    part = RotorPart(0, block.basis, slice(0, size), names[block.start : block.start + size])
+    return RotorBlock(block.basis.j, (part,), block.energies_mhz, block.vectors)
 
 
 def _rotor_block(block: SolvedBlock | CoupledBlock, representation: str) -> RotorBlock:
