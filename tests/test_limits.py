@@ -194,7 +194,6 @@ def test_couplings_of_an_electron_with_known_constants_are_left_out_by_size():
     from rotor.quantum.effects.of_top import effects_of
     from rotor.quantum.estimates.limits import model_limits
     from rotor.tops.spins.spin_constants import SpinConstants
-    from rotor.tops.top import Top
 
     spins = SpinConstants.parse("eps_aa(S)=5406 eps_bb(S)=8 b_F(S,14N)=147 chi_aa(14N)=0.5 MHz", "S=1/2")
     top = rotor.Top.from_constants("A=239905 B=13002 C=12305 MHz", spin_constants=spins)
