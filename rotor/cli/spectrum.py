@@ -38,6 +38,8 @@ if TYPE_CHECKING:
     from rotor.spectra.request import SpectrumAnswer, SpectrumRequest
     from rotor.tops.top import Top
 
+MOST_FACTS_OF_STATES = 10  # in the head of a list of lines; rotor info has all
+
 EXAMPLES = """\b
 Examples:
   rotor spectrum water
@@ -353,6 +355,7 @@ def _facts(lines: Lines, content: dict[str, Any]) -> list[tuple[str, str]]:
         ("constants", report.constants_text(top)),
         ("dipole", dipole),
         ("spin weights", weights),
+        *report.states_facts(top)[:MOST_FACTS_OF_STATES],
         ("temperature", f"{lines.temperature_k:g} K"),
         ("Q", report.q_text(content["q"])),
         ("J max", f"{lines.jmax}: {content['jmax_source']}"),

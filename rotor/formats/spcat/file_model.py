@@ -6,8 +6,8 @@ Each group of connected states has a top that stands for its symmetry, and the f
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from concurrent.futures import Executor
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +38,9 @@ from rotor.quantum.spins.operators import is_axial
 from rotor.quantum.spins.terms import Spin
 from rotor.tops.constants import Constants
 from rotor.tops.top import Top
+
+if TYPE_CHECKING:
+    from concurrent.futures import Executor
 
 _EVERY_K = 10**6
 
@@ -121,6 +124,11 @@ def _components(levels: Levels, n: Ints, oblate: bool) -> list[tuple[Ints, Ints,
     upper, lower = n - k, n - k + 1  # the other K of the two components; of K = 0 the first alone
     pairs = [(upper, every), (lower, k > 0)]
     return [(other, k, k, alike) if oblate else (k, other, k, alike) for other, alike in pairs]
+
+
+def line_names(file: ParameterFile) -> tuple[str, ...]:
+    """The parameter lines as `file_effect.coded_lines` names them."""
+    return tuple(f"{parameter.code}#{place}" for place, parameter in enumerate(file.parameters, 1))
 
 
 def groups_of(file: ParameterFile, intensities: IntensityFile, *, as_spcat: bool = False) -> list[Group]:
