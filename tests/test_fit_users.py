@@ -303,6 +303,17 @@ def test_what_is_not_written_is_said(call, folder, seen):
     assert [path.name for path in sorted(folder.glob("t.*"))] == ["t.fit"]
 
 
+@pytest.mark.parametrize(
+    ("sign", "words"), [(";", "its columns are parted by ';'; commas are needed"), ("\t", "parted by '\\\\t'")]
+)
+def test_a_table_with_other_signs_between_its_columns_is_named(call, folder, seen, sign, words):
+    write_csv(folder / "x.csv", seen)
+    (folder / "y.csv").write_text((folder / "x.csv").read_text().replace(",", sign))
+    code, _, err = call("fit", "y.csv", "--constants", "A=5213 B=1897 C=1402 MHz", "--free", "A,B,C")
+    assert code == 2
+    assert words.replace("\\\\", "\\") in err
+
+
 def write_csv(path, lines: Assignments) -> None:
     rows = zip(lines.upper.tolist(), lines.lower.tolist(), lines.frequency_mhz.tolist(), strict=True)
     path.write_text(HEAD + "".join(f"{','.join(map(str, [*u, *low]))},{f:.5f},0.003\n" for u, low, f in rows))
