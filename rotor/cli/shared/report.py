@@ -37,8 +37,7 @@ def describe(top: Top, text: str, command: str) -> dict[str, Any]:
 
 def model_facts(content: Mapping[str, Any]) -> list[tuple[str, str]]:
     """What the model has and what it leaves out, largest first, from the keys of `rotor.quantum.estimates.limits.limit_facts`."""
-    from rotor.quantum.estimates.beyond import Limit
-    from rotor.quantum.estimates.limits import COMPUTE
+    from rotor.quantum.estimates.beyond import COMPUTE, Limit
 
     present = [f"{one['name']} {one['size_mhz']:.2g} MHz" for one in content["effects"] if one["present"]]
     sizes = (
