@@ -106,10 +106,6 @@ def _refuse(file: ParameterFile, states: tuple[StateOptions, ...], intensities: 
     for what, found in reasons.items():
         if found:
             raise ValueError(f"{what} {NO_NAME}")
-    for parameter in file.parameters:
-        digits = split_code(parameter.code, len(states))
-        if is_series(digits) or is_constant(digits):
-            raise ValueError(f"parameter {parameter.code}: a term of a Fourier or Euler series {NO_NAME}")
 
 
 def _refuse_unlike(constants: list[Constants]) -> None:
