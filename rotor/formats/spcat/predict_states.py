@@ -17,15 +17,14 @@ from rotor.arrays import Floats, Ints, end_to_end
 from rotor.formats.spcat.codes import constants_of, split_code
 from rotor.formats.spcat.file_lines import (
     LEAST_MHZ,
-    Format,
     as_catalogue,
     as_level_list,
-    format_of,
     lines_of,
     transitions_of,
     within,
 )
-from rotor.formats.spcat.file_model import Group, groups_of, left_out
+from rotor.formats.spcat.file_model import Group, groups_of, left_out, line_names
+from rotor.formats.spcat.file_quanta import Format, format_of
 from rotor.formats.spcat.text.catalogue import Catalogue
 from rotor.formats.spcat.text.egy import LevelList
 from rotor.formats.spcat.text.int_file import IntensityFile, Request
@@ -108,11 +107,6 @@ def _with_levels(groups: list[Group], request: Request) -> list[Group]:
             f"KNMIN, WTPL, WTMN of the states are {limits}"
         )
     return found
-
-
-def line_names(file: ParameterFile) -> tuple[str, ...]:
-    """The parameter lines as `file_effect.coded_lines` names them."""
-    return tuple(f"{parameter.code}#{place}" for place, parameter in enumerate(file.parameters, 1))
 
 
 def level_spreads(group: Group, levels: Levels, names: Sequence[str], factor: Floats | None) -> Floats | None:

@@ -252,6 +252,8 @@ def solve_f(plan: Plan, twice_f: int, exist: Exist | None = None) -> list[SpinBl
     every = plan.shared.scheme.patterns(twice_f)
     known = plan.shared.cache.pop(("coupling", twice_f), None) or couplings(plan, {twice_f: every})[twice_f]
     blocks = list(parts_of_f(plan, every))
+    if not blocks:  # N of the first K (KNMIN) is above every N of this F
+        return []
     names, sizes = names_of_parts([part for parts in blocks for part in parts], every)
     there = np.ones(len(names), dtype=bool) if exist is None else exist(names)
     out, start, first = [], 0, 0
