@@ -76,10 +76,10 @@ def rows_of(table: NDArray[np.int16], rows: NDArray[Any]) -> NDArray[np.int16]:
     """
     count, width = table.shape
     if width > 8:
-        return table[rows]
+        return np.asarray(table[rows])
     wide = np.zeros((count, 8), dtype=np.int16)
     wide[:, :width] = table
-    return wide.view(np.complex128)[:, 0][rows].view(np.int16).reshape(-1, 8)[:, :width]
+    return np.asarray(wide.view(np.complex128)[:, 0][rows].view(np.int16).reshape(-1, 8)[:, :width])
 
 
 def same(one: Any, other: Any) -> bool:
