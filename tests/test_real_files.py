@@ -69,7 +69,8 @@ def test_zeros_behind_the_quantum_numbers_and_three_digits_of_j(gs):
     assert [100, 0, 100, 0] in asked.lines.lower.tolist()
     plain = line_list(asked.lines.upper, asked.lines.lower, asked.lines.frequency_mhz, 0.05)
     again = spfit_input(gs[0], plain).lines
-    assert (again.upper == asked.lines.upper).all() and (again.blend == asked.lines.blend).all()
+    assert (again.upper == asked.lines.upper).all()
+    assert (again.blend == asked.lines.blend).all()
 
 
 def test_numbers_behind_the_quantum_numbers_that_are_no_zeros_are_an_error(tmp_path: Path):
@@ -85,7 +86,8 @@ def test_a_line_without_digits_ends_the_parameters(gs):
     whole = read_par(GS / "gs.par")
     assert whole.rest.startswith("!\n!   S-reduction backup")
     many = read_par(format_par(whole).replace(b"  25  878", b" 900  878", 1))
-    assert many.parameters == whole.parameters and many.header.npar == 900
+    assert many.parameters == whole.parameters
+    assert many.header.npar == 900
     _, fit = fitted(with_free(many, FREE, 20.0), read_lin(GS / "gs.lin", 4))
     asked = replace(gs[1], file=with_free(many, FREE, 20.0))
     for variances in (True, False):
