@@ -132,7 +132,8 @@ def command(context: typer.Context, given: Options) -> None:
     writers = _writers(answer, content, scaled=given.table_errors == "scatter") | _saved(answer, given)
     deliver(files, writers, lambda: json_text(content), lambda: _show(request, fit, steps, extras))
     if not fit.converged:
-        raise ComputationError(f"not converged: {fit.reason}")
+        more = "; --iterations allows more" if fit.minimum.status == "too many iterations" else ""
+        raise ComputationError(f"not converged: {fit.reason}{more}")
     if extras.interrupted:
         raise ComputationError(f"interrupted: {extras.interrupted}; the fit itself is complete")
 
