@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import os
+import re
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -41,6 +42,7 @@ Examples:
   rotor fit case.par --out fitted
   rotor fit lines.csv --start constants.toml --free A,B,C,DeltaJ --out fitted
   rotor fit c060503.cat.gz --constants "B=6081 D=0.001 H=0 MHz" --free B,D,H
+  rotor fit lines.csv --start states.toml --free "A,B,C,E[1],A[1],B[1],C[1],G_c[0,1],chi_aa(14N)" --out fitted
   rotor fit lines.lin --start water --free A,B,C --try DeltaJ,DeltaJK,DeltaK
   rotor fit lines.csv --start constants.toml --free A,B,C --prior DeltaK=0.02 --tie "deltaK=0.5*deltaJ" --plot rest.png"""
 
@@ -60,8 +62,20 @@ class Options:
         None, metavar="SOURCE", help="Constants to start from: a file (.toml, .var, ...) or a name."
     )
     constants: str | None = option(None, metavar="TEXT", help='Constants to start from: "A=9.2 B=3 C=2.5 GHz" (MHz).')
+    spin_constants: str | None = option(
+        None,
+        metavar="TEXT",
+        help="Constants of spins to start from, in place of those of --start, as in 'rotor spectrum'.",
+    )
+    spins: str | None = option(None, metavar="LIST", help='Sizes of the spins of --spin-constants: "S=1/2 14N=1".')
+    state_constants: str | None = option(
+        None, metavar="TEXT", help="Further states to start from, in place of those of --start, as in 'rotor spectrum'."
+    )
     free: str | None = option(
-        None, metavar="LIST", help="Constants to fit: A,B,C,DeltaJ; those of --start that have an error if left out."
+        None,
+        metavar="LIST",
+        help='Constants to fit: A,B,C,DeltaJ; of states and spins "E[1],B[1],G_c[0,1],chi_aa(14N)"; those of --start that '
+        "have an error if left out.",
     )
     tie: list[str] | None = option(
         None, metavar="TEXT", help='A constant that follows a free one: "DeltaK=2.5*DeltaJ", "C=B-300"; repeatable.'
@@ -119,6 +133,7 @@ def command(context: typer.Context, given: Options) -> None:
     fit = answer.fit
     for text in request.notes:
         note(text)
+    _leave_out(files, fit)
     if fit.constants is None and "--out .toml" in files.paths:
         del files.paths["--out .toml"]
         note("spins or several states: no .toml is written, the .par and .var have everything")
@@ -134,6 +149,17 @@ def command(context: typer.Context, given: Options) -> None:
     deliver(files, writers, lambda: json_text(content), lambda: _show(request, fit, steps, trials, suggestions, spread))
     if not fit.converged:
         raise ComputationError(f"not converged: {fit.reason}")
+
+
+def _leave_out(files: Files, fit: Fit) -> None:
+    """Files that a fit of states or spins by names has not."""
+    from rotor.fit.top_constants import TopConstants
+
+    left = [name for name in ("--out .par", "--out .var") if name in files.paths]
+    if isinstance(fit.constants, TopConstants) and left:
+        for name in left:
+            del files.paths[name]
+        note("states or spins by names: no .par and .var are written, the .toml has everything")
 
 
 def _refuse_unsaved(given: Options) -> None:
@@ -161,7 +187,7 @@ def _saved(answer: FitAnswer, given: Options) -> dict[str, Writer]:
     files = FitFiles(
         str(beside(read.source, folder)), *(beside(one, folder) for one in (read.lin, read.merge, read.start))
     )
-    molecule = None if answer.request.spfit is not None else Input(given.start, given.constants)
+    molecule = None if answer.request.spfit is not None else _start_of(given)
     others: dict[str, Any] = (
         {} if stem is None else {"report": f"{stem}.fit", "par": f"{stem}.par", "var": f"{stem}.var"}
     )
@@ -187,8 +213,8 @@ def _refuse_overwriting(files: Files, read: Sequence[str | None]) -> None:
 
 
 def _names(option: str, text: str) -> list[str]:
-    """The names of a list, each once."""
-    names = [name.strip() for name in text.split(",")]
+    """The names of a list, each once; commas in brackets are part of a name."""
+    names = [name.strip() for name in re.split(r",(?![^()\[\]]*[)\]])", text)]
     if not all(names):
         raise ValueError(f"{option}: {text!r}: names parted by commas are needed, such as A,B,C,DeltaJ")
     twice = next((name for name in names if names.count(name) > 1), None)
@@ -215,7 +241,8 @@ def _of_spfit(given: Options) -> FitRequest:
     from rotor.formats.fit_request import fit_of_spfit
 
     others = {
-        "--start": given.start, "--constants": given.constants, "--free": given.free, "--tie": given.tie,
+        "--start": given.start, "--constants": given.constants, "--spin-constants": given.spin_constants,
+        "--spins": given.spins, "--state-constants": given.state_constants, "--free": given.free, "--tie": given.tie,
         "--prior": given.prior,
     }  # fmt: skip
     unused = [name for name, value in others.items() if value]
@@ -236,11 +263,22 @@ def _of_lines(given: Options) -> FitRequest:
         raise ValueError(
             f"--start {given.start}: a list of lines has no constants; give a .toml, .var or the name of a molecule"
         )
-    top = inputs.read_top(Input(given.start, given.constants))
+    top = inputs.read_top(_start_of(given))
     names = None if given.free is None else _names("--free", given.free)
     priors = _priors(given.prior or [])
     with inputs.fields_as_options(free="--free", tie="--tie", priors_mhz="--prior"):
         return fit_of_lines(given.source, top, names, ties=given.tie or [], priors_mhz=priors, start=given.start)
+
+
+def _start_of(given: Options) -> Input:
+    """Where the fit of a line list starts."""
+    return Input(
+        given.start,
+        given.constants,
+        spin_constants=given.spin_constants,
+        spins=given.spins,
+        state_constants=given.state_constants,
+    )
 
 
 def _priors(texts: Sequence[str]) -> dict[str, float]:
@@ -353,14 +391,19 @@ def _unmeasured(fit: Fit) -> tuple[Any, Any]:
     """Labels of lines of the kinds, frequencies and J that were measured, without those that are measured."""
     import numpy as np
 
+    from rotor.fit.top_constants import TopConstants, bright_top
+    from rotor.quantum.effects.watson import SEMI_RIGID
     from rotor.spectra.lines import line_list
     from rotor.tops.top import Top
 
-    measured = fit.lines
-    top = Top.from_constants(fit.named, dipole_abc_debye=_components(fit))
+    measured, named = fit.lines, fit.named
     jmax = int(max(measured.upper[:, 0].max(), measured.lower[:, 0].max()))
     seen_mhz = (float(measured.frequency_mhz.min()) * 0.99, float(measured.frequency_mhz.max()) * 1.01)
-    lines = line_list(top, jmax=jmax, min_lgint=None, q=1.0, range_mhz=seen_mhz)
+    if isinstance(named, TopConstants):
+        top, effects = bright_top(named.top, measured, _components(fit)), named.effects
+    else:
+        top, effects = Top.from_constants(named, dipole_abc_debye=_components(fit)), SEMI_RIGID
+    lines = line_list(top, jmax=jmax, min_lgint=None, q=1.0, range_mhz=seen_mhz, effects=effects)
     strong = lines.strength_debye2 > _WORTH_MEASURING
     labels = np.stack([lines.levels.quanta[name] for name in measured.names], axis=1)
     upper, lower = labels[lines.upper[strong]], labels[lines.lower[strong]]
@@ -374,7 +417,7 @@ def _components(fit: Fit) -> tuple[float, float, float]:
     kind = fit.named.kind
     if kind != "asymmetric":
         return (0.0, 0.0, 1.0) if kind == "oblate" else (1.0, 0.0, 0.0)
-    change = (fit.lines.upper[:, 1:] - fit.lines.lower[:, 1:]) % 2
+    change = (fit.lines.upper[:, 1:3] - fit.lines.lower[:, 1:3]) % 2
     kinds = {(0, 1): 0, (1, 1): 1, (1, 0): 2}
     found = {kinds.get((int(ka), int(kc)), 0) for ka, kc in change}
     a, b, c = (float(axis in found) for axis in range(3))

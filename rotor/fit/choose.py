@@ -14,7 +14,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -22,10 +21,11 @@ from rotor.arrays import Floats, Ints
 from rotor.fit.assignment import Assignments
 from rotor.fit.criteria import aicc, cross_validated_rms, f_test
 from rotor.fit.fit import Fit, FitOptions, fit_lines, weighted_derivatives
+from rotor.fit.orders import order_of
 from rotor.fit.parameters import Parameters, parameters, with_names
-from rotor.quantum.labelled import LevelModel, level_model
-from rotor.tops.constants import Constants
-from rotor.tops.operators import distortion_terms, powers_of_spelled
+from rotor.fit.top_constants import ConstantSet
+from rotor.fit.top_levels import model_of
+from rotor.quantum.labelled import LevelModel
 
 CHANCE = 0.01  # of an F so large by accident, above which a constant is not taken
 _MOST_STEPS = 40
@@ -83,36 +83,29 @@ def try_constants(fit: Fit, candidates: Sequence[str], options: FitOptions | Non
     Returns
     -------
     list of Trial
-        By F, the largest of those added first; A, B and C are never left out.
+        By F, the largest of those added first; A, B, C and the E of a state are never left out.
 
     Raises
     ------
     ValueError
         For a name that the kind of top or the reduction does not have.
     """
-    constants = with_names(_set_of(fit), [name for name in candidates if name not in fit.parameters.names])
+    constants = with_names(fit.named, [name for name in candidates if name not in fit.parameters.names])
     out = []
     for name in candidates:
         own = constants.own_name(name)
         if own in fit.parameters.names:
-            if own not in ("A", "B", "C"):
+            if own.partition("[")[0] not in ("A", "B", "C", "E"):
                 out.append(_without(fit, own, options))
         else:
             out.append(_with(fit, constants, own, options))
     return sorted([trial for trial in out if trial], key=lambda one: (not one.added, -one.f_ratio))
 
 
-def _set_of(fit: Fit) -> Constants:
-    return fit.named
-
-
-def _with(fit: Fit, constants: Constants, name: str, options: FitOptions | None) -> Trial | None:
+def _with(fit: Fit, constants: ConstantSet, name: str, options: FitOptions | None) -> Trial | None:
     free = [*fit.parameters.names, name]
-    values: dict[str, Any] = {k: v for k, v in constants.values.items() if k in fit.named.values or k == name}
-    own = Constants(
-        kind=constants.kind, reduction=constants.reduction, representation=constants.representation,
-**values,
-    )  # fmt: skip
+    others = [other for other in constants.values if other not in fit.named.values and other != name]
+    own = constants.replace(**dict.fromkeys(others))
     try:
         found = fit_lines(fit.lines, own, _same_priors(fit, parameters(own, free)), options)
     except ValueError:  # more constants than lines
@@ -156,7 +149,7 @@ def _trial(name: str, added: bool, before: Fit, found: Fit, ratio: float, chance
 
 def choose_constants(
     lines: Assignments,
-    constants: Constants,
+    constants: ConstantSet,
     base: Sequence[str],
     candidates: Sequence[str],
     options: FitOptions | None = None,
@@ -173,7 +166,7 @@ def choose_constants(
     Parameters
     ----------
     lines : Assignments
-    constants : Constants
+    constants : Constants or TopConstants
         Where the fit starts; candidates start from 0 unless they are in it.
     base : sequence of str
         Constants that are always free.
@@ -274,24 +267,6 @@ def _weakest(fit: Fit, names: Sequence[str]) -> list[str]:
     return sorted(names, key=lambda name: ratio[name])[:_TRIED]
 
 
-def order_of(name: str, constants: Constants) -> int:
-    """The highest power of J in a constant's operator: 2 for A, 4 for DeltaJ, 6 for PhiK.
-
-    >>> order_of("PhiK", Constants(A=9.0, B=3.0, C=2.0, reduction="A"))
-    6
-    """
-    if name in ("A", "B", "C"):
-        return 2
-    spelled = powers_of_spelled(name)
-    known = distortion_terms(constants.kind, constants.reduction)
-    if not spelled and name not in known:
-        raise ValueError(
-            f"{name!r} is no constant of the kind {constants.kind}; expected one such as {', '.join(list(known)[:3])}"
-        )
-    terms = {spelled: 1.0} if spelled else known[name]
-    return max(2 * (p + q + n) for p, q, n in terms)
-
-
 def _patient(options: FitOptions | None) -> FitOptions:
     """A model on its way may be far from the lines: only the last one is judged by its rms."""
     return replace(options or FitOptions(), poor_rms=1e12)
@@ -361,7 +336,7 @@ def suggest_lines(
         raise ValueError("some parameters are not determined by the lines; hold them before asking for the next line")
     labels, places = np.unique(np.concatenate([upper, lower]), axis=0, return_inverse=True)
     places = places.reshape(-1)
-    made = model(labels) if model else level_model(fit.named, labels)
+    made = model(labels) if model else model_of(fit.named, labels)
     energies, slopes = made.levels(fit.parameters.constants_of(fit.values))
     slopes = slopes @ fit.parameters.matrix
     up, low = places[: len(upper)], places[len(upper) :]

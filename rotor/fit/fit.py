@@ -22,10 +22,11 @@ from rotor.fit.parameters import Parameters, with_names
 from rotor.fit.parameters import parameters as parameters_of
 from rotor.fit.search import FitOptions as FitOptions
 from rotor.fit.search import Search, round_off, too_few, with_rejection
-from rotor.quantum.labelled import LevelModel, MissingLevelsError, level_model
+from rotor.fit.top_constants import ConstantSet
+from rotor.fit.top_levels import model_of
+from rotor.quantum.labelled import LevelModel, MissingLevelsError
 from rotor.statistics.least_squares import BENT, EXHAUSTED, Minimum, Progress
 from rotor.statistics.regression import Regression, regression
-from rotor.tops.constants import Constants
 from rotor.tops.covariance import Covariance
 
 NEARLY_THERE = 0.01  # standard errors: a next step below it is no news where no more iterations are allowed
@@ -46,7 +47,7 @@ class Fit:
     """
 
     lines: Assignments
-    constants: Constants | None
+    constants: ConstantSet | None
     parameters: Parameters
     values: Floats
     calculated_mhz: Floats
@@ -64,7 +65,7 @@ class Fit:
     notes: tuple[str, ...]
 
     @property
-    def named(self) -> Constants:
+    def named(self) -> ConstantSet:
         """The fitted constants. ValueError where the parameters are not named constants."""
         if self.constants is None:
             raise ValueError(
@@ -133,7 +134,7 @@ def covariance_of(parameters: Parameters, statistics: Regression) -> Covariance:
 
 def fit_lines(
     lines: Assignments,
-    constants: Constants | None,
+    constants: ConstantSet | None,
     parameters: Parameters,
     options: FitOptions | None = None,
     *,
@@ -145,13 +146,13 @@ def fit_lines(
     Parameters
     ----------
     lines : Assignments
-    constants : Constants
+    constants : Constants or TopConstants
         Where the fit starts: kind, reduction, representation and every constant that is held; None with a model of its own.
     parameters : Parameters
         What is free, for the same constants.
     options : FitOptions, optional
     model : callable, optional
-        Labels (levels, k) to a `LevelModel`; that of the constants (one state, no spins) where it is left out.
+        Labels (levels, k) to a `LevelModel`; that of the constants where it is left out.
     progress : callable, optional
         Called with every `Iteration`. A KeyboardInterrupt ends the search with the best constants so far.
 
@@ -172,6 +173,7 @@ def fit_lines(
 
     >>> from rotor.fit.assignment import assignments
     >>> from rotor.fit.parameters import parameters as free
+    >>> from rotor.tops.constants import Constants
     >>> start = Constants(B=57000.0, D=0.1)
     >>> seen = assignments(("j",), [[1], [2], [3]], [[0], [1], [2]], [115271.2018, 230538.0, 345795.9899], 0.0005)
     >>> found = fit_lines(seen, start, free(start, ["B", "D"]))
@@ -207,7 +209,7 @@ def weighted_derivatives(fit: Fit, names: Sequence[str], options: FitOptions | N
     constants = with_names(fit.named, [name for name in names if name not in fit.named])
     free = parameters_of(constants, names)
     labels, upper, lower = _labels(fit.lines)
-    model = level_model(constants, labels, kmax=options.kmax)
+    model = model_of(constants, labels, options.kmax)
     _, sigma = _errors_of(fit.lines, options)
     search = Search(fit.lines, model, free, options, upper, lower, sigma, fit.used)
     return search.weighted(free.start)[1]
@@ -222,11 +224,11 @@ def _labels(lines: Assignments) -> tuple[Ints, Ints, Ints]:
     return labels, places[: len(lines)], places[len(lines) :]
 
 
-def _of_constants(constants: Constants | None, options: FitOptions) -> Callable[[Ints], LevelModel]:
+def _of_constants(constants: ConstantSet | None, options: FitOptions) -> Callable[[Ints], LevelModel]:
     """What makes the model of the constants, from labels."""
     if constants is None:
         raise ValueError("either constants or a model of the levels is needed")
-    return partial(level_model, constants, kmax=options.kmax)
+    return partial(model_of, constants, kmax=options.kmax)
 
 
 def _with_levels(
@@ -286,7 +288,7 @@ def _errors_of(lines: Assignments, options: FitOptions) -> tuple[dict[int, str],
 
 
 def _finished(
-    search: Search, minimum: Minimum, constants: Constants | None, left_out: dict[int, str], labels: Ints
+    search: Search, minimum: Minimum, constants: ConstantSet | None, left_out: dict[int, str], labels: Ints
 ) -> Fit:
     values, parameters = minimum.parameters, search.parameters
     calculated, jacobian, slopes = search.lines_of(values)
@@ -317,8 +319,8 @@ def _finished(
 
 
 def _constants(
-    constants: Constants | None, parameters: Parameters, values: Floats, statistics: Regression
-) -> tuple[Constants | None, str]:
+    constants: ConstantSet | None, parameters: Parameters, values: Floats, statistics: Regression
+) -> tuple[ConstantSet | None, str]:
     """The fitted set with standard errors, and what is wrong with it: then it is the start, with that text."""
     if constants is None:
         return None, ""
@@ -350,7 +352,7 @@ def _changed(search: Search, values: Floats, labels: Ints) -> tuple[str, ...]:
     """Levels that are mostly another state than with the constants of the start."""
     start = search.parameters.constants_of(search.parameters.start)
     overlap = search.model.overlaps(start, search.parameters.constants_of(values))
-    return tuple(" ".join(map(str, labels[i].tolist())) for i in np.flatnonzero(overlap < CHANGED_STATE))
+    return tuple(search.lines.label_text(labels[i].tolist()) for i in np.flatnonzero(overlap < CHANGED_STATE))
 
 
 def _verdict(fit: Fit, disorder: str, options: FitOptions) -> tuple[bool, str]:

@@ -8,6 +8,7 @@
     atom = 3                            # which atom of [geometry]; may be left out where one alone is that isotope
     chi_aa = { value = 1.9543, uncertainty = 0.0012 }
     chi_bb-cc = 5.7476                  # the difference; names are those of rotor.quantum.effects
+    "chi_aa[1]" = 0.02                  # what state 1 has more of it: without a number a constant belongs to every state
 
     [spins.S]                           # any other name needs its spin
     spin = "1/2"
@@ -24,7 +25,7 @@ from __future__ import annotations
 from collections.abc import Collection
 from typing import TYPE_CHECKING, Any
 
-from rotor.formats.molecules.molecule_tables import TableReader
+from rotor.formats.molecules.molecule_tables import TableReader, uncertain_number
 from rotor.tops.spins.spin_constants import SpinConstants, parse_spins, spin_text, spins_of, twice_of
 
 if TYPE_CHECKING:
@@ -46,15 +47,14 @@ def spins_of_table(table: TableReader | None, molecule: Molecule | None) -> Spin
     values: dict[str, float] = {}
     errors: dict[str, float] = {}
     for key, part in parts.items():
-        for symbol, item in part.content.items():
+        for symbol in part.content:
             if symbol in _OF_SPIN:
                 continue
-            name = f"{symbol}({key.replace(' ', '')})"
-            one = TableReader(part.place, symbol, item if isinstance(item, dict) else {"value": item})
-            one.refuse_unknown(("value", "uncertainty", "source", "unverified"))
-            values[name] = one.quantity("value", one.content.get("value"), unit, "MHz")
-            if "uncertainty" in one.content:
-                errors[name] = one.quantity("uncertainty", one.content["uncertainty"], unit, "MHz")
+            before, bracket, state = symbol.partition("[")
+            name = f"{before}({key.replace(' ', '')}){bracket}{state}"
+            values[name], error = uncertain_number(part, symbol, unit)
+            if error is not None:
+                errors[name] = error
     sources = {name: part.text("source") for name, part in parts.items() if "source" in part.content}
     atoms = {name: number for name, part in parts.items() if (number := _atom(part, name, molecule)) is not None}
     try:
@@ -109,10 +109,15 @@ def spin_tables(constants: SpinConstants | None, unverified: Collection[str]) ->
         tables[name]["unverified"] = True if f"spins.{name}" in unverified else None
     for name, value in constants.values.items():
         key = ",".join(spins_of(name))
-        error = constants.uncertainties.get(name)
         tables.setdefault(key, {"source": constants.sources.get(key)})
-        tables[key][name.partition("(")[0]] = value if error is None else {"value": value, "uncertainty": error}
+        symbol = name.partition("(")[0] + name.partition(")")[2]
+        tables[key][symbol] = uncertain_entry(value, constants.uncertainties.get(name))
     return tables
+
+
+def uncertain_entry(value: float, error: float | None) -> float | dict[str, float]:
+    """A number as a file has it, with its standard deviation where it has one."""
+    return value if error is None else {"value": value, "uncertainty": error}
 
 
 def _is_isotope(name: str, twice: int) -> bool:

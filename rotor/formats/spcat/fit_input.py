@@ -317,6 +317,8 @@ def named_file(fit: Fit, title: str, *, variances: bool) -> ParameterFile:
     SPFIT's parameters are not always the constants (A - B of a symmetric top): their errors and correlations are carried over.
     Raises ValueError where a fitted combination of constants has no parameter of its own there (a tie between constants).
     """
+    if not isinstance(fit.named, Constants):
+        raise ValueError("states or spins by names: no .par and .var are written of them; write the .toml file instead")
     top = Top.from_constants(fit.named, name=title)
     highest = int(max(fit.lines.upper[:, 0].max(), fit.lines.lower[:, 0].max()))
     file = parameter_file(top, kmax=min(max(highest, 1), 359))

@@ -31,6 +31,7 @@ def spin_effects(top: Top) -> tuple[QuantumEffect, ...]:
     if top.spin_constants is None:
         return ()
     _refuse_like_nuclei(top)
+    _refuse_unknown_states(top)
     return _effects(top.spin_constants)
 
 
@@ -52,6 +53,20 @@ def _effects(constants: SpinConstants) -> tuple[QuantumEffect, ...]:
             raise ValueError(f"{name}: known constants of spins are {known}")
         values.setdefault(kind, {})[name] = value
     return tuple(kind(values[kind], spins) for kind in kinds if kind in values)
+
+
+def _refuse_unknown_states(top: Top) -> None:
+    """ValueError for a constant of a spin in a state that the top has not."""
+    from rotor.quantum.effects.spin_effect import parse_name
+
+    assert top.spin_constants is not None
+    count = 1 if top.states is None else top.states.count
+    for name in top.spin_constants.values:
+        states = parse_name(name).states
+        if states and states[1] >= count:
+            raise ValueError(
+                f"{name}: there is no state {states[1]}; {top.name or 'this top'} has {count}, counted from 0"
+            )
 
 
 def _refuse_like_nuclei(top: Top) -> None:

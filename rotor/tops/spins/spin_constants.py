@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from rotor.molecules.molecule import Molecule
 
 _ITEM = re.compile(
-    r"(?P<name>[A-Za-z][\w-]*\([^()]*\))\s*=\s*(?P<number>[-+−]?[\d.]+(?:[eEdD][-+]?\d+)?)(?P<gap>\s*)(?P<unit>[A-Za-z][\w-]*(?![\w(-]))?"
+    r"(?P<name>[A-Za-z][\w-]*\([^()]*\)(?:\[\d+\])?)\s*=\s*(?P<number>[-+−]?[\d.]+(?:[eEdD][-+]?\d+)?)(?P<gap>\s*)(?P<unit>[A-Za-z][\w-]*(?![\w(-]))?"
 )
 _ISOTOPE = re.compile(r"(\d+[A-Z][a-z]?|D|T)(?:_\w+)?")
 
@@ -61,6 +61,11 @@ class SpinConstants:
                     raise ValueError(f"{name}: spin {spin} is not among {', '.join(self.twice) or 'none'}")
             if name.startswith("chi_") and any(self.twice[spin] < 2 for spin in spins_of(name)):
                 raise ValueError(f"{name}: a spin of 1/2 has no quadrupole moment; that needs a spin of 1 or more")
+        pairs: dict[tuple[str, ...], str] = {}
+        for name in self.values:
+            first = pairs.setdefault((name.partition("(")[0], name.partition(")")[2], *sorted(spins_of(name))), name)
+            if first != name:
+                raise ValueError(f"{first} and {name} are one constant of two spins; give it once")
         for name, error in self.uncertainties.items():
             if name not in self.values or not error >= 0:
                 raise ValueError(
@@ -72,12 +77,16 @@ class SpinConstants:
         return type(self), (dict(self.values), dict(self.twice), self.source, *plain)
 
     def of(self, spin: str) -> dict[str, float]:
-        """The constants of one spin alone, by name without the spin.
+        """The constants of one spin alone in every state, by name without the spin.
 
         >>> SpinConstants.parse("chi_aa(14N)=-4.22MHz C_bb(14N)=2kHz T_aa(14N,D)=2kHz").of("14N")
         {'chi_aa': -4.22, 'C_bb': 0.002}
         """
-        return {name.partition("(")[0]: value for name, value in self.values.items() if spins_of(name) == (spin,)}
+        return {
+            name.partition("(")[0]: value
+            for name, value in self.values.items()
+            if spins_of(name) == (spin,) and "[" not in name
+        }
 
     @classmethod
     def parse(cls, text: str, spins: str | None = None, source: str = "") -> SpinConstants:
