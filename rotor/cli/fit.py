@@ -46,9 +46,6 @@ Examples:
   rotor fit lines.lin --start water --free A,B,C --try DeltaJ,DeltaJK,DeltaK
   rotor fit lines.csv --start constants.toml --free A,B,C --prior DeltaK=0.02 --tie "deltaK=0.5*deltaJ" --plot rest.png"""
 
-_WORTH_MEASURING = 1e-2  # S μ² of a line with μ = 1 D, below which it is not suggested
-
-
 MOST_SAMPLES = 100_000  # of a bootstrap: each is a fit
 
 
@@ -63,13 +60,11 @@ class Options:
     )
     constants: str | None = option(None, metavar="TEXT", help='Constants to start from: "A=9.2 B=3 C=2.5 GHz" (MHz).')
     spin_constants: str | None = option(
-        None,
-        metavar="TEXT",
-        help="Constants of spins to start from, in place of those of --start, as in 'rotor spectrum'.",
+        None, metavar="TEXT", help="Constants of spins to start from, as in 'rotor spectrum'."
     )
     spins: str | None = option(None, metavar="LIST", help='Sizes of the spins of --spin-constants: "S=1/2 14N=1".')
     state_constants: str | None = option(
-        None, metavar="TEXT", help="Further states to start from, in place of those of --start, as in 'rotor spectrum'."
+        None, metavar="TEXT", help="Further states to start from, as in 'rotor spectrum'."
     )
     free: str | None = option(
         None,
@@ -133,7 +128,7 @@ def command(context: typer.Context, given: Options) -> None:
     fit = answer.fit
     for text in request.notes:
         note(text)
-    _leave_out(files, fit)
+    _leave_out(files, answer)
     if fit.constants is None and "--out .toml" in files.paths:
         del files.paths["--out .toml"]
         note("spins or several states: no .toml is written, the .par and .var have everything")
@@ -151,15 +146,15 @@ def command(context: typer.Context, given: Options) -> None:
         raise ComputationError(f"not converged: {fit.reason}")
 
 
-def _leave_out(files: Files, fit: Fit) -> None:
-    """Files that a fit of states or spins by names has not."""
-    from rotor.fit.top_constants import TopConstants
+def _leave_out(files: Files, answer: FitAnswer) -> None:
+    """The files of SPFIT where these cannot say what a fit in named constants found."""
+    from rotor.formats.fit_request import fault_of_par
 
     left = [name for name in ("--out .par", "--out .var") if name in files.paths]
-    if isinstance(fit.constants, TopConstants) and left:
+    if left and (fault := fault_of_par(answer)):
         for name in left:
             del files.paths[name]
-        note("states or spins by names: no .par and .var are written, the .toml has everything")
+        note(f"no .par and .var are written: {fault}")
 
 
 def _refuse_unsaved(given: Options) -> None:
@@ -383,45 +378,10 @@ def _suggestions(request: FitRequest, fit: Fit, name: str | None) -> list[Sugges
 
         upper, lower = unmeasured_lines(request.spfit.file, fit.lines)
         return suggest_lines(fit, name, upper, lower, error_mhz=error, model=request.model)[:20]
-    upper, lower = _unmeasured(fit)
+    from rotor.fit.unmeasured import unmeasured
+
+    upper, lower = unmeasured(fit)
     return suggest_lines(fit, fit.named.own_name(name), upper, lower, error_mhz=error)[:20]
-
-
-def _unmeasured(fit: Fit) -> tuple[Any, Any]:
-    """Labels of lines of the kinds, frequencies and J that were measured, without those that are measured."""
-    import numpy as np
-
-    from rotor.fit.top_constants import TopConstants, bright_top
-    from rotor.quantum.effects.watson import SEMI_RIGID
-    from rotor.spectra.lines import line_list
-    from rotor.tops.top import Top
-
-    measured, named = fit.lines, fit.named
-    jmax = int(max(measured.upper[:, 0].max(), measured.lower[:, 0].max()))
-    seen_mhz = (float(measured.frequency_mhz.min()) * 0.99, float(measured.frequency_mhz.max()) * 1.01)
-    if isinstance(named, TopConstants):
-        top, effects = bright_top(named.top, measured, _components(fit)), named.effects
-    else:
-        top, effects = Top.from_constants(named, dipole_abc_debye=_components(fit)), SEMI_RIGID
-    lines = line_list(top, jmax=jmax, min_lgint=None, q=1.0, range_mhz=seen_mhz, effects=effects)
-    strong = lines.strength_debye2 > _WORTH_MEASURING
-    labels = np.stack([lines.levels.quanta[name] for name in measured.names], axis=1)
-    upper, lower = labels[lines.upper[strong]], labels[lines.lower[strong]]
-    known = {(*u, *low) for u, low in zip(measured.upper.tolist(), measured.lower.tolist(), strict=True)}
-    new = np.array([(*u, *low) not in known for u, low in zip(upper.tolist(), lower.tolist(), strict=True)], dtype=bool)
-    return upper[new], lower[new]
-
-
-def _components(fit: Fit) -> tuple[float, float, float]:
-    """1 D along each axis whose lines occur among those measured, by the parities of Ka and Kc."""
-    kind = fit.named.kind
-    if kind != "asymmetric":
-        return (0.0, 0.0, 1.0) if kind == "oblate" else (1.0, 0.0, 0.0)
-    change = (fit.lines.upper[:, 1:3] - fit.lines.lower[:, 1:3]) % 2
-    kinds = {(0, 1): 0, (1, 1): 1, (1, 0): 2}
-    found = {kinds.get((int(ka), int(kc)), 0) for ka, kc in change}
-    a, b, c = (float(axis in found) for axis in range(3))
-    return a, b, c
 
 
 def _bootstrap(request: FitRequest, fit: Fit, options: FitOptions, samples: int, seed: int) -> list[float]:

@@ -181,6 +181,25 @@ def assignments(
     )  # fmt: skip
 
 
+def levels_in(lines: Assignments) -> tuple[Ints, Ints, Ints]:
+    """The levels that occur, and for each line the places of its upper and lower one among them, -1 for the zero of energy."""
+    there = np.concatenate([np.ones(len(lines), dtype=bool), ~lines.from_zero])
+    labels, found = _distinct_rows(np.concatenate([lines.upper, lines.lower])[there])
+    places = np.full(2 * len(lines), -1, dtype=np.int64)
+    places[there] = found.reshape(-1)
+    return labels, places[: len(lines)], places[len(lines) :]
+
+
+def _distinct_rows(rows: Ints) -> tuple[Ints, Ints]:
+    """The rows of an array, each once, in order, and the place of each among them; rows of small numbers by one number each."""
+    spans = rows.max(axis=0, initial=0) - rows.min(axis=0, initial=0) + 1
+    if not len(rows) or np.prod(spans.astype(float)) > 2.0**62:
+        return np.unique(rows, axis=0, return_inverse=True)
+    keys = np.ravel_multi_index(tuple((rows - rows.min(axis=0, initial=0)).T), tuple(spans.tolist()))
+    _, first, found = np.unique(keys, return_index=True, return_inverse=True)
+    return rows[first], found
+
+
 def merged(first: Assignments, second: Assignments, *, same_within_mhz: float = 0.0) -> tuple[Assignments, list[str]]:
     """Two sets of assigned lines as one, and what was found in both.
 

@@ -20,7 +20,8 @@ import numpy as np
 from rotor.arrays import Floats, Ints
 from rotor.fit.assignment import Assignments
 from rotor.fit.criteria import aicc, cross_validated_rms, f_test
-from rotor.fit.fit import Fit, FitOptions, fit_lines, weighted_derivatives
+from rotor.fit.first_values import beside_zero, weighted_derivatives
+from rotor.fit.fit import Fit, FitOptions, fit_lines
 from rotor.fit.orders import order_of
 from rotor.fit.parameters import Parameters, parameters, with_names
 from rotor.fit.top_constants import ConstantSet
@@ -105,7 +106,7 @@ def try_constants(fit: Fit, candidates: Sequence[str], options: FitOptions | Non
 def _with(fit: Fit, constants: ConstantSet, name: str, options: FitOptions | None) -> Trial | None:
     free = [*fit.parameters.names, name]
     others = [other for other in constants.values if other not in fit.named.values and other != name]
-    own = constants.replace(**dict.fromkeys(others))
+    own, _ = beside_zero(constants.replace(**dict.fromkeys(others)), [name], fit.lines, options)
     try:
         found = fit_lines(fit.lines, own, _same_priors(fit, parameters(own, free)), options)
     except ValueError:  # more constants than lines
@@ -226,6 +227,11 @@ def _best_added(fit: Fit, left: Sequence[str], options: FitOptions) -> Trial | N
     if not left:
         return None
     alone, pairs = promised(fit, left, options)
+    for name in beside_zero(with_names(fit.named, left), left, fit.lines, options)[
+        1
+    ]:  # of no promise in a linear model
+        i = left.index(name)
+        alone[i], pairs[i], pairs[:, i] = np.inf, 0.0, 0.0
     few = [left[i] for i in np.argsort(-alone, kind="stable")[:_TRIED].tolist()]
     best = next((one for one in try_constants(fit, few, options) if one.added and one.better), None)
     if best is not None or len(left) < 2:
@@ -274,7 +280,7 @@ def _patient(options: FitOptions | None) -> FitOptions:
 
 def _pair(fit: Fit, one: str, other: str, options: FitOptions) -> Trial | None:
     """Two constants together, judged as one step; None where the lines are too few."""
-    constants = with_names(fit.named, [one, other])
+    constants, _ = beside_zero(with_names(fit.named, [one, other]), [one, other], fit.lines, options)
     try:
         free = _same_priors(fit, parameters(constants, [*fit.parameters.names, one, other]))
         both = fit_lines(fit.lines, constants, free, options)

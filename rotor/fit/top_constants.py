@@ -16,7 +16,6 @@ from functools import cached_property
 from types import MappingProxyType
 from typing import Any
 
-from rotor.fit.assignment import Assignments
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.of_top import effects_of
 from rotor.quantum.effects.spin_effect import parse_name
@@ -179,19 +178,6 @@ class TopConstants:
 
 
 ConstantSet = Constants | TopConstants
-
-
-def bright_top(top: Top, lines: Assignments, dipole_abc_debye: tuple[float, float, float]) -> Top:
-    """The top with that dipole in every state, and 1 D along each axis between states where a line was measured."""
-    states = top.states
-    if states is not None and "v" in lines.names:
-        v = lines.names.index("v")
-        pairs = {
-            (max(a, b), min(a, b)) for a, b in zip(lines.upper[:, v].tolist(), lines.lower[:, v].tolist(), strict=True)
-        }
-        between = {pair: (1.0, 1.0, 1.0) for pair in pairs if pair[0] != pair[1]}
-        states = replace(states, dipoles=between)
-    return replace(top, dipole_abc_debye=dipole_abc_debye, states=states, symmetry_checked=False)
 
 
 def _plain(table: Mapping[str, float]) -> dict[str, float]:

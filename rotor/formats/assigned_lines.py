@@ -241,6 +241,9 @@ def _size(path: object, line: int, name: str, row: Mapping[str, str], default: f
 
 
 def _whole(path: object, line: int, name: str, row: Mapping[str, str]) -> int:
+    text = (row.get(name) or "").strip()
+    if text.partition("/")[2] == "2":
+        raise ValueError(f"{path}, line {line} of the table: {name} reads {text!r}; this quantum number is whole here")
     value = _real(path, line, name, row)
     if not float(value).is_integer():
         raise ValueError(f"{path}, line {line} of the table: {name} = {value:g}; a quantum number is whole")

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
 from rotor.fit.assignment import Assignments, merged
+from rotor.fit.first_values import beside_zero
 from rotor.fit.fit import Fit, FitOptions, fit_lines
 from rotor.fit.parameters import Parameters, parameters, with_names
 from rotor.fit.report import fit_facts
@@ -175,6 +176,11 @@ def fit_of_lines(
     except ValueError as error:
         raise ValueError(f"free: {error}") from None
     made = parameters(begin, names, ties=ties, priors_mhz=priors)
+    begin, moved = beside_zero(begin, made.names, read)
+    if moved:
+        made = parameters(begin, names, ties=ties, priors_mhz=priors)
+        said = ", ".join(f"{name} at {value:.3g} MHz" for name, value in moved.items())
+        notes = [*notes, f"of these the lines know the square alone, so that they start beside 0: {said}"]
     title = " ".join(top.name.split()) or Path(lines).name
     files = FitFiles(lines, start=start)
     return FitRequest(
@@ -260,6 +266,17 @@ def _file_of(request: FitRequest, path: str | os.PathLike[str]) -> MoleculeFile:
         states=top.states,
         spin_constants=top.spin_constants,
     )
+
+
+def fault_of_par(answer: FitAnswer) -> str:
+    """Why no files of SPFIT are written of a fit in named constants; nothing where they are."""
+    if answer.request.spfit is not None:
+        return ""
+    try:
+        named_file(answer.fit, answer.request.title, variances=False)
+    except ValueError as error:
+        return str(error)
+    return ""
 
 
 def write_fitted_par(answer: FitAnswer, path: str | os.PathLike[str], *, variances: bool) -> None:

@@ -19,9 +19,11 @@ from rotor.arrays import Floats, Ints
 from rotor.fit.assignment import Assignments, assignments
 from rotor.fit.fit import Fit, FitOptions
 from rotor.fit.parameters import Parameters
+from rotor.fit.top_constants import TopConstants
 from rotor.formats.assigned_lines import QUANTA
 from rotor.formats.spcat.codes import HELD_BELOW, constants_and_matrix
 from rotor.formats.spcat.model import parameter_file
+from rotor.formats.spcat.named_codes import named_parameter_file
 from rotor.formats.spcat.states import is_plain
 from rotor.formats.spcat.text.fields import BLANK
 from rotor.formats.spcat.text.lin import LineList, note_of_defaults, note_of_remarks, read_lin, with_defaults
@@ -317,13 +319,16 @@ def named_file(fit: Fit, title: str, *, variances: bool) -> ParameterFile:
     SPFIT's parameters are not always the constants (A - B of a symmetric top): their errors and correlations are carried over.
     Raises ValueError where a fitted combination of constants has no parameter of its own there (a tie between constants).
     """
-    if not isinstance(fit.named, Constants):
-        raise ValueError("states or spins by names: no .par and .var are written of them; write the .toml file instead")
-    top = Top.from_constants(fit.named, name=title)
-    highest = int(max(fit.lines.upper[:, 0].max(), fit.lines.lower[:, 0].max()))
-    file = parameter_file(top, kmax=min(max(highest, 1), 359))
-    _, matrix = constants_and_matrix(file)
-    back = np.linalg.pinv(matrix) @ fit.parameters.matrix  # SPFIT's parameters by the free ones
+    highest = min(max(int(fit.lines.upper[:, 0].max()), int(fit.lines.lower[:, 0].max()), 1), 359)
+    named = fit.named
+    if isinstance(named, TopConstants):
+        spins = 0 if named.top.spin_constants is None else sum(named.top.spin_constants.twice.values())
+        file, matrix = named_parameter_file(named, title, min(highest + (spins + 1) // 2, 359))
+        back = matrix @ fit.parameters.matrix
+    else:
+        file = parameter_file(Top.from_constants(named, name=title), kmax=highest)
+        _, matrix = constants_and_matrix(file)
+        back = np.linalg.pinv(matrix) @ fit.parameters.matrix  # SPFIT's parameters by the free ones
     back[np.abs(back) < 1e-9] = 0.0
     covariance = back @ np.where(np.isfinite(fit.statistics.covariance), fit.statistics.covariance, 0.0) @ back.T
     errors = np.sqrt(np.diag(covariance))
@@ -335,10 +340,12 @@ def named_file(fit: Fit, title: str, *, variances: bool) -> ParameterFile:
     rows = np.flatnonzero(moved)
     if len(rows) != len(fit.parameters.names):
         raise ValueError(
-            "tied constants have no parameters of their own in SPFIT's files; write the .toml file instead"
+            "tied constants have no parameters of their own in SPFIT's files, nor has B where A of a symmetric top is held (they have "
+            "A - B); the .toml has everything"
         )
     rest = _packed(covariance[np.ix_(rows, rows)] / np.outer(errors[rows], errors[rows])) if variances else ""
-    header = replace(file.header, npar=len(parameters), nline=len(fit.lines), nitr=100)
+    count = len(fit.lines) if file.header.nline > 0 else -len(fit.lines)
+    header = replace(file.header, npar=len(parameters), nline=count, nitr=100)
     return replace(file, header=header, parameters=parameters, rest=rest)
 
 
