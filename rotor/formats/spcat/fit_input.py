@@ -323,7 +323,7 @@ def named_file(fit: Fit, title: str, *, variances: bool) -> ParameterFile:
     named = fit.named
     if isinstance(named, TopConstants):
         spins = 0 if named.top.spin_constants is None else sum(named.top.spin_constants.twice.values())
-        file, matrix = named_parameter_file(named, title, min(highest + (spins + 1) // 2, 359))
+        file, matrix = named_parameter_file(named, title, min(highest + spins, 359))
         back = matrix @ fit.parameters.matrix
     else:
         file = parameter_file(Top.from_constants(named, name=title), kmax=highest)
