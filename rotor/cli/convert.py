@@ -15,6 +15,7 @@ from rotor.cli.shared.options import argument, grouped, option
 from rotor.cli.shared.output import Files, Writer, deliver, json_text, note
 
 if TYPE_CHECKING:
+    from rotor.tops.spins.spin_constants import SpinConstants
     from rotor.tops.top import Top
 
 EXAMPLES = """\b
@@ -80,6 +81,11 @@ def top_with_errors(source: str) -> Top:
     return replace(top, constants=constants_of(read_par(path), errors=True))
 
 
+def _without_atoms(top: Top) -> SpinConstants | None:
+    """The constants of spins for a file without a geometry."""
+    return None if top.spin_constants is None else replace(top.spin_constants, atoms={})
+
+
 def writer_of(top: Top, source: str, target: str, kmax: int) -> Writer:
     """What writes the top in the format that the target's suffix names; what that cannot say is refused or noted."""
     if target.lower().endswith(".toml"):
@@ -96,14 +102,23 @@ def writer_of(top: Top, source: str, target: str, kmax: int) -> Writer:
             dipole_abc_debye=top.dipole_abc_debye,
             spin_weights=top.spin_weights,
             sources=sources,
+            covariance=top.covariance,
+            states=top.states,
+            spin_constants=_without_atoms(top),
         )
         return lambda path: write_molecule_file(file, path)
 
+    from rotor.fit.top_constants import TopConstants
     from rotor.formats.spcat.model import parameter_file
+    from rotor.formats.spcat.named_codes import named_parameter_file
     from rotor.formats.spcat.text.par import write_par
 
     if top.dipole_abc_debye and any(top.dipole_abc_debye):
         dipole = ", ".join(f"{mu:g}" for mu in top.dipole_abc_debye)
         note(f"a {Path(target).suffix} file has no place for the dipole ({dipole} D); it belongs into an .int file")
-    parameters = parameter_file(top, kmax)
+    if top.states is None and top.spin_constants is None:
+        parameters = parameter_file(top, kmax)
+    else:
+        constants = TopConstants(top, top.spin_constants is not None)
+        parameters = named_parameter_file(constants, top.name, kmax)[0]
     return lambda path: write_par(parameters, path)

@@ -62,7 +62,9 @@ class Options:
     spin_constants: str | None = option(
         None, metavar="TEXT", help="Constants of spins to start from, as in 'rotor spectrum'."
     )
-    spins: str | None = option(None, metavar="LIST", help='Sizes of the spins of --spin-constants: "S=1/2 14N=1".')
+    spins: str | None = option(
+        None, metavar="LIST", help='Sizes and order of the spins of --spin-constants: "S=1/2 14N".'
+    )
     state_constants: str | None = option(
         None, metavar="TEXT", help="Further states to start from, as in 'rotor spectrum'."
     )

@@ -17,6 +17,10 @@
     [spins."S,14N"]                     # what belongs to two spins
     b_F = 12.5
 
+    [spins.35Cl_1]                      # of two or three equivalent nuclei, the last ones: they are coupled to a total spin I first,
+    total = "I"                         # and last to the rest; quantum numbers I and F in place of F1 and F. Of two each has its
+    chi_aa = -40.0                      # constants, of three on a threefold axis the first alone, or the first and the second together
+
 The spins are coupled in the order in which they stand here.
 """
 
@@ -32,7 +36,7 @@ if TYPE_CHECKING:
     from rotor.molecules.molecule import Molecule
 
 _OF_TABLE = ("unit", "source", "unverified")
-_OF_SPIN = ("spin", "atom", "source", "unverified")
+_OF_SPIN = ("spin", "atom", "total", "source", "unverified")
 
 
 def spins_of_table(table: TableReader | None, molecule: Molecule | None) -> SpinConstants | None:
@@ -57,8 +61,9 @@ def spins_of_table(table: TableReader | None, molecule: Molecule | None) -> Spin
                 errors[name] = error
     sources = {name: part.text("source") for name, part in parts.items() if "source" in part.content}
     atoms = {name: number for name, part in parts.items() if (number := _atom(part, name, molecule)) is not None}
+    totals = {name: part.text("total") for name, part in parts.items() if "total" in part.content}
     try:
-        return SpinConstants(values, twice, table.text("source"), errors, sources, atoms)
+        return SpinConstants(values, twice, table.text("source"), errors, sources, atoms, totals)
     except ValueError as reason:
         raise ValueError(f"{table.place}: {reason}") from None
 
@@ -105,7 +110,11 @@ def spin_tables(constants: SpinConstants | None, unverified: Collection[str]) ->
     tables: dict[str, dict[str, Any]] = {"spins": {**marked, "unit": "MHz"}}
     for name, twice in constants.twice.items():
         tables[name] = {"spin": None if _is_isotope(name, twice) else spin_text(twice)}
-        tables[name] |= {"atom": constants.atoms.get(name), "source": constants.sources.get(name)}
+        tables[name] |= {
+            "atom": constants.atoms.get(name),
+            "total": constants.totals.get(name),
+            "source": constants.sources.get(name),
+        }
         tables[name]["unverified"] = True if f"spins.{name}" in unverified else None
     for name, value in constants.values.items():
         key = ",".join(spins_of(name))

@@ -53,7 +53,9 @@ Codes = dict[int, dict[str, float]]  # value of a code by named constants: what 
 
 
 def named_parameter_file(constants: TopConstants, title: str, kmax: int) -> tuple[ParameterFile, Floats]:
-    """The .par file of named constants, all held, and M (parameters, constants) with values of the file = M @ constants.
+    """The .var file of named constants with their errors, and M (parameters, constants) with values of the file = M @ constants.
+
+    A parameter with a constant whose error is not known has 1e-37, which holds it.
 
     Raises ValueError for what a file cannot say: another representation, weights that differ between states, names without a code.
     """
@@ -66,11 +68,18 @@ def named_parameter_file(constants: TopConstants, title: str, kmax: int) -> tupl
             matrix[row, names.index(name)] = factor
     values = matrix @ np.array(list(constants.values.values()))
     parameters = tuple(
-        Parameter(code, float(value), _FIXED, _label(factors))
+        Parameter(code, float(value), _error(factors, constants.uncertainties), _label(factors))
         for (code, factors), value in zip(codes.items(), values, strict=True)
     )
     header = Header(npar=len(parameters), nline=_nline(constants), nitr=1, errtst=1e6)
     return ParameterFile(title, header, (options,), parameters), matrix
+
+
+def _error(factors: Mapping[str, float], known: Mapping[str, float]) -> float:
+    """√Σ (factor · error)², as if the errors were independent."""
+    if not set(factors) <= set(known):
+        return _FIXED
+    return float(np.sqrt(sum((factor * known[name]) ** 2 for name, factor in factors.items()))) or _FIXED
 
 
 def _nline(constants: TopConstants) -> int:
@@ -181,22 +190,24 @@ def _of_spins(
     rotor = term.rotor
     if not isinstance(rotor, Cosines | CosinesWithN):
         return {base: term.factor}
-    found = _of_matrix(np.array(rotor.components, dtype=float), isinstance(rotor, CosinesWithN), oblate)
+    of_three = scheme.equivalent == 3 and max(places) > len(scheme.spins) - 3
+    found = _of_matrix(np.array(rotor.components, dtype=float), isinstance(rotor, CosinesWithN), oblate, of_three)
     return {base._replace(typ=typ): term.factor * factor for typ, factor in found.items()}
 
 
-def _of_matrix(c: Floats, whole: bool, oblate: bool) -> dict[int, float]:
-    """TYP and factors of Σ c_ij: of all of the matrix, or of its traceless part, which TYP 1, 2 or 3 of z and TYP 4 make up."""
-    cross = {typ: float(c[i, k]) for (i, k), typ in _CROSS.items() if c[i, k]}
+def _of_matrix(c: Floats, whole: bool, oblate: bool, of_three: bool) -> dict[int, float]:
+    """TYP and factors of Σ c_ij: of all of the matrix, or of its traceless part, which TYP 1, 2 or 3 of z and TYP 4 make up.
+
+    of_three: of one of three equivalent spins the parts that change K count twice, see `symmetry.halved_across`.
+    """
     x, y, z = ("abc".index(axis) for axis in AXES["IIIl" if oblate else "Ir"])
-    diagonal = np.diag(c)
-    across = float(diagonal[x] - diagonal[y]) / 4
+    diagonal, times = np.diag(c), 2.0 if of_three else 1.0
+    mean, across = float(diagonal[x] + diagonal[y]) / 2, times * float(diagonal[x] - diagonal[y]) / 4
+    found = {typ: times * float(c[i, k]) for (i, k), typ in _CROSS.items()}
     if not whole:
-        found = {z + 1: float(diagonal[z] - (diagonal[x] + diagonal[y]) / 2), 4: across}
-    elif diagonal[0] == diagonal[1] == diagonal[2]:
-        found = {0: float(diagonal[0])}
-    elif diagonal[x] == -diagonal[y] and not diagonal[z]:
-        found = {4: float(diagonal[x]) / 2}
+        found |= {z + 1: float(diagonal[z]) - mean, 4: across}
+    elif of_three or diagonal[0] == diagonal[1] == diagonal[2] or diagonal[x] == -diagonal[y]:
+        found |= {0: mean, z + 1: float(diagonal[z]) - mean, 4: across}
     else:
-        found = {i + 1: float(diagonal[i]) for i in range(3)}
-    return cross | {typ: factor for typ, factor in found.items() if abs(factor) > 1e-12}
+        found |= {i + 1: float(diagonal[i]) for i in range(3)}
+    return {typ: factor for typ, factor in found.items() if abs(factor) > 1e-12}

@@ -43,7 +43,10 @@ def _effects(constants: SpinConstants) -> tuple[QuantumEffect, ...]:
     from rotor.quantum.spins.terms import Spin
 
     kinds: tuple[type[SpinEffect], ...] = (NuclearQuadrupole, SpinRotation, SpinSpin)
-    spins = tuple(Spin(name, twice, name.startswith("S")) for name, twice in constants.twice.items())
+    spins = tuple(
+        Spin(name, twice, name.startswith("S"), constants.totals.get(name, ""))
+        for name, twice in constants.twice.items()
+    )
     values: dict[type[SpinEffect], dict[str, float]] = {}
     for name, value in constants.values.items():
         symbol = parse_name(name).symbol
@@ -70,9 +73,12 @@ def _refuse_unknown_states(top: Top) -> None:
 
 
 def _refuse_like_nuclei(top: Top) -> None:
-    """Nuclei that are coupled one by one must not be in the spin weights too."""
+    """Nuclei that are coupled one by one must not be in the spin weights too; with a total spin of two these are what I leaves of them."""
     assert top.spin_constants is not None
     labels = [name.partition("_")[0] for name in top.spin_constants.twice]
+    if len(top.spin_constants.totals) == 2:
+        top.spin_weights.exchanged()  # raises where an exchange of two nuclei does not tell the classes apart
+        labels = [name.partition("_")[0] for name in top.spin_constants.twice if name not in top.spin_constants.totals]
     like = [label for label in dict.fromkeys(labels) if labels.count(label) > 1]
     if like and top.spin_weights.rule != "none":
         raise ValueError(
