@@ -24,7 +24,7 @@ from rotor.formats.assigned_lines import read_assigned_lines, write_assigned_lin
 from rotor.formats.fit_request import answer_fit, fit_of_lines
 from rotor.formats.spcat.fit_input import named_file, spfit_input
 from rotor.formats.spcat.fit_states import groups_for_fit, levels_in_blocks
-from rotor.formats.spcat.named_codes import named_parameter_file
+from rotor.formats.spcat.named_parameters import named_parameters
 from rotor.formats.spcat.text.lin import read_lin
 from rotor.quantum.estimates.derivatives import level_derivatives
 from rotor.quantum.solve import solve_levels
@@ -138,7 +138,7 @@ def test_levels_and_derivatives_are_those_of_a_prediction(kind):
 @pytest.mark.parametrize("kind", TOPS)
 def test_the_codes_of_names_make_the_same_levels(kind):
     constants = named(kind)
-    file, matrix = named_parameter_file(constants, "", 99)
+    file, matrix = named_parameters(constants, "", 99)
     assert matrix @ np.array(list(constants.values.values())) == pytest.approx(
         [p.value for p in file.parameters], rel=1e-14
     )
@@ -164,7 +164,7 @@ def test_the_same_fit_as_from_spfits_files(case):
     assert 0.7 < fit.weighted_rms < 1.3  # of 88 degrees of freedom: three standard deviations are 0.23
     write_assigned_lines(fit.lines, "case.lin")
     file = named_file(fit, "case", variances=False)
-    start, matrix = named_parameter_file(TopConstants(rotor.read("start.toml"), True), "", 9)
+    start, matrix = named_parameters(TopConstants(rotor.read("start.toml"), True), "", 9)
     begin = tuple(p.__class__(p.code, s.value, 1e36) for p, s in zip(file.parameters, start.parameters, strict=True))
     asked = spfit_input(file.__class__("", file.header, file.options, begin), read_lin("case.lin", 5))
     other = fit_lines(asked.lines, asked.constants, asked.parameters, asked.options, model=asked.model)

@@ -13,7 +13,7 @@ from rotor.formats.molecules.molecule_file import parse_molecule_file
 from rotor.formats.molecules.molecule_writer import molecule_file_text
 from rotor.formats.read_write import top_of_file
 from rotor.formats.spcat.fit_states import groups_for_fit, levels_in_blocks
-from rotor.formats.spcat.named_codes import named_parameter_file
+from rotor.formats.spcat.named_parameters import named_parameters
 from rotor.quantum.effects.of_top import effects_of
 from rotor.quantum.solve import solve_levels
 from rotor.spectra.lines import line_list
@@ -100,7 +100,7 @@ def test_components_of_ortho_and_para_add_up_to_the_lines_without_spins():
 @pytest.mark.parametrize("kind", TOPS)
 def test_the_codes_make_the_same_levels(kind):
     constants = TopConstants(TOPS[kind], True)
-    file, _ = named_parameter_file(constants, "", 99)
+    file, _ = named_parameters(constants, "", 99)
     assert file.options[0].iax == {"two": -1}.get(kind, -6)
     levels = solve_levels(constants.top, 1 if kind == "three" else 2, effects=constants.effects)
     (group,) = groups_for_fit(file)

@@ -5,8 +5,10 @@ Levels keep their label by block and rank, so that no iteration reassigns a line
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -84,12 +86,11 @@ def robust(residuals: Floats, loss: str) -> tuple[Floats, Floats]:
     return residuals, np.ones_like(residuals)
 
 
-@dataclass(frozen=True, eq=False)
-class Grouping:
+class Grouping(NamedTuple):
     """The measured frequencies that count: for each the position of its first line; order, starts, shares: how blends add.
 
-    plain : no blend among them; blended, members, bounds : which of them are blends, the places of their lines in `order`, and where
-    each begins among these
+    plain : no blend among them. each : every line counts, in its order
+    blended, members, bounds : which of them are blends, the places of their lines in `order`, and where each begins among these
     """
 
     first: Ints
@@ -97,6 +98,7 @@ class Grouping:
     starts: Ints
     shares: Floats
     plain: bool
+    each: bool
     blended: Ints
     members: Ints
     bounds: Ints
@@ -116,10 +118,14 @@ class Grouping:
         blended = np.flatnonzero(counts > 1)
         bounds = np.concatenate([[0], np.cumsum(counts[blended])[:-1]]).astype(np.int64)
         members = np.flatnonzero(np.isin(each, blended))
-        return cls(order[starts], order, starts, shares, len(blended) == 0, blended, members, bounds)
+        first = order[starts]
+        each_line = np.array_equal(first, np.arange(len(lines)))
+        return cls(first, order, starts, shares, len(blended) == 0, each_line, blended, members, bounds)
 
     def mean(self, values: Floats) -> Floats:
-        """The weighted mean over each blend of values (lines, ...)."""
+        """The weighted mean over each blend of values (lines, ...); these themselves where every line stands alone."""
+        if self.plain and self.each:
+            return values
         out = values[self.first]
         if not self.plain:
             shares = self.shares[self.members].reshape(-1, *[1] * (values.ndim - 1))
@@ -159,7 +165,7 @@ class Search:
 
     def _lines_of(self, values: Floats) -> tuple[Floats, Floats, Floats]:
         energies, slopes = self.model.levels(self.parameters.constants_of(values))
-        slopes = slopes @ self.parameters.matrix
+        slopes = self.parameters.slopes_of(slopes)
         if self.from_zero:  # the place -1 of such lower levels is the last one
             energies, slopes = np.append(energies, 0.0), np.vstack([slopes, np.zeros(slopes.shape[1])])
         derivatives = slopes[self.upper]
@@ -184,8 +190,7 @@ class Search:
         group = self.group
         sigma = self.sigma[group.first]
         residuals = (self.lines.frequency_mhz[group.first] - group.mean(calculated)) / sigma
-        rows = group.mean(jacobian)
-        rows /= sigma[:, None]
+        rows = group.mean(jacobian) / sigma[:, None]
         spread, of_spread = self._apart(calculated, jacobian)
         known = np.flatnonzero(np.isfinite(self.parameters.prior))
         prior = self.parameters.prior[known]
@@ -240,18 +245,18 @@ def with_rejection(
 ) -> tuple[Search, Minimum, dict[int, str]]:
     """The search, repeated without the lines that are too far off until the same ones stay out.
 
-    Where no minimum was reached, or too few lines would be left, all lines count: the constants are wrong, not the lines.
+    Where no minimum was reached, or too few lines would be left, all lines count: the constants are wrong, not the lines; unless
+    the start describes half of the lines and more, see `_from_near_lines`.
     """
-    minimum = _searched(search, progress)
-    if options.reject_above is None or not minimum.converged:
+    minimum, may = _searched(search, progress), search.used
+    if options.reject_above is None:
         return search, minimum, {}
-    may = search.used
+    if not minimum.converged or _is_poor(search, minimum):
+        search, minimum = _from_near_lines(search, minimum, progress)
+    if not minimum.converged:
+        return search, minimum, {}
     for _ in range(_REJECTIONS):
-        calculated, _, _ = search.lines_of(minimum.parameters)
-        group = Grouping.of(search.lines, may)
-        means = group.spread_back(group.mean(calculated), calculated)
-        far = np.abs(search.lines.frequency_mhz - means) / search.sigma > options.reject_above
-        used = may & ~far
+        used = may & _near(search, may, minimum.parameters)
         if (used == search.used).all():
             break
         if too_few(search.lines, used, search.parameters):
@@ -260,6 +265,30 @@ def with_rejection(
         minimum = _continued(minimum, _minimised(search, minimum.parameters, progress, options.most_iterations))
     out = np.flatnonzero(may & ~search.used)
     return search, minimum, {int(i): f"more than {options.reject_above:g} errors off" for i in out}
+
+
+def _near(search: Search, may: NDArray[np.bool_], values: Floats) -> NDArray[np.bool_]:
+    """Which lines are no more than `reject_above` errors off, blends among those that may count by their means."""
+    calculated, _, _ = search.lines_of(values)
+    group = Grouping.of(search.lines, may)
+    means = group.spread_back(group.mean(calculated), calculated)
+    off = np.abs(search.lines.frequency_mhz - means) / search.sigma
+    return np.asarray(off <= (search.options.reject_above or math.inf))
+
+
+def _from_near_lines(search: Search, first: Minimum, progress: Progress | None) -> tuple[Search, Minimum]:
+    """The minimum of the lines that the start describes, where these are half of them and more and all together led nowhere.
+
+    SPFIT leaves lines out at the start always. Then lines that constants a little off put far away never come back, so that all
+    lines are tried first here.
+    """
+    start, limit = search.parameters.start, search.options.most_iterations
+    near = search.used & _near(search, search.used, start)
+    if 2 * near.sum() < search.used.sum() or too_few(search.lines, near, search.parameters):
+        return search, first
+    few = replace(search, used=near)
+    found = _continued(first, _minimised(few, start, progress, limit))
+    return (few, found) if found.converged and not _is_poor(few, found) else (search, first)
 
 
 def _searched(search: Search, progress: Progress | None) -> Minimum:

@@ -10,18 +10,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from rotor.arrays import Floats, Ints, distinct
-from rotor.formats.spcat.file_lines import Format, format_of, quanta_of
-from rotor.formats.spcat.file_model import Group, groups_of
+from rotor.formats.spcat.file_model import Group, groups_of, line_names
+from rotor.formats.spcat.file_quanta import Format, format_of, quanta_of
 from rotor.formats.spcat.l_doubled import functions_of_l, named_by_l
-from rotor.formats.spcat.predict_states import line_names
 from rotor.formats.spcat.text.int_file import IntensityFile, Request
 from rotor.formats.spcat.text.par import ParameterFile
 from rotor.formats.spcat.unresolved import HIGHEST_SEARCHED, excluded_parameters, refuse_far_f, spelled_out
-from rotor.quantum.estimates.contracted import ContractedLevels
 from rotor.quantum.estimates.effect_units import Functions, unit_levels
 from rotor.quantum.estimates.labelled_spins import found_with_spins
 from rotor.quantum.estimates.state_units import state_units
@@ -30,6 +29,9 @@ from rotor.quantum.labelled import LevelModel, MissingLevelsError
 from rotor.quantum.levels import Levels
 from rotor.quantum.spins.levels import levels_of_f
 from rotor.quantum.wang.rotation import solve_rotation
+
+if TYPE_CHECKING:
+    from rotor.quantum.estimates.contracted import ContractedLevels
 
 _NO_REQUEST = IntensityFile("", Request(), ())
 _AT_ZERO = 1e-30  # MHz: a free parameter that starts at 0 must not be left out of the Hamiltonian
@@ -59,8 +61,7 @@ def names_of_quanta(form: Format) -> tuple[str, ...]:
     return names if spins else ("j", *names[1:])
 
 
-@dataclass(frozen=True)
-class _Solved:
+class _Solved(NamedTuple):
     """A group with the labels that lie in it: their places among all, the parameters that it has, and its blocks."""
 
     rows: Ints

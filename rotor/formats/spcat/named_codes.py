@@ -13,8 +13,6 @@ Powers J, K, S in a name are NSQ, KSQ, NS. A name without a state has V1 = V2 = 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -23,7 +21,7 @@ from rotor.arrays import Floats
 from rotor.fit.top_constants import TopConstants
 from rotor.formats.spcat.codes import AXES, Digits, constants_and_matrix, join_code, parameters_of, split_code
 from rotor.formats.spcat.model import options_of
-from rotor.formats.spcat.text.par import Header, Options, Parameter, ParameterFile
+from rotor.formats.spcat.text.par import Header, ParameterFile
 from rotor.quantum.effects.hyperfine import NuclearQuadrupole
 from rotor.quantum.effects.spin_effect import ParameterName, parse_name
 from rotor.quantum.effects.spin_rotation import SpinRotation
@@ -32,6 +30,7 @@ from rotor.quantum.spins.operators import Cosines, CosinesWithN
 from rotor.quantum.spins.scheme import Scheme, scheme_of
 from rotor.quantum.spins.terms import SpinTerm
 from rotor.tops.constants import Constants
+from rotor.tops.spins.spin_weights import SpinWeights
 
 _BETWEEN = {
     "G_a": 20,
@@ -52,64 +51,21 @@ _FIXED = 1e-37
 Codes = dict[int, dict[str, float]]  # value of a code by named constants: what each has to be multiplied with
 
 
-def named_parameter_file(constants: TopConstants, title: str, kmax: int) -> tuple[ParameterFile, Floats]:
-    """The .var file of named constants with their errors, and M (parameters, constants) with values of the file = M @ constants.
+def codes_of_names(constants: TopConstants) -> Codes:
+    """Of every code that a file of the top has, which constants its value is made of, and how much of each.
 
-    A parameter with a constant whose error is not known has 1e-37, which holds it.
-
-    Raises ValueError for what a file cannot say: another representation, weights that differ between states, names without a code.
+    Raises ValueError for constants in another representation than Ir and IIIl.
     """
-    options = _options(constants, kmax)
-    codes = _of_own_states(constants, options) | _of_pairs_and_spins(constants, options)
-    names = list(constants.values)
-    matrix = np.zeros((len(codes), len(names)))
-    for row, factors in enumerate(codes.values()):
-        for name, factor in factors.items():
-            matrix[row, names.index(name)] = factor
-    values = matrix @ np.array(list(constants.values.values()))
-    parameters = tuple(
-        Parameter(code, float(value), _error(factors, constants.uncertainties), _label(factors))
-        for (code, factors), value in zip(codes.items(), values, strict=True)
-    )
-    header = Header(npar=len(parameters), nline=_nline(constants), nitr=1, errtst=1e6)
-    return ParameterFile(title, header, (options,), parameters), matrix
-
-
-def _error(factors: Mapping[str, float], known: Mapping[str, float]) -> float:
-    """√Σ (factor · error)², as if the errors were independent."""
-    if not set(factors) <= set(known):
-        return _FIXED
-    return float(np.sqrt(sum((factor * known[name]) ** 2 for name, factor in factors.items()))) or _FIXED
-
-
-def _nline(constants: TopConstants) -> int:
-    """Of one line; negative where a state has more than six quantum numbers."""
-    return -1 if len(constants.quanta) > 6 else 1
-
-
-def _label(factors: Mapping[str, float]) -> str:
-    """The constants that a parameter consists of."""
-    parts = [name if factor == 1 else f"{factor:.4g}*{name}" for name, factor in factors.items()]
-    return "+".join(parts).replace("+-", "-").replace("-1*", "-")
-
-
-def _options(constants: TopConstants, kmax: int) -> Options:
-    top = constants.top
     if constants.kind == "asymmetric" and constants.representation not in AXES:
         raise ValueError(
             f"constants in representation {constants.representation}: SPFIT's files have Ir and IIIl alone; convert them first"
         )
-    states = 1 if top.states is None else top.states.count
-    if top.states is not None and top.states.weights:
-        raise ValueError("states with spin weights of their own: no option lines of SPFIT are written of them")
-    options = options_of(top.constants, top.spin_weights, kmax)
-    spins = _scheme(constants)
-    if spins is not None:
-        options = replace(options, spind=(1 if options.spind > 0 else -1) * _spind(spins.twice))
-        if spins.equivalent:
-            iax = {2: max(abs(options.iax), 1), 3: 6}[spins.equivalent]
-            options = replace(options, iax=-iax, ewt=0 if iax == 6 else options.ewt)
-    return replace(options, nvib=(1 if options.nvib > 0 else -1) * states)
+    return _of_own_states(constants) | _of_pairs_and_spins(constants)
+
+
+def is_oblate(constants: Constants) -> bool:
+    """Whether c is the axis z of the basis."""
+    return constants.kind == "oblate" or constants.representation == "IIIl"
 
 
 def _scheme(constants: TopConstants) -> Scheme | None:
@@ -117,23 +73,11 @@ def _scheme(constants: TopConstants) -> Scheme | None:
     return found if found.spins else None
 
 
-def _spind(twice: tuple[int, ...]) -> int:
-    """SPIND of doubled spins, the first coupled in the units digit; with a 0 behind where one needs two digits.
-
-    >>> _spind((2,)), _spind((3, 2)), _spind((9,))
-    (3, 34, 100)
-    """
-    sizes = [two + 1 for two in reversed(twice)]
-    if max(sizes) < 10:
-        return int("".join(map(str, sizes)))
-    return int("".join(f"{size:02d}" for size in sizes) + "0")
-
-
 def _states(constants: TopConstants) -> int:
     return 1 if constants.top.states is None else constants.top.states.count
 
 
-def _of_own_states(constants: TopConstants, options: Options) -> Codes:
+def _of_own_states(constants: TopConstants) -> Codes:
     """Of the rotation in every state: what each parameter of a file of that state alone is made of."""
     top, out, states = constants.top, Codes(), _states(constants)
     for v in range(states):
@@ -144,7 +88,7 @@ def _of_own_states(constants: TopConstants, options: Options) -> Codes:
         own = Constants(
             kind=constants.kind, reduction=constants.reduction, representation=constants.representation, **values
         )
-        option = options_of(own, top.spin_weights, max(options.knmax, 1) if constants.kind != "linear" else 0)
+        option = options_of(own, SpinWeights(), 1)
         file = ParameterFile("", Header(npar=1), (option,), parameters_of(own))
         known, matrix = constants_and_matrix(file)
         back = np.linalg.inv(matrix)
@@ -155,8 +99,8 @@ def _of_own_states(constants: TopConstants, options: Options) -> Codes:
     return out
 
 
-def _of_pairs_and_spins(constants: TopConstants, options: Options) -> Codes:
-    out, scheme = Codes(), _scheme(constants)
+def _of_pairs_and_spins(constants: TopConstants) -> Codes:
+    out, scheme, oblate = Codes(), _scheme(constants), is_oblate(constants.top.constants)
     terms = {
         term.name: term
         for effect in constants.effects
@@ -166,12 +110,12 @@ def _of_pairs_and_spins(constants: TopConstants, options: Options) -> Codes:
     for name in constants.values:
         found: dict[Digits, float] = {}
         if name in terms and scheme is not None:
-            found = _of_spins(parse_name(name), terms[name], scheme, constants, options.nvib < 0)
+            found = _of_spins(parse_name(name), terms[name], scheme, constants, oblate)
         elif "," in name:
             parts = parse_name(name)
             assert parts.states is not None
             typ, (low, high) = _BETWEEN[parts.symbol], parts.states
-            sign = -1.0 if options.nvib < 0 and parts.symbol.startswith("G") else 1.0
+            sign = -1.0 if oblate and parts.symbol.startswith("G") else 1.0
             found = {Digits(0, 0, 0, 0, 0, typ, parts.nz2, parts.n2, low, high): sign}
         for digits, factor in found.items():
             out.setdefault(join_code(digits, _states(constants)), {})[name] = factor

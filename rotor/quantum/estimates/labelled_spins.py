@@ -12,7 +12,6 @@ import numpy as np
 
 from rotor.arrays import Floats, Ints, distinct
 from rotor.quantum.effect import QuantumEffect
-from rotor.quantum.estimates.contracted import ContractedLevels, contracted_levels
 from rotor.quantum.estimates.effect_units import Functions, unit_levels
 from rotor.quantum.estimates.unit_blocks import UnitBlocks
 from rotor.quantum.levels import Levels
@@ -20,6 +19,7 @@ from rotor.quantum.spins.levels import levels_of_f, unmixed_levels
 from rotor.quantum.spins.scheme import scheme_of
 
 if TYPE_CHECKING:
+    from rotor.quantum.estimates.contracted import ContractedLevels
     from rotor.tops.top import Top
 
 _MOST_ELEMENTS = 1e7  # of vectors over all functions of the F that are solved at a time
@@ -69,6 +69,8 @@ def found_with_spins(
     size = (1 + sum(len(effect.states(top)) for effect in effects)) * int(np.prod([two + 1 for two in scheme.twice]))
     products = scheme.equivalent < 3  # functions of three equivalent nuclei are none
     if products and size * int(every.max() + 1) > _LARGE:
+        from rotor.quantum.estimates.contracted import contracted_levels
+
         levels, plan = unmixed_levels(top, effects, every.tolist())
         rows = rows_of(levels, np.arange(len(twice_f)))
         here = np.flatnonzero(rows >= 0)
