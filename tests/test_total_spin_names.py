@@ -13,7 +13,9 @@ from rotor.formats.molecules.molecule_file import parse_molecule_file
 from rotor.formats.molecules.molecule_writer import molecule_file_text
 from rotor.formats.read_write import top_of_file
 from rotor.formats.spcat.fit_states import groups_for_fit, levels_in_blocks
-from rotor.formats.spcat.named_parameters import named_parameters
+from rotor.formats.spcat.named_parameters import named_parameter_file, named_parameters
+from rotor.formats.spcat.named_top import named_top
+from rotor.formats.spcat.text.par import format_par, read_par
 from rotor.quantum.effects.of_top import effects_of
 from rotor.quantum.solve import solve_levels
 from rotor.spectra.lines import line_list
@@ -112,6 +114,17 @@ def test_the_codes_make_the_same_levels(kind):
         for one in (levels, found)
     ]
     assert pairs[0] == pytest.approx(pairs[1], abs=1e-8)  # round-off of energies of 1e5 MHz
+
+
+@pytest.mark.parametrize("kind", [*TOPS, "protons"])
+def test_a_total_goes_to_codes_and_comes_back(kind):
+    top = top_of_file(parse_molecule_file(PROTONS)) if kind == "protons" else TOPS[kind]
+    back = named_top(read_par(format_par(named_parameter_file(top, 20))))
+    assert len(back.spin_constants.totals) == len(top.spin_constants.totals)
+    assert back.spin_weights == top.spin_weights
+    ours, theirs = (solve_levels(one, 1, effects=effects_of(one, True)) for one in (top, back))
+    assert np.sort(theirs.energy_mhz) == pytest.approx(np.sort(ours.energy_mhz), abs=1e-8)  # round-off of 1e5 MHz
+    assert sorted(theirs.degeneracy) == sorted(ours.degeneracy)
 
 
 def test_the_command_line(call, folder):
