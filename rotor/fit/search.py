@@ -47,6 +47,7 @@ class FitOptions:
     tolerance, most_iterations : of the search, see `rotor.statistics.least_squares.minimise`
     kmax : cut of the basis of an asymmetric top, as SPFIT's KNMAX; None for the whole basis
     leave_out_missing : lines with a level that does not exist are left out, and named, as SPFIT does; else they are an error
+    pass_interrupt : a KeyboardInterrupt goes on to the caller, of a fit that is one of many; else the fit ends with its best point
     """
 
     reject_above: float | None = None
@@ -57,6 +58,7 @@ class FitOptions:
     most_iterations: int = 100
     kmax: int | None = None
     leave_out_missing: bool = False
+    pass_interrupt: bool = False
 
     def __post_init__(self) -> None:
         if self.loss not in LOSSES:
@@ -248,12 +250,12 @@ def with_rejection(
     Where no minimum was reached, or too few lines would be left, all lines count: the constants are wrong, not the lines; unless
     the start describes half of the lines and more, see `_from_near_lines`.
     """
-    minimum, may = _searched(search, progress), search.used
-    if options.reject_above is None:
+    minimum, may = _passed_on(_searched(search, progress), options), search.used
+    if options.reject_above is None or minimum.status == INTERRUPTED:
         return search, minimum, {}
     if not minimum.converged or _is_poor(search, minimum):
         search, minimum = _from_near_lines(search, minimum, progress)
-    if not minimum.converged:
+    if not _passed_on(minimum, options).converged:
         return search, minimum, {}
     for _ in range(_REJECTIONS):
         used = may & _near(search, may, minimum.parameters)
@@ -263,8 +265,17 @@ def with_rejection(
             break
         search = replace(search, used=used)
         minimum = _continued(minimum, _minimised(search, minimum.parameters, progress, options.most_iterations))
+        if _passed_on(minimum, options).status == INTERRUPTED:
+            break
     out = np.flatnonzero(may & ~search.used)
     return search, minimum, {int(i): f"more than {options.reject_above:g} errors off" for i in out}
+
+
+def _passed_on(minimum: Minimum, options: FitOptions) -> Minimum:
+    """The same; KeyboardInterrupt for a search that was interrupted, where the caller asked for it."""
+    if minimum.status == INTERRUPTED and options.pass_interrupt:
+        raise KeyboardInterrupt
+    return minimum
 
 
 def _near(search: Search, may: NDArray[np.bool_], values: Floats) -> NDArray[np.bool_]:
@@ -288,6 +299,8 @@ def _from_near_lines(search: Search, first: Minimum, progress: Progress | None) 
         return search, first
     few = replace(search, used=near)
     found = _continued(first, _minimised(few, start, progress, limit))
+    if found.status == INTERRUPTED:
+        return search, _interrupted(replace(first, iterations=found.iterations))
     return (few, found) if found.converged and not _is_poor(few, found) else (search, first)
 
 
@@ -340,6 +353,8 @@ def _with_a_sign_turned(search: Search, first: Minimum, progress: Progress | Non
         except ValueError:  # out of the bounds of the model
             continue
         better = second.rms < _BETTER * first.rms  # else the lines do not know the sign
+        if second.status == INTERRUPTED:
+            return _interrupted(second if better else replace(first, iterations=second.iterations))
         first = second if better else replace(first, iterations=second.iterations)
         if first.rms <= search.options.poor_rms:
             break
@@ -369,10 +384,18 @@ def _by_stages(search: Search, first: Minimum, progress: Progress | None) -> Min
                 search, options=rough, used=search.used & (j <= cut), parameters=replace(search.parameters, prior=soft)
             )
             last = _continued(last, _minimised(stage, last.parameters, progress, max(limit - len(last.iterations), 0)))
+            if last.status == INTERRUPTED:  # of a part of the lines; the best point of all of them is the one before
+                return _interrupted(replace(first, iterations=last.iterations))
         second = _continued(last, _minimised(search, last.parameters, progress, max(limit - len(last.iterations), 0)))
     except ValueError:  # a stage left the bounds of the model
         return first
-    return second if second.rms < first.rms else replace(first, iterations=second.iterations)
+    best = second if second.rms < first.rms else replace(first, iterations=second.iterations)
+    return _interrupted(best) if second.status == INTERRUPTED else best
+
+
+def _interrupted(best: Minimum) -> Minimum:
+    """The best point so far of a search that was interrupted on another way."""
+    return replace(best, status=INTERRUPTED, reason=f"interrupted after {len(best.iterations)} iterations")
 
 
 def _minimised(

@@ -14,7 +14,7 @@ from rotor.structure.coordinates import bonded
 from rotor.structure.substitution import Value
 
 _MARGIN = 0.9  # Å around the atoms
-SMALLEST_ERROR = 1e-6  # of a label: what is fitted to exact constants has errors of round-off, which are not written
+SMALLEST_ERROR = 1e-5  # of a label: what is fitted to exact constants has errors of round-off, which are not written
 
 
 def structure_figure(molecule: Molecule, *, values: Sequence[Value] = (), title: str = "") -> Any:
