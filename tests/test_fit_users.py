@@ -303,6 +303,47 @@ def test_what_is_not_written_is_said(call, folder, seen):
     assert [path.name for path in sorted(folder.glob("t.*"))] == ["t.fit"]
 
 
+def test_levels_that_have_become_another_state_are_named(seen):
+    """D_K of the start takes K = 4 below K = 2 of one block: labels stay with block and rank, and the flip is said."""
+    true = Constants(A=10e3, B=3001.0, C=2999.0, DJ=1e-3, DK=0.1, reduction="S")
+    lines = lines_of(true)
+    start = true.replace(DK=900.0)
+    fit = fit_lines(lines, start, parameters(start, ["A", "B", "C", "DK"]))
+    assert fit.converged
+    assert abs(fit.constants["DK"] - 0.1) < 5 * fit.constants.uncertainties["DK"]
+    assert "4 2 3" in fit.changed_states
+    assert "4 4 1" in fit.changed_states
+    assert any("levels are mostly another state than at the start (by overlap)" in text for text in fit.notes)
+
+
+def test_lengths_beside_bonds_do_not_lie_on_atoms():
+    from rotor.molecules.molecule import Molecule
+    from rotor.plots.structure import structure_figure
+    from rotor.structure.substitution import Value
+
+    z = (-2.96, -1.9, -0.69, 0.69, 1.84)
+    chain = Molecule(("H", "C", "C", "C", "N"), [[x, 0, 0] for x in z])
+    values = [Value(f"r{i}", (i, i + 1), z[i] - z[i - 1], 1e-4, "Å") for i in range(1, 5)]
+    figure = structure_figure(chain, values=values)
+    axes = figure.axes[0]
+    figure.canvas.draw()
+    texts = [one for one in axes.texts if "(" in one.get_text()]
+    assert len(texts) == 4
+    circles = [patch.get_window_extent() for patch in axes.patches]
+    assert not any(text.get_window_extent().overlaps(circle) for text in texts for circle in circles)
+
+
+@pytest.mark.parametrize(
+    ("sign", "words"), [(";", "its columns are parted by ';'; commas are needed"), ("\t", "parted by '\\\\t'")]
+)
+def test_a_table_with_other_signs_between_its_columns_is_named(call, folder, seen, sign, words):
+    write_csv(folder / "x.csv", seen)
+    (folder / "y.csv").write_text((folder / "x.csv").read_text().replace(",", sign))
+    code, _, err = call("fit", "y.csv", "--constants", "A=5213 B=1897 C=1402 MHz", "--free", "A,B,C")
+    assert code == 2
+    assert words.replace("\\\\", "\\") in err
+
+
 def write_csv(path, lines: Assignments) -> None:
     rows = zip(lines.upper.tolist(), lines.lower.tolist(), lines.frequency_mhz.tolist(), strict=True)
     path.write_text(HEAD + "".join(f"{','.join(map(str, [*u, *low]))},{f:.5f},0.003\n" for u, low, f in rows))

@@ -135,6 +135,11 @@ def spfit_input(file: ParameterFile, lines: LineList, source: str = "") -> Spfit
         leave_out_missing=True,
     )
     notes += _notes(file, options, model is None, assigned)
+    if model is not None:
+        from rotor.formats.spcat.at_zero import stay_at_zero
+
+        if stay := stay_at_zero(file):
+            notes.append(f"{', '.join(stay)}: at 0 they change no level to first order, and stay there; give other starts")
     return SpfitInput(file, assigned, constants, parameters, options, columns, ratios, tuple(notes), model)
 
 

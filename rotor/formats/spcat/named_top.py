@@ -95,7 +95,9 @@ def named_top(file: ParameterFile, intensities: IntensityFile | None = None, *, 
 
 def _refuse(file: ParameterFile, states: tuple[StateOptions, ...], intensities: IntensityFile | None) -> None:
     first = file.options[0]
+    digits = [split_code(parameter.code, len(states)) for parameter in file.parameters]
     reasons = {
+        "FF, EX, TYP 90 to 99: a Fourier or Euler series": any(is_series(d) or is_constant(d) for d in digits),
         f"IXX = {first.ixx}: a sum of angular momenta that is held for conserved": first.ixx != 0,
         f"IAX = {first.iax}: a total spin of three nuclei with unlike weights": any(
             s.equivalent == 3 and s.plus != s.minus for s in states
@@ -110,10 +112,6 @@ def _refuse(file: ParameterFile, states: tuple[StateOptions, ...], intensities: 
     for what, found in reasons.items():
         if found:
             raise ValueError(f"{what} {NO_NAME}")
-    for parameter in file.parameters:
-        digits = split_code(parameter.code, len(states))
-        if is_series(digits) or is_constant(digits):
-            raise ValueError(f"parameter {parameter.code}: a term of a Fourier or Euler series {NO_NAME}")
 
 
 def _refuse_unlike(constants: list[Constants]) -> None:

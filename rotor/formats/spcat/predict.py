@@ -144,6 +144,9 @@ def predict(
         return replace(in_mhz, catalogue=wavenumbers.catalogue_in_cm(in_mhz.catalogue), request=request)
     if not (own_q or (math.isfinite(request.qrot) and request.qrot > 0)):
         raise ValueError(f"QROT = {request.qrot}: a partition function is a number above 0")
+    if as_spcat and 0 < request.qrot < 1:  # taken for 1 by the program
+        request = replace(request, qrot=1.0)
+        intensities = replace(intensities, request=request)
     others_names = options.diag in BY_DIAG and options.spind > 0 and not is_linear(options)
     left_out = as_spcat and options.knmax < request.fend and not is_linear(options)
     if not is_plain(parameters, intensities) or left_out or others_names:

@@ -13,13 +13,12 @@ from typing import Any
 import numpy as np
 
 from rotor import units
-from rotor.arrays import Floats, Ints
+from rotor.arrays import Floats, Ints, end_to_end
 from rotor.formats.spcat.codes import constants_of, split_code
 from rotor.formats.spcat.file_lines import (
     LEAST_MHZ,
     as_catalogue,
     as_level_list,
-    end_to_end,
     lines_of,
     transitions_of,
     within,
