@@ -25,6 +25,7 @@ from rotor.arrays import Floats, Ints, distinct
 from rotor.quantum.effects.watson import operators_by_name
 from rotor.quantum.wang.basis import WangBlock, ka_kc, wang_blocks
 from rotor.tops.constants import Constants
+from rotor.tops.operators import REPRESENTATIONS
 
 _MOST_PADDED = 1 << 22  # matrix elements of blocks that are worked on together: 32 MB
 
@@ -161,6 +162,7 @@ class WangBlocks(LevelModel):
     factors: Floats
     chunks: tuple[_Chunk, ...] = field(repr=False)
     j: Ints = field(repr=False)
+    rise: int
 
     @classmethod
     def of(cls, constants: Constants, labels: Ints, kmax: int | None) -> WangBlocks:
@@ -173,7 +175,9 @@ class WangBlocks(LevelModel):
         chunks = tuple(
             _chunks(_occurring(labels, str(constants.representation), kmax), units, [p for p, _, _ in hamiltonian])
         )
-        return cls(tuple(by_name), len(labels), places, factors, chunks, labels[:, 0])
+        axis = REPRESENTATIONS[str(constants.representation)][2]
+        rise = {"a": 1, "c": -1}.get(axis, 0)
+        return cls(tuple(by_name), len(labels), places, factors, chunks, labels[:, 0], rise)
 
     def levels(self, values_mhz: Floats) -> tuple[Floats, Floats]:
         """See `LevelModel`. Raises ValueError where a block is not finite or LAPACK does not converge."""
@@ -183,7 +187,7 @@ class WangBlocks(LevelModel):
         for chunk in self.chunks:
             weights = self._weights(coefficients, chunk.x)
             bands = [np.einsum("bkt,bt->bk", unit, weights) for unit in chunk.units]
-            solved, vectors = _diagonalised(bands, chunk.sizes)
+            solved, vectors = self._solved(chunk, bands)
             energies[chunk.rows] = solved[chunk.block, chunk.rank]
             expected = np.ones((len(chunk.rows), chunk.units[0].shape[2] + 1))
             expected[:, :-1] = _expectations(chunk, vectors)
@@ -201,9 +205,16 @@ class WangBlocks(LevelModel):
             for values in (before_mhz, after_mhz):
                 weights = self._weights(self.factors @ values, chunk.x)
                 bands = [np.einsum("bkt,bt->bk", unit, weights) for unit in chunk.units]
-                both.append(_diagonalised(bands, chunk.sizes)[1][chunk.block, :, chunk.rank])
+                both.append(self._solved(chunk, bands)[1][chunk.block, :, chunk.rank])
             out[chunk.rows] = np.einsum("lk,lk->l", *both) ** 2
         return out
+
+    def _solved(self, chunk: _Chunk, bands: Sequence[Floats]) -> tuple[Floats, Floats]:
+        """Energies and vectors of the blocks, states in the order of their labels."""
+        energies, vectors = _diagonalised(bands, chunk.sizes)
+        if self.rise:
+            _order_beyond_the_turn(self.rise * bands[0], chunk.sizes, energies, vectors)
+        return energies, vectors
 
     def _weights(self, coefficients: Floats, x: Floats) -> Floats:
         """Σ_p c X^p of every unit matrix, (blocks, units)."""
@@ -333,6 +344,20 @@ def _diagonalised(bands: Sequence[Floats], sizes: Sequence[int]) -> tuple[Floats
     else:
         _banded(bands, sizes, energies, vectors)
     return energies, vectors
+
+
+def _order_beyond_the_turn(diagonal: Floats, sizes: Sequence[int], energies: Floats, vectors: Floats) -> None:
+    """States beyond the K where the diagonal ceases to rise come last, by their mean K, those of other K by energy before them."""
+    inside = np.arange(diagonal.shape[1]) < np.asarray(sizes)[:, None]
+    turn = np.where(inside, diagonal, -np.inf).argmax(axis=1)
+    for b in np.flatnonzero((turn > 0) & (turn < np.asarray(sizes) - 1)).tolist():
+        n = sizes[b]
+        share = vectors[b, :n, :n] ** 2
+        beyond = share[turn[b] + 1 :].sum(axis=0) > 0.5
+        mean = np.arange(n) @ share
+        order = np.lexsort((np.where(beyond, mean, 0.0), beyond))
+        energies[b, :n] = energies[b, order]
+        vectors[b, :n, :n] = vectors[b, :n, order].T
 
 
 def _tridiagonal(bands: Sequence[Floats], sizes: Sequence[int], energies: Floats, vectors: Floats) -> None:
