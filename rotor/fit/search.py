@@ -24,6 +24,10 @@ _CANCELLED = 1e-12  # of the level derivatives: what is left of differences belo
 _REJECTIONS = 20
 _STAGES = (0.1, 0.2, 0.35, 0.5, 0.7, 0.85)  # shares of the lines, in order of J, of a search that begins with low J
 _ROUGH = 10.0  # standard errors within which a stage has converged
+_FAR = 15.0  # times the median of the residuals, some ten standard deviations: lines beyond it may be those of other levels
+_ROUNDS = 8  # of searches with the lines that are not far off
+_ROUND_ITERATIONS = 12  # of each
+_NEARLY = 0.1  # standard errors within which one has converged
 _FIRST_ITERATIONS = 12  # of a direct search, after which it must have made way
 _WAY = 0.01  # of the weighted rms at the start, below which it has
 _LATELY = 6  # iterations in which it must halve the weighted rms after these
@@ -263,7 +267,8 @@ def with_rejection(
 
 
 def _searched(search: Search, progress: Progress | None) -> Minimum:
-    """A direct search; where it makes no way for some iterations, or ends far from the lines, one by rising J, then other signs."""
+    """A direct search; where it makes no way for some iterations, or ends far from the lines, one with most of the lines, one by rising
+    J, then other signs."""
     options = search.options
 
     def hopeless(taken: Sequence[Iteration]) -> bool:
@@ -275,7 +280,7 @@ def _searched(search: Search, progress: Progress | None) -> Minimum:
 
     limit = options.most_iterations
     first = _minimised(search, search.parameters.start, progress, limit, hopeless)
-    for further in (_by_stages, _with_a_sign_turned):
+    for further in (_with_most_lines, _by_stages, _with_a_sign_turned):
         if _is_poor(search, first) and first.status != INTERRUPTED and len(first.iterations) < limit:
             first = further(search, first, progress)
     return first
@@ -320,6 +325,39 @@ def _with_a_sign_turned(search: Search, first: Minimum, progress: Progress | Non
 def _continued(first: Minimum, second: Minimum) -> Minimum:
     """The second search with the iterations of both."""
     return replace(second, iterations=(*first.iterations, *second.iterations))
+
+
+def _with_most_lines(search: Search, first: Minimum, progress: Progress | None) -> Minimum:
+    """The better of the minimum found and the one that is reached from the start when lines far off those of the rest come in last.
+
+    Where two levels share their functions nearly by halves, a small error of the constants exchanges their names. Such lines are off by
+    the distance of the levels, a hundred times as far as all others, and they alone decide where a direct search goes. With the others
+    in their places the names are right, and they come back.
+    """
+    last, limit = replace(first, parameters=search.parameters.start), search.options.most_iterations
+    rough = replace(search.options, tolerance=_NEARLY)
+    for number in range(_ROUNDS):
+        part = replace(search, options=rough, used=_not_far_off(search, last.parameters))
+        if (part.used == search.used).all() and not number:
+            return first  # that was the direct search
+        if (part.used == search.used).all() or too_few(search.lines, part.used, search.parameters):
+            break
+        before = part.evaluate(last.parameters)[0]
+        left = min(max(limit - len(last.iterations), 0), _ROUND_ITERATIONS)
+        last = _continued(last, _minimised(part, last.parameters, progress, left))
+        if last.residuals @ last.residuals > before @ before / 4 and last.rms > search.options.poor_rms:
+            return replace(first, iterations=last.iterations)
+    second = _continued(last, _minimised(search, last.parameters, progress, max(limit - len(last.iterations), 0)))
+    return second if second.rms < first.rms else replace(first, iterations=second.iterations)
+
+
+def _not_far_off(search: Search, values: Floats) -> NDArray[np.bool_]:
+    """The lines (lines,) that count and whose residual is not many times the median of all."""
+    group = search.group
+    size = np.abs(search.weighted(values)[0][: len(group.first)])
+    near = size <= max(_FAR * float(np.median(size)), search.options.poor_rms)
+    blends = search.lines.blend[group.first[near]]
+    return search.used & np.isin(search.lines.blend, blends)
 
 
 def _by_stages(search: Search, first: Minimum, progress: Progress | None) -> Minimum:

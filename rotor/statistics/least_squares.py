@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from itertools import takewhile
 
 import numpy as np
 
@@ -28,6 +29,7 @@ FIRST_DAMPING, MOST_DAMPING = 1e-4, 1e12  # λ where D p has columns of length 1
 _FLOOR = 10.0  # times the tolerance, below which a step that does not come nearer says that round-off is reached
 BENT = 0.01  # standard errors that seem to be left at a minimum, above which the linear model does not hold there
 _NOTHING = 1e-9  # of χ², below which round-off of the residuals hides what a damped step does
+_UNFORESEEN = 1e-6  # of the length of the residuals, below which round-off may be what a step did not foresee
 _FINER = 0.01  # of the least λ tried so far, below which a smaller one is worth a try
 _NOISE = 1e-7  # of χ², below which round-off of the residuals hides whether a step has decreased it: the linear model decides
 ROUND_OFF = 1e-13  # singular values below this part of the largest carry no information
@@ -54,7 +56,7 @@ class Minimum:
 
     parameters (n,), residuals (m,), jacobian (m, n) : at the best point found, which is what a search that did not end
         well leaves too
-    status : "converged", "stalled", "too many iterations" or "interrupted"; reason : the same in a sentence with numbers
+    status : "converged", "stalled", "too many iterations" or "interrupted"
     gradient : largest |cosine| between the residuals and a column of the Jacobian, 0 at a minimum
     distance : length of the undamped step in standard errors, √(δᵀ JᵀJ δ), 0 at a minimum
     """
@@ -63,7 +65,6 @@ class Minimum:
     residuals: Floats
     jacobian: Floats
     status: str
-    reason: str
     gradient: float
     distance: float
     iterations: tuple[Iteration, ...] = field(default=(), repr=False)
@@ -77,6 +78,18 @@ class Minimum:
     def rms(self) -> float:
         """√(Σ r²/m), the weighted rms."""
         return _rms(self.residuals)
+
+    @property
+    def reason(self) -> str:
+        """The status in a sentence with numbers."""
+        count, left = len(self.iterations), f"{self.distance:.1e} standard errors"
+        bends = ", of which χ² allows none: it bends upwards" if self.distance > BENT * max(1.0, self.rms) else ""
+        return {
+            CONVERGED: f"converged after {count} iterations: the next step would be {left}{bends}",
+            STALLED: f"no step decreases the residuals, although {left} seem to be left",
+            EXHAUSTED: f"{count} iterations were not enough: the next step would be {left}",
+            INTERRUPTED: f"interrupted after {count} iterations: the next step would be {left}",
+        }[self.status]
 
 
 def minimise(
@@ -134,13 +147,15 @@ def minimise(
     blind = np.zeros(len(point)) if floor is None else floor
     state = _State.at(point, *_evaluated(evaluate, point))
     scale, damping, taken, before = state.norms, 0.0, list[Iteration](), math.inf
+    refused = list[tuple[float, float]]()
     first = FIRST_DAMPING  # the least λ above 0, until nothing between it and the largest leads on
     try:
         while True:
             scale = np.maximum(scale, state.norms)
             linear = _Linear.of(state, scale, blind)
             enough = tolerance * max(1.0, state.rms)
-            if linear.distance <= enough or (linear.distance > before / 2 and linear.distance <= _FLOOR * enough):
+            floor_of_noise = min(_FLOOR * enough, math.sqrt(_NOISE * len(state.residuals)) * state.rms)
+            if linear.distance <= enough or before / 2 < linear.distance <= floor_of_noise:
                 return state.ended(CONVERGED, linear, taken)
             if len(taken) >= most_iterations or (hopeless and hopeless(taken)):
                 return state.ended(EXHAUSTED, linear, taken)
@@ -155,6 +170,10 @@ def minimise(
             before = linear.distance if damping == 0 else math.inf
             if good and trial:
                 state = trial
+                refused.clear()
+            elif trial:
+                unforeseen = trial.residuals - state.residuals + state.jacobian @ step
+                refused.append((float(np.linalg.norm(scale * step)), float(np.linalg.norm(unforeseen))))
             if progress:
                 progress(taken[-1])
             if good:
@@ -166,11 +185,21 @@ def minimise(
             if damping > MOST_DAMPING or (
                 damping > first and predicted < _NOTHING * state.rms**2 * len(state.residuals)
             ):
-                if linear.weakest >= _FINER * first:
-                    return state.ended(_without_decrease(linear, state, taken), linear, taken)
-                damping = first = linear.weakest
+                if all(one.damping > 0 for one in _refused(taken)):
+                    damping = 0.0  # of the last point only damped steps are known
+                elif linear.weakest < _FINER * first:
+                    damping = first = linear.weakest
+                else:
+                    smooth = _are_smooth(refused, _UNFORESEEN * float(np.linalg.norm(state.residuals)))
+                    ending = _without_decrease(linear, state, taken) if smooth else STALLED
+                    return state.ended(ending, linear, taken)
     except KeyboardInterrupt:
         return state.ended(INTERRUPTED, _Linear.of(state, scale, blind), taken)
+
+
+def _refused(taken: Sequence[Iteration]) -> list[Iteration]:
+    """The steps that were refused at the last point, the last one first."""
+    return list(takewhile(lambda one: not one.taken, reversed(taken)))
 
 
 def _relaxed(damping: float, gain: float, first: float) -> float:
@@ -188,6 +217,20 @@ def _without_decrease(linear: _Linear, state: _State, taken: Sequence[Iteration]
     return CONVERGED if left < BENT * max(1.0, state.rms) else STALLED
 
 
+def _are_smooth(refused: Sequence[tuple[float, float]], noise: float) -> bool:
+    """Whether what the linear model did not foresee of steps falls with their square: lengths and |r(p + δ) - r + J δ| of each.
+
+    Where levels exchange their names it falls with their length, or not at all. Then χ² bends upwards on one side alone, and a point
+    where no step leads on is no minimum. What is below `noise` says nothing.
+    """
+    known = sorted((length, off) for length, off in refused if off > noise)
+    longer = [(length, off) for length, off in known if length > 3 * known[0][0]]
+    if not longer or not known[0][0]:
+        return True
+    (short, little), (long, much) = known[0], longer[0]
+    return math.log(much / little) > 1.5 * math.log(long / short)
+
+
 def _left_to_gain(taken: Sequence[Iteration], count: int) -> float:
     """By how much χ² may still fall, from the steps that were refused at the last point; count : residuals.
 
@@ -196,9 +239,7 @@ def _left_to_gain(taken: Sequence[Iteration], count: int) -> float:
     P may be left.
     """
     left = 0.0
-    for one in reversed(taken):
-        if one.taken:
-            break
+    for one in _refused(taken):
         gain = (one.rms_before**2 - one.rms_after**2) * count
         if not math.isfinite(gain):
             left = max(left, one.predicted)
@@ -252,18 +293,9 @@ class _State:
         return _rms(self.residuals)
 
     def ended(self, status: str, linear: _Linear, iterations: list[Iteration]) -> Minimum:
-        count = len(iterations)
-        reasons = {
-            CONVERGED: f"converged after {count} iterations: the next step would be {linear.distance:.1e} standard errors"
-            + (", of which χ² allows none: it bends upwards" if linear.distance > BENT * max(1.0, self.rms) else ""),
-            STALLED: f"no step decreases the residuals, although {linear.distance:.1e} standard errors seem to be left",
-            EXHAUSTED: f"{count} iterations were not enough: the next step would be {linear.distance:.1e} standard errors",
-            INTERRUPTED: f"interrupted after {count} iterations: the next step would be {linear.distance:.1e} standard errors",
-        }
         return Minimum(
-            self.parameters, self.residuals, self.jacobian, status, reasons[status], linear.gradient, linear.distance,
-            tuple(iterations),
-        )  # fmt: skip
+            self.parameters, self.residuals, self.jacobian, status, linear.gradient, linear.distance, tuple(iterations)
+        )
 
 
 def _triangle(stacked: Floats) -> Floats:

@@ -20,11 +20,15 @@ from typing import NamedTuple
 
 import numpy as np
 
+from numpy.typing import NDArray
+
 from rotor.arrays import Floats, Ints, distinct
 
 Namer = Callable[[Floats, Floats, Floats], Ints]  # matrix, energies, vectors -> names (n, columns) of the states
 
 _AT_ONCE = 1 << 18  # numbers of the largest array of blocks side by side: 2 MB, which stays in the cache of a core
+
+_CLEAR = 0.8  # share of a sub-block in a state, above which it and the rank by energy in it make the name
 
 _ALIKE = 1e-13  # of the width of a block: energies that differ less are one, such as doublets of high K
 
@@ -147,18 +151,19 @@ class _Stack:
         energies, vectors = np.linalg.eigh(matrices)
         return _Solved(matrices, energies + zero[:, None], vectors)
 
-    def leading(self, solved: _Solved) -> Ints:
-        """The sub-block with the largest share of each state, (blocks, size); of two states that round-off alone tells apart the lower
-        number first, whichever way round they come."""
+    def leading(self, solved: _Solved) -> tuple[Ints, Floats]:
+        """The sub-block with the largest share of each state, (blocks, size), and that share; of two states that round-off alone tells
+        apart the lower number first, whichever way round they come."""
         if self.members.shape[1] == 1 or self.size == 1:
-            return np.zeros(solved.energies.shape, dtype=np.int64)
-        found = np.asarray((self.members @ solved.vectors**2).argmax(axis=1))
+            return np.zeros(solved.energies.shape, dtype=np.int64), np.ones(solved.energies.shape)
+        shares = self.members @ solved.vectors**2
+        found, largest = np.asarray(shares.argmax(axis=1)), np.asarray(shares.max(axis=1))
         whole = solved.energies[:, -1:] - solved.energies[:, :1]
         turned = (np.diff(solved.energies, axis=1) <= _ALIKE * whole) & (found[:, :-1] > found[:, 1:])
         turned[:, 1:] &= ~turned[:, :-1]
         block, place = np.nonzero(turned)
         found[block, place], found[block, place + 1] = found[block, place + 1], found[block, place]
-        return found
+        return found, largest
 
     def slopes(self, vectors: Floats, states: Ints) -> Floats:
         """⟨n|O_i|n⟩ (blocks, states, parameters of the blocks) of some states (blocks, states)."""
@@ -172,12 +177,13 @@ class _Stack:
 
 class AtStart(NamedTuple):
     """What labels of a block had when they were looked for: parameters of the block, energies, derivatives by them, sub-blocks of all
-    its states."""
+    its states and the shares of these."""
 
     values_mhz: Floats
     energies: Floats
     slopes: Floats
     leading: Ints
+    shares: Floats
 
 
 @dataclass(frozen=True)
@@ -234,12 +240,13 @@ def tracked_blocks(
         ]
         found = [find(i, names) for i, names in zip(numbers.tolist(), named, strict=True)]
         slopes = stack.slopes(solved.vectors, _padded([states for _, states in found], 0))
-        leading = stack.leading(solved)
+        leading, shares = stack.leading(solved)
         for place, (rows, states) in enumerate(found):
             if len(rows):
                 block = blocks[numbers[place]]
                 own = slopes[place, : len(rows), : len(block.parameters)]
-                start = AtStart(values_mhz[block.parameters], solved.energies[place, states], own, leading[place])
+                of_states = leading[place], shares[place]
+                start = AtStart(values_mhz[block.parameters], solved.energies[place, states], own, *of_states)
                 tracked.append(Tracked(block, rows, named[place][states], states, start))
     return UnitBlocks(count, tuple(tracked))
 
@@ -280,8 +287,9 @@ class _Labelled:
 
     def _states(self, solved: _Solved) -> Ints:
         """The states that have the labels now; names are made anew only where a state is mostly in another sub-block."""
-        leading = self.stack.leading(solved)
+        leading, shares = self.stack.leading(solved)
         moved = ((self._ranks(leading) != self._at_start) & (self.rows >= 0)).any(axis=1)
+        moved |= self._unclear_at_start | self._unclear(leading, shares)
         if not moved.any():
             return self.states
         states = self.states.copy()
@@ -290,6 +298,15 @@ class _Labelled:
             made = one.block.namer(solved.matrices[b], solved.energies[b], solved.vectors[b])
             states[b, : len(one.rows)] = _states_of(made, one.names)
         return states
+
+    @cached_property
+    def _unclear_at_start(self) -> NDArray[np.bool_]:
+        return self._unclear(self.leading, np.stack([one.start.shares for one in self.tracked]))
+
+    def _unclear(self, leading: Ints, shares: Floats) -> NDArray[np.bool_]:
+        """Blocks (blocks,) with a labelled state that no sub-block has most of: its sub-block and rank do not make its name."""
+        own = np.take_along_axis(shares, self.states, axis=1)
+        return np.asarray(((own < _CLEAR) & (self.rows >= 0)).any(axis=1))
 
     def _ranks(self, leading: Ints) -> Ints:
         """The sub-blocks of the labelled states and their places by energy in these, as one number each (blocks, labels).
