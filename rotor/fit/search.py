@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,7 @@ from rotor.arrays import Floats, Ints
 from rotor.fit.assignment import Assignments
 from rotor.fit.parameters import Parameters
 from rotor.quantum.labelled import LevelModel
-from rotor.statistics.least_squares import INTERRUPTED, Iteration, Minimum, Progress, minimise
+from rotor.statistics.least_squares import EXHAUSTED, INTERRUPTED, STALLED, Iteration, Minimum, Progress, minimise
 
 LOSSES = ("squares", "huber", "cauchy")
 POOR_RMS = 10.0  # weighted rms above which the lines are not described, unless the caller says otherwise
@@ -23,7 +24,7 @@ _HUBER, _CAUCHY = 1.345, 2.385  # σ at which a loss bends: 95 % efficiency for 
 _CANCELLED = 1e-12  # of the level derivatives: what is left of differences below it is round-off
 _REJECTIONS = 20
 _STAGES = (0.1, 0.2, 0.35, 0.5, 0.7, 0.85)  # shares of the lines, in order of J, of a search that begins with low J
-_ROUGH = 10.0  # standard errors within which a stage has converged
+_STAGE_ITERATIONS = 4  # of each
 _FAR = 15.0  # times the median of the residuals, some ten standard deviations: lines beyond it may be those of other levels
 _ROUNDS = 8  # of searches with the lines that are not far off
 _ROUND_ITERATIONS = 12  # of each
@@ -267,9 +268,26 @@ def with_rejection(
 
 
 def _searched(search: Search, progress: Progress | None) -> Minimum:
-    """A direct search; where it makes no way for some iterations, or ends far from the lines, one with most of the lines, one by rising
-    J, then other signs."""
-    options = search.options
+    """A direct search; where it makes no way for some iterations, or ends far from the lines, one with most of the lines, two by rising
+    J, and other signs. What iterations are left then go on from the best point."""
+    limit = search.options.most_iterations
+    first = _minimised(search, search.parameters.start, progress, limit, _makes_no_way(search.options))
+    for further in (
+        _with_most_lines,
+        partial(_by_stages, rough=10.0),
+        partial(_by_stages, rough=1.0),
+        _with_a_sign_turned,
+    ):
+        if _is_open(search, first):
+            first = further(search, first, progress)
+    if _is_open(search, first) and first.status == EXHAUSTED:
+        left = limit - len(first.iterations)
+        first = _continued(first, _minimised(search, first.parameters, progress, left))
+    return first
+
+
+def _makes_no_way(options: FitOptions) -> Callable[[Sequence[Iteration]], bool]:
+    """Whether the iterations of a search so far make further ones a waste, while there are other ways."""
 
     def hopeless(taken: Sequence[Iteration]) -> bool:
         if len(taken) < _FIRST_ITERATIONS:
@@ -278,12 +296,14 @@ def _searched(search: Search, progress: Progress | None) -> Minimum:
         lately = min(one.rms_after for one in taken[:-_LATELY])
         return now > options.poor_rms and (now > _WAY * taken[0].rms_before or now > lately / 2)
 
-    limit = options.most_iterations
-    first = _minimised(search, search.parameters.start, progress, limit, hopeless)
-    for further in (_with_most_lines, _by_stages, _with_a_sign_turned):
-        if _is_poor(search, first) and first.status != INTERRUPTED and len(first.iterations) < limit:
-            first = further(search, first, progress)
-    return first
+    return hopeless
+
+
+def _is_open(search: Search, found: Minimum) -> bool:
+    """Whether another way may lead further: the lines are not described, or the search has stalled, and iterations are left."""
+    if found.status == INTERRUPTED or len(found.iterations) >= search.options.most_iterations:
+        return False
+    return found.status == STALLED or _is_poor(search, found)
 
 
 def _is_poor(search: Search, found: Minimum) -> bool:
@@ -347,7 +367,8 @@ def _with_most_lines(search: Search, first: Minimum, progress: Progress | None) 
         last = _continued(last, _minimised(part, last.parameters, progress, left))
         if last.residuals @ last.residuals > before @ before / 4 and last.rms > search.options.poor_rms:
             return replace(first, iterations=last.iterations)
-    second = _continued(last, _minimised(search, last.parameters, progress, max(limit - len(last.iterations), 0)))
+    left = max(limit - len(last.iterations), 0)
+    second = _continued(last, _minimised(search, last.parameters, progress, left, _makes_no_way(search.options)))
     return second if second.rms < first.rms else replace(first, iterations=second.iterations)
 
 
@@ -360,25 +381,27 @@ def _not_far_off(search: Search, values: Floats) -> NDArray[np.bool_]:
     return search.used & np.isin(search.lines.blend, blends)
 
 
-def _by_stages(search: Search, first: Minimum, progress: Progress | None) -> Minimum:
+def _by_stages(search: Search, first: Minimum, progress: Progress | None, rough: float) -> Minimum:
     """The better of the minimum found and the one that a search by rising J ends in.
 
     Low J moves nearly linearly with the constants even when these are 10 % off, and what it fixes carries the next lines: the
     lines come in by J, a tenth of them first. Until all are in, a constant stays within about itself of its start, and one that
-    starts at 0 stays there.
+    starts at 0 stays there. rough : standard errors within which a stage has converged
     """
     j = np.maximum(search.lines.upper[:, 0], search.lines.lower[:, 0])
     last, limit = replace(first, parameters=search.parameters.start), search.options.most_iterations
-    rough = replace(search.options, tolerance=_ROUGH)
+    coarse = replace(search.options, tolerance=rough)
     try:
         for share in _STAGES:
             cut = np.quantile(j[search.used], share)
             soft = np.minimum(search.parameters.prior, np.maximum(np.abs(search.parameters.start), _AT_ZERO_MHZ))
             stage = replace(
-                search, options=rough, used=search.used & (j <= cut), parameters=replace(search.parameters, prior=soft)
+                search, options=coarse, used=search.used & (j <= cut), parameters=replace(search.parameters, prior=soft)
             )
-            last = _continued(last, _minimised(stage, last.parameters, progress, max(limit - len(last.iterations), 0)))
-        second = _continued(last, _minimised(search, last.parameters, progress, max(limit - len(last.iterations), 0)))
+            left = min(max(limit - len(last.iterations), 0), _STAGE_ITERATIONS)
+            last = _continued(last, _minimised(stage, last.parameters, progress, left))
+        left = max(limit - len(last.iterations), 0)
+        second = _continued(last, _minimised(search, last.parameters, progress, left, _makes_no_way(search.options)))
     except ValueError:  # a stage left the bounds of the model
         return first
     return second if second.rms < first.rms else replace(first, iterations=second.iterations)

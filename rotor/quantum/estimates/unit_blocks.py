@@ -19,7 +19,6 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints, distinct
