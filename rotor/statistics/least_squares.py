@@ -153,9 +153,7 @@ def minimise(
         while True:
             scale = np.maximum(scale, state.norms)
             linear = _Linear.of(state, scale, blind)
-            enough = tolerance * max(1.0, state.rms)
-            floor_of_noise = min(_FLOOR * enough, math.sqrt(_NOISE * len(state.residuals)) * state.rms)
-            if linear.distance <= enough or before / 2 < linear.distance <= floor_of_noise:
+            if _is_enough(linear.distance, before, tolerance, state):
                 return state.ended(CONVERGED, linear, taken)
             if len(taken) >= most_iterations or (hopeless and hopeless(taken)):
                 return state.ended(EXHAUSTED, linear, taken)
@@ -164,16 +162,15 @@ def minimise(
             trial = _tried(evaluate, state.parameters + step)
             after = trial.rms if trial else math.inf
             gain = (state.rms**2 - after**2) * len(state.residuals) / predicted if predicted > 0 else -1.0
-            small = predicted <= _NOISE * state.rms**2 * len(state.residuals) and after <= (1 + _NOISE) * state.rms
-            good = math.isfinite(after) and (gain > 1e-4 or (small and damping == 0))
+            small = damping == 0 and predicted <= _NOISE * state.chi_squared and after <= (1 + _NOISE) * state.rms
+            good = math.isfinite(after) and (gain > 1e-4 or small)
             taken.append(Iteration(len(taken) + 1, state.rms, after, damping, predicted, good))
             before = linear.distance if damping == 0 else math.inf
             if good and trial:
                 state = trial
                 refused.clear()
             elif trial:
-                unforeseen = trial.residuals - state.residuals + state.jacobian @ step
-                refused.append((float(np.linalg.norm(scale * step)), float(np.linalg.norm(unforeseen))))
+                refused.append(_unforeseen(state, trial, step, scale))
             if progress:
                 progress(taken[-1])
             if good:
@@ -182,19 +179,21 @@ def minimise(
                 damping = _relaxed(damping, gain, first)
                 continue
             damping = max(10.0 * damping, first)
-            if damping > MOST_DAMPING or (
-                damping > first and predicted < _NOTHING * state.rms**2 * len(state.residuals)
-            ):
+            if damping > MOST_DAMPING or (damping > first and predicted < _NOTHING * state.chi_squared):
                 if all(one.damping > 0 for one in _refused(taken)):
                     damping = 0.0  # of the last point only damped steps are known
                 elif linear.weakest < _FINER * first:
                     damping = first = linear.weakest
                 else:
-                    smooth = _are_smooth(refused, _UNFORESEEN * float(np.linalg.norm(state.residuals)))
-                    ending = _without_decrease(linear, state, taken) if smooth else STALLED
-                    return state.ended(ending, linear, taken)
+                    return state.ended(_without_decrease(linear, state, taken, refused), linear, taken)
     except KeyboardInterrupt:
         return state.ended(INTERRUPTED, _Linear.of(state, scale, blind), taken)
+
+
+def _is_enough(distance: float, before: float, tolerance: float, state: _State) -> bool:
+    """Whether the full step is below the tolerance, or is round-off: it was no more than twice as long before an undamped step."""
+    enough = tolerance * max(1.0, state.rms)
+    return distance <= enough or before / 2 < distance <= min(_FLOOR * enough, math.sqrt(_NOISE * state.chi_squared))
 
 
 def _refused(taken: Sequence[Iteration]) -> list[Iteration]:
@@ -211,8 +210,18 @@ def _relaxed(damping: float, gain: float, first: float) -> float:
     return damping if damping >= first else 0.0
 
 
-def _without_decrease(linear: _Linear, state: _State, taken: Sequence[Iteration]) -> str:
+def _unforeseen(state: _State, trial: _State, step: Floats, scale: Floats) -> tuple[float, float]:
+    """The length of a step and |r(p + δ) - r + J δ|, what the linear model did not foresee of it."""
+    off = trial.residuals - state.residuals + state.jacobian @ step
+    return float(np.linalg.norm(scale * step)), float(np.linalg.norm(off))
+
+
+def _without_decrease(
+    linear: _Linear, state: _State, taken: Sequence[Iteration], refused: Sequence[tuple[float, float]]
+) -> str:
     """No step decreases χ²: a minimum has been reached if what is left to gain is small, else the search has stalled."""
+    if not _are_smooth(refused, _UNFORESEEN * float(np.linalg.norm(state.residuals))):
+        return STALLED
     left = min(linear.distance, math.sqrt(_left_to_gain(taken, len(state.residuals))))
     return CONVERGED if left < BENT * max(1.0, state.rms) else STALLED
 
@@ -291,6 +300,10 @@ class _State:
     @property
     def rms(self) -> float:
         return _rms(self.residuals)
+
+    @property
+    def chi_squared(self) -> float:
+        return float(self.residuals @ self.residuals)
 
     def ended(self, status: str, linear: _Linear, iterations: list[Iteration]) -> Minimum:
         return Minimum(
