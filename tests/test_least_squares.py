@@ -46,10 +46,10 @@ def test_a_curved_valley_is_followed_to_its_end():
 
 
 def test_it_does_not_say_that_it_has_converged_when_it_has_not():
-    cut = minimise(rosenbrock, np.array([-1.2, 1.0]), most_iterations=3)
+    cut = minimise(rosenbrock, np.array([-1.2, 1.0]), most_iterations=1)
     assert not cut.converged
     assert cut.status == "too many iterations"
-    assert "3 iterations were not enough" in cut.reason
+    assert "1 iterations were not enough" in cut.reason
 
     def downhill_forever(p):  # the Jacobian has the wrong sign: every step leads up
         r, j = rosenbrock(p)

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import takewhile
 
 import numpy as np
@@ -29,6 +29,9 @@ FIRST_DAMPING, MOST_DAMPING = 1e-4, 1e12  # λ where D p has columns of length 1
 _FLOOR = 10.0  # times the tolerance, below which a step that does not come nearer says that round-off is reached
 BENT = 0.01  # standard errors that seem to be left at a minimum, above which the linear model does not hold there
 _NOTHING = 1e-9  # of χ², below which round-off of the residuals hides what a damped step does
+_PARTS = (1.0, 0.5, 0.25, 0.125)  # of a step that was refused, at which the bent way is looked at
+_MOST_BENT = 0.75  # of the step's length, beyond which the way bends more than its second order knows
+_WORTHWHILE = 0.1  # of what the straight step promised
 _UNFORESEEN = 1e-6  # of the length of the residuals, below which round-off may be what a step did not foresee
 _FINER = 0.01  # of the least λ tried so far, below which a smaller one is worth a try
 _NOISE = 1e-7  # of χ², below which round-off of the residuals hides whether a step has decreased it: the linear model decides
@@ -48,6 +51,10 @@ class Iteration:
     damping: float
     predicted: float
     taken: bool
+
+    def gain(self, count: int) -> float:
+        """The decrease of χ² over what was expected; count : residuals."""
+        return (self.rms_before**2 - self.rms_after**2) * count / self.predicted if self.predicted > 0 else -1.0
 
 
 @dataclass(frozen=True)
@@ -147,7 +154,7 @@ def minimise(
     blind = np.zeros(len(point)) if floor is None else floor
     state = _State.at(point, *_evaluated(evaluate, point))
     scale, damping, taken, before = state.norms, 0.0, list[Iteration](), math.inf
-    refused = list[tuple[float, float]]()
+    refused, arc = list[tuple[float, float]](), None
     first = FIRST_DAMPING  # the least λ above 0, until nothing between it and the largest leads on
     try:
         while True:
@@ -158,22 +165,22 @@ def minimise(
             if len(taken) >= most_iterations or (hopeless and hopeless(taken)):
                 return state.ended(EXHAUSTED, linear, taken)
 
-            step, predicted = linear.step(damping)
+            step, predicted = arc or linear.step(damping)
             trial = _tried(evaluate, state.parameters + step)
-            after = trial.rms if trial else math.inf
-            gain = (state.rms**2 - after**2) * len(state.residuals) / predicted if predicted > 0 else -1.0
-            small = damping == 0 and predicted <= _NOISE * state.chi_squared and after <= (1 + _NOISE) * state.rms
-            good = math.isfinite(after) and (gain > 1e-4 or small)
-            taken.append(Iteration(len(taken) + 1, state.rms, after, damping, predicted, good))
+            taken.append(_judged(len(taken) + 1, state, trial, damping, predicted))
             before = linear.distance if damping == 0 else math.inf
-            if good and trial:
-                state = trial
-                refused.clear()
-            elif trial:
-                refused.append(_unforeseen(state, trial, step, scale))
+            if trial and taken[-1].taken:
+                state, refused = trial, []
             if progress:
                 progress(taken[-1])
-            if good:
+            if trial and not taken[-1].taken and not arc:
+                off = trial.residuals - state.residuals + state.jacobian @ step
+                refused.append((float(np.linalg.norm(scale * step)), float(np.linalg.norm(off))))
+                if arc := linear.arc(state, scale, off, damping):
+                    continue
+            arc = None
+            if taken[-1].taken:
+                gain = taken[-1].gain(len(state.residuals))
                 if damping == first and gain > 0.75 and len(taken) > 1 and taken[-2].damping == 0:
                     first /= 10.0  # the undamped step goes too far, this one not far enough
                 damping = _relaxed(damping, gain, first)
@@ -188,6 +195,14 @@ def minimise(
                     return state.ended(_without_decrease(linear, state, taken, refused), linear, taken)
     except KeyboardInterrupt:
         return state.ended(INTERRUPTED, _Linear.of(state, scale, blind), taken)
+
+
+def _judged(number: int, state: _State, trial: _State | None, damping: float, predicted: float) -> Iteration:
+    """A step that was tried: taken where χ² falls, or where round-off hides whether it does and the linear model decides."""
+    after = trial.rms if trial else math.inf
+    found = Iteration(number, state.rms, after, damping, predicted, False)
+    small = damping == 0 and predicted <= _NOISE * state.chi_squared and after <= (1 + _NOISE) * state.rms
+    return replace(found, taken=math.isfinite(after) and (found.gain(len(state.residuals)) > 1e-4 or small))
 
 
 def _is_enough(distance: float, before: float, tolerance: float, state: _State) -> bool:
@@ -208,12 +223,6 @@ def _relaxed(damping: float, gain: float, first: float) -> float:
     if gain > 0.75:
         damping /= 10.0
     return damping if damping >= first else 0.0
-
-
-def _unforeseen(state: _State, trial: _State, step: Floats, scale: Floats) -> tuple[float, float]:
-    """The length of a step and |r(p + δ) - r + J δ|, what the linear model did not foresee of it."""
-    off = trial.residuals - state.residuals + state.jacobian @ step
-    return float(np.linalg.norm(scale * step)), float(np.linalg.norm(off))
 
 
 def _without_decrease(
@@ -357,3 +366,27 @@ class _Linear:
         along = factor * self.z
         promised = 2 * (self.s * along) @ self.z - (self.s * along) @ (self.s * along)
         return self.back @ along, float(promised)
+
+    def arc(self, state: _State, scale: Floats, off: Floats, damping: float) -> tuple[Floats, float] | None:
+        """A point t δ + t² a of the way that bends as the model does, and the decrease of χ² foretold there; None where that is little.
+
+        From what the linear model did not foresee of a step, u = r(p + δ) - r + J δ, which is ½ δᵀ(∇²r)δ to lowest order, follow
+        a = (JᵀJ + λD²)⁻¹ Jᵀu and r(t) = r - t J δ + t² (u - J a): the geodesic acceleration of M. K. Transtrum and J. P. Sethna,
+        arXiv:1201.5885 (2012), from the residuals of a step that was refused in place of one more evaluation.
+        scale : D. off : u
+        """
+        used = self.s > 0
+        inverse = np.where(used, 1 / np.where(used, self.s**2 + damping, 1.0), 0.0)
+        bent = self.back @ (inverse * (self.back.T @ (state.jacobian.T @ off)))
+        step, promised = self.step(damping)
+        along, across = state.jacobian @ step, off - state.jacobian @ bent
+        ratio = float(np.linalg.norm(scale * bent)) / (float(np.linalg.norm(scale * step)) or 1.0)
+        ways = [(_left(state.residuals - t * along + t * t * across), t) for t in _PARTS if t * ratio <= _MOST_BENT]
+        if not ways or state.chi_squared - min(ways)[0] < _WORTHWHILE * promised:
+            return None
+        least, t = min(ways)
+        return t * step + t * t * bent, state.chi_squared - least
+
+
+def _left(residuals: Floats) -> float:
+    return float(residuals @ residuals)
