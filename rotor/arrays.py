@@ -1,7 +1,8 @@
-"""The array types of annotations: real numbers, whole numbers, and row numbers of long tables; equality of what holds arrays."""
+"""The array types of annotations: real numbers, whole numbers, and row numbers of long tables; memory used again; equality."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from typing import Any
@@ -12,6 +13,20 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Indices = NDArray[np.int32]
+
+
+class Workspace:
+    """Memory for large arrays that come and go: taken from the system anew each time it would cost as much as what is done with it."""
+
+    def __init__(self) -> None:
+        self._taken = dict[str, Floats]()
+
+    def array(self, name: str, *shape: int) -> Floats:
+        """An array of that shape with anything in it, valid until the next one of that name."""
+        size = math.prod(shape)
+        if name not in self._taken or len(self._taken[name]) < size:
+            self._taken[name] = np.empty(size)
+        return self._taken[name][:size].reshape(shape)
 
 
 def distinct(values: NDArray[Any]) -> NDArray[Any]:

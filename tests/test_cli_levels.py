@@ -165,3 +165,13 @@ def test_spin_constants_split_levels(call, folder):
     )  # second order: χ²/B = 5e-4 MHz, times less than 0.4
     assert "N from 0 to 1" in call("levels", *given, "--jmax", "1")[1]
     assert "J from 0 to 1" in call("levels", *given[:2], "--jmax", "1")[1]
+
+
+def test_levels_with_the_spins_of_the_library(call, folder):
+    code, out, _ = call("levels", "formamide", "--hyperfine", "--jmax", "1", "--csv", "a.csv")
+    assert code == 0
+    assert "N Ka Kc F" in out
+    assert len((folder / "a.csv").read_text().splitlines()) == 1 + 1 + 9  # F = 1 of N = 0; three F of three levels
+    code, _, error = call("levels", "water", "--hyperfine")
+    assert code == 2
+    assert "no constants of spins are known" in error

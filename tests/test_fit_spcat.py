@@ -13,7 +13,7 @@ import pytest
 
 from rotor.fit.choose import bootstrap
 from rotor.fit.fit import fit_lines
-from rotor.formats.spcat.file_lines import format_of
+from rotor.formats.spcat.file_quanta import format_of
 from rotor.formats.spcat.fit_input import error_factor, fitted_file, read_fit, spfit_input
 from rotor.formats.spcat.fit_states import FileLevels, groups_for_fit, names_of_quanta
 from rotor.formats.spcat.predict import predict
@@ -159,7 +159,7 @@ def test_the_unit_blocks_are_the_cores_levels_and_derivatives():
     values = np.array([p.value for p in file.parameters])
     energies, slopes = model.levels(values)
 
-    from rotor.formats.spcat.file_lines import quanta_of
+    from rotor.formats.spcat.file_quanta import quanta_of
 
     levels = groups[0].levels((0, 12))
     printed = {tuple(q): e for q, e in zip(quanta_of(groups[0], levels, form).tolist(), levels.energy_mhz, strict=True)}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gzip
-from collections import defaultdict
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,6 +16,7 @@ from oracle_cases import (
     disagreements,
     prediction,
 )
+from test_doc_pages import script
 
 from rotor.formats.spcat.compare import compare
 from rotor.formats.spcat.text.cat import read_cat, write_cat
@@ -80,17 +80,6 @@ def _reference(folder: Path) -> Catalogue:
     return read_cat(gzip.decompress((folder / f"{folder.name}.cat.gz").read_bytes()))
 
 
-def _doublets(lines: Catalogue) -> dict[tuple[int, ...], tuple[float, float]]:
-    """Intensity over both K components above and below, by N Ka v, and the highest of their frequencies."""
-    sums: dict[tuple[int, ...], tuple[float, float]] = defaultdict(lambda: (0.0, 0.0))
-    for i in range(len(lines)):
-        up, low = lines.quanta_upper[i].tolist(), lines.quanta_lower[i].tolist()
-        label = (up[0], up[1], up[3], low[0], low[1], low[3])
-        total, highest = sums[label]
-        sums[label] = total + 10.0 ** lines.lgint[i], max(highest, lines.frequency_mhz[i])
-    return dict(sums)
-
-
 @pytest.mark.oracle
 def test_three_states_by_their_doublets(shared: Path):
     """Fermi and two Coriolis couplings leave no symmetry: both components of a K doublet stand in one block there.
@@ -101,7 +90,7 @@ def test_three_states_by_their_doublets(shared: Path):
     folder = shared / "reference" / "spcat" / "three_states_fermi_coriolis"
     lists = _reference(folder), prediction(folder).catalogue
     assert np.abs(compare(*lists).differences("frequency_mhz")).max() < 1.1e-4  # one digit of print
-    reference, ours = (_doublets(each) for each in lists)
+    reference, ours = (script("make_reference_cases").sums_over_doublets(each) for each in lists)
     assert len(reference) > 20_000
     for label, (total, frequency) in reference.items():
         cut = 1e-12 * (1 + (frequency / 3e5) ** 2)  # STR0 = STR1 = -12; below it a component is not listed

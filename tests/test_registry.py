@@ -22,7 +22,7 @@ from rotor.formats import packed, tables
 from rotor.formats.line_tables import as_printed
 from rotor.formats.provenance import record_of
 from rotor.formats.registry import FORMATS, loaded, suffixes_for
-from rotor.formats.spcat.file_lines import Format
+from rotor.formats.spcat.file_quanta import Format
 from rotor.formats.spcat.text.catalogue import Catalogue
 from rotor.formats.spcat.text.egy import LevelList
 from rotor.formats.spcat.text.fields import BLANK

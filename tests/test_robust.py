@@ -367,3 +367,22 @@ def test_sums_over_very_many_levels_take_seconds(call, words):
     assert time.perf_counter() - started < 15.0  # s; 1 on a quiet machine, 39 and more than 60 before
     assert code == 0
     assert out
+
+
+ENDS = """
+import atexit, sys
+from rotor.cli.shared import process
+atexit.register(print, "at the end")
+if "own" in sys.argv:
+    process.begin()
+if "trace" in sys.argv:
+    sys.settrace(lambda *seen: None)
+print("written")
+process.end(3)
+"""
+
+
+@pytest.mark.parametrize("words", [["own"], ["own", "trace"], []])
+def test_a_process_that_ends_has_written_and_done_what_was_registered(words):
+    done = subprocess.run([sys.executable, "-c", ENDS, *words], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (3, "written\nat the end\n", "")

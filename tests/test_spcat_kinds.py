@@ -28,7 +28,8 @@ MADE = {
     "threefold_asymmetric_quanta": 52, "forbidden_coupling": 654, "water_diag1": 339, "water_diag5": 398, "two_quadrupoles_i_tot": 1005,
     "eighteen_states": 958, "oblate_spin_orbit": 238, "three_protons_i_tot": 247, "methyl_i_tot": 215, "inversion_i_tot": 215,
     "deuterons_i_tot": 323, "forbidden_three_i_tot": 292, "l_doubled_weights": 419, "inversion_weights": 100, "one_of_two_i_tot": 208,
-    "moment_of_n": 92, "weights_of_states_i_tot": 583, "unequal_weights_i_tot": 361,
+    "moment_of_n": 92, "weights_of_states_i_tot": 583, "unequal_weights_i_tot": 361, "fourier_l_doubled": 588,
+    "fourier_two_states": 7206, "euler_water": 273, "sampled_k": 1603,
 }  # fmt: skip
 
 
@@ -104,7 +105,8 @@ def test_coriolis_terms_of_third_order(factor, off):
     ("code", "says"),
     [
         (61001, "moment of third order"),
-        (70001, "cosine of internal rotation"),
+        (80001, "sine of internal rotation"),
+        (71000, "cosine of internal rotation"),
         (1001, "acts on spin 1"),
         (1010, "magnetic moment between two states"),
         (2000, "spin 2 is not among the 1"),

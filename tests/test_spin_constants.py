@@ -50,6 +50,22 @@ def test_impossible_text_is_refused(text, spins, says):
         SpinConstants.parse(text, spins)
 
 
+@pytest.mark.parametrize(
+    ("text", "spins", "says"),
+    [
+        ("eps_aa=-500 eps_bb=-4 MHz", "S=1/2", r"eps_aa needs its spin or spins in round brackets"),
+        ("chi_aa(14N)=2", "14N=3/2", r"spin 14N = 3/2: the isotope has 1"),
+    ],
+)
+def test_a_mistake_is_named_with_what_to_do(text, spins, says):
+    with pytest.raises(ValueError, match=says):
+        SpinConstants.parse(text, spins)
+
+
+def test_a_difference_may_be_spelled():
+    assert SpinConstants.parse("chi_bb_minus_cc(14N)=1.5 chi_aa(14N)=2").values["chi_bb-cc(14N)"] == 1.5
+
+
 def test_first_order_pattern_of_a_linear_molecule():
     """J = 1: F = 0, 1, 2 at eQq (½, -¼, 1/20) from the centre to first order (Casimir's function of I = 1)."""
     lines = line_list(NITRILE, jmax=1, temperature_k=30.0, effects=effects_of(NITRILE, True), min_lgint=None)

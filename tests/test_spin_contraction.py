@@ -7,7 +7,7 @@ import pytest
 
 from rotor.quantum.effects.interactions import InteractingStates
 from rotor.quantum.effects.watson import SEMI_RIGID
-from rotor.quantum.spins.contraction import operators_of_stacks, stacks_of, tensor_elements_of_stacks
+from rotor.quantum.spins.contraction import by_numbers, operators_of_stacks, stacks_of, tensors_of_stacks
 from rotor.quantum.spins.lines import _rotor_element
 from rotor.quantum.spins.operators import Cosines, CosinesWithN, Scalar
 from rotor.quantum.spins.rotor import Piece, in_both_orders, solved_rotor
@@ -48,7 +48,7 @@ def test_operators_are_those_of_pairs(name, effects):
     """Every pair of blocks up to ΔN = 2, one by one; of blocks with one Wang function too."""
     blocks, representation = _blocks(effects)
     for piece in PIECES[name]:
-        found = operators_of_stacks(stacks_of(blocks), 2, [piece], representation)
+        found = by_numbers(operators_of_stacks(stacks_of(blocks), 2, [piece], representation))
         expected = {}
         for i, up in enumerate(blocks):
             for k, low in enumerate(blocks[: i + 1]):
@@ -69,7 +69,7 @@ def test_dipoles_are_those_of_pairs(sign):
     along = np.array([1.2, 0.7, 0.4])
     tensors = {(v, w): body_tensor((1 + v + w) * along, 1, representation) for v, w in ((0, 0), (1, 1), (0, 1))}
     tensors[1, 0] = body_tensor(sign * 2 * along, 1, representation)
-    found = tensor_elements_of_stacks(stacks_of(blocks), tensors)
+    found = by_numbers(tensors_of_stacks(stacks_of(blocks), tensors))
     count = 0
     for i, up in enumerate(blocks):
         for k, low in enumerate(blocks):

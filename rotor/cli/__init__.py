@@ -218,4 +218,4 @@ def main() -> None:
 
         completion_init()
         _application()(prog_name="rotor")
-    sys.exit(run())
+    process.end(run())

@@ -15,13 +15,15 @@ from rotor.cli.shared.options import argument, grouped, option
 from rotor.cli.shared.output import Files, Writer, deliver, json_text, note
 
 if TYPE_CHECKING:
+    from rotor.formats.spcat.text.int_file import IntensityFile
     from rotor.tops.top import Top
 
 EXAMPLES = """\b
 Examples:
   rotor convert case.var constants.toml
   rotor convert constants.toml case.par --kmax 60
-  rotor convert water water.var"""
+  rotor convert water water.var
+  rotor convert NH3 ammonia.par && rotor convert NH3 ammonia.int"""
 
 
 @dataclass(frozen=True)
@@ -29,17 +31,17 @@ class Options:
     """What is read and what is written."""
 
     source: str = argument(..., help="File (.par, .var, .int, .toml, ...) or name.")
-    target: str = argument(..., help="File to write: .toml, .par or .var.")
-    kmax: int = option(99, metavar="N", help="Highest K of a .par or .var (KNMAX).")
+    target: str = argument(..., help="File to write: .toml, .par, .var or .int.")
+    kmax: int = option(99, metavar="N", help="Highest K of a .par or .var (KNMAX), highest F of an .int.")
     json: str | None = json_option()
 
 
 @grouped()
 def command(context: typer.Context, options: Options) -> None:
-    """Constants, dipole and spin weights into another format; nothing is converted but the format."""
+    """Constants, spins, states, dipoles and weights into another format; nothing is converted but the format."""
     require_whole("--kmax", options.kmax, 0, 359)
     files, source, target = Files(), options.source, options.target
-    files.ask("TARGET", target, (".toml", ".par", ".var"))
+    files.ask("TARGET", target, (".toml", ".par", ".var", ".int"))
     files.ask_json(options.json)
     _refuse_overwriting(source, target)
     top = top_with_errors(source)
@@ -47,9 +49,16 @@ def command(context: typer.Context, options: Options) -> None:
     from rotor.cli.shared.report import describe
 
     content = {**describe(top, source, context.obj), "files": files.names}
-    done = f"{source} → {target}: {top.constants.text()}"
+    done = f"{source} → {target}: {top.constants.text()}{_further(top)}"
     writers = {"TARGET": writer_of(top, source, target, options.kmax)}
     deliver(files, writers, lambda: json_text(content), lambda: print(done))
+
+
+def _further(top: Top) -> str:
+    """What goes with the constants of the first state, in words."""
+    states = f"; {top.states.count} states" if top.states else ""
+    spins = f"; spins {', '.join(top.spin_constants.twice)}" if top.spin_constants else ""
+    return states + spins
 
 
 def _refuse_overwriting(source: str, target: str) -> None:
@@ -65,19 +74,21 @@ def _refuse_overwriting(source: str, target: str) -> None:
 
 def top_with_errors(source: str) -> Top:
     """The top a source means; of a .var file the errors of its parameters are the constants' uncertainties."""
-    top = inputs.read_top(Input(source))
     path = Path(source)
     if path.suffix.lower() == ".int":
         from rotor.formats.spcat.predict import parameters_beside
 
         path = parameters_beside(path)
     if path.suffix.lower() != ".var" or not path.exists():
-        return top
+        return inputs.read_top(Input(source))
 
+    from rotor.formats.read_write import read_spcat_top
     from rotor.formats.spcat.codes import constants_of
+    from rotor.formats.spcat.states import has_one_state
     from rotor.formats.spcat.text.par import read_par
 
-    return replace(top, constants=constants_of(read_par(path), errors=True))
+    file, top = read_par(path), read_spcat_top(path, errors=True)
+    return replace(top, constants=constants_of(file, errors=True)) if has_one_state(file) else top
 
 
 def writer_of(top: Top, source: str, target: str, kmax: int) -> Writer:
@@ -93,17 +104,46 @@ def writer_of(top: Top, source: str, target: str, kmax: int) -> Writer:
         file = MoleculeFile(
             name=top.name or Path(target).stem,
             constants=top.constants,
+            covariance=top.covariance,
             dipole_abc_debye=top.dipole_abc_debye,
             spin_weights=top.spin_weights,
+            states=top.states,
+            spin_constants=top.spin_constants,
+            polarizability_abc_angstrom3=top.polarizability_abc_angstrom3,
+            magnetic=top.magnetic,
             sources=sources,
         )
         return lambda path: write_molecule_file(file, path)
 
-    from rotor.formats.spcat.model import parameter_file
+    if top.level_table is not None:
+        note(
+            f"a {Path(target).suffix} file has no place for the table of level energies, which count before the constants"
+        )
+    if target.lower().endswith(".int"):
+        from rotor.formats.spcat.text.int_file import write_int
+
+        intensities = _intensities(top, kmax)
+        return lambda path: write_int(intensities, path)
+
+    from rotor.formats.spcat.named_parameters import named_parameter_file
     from rotor.formats.spcat.text.par import write_par
 
-    if top.dipole_abc_debye and any(top.dipole_abc_debye):
-        dipole = ", ".join(f"{mu:g}" for mu in top.dipole_abc_debye)
+    moments = [top.dipole_abc_debye or (0.0, 0.0, 0.0), *(top.states.dipoles.values() if top.states else ())]
+    if any(map(any, moments)):
+        dipole = ", ".join(f"{mu:g}" for mu in moments[0])
         note(f"a {Path(target).suffix} file has no place for the dipole ({dipole} D); it belongs into an .int file")
-    parameters = parameter_file(top, kmax)
+    parameters = named_parameter_file(top, kmax)
     return lambda path: write_par(parameters, path)
+
+
+def _intensities(top: Top, highest: int) -> IntensityFile:
+    """The .int file at 300 K, F to `highest`, with Q summed over the levels and spins of the top."""
+    from rotor.formats.spcat.model import intensity_file
+    from rotor.formats.spcat.text.int_file import Request
+    from rotor.quantum.effects.of_top import effects_of
+    from rotor.thermo import partition_function
+
+    count = top.states.count if top.states else 1
+    q = partition_function(top, 300.0, effects=effects_of(top, bool(top.spin_constants))).q
+    request = Request(tag=0, qrot=q, fend=min(highest, 99), str0=-12.0, str1=-12.0, maxv=count - 1)
+    return intensity_file(top, request)

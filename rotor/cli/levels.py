@@ -39,6 +39,7 @@ Examples:
   rotor levels water
   rotor levels water --jmax 4 --unit K --csv water.csv --plot terms.png
   rotor levels CH3CN --k 0:3 --jmax 20 --egy levels.egy
+  rotor levels formamide --hyperfine --jmax 3
   rotor levels --constants "A=9.2 B=3 C=2.5 GHz" --j 2:5 --max-energy 10cm-1"""
 
 NAMES = {"jmax": "--jmax", "jmin": "--j", "kmin": "--k", "kmax": "--k", "max_energy_mhz": "--max-energy"}
@@ -55,6 +56,11 @@ class Options:
     )
     max_energy: str | None = option(
         None, metavar="E", help="Highest energy above the lowest level that exists (MHz; 10cm-1, 50K)."
+    )
+    hyperfine: bool | None = option(
+        None,
+        "--hyperfine/--no-hyperfine",
+        help="Split levels by the spins of nuclei; by default where --spin-constants are given.",
     )
     unit: str = option("cm-1", metavar="UNIT", help="Of the table and the diagram: MHz, cm-1 or K.")
     top_levels: int = option(60, "--top", metavar="N", help="How many of the lowest levels are shown.")
@@ -84,7 +90,7 @@ def command(context: typer.Context, given: Input, options: Options, outputs: Out
     view = view_of(picture, files)
     with inputs.fields_as_options(**NAMES):
         top = inputs.read_top(given)
-        if given.spin_constants is not None:
+        if given.spin_constants is not None if options.hyperfine is None else options.hyperfine:
             settings["effects"] = effects_of(top, hyperfine=True)
         request = LevelsRequest(top, **settings)
     with answering():

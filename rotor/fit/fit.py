@@ -3,7 +3,7 @@
     χ² = Σ ((ν_obs - ν_calc)/σ)² + Σ ((p - p₀)/σ_prior)²,      ν_calc = E(upper) - E(lower), in a blend the weighted mean
 
 The fit knows levels by their labels only: a `LevelModel` gives their energies and derivatives for any constants. The search
-itself is in `rotor.fit.search`. A fit has converged when the search is at a minimum and
+itself is in `rotor.fit.search` and `rotor.fit.strategies`. A fit has converged when the search is at a minimum and
 that minimum describes the lines: a weighted rms far above 1 is a failure and says so.
 """
 
@@ -21,7 +21,8 @@ from rotor.fit.assignment import Assignments, duplicates
 from rotor.fit.parameters import Parameters, with_names
 from rotor.fit.parameters import parameters as parameters_of
 from rotor.fit.search import FitOptions as FitOptions
-from rotor.fit.search import Search, round_off, too_few, with_rejection
+from rotor.fit.search import Search, round_off, too_few
+from rotor.fit.strategies import with_rejection
 from rotor.quantum.labelled import LevelModel, MissingLevelsError, level_model
 from rotor.statistics.least_squares import BENT, EXHAUSTED, Minimum, Progress
 from rotor.statistics.regression import Regression, regression

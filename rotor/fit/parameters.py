@@ -9,10 +9,11 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from rotor.arrays import Floats
+from rotor.arrays import Floats, Ints
 from rotor.tops.constants import Constants
 from rotor.units import parse_quantity
 
@@ -40,6 +41,21 @@ class Parameters:
     def constants_of(self, parameters: Floats) -> Floats:
         """The constants (c,) in MHz."""
         return np.asarray(self.base + self.matrix @ parameters)
+
+    def slopes_of(self, slopes: Floats) -> Floats:
+        """Derivatives by the parameters (..., n) from those by the constants (..., c)."""
+        if self._constants is None:
+            return np.asarray(slopes @ self.matrix)
+        return slopes if len(self._constants) == slopes.shape[-1] else slopes.take(self._constants, axis=-1)
+
+    @cached_property
+    def _constants(self) -> Ints | None:
+        """Which constants the parameters are; None where some are not constants, or tied to several."""
+        rows = self.matrix.argmax(axis=0) if self.matrix.size else np.zeros(0, dtype=np.int64)
+        plain = np.zeros(self.matrix.shape)
+        plain[rows, np.arange(len(rows))] = 1.0
+        rising = bool((np.diff(rows) > 0).all())  # so that all of them are in their order
+        return rows if rising and np.array_equal(self.matrix, plain) else None
 
     def without(self, name: str) -> Parameters:
         """The same with one parameter held at 0."""

@@ -5,9 +5,8 @@ Levels keep their label by block and rank, so that no iteration reassigns a line
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from functools import partial
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,27 +15,12 @@ from rotor.arrays import Floats, Ints
 from rotor.fit.assignment import Assignments
 from rotor.fit.parameters import Parameters
 from rotor.quantum.labelled import LevelModel
-from rotor.statistics.least_squares import EXHAUSTED, INTERRUPTED, STALLED, Iteration, Minimum, Progress, minimise
 
 LOSSES = ("squares", "huber", "cauchy")
 POOR_RMS = 10.0  # weighted rms above which the lines are not described, unless the caller says otherwise
 _HUBER, _CAUCHY = 1.345, 2.385  # σ at which a loss bends: 95 % efficiency for normal errors
 _CANCELLED = 1e-12  # of the level derivatives: what is left of differences below it is round-off
-_REJECTIONS = 20
-_STAGES = (0.1, 0.2, 0.35, 0.5, 0.7, 0.85)  # shares of the lines, in order of J, of a search that begins with low J
-_STAGE_ITERATIONS = 4  # of each
-_FAR = 15.0  # times the median of the residuals, some ten standard deviations: lines beyond it may be those of other levels
-_ROUNDS = 8  # of searches with the lines that are not far off
-_ROUND_ITERATIONS = 12  # of each
-_NEARLY = 0.1  # standard errors within which one has converged
-_FIRST_ITERATIONS = 12  # of a direct search, after which it must have made way
-_WAY = 0.01  # of the weighted rms at the start, below which it has
-_LATELY = 6  # iterations in which it must halve the weighted rms after these
-_TURNED = 5  # parameters whose other sign is tried
-_TURNED_ITERATIONS = 8  # after which it must have made way
-_BETTER = 0.99  # of the weighted rms, below which the other sign is taken
 _NONE = np.zeros(0, dtype=np.int64)
-_AT_ZERO_MHZ = 1e-30  # how far a constant that starts at 0 may move in these stages
 
 
 @dataclass(frozen=True)
@@ -89,12 +73,11 @@ def robust(residuals: Floats, loss: str) -> tuple[Floats, Floats]:
     return residuals, np.ones_like(residuals)
 
 
-@dataclass(frozen=True, eq=False)
-class Grouping:
+class Grouping(NamedTuple):
     """The measured frequencies that count: for each the position of its first line; order, starts, shares: how blends add.
 
-    plain : no blend among them; blended, members, bounds : which of them are blends, the places of their lines in `order`, and where
-    each begins among these
+    plain : no blend among them. each : every line counts, in its order
+    blended, members, bounds : which of them are blends, the places of their lines in `order`, and where each begins among these
     """
 
     first: Ints
@@ -102,6 +85,7 @@ class Grouping:
     starts: Ints
     shares: Floats
     plain: bool
+    each: bool
     blended: Ints
     members: Ints
     bounds: Ints
@@ -121,10 +105,14 @@ class Grouping:
         blended = np.flatnonzero(counts > 1)
         bounds = np.concatenate([[0], np.cumsum(counts[blended])[:-1]]).astype(np.int64)
         members = np.flatnonzero(np.isin(each, blended))
-        return cls(order[starts], order, starts, shares, len(blended) == 0, blended, members, bounds)
+        first = order[starts]
+        each_line = np.array_equal(first, np.arange(len(lines)))
+        return cls(first, order, starts, shares, len(blended) == 0, each_line, blended, members, bounds)
 
     def mean(self, values: Floats) -> Floats:
-        """The weighted mean over each blend of values (lines, ...)."""
+        """The weighted mean over each blend of values (lines, ...); these themselves where every line stands alone."""
+        if self.plain and self.each:
+            return values
         out = values[self.first]
         if not self.plain:
             shares = self.shares[self.members].reshape(-1, *[1] * (values.ndim - 1))
@@ -164,7 +152,7 @@ class Search:
 
     def _lines_of(self, values: Floats) -> tuple[Floats, Floats, Floats]:
         energies, slopes = self.model.levels(self.parameters.constants_of(values))
-        slopes = slopes @ self.parameters.matrix
+        slopes = self.parameters.slopes_of(slopes)
         if self.from_zero:  # the place -1 of such lower levels is the last one
             energies, slopes = np.append(energies, 0.0), np.vstack([slopes, np.zeros(slopes.shape[1])])
         derivatives = slopes[self.upper]
@@ -189,8 +177,7 @@ class Search:
         group = self.group
         sigma = self.sigma[group.first]
         residuals = (self.lines.frequency_mhz[group.first] - group.mean(calculated)) / sigma
-        rows = group.mean(jacobian)
-        rows /= sigma[:, None]
+        rows = group.mean(jacobian) / sigma[:, None]
         spread, of_spread = self._apart(calculated, jacobian)
         known = np.flatnonzero(np.isfinite(self.parameters.prior))
         prior = self.parameters.prior[known]
@@ -238,191 +225,6 @@ class Search:
             return residuals, jacobian
         factor = np.concatenate([slope, np.ones(len(residuals) - count)])
         return np.concatenate([bent, residuals[count:]]), jacobian * factor[:, None]
-
-
-def with_rejection(
-    search: Search, options: FitOptions, progress: Progress | None
-) -> tuple[Search, Minimum, dict[int, str]]:
-    """The search, repeated without the lines that are too far off until the same ones stay out.
-
-    Where no minimum was reached, or too few lines would be left, all lines count: the constants are wrong, not the lines.
-    """
-    minimum = _searched(search, progress)
-    if options.reject_above is None or not minimum.converged:
-        return search, minimum, {}
-    may = search.used
-    for _ in range(_REJECTIONS):
-        calculated, _, _ = search.lines_of(minimum.parameters)
-        group = Grouping.of(search.lines, may)
-        means = group.spread_back(group.mean(calculated), calculated)
-        far = np.abs(search.lines.frequency_mhz - means) / search.sigma > options.reject_above
-        used = may & ~far
-        if (used == search.used).all():
-            break
-        if too_few(search.lines, used, search.parameters):
-            break
-        search = replace(search, used=used)
-        minimum = _continued(minimum, _minimised(search, minimum.parameters, progress, options.most_iterations))
-    out = np.flatnonzero(may & ~search.used)
-    return search, minimum, {int(i): f"more than {options.reject_above:g} errors off" for i in out}
-
-
-def _searched(search: Search, progress: Progress | None) -> Minimum:
-    """A direct search; where it makes no way for some iterations, or ends far from the lines, one with most of the lines, two by rising
-    J, and other signs. What iterations are left then go on from the best point."""
-    limit = search.options.most_iterations
-    first = _minimised(search, search.parameters.start, progress, limit, _makes_no_way(search.options))
-    for further in (
-        _with_most_lines,
-        partial(_by_stages, rough=10.0),
-        partial(_by_stages, rough=1.0),
-        _with_a_sign_turned,
-    ):
-        if _is_open(search, first):
-            first = further(search, first, progress)
-    if _is_open(search, first) and first.status == EXHAUSTED:
-        left = limit - len(first.iterations)
-        first = _continued(first, _minimised(search, first.parameters, progress, left))
-    return first
-
-
-def _makes_no_way(options: FitOptions) -> Callable[[Sequence[Iteration]], bool]:
-    """Whether the iterations of a search so far make further ones a waste, while there are other ways."""
-
-    def hopeless(taken: Sequence[Iteration]) -> bool:
-        if len(taken) < _FIRST_ITERATIONS:
-            return False
-        now = min(one.rms_after for one in taken)
-        lately = min(one.rms_after for one in taken[:-_LATELY])
-        return now > options.poor_rms and (now > _WAY * taken[0].rms_before or now > lately / 2)
-
-    return hopeless
-
-
-def _is_open(search: Search, found: Minimum) -> bool:
-    """Whether another way may lead further: the lines are not described, or the search has stalled, and iterations are left."""
-    if found.status == INTERRUPTED or len(found.iterations) >= search.options.most_iterations:
-        return False
-    return found.status == STALLED or _is_poor(search, found)
-
-
-def _is_poor(search: Search, found: Minimum) -> bool:
-    """Whether the lines are not described: by all of them, or by those that rejection would leave, where it leaves half and more."""
-    limit, size = search.options.reject_above, np.abs(found.residuals[: len(search.group.first)])
-    if limit is not None and found.converged and 2 * int((size <= limit).sum()) >= len(size):
-        size = size[size <= limit]
-        return bool(np.sqrt(size @ size / max(len(size), 1)) > search.options.poor_rms)
-    return found.rms > search.options.poor_rms
-
-
-def _with_a_sign_turned(search: Search, first: Minimum, progress: Progress | None) -> Minimum:
-    """The better of a minimum that does not describe the lines and those that are reached from it with the sign of one parameter turned.
-
-    The sign of a coupling between states counts only in products with others, so that a search may end with one of them turned.
-    Tried are the few that went furthest from their start, counted in its size.
-    """
-
-    def hopeless(taken: Sequence[Iteration]) -> bool:
-        return len(taken) >= _TURNED_ITERATIONS and min(one.rms_after for one in taken) > search.options.poor_rms
-
-    start, reached = search.parameters.start, first.parameters
-    moved = np.abs(reached - start) / np.maximum(np.abs(start), _AT_ZERO_MHZ)
-    for place in np.argsort(-moved, kind="stable")[:_TURNED].tolist():
-        turned = reached.copy()
-        turned[place] *= -1
-        left = search.options.most_iterations - len(first.iterations)
-        try:
-            second = _continued(first, _minimised(search, turned, progress, max(left, 0), hopeless))
-        except ValueError:  # out of the bounds of the model
-            continue
-        better = second.rms < _BETTER * first.rms  # else the lines do not know the sign
-        first = second if better else replace(first, iterations=second.iterations)
-        if first.rms <= search.options.poor_rms:
-            break
-    return first
-
-
-def _continued(first: Minimum, second: Minimum) -> Minimum:
-    """The second search with the iterations of both."""
-    return replace(second, iterations=(*first.iterations, *second.iterations))
-
-
-def _with_most_lines(search: Search, first: Minimum, progress: Progress | None) -> Minimum:
-    """The better of the minimum found and the one that is reached from the start when lines far off those of the rest come in last.
-
-    Where two levels share their functions nearly by halves, a small error of the constants exchanges their names. Such lines are off by
-    the distance of the levels, a hundred times as far as all others, and they alone decide where a direct search goes. With the others
-    in their places the names are right, and they come back.
-    """
-    last, limit = replace(first, parameters=search.parameters.start), search.options.most_iterations
-    rough = replace(search.options, tolerance=_NEARLY)
-    for number in range(_ROUNDS):
-        part = replace(search, options=rough, used=_not_far_off(search, last.parameters))
-        if (part.used == search.used).all() and not number:
-            return first  # that was the direct search
-        if (part.used == search.used).all() or too_few(search.lines, part.used, search.parameters):
-            break
-        before = part.evaluate(last.parameters)[0]
-        left = min(max(limit - len(last.iterations), 0), _ROUND_ITERATIONS)
-        last = _continued(last, _minimised(part, last.parameters, progress, left))
-        if last.residuals @ last.residuals > before @ before / 4 and last.rms > search.options.poor_rms:
-            return replace(first, iterations=last.iterations)
-    left = max(limit - len(last.iterations), 0)
-    second = _continued(last, _minimised(search, last.parameters, progress, left, _makes_no_way(search.options)))
-    return second if second.rms < first.rms else replace(first, iterations=second.iterations)
-
-
-def _not_far_off(search: Search, values: Floats) -> NDArray[np.bool_]:
-    """The lines (lines,) that count and whose residual is not many times the median of all."""
-    group = search.group
-    size = np.abs(search.weighted(values)[0][: len(group.first)])
-    near = size <= max(_FAR * float(np.median(size)), search.options.poor_rms)
-    blends = search.lines.blend[group.first[near]]
-    return search.used & np.isin(search.lines.blend, blends)
-
-
-def _by_stages(search: Search, first: Minimum, progress: Progress | None, rough: float) -> Minimum:
-    """The better of the minimum found and the one that a search by rising J ends in.
-
-    Low J moves nearly linearly with the constants even when these are 10 % off, and what it fixes carries the next lines: the
-    lines come in by J, a tenth of them first. Until all are in, a constant stays within about itself of its start, and one that
-    starts at 0 stays there. rough : standard errors within which a stage has converged
-    """
-    j = np.maximum(search.lines.upper[:, 0], search.lines.lower[:, 0])
-    last, limit = replace(first, parameters=search.parameters.start), search.options.most_iterations
-    coarse = replace(search.options, tolerance=rough)
-    try:
-        for share in _STAGES:
-            cut = np.quantile(j[search.used], share)
-            soft = np.minimum(search.parameters.prior, np.maximum(np.abs(search.parameters.start), _AT_ZERO_MHZ))
-            stage = replace(
-                search, options=coarse, used=search.used & (j <= cut), parameters=replace(search.parameters, prior=soft)
-            )
-            left = min(max(limit - len(last.iterations), 0), _STAGE_ITERATIONS)
-            last = _continued(last, _minimised(stage, last.parameters, progress, left))
-        left = max(limit - len(last.iterations), 0)
-        second = _continued(last, _minimised(search, last.parameters, progress, left, _makes_no_way(search.options)))
-    except ValueError:  # a stage left the bounds of the model
-        return first
-    return second if second.rms < first.rms else replace(first, iterations=second.iterations)
-
-
-def _minimised(
-    search: Search,
-    start: Floats,
-    progress: Progress | None,
-    limit: int,
-    hopeless: Callable[[Sequence[Iteration]], bool] | None = None,
-) -> Minimum:
-    return minimise(
-        search.evaluate,
-        start,
-        tolerance=search.options.tolerance,
-        most_iterations=limit,
-        floor=round_off(search, search.lines_of(start)[2]),
-        progress=progress,
-        hopeless=hopeless,
-    )
 
 
 def round_off(search: Search, slopes: Floats) -> Floats:

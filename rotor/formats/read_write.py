@@ -128,9 +128,14 @@ def _read_path(path: Path, isotopes: Isotopes | None) -> Any:
     return found
 
 
-def read_spcat_top(path: Path) -> Top:
-    """The top of a .par or .var file, with the dipole of the .int file beside it; or of an .int file likewise."""
+def read_spcat_top(path: Path, *, errors: bool = False) -> Top:
+    """The top of a .par or .var file, with the dipole of the .int file beside it; or of an .int file likewise.
+
+    errors: of files with spins or several states, whether errors of parameters become uncertainties.
+    """
     from rotor.formats.spcat.model import top_of
+    from rotor.formats.spcat.named_top import named_top
+    from rotor.formats.spcat.states import has_one_state
     from rotor.formats.spcat.text.int_file import read_int
     from rotor.formats.spcat.text.par import read_par
 
@@ -141,7 +146,8 @@ def read_spcat_top(path: Path) -> Top:
         parameters = next((p for p in beside if p.exists()), path)
         if parameters == path:
             raise ValueError(f"{path}: an .int file has no constants; its .var or .par must stand beside it")
-    return top_of(read_par(parameters), read_int(intensities) if intensities.exists() else None)
+    file, light = read_par(parameters), read_int(intensities) if intensities.exists() else None
+    return top_of(file, light) if has_one_state(file) else named_top(file, light, errors=errors)
 
 
 def _read_standard_input(isotopes: Isotopes | None) -> Top:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
+from itertools import accumulate
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -311,8 +312,8 @@ def connected_parts(count: int, edges: Iterable[tuple[int, int]]) -> list[list[i
 
 
 def parts_of(members: list[tuple[int, WangBlock]]) -> tuple[Part, ...]:
-    starts = np.cumsum([0, *(basis.size for _, basis in members)])
-    return tuple(Part(v, basis, int(start)) for (v, basis), start in zip(members, starts, strict=False))
+    starts = accumulate((basis.size for _, basis in members), initial=0)
+    return tuple(Part(v, basis, start) for (v, basis), start in zip(members, starts, strict=False))
 
 
 def _dense(bands: list[Floats]) -> Floats:
@@ -356,14 +357,19 @@ def names_of_states(
     overlaps : (n,) array
         Squared overlaps, from 0 to 1.
     """
-    names, functions = [], []
-    for part in parts:
-        ka, kc = names_of(part.basis, representation)
-        names.append(np.stack([np.full_like(ka, part.v), ka, kc], axis=1))
-        functions.append(np.linalg.eigh(matrix[part.place, part.place]).eigenvectors.T @ vectors[part.place])
+    functions = [np.linalg.eigh(matrix[part.place, part.place]).eigenvectors.T @ vectors[part.place] for part in parts]
     overlaps = np.concatenate(functions) ** 2
     of_state = one_to_one(overlaps) if len(parts) > 1 else np.arange(vectors.shape[1])
-    return np.concatenate(names)[of_state], overlaps[of_state, np.arange(vectors.shape[1])]
+    return names_of_functions(parts, representation)[of_state], overlaps[of_state, np.arange(vectors.shape[1])]
+
+
+def names_of_functions(parts: tuple[Part, ...], representation: str) -> Ints:
+    """v, Ka, Kc (n, 3) of the states of the parts, each solved by itself, one part behind the other."""
+    names = np.empty((parts[-1].place.stop, 3), dtype=np.int64)
+    for part in parts:
+        names[part.place, 0] = part.v
+        names[part.place, 1], names[part.place, 2] = names_of(part.basis, representation)
+    return names
 
 
 def parameter_matrix(

@@ -18,16 +18,20 @@ import sys
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
-from rotor.arrays import Floats, Ints, distinct
+from rotor.arrays import Floats, Ints, Workspace
 from rotor.quantum.effects.watson import operators_by_name
 from rotor.quantum.wang.basis import WangBlock, ka_kc, wang_blocks
 from rotor.tops.constants import Constants
 from rotor.tops.operators import REPRESENTATIONS
 
 _MOST_PADDED = 1 << 22  # matrix elements of blocks that are worked on together: 32 MB
+_MOST_STATES = 0.6  # of all states of a block: where labels are fewer, they alone are looked at
 
 
 class MissingLevelsError(ValueError):
@@ -131,20 +135,29 @@ class ClosedForm(LevelModel):
         return self.slopes @ values_mhz, self.slopes
 
 
-@dataclass(frozen=True)
-class _Chunk:
-    """Blocks of like size side by side: unit diagonals units[d] (blocks, size, terms) and what fills their places.
+class _Chunk(NamedTuple):
+    """Blocks of like size, in order of size, side by side: unit diagonals units[d] (blocks, size, terms), and what fills their places.
 
-    sizes (blocks,); x (blocks,): J(J+1); rows: labels that lie in these blocks, block and rank: where each is; powers (labels, terms
-    of the Hamiltonian): X^p
+    sizes (blocks,); runs: of blocks of one size the first, the one behind the last, and the size
+    bands: for every d which of the elements (blocks, size) are in a block, and their places in all matrices, one behind the other
+    offsets (blocks + 1,): where each matrix begins
+    x: (blocks, terms of the Hamiltonian) X^p
+    rows, block, slot (labels,): labels that lie in these blocks, their blocks and places among the labels of each
+    states (blocks, most labels): which states they are; None where the states that have labels are most of all
+    powers: (labels, terms of the Hamiltonian) X^p
     """
 
     units: tuple[Floats, ...]
     sizes: list[int]
+    runs: tuple[tuple[int, int, int], ...]
+    bands: tuple[tuple[Ints, Ints], ...]
+    offsets: Ints
     x: Floats
     rows: Ints
     block: Ints
     rank: Ints
+    slot: Ints
+    states: Ints | None
     powers: Floats
 
 
@@ -152,6 +165,7 @@ class _Chunk:
 class WangBlocks(LevelModel):
     """An asymmetric top, the blocks that occur.
 
+    rise: 1 where energies rise with K (z is a), -1 where they fall (c), 0 where neither (b)
     terms: unique (q, n) but for (0, 0); powers: p, (q, n) as a place in `terms` or -1, of every column of factors (terms of the
     Hamiltonian, names)
     """
@@ -185,12 +199,10 @@ class WangBlocks(LevelModel):
         energies, slopes = np.empty(self.count), np.empty((self.count, len(self.names)))
         places = [place for _, place in self.powers]  # that of a scalar is -1, the column of ones
         for chunk in self.chunks:
-            weights = self._weights(coefficients, chunk.x)
-            bands = [np.einsum("bkt,bt->bk", unit, weights) for unit in chunk.units]
-            solved, vectors = self._solved(chunk, bands)
+            solved, vectors = self._solved(chunk, coefficients)
             energies[chunk.rows] = solved[chunk.block, chunk.rank]
             expected = np.ones((len(chunk.rows), chunk.units[0].shape[2] + 1))
-            expected[:, :-1] = _expectations(chunk, vectors)
+            expected[:, :-1] = _expectations(chunk, vectors, self._space)
             slopes[chunk.rows] = (expected[:, places] * chunk.powers) @ self.factors
         alone = [i for i, place in enumerate(places) if place < 0]
         for chunk in self.chunks:
@@ -203,31 +215,31 @@ class WangBlocks(LevelModel):
         for chunk in self.chunks:
             both = []
             for values in (before_mhz, after_mhz):
-                weights = self._weights(self.factors @ values, chunk.x)
-                bands = [np.einsum("bkt,bt->bk", unit, weights) for unit in chunk.units]
-                both.append(self._solved(chunk, bands)[1][chunk.block, :, chunk.rank])
+                both.append(self._solved(chunk, self.factors @ values)[1][chunk.block, :, chunk.rank])
             out[chunk.rows] = np.einsum("lk,lk->l", *both) ** 2
         return out
 
-    def _solved(self, chunk: _Chunk, bands: Sequence[Floats]) -> tuple[Floats, Floats]:
-        """Energies and vectors of the blocks, states in the order of their labels."""
-        energies, vectors = _diagonalised(bands, chunk.sizes)
+    def _solved(self, chunk: _Chunk, coefficients: Floats) -> tuple[Floats, Floats]:
+        """Eigenvalues (blocks, size) and eigenvectors (blocks, size, size) with the coefficients of the terms, in the order of labels."""
+        weights = (chunk.x * coefficients) @ self._of_unit
+        bands = [(unit @ weights[:, :, None])[:, :, 0] for unit in chunk.units]
+        energies, vectors = _diagonalised(bands, chunk, self._space)
         if self.rise:
             _order_beyond_the_turn(self.rise * bands[0], chunk.sizes, energies, vectors)
         return energies, vectors
 
-    def _weights(self, coefficients: Floats, x: Floats) -> Floats:
-        """Σ_p c X^p of every unit matrix, (blocks, units)."""
-        count = 1 + max((place for _, place in self.powers), default=-1)
-        out = np.zeros((len(x), count))
-        for (p, place), coefficient in zip(self.powers, coefficients.tolist(), strict=True):
-            if place >= 0:
-                out[:, place] += coefficient * x**p
-        return out
+    @cached_property
+    def _of_unit(self) -> Floats:
+        """1 where a term of the Hamiltonian has a unit matrix, (terms, units)."""
+        places = np.array([place for _, place in self.powers])
+        return np.asarray(places[:, None] == np.arange(1 + max(places.max(initial=-1), -1)), dtype=float)
+
+    @cached_property
+    def _space(self) -> Workspace:
+        return Workspace()
 
 
-@dataclass(frozen=True)
-class _Occurring:
+class _Occurring(NamedTuple):
     """A block in which labels lie, cut at the highest K, with the places of the labels and their ranks."""
 
     basis: WangBlock
@@ -278,17 +290,36 @@ def _chunks(blocks: Sequence[_Occurring], units: Sequence[tuple[int, int]], powe
 
 
 def _chunk(blocks: Sequence[_Occurring], units: Sequence[tuple[int, int]], powers: Sequence[int]) -> _Chunk:
-    x = np.array([one.basis.j * (one.basis.j + 1.0) for one in blocks])
+    diagonals = unit_diagonals([one.basis for one in blocks], [one.size for one in blocks], units)
+    sizes, size = np.array([one.size for one in blocks]), blocks[-1].size
     block = np.array([b for b, one in enumerate(blocks) for _ in one.rows])
+    x = np.stack([np.array([one.basis.j * (one.basis.j + 1.0) for one in blocks]) ** p for p in powers], axis=1)
+    states = np.zeros((len(blocks), max(len(one.rows) for one in blocks)), dtype=np.int64)
+    for b, one in enumerate(blocks):
+        states[b, : len(one.rows)] = one.ranks
+    bounds = [0, *(1 + np.flatnonzero(np.diff(sizes))).tolist(), len(blocks)]
+    offsets = np.cumsum([0, *(sizes**2).tolist()])
     return _Chunk(
-        units=unit_diagonals([one.basis for one in blocks], [one.size for one in blocks], units),
-        sizes=[one.size for one in blocks],
+        units=diagonals,
+        sizes=sizes.tolist(),
+        runs=tuple((first, stop, int(sizes[first])) for first, stop in pairwise(bounds)),
+        bands=tuple(_of_band(d, sizes, offsets) for d in range(min(len(diagonals), size))),
+        offsets=offsets,
         x=x,
         rows=np.array([row for one in blocks for row in one.rows]),
         block=block,
         rank=np.array([rank for one in blocks for rank in one.ranks]),
-        powers=np.stack([x**p for p in powers], axis=1)[block],
+        slot=np.array([slot for one in blocks for slot in range(len(one.rows))]),
+        states=states if states.shape[1] < _MOST_STATES * size else None,
+        powers=x[block],
     )
+
+
+def _of_band(d: int, sizes: Ints, offsets: Ints) -> tuple[Ints, Ints]:
+    """Which elements (blocks, size) of diagonal d are in a block, and their places in the lower triangles of all matrices."""
+    index, size = np.arange(sizes[-1]), int(sizes[-1])
+    block, place = np.nonzero(index + d < sizes[:, None])
+    return block * size + place, offsets[block] + (place + d) * sizes[block] + place
 
 
 def unit_diagonals(
@@ -329,33 +360,38 @@ def _element(j: Floats, k: Floats, q: int, n: int) -> Floats:
     return np.asarray(0.5 * ((k + 2 * n) ** (2 * q) + k ** (2 * q)) * np.sqrt(squared))
 
 
-def _diagonalised(bands: Sequence[Floats], sizes: Sequence[int]) -> tuple[Floats, Floats]:
+def _diagonalised(bands: Sequence[Floats], chunk: _Chunk, space: Workspace) -> tuple[Floats, Floats]:
     """Eigenvalues (blocks, size), rising, and eigenvectors (blocks, size, size) in columns, padded with zeros.
 
     Tridiagonal blocks too are solved by numpy's dense routine where scipy.linalg is not loaded: loading it takes as long as 500 iterations
     of a fit to 5,000 lines gain by it. Only where BLAS has one thread: several of them wait for each other on small blocks.
     """
-    if not all(np.isfinite(band).all() for band in bands):
+    if not all(np.isfinite(band.sum()) for band in bands):
         raise ValueError("a block of the Hamiltonian is not finite with these constants")
     count, size = bands[0].shape
-    energies, vectors = np.zeros((count, size)), np.zeros((count, size, size))
+    energies, vectors = np.zeros((count, size)), space.array("vectors", count, size, size)
+    least = chunk.sizes[0]
+    vectors[:, least:, :] = vectors[:, :, least:] = 0.0
     if len(bands) <= 2 and ("scipy.linalg" in sys.modules or os.environ.get("OPENBLAS_NUM_THREADS") != "1"):
-        _tridiagonal(bands, sizes, energies, vectors)
+        _tridiagonal(bands, chunk.sizes, energies, vectors)
     else:
-        _banded(bands, sizes, energies, vectors)
+        _banded(bands, chunk, energies, vectors, space)
     return energies, vectors
 
 
 def _order_beyond_the_turn(diagonal: Floats, sizes: Sequence[int], energies: Floats, vectors: Floats) -> None:
-    """States beyond the K where the diagonal ceases to rise come last, by their mean K, those of other K by energy before them."""
-    inside = np.arange(diagonal.shape[1]) < np.asarray(sizes)[:, None]
-    turn = np.where(inside, diagonal, -np.inf).argmax(axis=1)
-    for b in np.flatnonzero((turn > 0) & (turn < np.asarray(sizes) - 1)).tolist():
+    """States beyond the K where the diagonal (blocks, size) ceases to rise come last, by their mean K; the arrays are changed.
+
+    Constants that describe K up to 20 may bring the states of K = 60 down among those: the series has left the molecule there. Such a
+    state is mostly beyond the turn, and the labels of the others are the ranks among themselves, whatever it does.
+    """
+    size = np.asarray(sizes)
+    turn = np.where(np.arange(diagonal.shape[1]) < size[:, None], diagonal, -np.inf).argmax(axis=1)
+    for b in np.flatnonzero((turn > 0) & (turn < size - 1)).tolist():
         n = sizes[b]
         share = vectors[b, :n, :n] ** 2
         beyond = share[turn[b] + 1 :].sum(axis=0) > 0.5
-        mean = np.arange(n) @ share
-        order = np.lexsort((np.where(beyond, mean, 0.0), beyond))
+        order = np.lexsort((np.where(beyond, np.arange(n) @ share, 0.0), beyond))
         energies[b, :n] = energies[b, order]
         vectors[b, :n, :n] = vectors[b, :n, order].T
 
@@ -375,25 +411,31 @@ def _tridiagonal(bands: Sequence[Floats], sizes: Sequence[int], energies: Floats
         vectors[b, :n, :n] = states
 
 
-def _banded(bands: Sequence[Floats], sizes: Sequence[int], energies: Floats, vectors: Floats) -> None:
-    """Blocks of one size at a time, by LAPACK's dense routine."""
-    unlike = np.asarray(sizes)
-    for n in distinct(unlike).tolist():
-        chosen = np.flatnonzero(unlike == n)
-        matrices = np.zeros((len(chosen), n, n))
-        for d, band in enumerate(bands[:n]):
-            places = np.arange(n - d)
-            matrices[:, places + d, places] = band[chosen, : n - d]  # eigh reads the lower triangle
-        found, states = np.linalg.eigh(matrices)
-        energies[chosen, :n] = found
-        vectors[chosen, :n, :n] = states
+def _banded(bands: Sequence[Floats], chunk: _Chunk, energies: Floats, vectors: Floats, space: Workspace) -> None:
+    """Blocks of one size at a time, by LAPACK's dense routine, which reads the lower triangle."""
+    whole = space.array("matrices", int(chunk.offsets[-1]))
+    whole.fill(0.0)
+    for band, (inside, places) in zip(bands, chunk.bands, strict=False):
+        whole[places] = band.take(inside)
+    for first, stop, n in chunk.runs:
+        matrices = whole[chunk.offsets[first] : chunk.offsets[stop]].reshape(stop - first, n, n)
+        energies[first:stop, :n], vectors[first:stop, :n, :n] = np.linalg.eigh(matrices)
 
 
-def _expectations(chunk: _Chunk, vectors: Floats) -> Floats:
+def _expectations(chunk: _Chunk, vectors: Floats, space: Workspace) -> Floats:
     """⟨unit⟩ (labels, units) of the labelled states."""
-    total = np.matmul((vectors**2).transpose(0, 2, 1), chunk.units[0])
+    count, size, _ = vectors.shape
+    place = chunk.rank
+    if chunk.states is not None:
+        most, place = chunk.states.shape[1], chunk.slot
+        rows = size * size * np.arange(count)[:, None, None] + size * np.arange(size)[:, None]
+        chosen = space.array("chosen", count, size, most)
+        vectors = vectors.ravel().take(rows + chunk.states[:, None, :], out=chosen, mode="clip")
+    products = np.multiply(vectors, vectors, out=space.array("products", *vectors.shape))
+    total = np.matmul(products.transpose(0, 2, 1), chunk.units[0])
     for d, unit in enumerate(chunk.units[1:], 1):
-        if d < vectors.shape[1]:
-            products = 2.0 * vectors[:, :-d, :] * vectors[:, d:, :]
-            total += np.matmul(products.transpose(0, 2, 1), unit[:, :-d])
-    return np.asarray(total[chunk.block, chunk.rank])
+        if d < size:
+            products = space.array("products", count, size - d, vectors.shape[2])
+            np.multiply(vectors[:, :-d, :], vectors[:, d:, :], out=products)
+            total += 2.0 * np.matmul(products.transpose(0, 2, 1), unit[:, :-d])
+    return np.asarray(total[chunk.block, place])

@@ -23,7 +23,8 @@ class Moment(NamedTuple):
 
     value_debye: what it is multiplied with. along_abc: μ of an electric moment, None of a magnetic one. powers: of an electric one, ""
     none, "J" ½{N², }, "JJ" ½{N⁴, }, "K" ½{Nz², }, "[J]" ½[N², ], "[[J]]" ¼[N², [N², ]]; of a magnetic one "3K-J" ½(3Nz² - N²).
-    spin: of a magnetic moment, the spin's name, "" the rotation. tensor: c of a magnetic moment that is not isotropic.
+    spin: of a magnetic moment, the spin's name, "" the rotation. tensor: c of a magnetic moment that is not isotropic. cosine: of an
+    electric one α', α of the two states where an element is multiplied by cos(α'K' + αK), a Fourier term of internal rotation.
     """
 
     value_debye: float
@@ -32,6 +33,7 @@ class Moment(NamedTuple):
     powers: str = ""
     spin: str = ""
     tensor: Matrix | None = None
+    cosine: tuple[float, float] | None = None
 
     @property
     def electric(self) -> bool:

@@ -15,14 +15,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.watson import SEMI_RIGID
-from rotor.quantum.levels import Levels, SolvedBlock
+from rotor.quantum.levels import Levels
+from rotor.quantum.tabulated import as_tabulated
 from rotor.quantum.wang.rotation import solve_rotation
-from rotor.tops.states.level_table import LevelTable, tabulated_energies
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -85,10 +84,7 @@ def solve_levels(
         from rotor.quantum.spins.levels import spin_levels
 
         return spin_levels(top, effects, jmin, jmax, executor)
-    found = solve_rotation(top, effects, jmin, jmax, vectors, executor, below_mhz=below_mhz)
-    if top.level_table is None or not _is_own(top, effects):
-        return found
-    return with_tabulated_energies(found, top.level_table)
+    return as_tabulated(top, effects, solve_rotation(top, effects, jmin, jmax, vectors, executor, below_mhz=below_mhz))
 
 
 def _with_states(top: Top, effects: Sequence[QuantumEffect]) -> tuple[Top, tuple[QuantumEffect, ...]]:
@@ -99,14 +95,6 @@ def _with_states(top: Top, effects: Sequence[QuantumEffect]) -> tuple[Top, tuple
     return with_states(top, top.states, effects)
 
 
-def _is_own(top: Top, effects: tuple[QuantumEffect, ...]) -> bool:
-    if top.states is None:
-        return effects == SEMI_RIGID
-    from rotor.quantum.effects.of_top import has_own_hamiltonian
-
-    return has_own_hamiltonian(top, effects)
-
-
 def _refuse_too_many(kind: str, jmin: int, jmax: int) -> None:
     """ValueError for a range of J that no machine solves in one piece."""
     count = jmax + 1 - jmin if kind in ("linear", "spherical") else (jmax + 1) ** 2 - jmin**2
@@ -114,14 +102,3 @@ def _refuse_too_many(kind: str, jmin: int, jmax: int) -> None:
         raise ValueError(
             f"J max {jmax}: more than {MOST_LEVELS} levels from J = {jmin} on; ask for fewer, in ranges of J"
         )
-
-
-def with_tabulated_energies(levels: Levels, table: LevelTable) -> Levels:
-    """The same levels, and the same states, with the energies of a table where it has the level."""
-    energy, _ = tabulated_energies(table, levels.quanta, levels.energy_mhz)
-    blocks = tuple(
-        replace(block, energies_mhz=energy[block.start : block.start + block.basis.size])
-        for block in levels.blocks
-        if isinstance(block, SolvedBlock)
-    )
-    return replace(levels, energy_mhz=energy, blocks=blocks)

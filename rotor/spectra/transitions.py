@@ -8,7 +8,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,9 @@ from rotor.quantum.tensors import body_tensor
 from rotor.spectra.intensity import IntensityCut
 from rotor.spectra.strong_lines import strong_lines
 from rotor.tops.operators import FIGURE_AXIS
+
+if TYPE_CHECKING:
+    from rotor.quantum.spins.many_f_lines import Rows as ManyF
 
 EVERYTHING = (0.0, float("inf"))
 LONG_LIST = 30_000_000  # lines from which the compiled loop is loaded: the compiler takes 0.6 s, the plain loop 20 ns a line more
@@ -85,6 +88,8 @@ def all_transitions(
         strong = strong_lines(levels, solved, vector, cut.needed, range_mhz[1])
         found = _joined([_with_frequencies(levels, *batch, range_mhz, cut) for batch in _batches(strong)])
         return _rows(found, levels.weight[found.lower] > 0) if some_without else found
+    if cut is not None and not moments and (many := _of_groups(levels, blocks, dipoles, range_mhz, cut)) is not None:
+        return _rows(many, levels.weight[many.lower] > 0) if some_without else many
     pairs, between = _acting(levels, blocks, dipoles, moments)
     if cut is None and range_mhz == EVERYTHING and not any(up is low for up, low in pairs):
         found = _every_pair(pairs, between)
@@ -123,7 +128,8 @@ def _blocks_with_weight(levels: Levels) -> tuple[list[Block], bool]:
     return [block for block, _ in with_some], any((weight <= 0).any() for _, weight in with_some)
 
 
-def _rows(lines: Transitions, rows: NDArray[np.bool_]) -> Transitions:
+def _rows(lines: Transitions, chosen: NDArray[np.bool_]) -> Transitions:
+    rows = np.flatnonzero(chosen)
     return Transitions(lines.frequency_mhz[rows], lines.strength_debye2[rows], lines.upper[rows], lines.lower[rows])
 
 
@@ -194,6 +200,53 @@ def _chosen(
     needed = np.full(len(levels), -np.inf) if cut is None else cut.needed
     candidates = (_candidates(levels, up, lows, between(up, lows), needed, range_mhz) for up, lows in _by_upper(pairs))
     return _joined([_with_frequencies(levels, *batch, range_mhz, cut) for batch in _batches(candidates)])
+
+
+def _of_groups(
+    levels: Levels, blocks: list[Block], dipoles: Mapping[tuple[int, int], Vector], range_mhz: tuple[float, float],
+    cut: IntensityCut,
+) -> Transitions | None:  # fmt: skip
+    """The same of levels with spins that were solved for many F at once, and are looked at so; None for others."""
+    if not blocks or isinstance(blocks[0], SolvedBlock):
+        return None
+    from rotor.quantum.spins.many_f_lines import amplitudes_of_groups, can_be_stacked
+
+    tensors = {states: body_tensor(mu, 1, str(levels.representation)) for states, mu in dipoles.items()}
+    needed = cut.needed
+    if not can_be_stacked(blocks, tensors) or not (needed > 0).all():
+        return None
+    found = amplitudes_of_groups(blocks, tensors, len(levels))  # type: ignore[arg-type]
+    extended = np.append(levels.energy_mhz, 0.0), np.append(needed, np.inf)
+    candidates = (_candidates_of_many(*extended, of_f, range_mhz) for of_f in found)
+    return _joined([_with_frequencies(levels, *batch, range_mhz, cut) for batch in _batches(candidates)])
+
+
+def _candidates_of_many(
+    energies: Floats,
+    needed: Floats,
+    of_f: ManyF,
+    range_mhz: tuple[float, float],
+) -> Rows:
+    """`_candidates` of blocks of many F; beyond the levels of an F amplitudes are 0."""
+    up, low, amplitude, alike = of_f
+    of_up, of_low = needed[up], needed[low]
+    frequency = energies[up][:, :, None] - energies[low][:, None, :]
+    np.abs(frequency, out=frequency)
+    strength = np.multiply(amplitude, amplitude, out=amplitude)
+    least = min(of_up.min(), of_low.min())
+    keep = frequency * strength >= least
+    if range_mhz != EVERYTHING:
+        keep &= (frequency >= range_mhz[0]) & (frequency <= range_mhz[1])
+    if alike:
+        keep &= up[:, :, None] > low[:, None, :]
+    places = np.flatnonzero(keep)
+    above = places // low.shape[1]
+    below = above // up.shape[1] * low.shape[1] + places - above * low.shape[1]
+    if least < max(of_up.max(), of_low.max()):  # of few states alone
+        exact = np.minimum(of_up.ravel()[above], of_low.ravel()[below])
+        chosen = np.flatnonzero(frequency.ravel()[places] * strength.ravel()[places] >= exact)
+        places, above, below = places[chosen], above[chosen], below[chosen]
+    return up.ravel()[above], low.ravel()[below], strength.ravel()[places]
 
 
 def _batches(pieces: Iterable[Rows]) -> Iterator[Rows]:

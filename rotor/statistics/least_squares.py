@@ -16,6 +16,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import takewhile
+from typing import NamedTuple
 
 import numpy as np
 
@@ -286,8 +287,7 @@ def _rms(residuals: Floats) -> float:
     return float(np.sqrt(residuals @ residuals / len(residuals))) if len(residuals) else 0.0
 
 
-@dataclass(frozen=True)
-class _State:
+class _State(NamedTuple):
     """A point with residuals and Jacobian, and the triangle R of the QR of (J, r), from which all else follows."""
 
     parameters: Floats
@@ -327,8 +327,7 @@ def _triangle(stacked: Floats) -> Floats:
     return np.asarray(np.linalg.qr(stacked, mode="r"))
 
 
-@dataclass(frozen=True)
-class _Linear:
+class _Linear(NamedTuple):
     """The linear model at a point, D p its variables: singular values s, z = Uᵀ r, and D⁻¹ V."""
 
     s: Floats

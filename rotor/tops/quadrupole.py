@@ -5,12 +5,16 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from rotor.arrays import Floats
-from rotor.geometry.inertia import PrincipalFrame
-from rotor.molecules.molecule import Molecule
 from rotor.tops.spins.spin_constants import SpinConstants
+
+if TYPE_CHECKING:
+    from rotor.geometry.inertia import PrincipalFrame
+    from rotor.molecules.molecule import Molecule
 
 NOISE = 1e-3  # of the largest element, and in MHz: programs print four decimals, and symmetry is met that well
 

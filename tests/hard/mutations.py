@@ -97,8 +97,8 @@ MUTATIONS = (
     ),
     Mutation(
         7, "rotor/quantum/wang/rotation.py",
-        "        energies, states = diagonalise(block_bands(of_j, block), vectors)\n        out.append((block, energies + scalar, states))",
-        "        bands = block_bands(of_j, block)\n        bands[0] += scalar\n        out.append((block, *diagonalise(bands, vectors)))",
+        "        out.append((block, scalar, block_bands(of_j, block)))",
+        "        bands = block_bands(of_j, block)\n        bands[0] += scalar\n        out.append((block, 0.0, bands))",
         "tests/test_safeguards.py::test_the_scalar_part_stays_out_of_the_matrix",
     ),
     Mutation(

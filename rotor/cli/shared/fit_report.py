@@ -110,7 +110,9 @@ def parameter_table(fit: Fit, spread: Sequence[float]) -> Table:
     for i, name in enumerate(fit.parameters.names):
         error = float(fit.errors[i])
         text = (
-            value_text(float(fit.values[i]), error) if error < float("inf") else f"{fit.values[i]!r} (not determined)"
+            value_text(float(fit.values[i]), error)
+            if error < float("inf")
+            else f"{float(fit.values[i])!r} (not determined)"
         )
         numbers = [
             f"{error:.3g}",

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import atexit
 import os
 import sys
+import threading
+from contextlib import suppress
+from typing import NoReturn
 
 _OWN = False  # set by the console script
 
@@ -23,6 +27,21 @@ def _open_missing_streams() -> None:
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):  # in the order of their numbers
         if getattr(sys, name) is None:
             setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: SIM115  # for as long as the process lives
+
+
+def end(code: int) -> NoReturn:
+    """The process ends with this exit code, without taking modules and arrays apart one by one, which takes 0.02 to 0.04 s.
+
+    What was registered for the end runs, and what was printed is written. Where threads still run, or a debugger, a profiler or a
+    measurement of coverage looks on, Python ends as always.
+    """
+    if not _OWN or threading.active_count() > 1 or sys.gettrace() is not None or sys.getprofile() is not None:
+        sys.exit(code)
+    atexit._run_exitfuncs()
+    for stream in (sys.stdout, sys.stderr):
+        with suppress(OSError, ValueError):  # of an output that is full or closed: `run` has said so
+            stream.flush()
+    os._exit(code)
 
 
 def leave_compiler_out() -> None:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from math import pi
 from typing import NamedTuple
 
+from rotor.formats.spcat.series import Series
 from rotor.formats.spcat.text.int_file import Dipole
 from rotor.quantum.moments import DEBYE_PER_BOHR_MAGNETON, Moment
 
@@ -12,7 +14,10 @@ Dipoles = dict[tuple[int, int], tuple[float, float, float]]
 
 
 class DipoleCode(NamedTuple):
-    """The fields of a dipole's code, FC TYP I1 V2 V1 SYM: TYP with FC as its second digit, the states lower first."""
+    """The fields of a dipole's code, FC TYP I1 V2 V1 SYM: TYP with FC as its second digit, the states lower first.
+
+    With TYP 7 and 8, Fourier terms, FC and I1 are the two digits of n, which stands in `spin`.
+    """
 
     typ: int
     spin: int
@@ -33,6 +38,8 @@ def split_dipole(code: int, states: int) -> DipoleCode:
     rest, spin = divmod(rest, 10)
     second, typ = divmod(rest, 10)
     low, high = sorted((v1, v2))
+    if typ in FOURIER:
+        return DipoleCode(typ, spin + 10 * second, (low, high), axis)
     return DipoleCode(typ + 10 * second, spin, (low, high), axis)
 
 
@@ -51,6 +58,7 @@ def dipoles_of(dipoles: Iterable[Dipole], states: int) -> tuple[Dipoles, list[tu
     return {pair: (mu[0], mu[1], mu[2]) for pair, mu in found.items()}, others
 
 
+FOURIER = (7, 8)
 _POWERS = {3: "J", 4: "K", 5: "[J]", 9: "JJ", 10: "[[J]]"}  # TYP of electric moments
 NOT_YET = "is read but not computed yet"
 
@@ -62,12 +70,14 @@ def moment_of(
     spins: int,
     oblate: bool = False,
     as_spcat: bool = False,
+    series: Series | None = None,
 ) -> Moment:
     """A moment that makes lines of another kind than a plain component of the dipole does.
 
     | TYP, I1, SYM | moment |
     |---|---|
     | 3, 4, 5, 9, 10; 0; 1, 2, 3 | {N², φ}/2, {Nz², φ}/2, [N², φ]/2, {N⁴, φ}/2, [N², [N², φ]]/4, in D |
+    | 7; n; 1, 2, 3 | φ times a cosine of K, a Fourier term of internal rotation (`series`), in D |
     | 0; 0 or a spin; 0 | N, or that spin, in Bohr magnetons |
     | 1; 0; 0 | ½(2 φ_z N_z - φ_x N_x - φ_y N_y), in Bohr magnetons; with `as_spcat` TYP 0 too: the program has this for N |
     | 1; a spin; 0 | S ½(3 Nz² - N²), in Bohr magnetons, as the program computes it (documented: φ_z S_z - ½ φ_x S_x - ½ φ_y S_y) |
@@ -86,6 +96,8 @@ def moment_of(
         Whether z is the c axis.
     as_spcat : bool, optional
         Whether N is what the program computes for it.
+    series : Series, optional
+        The constants of Fourier series of the file.
 
     Returns
     -------
@@ -97,6 +109,8 @@ def moment_of(
     ValueError
         With what it stands for, for any other code.
     """
+    if code.typ in FOURIER:
+        return _cosine_of(dipole, code, states, series or Series())
     if code.spin > spins:
         raise ValueError(f"dipole {dipole.code}: spin {code.spin} is not among the {spins} that SPIND names")
     if code.axis == 0 and code.states[0] == code.states[1]:
@@ -113,6 +127,18 @@ def moment_of(
         along = (float(code.axis == 1), float(code.axis == 2), float(code.axis == 3))
         return Moment(dipole.value, states, along, _POWERS[code.typ])
     raise ValueError(f"dipole {dipole.code}: {_meaning(code)} {NOT_YET}")
+
+
+def _cosine_of(dipole: Dipole, code: DipoleCode, states: tuple[int, int], series: Series) -> Moment:
+    """A component of the dipole times cos(2π n (ρ'K' + ρ''K'')/2 / 3); states: as numbered in the group, the higher of the file first."""
+    odd = series.g12 and code.spin % 2
+    if code.typ != 7 or code.axis == 0 or series.nofc or odd:
+        more = " of one K (NOFC)" if series.nofc else ", with signs by K (G12)" if odd else ""
+        raise ValueError(f"dipole {dipole.code}: {_meaning(code)}{more} {NOT_YET}")
+    low, high = (series.rho.get(v, 0.0) for v in code.states)
+    each = pi / 3 * (code.spin - 0.5 * ((low < 0) != (high < 0)))
+    along = (float(code.axis == 1), float(code.axis == 2), float(code.axis == 3))
+    return Moment(dipole.value, states, along, cosine=(each * abs(high), each * abs(low)))
 
 
 def _meaning(code: DipoleCode) -> str:

@@ -5,16 +5,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
-from rotor.formats.spcat.codes import AXES, split_code
+from rotor.formats.spcat.codes import AXES, Digits, split_code, state_digits
 from rotor.formats.spcat.l_doubled import Pair, couplings_with_pairs
 from rotor.formats.spcat.l_spins import spin_terms_with_pairs
-from rotor.formats.spcat.operators import CodedOperator, operator_of, plain_of_j
-from rotor.formats.spcat.text.par import Parameter
+from rotor.formats.spcat.operators import CodedOperator, energy_of_k, operator_of, plain_of_j
+from rotor.formats.spcat.series import (
+    Series,
+    is_constant,
+    is_series,
+    refuse_within_pairs,
+    series_of,
+    symmetry_type,
+    term_of,
+)
+from rotor.formats.spcat.text.par import Options, ParameterFile
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.moments import Moment
 from rotor.quantum.spins import Scheme, Spin
@@ -45,24 +54,20 @@ class CodedLine(NamedTuple):
     exchange: int = 0
 
 
-def coded_lines(
-    parameters: Iterable[Parameter], states: int, oblate: bool, doubled: frozenset[int] = frozenset()
-) -> list[CodedLine]:
-    """The parameter lines of a file with so many states.
+def coded_lines(file: ParameterFile, states: int, pairs: Sequence[Pair] = ()) -> list[CodedLine]:
+    """The parameter lines of a file with so many states, one for each state where its series has constants of each.
 
     A parameter of value zero does nothing and is not looked at, nor is one of a state and 9 (99, 999), which SPFIT
-    takes for a place holder.
+    takes for a place holder, and a constant of a series is none.
 
     Parameters
     ----------
-    parameters : iterable of Parameter
-        Codes, values in MHz, and labels.
+    file : ParameterFile
+        Codes, values in MHz, and labels; NVIB below 0 for the oblate basis, XOPT.
     states : int
-        Number of states, NVIB.
-    oblate : bool
-        Whether z is the c axis (IIIl) and not the a axis (Ir).
-    doubled : frozenset of int, optional
-        States that are l-doubled, within which an odd operator acts with the sign of l.
+        Number of states, |NVIB|.
+    pairs : sequence of Pair, optional
+        Those that are l-doubled, within which an odd operator acts with the sign of l.
 
     Returns
     -------
@@ -74,35 +79,85 @@ def coded_lines(
     ValueError
         Naming the line, for what does not compute: an unknown operator or state, a violation of time reversal.
     """
-    wild, axes = 10 ** (1 if states <= 9 else 2 if states <= 99 else 3) - 1, AXES["IIIl" if oblate else "Ir"]
+    options, wild = file.options[0], 10 ** state_digits(states) - 1
+    _refuse_phases(options)
+    series = series_of(file, states, pairs)
     found: list[CodedLine] = []
-    for place, parameter in enumerate(parameters, 1):
+    for place, parameter in enumerate(file.parameters, 1):
         digits = split_code(parameter.code, states)
         low, high = sorted((digits.v1, digits.v2))
-        if parameter.value == 0.0 or (high == wild and low != wild):
+        if parameter.value == 0.0 or (high == wild and low != wild) or is_constant(digits):
             continue
         label = f" /{parameter.label}" if parameter.label else ""
         try:
             if states <= high != wild:
                 raise ValueError(f"state {high} does not exist, NVIB = {states} counts from 0")
-            operator = operator_of(digits, axes)
-            if operator.odd and low == high and low not in doubled:
-                raise ValueError(
-                    "time reversal changes the sign of the operator, so that it can connect different states only"
-                )
+            own = None if low == wild else (low, high)
+            lines = (
+                _of_series(digits, own, states, series, options)
+                if is_series(digits)
+                else [_plain_line(digits, own, options)]
+            )
+            lines = [_within_pairs(line, digits, pairs, options) for line in lines]
         except ValueError as error:
             raise ValueError(f"parameter {parameter.code}{label}: {error}") from None
-        found.append(
-            CodedLine(
-                f"{parameter.code}#{place}",
-                parameter.value,
-                operator,
-                None if low == wild else (low, high),
-                digits.v2 > digits.v1,
-                digits.typ,
-            )
-        )
+        found += [line._replace(name=f"{parameter.code}#{place}", value=parameter.value) for line in lines]
     return found
+
+
+def _refuse_phases(options: Options) -> None:
+    if not 0 <= options.xopt < 80 or options.xopt % 10 not in (0, 8):
+        raise ValueError(
+            f"XOPT = {options.xopt}: expected PHASE + 10 NEWLZ + 20 NOFC + 40 G12 with a PHASE of 0 or 8; a forced phase of another "
+            "kind is read but not computed yet"
+        )
+
+
+def _plain_line(digits: Digits, states: tuple[int, int] | None, options: Options) -> CodedLine:
+    operator = operator_of(digits, AXES["IIIl" if options.nvib < 0 else "Ir"])
+    return CodedLine("", 0.0, operator, states, digits.v2 > digits.v1, digits.typ)
+
+
+def _of_series(
+    digits: Digits, states: tuple[int, int] | None, count: int, series: Series, options: Options
+) -> list[CodedLine]:
+    """A term of a series: of every state one with the constants of each."""
+    oblate = options.nvib < 0
+    typ, axes = symmetry_type(digits, oblate), AXES["IIIl" if oblate else "Ir"]
+    every = [states] if states else [(v, v) for v in range(count)]
+    return [CodedLine("", 0.0, term_of(digits, axes, series, own), own, digits.v2 > digits.v1, typ) for own in every]
+
+
+def _within_pairs(line: CodedLine, digits: Digits, pairs: Sequence[Pair], options: Options) -> CodedLine:
+    """The line as it acts on l-doubled states: with NEWLZ the operators that are named by the state with K l ≤ 0 have the sign of l.
+
+    Raises ValueError for what time reversal forbids, and for series that do not compute there.
+    """
+    firsts = {pair.second: pair.first for pair in pairs}
+    members = frozenset(v for pair in pairs for v in pair)
+    states = line.states
+    if states:
+        refuse_within_pairs(digits, states, members)
+    if not states or states[0] != states[1] or states[0] not in members:
+        if line.operator.odd and (not states or states[0] == states[1]):
+            raise ValueError(
+                "time reversal changes the sign of the operator, so that it can connect different states only"
+            )
+        return line
+    v, newlz = states[0], bool(options.xopt // 10 & 1)
+    if newlz and v in firsts and 80 <= digits.typ < 90:
+        return _half_difference(line, digits, firsts[v], options)
+    if newlz and line.operator.odd != (v in firsts) and not 80 <= digits.typ < 90:
+        raise ValueError(
+            "with NEWLZ an operator that time reversal turns around is named by the state with K l ≤ 0, any other by the one with K l > 0"
+        )
+    return line._replace(states=(firsts[v], firsts[v])) if newlz and v in firsts else line
+
+
+def _half_difference(line: CodedLine, digits: Digits, first: int, options: Options) -> CodedLine:
+    """TYP 80 to 89 of the state with K l ≤ 0, with NEWLZ: half the difference of the energies of one K with K l > 0 and K l < 0."""
+    of_k = energy_of_k(10 * (digits.typ - 80) + digits.ksq, digits.nsq, 1j if options.nvib > 0 else -1j)
+    return line._replace(operator=CodedOperator(of_j=of_k, odd=True), states=(first, first))
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,8 +6,8 @@ Each group of connected states has a top that stands for its symmetry, and the f
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from concurrent.futures import Executor
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,7 @@ from rotor.formats.spcat.file_effect import CodedLine, FileEffect, Vector, coded
 from rotor.formats.spcat.l_doubled import Pair, named_by_l, pairs_of
 from rotor.formats.spcat.l_spins import named_by_l_with_spins
 from rotor.formats.spcat.labels import BY_DIAG, named_by
+from rotor.formats.spcat.series import Series, series_of
 from rotor.formats.spcat.states import StateOptions, states_of
 from rotor.formats.spcat.symmetry import (
     exchange_of,
@@ -37,6 +38,9 @@ from rotor.quantum.spins.operators import is_axial
 from rotor.quantum.spins.terms import Spin
 from rotor.tops.constants import Constants
 from rotor.tops.top import Top
+
+if TYPE_CHECKING:
+    from concurrent.futures import Executor
 
 _EVERY_K = 10**6
 
@@ -122,6 +126,11 @@ def _components(levels: Levels, n: Ints, oblate: bool) -> list[tuple[Ints, Ints,
     return [(other, k, k, alike) if oblate else (k, other, k, alike) for other, alike in pairs]
 
 
+def line_names(file: ParameterFile) -> tuple[str, ...]:
+    """The parameter lines as `file_effect.coded_lines` names them."""
+    return tuple(f"{parameter.code}#{place}" for place, parameter in enumerate(file.parameters, 1))
+
+
 def groups_of(file: ParameterFile, intensities: IntensityFile, *, as_spcat: bool = False) -> list[Group]:
     """The groups of connected states, by their lowest numbers.
 
@@ -130,16 +139,15 @@ def groups_of(file: ParameterFile, intensities: IntensityFile, *, as_spcat: bool
     states = states_of(file)
     first = file.options[0]
     doubled = pairs_of(states)
-    members = frozenset(v for pair in doubled for v in pair)
-    lines = coded_lines(file.parameters, len(states), first.nvib < 0, members)
+    lines = coded_lines(file, len(states), doubled)
     lines = allowed(lines, states, doubled, first.nvib < 0)[0]
     dipoles, others = dipoles_of(intensities.dipoles, len(states))
-    dipoles = _of_both_components(dipoles, doubled)
+    dipoles, others = _of_both_components(dipoles, doubled), _others_of_both(others, doubled)
     if not others and not any(_has_elements(pair, mu, states, doubled) for pair, mu in dipoles.items()):
         dipoles |= {(high, low): (-a, -b, -c) for (low, high), (a, b, c) in dipoles.items() if low != high}
     pairs = [line.states for line in lines if line.states] + list(dipoles) + [code.states for _, code in others]
     _refuse_missing_spins(lines, states)
-    light = (dipoles, others)
+    light = (dipoles, others, series_of(file, len(states), doubled))
     return [
         _group([states[v] for v in numbers], lines, light, first, as_spcat, file.title, doubled)
         for numbers in _connected(len(states), [*pairs, *doubled])
@@ -150,8 +158,7 @@ def left_out(file: ParameterFile) -> list[str]:
     """A sentence for every parameter that the declared symmetry forbids."""
     states, oblate = states_of(file), file.options[0].nvib < 0
     doubled = pairs_of(states)
-    members = frozenset(v for pair in doubled for v in pair)
-    return allowed(coded_lines(file.parameters, len(states), oblate, members), states, doubled, oblate)[1]
+    return allowed(coded_lines(file, len(states), doubled), states, doubled, oblate)[1]
 
 
 def _has_elements(pair: tuple[int, int], mu: Vector, states: tuple[StateOptions, ...], doubled: list[Pair]) -> bool:
@@ -225,6 +232,21 @@ def _of_both_components(dipoles: Dipoles, pairs: list[Pair]) -> Dipoles:
     return found
 
 
+def _others_of_both(others: list[tuple[Dipole, DipoleCode]], pairs: list[Pair]) -> list[tuple[Dipole, DipoleCode]]:
+    """Moments of other kinds likewise."""
+    firsts, seconds = {pair.first: pair.second for pair in pairs}, {pair.second for pair in pairs}
+    found = []
+    for dipole, code in others:
+        low, high = code.states
+        if low != high and {low, high} & ({*firsts} | seconds):
+            raise ValueError(f"dipole {dipole.code}: a moment between states of which one is l-doubled {NOT_YET}")
+        if low not in seconds:
+            found.append((dipole, code))
+        if low in firsts:
+            found.append((dipole, code._replace(states=(firsts[low], firsts[low]))))
+    return found
+
+
 def _connected(count: int, pairs: Iterable[tuple[int, int]]) -> list[list[int]]:
     group = list(range(count))
     for i, k in pairs:
@@ -263,7 +285,7 @@ def _by_exchange(line: CodedLine, of: Mapping[int, StateOptions]) -> list[CodedL
 def _group(
     states: list[StateOptions],
     lines: list[CodedLine],
-    light: tuple[Dipoles, list[tuple[Dipole, DipoleCode]]],
+    light: tuple[Dipoles, list[tuple[Dipole, DipoleCode]], Series],
     first: Options,
     as_spcat: bool,
     title: str,
@@ -277,7 +299,7 @@ def _group(
     here = {v: place for place, v in enumerate(numbers)}
     moments = {(here[b], here[a]): mu for (a, b), mu in light[0].items() if a in here and b in here}
     beside = tuple(
-        moment_of(dipole, code, (here[code.states[1]], here[code.states[0]]), len(spins), oblate, as_spcat)
+        moment_of(dipole, code, (here[code.states[1]], here[code.states[0]]), len(spins), oblate, as_spcat, light[2])
         for dipole, code in light[1]
         if set(code.states) <= set(here)
     )

@@ -90,7 +90,7 @@ def _quanta_names(file: ParameterFile) -> tuple[str, ...]:
     """The quantum numbers of a state in the .lin file."""
     if is_plain(file, None):
         return QUANTA[constants_and_matrix(file)[0].kind]
-    from rotor.formats.spcat.file_lines import format_of
+    from rotor.formats.spcat.file_quanta import format_of
     from rotor.formats.spcat.fit_states import groups_for_fit, names_of_quanta
 
     return names_of_quanta(format_of(file, groups_for_fit(file)))
@@ -111,8 +111,8 @@ def spfit_input(file: ParameterFile, lines: LineList, source: str = "") -> Spfit
         constants, matrix = constants_and_matrix(file)
         names, kmax = tuple(constants.values), _kmax(file, constants)
     else:
+        from rotor.formats.spcat.file_model import line_names
         from rotor.formats.spcat.fit_states import FileLevels
-        from rotor.formats.spcat.predict_states import line_names
 
         matrix, names = np.eye(len(file.parameters)), line_names(file)
         model = partial(FileLevels.of, file)
@@ -307,8 +307,9 @@ def fitted_file(asked: SpfitInput, fit: Fit, *, variances: bool) -> ParameterFil
         if variances and column >= 0:
             error = float(errors[column]) * abs(ratio)
         made.append(replace(parameter, value=value, error=error))
-    rest = correlation_text(fit) if variances else ""
-    return replace(asked.file, parameters=tuple(made), rest=rest)
+    rest = correlation_text(asked, fit) if variances else ""
+    header = replace(asked.file.header, npar=len(made))
+    return replace(asked.file, header=header, parameters=tuple(made), rest=rest)
 
 
 def named_file(fit: Fit, title: str, *, variances: bool) -> ParameterFile:
@@ -340,12 +341,18 @@ def named_file(fit: Fit, title: str, *, variances: bool) -> ParameterFile:
     return replace(file, header=header, parameters=parameters, rest=rest)
 
 
-def correlation_text(fit: Fit) -> str:
+def correlation_text(asked: SpfitInput, fit: Fit) -> str:
     """What stands at the end of a .var file: the correlations C = V Vᵀ, V upper triangular, column by column, eight in a line.
 
-    The sign of a column has no bearing on C.
+    They are of all parameters but those with a minus sign, held ones too, which have none with others: SPCAT reads so many, and
+    takes none where fewer stand there. The sign of a column has no bearing on C.
     """
-    correlations = np.nan_to_num(fit.statistics.correlations)
+    leaders = [i for i, parameter in enumerate(asked.file.parameters) if not parameter.constrained]
+    columns = np.array([asked.columns[i] for i in leaders])
+    free = np.flatnonzero(columns >= 0)
+    correlations = np.eye(len(leaders))
+    known = np.nan_to_num(fit.statistics.correlations)
+    correlations[np.ix_(free, free)] = known[np.ix_(columns[free], columns[free])]
     np.fill_diagonal(correlations, 1.0)
     return _packed(correlations)
 

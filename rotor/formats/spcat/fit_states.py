@@ -10,18 +10,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from rotor.arrays import Floats, Ints, distinct
-from rotor.formats.spcat.file_lines import Format, format_of, quanta_of
-from rotor.formats.spcat.file_model import Group, groups_of
+from rotor.formats.spcat.file_model import Group, groups_of, line_names
+from rotor.formats.spcat.file_quanta import Format, format_of, quanta_of
 from rotor.formats.spcat.l_doubled import functions_of_l, named_by_l
-from rotor.formats.spcat.predict_states import line_names
 from rotor.formats.spcat.text.int_file import IntensityFile, Request
 from rotor.formats.spcat.text.par import ParameterFile
 from rotor.formats.spcat.unresolved import HIGHEST_SEARCHED, excluded_parameters, refuse_far_f, spelled_out
-from rotor.quantum.estimates.contracted import ContractedLevels, contracted_levels
 from rotor.quantum.estimates.effect_units import unit_levels
 from rotor.quantum.estimates.state_units import state_units
 from rotor.quantum.estimates.unit_blocks import UnitBlocks, joined
@@ -29,6 +28,9 @@ from rotor.quantum.labelled import LevelModel, MissingLevelsError
 from rotor.quantum.levels import Levels
 from rotor.quantum.spins.levels import levels_of_f, unmixed_levels
 from rotor.quantum.wang.rotation import solve_rotation
+
+if TYPE_CHECKING:
+    from rotor.quantum.estimates.contracted import ContractedLevels
 
 _NO_REQUEST = IntensityFile("", Request(), ())
 _MOST_ELEMENTS = 1e7  # of vectors over all functions of the F that are solved at a time
@@ -60,8 +62,7 @@ def names_of_quanta(form: Format) -> tuple[str, ...]:
     return names if spins else ("j", *names[1:])
 
 
-@dataclass(frozen=True)
-class _Solved:
+class _Solved(NamedTuple):
     """A group with the labels that lie in it: their places among all, the parameters that it has, and its blocks."""
 
     rows: Ints
@@ -225,6 +226,8 @@ def _contracted(
     group: Group, form: Format, labels: Ints, here: Ints, every: Ints, names: Sequence[str], values: Floats
 ) -> _Solved | None:
     """The labels at the places `here`, each among the functions near it; None where the blocks had better be solved whole."""
+    from rotor.quantum.estimates.contracted import contracted_levels
+
     levels, plan = unmixed_levels(group.top, (group.effect,), every.tolist())
     rows = _rows_of(group, levels, form, labels[here])
     found = rows >= 0

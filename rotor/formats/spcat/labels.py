@@ -9,8 +9,8 @@
 | 4 | as 3 | ⟨K²⟩, those of one K by energy |
 | 5 | as 3 | energy, as the diagonal elements rise |
 
-0 and 3 are the names that levels have already: 3 differs from 0 only where a block holds several Wang blocks of one v and pattern.
-In an oblate basis energy falls as K rises.
+Levels with spins have the names of 0 already, those of one Wang block too; of states that are coupled they are given here (elsewhere
+in this package such levels are named by their overlaps with the levels of each state). In an oblate basis energy falls as K rises.
 """
 
 from __future__ import annotations
@@ -28,6 +28,9 @@ from rotor.quantum.spins.parts import assigned
 from rotor.quantum.wang.basis import WangBlock, names_of
 
 BY_DIAG = (1, 2, 4, 5)  # those that need another naming than that of levels
+_OF_WANG = (0, 2)  # whose groups are Wang blocks
+_BY_DIAGONAL = (2, 5)
+_EQUAL = 1e-11  # of the largest energy: the two functions of one K have one diagonal element but for round-off
 
 
 class Functions(NamedTuple):
@@ -41,8 +44,8 @@ class Functions(NamedTuple):
 
 
 def named_by(levels: Levels, diag: int, oblate: bool) -> Levels:
-    """The same levels of an asymmetric top with the names that a DIAG of 1, 2, 4 or 5 gives; others as they are."""
-    if diag not in BY_DIAG or "kc" not in levels.quanta or not levels.blocks:
+    """The same levels of an asymmetric top with the names that DIAG gives; those that have them already as they are."""
+    if "kc" not in levels.quanta or not (diag in BY_DIAG or any(_coupled(block) for block in levels.blocks)):
         return levels
     tables, shares = [], []
     for block in levels.blocks:
@@ -62,9 +65,14 @@ def named_by(levels: Levels, diag: int, oblate: bool) -> Levels:
     return replace(levels, quanta=quanta, mixing=np.concatenate(shares))
 
 
+def _coupled(block: object) -> bool:
+    """Whether a block without spins holds several Wang blocks."""
+    return isinstance(block, CoupledBlock) and len(block.parts) > 1
+
+
 def _shares_of_groups(functions: Functions, at: Ints, diag: int) -> Floats:
     """The share of each state in the group that it is named after."""
-    of_function = np.arange(len(at)) if diag == 1 else functions.wang if diag == 2 else functions.pattern
+    of_function = np.arange(len(at)) if diag == 1 else functions.wang if diag in _OF_WANG else functions.pattern
     inside = of_function[:, None] == of_function[at][None, :]
     return np.asarray((functions.amplitudes**2 * inside).sum(axis=0))
 
@@ -74,11 +82,11 @@ def places(functions: Functions, energies: Floats, diag: int) -> Ints:
     shares = functions.amplitudes**2
     if diag == 1:
         return assigned(shares, np.ones(len(shares), dtype=np.int64))
-    groups = functions.wang if diag == 2 else functions.pattern
+    groups = functions.wang if diag in _OF_WANG else functions.pattern
     count = int(groups.max()) + 1
     of_group = np.stack([shares[groups == g].sum(axis=0) for g in range(count)])
     of_state = assigned(of_group, np.bincount(groups, minlength=count))
-    diagonal = shares @ energies
+    rising = _ranks(shares @ energies) if diag in _BY_DIAGONAL else _in_order_of_k(functions)
     found = np.empty(len(energies), dtype=np.int64)
     for g in range(count):
         members, states = np.flatnonzero(groups == g), np.flatnonzero(of_state == g)
@@ -86,9 +94,25 @@ def places(functions: Functions, energies: Floats, diag: int) -> Ints:
             found[states] = _by_k2(functions, members, states, shares, energies)
         else:
             found[states[np.argsort(energies[states], kind="stable")]] = members[
-                np.argsort(diagonal[members], kind="stable")
+                np.argsort(rising[members], kind="stable")
             ]
     return found
+
+
+def _ranks(diagonal: Floats) -> Floats:
+    """A number for each function that rises with its diagonal element, one for those that round-off alone tells apart."""
+    order = np.argsort(diagonal, kind="stable")
+    steps = np.diff(diagonal[order]) > _EQUAL * np.abs(diagonal).max(initial=0.0)
+    ranks = np.empty(len(diagonal))
+    ranks[order] = np.concatenate([[0.0], np.cumsum(steps)])
+    return ranks
+
+
+def _in_order_of_k(functions: Functions) -> Floats:
+    """A number for each function that rises with K, then with the number of its Wang block."""
+    order = np.empty(len(functions.k))
+    order[np.lexsort((functions.wang, functions.k))] = np.arange(len(functions.k))
+    return order
 
 
 def _by_k2(functions: Functions, members: Ints, states: Ints, shares: Floats, energies: Floats) -> Ints:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from functools import reduce
 from math import gcd
 
-from rotor.formats.spcat.codes import NOT_YET, constants_of, is_linear, parameters_of
+from rotor.formats.spcat.codes import NOT_YET, constants_of, is_linear, parameters_of, state_digits
 from rotor.formats.spcat.text.int_file import Dipole, IntensityFile, Request
 from rotor.formats.spcat.text.par import Header, Options, ParameterFile
 from rotor.tops.constants import Constants
@@ -90,7 +90,13 @@ def _coded_weights(weights: SpinWeights, oblate: bool) -> tuple[int, int, int, i
         return 1, 1, 1, 0
     if weights.rule == "J":
         return 2, by_class["even"], by_class["odd"], 0
-    if weights.rule == "K":
+    if weights.rule == "K" and "0even" in by_class:
+        others = {weight for name, weight in by_class.items() if not name.startswith("0")}
+        iax = {4: 6, 6: 9}.get(len(by_class), 0)
+        plus, minus = by_class["0even"], by_class["0odd"]
+        if iax and len(others) == 1:  # where one of the two is 0, SPCAT has one level of each E pair alone
+            return iax, plus, minus, others.pop() * (1 if min(plus, minus) else 2)
+    elif weights.rule == "K":
         others = set(weights.values[1:])
         iax = {2: 3 if oblate else 1, 3: 6, 5: 9}.get(len(weights.values), 0)
         if iax and len(others) == 1:
@@ -144,11 +150,20 @@ def parameter_file(top: Top, kmax: int) -> ParameterFile:
 
 
 def intensity_file(top: Top, request: Request) -> IntensityFile:
-    """The .int file of a top; a component of exactly zero has no line."""
+    """The .int file of a top, with the dipoles of its states and between them; a component of exactly zero has no line."""
     if top.dipole_abc_debye is None:
         raise ValueError(f"{top.name or 'the top'} has no dipole; expected one for an .int file, (μa, μb, μc) in D")
-    components = enumerate(top.dipole_abc_debye, 1)
-    dipoles = tuple(Dipole(code, value) for code, value in components if value)
+    count = 1 if top.states is None else top.states.count
+    given = top.states.dipoles if top.states else {}
+    moments = {(v, v): given.get((v, v), top.dipole_abc_debye) for v in range(count)}
+    moments |= {pair: moment for pair, moment in given.items() if pair[0] != pair[1]}
+    width = 0 if count == 1 else state_digits(count)
+    dipoles = tuple(
+        Dipole((low * 10**width + high) * 10 + axis, value)
+        for (high, low), moment in moments.items()
+        for axis, value in enumerate(moment, 1)
+        if value
+    )
     return IntensityFile(top.name, request, dipoles)
 
 

@@ -12,6 +12,8 @@
 | I1 ≠ I2 | I1·I2 with TYP 0, else the traceless tensor I1a I2a - I1·I2/3, ... |
 | KSQ, NSQ, NS | half anticommutators with Nz^2KSQ, then N^2NSQ (N·S1)^NS; NS > 4: NS - 5, and N_z S_z in place of the 1 of TYP 0 |
 
+Terms of Fourier and Euler series (FF, EX, TYP 90 to 99) are in `series`.
+
 (H. M. Pickett, documentation of SPFIT and SPCAT, and J. Mol. Spectrosc. 148, 371 (1991); each kind compared with the program's
 own levels.) Any other code is refused with its meaning.
 """
@@ -36,11 +38,9 @@ from rotor.tops.operators import Operators
 ODD = {20: "a", 40: "b", 60: "c"}  # change sign under time reversal
 CROSS = {21: "bc", 41: "ac", 61: "ab"}
 REFUSED = {
-    "ex": "a term of an Euler series",
-    "ff": "a Fourier term of internal rotation, or a constant of one K",
     "commutator": "a commutator of a spin term with Nz²",
     "own": "the energy of one K with a spin",
-    "series": "a constant of an Euler or Fourier series",
+    "series": "a term of a series without the constants of its file",
     "szsz": "N_z S_z together with another operator",
 }
 
@@ -76,29 +76,28 @@ def operator_of(digits: Digits, axes: str) -> CodedOperator:
     if spins or ns:
         return _with_spins(digits._replace(typ=typ, ns=ns), spins, axes)
     if 80 <= typ < 90:
-        return CodedOperator(of_j=_of_one_k(10 * (typ - 80) + digits.ksq, digits.nsq))
+        return CodedOperator(of_j=energy_of_k(10 * (typ - 80) + digits.ksq, digits.nsq))
     if 12 <= typ < 80:
         return CodedOperator(of_j=_of_j(digits, axes), odd=order_of(typ) % 2 == 1)
     return CodedOperator(plain=_plain(digits, axes))
 
 
-def _of_one_k(own: int, n2: int) -> OperatorOfJ:
-    """N^2p of the functions with |K| = 10 (TYP - 80) + KSQ alone."""
+def energy_of_k(own: int, n2: int, factor: complex = 0.0) -> OperatorOfJ:
+    """N^2p of the functions with |K| = 10 (TYP - 80) + KSQ alone; with a factor, ± i, that times the sign of K."""
 
     def operator(j: int, representation: str) -> JOperator:
-        of_k = (np.abs(np.arange(-j, j + 1)) == own).astype(np.complex128)
-        return JOperator(j, {0: (j * (j + 1.0)) ** n2 * of_k})
+        k = np.arange(-j, j + 1)
+        of_k = (np.abs(k) == own) * (factor * np.sign(k) if factor else 1.0)
+        return JOperator(j, {0: (j * (j + 1.0)) ** n2 * of_k.astype(np.complex128)})
 
     return operator
 
 
 def _refuse(d: Digits) -> None:
     found = {
-        "ex": d.ex > 0,
-        "ff": d.ff > 0,
         "commutator": d.i1 == 0 and d.i2 > 0,
         "own": 80 <= d.typ < 90 and bool(d.i1 or d.i2 or d.ns),
-        "series": d.typ >= 90,
+        "series": bool(d.ff or d.ex) or d.typ >= 90,
         "szsz": d.ns > 4 and (d.typ != 0 or d.i1 > 0 or d.i2 > 0),
     }
     for reason, applies in found.items():

@@ -17,15 +17,15 @@ from rotor.arrays import Floats, Ints
 from rotor.formats.spcat.codes import constants_of, split_code
 from rotor.formats.spcat.file_lines import (
     LEAST_MHZ,
-    Format,
     as_catalogue,
     as_level_list,
-    format_of,
+    end_to_end,
     lines_of,
     transitions_of,
     within,
 )
-from rotor.formats.spcat.file_model import Group, groups_of, left_out
+from rotor.formats.spcat.file_model import Group, groups_of, left_out, line_names
+from rotor.formats.spcat.file_quanta import Format, format_of
 from rotor.formats.spcat.text.catalogue import Catalogue
 from rotor.formats.spcat.text.egy import LevelList
 from rotor.formats.spcat.text.int_file import IntensityFile, Request
@@ -110,11 +110,6 @@ def _with_levels(groups: list[Group], request: Request) -> list[Group]:
     return found
 
 
-def line_names(file: ParameterFile) -> tuple[str, ...]:
-    """The parameter lines as `file_effect.coded_lines` names them."""
-    return tuple(f"{parameter.code}#{place}" for place, parameter in enumerate(file.parameters, 1))
-
-
 def level_spreads(group: Group, levels: Levels, names: Sequence[str], factor: Floats | None) -> Floats | None:
     """What the covariance of a file's parameters makes of each level, ∂E/∂p F; None without one.
 
@@ -179,21 +174,17 @@ def _lines(
     q: float,
 ) -> Lines:
     """The lines as this package has them: one table of levels for all groups, one line for both components of ±K."""
-    starts = np.cumsum([0, *(len(levels) for _, levels in solved)])
+    starts = np.cumsum([0, *(len(levels) for _, levels in solved[:-1])]).astype(np.int32)
     levels = _joined(solved, form)
     t = request.temperature_k
     above = math.exp(levels.ground_mhz / units.MHZ_PER_K / t)  # Q counts from zero, `Lines` from the lowest level
     lines = Lines(
         top=_shown(parameters, solved[0][0]),
         levels=levels,
-        frequency_mhz=np.concatenate([each.frequency_mhz for each in transitions]),
-        strength_debye2=np.concatenate([each.strength_debye2 for each in transitions]),
-        upper=np.concatenate([each.upper + start for each, start in zip(transitions, starts, strict=False)]).astype(
-            np.int32
-        ),
-        lower=np.concatenate([each.lower + start for each, start in zip(transitions, starts, strict=False)]).astype(
-            np.int32
-        ),
+        frequency_mhz=end_to_end([each.frequency_mhz for each in transitions]),
+        strength_debye2=end_to_end([each.strength_debye2 for each in transitions]),
+        upper=end_to_end([each.upper + start for each, start in zip(transitions, starts, strict=True)]),
+        lower=end_to_end([each.lower + start for each, start in zip(transitions, starts, strict=True)]),
         temperature_k=t,
         min_lgint=request.str0,
         range_mhz=(LEAST_MHZ, request.fqlim_ghz * 1e3),

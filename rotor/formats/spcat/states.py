@@ -209,11 +209,16 @@ def is_odd(ka: Ints, kc: Ints) -> NDArray[np.bool_]:
     return np.asarray((ka + kc) % 2 == 1)
 
 
+def has_one_state(parameters: ParameterFile) -> bool:
+    """Whether a file has one state and no spin."""
+    first = parameters.options[0]
+    return abs(first.nvib) == 1 and len(parameters.options) == 1 and not doubled_spins(first.spind)
+
+
 def is_plain(parameters: ParameterFile, intensities: IntensityFile | None) -> bool:
     """Whether a file has one state, no spin and operators of orthorhombic symmetry, so that its constants have names."""
     first = parameters.options[0]
-    one = abs(first.nvib) == 1 and len(parameters.options) == 1 and not doubled_spins(first.spind)
-    if not one or first.knmin != 0 or first.iax not in (0, 1, 2, 3, 6, 9) or first.ixx:
+    if not has_one_state(parameters) or first.knmin != 0 or first.iax not in (0, 1, 2, 3, 6, 9) or first.ixx:
         return False
     if first.spind < 0 and first.knmax and first.wtpl != first.wtmn:  # the two levels of one K weigh differently
         return False
@@ -221,7 +226,7 @@ def is_plain(parameters: ParameterFile, intensities: IntensityFile | None) -> bo
         return False
     digits = [split_code(parameter.code) for parameter in parameters.parameters]
     orthorhombic = all(
-        not (d.i1 or d.i2 or d.ns) and (d.typ < 12 or d.typ >= 90) and (d.v1, d.v2) in ((0, 0), (9, 9)) for d in digits
+        not (d.i1 or d.i2 or d.ns or d.ff or d.ex) and d.typ < 12 and (d.v1, d.v2) in ((0, 0), (9, 9)) for d in digits
     )
     energies = any(not any(d[:8]) for d in digits)
     mixed = any(d.typ == 4 and d.ksq for d in digits) and any(d.typ > 4 for d in digits)  # terms of both reductions

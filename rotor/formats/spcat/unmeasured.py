@@ -8,8 +8,8 @@ import numpy as np
 
 from rotor.arrays import Floats, Ints
 from rotor.fit.assignment import Assignments
-from rotor.formats.spcat.file_lines import Format, format_of, quanta_of
 from rotor.formats.spcat.file_model import Group
+from rotor.formats.spcat.file_quanta import Format, format_of, quanta_of
 from rotor.formats.spcat.fit_states import groups_for_fit, levels_in_blocks
 from rotor.formats.spcat.text.par import ParameterFile
 from rotor.quantum.spins.levels import unmixed_levels

@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from rotor.arrays import Ints
-from rotor.formats.spcat.file_lines import Format
+from rotor.formats.spcat.file_quanta import Format
 from rotor.formats.spcat.text.par import ParameterFile
 from rotor.quantum.labelled import MissingLevelsError
 

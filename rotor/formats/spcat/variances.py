@@ -6,6 +6,8 @@ without V the errors count as uncorrelated, as SPCAT takes them. A parameter wit
 
 from __future__ import annotations
 
+from itertools import takewhile
+
 import numpy as np
 
 from rotor.arrays import Floats
@@ -27,7 +29,7 @@ def variance_factor(file: ParameterFile) -> Floats | None:
         return None
     leaders = [i for i, parameter in enumerate(file.parameters) if not parameter.constrained]
     fitted = [i for i in leaders if errors[i] > 0]
-    correlations = _correlations(file.rest)
+    correlations = _correlations(file)
     named = leaders if len(correlations) == len(leaders) else fitted
     if not len(correlations):
         correlations = np.eye(len(named))
@@ -63,9 +65,20 @@ def _estimated(parameter: Parameter) -> float:
     return error if HELD_BELOW <= error < FREE_ABOVE and not parameter.constrained else 0.0
 
 
-def _correlations(text: str) -> Floats:
-    """V (k, k), upper triangular; (0, 0) where none stands there."""
-    words = [line[i : i + _WIDTH] for line in text.splitlines() for i in range(0, len(line.rstrip()), _WIDTH)]
+def _is_of_numbers(line: str) -> bool:
+    return not line.strip() or line.strip()[0] in "+-.0123456789"
+
+
+def _correlations(file: ParameterFile) -> Floats:
+    """V (k, k), upper triangular; (0, 0) where none stands there.
+
+    As for SPCAT (`getpar`, `getvar`) there is none behind fewer parameters than NPAR; nor is a text behind them, such as another list
+    that is put aside, one.
+    """
+    rows = list(takewhile(_is_of_numbers, file.rest.splitlines()))
+    if len(file.parameters) < file.header.npar:
+        rows = []
+    words = [line[i : i + _WIDTH] for line in rows for i in range(0, len(line.rstrip()), _WIDTH)]
     try:
         values = [float(word) for word in words if word.strip()]
     except ValueError:

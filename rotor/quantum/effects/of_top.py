@@ -45,11 +45,11 @@ def _effects(constants: SpinConstants) -> tuple[QuantumEffect, ...]:
     spins = tuple(Spin(name, twice, name.startswith("S")) for name, twice in constants.twice.items())
     values: dict[type[SpinEffect], dict[str, float]] = {}
     for name, value in constants.values.items():
-        symbol = parse_name(name).symbol
+        known = [one for kind in kinds for one in kind.symbols]
+        symbol = parse_name(name).symbol if name.startswith(tuple(known)) else ""
         kind = next((kind for kind in kinds if symbol in kind.symbols), None)
         if kind is None:
-            known = ", ".join(one for kind in kinds for one in kind.symbols)
-            raise ValueError(f"{name}: known constants of spins are {known}")
+            raise ValueError(f"{name}: known constants of spins are {', '.join(known)}")
         values.setdefault(kind, {})[name] = value
     return tuple(kind(values[kind], spins) for kind in kinds if kind in values)
 
@@ -88,13 +88,6 @@ def with_states(
         effects = (*effects, *state_effects(top))
     weights = states.weights.get(0, top.spin_weights)
     return replace(top, spin_weights=weights, symmetry_checked=False), effects
-
-
-def has_own_hamiltonian(top: Top, effects: Sequence[QuantumEffect]) -> bool:
-    """Whether the effects are those of the constants of a top and of its further states, no more and no other values."""
-    known = dict(state_effects(top)[0].parameters(top))
-    rest = [effect for effect in effects if effect not in SEMI_RIGID]
-    return len(effects) == len(SEMI_RIGID) + 1 and len(rest) == 1 and dict(rest[0].parameters(top)) == known
 
 
 def effects_of(

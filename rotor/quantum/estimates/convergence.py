@@ -136,8 +136,8 @@ def converges_to(top: Top, jmax: int, effects: Sequence[QuantumEffect] = SEMI_RI
 def _ratios(
     top: Top, j: int, kmax: int | None, effects: Sequence[QuantumEffect] = SEMI_RIGID
 ) -> list[tuple[float, int]]:
-    """(ratio to the order before, order) of every order above the first."""
-    sizes = list(order_sizes_mhz(top, j, kmax, effects).items())
+    """(ratio to the order before, order) of every order above the first; the energy of a state is none."""
+    sizes = [(order, size) for order, size in order_sizes_mhz(top, j, kmax, effects).items() if order]
     pairs = pairwise(sizes)
     return [(size / before if before else 0.0, order) for (_, before), (order, size) in pairs]
 

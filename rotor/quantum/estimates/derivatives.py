@@ -76,7 +76,7 @@ def level_derivatives(top: Top, levels: Levels, names: Sequence[str] | None = No
             raise ValueError(f"no parameter {name} here to derive by: the effects have {', '.join(by_name)}")
     rows = np.arange(len(levels)) if rows is None else np.asarray(rows)
 
-    if "f" in levels.quanta:
+    if "f" in levels.quanta or any(hasattr(block, "shared") for block in levels.blocks[:1]):  # solved as with spins
         from rotor.quantum.spins.lines import derivatives
 
         return derivatives(top, levels, names, np.asarray(rows, dtype=np.int64))

@@ -15,23 +15,26 @@ import numpy as np
 from rotor.arrays import Floats, Ints, distinct
 from rotor.quantum.coupled import CoupledBlock, names_of_states, parameter_matrix
 from rotor.quantum.effect import QuantumEffect
-from rotor.quantum.estimates.unit_blocks import (
+from rotor.quantum.estimates.state_units import WangElements, wang_elements
+from rotor.quantum.estimates.unit_blocks import UnitBlocks, tracked_blocks
+from rotor.quantum.estimates.unit_matrices import (
     Elements,
     Namer,
     UnitBlock,
-    UnitBlocks,
+    WeightedElements,
     elements_of,
-    tracked_blocks,
     unit_block,
 )
 from rotor.quantum.levels import Levels, SolvedBlock
 from rotor.quantum.spins.blocks import SpinBlock, coefficients_of, product
 from rotor.quantum.spins.lines import ParameterOperator
-from rotor.quantum.spins.operators import Scalar
+from rotor.quantum.spins.operators import AxialState, Basis, Scalar
 from rotor.quantum.spins.parts import SpinPart, assigned, labels_of, names_of_parts
-from rotor.quantum.spins.rotor import Channel
+from rotor.quantum.spins.rotor import Channel, RotorBlock
 from rotor.quantum.spins.three_equivalent import labels_of_functions
 from rotor.quantum.spins.three_spins import Allowed
+from rotor.quantum.wang.basis import WangBlock
+from rotor.tops.operators import Operators
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
@@ -144,8 +147,7 @@ class _Makers:
         sub_blocks = np.repeat(np.arange(len(block.parts)), [part.basis.size for part in block.parts])
 
         def namer(matrix: Floats, energies: Floats, vectors: Floats) -> Ints:
-            whole = np.tril(matrix) + np.tril(matrix, -1).T
-            return names_of_states(block.parts, whole, vectors, self._representation)[0]
+            return names_of_states(block.parts, matrix, vectors, self._representation)[0]  # it reads the lower triangle
 
         return unit_block(units, sub_blocks, namer)
 
@@ -176,20 +178,27 @@ class _SpinUnits:
         self, top: Top, effects: tuple[QuantumEffect, ...], names: Sequence[str], blocks: Sequence[SpinBlock]
     ) -> None:
         self._shared = blocks[0].shared
-        self._operators = [ParameterOperator(top, effects, name, self._shared) for name in names]
+        rotation = _Rotation.of(top, effects, names, blocks)
+        self._rotation = rotation
+        self._operators = {
+            place: ParameterOperator(top, effects, name, self._shared)
+            for place, name in enumerate(names)
+            if rotation is None or name not in rotation.names
+        }
         self._coefficients: dict[tuple[Channel, int], Floats] = {}
 
     def unit(self, block: SpinBlock) -> UnitBlock:
         """The unit matrices of one block of an F, the functions of the basis in place of the states of the rotation."""
         parts = tuple(_in_functions(part) for part in block.parts)
         units: Units = {}
-        for place, operator in enumerate(self._operators):
+        for place, operator in self._operators.items():
             matrix = self._matrix(operator, parts, block)
             if matrix is not None:
                 units[place] = elements_of(_of_allowed(matrix, block.allowed) if block.allowed else matrix)
         if block.allowed:
             return unit_block(units, block.allowed.sub_block, _namer_of_allowed(block.allowed))
-        return unit_block(units, _sub_blocks(parts, parts[-1].place.stop), _namer(parts, block.patterns))
+        more = self._rotation.of_parts(parts) if self._rotation else None
+        return unit_block(units, _sub_blocks(parts, parts[-1].place.stop), _namer(parts, block.patterns), more)
 
     def _matrix(self, operator: ParameterOperator, parts: tuple[SpinPart, ...], block: SpinBlock) -> Floats | None:
         out: Floats | None = None
@@ -207,6 +216,86 @@ class _SpinUnits:
         """Coefficients over the patterns of an F; those of the Hamiltonian are there since its plan was made."""
         known = self._shared.cache.get(("coupling", block.twice_f), {})
         return known[channel] if channel in known else coefficients_of(self._shared.scheme, channel, block.patterns)
+
+
+class _Rotation:
+    """The parameters whose operators are powers of N², Nz² and N± alone: elements over the functions of all parts, made at once.
+
+    They are the same for every coupling pattern. names : these parameters
+    """
+
+    def __init__(self, names: Sequence[str], own: dict[int, dict[str, Operators]], bases: set[Basis]) -> None:
+        found = {(q, n) for terms in own.values() for name in names for _, q, n in terms.get(name, {})}
+        powers = ((0, 0), *sorted(found - {(0, 0)}))
+        self.names = frozenset(names)
+        self._all, self._own, self._powers = names, own, {power: i for i, power in enumerate(powers)}
+        wang = {basis for basis in bases if isinstance(basis, WangBlock)}
+        self._elements: dict[Basis, WangElements] = {
+            basis: _axial(basis, powers) for basis in bases if isinstance(basis, AxialState)
+        }
+        for basis, elements in wang_elements(wang, powers).items():
+            self._elements[basis] = elements
+        self._known: dict[int, WeightedElements] = {}
+
+    @classmethod
+    def of(
+        cls, top: Top, effects: tuple[QuantumEffect, ...], names: Sequence[str], blocks: Sequence[SpinBlock]
+    ) -> _Rotation | None:
+        """None where exchange allows some functions alone, or two effects have parameters of one name."""
+        if any(block.allowed for block in blocks):
+            return None
+        bases = {own.basis for block in blocks for part in block.parts for own in part.rotor.parts}
+        others = {term.name for effect in effects for term in effect.spin_terms(top)}
+        others |= {one.name for effect in effects for one in effect.couplings(top)}
+        representation = blocks[0].shared.representation
+        others |= {
+            name
+            for effect in effects
+            for name in effect.parameters(top)
+            if effect.j_operator(top, name, 1, representation) is not None
+        }
+        own: dict[int, dict[str, Operators]] = {}
+        for effect in effects:
+            for v, terms in ((0, effect.operators(top)), *((one.v, one.terms) for one in effect.states(top))):
+                if own.get(v, {}).keys() & terms.keys():  # of two effects: they add up
+                    return None
+                own[v] = own.get(v, {}) | dict(terms)
+        return cls([name if name not in others else "" for name in names], own, bases)
+
+    def of_parts(self, parts: Sequence[SpinPart]) -> WeightedElements:
+        """The elements of a block with spins."""
+        size, places, factors = parts[-1].place.stop, list[Ints](), list[Floats]()
+        for part in parts:
+            if part.number not in self._known:
+                self._known[part.number] = self._of_rotor(part.rotor)
+            one = self._known[part.number]
+            states = len(part.rotor.energies_mhz)
+            rows, columns = np.divmod(one.places, states)
+            start = part.place.start + states * np.arange(part.repeats)[:, None]
+            places.append(((start + rows) * size + start + columns).ravel())
+            factors.append(np.tile(one.factors, (part.repeats, 1)))
+        return WeightedElements(np.concatenate(places), np.concatenate(factors))
+
+    def _of_rotor(self, rotor: RotorBlock) -> WeightedElements:
+        """The lower triangle over the functions of a solved block."""
+        size, places, factors = len(rotor.energies_mhz), list[Ints](), list[Floats]()
+        for part in rotor.parts:
+            elements, start = self._elements[part.basis], part.place.start
+            mix = np.zeros((len(self._powers), len(self._all)))
+            for column, name in enumerate(self._all):
+                for (p, q, n), factor in self._own.get(part.v, {}).get(name, {}).items():
+                    mix[self._powers[q, n], column] += factor * (rotor.n * (rotor.n + 1.0)) ** p
+            places.append((start + elements.rows) * size + start + elements.columns)
+            factors.append(elements.values[:, None] * mix[elements.units])
+        return WeightedElements(np.concatenate(places), np.concatenate(factors))
+
+
+def _axial(state: AxialState, powers: Sequence[tuple[int, int]]) -> WangElements:
+    """Nz^2q of one |N K⟩."""
+    units = np.array([place for place, (_, n) in enumerate(powers) if n == 0])
+    values = np.array([float(state.axial_k) ** (2 * q) for q, n in powers if n == 0])
+    zeros = np.zeros_like(units)
+    return WangElements(zeros, zeros, units, values)
 
 
 def _of_allowed(matrix: Floats, allowed: Allowed) -> Floats:

@@ -42,6 +42,9 @@ COMPUTE = "its constants are known, add the effects of spins"  # the command lin
 HIGHEST_J = 20  # A - E differences change little with J; those of higher J are estimated at this one
 LOW_BARRIER = 10.0  # s = 4 V3/9F below which the torsional levels of E species depend on K as much as the rotation
 ELECTRON_SPIN = "electron spin"
+_MULTIPLETS = (
+    "the molecule has unpaired electrons: levels and lines are multiplets, by spin constants such as eps_aa(S)"
+)
 ZERO_POINT = "vibration-rotation difference"
 OF_SPINS = frozenset({"nuclear quadrupole", "magnetic coupling of nuclear spins", ELECTRON_SPIN})
 AMMONIA_MHZ = 24_000.0  # the splitting of NH3, see docs/limitations.md
@@ -212,7 +215,8 @@ def _split_text(nuclei: Sequence[Splitting]) -> str:
     texts = [f"{', '.join(known)}: {COMPUTE}"] if known else []
     if others:
         texts.append(
-            f"{', '.join(others)} split{'s' if len(others) == 1 else ''} lines of low J, by so much in covalent bonds"
+            f"{', '.join(others)} split{'s' if len(others) == 1 else ''} lines of low J, by so much in covalent bonds; its spin "
+            f"constants, such as chi_aa({others[0]}), are not known"
         )
     return "; ".join(texts)
 
@@ -229,7 +233,7 @@ def _of_geometry(top: Top, molecule: Molecule, j: int, present: set[str]) -> lis
         found.append(Limit("inversion", AMMONIA_MHZ, text, at_most=True))
     electrons = sum(one.element_number for one in molecule.nuclei) - molecule.charge
     if (electrons % 2 or molecule.electronic == "odd") and "spin-rotation" not in present:
-        found.append(Limit(ELECTRON_SPIN, None, "the molecule has unpaired electrons: levels and lines are multiplets"))
+        found.append(Limit(ELECTRON_SPIN, None, _MULTIPLETS))
     return found
 
 

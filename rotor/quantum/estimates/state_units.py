@@ -9,15 +9,15 @@ label are made. `effect_units` does the same for levels that have been solved, w
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from rotor.arrays import Floats, Ints, distinct
-from rotor.quantum.coupled import NOTHING, Part, connected_parts, names_of_states, parts_of
+from rotor.quantum.coupled import NOTHING, Part, connected_parts, names_of_functions, names_of_states, parts_of
 from rotor.quantum.effect import QuantumEffect, k_limits_of
-from rotor.quantum.estimates.unit_blocks import UnitBlock, UnitBlocks, members_of, tracked_blocks
+from rotor.quantum.estimates.unit_blocks import UnitBlocks, tracked_blocks
+from rotor.quantum.estimates.unit_matrices import UnitBlock, members_of, numbered
 from rotor.quantum.labelled import unit_diagonals
 from rotor.quantum.states import OperatorOfJ, State
 from rotor.quantum.wang.basis import WangBlock, limited, wang_blocks
@@ -31,7 +31,7 @@ _LOOKED_AT = 3  # J at which all pairs of Wang blocks are tried
 Vertex = tuple[int, WangBlock]
 
 
-class _Elements(NamedTuple):
+class WangElements(NamedTuple):
     """Elements that are not zero: rows, columns, which unit matrix, values."""
 
     rows: Ints
@@ -49,8 +49,7 @@ class _Link(NamedTuple):
     operator: OperatorOfJ
 
 
-@dataclass(frozen=True)
-class _Terms:
+class _Terms(NamedTuple):
     """What parameters, by their places, multiply.
 
     powers : (q, n) of the unit matrices of every state, the first (0, 0); that of state v has the number first[v] + its place here
@@ -150,7 +149,7 @@ def state_units(
         j: [(v, cut) for v in sorted(terms.first) for block in whole[j] if (cut := _within(block, limits.get(v)))]
         for j in of_j
     }
-    elements = _elements({block for some in vertices.values() for _, block in some}, terms.powers)
+    elements = wang_elements({block for some in vertices.values() for _, block in some}, terms.powers)
 
     blocks, inside, joining = list[UnitBlock](), list[Ints](), _Joining(terms.links, representation)
     for j, rows in sorted(of_j.items(), reverse=True):
@@ -179,8 +178,10 @@ def _within(block: WangBlock, limits: tuple[int, int] | None) -> WangBlock | Non
     return limited(block, *limits) if limits else block
 
 
-def _elements(blocks: set[WangBlock], powers: Sequence[tuple[int, int]]) -> dict[WangBlock, _Elements]:
+def wang_elements(blocks: set[WangBlock], powers: Sequence[tuple[int, int]]) -> dict[WangBlock, WangElements]:
     """The unit matrices of one state, those of `powers`, over every Wang block: lower triangles."""
+    if not blocks:
+        return {}
     every = sorted(blocks)
     diagonals = unit_diagonals(every, [block.size for block in every], powers[1:])
     size = max(block.size for block in every)
@@ -199,7 +200,7 @@ def _elements(blocks: set[WangBlock], powers: Sequence[tuple[int, int]]) -> dict
     out = {}
     for number, block in enumerate(every):
         chosen = order[bounds[number] : bounds[number + 1]]
-        out[block] = _Elements(i[chosen] + d_of[chosen], i[chosen], unit[chosen], value[chosen])
+        out[block] = WangElements(i[chosen] + d_of[chosen], i[chosen], unit[chosen], value[chosen])
     return out
 
 
@@ -210,9 +211,9 @@ class _Joining:
         self._links, self._representation, self._looked = links, representation, 0
         self._kinds: set[tuple[int, int, int, int, int]] = set()
 
-    def elements(self, vertices: Sequence[Vertex], j: int) -> list[tuple[int, int, _Elements]]:
+    def elements(self, vertices: Sequence[Vertex], j: int) -> list[tuple[int, int, WangElements]]:
         """Elements between two vertices, those of the bra in rows, or within one, for every link; none for round-off of zero."""
-        found = list[tuple[int, int, _Elements]]()
+        found = list[tuple[int, int, WangElements]]()
         everywhere, self._looked = self._looked < _LOOKED_AT, self._looked + 1
         of_state: dict[int, list[tuple[int, WangBlock, int]]] = {}
         for i, (v, block) in enumerate(vertices):
@@ -231,7 +232,7 @@ class _Joining:
         return found
 
 
-def _linked(link: _Link, operator: JOperator, up: WangBlock, low: WangBlock, least: float) -> _Elements | None:
+def _linked(link: _Link, operator: JOperator, up: WangBlock, low: WangBlock, least: float) -> WangElements | None:
     """Elements between two Wang blocks; None where all are below `least`."""
     between = between_blocks(up, low, operator)
     size = np.abs(between)
@@ -242,44 +243,40 @@ def _linked(link: _Link, operator: JOperator, up: WangBlock, low: WangBlock, lea
             f"parameter of states {link.bra} and {link.ket}: the operator is not invariant under time reversal"
         )
     rows, columns = np.nonzero(size)
-    return _Elements(rows, columns, np.full(len(rows), link.unit), between.real[rows, columns])
+    return WangElements(rows, columns, np.full(len(rows), link.unit), between.real[rows, columns])
 
 
-def _shifted(elements: _Elements, part: Part, first: int) -> _Elements:
+def _shifted(elements: WangElements, part: Part, first: int) -> WangElements:
     """Of one state, where its part stands in a block."""
     rows, columns, units, values = elements
-    return _Elements(rows + part.start, columns + part.start, units + first, values)
+    return WangElements(rows + part.start, columns + part.start, units + first, values)
 
 
-def _between(elements: _Elements, up: Part, low: Part) -> _Elements:
+def _between(elements: WangElements, up: Part, low: Part) -> WangElements:
     """In the lower triangle of a block; of one state both elements of a pair are there, between two states the one alone."""
     rows, columns = elements.rows + up.start, elements.columns + low.start
     if up.v != low.v and up.start < low.start:
         rows, columns = columns, rows
     lower = rows >= columns
-    return _Elements(rows[lower], columns[lower], elements.units[lower], elements.values[lower])
+    return WangElements(rows[lower], columns[lower], elements.units[lower], elements.values[lower])
 
 
-def _block(found: Sequence[_Elements], parts: tuple[Part, ...], mix: Floats, representation: str) -> UnitBlock:
+def _block(found: Sequence[WangElements], parts: tuple[Part, ...], mix: Floats, representation: str) -> UnitBlock:
     rows, columns, units, values = (np.concatenate(column) for column in zip(*found, strict=True))
     size = parts[-1].place.stop
-    places, of_place = np.unique(rows * size + columns, return_inverse=True)
-    used, of_unit = np.unique(units, return_inverse=True)
+    places, of_place = numbered(rows * size + columns, size * size)
+    used, of_unit = numbered(units, len(mix))
     factors = np.zeros((len(places), len(used)))
     np.add.at(factors, (of_place, of_unit), values)
-    parameters = np.flatnonzero(mix[used].any(axis=0))
+    of_used = mix[used]
+    parameters = np.flatnonzero(of_used.any(axis=0))
     sub_blocks = np.repeat(np.arange(len(parts)), [part.basis.size for part in parts])
 
     def namer(matrix: Floats, energies: Floats, vectors: Floats) -> Ints:
-        symmetric = np.tril(matrix) + np.tril(matrix, -1).T
-        return names_of_states(parts, symmetric, vectors, representation)[0]
+        if len(parts) == 1:
+            return names_of_functions(parts, representation)
+        return names_of_states(parts, matrix, vectors, representation)[0]  # of the matrix the lower triangle is read
 
     return UnitBlock(
-        size,
-        *np.divmod(places, size),
-        factors,
-        mix[np.ix_(used, parameters)],
-        parameters,
-        members_of(sub_blocks),
-        namer,
+        size, *np.divmod(places, size), factors, of_used[:, parameters], parameters, members_of(sub_blocks), namer
     )

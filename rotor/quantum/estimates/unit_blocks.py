@@ -14,102 +14,56 @@ stays state n; where they are not, the names are made anew.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor.arrays import Floats, Ints, distinct
-
-Namer = Callable[[Floats, Floats, Floats], Ints]  # matrix, energies, vectors -> names (n, columns) of the states
+from rotor.arrays import Floats, Ints, Workspace
+from rotor.quantum.estimates.unit_matrices import Namer, UnitBlock
 
 _AT_ONCE = 1 << 18  # numbers of the largest array of blocks side by side: 2 MB, which stays in the cache of a core
 
 _CLEAR = 0.8  # share of a sub-block in a state, above which it and the rank by energy in it make the name
+_LIKE = 1.5  # sizes of blocks that stand side by side
 
 _ALIKE = 1e-13  # of the width of a block: energies that differ less are one, such as doublets of high K
 
 
-@dataclass(frozen=True)
-class UnitBlock:
-    """One block: size, places (row, column, row ≥ column) of elements, their factors (elements, units), which parameters.
-
-    mix (units, parameters) : how much of each unit matrix a parameter has
-    members (sub-blocks, functions) : 1 where a function is in a sub-block
-    namer : names of all states, where they must be made
-    """
-
-    size: int
-    rows: Ints
-    columns: Ints
-    factors: Floats
-    mix: Floats
-    parameters: Ints
-    members: Floats
-    namer: Namer
-
-
-class Elements(NamedTuple):
-    """Elements of a matrix that are not zero, of its lower triangle: places row * size + column, rising, and values."""
-
-    places: Ints
-    values: Floats
-
-
-def elements_of(matrix: Floats) -> Elements:
-    """Of a dense matrix (size, size).
-
-    >>> elements_of(np.array([[1.0, 9.0], [0.0, 2.0]])).places.tolist()
-    [0, 3]
-    """
-    places = np.flatnonzero(matrix)
-    rows, columns = np.divmod(places, matrix.shape[1])
-    places = places[rows >= columns]
-    return Elements(places, matrix.ravel()[places])
-
-
-def unit_block(units: dict[int, Elements], sub_blocks: Ints, namer: Namer) -> UnitBlock:
-    """From the unit matrix of every parameter, by its number, that acts in the block."""
-    parameters, size = sorted(units), len(sub_blocks)
-    diagonal = np.arange(size) * (size + 1)
-    places = distinct(np.concatenate([diagonal, *(units[i].places for i in parameters)]))
-    factors = np.zeros((len(places), len(parameters)))
-    for column, i in enumerate(parameters):
-        factors[np.searchsorted(places, units[i].places), column] = units[i].values
-    rows, columns = np.divmod(places, size)
-    numbers = np.array(parameters, dtype=np.int64)
-    return UnitBlock(size, rows, columns, factors, np.eye(len(parameters)), numbers, members_of(sub_blocks), namer)
-
-
-def members_of(sub_blocks: Ints) -> Floats:
-    """1 where a function (columns) is in a sub-block (rows), from the number of the sub-block of every function."""
-    return np.asarray(sub_blocks[None, :] == np.arange(sub_blocks.max(initial=0) + 1)[:, None], dtype=float)
-
-
-@dataclass(frozen=True)
-class _Solved:
-    """Blocks side by side: matrices (lower triangles, less `zero` on the diagonal), energies, vectors."""
+class _Solved(NamedTuple):
+    """Blocks side by side: all matrices (lower triangles, less `zero` on the diagonal) one behind the other, energies (blocks, size), NaN
+    beyond a block, vectors (blocks, size, size), 0 beyond a block."""
 
     matrices: Floats
     energies: Floats
     vectors: Floats
 
 
-@dataclass(frozen=True)
-class _Stack:
-    """Blocks of one size side by side, padded with elements that are 0.
+class _Stack(NamedTuple):
+    """Blocks of like size, in order of size, side by side, padded with elements that are 0.
 
-    places (blocks, elements) : in all matrices one behind the other, the place behind them where padded. twice : 2 off the diagonal
-    rows, columns, factors, mix, parameters, members : as of the blocks; padded parameters are the one behind all, whose value is 0
+    size, sizes : of the largest block, of each
+    runs : of blocks of one size the first, the one behind the last, and the size
+    offsets (blocks + 1,) : where each matrix begins, all of them one behind the other
+    places (blocks, elements) : in all matrices, the place behind them where padded
+    diagonal : the places of all diagonals
+    rows, columns (blocks, elements) : as of the blocks, counted through all of them, `size` for each
+    half, factors, mix, parameters, members : half is 1 on the diagonal, else 1/2, and factors are those of the blocks over it; padded
+    parameters are the one behind all, whose value is 0
     """
 
     size: int
+    sizes: Ints
+    runs: tuple[tuple[int, int, int], ...]
+    offsets: Ints
     places: Ints
+    diagonal: Ints
     rows: Ints
     columns: Ints
-    twice: Floats
+    half: Floats
     factors: Floats
     mix: Floats
     parameters: Ints
@@ -117,38 +71,59 @@ class _Stack:
 
     @classmethod
     def of(cls, blocks: Sequence[UnitBlock]) -> _Stack:
-        count, size = len(blocks), blocks[0].size
+        sizes = np.array([block.size for block in blocks])
+        count, size, offsets = len(blocks), int(sizes[-1]), np.cumsum([0, *(sizes**2).tolist()])
         most, units = max(len(b.rows) for b in blocks), max(b.factors.shape[1] for b in blocks)
         acting, parts = max(len(b.parameters) for b in blocks), max(len(b.members) for b in blocks)
-        places = np.full((count, most), count * size * size)
+        places, half = np.full((count, most), offsets[-1]), np.ones((count, most))
         rows, columns = np.zeros((2, count, most), dtype=np.int64)
         factors, mix = np.zeros((count, most, units)), np.zeros((count, units, acting))
         parameters, members = np.full((count, acting), -1), np.zeros((count, parts, size))
         for b, block in enumerate(blocks):
             n = len(block.rows)
-            places[b, :n] = (b * size + block.rows) * size + block.columns
+            places[b, :n] = offsets[b] + block.rows * block.size + block.columns
             rows[b, :n], columns[b, :n] = block.rows, block.columns
-            factors[b, :n, : block.factors.shape[1]] = block.factors
+            half[b, :n][block.rows != block.columns] = 0.5
+            factors[b, :n, : block.factors.shape[1]] = block.factors / half[b, :n, None]
             mix[b, : block.mix.shape[0], : block.mix.shape[1]] = block.mix
             parameters[b, : len(block.parameters)] = block.parameters
-            members[b, : len(block.members)] = block.members
-        twice = np.where(rows == columns, 1.0, 2.0)
-        return cls(size, places, rows, columns, twice, factors, mix, parameters, members)
+            members[b, : len(block.members), : block.size] = block.members
+        diagonal = np.concatenate([start + np.arange(n) * (n + 1) for start, n in zip(offsets, sizes, strict=False)])
+        first = size * np.arange(count)[:, None]
+        bounds = [0, *(1 + np.flatnonzero(np.diff(sizes))).tolist(), count]
+        runs = tuple((i, k, int(sizes[i])) for i, k in pairwise(bounds))
+        return cls(
+            size, sizes, runs, offsets, places, diagonal, rows + first, columns + first, half, factors, mix, parameters,
+            members,
+        )  # fmt: skip
 
-    def solved(self, values_mhz: Floats) -> _Solved:
+    def solved(self, values_mhz: Floats, space: Workspace) -> _Solved:
         """A number is taken off each diagonal for the sake of digits, and added to the energies."""
-        count, size = len(self.rows), self.size
+        count, size = self.rows.shape[0], self.size
         values = np.append(values_mhz, 0.0)[self.parameters]
-        of_units = self.mix @ values[:, :, None]
-        whole = np.zeros(count * size * size + 1)
-        whole[self.places] = (self.factors @ of_units)[:, :, 0]
-        matrices = whole[:-1].reshape(count, size, size)
-        zero = matrices[:, 0, 0].copy()
-        matrices.reshape(count, -1)[:, :: size + 1] -= zero[:, None]
-        if not np.isfinite(whole[:-1].sum()):
+        elements = (self.factors @ (self.mix @ values[:, :, None]))[:, :, 0]
+        elements *= self.half
+        whole = space.array("matrices", int(self.offsets[-1]) + 1)
+        whole.fill(0.0)
+        whole[self.places] = elements
+        if not np.isfinite(whole.sum()):
             raise ValueError("a block of the Hamiltonian is not finite with these constants")
-        energies, vectors = np.linalg.eigh(matrices)
-        return _Solved(matrices, energies + zero[:, None], vectors)
+        zero = whole[self.offsets[:-1]]
+        whole[self.diagonal] -= np.repeat(zero, self.sizes)
+        energies = np.full((count, size), np.nan)
+        vectors = space.array("vectors", count, size, size)
+        vectors[:, self.runs[0][2] :, :] = vectors[:, :, self.runs[0][2] :] = 0.0
+        for first, stop, n in self.runs:
+            some = whole[self.offsets[first] : self.offsets[stop]].reshape(stop - first, n, n)
+            energies[first:stop, :n], vectors[first:stop, :n, :n] = np.linalg.eigh(some)
+        energies += zero[:, None]
+        return _Solved(whole, energies, vectors)
+
+    def names(self, solved: _Solved, place: int, namer: Namer) -> Ints:
+        """The names of the states of one block."""
+        n = int(self.sizes[place])
+        matrix = solved.matrices[self.offsets[place] : self.offsets[place + 1]].reshape(n, n)
+        return namer(matrix, solved.energies[place, :n], solved.vectors[place, :n, :n])
 
     def leading(self, solved: _Solved) -> tuple[Ints, Floats]:
         """The sub-block with the largest share of each state, (blocks, size), and that share; of two states that round-off alone tells
@@ -157,20 +132,21 @@ class _Stack:
             return np.zeros(solved.energies.shape, dtype=np.int64), np.ones(solved.energies.shape)
         shares = self.members @ solved.vectors**2
         found, largest = np.asarray(shares.argmax(axis=1)), np.asarray(shares.max(axis=1))
-        whole = solved.energies[:, -1:] - solved.energies[:, :1]
+        whole = np.nanmax(solved.energies, axis=1, keepdims=True) - solved.energies[:, :1]
         turned = (np.diff(solved.energies, axis=1) <= _ALIKE * whole) & (found[:, :-1] > found[:, 1:])
         turned[:, 1:] &= ~turned[:, :-1]
         block, place = np.nonzero(turned)
         found[block, place], found[block, place + 1] = found[block, place + 1], found[block, place]
         return found, largest
 
-    def slopes(self, vectors: Floats, states: Ints) -> Floats:
+    def slopes(self, vectors: Floats, states: Ints, space: Workspace) -> Floats:
         """⟨n|O_i|n⟩ (blocks, states, parameters of the blocks) of some states (blocks, states)."""
-        chosen = np.take_along_axis(vectors, states[:, None, :], axis=2)
-        block = np.arange(len(states))[:, None]
-        weights = chosen[block, self.rows]
-        weights *= chosen[block, self.columns]
-        weights *= self.twice[:, :, None]
+        (count, most), size, elements = states.shape, self.size, self.rows.shape[1]
+        places = (size * size * np.arange(count)[:, None, None] + size * np.arange(size)[:, None]) + states[:, None, :]
+        chosen = vectors.ravel().take(places, out=space.array("chosen", count, size, most), mode="clip")
+        by_function = chosen.reshape(count * size, most)
+        weights = by_function.take(self.rows, axis=0, out=space.array("weights", count, elements, most), mode="clip")
+        weights *= by_function.take(self.columns, axis=0, out=space.array("others", count, elements, most), mode="clip")
         return np.asarray(weights.transpose(0, 2, 1) @ self.factors @ self.mix)
 
 
@@ -185,8 +161,7 @@ class AtStart(NamedTuple):
     shares: Floats
 
 
-@dataclass(frozen=True)
-class Tracked:
+class Tracked(NamedTuple):
     """Labels in a block: their places among all, the names and the states that they have."""
 
     block: UnitBlock
@@ -197,15 +172,16 @@ class Tracked:
 
 
 def _stacks(blocks: Sequence[UnitBlock]) -> list[Ints]:
-    """Positions of the blocks that are worked on together: of one size, of like numbers of elements, of bounded memory."""
+    """Positions of the blocks that are worked on together: of like size, of like numbers of elements, of bounded memory."""
     order = sorted(range(len(blocks)), key=lambda i: (blocks[i].size, len(blocks[i].rows), blocks[i].factors.shape[1]))
-    out, some = list[Ints](), list[int]()
+    out, some, least, most = list[Ints](), list[int](), 0, 0
     for i in order:
         block = blocks[i]
-        width = max(block.factors.shape[1], block.size)
-        if some and (block.size != blocks[some[0]].size or (len(some) + 1) * len(block.rows) * width > _AT_ONCE):
+        most = max(most, len(block.rows) * max(block.factors.shape[1], block.size))
+        if some and (block.size > _LIKE * least or (len(some) + 1) * most > _AT_ONCE):
             out.append(np.array(some))
-            some = []
+            some, most = [], len(block.rows) * max(block.factors.shape[1], block.size)
+        least = block.size if not some else least
         some.append(i)
     return [*out, np.array(some)] if some else out
 
@@ -229,22 +205,19 @@ def tracked_blocks(
     UnitBlocks
         Blocks in which labels lie.
     """
-    tracked = list[Tracked]()
+    tracked, space = list[Tracked](), Workspace()
     for numbers in _stacks(blocks):
         stack = _Stack.of([blocks[i] for i in numbers.tolist()])
-        solved = stack.solved(values_mhz)
-        named = [
-            blocks[i].namer(solved.matrices[place], solved.energies[place], solved.vectors[place])
-            for place, i in enumerate(numbers.tolist())
-        ]
+        solved = stack.solved(values_mhz, space)
+        named = [stack.names(solved, place, blocks[i].namer) for place, i in enumerate(numbers.tolist())]
         found = [find(i, names) for i, names in zip(numbers.tolist(), named, strict=True)]
-        slopes = stack.slopes(solved.vectors, _padded([states for _, states in found], 0))
+        slopes = stack.slopes(solved.vectors, _padded([states for _, states in found], 0), space)
         leading, shares = stack.leading(solved)
         for place, (rows, states) in enumerate(found):
             if len(rows):
                 block = blocks[numbers[place]]
                 own = slopes[place, : len(rows), : len(block.parameters)]
-                of_states = leading[place], shares[place]
+                of_states = leading[place, : block.size], shares[place, : block.size]
                 start = AtStart(values_mhz[block.parameters], solved.energies[place, states], own, *of_states)
                 tracked.append(Tracked(block, rows, named[place][states], states, start))
     return UnitBlocks(count, tuple(tracked))
@@ -258,7 +231,12 @@ def _padded(rows: Sequence[Ints], fill: int) -> Ints:
     return out
 
 
-@dataclass(frozen=True)
+def _filled(values: Floats, count: int) -> Floats:
+    """Values (n,) with zeros behind them."""
+    return np.concatenate([values, np.zeros(count - len(values))])
+
+
+@dataclass(frozen=True, eq=False)
 class _Labelled:
     """A stack with the labels in it: rows (blocks, labels), the place behind all where padded; states (blocks, labels)."""
 
@@ -271,41 +249,49 @@ class _Labelled:
     @classmethod
     def of(cls, tracked: Sequence[Tracked]) -> _Labelled:
         rows, states = _padded([one.rows for one in tracked], -1), _padded([one.states for one in tracked], 0)
-        leading = np.stack([one.start.leading for one in tracked])
+        leading = _padded([one.start.leading for one in tracked], 0)
         return cls(_Stack.of([one.block for one in tracked]), tuple(tracked), rows, states, leading)
 
     @cached_property
     def _at_start(self) -> Ints:
         return self._ranks(self.leading)
 
-    def levels(self, values_mhz: Floats) -> tuple[Floats, Floats]:
+    def levels(self, values_mhz: Floats, space: Workspace) -> tuple[Floats, Floats]:
         """Energies (blocks, labels) and derivatives (blocks, labels, parameters of the blocks)."""
-        solved = self.stack.solved(values_mhz)
+        solved = self.stack.solved(values_mhz, space)
         states = self._states(solved)
-        return np.take_along_axis(solved.energies, states, axis=1), self.stack.slopes(solved.vectors, states)
+        return np.take_along_axis(solved.energies, states, axis=1), self.stack.slopes(solved.vectors, states, space)
 
     def _states(self, solved: _Solved) -> Ints:
-        """The states that have the labels now; names are made anew only where a state is mostly in another sub-block."""
+        """The states that have the labels now; names are made anew where a state is mostly in another sub-block, and where sub-blocks
+        share one now or did so at the start: names are those of these constants, whatever the way to them was."""
         leading, shares = self.stack.leading(solved)
-        moved = ((self._ranks(leading) != self._at_start) & (self.rows >= 0)).any(axis=1)
-        moved |= self._unclear_at_start | self._unclear(leading, shares)
+        moved = self._unclear_at_start | self._unclear(shares)
+        if (self._below & (leading != self.leading)).any():
+            moved |= ((self._ranks(leading) != self._at_start) & (self.rows >= 0)).any(axis=1)
         if not moved.any():
             return self.states
         states = self.states.copy()
         for b in np.flatnonzero(moved).tolist():
             one = self.tracked[b]
-            made = one.block.namer(solved.matrices[b], solved.energies[b], solved.vectors[b])
+            made = self.stack.names(solved, b, one.block.namer)
             states[b, : len(one.rows)] = _states_of(made, one.names)
         return states
 
     @cached_property
     def _unclear_at_start(self) -> NDArray[np.bool_]:
-        return self._unclear(self.leading, np.stack([one.start.shares for one in self.tracked]))
+        return self._unclear(np.stack([_filled(one.start.shares, self.stack.size) for one in self.tracked]))
 
-    def _unclear(self, leading: Ints, shares: Floats) -> NDArray[np.bool_]:
+    def _unclear(self, shares: Floats) -> NDArray[np.bool_]:
         """Blocks (blocks,) with a labelled state that no sub-block has most of: its sub-block and rank do not make its name."""
         own = np.take_along_axis(shares, self.states, axis=1)
         return np.asarray(((own < _CLEAR) & (self.rows >= 0)).any(axis=1))
+
+    @cached_property
+    def _below(self) -> NDArray[np.bool_]:
+        """The states (blocks, size) up to the highest one with a label."""
+        highest = np.where(self.rows >= 0, self.states, -1).max(axis=1)
+        return np.asarray(np.arange(self.stack.size) <= highest[:, None])
 
     def _ranks(self, leading: Ints) -> Ints:
         """The sub-blocks of the labelled states and their places by energy in these, as one number each (blocks, labels).
@@ -341,6 +327,10 @@ class UnitBlocks:
         return np.concatenate([one.rows for one in self.tracked]) if self.tracked else np.zeros(0, dtype=np.int64)
 
     @cached_property
+    def _space(self) -> Workspace:
+        return Workspace()
+
+    @cached_property
     def _labelled(self) -> list[_Labelled]:
         numbers = _stacks([one.block for one in self.tracked])
         return [_Labelled.of([self.tracked[i] for i in some.tolist()]) for some in numbers]
@@ -352,7 +342,7 @@ class UnitBlocks:
         energies = np.full(self.count + 1, np.nan)  # padded labels and parameters go to the last place
         slopes = np.zeros((self.count + 1, len(values_mhz) + 1))
         for one in self._labelled:
-            found, derived = one.levels(values_mhz)
+            found, derived = one.levels(values_mhz, self._space)
             energies[one.rows] = found
             slopes[one.rows[:, :, None], one.stack.parameters[:, None, :]] = derived
         return energies[:-1], slopes[:-1, :-1]
@@ -370,6 +360,6 @@ def joined(parts: Sequence[tuple[UnitBlocks, Ints, Ints]], count: int) -> UnitBl
     tracked = list[Tracked]()
     for blocks, rows, columns in parts:
         for one in blocks.tracked:
-            block = replace(one.block, parameters=columns[one.block.parameters])
-            tracked.append(replace(one, block=block, rows=rows[one.rows]))
+            block = one.block._replace(parameters=columns[one.block.parameters])
+            tracked.append(one._replace(block=block, rows=rows[one.rows]))
     return UnitBlocks(count, tuple(tracked))

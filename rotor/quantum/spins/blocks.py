@@ -21,8 +21,9 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum.effect import QuantumEffect
-from rotor.quantum.spins.contraction import Stack, operators_of_stacks, stacks_of
+from rotor.quantum.spins.contraction import Contracted, Stack, by_numbers, operators_of_stacks, stacks_of
 from rotor.quantum.spins.coupling import coefficients, for_every_f, n_dot_s
+from rotor.quantum.spins.many_f import Group
 from rotor.quantum.spins.method import FIRST_ORDER, Used
 from rotor.quantum.spins.operators import AxialState
 from rotor.quantum.spins.parts import SpinPart, labels_of, named_states, names_of_parts
@@ -66,6 +67,7 @@ class SpinBlock:
 
     patterns: all coupling patterns of the F, doubled. labels: (n, columns) v, Ka (K of an axial top), Kc, the doubled pattern N, J ... F
     of states. mixing: (n,) shares of the sub-blocks that name them. start: row of the first state. allowed: the functions that are there.
+    group: blocks of other F that it was solved with.
     """
 
     twice_f: int
@@ -78,6 +80,7 @@ class SpinBlock:
     shared: Shared
     start: int = 0
     allowed: Allowed | None = None
+    group: Group | None = field(default=None, repr=False, compare=False)
 
     @cached_property
     def single(self) -> bool:
@@ -98,12 +101,14 @@ class Plan:
     """Solved rotation, operators of every channel by pairs of blocks (i ≥ k), and which blocks are connected.
 
     families: members (block, class), the class 1 of functions that change sign with the exchange of two equivalent spins.
+    contracted: the same operators in stacks, each with the channels that share it, where they were made so.
     """
 
     shared: Shared
     blocks: list[RotorBlock]
     operators: dict[tuple[int, int], dict[Channel, Floats]]
     families: list[list[tuple[int, int]]]
+    contracted: list[tuple[list[Contracted], list[Channel]]] | None = field(default=None, repr=False)
 
     @cached_property
     def grouped(self) -> dict[tuple[int, int], list[tuple[Floats, list[Channel]]]]:
@@ -112,8 +117,11 @@ class Plan:
 
     def with_method(self, used: Used, operators: dict[tuple[int, int], dict[Channel, Floats]]) -> Plan:
         """The same rotation with some of the operators, and what that is called."""
+        shared = replace(self.shared, used=used)
+        if operators is self.operators:
+            return replace(self, shared=shared)
         families = _families(len(self.blocks), operators, max(self.shared.scheme.equivalent, 1))
-        return Plan(replace(self.shared, used=used), self.blocks, operators, families)
+        return Plan(shared, self.blocks, operators, families)
 
 
 def plan_of(top: Top, effects: tuple[QuantumEffect, ...], nmin: int, nmax: int, executor: Executor | None) -> Plan:
@@ -140,32 +148,33 @@ def plan_of(top: Top, effects: tuple[QuantumEffect, ...], nmin: int, nmax: int, 
     distinct = {first: channels[first] for first in firsts.values()}
     reach = 0 if "n" in scheme.conserved else 2
     stacks = None if _are_axial(blocks) else stacks_of(blocks)
+    contracted = None
     if stacks is None:
         between = {
             (i, k): operators_between(blocks[i], blocks[k], distinct, representation) for i, k in _near(blocks, reach)
         }
     else:
-        between = _operators(stacks, reach, distinct, representation)
+        found = {c: operators_of_stacks(stacks, min(reach, c.rank), x, representation) for c, x in distinct.items()}
+        contracted = [(found[c], [other for other, first in firsts.items() if first == c]) for c in distinct]
+        between = _by_pairs(found)
     operators = {
-        pair: {channel: found[first] for channel, first in firsts.items() if first in found}
-        for pair, found in between.items()
-        if found
+        pair: {channel: own[first] for channel, first in firsts.items() if first in own}
+        for pair, own in between.items()
+        if own
     }
     families = _families(len(blocks), operators, max(scheme.equivalent, 1))
-    return Plan(Shared(scheme, representation, stacks), blocks, operators, families)
+    return Plan(Shared(scheme, representation, stacks), blocks, operators, families, contracted)
 
 
 def _are_axial(blocks: list[RotorBlock]) -> bool:
     return isinstance(blocks[0].parts[0].basis, AxialState)
 
 
-def _operators(
-    stacks: list[Stack], reach: int, channels: Channels, representation: str
-) -> dict[tuple[int, int], dict[Channel, Floats]]:
-    """`operators_between` of all blocks whose N differ by `reach` at most."""
+def _by_pairs(of_channels: dict[Channel, list[Contracted]]) -> dict[tuple[int, int], dict[Channel, Floats]]:
+    """The same by pairs of blocks."""
     out: dict[tuple[int, int], dict[Channel, Floats]] = {}
-    for channel, pieces in channels.items():
-        for pair, operator in operators_of_stacks(stacks, min(reach, channel.rank), pieces, representation).items():
+    for channel, found in of_channels.items():
+        for pair, operator in by_numbers(found).items():
             out.setdefault(pair, {})[channel] = operator
     return out
 
@@ -241,8 +250,10 @@ def _families(
 def solve_f(plan: Plan, twice_f: int, exist: Exist | None = None) -> list[SpinBlock]:
     """The blocks of one F, those left out in which no level exists by `exist` (see `levels_of_f`)."""
     every = plan.shared.scheme.patterns(twice_f)
-    known = plan.shared.cache.pop(("coupling", twice_f), None) or _couplings(plan, {twice_f: every})[twice_f]
-    blocks = list(_parts_of_f(plan, every))
+    known = plan.shared.cache.pop(("coupling", twice_f), None) or couplings(plan, {twice_f: every})[twice_f]
+    blocks = list(parts_of_f(plan, every))
+    if not blocks:  # N of the first K (KNMIN) is above every N of this F
+        return []
     names, sizes = names_of_parts([part for parts in blocks for part in parts], every)
     there = np.ones(len(names), dtype=bool) if exist is None else exist(names)
     out, start, first = [], 0, 0
@@ -254,7 +265,7 @@ def solve_f(plan: Plan, twice_f: int, exist: Exist | None = None) -> list[SpinBl
     return out
 
 
-def _parts_of_f(plan: Plan, every: Ints) -> Iterator[tuple[SpinPart, ...]]:
+def parts_of_f(plan: Plan, every: Ints) -> Iterator[tuple[SpinPart, ...]]:
     """The parts of every block of an F whose patterns these are."""
     n, classes = every[:, 0] // 2, plan.shared.scheme.classes(every)
     bounds = [0, *(np.flatnonzero((n[1:] != n[:-1]) | (classes[1:] != classes[:-1])) + 1).tolist(), len(every)]
@@ -269,9 +280,9 @@ def functions_of_f(plan: Plan, twice_f: int) -> list[SpinBlock]:
     """The functions of the blocks of one F, each named after its state of the rotation, with the energy of that; no vectors."""
     every = plan.shared.scheme.patterns(twice_f)
     if ("coupling", twice_f) not in plan.shared.cache:
-        plan.shared.cache["coupling", twice_f] = _couplings(plan, {twice_f: every})[twice_f]
+        plan.shared.cache["coupling", twice_f] = couplings(plan, {twice_f: every})[twice_f]
     out = []
-    for parts in _parts_of_f(plan, every):
+    for parts in parts_of_f(plan, every):
         energies = np.concatenate([np.tile(part.rotor.energies_mhz, part.repeats) for part in parts])
         labels = np.concatenate([_labels_of_functions(part, every[part.patterns]) for part in parts])
         ones = np.ones(len(energies))
@@ -285,29 +296,30 @@ def _labels_of_functions(part: SpinPart, own_patterns: Ints) -> Ints:
 
 
 def prepare(plan: Plan, every_f: Iterable[int]) -> None:
-    """Coefficients of all channels for many F at once; those of patterns with a total spin are made F by F."""
+    """Coefficients of all channels for many F at once, by F; those of patterns with a total spin are made F by F."""
     scheme = plan.shared.scheme
     if scheme.equivalent:
         return
     tables = {f: scheme.patterns(f) for f in every_f}
     plan.shared.cache["patterns"] = tables
     if max(map(len, plan.shared.cache["patterns"].values()), default=0) <= _FEW:
-        found = _couplings(plan, tables)
+        found = couplings(plan, tables)
         plan.shared.cache.update({("coupling", f): own for f, own in found.items()})
 
 
-def _couplings(plan: Plan, tables: dict[int, Ints]) -> dict[int, dict[Channel, Floats]]:
+def couplings(plan: Plan, tables: dict[int, Ints]) -> dict[int, dict[Channel, Floats]]:
     """c(p', p) of all channels by F."""
-    scheme = plan.shared.scheme
     acting = {channel for operators in plan.operators.values() for channel in operators}
-    if scheme.equivalent:
-        return {f: {c: coefficients_of(scheme, c, own) for c in acting} for f, own in tables.items()}
-    both = {f: (own, own) for f, own in tables.items()}
-    found = {
-        channel: for_every_f(both, lambda bra, ket, channel=channel: _between(scheme, channel, bra, ket))  # type: ignore[misc]
-        for channel in acting
-    }
+    found = {channel: couplings_of(plan.shared.scheme, channel, tables) for channel in acting}
     return {f: {channel: own[f] for channel, own in found.items()} for f in tables}
+
+
+def couplings_of(scheme: Scheme, channel: Channel, tables: dict[int, Ints]) -> dict[int, Floats]:
+    """c(p', p) of a channel by F, whose patterns these are."""
+    if scheme.equivalent:
+        return {f: coefficients_of(scheme, channel, own) for f, own in tables.items()}
+    both = {f: (own, own) for f, own in tables.items()}
+    return for_every_f(both, lambda bra, ket: _between(scheme, channel, bra, ket))
 
 
 def _parts(plan: Plan, members: list[tuple[int, slice]]) -> tuple[SpinPart, ...]:

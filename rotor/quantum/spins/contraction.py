@@ -8,6 +8,7 @@ N, and are contracted by one product of matrices. Pair by pair the same is `roto
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -32,15 +33,18 @@ class Section(NamedTuple):
 
 
 class Stack(NamedTuple):
-    """Solved blocks of rising N: their numbers, N, eigenvectors (blocks, rows, states) with zeros beyond a block, how many states
-    each has, and its own eigenvectors."""
+    """Solved blocks of rising N: which states and Wang functions are in them, as a number, their own numbers, N, eigenvectors
+    (blocks, rows, states) with zeros beyond a block, how many states each has, its own eigenvectors, and its energies."""
 
+    kind: int
     numbers: Ints
     n: Ints
     sections: tuple[Section, ...]
     vectors: Floats
     sizes: list[int]
     own: list[Floats]
+    energies_mhz: list[Floats]
+    single: list[bool]
 
 
 class Pairs(NamedTuple):
@@ -65,13 +69,27 @@ Element = tuple[Section, Section, Floats]
 """Elements (pairs, functions', functions) between two sections."""
 
 
+class Contracted(NamedTuple):
+    """Elements between the states of pairs of blocks of two stacks: (pairs, states', states), zeros beyond a block."""
+
+    up: Stack
+    low: Stack
+    pairs: Pairs
+    matrices: Floats
+
+    def turned(self, sign: float) -> Contracted:
+        """The other way round, times a sign."""
+        return Contracted(self.low, self.up, self.pairs.turned(), sign * self.matrices.transpose(0, 2, 1))
+
+
 def stacks_of(blocks: Sequence[RotorBlock]) -> list[Stack]:
     """All blocks, whose functions are those of Wang blocks, in stacks of like shapes."""
     alike: dict[tuple[tuple[int, int, int], ...], list[int]] = {}
     for number, block in enumerate(blocks):
         key = tuple((part.v, part.basis.first_k, part.basis.sign) for part in block.parts)  # type: ignore[union-attr]
         alike.setdefault(key, []).append(number)
-    return [_stack(blocks, some) for members in alike.values() for some in _of_like_size(blocks, members)]
+    of_kinds = enumerate(alike.values())
+    return [_stack(blocks, kind, some) for kind, members in of_kinds for some in _of_like_size(blocks, members)]
 
 
 def _of_like_size(blocks: Sequence[RotorBlock], members: list[int]) -> Iterator[list[int]]:
@@ -84,7 +102,7 @@ def _of_like_size(blocks: Sequence[RotorBlock], members: list[int]) -> Iterator[
     yield some
 
 
-def _stack(blocks: Sequence[RotorBlock], numbers: list[int]) -> Stack:
+def _stack(blocks: Sequence[RotorBlock], kind: int, numbers: list[int]) -> Stack:
     own = [blocks[number] for number in numbers]
     sections, start = [], 0
     for parts in zip(*(block.parts for block in own), strict=True):
@@ -99,19 +117,22 @@ def _stack(blocks: Sequence[RotorBlock], numbers: list[int]) -> Stack:
             first = section.rows.start
             vectors[place, first : first + part.basis.size, :states] = block.vectors[part.place]
     return Stack(
+        kind,
         np.array(numbers),
         np.array([block.n for block in own]),
         tuple(sections),
         vectors,
         sizes,
         [block.vectors for block in own],
+        [block.energies_mhz for block in own],
+        [len(block.energies_mhz) == 1 or any(part.basis.size == 1 for part in block.parts) for block in own],
     )
 
 
 def operators_of_stacks(
     stacks: Sequence[Stack], reach: int, pieces: Sequence[Piece], representation: str
-) -> dict[tuple[int, int], Floats]:
-    """Σ value ⟨r'‖X‖r⟩ by the numbers of two blocks (i ≥ k) whose N differ by `reach` at most, where it is not zero.
+) -> list[Contracted]:
+    """Σ value ⟨r'‖X‖r⟩ between blocks whose N differ by `reach` at most, each pair once, the one of the higher number first.
 
     Parameters
     ----------
@@ -126,24 +147,27 @@ def operators_of_stacks(
 
     Returns
     -------
-    dict of (int, int) to (n', n) array
+    list of Contracted
         In MHz, as `rotor.in_both_orders` gives them.
     """
 
     between = [piece for piece in pieces if piece.bra != piece.ket]
-    out: dict[tuple[int, int], Floats] = {}
+    out = []
     for up, low, pairs in _near(stacks, reach):
         found = _contracted(up, low, pairs, _of_pieces(pieces, up, low, pairs, representation))
-        back = _contracted(low, up, pairs.turned(), _of_pieces(between, low, up, pairs.turned(), representation))
-        for pair in {**found, **{pair[::-1]: None for pair in back}}:
-            turned = (-1.0) ** pairs.rise * back[pair[::-1]].T if pair[::-1] in back else None
-            there = found.get(pair)
-            out[pair] = there if turned is None else turned if there is None else there + turned  # type: ignore[assignment]
+        if between:
+            turned = pairs.turned()
+            back = _contracted(low, up, turned, _of_pieces(between, low, up, turned, representation))
+            if back is not None:
+                back = back.turned((-1.0) ** pairs.rise)
+                found = back if found is None else found._replace(matrices=found.matrices + back.matrices)
+        if found is not None:
+            out.append(found)
     return out
 
 
-def tensor_elements_of_stacks(stacks: Sequence[Stack], tensors: Tensors) -> dict[tuple[int, int], Floats]:
-    """⟨r'‖T‖r⟩ by the numbers of two blocks, both ways round, where it is not zero.
+def tensors_of_stacks(stacks: Sequence[Stack], tensors: Tensors) -> list[Contracted]:
+    """⟨r'‖T‖r⟩ between blocks, both ways round.
 
     Parameters
     ----------
@@ -154,24 +178,35 @@ def tensor_elements_of_stacks(stacks: Sequence[Stack], tensors: Tensors) -> dict
 
     Returns
     -------
-    dict of (int, int) to (n', n) array
-        In the unit of the tensors.
+    list of Contracted
+        In the unit of the tensors; of a block with itself the last one counts.
     """
     rank = rank_of(tensors)
 
     alike = all(tensors.get((v, w), tensor) == tensor for (w, v), tensor in tensors.items())
-    there: dict[tuple[int, int], Floats] = {}
-    back: dict[tuple[int, int], Floats] = {}
+    there, back = list[Contracted | None](), list[Contracted | None]()
     for up, low, pairs in _near(stacks, rank):
         found = _contracted(up, low, pairs, _of_tensors(tensors, up, low, pairs))
-        there |= found
+        there.append(found)
         if alike:
-            sign = (-1.0) ** (pairs.rise + rank)
-            back |= {(k, i): sign * x.T for (i, k), x in found.items() if i != k}
+            back.append(None if found is None else found.turned((-1.0) ** (pairs.rise + rank)))
         else:
             turned = pairs.turned()
-            back |= _contracted(low, up, turned, _of_tensors(tensors, low, up, turned))
-    return back | there
+            back.append(_contracted(low, up, turned, _of_tensors(tensors, low, up, turned)))
+    return [found for found in (*back, *there) if found is not None]
+
+
+def by_numbers(found: Sequence[Contracted]) -> dict[tuple[int, int], Floats]:
+    """The (n', n) elements of every pair of blocks by their numbers, those that are zero left out."""
+    out = {}
+    for up, low, pairs, matrices in found:
+        acting: list[bool] = matrices.any(axis=(1, 2)).tolist()  # type: ignore[assignment]
+        numbers = zip(up.numbers[pairs.up].tolist(), low.numbers[pairs.low].tolist(), strict=True)
+        sizes = zip(pairs.up.tolist(), pairs.low.tolist(), strict=True)
+        for matrix, acts_here, number, (a, b) in zip(matrices, acting, numbers, sizes, strict=True):
+            if acts_here:
+                out[number] = matrix[: up.sizes[a], : low.sizes[b]]
+    return out
 
 
 def _of_tensors(tensors: Tensors, up: Stack, low: Stack, pairs: Pairs) -> list[Element]:
@@ -212,27 +247,18 @@ def _alike(one: Ints, other: Ints) -> tuple[Ints, Ints]:
     return a, b
 
 
-def _contracted(up: Stack, low: Stack, pairs: Pairs, elements: Sequence[Element]) -> dict[tuple[int, int], Floats]:
-    """The sum of elements between the states of each pair of blocks, by their numbers, those that are zero left out."""
+def _contracted(up: Stack, low: Stack, pairs: Pairs, elements: Sequence[Element]) -> Contracted | None:
+    """The sum of elements between the states of each pair of blocks, None where there are none."""
     if not elements:
-        return {}
+        return None
     bra, ket = up.vectors[pairs.up].transpose(0, 2, 1), low.vectors[pairs.low]
     total = sum(np.matmul(np.matmul(bra[:, :, left.rows], x), ket[:, right.rows]) for left, right, x in elements)
     matrices: Floats = np.asarray(total)
-    acting: list[bool] = matrices.any(axis=(1, 2)).tolist()  # type: ignore[assignment]
-    out = {}
     for place, (a, b) in enumerate(zip(pairs.up.tolist(), pairs.low.tolist(), strict=True)):
-        if acting[place]:
-            matrix = matrices[place, : up.sizes[a], : low.sizes[b]]
-            if _has_single(up, a) or _has_single(low, b):
-                matrix = _one_contracted(up, low, (a, b), [(left, right, x[place]) for left, right, x in elements])
-            out[int(up.numbers[a]), int(low.numbers[b])] = matrix
-    return out
-
-
-def _has_single(stack: Stack, place: int) -> bool:
-    """Whether products with a block are products with vectors, which BLAS adds up in another order than those of matrices."""
-    return stack.sizes[place] == 1 or any(section.every[place].basis.size == 1 for section in stack.sections)
+        if up.single[a] or low.single[b]:
+            own = _one_contracted(up, low, (a, b), [(left, right, x[place]) for left, right, x in elements])
+            matrices[place, : up.sizes[a], : low.sizes[b]] = own
+    return Contracted(up, low, pairs, matrices)
 
 
 def _one_contracted(up: Stack, low: Stack, place: tuple[int, int], elements: Sequence[Element]) -> Floats:
@@ -329,14 +355,15 @@ def _of_tensor(tensor: BodyTensor, up: WangBlock, low: WangBlock, pairs: Pairs) 
     m, n = (pairs.m, pairs.n) if closes.all() else (pairs.m[closes], pairs.n[closes])
     by_n = [tensor.signed_parts(up._replace(j=j + rise), low._replace(j=j)) for j in range(4)]  # N modulo 4 counts
     parts = np.array([own for _, own in by_n])[n[:, 0] % 4]
-    found = np.zeros((len(m), up.size, low.size))
+    found, every_n = np.zeros((len(m), up.size, low.size)), tuple(n[:, 0].tolist())
     for step in steps:
         source, target = overlap(up, low, step)
         if source.start < source.stop:
             rows, columns = np.arange(target.start, target.stop), np.arange(source.start, source.stop)
-            found[:, rows, columns] = _couplings(m, n, rank, step, low.k[source]) * parts[:, rank + step, None]
+            first, count = low.first_k + 2 * source.start, source.stop - source.start
+            found[:, rows, columns] = _couplings(every_n, rise, rank, step, first, count) * parts[:, rank + step, None]
     if rank > 1:
-        _add_folded(found, parts, up, low, (m, n))
+        _add_folded(found, parts, up, low, (every_n, rise))
     if closes.all():
         return found
     out = np.zeros((len(closes), up.size, low.size))
@@ -344,21 +371,43 @@ def _of_tensor(tensor: BodyTensor, up: WangBlock, low: WangBlock, pairs: Pairs) 
     return out
 
 
-def _couplings(m: Ints, n: Ints, rank: int, step: int, k: Ints) -> Floats:
-    """`tensors.coupling` from n (pairs, 1) to m, over K (functions,), times √2 where one of K and K + step is 0."""
+@lru_cache(maxsize=512)  # of N up to 100 some 20 MB
+def _couplings(every_n: tuple[int, ...], rise: int, rank: int, step: int, first_k: int, count: int) -> Floats:
+    """`tensors.coupling` from each N to N + rise, over K = first_k, first_k + 2, ..., times √2 where one of K and K + step is 0.
+
+    Parameters
+    ----------
+    every_n : tuple of int
+        N of the lower blocks.
+    rise, rank, step : int
+        By how much N changes, rank of the tensor, by how much K changes.
+    first_k, count : int
+        The lowest K and their number.
+
+    Returns
+    -------
+    (N, K) array
+        0 where there is no such K; shared and read-only.
+    """
+    n, k = np.array(every_n)[:, None], first_k + 2 * np.arange(count)
+    m = n + rise
     exists = (np.abs(k) <= n) & (np.abs(k + step) <= m)
     inside = np.where(exists, k, np.maximum(-n, -m - step)).astype(float)
-    values = closed_coupling(n.astype(float), int(m[0, 0] - n[0, 0]), rank, step, inside)
+    values = closed_coupling(n.astype(float), rise, rank, step, inside)
     if step:
         values = values * np.where(k == max(0, -step), np.sqrt(2.0), 1.0)
-    return np.where(exists, values, 0.0)
+    out = np.where(exists, values, 0.0)
+    out.flags.writeable = False
+    return out
 
 
-def _add_folded(found: Floats, parts: Floats, up: WangBlock, low: WangBlock, of_pairs: tuple[Ints, Ints]) -> None:
+def _add_folded(
+    found: Floats, parts: Floats, up: WangBlock, low: WangBlock, of_pairs: tuple[tuple[int, ...], int]
+) -> None:
     """Adds what joins K to -K', as `tensors.bands_between` does: s X(K', -K) of 1 ≤ K, K' and K + K' ≤ rank."""
-    rank, (m, n) = parts.shape[1] // 2, of_pairs
+    rank, (every_n, rise) = parts.shape[1] // 2, of_pairs
     for column, k in enumerate(low.k[:rank].tolist()):
         for row, k_up in enumerate(up.k[:rank].tolist()):
             if k and k_up and k + k_up <= rank:
-                turned = _couplings(m, n, rank, k + k_up, np.array([-k]))[:, 0]
+                turned = _couplings(every_n, rise, rank, k + k_up, -k, 1)[:, 0]
                 found[:, row, column] += low.sign * turned * parts[:, rank + k + k_up]

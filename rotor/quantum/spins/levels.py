@@ -12,6 +12,7 @@ from rotor.arrays import Ints
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.levels import Levels, weights_of_levels
 from rotor.quantum.spins.blocks import Exist, Plan, Shared, SpinBlock, functions_of_f, plan_of, prepare, solve_f
+from rotor.quantum.spins.many_f_levels import solve_many_f
 from rotor.quantum.spins.operators import AxialState
 from rotor.quantum.spins.scheme import scheme_of
 from rotor.quantum.spins.simplify import simplified
@@ -87,8 +88,10 @@ def levels_of_f(
     solve = solve_f
     if plan.shared.scheme.equivalent == 3:
         plan, solve = in_wang_functions(plan), solve_three
-    prepare(plan, every_f)
-    solved = [block for f in every_f for block in solve(plan, f, exist)]
+    solved = solve_many_f(plan, every_f, exist)
+    if solved is None:
+        prepare(plan, every_f)
+        solved = [block for f in every_f for block in solve(plan, f, exist)]
     if n_range:
         solved = [_within(block, n_range) for block in solved]
     blocks = tuple(_placed(solved))
@@ -142,7 +145,7 @@ def _placed(blocks: Iterable[SpinBlock]) -> Iterator[SpinBlock]:
     start = 0
     for block in blocks:
         if len(block.energies_mhz):
-            yield replace(block, start=start)
+            yield block if block.start == start else replace(block, start=start)
             start += len(block.energies_mhz)
 
 

@@ -18,7 +18,7 @@ import numpy as np
 from rotor.arrays import Floats, Ints
 from rotor.quantum.levels import Levels
 from rotor.quantum.spins.blocks import Shared, SpinBlock, coefficients_of, operators_between, product
-from rotor.quantum.spins.contraction import MOST_RANK, tensor_elements_of_stacks
+from rotor.quantum.spins.contraction import MOST_RANK, by_numbers, tensors_of_stacks
 from rotor.quantum.spins.coupling import for_every_f, tensor_coefficients
 from rotor.quantum.spins.operators import AxialState, Scalar, tensor_elements
 from rotor.quantum.spins.parts import SpinPart
@@ -109,7 +109,7 @@ def _elements(shared: Shared, tensors: Tensors, rank: int) -> Elements:
         if shared.stacks is None or rank > MOST_RANK:
             found = Elements(tensors, {}, None)
         else:
-            known = tensor_elements_of_stacks(shared.stacks, tensors)
+            known = by_numbers(tensors_of_stacks(shared.stacks, tensors))
             partners: dict[int, list[tuple[int, Floats]]] = {}
             for (i, k), element in known.items():
                 partners.setdefault(i, []).append((k, element))
@@ -194,10 +194,17 @@ def _of_alike(shared: Shared, rank: int, up: SpinBlock, low: SpinBlock) -> dict[
     if shared.scheme.equivalent or "patterns" not in shared.cache or len(up.patterns) * len(low.patterns) > _FEW:
         only = _tensor_coefficients(shared.scheme, rank, up.patterns, low.patterns)
         return {("tensor", rank, up.twice_f, low.twice_f): only}
-    every, step = shared.cache["patterns"], up.twice_f - low.twice_f
-    tables = {f: (every[f + step], own) for f, own in every.items() if f + step in every}
-    found = for_every_f(tables, lambda bra, ket: tensor_coefficients(shared.scheme.twice, rank, bra, ket))
+    step = up.twice_f - low.twice_f
+    found = coefficients_of_step(shared.scheme, shared.cache["patterns"], rank, step)
     return {("tensor", rank, f + step, f): own for f, own in found.items()}
+
+
+def coefficients_of_step(scheme: Scheme, every: dict[int, Ints], rank: int, step: int) -> dict[int, Floats]:
+    """t(p', p) of all F' = F + step by F, doubled, where there are both."""
+    tables = {f: (every[f + step], own) for f, own in every.items() if f + step in every}
+    if scheme.equivalent:
+        return {f: _tensor_coefficients(scheme, rank, *of_both) for f, of_both in tables.items()}
+    return for_every_f(tables, lambda bra, ket: tensor_coefficients(scheme.twice, rank, bra, ket))
 
 
 def _tensor_coefficients(scheme: Scheme, rank: int, bra: Ints, ket: Ints) -> Floats:

@@ -105,7 +105,7 @@ class SpinMoments:
         up, low = left.basis, right.basis
         if moment.electric:
             found = tensor_elements(up, low, self._tensor(moment.along_abc, 1))
-            return None if found is None else found * _factor(moment.powers, left, right)
+            return None if found is None else found * _factor(moment.powers, left, right) * _cosine(moment, left, right)
         if moment.tensor is not None and not moment.spin:
             return CosinesWithN(moment.tensor).elements(up, low, self.representation)
         if moment.tensor is not None:
@@ -156,6 +156,15 @@ def _factor(powers: str, left: RotorPart, right: RotorPart) -> Floats:
     return np.array(
         {"": 1.0, "J": (m + n) / 2, "JJ": (m**2 + n**2) / 2, "[J]": (n - m) / 2, "[[J]]": (m - n) ** 2 / 4}[powers]
     )
+
+
+def _cosine(moment: Moment, left: RotorPart, right: RotorPart) -> Floats:
+    """cos(α'K' + αK): between functions of |K| too, since of an element with ΔK = 0 or 1 either both K have one sign or one is 0."""
+    if moment.cosine is None:
+        return np.ones(1)
+    angle = dict(zip(moment.states, moment.cosine, strict=True))
+    above, below = angle[left.v] * left.basis.k, angle[right.v] * right.basis.k
+    return np.asarray(np.cos(above[:, None] + below))
 
 
 def _coefficients(scheme: Scheme, rank: int, acting: int | None, up: int, low: int) -> Floats:

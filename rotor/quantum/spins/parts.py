@@ -71,16 +71,23 @@ def _over_functions(part: SpinPart, vectors: Floats) -> Floats:
 
 def names_of_parts(parts: Sequence[SpinPart], every: Ints) -> tuple[Ints, Ints]:
     """v, Ka, Kc and the pattern of the levels that the sub-blocks name, (functions, 3 + pattern), and how many each names."""
-    found, sizes, rows = list[Ints](), list[int](), list[int]()
-    for part in parts:
-        for names in part.rotor.names:
-            for row in range(part.patterns.start, part.patterns.stop):
-                found.append(names)
-                rows.append(row)
-                sizes.append(len(names))
-    out = np.empty((sum(sizes), 3 + every.shape[1]), dtype=np.int64)
+    return names_of_tables([(every, parts)])
+
+
+def names_of_tables(tables: Sequence[tuple[Ints, Sequence[SpinPart]]]) -> tuple[Ints, Ints]:
+    """The same of several tables of patterns, each with its parts."""
+    found, sizes, rows, first = list[Ints](), list[int](), list[int](), 0
+    for every, parts in tables:
+        for part in parts:
+            start, stop = first + part.patterns.start, first + part.patterns.stop
+            for names in part.rotor.names:
+                found += [names] * (stop - start)
+                rows += range(start, stop)
+                sizes += [len(names)] * (stop - start)
+        first += len(every)
+    out = np.empty((sum(sizes), 3 + tables[0][0].shape[1]), dtype=np.int64)
     np.concatenate(found, out=out[:, :3])
-    out[:, 3:] = every[rows].repeat(sizes, axis=0)
+    out[:, 3:] = np.concatenate([every for every, _ in tables])[rows].repeat(sizes, axis=0)
     return out, np.array(sizes)
 
 

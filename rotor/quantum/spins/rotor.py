@@ -20,6 +20,7 @@ from rotor.quantum.levels import SolvedBlock
 from rotor.quantum.spins.operators import EVERY_STATE, AxialState, Basis, Rotor, is_axial, summed
 from rotor.quantum.spins.scheme import Scheme, scheme_of
 from rotor.quantum.spins.terms import SpinTerm
+from rotor.quantum.tabulated import as_tabulated
 from rotor.quantum.wang.basis import names_of
 from rotor.quantum.wang.rotation import hamiltonian, solve_rotation
 
@@ -111,12 +112,19 @@ def solved_rotor(
         Which principal axes are x, y, z.
     """
     if top.kind in ("prolate", "oblate") and _all_axial(top, effects, terms):
-        levels = solve_rotation(top, effects, nmin, nmax, False, executor)
-        rows = zip(levels.rotational.tolist(), levels.quanta["k"].tolist(), levels.energy_mhz.tolist(), strict=True)
-        return [_axial_block(n, k, e) for n, k, e in rows], "Ir" if top.kind == "prolate" else "IIIr"
-    levels = solve_rotation(top, effects, nmin, nmax, True, executor, in_blocks=True)
+        levels = as_tabulated(top, effects, solve_rotation(top, effects, nmin, nmax, False, executor))
+        v = levels.quanta.get("v", np.zeros(len(levels), dtype=np.int64))
+        columns = (v, levels.rotational, levels.quanta["k"], levels.energy_mhz)
+        rows = zip(*(column.tolist() for column in columns), strict=True)
+        return [_axial_block(*row) for row in rows], "Ir" if top.kind == "prolate" else "IIIr"
+    levels = as_tabulated(top, effects, solve_rotation(top, effects, nmin, nmax, True, executor, in_blocks=True))
     representation = str(levels.representation)
-    return [_rotor_block(block, representation) for block in levels.blocks], representation
+    if "ka" not in levels.quanta or not isinstance(levels.blocks[0], SolvedBlock):
+        return [_rotor_block(block, representation) for block in levels.blocks], representation
+    names = np.column_stack(
+        [levels.quanta["ka"], levels.quanta["kc"]]
+    )  # of states in order of energy, as those of functions are
+    return [_of_one_state(block, names) for block in levels.blocks], representation
 
 
 def _all_axial(top: Top, effects: tuple[QuantumEffect, ...], terms: Terms) -> bool:
@@ -127,13 +135,19 @@ def _all_axial(top: Top, effects: tuple[QuantumEffect, ...], terms: Terms) -> bo
     if not all(is_axial(piece.rotor, axis) for pieces in channels.values() for piece in pieces):
         return False
     own = (effect.j_operator(top, name, 1, "Ir") for effect in effects for name in effect.parameters(top))
-    states = any(effect.states(top) or effect.couplings(top) for effect in effects)
-    return not states and all(operator is None for operator in own)
+    coupled = any(effect.couplings(top) or (top.states is None and effect.states(top)) for effect in effects)
+    return not coupled and all(operator is None for operator in own)
 
 
-def _axial_block(n: int, k: int, energy_mhz: float) -> RotorBlock:
-    part = RotorPart(0, AxialState(n, k), slice(0, 1), np.array([[k, 0]]))
+def _axial_block(v: int, n: int, k: int, energy_mhz: float) -> RotorBlock:
+    part = RotorPart(v, AxialState(n, k), slice(0, 1), np.array([[k, 0]]))
     return RotorBlock(n, (part,), np.array([energy_mhz]), np.ones((1, 1)))
+
+
+def _of_one_state(block: SolvedBlock, names: Ints) -> RotorBlock:
+    size = block.basis.size
+    part = RotorPart(0, block.basis, slice(0, size), names[block.start : block.start + size])
+    return RotorBlock(block.basis.j, (part,), block.energies_mhz, block.vectors)
 
 
 def _rotor_block(block: SolvedBlock | CoupledBlock, representation: str) -> RotorBlock:

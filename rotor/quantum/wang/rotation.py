@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -20,7 +20,7 @@ from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.levels import Levels, SolvedBlock, weights_of_levels
 from rotor.quantum.wang.basis import WangBlock, limited, names_of, wang_blocks
 from rotor.quantum.wang.spherical_top import DIMENSION, is_cubic, scalar_and_tensor, tensor_eigenvalues
-from rotor.quantum.wang.wang_matrix import JMatrix, block_bands, diagonalise, lowest_energies, scalar_energy
+from rotor.quantum.wang.wang_matrix import JMatrix, block_bands, diagonalise_all, lowest_energies, scalar_energy
 from rotor.tops.operators import AXIAL_REPRESENTATION, Operators
 from rotor.tops.spins.spin_weights import SpinWeights
 
@@ -239,9 +239,13 @@ def _in_wang_blocks(
     below_mhz: float = math.inf,
 ) -> Levels:
     representation = representation_of(top)
-    pieces = [(operators, j, representation, vectors, limits, below_mhz) for j in range(jmin, jmax + 1)]
-    solved = executor.map(_solve_j, *zip(*pieces, strict=True)) if executor else (_solve_j(*piece) for piece in pieces)
-    blocks = tuple(_placed(block for of_one_j in solved for block in of_one_j))
+    every = range(jmin, jmax + 1)
+    pieces = [
+        (operators, js, representation, vectors, limits, below_mhz)
+        for js in ([[j] for j in every] if executor else [every])
+    ]
+    solved = executor.map(_solve, *zip(*pieces, strict=True)) if executor else (_solve(*piece) for piece in pieces)
+    blocks = tuple(_placed(block for of_some_j in solved for block in of_some_j))
 
     labels = [names_of(b.basis, representation) for b in blocks]
     sizes = [len(b.energies_mhz) for b in blocks]
@@ -282,18 +286,28 @@ def _placed(solved: Iterator[tuple[WangBlock, Floats, Floats]]) -> Iterator[Solv
         start += len(energies)
 
 
-def _solve_j(
-    operators: Operators, j: int, representation: str, vectors: bool = True, limits: tuple[int, int] | None = None,
-    below_mhz: float = math.inf,
+def _solve(
+    operators: Operators, js: Iterable[int], representation: str, vectors: bool = True,
+    limits: tuple[int, int] | None = None, below_mhz: float = math.inf,
 ) -> list[tuple[WangBlock, Floats, Floats]]:  # fmt: skip
-    """The Wang blocks of one J solved: (block, energies in MHz, eigenvectors) in the order ee, eo, oe, oo; K within `limits`."""
+    """The Wang blocks of some J solved: (block, energies in MHz, eigenvectors) by J in the order ee, eo, oe, oo; K within `limits`."""
+    pieces = [piece for j in js for piece in _matrices_of_j(operators, j, representation, limits)]
+    if below_mhz < math.inf and not vectors:
+        return [(block, lowest_energies(bands, below_mhz - scalar) + scalar, _NONE) for block, scalar, bands in pieces]
+    solved = diagonalise_all([bands for _, _, bands in pieces], vectors)
+    return [
+        (block, energies + scalar, states)
+        for (block, scalar, _), (energies, states) in zip(pieces, solved, strict=True)
+    ]
+
+
+def _matrices_of_j(
+    operators: Operators, j: int, representation: str, limits: tuple[int, int] | None
+) -> list[tuple[WangBlock, float, list[Floats]]]:
+    """The Wang blocks of one J: (block, the scalar part of the energy, the diagonals of the rest)."""
     scalar, of_j = scalar_energy(operators, j), JMatrix(operators, j)
     out = []
     whole = wang_blocks(j, representation)
     for block in whole if limits is None else [part for b in whole if (part := limited(b, *limits))]:
-        if below_mhz < math.inf and not vectors:
-            out.append((block, lowest_energies(block_bands(of_j, block), below_mhz - scalar) + scalar, _NONE))
-            continue
-        energies, states = diagonalise(block_bands(of_j, block), vectors)
-        out.append((block, energies + scalar, states))
+        out.append((block, scalar, block_bands(of_j, block)))
     return out

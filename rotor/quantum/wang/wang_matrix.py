@@ -11,6 +11,7 @@ with the phases of J∓ (body-fixed) real and positive.
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,8 @@ from rotor.quantum.wang.basis import WangBlock
 from rotor.tops.operators import Operators
 
 FEW = 20  # of so many eigenvalues a bisection to one takes no longer than the finding of all
+AT_ONCE = 32  # rows up to which matrices of one size are solved together
+_NONE: Floats = np.zeros((0, 0))
 SMALL = 100  # rows of a tridiagonal block up to which scipy.linalg, 0.2 s to load, is not loaded for it
 
 
@@ -126,6 +129,28 @@ def diagonalise(bands: list[Floats], vectors: bool = True) -> tuple[Floats, Floa
     if info:
         raise ValueError(f"LAPACK dstevd did not converge on a block of size {size} (info = {info})")
     return energies, states
+
+
+def diagonalise_all(matrices: Sequence[list[Floats]], vectors: bool = True) -> list[tuple[Floats, Floats]]:
+    """`diagonalise` of many matrices; with vectors, small ones of one size and band width are solved in one call."""
+    alike: dict[tuple[int, int], list[int]] = {}
+    out: list[tuple[Floats, Floats]] = []
+    for number, bands in enumerate(matrices):
+        small = vectors and len(bands) > 1 and len(bands[0]) <= AT_ONCE and _are_finite(bands)
+        out.append((bands[0], _NONE) if small else diagonalise(bands, vectors))
+        if small:
+            alike.setdefault((len(bands[0]), len(bands)), []).append(number)
+    for (size, width), numbers in alike.items():
+        stacked = np.zeros((len(numbers), size * size))
+        for n in range(width):
+            stacked[:, n * size :: size + 1] = [
+                matrices[number][n] for number in numbers
+            ]  # eigh reads the lower triangle
+        energies, states = np.linalg.eigh(stacked.reshape(-1, size, size))
+        states = np.ascontiguousarray(states.transpose(0, 2, 1)).transpose(0, 2, 1)  # a state's components side by side
+        for place, number in enumerate(numbers):
+            out[number] = energies[place], states[place]
+    return out
 
 
 def _are_finite(bands: list[Floats]) -> bool:

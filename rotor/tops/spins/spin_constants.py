@@ -45,7 +45,8 @@ class SpinConstants:
     atoms: Mapping[str, int] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        values, errors = without_trace(self.values, self.uncertainties)
+        plain = ({_in_short(name): value for name, value in one.items()} for one in (self.values, self.uncertainties))
+        values, errors = without_trace(*plain)
         object.__setattr__(self, "values", values)
         object.__setattr__(self, "uncertainties", errors)
         for name in ("values", "twice", "uncertainties", "sources", "atoms"):
@@ -54,6 +55,11 @@ class SpinConstants:
             if twice < 1:
                 raise ValueError(
                     f"spin {name}: expected 1/2, 1, 3/2, ..., found {twice}/2; a nucleus without spin splits nothing"
+                )
+            if _ISOTOPE.fullmatch(name) and twice != twice_of(name):
+                raise ValueError(
+                    f"spin {name} = {spin_text(twice)}: the isotope has {spin_text(twice_of(name))}; leave its spin out, or give it "
+                    "another name"
                 )
         for name in self.values:
             for spin in spins_of(name):
@@ -95,7 +101,7 @@ class SpinConstants:
         if not items or rest:
             raise ValueError(
                 f"{text!r}: expected constants such as chi_aa(14N)=-4.22 MHz"
-                + (f"; {rest!r} is none" if rest and items else "")
+                + (_without_spin(rest) or (f"; {rest!r} is none" if rest and items else ""))
             )
         last, unitless = items[-1], [item["name"] for item in items if not item["unit"]]
         if unitless and last["unit"] and not last["gap"]:
@@ -173,6 +179,19 @@ def refuse_other_nuclei(constants: SpinConstants, molecule: Molecule | None) -> 
                 f"{count} {'spin is' if count == 1 else 'spins are'} called after {number}{symbol}, and "
                 f"{molecule.formula} has {has}; give another isotope with --isotope, or the spin another name and its size"
             )
+
+
+def _in_short(name: str) -> str:
+    """chi_bb_minus_cc(14N) as chi_bb-cc(14N)."""
+    return re.sub(r"^([A-Za-z]+_[abc]{2})_minus_([abc]{2})", r"\1-\2", name)
+
+
+def _without_spin(text: str) -> str:
+    """What to do about a constant that does not say to which spin it belongs; "" where there is none."""
+    found = re.search(r"(?<![\w)])([A-Za-z][\w-]*)\s*=\s*[-+−.\d]", text)
+    return (
+        f"; {found[1]} needs its spin or spins in round brackets, {found[1]}(14N), {found[1]}(S,14N)" if found else ""
+    )
 
 
 def _named(values: Mapping[str, float]) -> list[str]:

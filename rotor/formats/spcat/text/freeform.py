@@ -48,7 +48,7 @@ def read_lines(source: str | os.PathLike[str] | bytes) -> list[Line]:
     pieces = text.split("\n")
     ended = [piece + "\n" for piece in pieces[:-1]] + ([pieces[-1]] if pieces[-1] else [])
     lines = [Line(piece, number, name) for number, piece in enumerate(ended, 1)]
-    for line in lines:
+    for line in lines if "\r" in text else ():
         if "\r" in line.body:
             raise line.error(line.body.index("\r"), "a carriage return inside a line; end lines with line feeds")
     return lines

@@ -196,11 +196,12 @@ def _is_line(line: Line, per_state: int) -> bool:
 
 
 def with_defaults(lines: LineList, names: Sequence[str]) -> LineList:
-    """The lines with SPFIT's values for quantum numbers that are missing; as they are where none is.
+    """The lines with SPFIT's values for quantum numbers that are missing, and no zeros behind those that are needed.
 
     0 for those of rotation and state; for a sum of angular momenta the sum before it, which is N for the first
     (`deflin` and `getlin` in H. M. Pickett's program). names: of the quantum numbers of a state, rotation and state first.
     """
+    lines = _without_zeros_behind(lines, len(names))
     if lines.per_state != len(names):
         return lines
     rotation = sum(name in _ROTATION for name in names)
@@ -211,6 +212,20 @@ def with_defaults(lines: LineList, names: Sequence[str]) -> LineList:
             quanta[:, start + k] = np.where(quanta[:, start + k] == BLANK, before, quanta[:, start + k])
     changed = np.flatnonzero((quanta != lines.quanta).any(axis=1)).tolist()
     return replace(lines, quanta=quanta, per_state=0, defaulted=lines.defaulted | set(changed))
+
+
+def _without_zeros_behind(lines: LineList, per_state: int) -> LineList:
+    """The lines without the zeros that fill the fields behind the quantum numbers of both states, which SPFIT does not look at.
+
+    Programs that write .lin files for other programs too fill all twelve fields so. Other numbers there stay.
+    """
+    behind = lines.quanta[:, 2 * per_state :]
+    filled = ((behind == 0) | (behind == BLANK)).all(axis=1) & (behind == 0).any(axis=1)
+    if lines.per_state or not filled.any():
+        return lines
+    quanta = lines.quanta.copy()
+    quanta[filled, 2 * per_state :] = BLANK
+    return replace(lines, quanta=quanta)
 
 
 def note_of_remarks(lines: LineList, blends: NDArray[np.int64]) -> list[str]:
@@ -253,9 +268,8 @@ def read_measured(line: Line, width: int = QUANTA_FIELDS) -> Measured:
 
 
 def _numbers(line: Line, width: int) -> tuple[tuple[float, float, float], int]:
-    """Frequency, error and weight behind so many fields of quantum numbers, and how many of them are written."""
-    body = line.body
-    if found := _AS_USUAL.match(body, 3 * width):
+    """Frequency, error and weight behind so many fields of quantum numbers of a plain line, and how many of them are written."""
+    if found := _AS_USUAL.match(line.text, 3 * width):
         texts = [text for text in found.groups() if text is not None]
         values = [float(text) for text in texts]
         if all(map(math.isfinite, values)):

@@ -13,6 +13,7 @@ from rotor.formats.packed import name_of
 from rotor.formats.spcat.text.freeform import Line, encode, number, read_lines, read_words, spell, whole
 
 _LETTER = re.compile(r"[ \t]*([A-Za-z])?")
+_DIGIT = re.compile(r"[0-9]")
 
 
 @dataclass(frozen=True)
@@ -91,6 +92,8 @@ _OPTIONS = ("spind", "nvib", "knmin", "knmax", "ixx", "iax", "wtpl", "wtmn", "vs
 def read_par(source: str | os.PathLike[str] | bytes) -> ParameterFile:
     """The parameters in a .par or .var file, or in the bytes of one.
 
+    As in the field's program (`getpar`) the list ends after NPAR lines, and before that at a blank line or one without any digit,
+    such as "!": what follows is preserved and has no bearing.
     Raises ValueError with file, line, column and the rule that is broken.
     """
     lines = read_lines(source)
@@ -107,7 +110,7 @@ def read_par(source: str | os.PathLike[str] | bytes) -> ParameterFile:
 
     first = 2 + len(options)
     end = first
-    while end < min(len(lines), first + header.npar) and not lines[end].blank:
+    while end < min(len(lines), first + header.npar) and _DIGIT.search(lines[end].text):
         end += 1
     parameters = tuple(_parameter(line) for line in lines[first:end])
     rest = "".join(line.text for line in lines[end:])

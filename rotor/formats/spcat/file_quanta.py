@@ -1,0 +1,150 @@
+"""How levels of any .par or .var file are called: quantum numbers by SPCAT's rules.
+
+Quantum numbers are N, then nothing, K or Ka Kc, then v where there are several states, then J, F1, ... F, half-integers rounded up.
+Where that makes more than six (ten, where NLINE is negative), one number that counts the coupling patterns stands for all but F.
+QNFMT = 100 Q + 10 H + NQN: Q is the kind of quanta, H in binary which of the last ones are half-integers.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor.arrays import Ints
+from rotor.formats.spcat.file_model import Group
+from rotor.formats.spcat.pattern_numbers import pattern_numbers
+from rotor.formats.spcat.states import is_odd
+from rotor.formats.spcat.text.par import ParameterFile
+from rotor.quantum.levels import Levels
+
+
+@dataclass(frozen=True)
+class Format:
+    """How a file's levels are called: columns of rotation (1, 2 or 3), whether v is listed, spins at most, columns at most.
+
+    equivalent: how many spins are coupled to a total, 0, 2 or 3.
+    """
+
+    rotation: int
+    states: bool
+    spins: int
+    most: int = 6
+    equivalent: int = 0
+
+    @property
+    def before_spins(self) -> int:
+        """Columns before those of spins."""
+        return self.rotation + self.states
+
+    @property
+    def aggregate(self) -> bool:
+        """Whether one number stands for the coupling pattern."""
+        return self.before_spins + self.spins > self.most
+
+    @property
+    def width(self) -> int:
+        """Number of columns."""
+        return self.before_spins + (2 if self.aggregate else self.spins)
+
+    def qnfmt(self, spins: tuple[int, ...]) -> int:
+        """The code of a group whose doubled spins are these.
+
+        >>> Format(3, True, 1).qnfmt((2,)), Format(3, False, 2).qnfmt((3, 3)), Format(1, False, 0).qnfmt(())
+        (1405, 325, 101)
+        """
+        code = 1000 * self.states + 100 * self.before_spins + self.width
+        code += {0: 0, 2: 2000, 3: 6000}[0 if self.aggregate else self.equivalent]
+        odd = np.cumsum(spins) % 2 if spins else np.zeros(0, dtype=np.int64)
+        if self.equivalent == 2 and len(odd) > 1:
+            odd[-2] = 0
+        if self.equivalent == 3 and len(odd) > 2:
+            odd[-3:-1] = 0, sum(spins[-3:]) % 2
+        total = int(odd[-1]) if len(odd) else 0
+        if self.aggregate:
+            return code + 4000 + 10 * total
+        halves = [int(odd[i]) if i < len(odd) else total for i in range(self.spins)]
+        h = 0
+        for bit in halves:
+            h = 2 * h + bit
+        return code + 10 * (h & 7 if h > 9 else h)
+
+
+def format_of(file: ParameterFile, groups: list[Group]) -> Format:
+    """How the levels of a file are called."""
+    first = file.options[0]
+    linear = all(state.linear for group in groups for state in group.states)
+    rotation = 3 if first.spind > 0 else 1 if linear else 2
+    spins = max(len(group.spins) for group in groups)
+    equivalent = max(state.equivalent for group in groups for state in group.states)
+    return Format(rotation, abs(first.nvib) > 1, spins, 10 if file.header.nline < 0 else 6, equivalent)
+
+
+def quanta_of(group: Group, levels: Levels, form: Format, negative: bool = False) -> Ints:
+    """The quantum numbers of every row as the file prints them, of one component of ±K.
+
+    Parameters
+    ----------
+    group : Group
+        The connected states that the levels belong to.
+    levels : Levels
+        n solved levels.
+    form : Format
+        Which columns there are.
+    negative : bool, optional
+        Of a K doublet whose two levels differ in species, the one with -K.
+
+    Returns
+    -------
+    (n, width) array of int
+        Half-integers rounded up.
+    """
+    quanta, n = levels.quanta, levels.rotational
+    v = quanta.get("v", np.zeros(len(levels), dtype=np.int64))
+    columns = [n, *_rotation(group, levels, v, form, negative)]
+    if form.states:
+        columns.append(np.array([state.number for state in group.states])[v])
+    names = [name for name in quanta if name not in ("v", "n", "k", "ka", "kc")] if group.spins else []
+    totals = [(quanta[name] + 1) // 2 if name in levels.halves else quanta[name] for name in names] or [n]
+    if form.aggregate:
+        columns += [pattern_numbers(group, levels, names), totals[-1]]
+    elif form.spins:
+        columns += totals + [totals[-1]] * (form.spins - len(totals))
+    return np.stack(columns, axis=1)
+
+
+def _rotation(group: Group, levels: Levels, v: Ints, form: Format, negative: bool) -> list[Ints]:
+    """Nothing, signed K, or Ka and Kc."""
+    quanta = levels.quanta
+    if form.rotation == 1:
+        return []
+    if form.rotation == 3:
+        if "kc" in quanta:
+            return _ka_kc(group, levels, v)
+        n = levels.rotational  # linear, in a file with the quanta of asymmetric tops
+        return [np.zeros_like(n), n]
+    if "kc" in quanta:
+        k = quanta["kc"] if group.oblate else quanta["ka"]
+        odd = is_odd(quanta["ka"], quanta["kc"])
+    else:
+        k = quanta.get("k", np.zeros(len(levels), dtype=np.int64))
+        odd = np.full(len(levels), negative)
+    return [np.where(odd & ~_unsigned(group, v, k), -k, k)]
+
+
+def _unsigned(group: Group, v: Ints, k: Ints) -> NDArray[np.bool_]:
+    """Which levels are of E species or l-doubled: the sign of K, or the parity of the other K, says nothing of them."""
+    found = np.zeros(len(k), dtype=bool)
+    for place, state in enumerate(group.states):
+        found |= (v == place) & state.is_e(k)
+    return found
+
+
+def _ka_kc(group: Group, levels: Levels, v: Ints) -> list[Ints]:
+    """Ka and Kc; of E species the K that is not along the axis is N - K, and N - K + 1 in the first state of an l-doubled pair."""
+    n, ka, kc = levels.rotational, levels.quanta["ka"], levels.quanta["kc"]
+    along = kc if group.oblate else ka
+    firsts = [pair.first for pair in group.effect.pairs]
+    other = np.where(_unsigned(group, v, along), n - along + np.isin(v, firsts), ka if group.oblate else kc)
+    return [other, along] if group.oblate else [along, other]

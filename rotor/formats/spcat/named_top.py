@@ -1,0 +1,363 @@
+"""A .par or .var file with spins and several states as a top of named constants: chi_aa(14N), B[1], G_c[0,1], ...
+
+The files know sizes of spins and no isotopes: a spin is called after the isotope that labels such as chi_aa(14N) name, where its size
+is that, else by its place in SPIND, I1, I2, ...; electrons are no spins of another kind there. What has no name here (a total spin of
+equivalent nuclei, l-doubled states, terms outside orthorhombic symmetry in one state, spin-orbit terms) is refused with its meaning;
+`rotor.formats.spcat.predict` computes the files themselves.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from math import gcd
+
+import numpy as np
+
+from rotor.arrays import Floats
+from rotor.formats.spcat.codes import HELD_BELOW, constants_of, is_linear, join_code, split_code
+from rotor.formats.spcat.dipole_codes import dipoles_of
+from rotor.formats.spcat.file_effect import CodedLine, coded_lines
+from rotor.formats.spcat.file_model import allowed
+from rotor.formats.spcat.model import weights_of
+from rotor.formats.spcat.series import is_constant, is_series
+from rotor.formats.spcat.states import StateOptions, states_of
+from rotor.formats.spcat.text.int_file import IntensityFile
+from rotor.formats.spcat.text.par import Options, Parameter, ParameterFile
+from rotor.quantum.spins.operators import Cosines, CosinesWithN, Scalar
+from rotor.tops.constants import Constants
+from rotor.tops.spins.spin_constants import SpinConstants, twice_of
+from rotor.tops.spins.spin_weights import SpinWeights
+from rotor.tops.states.state_constants import StateConstants
+from rotor.tops.top import Top
+
+NO_NAME = "cannot be said by the named constants of a top; predict from the files themselves"
+_BETWEEN = {20: "G_a", 40: "G_b", 60: "G_c", 21: "F_bc", 41: "F_ac", 61: "F_ab"}
+_LADDERS = {0: "W", 1: "W_pm2", 2: "W_pm4", 3: "W_pm6"}
+_PAIRS = {"ab": (0, 1), "ac": (0, 2), "bc": (1, 2)}
+
+
+def named_top(file: ParameterFile, intensities: IntensityFile | None = None, *, errors: bool = False) -> Top:
+    """The top of files with several states or spins.
+
+    Parameters
+    ----------
+    file : ParameterFile
+        Of a .par or .var file.
+    intensities : IntensityFile, optional
+        For the dipoles of the states and between them.
+    errors : bool, optional
+        Whether the errors of parameters become uncertainties, of constants that are one parameter.
+
+    Returns
+    -------
+    Top
+        Constants of state 0, `states` and `spin_constants`. The Hamiltonian is that of the files with every K to N in the basis.
+
+    Raises
+    ------
+    ValueError
+        Naming the field or the parameter, for what has no name.
+    """
+    states, first = states_of(file), file.options[0]
+    _refuse(file, states, intensities)
+    lines, left_out = allowed(coded_lines(file, len(states)), states, [], first.nvib < 0)
+    if left_out:
+        raise ValueError(f"{left_out[0]}; leave it out of the file, or predict from the files themselves")
+    rows = [(line, file.parameters[int(line.name.partition("#")[2]) - 1]) for line in lines]
+
+    letter, own = _letter(file, rows), _own_parameters(rows, len(states))
+    constants, energies = [], []
+    for v, parameters in enumerate(own):
+        option = replace(_option_of(file, v), chr=letter, spind=-1 if first.spind < 0 else 1)
+        option = replace(option, nvib=-1 if first.nvib < 0 else 1, vsym=0, text="")
+        energies.append(sum(p.value for p in parameters if not any(split_code(p.code)[:8])))
+        plain = tuple(p for p in parameters if any(split_code(p.code)[:8]))
+        constants.append(constants_of(replace(file, options=(option,), parameters=plain), errors=errors))
+    _refuse_unlike(constants)
+    turned = (constants[0].kind, first.nvib < 0) in (("prolate", True), ("oblate", False))
+    weights = _weights(file, states, constants[0].kind in ("prolate", "oblate"))
+    couplings, dipoles = _couplings(rows, len(states), first, turned), _dipoles(intensities, len(states), turned)
+    _refuse_phases(couplings, dipoles)
+    return Top.from_constants(
+        constants[0],
+        name=file.title,
+        dipole_abc_debye=dipoles.get((0, 0), (0.0, 0.0, 0.0)) if intensities else None,
+        spin_weights=weights[0],
+        symmetry_checked=False,
+        states=_states(constants, energies, couplings, weights, dipoles),
+        spin_constants=_spins(rows, states, turned, errors),
+    )
+
+
+def _refuse(file: ParameterFile, states: tuple[StateOptions, ...], intensities: IntensityFile | None) -> None:
+    first = file.options[0]
+    digits = [split_code(parameter.code, len(states)) for parameter in file.parameters]
+    reasons = {
+        "FF, EX, TYP 90 to 99: a Fourier or Euler series": any(is_series(d) or is_constant(d) for d in digits),
+        f"IXX = {first.ixx}: a sum of angular momenta that is held for conserved": first.ixx != 0,
+        f"IAX = {first.iax}: a total spin of equivalent nuclei": any(s.i_tot for s in states),
+        f"EWT = {first.ewt}: an l-doubled state": any(s.l_code for s in states),
+        "KNMIN: a range of K that does not begin with 0": any(s.kmin for s in states),
+        "SPIND: spins that differ from state to state": len({s.spins for s in states}) > 1,
+        "KNMAX: linear states beside others": len({s.linear for s in states}) > 1,
+        "FLAGS: constants in cm⁻¹": intensities is not None and intensities.request.flags >= 1000,
+    }
+    for what, found in reasons.items():
+        if found:
+            raise ValueError(f"{what} {NO_NAME}")
+
+
+def _refuse_unlike(constants: list[Constants]) -> None:
+    kinds = list(dict.fromkeys(one.kind for one in constants))
+    if len(kinds) > 1:
+        raise ValueError(f"states of the kinds {' and '.join(kinds)} in one file: a top has one kind of constants")
+
+
+def _option_of(file: ParameterFile, v: int) -> Options:
+    """The option line of a state; where it has none of its own, the first, of which the digits of VSYM say who exchanges weights."""
+    first = file.options[0]
+    own = [line for line in file.options[1:] if abs(line.nvib) == v]
+    if own:
+        return own[-1]
+    digits = str(max(first.vsym, 0))[::-1]
+    swapped = not file.options[1:] and v < len(digits) and int(digits[v]) % 2 == 1
+    return replace(first, wtpl=first.wtmn, wtmn=first.wtpl) if swapped else first
+
+
+def _letter(file: ParameterFile, rows: list[tuple[CodedLine, Parameter]]) -> str:
+    """The letter of the reduction that some state shows, for all of them; else that of the file."""
+    plain = [split_code(p.code, abs(file.options[0].nvib)) for line, p in rows if line.operator.plain is not None]
+    if any(d.typ > 4 for d in plain):
+        return "s"
+    return "a" if any(d.typ == 4 and d.ksq for d in plain) else file.options[0].chr
+
+
+def _own_parameters(rows: list[tuple[CodedLine, Parameter]], count: int) -> list[list[Parameter]]:
+    """The parameters of each state without spins, under the codes of one state; those of every state at each."""
+    own: list[list[Parameter]] = [[] for _ in range(count)]
+    for line, parameter in rows:
+        if line.operator.rotor is not None or (line.states and line.states[0] != line.states[1]):
+            continue
+        if line.operator.plain is None:
+            raise ValueError(f"parameter {parameter.code}: a term of this kind in one state {NO_NAME}")
+        digits = split_code(parameter.code, count)._replace(v1=0, v2=0)
+        plain = replace(parameter, code=join_code(digits), constrained=False, text="")
+        parts = [plain]
+        if digits.typ in (1, 2, 3) and len(line.operator.plain) == 2:  # across an axis of more than two folds
+            parts = [replace(plain, code=100, value=plain.value / 2), replace(plain, code=1000, value=-plain.value / 2)]
+        for v in range(count) if line.states is None else line.states[:1]:
+            own[v] += parts
+    return own
+
+
+def _couplings(rows: list[tuple[CodedLine, Parameter]], count: int, first: Options, turned: bool) -> dict[str, float]:
+    """What connects two states without a spin, by name; values of one name are added."""
+    found: dict[str, float] = {}
+    sign = -1.0 if first.nvib < 0 else 1.0  # of G in an oblate basis
+    for line, parameter in rows:
+        if line.operator.rotor is not None or line.states is None or line.states[0] == line.states[1]:
+            continue
+        if turned:
+            raise ValueError(f"parameter {parameter.code}: a coupling of states whose symmetry axis is not z {NO_NAME}")
+        digits, terms = split_code(parameter.code, count), dict[str, float]()
+        if digits.typ in _BETWEEN:
+            factor = sign if digits.typ % 20 == 0 else 1.0
+            terms[_with_powers(_BETWEEN[digits.typ], digits.nsq, digits.ksq)] = factor
+        for (p, q, n), factor in (line.operator.plain or {}).items():
+            if n not in _LADDERS:
+                terms.clear()
+                break
+            terms[_with_powers(_LADDERS[n], p, q)] = factor
+        if not terms:
+            raise ValueError(f"parameter {parameter.code}: this coupling of two states {NO_NAME}")
+        for name, factor in terms.items():
+            full = f"{name}[{line.states[0]},{line.states[1]}]"
+            found[full] = found.get(full, 0.0) + factor * parameter.value
+    return found
+
+
+def _with_powers(symbol: str, n2: int, nz2: int, ns: int = 0) -> str:
+    powers = "J" * n2 + "K" * nz2 + "S" * ns
+    return f"{symbol}_{powers}" if powers else symbol
+
+
+def _weights(file: ParameterFile, states: tuple[StateOptions, ...], symmetric: bool) -> list[SpinWeights]:
+    """The weights of every state; ValueError where a common divisor of one state is none of another."""
+    found, divisors = [], []
+    for v, state in enumerate(states):
+        option = replace(_option_of(file, v), vsym=0, spind=-1 if file.options[0].spind < 0 else 1)
+        option = replace(option, nvib=-1 if file.options[0].nvib < 0 else 1)
+        if state.fold in (3, 5) and state.plus != state.minus:
+            if not symmetric:
+                raise ValueError(f"IAX = {state.iax} of an asymmetric top with unlike WTPL and WTMN {NO_NAME}")
+            e = state.e_weight if min(state.plus, state.minus) > 0 else state.e_weight / 2
+            raw = [2 * state.plus, 2 * state.minus, *[round(2 * e)] * (state.fold - 1)]
+            names = ["0even", "0odd", *(str(k) for k in range(1, state.fold))]
+            found.append(SpinWeights.from_mapping(dict(zip(names, (max(w, 0) for w in raw), strict=True))))
+            divisors.append(gcd(*raw))
+        else:
+            found.append(weights_of(option))
+            divisors.append(2 * (gcd(state.plus, state.minus) if not is_linear(option) else max(state.plus, 1)))
+    if len(set(divisors)) > 1:
+        raise ValueError(f"WTPL, WTMN: weights of states whose common divisors differ {NO_NAME}")
+    return found
+
+
+def _dipoles(
+    intensities: IntensityFile | None, count: int, turned: bool
+) -> dict[tuple[int, int], tuple[float, float, float]]:
+    if intensities is None:
+        return {}
+    plain, others = dipoles_of(intensities.dipoles, count)
+    if others:
+        raise ValueError(f"dipole {others[0][0].code}: a moment other than a plain component {NO_NAME}")
+    return {pair: mu[::-1] if turned else mu for pair, mu in plain.items()}
+
+
+def _refuse_phases(
+    couplings: Mapping[str, float], dipoles: Mapping[tuple[int, int], tuple[float, float, float]]
+) -> None:
+    """ValueError where dipoles between states have a phase that a top has not: the program gives them i if they stand alone."""
+    across = any(low != high and any(mu) for (low, high), mu in dipoles.items())
+    own = any(low == high and any(mu) for (low, high), mu in dipoles.items())
+    if across and not own and couplings:
+        raise ValueError(f"dipoles between coupled states alone, which SPCAT takes times i, {NO_NAME}")
+
+
+def _states(
+    constants: list[Constants],
+    energies: list[float],
+    couplings: dict[str, float],
+    weights: list[SpinWeights],
+    dipoles: Mapping[tuple[int, int], tuple[float, float, float]],
+) -> StateConstants | None:
+    if len(constants) == 1:
+        return None
+    values: dict[str, float] = {}
+    for v, one in enumerate(constants[1:], 1):
+        values[f"E[{v}]"] = energies[v] - energies[0]
+        values |= {f"{name}[{v}]": value for name, value in one.values.items()}
+    own = {(v, v): (0.0, 0.0, 0.0) for v in range(len(constants))} if dipoles else {}
+    others = {v: one for v, one in enumerate(weights) if one != weights[0]}
+    if others:
+        others[0] = weights[0]
+    return StateConstants(values | couplings, weights=others, dipoles=own | dict(dipoles))
+
+
+# spins
+
+
+@dataclass
+class _Sum:
+    """The terms of one kind and of one choice of spins, powers and states: matrices along a, b, c, or numbers, and their errors."""
+
+    kind: str
+    values: list[Floats] = field(default_factory=list)
+    errors: list[float] = field(default_factory=list)
+
+    def named(self) -> dict[str, tuple[float, float | None]]:
+        """Elements by name, each with its error where it is of one parameter."""
+        total = np.sum(self.values, axis=0)
+        out: dict[str, tuple[float, float | None]] = {}
+        for letters in _letters(self.kind, total):
+            parts = [_element(one, letters) for one in self.values]
+            spreads = [abs(part) * error for part, error in zip(parts, self.errors, strict=True) if part]
+            known = len(spreads) == 1 and spreads[0] > 0
+            value = float(f"{_element(total, letters):.15g}")
+            out[f"{self.kind}_{letters}" if letters else self.kind] = (
+                value,
+                float(f"{spreads[0]:.12g}") if known else None,
+            )
+        return out
+
+
+def _letters(kind: str, total: Floats) -> list[str]:
+    """The elements by which a tensor is given, those of 0 left out; of spin-rotation a scalar alone where it is one."""
+    if kind == "J":
+        return [""]
+    if kind == "C" and np.allclose(total, total[0, 0] * np.eye(3), rtol=0, atol=1e-14 * np.abs(total).max()):
+        return ["iso"]
+    names = ["aa", "bb", "cc", *_PAIRS] if kind == "C" else ["aa", "bb-cc", *_PAIRS]
+    return [name for name in names if abs(_element(total, name)) > 1e-14 * np.abs(total).max()]
+
+
+def _element(matrix: Floats, letters: str) -> float:
+    if not letters:
+        return float(matrix)
+    if letters == "bb-cc":
+        return float(matrix[1, 1] - matrix[2, 2])
+    if letters in _PAIRS:
+        return float(matrix[_PAIRS[letters]])
+    place = "abc".index(letters[0]) if letters != "iso" else 0
+    return float(matrix[place, place])
+
+
+def _spins(
+    rows: list[tuple[CodedLine, Parameter]], states: tuple[StateOptions, ...], turned: bool, errors: bool
+) -> SpinConstants | None:
+    sizes, called = states[0].spins, _names_of_spins(rows, states[0].spins)
+    sums: dict[tuple[str, str], _Sum] = {}
+    for line, parameter in rows:
+        if line.operator.rotor is None:
+            continue
+        try:
+            kind, matrix = _tensor(line)
+        except ValueError as reason:
+            raise ValueError(f"parameter {parameter.code}: {reason}") from None
+        o, value = line.operator, parameter.value
+        of_state = "" if line.states is None or len(states) == 1 else f"[{','.join(map(str, _once(line.states)))}]"
+        spins = ",".join(called[place - 1] for place in _once(sorted(o.spins)))
+        key = kind, f"{_with_powers('', o.n2, o.nz2, o.ns)}({spins}){of_state}"
+        one = sums.setdefault(key, _Sum(kind))
+        one.values.append(value * (matrix[::-1, ::-1] if turned and matrix.ndim else matrix))
+        spread = parameter.error or 0.0
+        one.errors.append(spread / abs(value) if errors and spread > HELD_BELOW and value else 0.0)
+    values: dict[str, float] = {}
+    spreads: dict[str, float] = {}
+    for (_, rest), one in sums.items():
+        for symbol, (value, error) in one.named().items():
+            values[symbol + rest] = value
+            if error:
+                spreads[symbol + rest] = error
+    if not sizes:
+        return None
+    return SpinConstants(values, dict(zip(called, sizes, strict=True)), uncertainties=spreads)
+
+
+def _names_of_spins(rows: list[tuple[CodedLine, Parameter]], sizes: tuple[int, ...]) -> list[str]:
+    """What the spins are called: S or the isotope in the labels of the parameters of one alone, if the size is right; else I1, I2, ..."""
+    found = [f"I{place}" for place in range(1, len(sizes) + 1)]
+    for line, parameter in rows:
+        places, inside = set(line.operator.spins), re.search(r"\(([^(),]+)\)", parameter.label)
+        if inside and len(places) == 1 and (name := inside[1].strip()) not in found:
+            place = min(places) - 1
+            if name.startswith("S") or _is_isotope(name, sizes[place]):
+                found[place] = name
+    return found
+
+
+def _is_isotope(name: str, twice: int) -> bool:
+    try:
+        return twice_of(name) == twice
+    except ValueError:
+        return False
+
+
+def _once(states: Iterable[int]) -> list[int]:
+    return list(dict.fromkeys(states))
+
+
+def _tensor(line: CodedLine) -> tuple[str, Floats]:
+    """Which tensor a spin term belongs to, and the matrix, or 1, that its value multiplies."""
+    rotor, spins = line.operator.rotor, line.operator.spins
+    if isinstance(rotor, Scalar) and len(spins) == 2:
+        return "J", np.array(1.0)
+    if isinstance(rotor, CosinesWithN):
+        return "C", np.array(rotor.components)
+    if isinstance(rotor, Cosines) and rotor.rank == 2:
+        matrix = np.array(rotor.components)
+        return "chi" if spins[0] == spins[1] else "T", matrix - np.trace(matrix) / 3 * np.eye(3)
+    what = "a spin-orbit term" if isinstance(rotor, Cosines) else "a power of N·S alone"
+    raise ValueError(f"{what} {NO_NAME}")

@@ -1,0 +1,248 @@
+"""Fourier and Euler series of SPFIT's files: functions of K, or of N and K, that multiply an operator element by element.
+
+With K', K'' the signed K of an element, between states with ρ' and ρ'' (H. M. Pickett, documentation of SPFIT and SPCAT, "Parameter lines"
+and its notes 1, 3, 6 and 11; Euler series: J. Mol. Spectrosc. 233, 174 (2005)):
+
+| field | an element is multiplied by |
+|---|---|
+| FF = n, 1 to 10 | cos(2π n (ρ'K' + ρ''K'')/2 / 3); n - ½ for n where ρ' and ρ'' have unlike signs; 21 to 30: n = FF - 10, ... |
+| FF = 10 + n | the sine of the same; 31 to 40: n = FF - 20, ... |
+| the same with NOFC | 1 where \\|K' + K''\\|/2 = n (n - ½ where ΔK is odd), else 0; for a sine the sign of K' + K'' |
+| EX = n + 1 | ½(f' + f''), f = ((N² - K²)/D)^NSQ (K²/D)^KSQ, D = 1 + a K² + b (N² - K²); f/D but for TYP 0 with EX = 1 |
+| TYP 90 + 2n | the same of N₊^2n + N₋^2n, f/D for n > 0; TYP 91 with KSQ of 2 to 9: TYP 90 with KSQ + 8 |
+| TYP 91, KSQ = NSQ = 0 | the constant ρ of a state |
+| TYP 91 + 2n, (KSQ, NSQ) = (1, 0) or (0, 1) | the constants a and b of the series n; here N² is N(N+1) |
+
+G12 changes the sign of an odd n where the smaller |K| is odd. A sine is odd under K -> -K: with it an operator that time reversal leaves
+alone is turned around by it and has the factor i, and the reverse.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field, replace
+from math import pi
+
+import numpy as np
+
+from rotor.arrays import Floats
+from rotor.formats.spcat.codes import Digits, split_code, state_digits
+from rotor.formats.spcat.operators import CodedOperator, operator_of, order_of, plain_of_j
+from rotor.formats.spcat.text.par import Parameter, ParameterFile
+from rotor.quantum.states import OperatorOfJ
+from rotor.quantum.wang.j_operators import JOperator
+
+NOT_YET = "is read but not computed yet"
+Factor = Callable[[int, Floats, Floats], Floats]  # of J, K' and K''
+_PAIR_TYPES = (*range(12), 20)  # TYP of what may have a series within l-doubled states
+
+
+@dataclass(frozen=True)
+class Series:
+    """Constants of the series of a file. rho: by state. a, b: by (series, lower state, higher state). nofc, g12: flags of XOPT."""
+
+    rho: dict[int, float] = field(default_factory=dict)
+    a: dict[tuple[int, int, int], float] = field(default_factory=dict)
+    b: dict[tuple[int, int, int], float] = field(default_factory=dict)
+    nofc: bool = False
+    g12: bool = False
+
+
+def is_constant(d: Digits) -> bool:
+    """Whether a code names a constant of a series, which is not an operator and is not fitted."""
+    return d.typ > 90 and d.typ % 2 == 1 and d.ksq < 2
+
+
+def is_series(d: Digits) -> bool:
+    """Whether a code names a term of a series."""
+    return bool(d.ff or d.ex) or (d.typ >= 90 and not is_constant(d))
+
+
+def series_of(file: ParameterFile, states: int, pairs: Iterable[tuple[int, int]] = ()) -> Series:
+    """The constants of the series of a file.
+
+    Parameters
+    ----------
+    file : ParameterFile
+        Codes and values; NOFC and G12 in its first option line.
+    states : int
+        Number of states.
+    pairs : iterable of (int, int), optional
+        l-doubled states, which share the constants of the one with the lower number.
+
+    Returns
+    -------
+    Series
+        Those that are not given are 0.
+
+    Raises
+    ------
+    ValueError
+        For a code with TYP 91 to 99 that names no constant.
+    """
+    flags, wild = file.options[0].xopt // 10, 10 ** state_digits(states) - 1
+    found = Series(nofc=bool(flags & 2), g12=bool(flags & 4))
+    for parameter in file.parameters:
+        d = split_code(parameter.code, states)
+        if not is_constant(d):
+            continue
+        low, high = sorted((d.v1, d.v2))
+        for own in [(v, v) for v in range(states)] if low == wild else [(low, high)]:
+            _set(found, d, parameter, own)
+    for pair in pairs:
+        lower, other = min(pair), max(pair)
+        found.rho[other] = found.rho.get(lower, 0.0)
+        for constants in (found.a, found.b):
+            constants.update({(n, other, other): constants.get((n, lower, lower), 0.0) for n in range(5)})
+    return found
+
+
+def _set(series: Series, d: Digits, parameter: Parameter, pair: tuple[int, int]) -> None:
+    number = (d.typ - 91) // 2
+    if d.i1 or d.i2 or d.ns or d.ff or d.ex:
+        raise ValueError(f"parameter {parameter.code}: a constant of a series has no spin, no FF and no EX")
+    if (d.ksq, d.nsq) == (1, 0):
+        series.a[number, *pair] = parameter.value
+    elif (d.ksq, d.nsq) == (0, 1):
+        series.b[number, *pair] = parameter.value
+    elif (d.typ, d.ksq, d.nsq) == (91, 0, 0) and pair[0] == pair[1]:
+        series.rho[pair[0]] = parameter.value
+    elif (d.typ, d.ksq, d.nsq) != (99, 0, 0):  # 9900 is a place holder
+        raise ValueError(
+            f"parameter {parameter.code}: TYP {d.typ} with KSQ = {d.ksq}, NSQ = {d.nsq} is no constant of a series; expected "
+            "9100 (ρ of one state), 9110 (a) or 9101 (b), and for further series 93, 95, 97, 99 in place of 91"
+        )
+
+
+def term_of(d: Digits, axes: str, series: Series, states: tuple[int, int]) -> CodedOperator:
+    """The operator of a code with a series, between two states, lower first.
+
+    Parameters
+    ----------
+    d : Digits
+        Of the code.
+    axes : str
+        Those at x, y, z: bca or bac.
+    series : Series
+        The constants of the file.
+    states : (int, int)
+        Whose constants it takes.
+
+    Returns
+    -------
+    CodedOperator
+        By its elements over |J k⟩.
+
+    Raises
+    ------
+    ValueError
+        For a series with a spin, two series at once, and a base that is not known.
+    """
+    if d.i1 or d.i2 or d.ns:
+        raise ValueError(f"a term of a Fourier or Euler series with a spin {NOT_YET}")
+    if 80 <= d.typ < 90 or (d.ff and (d.ex or d.typ >= 90)) or (d.ex and d.typ >= 90):
+        raise ValueError("a code has one series alone, and no energy of one K (TYP 80 to 89) with it")
+    if d.ff:
+        sine, n = harmonic(d.ff)
+        base = operator_of(d._replace(ff=0), axes)
+        sampled = _sampled(n, sine) if series.nofc else _fourier(n, sine, series, states)
+        return _multiplied(base, sampled, sine, axes)
+    return _multiplied(*_euler(d, axes, series, states), False, axes)
+
+
+def harmonic(ff: int) -> tuple[bool, int]:
+    """Whether FF is a sine, and n.
+
+    >>> [harmonic(ff) for ff in (1, 10, 11, 20, 21, 31)]
+    [(False, 1), (False, 10), (True, 1), (True, 10), (False, 11), (True, 11)]
+    """
+    half = (ff - 1) // 10
+    return half % 2 == 1, ff - 10 * ((half + 1) // 2)
+
+
+def _fourier(n: int, sine: bool, series: Series, states: tuple[int, int]) -> Factor:
+    up, low = (series.rho.get(v, 0.0) for v in states)
+    times = n - 0.5 * ((up < 0) != (low < 0))
+
+    def factor(j: int, above: Floats, below: Floats) -> Floats:
+        angle = times * pi / 3 * (abs(up) * above + abs(low) * below)
+        turned = np.where(np.minimum(abs(above), abs(below)) % 2 == 1, -1.0, 1.0) if series.g12 and n % 2 else 1.0
+        return np.asarray(turned * (np.sin(angle) if sine else np.cos(angle)))
+
+    return factor
+
+
+def _sampled(n: int, sine: bool) -> Factor:
+    def factor(j: int, above: Floats, below: Floats) -> Floats:
+        twice = above + below
+        return np.where((abs(twice) + 1) // 2 == n, np.sign(twice) if sine else 1.0, 0.0)
+
+    return factor
+
+
+def _euler(d: Digits, axes: str, series: Series, states: tuple[int, int]) -> tuple[CodedOperator, Factor]:
+    """The operator without the series, and the function of it."""
+    plain = d._replace(ex=0, ksq=0, nsq=0)
+    if d.typ >= 90:
+        number = (d.typ - 90) // 2
+        extra = number > 0
+        ksq = d.ksq + 8 if d.typ % 2 else d.ksq
+        plain = plain._replace(typ=3 + number if number else 0)
+    else:
+        number, ksq = d.ex - 1, d.ksq
+        extra = d.ex > 1 or d.typ > 0
+        if not extra and not (d.ksq or d.nsq):
+            raise ValueError("EX = 1 with TYP, KSQ and NSQ of 0 is a constant; an energy has no EX")
+    if number > 4:
+        raise ValueError(f"EX = {d.ex}: there are five Euler series, EX 1 to 5")
+    a, b = (constants.get((number, *states), 0.0) for constants in (series.a, series.b))
+
+    def of_k(j: int, k: Floats) -> Floats:
+        square = j * (j + 1.0) - k**2
+        below = 1 + a * k**2 + b * square
+        return np.asarray((square / below) ** d.nsq * (k**2 / below) ** ksq / (below if extra else 1.0))
+
+    return operator_of(plain, axes), lambda j, above, below: 0.5 * (of_k(j, above) + of_k(j, below))
+
+
+def _multiplied(base: CodedOperator, factor: Factor, sine: bool, axes: str) -> CodedOperator:
+    of = base.of_j or plain_of_j(base.plain or {})
+    own = (1j if axes[2] == "a" else -1j) if sine else 1.0
+    whole = 1.0 / own if base.odd else own
+    return replace(base, plain=None, of_j=_by_elements(of, factor, whole), odd=base.odd != sine)
+
+
+def _by_elements(of: OperatorOfJ, factor: Factor, whole: complex) -> OperatorOfJ:
+    def operator(j: int, representation: str) -> JOperator:
+        k = np.arange(-j, j + 1.0)
+        bands = of(j, representation).bands
+        return JOperator(j, {q: whole * factor(j, k + q, k) * band for q, band in bands.items()})
+
+    return operator
+
+
+def symmetry_type(d: Digits, oblate: bool) -> int:
+    """The TYP of an operator of the same species and ΔK as a term of a series.
+
+    >>> from rotor.formats.spcat.codes import split_code
+    >>> [symmetry_type(split_code(code), False) for code in (1_000_400_00, 11_000_000_00, 11_000_400_00, 11_002_000_00, 92_00_00)]
+    [4, 20, 21, 0, 4]
+    """
+    typ = (3 + (d.typ - 90) // 2 if d.typ >= 92 else 0) if d.typ >= 90 else d.typ
+    if not d.ff or not harmonic(d.ff)[0]:
+        return typ
+    along = 60 if oblate else 20
+    if typ < 20:  # of no axis: a sine makes it one of z
+        step = 0 if typ < 4 else 2 * (typ - 3) if typ < 12 else 2 * (typ - 11)
+        return along + max(step, 1) - 1
+    if along <= typ < along + 20:
+        step = order_of(typ) - order_of(typ) % 2
+        return 3 + step // 2 if step else 0
+    across = {20: 40, 40: 20} if oblate else {40: 60, 60: 40}
+    return across[typ // 20 * 20] + typ % 20
+
+
+def refuse_within_pairs(d: Digits, states: Sequence[int], doubled: frozenset[int]) -> None:
+    """ValueError for a series of an operator of more than second order, or along x or y, of l-doubled states."""
+    if is_series(d) and set(states) & doubled and d.typ < 90 and d.typ not in _PAIR_TYPES:
+        raise ValueError(f"a series of this operator within l-doubled states {NOT_YET}")

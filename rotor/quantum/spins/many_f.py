@@ -1,0 +1,238 @@
+"""Blocks of many F whose functions differ in F alone, in one array: an operator between them is written for all F at once.
+
+Blocks of different F that hold the same kinds of solved blocks of the rotation, at the same N - F and with the same coupling patterns,
+make a group. A function of a group has a column (a kind of block and a pattern, the same number for all F) and a state of that
+block, whose number counts first: function = state · columns + column. What a block lacks, since its N is low or its
+states are fewer, are zeros. Elements of the rotation stand in tables by N, coefficients of coupling in tables by F.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from rotor.arrays import Floats, Ints
+from rotor.quantum.spins.contraction import Contracted, Stack
+from rotor.quantum.spins.parts import SpinPart
+
+MOST = 160  # functions of a block up to which many F are done at once: of larger ones each has arithmetic enough for itself
+Tables = dict[tuple[int, int, int], Floats]
+"""Elements (N, states', states) by the kinds of both blocks and N' - N, by the N of the second from the lowest on."""
+
+
+class Slot(NamedTuple):
+    """Columns of a group that belong to one kind of block of the rotation at one N: 2(N - F), the kind, patterns among those of the
+    calculation, columns."""
+
+    rise: int
+    kind: int
+    patterns: slice
+    columns: slice
+
+
+@dataclass(frozen=True, eq=False)
+class Group:
+    """Blocks of rising F, doubled; functions: of every block where its functions stand, in the order of its parts.
+
+    states: the largest number of states of a block of the rotation. places: of a doubled F among the blocks.
+    """
+
+    slots: tuple[Slot, ...]
+    twice_f: list[int]
+    states: int
+    functions: list[Ints]
+    places: dict[int, int] = field(repr=False)
+
+    @property
+    def columns(self) -> int:
+        """Number of columns."""
+        return int(self.slots[-1].columns.stop)
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """What all groups of a calculation share: the doubled F, the lowest N, kinds and sizes of blocks of the rotation by number, their
+    energies (N, states) by kind, and for each F the numbers of its patterns among those of the highest F, counted by their
+    distances from F."""
+
+    twice_f: list[int]
+    lowest: int
+    kinds: list[int]
+    sizes: list[int]
+    energies_mhz: dict[int, Floats]
+    patterns: dict[int, Ints]
+    every: Ints
+
+    def of_f(self, twice_f: Sequence[int]) -> slice | Ints:
+        """The places of some rising F in tables by F."""
+        return _places((twice_f[0] - self.twice_f[0]) // 2, twice_f, len(self.twice_f))
+
+    def of_n(self, twice_f: Sequence[int], slot: Slot) -> slice | Ints:
+        """The places in tables by N of the N that a slot has at some rising F; any where that is beyond the table."""
+        count = len(self.energies_mhz[slot.kind])
+        return _places((twice_f[0] + slot.rise) // 2 - self.lowest, twice_f, count)
+
+
+def _places(first: int, twice_f: Sequence[int], count: int) -> slice | Ints:
+    """Places that rise with F from the first on, among so many: a slice where all are there and no F is left out."""
+    if first >= 0 and first + len(twice_f) <= count and twice_f[-1] - twice_f[0] == 2 * (len(twice_f) - 1):
+        return slice(first, first + len(twice_f))
+    return np.asarray(np.clip(first + (np.asarray(twice_f) - twice_f[0]) // 2, 0, count - 1))
+
+
+def frame_of(stacks: Sequence[Stack], places: dict[int, Ints], every: Ints) -> Frame:
+    """The frame of all F, rising without gaps, with all solved blocks of the rotation; places, every: see
+    `pattern_tables.PatternTable`."""
+    lowest, highest = min(int(stack.n[0]) for stack in stacks), max(int(stack.n[-1]) for stack in stacks)
+    count = sum(len(stack.numbers) for stack in stacks)
+    kinds, sizes = [0] * count, [0] * count
+    energies: dict[int, Floats] = {}
+    largest: dict[int, int] = {}
+    for stack in stacks:
+        largest[stack.kind] = max(largest.get(stack.kind, 0), *stack.sizes)
+    for stack in stacks:
+        of_kind = energies.setdefault(stack.kind, np.zeros((highest - lowest + 1, largest[stack.kind])))
+        members = zip(stack.numbers.tolist(), stack.n.tolist(), stack.sizes, stack.energies_mhz, strict=True)
+        for number, n, size, own in members:
+            kinds[number], sizes[number] = stack.kind, size
+            of_kind[n - lowest, :size] = own
+    return Frame(list(places), lowest, kinds, sizes, energies, places, every)
+
+
+def tables_of(found: Sequence[Contracted], frame: Frame) -> Tables:
+    """Elements between blocks of the rotation as tables by N; of a pair that occurs twice the last counts."""
+    out: Tables = {}
+    for up, low, pairs, matrices in found:
+        key = (up.kind, low.kind, pairs.rise)
+        if key not in out:
+            count, right = frame.energies_mhz[low.kind].shape
+            out[key] = np.zeros((count, frame.energies_mhz[up.kind].shape[1], right))
+        out[key][pairs.n[:, 0] - frame.lowest, : matrices.shape[1], : matrices.shape[2]] = matrices
+    return out
+
+
+Cell = tuple[int, int]
+"""2(N - F) and class of patterns."""
+Key = tuple[tuple[Cell, int], ...]
+"""The cell and the kind of each slot."""
+
+
+def groups_of(members: Sequence[tuple[int, Sequence[SpinPart]]], frame: Frame) -> list[tuple[Group, list[int]]]:
+    """Blocks, given by their doubled F and parts, in groups, each with the numbers of its blocks."""
+    cells: list[Cell] = [(rise, of) for rise, of in frame.every[:, [0, -1]].tolist()]
+    found: list[tuple[Key, dict[int, int]]] = []
+    for number in sorted(range(len(members)), key=lambda number: -members[number][0]):
+        f, parts = members[number]
+        key = _key(frame.patterns[f], parts, frame, cells)
+        for known, by_f in found:
+            if f not in by_f and (key == known or set(key) <= set(known)):
+                by_f[f] = number
+                break
+        else:
+            found.append((key, {f: number}))
+    return [
+        (_group(key, by_f, members, frame, cells), sorted(by_f.values(), key=lambda i: members[i][0]))
+        for key, by_f in found
+    ]
+
+
+def _group(
+    key: Key,
+    by_f: Mapping[int, int],
+    members: Sequence[tuple[int, Sequence[SpinPart]]],
+    frame: Frame,
+    cells: Sequence[Cell],
+) -> Group:
+    slots, start = list[Slot](), 0
+    for cell, kind in key:
+        first, count = cells.index(cell), cells.count(cell)
+        slots.append(Slot(cell[0], kind, slice(first, first + count), slice(start, start + count)))
+        start += count
+    twice_f = sorted(by_f)
+    columns, orders = np.zeros((len(twice_f), start), dtype=np.int64), list[Any]()
+    counts = [slot.columns.stop - slot.columns.start for slot in slots]
+    for place, f in enumerate(twice_f):
+        own, parts = frame.patterns[f], members[by_f[f]][1]
+        sizes = [frame.sizes[part.number] for part in parts]
+        if len(own) == len(cells) and _key(own, parts, frame, cells) == key:
+            columns[place] = np.repeat(sizes, counts)
+            orders.append(slice(None))
+            continue
+        order = list[int]()
+        for part, size in zip(parts, sizes, strict=True):
+            slot = slots[key.index((cells[own[part.patterns.start]], frame.kinds[part.number]))]
+            at = own[part.patterns] + (slot.columns.start - slot.patterns.start)
+            columns[place, at] = size
+            order += at.tolist()
+        orders.append(order)
+    states = int(columns.max())
+    every = np.arange(start)[:, None] + np.arange(states) * start
+    there = np.arange(states) < columns[:, :, None]
+    functions = [every[order][there[place, order]] for place, order in enumerate(orders)]
+    return Group(tuple(slots), twice_f, states, functions, {f: place for place, f in enumerate(twice_f)})
+
+
+def _key(own: Ints, parts: Sequence[SpinPart], frame: Frame, cells: Sequence[Cell]) -> Key:
+    """Where the columns of a block stand."""
+    return tuple((cells[own[part.patterns.start]], frame.kinds[part.number]) for part in parts)
+
+
+def are_connected(up: Group, low: Group, step: int, tables: Tables) -> bool:
+    """Whether there are elements between two groups whose F differ by `step`, doubled."""
+    return any((a.kind, b.kind, (step + a.rise - b.rise) // 2) in tables for a in up.slots for b in low.slots)
+
+
+def between(
+    up: Group, low: Group, twice_f: Sequence[int], step: int, tables: Tables, coefficients: Floats, frame: Frame
+) -> Floats:
+    """c(F) ⟨r'‖X‖r⟩ between two groups, with F' = F + step.
+
+    Parameters
+    ----------
+    up, low : Group
+        Of F' and F.
+    twice_f : sequence of int
+        Doubled F, rising.
+    step : int
+        F' - F, doubled.
+    tables : Tables
+        Elements of the rotation.
+    coefficients : (F, patterns', patterns) array
+        By all F of the frame.
+    frame : Frame
+        Of both groups.
+
+    Returns
+    -------
+    (F, states', columns', states, columns) array
+        Functions are counted as `functions_of` does.
+    """
+    # the longest axes last where a slot has several columns: short innermost loops take most of the time
+    alone = up.columns == len(up.slots) and low.columns == len(low.slots)
+    shape = len(twice_f), up.states, up.columns, low.states, low.columns
+    order = (0, 1, 2, 3, 4) if alone else (2, 4, 0, 1, 3)
+    out = np.zeros([shape[axis] for axis in order])
+    view = out.transpose(np.argsort(order).tolist())
+    own = coefficients[frame.of_f(twice_f)]
+    for right in low.slots:
+        places = frame.of_n(twice_f, right)
+        for left in up.slots:
+            table = tables.get((left.kind, right.kind, (step + left.rise - right.rise) // 2))
+            if table is not None:
+                element = table[places, : up.states, : low.states]
+                _, rows, columns = element.shape
+                np.multiply(
+                    element[:, :, None, :, None],
+                    own[:, None, left.patterns, None, right.patterns],
+                    out=view[:, :rows, left.columns, :columns, right.columns],
+                )
+    return view
+
+
+def functions_of(elements: Floats) -> Floats:
+    """Elements (F, states', columns', states, columns) as (F, functions', functions); a view where columns come last in memory."""
+    count, states_up, columns_up, states, columns = elements.shape
+    return elements.reshape(count, states_up * columns_up, states * columns)

@@ -1,0 +1,129 @@
+"""Levels of many F at once: the Hamiltonians of all blocks of a group in one array, see `many_f`.
+
+Each block is then solved by itself, with the matrix that `blocks` makes of it, to the last bit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from rotor.arrays import Floats, Ints
+from rotor.quantum.spins.blocks import Exist, Plan, SpinBlock, parts_of_f
+from rotor.quantum.spins.many_f import MOST, Frame, Group, Tables, between, frame_of, functions_of, groups_of, tables_of
+from rotor.quantum.spins.method import FIRST_ORDER
+from rotor.quantum.spins.parts import SpinPart, labels_of, names_of_tables
+from rotor.quantum.spins.pattern_tables import couplings_by_f, pattern_table
+
+_FEW = 100  # patterns of an F
+Member = tuple[int, tuple[SpinPart, ...]]
+"""A block before it is solved: doubled F, parts."""
+
+
+def solve_many_f(plan: Plan, every_f: Sequence[int], exist: Exist | None = None) -> list[SpinBlock] | None:
+    """The blocks of all F as `blocks.solve_f` gives them one by one; None where that is the way to solve them.
+
+    Parameters
+    ----------
+    plan : Plan
+        The rotation and the operators.
+    every_f : sequence of int
+        Doubled F, rising by 2.
+    exist : callable, optional
+        See `levels.levels_of_f`.
+
+    Returns
+    -------
+    list of SpinBlock or None
+    """
+    shared = plan.shared
+    alone = shared.used is not None and shared.used.method == FIRST_ORDER
+    if shared.stacks is None or plan.contracted is None or alone or shared.scheme.equivalent == 3:
+        return None
+    table = pattern_table(shared.scheme, every_f[0], every_f[-1])
+    if not 0 < len(table.every) <= _FEW:
+        return None
+    members = [(f, parts) for f, own in table.patterns.items() for parts in parts_of_f(plan, own)]
+    if not members or max(parts[-1].place.stop for _, parts in members) > MOST:
+        return None
+    members, names, sizes = _existing(members, table.patterns, exist)
+    frame = frame_of(shared.stacks, table.places, table.every)
+    shared.cache.update(frame=frame, patterns=table.patterns)
+    acting = []
+    for contracted, channels in (found for found in plan.contracted if found[0]):
+        each = [couplings_by_f(shared.scheme, channel, every_f[0], every_f[-1]) for channel in channels]
+        acting.append((tables_of(contracted, frame), each[0] if len(each) == 1 else np.add.reduce(each)))
+    out, start = [], 0
+    for (f, parts), own, of_names in zip(
+        members, _solved(members, acting, frame), zip(names, sizes, strict=True), strict=True
+    ):
+        group, energies, vectors = own
+        labels, mixing = labels_of(parts, of_names, vectors)
+        out.append(
+            SpinBlock(f, table.patterns[f], parts, energies, vectors, labels, mixing, shared, start, group=group)
+        )
+        start += len(energies)
+    return out
+
+
+def _existing(
+    members: list[Member], patterns: dict[int, Ints], exist: Exist | None
+) -> tuple[list[Member], list[Ints], list[Ints]]:
+    """The blocks in which a level exists, the names of their levels, and how many each sub-block names."""
+    by_f: dict[int, list[SpinPart]] = {}
+    for f, parts in members:
+        by_f.setdefault(f, []).extend(parts)
+    names, sizes = names_of_tables([(patterns[f], parts) for f, parts in by_f.items()])
+    stops = np.cumsum([parts[-1].place.stop for _, parts in members])
+    lasts = np.cumsum([sum(part.sub_blocks for part in parts) for _, parts in members])
+    there = np.ones(len(members), dtype=bool)
+    if exist is not None:
+        there = np.logical_or.reduceat(exist(names), np.append(0, stops[:-1]))
+    chosen = np.flatnonzero(there).tolist()
+    of_members, of_sizes = np.split(names, stops[:-1]), np.split(sizes, lasts[:-1])
+    return [members[i] for i in chosen], [of_members[i] for i in chosen], [of_sizes[i] for i in chosen]
+
+
+def _solved(
+    members: Sequence[Member], acting: Sequence[tuple[Tables, Floats]], frame: Frame
+) -> list[tuple[Group, Floats, Floats]]:
+    """The group, energies and eigenvectors of every block; blocks of one size are solved in one call."""
+    matrices: dict[int, list[tuple[int, Floats]]] = {}
+    groups: dict[int, Group] = {}
+    zeros = [float(parts[0].rotor.energies_mhz[0]) for _, parts in members]  # taken out for the sake of digits
+    for group, numbers in groups_of(members, frame):
+        own_zeros = np.array([zeros[number] for number in numbers])
+        for number, matrix in zip(numbers, _hamiltonians(group, acting, frame, own_zeros), strict=True):
+            groups[number] = group
+            matrices.setdefault(len(matrix), []).append((number, matrix))
+    out: list[tuple[Group, Floats, Floats]] = [None] * len(members)  # type: ignore[list-item]
+    for alike in matrices.values():
+        every = np.stack([matrix for _, matrix in alike])
+        if not np.isfinite(every).all():
+            raise ValueError("a block of the Hamiltonian overflows: N max is too high for these constants")
+        energies, vectors = np.linalg.eigh(every)  # reads the lower triangle
+        for (number, _), own, states in zip(alike, energies, vectors, strict=True):
+            out[number] = groups[number], own + zeros[number], states
+    return out
+
+
+def _hamiltonians(
+    group: Group, acting: Sequence[tuple[Tables, Floats]], frame: Frame, zeros: Floats
+) -> Iterator[Floats]:
+    """The Hamiltonians of a group, (functions, functions) of each block, energies from `zeros` on, in the lower triangle."""
+    every = [
+        functions_of(between(group, group, group.twice_f, 0, tables, coefficients, frame))
+        for tables, coefficients in acting
+    ]
+    diagonal = np.zeros((len(zeros), group.states, group.columns))
+    for slot in group.slots:
+        own = frame.energies_mhz[slot.kind][frame.of_n(group.twice_f, slot), : group.states]
+        diagonal[:, : own.shape[1], slot.columns] = (own - zeros[:, None])[:, :, None]
+    for place, functions in enumerate(group.functions):
+        chosen = functions[:, None], functions
+        matrix = every[0][place][chosen] if every else np.zeros((len(functions), len(functions)))
+        matrix.flat[:: len(functions) + 1] += diagonal[place].ravel()[functions]
+        for one in every[1:]:
+            matrix += one[place][chosen]
+        yield matrix

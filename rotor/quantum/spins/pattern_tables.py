@@ -1,0 +1,71 @@
+"""Coupling patterns of many F, and coefficients between them, in tables by F.
+
+They depend on the spins and on F alone, so that the last ones are kept: a fit or a second prediction finds them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from rotor.arrays import Floats, Ints
+from rotor.quantum.spins.blocks import couplings_of
+from rotor.quantum.spins.lines import coefficients_of_step
+from rotor.quantum.spins.rotor import Channel
+from rotor.quantum.spins.scheme import Scheme
+
+
+class PatternTable(NamedTuple):
+    """Patterns by doubled F, their numbers among those of the highest F, counted by their distances from F, and these distances, with
+    the class of exchange in the last column."""
+
+    patterns: dict[int, Ints]
+    places: dict[int, Ints]
+    every: Ints
+
+
+@lru_cache(maxsize=16)
+def pattern_table(scheme: Scheme, first: int, last: int) -> PatternTable:
+    """The patterns of all F from the first to the last, doubled, that have any."""
+    patterns = {f: own for f in range(first, last + 1, 2) if len(own := scheme.patterns(f))}
+    if not patterns:
+        return PatternTable({}, {}, np.zeros((0, 0), dtype=np.int64))
+    highest = patterns[max(patterns)]
+    moving = np.ones(highest.shape[1], dtype=np.int64)
+    if scheme.equivalent:
+        moving[-2] = 0  # a total of equivalent spins does not rise with F
+    every = highest - moving * max(patterns)
+    numbers = {tuple(row): place for place, row in enumerate(every.tolist())}
+    places = {}
+    for f, own in patterns.items():
+        if len(own) == len(highest):
+            places[f] = np.arange(len(highest))
+        else:
+            places[f] = np.array([numbers[tuple(row)] for row in (own - moving * f).tolist()])
+    return PatternTable(patterns, places, np.column_stack([every, scheme.classes(highest)]))
+
+
+@lru_cache(maxsize=64)
+def couplings_by_f(scheme: Scheme, channel: Channel, first: int, last: int) -> Floats:
+    """c(p', p) of a channel within each F, (F, patterns', patterns); shared and read-only."""
+    table = pattern_table(scheme, first, last)
+    return _by_f(table, couplings_of(scheme, channel, table.patterns), 0)
+
+
+@lru_cache(maxsize=64)
+def tensors_by_f(scheme: Scheme, rank: int, step: int, first: int, last: int) -> Floats:
+    """t(p', p) of a tensor from each F to F + step, doubled, (F, patterns', patterns); shared and read-only."""
+    table = pattern_table(scheme, first, last)
+    return _by_f(table, coefficients_of_step(scheme, table.patterns, rank, step), step)
+
+
+def _by_f(table: PatternTable, coefficients: Mapping[int, Floats], step: int) -> Floats:
+    first, count = min(table.patterns), len(table.every)
+    out = np.zeros((len(table.patterns), count, count))
+    for f, own in coefficients.items():
+        out[(f - first) // 2, table.places[f + step][:, None], table.places[f]] = own
+    out.flags.writeable = False
+    return out

@@ -1,0 +1,50 @@
+"""Energies of a top's level table in place of those of its constants, with spins or without."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from rotor.quantum.coupled import CoupledBlock
+from rotor.quantum.effect import QuantumEffect
+from rotor.quantum.effects.watson import SEMI_RIGID
+from rotor.quantum.levels import Levels, SolvedBlock
+from rotor.tops.states.level_table import LevelTable, tabulated_energies
+
+if TYPE_CHECKING:
+    from rotor.tops.top import Top
+
+
+def as_tabulated(top: Top, effects: Sequence[QuantumEffect], rotation: Levels) -> Levels:
+    """Solved levels of the rotation with the energies of the top's table, where it has one that holds for these effects.
+
+    The table stands for the semi-rigid Hamiltonian of the top in all its states; spins do not change that.
+    """
+    if top.level_table is None or not _is_own(top, effects):
+        return rotation
+    return with_tabulated_energies(rotation, top.level_table)
+
+
+def _is_own(top: Top, effects: Sequence[QuantumEffect]) -> bool:
+    """Whether the effects without spins are those of the constants of a top and of its further states, no more and no other values."""
+    plain = [effect for effect in effects if not effect.spins(top)]
+    others = [effect for effect in plain if effect not in SEMI_RIGID]
+    if len(plain) != len(SEMI_RIGID) + len(others):
+        return False
+    known = [dict(top.states.values)] if top.states else []
+    return [dict(effect.parameters(top)) for effect in others] == known
+
+
+def with_tabulated_energies(levels: Levels, table: LevelTable) -> Levels:
+    """The same levels, and the same states, with the energies of a table where it has the level."""
+    quanta = dict(levels.quanta)
+    if "k" not in quanta and "ka" in quanta:  # of a symmetric top in Wang functions
+        quanta["k"] = quanta["kc" if levels.kind == "oblate" else "ka"]
+    energy, _ = tabulated_energies(table, quanta, levels.energy_mhz)
+    blocks = tuple(
+        replace(block, energies_mhz=energy[block.start : block.start + len(block.energies_mhz)])
+        for block in levels.blocks
+        if isinstance(block, SolvedBlock | CoupledBlock)
+    )
+    return replace(levels, energy_mhz=energy, blocks=blocks)

@@ -1,0 +1,118 @@
+"""Fourier and Euler series of SPFIT's files, XOPT, against plain matrices over signed K; lines in tests/oracles/kinds."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from full_matrix_rotor import momenta
+
+from rotor.formats.spcat.file_effect import coded_lines
+from rotor.formats.spcat.file_model import groups_of
+from rotor.formats.spcat.predict import predict
+from rotor.formats.spcat.text.int_file import IntensityFile, Request, read_int
+from rotor.formats.spcat.text.par import read_par
+
+ABC = ((10000, 30000.123), (20000, 9000.2), (30000, 7500.7))
+RHO = 0.37
+
+
+def _file(parameters, options="a 1 1 0 20 0 1 1 1 0 1 0\n"):
+    lines = "".join(f"{code} {value!r} 0\n" for code, value in parameters)
+    return read_par(f"a case\n {len(parameters)} 1 1 0 0 1e6 1 1\n{options}{lines}".encode())
+
+
+def _energies(file, j):
+    (group,) = groups_of(file, IntensityFile("", Request(), ()))
+    levels = group.levels((2 * j, 2 * j))
+    return np.sort(levels.energy_mhz[levels.rotational == j])
+
+
+def _plain(j):
+    """Na, Nb, Nc over signed k, and the rigid rotor of ABC."""
+    of = momenta(j, "a")
+    return of, sum(value * of[axis] @ of[axis] for axis, (_, value) in zip("abc", ABC, strict=True))
+
+
+@pytest.mark.parametrize("j", [1, 4, 7])
+def test_cosines(j):
+    """c cos(2π n ρ K/3) along the diagonal, and of an operator at the mean of both K."""
+    of, rigid = _plain(j)
+    k = np.arange(-j, j + 1)
+    mean = (k[:, None] + k[None, :]) / 2
+    across = of["a"] @ of["b"] + of["b"] @ of["a"]
+    plain = (
+        rigid + np.diag(55.5 * np.cos(4 * np.pi / 3 * RHO * k)) + 350.0 * across * np.cos(2 * np.pi / 3 * RHO * mean)
+    )
+    series = ((910000, RHO), (2_000_000_000, 55.5), (1_000_610_000, 350.0))
+    found = _energies(_file((*ABC, *series)), j)
+    assert found == pytest.approx(np.linalg.eigvalsh(plain), abs=1e-8)  # round-off of 1e6 MHz
+    assert np.abs(found - _energies(_file((*ABC, *series[:2])), j)).max() > 1.0  # the off-diagonal term acts
+
+
+@pytest.mark.parametrize("j", [1, 5])
+def test_euler_series(j):
+    """((N² - K²)/D)^p (K²/D)^q, the operators with ΔK = 2 as half an anticommutator with 1/D."""
+    of, rigid = _plain(j)
+    a, b = 2e-3, 3e-4
+    k = np.arange(-j, j + 1.0)
+    rest = j * (j + 1) - k**2
+    below = 1 + a * k**2 + b * rest
+    step = of["b"] - 1j * of["c"]
+    across = np.diag(1 / below) @ (step @ step + (step @ step).conj().T)
+    own = -973.0 * (k**2 / below) ** 2 - 170.0 * (k**2 / below) * (rest / below)
+    plain = rigid + np.diag(own) - 15.2 * (across + across.conj().T) / 2
+    series = ((911000, a), (910100, b), (100_000_002_000, -973.0), (100_000_001_100, -170.0), (100_000_040_000, -15.2))
+    assert _energies(_file((*ABC, *series)), j) == pytest.approx(np.linalg.eigvalsh(plain), abs=1e-8)  # round-off
+
+
+def test_sine_between_states():
+    """⟨0|H|1⟩ = i s sin(2π ρ K/3): the function changes its sign with K, so that time reversal needs the i."""
+    j, energy, s = 4, 500.0, 20.0
+    options = "a 1 2 0 20 0 1 1 1 0 1 0\n"
+    every = tuple((code + 99, value) for code, value in ABC)
+    file = _file((*every, (11, energy), (910099, RHO), (11_000_000_001, s)), options)
+    _, rigid = _plain(j)
+    between = 1j * s * np.diag(np.sin(2 * np.pi / 3 * RHO * np.arange(-j, j + 1)))
+    plain = np.block([[rigid, between], [between.conj().T, rigid + energy * np.eye(2 * j + 1)]])
+    assert _energies(file, j) == pytest.approx(np.linalg.eigvalsh(plain), abs=1e-8)  # round-off
+
+
+@pytest.mark.parametrize(
+    ("options", "code", "says"),
+    [
+        ("a 1 1 0 20 0 1 1 1 0 1 0 3\n", 100, "PHASE of 0 or 8"),
+        ("a 1 1 0 20 0 1 1 1 0 1 0 90\n", 100, "PHASE of 0 or 8"),
+        ("a 3 1 0 20 0 1 1 1 0 1 0\n", 1_010_010_000, "series with a spin"),
+        ("a 1 1 0 20 0 1 1 1 0 1 0\n", 1_000_830_000, "one series alone"),
+        ("a 1 1 0 20 0 1 1 1 0 1 0\n", 11_000_000_000, "time reversal"),
+        ("a 1 1 0 20 0 1 1 1 0 1 0\n", 930000, "no constant of a series"),
+        ("a 1 1 0 20 0 1 1 1 0 1 0\n", 100_000_000_000, "an energy has no EX"),
+        ("a 1 1 0 20 0 1 1 1 0 1 0\n", 600_000_000_100, "five Euler series"),
+    ],
+)
+def test_what_does_not_compute_is_named(options, code, says):
+    with pytest.raises(ValueError, match=says):
+        coded_lines(_file(((code, 1.0),), options), 1)
+
+
+def test_newlz_names_the_sign_of_l():
+    """With NEWLZ -2Aζ stands at the state with K l ≤ 0; at the other it is refused."""
+    own = "s -1 {n} 0 20 0 6 2 2 {more} {ewt} 1 {x}\n"
+    lines = [(3, -1, 1), (1, -1, 101), (2, 0, 201)]
+    options = {x: "".join(own.format(n=n, more=m, ewt=e, x=x) for n, m, e in lines) for x in (0, 10)}
+    common = ((1099, 148900.0), (199, 9198.9), (11, 3.0e5))
+    asked = read_int(b"a case\n0 41 14000 0 5 -30 -30 99999 300\n 001 3.92\n 111 3.92\n")
+    plain = predict(_file((*common, (200011, -277854.0)), options[0]), asked).catalogue
+    explicit = predict(_file((*common, (200022, -277854.0)), options[10]), asked).catalogue
+    assert np.array_equal(plain.frequency_mhz, explicit.frequency_mhz)
+    assert np.array_equal(plain.energy_lower_cm, explicit.energy_lower_cm)
+    with pytest.raises(ValueError, match="with NEWLZ"):
+        predict(_file((*common, (200011, -277854.0)), options[10]), asked)
+
+
+def test_moments_of_other_kinds_with_errors_of_constants():
+    """A moment with N² and constants that have errors: each line gets its error; of a pair of l-doubled states both take part."""
+    asked = read_int(b"a case\n0 41 14000 0 5 -30 -30 99999 300\n 1 3.92\n 30001 1e-4\n")
+    file = read_par(b"a case\n 1 1 1\na -1 1 0 0 0 1 1 1 0 1 0\n 100 6081.5 1e-3 /B\n")
+    found = predict(file, asked).catalogue
+    assert found.error_mhz == pytest.approx(2e-3 * np.arange(1, 6))  # σ(ν) = 2 (J + 1) σ(B)
