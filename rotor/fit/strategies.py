@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from rotor.arrays import Floats
 from rotor.fit.search import FitOptions, Grouping, Search, round_off, too_few
 from rotor.statistics.least_squares import EXHAUSTED, INTERRUPTED, STALLED, Iteration, Minimum, Progress, minimise
+from rotor.statistics.regression import regression
 
 _REJECTIONS = 20
 _STAGES = (0.1, 0.2, 0.35, 0.5, 0.7, 0.85)  # shares of the lines, in order of J, of a search that begins with low J
@@ -31,6 +32,12 @@ _LATELY = 6  # iterations in which it must halve the weighted rms after these
 _TURNED = 5  # parameters whose other sign is tried
 _TURNED_ITERATIONS = 8  # after which it must have made way
 _BETTER = 0.99  # of the weighted rms, below which the other sign is taken
+_FURTHER, _MANY_ERRORS = (
+    0.5,
+    20.0,
+)  # of its size at the start, and standard errors: who went further may have gone to another minimum
+_PUT_BACK = 3  # parameters that are put back
+_LOWER = 1.0  # by which χ² must be lower there: a standard error of one parameter
 _AT_ZERO_MHZ = 1e-30  # how far a constant that starts at 0 may move in these stages
 
 
@@ -101,6 +108,8 @@ def _searched(search: Search, progress: Progress | None) -> Minimum:
     if _is_open(search, first) and first.status == EXHAUSTED:
         left = limit - len(first.iterations)
         first = _continued(first, _minimised(search, first.parameters, progress, left))
+    if first.converged and "v" in search.lines.names:
+        first = _with_one_as_at_the_start(search, first, progress)
     return first
 
 
@@ -157,6 +166,30 @@ def _with_a_sign_turned(search: Search, first: Minimum, progress: Progress | Non
         first = second if better else replace(first, iterations=second.iterations)
         if first.rms <= search.options.poor_rms:
             break
+    return first
+
+
+def _with_one_as_at_the_start(search: Search, first: Minimum, progress: Progress | None) -> Minimum:
+    """The better of a minimum and those that are reached from it with one parameter put back to its start.
+
+    Two couplings of the same states act together as a square, (G + F)², so that χ² has two minima along one of them, which differ
+    little. Tried are the few that went further than half their size and many standard errors.
+    """
+    start, moved = search.parameters.start, first.parameters - search.parameters.start
+    floor = round_off(search, search.lines_of(first.parameters)[2])
+    errors = regression(first.jacobian, search.parameters.names, floor).errors
+    far = (start != 0) & (np.abs(moved) > _FURTHER * np.abs(start)) & (np.abs(moved) > _MANY_ERRORS * errors)
+    order = np.argsort(np.where(far, -np.abs(moved) / np.maximum(np.abs(start), _AT_ZERO_MHZ), 0.0), kind="stable")
+    for place in order[: min(int(far.sum()), _PUT_BACK)].tolist():
+        back = first.parameters.copy()
+        back[place] = start[place]
+        left = min(search.options.most_iterations - len(first.iterations), _FIRST_ITERATIONS)
+        try:
+            second = _continued(first, _minimised(search, back, progress, max(left, 0)))
+        except ValueError:  # out of the bounds of the model
+            continue
+        lower = first.residuals @ first.residuals - second.residuals @ second.residuals
+        first = second if second.converged and lower > _LOWER else replace(first, iterations=second.iterations)
     return first
 
 
