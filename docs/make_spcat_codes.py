@@ -11,6 +11,7 @@ from pathlib import Path
 
 from rotor.formats.spcat.codes import AXES, split_code
 from rotor.formats.spcat.dipole_codes import moment_of, split_dipole
+from rotor.formats.spcat.file_effect import coded_lines
 from rotor.formats.spcat.l_doubled import pairs_of
 from rotor.formats.spcat.operators import operator_of
 from rotor.formats.spcat.series import Series, is_constant, is_series, term_of
@@ -140,7 +141,13 @@ def other_rows() -> list[str]:
         ("I1 = 0, I2 > 0: commutator with Nz²", 100_010_000), ("FF: Fourier term, with NOFC that of one K", 1_000_010_000),
         ("FF with a spin", 1_010_010_000), ("EX 1 to 5: Euler series", 100_000_010_000), ("EX with a spin", 100_010_010_000),
     ]  # fmt: skip
-    return [f"| {name} | {operator_answer(code)} |" for name, code in cases]
+    rows = [f"| {name} | {operator_answer(code)} |" for name, code in cases]
+    file = read_par(b"a case\n 1 0 0 0\na 1 1 0 20\n 200000 1.0 0\n")
+    odd = answer(lambda: coded_lines(file, 1))
+    return [
+        *rows,
+        f"| TYP 20, 40, 60 and other operators of odd order within one state that is not l-doubled | {odd} |",
+    ]
 
 
 def option_answer(line: str) -> str:

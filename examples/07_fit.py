@@ -11,11 +11,12 @@ import numpy as np
 
 import rotor
 from rotor.fit.assignment import assignments
-from rotor.fit.choose import bootstrap, choose_constants, suggest_lines
+from rotor.fit.choose import choose_constants, suggest_lines
 from rotor.fit.fit import FitOptions, fit_lines
 from rotor.fit.parameters import parameters
 from rotor.fit.publication import publication_table
 from rotor.fit.report import report_text
+from rotor.fit.resampling import bootstrap
 from rotor.formats.assigned_lines import read_assigned_lines
 from rotor.formats.spcat.fit_input import fitted_file, read_fit
 from rotor.plots.fit import fit_figure

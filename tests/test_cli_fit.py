@@ -119,7 +119,7 @@ BD = ("--constants", "B=57000 D=0.17 MHz", "--free", "B,D")
         (("co.csv", "--constants", "B=57000 MHz", "--free", "B,A"), "--free: kind 'linear' needs B alone"),
         (("co.csv", *BD, "--prior", "B=1", "--prior", "B=2"), "--prior 'B=2': B has an a-priori error already"),
         (("co.csv", *BD, "--prior", "H=1"), "--prior: H is not in the set"),
-        (("co.csv", *BD, "--tie", "H=2*B"), "--tie 'H=2*B': H is not in the set"),
+        (("co.csv", *BD, "--tie", "Q=2*B"), "--tie 'Q=2*B': 'Q' is not a rotational constant known here"),
         (("co.csv", *BD, "--tie", "D=1..2*B"), "--tie 'D=1..2*B': write 'X = 2.5*Y'"),
         (("co.csv", *BD, "--tie", "D=2*B"), "--tie 'D=2*B': D must not be free"),
         (("co.csv", *BD, "--loss", "l1"), "--loss 'l1'"),

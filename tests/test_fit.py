@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 from rotor.fit.assignment import assignments, duplicates, merged
-from rotor.fit.choose import bootstrap, choose_constants, promised, suggest_lines, try_constants
+from rotor.fit.choose import choose_constants, promised, suggest_lines, try_constants
 from rotor.fit.criteria import chi_squared
 from rotor.fit.fit import FitOptions, fit_lines
 from rotor.fit.parameters import parameters, with_names
 from rotor.fit.publication import publication_table, value_text
 from rotor.fit.report import decisive, report_text
+from rotor.fit.resampling import bootstrap
 from rotor.fit.search import robust
 from rotor.formats.assigned_lines import read_assigned_lines, write_assigned_lines
 from rotor.formats.spcat.text.cat import read_cat

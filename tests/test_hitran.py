@@ -20,6 +20,7 @@ from rotor.formats.hitran import (
     read_hitran,
     write_hitran,
 )
+from rotor.quantum.effects.of_top import effects_of
 
 SAMPLE = Path(__file__).parent / "oracles" / "hitran" / "CO_fragment.par"
 TEXT = SAMPLE.read_bytes()
@@ -118,6 +119,10 @@ def test_what_is_no_list_for_hitran_is_refused(tmp_path):
     at_296 = rotor.line_list(rotor.read("CO"), jmax=3, temperature_k=296.0)
     with pytest.raises(ValueError, match="number of the molecule"):
         rotor.write(at_296, tmp_path / "co.hitran")
+    split = rotor.read("CH3Cl")
+    split = rotor.line_list(split, jmax=2, temperature_k=296.0, effects=effects_of(split, True))
+    with pytest.raises(ValueError, match="lines split by spins"):  # F = 5/2 has no place among whole numbers
+        hitran_lines(split, molecule=24)
     with pytest.raises(ValueError, match=r"abundance 1\.2"):
         hitran_lines(at_296, molecule=5, abundance=1.2)
     assert list(tmp_path.iterdir()) == []

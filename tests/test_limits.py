@@ -158,9 +158,9 @@ def test_reports_end_with_the_limits(call, verb):
     last = out.rstrip().splitlines()[-3:]
     assert last[0].startswith("effects   at J = ")
     assert last[1].startswith("left out  nuclear quadrupole: about 4 MHz; 14N splits J = 1 by 3.53 MHz: rotor")
-    assert "magnetic coupling" in last[2]
+    assert last[2].lstrip().startswith("spin-rotation: about 0.")  # C of 14N is known
     printed = json.loads(call(verb, *given, "--json", "-")[1])
-    assert [one["name"] for one in printed["limits"]] == ["nuclear quadrupole", "magnetic coupling of nuclear spins"]
+    assert [one["name"] for one in printed["limits"]] == ["nuclear quadrupole", "spin-rotation"]
     assert {one["name"]: one["present"] for one in printed["effects"]}["nuclear quadrupole"] is False
 
 
@@ -187,3 +187,20 @@ def test_every_report_says_what_is_left_out(call, command, said):
     assert f"\nleft out  {said}" in out
     printed = json.loads(call(*command, "--json", "-")[1])
     assert "left_out" in printed if command[0] == "gas" else printed["effects"]
+
+
+def test_couplings_of_an_electron_with_known_constants_are_left_out_by_size():
+    """ε of S stands before χ: it splits by N ε S, here 22 (5.4 GHz)/2; with the spins nothing of it is left out."""
+    from rotor.quantum.effects.of_top import effects_of
+    from rotor.quantum.estimates.limits import model_limits
+    from rotor.tops.spins.spin_constants import SpinConstants
+
+    spins = SpinConstants.parse("eps_aa(S)=5406 eps_bb(S)=8 b_F(S,14N)=147 chi_aa(14N)=0.5 MHz", "S=1/2")
+    top = rotor.Top.from_constants("A=239905 B=13002 C=12305 MHz", spin_constants=spins)
+    found = {one.name: one for one in model_limits(top, 22, effects_of(top, False))}
+    assert next(iter(found)) == "spin-rotation"
+    assert found["spin-rotation"].size_mhz == pytest.approx(22 * 5406 / 2)
+    assert "S, 14N: its constants are known" in found["spin-spin"].text
+    assert not {"spin-rotation", "spin-spin", "nuclear quadrupole"} & {
+        one.name for one in model_limits(top, 22, effects_of(top, True))
+    }

@@ -154,6 +154,7 @@ def test_a_radical_with_powers_and_states_goes_to_codes():
         ("a 2 2 0 20 0 1 1 1 0 1 0", ("10099 9e3", "20099 3e3", "30099 2e3", "10200001 5.0"), "spin-orbit"),
         ("a 1 2 0 20 0 1 1 1 0 1 0", ("10099 9e3", "20099 3e3", "30099 2e3", "70001 5.0"), "this coupling of two states"),
         ("a 3 1 0 20 0 1 1 1 0 1 0", ("10000 9e3", "20000 3e3", "30000 2e3", "610000 5.0"), "a term of this kind in one state"),
+        ("a 3 1 0 20 0 1 1 1 0 1 0", ("10000 9e3", "20000 3e3", "30000 2e3", "1000000000 5.0"), "Fourier or Euler"),
         ("a 3 1 2 20 0 1 1 1 0 1 0", ("10000 9e3", "20000 3e3", "30000 2e3"), "KNMIN"),
     ],
 )  # fmt: skip
@@ -170,3 +171,21 @@ def test_the_command_takes_spins_and_states_along(tmp_path, capsys):
     top = rotor.read(tmp_path / "a.toml")
     assert top.states.dipoles[1, 0] == (0.0, 0.0, 1.47)
     assert top.spin_constants.values["chi_bb-cc(14N)"] == pytest.approx(1.5 * 4.08983, rel=1e-12)
+
+
+def test_lines_of_a_file_are_shown_with_its_names(capsys):
+    assert (
+        run(["spectrum", str(ORACLES / "tunnelling_doublet_quad" / "tunnelling_doublet_quad.int"), "--top", "1"]) == 0
+    )
+    shown = capsys.readouterr().out
+    for text in (
+        "dipole between 0 and 1: μa 0, μb 0, μc 0.9 D",
+        "interacting states",
+        "nuclear quadrupole 2.5 MHz",
+        "hyperfine     exact",
+    ):
+        assert text in shown
+    assert (
+        run(["spectrum", str(ORACLES / "kinds" / "o2" / "o2.int"), "--top", "1"]) == 0
+    )  # magnetic moments have no name
+    assert "effects   those of the parameters of the files" in capsys.readouterr().out

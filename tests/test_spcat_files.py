@@ -92,14 +92,35 @@ def test_constrained_parameters_and_several_option_lines():
         ("100.\t+5500 / B", 5500.0),
         (" 100 , 5500., 1 /x", 5500.0),
         ("100,.55E+04,,", 5500.0),
-        ("100", 0.0),
-        ("100 / 7", 0.0),
-        ("100,,3.0", 0.0),
+        ("100,,3.0", 3.0),  # as SPCAT reads it
     ],
 )
 def test_numbers_in_free_form(line, value):
     parameter = read_par(f"t\n1\na 1 1 0 5\n{line}\n".encode()).parameters[0]
     assert (parameter.code, parameter.value) == (100, value)
+
+
+@pytest.mark.parametrize("line", ["100", "100 / 7", "100 ,,,3.0"])
+def test_a_parameter_without_a_value_is_refused(line):
+    """SPCAT takes such a line for the last one, and the value of the third for 0."""
+    with pytest.raises(ValueError, match=r"line 4, .* the parameter's value is missing"):
+        read_par(f"t\n1\na 1 1 0 5\n{line}\n".encode())
+
+
+@pytest.mark.parametrize(
+    ("line", "fields"),
+    [
+        ("a,,2,,20", (1, 2, 0, 20)),
+        ("a 3,,2,1,20", (3, 2, 1, 20)),
+        ("a ,2,,30", (1, 2, 0, 30)),
+        ("a-3,,,1", (-3, 1, 1, 359)),
+        ("a 3 2 1 20", (3, 2, 1, 20)),
+    ],
+)
+def test_one_comma_belongs_to_spind_and_one_before_nvib_leaves_no_default(line, fields):
+    """As the compiled SPCAT reads such lines."""
+    o = read_par(f"t\n1\n{line}\n100 5\n".encode()).options[0]
+    assert (o.spind, o.nvib, o.knmin, o.knmax) == fields
 
 
 def test_options_left_out_have_defaults():

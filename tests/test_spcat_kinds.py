@@ -13,7 +13,7 @@ import pytest
 from rotor.formats.spcat.dipole_codes import moment_of, split_dipole
 from rotor.formats.spcat.file_model import groups_of, left_out
 from rotor.formats.spcat.operators import operator_of
-from rotor.formats.spcat.predict import predict
+from rotor.formats.spcat.predict import levels_of_file, predict
 from rotor.formats.spcat.text.cat import format_lines, read_cat
 from rotor.formats.spcat.text.catalogue import Catalogue
 from rotor.formats.spcat.text.int_file import Dipole, IntensityFile, Request, read_int
@@ -30,6 +30,8 @@ MADE = {
     "deuterons_i_tot": 323, "forbidden_three_i_tot": 292, "l_doubled_weights": 419, "inversion_weights": 100, "one_of_two_i_tot": 208,
     "moment_of_n": 92, "weights_of_states_i_tot": 583, "unequal_weights_i_tot": 361, "fourier_l_doubled": 588,
     "fourier_two_states": 7206, "euler_water": 273, "sampled_k": 1603,
+    "diag3_states": 167, "euler_series": 218, "fourier_series": 288, "near_sphere_states": 235,
+    "states_up_to_maxv": 320, "triplet_and_delta": 57, "wavenumbers": 437,
 }  # fmt: skip
 
 
@@ -69,6 +71,21 @@ def test_lines(name):
 @pytest.mark.parametrize("name", MADE)
 def test_no_line_is_missing_or_extra(name):
     assert len(_predicted(name)) == MADE[name]
+
+
+@pytest.mark.parametrize(
+    "name", ["triplet_and_delta", "diag3_states", "euler_series", "states_up_to_maxv", "water_diag5"]
+)
+def test_levels_hold_the_lower_states_of_all_lines(name):
+    """Energies, labels and degeneracies of the list of levels; of the last one's one state too, whose levels have other names here."""
+    levels = levels_of_file(KINDS / name / f"{name}.int", as_spcat=True)
+    found = {}
+    for quanta, energy in zip(levels.quanta.tolist(), levels.energy_cm, strict=True):
+        found.setdefault(tuple(q for q in quanta if q >= -99), []).append(energy)
+    lines = read_cat(KINDS / name / "sample.cat")
+    for quanta, energy in zip(lines.quanta_lower.tolist(), lines.energy_lower_cm, strict=True):
+        near = found[tuple(q for q in quanta if q >= -99)]
+        assert min(abs(energy - one) for one in near) < 5.1e-5  # half a digit
 
 
 @pytest.mark.slow

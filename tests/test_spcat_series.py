@@ -65,14 +65,16 @@ def test_euler_series(j):
     assert _energies(_file((*ABC, *series)), j) == pytest.approx(np.linalg.eigvalsh(plain), abs=1e-8)  # round-off
 
 
-def test_sine_between_states():
-    """⟨0|H|1⟩ = i s sin(2π ρ K/3): the function changes its sign with K, so that time reversal needs the i."""
+@pytest.mark.parametrize(("code", "of_k"), [(11_000_000_001, lambda k: 1j), (11_000_200_001, lambda k: k)])
+def test_sine_between_states(code, of_k):
+    """⟨0|H|1⟩ = i s sin(2π ρ K/3): the function changes its sign with K, so that time reversal needs the i; with Na it does not."""
     j, energy, s = 4, 500.0, 20.0
     options = "a 1 2 0 20 0 1 1 1 0 1 0\n"
     every = tuple((code + 99, value) for code, value in ABC)
-    file = _file((*every, (11, energy), (910099, RHO), (11_000_000_001, s)), options)
+    file = _file((*every, (11, energy), (910099, RHO), (code, s)), options)
     _, rigid = _plain(j)
-    between = 1j * s * np.diag(np.sin(2 * np.pi / 3 * RHO * np.arange(-j, j + 1)))
+    k = np.arange(-j, j + 1)
+    between = s * np.diag(of_k(k) * np.sin(2 * np.pi / 3 * RHO * k))
     plain = np.block([[rigid, between], [between.conj().T, rigid + energy * np.eye(2 * j + 1)]])
     assert _energies(file, j) == pytest.approx(np.linalg.eigvalsh(plain), abs=1e-8)  # round-off
 

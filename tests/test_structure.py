@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import sys
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from hypothesis import strategies as st
 import rotor
 from rotor.molecules.molecule import Molecule
 from rotor.molecules.symmetry.point_group import symmetry_of
+from rotor.structure.consistency import doubts, gains, moments_across_planes, without_each
 from rotor.structure.coordinates import bonds_and_angles, moved_to, named, symmetric_displacements, symmetric_geometry
 from rotor.structure.family import family
 from rotor.structure.kraitchman import kraitchman, planar_moments
@@ -434,3 +436,56 @@ def test_derivatives_of_moments_are_those_of_differences(method):
     for i, step in enumerate(1e-5 * np.eye(problem.count)):
         difference = (problem.model(at + step)[0] - problem.model(at - step)[0]) / 2e-5
         assert jacobian[:, i] == pytest.approx(difference, abs=1e-7)  # third derivatives and round-off at this step
+
+
+CHAIN = Molecule(
+    ("O", "C", "C", "C", "H", "H"),
+    [[2.26, -0.62, 0], [1.19, -0.07, 0], [-0.03, -0.86, 0], [-1.04, -1.51, 0], [-1.93, -2.085, 0], [1.125, 1.04, 0]],
+)
+
+
+def chain(wrong: str = "", shift_mhz: float = 0.0):
+    """A planar chain of four heavy atoms, I + c √I as vibration, with one B that is off."""
+    measured = []
+    for isotopes in ("", "2=13C", "3=13C", "4=13C", "1=18O", "6=2H"):
+        changed = CHAIN.with_isotopes(isotopes) if isotopes else CHAIN
+        rigid = rotor.Top.from_molecule(changed).constants
+        moments = ROTATIONAL_MHZ_U_ANGSTROM2 / np.array([rigid[name] for name in "ABC"])
+        values = ROTATIONAL_MHZ_U_ANGSTROM2 / (moments + np.array([0.012, 0.018, 0.032]) * np.sqrt(moments))
+        values[1] += shift_mhz if isotopes == wrong else 0.0
+        measured.append((isotopes or "parent", isotopes, dict(zip("ABC", values.tolist(), strict=True)), {}))
+    return family(CHAIN, measured)
+
+
+def test_a_wrong_constant_of_an_isotopologue_in_a_plane_is_called_doubtful():
+    assert not doubts(chain())
+    assert {(one.species, one.axis) for one in moments_across_planes(chain())} == {
+        (name, "c") for name in ("2=13C", "3=13C", "4=13C", "1=18O", "6=2H")
+    }
+    for name, shift in (("3=13C", 1.0), ("4=13C", -10.0), ("1=18O", 1.0)):
+        said = doubts(chain(name, shift))
+        assert len(said) == 1
+        assert said[0].startswith(f"{name}: P_c")
+    assert len(doubts(chain("", 1.0))) >= 4  # of the parent: all the others differ from it
+
+
+@pytest.mark.slow
+def test_the_isotopologue_that_is_unlike_the_others_is_found():
+    """Of the r_m fit, which has the vibration of this family exactly: without the wrong one nothing is left."""
+    whole = chain("3=13C", 1.0)
+    found = without_each(whole, fit_structure(whole, "rm1"), partial(fit_structure, method="rm1"))
+    assert found[0].species == "3=13C"
+    assert found[0].rms_u_angstrom2 < 1e-6  # round-off of the constants
+    assert found[0].chance < 1e-6
+    assert all(one.chance > 0.1 for one in found[1:])
+    assert "without 3=13C" in gains("rm1", found, 0.003)[0]
+    assert not gains("rm1", found[1:], 0.003)
+
+
+def test_measured_families_have_no_false_alarm():
+    """Of maleic anhydride the published constants: its planar moments change by 0.0024 along c and by 0.017 along a."""
+    from rotor.formats.family_file import read_family
+
+    file = read_family(Path(__file__).resolve().parents[1] / "examples" / "maleic_anhydride.toml")
+    assert len(moments_across_planes(file.family)) >= 9
+    assert not doubts(file.family)

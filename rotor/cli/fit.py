@@ -14,6 +14,7 @@ import typer
 
 from rotor.checks import require_whole
 from rotor.cli.shared import inputs
+from rotor.cli.shared.fit_extras import Extras, chosen, extras_of
 from rotor.cli.shared.fit_report import parameter_table, record, suggestion_table, trial_table
 from rotor.cli.shared.inputs import Input, json_option
 from rotor.cli.shared.options import argument, file_option, grouped, option
@@ -31,7 +32,7 @@ from rotor.cli.shared.output import (
 from rotor.cli.shared.save_scene import beside, save_scene, save_scene_option
 
 if TYPE_CHECKING:
-    from rotor.fit.choose import Suggestion, Trial
+    from rotor.fit.choose import Trial
     from rotor.fit.fit import Fit, FitOptions
     from rotor.formats.fit_request import FitAnswer, FitRequest
     from rotor.statistics.least_squares import Iteration
@@ -43,9 +44,6 @@ Examples:
   rotor fit c060503.cat.gz --constants "B=6081 D=0.001 H=0 MHz" --free B,D,H
   rotor fit lines.lin --start water --free A,B,C --try DeltaJ,DeltaJK,DeltaK
   rotor fit lines.csv --start constants.toml --free A,B,C --prior DeltaK=0.02 --tie "deltaK=0.5*deltaJ" --plot rest.png"""
-
-_WORTH_MEASURING = 1e-2  # S μ² of a line with μ = 1 D, below which it is not suggested
-
 
 MOST_SAMPLES = 100_000  # of a bootstrap: each is a fit
 
@@ -88,6 +86,9 @@ class Options:
     out: str | None = option(None, metavar="STEM", help="Write STEM.fit (report), .toml, .par and .var.")
     table: str | None = file_option(".txt", ".md", ".tex", help="Table for a publication.")
     save_lines: str | None = file_option(".lin", ".csv", help="The assigned lines, merged.")
+    table_errors: str = option(
+        "stated", metavar="NAME", help="Errors in --table: from the stated errors of the lines, or from their scatter."
+    )
     plot: str | None = file_option(".png", ".pdf", ".svg", help="Residuals against frequency, J and K.")
     json: str | None = json_option()
     save_scene: str | None = save_scene_option()
@@ -103,37 +104,60 @@ def command(context: typer.Context, given: Options) -> None:
     require_whole("--bootstrap", given.bootstrap, 0, MOST_SAMPLES)
     require_whole("--seed", given.seed, 0)
     require_whole("--iterations", given.iterations, 1)
+    if given.table_errors not in ("stated", "scatter"):
+        raise ValueError(f"--table-errors {given.table_errors}: one of stated, scatter is needed")
     files = _files(given)
     _refuse_unsaved(given)
     request = read_request(given)
-    options, source = request.options, given.source
-    _refuse_overwriting(files, [source, given.lin, given.start, given.more, str(Path(source).with_suffix(".lin"))])
-
-    steps: list[Trial] = []
+    beside_it = str(Path(given.source).with_suffix(".lin"))
+    _refuse_overwriting(files, [given.source, given.lin, given.start, given.more, beside_it])
     if given.all_orders and given.choose is None:
         raise ValueError("--all-orders goes with --choose, which names the constants to choose from")
     if given.choose is not None:
-        answer, steps = _chosen(request, _names("--choose", given.choose), not given.all_orders)
+        answer, steps = chosen(request, _names("--choose", given.choose), not given.all_orders)
     else:
-        answer = _fitted(request)
+        answer, steps = _fitted(request), []
     fit = answer.fit
     for text in request.notes:
         note(text)
     if fit.constants is None and "--out .toml" in files.paths:
         del files.paths["--out .toml"]
         note("spins or several states: no .toml is written, the .par and .var have everything")
-    trials = _trials(fit, options, given.try_)
-    suggestions = _suggestions(request, fit, given.suggest)
-    spread = _bootstrap(request, fit, options, given.bootstrap, given.seed)
-    if not fit.converged and fit.minimum.status != "interrupted":
-        for name in ("--out .toml", "--out .par", "--out .var"):
-            files.paths.pop(name, None)
-    content = record(answer, context.obj, steps, trials, suggestions, spread)
+    tried = None if given.try_ is None else _names("--try", given.try_)
+    extras = extras_of(answer, tried, given.suggest, given.bootstrap, given.seed)
+    _refuse_constants(files, fit)
+    _refuse_par(files, answer)
+    content = record(answer, context.obj, steps, extras)
     content["files"] = files.names
-    writers = _writers(answer, content) | _saved(answer, given)
-    deliver(files, writers, lambda: json_text(content), lambda: _show(request, fit, steps, trials, suggestions, spread))
+    writers = _writers(answer, content, scaled=given.table_errors == "scatter") | _saved(answer, given)
+    deliver(files, writers, lambda: json_text(content), lambda: _show(request, fit, steps, extras))
     if not fit.converged:
         raise ComputationError(f"not converged: {fit.reason}")
+    if extras.interrupted:
+        raise ComputationError(f"interrupted: {extras.interrupted}; the fit itself is complete")
+
+
+def _refuse_constants(files: Files, fit: Fit) -> None:
+    """Constants of a fit that has failed are not written; the best point of one that was interrupted is."""
+    if fit.converged or fit.minimum.status == "interrupted":
+        return
+    left = [files.paths.pop(name).name for name in ("--out .toml", "--out .par", "--out .var") if name in files.paths]
+    if left:
+        note(f"not converged: {', '.join(left)} are not written")
+
+
+def _refuse_par(files: Files, answer: FitAnswer) -> None:
+    """What has no parameters in SPFIT's files goes into the others alone."""
+    from rotor.formats.fit_request import fitted_par
+
+    names = [name for name in ("--out .par", "--out .var") if name in files.paths]
+    try:
+        if names:
+            fitted_par(answer, variances=True)
+            fitted_par(answer, variances=False)
+    except ValueError as error:
+        left = ", ".join(files.paths.pop(name).name for name in names)
+        note(f"{left} are not written: {error}")
 
 
 def _refuse_unsaved(given: Options) -> None:
@@ -147,11 +171,9 @@ def _saved(answer: FitAnswer, given: Options) -> dict[str, Writer]:
     """The writer of --save-scene, with files counted from the folder of the scene."""
     if given.save_scene is None:
         return {}
-    left = [
-        name
-        for name, value in (("--try", given.try_), ("--suggest", given.suggest), ("--bootstrap", given.bootstrap))
-        if value
-    ]
+    others = {"--try": given.try_, "--suggest": given.suggest, "--bootstrap": given.bootstrap}
+    left = [name for name, value in others.items() if value]
+    left += ["--table-errors"] if given.table_errors != "stated" else []
     if left:
         note(f"the scene does not repeat {', '.join(left)}")
     from rotor.formats.fit_request import FitFiles
@@ -162,12 +184,12 @@ def _saved(answer: FitAnswer, given: Options) -> dict[str, Writer]:
         str(beside(read.source, folder)), *(beside(one, folder) for one in (read.lin, read.merge, read.start))
     )
     molecule = None if answer.request.spfit is not None else Input(given.start, given.constants)
-    others: dict[str, Any] = (
+    outputs: dict[str, Any] = (
         {} if stem is None else {"report": f"{stem}.fit", "par": f"{stem}.par", "var": f"{stem}.var"}
     )
     if stem is not None and answer.fit.constants is not None:
-        others["toml"] = f"{stem}.toml"
-    return save_scene("fit", replace(answer.request, files=files), given, molecule, **others)
+        outputs["toml"] = f"{stem}.toml"
+    return save_scene("fit", replace(answer.request, files=files), given, molecule, **outputs)
 
 
 def _files(given: Options) -> Files:
@@ -296,110 +318,12 @@ def _progress() -> Any:
     return show
 
 
-def _chosen(request: FitRequest, candidates: Sequence[str], by_order: bool) -> tuple[FitAnswer, list[Trial]]:
-    from rotor.fit.choose import choose_constants
-    from rotor.fit.parameters import parameters, with_names
-    from rotor.formats.fit_request import answer_fit
-
-    if request.spfit is not None:
-        raise ValueError("--choose: start from a line list and constants, whose free ones are the base of the model")
-    assert request.constants is not None  # a list of lines has constants to start from
-    own_name = request.constants.own_name
-    idle = [name for name in candidates if own_name(name) in request.parameters.names]
-    if idle:
-        raise ValueError(
-            f"--choose: {', '.join(idle)} is free already, part of the base of the model; choose from others"
-        )
-    with inputs.named("--choose"):
-        with_names(request.constants, candidates)
-    fit, steps = choose_constants(
-        request.lines, request.constants, request.parameters.names, candidates, request.options, by_order=by_order
-    )
-    free = parameters(fit.named, fit.parameters.names)
-    return answer_fit(replace(request, constants=fit.named, parameters=free)), steps
-
-
-def _trials(fit: Fit, options: FitOptions, text: str | None) -> list[Trial]:
-    if text is None:
-        return []
-    from rotor.fit.choose import try_constants
-
-    with inputs.named("--try"):
-        return try_constants(fit, _names("--try", text), options)
-
-
-def _suggestions(request: FitRequest, fit: Fit, name: str | None) -> list[Suggestion]:
-    """The best twenty of all lines of the kinds that were measured, for J up to the highest measured."""
-    if name is None:
-        return []
-    import numpy as np
-
-    from rotor.fit.choose import suggest_lines
-
-    error = float(np.median(fit.lines.error_mhz[fit.used]))
-    own = name if fit.constants is None else fit.constants.own_name(name)
-    if own not in fit.parameters.names:
-        raise ValueError(f"--suggest: {name} is not among the free parameters {', '.join(fit.parameters.names)}")
-    if request.spfit is not None and fit.constants is None:
-        from rotor.formats.spcat.unmeasured import unmeasured_lines
-
-        upper, lower = unmeasured_lines(request.spfit.file, fit.lines)
-        return suggest_lines(fit, name, upper, lower, error_mhz=error, model=request.model)[:20]
-    upper, lower = _unmeasured(fit)
-    return suggest_lines(fit, fit.named.own_name(name), upper, lower, error_mhz=error)[:20]
-
-
-def _unmeasured(fit: Fit) -> tuple[Any, Any]:
-    """Labels of lines of the kinds, frequencies and J that were measured, without those that are measured."""
-    import numpy as np
-
-    from rotor.spectra.lines import line_list
-    from rotor.tops.top import Top
-
-    measured = fit.lines
-    top = Top.from_constants(fit.named, dipole_abc_debye=_components(fit))
-    jmax = int(max(measured.upper[:, 0].max(), measured.lower[:, 0].max()))
-    seen_mhz = (float(measured.frequency_mhz.min()) * 0.99, float(measured.frequency_mhz.max()) * 1.01)
-    lines = line_list(top, jmax=jmax, min_lgint=None, q=1.0, range_mhz=seen_mhz)
-    strong = lines.strength_debye2 > _WORTH_MEASURING
-    labels = np.stack([lines.levels.quanta[name] for name in measured.names], axis=1)
-    upper, lower = labels[lines.upper[strong]], labels[lines.lower[strong]]
-    known = {(*u, *low) for u, low in zip(measured.upper.tolist(), measured.lower.tolist(), strict=True)}
-    new = np.array([(*u, *low) not in known for u, low in zip(upper.tolist(), lower.tolist(), strict=True)], dtype=bool)
-    return upper[new], lower[new]
-
-
-def _components(fit: Fit) -> tuple[float, float, float]:
-    """1 D along each axis whose lines occur among those measured, by the parities of Ka and Kc."""
-    kind = fit.named.kind
-    if kind != "asymmetric":
-        return (0.0, 0.0, 1.0) if kind == "oblate" else (1.0, 0.0, 0.0)
-    change = (fit.lines.upper[:, 1:] - fit.lines.lower[:, 1:]) % 2
-    kinds = {(0, 1): 0, (1, 1): 1, (1, 0): 2}
-    found = {kinds.get((int(ka), int(kc)), 0) for ka, kc in change}
-    a, b, c = (float(axis in found) for axis in range(3))
-    return a, b, c
-
-
-def _bootstrap(request: FitRequest, fit: Fit, options: FitOptions, samples: int, seed: int) -> list[float]:
-    if not samples:
-        return []
-    import numpy as np
-
-    from rotor.fit.choose import bootstrap
-
-    rng = np.random.default_rng(seed)
-    return [float(x) for x in bootstrap(fit, samples, rng, options, model=request.model)[1]]
-
-
 # What goes out
 
 
-def _writers(answer: FitAnswer, content: dict[str, Any]) -> dict[str, Writer]:
-    from rotor.fit.publication import publication_table
-    from rotor.fit.report import report_text
+def _writers(answer: FitAnswer, content: dict[str, Any], *, scaled: bool) -> dict[str, Writer]:
     from rotor.formats.assigned_lines import write_assigned_lines
-    from rotor.formats.fit_request import write_fitted_par, write_fitted_toml
+    from rotor.formats.fit_request import report_of, table_of, write_fitted_par, write_fitted_toml
 
     request, fit = answer.request, answer.fit
 
@@ -410,11 +334,11 @@ def _writers(answer: FitAnswer, content: dict[str, Any]) -> dict[str, Writer]:
 
     form = {".txt": "text", ".md": "markdown", ".tex": "latex"}
     return {
-        "--out .fit": lambda path: write_text(path, report_text(fit, request.title, notes=request.notes)),
+        "--out .fit": lambda path: write_text(path, report_of(answer)),
         "--out .toml": lambda path: write_fitted_toml(answer, path),
         "--out .par": lambda path: write_fitted_par(answer, path, variances=False),
         "--out .var": lambda path: write_fitted_par(answer, path, variances=True),
-        "--table": lambda path: write_text(path, publication_table(fit, form[path.suffix.lower()])),
+        "--table": lambda path: write_text(path, table_of(answer, form[path.suffix.lower()], scaled=scaled)),
         "--save-lines": lambda path: write_assigned_lines(fit.lines, path),
         "--plot": picture,
     }
@@ -424,21 +348,19 @@ def _show(
     request: FitRequest,
     fit: Fit,
     steps: Sequence[Trial],
-    trials: Sequence[Trial],
-    suggestions: Sequence[Suggestion],
-    spread: Sequence[float],
+    extras: Extras,
 ) -> None:
     from rotor.fit.report import far_off, statistics_text, status_text
 
     print(f"{request.title}: {status_text(fit)}")
-    show_table(parameter_table(fit, spread))
+    show_table(parameter_table(fit, extras.spread))
     print("\n".join(statistics_text(fit)))
     for text in fit.notes:
         note(text)
-    for what, some in (("chosen, in this order", steps), ("tried", trials)):
+    for what, some in (("chosen, in this order", steps), ("tried", extras.trials)):
         if some:
             show_table(trial_table(what, some))
-    if suggestions:
-        show_table(suggestion_table(fit, suggestions))
+    if extras.suggestions:
+        show_table(suggestion_table(fit, extras.suggestions))
     if not far_off(fit):
         show_facts([("lines", "none is more than 3 errors off")])

@@ -129,7 +129,7 @@ def _facts(top: Top, content: dict[str, Any]) -> list[tuple[str, str]]:
         ("dipole", dipole),
         ("polarizability", report.tensor_text(top)),
         ("spin weights", weights),
-        *_states_facts(top),
+        *report.states_facts(top),
         ("mass", f"{top.mass_u:.6f} u" if top.mass_u else "not known"),
         ("inertial defect", f"{round(content['inertial_defect_u_angstrom2'], 9) + 0.0:.6g} u Å²"),
     ]
@@ -171,23 +171,6 @@ def _constants_table(top: Top) -> Table:
     return Table("", ("constant", "MHz", "± MHz", "cm-1"), rows, frozenset({"constant"}))
 
 
-def _states_facts(top: Top) -> list[tuple[str, str]]:
-    """Names, spin weights and dipoles of several states, and where they are from."""
-    states = top.states
-    if states is None:
-        return []
-    from rotor.cli.shared.report import vector_text, weights_text
-
-    names = [f"{v} ({states.name_of(v)})" if states.names else str(v) for v in range(states.count)]
-    facts = [("states", f"v = {', '.join(names)}")]
-    for v, one in states.weights.items():
-        facts.append(("", f"spin weights of {states.name_of(v)}: {weights_text(one.to_mapping())}"))
-    for (up, low), moment in states.dipoles.items():
-        where = f"in {states.name_of(up)}" if up == low else f"between {states.name_of(low)} and {states.name_of(up)}"
-        facts.append(("", f"dipole {where}: {vector_text(moment)}"))
-    return facts
-
-
 def _states_table(top: Top) -> Table | None:
     """Constants of further states and what couples them."""
     if top.states is None:
@@ -220,6 +203,13 @@ def _nuclei_table(top: Top, content: dict[str, Any]) -> Table | None:
         said = constants or "not known; the size is that of covalent bonds of this element"
         about = "" if one["known"] else "about "
         rows.append([one["nucleus"], f"{one['spin']:g}", f"{about}{one['splitting_mhz']:.3g}", said])
+    listed = [row[0] for row in rows]
+    known = top.spin_constants.values if top.spin_constants else {}
+    for spins in dict.fromkeys(re.findall(r"\(([^()]*)\)", " ".join(known))):  # electrons, spins of 1/2, pairs
+        if spins not in listed:
+            own = {name.replace(f"({spins})", ""): value for name, value in known.items() if f"({spins})" in name}
+            size = "" if "," in spins or not top.spin_constants else f"{top.spin_constants.twice[spins] / 2:g}"
+            rows.append([spins, size, "", ", ".join(f"{name} {value:.6g}" for name, value in own.items())])
     if not rows:
         return None
     columns = ("nucleus", "spin", "splits J = 1 by (MHz)", "constants (MHz)")

@@ -38,6 +38,8 @@ if TYPE_CHECKING:
     from rotor.spectra.request import SpectrumAnswer, SpectrumRequest
     from rotor.tops.top import Top
 
+MOST_FACTS_OF_STATES = 10  # in the head of a list of lines; rotor info has all
+
 EXAMPLES = """\b
 Examples:
   rotor spectrum water
@@ -98,6 +100,7 @@ class Outputs:
     hitran_id: str | None = option(
         None, metavar="M:I", help="HITRAN's numbers of molecule and isotopologue, such as 5:1."
     )
+    egy: str | None = file_option(".egy", help="Of an .int file: write its levels as SPCAT's list (.egy).")
     csv: str | None = file_option(".csv", help="Write all lines as CSV.")
     parquet: str | None = file_option(".parquet", help="Write all lines as Parquet.")
     profile_csv: str | None = file_option(".csv", help="Write the profile on its grid as CSV.")
@@ -131,6 +134,8 @@ def command(
     hitran = _hitran_numbers(outputs, settings["temperature_k"])
 
     prediction = spcat.prediction_asked(context, given.source, options.as_spcat)
+    if prediction is None and outputs.egy is not None:
+        raise ValueError("--egy: expected with an .int file; levels of anything else are written by rotor levels --egy")
     with inputs.fields_as_options(**NAMES):
         if prediction is not None:
             answer, tag = spcat.answer_of(prediction, shape), prediction.request.tag
@@ -150,6 +155,7 @@ def command(
     writers |= save_scene("spectrum", answer.request, outputs, given, tag=tag)
     if prediction is not None:
         writers["--cat"] = _program_catalogue(prediction, content)
+        writers["--egy"] = _program_levels(prediction, content, str(given.source), options.as_spcat)
     deliver(
         files,
         writers,
@@ -266,6 +272,23 @@ def _program_catalogue(prediction: Prediction, content: dict[str, Any]) -> Write
     return write
 
 
+def _program_levels(prediction: Prediction, content: dict[str, Any], source: str, as_spcat: bool) -> Writer:
+    """The levels as SPCAT lists them."""
+    from rotor.formats.provenance import record_of, write_beside
+    from rotor.formats.spcat.predict import levels_of_file
+    from rotor.formats.spcat.text.egy import write_egy
+
+    def write(path: Path) -> None:
+        levels = prediction.levels
+        if levels is None:
+            levels = levels_of_file(source, as_spcat=as_spcat)
+        write_egy(levels, path)
+        record = record_of(prediction.lines, {"command": content["command"], "input": content["input"]})
+        write_beside(path, record | {"levels": len(levels)})
+
+    return write
+
+
 def _content(answer: SpectrumAnswer, given: Input, command: str, shown: int) -> dict[str, Any]:
     """What is printed and more, by the keys of docs/command_line.md."""
     from rotor.cli.shared.report import begin
@@ -332,6 +355,7 @@ def _facts(lines: Lines, content: dict[str, Any]) -> list[tuple[str, str]]:
         ("constants", report.constants_text(top)),
         ("dipole", dipole),
         ("spin weights", weights),
+        *report.states_facts(top)[:MOST_FACTS_OF_STATES],
         ("temperature", f"{lines.temperature_k:g} K"),
         ("Q", report.q_text(content["q"])),
         ("J max", f"{lines.jmax}: {content['jmax_source']}"),

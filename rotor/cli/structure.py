@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -28,6 +29,8 @@ from rotor.cli.shared.output import (
 if TYPE_CHECKING:
     from rotor.formats.family_file import FamilyFile
     from rotor.molecules.molecule import Molecule
+    from rotor.structure.consistency import PlanarMoment, Without
+    from rotor.structure.family import Family
     from rotor.structure.least_squares import FittedStructure
     from rotor.structure.substitution import SubstitutionStructure, Value
 
@@ -46,6 +49,9 @@ class Answer:
 
     substitution: SubstitutionStructure | None
     fitted: tuple[FittedStructure, ...]
+    planar: tuple[PlanarMoment, ...] = ()
+    without: Mapping[str, list[Without]] = field(default_factory=dict)
+    doubts: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -57,6 +63,7 @@ class Options:
     weights: str = option("equal", metavar="NAME", help="Moments weighted equally, or by their errors (errors).")
     leave_out: str = option("", metavar="AXES", help="Axes whose moments are not fitted, such as c.")
     pair: str = option("ab", metavar="AB", help="Which two moments serve for rs of a planar molecule: ab, ac, bc.")
+    check: bool = option(False, "--check", help="Fit again without each isotopologue: is one unlike the others?")
     xyz: str | None = file_option(".xyz", help="The geometry of the last method, in principal axes.")
     plot: str | None = file_option(".png", ".pdf", ".svg", help="The molecule with its bonds.")
     json: str | None = json_option()
@@ -79,7 +86,7 @@ def command(context: typer.Context, given: Options) -> None:
 
     file = read_family(source)
     with fields_as_options(weights="--weights", leave_out="--leave-out", pair="--pair"):
-        answer = answered(file, chosen, given.weights, given.leave_out, given.pair)
+        answer = answered(file, chosen, given.weights, given.leave_out, given.pair, check=given.check)
     for text in _notes(answer):
         note(text)
     content = record(file, answer, source, context.obj)
@@ -90,26 +97,34 @@ def command(context: typer.Context, given: Options) -> None:
         raise ComputationError(f"{bad[0].method} has not converged: {bad[0].minimum.reason}")
 
 
-def answered(file: FamilyFile, methods: Sequence[str], weights: str, leave_out: str, pair: str) -> Answer:
-    """The structures of the methods, in their order."""
+def answered(
+    file: FamilyFile, methods: Sequence[str], weights: str, leave_out: str, pair: str, *, check: bool = False
+) -> Answer:
+    """The structures of the methods, in their order; with check, fitted again without each isotopologue."""
+    from rotor.structure.consistency import doubts, gains, moments_across_planes, without_each
     from rotor.structure.least_squares import fit_structure
     from rotor.structure.substitution import substitution_structure
 
     substitution = None
     if "rs" in methods:
         substitution = substitution_structure(file.family, pair=pair, coordinates=file.coordinates)
-    fitted = [
-        fit_structure(
-            file.family, name, coordinates=file.coordinates, held=file.held, weights=weights, leave_out=tuple(leave_out)
+
+    def fitted_to(family: Family, name: str) -> FittedStructure:
+        return fit_structure(
+            family, name, coordinates=file.coordinates, held=file.held, weights=weights, leave_out=tuple(leave_out)
         )
-        for name in methods
-        if name != "rs"
-    ]
-    return Answer(substitution, tuple(fitted))
+
+    fitted = tuple(fitted_to(file.family, name) for name in methods if name != "rs")
+    without = {
+        one.method: without_each(file.family, one, partial(fitted_to, name=one.method)) for one in fitted if check
+    }
+    said = [text for one in fitted for text in gains(one.method, without.get(one.method, []), one.rms_u_angstrom2)]
+    planar = tuple(moments_across_planes(file.family))
+    return Answer(substitution, fitted, planar, without, (*doubts(file.family), *said))
 
 
 def _notes(answer: Answer) -> list[str]:
-    found = list(answer.substitution.notes) if answer.substitution else []
+    found = [*answer.doubts, *(answer.substitution.notes if answer.substitution else ())]
     for one in answer.fitted:
         found += [f"{one.method}: {text}" for text in one.notes]
         found += [f"{one.method}: not determined by these moments: {c.text}" for c in one.undetermined]
@@ -140,6 +155,8 @@ def record(file: FamilyFile, answer: Answer, source: str, command_line: str) -> 
             }
             for one in family.species
         ],
+        "planar_moments": [{**vars(one), "doubtful": one.doubtful} for one in answer.planar],
+        "without": {method: [vars(one) for one in found] for method, found in answer.without.items()},
         "rs": _substitution_record(answer.substitution),
         **{one.method: _fitted_record(one) for one in answer.fitted},
         "notes": _notes(answer),
@@ -223,6 +240,8 @@ def _writers(file: FamilyFile, answer: Answer, content: dict[str, Any]) -> dict[
 def _show(file: FamilyFile, answer: Answer) -> None:
     family = file.family
     print(f"{family.name}: {len(family.species)} isotopologues, {family.top.kind} top")
+    if answer.planar:
+        show_table(_planar_table(answer.planar))
     if answer.substitution:
         show_table(_coordinates_table(answer.substitution))
         show_table(_values_table("rs", answer.substitution.values))
@@ -239,6 +258,29 @@ def _show(file: FamilyFile, answer: Answer) -> None:
                 ("search", one.minimum.reason),
             ]
         )
+        if answer.without.get(one.method):
+            show_table(_without_table(one.method, answer.without[one.method]))
+
+
+def _planar_table(found: Sequence[PlanarMoment]) -> Table:
+    rows = [
+        [
+            one.species,
+            one.axis,
+            f"{one.value:.5f}",
+            f"{one.change:+.5f}",
+            f"{one.error:.5f}",
+            "doubtful" if one.doubtful else "",
+        ]
+        for one in found
+    ]
+    columns = ["isotopologue", "axis", "P (u Å²)", "from the parent", "error", ""]
+    return Table("planar moments of substitutions in a plane", columns, rows, frozenset({"isotopologue", "axis", ""}))
+
+
+def _without_table(method: str, found: Sequence[Without]) -> Table:
+    rows = [[one.species, f"{one.rms_u_angstrom2:.3g}", f"{one.chance:.2g}"] for one in found]
+    return Table(f"{method} without", ["isotopologue", "rms (u Å²)", "by chance"], rows, frozenset({"isotopologue"}))
 
 
 def _coordinates_table(found: SubstitutionStructure) -> Table:

@@ -1,4 +1,4 @@
-"""Which constants the lines call for, which unmeasured line would help most, and errors by resampling.
+"""Which constants the lines call for, and which unmeasured line would help most.
 
 Adding one constant to a fit with χ²₀ leaves χ²₁ with f₁ degrees of freedom; F = (χ²₀ - χ²₁)/(χ²₁/f₁) follows Fisher's
 distribution with 1 and f₁ where the constant is not needed. Beside it stand Akaike's criterion with its correction for small
@@ -12,7 +12,7 @@ and the rms of the residuals that leaving each line out in turn would give, r_i/
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -24,6 +24,7 @@ from rotor.fit.criteria import aicc, cross_validated_rms, f_test
 from rotor.fit.fit import Fit, FitOptions, fit_lines, weighted_derivatives
 from rotor.fit.parameters import Parameters, parameters, with_names
 from rotor.quantum.labelled import LevelModel, level_model
+from rotor.statistics.least_squares import INTERRUPTED
 from rotor.tops.constants import Constants
 from rotor.tops.operators import distortion_terms, powers_of_spelled
 
@@ -90,6 +91,7 @@ def try_constants(fit: Fit, candidates: Sequence[str], options: FitOptions | Non
     ValueError
         For a name that the kind of top or the reduction does not have.
     """
+    options = replace(options or FitOptions(), pass_interrupt=True)
     constants = with_names(_set_of(fit), [name for name in candidates if name not in fit.parameters.names])
     out = []
     for name in candidates:
@@ -188,41 +190,54 @@ def choose_constants(
     Returns
     -------
     (Fit, list of Trial)
-        The last fit, and the steps that were taken.
+        The last fit, and the steps that were taken. After a KeyboardInterrupt these are the model so far, which has not converged.
     """
     start = with_names(constants, base)
     fit = fit_lines(lines, start, parameters(start, base), _patient(options))
     fixed, taken = tuple(fit.parameters.names), list[Trial]()
     known = with_names(start, [name for name in candidates if name not in start])  # refuses names that there are not
     names = dict.fromkeys(known.own_name(name) for name in candidates)
-    orders = {name: order_of(name, start) for name in names if name not in fixed}
-
-    def take(trial: Trial) -> Fit:
-        taken.append(trial)
-        if progress:
-            progress(trial)
-        return trial.fit
+    orders = {name: order_of(name, known) for name in names if name not in fixed}
 
     different = sorted(set(orders.values()))
     groups = [{order} for order in different] if by_order else [set(different)]
-    before = -1
-    while (
-        len(taken) > before
-    ):  # once more while something was taken: a higher order may have made a lower one significant
-        before = len(taken)
+    try:
+        for trial in _steps(fit, fixed, orders, groups, _patient(options)):
+            taken.append(trial)
+            if progress:
+                progress(trial)
+    except KeyboardInterrupt:
+        last = taken[-1].fit if taken else fit
+        ended = replace(last.minimum, status=INTERRUPTED)
+        return replace(
+            last, minimum=ended, converged=False, reason=f"interrupted after {len(taken)} steps of the choice"
+        ), taken
+    return taken[-1].fit if taken else fit, taken
+
+
+def _steps(
+    fit: Fit, fixed: Sequence[str], orders: Mapping[str, int], groups: Sequence[set[int]], options: FitOptions
+) -> Iterator[Trial]:
+    """The steps of `choose_constants`, each a trial that is better than the model before it."""
+    count, before = 0, -1
+    while count > before:  # once more while something was taken: a higher order may have made a lower one significant
+        before = count
         for group in groups:
-            while len(taken) < _MOST_STEPS:
+            while count < _MOST_STEPS:
                 left = [name for name in orders if orders[name] in group and name not in fit.parameters.names]
-                best = _best_added(fit, left, _patient(options))
+                best = _best_added(fit, left, options)
                 if best is None:
                     break
-                fit = take(best)
+                count, fit = count + 1, best.fit
+                yield best
     while True:
         spare = [name for name in fit.parameters.names if name not in fixed]
-        needless = [one for one in try_constants(fit, _weakest(fit, spare), _patient(options)) if one.better]
+        needless = [one for one in try_constants(fit, _weakest(fit, spare), options) if one.better]
         if not needless:
-            return fit, taken
-        fit = take(min(needless, key=lambda one: (-orders[one.name], one.f_ratio)))
+            return
+        least = min(needless, key=lambda one: (-orders[one.name], one.f_ratio))
+        fit = least.fit
+        yield least
 
 
 def _best_added(fit: Fit, left: Sequence[str], options: FitOptions) -> Trial | None:
@@ -293,8 +308,8 @@ def order_of(name: str, constants: Constants) -> int:
 
 
 def _patient(options: FitOptions | None) -> FitOptions:
-    """A model on its way may be far from the lines: only the last one is judged by its rms."""
-    return replace(options or FitOptions(), poor_rms=1e12)
+    """A model on its way may be far from the lines: only the last one is judged by its rms. An interrupt ends the whole choice."""
+    return replace(options or FitOptions(), poor_rms=1e12, pass_interrupt=True)
 
 
 def _pair(fit: Fit, one: str, other: str, options: FitOptions) -> Trial | None:
@@ -378,68 +393,3 @@ def suggest_lines(
         )
         for i in np.argsort(ratio, kind="stable").tolist()
     ]  # fmt: skip
-
-
-def bootstrap(
-    fit: Fit,
-    samples: int,
-    rng: np.random.Generator,
-    options: FitOptions | None = None,
-    *,
-    model: Callable[[Ints], LevelModel] | None = None,
-) -> tuple[Floats, Floats]:
-    """Parameters of fits to lines drawn anew with replacement, and their standard deviations.
-
-    Measured frequencies are drawn, blends as one. Samples that determine fewer constants are drawn again, at most ten
-    times as many.
-
-    Parameters
-    ----------
-    fit : Fit
-        A finished fit of n parameters; each sample starts from its result.
-    samples : int
-        How many samples.
-    rng : numpy.random.Generator
-        Draws the lines.
-    options : FitOptions, optional
-        Of each fit.
-    model : callable, optional
-        As in `fit_lines`.
-
-    Returns
-    -------
-    values : (samples, n) array
-        MHz.
-    deviations : (n,) array
-        Standard deviations, MHz.
-
-    Raises
-    ------
-    ValueError
-        Where ten times as many samples are not enough.
-
-    Notes
-    -----
-    It needs no assumption about the errors but that the lines are independent; where few lines fix a constant it comes
-    out too large or infinite.
-    """
-    groups = fit.lines.blend[fit.groups]
-    members = {int(b): np.flatnonzero((fit.lines.blend == b) & fit.used) for b in groups}
-    at = fit.parameters.moved(fit.values)
-    out: list[Floats] = []
-    for _ in range(10 * samples):
-        if len(out) == samples:
-            break
-        drawn = rng.choice(groups, size=len(groups))
-        rows = np.concatenate([members[int(b)] for b in drawn])
-        blend = np.repeat(np.arange(len(drawn)), [len(members[int(b)]) for b in drawn])
-        lines = replace(fit.lines.take(rows), blend=blend, comments=())
-        one = fit_lines(lines, fit.constants, at, _patient(options), model=model)
-        if one.statistics.rank == fit.statistics.rank:
-            out.append(one.values)
-    if len(out) < samples:
-        raise ValueError(
-            f"only {len(out)} of {10 * samples} samples determine all constants; too few lines for a bootstrap"
-        )
-    found = np.array(out)
-    return found, np.asarray(found.std(axis=0, ddof=1))

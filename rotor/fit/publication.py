@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Sequence
+from dataclasses import dataclass
 from decimal import Decimal
 
 from rotor.fit.fit import Fit
@@ -46,12 +48,12 @@ def _power_of_ten(value: float, error: float) -> int:
 
 
 def unit_of(value: float, error: float | None) -> tuple[str, float]:
-    """The unit in which a number reads well and its size in MHz: the value, or its error, above 0.1 of it.
+    """The unit in which a number reads well and its size in MHz: the value above 0.1 of it, its error not above 10.
 
-    >>> unit_of(0.0013014, 3.7e-9)
-    ('kHz', 0.001)
+    >>> unit_of(0.0013014, 3.7e-9), unit_of(0.0, 2e-6)
+    (('kHz', 0.001), ('Hz', 1e-06))
     """
-    size = abs(value) or (error or 0.0)
+    size = max(abs(value), 0.1 * (error or 0.0))
     return next((unit for unit in _UNITS if size >= 0.1 * unit[1]), _UNITS[-1])
 
 
@@ -63,14 +65,27 @@ def name_text(name: str, form: str) -> str:
     """
     match = _NAME.fullmatch(name)
     if not match:
-        return f"\\texttt{{{name}}}".replace("_", "\\_") if form == "latex" else name
+        return f"\\texttt{{{_latex_text(name)}}}" if form == "latex" else name
     letter, below = match[1], match[2]
     if form != "latex":
         return _SHOWN.get(letter, letter) + below
     return f"${_GREEK.get(letter, letter)}{f'_{{{below}}}' if below else ''}$"
 
 
-def publication_table(fit: Fit, form: str = "text", *, scaled: bool = False, digits: int = 2) -> str:
+@dataclass(frozen=True)
+class Row:
+    """A constant of the table: name, value and standard error in MHz (None: held), what it follows where it is tied, its states."""
+
+    name: str
+    value: float
+    error: float | None
+    follows: str = ""
+    states: str = ""
+
+
+def publication_table(
+    fit: Fit, form: str = "text", *, scaled: bool = False, digits: int = 2, rows: Sequence[Row] = ()
+) -> str:
     """The constants with their standard errors, then what the fit is like.
 
     Parameters
@@ -81,6 +96,8 @@ def publication_table(fit: Fit, form: str = "text", *, scaled: bool = False, dig
         Errors times √(χ²/degrees of freedom), from the scatter of the lines, instead of those of the stated errors.
     digits : int
         Of the errors.
+    rows : sequence of Row, optional
+        What stands in the table; the constants of the fit, or its free parameters where these are no named constants.
 
     Returns
     -------
@@ -89,30 +106,70 @@ def publication_table(fit: Fit, form: str = "text", *, scaled: bool = False, dig
     Raises
     ------
     ValueError
-        For an unknown form.
+        For an unknown form, or scaled errors without degrees of freedom.
     """
     if form not in FORMS:
         raise ValueError(f"form {form!r}: one of {', '.join(FORMS)} is needed")
     if scaled and not fit.degrees_of_freedom:
         raise ValueError("scaled: with 0 degrees of freedom there are no errors from the scatter; take the stated ones")
     factor = fit.reduced_chi if scaled else 1.0
-    rows = []
-    for name, value, error in _numbers(fit):
-        free = error is not None
-        unit, size = unit_of(value, error)
-        text = value_text(value / size, error * factor / size if error else None, digits)
-        rows.append((name_text(name, form), unit, text if free else f"{text} (held)"))
-    facts = _facts(fit, scaled)
-    return {"text": _plain, "markdown": _markdown, "latex": _latex}[form](rows, facts)
+    given = rows or _rows(fit)
+    cells = [_cells(row, factor, digits, form, any(one.states for one in given)) for row in given]
+    heads = ["constant", *(["states"] if any(one.states for one in given) else []), "unit", "value"]
+    facts = [*_facts(fit, scaled), *_of_states(given)]
+    return {"text": _plain, "markdown": _markdown, "latex": _latex}[form](heads, cells, facts)
 
 
-def _numbers(fit: Fit) -> list[tuple[str, float, float | None]]:
-    """Name, value and standard error (None: held) of the constants, or of SPFIT's parameters where they have no names."""
+def _of_states(rows: Sequence[Row]) -> list[tuple[str, str]]:
+    """How a constant of all states and one of a single state go together, where both are there."""
+    both = {row.name for row in rows if row.states == "all"} & {
+        row.name for row in rows if row.states not in ("", "all")
+    }
+    return [("states", "what stands for all states and what stands for one add up")] if both else []
+
+
+def _rows(fit: Fit) -> list[Row]:
+    """The constants, or SPFIT's parameters where they have no names."""
     if fit.constants is None:
-        rows = zip(fit.parameters.names, fit.values.tolist(), fit.errors.tolist(), strict=True)
-        return [(name, value, error) for name, value, error in rows]
+        numbers = zip(fit.parameters.names, fit.values.tolist(), fit.errors.tolist(), strict=True)
+        return [Row(name, value, error) for name, value, error in numbers]
     errors = fit.constants.uncertainties
-    return [(name, value, errors.get(name)) for name, value in fit.constants.values.items()]
+    tied = _tied(fit)
+    return [Row(name, value, errors.get(name), tied.get(name, "")) for name, value in fit.constants.values.items()]
+
+
+def _tied(fit: Fit) -> dict[str, str]:
+    """Constants that follow one free constant, and which."""
+    made = fit.parameters
+    if not set(made.names) <= set(made.constant_names):
+        return {}
+    free = [(row != 0).nonzero()[0].tolist() for row in made.matrix]
+    return {
+        name: made.names[places[0]]
+        for name, places in zip(made.constant_names, free, strict=True)
+        if places and name not in made.names
+    }
+
+
+def _cells(row: Row, factor: float, digits: int, form: str, with_states: bool) -> list[str]:
+    unit, size = unit_of(row.value, row.error if row.error and math.isfinite(row.error) else None)
+    known = row.error is not None and math.isfinite(row.error)
+    text = (
+        f"{row.value / size:.12g}" if not row.error else value_text(row.value / size, row.error * factor / size, digits)
+    )
+    remark = (
+        "held"
+        if row.error is None
+        else f"follows {name_text(row.follows, form)}"
+        if row.follows
+        else ""
+        if known
+        else "not determined"
+    )
+    if form == "latex":
+        unit, text = _latex_text(unit), _latex_number(text)
+    name = name_text(row.name, form)
+    return [name, *([row.states] if with_states else []), unit, f"{text} ({remark})" if remark else text]
 
 
 def _facts(fit: Fit, scaled: bool) -> list[tuple[str, str]]:
@@ -129,22 +186,48 @@ def _facts(fit: Fit, scaled: bool) -> list[tuple[str, str]]:
     ]
 
 
-def _plain(rows: list[tuple[str, str, str]], facts: list[tuple[str, str]]) -> str:
-    widths = [max(len(row[i]) for row in rows) for i in range(3)]
-    lines = [f"{name:<{widths[0]}}  {unit:<{widths[1]}}  {text:>{widths[2]}}" for name, unit, text in rows]
+def _plain(heads: list[str], rows: list[list[str]], facts: list[tuple[str, str]]) -> str:
+    widths = [max(len(row[i]) for row in rows) for i in range(len(heads))]
+    aligned = ["<"] * (len(heads) - 1) + [">"]
+    lines = [
+        "  ".join(f"{cell:{side}{width}}" for cell, side, width in zip(row, aligned, widths, strict=True))
+        for row in rows
+    ]
     return "\n".join([*lines, "", *(f"{name}: {text}" for name, text in facts)]) + "\n"
 
 
-def _markdown(rows: list[tuple[str, str, str]], facts: list[tuple[str, str]]) -> str:
-    lines = ["| constant | unit | value |", "|---|---|---:|", *(f"| {' | '.join(row)} |" for row in rows)]
+def _markdown(heads: list[str], rows: list[list[str]], facts: list[tuple[str, str]]) -> str:
+    top = [f"| {' | '.join(heads)} |", f"|{'---|' * (len(heads) - 1)}---:|"]
+    lines = [*top, *(f"| {' | '.join(row)} |" for row in rows)]
     return "\n".join([*lines, "", *(f"- {name}: {text}" for name, text in facts)]) + "\n"
 
 
-def _latex(rows: list[tuple[str, str, str]], facts: list[tuple[str, str]]) -> str:
-    def cell(text: str) -> str:
-        return text.replace("μ", "$\\mu$").replace("e-", "\\times 10^{-}").replace("%", "\\%")
-
-    lines = ["\\begin{tabular}{llr}", "\\hline", "constant & unit & value \\\\", "\\hline"]
-    lines += [f"{name} & {cell(unit)} & {cell(text)} \\\\" for name, unit, text in rows]
-    lines += ["\\hline", *(f"\\multicolumn{{3}}{{l}}{{{name}: {cell(text)}}} \\\\" for name, text in facts)]
+def _latex(heads: list[str], rows: list[list[str]], facts: list[tuple[str, str]]) -> str:
+    lines = [f"\\begin{{tabular}}{{{'l' * (len(heads) - 1)}r}}", "\\hline", f"{' & '.join(heads)} \\\\", "\\hline"]
+    lines += [f"{' & '.join(row)} \\\\" for row in rows]
+    lines += [
+        "\\hline",
+        *(f"\\multicolumn{{{len(heads)}}}{{l}}{{{name}: {_latex_text(text)}}} \\\\" for name, text in facts),
+    ]
     return "\n".join([*lines, "\\hline", "\\end{tabular}"]) + "\n"
+
+
+def _latex_number(text: str) -> str:
+    """A number in mathematical type, with its sign and power of ten.
+
+    >>> _latex_number("-0.26(22)e-12")
+    '$-0.26(22)\\\\times 10^{-12}$'
+    """
+    number, _, power = text.partition("e")
+    return f"${number}\\times 10^{{{power}}}$" if power else f"${number}$"
+
+
+def _latex_text(text: str) -> str:
+    """Plain text with the signs that LaTeX takes for commands.
+
+    >>> _latex_text("50 % of SPFIT_1, cm-1, μHz")
+    '50 \\\\% of SPFIT\\\\_1, cm$^{-1}$, $\\\\mu$Hz'
+    """
+    for sign in "&%#_":
+        text = text.replace(sign, "\\" + sign)
+    return text.replace("μ", "$\\mu$").replace("cm-1", "cm$^{-1}$")

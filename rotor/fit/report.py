@@ -8,18 +8,40 @@ from typing import Any
 
 import numpy as np
 
+from rotor.arrays import Floats
 from rotor.fit.assignment import Assignments
 from rotor.fit.fit import Fit
 from rotor.fit.publication import value_text
 
 FAR_OFF = 3.0  # errors beyond which a line is listed among those that are far off
 _CORRELATED = 0.95  # correlation from which a pair is listed
+_INFLUENTIAL = 10  # lines listed that move a constant most
+_MOVED = 3  # constants listed of each
+_INFLUENCE = f"INFLUENCE: leverage, and what moves most without the line (DFBETAS), of {_INFLUENTIAL} lines"
 
 
-def report_text(fit: Fit, title: str = "", *, notes: Sequence[str] = ()) -> str:
-    """The whole report, in the order of SPFIT's .fit: parameters at the start, lines, parameters at the end, statistics."""
+def report_text(
+    fit: Fit, title: str = "", *, notes: Sequence[str] = (), head: Sequence[str] = (), of_file: Sequence[str] = ()
+) -> str:
+    """The whole report, in the order of SPFIT's .fit: parameters at the start, lines, parameters at the end, statistics.
+
+    Parameters
+    ----------
+    fit : Fit
+    title : str, optional
+    notes : sequence of str, optional
+        What must be known of how the lines were read.
+    head : sequence of str, optional
+        Lines below the title, such as what was read.
+    of_file : sequence of str, optional
+        A line for each parameter of SPFIT's file, free or not.
+
+    Returns
+    -------
+    str
+    """
     parts = [
-        [title or "fit of rotational constants", status_text(fit), ""],
+        [title or "fit of rotational constants", status_text(fit), *_hamiltonian(fit), *head, ""],
         ["PARAMETERS AT THE START (MHz), A-PRIORI ERRORS", *_start(fit), ""],
         ["LINES", *_lines(fit), ""],
         [
@@ -27,7 +49,13 @@ def report_text(fit: Fit, title: str = "", *, notes: Sequence[str] = ()) -> str:
             *_end(fit),
             "",
         ],
+        *([["PARAMETERS OF THE FILE: code, label, value(error)", *of_file, ""]] if of_file else []),
         ["STATISTICS", *statistics_text(fit), ""],
+        [
+            _INFLUENCE,
+            *influence(fit),
+            "",
+        ],
         ["SEARCH: weighted rms before and after each step, damping", *_search(fit), ""],
         ["CORRELATIONS", *_correlations(fit), ""],
     ]
@@ -78,6 +106,7 @@ def statistics_text(fit: Fit) -> list[str]:
     ]
     out += [f"not determined by these lines: {one.text} (left at the start)" for one in fit.statistics.undetermined]
     out += [f"far off, {text}" for text in far_off(fit)]
+    out += [f"influential, {text}" for text in influential(fit)]
     return out + [f"decisive, {text}" for text in decisive(fit)]
 
 
@@ -118,6 +147,51 @@ def decisive(fit: Fit, leverage: float = 0.9) -> list[str]:
         for i in np.argsort(-leverages)[:10].tolist()
         if leverages[i] > leverage
     ]
+
+
+def dfbetas(fit: Fit) -> Floats:
+    """By how many standard errors each parameter moves when a measured frequency is left out (frequencies, n); see `Regression`."""
+    return fit.statistics.dfbetas(fit.minimum.residuals)[: len(fit.groups)]
+
+
+def influential(fit: Fit, errors: float = 1.0) -> list[str]:
+    """Lines without which a constant would move by more than so many of its standard errors, the most influential first."""
+    moved, out = dfbetas(fit), list[str]()
+    size = np.where(np.isfinite(moved), np.abs(moved), 0.0)
+    largest = size.max(axis=1, initial=0.0)
+    for i in np.argsort(-largest, kind="stable")[:5].tolist():
+        if largest[i] > errors:
+            k, place = int(np.argmax(size[i])), int(fit.groups[i])
+            out.append(
+                f"line {fit.lines.number(place)}, {fit.lines.text(place)}: moves {fit.parameters.names[k]} by {moved[i, k]:+.1f} "
+                "standard errors (DFBETAS)"
+            )
+    return out
+
+
+def influence(fit: Fit) -> list[str]:
+    """The lines that move a constant most, with their leverages and DFBETAS, in standard errors of the scatter without them."""
+    moved = dfbetas(fit)
+    size = np.abs(moved).max(axis=1, initial=0.0)
+    leverages, lines = fit.statistics.leverages, fit.lines
+    out = []
+    for i in np.argsort(-size, kind="stable")[:_INFLUENTIAL].tolist():
+        place = int(fit.groups[i])
+        text = f"line {lines.number(place)}, {lines.text(place)}: leverage {leverages[i]:.3f}"
+        if not np.isfinite(size[i]):
+            out.append(f"{text}; without it constants are not determined")
+            continue
+        most = np.argsort(-np.abs(moved[i]), kind="stable")[:_MOVED].tolist()
+        out.append(f"{text}; " + ", ".join(f"{fit.parameters.names[k]} {moved[i, k]:+.2f}" for k in most))
+    return out
+
+
+def _hamiltonian(fit: Fit) -> list[str]:
+    """Kind of top, reduction and representation of the constants."""
+    if fit.constants is None:
+        return []
+    one = fit.constants
+    return [f"{one.kind} top" + (f", {one.reduction}-reduction, {one.representation}" if one.reduction else "")]
 
 
 def _start(fit: Fit) -> list[str]:

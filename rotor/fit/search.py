@@ -34,6 +34,7 @@ class FitOptions:
     tolerance, most_iterations : of the search, see `rotor.statistics.least_squares.minimise`
     kmax : cut of the basis of an asymmetric top, as SPFIT's KNMAX; None for the whole basis
     leave_out_missing : lines with a level that does not exist are left out, and named, as SPFIT does; else they are an error
+    pass_interrupt : a KeyboardInterrupt goes on to the caller, of a fit that is one of many; else the fit ends with its best point
     """
 
     reject_above: float | None = None
@@ -44,6 +45,7 @@ class FitOptions:
     most_iterations: int = 100
     kmax: int | None = None
     leave_out_missing: bool = False
+    pass_interrupt: bool = False
 
     def __post_init__(self) -> None:
         if self.loss not in LOSSES:

@@ -49,12 +49,12 @@ def with_rejection(
     Where no minimum was reached, or too few lines would be left, all lines count: the constants are wrong, not the lines; unless
     the start describes half of the lines and more, see `_from_near_lines`.
     """
-    minimum, may = _searched(search, progress), search.used
-    if options.reject_above is None:
+    minimum, may = _passed_on(_searched(search, progress), options), search.used
+    if options.reject_above is None or minimum.status == INTERRUPTED:
         return search, minimum, {}
     if not minimum.converged or _is_poor(search, minimum):
         search, minimum = _from_near_lines(search, minimum, progress)
-    if not minimum.converged:
+    if not _passed_on(minimum, options).converged:
         return search, minimum, {}
     for _ in range(_REJECTIONS):
         used = may & _near(search, may, minimum.parameters)
@@ -64,8 +64,17 @@ def with_rejection(
             break
         search = replace(search, used=used)
         minimum = _continued(minimum, _minimised(search, minimum.parameters, progress, options.most_iterations))
+        if _passed_on(minimum, options).status == INTERRUPTED:
+            break
     out = np.flatnonzero(may & ~search.used)
     return search, minimum, {int(i): f"more than {options.reject_above:g} errors off" for i in out}
+
+
+def _passed_on(minimum: Minimum, options: FitOptions) -> Minimum:
+    """The same; KeyboardInterrupt for a search that was interrupted, where the caller asked for it."""
+    if minimum.status == INTERRUPTED and options.pass_interrupt:
+        raise KeyboardInterrupt
+    return minimum
 
 
 def _near(search: Search, may: NDArray[np.bool_], values: Floats) -> NDArray[np.bool_]:
@@ -89,6 +98,8 @@ def _from_near_lines(search: Search, first: Minimum, progress: Progress | None) 
         return search, first
     few = replace(search, used=near)
     found = _continued(first, _minimised(few, start, progress, limit))
+    if found.status == INTERRUPTED:
+        return search, _better(first, found, replaced=False)
     return (few, found) if found.converged and not _is_poor(few, found) else (search, first)
 
 
@@ -162,9 +173,9 @@ def _with_a_sign_turned(search: Search, first: Minimum, progress: Progress | Non
             second = _continued(first, _minimised(search, turned, progress, max(left, 0), hopeless))
         except ValueError:  # out of the bounds of the model
             continue
-        better = second.rms < _BETTER * first.rms  # else the lines do not know the sign
-        first = second if better else replace(first, iterations=second.iterations)
-        if first.rms <= search.options.poor_rms:
+        # where it is not much better the lines do not know the sign
+        first = _better(first, second, replaced=second.rms < _BETTER * first.rms)
+        if first.status == INTERRUPTED or first.rms <= search.options.poor_rms:
             break
     return first
 
@@ -189,8 +200,16 @@ def _with_one_as_at_the_start(search: Search, first: Minimum, progress: Progress
         except ValueError:  # out of the bounds of the model
             continue
         lower = first.residuals @ first.residuals - second.residuals @ second.residuals
-        first = second if second.converged and lower > _LOWER else replace(first, iterations=second.iterations)
+        first = _better(first, second, replaced=second.converged and bool(lower > _LOWER))
+        if first.status == INTERRUPTED:
+            break
     return first
+
+
+def _better(first: Minimum, second: Minimum, *, replaced: bool) -> Minimum:
+    """The second search in place of the first or not, with the iterations of both; an interrupt of the second ends all."""
+    best = second if replaced else replace(first, iterations=second.iterations)
+    return replace(best, status=INTERRUPTED) if second.status == INTERRUPTED else best
 
 
 def _continued(first: Minimum, second: Minimum) -> Minimum:
@@ -216,11 +235,13 @@ def _with_most_lines(search: Search, first: Minimum, progress: Progress | None) 
         before = part.evaluate(last.parameters)[0]
         left = min(max(limit - len(last.iterations), 0), _ROUND_ITERATIONS)
         last = _continued(last, _minimised(part, last.parameters, progress, left))
+        if last.status == INTERRUPTED:  # the best point of all lines is the one before
+            return _better(first, last, replaced=False)
         if last.residuals @ last.residuals > before @ before / 4 and last.rms > search.options.poor_rms:
             return replace(first, iterations=last.iterations)
     left = max(limit - len(last.iterations), 0)
     second = _continued(last, _minimised(search, last.parameters, progress, left, _makes_no_way(search.options)))
-    return second if second.rms < first.rms else replace(first, iterations=second.iterations)
+    return _better(first, second, replaced=second.rms < first.rms)
 
 
 def _not_far_off(search: Search, values: Floats) -> NDArray[np.bool_]:
@@ -251,11 +272,13 @@ def _by_stages(search: Search, first: Minimum, progress: Progress | None, rough:
             )
             left = min(max(limit - len(last.iterations), 0), _STAGE_ITERATIONS)
             last = _continued(last, _minimised(stage, last.parameters, progress, left))
+            if last.status == INTERRUPTED:  # of a part of the lines; the best point of all of them is the one before
+                return _better(first, last, replaced=False)
         left = max(limit - len(last.iterations), 0)
         second = _continued(last, _minimised(search, last.parameters, progress, left, _makes_no_way(search.options)))
     except ValueError:  # a stage left the bounds of the model
         return first
-    return second if second.rms < first.rms else replace(first, iterations=second.iterations)
+    return _better(first, second, replaced=second.rms < first.rms)
 
 
 def _minimised(

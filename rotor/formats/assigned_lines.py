@@ -172,12 +172,18 @@ def _refuse_rows(path: object, rows: Sequence[Mapping[Any, Any]]) -> None:
 def _refuse_columns(
     path: str | os.PathLike[str], columns: Sequence[str], labels: Sequence[str], known: set[str]
 ) -> None:
+    other = next((sign for sign in (";", "\t") if len(columns) == 1 and sign in columns[0]), None)
+    if other is not None:
+        raise ValueError(
+            f"{path}: its columns are parted by {other!r}; commas are needed, and a point in decimal numbers"
+        )
     missing = [name for name in labels if name not in columns]
     strange = [name for name in columns if name not in known]
     if missing or strange:
         what = f"no column {', '.join(missing)}" if missing else f"unknown column {', '.join(map(repr, strange))}"
         raise ValueError(
-            f"{path}: {what}; columns are {', '.join(labels)}, a frequency, an error, weight, blend, width_mhz, comment"
+            f"{path}: {what}; columns are {', '.join(labels)}, a frequency ({' or '.join(_FREQUENCY)}), an error "
+            f"({' or '.join(_ERROR)}), and, where needed, weight, blend, width_mhz, comment"
         )
     twice = next((name for name in columns if columns.count(name) > 1), None)
     if twice is not None:

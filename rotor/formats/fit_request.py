@@ -18,14 +18,18 @@ from rotor.arrays import Floats, Ints
 from rotor.fit.assignment import Assignments, merged
 from rotor.fit.fit import Fit, FitOptions, fit_lines
 from rotor.fit.parameters import Parameters, parameters, with_names
-from rotor.fit.report import fit_facts
+from rotor.fit.publication import publication_table
+from rotor.fit.report import fit_facts, report_text
 from rotor.formats.assigned_lines import QUANTA, read_assigned_lines
-from rotor.formats.spcat.fit_input import SpfitInput, fitted_file, named_file, read_fit
+from rotor.formats.spcat.fit_input import SpfitInput, fitted_file, read_fit
+from rotor.formats.spcat.named_fit import named_file
+from rotor.formats.spcat.text.par import ParameterFile
 from rotor.quantum.labelled import LevelModel
 from rotor.statistics.least_squares import Progress
 from rotor.table import Table
 from rotor.tops.constants import Constants
 from rotor.tops.top import Top
+from rotor.version import version
 
 
 @dataclass(frozen=True)
@@ -167,6 +171,11 @@ def fit_of_lines(
         begin = with_names(top.constants, names)
     except ValueError as error:
         raise ValueError(f"free: {error}") from None
+    for tie in ties:  # a constant that follows another need not be in the start
+        try:
+            begin = with_names(begin, [tie.partition("=")[0].strip()] if "=" in tie else [])
+        except ValueError as error:
+            raise ValueError(f"tie {tie!r}: {error}") from None
     priors = dict(priors_mhz or {})
     made = parameters(begin, names, ties=ties, priors_mhz=priors)
     title = " ".join(top.name.split()) or Path(lines).name
@@ -184,6 +193,31 @@ def with_more_lines(request: FitRequest, path: str) -> FitRequest:
     return replace(request, lines=both, files=files, notes=(*request.notes, *notes, *found))
 
 
+def report_of(answer: FitAnswer) -> str:
+    """The report of a fit with what it was read from, and of SPFIT's files every parameter."""
+    from rotor.formats.spcat.fit_table import parameter_section
+
+    request, read = answer.request, answer.request.files
+    files = [Path(one).name for one in (read.source, read.lin, read.merge) if one]
+    head = [
+        f"rotor {version()}; read: {', '.join(files)}" + (f"; start: {Path(read.start).name}" if read.start else "")
+    ]
+    loss = request.options.loss
+    if loss != "squares":
+        head.append(f"robust loss {loss}: lines that are far off weigh less")
+    of_file = parameter_section(request.spfit, answer.fit) if request.spfit else ()
+    return report_text(answer.fit, request.title, notes=request.notes, head=head, of_file=of_file)
+
+
+def table_of(answer: FitAnswer, form: str, *, scaled: bool = False) -> str:
+    """The table of a publication; ValueError as `publication_table`."""
+    from rotor.formats.spcat.fit_table import publication_rows
+
+    spfit = answer.request.spfit
+    rows = publication_rows(spfit, answer.fit) if spfit and answer.fit.constants is None else ()
+    return publication_table(answer.fit, form, scaled=scaled, rows=rows)
+
+
 def write_fitted_toml(answer: FitAnswer, path: str | os.PathLike[str]) -> None:
     """The constants with errors and correlations in the file of the start, or in a new one.
 
@@ -193,9 +227,10 @@ def write_fitted_toml(answer: FitAnswer, path: str | os.PathLike[str]) -> None:
     from rotor.formats.molecules.molecule_writer import write_molecule_file
 
     request, fit = answer.request, answer.fit
+    doubt = "" if fit.converged else f"NOT CONVERGED ({fit.reason}): "
     origin = (
-        f"fitted by rotor to {int(fit.used.sum())} lines of {Path(request.files.source).name}, weighted by their errors; weighted rms "
-        f"{fit.weighted_rms:.4g}; errors from the stated errors of the lines"
+        f"{doubt}fitted by rotor to {int(fit.used.sum())} lines of {Path(request.files.source).name}, weighted by their "
+        f"errors; weighted rms {fit.weighted_rms:.4g}; errors from the stated errors of the lines"
     )
     start = request.files.start or ""
     own = start.lower().endswith(".toml") and Path(start).exists()
@@ -213,11 +248,15 @@ def write_fitted_toml(answer: FitAnswer, path: str | os.PathLike[str]) -> None:
 
 
 def write_fitted_par(answer: FitAnswer, path: str | os.PathLike[str], *, variances: bool) -> None:
-    """The .par file of SPFIT after the fit, or, with variances, the .var file."""
+    """The .par file of SPFIT after the fit, or, with variances, the .var file. Raises ValueError as `fitted_par` does."""
     from rotor.formats.spcat.text.par import write_par
 
+    write_par(fitted_par(answer, variances=variances), path)
+
+
+def fitted_par(answer: FitAnswer, *, variances: bool) -> ParameterFile:
+    """What stands in the .par file after the fit, or in the .var file. ValueError where SPFIT has no such parameters."""
     request, fit = answer.request, answer.fit
     if request.spfit is not None:
-        write_par(fitted_file(request.spfit, fit, variances=variances), path)
-    else:
-        write_par(named_file(fit, request.title, variances=variances), path)
+        return fitted_file(request.spfit, fit, variances=variances)
+    return named_file(fit, request.title, variances=variances)

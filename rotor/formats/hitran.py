@@ -261,7 +261,7 @@ def hitran_lines(lines: Lines, *, molecule: int, isotopologue: int = 1, abundanc
     Raises
     ------
     ValueError
-        For another temperature than 296 K and for an abundance that is not from above 0 to 1.
+        For another temperature than 296 K, for an abundance that is not from above 0 to 1, and for lines split by spins.
 
     Notes
     -----
@@ -275,6 +275,7 @@ def hitran_lines(lines: Lines, *, molecule: int, isotopologue: int = 1, abundanc
         )
     if not 0 < abundance <= 1:
         raise ValueError(f"abundance {abundance}: the share of the isotopologue is above 0 and at most 1")
+    _refuse_spins(lines)
     lines = lines.where(np.argsort(lines.frequency_mhz, kind="stable"))
     levels, n = lines.levels, len(lines)
     zero, (global_upper, global_lower) = np.zeros(n), _global_quanta(lines)
@@ -300,6 +301,16 @@ def hitran_lines(lines: Lines, *, molecule: int, isotopologue: int = 1, abundanc
         g_upper=levels.degeneracy[lines.upper].astype(float),
         g_lower=levels.degeneracy[lines.lower].astype(float),
     )
+
+
+def _refuse_spins(lines: Lines) -> None:
+    """ValueError for labels that end in F: written as J, K they would be other lines' labels."""
+    if "n" in lines.levels.quanta:
+        names = " ".join(lines.levels.quanta)
+        raise ValueError(
+            f"lines split by spins (labels {names}): records here hold J, K or Ka and Kc; leave the hyperfine structure out, or "
+            "write a .cat file, which holds F"
+        )
 
 
 def _global_quanta(lines: Lines) -> tuple[NDArray[np.str_], NDArray[np.str_]]:

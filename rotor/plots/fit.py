@@ -34,6 +34,8 @@ def fit_figure(fit: Fit, title: str = "") -> Any:
             axes = figure.add_subplot(len(panels), 1, place)
             _draw(axes, fit, x)
             axes.set_xlabel(heading)
+            if place > 1:  # quantum numbers: no marks between whole numbers
+                axes.xaxis.get_major_locator().set_params(integer=True)
         figure.axes[0].set_title(_title(fit, title).replace("$", r"\$"), loc="left")
     return figure
 

@@ -8,13 +8,16 @@ from typing import Any
 
 import numpy as np
 
+from rotor.arrays import Floats
 from rotor.molecules.molecule import Molecule
 from rotor.plots.picture import GREY, checked_suffix, formula_text, new_figure, save, styled
 from rotor.structure.coordinates import bonded
 from rotor.structure.substitution import Value
 
 _MARGIN = 0.9  # Å around the atoms
-SMALLEST_ERROR = 1e-6  # of a label: what is fitted to exact constants has errors of round-off, which are not written
+_STANDS, _BESIDE = 0.5, 0.1  # sine of a bond's slope from which its length stands beside it, and how far, Å
+_OUTSIDE = 0.3  # Å that a bond passes the centre of the molecule by, from which its length stands outside
+SMALLEST_ERROR = 1e-5  # of a label: what is fitted to exact constants has errors of round-off, which are not written
 
 
 def structure_figure(molecule: Molecule, *, values: Sequence[Value] = (), title: str = "") -> Any:
@@ -90,18 +93,40 @@ def _draw_bonds(axes: Any, molecule: Molecule, values: Sequence[Value], across: 
             text = value_text(round(value.value, 6), value.error) if seen else f"{value.value:.4f}"
             for atoms in named(molecule, value.name, value.atoms).alike:
                 written.setdefault(tuple(sorted(atoms)), text)
+    centre = x[:, [across, up]].mean(axis=0)
     for i, j in bonded(molecule):
         ends = x[[i - 1, j - 1]][:, [across, up]]
         axes.plot(ends[:, 0], ends[:, 1], color=GREY, linewidth=2.5, solid_capstyle="round", zorder=1)
         if (i, j) in written:
-            along = ends[1] - ends[0]
-            normal = np.array([-along[1], along[0]]) / (np.linalg.norm(along) or 1.0)
-            place = ends.mean(axis=0) + 0.22 * normal * (1 if normal[1] >= 0 else -1)
-            axes.text(*place, written[i, j], ha="center", va="center", fontsize=7.0, zorder=4)
+            _write_at_bond(axes, ends, [_radius(molecule.symbols[k - 1]) for k in (i, j)], centre, written[i, j])
+
+
+def _write_at_bond(axes: Any, ends: Floats, radii: Sequence[float], centre: Floats, text: str) -> None:
+    """Beside the middle of what is seen of a bond: beyond both atoms where it lies flat, beside the line where it stands.
+
+    It stands on the side away from the centre of the molecule, above bonds that pass the centre.
+    """
+    along = (ends[1] - ends[0]) / (np.linalg.norm(ends[1] - ends[0]) or 1.0)
+    normal = np.array([-along[1], along[0]])
+    middle = (ends[0] + radii[0] * along + ends[1] - radii[1] * along) / 2
+    outward = float((middle - centre) @ normal)
+    up = normal[1] > 0 or (normal[1] == 0 and normal[0] > 0)
+    normal = normal if (outward > 0 if abs(outward) > _OUTSIDE else up) else -normal
+    side = "left" if normal[0] > 0 else "right"
+    stands = abs(normal[0]) > _STANDS
+    place = middle + normal * (_BESIDE if stands else max(radii) + _BESIDE)
+    axes.text(*place, text, ha=side if stands else "center", va="center", fontsize=7.0, zorder=4)
+
+
+def _radius(symbol: str) -> float:
+    """Of the circle of an atom, Å."""
+    from ase.data import atomic_numbers, covalent_radii
+
+    return float(0.42 * covalent_radii[atomic_numbers[symbol]])
 
 
 def _draw_atoms(axes: Any, molecule: Molecule, across: int, up: int, depth: int) -> None:
-    from ase.data import atomic_numbers, covalent_radii
+    from ase.data import atomic_numbers
     from ase.data.colors import jmol_colors
     from matplotlib.patches import Circle
 
@@ -111,6 +136,6 @@ def _draw_atoms(axes: Any, molecule: Molecule, across: int, up: int, depth: int)
         colour = 0.75 * np.asarray(jmol_colors[number]) + 0.25
         place = (x[atom, across], x[atom, up])
         axes.add_patch(
-            Circle(place, 0.42 * covalent_radii[number], facecolor=colour, edgecolor=GREY, linewidth=0.8, zorder=2)
+            Circle(place, _radius(molecule.symbols[atom]), facecolor=colour, edgecolor=GREY, linewidth=0.8, zorder=2)
         )
         axes.text(*place, f"{molecule.symbols[atom]}{atom + 1}", ha="center", va="center", fontsize=7.0, zorder=3)

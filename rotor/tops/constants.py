@@ -278,7 +278,7 @@ def _refuse_unknown(names: Iterable[str]) -> None:
             near = near or difflib.get_close_matches(name, KNOWN, n=3)
             hint = f"did you mean {' or '.join(near)}? " if near else ""
             raise ValueError(
-                f"{name!r} is not a rotational constant known here: {hint}Known are {', '.join(KNOWN)}, and terms "
+                f"{name!r} is not a rotational constant known here: {hint}{'K' if hint else 'k'}nown are {', '.join(KNOWN)}, and terms "
                 "spelled out such as J4Jz2Jpm6"
             )
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+from rotor.cli.shared.fit_extras import Extras
 from rotor.cli.shared.output import (
     Table,
 )
@@ -23,9 +24,7 @@ def record(
     answer: FitAnswer,
     command_line: str,
     steps: Sequence[Trial],
-    trials: Sequence[Trial],
-    suggestions: Sequence[Suggestion],
-    spread: Sequence[float],
+    extras: Extras,
 ) -> dict[str, Any]:
     """Everything about a fit, by the keys of docs/command_line.md."""
     import rotor
@@ -42,12 +41,12 @@ def record(
                 fit.parameters.names, fit.values, fit.errors, fit.scaled_errors, fit.parameters.start, strict=True
             )
         ],
-        "bootstrap_errors": list(spread) or None,
+        "bootstrap_errors": list(extras.spread) or None,
         "correlations": fit.statistics.correlations,
         **{name: facts[name] for name in _AFTER},
         "chosen": [_trial_record(one) for one in steps],
-        "trials": [_trial_record(one) for one in trials],
-        "suggestions": [vars(one) for one in suggestions],
+        "trials": [_trial_record(one) for one in extras.trials],
+        "suggestions": [vars(one) for one in extras.suggestions],
         "lines": _line_records(fit),
     }
 
@@ -83,6 +82,9 @@ def _trial_record(trial: Trial) -> dict[str, Any]:
 def _line_records(fit: Fit) -> list[dict[str, Any]]:
     lines = fit.lines
     leverage = dict(zip(fit.groups.tolist(), fit.statistics.leverages.tolist(), strict=False))
+    from rotor.fit.report import dfbetas
+
+    moved = dict(zip(fit.groups.tolist(), dfbetas(fit), strict=True))
     difference = fit.difference_mhz
     return [
         {
@@ -96,6 +98,7 @@ def _line_records(fit: Fit) -> list[dict[str, Any]]:
             "blend": lines.blend[i],
             "used": bool(fit.used[i]),
             "leverage": leverage.get(i),
+            "dfbetas": moved.get(i),
         }
         for i in range(len(lines))
     ]

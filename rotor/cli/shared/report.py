@@ -37,18 +37,38 @@ def describe(top: Top, text: str, command: str) -> dict[str, Any]:
 
 def model_facts(content: Mapping[str, Any]) -> list[tuple[str, str]]:
     """What the model has and what it leaves out, largest first, from the keys of `rotor.quantum.estimates.limits.limit_facts`."""
-    from rotor.quantum.estimates.beyond import Limit
-    from rotor.quantum.estimates.limits import COMPUTE
+    from rotor.quantum.estimates.beyond import COMPUTE, Limit
 
     present = [f"{one['name']} {one['size_mhz']:.2g} MHz" for one in content["effects"] if one["present"]]
-    facts = [("effects", f"at J = {content['sizes_at_j']}: " + ", ".join(present))]
+    sizes = (
+        f"at J = {content['sizes_at_j']}: " + ", ".join(present) if present else "those of the parameters of the files"
+    )
+    facts = [("effects", sizes)]
     limits = [Limit(**one).sentence.replace(COMPUTE, "rotor spectrum --hyperfine") for one in content["limits"]]
-    return facts + left_out_facts(limits or [NOTHING_SEEN if content["mass_u"] is not None else NOTHING_KNOWN])
+    unknown = (
+        NOTHING_KNOWN if not content.get("spins") else NOTHING_KNOWN.replace("nuclear spins", "further nuclear spins")
+    )
+    return facts + left_out_facts(limits or [NOTHING_SEEN if content["mass_u"] is not None else unknown])
 
 
 def left_out_facts(sentences: Sequence[str]) -> list[tuple[str, str]]:
     """Sentences of what is left out, the first with the name of the list."""
     return [("left out" if not i else "", sentence) for i, sentence in enumerate(sentences)]
+
+
+def states_facts(top: Top) -> list[tuple[str, str]]:
+    """Names, spin weights and dipoles of several states, and where they are from."""
+    states = top.states
+    if states is None:
+        return []
+    names = [f"{v} ({states.name_of(v)})" if states.names else str(v) for v in range(states.count)]
+    facts = [("states", f"v = {', '.join(names)}")]
+    for v, one in sorted(states.weights.items()):
+        facts.append(("", f"spin weights of {states.name_of(v)}: {weights_text(one.to_mapping())}"))
+    for (up, low), moment in states.dipoles.items():
+        where = f"in {states.name_of(up)}" if up == low else f"between {states.name_of(low)} and {states.name_of(up)}"
+        facts.append(("", f"dipole {where}: {vector_text(moment)}"))
+    return facts
 
 
 def heading(top: Top) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
@@ -68,7 +70,24 @@ def prediction_of(context: typer.Context, source: str, as_spcat: bool) -> Predic
     prediction = predict_file(source, as_spcat=as_spcat)
     for text in prediction.notes:
         note(text)
-    return prediction
+    return with_names(prediction, Path(source))
+
+
+def with_names(prediction: Prediction, source: Path) -> Prediction:
+    """The prediction with the named constants of its files, their spins and states, where all have names; else as it is."""
+    from rotor.formats.read_write import read_spcat_top
+    from rotor.quantum.effects.of_top import effects_of
+
+    lines = prediction.lines
+    if all(effect.name for effect in lines.levels.effects):
+        return prediction
+    try:
+        top = read_spcat_top(source)
+        effects = effects_of(top, top.spin_constants is not None)
+    except ValueError:
+        return prediction
+    levels = replace(lines.levels, effects=effects)
+    return replace(prediction, lines=replace(lines, top=top, levels=levels))
 
 
 def answer_of(prediction: Prediction, shape: dict[str, Any]) -> SpectrumAnswer:

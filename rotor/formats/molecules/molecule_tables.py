@@ -149,7 +149,7 @@ def refuse_unknown_keys(given: Iterable[str], known: Iterable[str], place: str) 
         if key not in known:
             near = difflib.get_close_matches(key, known, n=1)
             hint = f"did you mean {near[0]}? " if near else ""
-            raise ValueError(f"{place}: unknown key {key!r}; {hint}Known are {', '.join(known)}")
+            raise ValueError(f"{place}: unknown key {key!r}; {hint}{'K' if hint else 'k'}nown are {', '.join(known)}")
 
 
 # One function a table

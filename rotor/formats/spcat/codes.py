@@ -144,7 +144,8 @@ def _whole_code(parameter: Parameter) -> int:
     }
     for what, found in reasons.items():
         if found:
-            raise ValueError(f"parameter {parameter.code}{label}: {what} {NOT_YET}")
+            why = "has no name here; predict from the file itself" if what.endswith("series") else NOT_YET
+            raise ValueError(f"parameter {parameter.code}{label}: {what} {why}")
     return join_code(d._replace(v1=0, v2=0))
 
 

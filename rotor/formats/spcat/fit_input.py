@@ -21,7 +21,6 @@ from rotor.fit.fit import Fit, FitOptions
 from rotor.fit.parameters import Parameters
 from rotor.formats.assigned_lines import QUANTA
 from rotor.formats.spcat.codes import HELD_BELOW, constants_and_matrix
-from rotor.formats.spcat.model import parameter_file
 from rotor.formats.spcat.states import is_plain
 from rotor.formats.spcat.text.fields import BLANK
 from rotor.formats.spcat.text.lin import LineList, note_of_defaults, note_of_remarks, read_lin, with_defaults
@@ -29,7 +28,6 @@ from rotor.formats.spcat.text.par import Header, Parameter, ParameterFile, read_
 from rotor.formats.spcat.variances import FREE_ABOVE
 from rotor.quantum.labelled import LevelModel
 from rotor.tops.constants import Constants
-from rotor.tops.top import Top
 
 _NO_ERRTST = 1e6  # what SPFIT takes for an ERRTST of 0 or less
 
@@ -118,7 +116,7 @@ def spfit_input(file: ParameterFile, lines: LineList, source: str = "") -> Spfit
         model = partial(FileLevels.of, file)
     values = np.array([p.value for p in file.parameters])
     parameters = Parameters(
-        names=_distinct([file.parameters[i].label or str(file.parameters[i].code) for i in free]),
+        names=_distinct([file.parameters[i] for i in free]),
         start=values[list(free)],
         prior=np.array([_prior(file.parameters[i]) for i in free]),
         constant_names=names,
@@ -137,6 +135,13 @@ def spfit_input(file: ParameterFile, lines: LineList, source: str = "") -> Spfit
         leave_out_missing=True,
     )
     notes += _notes(file, options, model is None, assigned)
+    if model is not None:
+        from rotor.formats.spcat.at_zero import stay_at_zero
+
+        if stay := stay_at_zero(file):
+            notes.append(
+                f"{', '.join(stay)}: at 0 they change no level to first order, and stay there; give other starts"
+            )
     return SpfitInput(file, assigned, constants, parameters, options, columns, ratios, tuple(notes), model)
 
 
@@ -201,11 +206,12 @@ def _prior(parameter: Parameter) -> float:
     return error if error < FREE_ABOVE else np.inf
 
 
-def _distinct(names: Sequence[str]) -> tuple[str, ...]:
-    """Names with a number behind those that stand twice."""
+def _distinct(parameters: Sequence[Parameter]) -> tuple[str, ...]:
+    """The labels, with the code behind those that stand twice, and a number where the code does too."""
+    labels = [p.label or str(p.code) for p in parameters]
+    names = [f"{x} ({p.code})" if labels.count(x) > 1 else x for x, p in zip(labels, parameters, strict=True)]
     return tuple(
-        f"{name} ({1 + list(names[:i]).count(name)})" if list(names).count(name) > 1 else name
-        for i, name in enumerate(names)
+        f"{name}, {1 + names[:i].count(name)}" if names.count(name) > 1 else name for i, name in enumerate(names)
     )
 
 
@@ -307,58 +313,30 @@ def fitted_file(asked: SpfitInput, fit: Fit, *, variances: bool) -> ParameterFil
         if variances and column >= 0:
             error = float(errors[column]) * abs(ratio)
         made.append(replace(parameter, value=value, error=error))
-    rest = correlation_text(asked, fit) if variances else ""
+    leaders = [c for p, c in zip(asked.file.parameters, asked.columns, strict=True) if not p.constrained]
+    rest = correlation_text(fit, leaders) if variances else ""
     header = replace(asked.file.header, npar=len(made))
     return replace(asked.file, header=header, parameters=tuple(made), rest=rest)
 
 
-def named_file(fit: Fit, title: str, *, variances: bool) -> ParameterFile:
-    """The .par or .var file of a fit in named constants.
-
-    SPFIT's parameters are not always the constants (A - B of a symmetric top): their errors and correlations are carried over.
-    Raises ValueError where a fitted combination of constants has no parameter of its own there (a tie between constants).
-    """
-    top = Top.from_constants(fit.named, name=title)
-    highest = int(max(fit.lines.upper[:, 0].max(), fit.lines.lower[:, 0].max()))
-    file = parameter_file(top, kmax=min(max(highest, 1), 359))
-    _, matrix = constants_and_matrix(file)
-    back = np.linalg.pinv(matrix) @ fit.parameters.matrix  # SPFIT's parameters by the free ones
-    back[np.abs(back) < 1e-9] = 0.0
-    covariance = back @ np.where(np.isfinite(fit.statistics.covariance), fit.statistics.covariance, 0.0) @ back.T
-    errors = np.sqrt(np.diag(covariance))
-    moved = np.atleast_1d(back.any(axis=1))
-    parameters = tuple(
-        replace(p, error=(float(errors[i]) if variances else 1e36) if moved[i] else 1e-37)
-        for i, p in enumerate(file.parameters)
-    )
-    rows = np.flatnonzero(moved)
-    if len(rows) != len(fit.parameters.names):
-        raise ValueError(
-            "tied constants have no parameters of their own in SPFIT's files; write the .toml file instead"
-        )
-    rest = _packed(covariance[np.ix_(rows, rows)] / np.outer(errors[rows], errors[rows])) if variances else ""
-    header = replace(file.header, npar=len(parameters), nline=len(fit.lines), nitr=100)
-    return replace(file, header=header, parameters=parameters, rest=rest)
-
-
-def correlation_text(asked: SpfitInput, fit: Fit) -> str:
+def correlation_text(fit: Fit, columns: Sequence[int]) -> str:
     """What stands at the end of a .var file: the correlations C = V Vᵀ, V upper triangular, column by column, eight in a line.
 
-    They are of all parameters but those with a minus sign, held ones too, which have none with others: SPCAT reads so many, and
-    takes none where fewer stand there. The sign of a column has no bearing on C.
+    columns : of every parameter without a minus sign its place among those of the fit, -1 of one that is held, which has none with others:
+    SPCAT reads so many, and takes none where fewer stand there. The sign of a column has no bearing on C.
     """
-    leaders = [i for i, parameter in enumerate(asked.file.parameters) if not parameter.constrained]
-    columns = np.array([asked.columns[i] for i in leaders])
-    free = np.flatnonzero(columns >= 0)
-    correlations = np.eye(len(leaders))
-    known = np.nan_to_num(fit.statistics.correlations)
-    correlations[np.ix_(free, free)] = known[np.ix_(columns[free], columns[free])]
+    correlations = np.nan_to_num(fit.statistics.correlations)
     np.fill_diagonal(correlations, 1.0)
-    return _packed(correlations)
+    return packed_correlations(correlations, columns)
 
 
-def _packed(correlations: Floats) -> str:
-    factor = _lower_factor(correlations[::-1, ::-1])[::-1, ::-1]
+def packed_correlations(correlations: Floats, columns: Sequence[int]) -> str:
+    """Correlations (n, n) as `correlation_text` has them."""
+    places = np.array(columns)
+    free = np.flatnonzero(places >= 0)
+    whole = np.eye(len(places))
+    whole[np.ix_(free, free)] = correlations[np.ix_(places[free], places[free])]
+    factor = _lower_factor(whole[::-1, ::-1])[::-1, ::-1]
     values = [factor[i, j] for j in range(len(factor)) for i in range(j + 1)]
     rows = [values[i : i + 8] for i in range(0, len(values), 8)]
     return "".join("".join(f"{value:10.7f}" for value in row) + "\n" for row in rows)

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from rotor.arrays import Floats, Ints, distinct
+from rotor.formats.spcat.at_zero import left_at_zero
 from rotor.formats.spcat.file_model import Group, groups_of, line_names
 from rotor.formats.spcat.file_quanta import Format, format_of, quanta_of
 from rotor.formats.spcat.l_doubled import functions_of_l, named_by_l
@@ -39,8 +40,9 @@ _AT_ZERO = 1e-30  # MHz: a free parameter that starts at 0 must not be left out 
 
 
 def groups_for_fit(file: ParameterFile) -> list[Group]:
-    """The groups of connected states with every parameter line in, those of value 0 too; K limited as SPFIT does."""
-    nonzero = tuple(replace(p, value=p.value or _AT_ZERO) for p in file.parameters)
+    """The groups of connected states with every parameter line in that may leave 0 in a fit; K limited as SPFIT does."""
+    left = left_at_zero(file)
+    nonzero = tuple(p if i in left else replace(p, value=p.value or _AT_ZERO) for i, p in enumerate(file.parameters))
     return groups_of(replace(file, parameters=nonzero), _NO_REQUEST, as_spcat=True)
 
 

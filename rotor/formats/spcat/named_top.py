@@ -99,6 +99,7 @@ def _refuse(file: ParameterFile, states: tuple[StateOptions, ...], intensities: 
         f"IXX = {first.ixx}: a sum of angular momenta that is held for conserved": first.ixx != 0,
         f"IAX = {first.iax}: a total spin of equivalent nuclei": any(s.i_tot for s in states),
         f"EWT = {first.ewt}: an l-doubled state": any(s.l_code for s in states),
+        f"XOPT = {first.xopt}: NEWLZ, NOFC or G12": first.xopt >= 10,
         "KNMIN: a range of K that does not begin with 0": any(s.kmin for s in states),
         "SPIND: spins that differ from state to state": len({s.spins for s in states}) > 1,
         "KNMAX: linear states beside others": len({s.linear for s in states}) > 1,

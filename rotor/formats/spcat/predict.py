@@ -15,11 +15,12 @@ from numpy.typing import NDArray
 
 from rotor import units
 from rotor.formats.line_tables import catalogue
+from rotor.formats.spcat import wavenumbers
 from rotor.formats.spcat.codes import is_linear
 from rotor.formats.spcat.file_lines import LEAST_MHZ, equally_weighted
 from rotor.formats.spcat.labels import BY_DIAG
 from rotor.formats.spcat.model import FOLD, common_weight, top_of
-from rotor.formats.spcat.predict_states import predicted
+from rotor.formats.spcat.predict_states import levels_of_files, predicted
 from rotor.formats.spcat.states import is_plain
 from rotor.formats.spcat.text.catalogue import Catalogue
 from rotor.formats.spcat.text.egy import LevelList
@@ -43,8 +44,8 @@ _STR_SCALE_MHZ = 300_000.0  # STR1 counts (ν/300 GHz)²
 class Prediction:
     """A predicted catalogue and what it was made from.
 
-    catalogue: as the program would list it, E″ from the Hamiltonian's zero, degeneracies with the weights as the file
-    has them. lines: the same lines before K doublets were parted, weights reduced, E″ from the lowest level.
+    catalogue: as the program would list it, in cm⁻¹ where FLAGS says so, E″ from the Hamiltonian's zero, degeneracies with the
+    weights as the file has them. lines: the same lines before K doublets were parted, weights reduced, E″ from the lowest level.
     q: the partition function used, as a file counts it: unreduced weights, energies from the Hamiltonian's zero.
     request: line 2 of the .int file. notes: what the program would have passed over in silence. levels: as the program would list
     them, where the file has spins or several states.
@@ -64,6 +65,17 @@ def predict_file(path: str | os.PathLike[str], *, own_q: bool = False, as_spcat:
     own_q, as_spcat: see `predict`. Raises ValueError, with file and line, for what cannot be read or is not computed yet.
     """
     return predict(read_par(parameters_beside(path)), read_int(path), own_q=own_q, as_spcat=as_spcat)
+
+
+def levels_of_file(path: str | os.PathLike[str], *, as_spcat: bool = False) -> LevelList:
+    """The levels that belong to an .int file as SPCAT lists them in its .egy file, from FBGN to FEND; see `predict_file`."""
+    parameters, intensities = read_par(parameters_beside(path)), read_int(path)
+    if intensities.request.flags >= wavenumbers.FROM:
+        parameters, intensities = (
+            wavenumbers.parameters_in_mhz(parameters),
+            wavenumbers.request_in_mhz(intensities),
+        )
+    return levels_of_files(parameters, intensities, as_spcat=as_spcat)
 
 
 def parameters_beside(path: str | os.PathLike[str]) -> Path:
@@ -122,12 +134,19 @@ def predict(
             f"FBGN = {request.fbgn}, FEND = {request.fend}: F runs from FBGN to FEND, from 0 to {QUANTUM_RANGE[1]}, the "
             "highest that two characters of a catalogue can say"
         )
-    if request.flags >= 1000:
-        raise ValueError(
-            f"FLAGS = {request.flags}: constants and frequencies in cm⁻¹ are read but not computed yet; expected below 1000, in MHz"
+    if request.flags >= wavenumbers.FROM:
+        in_mhz = predict(
+            wavenumbers.parameters_in_mhz(parameters),
+            wavenumbers.request_in_mhz(intensities),
+            own_q=own_q,
+            as_spcat=as_spcat,
         )
+        return replace(in_mhz, catalogue=wavenumbers.catalogue_in_cm(in_mhz.catalogue), request=request)
     if not (own_q or (math.isfinite(request.qrot) and request.qrot > 0)):
         raise ValueError(f"QROT = {request.qrot}: a partition function is a number above 0")
+    if as_spcat and 0 < request.qrot < 1:  # taken for 1 by the program
+        request = replace(request, qrot=1.0)
+        intensities = replace(intensities, request=request)
     others_names = options.diag in BY_DIAG and options.spind > 0 and not is_linear(options)
     left_out = as_spcat and options.knmax < request.fend and not is_linear(options)
     if not is_plain(parameters, intensities) or left_out or others_names:

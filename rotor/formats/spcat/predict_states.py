@@ -13,13 +13,12 @@ from typing import Any
 import numpy as np
 
 from rotor import units
-from rotor.arrays import Floats, Ints
+from rotor.arrays import Floats, Ints, end_to_end
 from rotor.formats.spcat.codes import constants_of, split_code
 from rotor.formats.spcat.file_lines import (
     LEAST_MHZ,
     as_catalogue,
     as_level_list,
-    end_to_end,
     lines_of,
     transitions_of,
     within,
@@ -82,7 +81,7 @@ def predicted(
     form = format_of(parameters, groups)
     q = summed_q(groups, request.temperature_k).q if own_q else request.qrot
     groups = _with_levels(groups, request)
-    solved = [(group, group.levels(f_range(group, request))) for group in groups]
+    solved = _solved(groups, request, form)
     transitions = [transitions_of(group, levels, request, q) for group, levels in solved]
     factor, names = variance_factor(parameters), line_names(parameters)
     spreads = [level_spreads(group, levels, names, factor) for group, levels in solved]
@@ -96,6 +95,46 @@ def predicted(
     if factor is not None:
         lines = replace(lines, given_spread=np.concatenate([one for one in spreads if one is not None]))
     return made, lines, q, as_level_list(solved, form), notes
+
+
+def _solved(groups: list[Group], request: Request, form: Format) -> list[tuple[Group, Levels]]:
+    """The levels of every group from FBGN to FEND; those of states above MAXV count as levels that do not exist."""
+    found = [(group, group.levels(f_range(group, request))) for group in groups]
+    if request.maxv < 0 or not form.states:
+        return found
+    return [(group, _up_to(request.maxv, group, levels)) for group, levels in found]
+
+
+def _up_to(maxv: int, group: Group, levels: Levels) -> Levels:
+    return replace(levels, weight=np.where(_file_numbers(group, levels) <= maxv, levels.weight, 0))
+
+
+def levels_of_files(parameters: ParameterFile, intensities: IntensityFile, *, as_spcat: bool = False) -> LevelList:
+    """The levels of an .int file from FBGN to FEND as SPCAT lists them, whether they have names of this package or not.
+
+    Parameters
+    ----------
+    parameters : ParameterFile
+        The .var or .par file.
+    intensities : IntensityFile
+        The .int file.
+    as_spcat : bool, optional
+        Whether K beyond KNMAX is left out of the basis.
+
+    Returns
+    -------
+    LevelList
+        Energies in cm⁻¹ from the zero of the Hamiltonian, degeneracies with the weights of the file.
+
+    Raises
+    ------
+    ValueError
+        As `predict.predict` does.
+    """
+    groups = groups_of(parameters, intensities, as_spcat=as_spcat)
+    form = format_of(parameters, groups)
+    groups = _with_levels(groups, intensities.request)
+    return as_level_list(_solved(groups, intensities.request, form), form)
 
 
 def _with_levels(groups: list[Group], request: Request) -> list[Group]:

@@ -7,8 +7,10 @@ and its notes 1, 3, 6 and 11; Euler series: J. Mol. Spectrosc. 233, 174 (2005)):
 |---|---|
 | FF = n, 1 to 10 | cos(2π n (ρ'K' + ρ''K'')/2 / 3); n - ½ for n where ρ' and ρ'' have unlike signs; 21 to 30: n = FF - 10, ... |
 | FF = 10 + n | the sine of the same; 31 to 40: n = FF - 20, ... |
+| FF = 11 to 20, 31 to 40, of K and -K | 0, as the program has it (it follows where the two ρ are one) |
 | the same with NOFC | 1 where \\|K' + K''\\|/2 = n (n - ½ where ΔK is odd), else 0; for a sine the sign of K' + K'' |
 | EX = n + 1 | ½(f' + f''), f = ((N² - K²)/D)^NSQ (K²/D)^KSQ, D = 1 + a K² + b (N² - K²); f/D but for TYP 0 with EX = 1 |
+| EX with TYP 1 to 3 | the same of each part: K² counts as KSQ + 1, ½N² and -½K² of Nb² and Nc² as NSQ + 1 and KSQ + 1, ¼(N₊² + N₋²) as 1 |
 | TYP 90 + 2n | the same of N₊^2n + N₋^2n, f/D for n > 0; TYP 91 with KSQ of 2 to 9: TYP 90 with KSQ + 8 |
 | TYP 91, KSQ = NSQ = 0 | the constant ρ of a state |
 | TYP 91 + 2n, (KSQ, NSQ) = (1, 0) or (0, 1) | the constants a and b of the series n; here N² is N(N+1) |
@@ -147,7 +149,7 @@ def term_of(d: Digits, axes: str, series: Series, states: tuple[int, int]) -> Co
         base = operator_of(d._replace(ff=0), axes)
         sampled = _sampled(n, sine) if series.nofc else _fourier(n, sine, series, states)
         return _multiplied(base, sampled, sine, axes)
-    return _multiplied(*_euler(d, axes, series, states), False, axes)
+    return _euler(d, axes, series, states)
 
 
 def harmonic(ff: int) -> tuple[bool, int]:
@@ -167,7 +169,7 @@ def _fourier(n: int, sine: bool, series: Series, states: tuple[int, int]) -> Fac
     def factor(j: int, above: Floats, below: Floats) -> Floats:
         angle = times * pi / 3 * (abs(up) * above + abs(low) * below)
         turned = np.where(np.minimum(abs(above), abs(below)) % 2 == 1, -1.0, 1.0) if series.g12 and n % 2 else 1.0
-        return np.asarray(turned * (np.sin(angle) if sine else np.cos(angle)))
+        return np.asarray(turned * (np.where(above == -below, 0.0, np.sin(angle)) if sine else np.cos(angle)))
 
     return factor
 
@@ -180,8 +182,8 @@ def _sampled(n: int, sine: bool) -> Factor:
     return factor
 
 
-def _euler(d: Digits, axes: str, series: Series, states: tuple[int, int]) -> tuple[CodedOperator, Factor]:
-    """The operator without the series, and the function of it."""
+def _euler(d: Digits, axes: str, series: Series, states: tuple[int, int]) -> CodedOperator:
+    """The operator with the function of its series."""
     plain = d._replace(ex=0, ksq=0, nsq=0)
     if d.typ >= 90:
         number = (d.typ - 90) // 2
@@ -196,13 +198,36 @@ def _euler(d: Digits, axes: str, series: Series, states: tuple[int, int]) -> tup
     if number > 4:
         raise ValueError(f"EX = {d.ex}: there are five Euler series, EX 1 to 5")
     a, b = (constants.get((number, *states), 0.0) for constants in (series.a, series.b))
+    base = operator_of(plain, axes)
+    if base.of_j is not None:
+        return _multiplied(base, _mean(d.nsq, ksq, (a, b), extra), False, axes)
+    parts = [
+        _by_elements(plain_of_j({(0, 0, n): factor}), _mean(d.nsq + p, ksq + q, (a, b), extra), 1.0)
+        for (p, q, n), factor in (base.plain or {}).items()
+    ]
+    return replace(base, plain=None, of_j=_summed(parts))
+
+
+def _mean(n2: int, k2: int, constants: tuple[float, float], extra: bool) -> Factor:
+    """½(f' + f'') with NSQ, KSQ; over D once more where `extra`."""
+    a, b = constants
 
     def of_k(j: int, k: Floats) -> Floats:
         square = j * (j + 1.0) - k**2
         below = 1 + a * k**2 + b * square
-        return np.asarray((square / below) ** d.nsq * (k**2 / below) ** ksq / (below if extra else 1.0))
+        return np.asarray((square / below) ** n2 * (k**2 / below) ** k2 / (below if extra else 1.0))
 
-    return operator_of(plain, axes), lambda j, above, below: 0.5 * (of_k(j, above) + of_k(j, below))
+    return lambda j, above, below: 0.5 * (of_k(j, above) + of_k(j, below))
+
+
+def _summed(parts: Sequence[OperatorOfJ]) -> OperatorOfJ:
+    def operator(j: int, representation: str) -> JOperator:
+        whole = parts[0](j, representation)
+        for part in parts[1:]:
+            whole = whole + part(j, representation)
+        return whole
+
+    return operator
 
 
 def _multiplied(base: CodedOperator, factor: Factor, sine: bool, axes: str) -> CodedOperator:

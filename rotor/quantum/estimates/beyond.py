@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from rotor.tops.top import Top
 
 FACTORS = {"linear": 0.3, "other": 3.0, "higher": 1.0}  # c
+COMPUTE = "its constants are known, add the effects of spins"  # the command line names its option in place of this
 OF_CHI = 0.5  # of χ: J = 1 of I = 1 is shifted by χ/2 at most, higher J by χ/4
 
 
@@ -70,7 +71,13 @@ def known_couplings(top: Top, j: int, effects: Sequence[QuantumEffect]) -> list[
     present = {effect.name for effect in effects}
     parts = {"nuclear quadrupole": OF_CHI}
     return [
-        Limit(one.name, parts.get(one.name, 1.0) * one.size_mhz(top, j), "from the constants known")
+        Limit(one.name, parts.get(one.name, 1.0) * one.size_mhz(top, j), f"{_spins_in(one, top)}: {COMPUTE}")
         for one in spin_effects(top)
         if one.name not in present
     ]
+
+
+def _spins_in(effect: QuantumEffect, top: Top) -> str:
+    """The spins that the terms of an effect name."""
+    found = dict.fromkeys(name for term in effect.spin_terms(top) for name in term.spins)
+    return ", ".join(found)

@@ -18,7 +18,7 @@ a barrier has the levels F m², m = 0 of A and m = ±1 of E species, F apart.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
@@ -27,7 +27,7 @@ import numpy as np
 from rotor import units
 from rotor.arrays import Ints
 from rotor.quantum.effect import EffectSize, QuantumEffect, effect_sizes
-from rotor.quantum.estimates.beyond import Limit, known_couplings, next_order
+from rotor.quantum.estimates.beyond import COMPUTE, Limit, known_couplings, next_order
 from rotor.quantum.estimates.internal_rotation import LineShifts, line_shifts
 from rotor.quantum.spins.splittings import Splitting, splitting_nuclei
 
@@ -38,7 +38,6 @@ if TYPE_CHECKING:
     from rotor.tops.top import Top
 
 VIBRATION_CM, VIBRATION_POWER = 1150.0, 0.3  # ν = 1150 (B/cm⁻¹)^0.3 cm⁻¹, for distortion that was not computed
-COMPUTE = "its constants are known, add the effects of spins"  # the command line names its option in place of this
 HIGHEST_J = 20  # A - E differences change little with J; those of higher J are estimated at this one
 LOW_BARRIER = 10.0  # s = 4 V3/9F below which the torsional levels of E species depend on K as much as the rotation
 ELECTRON_SPIN = "electron spin"
@@ -92,8 +91,11 @@ def model_limits(top: Top, j: int, effects: Sequence[QuantumEffect]) -> list[Lim
     >>> [limit.name for limit in model_limits(Top.from_constants("B=57.6 GHz"), 7, ())]
     ['centrifugal distortion']
     """
-    present = {effect.name for effect in effects}
-    found = [*_of_constants(top, j), *(_of_nuclei(top, j, effects))]
+    couplings = [
+        one for one in known_couplings(top, j, effects) if one.name != "nuclear quadrupole"
+    ]  # which _of_nuclei has
+    present = {effect.name for effect in effects} | {one.name for one in couplings}
+    found = [*couplings, *_of_constants(top, j), *_of_nuclei(top, j, effects, present)]
     if top.molecule is not None:
         found += _of_geometry(top, top.molecule, j, present)
     return largest_first(found)
@@ -193,8 +195,8 @@ def _largest(top: Top) -> float:
     return (b + c) / 2
 
 
-def _of_nuclei(top: Top, j: int, effects: Sequence[QuantumEffect]) -> list[Limit]:
-    """Couplings of nuclear spins that no effect of the calculation has."""
+def _of_nuclei(top: Top, j: int, effects: Sequence[QuantumEffect], known: Collection[str]) -> list[Limit]:
+    """Couplings of nuclear spins that no effect of the calculation has; known: names of those that have a size already."""
     found = []
     if absent_effects(top, effects):
         nuclei = splitting_nuclei(top)
@@ -203,7 +205,7 @@ def _of_nuclei(top: Top, j: int, effects: Sequence[QuantumEffect]) -> list[Limit
     if top.molecule is None:
         return found
     magnetic = sorted({one.label for one in top.molecule.nuclei if one.spin > 0})
-    if magnetic and not {"spin-rotation", "spin-spin"} & {effect.name for effect in effects}:
+    if magnetic and not {"spin-rotation", "spin-spin"} & set(known):
         found.append(Limit("magnetic coupling of nuclear spins", None, f"{', '.join(magnetic)}: small splittings"))
     return found
 

@@ -200,7 +200,22 @@ def _of_alike(shared: Shared, rank: int, up: SpinBlock, low: SpinBlock) -> dict[
 
 
 def coefficients_of_step(scheme: Scheme, every: dict[int, Ints], rank: int, step: int) -> dict[int, Floats]:
-    """t(p', p) of all F' = F + step by F, doubled, where there are both."""
+    """t(p', p) of all F' = F + step by F, where there are both.
+
+    Parameters
+    ----------
+    scheme : Scheme
+        Which spins are coupled.
+    every : dict of int to (n, columns) array
+        Coupling patterns by doubled F.
+    rank, step : int
+        Rank of the tensor, and by how much F changes, doubled.
+
+    Returns
+    -------
+    dict of int to (n', n) array
+        Pure numbers by doubled F.
+    """
     tables = {f: (every[f + step], own) for f, own in every.items() if f + step in every}
     if scheme.equivalent:
         return {f: _tensor_coefficients(scheme, rank, *of_both) for f, of_both in tables.items()}

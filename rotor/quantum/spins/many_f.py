@@ -180,8 +180,9 @@ def _key(own: Ints, parts: Sequence[SpinPart], frame: Frame, cells: Sequence[Cel
     return tuple((cells[own[part.patterns.start]], frame.kinds[part.number]) for part in parts)
 
 
-def are_connected(up: Group, low: Group, step: int, tables: Tables) -> bool:
+def are_connected(of_both: tuple[Group, Group], step: int, tables: Tables) -> bool:
     """Whether there are elements between two groups whose F differ by `step`, doubled."""
+    up, low = of_both
     return any((a.kind, b.kind, (step + a.rise - b.rise) // 2) in tables for a in up.slots for b in low.slots)
 
 

@@ -99,7 +99,7 @@ def _between(
 ) -> Iterator[Rows]:
     """Between two groups, F' = F + step, doubled."""
     twice_f = [f for f in low.places if f + step in up.places and 2 * f + step >= 2 * rank]
-    if not twice_f or not are_connected(up.group, low.group, step, tables):
+    if not twice_f or not are_connected((up.group, low.group), step, tables):
         return
     whole = between(up.group, low.group, twice_f, step, tables, coefficients, frame)
     lefts, rights = [up.places[f + step] for f in twice_f], [low.places[f] for f in twice_f]

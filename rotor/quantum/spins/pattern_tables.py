@@ -1,6 +1,6 @@
 """Coupling patterns of many F, and coefficients between them, in tables by F.
 
-They depend on the spins and on F alone, so that the last ones are kept: a fit or a second prediction finds them.
+They depend on the spins and on F alone, so that the last ones stay in memory: a fit or a second prediction finds them.
 """
 
 from __future__ import annotations
@@ -50,14 +50,44 @@ def pattern_table(scheme: Scheme, first: int, last: int) -> PatternTable:
 
 @lru_cache(maxsize=64)
 def couplings_by_f(scheme: Scheme, channel: Channel, first: int, last: int) -> Floats:
-    """c(p', p) of a channel within each F, (F, patterns', patterns); shared and read-only."""
+    """c(p', p) of a channel within each F.
+
+    Parameters
+    ----------
+    scheme : Scheme
+        Which spins are coupled.
+    channel : Channel
+        Which of them act, and with what power.
+    first, last : int
+        The first and the last F, doubled.
+
+    Returns
+    -------
+    (F, patterns', patterns) array
+        Pure numbers, 0 where an F lacks a pattern; shared and read-only.
+    """
     table = pattern_table(scheme, first, last)
     return _by_f(table, couplings_of(scheme, channel, table.patterns), 0)
 
 
 @lru_cache(maxsize=64)
 def tensors_by_f(scheme: Scheme, rank: int, step: int, first: int, last: int) -> Floats:
-    """t(p', p) of a tensor from each F to F + step, doubled, (F, patterns', patterns); shared and read-only."""
+    """t(p', p) of a tensor from each F to F + step.
+
+    Parameters
+    ----------
+    scheme : Scheme
+        Which spins are coupled.
+    rank, step : int
+        Rank of the tensor, and by how much F changes, doubled.
+    first, last : int
+        The first and the last F, doubled.
+
+    Returns
+    -------
+    (F, patterns', patterns) array
+        Pure numbers, 0 where there is no F + step or an F lacks a pattern; shared and read-only.
+    """
     table = pattern_table(scheme, first, last)
     return _by_f(table, coefficients_of_step(scheme, table.patterns, rank, step), step)
 

@@ -118,9 +118,8 @@ def table(found: FitAnswer) -> FittedParameters:
 
 def writers(found: FitAnswer, scene: FitScene) -> Mapping[str, Writer]:
     """Report, constants in three forms, table for a publication, lines and picture."""
-    from rotor.fit.publication import publication_table
-    from rotor.fit.report import report_text
     from rotor.formats.assigned_lines import write_assigned_lines
+    from rotor.formats.fit_request import report_of, table_of
 
     fit, title, form = found.fit, found.request.title, {".txt": "text", ".md": "markdown", ".tex": "latex"}
 
@@ -130,11 +129,11 @@ def writers(found: FitAnswer, scene: FitScene) -> Mapping[str, Writer]:
         plot_fit(fit, path, title=title, provenance={})
 
     return {
-        "report": lambda path: _write_text(path, report_text(fit, title, notes=found.request.notes)),
+        "report": lambda path: _write_text(path, report_of(found)),
         "toml": lambda path: named("outputs.toml", lambda: write_fitted_toml(found, path)),
         "par": lambda path: named("outputs.par", lambda: write_fitted_par(found, path, variances=False)),
         "var": lambda path: named("outputs.var", lambda: write_fitted_par(found, path, variances=True)),
-        "table": lambda path: _write_text(path, publication_table(fit, form[path.suffix.lower()])),
+        "table": lambda path: _write_text(path, table_of(found, form[path.suffix.lower()])),
         "save_lines": lambda path: write_assigned_lines(fit.lines, path),
         "plot": plot,
     }

@@ -93,12 +93,13 @@ def read_words(line: Line, start: int, count: int, remark_from: int | None = Non
 
     Notes
     -----
-    Numbers are separated by blanks or a comma; two commas in a row leave a default; a slash ends the list. Anything
+    Numbers are separated by blanks or a comma; two commas in a row leave a default, one before the first number does not, as the field's
+    programs read such lines; a slash ends the list. Anything
     else where a number may stand is an error: the field's programs skip it in silence and take the next digits,
     those of a comment for instance.
     """
     text, at, words = line.body, start, list[Word]()
-    pending_comma = True  # a comma first of all leaves a default
+    pending_comma = False
     while len(words) < count:
         while at < len(text) and text[at] in _GAP:
             at += 1
@@ -122,6 +123,22 @@ def read_words(line: Line, start: int, count: int, remark_from: int | None = Non
         pending_comma = False
         at = match.end()
     return words, at
+
+
+def read_code(line: Line, start: int = 0) -> tuple[list[Word], int]:
+    """The whole number that a line begins with from column `start` on, none where a comma stands there, and where the rest begins.
+
+    One comma behind it belongs to it.
+    """
+    text, at = line.body, start
+    while at < len(text) and text[at] in _GAP:
+        at += 1
+    words: list[Word] = []
+    if at < len(text) and text[at] not in ",/":
+        words, at = read_words(line, at, 1)
+    while at < len(text) and text[at] in _GAP:
+        at += 1
+    return words or [Word(None, at)], at + (at < len(text) and text[at] == ",")
 
 
 def _ends(text: str, at: int) -> bool:

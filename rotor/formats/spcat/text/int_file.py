@@ -8,7 +8,7 @@ from typing import Any
 
 from rotor.formats.atomic_write import open_atomic
 from rotor.formats.packed import name_of
-from rotor.formats.spcat.text.freeform import Line, encode, number, read_lines, read_words, whole
+from rotor.formats.spcat.text.freeform import Line, encode, number, read_code, read_lines, read_words, whole
 
 
 @dataclass(frozen=True)
@@ -100,7 +100,8 @@ def _request(line: Line) -> Request:
 
 
 def _dipole(line: Line) -> Dipole:
-    words, _ = read_words(line, 0, 2)
+    words, rest = read_code(line)
+    words += read_words(line, rest, 1)[0]
     code = whole(line, words, 0, "the dipole's code")
     value = number(line, words, 1, "the dipole's value")
     return Dipole(abs(code), value, code < 0, line.text)

@@ -10,7 +10,7 @@ from typing import Any
 
 from rotor.formats.atomic_write import open_atomic
 from rotor.formats.packed import name_of
-from rotor.formats.spcat.text.freeform import Line, encode, number, read_lines, read_words, spell, whole
+from rotor.formats.spcat.text.freeform import Line, encode, number, read_code, read_lines, read_words, spell, whole
 
 _LETTER = re.compile(r"[ \t]*([A-Za-z])?")
 _DIGIT = re.compile(r"[0-9]")
@@ -138,7 +138,8 @@ def _options(line: Line, defaults: Options = Options()) -> Options:
     """An option line; the first one sets the defaults of those that follow, but for VSYM."""
     letter = _LETTER.match(line.body)
     start = letter.end() if letter else 0
-    words, _ = read_words(line, start, len(_OPTIONS))
+    spins, rest = read_code(line, start)
+    words = spins + read_words(line, rest, len(_OPTIONS) - 1)[0]
     defaults = replace(defaults, vsym=0)
     values = {
         name: whole(line, words, index, name.upper(), getattr(defaults, name)) for index, name in enumerate(_OPTIONS)
@@ -147,9 +148,13 @@ def _options(line: Line, defaults: Options = Options()) -> Options:
 
 
 def _parameter(line: Line) -> Parameter:
-    words, end = read_words(line, 0, 3)
-    code = whole(line, words, 0, "the parameter code")
-    value = number(line, words, 1, "the parameter's value", 0.0)
+    code_word, rest = read_code(line)
+    code = whole(line, code_word, 0, "the parameter code")
+    others, end = read_words(line, rest, 2)
+    words = code_word + others
+    value = number(
+        line, words, 1, "the parameter's value"
+    )  # SPCAT takes a line without one for the last parameter, without a word
     error = number(line, words, 2, "the parameter's error") if len(words) > 2 and words[2].text else None
     tail = line.body[end:]
     label = tail.partition("/")[2].strip() if "/" in tail else ""

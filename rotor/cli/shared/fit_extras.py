@@ -1,0 +1,142 @@
+"""What `rotor fit` does beside the fit: choosing constants, trying them, lines worth measuring, errors by resampling."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+from rotor.cli.shared import inputs
+
+if TYPE_CHECKING:
+    from rotor.fit.choose import Suggestion, Trial
+    from rotor.fit.fit import Fit, FitOptions
+    from rotor.formats.fit_request import FitAnswer, FitRequest
+
+_WORTH_MEASURING = 1e-2  # S μ² of a line with μ = 1 D, below which it is not suggested
+
+
+@dataclass(frozen=True)
+class Extras:
+    """What was asked for beside the fit; spread: errors by resampling; interrupted: by an interrupt, what is not complete."""
+
+    trials: Sequence[Trial] = ()
+    suggestions: Sequence[Suggestion] = ()
+    spread: Sequence[float] = ()
+    interrupted: str = ""
+
+
+def extras_of(answer: FitAnswer, tried: Sequence[str] | None, suggest: str | None, samples: int, seed: int) -> Extras:
+    """Trials of constants, the lines that would help one most, errors from so many samples; an interrupt leaves those that are done."""
+    request, fit = answer.request, answer.fit
+    done, now = Extras(), "--try"
+    try:
+        done = replace(done, trials=_trials(fit, request.options, tried))
+        now = "--suggest"
+        done = replace(done, suggestions=_suggestions(request, fit, suggest))
+        now = "--bootstrap"
+        spread, count = _bootstrap(request, fit, samples, seed)
+        few = f"{count} of {samples} samples of --bootstrap" if count < samples else ""
+        return replace(done, spread=spread, interrupted=few)
+    except KeyboardInterrupt:
+        return replace(done, interrupted=f"{now} is not complete")
+
+
+def chosen(request: FitRequest, candidates: Sequence[str], by_order: bool) -> tuple[FitAnswer, list[Trial]]:
+    """The fit of the constants that the lines call for, and the steps that led to it; after an interrupt those found so far."""
+    from rotor.fit.choose import choose_constants
+    from rotor.fit.parameters import parameters, with_names
+    from rotor.formats.fit_request import FitAnswer, answer_fit
+
+    if request.spfit is not None:
+        raise ValueError("--choose: start from a line list and constants, whose free ones are the base of the model")
+    assert request.constants is not None  # a list of lines has constants to start from
+    own_name = request.constants.own_name
+    idle = [name for name in candidates if own_name(name) in request.parameters.names]
+    if idle:
+        raise ValueError(
+            f"--choose: {', '.join(idle)} is free already, part of the base of the model; choose from others"
+        )
+    with inputs.named("--choose"):
+        with_names(request.constants, candidates)
+    fit, steps = choose_constants(
+        request.lines, request.constants, request.parameters.names, candidates, request.options, by_order=by_order
+    )
+    if fit.minimum.status == "interrupted":
+        return FitAnswer(request, fit), steps
+    free = parameters(fit.named, fit.parameters.names)
+    return answer_fit(replace(request, constants=fit.named, parameters=free)), steps
+
+
+def _trials(fit: Fit, options: FitOptions, names: Sequence[str] | None) -> list[Trial]:
+    if names is None:
+        return []
+    from rotor.fit.choose import try_constants
+
+    with inputs.named("--try"):
+        return try_constants(fit, names, options)
+
+
+def _suggestions(request: FitRequest, fit: Fit, name: str | None) -> list[Suggestion]:
+    """The best twenty of all lines of the kinds that were measured, for J up to the highest measured."""
+    if name is None:
+        return []
+    import numpy as np
+
+    from rotor.fit.choose import suggest_lines
+
+    error = float(np.median(fit.lines.error_mhz[fit.used]))
+    own = name if fit.constants is None else fit.constants.own_name(name)
+    if own not in fit.parameters.names:
+        raise ValueError(f"--suggest: {name} is not among the free parameters {', '.join(fit.parameters.names)}")
+    if request.spfit is not None and fit.constants is None:
+        from rotor.formats.spcat.unmeasured import unmeasured_lines
+
+        upper, lower = unmeasured_lines(request.spfit.file, fit.lines)
+        return suggest_lines(fit, name, upper, lower, error_mhz=error, model=request.model)[:20]
+    upper, lower = _unmeasured(fit)
+    return suggest_lines(fit, fit.named.own_name(name), upper, lower, error_mhz=error)[:20]
+
+
+def _unmeasured(fit: Fit) -> tuple[Any, Any]:
+    """Labels of lines of the kinds, frequencies and J that were measured, without those that are measured."""
+    import numpy as np
+
+    from rotor.spectra.lines import line_list
+    from rotor.tops.top import Top
+
+    measured = fit.lines
+    top = Top.from_constants(fit.named, dipole_abc_debye=_components(fit))
+    jmax = int(max(measured.upper[:, 0].max(), measured.lower[:, 0].max()))
+    seen_mhz = (float(measured.frequency_mhz.min()) * 0.99, float(measured.frequency_mhz.max()) * 1.01)
+    lines = line_list(top, jmax=jmax, min_lgint=None, q=1.0, range_mhz=seen_mhz)
+    strong = lines.strength_debye2 > _WORTH_MEASURING
+    labels = np.stack([lines.levels.quanta[name] for name in measured.names], axis=1)
+    upper, lower = labels[lines.upper[strong]], labels[lines.lower[strong]]
+    known = {(*u, *low) for u, low in zip(measured.upper.tolist(), measured.lower.tolist(), strict=True)}
+    new = np.array([(*u, *low) not in known for u, low in zip(upper.tolist(), lower.tolist(), strict=True)], dtype=bool)
+    return upper[new], lower[new]
+
+
+def _components(fit: Fit) -> tuple[float, float, float]:
+    """1 D along each axis whose lines occur among those measured, by the parities of Ka and Kc."""
+    kind = fit.named.kind
+    if kind != "asymmetric":
+        return (0.0, 0.0, 1.0) if kind == "oblate" else (1.0, 0.0, 0.0)
+    change = (fit.lines.upper[:, 1:] - fit.lines.lower[:, 1:]) % 2
+    kinds = {(0, 1): 0, (1, 1): 1, (1, 0): 2}
+    found = {kinds.get((int(ka), int(kc)), 0) for ka, kc in change}
+    a, b, c = (float(axis in found) for axis in range(3))
+    return a, b, c
+
+
+def _bootstrap(request: FitRequest, fit: Fit, samples: int, seed: int) -> tuple[list[float], int]:
+    """Standard deviations from samples of the lines, and from how many."""
+    if not samples:
+        return [], 0
+    import numpy as np
+
+    from rotor.fit.resampling import bootstrap
+
+    values, spread = bootstrap(fit, samples, np.random.default_rng(seed), request.options, model=request.model)
+    return spread.tolist(), len(values)

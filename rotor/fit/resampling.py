@@ -1,0 +1,88 @@
+"""Errors of constants by resampling: fits to lines drawn anew with replacement."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from rotor.arrays import Floats, Ints
+from rotor.fit.fit import Fit, FitOptions, fit_lines
+from rotor.quantum.labelled import LevelModel
+
+
+def bootstrap(
+    fit: Fit,
+    samples: int,
+    rng: np.random.Generator,
+    options: FitOptions | None = None,
+    *,
+    model: Callable[[Ints], LevelModel] | None = None,
+) -> tuple[Floats, Floats]:
+    """Parameters of fits to lines drawn anew with replacement, and their standard deviations.
+
+    Measured frequencies are drawn, blends as one. Samples that determine fewer constants are drawn again, at most ten
+    times as many.
+
+    Parameters
+    ----------
+    fit : Fit
+        A finished fit of n parameters; each sample starts from its result.
+    samples : int
+        How many samples.
+    rng : numpy.random.Generator
+        Draws the lines.
+    options : FitOptions, optional
+        Of each fit.
+    model : callable, optional
+        As in `fit_lines`.
+
+    Returns
+    -------
+    values : (samples, n) array
+        MHz; of fewer samples where a KeyboardInterrupt came, with two or more done.
+    deviations : (n,) array
+        Standard deviations, MHz.
+
+    Raises
+    ------
+    ValueError
+        Where ten times as many samples are not enough.
+
+    Notes
+    -----
+    It needs no assumption about the errors but that the lines are independent; where few lines fix a constant it comes
+    out too large or infinite.
+    """
+    groups = fit.lines.blend[fit.groups]
+    members = {int(b): np.flatnonzero((fit.lines.blend == b) & fit.used) for b in groups}
+    at = fit.parameters.moved(fit.values)
+    own = replace(options or FitOptions(), poor_rms=1e12, pass_interrupt=True)  # no sample is judged by its rms
+    out: list[Floats] = []
+
+    def sample() -> Fit:
+        drawn = rng.choice(groups, size=len(groups)).tolist()
+        rows = np.concatenate([members[b] for b in drawn])
+        blend = np.repeat(np.arange(len(drawn)), [len(members[b]) for b in drawn])
+        widths = {i: fit.lines.widths_mhz[b] for i, b in enumerate(drawn) if b in fit.lines.widths_mhz}
+        lines = replace(fit.lines.take(rows), blend=blend, comments=(), widths_mhz=widths)
+        return fit_lines(lines, fit.constants, at, own, model=model)
+
+    try:
+        for _ in range(10 * samples):
+            one = sample()
+            if one.statistics.rank == fit.statistics.rank:
+                out.append(one.values)
+            if len(out) == samples:
+                break
+    except KeyboardInterrupt:
+        if len(out) < 2:
+            raise
+        samples = len(out)
+    if len(out) < samples:
+        raise ValueError(
+            f"only {len(out)} of {10 * samples} samples determine all constants; too few lines for a bootstrap"
+        )
+    found = np.array(out)
+    return found, np.asarray(found.std(axis=0, ddof=1))

@@ -1,0 +1,77 @@
+"""Parameters at 0 that a fit may leave out of the Hamiltonian: they change no level to first order, and make blocks larger.
+
+A block of states without spins is a set of (state, symmetry under the twofold rotations) that parameters other than 0 connect. A
+parameter at 0 between two of these sets moves their levels by its square alone: its derivative is 0 where it starts, and it stays there.
+Where levels of two sets coincide, as the two of one K do at high K, round-off would mix them and give it a derivative all the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from rotor.formats.spcat.codes import HELD_BELOW, split_code, state_digits
+from rotor.formats.spcat.l_doubled import pairs_of
+from rotor.formats.spcat.series import is_constant, is_series
+from rotor.formats.spcat.states import states_of
+from rotor.formats.spcat.text.par import Parameter, ParameterFile
+
+_SYMMETRIES = range(4)  # of the group of twofold rotations; an operator of symmetry s leads from t to s ^ t
+_OF_TYP = 20  # TYP 20, 40 and 60 begin the operators of the symmetry of N_a, N_b and N_c
+_HIGHEST_TYP = 80
+
+Place = tuple[int, int, int]  # of the two states and the symmetry of an operator
+
+
+def left_at_zero(file: ParameterFile) -> frozenset[int]:
+    """The places of parameters of value 0 that are held, or connect what nothing else connects and so stay at 0."""
+    places = [_place(file, parameter) for parameter in file.parameters]
+    known = _sets(place for place, p in zip(places, file.parameters, strict=True) if place and p.value)
+    apart = [place is not None and _joins_sets(place, known) for place in places]
+    return frozenset(
+        i for i, p in enumerate(file.parameters) if not p.value and (p.constrained or _is_held(p) or apart[i])
+    )
+
+
+def stay_at_zero(file: ParameterFile) -> list[str]:
+    """Labels of the free ones among them."""
+    found = [file.parameters[i] for i in sorted(left_at_zero(file))]
+    return [p.label or str(p.code) for p in found if not (p.constrained or _is_held(p))]
+
+
+def _is_held(parameter: Parameter) -> bool:
+    return parameter.error is not None and parameter.error < HELD_BELOW
+
+
+def _place(file: ParameterFile, parameter: Parameter) -> Place | None:
+    """The states and the symmetry of an operator of certain states without spins; None of others."""
+    states = states_of(file)
+    digits, wild = split_code(parameter.code, len(states)), 10 ** state_digits(len(states)) - 1
+    if any(state.spins for state in states) or pairs_of(states) or is_series(digits) or is_constant(digits):
+        return None
+    low, high = sorted((digits.v1, digits.v2))
+    if high == wild or high >= len(states) or digits.typ >= _HIGHEST_TYP:
+        return None
+    return low, high, digits.typ // _OF_TYP
+
+
+def _sets(places: Iterable[Place]) -> dict[tuple[int, int], tuple[int, int]]:
+    """Of (state, symmetry) the one that stands for all that are connected with it; those that nothing connects are missing."""
+    above: dict[tuple[int, int], tuple[int, int]] = {}
+    for low, high, symmetry in places:
+        for one in _SYMMETRIES:
+            first, second = _top(above, (low, one)), _top(above, (high, one ^ symmetry))
+            if first != second:
+                above[first] = second
+    return above
+
+
+def _top(above: dict[tuple[int, int], tuple[int, int]], one: tuple[int, int]) -> tuple[int, int]:
+    while one in above:
+        one = above[one]
+    return one
+
+
+def _joins_sets(place: Place, above: dict[tuple[int, int], tuple[int, int]]) -> bool:
+    """Whether an operator has elements between different sets alone."""
+    low, high, symmetry = place
+    return all(_top(above, (low, one)) != _top(above, (high, one ^ symmetry)) for one in _SYMMETRIES)

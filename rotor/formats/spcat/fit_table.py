@@ -1,0 +1,85 @@
+"""The parameters of SPFIT's files after a fit, for a publication and for the report: every one, by name, code and states."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from rotor.fit.fit import Fit
+from rotor.fit.publication import Row, value_text
+from rotor.formats.spcat.codes import A_REDUCTION, LINEAR, S_REDUCTION, SYMMETRIC, Digits, Named, is_linear, split_code
+from rotor.formats.spcat.fit_input import SpfitInput
+from rotor.formats.spcat.text.par import Parameter, ParameterFile
+
+_RIGID = (Named("A", 10000, 1), Named("B", 20000, 1), Named("C", 30000, 1))
+_WITHOUT_STATES = 100_000  # codes without spins and series, states left out
+
+
+def publication_rows(asked: SpfitInput, fit: Fit) -> list[Row]:
+    """Every parameter: published constants of rotation and distortion under their names and signs, others by their labels."""
+    file, rows = asked.file, list[Row]()
+    known = {item.code: item for item in _names(file)}
+    for place, parameter in enumerate(file.parameters):
+        digits = split_code(parameter.code, len(file.options))
+        named = known.get(_rotational(digits))
+        name = named.name if named else parameter.label or str(parameter.code)
+        sign = named.sign if named else 1
+        value, error, follows = _numbers(asked, fit, place)
+        rows.append(Row(name, sign * value, error, follows, _states(digits, len(file.options))))
+    return rows
+
+
+def parameter_section(asked: SpfitInput, fit: Fit) -> list[str]:
+    """A line for each parameter of the file: code, label, value(error), and what it does where it is not free."""
+    out = []
+    for place, parameter in enumerate(asked.file.parameters):
+        value, error, follows = _numbers(asked, fit, place)
+        role = "held" if error is None else f"follows {follows}" if follows else ""
+        code = f"{'-' if parameter.constrained else ''}{parameter.code}"
+        text = value_text(value, error) if error else f"{value:.15g}"
+        out.append(f"{place + 1:5d}  {code:>13}  {parameter.label:<16}{text:>28}  {role}".rstrip())
+    return out
+
+
+def _numbers(asked: SpfitInput, fit: Fit, place: int) -> tuple[float, float | None, str]:
+    """Value and error (None: held) of a parameter, and the label or code of the one whose ratio it keeps."""
+    parameter, column, ratio = asked.file.parameters[place], asked.columns[place], asked.ratios[place]
+    if column < 0:
+        return parameter.value, None, ""
+    leader = _leader(asked.file.parameters, place)
+    follows = "" if not parameter.constrained else leader.label or str(leader.code)
+    return float(fit.values[column]) * ratio, float(fit.errors[column]) * abs(ratio), follows
+
+
+def _leader(parameters: Sequence[Parameter], place: int) -> Parameter:
+    return next(p for p in reversed(parameters[: place + 1]) if not p.constrained)
+
+
+def _rotational(digits: Digits) -> int:
+    """The code without its states; -1 of terms with spins, series or between states."""
+    if digits.v1 != digits.v2 or any((digits.ex, digits.ff, digits.i2, digits.i1, digits.ns)):
+        return -1
+    return 10000 * digits.typ + 1000 * digits.ksq + 100 * digits.nsq
+
+
+def _names(file: ParameterFile) -> tuple[Named, ...]:
+    """The published names of a file's codes; none where its terms are of more than one reduction, or of none."""
+    codes = {_rotational(split_code(p.code, len(file.options))) for p in file.parameters}
+    if all(is_linear(options) for options in file.options):
+        return (Named("B", 100, 1), *LINEAR)
+    if not any(code >= 10000 for code in codes):
+        return (Named("B", 100, 1), *SYMMETRIC)
+    in_a = any(40000 <= code < 50000 and code % 10000 >= 1000 for code in codes)
+    in_s = any(code >= 50000 for code in codes)
+    rigid = _RIGID if {10000, 20000, 30000} <= codes else ()
+    if in_a == in_s:
+        return rigid
+    return (*rigid, *(A_REDUCTION if in_a else S_REDUCTION))
+
+
+def _states(digits: Digits, count: int) -> str:
+    """The states of a term: all of a file with several, one, or the two that it connects."""
+    if count == 1:
+        return ""
+    if digits.v1 == digits.v2:
+        return f"{digits.v1}" if digits.v1 < count else "all"
+    return f"{digits.v2}, {digits.v1}" if digits.v2 < digits.v1 else f"{digits.v1}, {digits.v2}"

@@ -1,0 +1,349 @@
+"""What users of `rotor fit` need at the terminal: interrupts, ties in SPFIT's files, held parameters in a .var, names of the start."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import rotor
+from rotor.fit.assignment import Assignments, assignments
+from rotor.fit.choose import choose_constants
+from rotor.fit.fit import Fit, FitOptions, fit_lines
+from rotor.fit.parameters import parameters
+from rotor.fit.resampling import bootstrap
+from rotor.formats.spcat.fit_input import fitted_file, spfit_input
+from rotor.formats.spcat.named_fit import named_file
+from rotor.formats.spcat.text.par import read_par
+from rotor.formats.spcat.variances import constants_covariance
+from rotor.spectra.lines import line_list
+from rotor.statistics.least_squares import INTERRUPTED, Iteration
+from rotor.tops.constants import Constants
+
+TRUE = Constants(A=5213.4471, B=1897.2265, C=1401.8812, DeltaJ=2.12e-4, DeltaJK=-1.11e-3, deltaJ=5.1e-5, deltaK=9.3e-4)
+HEAD = "j_upper,ka_upper,kc_upper,j_lower,ka_lower,kc_lower,frequency_mhz,error_mhz\n"
+
+
+def lines_of(constants: Constants, error: float = 0.003, shift: float = 0.0) -> Assignments:
+    """Lines to J = 6 with normal noise."""
+    made = line_list(rotor.Top.from_constants(constants, dipole_abc_debye=(1, 1, 0)), jmax=6, min_lgint=None, q=1.0)
+    labels = np.stack([made.levels.quanta[name] for name in ("j", "ka", "kc")], axis=1)
+    noise = error * np.random.default_rng(7).normal(size=len(made)) + shift
+    return assignments(("j", "ka", "kc"), labels[made.upper], labels[made.lower], made.frequency_mhz + noise, error)
+
+
+@pytest.fixture(scope="module")
+def seen() -> Assignments:
+    return lines_of(TRUE)
+
+
+def interrupting(last: int, steps: list[Iteration]):
+    """A progress that notes the steps and interrupts once, at the last one."""
+
+    def progress(step: Iteration) -> None:
+        steps.append(step)
+        if len(steps) == last:
+            raise KeyboardInterrupt
+
+    return progress
+
+
+def test_an_interrupt_ends_every_way_of_the_search(seen):
+    """Lines that nothing describes: the direct search, that by rising J and those with other signs. Each step may be interrupted."""
+    wrong = replace(seen, frequency_mhz=np.roll(seen.frequency_mhz, 7))
+    free = parameters(TRUE, ["A", "B", "C"])
+    seen_steps = list[Iteration]()
+    fit_lines(wrong, TRUE, free, progress=seen_steps.append)
+    assert len({step.rms_before for step in seen_steps}) > 15  # more than one way
+    for step in range(1, len(seen_steps)):
+        after = list[Iteration]()
+        fit = fit_lines(wrong, TRUE, free, progress=interrupting(step, after))
+        assert fit.minimum.status == INTERRUPTED
+        assert not fit.converged
+        assert "interrupted after" in fit.reason
+        assert len(after) == step  # nothing went on behind it
+
+
+def test_an_interrupt_of_many_fits_leaves_what_is_done(seen, monkeypatch):
+    import rotor.fit.choose as choose
+    import rotor.fit.resampling as resampling
+
+    fit = fit_lines(seen, TRUE, parameters(TRUE, ["A", "B", "C", "DeltaJ"]))
+
+    def interrupted_at(last: int):
+        count = [0]
+
+        def fitted(*given, **more) -> Fit:
+            count[0] += 1
+            if count[0] == last:
+                raise KeyboardInterrupt
+            return fit_lines(*given, **more)
+
+        return fitted
+
+    monkeypatch.setattr(resampling, "fit_lines", interrupted_at(6))
+    values, spread = bootstrap(fit, 50, np.random.default_rng(1))
+    assert values.shape == (5, 4)
+    assert np.allclose(spread, values.std(axis=0, ddof=1))
+    monkeypatch.setattr(choose, "fit_lines", interrupted_at(9))
+    start = Constants(A=5213.0, B=1897.0, C=1402.0)
+    found, steps = choose_constants(seen, start, ["A", "B", "C"], ["DeltaJ", "DeltaJK", "deltaJ", "deltaK"])
+    assert not found.converged
+    assert found.minimum.status == INTERRUPTED
+    assert found.reason == f"interrupted after {len(steps)} steps of the choice"
+
+
+def test_a_search_passes_an_interrupt_on_where_it_is_one_of_many(seen):
+    free = parameters(TRUE, ["A", "B"])
+    with pytest.raises(KeyboardInterrupt):
+        fit_lines(seen, TRUE, free, FitOptions(pass_interrupt=True), progress=interrupting(1, []))
+
+
+def test_choosing_may_begin_with_a_b_c_alone(seen):
+    """The reduction comes with the first constant that has one."""
+    start = Constants(A=5213.0, B=1897.0, C=1402.0)
+    fit, steps = choose_constants(seen, start, ["A", "B", "C"], ["DeltaJ", "DeltaJK", "deltaJ", "deltaK"])
+    assert fit.converged
+    assert {step.name for step in steps} >= {"DeltaJ", "DeltaJK"}
+    assert fit.weighted_rms < 1.2  # normal errors of the lines
+
+
+def tied(seen: Assignments) -> Fit:
+    """C = B - 495.3453 MHz and deltaK in a ratio to deltaJ; DeltaJ with an a-priori error."""
+    ties = ["C = B - 495.3453 MHz", f"deltaK = {9.3 / 0.51}*deltaJ"]
+    free = parameters(TRUE, ["A", "B", "DeltaJ", "DeltaJK", "deltaJ"], ties=ties, priors_mhz={"DeltaJ": 1e-3})
+    return fit_lines(seen, TRUE, free)
+
+
+def test_ties_and_a_priori_errors_go_into_spfits_files_and_come_back(seen):
+    fit = tied(seen)
+    file = named_file(fit, "tied", variances=False)
+    rows = {(p.code, p.constrained): p for p in file.parameters}
+    assert rows[30000, True].value == fit.constants["B"]
+    assert rows[30000, False].value == pytest.approx(-495.3453, abs=1e-9)  # round-off of 1900
+    assert rows[30000, False].error == 1e-37
+    assert rows[200, False].error == 1e-3
+    assert rows[41000, True].value / rows[40100, False].value == pytest.approx(9.3 / 0.51, rel=1e-12)  # round-off
+    text = "".join(
+        f"{''.join(f'{n:3d}' for n in (*u, *low)):36s} {f:15.6f} 0.003\n"
+        for u, low, f in zip(seen.upper, seen.lower, seen.frequency_mhz, strict=True)
+    )
+    from rotor.formats.spcat.text.lin import read_lin
+
+    asked = spfit_input(file, read_lin(text.encode(), 3))
+    again = fit_lines(asked.lines, asked.constants, asked.parameters, asked.options)
+    for name in ("A", "B", "C", "DeltaK", "deltaK"):
+        if name in fit.constants:
+            assert abs(again.constants[name] - fit.constants[name]) < 1e-3 * fit.constants.uncertainties[name]
+
+
+def test_a_var_file_has_the_correlations_of_held_parameters_too(seen):
+    """SPCAT counts every parameter without a minus sign: with those of the free ones alone its errors were up to 3 times too large."""
+    fit = tied(seen)
+    file = named_file(fit, "tied", variances=True)
+    leaders = [p for p in file.parameters if not p.constrained]
+    count = len([line[i : i + 10] for line in file.rest.splitlines() for i in range(0, len(line), 10)])
+    assert len(leaders) == len(fit.parameters.names) + 1  # the difference is held
+    assert count == len(leaders) * (len(leaders) + 1) // 2
+    covariance = constants_covariance(file)
+    assert covariance is not None
+    for name in fit.parameters.names:
+        row = [covariance.names.index(n) for n in ("B", name)]
+        own = [fit.covariance.names.index(n) for n in ("B", name)]
+        theirs, ours = covariance.matrix_mhz2[np.ix_(row, row)], fit.covariance.matrix_mhz2[np.ix_(own, own)]
+        assert np.allclose(theirs, ours, rtol=1e-5, atol=1e-6 * abs(ours[0, 1]))  # seven digits in the file
+
+
+def test_a_held_parameter_of_a_par_file_stays_in_the_var(tmp_path):
+    (tmp_path / "co.par").write_text(
+        "CO\n   3  20   20    0    0.0E+000    1.0E+006    1.0E+000 1.0\n"
+        "l   -1    1    0    0    0    1    1    1         0   -1    0\n"
+        "   100  5.7E+004 1.0E+035 /B\n   200 -1.835E-001 1.0E-037 /-D\n   300  1.7E-007 1.0E+035 /H\n"
+    )
+    top = rotor.Top.from_constants("B=57635.96804 D=0.1835053 H=1.7e-7 MHz", dipole_abc_debye=(0.1, 0, 0))
+    made = line_list(top, jmax=20, min_lgint=None, q=1.0)
+    j = made.levels.quanta["j"]
+    rows = zip(j[made.upper].tolist(), j[made.lower].tolist(), made.frequency_mhz.tolist(), strict=True)
+    (tmp_path / "co.lin").write_text("".join(f"{u:3d}{low:3d}{'':30s} {f:15.4f} 0.003\n" for u, low, f in rows))
+    from rotor.formats.spcat.fit_input import read_fit
+
+    asked = read_fit(tmp_path / "co.par")
+    fit = fit_lines(asked.lines, asked.constants, asked.parameters, replace(asked.options, poor_rms=1e9))
+    rest = fitted_file(asked, fit, variances=True).rest
+    numbers = [rest[i : i + 10] for i in range(0, len(rest.strip()), 10)]
+    assert len(numbers) == 6  # B, -D, H
+    assert [float(x) for x in numbers[1:3]] == [0.0, 1.0]  # -D with B, and with itself
+    assert float(numbers[3]) == pytest.approx(fit.statistics.correlations[0, 1], abs=1e-7)  # as printed
+
+
+def test_a_tied_constant_need_not_be_in_the_start(call, folder, seen):
+    write_csv(folder / "x.csv", seen)
+    start = "A=5213 B=1897 C=1402 DeltaJ=2e-4 deltaJ=5e-5 DeltaJK=-1e-3 MHz"
+    common = ("fit", "x.csv", "--constants", start, "--free", "A,B,C,DeltaJ,DeltaJK,deltaJ", "--out", "t")
+    code, _, err = call(*common, "--tie", f"deltaK={9.3 / 0.51}*deltaJ")
+    assert code == 0, err
+    assert {path.name for path in folder.iterdir()} == {"x.csv", "t.fit", "t.toml", "t.par", "t.var"}
+    file = read_par(folder / "t.par")
+    assert [p.constrained for p in file.parameters if p.code == 41000] == [True]
+    assert file.options[0].knmax == 99  # more than was measured: SPCAT leaves higher K out of what it predicts
+    code, _, err = call(*common, "--tie", "DeltaQ=2*deltaJ")
+    assert code == 2
+    assert "--tie 'DeltaQ=2*deltaJ': 'DeltaQ' is not a rotational constant known here" in err
+
+
+def test_the_report_has_what_each_line_moves(call, folder, seen):
+    """DFBETAS by leaving the line out and fitting again; linear, so that a tenth is a wide bound."""
+    import json
+
+    few = seen.take(np.arange(0, len(seen), 9))
+    write_csv(folder / "x.csv", few)
+    start = "A=5213.4471 B=1897.2265 C=1401.8812 DeltaJ=2e-4 DeltaJK=-1.11e-3 deltaJ=5.1e-5 deltaK=9.3e-4 MHz"
+    common = ("fit", "x.csv", "--constants", start, "--free", "A,B,C,DeltaJ")
+    code, out, err = call(*common, "--out", "t", "--json", "t.json")
+    assert code == 0, err
+    content = json.loads((folder / "t.json").read_text(encoding="utf-8"))
+    moved = np.array([line["dfbetas"] for line in content["lines"]])
+    worst = int(np.abs(moved).max(axis=1).argmax())
+    text = (folder / "t.fit").read_text(encoding="utf-8")
+    assert "asymmetric top, A-reduction, Ir" in text
+    assert text.split("INFLUENCE")[1].splitlines()[1].startswith(f"line {worst + 1}, ")
+    write_csv(folder / "less.csv", few.take(np.arange(len(few)) != worst))
+    call("fit", "less.csv", *common[2:], "--json", "less.json")
+    less = json.loads((folder / "less.json").read_text(encoding="utf-8"))
+    for k, (whole, rest) in enumerate(zip(content["parameters"], less["parameters"], strict=True)):
+        change = (whole["value"] - rest["value"]) / (whole["error"] * less["reduced_chi"])
+        assert moved[worst, k] == pytest.approx(change, abs=0.02)  # of a standard error: what is not linear
+    assert ("influential, line" in out) == (np.abs(moved).max() > 1)
+
+
+TWO_STATES = """two states
+   8   30   20    0    0.0E+000    1.0E+006    1.0E+000 1.0
+a    1    2    0   20    0    1    1    1   -1    -1   1
+a    1    1    0   20    0    1    1    1    0    -1   1
+        10099  5.2134471E+03 1.0E+36 /A
+        20000  1.8972265E+03 1.0E+36 /B
+        20011  1.8900000E+03 1.0E+36 /B
+        30099  1.4018812E+03 1.0E+36 /C
+          299 -2.1200000E-04 1.0E+36 /-DJ
+        41099 -9.3000000E-04 1.0E-37 /-dK
+        40199 -5.1000000E-05 1.0E+36 /-dJ
+       -40111  1.0200000E-05 1.0E+36 /-dJ
+"""
+
+
+def test_the_table_of_several_states_has_every_parameter_with_its_state(seen, tmp_path):
+    from rotor.formats.fit_request import answer_fit, fit_of_spfit, report_of, table_of
+
+    (tmp_path / "two.par").write_text(TWO_STATES)
+    rows = []
+    for v, b in ((0, 1897.2265), (1, 1890.0)):
+        deltas = TRUE["deltaJ"] * (0.8 if v else 1.0)
+        for one in lines_with_v(lines_of(TRUE.replace(B=b, DeltaJK=0.0, deltaJ=deltas)), v):
+            rows.append(one)
+    (tmp_path / "two.lin").write_text("".join(rows))
+    header = TWO_STATES.replace("   8   30", f"   8 {len(rows):4d}")
+    (tmp_path / "two.par").write_text(header)
+    answer = answer_fit(fit_of_spfit(str(tmp_path / "two.par")))
+    assert answer.fit.converged
+    assert answer.fit.parameters.names == ("A", "B (20000)", "B (20011)", "C", "-DJ", "-dJ")
+    cells = [[cell.strip() for cell in line.split("|")[1:-1]] for line in table_of(answer, "markdown").splitlines()]
+    by_name = {(row[0], row[1]): row[3] for row in cells if len(row) == 4}
+    assert by_name["δK", "all"] == "0.93 (held)"  # kHz, with the sign of the publication
+    assert by_name["δJ", "1"].startswith("-1")
+    assert by_name["δJ", "1"].endswith("(follows -dJ)")
+    assert float(by_name["B", "1"].partition("(")[0]) == pytest.approx(1890.0, abs=3e-4)  # four standard errors
+    assert by_name["B", "0"].startswith("1897.22")
+    section = report_of(answer).split("PARAMETERS OF THE FILE")[1].splitlines()
+    assert len(section[1 : section.index("")]) == 8
+    assert section[8].split()[1:3] == ["-40111", "-dJ"]
+
+
+def lines_with_v(lines: Assignments, v: int) -> list[str]:
+    """Lines of a .lin file with the state v behind the quantum numbers."""
+    rows = zip(lines.upper.tolist(), lines.lower.tolist(), lines.frequency_mhz.tolist(), strict=True)
+    return [f"{''.join(f'{n:3d}' for n in (*u, v, *low, v)):36s} {f:15.6f} 0.003\n" for u, low, f in rows]
+
+
+def test_the_errors_of_the_table_may_be_those_of_the_scatter(call, folder, seen):
+    write_csv(folder / "x.csv", seen)
+    start = "A=5213 B=1897 C=1402 DeltaJ=2e-4 DeltaJK=-1.11e-3 deltaJ=5.1e-5 deltaK=9.3e-4 MHz"
+    common = (
+        "fit",
+        "x.csv",
+        "--constants",
+        start,
+        "--free",
+        "A,B,C",
+        "--tie",
+        "DeltaJ=1e-7*B",
+        "--default-error",
+        "0.01",
+    )
+    for name in ("stated", "scatter"):
+        assert call(*common, "--poor-rms", "1e9", "--table", f"{name}.tex", "--table-errors", name)[0] == 0
+    stated, scatter = ((folder / f"{name}.tex").read_text(encoding="utf-8") for name in ("stated", "scatter"))
+    assert "scaled by the scatter" in scatter
+    assert "scaled" not in stated
+    assert stated.splitlines()[4] != scatter.splitlines()[4]
+    assert "(follows $B$)" in stated
+    assert "$-1.11$ (held)" in stated  # kHz
+    code, _, err = call(*common, "--table", "x.tex", "--table-errors", "both")
+    assert code == 2
+    assert "--table-errors both: one of stated, scatter is needed" in err
+
+
+def test_what_is_not_written_is_said(call, folder, seen):
+    write_csv(folder / "x.csv", lines_of(TRUE, shift=0.0))
+    code, _, err = call(
+        "fit", "x.csv", "--constants", "A=5213 B=1897 C=1402 MHz", "--free", "A,B,C", "--poor-rms", "1", "--out", "t"
+    )
+    assert code == 1
+    assert "not converged: t.toml, t.par, t.var are not written" in err
+    assert [path.name for path in sorted(folder.glob("t.*"))] == ["t.fit"]
+
+
+def test_levels_that_have_become_another_state_are_named(seen):
+    """D_K of the start takes K = 4 below K = 2 of one block: labels stay with block and rank, and the flip is said."""
+    true = Constants(A=10e3, B=3001.0, C=2999.0, DJ=1e-3, DK=0.1, reduction="S")
+    lines = lines_of(true)
+    start = true.replace(DK=900.0)
+    fit = fit_lines(lines, start, parameters(start, ["A", "B", "C", "DK"]))
+    assert fit.converged
+    assert abs(fit.constants["DK"] - 0.1) < 5 * fit.constants.uncertainties["DK"]
+    assert "4 2 3" in fit.changed_states
+    assert "4 4 1" in fit.changed_states
+    assert any("levels are mostly another state than at the start (by overlap)" in text for text in fit.notes)
+
+
+def test_lengths_beside_bonds_do_not_lie_on_atoms():
+    from rotor.molecules.molecule import Molecule
+    from rotor.plots.structure import structure_figure
+    from rotor.structure.substitution import Value
+
+    z = (-2.96, -1.9, -0.69, 0.69, 1.84)
+    chain = Molecule(("H", "C", "C", "C", "N"), [[x, 0, 0] for x in z])
+    values = [Value(f"r{i}", (i, i + 1), z[i] - z[i - 1], 1e-4, "Å") for i in range(1, 5)]
+    figure = structure_figure(chain, values=values)
+    axes = figure.axes[0]
+    figure.canvas.draw()
+    texts = [one for one in axes.texts if "(" in one.get_text()]
+    assert len(texts) == 4
+    circles = [patch.get_window_extent() for patch in axes.patches]
+    assert not any(text.get_window_extent().overlaps(circle) for text in texts for circle in circles)
+
+
+@pytest.mark.parametrize(
+    ("sign", "words"), [(";", "its columns are parted by ';'; commas are needed"), ("\t", "parted by '\\\\t'")]
+)
+def test_a_table_with_other_signs_between_its_columns_is_named(call, folder, seen, sign, words):
+    write_csv(folder / "x.csv", seen)
+    (folder / "y.csv").write_text((folder / "x.csv").read_text().replace(",", sign))
+    code, _, err = call("fit", "y.csv", "--constants", "A=5213 B=1897 C=1402 MHz", "--free", "A,B,C")
+    assert code == 2
+    assert words.replace("\\\\", "\\") in err
+
+
+def write_csv(path, lines: Assignments) -> None:
+    rows = zip(lines.upper.tolist(), lines.lower.tolist(), lines.frequency_mhz.tolist(), strict=True)
+    path.write_text(HEAD + "".join(f"{','.join(map(str, [*u, *low]))},{f:.5f},0.003\n" for u, low, f in rows))
