@@ -7,7 +7,9 @@ that labels, ties, units, blends and searches of such files work together, from 
 from __future__ import annotations
 
 import re
+import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -190,6 +192,25 @@ FAST = (
 )
 
 
+def test_names_of_shared_levels_do_not_depend_on_where_the_fit_began():
+    """J = 49: two levels share a function of the ground state and one of the highest by halves, and a small step exchanges their names."""
+    kind = KINDS[FAST[0]]
+    file = parameter_file(replace(kind, options=kind.options.replace(" 0 40 ", " 0 60 ")))
+    energy = next(i for i, one in enumerate(file.parameters) if one.label.strip() == "E2")
+
+    def with_energy(value):
+        rows = list(file.parameters)
+        rows[energy] = replace(rows[energy], value=value)
+        return replace(file, parameters=tuple(rows))
+
+    before, after = with_energy(287500.0), with_energy(287750.0)
+    labels, values = np.array([[49, 15, 34, 0], [49, 14, 35, 2]]), np.array([one.value for one in after.parameters])
+    fresh, from_before = FileLevels.of(after, labels), FileLevels.of(before, labels)
+    energies = fresh.levels(values)[0]
+    assert from_before.levels(values)[0] == pytest.approx(energies, abs=1e-3)  # MHz, round-off of 1e7
+    assert abs(energies[0] - energies[1]) > 1e4
+
+
 @pytest.mark.parametrize(
     "name", [name if name in FAST else pytest.param(name, marks=pytest.mark.slow) for name in KINDS]
 )
@@ -209,7 +230,7 @@ def test_starts_up_to_ten_per_cent_off(tmp_path, name, share):
 @pytest.mark.slow
 @pytest.mark.parametrize("share", [0.03, 0.1])
 def test_most_searches_for_three_states_in_resonance_find_the_way_and_the_others_say_so(tmp_path, share):
-    """Of twenty sets of lines 19 did at 3 % and 17 at 10 %; which of them depends on the last digits of the lines."""
+    """Of sixty sets of lines 60 did at 3 % and 56 at 10 %; which of them depends on the last digits of the lines."""
     converged = 0
     for seed in range(1, 9):
         write_case(tmp_path, "case", KINDS[FAST[0]], share, seed)
@@ -221,7 +242,16 @@ def test_most_searches_for_three_states_in_resonance_find_the_way_and_the_others
         else:
             assert "weighted rms" in fit.reason
             assert fit.weighted_rms > 10  # far from a minimum that would pass for the true one
-    assert converged >= 5
+    assert converged >= 7
+
+
+@pytest.mark.slow
+def test_lines_of_exchanged_names_do_not_lead_the_search_away(tmp_path):
+    """Fifty-seven constants of three states, 2e-4 off: 18 of 8,573 lines are off by 25 GHz at the start, the others by 0.1 GHz."""
+    sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
+    from bench_fit_runs import CASES
+
+    check(tmp_path, CASES["three states, 57 parameters, J ≤ 50"][1], 2e-4)
 
 
 @pytest.mark.slow

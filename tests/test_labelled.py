@@ -89,3 +89,18 @@ def test_overlaps_see_a_state_that_has_become_another():
     after[model.names.index("DK")] = 1.0  # K⁴ takes 256 from K = 4 and 16 from K = 2, more than A K² gives
     assert model.overlaps(before, before) == pytest.approx([1.0, 1.0], abs=1e-14)  # round-off
     assert model.overlaps(before, after).max() < 0.01
+
+
+def test_a_series_that_diverges_at_high_k_leaves_the_labels_of_low_k_as_they_are():
+    """D_K bends the diagonal down from K = 12 on: states of K = 18 and 20 lie among those of K = 4, which a cut at K = 14 does not have."""
+    constants = Constants(A=30.0, B=5.0, C=4.9, DK=0.0863, reduction="S")
+    labels = np.array([[20, ka, 20 - ka] for ka in range(7)] + [[20, ka, 21 - ka] for ka in range(1, 7)])
+    whole, cut = level_model(constants, labels), level_model(constants, labels, kmax=14)
+    values = np.array([constants[name] for name in whole.names])
+    energies = whole.levels(values)[0]
+    assert energies == pytest.approx(
+        cut.levels(values)[0], abs=1e-9
+    )  # round-off; K = 16 is nine steps of 0.05 x^2 away
+    assert whole.overlaps(values, values * (1 + 1e-6)).min() > 0.99
+    high = level_model(constants, np.array([[20, 18, 2], [20, 20, 0], [20, 14, 6]])).levels(values)[0]
+    assert high[1] < high[0] < energies[4] < high[2]  # the highest K is the lowest, and still called by its K

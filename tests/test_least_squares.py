@@ -46,10 +46,10 @@ def test_a_curved_valley_is_followed_to_its_end():
 
 
 def test_it_does_not_say_that_it_has_converged_when_it_has_not():
-    cut = minimise(rosenbrock, np.array([-1.2, 1.0]), most_iterations=3)
+    cut = minimise(rosenbrock, np.array([-1.2, 1.0]), most_iterations=1)
     assert not cut.converged
     assert cut.status == "too many iterations"
-    assert "3 iterations were not enough" in cut.reason
+    assert "1 iterations were not enough" in cut.reason
 
     def downhill_forever(p):  # the Jacobian has the wrong sign: every step leads up
         r, j = rosenbrock(p)
@@ -175,3 +175,32 @@ def test_a_narrow_curved_valley_is_followed_to_its_end():
     found = minimise(valley, np.array([-1.2, 1.0]), most_iterations=700)
     assert found.converged
     assert found.parameters == pytest.approx([1.0, 1.0], abs=1e-6)  # of a step below 1e-4 standard errors at rms 0
+
+
+@pytest.mark.parametrize("start", [0.0, 0.5, 1.0, -3.0])
+@pytest.mark.parametrize("slope", [1e2, 1e4, 1e6, 1e9])
+def test_a_kink_is_no_minimum(slope, start):
+    """Beyond p = 1 one residual rises steeply, as where two levels exchange their names: χ² has its lowest point there, and a slope."""
+    rng, x = np.random.default_rng(1), np.linspace(0, 1, 30)
+    noise = 0.1 * rng.normal(size=30)
+
+    def kinked(p):
+        r = (5 - p[0]) * x + noise
+        r[3] += slope * max(p[0] - 1, 0.0)
+        return r, x[:, None].copy()
+
+    found = minimise(kinked, np.array([start]))
+    assert not found.converged
+    assert found.distance > 10  # standard errors that seem to be left
+
+
+def test_a_long_curved_valley_takes_a_few_steps():
+    """Steps along the tangent leave it at once; with what they did not foresee the way follows the bend."""
+
+    def valley(p):
+        x, y = p
+        return np.array([300 * (y - x * x), 1 - x]), np.array([[600 * x, -300.0], [1.0, 0.0]])
+
+    found = minimise(valley, np.array([-1.2, 1.0]))
+    assert found.converged
+    assert len(found.iterations) < 5  # 393 without it

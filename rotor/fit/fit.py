@@ -3,7 +3,7 @@
     χ² = Σ ((ν_obs - ν_calc)/σ)² + Σ ((p - p₀)/σ_prior)²,      ν_calc = E(upper) - E(lower), in a blend the weighted mean
 
 The fit knows levels by their labels only: a `LevelModel` gives their energies and derivatives for any constants. The search
-itself is in `rotor.fit.search`. A fit has converged when the search is at a minimum and
+itself is in `rotor.fit.search` and `rotor.fit.strategies`. A fit has converged when the search is at a minimum and
 that minimum describes the lines: a weighted rms far above 1 is a failure and says so.
 """
 
@@ -20,7 +20,8 @@ from rotor.arrays import Floats, Ints
 from rotor.fit.assignment import Assignments, duplicates, levels_in
 from rotor.fit.parameters import Parameters
 from rotor.fit.search import FitOptions as FitOptions
-from rotor.fit.search import Search, errors_of, round_off, too_few, with_rejection
+from rotor.fit.search import Search, errors_of, round_off, too_few
+from rotor.fit.strategies import with_rejection
 from rotor.fit.top_constants import ConstantSet
 from rotor.fit.top_levels import model_of
 from rotor.quantum.labelled import LevelModel, MissingLevelsError

@@ -5,9 +5,7 @@ Levels keep their label by block and rank, so that no iteration reassigns a line
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -17,23 +15,12 @@ from rotor.arrays import Floats, Ints
 from rotor.fit.assignment import Assignments
 from rotor.fit.parameters import Parameters
 from rotor.quantum.labelled import LevelModel
-from rotor.statistics.least_squares import INTERRUPTED, Iteration, Minimum, Progress, minimise
 
 LOSSES = ("squares", "huber", "cauchy")
 POOR_RMS = 10.0  # weighted rms above which the lines are not described, unless the caller says otherwise
 _HUBER, _CAUCHY = 1.345, 2.385  # σ at which a loss bends: 95 % efficiency for normal errors
 _CANCELLED = 1e-12  # of the level derivatives: what is left of differences below it is round-off
-_REJECTIONS = 20
-_STAGES = (0.1, 0.2, 0.35, 0.5, 0.7, 0.85)  # shares of the lines, in order of J, of a search that begins with low J
-_ROUGH = 10.0  # standard errors within which a stage has converged
-_FIRST_ITERATIONS = 12  # of a direct search, after which it must have made way
-_WAY = 0.01  # of the weighted rms at the start, below which it has
-_LATELY = 6  # iterations in which it must halve the weighted rms after these
-_TURNED = 5  # parameters whose other sign is tried
-_TURNED_ITERATIONS = 8  # after which it must have made way
-_BETTER = 0.99  # of the weighted rms, below which the other sign is taken
 _NONE = np.zeros(0, dtype=np.int64)
-_AT_ZERO_MHZ = 1e-30  # how far a constant that starts at 0 may move in these stages
 
 
 @dataclass(frozen=True)
@@ -240,180 +227,6 @@ class Search:
             return residuals, jacobian
         factor = np.concatenate([slope, np.ones(len(residuals) - count)])
         return np.concatenate([bent, residuals[count:]]), jacobian * factor[:, None]
-
-
-def with_rejection(
-    search: Search, options: FitOptions, progress: Progress | None
-) -> tuple[Search, Minimum, dict[int, str]]:
-    """The search, repeated without the lines that are too far off until the same ones stay out.
-
-    Where no minimum was reached, or too few lines would be left, all lines count: the constants are wrong, not the lines; unless
-    the start describes half of the lines and more, see `_from_near_lines`.
-    """
-    minimum, may = _passed_on(_searched(search, progress), options), search.used
-    if options.reject_above is None or minimum.status == INTERRUPTED:
-        return search, minimum, {}
-    if not minimum.converged or _is_poor(search, minimum):
-        search, minimum = _from_near_lines(search, minimum, progress)
-    if not _passed_on(minimum, options).converged:
-        return search, minimum, {}
-    for _ in range(_REJECTIONS):
-        used = may & _near(search, may, minimum.parameters)
-        if (used == search.used).all():
-            break
-        if too_few(search.lines, used, search.parameters):
-            break
-        search = replace(search, used=used)
-        minimum = _continued(minimum, _minimised(search, minimum.parameters, progress, options.most_iterations))
-        if _passed_on(minimum, options).status == INTERRUPTED:
-            break
-    out = np.flatnonzero(may & ~search.used)
-    return search, minimum, {int(i): f"more than {options.reject_above:g} errors off" for i in out}
-
-
-def _passed_on(minimum: Minimum, options: FitOptions) -> Minimum:
-    """The same; KeyboardInterrupt for a search that was interrupted, where the caller asked for it."""
-    if minimum.status == INTERRUPTED and options.pass_interrupt:
-        raise KeyboardInterrupt
-    return minimum
-
-
-def _near(search: Search, may: NDArray[np.bool_], values: Floats) -> NDArray[np.bool_]:
-    """Which lines are no more than `reject_above` errors off, blends among those that may count by their means."""
-    calculated, _, _ = search.lines_of(values)
-    group = Grouping.of(search.lines, may)
-    means = group.spread_back(group.mean(calculated), calculated)
-    off = np.abs(search.lines.frequency_mhz - means) / search.sigma
-    return np.asarray(off <= (search.options.reject_above or math.inf))
-
-
-def _from_near_lines(search: Search, first: Minimum, progress: Progress | None) -> tuple[Search, Minimum]:
-    """The minimum of the lines that the start describes, where these are half of them and more and all together led nowhere.
-
-    SPFIT leaves lines out at the start always. Then lines that constants a little off put far away never come back, so that all
-    lines are tried first here.
-    """
-    start, limit = search.parameters.start, search.options.most_iterations
-    near = search.used & _near(search, search.used, start)
-    if 2 * near.sum() < search.used.sum() or too_few(search.lines, near, search.parameters):
-        return search, first
-    few = replace(search, used=near)
-    found = _continued(first, _minimised(few, start, progress, limit))
-    if found.status == INTERRUPTED:
-        return search, _interrupted(replace(first, iterations=found.iterations))
-    return (few, found) if found.converged and not _is_poor(few, found) else (search, first)
-
-
-def _searched(search: Search, progress: Progress | None) -> Minimum:
-    """A direct search; where it makes no way for some iterations, or ends far from the lines, one by rising J, then other signs."""
-    options = search.options
-
-    def hopeless(taken: Sequence[Iteration]) -> bool:
-        if len(taken) < _FIRST_ITERATIONS:
-            return False
-        now = min(one.rms_after for one in taken)
-        lately = min(one.rms_after for one in taken[:-_LATELY])
-        return now > options.poor_rms and (now > _WAY * taken[0].rms_before or now > lately / 2)
-
-    limit = options.most_iterations
-    first = _minimised(search, search.parameters.start, progress, limit, hopeless)
-    for further in (_by_stages, _with_a_sign_turned):
-        if _is_poor(search, first) and first.status != INTERRUPTED and len(first.iterations) < limit:
-            first = further(search, first, progress)
-    return first
-
-
-def _is_poor(search: Search, found: Minimum) -> bool:
-    """Whether the lines are not described: by all of them, or by those that rejection would leave, where it leaves half and more."""
-    limit, size = search.options.reject_above, np.abs(found.residuals[: len(search.group.first)])
-    if limit is not None and found.converged and 2 * int((size <= limit).sum()) >= len(size):
-        size = size[size <= limit]
-        return bool(np.sqrt(size @ size / max(len(size), 1)) > search.options.poor_rms)
-    return found.rms > search.options.poor_rms
-
-
-def _with_a_sign_turned(search: Search, first: Minimum, progress: Progress | None) -> Minimum:
-    """The better of a minimum that does not describe the lines and those that are reached from it with the sign of one parameter turned.
-
-    The sign of a coupling between states counts only in products with others, so that a search may end with one of them turned.
-    Tried are the few that went furthest from their start, counted in its size.
-    """
-
-    def hopeless(taken: Sequence[Iteration]) -> bool:
-        return len(taken) >= _TURNED_ITERATIONS and min(one.rms_after for one in taken) > search.options.poor_rms
-
-    start, reached = search.parameters.start, first.parameters
-    moved = np.abs(reached - start) / np.maximum(np.abs(start), _AT_ZERO_MHZ)
-    for place in np.argsort(-moved, kind="stable")[:_TURNED].tolist():
-        turned = reached.copy()
-        turned[place] *= -1
-        left = search.options.most_iterations - len(first.iterations)
-        try:
-            second = _continued(first, _minimised(search, turned, progress, max(left, 0), hopeless))
-        except ValueError:  # out of the bounds of the model
-            continue
-        better = second.rms < _BETTER * first.rms  # else the lines do not know the sign
-        if second.status == INTERRUPTED:
-            return _interrupted(second if better else replace(first, iterations=second.iterations))
-        first = second if better else replace(first, iterations=second.iterations)
-        if first.rms <= search.options.poor_rms:
-            break
-    return first
-
-
-def _continued(first: Minimum, second: Minimum) -> Minimum:
-    """The second search with the iterations of both."""
-    return replace(second, iterations=(*first.iterations, *second.iterations))
-
-
-def _by_stages(search: Search, first: Minimum, progress: Progress | None) -> Minimum:
-    """The better of the minimum found and the one that a search by rising J ends in.
-
-    Low J moves nearly linearly with the constants even when these are 10 % off, and what it fixes carries the next lines: the
-    lines come in by J, a tenth of them first. Until all are in, a constant stays within about itself of its start, and one that
-    starts at 0 stays there.
-    """
-    j = np.maximum(search.lines.upper[:, 0], search.lines.lower[:, 0])
-    last, limit = replace(first, parameters=search.parameters.start), search.options.most_iterations
-    rough = replace(search.options, tolerance=_ROUGH)
-    try:
-        for share in _STAGES:
-            cut = np.quantile(j[search.used], share)
-            soft = np.minimum(search.parameters.prior, np.maximum(np.abs(search.parameters.start), _AT_ZERO_MHZ))
-            stage = replace(
-                search, options=rough, used=search.used & (j <= cut), parameters=replace(search.parameters, prior=soft)
-            )
-            last = _continued(last, _minimised(stage, last.parameters, progress, max(limit - len(last.iterations), 0)))
-            if last.status == INTERRUPTED:  # of a part of the lines; the best point of all of them is the one before
-                return _interrupted(replace(first, iterations=last.iterations))
-        second = _continued(last, _minimised(search, last.parameters, progress, max(limit - len(last.iterations), 0)))
-    except ValueError:  # a stage left the bounds of the model
-        return first
-    best = second if second.rms < first.rms else replace(first, iterations=second.iterations)
-    return _interrupted(best) if second.status == INTERRUPTED else best
-
-
-def _interrupted(best: Minimum) -> Minimum:
-    """The best point so far of a search that was interrupted on another way."""
-    return replace(best, status=INTERRUPTED, reason=f"interrupted after {len(best.iterations)} iterations")
-
-
-def _minimised(
-    search: Search,
-    start: Floats,
-    progress: Progress | None,
-    limit: int,
-    hopeless: Callable[[Sequence[Iteration]], bool] | None = None,
-) -> Minimum:
-    return minimise(
-        search.evaluate,
-        start,
-        tolerance=search.options.tolerance,
-        most_iterations=limit,
-        floor=round_off(search, search.lines_of(start)[2]),
-        progress=progress,
-        hopeless=hopeless,
-    )
 
 
 def round_off(search: Search, slopes: Floats) -> Floats:

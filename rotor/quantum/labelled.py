@@ -29,6 +29,7 @@ from rotor.quantum.effects.watson import operators_by_name
 from rotor.quantum.wang.basis import WangBlock, ka_kc, wang_blocks
 from rotor.quantum.wang.tridiagonal import vectors_of_values
 from rotor.tops.constants import Constants
+from rotor.tops.operators import REPRESENTATIONS
 
 _MOST_PADDED = 1 << 22  # matrix elements of blocks that are worked on together: 32 MB
 _MOST_STATES = 0.6  # of all states of a block: where labels are fewer, they alone are looked at
@@ -165,6 +166,7 @@ class _Chunk(NamedTuple):
 class WangBlocks(LevelModel):
     """An asymmetric top, the blocks that occur.
 
+    rise: 1 where energies rise with K (z is a), -1 where they fall (c), 0 where neither (b)
     terms: unique (q, n) but for (0, 0); powers: p, (q, n) as a place in `terms` or -1, of every column of factors (terms of the
     Hamiltonian, names)
     """
@@ -175,6 +177,7 @@ class WangBlocks(LevelModel):
     factors: Floats
     chunks: tuple[_Chunk, ...] = field(repr=False)
     j: Ints = field(repr=False)
+    rise: int
 
     @classmethod
     def of(cls, constants: Constants, labels: Ints, kmax: int | None) -> WangBlocks:
@@ -187,7 +190,9 @@ class WangBlocks(LevelModel):
         chunks = tuple(
             _chunks(_occurring(labels, str(constants.representation), kmax), units, [p for p, _, _ in hamiltonian])
         )
-        return cls(tuple(by_name), len(labels), places, factors, chunks, labels[:, 0])
+        axis = REPRESENTATIONS[str(constants.representation)][2]
+        rise = {"a": 1, "c": -1}.get(axis, 0)
+        return cls(tuple(by_name), len(labels), places, factors, chunks, labels[:, 0], rise)
 
     def levels(self, values_mhz: Floats) -> tuple[Floats, Floats]:
         """See `LevelModel`. Raises ValueError where a block is not finite or LAPACK does not converge."""
@@ -216,15 +221,21 @@ class WangBlocks(LevelModel):
         return out
 
     def _solved(self, chunk: _Chunk, coefficients: Floats) -> tuple[Floats, Floats]:
-        """Eigenvalues (blocks, size) and eigenvectors (blocks, size, size) with the coefficients of the terms."""
-        return _diagonalised(self._bands(chunk, coefficients), chunk, self._space)
+        """Eigenvalues (blocks, size) and eigenvectors (blocks, size, size) with the coefficients of the terms, in the order of labels."""
+        return self._in_order(self._bands(chunk, coefficients), chunk)
+
+    def _in_order(self, bands: Sequence[Floats], chunk: _Chunk) -> tuple[Floats, Floats]:
+        energies, vectors = _diagonalised(bands, chunk, self._space)
+        if self.rise:
+            _order_beyond_the_turn(self.rise * bands[0], chunk.sizes, energies, vectors)
+        return energies, vectors
 
     def _labelled(self, chunk: _Chunk, coefficients: Floats) -> tuple[Floats, Floats]:
         """Eigenvalues (blocks, size), and the eigenvectors of the labelled states (blocks, size, most labels), or of all states."""
         bands, states = self._bands(chunk, coefficients), chunk.states
         if states is None:
-            return _diagonalised(bands, chunk, self._space)
-        if len(bands) == 2 and _dense():
+            return self._in_order(bands, chunk)
+        if len(bands) == 2 and _dense() and not (self.rise and _turns(self.rise * bands[0], chunk.sizes).any()):
             energies = _banded(bands, chunk, self._space)
             found = vectors_of_values(bands[0], bands[1], energies, chunk.block, chunk.rank, self._space)
             if found is not None:
@@ -232,7 +243,7 @@ class WangBlocks(LevelModel):
                 chosen.fill(0.0)
                 chosen.transpose(1, 0, 2)[:, chunk.block, chunk.slot] = found
                 return energies, chosen
-        energies, vectors = _diagonalised(bands, chunk, self._space)
+        energies, vectors = self._in_order(bands, chunk)
         count, size, most = len(vectors), vectors.shape[1], states.shape[1]
         rows = size * size * np.arange(count)[:, None, None] + size * np.arange(size)[:, None]
         chosen = self._space.array("chosen", count, size, most)
@@ -397,6 +408,29 @@ def _dense() -> bool:
     each other on small blocks.
     """
     return "scipy.linalg" not in sys.modules and os.environ.get("OPENBLAS_NUM_THREADS") == "1"
+
+
+def _order_beyond_the_turn(diagonal: Floats, sizes: Sequence[int], energies: Floats, vectors: Floats) -> None:
+    """States beyond the K where the diagonal (blocks, size) ceases to rise come last, by their mean K; the arrays are changed.
+
+    Constants that describe K up to 20 may bring the states of K = 60 down among those: the series has left the molecule there. Such a
+    state is mostly beyond the turn, and the labels of the others are the ranks among themselves, whatever it does.
+    """
+    turn = _turns(diagonal, sizes)
+    for b in np.flatnonzero(turn).tolist():
+        n = sizes[b]
+        share = vectors[b, :n, :n] ** 2
+        beyond = share[turn[b] + 1 :].sum(axis=0) > 0.5
+        order = np.lexsort((np.where(beyond, np.arange(n) @ share, 0.0), beyond))
+        energies[b, :n] = energies[b, order]
+        vectors[b, :n, :n] = vectors[b, :n, order].T
+
+
+def _turns(diagonal: Floats, sizes: Sequence[int]) -> Ints:
+    """The place in each block where the diagonal (blocks, size) ceases to rise, 0 where it rises to the end or not at all."""
+    size = np.asarray(sizes)
+    turn = np.where(np.arange(diagonal.shape[1]) < size[:, None], diagonal, -np.inf).argmax(axis=1)
+    return np.where(turn < size - 1, turn, 0)
 
 
 def _tridiagonal(bands: Sequence[Floats], sizes: Sequence[int], energies: Floats, vectors: Floats) -> None:

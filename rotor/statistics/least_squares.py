@@ -14,7 +14,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from itertools import takewhile
 from typing import NamedTuple
 
 import numpy as np
@@ -29,6 +30,10 @@ FIRST_DAMPING, MOST_DAMPING = 1e-4, 1e12  # λ where D p has columns of length 1
 _FLOOR = 10.0  # times the tolerance, below which a step that does not come nearer says that round-off is reached
 BENT = 0.01  # standard errors that seem to be left at a minimum, above which the linear model does not hold there
 _NOTHING = 1e-9  # of χ², below which round-off of the residuals hides what a damped step does
+_PARTS = (1.0, 0.5, 0.25, 0.125)  # of a step that was refused, at which the bent way is looked at
+_MOST_BENT = 0.75  # of the step's length, beyond which the way bends more than its second order knows
+_WORTHWHILE = 0.1  # of what the straight step promised
+_UNFORESEEN = 1e-6  # of the length of the residuals, below which round-off may be what a step did not foresee
 _FINER = 0.01  # of the least λ tried so far, below which a smaller one is worth a try
 _NOISE = 1e-7  # of χ², below which round-off of the residuals hides whether a step has decreased it: the linear model decides
 ROUND_OFF = 1e-13  # singular values below this part of the largest carry no information
@@ -48,6 +53,10 @@ class Iteration:
     predicted: float
     taken: bool
 
+    def gain(self, count: int) -> float:
+        """The decrease of χ² over what was expected; count : residuals."""
+        return (self.rms_before**2 - self.rms_after**2) * count / self.predicted if self.predicted > 0 else -1.0
+
 
 @dataclass(frozen=True)
 class Minimum:
@@ -55,7 +64,7 @@ class Minimum:
 
     parameters (n,), residuals (m,), jacobian (m, n) : at the best point found, which is what a search that did not end
         well leaves too
-    status : "converged", "stalled", "too many iterations" or "interrupted"; reason : the same in a sentence with numbers
+    status : "converged", "stalled", "too many iterations" or "interrupted"
     gradient : largest |cosine| between the residuals and a column of the Jacobian, 0 at a minimum
     distance : length of the undamped step in standard errors, √(δᵀ JᵀJ δ), 0 at a minimum
     """
@@ -64,7 +73,6 @@ class Minimum:
     residuals: Floats
     jacobian: Floats
     status: str
-    reason: str
     gradient: float
     distance: float
     iterations: tuple[Iteration, ...] = field(default=(), repr=False)
@@ -78,6 +86,18 @@ class Minimum:
     def rms(self) -> float:
         """√(Σ r²/m), the weighted rms."""
         return _rms(self.residuals)
+
+    @property
+    def reason(self) -> str:
+        """The status in a sentence with numbers."""
+        count, left = len(self.iterations), f"{self.distance:.1e} standard errors"
+        bends = ", of which χ² allows none: it bends upwards" if self.distance > BENT * max(1.0, self.rms) else ""
+        return {
+            CONVERGED: f"converged after {count} iterations: the next step would be {left}{bends}",
+            STALLED: f"no step decreases the residuals, although {left} seem to be left",
+            EXHAUSTED: f"{count} iterations were not enough: the next step would be {left}",
+            INTERRUPTED: f"interrupted after {count} iterations: the next step would be {left}",
+        }[self.status]
 
 
 def minimise(
@@ -135,43 +155,66 @@ def minimise(
     blind = np.zeros(len(point)) if floor is None else floor
     state = _State.at(point, *_evaluated(evaluate, point))
     scale, damping, taken, before = state.norms, 0.0, list[Iteration](), math.inf
+    refused, arc = list[tuple[float, float]](), None
     first = FIRST_DAMPING  # the least λ above 0, until nothing between it and the largest leads on
     try:
         while True:
             scale = np.maximum(scale, state.norms)
             linear = _Linear.of(state, scale, blind)
-            enough = tolerance * max(1.0, state.rms)
-            if linear.distance <= enough or (linear.distance > before / 2 and linear.distance <= _FLOOR * enough):
+            if _is_enough(linear.distance, before, tolerance, state):
                 return state.ended(CONVERGED, linear, taken)
             if len(taken) >= most_iterations or (hopeless and hopeless(taken)):
                 return state.ended(EXHAUSTED, linear, taken)
 
-            step, predicted = linear.step(damping)
+            step, predicted = arc or linear.step(damping)
             trial = _tried(evaluate, state.parameters + step)
-            after = trial.rms if trial else math.inf
-            gain = (state.rms**2 - after**2) * len(state.residuals) / predicted if predicted > 0 else -1.0
-            small = predicted <= _NOISE * state.rms**2 * len(state.residuals) and after <= (1 + _NOISE) * state.rms
-            good = math.isfinite(after) and (gain > 1e-4 or (small and damping == 0))
-            taken.append(Iteration(len(taken) + 1, state.rms, after, damping, predicted, good))
+            taken.append(_judged(len(taken) + 1, state, trial, damping, predicted))
             before = linear.distance if damping == 0 else math.inf
-            if good and trial:
-                state = trial
+            if trial and taken[-1].taken:
+                state, refused = trial, []
             if progress:
                 progress(taken[-1])
-            if good:
+            if trial and not taken[-1].taken and not arc:
+                off = trial.residuals - state.residuals + state.jacobian @ step
+                refused.append((float(np.linalg.norm(scale * step)), float(np.linalg.norm(off))))
+                if arc := linear.arc(state, scale, off, damping):
+                    continue
+            arc = None
+            if taken[-1].taken:
+                gain = taken[-1].gain(len(state.residuals))
                 if damping == first and gain > 0.75 and len(taken) > 1 and taken[-2].damping == 0:
                     first /= 10.0  # the undamped step goes too far, this one not far enough
                 damping = _relaxed(damping, gain, first)
                 continue
             damping = max(10.0 * damping, first)
-            if damping > MOST_DAMPING or (
-                damping > first and predicted < _NOTHING * state.rms**2 * len(state.residuals)
-            ):
-                if linear.weakest >= _FINER * first:
-                    return state.ended(_without_decrease(linear, state, taken), linear, taken)
-                damping = first = linear.weakest
+            if damping > MOST_DAMPING or (damping > first and predicted < _NOTHING * state.chi_squared):
+                if all(one.damping > 0 for one in _refused(taken)):
+                    damping = 0.0  # of the last point only damped steps are known
+                elif linear.weakest < _FINER * first:
+                    damping = first = linear.weakest
+                else:
+                    return state.ended(_without_decrease(linear, state, taken, refused), linear, taken)
     except KeyboardInterrupt:
         return state.ended(INTERRUPTED, _Linear.of(state, scale, blind), taken)
+
+
+def _judged(number: int, state: _State, trial: _State | None, damping: float, predicted: float) -> Iteration:
+    """A step that was tried: taken where χ² falls, or where round-off hides whether it does and the linear model decides."""
+    after = trial.rms if trial else math.inf
+    found = Iteration(number, state.rms, after, damping, predicted, False)
+    small = damping == 0 and predicted <= _NOISE * state.chi_squared and after <= (1 + _NOISE) * state.rms
+    return replace(found, taken=math.isfinite(after) and (found.gain(len(state.residuals)) > 1e-4 or small))
+
+
+def _is_enough(distance: float, before: float, tolerance: float, state: _State) -> bool:
+    """Whether the full step is below the tolerance, or is round-off: it was no more than twice as long before an undamped step."""
+    enough = tolerance * max(1.0, state.rms)
+    return distance <= enough or before / 2 < distance <= min(_FLOOR * enough, math.sqrt(_NOISE * state.chi_squared))
+
+
+def _refused(taken: Sequence[Iteration]) -> list[Iteration]:
+    """The steps that were refused at the last point, the last one first."""
+    return list(takewhile(lambda one: not one.taken, reversed(taken)))
 
 
 def _relaxed(damping: float, gain: float, first: float) -> float:
@@ -183,10 +226,28 @@ def _relaxed(damping: float, gain: float, first: float) -> float:
     return damping if damping >= first else 0.0
 
 
-def _without_decrease(linear: _Linear, state: _State, taken: Sequence[Iteration]) -> str:
+def _without_decrease(
+    linear: _Linear, state: _State, taken: Sequence[Iteration], refused: Sequence[tuple[float, float]]
+) -> str:
     """No step decreases χ²: a minimum has been reached if what is left to gain is small, else the search has stalled."""
+    if not _are_smooth(refused, _UNFORESEEN * float(np.linalg.norm(state.residuals))):
+        return STALLED
     left = min(linear.distance, math.sqrt(_left_to_gain(taken, len(state.residuals))))
     return CONVERGED if left < BENT * max(1.0, state.rms) else STALLED
+
+
+def _are_smooth(refused: Sequence[tuple[float, float]], noise: float) -> bool:
+    """Whether what the linear model did not foresee of steps falls with their square: lengths and |r(p + δ) - r + J δ| of each.
+
+    Where levels exchange their names it falls with their length, or not at all. Then χ² bends upwards on one side alone, and a point
+    where no step leads on is no minimum. What is below `noise` says nothing.
+    """
+    known = sorted((length, off) for length, off in refused if off > noise)
+    longer = [(length, off) for length, off in known if length > 3 * known[0][0]]
+    if not longer or not known[0][0]:
+        return True
+    (short, little), (long, much) = known[0], longer[0]
+    return math.log(much / little) > 1.5 * math.log(long / short)
 
 
 def _left_to_gain(taken: Sequence[Iteration], count: int) -> float:
@@ -197,9 +258,7 @@ def _left_to_gain(taken: Sequence[Iteration], count: int) -> float:
     P may be left.
     """
     left = 0.0
-    for one in reversed(taken):
-        if one.taken:
-            break
+    for one in _refused(taken):
         gain = (one.rms_before**2 - one.rms_after**2) * count
         if not math.isfinite(gain):
             left = max(left, one.predicted)
@@ -251,19 +310,14 @@ class _State(NamedTuple):
     def rms(self) -> float:
         return _rms(self.residuals)
 
+    @property
+    def chi_squared(self) -> float:
+        return float(self.residuals @ self.residuals)
+
     def ended(self, status: str, linear: _Linear, iterations: list[Iteration]) -> Minimum:
-        count = len(iterations)
-        reasons = {
-            CONVERGED: f"converged after {count} iterations: the next step would be {linear.distance:.1e} standard errors"
-            + (", of which χ² allows none: it bends upwards" if linear.distance > BENT * max(1.0, self.rms) else ""),
-            STALLED: f"no step decreases the residuals, although {linear.distance:.1e} standard errors seem to be left",
-            EXHAUSTED: f"{count} iterations were not enough: the next step would be {linear.distance:.1e} standard errors",
-            INTERRUPTED: f"interrupted after {count} iterations: the next step would be {linear.distance:.1e} standard errors",
-        }
         return Minimum(
-            self.parameters, self.residuals, self.jacobian, status, reasons[status], linear.gradient, linear.distance,
-            tuple(iterations),
-        )  # fmt: skip
+            self.parameters, self.residuals, self.jacobian, status, linear.gradient, linear.distance, tuple(iterations)
+        )
 
 
 def _triangle(stacked: Floats) -> Floats:
@@ -311,3 +365,27 @@ class _Linear(NamedTuple):
         along = factor * self.z
         promised = 2 * (self.s * along) @ self.z - (self.s * along) @ (self.s * along)
         return self.back @ along, float(promised)
+
+    def arc(self, state: _State, scale: Floats, off: Floats, damping: float) -> tuple[Floats, float] | None:
+        """A point t δ + t² a of the way that bends as the model does, and the decrease of χ² foretold there; None where that is little.
+
+        From what the linear model did not foresee of a step, u = r(p + δ) - r + J δ, which is ½ δᵀ(∇²r)δ to lowest order, follow
+        a = (JᵀJ + λD²)⁻¹ Jᵀu and r(t) = r - t J δ + t² (u - J a): the geodesic acceleration of M. K. Transtrum and J. P. Sethna,
+        arXiv:1201.5885 (2012), from the residuals of a step that was refused in place of one more evaluation.
+        scale : D. off : u
+        """
+        used = self.s > 0
+        inverse = np.where(used, 1 / np.where(used, self.s**2 + damping, 1.0), 0.0)
+        bent = self.back @ (inverse * (self.back.T @ (state.jacobian.T @ off)))
+        step, promised = self.step(damping)
+        along, across = state.jacobian @ step, off - state.jacobian @ bent
+        ratio = float(np.linalg.norm(scale * bent)) / (float(np.linalg.norm(scale * step)) or 1.0)
+        ways = [(_left(state.residuals - t * along + t * t * across), t) for t in _PARTS if t * ratio <= _MOST_BENT]
+        if not ways or state.chi_squared - min(ways)[0] < _WORTHWHILE * promised:
+            return None
+        least, t = min(ways)
+        return t * step + t * t * bent, state.chi_squared - least
+
+
+def _left(residuals: Floats) -> float:
+    return float(residuals @ residuals)

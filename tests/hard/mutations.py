@@ -165,7 +165,7 @@ MUTATIONS = (
     Mutation(
         19, "rotor/statistics/least_squares.py",
         "    return CONVERGED if left < BENT * max(1.0, state.rms) else STALLED", "    return CONVERGED",
-        "tests/test_least_squares.py::test_it_does_not_say_that_it_has_converged_when_it_has_not",
+        "tests/test_least_squares.py::test_a_search_at_the_edge_of_the_model_has_not_converged",
     ),
     Mutation(
         19, "rotor/statistics/least_squares.py",

@@ -16,14 +16,13 @@ from rotor.arrays import Floats, Ints, distinct
 from rotor.quantum.coupled import CoupledBlock, names_of_states, parameter_matrix
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.estimates.state_units import WangElements, wang_elements
-from rotor.quantum.estimates.unit_blocks import (
+from rotor.quantum.estimates.unit_blocks import UnitBlocks, tracked_blocks
+from rotor.quantum.estimates.unit_matrices import (
     Elements,
     Namer,
     UnitBlock,
-    UnitBlocks,
     WeightedElements,
     elements_of,
-    tracked_blocks,
     unit_block,
 )
 from rotor.quantum.levels import Levels, SolvedBlock

@@ -16,7 +16,8 @@ import numpy as np
 from rotor.arrays import Floats, Ints, distinct
 from rotor.quantum.coupled import NOTHING, Part, connected_parts, names_of_functions, names_of_states, parts_of
 from rotor.quantum.effect import QuantumEffect, k_limits_of
-from rotor.quantum.estimates.unit_blocks import UnitBlock, UnitBlocks, members_of, numbered, tracked_blocks
+from rotor.quantum.estimates.unit_blocks import UnitBlocks, tracked_blocks
+from rotor.quantum.estimates.unit_matrices import UnitBlock, members_of, numbered
 from rotor.quantum.labelled import unit_diagonals
 from rotor.quantum.states import OperatorOfJ, State
 from rotor.quantum.wang.basis import WangBlock, limited, wang_blocks

@@ -23,113 +23,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints, Workspace
-
-Namer = Callable[[Floats, Floats, Floats], Ints]  # matrix, energies, vectors -> names (n, columns) of the states
+from rotor.quantum.estimates.unit_matrices import Namer, UnitBlock
 
 _AT_ONCE = 1 << 18  # numbers of the largest array of blocks side by side: 2 MB, which stays in the cache of a core
 
+_CLEAR = 0.8  # share of a sub-block in a state, above which it and the rank by energy in it make the name
 _LIKE = 1.5  # sizes of blocks that stand side by side
 
 _ALIKE = 1e-13  # of the width of a block: energies that differ less are one, such as doublets of high K
-
-
-class UnitBlock(NamedTuple):
-    """One block: size, places (row, column, row ≥ column) of elements, their factors (elements, units), which parameters.
-
-    mix (units, parameters) : how much of each unit matrix a parameter has
-    members (sub-blocks, functions) : 1 where a function is in a sub-block
-    namer : names of all states, where they must be made
-    """
-
-    size: int
-    rows: Ints
-    columns: Ints
-    factors: Floats
-    mix: Floats
-    parameters: Ints
-    members: Floats
-    namer: Namer
-
-
-class Elements(NamedTuple):
-    """Elements of a matrix that are not zero, of its lower triangle: places row * size + column, rising, and values."""
-
-    places: Ints
-    values: Floats
-
-
-def elements_of(matrix: Floats) -> Elements:
-    """Of a dense matrix (size, size).
-
-    >>> elements_of(np.array([[1.0, 9.0], [0.0, 2.0]])).places.tolist()
-    [0, 3]
-    """
-    places = np.flatnonzero(matrix)
-    rows, columns = np.divmod(places, matrix.shape[1])
-    places = places[rows >= columns]
-    return Elements(places, matrix.ravel()[places])
-
-
-class WeightedElements(NamedTuple):
-    """Elements of many matrices at once: places as of `Elements`, in any order, and factors (elements, parameters), which add up."""
-
-    places: Ints
-    factors: Floats
-
-
-def unit_block(
-    units: dict[int, Elements], sub_blocks: Ints, namer: Namer, more: WeightedElements | None = None
-) -> UnitBlock:
-    """From the unit matrix of every parameter that acts in the block.
-
-    Parameters
-    ----------
-    units : dict
-        Unit matrices by the number of the parameter.
-    sub_blocks : (functions,) array
-        The number of the sub-block of every function.
-    namer : callable
-    more : WeightedElements, optional
-        Elements of other parameters, a column for every number.
-
-    Returns
-    -------
-    UnitBlock
-    """
-    size = len(sub_blocks)
-    given = [np.arange(size) * (size + 1), *(one.places for one in units.values()), *([more.places] if more else [])]
-    places, of_place = numbered(np.concatenate(given), size * size)
-    bounds = np.cumsum([0, *map(len, given)]).tolist()
-    count = more.factors.shape[1] if more else 1 + max(units, default=-1)
-    factors = np.zeros((len(places), count))
-    if more:
-        np.add.at(factors, of_place[bounds[-2] :], more.factors)
-    for column, start, stop in zip(units, bounds[1:], bounds[2:], strict=False):
-        factors[of_place[start:stop], column] = units[column].values
-    numbers = np.flatnonzero(factors.any(axis=0))
-    rows, columns = np.divmod(places, size)
-    return UnitBlock(
-        size, rows, columns, factors[:, numbers], np.eye(len(numbers)), numbers, members_of(sub_blocks), namer
-    )
-
-
-def numbered(values: Ints, count: int) -> tuple[Ints, Ints]:
-    """The different ones of whole numbers from 0 to `count`, rising, and the place of each value among them.
-
-    >>> [found.tolist() for found in numbered(np.array([3, 1, 3]), 4)]
-    [[1, 3], [1, 0, 1]]
-    """
-    there = np.zeros(count, dtype=bool)
-    there[values] = True
-    found = np.flatnonzero(there)
-    place = np.empty(count, dtype=np.int64)
-    place[found] = np.arange(len(found))
-    return found, place[values]
-
-
-def members_of(sub_blocks: Ints) -> Floats:
-    """1 where a function (columns) is in a sub-block (rows), from the number of the sub-block of every function."""
-    return np.asarray(sub_blocks[None, :] == np.arange(sub_blocks.max(initial=0) + 1)[:, None], dtype=float)
 
 
 class _Solved(NamedTuple):
@@ -224,18 +125,19 @@ class _Stack(NamedTuple):
         matrix = solved.matrices[self.offsets[place] : self.offsets[place + 1]].reshape(n, n)
         return namer(matrix, solved.energies[place, :n], solved.vectors[place, :n, :n])
 
-    def leading(self, solved: _Solved) -> Ints:
-        """The sub-block with the largest share of each state, (blocks, size); of two states that round-off alone tells apart the lower
-        number first, whichever way round they come."""
+    def leading(self, solved: _Solved) -> tuple[Ints, Floats]:
+        """The sub-block with the largest share of each state, (blocks, size), and that share; of two states that round-off alone tells
+        apart the lower number first, whichever way round they come."""
         if self.members.shape[1] == 1 or self.size == 1:
-            return np.zeros(solved.energies.shape, dtype=np.int64)
-        found = np.asarray((self.members @ solved.vectors**2).argmax(axis=1))
+            return np.zeros(solved.energies.shape, dtype=np.int64), np.ones(solved.energies.shape)
+        shares = self.members @ solved.vectors**2
+        found, largest = np.asarray(shares.argmax(axis=1)), np.asarray(shares.max(axis=1))
         whole = np.nanmax(solved.energies, axis=1, keepdims=True) - solved.energies[:, :1]
         turned = (np.diff(solved.energies, axis=1) <= _ALIKE * whole) & (found[:, :-1] > found[:, 1:])
         turned[:, 1:] &= ~turned[:, :-1]
         block, place = np.nonzero(turned)
         found[block, place], found[block, place + 1] = found[block, place + 1], found[block, place]
-        return found
+        return found, largest
 
     def slopes(self, vectors: Floats, states: Ints, space: Workspace) -> Floats:
         """⟨n|O_i|n⟩ (blocks, states, parameters of the blocks) of some states (blocks, states)."""
@@ -250,12 +152,13 @@ class _Stack(NamedTuple):
 
 class AtStart(NamedTuple):
     """What labels of a block had when they were looked for: parameters of the block, energies, derivatives by them, sub-blocks of all
-    its states."""
+    its states and the shares of these."""
 
     values_mhz: Floats
     energies: Floats
     slopes: Floats
     leading: Ints
+    shares: Floats
 
 
 class Tracked(NamedTuple):
@@ -309,14 +212,13 @@ def tracked_blocks(
         named = [stack.names(solved, place, blocks[i].namer) for place, i in enumerate(numbers.tolist())]
         found = [find(i, names) for i, names in zip(numbers.tolist(), named, strict=True)]
         slopes = stack.slopes(solved.vectors, _padded([states for _, states in found], 0), space)
-        leading = stack.leading(solved)
+        leading, shares = stack.leading(solved)
         for place, (rows, states) in enumerate(found):
             if len(rows):
                 block = blocks[numbers[place]]
                 own = slopes[place, : len(rows), : len(block.parameters)]
-                start = AtStart(
-                    values_mhz[block.parameters], solved.energies[place, states], own, leading[place, : block.size]
-                )
+                of_states = leading[place, : block.size], shares[place, : block.size]
+                start = AtStart(values_mhz[block.parameters], solved.energies[place, states], own, *of_states)
                 tracked.append(Tracked(block, rows, named[place][states], states, start))
     return UnitBlocks(count, tuple(tracked))
 
@@ -327,6 +229,11 @@ def _padded(rows: Sequence[Ints], fill: int) -> Ints:
     for place, row in enumerate(rows):
         out[place, : len(row)] = row
     return out
+
+
+def _filled(values: Floats, count: int) -> Floats:
+    """Values (n,) with zeros behind them."""
+    return np.concatenate([values, np.zeros(count - len(values))])
 
 
 @dataclass(frozen=True, eq=False)
@@ -356,11 +263,12 @@ class _Labelled:
         return np.take_along_axis(solved.energies, states, axis=1), self.stack.slopes(solved.vectors, states, space)
 
     def _states(self, solved: _Solved) -> Ints:
-        """The states that have the labels now; names are made anew only where a state is mostly in another sub-block."""
-        leading = self.stack.leading(solved)
-        if not (self._below & (leading != self.leading)).any():
-            return self.states
-        moved = ((self._ranks(leading) != self._at_start) & (self.rows >= 0)).any(axis=1)
+        """The states that have the labels now; names are made anew where a state is mostly in another sub-block, and where sub-blocks
+        share one now or did so at the start: names are those of these constants, whatever the way to them was."""
+        leading, shares = self.stack.leading(solved)
+        moved = self._unclear_at_start | self._unclear(shares)
+        if (self._below & (leading != self.leading)).any():
+            moved |= ((self._ranks(leading) != self._at_start) & (self.rows >= 0)).any(axis=1)
         if not moved.any():
             return self.states
         states = self.states.copy()
@@ -369,6 +277,15 @@ class _Labelled:
             made = self.stack.names(solved, b, one.block.namer)
             states[b, : len(one.rows)] = _states_of(made, one.names)
         return states
+
+    @cached_property
+    def _unclear_at_start(self) -> NDArray[np.bool_]:
+        return self._unclear(np.stack([_filled(one.start.shares, self.stack.size) for one in self.tracked]))
+
+    def _unclear(self, shares: Floats) -> NDArray[np.bool_]:
+        """Blocks (blocks,) with a labelled state that no sub-block has most of: its sub-block and rank do not make its name."""
+        own = np.take_along_axis(shares, self.states, axis=1)
+        return np.asarray(((own < _CLEAR) & (self.rows >= 0)).any(axis=1))
 
     @cached_property
     def _below(self) -> NDArray[np.bool_]:
