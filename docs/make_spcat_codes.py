@@ -51,25 +51,26 @@ OPTIONS = """
 CHECKED = """
 ## Beside the compiled program
 
-538 inputs of the kinds that published fits have, 16 of them published files, and 328 made afterwards with other random numbers, were
+538 inputs of the kinds that published fits have, 16 of them published files, and 656 made afterwards with other random numbers, were
 computed here and by the program itself (its public C source, gcc -O2; it repeats 22 reference catalogues of 2008 line by line), and
 compared by quantum numbers, frequencies, intensities, degeneracies and energies of levels: 1 to 18 states in either basis, up to five
 spins with and without a total spin of two or three, more than six quanta, weights by IAX 1 to 11, E species, l-doubled states with and
 without spins, energies of one K, KNMIN, KNMAX, DIAG, IXX, VSYM, MAXV, FQLIM, STR1, FLAGS 0 to 1111, 300 tied parameters, option lines of
 each state, commas, moments of other kinds, series. With `--as-spcat`:
 
-| inputs | first 538 | later 328 |
+| inputs | first 538 | later 656 |
 |---|---|---|
-| equal | 490 | 287 |
-| refused by name | 7 | 15 |
-| shares of strength, and names, of levels of one block that nearly or exactly coincide or are half and half of two names | 7 | 12 |
-| DIAG 4, and once 2, where a block has several Wang blocks: the program's sort by ⟨K²⟩ exchanges states without their ⟨K²⟩ | 3 | 2 |
+| equal | 490 | 590 |
+| refused by name | 7 | 25 |
+| shares of strength, and names, of levels of one block that nearly or exactly coincide or are half and half of two names | 7 | 21 |
+| DIAG 4, and once 2: the program's sort by ⟨K²⟩ exchanges states without their ⟨K²⟩ | 3 | 6 |
+| DIAG 3 with l-doubled states: names by the largest share here | 0 | 1 |
 | DIAG 0 where the diagonal stops rising with K ("roll-over"): it lists first-order energies, here are eigenvalues | 0 | 1 |
 | [N², φ] (TYP 5) where its phase decides: the program then computes φ without N' (N' + 1) - N (N + 1); here it is the commutator | 5 | 3 |
 | degenerate states of IAX 7 with odd l: the program exchanges the weights of A and B species | 1 | 0 |
 | three equivalent nuclei: eight with spins of 3/2, others with levels that coincide or change places with forbidden ones | 25 | 0 |
 | TYP 21 and 4 (with Δk = Δl = 2 both) between the states of one l-doubled pair, an imaginary q | 0 | 7 |
-| an operator that joins states of which some weights agree and others do not | 0 | 1 |
+| an operator that joins states of which some weights agree and others do not | 0 | 2 |
 
 16 of the later inputs were then spelled in 144 other ways (tabs, carriage returns, D exponents, missing errors and labels, long
 titles, blank lines, other counts, commas, comments, text at the end): 129 were read as the program reads them; the others had an empty

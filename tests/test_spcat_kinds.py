@@ -202,3 +202,9 @@ def test_terms_of_three_nuclei_that_spcat_leaves_out_are_noted():
     assert len(notes) == 4
     assert sum("the first is named, or the first and the second" in note for note in notes) == 3
     assert sum("no multiple of 3" in note for note in notes) == 1
+
+
+def test_files_without_a_level_that_has_a_weight_are_refused():
+    file = read_par(b"a case\n 1 0 0 0\nl -2 1 0 0 0 1 0 1\n 100 6000.0 0\n")
+    with pytest.raises(ValueError, match="no level"):
+        predict(file, IntensityFile("", Request(fend=3), (Dipole(1, 1.0),)))

@@ -100,9 +100,14 @@ def predicted(
 def _solved(groups: list[Group], request: Request, form: Format) -> list[tuple[Group, Levels]]:
     """The levels of every group from FBGN to FEND; those of states above MAXV count as levels that do not exist."""
     found = [(group, group.levels(f_range(group, request))) for group in groups]
-    if request.maxv < 0 or not form.states:
-        return found
-    return [(group, _up_to(request.maxv, group, levels)) for group, levels in found]
+    if request.maxv >= 0 and form.states:
+        found = [(group, _up_to(request.maxv, group, levels)) for group, levels in found]
+    if not any((levels.weight > 0).any() for _, levels in found):
+        raise ValueError(
+            f"no level has a weight from FBGN = {request.fbgn} to FEND = {request.fend}, MAXV = {request.maxv}; give other limits or "
+            "weights (WTPL, WTMN, EWT)"
+        )
+    return found
 
 
 def _up_to(maxv: int, group: Group, levels: Levels) -> Levels:
