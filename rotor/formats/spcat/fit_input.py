@@ -139,7 +139,9 @@ def spfit_input(file: ParameterFile, lines: LineList, source: str = "") -> Spfit
         from rotor.formats.spcat.at_zero import stay_at_zero
 
         if stay := stay_at_zero(file):
-            notes.append(f"{', '.join(stay)}: at 0 they change no level to first order, and stay there; give other starts")
+            notes.append(
+                f"{', '.join(stay)}: at 0 they change no level to first order, and stay there; give other starts"
+            )
     return SpfitInput(file, assigned, constants, parameters, options, columns, ratios, tuple(notes), model)
 
 
