@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 from rotor.fit.fit import fit_lines
+from rotor.formats.spcat.at_zero import left_at_zero, stay_at_zero
 from rotor.formats.spcat.fit_input import fitted_file, read_fit, spfit_input
+from rotor.formats.spcat.fit_states import FileLevels
 from rotor.formats.spcat.text.lin import line_list, read_lin
 from rotor.formats.spcat.text.par import format_par, read_par
 from rotor.formats.spcat.variances import variance_factor
@@ -114,3 +116,44 @@ def test_the_correlations_of_a_var_file_are_of_all_parameters_held_ones_too(gs):
     free = [i for i, p in enumerate(file.parameters) if p.label in FREE]
     covariance = (factor @ factor.T)[np.ix_(free, free)]
     assert np.allclose(covariance, fit.statistics.covariance, rtol=3e-5)  # seven digits of correlations of 0.99
+
+
+TWO = """two states
+ 13 1 10 0 0 1E6 1 1
+a 1 2 0 60
+ 10000 7800. 1E+36 /A0
+ 20000 2560. 1E+36 /B0
+ 30000 2130. 1E+36 /C0
+ 10011 7850. 1E+36 /A1
+ 20011 2566. 1E+36 /B1
+ 30011 2137. 1E+36 /C1
+ 11 229000. 1E-37 /E1
+ 1 {w} 1E-37 /W
+ 200001 0.0 1E+00 /Ga
+ 400001 0.0 1E+00 /Gb
+ 610001 0.0 {held} /Fab
+ 10001 0.0 1E+00 /WK
+ 610000 0.0 1E+00 /Dab
+"""
+
+
+@pytest.mark.parametrize(
+    ("w", "left"),
+    [("160000.", {"Ga", "Gb", "Fab", "Dab"}), ("0.0", {"W", "Ga", "Gb", "Fab", "WK", "Dab"})],
+    ids=["states joined by W", "states apart"],
+)
+def test_parameters_at_zero_that_move_no_level_to_first_order_stay_out(w: str, left: set[str]):
+    """Their derivatives, with each of them in the Hamiltonian at 1e-7 MHz: those that stay out have none, the others have one."""
+    file = read_par(TWO.format(w=w, held="1E-37").encode())
+    assert {file.parameters[i].label for i in left_at_zero(file)} == left
+    labels = np.array([[j, ka, j - ka, v] for j in (8, 20) for ka in (0, 2, 5) for v in (0, 1)])
+    small = replace(file, parameters=tuple(replace(p, value=p.value or 1e-7, error=1.0) for p in file.parameters))
+    model = FileLevels.of(small, labels)
+    _, slopes = model.levels(np.array([p.value for p in small.parameters]))
+    for i, parameter in enumerate(file.parameters):
+        if parameter.value == 0:
+            largest = np.abs(slopes[:, i]).max()
+            assert (largest < 1e-3) == (parameter.label in left), parameter.label  # second order: 1e-7 N^2 over 1 MHz
+    assert not left_at_zero(small)
+    free = read_par(TWO.format(w=w, held="1E+00").encode())
+    assert set(stay_at_zero(free)) == left - {"W"}  # W is held
