@@ -109,11 +109,11 @@ from rotor.formats.molecules.molecule_tables import (
     refuse_unknown_keys,
     served_of,
     spin_weights_of,
-    states_of,
     unverified_in,
     with_polarizability,
 )
 from rotor.formats.molecules.spin_table import spins_of_table
+from rotor.formats.molecules.state_table import states_of
 from rotor.formats.toml import parse_toml
 from rotor.molecules.molecule import Molecule
 from rotor.tops.constants import Constants

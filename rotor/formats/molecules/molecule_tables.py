@@ -351,34 +351,6 @@ def spin_weights_of(table: TableReader | None, constants: Constants | None) -> S
     return weights
 
 
-def states_of(table: TableReader | None, constants: Constants | None) -> StateConstants | None:
-    """Further states of a top: constants with the state in brackets, their names, weights and dipoles."""
-    if table is None:
-        return None
-    if constants is None:
-        raise ValueError(f"{table.place}: states beyond the one of [constants], which is missing")
-    known = ("source", "unverified", "unit", "names", "symmetry", "weights", "dipoles")
-    unit, values, errors = table.text("unit", "MHz"), dict[str, float](), dict[str, float]()
-    for key in table.content:
-        if key not in known:
-            values[key], error = uncertain_number(table, key, unit)
-            if error is not None:
-                errors[key] = error
-    weights = {_state(table, v): _weights_of_state(table, one, constants) for v, one in _part(table, "weights").items()}
-    dipoles = {}
-    for pair, moment in _part(table, "dipoles").items():
-        a, b = sorted(_state(table, part) for part in (pair.split(",") * 2)[:2])
-        if not (isinstance(moment, list) and len(moment) == 3 and all(is_number(x) for x in moment)):
-            raise table.error("dipoles", f"state {pair}: expected three numbers, along a, b, c in D")
-        dipoles[b, a] = (float(moment[0]), float(moment[1]), float(moment[2]))
-    try:
-        return StateConstants(
-            values, table.texts("names"), weights, dipoles, table.text("source"), table.text("symmetry"), errors
-        )
-    except ValueError as reason:
-        raise ValueError(f"{table.place}: {reason}") from None
-
-
 def uncertain_number(table: TableReader, key: str, unit: str) -> tuple[float, float | None]:
     """Value and standard deviation in MHz of an entry that is a number, text with a unit, or a table of value and uncertainty."""
     item = table.content[key]
@@ -388,28 +360,6 @@ def uncertain_number(table: TableReader, key: str, unit: str) -> tuple[float, fl
     if "uncertainty" not in one.content:
         return value, None
     return value, one.quantity("uncertainty", one.content["uncertainty"], unit, "MHz")
-
-
-def _part(table: TableReader, key: str) -> Table:
-    value = table.content.get(key, {})
-    if not isinstance(value, dict):
-        raise table.error(key, "expected a table, with the numbers of states as keys")
-    return value
-
-
-def _state(table: TableReader, text: str) -> int:
-    if not text.strip().isdigit():
-        raise ValueError(f"{table.place}: state {text!r}: expected a number, 0 for the top's own state")
-    return int(text)
-
-
-def _weights_of_state(table: TableReader, classes: Any, constants: Constants) -> SpinWeights:
-    weights = spin_weights_of(TableReader(f"{table.place}", "weights", classes), constants)
-    if weights.to_mapping() != classes:
-        raise ValueError(
-            f"{table.place}, weights = {classes}: expected numbers without a common divisor, as those of state 0 have"
-        )
-    return weights
 
 
 def catalogue_of(table: TableReader | None) -> MeasuredLines | None:

@@ -18,7 +18,7 @@ from rotor.quantum.coupled import NOTHING, Part, connected_parts, names_of_funct
 from rotor.quantum.effect import QuantumEffect, k_limits_of
 from rotor.quantum.estimates.unit_blocks import UnitBlocks, tracked_blocks
 from rotor.quantum.estimates.unit_matrices import UnitBlock, members_of, numbered
-from rotor.quantum.labelled import unit_diagonals
+from rotor.quantum.label_blocks import unit_diagonals
 from rotor.quantum.states import OperatorOfJ, State
 from rotor.quantum.wang.basis import WangBlock, limited, wang_blocks
 from rotor.quantum.wang.j_operators import JOperator, between_blocks

@@ -1,0 +1,73 @@
+"""Tables of `rotor spectrum` on the screen: the strongest lines, and the strongest patterns at a resolution."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from rotor.cli.shared.output import Table
+
+if TYPE_CHECKING:
+    from rotor.spectra.lines import Lines
+
+
+def pattern_records(lines: Lines, resolution_mhz: float, shown: int) -> list[dict[str, Any]]:
+    """The strongest lines at a resolution, by frequency."""
+    from rotor.quantum.quanta import labels, of_rotation
+    from rotor.spectra.intensity import largest
+    from rotor.spectra.patterns import patterns
+
+    found, levels = patterns(lines, resolution_mhz), lines.levels
+    quanta = of_rotation(levels.quanta)
+    rows = sorted(largest(found.intensity_nm2_mhz, shown).tolist()) if shown else []
+    sides = {s: labels(quanta, getattr(lines, s)[found.strongest], levels.halves) for s in ("upper", "lower")}
+    names = ("frequency_mhz", "intensity_nm2_mhz", "components", "width_mhz")
+    records = []
+    for row in rows:
+        record: dict[str, Any] = {name: getattr(found, name)[row].item() for name in names}
+        records.append(record | {side: text[row].strip() for side, text in sides.items()})
+    return records
+
+
+def patterns_table(records: list[dict[str, Any]]) -> Table:
+    forms = {"frequency_mhz": "{:.4f}", "intensity_nm2_mhz": "{:.3e}", "components": "{}", "width_mhz": "{:.4f}"}
+    rows = [(*(form.format(one[name]) for name, form in forms.items()), one["upper"], one["lower"]) for one in records]
+    columns = ("frequency (MHz)", "nm² MHz", "components", "width (MHz)", "upper", "lower")
+    return Table("the strongest lines at this resolution, in order of frequency", columns, rows)
+
+
+class _Column(NamedTuple):
+    """A column of the table: its name in `Lines.columns`, its heading, and how a number is printed."""
+
+    name: str
+    heading: str
+    form: str
+
+
+_COLUMNS = (
+    _Column("frequency_mhz", "frequency (MHz)", "{:.4f}"),
+    _Column("error_mhz", "error (MHz)", "{:.4f}"),
+    _Column("lgint", "lgint", "{:.4f}"),
+    _Column("energy_lower_cm", 'E" (cm-1)', "{:.4f}"),
+    _Column("g_upper", "g'", "{}"),
+    _Column("einstein_a_per_s", "A (1/s)", "{:.2e}"),
+    _Column("strength_debye2", "Sμ² (D²)", "{:.5g}"),
+)
+
+
+def lines_table(lines: Lines, rows: Any, depth: Any = None) -> Table:
+    """The strongest lines in order of frequency, with their optical depths where there is a layer of gas."""
+    from rotor.quantum import quanta
+
+    shown = lines.where(rows)
+    names = quanta.headings(lines.quanta_names)
+    values = shown.columns
+    present = [column for column in _COLUMNS if column.name in values]
+    cells = [[column.form.format(x) for x in values[column.name]] for column in present]
+    headings = [column.heading for column in present]
+    if depth is not None:
+        headings.append("τ")
+        cells.append([f"{x:.3e}" for x in depth[rows]])
+    labels = [shown.levels.labels(states) for states in (shown.upper, shown.lower)]
+    columns = (*headings, "upper", "lower")
+    title = f"the {len(shown)} strongest lines" if len(shown) < len(lines) else "all lines"
+    return Table(f"{title}, in order of frequency (states: {names})", columns, list(zip(*cells, *labels, strict=True)))

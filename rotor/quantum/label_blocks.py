@@ -1,0 +1,162 @@
+"""The Wang blocks in which chosen labels lie, side by side in arrays: unit matrices, places of labels, pieces of like size."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from rotor.arrays import Floats, Ints
+from rotor.quantum.wang.basis import WangBlock, ka_kc, wang_blocks
+
+_MOST_PADDED = 1 << 22  # matrix elements of blocks that are worked on together: 32 MB
+_MOST_STATES = 0.6  # of all states of a block: where labels are fewer, they alone are looked at
+
+
+class Chunk(NamedTuple):
+    """Blocks of like size, in order of size, side by side: unit diagonals units[d] (blocks, size, terms), and what fills their places.
+
+    sizes (blocks,); runs: of blocks of one size the first, the one behind the last, and the size
+    bands: for every d which of the elements (blocks, size) are in a block, and their places in all matrices, one behind the other
+    offsets (blocks + 1,): where each matrix begins
+    x: (blocks, terms of the Hamiltonian) X^p
+    rows, block, slot (labels,): labels that lie in these blocks, their blocks and places among the labels of each
+    states (blocks, most labels): which states they are; None where the states that have labels are most of all
+    powers: (labels, terms of the Hamiltonian) X^p
+    """
+
+    units: tuple[Floats, ...]
+    sizes: list[int]
+    runs: tuple[tuple[int, int, int], ...]
+    bands: tuple[tuple[Ints, Ints], ...]
+    offsets: Ints
+    x: Floats
+    rows: Ints
+    block: Ints
+    rank: Ints
+    slot: Ints
+    states: Ints | None
+    powers: Floats
+
+
+class Occurring(NamedTuple):
+    """A block in which labels lie, cut at the highest K, with the places of the labels and their ranks."""
+
+    basis: WangBlock
+    size: int
+    rows: list[int]
+    ranks: list[int]
+
+
+def occurring_blocks(labels: Ints, representation: str, kmax: int | None) -> list[Occurring]:
+    """The blocks in order of size; ValueError for a label that the cut at `kmax` leaves without a state."""
+    found: dict[tuple[int, str], Occurring] = {}
+    by_j: dict[int, dict[str, WangBlock]] = {}
+    for row, (j, ka, kc) in enumerate(labels.tolist()):
+        species = "eo"[ka % 2] + "eo"[kc % 2]
+        if j not in by_j:
+            by_j[j] = {block.species: block for block in wang_blocks(j, representation)}
+        basis = by_j[j][species]
+        rank = (ka - int(ka_kc(j, species, 1)[0][0])) // 2
+        if (j, species) not in found:
+            found[j, species] = Occurring(basis, _cut(basis, kmax), [], [])
+        one = found[j, species]
+        if rank >= one.size:
+            raise ValueError(f"level {j} {ka} {kc} is not among the states with K up to {kmax}; raise KNMAX")
+        one.rows.append(row)
+        one.ranks.append(rank)
+    return sorted(found.values(), key=lambda one: one.size)
+
+
+def _cut(basis: WangBlock, kmax: int | None) -> int:
+    return basis.size if kmax is None else min(basis.size, max(0, (kmax - basis.first_k) // 2 + 1))
+
+
+def chunks_of(blocks: Sequence[Occurring], units: Sequence[tuple[int, int]], powers: Sequence[int]) -> list[Chunk]:
+    """Blocks in order of size, cut into pieces of bounded memory and of sizes within a factor of two."""
+    out, start = [], 0
+    while start < len(blocks):
+        stop = start
+        while (
+            stop < len(blocks)
+            and (stop - start + 1) * blocks[stop].size ** 2 <= _MOST_PADDED
+            and blocks[stop].size <= max(2 * blocks[start].size, 8)
+        ):
+            stop += 1
+        stop = max(stop, start + 1)
+        out.append(_chunk(blocks[start:stop], units, powers))
+        start = stop
+    return out
+
+
+def _chunk(blocks: Sequence[Occurring], units: Sequence[tuple[int, int]], powers: Sequence[int]) -> Chunk:
+    diagonals = unit_diagonals([one.basis for one in blocks], [one.size for one in blocks], units)
+    sizes, size = np.array([one.size for one in blocks]), blocks[-1].size
+    block = np.array([b for b, one in enumerate(blocks) for _ in one.rows])
+    x = np.stack([np.array([one.basis.j * (one.basis.j + 1.0) for one in blocks]) ** p for p in powers], axis=1)
+    states = np.zeros((len(blocks), max(len(one.rows) for one in blocks)), dtype=np.int64)
+    for b, one in enumerate(blocks):
+        states[b, : len(one.rows)] = one.ranks
+    bounds = [0, *(1 + np.flatnonzero(np.diff(sizes))).tolist(), len(blocks)]
+    offsets = np.cumsum([0, *(sizes**2).tolist()])
+    return Chunk(
+        units=diagonals,
+        sizes=sizes.tolist(),
+        runs=tuple((first, stop, int(sizes[first])) for first, stop in pairwise(bounds)),
+        bands=tuple(_of_band(d, sizes, offsets) for d in range(min(len(diagonals), size))),
+        offsets=offsets,
+        x=x,
+        rows=np.array([row for one in blocks for row in one.rows]),
+        block=block,
+        rank=np.array([rank for one in blocks for rank in one.ranks]),
+        slot=np.array([slot for one in blocks for slot in range(len(one.rows))]),
+        states=states if states.shape[1] < _MOST_STATES * size else None,
+        powers=x[block],
+    )
+
+
+def _of_band(d: int, sizes: Ints, offsets: Ints) -> tuple[Ints, Ints]:
+    """Which elements (blocks, size) of diagonal d are in a block, and their places in the lower triangles of all matrices."""
+    index, size = np.arange(sizes[-1]), int(sizes[-1])
+    block, place = np.nonzero(index + d < sizes[:, None])
+    return block * size + place, offsets[block] + (place + d) * sizes[block] + place
+
+
+def unit_diagonals(
+    blocks: Sequence[WangBlock], taken: Sequence[int], units: Sequence[tuple[int, int]]
+) -> tuple[Floats, ...]:
+    """Diagonal d of ½[Jz^2q, J₊^2n + J₋^2n]₊ at (block, state, (q, n)), state i with i + d; zero beyond a block.
+
+    As in `rotor.quantum.effects.watson`: ⟨K+2n|..|K⟩ on diagonal n, √2 more where K = 0, and ⟨2n-K|..|-K⟩ with the sign of the
+    block on diagonal n - K. taken: how many of the states of each block.
+    """
+    order = max((n for _, n in units), default=0)
+    j = np.array([one.j for one in blocks], dtype=float)[:, None]
+    first = np.array([one.first_k for one in blocks])[:, None]
+    sign = np.array([one.sign for one in blocks], dtype=float)[:, None]
+    size, sizes = max(taken), np.array(taken)[:, None]
+    index = np.arange(size)[None, :]
+    k = (first + 2 * index).astype(float)
+
+    out = tuple(np.zeros((len(blocks), size, len(units))) for _ in range(order + 1))
+    for place, (q, n) in enumerate(units):
+        inside = index + n < sizes
+        element = _element(j, k, q, n) * np.where((k == 0) & (n > 0), np.sqrt(2.0), 1.0)
+        out[n][:, :, place] += np.where(inside, element, 0.0)
+        for low in range(1, n + 1):
+            here = (k == low) & (index + n - low < sizes) & (index < sizes)
+            folded = sign * _element(j, np.full_like(k, -low), q, n)
+            out[n - low][:, :, place] += np.where(here, folded, 0.0)
+    return out
+
+
+def _element(j: Floats, k: Floats, q: int, n: int) -> Floats:
+    """⟨K+2n|½[Jz^2q, J₊^2n + J₋^2n]₊|K⟩, K^2q for n = 0."""
+    if n == 0:
+        return np.asarray(k ** (2 * q) + 0.0 * j)
+    squared = np.ones_like(j * k)
+    for i in range(2 * n):
+        squared = squared * np.maximum((j - k - i) * (j + k + i + 1), 0.0)
+    return np.asarray(0.5 * ((k + 2 * n) ** (2 * q) + k ** (2 * q)) * np.sqrt(squared))
