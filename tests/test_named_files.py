@@ -150,7 +150,7 @@ def test_a_radical_with_powers_and_states_goes_to_codes():
 @pytest.mark.parametrize(
     ("options", "parameters", "says"),
     [
-        ("a 44 1 0 20 0 -2 1 1 0 1 0", ("10000 9e3", "20000 3e3", "30000 2e3"), "IAX = -2: a total spin of equivalent nuclei"),
+        ("s -222 1 0 20 0 -6 1 0 0 0 0", ("1000 9e3", "100 3e3"), "IAX = -6: a total spin of three nuclei with unlike weights"),
         ("a 2 2 0 20 0 1 1 1 0 1 0", ("10099 9e3", "20099 3e3", "30099 2e3", "10200001 5.0"), "spin-orbit"),
         ("a 1 2 0 20 0 1 1 1 0 1 0", ("10099 9e3", "20099 3e3", "30099 2e3", "70001 5.0"), "this coupling of two states"),
         ("a 3 1 0 20 0 1 1 1 0 1 0", ("10000 9e3", "20000 3e3", "30000 2e3", "610000 5.0"), "a term of this kind in one state"),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import os
+import re
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -42,6 +43,7 @@ Examples:
   rotor fit case.par --out fitted
   rotor fit lines.csv --start constants.toml --free A,B,C,DeltaJ --out fitted
   rotor fit c060503.cat.gz --constants "B=6081 D=0.001 H=0 MHz" --free B,D,H
+  rotor fit lines.csv --start states.toml --free "A,B,C,E[1],A[1],B[1],C[1],G_c[0,1],chi_aa(14N)" --out fitted
   rotor fit lines.lin --start water --free A,B,C --try DeltaJ,DeltaJK,DeltaK
   rotor fit lines.csv --start constants.toml --free A,B,C --prior DeltaK=0.02 --tie "deltaK=0.5*deltaJ" --plot rest.png"""
 
@@ -58,8 +60,20 @@ class Options:
         None, metavar="SOURCE", help="Constants to start from: a file (.toml, .var, ...) or a name."
     )
     constants: str | None = option(None, metavar="TEXT", help='Constants to start from: "A=9.2 B=3 C=2.5 GHz" (MHz).')
+    spin_constants: str | None = option(
+        None, metavar="TEXT", help="Constants of spins to start from, as in 'rotor spectrum'."
+    )
+    spins: str | None = option(
+        None, metavar="LIST", help='Sizes and order of the spins of --spin-constants: "S=1/2 14N".'
+    )
+    state_constants: str | None = option(
+        None, metavar="TEXT", help="Further states to start from, as in 'rotor spectrum'."
+    )
     free: str | None = option(
-        None, metavar="LIST", help="Constants to fit: A,B,C,DeltaJ; those of --start that have an error if left out."
+        None,
+        metavar="LIST",
+        help='Constants to fit: A,B,C,DeltaJ; of states and spins "E[1],B[1],G_c[0,1],chi_aa(14N)"; those of --start that '
+        "have an error if left out.",
     )
     tie: list[str] | None = option(
         None, metavar="TEXT", help='A constant that follows a free one: "DeltaK=2.5*DeltaJ", "C=B-300"; repeatable.'
@@ -132,7 +146,8 @@ def command(context: typer.Context, given: Options) -> None:
     writers = _writers(answer, content, scaled=given.table_errors == "scatter") | _saved(answer, given)
     deliver(files, writers, lambda: json_text(content), lambda: _show(request, fit, steps, extras))
     if not fit.converged:
-        raise ComputationError(f"not converged: {fit.reason}")
+        more = "; --iterations allows more" if fit.minimum.status == "too many iterations" else ""
+        raise ComputationError(f"not converged: {fit.reason}{more}")
     if extras.interrupted:
         raise ComputationError(f"interrupted: {extras.interrupted}; the fit itself is complete")
 
@@ -183,7 +198,7 @@ def _saved(answer: FitAnswer, given: Options) -> dict[str, Writer]:
     files = FitFiles(
         str(beside(read.source, folder)), *(beside(one, folder) for one in (read.lin, read.merge, read.start))
     )
-    molecule = None if answer.request.spfit is not None else Input(given.start, given.constants)
+    molecule = None if answer.request.spfit is not None else _start_of(given)
     outputs: dict[str, Any] = (
         {} if stem is None else {"report": f"{stem}.fit", "par": f"{stem}.par", "var": f"{stem}.var"}
     )
@@ -209,8 +224,8 @@ def _refuse_overwriting(files: Files, read: Sequence[str | None]) -> None:
 
 
 def _names(option: str, text: str) -> list[str]:
-    """The names of a list, each once."""
-    names = [name.strip() for name in text.split(",")]
+    """The names of a list, each once; commas in brackets are part of a name."""
+    names = [name.strip() for name in re.split(r",(?![^()\[\]]*[)\]])", text)]
     if not all(names):
         raise ValueError(f"{option}: {text!r}: names parted by commas are needed, such as A,B,C,DeltaJ")
     twice = next((name for name in names if names.count(name) > 1), None)
@@ -237,7 +252,8 @@ def _of_spfit(given: Options) -> FitRequest:
     from rotor.formats.fit_request import fit_of_spfit
 
     others = {
-        "--start": given.start, "--constants": given.constants, "--free": given.free, "--tie": given.tie,
+        "--start": given.start, "--constants": given.constants, "--spin-constants": given.spin_constants,
+        "--spins": given.spins, "--state-constants": given.state_constants, "--free": given.free, "--tie": given.tie,
         "--prior": given.prior,
     }  # fmt: skip
     unused = [name for name, value in others.items() if value]
@@ -258,11 +274,22 @@ def _of_lines(given: Options) -> FitRequest:
         raise ValueError(
             f"--start {given.start}: a list of lines has no constants; give a .toml, .var or the name of a molecule"
         )
-    top = inputs.read_top(Input(given.start, given.constants))
+    top = inputs.read_top(_start_of(given))
     names = None if given.free is None else _names("--free", given.free)
     priors = _priors(given.prior or [])
     with inputs.fields_as_options(free="--free", tie="--tie", priors_mhz="--prior"):
         return fit_of_lines(given.source, top, names, ties=given.tie or [], priors_mhz=priors, start=given.start)
+
+
+def _start_of(given: Options) -> Input:
+    """Where the fit of a line list starts."""
+    return Input(
+        given.start,
+        given.constants,
+        spin_constants=given.spin_constants,
+        spins=given.spins,
+        state_constants=given.state_constants,
+    )
 
 
 def _priors(texts: Sequence[str]) -> dict[str, float]:

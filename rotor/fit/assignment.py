@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rotor.arrays import Floats, Ints
+from rotor.quantum.quanta import value_text
 from rotor.table import Table
 
 
@@ -25,6 +26,7 @@ class Assignments(Table):
     source : where the lines are from. comments : by line, what was written beside it
     widths_mhz : by the number of a blend, how far its components may lie apart (rms): a standard error about 0
     places (n,) : of each line in its source from 0 on, where some were left out
+    halves : names of the quantum numbers that are half-integers, of which the labels have twice the value
     """
 
     names: tuple[str, ...]
@@ -39,6 +41,7 @@ class Assignments(Table):
     comments: tuple[str, ...] = ()
     widths_mhz: dict[int, float] = field(default_factory=dict)
     places: Ints | None = None
+    halves: frozenset[str] = frozenset()
 
     def __post_init__(self) -> None:
         n, k = len(self.frequency_mhz), len(self.names)
@@ -87,8 +90,12 @@ class Assignments(Table):
         return int(line if self.places is None else self.places[line]) + 1
 
     def text(self, line: int) -> str:
-        """The labels of one line as `3 1 2 - 2 1 1`."""
-        return " - ".join(" ".join(map(str, side[line].tolist())) for side in (self.upper, self.lower))
+        """The labels of one line as `3 1 2 - 2 1 1`, half-integers as 5/2."""
+        return " - ".join(self.label_text(side[line].tolist()) for side in (self.upper, self.lower))
+
+    def label_text(self, label: Sequence[int]) -> str:
+        """One label as text."""
+        return " ".join(value_text(q, name in self.halves) for name, q in zip(self.names, label, strict=True))
 
 
 def _refuse_numbers(lines: Assignments) -> None:
@@ -116,6 +123,7 @@ def assignments(
     source: str = "",
     comments: Sequence[str] = (),
     widths_mhz: Mapping[int, float] | None = None,
+    halves: Collection[str] = (),
 ) -> Assignments:
     """Assigned lines from labels (n, k) and numbers (n,), or one number for all.
 
@@ -134,6 +142,8 @@ def assignments(
     source, comments : where from; what was written beside each line
     widths_mhz : mapping, optional
         By the number of a blend how far its components may lie apart (rms).
+    halves : collection of str, optional
+        Quantum numbers that are half-integers: the labels have twice their value.
 
     Returns
     -------
@@ -167,8 +177,27 @@ def assignments(
         np.broadcast_to(np.asarray(weight, dtype=float), (n,)).copy(),
         groups.reshape(-1).astype(np.int64),
         np.broadcast_to(np.asarray(wavenumber, dtype=bool), (n,)).copy(),
-        source, tuple(comments), widths,
+        source, tuple(comments), widths, halves=frozenset(halves),
     )  # fmt: skip
+
+
+def levels_in(lines: Assignments) -> tuple[Ints, Ints, Ints]:
+    """The levels that occur, and for each line the places of its upper and lower one among them, -1 for the zero of energy."""
+    there = np.concatenate([np.ones(len(lines), dtype=bool), ~lines.from_zero])
+    labels, found = _distinct_rows(np.concatenate([lines.upper, lines.lower])[there])
+    places = np.full(2 * len(lines), -1, dtype=np.int64)
+    places[there] = found.reshape(-1)
+    return labels, places[: len(lines)], places[len(lines) :]
+
+
+def _distinct_rows(rows: Ints) -> tuple[Ints, Ints]:
+    """The rows of an array, each once, in order, and the place of each among them; rows of small numbers by one number each."""
+    spans = rows.max(axis=0, initial=0) - rows.min(axis=0, initial=0) + 1
+    if not len(rows) or np.prod(spans.astype(float)) > 2.0**62:
+        return np.unique(rows, axis=0, return_inverse=True)
+    keys = np.ravel_multi_index(tuple((rows - rows.min(axis=0, initial=0)).T), tuple(spans.tolist()))
+    _, first, found = np.unique(keys, return_index=True, return_inverse=True)
+    return rows[first], found
 
 
 def merged(first: Assignments, second: Assignments, *, same_within_mhz: float = 0.0) -> tuple[Assignments, list[str]]:

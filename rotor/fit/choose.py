@@ -14,19 +14,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from rotor.arrays import Floats, Ints
 from rotor.fit.assignment import Assignments
 from rotor.fit.criteria import aicc, cross_validated_rms, f_test
-from rotor.fit.fit import Fit, FitOptions, fit_lines, weighted_derivatives
+from rotor.fit.first_values import beside_zero, weighted_derivatives
+from rotor.fit.fit import Fit, FitOptions, fit_lines
+from rotor.fit.orders import order_of
 from rotor.fit.parameters import Parameters, parameters, with_names
-from rotor.quantum.labelled import LevelModel, level_model
+from rotor.fit.top_constants import ConstantSet
+from rotor.fit.top_levels import model_of
+from rotor.quantum.labelled import LevelModel
 from rotor.statistics.least_squares import INTERRUPTED
-from rotor.tops.constants import Constants
-from rotor.tops.operators import distortion_terms, powers_of_spelled
 
 CHANCE = 0.01  # of an F so large by accident, above which a constant is not taken
 _MOST_STEPS = 40
@@ -84,7 +85,7 @@ def try_constants(fit: Fit, candidates: Sequence[str], options: FitOptions | Non
     Returns
     -------
     list of Trial
-        By F, the largest of those added first; A, B and C are never left out.
+        By F, the largest of those added first; A, B, C and the E of a state are never left out.
 
     Raises
     ------
@@ -92,29 +93,22 @@ def try_constants(fit: Fit, candidates: Sequence[str], options: FitOptions | Non
         For a name that the kind of top or the reduction does not have.
     """
     options = replace(options or FitOptions(), pass_interrupt=True)
-    constants = with_names(_set_of(fit), [name for name in candidates if name not in fit.parameters.names])
+    constants = with_names(fit.named, [name for name in candidates if name not in fit.parameters.names])
     out = []
     for name in candidates:
         own = constants.own_name(name)
         if own in fit.parameters.names:
-            if own not in ("A", "B", "C"):
+            if own.partition("[")[0] not in ("A", "B", "C", "E"):
                 out.append(_without(fit, own, options))
         else:
             out.append(_with(fit, constants, own, options))
     return sorted([trial for trial in out if trial], key=lambda one: (not one.added, -one.f_ratio))
 
 
-def _set_of(fit: Fit) -> Constants:
-    return fit.named
-
-
-def _with(fit: Fit, constants: Constants, name: str, options: FitOptions | None) -> Trial | None:
+def _with(fit: Fit, constants: ConstantSet, name: str, options: FitOptions | None) -> Trial | None:
     free = [*fit.parameters.names, name]
-    values: dict[str, Any] = {k: v for k, v in constants.values.items() if k in fit.named.values or k == name}
-    own = Constants(
-        kind=constants.kind, reduction=constants.reduction, representation=constants.representation,
-**values,
-    )  # fmt: skip
+    others = [other for other in constants.values if other not in fit.named.values and other != name]
+    own, _ = beside_zero(constants.replace(**dict.fromkeys(others)), [name], fit.lines, options)
     try:
         found = fit_lines(fit.lines, own, _same_priors(fit, parameters(own, free)), options)
     except ValueError:  # more constants than lines
@@ -158,7 +152,7 @@ def _trial(name: str, added: bool, before: Fit, found: Fit, ratio: float, chance
 
 def choose_constants(
     lines: Assignments,
-    constants: Constants,
+    constants: ConstantSet,
     base: Sequence[str],
     candidates: Sequence[str],
     options: FitOptions | None = None,
@@ -175,7 +169,7 @@ def choose_constants(
     Parameters
     ----------
     lines : Assignments
-    constants : Constants
+    constants : Constants or TopConstants
         Where the fit starts; candidates start from 0 unless they are in it.
     base : sequence of str
         Constants that are always free.
@@ -248,6 +242,11 @@ def _best_added(fit: Fit, left: Sequence[str], options: FitOptions) -> Trial | N
     if not left:
         return None
     alone, pairs = promised(fit, left, options)
+    for name in beside_zero(with_names(fit.named, left), left, fit.lines, options)[
+        1
+    ]:  # of no promise in a linear model
+        i = left.index(name)
+        alone[i], pairs[i], pairs[:, i] = np.inf, 0.0, 0.0
     few = [left[i] for i in np.argsort(-alone, kind="stable")[:_TRIED].tolist()]
     best = next((one for one in try_constants(fit, few, options) if one.added and one.better), None)
     if best is not None or len(left) < 2:
@@ -289,24 +288,6 @@ def _weakest(fit: Fit, names: Sequence[str]) -> list[str]:
     return sorted(names, key=lambda name: ratio[name])[:_TRIED]
 
 
-def order_of(name: str, constants: Constants) -> int:
-    """The highest power of J in a constant's operator: 2 for A, 4 for DeltaJ, 6 for PhiK.
-
-    >>> order_of("PhiK", Constants(A=9.0, B=3.0, C=2.0, reduction="A"))
-    6
-    """
-    if name in ("A", "B", "C"):
-        return 2
-    spelled = powers_of_spelled(name)
-    known = distortion_terms(constants.kind, constants.reduction)
-    if not spelled and name not in known:
-        raise ValueError(
-            f"{name!r} is no constant of the kind {constants.kind}; expected one such as {', '.join(list(known)[:3])}"
-        )
-    terms = {spelled: 1.0} if spelled else known[name]
-    return max(2 * (p + q + n) for p, q, n in terms)
-
-
 def _patient(options: FitOptions | None) -> FitOptions:
     """A model on its way may be far from the lines: only the last one is judged by its rms. An interrupt ends the whole choice."""
     return replace(options or FitOptions(), poor_rms=1e12, pass_interrupt=True)
@@ -314,7 +295,7 @@ def _patient(options: FitOptions | None) -> FitOptions:
 
 def _pair(fit: Fit, one: str, other: str, options: FitOptions) -> Trial | None:
     """Two constants together, judged as one step; None where the lines are too few."""
-    constants = with_names(fit.named, [one, other])
+    constants, _ = beside_zero(with_names(fit.named, [one, other]), [one, other], fit.lines, options)
     try:
         free = _same_priors(fit, parameters(constants, [*fit.parameters.names, one, other]))
         both = fit_lines(fit.lines, constants, free, options)
@@ -376,7 +357,7 @@ def suggest_lines(
         raise ValueError("some parameters are not determined by the lines; hold them before asking for the next line")
     labels, places = np.unique(np.concatenate([upper, lower]), axis=0, return_inverse=True)
     places = places.reshape(-1)
-    made = model(labels) if model else level_model(fit.named, labels)
+    made = model(labels) if model else model_of(fit.named, labels)
     energies, slopes = made.levels(fit.parameters.constants_of(fit.values))
     slopes = slopes @ fit.parameters.matrix
     up, low = places[: len(upper)], places[len(upper) :]

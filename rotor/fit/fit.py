@@ -17,16 +17,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
-from rotor.fit.assignment import Assignments, duplicates
-from rotor.fit.parameters import Parameters, with_names
-from rotor.fit.parameters import parameters as parameters_of
+from rotor.fit.assignment import Assignments, duplicates, levels_in
+from rotor.fit.parameters import Parameters
 from rotor.fit.search import FitOptions as FitOptions
-from rotor.fit.search import Search, round_off, too_few
+from rotor.fit.search import Search, errors_of, round_off, too_few
 from rotor.fit.strategies import with_rejection
-from rotor.quantum.labelled import LevelModel, MissingLevelsError, level_model
+from rotor.fit.top_constants import ConstantSet
+from rotor.fit.top_levels import model_of
+from rotor.quantum.labelled import LevelModel, MissingLevelsError
 from rotor.statistics.least_squares import BENT, EXHAUSTED, Minimum, Progress
 from rotor.statistics.regression import Regression, regression
-from rotor.tops.constants import Constants
 from rotor.tops.covariance import Covariance
 
 NEARLY_THERE = 0.01  # standard errors: a next step below it is no news where no more iterations are allowed
@@ -47,7 +47,7 @@ class Fit:
     """
 
     lines: Assignments
-    constants: Constants | None
+    constants: ConstantSet | None
     parameters: Parameters
     values: Floats
     calculated_mhz: Floats
@@ -65,7 +65,7 @@ class Fit:
     notes: tuple[str, ...]
 
     @property
-    def named(self) -> Constants:
+    def named(self) -> ConstantSet:
         """The fitted constants. ValueError where the parameters are not named constants."""
         if self.constants is None:
             raise ValueError(
@@ -134,7 +134,7 @@ def covariance_of(parameters: Parameters, statistics: Regression) -> Covariance:
 
 def fit_lines(
     lines: Assignments,
-    constants: Constants | None,
+    constants: ConstantSet | None,
     parameters: Parameters,
     options: FitOptions | None = None,
     *,
@@ -146,13 +146,13 @@ def fit_lines(
     Parameters
     ----------
     lines : Assignments
-    constants : Constants
+    constants : Constants or TopConstants
         Where the fit starts: kind, reduction, representation and every constant that is held; None with a model of its own.
     parameters : Parameters
         What is free, for the same constants.
     options : FitOptions, optional
     model : callable, optional
-        Labels (levels, k) to a `LevelModel`; that of the constants (one state, no spins) where it is left out.
+        Labels (levels, k) to a `LevelModel`; that of the constants where it is left out.
     progress : callable, optional
         Called with every `Iteration`. A KeyboardInterrupt ends the search with the best constants so far.
 
@@ -173,6 +173,7 @@ def fit_lines(
 
     >>> from rotor.fit.assignment import assignments
     >>> from rotor.fit.parameters import parameters as free
+    >>> from rotor.tops.constants import Constants
     >>> start = Constants(B=57000.0, D=0.1)
     >>> seen = assignments(("j",), [[1], [2], [3]], [[0], [1], [2]], [115271.2018, 230538.0, 345795.9899], 0.0005)
     >>> found = fit_lines(seen, start, free(start, ["B", "D"]))
@@ -183,8 +184,8 @@ def fit_lines(
     if not len(lines):
         raise ValueError("there are no lines to fit to")
     lines, made, missing = _with_levels(lines, model or _of_constants(constants, options), options)
-    left_out, sigma = _errors_of(lines, options)
-    labels, upper, lower = _labels(lines)
+    left_out, sigma = errors_of(lines, options)
+    labels, upper, lower = levels_in(lines)
     if made.names != parameters.constant_names:
         raise ValueError(f"parameters for {parameters.constant_names}, but the levels depend on {made.names}")
 
@@ -199,35 +200,11 @@ def fit_lines(
     return replace(fit, notes=(*missing, *fit.notes))
 
 
-def weighted_derivatives(fit: Fit, names: Sequence[str], options: FitOptions | None = None) -> Floats:
-    """Derivatives of the measured frequencies over their errors, (frequencies, names), by any constants at those of a fit.
-
-    names : named constants, free in the fit or not, also those that it does not have (at 0). Raises ValueError for other names.
-    """
-    options = options or FitOptions()
-    constants = with_names(fit.named, [name for name in names if name not in fit.named])
-    free = parameters_of(constants, names)
-    labels, upper, lower = _labels(fit.lines)
-    model = level_model(constants, labels, kmax=options.kmax)
-    _, sigma = _errors_of(fit.lines, options)
-    search = Search(fit.lines, model, free, options, upper, lower, sigma, fit.used)
-    return search.weighted(free.start)[1]
-
-
-def _labels(lines: Assignments) -> tuple[Ints, Ints, Ints]:
-    """The levels that occur, and for each line the places of its upper and lower one among them, -1 for the zero of energy."""
-    there = np.concatenate([np.ones(len(lines), dtype=bool), ~lines.from_zero])
-    labels, found = _distinct_rows(np.concatenate([lines.upper, lines.lower])[there])
-    places = np.full(2 * len(lines), -1, dtype=np.int64)
-    places[there] = found.reshape(-1)
-    return labels, places[: len(lines)], places[len(lines) :]
-
-
-def _of_constants(constants: Constants | None, options: FitOptions) -> Callable[[Ints], LevelModel]:
+def _of_constants(constants: ConstantSet | None, options: FitOptions) -> Callable[[Ints], LevelModel]:
     """What makes the model of the constants, from labels."""
     if constants is None:
         raise ValueError("either constants or a model of the levels is needed")
-    return partial(level_model, constants, kmax=options.kmax)
+    return partial(model_of, constants, kmax=options.kmax)
 
 
 def _with_levels(
@@ -237,7 +214,7 @@ def _with_levels(
 
     A label that no level has is an error, or, with `leave_out_missing`, its lines are left out.
     """
-    labels, upper, lower = _labels(lines)
+    labels, upper, lower = levels_in(lines)
     one = np.flatnonzero(upper == lower)
     if len(one):
         raise ValueError(
@@ -263,31 +240,8 @@ def _named(lines: Assignments, i: int) -> str:
     return f"{lines.source or 'the lines'}: line {lines.number(i)}, {lines.text(i)} at {lines.frequency_mhz[i]:.4f} MHz"
 
 
-def _distinct_rows(rows: Ints) -> tuple[Ints, Ints]:
-    """The rows of an array, each once, in order, and the place of each among them; rows of small numbers by one number each."""
-    spans = rows.max(axis=0, initial=0) - rows.min(axis=0, initial=0) + 1
-    if not len(rows) or np.prod(spans.astype(float)) > 2.0**62:
-        return np.unique(rows, axis=0, return_inverse=True)
-    keys = np.ravel_multi_index(tuple((rows - rows.min(axis=0, initial=0)).T), tuple(spans.tolist()))
-    _, first, found = np.unique(keys, return_index=True, return_inverse=True)
-    return rows[first], found
-
-
-def _errors_of(lines: Assignments, options: FitOptions) -> tuple[dict[int, str], Floats]:
-    """Lines without an error, by position, and errors with the default put in."""
-    zero = lines.error_mhz == 0
-    if zero.all() and options.default_error_mhz is None:
-        raise ValueError(
-            f"{lines.source or 'the lines'}: every line has an error of 0: give errors in the file, or one for all of them "
-            "(default_error_mhz, --default-error)"
-        )
-    if options.default_error_mhz is not None:
-        return {}, np.where(zero, options.default_error_mhz, lines.error_mhz)
-    return {int(i): "its error is 0" for i in np.flatnonzero(zero)}, np.where(zero, 1.0, lines.error_mhz)
-
-
 def _finished(
-    search: Search, minimum: Minimum, constants: Constants | None, left_out: dict[int, str], labels: Ints
+    search: Search, minimum: Minimum, constants: ConstantSet | None, left_out: dict[int, str], labels: Ints
 ) -> Fit:
     values, parameters = minimum.parameters, search.parameters
     calculated, jacobian, slopes = search.lines_of(values)
@@ -318,8 +272,8 @@ def _finished(
 
 
 def _constants(
-    constants: Constants | None, parameters: Parameters, values: Floats, statistics: Regression
-) -> tuple[Constants | None, str]:
+    constants: ConstantSet | None, parameters: Parameters, values: Floats, statistics: Regression
+) -> tuple[ConstantSet | None, str]:
     """The fitted set with standard errors, and what is wrong with it: then it is the start, with that text."""
     if constants is None:
         return None, ""
@@ -351,7 +305,7 @@ def _changed(search: Search, values: Floats, labels: Ints) -> tuple[str, ...]:
     """Levels that are mostly another state than with the constants of the start."""
     start = search.parameters.constants_of(search.parameters.start)
     overlap = search.model.overlaps(start, search.parameters.constants_of(values))
-    return tuple(" ".join(map(str, labels[i].tolist())) for i in np.flatnonzero(overlap < CHANGED_STATE))
+    return tuple(search.lines.label_text(labels[i].tolist()) for i in np.flatnonzero(overlap < CHANGED_STATE))
 
 
 def _verdict(fit: Fit, disorder: str, options: FitOptions) -> tuple[bool, str]:

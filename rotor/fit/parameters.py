@@ -14,11 +14,12 @@ from functools import cached_property
 import numpy as np
 
 from rotor.arrays import Floats, Ints
-from rotor.tops.constants import Constants
+from rotor.fit.top_constants import ConstantSet
 from rotor.units import parse_quantity
 
+_NAME = r"(\w+(?:-[abc]{2}(?:_\w+)?(?=\())?(?:\([^()]*\))?(?:\[[^\[\]]*\])?)"  # DeltaJ, A[1], G_c[0,1], chi_bb-cc(14N)
 _TIE = re.compile(
-    r"\s*(\w+)\s*=\s*(?:([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*\*\s*)?(\w+)\s*(?:([+-])\s*(.+))?\s*$"
+    rf"\s*{_NAME}\s*=\s*(?:([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*\*\s*)?{_NAME}\s*(?:([+-])\s*(.+))?\s*$"
 )
 
 
@@ -72,7 +73,7 @@ class Parameters:
 
 
 def parameters(
-    constants: Constants,
+    constants: ConstantSet,
     free: Sequence[str],
     *,
     ties: Sequence[str] = (),
@@ -82,7 +83,7 @@ def parameters(
 
     Parameters
     ----------
-    constants : Constants
+    constants : Constants or TopConstants
         The start; those not free stay as they are. A free constant that the set does not have must be added to it first.
     free : sequence of str
     ties : sequence of str
@@ -103,6 +104,7 @@ def parameters(
 
     Examples
     --------
+    >>> from rotor.tops.constants import Constants
     >>> set_ = Constants(A=9.0, B=3.0, C=2.0)
     >>> parameters(set_, ["A", "B"], ties=["C = B - 1"]).constants_of(np.array([9.5, 3.5])).tolist()
     [9.5, 3.5, 2.5]
@@ -132,11 +134,12 @@ def parameters(
     return Parameters(tuple(chosen), start, _priors(chosen, priors_mhz or {}, constants), names, base, matrix)
 
 
-def with_names(constants: Constants, names: Sequence[str]) -> Constants:
+def with_names(constants: ConstantSet, names: Sequence[str]) -> ConstantSet:
     """The set with those constants of `names` that it lacks added at 0, so that they can be fitted.
 
-    Raises ValueError for a name that the kind of top or the reduction does not have.
+    Raises ValueError for a name that the kind of top or the reduction does not have, and for a state or spin that there is not.
 
+    >>> from rotor.tops.constants import Constants
     >>> with_names(Constants(B=6081.5), ["D"]).values["D"]
     0.0
     """
@@ -144,7 +147,7 @@ def with_names(constants: Constants, names: Sequence[str]) -> Constants:
     return constants.replace(**dict.fromkeys(missing, 0.0)) if missing else constants
 
 
-def _known(name: str, constants: Constants, where: str) -> str:
+def _known(name: str, constants: ConstantSet, where: str) -> str:
     if name not in constants:
         raise ValueError(
             f"{where}: {name} is not in the set of constants to start from, which has {', '.join(constants.values)}"
@@ -152,7 +155,7 @@ def _known(name: str, constants: Constants, where: str) -> str:
     return constants.own_name(name)
 
 
-def _tie(text: str, constants: Constants) -> tuple[str, float, str, float]:
+def _tie(text: str, constants: ConstantSet) -> tuple[str, float, str, float]:
     """Left, ratio, right, difference in MHz of `left = ratio*right + difference`."""
     match = _TIE.match(text.replace("−", "-"))
     if not match:
@@ -169,7 +172,7 @@ def _tie(text: str, constants: Constants) -> tuple[str, float, str, float]:
     return left, float(match[2] or 1.0), right, -shift if match[4] == "-" else shift
 
 
-def _priors(chosen: Sequence[str], priors_mhz: Mapping[str, float], constants: Constants) -> Floats:
+def _priors(chosen: Sequence[str], priors_mhz: Mapping[str, float], constants: ConstantSet) -> Floats:
     known = {_known(name, constants, "priors_mhz"): value for name, value in priors_mhz.items()}
     lost = [name for name in known if name not in chosen]
     if lost:

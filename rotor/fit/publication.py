@@ -12,9 +12,10 @@ from rotor.fit.fit import Fit
 
 FORMS = ("text", "markdown", "latex")
 _UNITS = (("MHz", 1.0), ("kHz", 1e-3), ("Hz", 1e-6), ("mHz", 1e-9), ("μHz", 1e-12), ("nHz", 1e-15), ("pHz", 1e-18))
-_GREEK = {"Delta": "\\Delta", "delta": "\\delta", "Phi": "\\Phi", "phi": "\\phi"}
-_SHOWN = {"Delta": "Δ", "delta": "δ", "Phi": "Φ", "phi": "φ"}
+_SHOWN = {"Delta": "Δ", "delta": "δ", "Phi": "Φ", "phi": "φ", "chi": "χ", "eps": "ε", "gamma": "γ", "lambda": "λ"}
+_GREEK = {name: "\\epsilon" if name == "eps" else f"\\{name}" for name in _SHOWN}
 _NAME = re.compile(r"(Delta|delta|Phi|phi|[A-Za-z])([JK]*|\d?)")
+_WITH_AXES = re.compile(r"(chi|eps|gamma|lambda|[CTDGFWb])_?([\w-]*)")  # of states and spins: chi_bb-cc, G_c_J
 
 
 def value_text(value: float, error: float | None, digits: int = 2) -> str:
@@ -58,18 +59,25 @@ def unit_of(value: float, error: float | None) -> tuple[str, float]:
 
 
 def name_text(name: str, form: str) -> str:
-    """A constant's name as text (ΔJK), or in LaTeX.
+    """A constant's name as text (ΔJK), or in LaTeX; spins and states stand behind it.
 
     >>> name_text("DeltaJK", "latex"), name_text("d1", "latex"), name_text("PhiJ", "text")
     ('$\\\\Delta_{JK}$', '$d_{1}$', 'ΦJ')
+    >>> name_text("DeltaJ[1]", "text"), name_text("chi_bb-cc(14N)", "latex"), name_text("G_c[0,1]", "latex")
+    ('ΔJ[1]', '$\\\\chi_{bb-cc}$(14N)', '$G_{c}$[0,1]')
     """
-    match = _NAME.fullmatch(name)
+    head = re.match(r"[^(\[]*", name)
+    assert head is not None  # an empty one matches too
+    own = name[head.end() :]  # spins and states, as in chi_aa(14N) or A[1]
+    match = _NAME.fullmatch(head[0]) or _WITH_AXES.fullmatch(head[0])
     if not match:
         return f"\\texttt{{{_latex_text(name)}}}" if form == "latex" else name
     letter, below = match[1], match[2]
     if form != "latex":
-        return _SHOWN.get(letter, letter) + below
-    return f"${_GREEK.get(letter, letter)}{f'_{{{below}}}' if below else ''}$"
+        between = "_" if "_" in head[0] else ""
+        return _SHOWN.get(letter, letter) + between + below + own
+    symbol = _GREEK.get(letter, letter) + (f"_{{{below}}}" if below else "")
+    return f"${symbol}$" + own.replace("_", "\\_")
 
 
 @dataclass(frozen=True)

@@ -241,3 +241,16 @@ def too_few(lines: Assignments, used: NDArray[np.bool_], parameters: Parameters)
     if count >= len(parameters.names):
         return ""
     return f"{len(parameters.names)} free constants for {count} measured frequencies; free fewer, or add lines"
+
+
+def errors_of(lines: Assignments, options: FitOptions) -> tuple[dict[int, str], Floats]:
+    """Lines without an error, by position, and errors with the default put in."""
+    zero = lines.error_mhz == 0
+    if zero.all() and options.default_error_mhz is None:
+        raise ValueError(
+            f"{lines.source or 'the lines'}: every line has an error of 0: give errors in the file, or one for all of them "
+            "(default_error_mhz, --default-error)"
+        )
+    if options.default_error_mhz is not None:
+        return {}, np.where(zero, options.default_error_mhz, lines.error_mhz)
+    return {int(i): "its error is 0" for i in np.flatnonzero(zero)}, np.where(zero, 1.0, lines.error_mhz)

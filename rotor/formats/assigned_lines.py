@@ -1,6 +1,8 @@
 """Assigned lines from .lin, .csv and .cat files, and back.
 
-A .csv has a column for each quantum number of both states (`j_upper`, `ka_upper`, `kc_upper`, `j_lower`, ...), a frequency
+A .csv has a column for each quantum number of both states (`j_upper`, `ka_upper`, `kc_upper`, `j_lower`, ...; of several states
+`v_upper` too; with spins N in place of J, `n_upper`, and the sums `f1_upper`, ..., `f_upper`, half-integers as 5/2, 2.5, or as twice
+the value, 5), a frequency
 (`frequency_mhz`, `frequency_ghz` or `wavenumber_cm`), its error (`error_mhz`, `error_khz`, `error_ghz` or `error_cm`), and, where
 needed, `weight`, `blend` (one text or number for the lines of one measured frequency), `width_mhz` (how far the components of a
 blend may lie apart, rms, at one of its lines or at all) and `comment`. Of a catalogue the lines
@@ -15,7 +17,8 @@ import io
 import math
 import os
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -48,7 +51,9 @@ _WIDTH = {"width_mhz": 1.0, "width_khz": 1e-3}
 _ERROR = {"error_mhz": 1.0, "error_khz": 1e-3, "error_ghz": 1e3, "error_cm": MHZ_PER_CM}
 
 
-def read_assigned_lines(path: str | os.PathLike[str], names: Sequence[str]) -> tuple[Assignments, list[str]]:
+def read_assigned_lines(
+    path: str | os.PathLike[str], names: Sequence[str], halves: Collection[str] = ()
+) -> tuple[Assignments, list[str]]:
     """The assigned lines of a file, and what must be known of how they were read.
 
     Parameters
@@ -56,7 +61,9 @@ def read_assigned_lines(path: str | os.PathLike[str], names: Sequence[str]) -> t
     path : path
         .lin, .csv, .cat or .cat.gz.
     names : sequence of str
-        The quantum numbers that label a state, such as ("j", "ka", "kc").
+        The quantum numbers that label a state, such as ("j", "ka", "kc"); in the order of a .lin file.
+    halves : collection of str, optional
+        Those of them that are half-integers: the labels have twice their value. A .lin and a .cat have them rounded up.
 
     Returns
     -------
@@ -70,15 +77,36 @@ def read_assigned_lines(path: str | os.PathLike[str], names: Sequence[str]) -> t
     text = os.fspath(path).lower()
     if not text.endswith(SUFFIXES):
         raise ValueError(f"{path}: assigned lines are read from {', '.join(SUFFIXES)}")
-    if text.endswith(".lin"):
-        found, notes = _of_lin(path, names)
-    elif text.endswith(".csv"):
-        found, notes = _of_csv(path, names), []
+    if text.endswith(".csv"):
+        found, notes = _of_csv(path, names, halves), list[str]()
     else:
-        found, notes = _of_catalogue(path, names)
+        plain = "v" not in names and names[0] != "n"
+        read = _of_lin if text.endswith(".lin") else _of_catalogue if plain else _of_full_catalogue
+        found, notes = read(path, names)
+        found = with_halves(found, halves)
     if not len(found):
         raise ValueError(f"{path}: no lines in it" + ("" if text.endswith((".lin", ".csv")) else " that are measured"))
     return found, notes
+
+
+def with_halves(lines: Assignments, halves: Collection[str]) -> Assignments:
+    """Lines whose half-integers are rounded up as lines with twice their values."""
+    columns = [i for i, name in enumerate(lines.names) if name in halves]
+    upper, lower = lines.upper.copy(), lines.lower.copy()
+    for side in (upper, lower):
+        side[:, columns] = 2 * side[:, columns] - 1
+    return replace(lines, upper=upper, lower=lower, halves=frozenset(halves))
+
+
+def names_sums(path: str | os.PathLike[str], count: int) -> bool:
+    """Whether the lines of a .csv or .lin file name sums with spins: a column of F, or more than `count` quantum numbers a state."""
+    text = os.fspath(path).lower()
+    if text.endswith(".csv"):
+        return any(name in ("f_upper", "f_lower", "n_upper", "n_lower") for name in _table_of(path)[0])
+    if not text.endswith(".lin"):
+        return False
+    lines = read_lin(path, count)
+    return len(lines) > 0 and len(lines.measured(0).quanta) // 2 > count
 
 
 def _of_lin(path: str | os.PathLike[str], names: Sequence[str]) -> tuple[Assignments, list[str]]:
@@ -103,7 +131,7 @@ def _of_lin(path: str | os.PathLike[str], names: Sequence[str]) -> tuple[Assignm
     ), notes  # fmt: skip
 
 
-def _of_csv(path: str | os.PathLike[str], names: Sequence[str]) -> Assignments:
+def _of_csv(path: str | os.PathLike[str], names: Sequence[str], halves: Collection[str]) -> Assignments:
     columns, rows = _table_of(path)
     labels = [f"{name}_{side}" for side in ("upper", "lower") for name in names]
     known = {*labels, *_FREQUENCY, *_ERROR, *_WIDTH, "weight", "blend", "comment"}
@@ -111,7 +139,8 @@ def _of_csv(path: str | os.PathLike[str], names: Sequence[str]) -> Assignments:
     unit = next(name for name in _FREQUENCY if name in columns)
     error = next((name for name in _ERROR if name in columns), None)
     _refuse_rows(path, rows)
-    numbers = [[_whole(path, i, name, row) for name in labels] for i, row in enumerate(rows, 1)]
+    read = [(name, _half if name.rpartition("_")[0] in halves else _whole) for name in labels]
+    numbers = [[of(path, i, name, row) for name, of in read] for i, row in enumerate(rows, 1)]
     quanta = np.array(numbers, dtype=np.int64).reshape(len(rows), len(labels))
     for i, row in enumerate(quanta.tolist(), 1):
         for side in (row[: len(names)], row[len(names) :]):
@@ -130,6 +159,7 @@ def _of_csv(path: str | os.PathLike[str], names: Sequence[str]) -> Assignments:
         wavenumber=unit == "wavenumber_cm",
         source=Path(path).name,
         comments=[(row.get("comment") or "").strip() for row in rows] if "comment" in columns else (),
+        halves=halves,
     )  # fmt: skip
 
 
@@ -217,10 +247,28 @@ def _size(path: object, line: int, name: str, row: Mapping[str, str], default: f
 
 
 def _whole(path: object, line: int, name: str, row: Mapping[str, str]) -> int:
+    text = (row.get(name) or "").strip()
+    if text.partition("/")[2] == "2":
+        raise ValueError(f"{path}, line {line} of the table: {name} reads {text!r}; this quantum number is whole here")
     value = _real(path, line, name, row)
     if not float(value).is_integer():
         raise ValueError(f"{path}, line {line} of the table: {name} = {value:g}; a quantum number is whole")
     return int(value)
+
+
+def _half(path: object, line: int, name: str, row: Mapping[str, str]) -> int:
+    """Twice a half-integer, which stands as 5/2, 2.5, or as twice its value, 5."""
+    text = (row.get(name) or "").strip()
+    number, slash, two = text.partition("/")
+    if number.isdigit() and int(number) % 2 and (two == "2" or not slash):
+        return int(number)
+    value = _real(path, line, name, row) if not slash else math.nan
+    if not (2 * value) % 2 == 1:
+        raise ValueError(
+            f"{path}, line {line} of the table: {name} reads {text!r}; this quantum number is a half-integer: write 5/2 or 2.5, or "
+            "twice it, 5"
+        )
+    return int(2 * value)
 
 
 def _blends(texts: Sequence[str]) -> list[int]:
@@ -259,6 +307,29 @@ def _of_catalogue(path: str | os.PathLike[str], names: Sequence[str]) -> tuple[A
         names, upper[first], lower[first], frequency[first], error[first],
         weight=weight[first] if len(measured) else 1.0,
         blend=np.array([order[key] for key in groups], dtype=np.int64)[first], source=Path(path).name,
+    ), notes  # fmt: skip
+
+
+def _of_full_catalogue(path: str | os.PathLike[str], names: Sequence[str]) -> tuple[Assignments, list[str]]:
+    """The measured lines of a catalogue that has all of the quantum numbers, v and F among them."""
+    from rotor.formats.spcat.compare import in_mhz
+    from rotor.formats.spcat.text.cat import read_cat
+
+    catalogue = read_cat(path)
+    measured = catalogue.take(catalogue.tag < 0)
+    width = len(names)
+    whole = (measured.qnfmt % 10 == width) & ((measured.qnfmt // 1000 % 2 == 1) == ("v" in names))
+    notes = [] if whole.all() else [f"{int((~whole).sum())} measured lines without {', '.join(names)} are left aside"]
+    measured = measured.take(whole)
+    frequency, error = in_mhz(measured)
+    upper, lower = (np.abs(side[:, :width].astype(np.int64)) for side in (measured.quanta_upper, measured.quanta_lower))
+    weight = 10.0 ** (measured.lgint - measured.lgint.max(initial=0.0)) if len(measured) else np.zeros(0)
+    first = _first_of_each(upper, lower, frequency)
+    pairs = np.stack([frequency.round(6), error.round(6)], axis=1)
+    blend = np.unique(pairs, axis=0, return_inverse=True)[1].reshape(-1) if len(pairs) else np.zeros(0, dtype=np.int64)
+    return assignments(
+        names, upper[first], lower[first], frequency[first], error[first], weight=weight[first], blend=blend[first],
+        source=Path(path).name,
     ), notes  # fmt: skip
 
 
@@ -330,10 +401,10 @@ def _with_widths(lines: Assignments) -> Assignments:
 
 
 def _as_lin(lines: Assignments):  # type: ignore[no-untyped-def]
-    from dataclasses import replace
-
     ordered = _with_widths(lines.take(np.argsort(lines.blend, kind="stable")))
-    made = line_list(ordered.upper, ordered.lower, ordered.frequency_mhz, ordered.error_mhz, ordered.weight)
+    halves = np.array([name in ordered.halves for name in ordered.names])
+    upper, lower = (np.where(halves, (side + 1) // 2, side) for side in (ordered.upper, ordered.lower))
+    made = line_list(upper, lower, ordered.frequency_mhz, ordered.error_mhz, ordered.weight)
     unit = np.where(ordered.wavenumber, 1 / MHZ_PER_CM, 1.0)
     sign = np.where(ordered.wavenumber, -1.0, 1.0)
     return replace(made, frequency=ordered.frequency_mhz * unit, error=sign * ordered.error_mhz * unit)

@@ -9,27 +9,31 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
 from rotor.fit.assignment import Assignments, merged
+from rotor.fit.first_values import beside_zero
 from rotor.fit.fit import Fit, FitOptions, fit_lines
 from rotor.fit.parameters import Parameters, parameters, with_names
 from rotor.fit.publication import publication_table
 from rotor.fit.report import fit_facts, report_text
-from rotor.formats.assigned_lines import QUANTA, read_assigned_lines
+from rotor.fit.top_constants import ConstantSet, TopConstants
+from rotor.formats.assigned_lines import QUANTA, names_sums, read_assigned_lines
 from rotor.formats.spcat.fit_input import SpfitInput, fitted_file, read_fit
 from rotor.formats.spcat.named_fit import named_file
 from rotor.formats.spcat.text.par import ParameterFile
 from rotor.quantum.labelled import LevelModel
 from rotor.statistics.least_squares import Progress
 from rotor.table import Table
-from rotor.tops.constants import Constants
 from rotor.tops.top import Top
 from rotor.version import version
+
+if TYPE_CHECKING:
+    from rotor.formats.molecules.molecule_file import MoleculeFile
 
 
 @dataclass(frozen=True)
@@ -52,7 +56,7 @@ class FitRequest:
     """
 
     lines: Assignments
-    constants: Constants | None
+    constants: ConstantSet | None
     parameters: Parameters
     options: FitOptions
     title: str
@@ -70,6 +74,8 @@ class FitRequest:
     @property
     def top(self) -> Top | None:
         """The constants to start from as a top; None of codes with spins or several states."""
+        if isinstance(self.constants, TopConstants):
+            return self.constants.top
         return None if self.constants is None else Top.from_constants(self.constants)
 
 
@@ -163,12 +169,14 @@ def fit_of_lines(
     ValueError
         Lines or names that cannot be, and no constant to fit.
     """
-    read, notes = read_assigned_lines(lines, QUANTA[top.kind])
-    names = list(top.constants.uncertainties) if free is None else list(free)
+    has, priors = constants_for(lines, top, free or ()), dict(priors_mhz or {})
+    quanta, halves = (has.quanta, has.halves) if isinstance(has, TopConstants) else (QUANTA[top.kind], frozenset[str]())
+    read, notes = read_assigned_lines(lines, quanta, halves)
+    names = list(has.uncertainties) if free is None else list(free)
     if not names:
         raise ValueError("free: name the constants to fit, such as A,B,C,DeltaJ; those of the start have no errors")
     try:
-        begin = with_names(top.constants, names)
+        begin = with_names(has, names)
     except ValueError as error:
         raise ValueError(f"free: {error}") from None
     for tie in ties:  # a constant that follows another need not be in the start
@@ -176,8 +184,12 @@ def fit_of_lines(
             begin = with_names(begin, [tie.partition("=")[0].strip()] if "=" in tie else [])
         except ValueError as error:
             raise ValueError(f"tie {tie!r}: {error}") from None
-    priors = dict(priors_mhz or {})
     made = parameters(begin, names, ties=ties, priors_mhz=priors)
+    begin, moved = beside_zero(begin, made.names, read)
+    if moved:
+        made = parameters(begin, names, ties=ties, priors_mhz=priors)
+        said = ", ".join(f"{name} at {value:.3g} MHz" for name, value in moved.items())
+        notes = [*notes, f"of these the lines know the square alone, so that they start beside 0: {said}"]
     title = " ".join(top.name.split()) or Path(lines).name
     files = FitFiles(lines, start=start)
     return FitRequest(
@@ -185,9 +197,24 @@ def fit_of_lines(
     )
 
 
+def constants_for(lines: str, top: Top, free: Sequence[str]) -> ConstantSet:
+    """The constants of a top as a fit of these lines takes them: with its further states, and its spins where the lines have F.
+
+    Raises ValueError for lines or free constants of spins that the top has not.
+    """
+    rotation = len(QUANTA[top.kind]) + (top.states is not None)
+    hyperfine = names_sums(lines, rotation) or any("(" in name for name in free)
+    if hyperfine and top.spin_constants is None:
+        raise ValueError(
+            f"{lines}: lines or free constants of spins, and the constants to start from have none; give them there, such as "
+            "[spins.14N] with chi_aa = -4.2"
+        )
+    return TopConstants(top, hyperfine) if hyperfine or top.states is not None else top.constants
+
+
 def with_more_lines(request: FitRequest, path: str) -> FitRequest:
     """The request with the lines of one more file of the same kind."""
-    more, notes = read_assigned_lines(path, request.lines.names)
+    more, notes = read_assigned_lines(path, request.lines.names, request.lines.halves)
     both, found = merged(request.lines, more)
     files = replace(request.files, merge=path)
     return replace(request, lines=both, files=files, notes=(*request.notes, *notes, *found))
@@ -221,9 +248,9 @@ def table_of(answer: FitAnswer, form: str, *, scaled: bool = False) -> str:
 def write_fitted_toml(answer: FitAnswer, path: str | os.PathLike[str]) -> None:
     """The constants with errors and correlations in the file of the start, or in a new one.
 
-    Raises ValueError of spins and several states, which have no named constants.
+    Raises ValueError of SPFIT's codes with spins and several states, which have no named constants.
     """
-    from rotor.formats.molecules.molecule_file import MoleculeFile, read_molecule_file
+    from rotor.formats.molecules.molecule_file import read_molecule_file
     from rotor.formats.molecules.molecule_writer import write_molecule_file
 
     request, fit = answer.request, answer.fit
@@ -234,17 +261,46 @@ def write_fitted_toml(answer: FitAnswer, path: str | os.PathLike[str]) -> None:
     )
     start = request.files.start or ""
     own = start.lower().endswith(".toml") and Path(start).exists()
-    file = read_molecule_file(start) if own else MoleculeFile(request.title or Path(path).stem)
+    file = read_molecule_file(start) if own else _file_of(request, path)
     covariance = None if fit.statistics.undetermined else fit.covariance
+    sources = {**file.sources, "constants": origin}
+    named, states, spins = fit.named, file.states, file.spin_constants
+    if isinstance(named, TopConstants):
+        top = named.top
+        states = replace(top.states, source=origin) if top.states is not None else None
+        spins = replace(top.spin_constants, source=origin) if named.hyperfine and top.spin_constants else spins
+        sources |= {"states": origin} if states is not None else {}
+        named = top.constants
     made = replace(
         file,
-        constants=fit.named,
+        constants=named,
         covariance=covariance,
+        states=states,
+        spin_constants=spins,
         levels=None,
         serves=None,
-        sources={**file.sources, "constants": origin},
+        sources=sources,
     )
     write_molecule_file(made, path)
+
+
+def _file_of(request: FitRequest, path: str | os.PathLike[str]) -> MoleculeFile:
+    """A new file; of states and spins with the dipole and the weights without which they make no spectrum."""
+    from rotor.formats.molecules.molecule_file import MoleculeFile
+
+    name = request.title or Path(path).stem
+    if not isinstance(request.constants, TopConstants):
+        return MoleculeFile(name)
+    top = request.constants.top
+    sources = {"dipole": top.dipole_source, "spin_weights": top.weights_source}
+    return MoleculeFile(
+        name,
+        dipole_abc_debye=top.dipole_abc_debye,
+        spin_weights=top.spin_weights,
+        sources={table: text for table, text in sources.items() if text},
+        states=top.states,
+        spin_constants=top.spin_constants,
+    )
 
 
 def write_fitted_par(answer: FitAnswer, path: str | os.PathLike[str], *, variances: bool) -> None:

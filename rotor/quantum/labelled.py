@@ -27,6 +27,8 @@ import numpy as np
 from rotor.arrays import Floats, Ints, Workspace
 from rotor.quantum.effects.watson import operators_by_name
 from rotor.quantum.wang.basis import WangBlock, ka_kc, wang_blocks
+from rotor.quantum.wang.tridiagonal import vectors_of_values
+from rotor.quantum.wang.turn import order_beyond_the_turn, turned
 from rotor.tops.constants import Constants
 from rotor.tops.operators import REPRESENTATIONS
 
@@ -199,7 +201,7 @@ class WangBlocks(LevelModel):
         energies, slopes = np.empty(self.count), np.empty((self.count, len(self.names)))
         places = [place for _, place in self.powers]  # that of a scalar is -1, the column of ones
         for chunk in self.chunks:
-            solved, vectors = self._solved(chunk, coefficients)
+            solved, vectors = self._labelled(chunk, coefficients)
             energies[chunk.rows] = solved[chunk.block, chunk.rank]
             expected = np.ones((len(chunk.rows), chunk.units[0].shape[2] + 1))
             expected[:, :-1] = _expectations(chunk, vectors, self._space)
@@ -221,12 +223,41 @@ class WangBlocks(LevelModel):
 
     def _solved(self, chunk: _Chunk, coefficients: Floats) -> tuple[Floats, Floats]:
         """Eigenvalues (blocks, size) and eigenvectors (blocks, size, size) with the coefficients of the terms, in the order of labels."""
-        weights = (chunk.x * coefficients) @ self._of_unit
-        bands = [(unit @ weights[:, :, None])[:, :, 0] for unit in chunk.units]
+        return self._in_order(chunk, self._bands(chunk, coefficients))
+
+    def _in_order(self, chunk: _Chunk, bands: Sequence[Floats]) -> tuple[Floats, Floats]:
         energies, vectors = _diagonalised(bands, chunk, self._space)
         if self.rise:
-            _order_beyond_the_turn(self.rise * bands[0], chunk.sizes, energies, vectors)
+            order_beyond_the_turn(self.rise * bands[0], chunk.sizes, energies, vectors)
         return energies, vectors
+
+    def _labelled(self, chunk: _Chunk, coefficients: Floats) -> tuple[Floats, Floats]:
+        """Eigenvalues (blocks, size), and the eigenvectors of the labelled states (blocks, size, most labels), or of all states."""
+        bands, states = self._bands(chunk, coefficients), chunk.states
+        if states is None:
+            return self._in_order(chunk, bands)
+        by_energy = not self.rise or not len(turned(self.rise * bands[0], chunk.sizes)[0])
+        if len(bands) == 2 and _dense() and by_energy:
+            energies = _banded(bands, chunk, self._space)
+            found = vectors_of_values(bands[0], bands[1], energies, chunk.block, chunk.rank, self._space)
+            if found is not None:
+                chosen = self._space.array("chosen", len(states), len(found), states.shape[1])
+                chosen.fill(0.0)
+                chosen.transpose(1, 0, 2)[:, chunk.block, chunk.slot] = found
+                return energies, chosen
+        energies, vectors = self._in_order(chunk, bands)
+        count, size, most = len(vectors), vectors.shape[1], states.shape[1]
+        rows = size * size * np.arange(count)[:, None, None] + size * np.arange(size)[:, None]
+        chosen = self._space.array("chosen", count, size, most)
+        return energies, vectors.ravel().take(rows + states[:, None, :], out=chosen, mode="clip")
+
+    def _bands(self, chunk: _Chunk, coefficients: Floats) -> list[Floats]:
+        """Diagonals (blocks, size) of the Hamiltonian."""
+        weights = (chunk.x * coefficients) @ self._of_unit
+        bands = [(unit @ weights[:, :, None])[:, :, 0] for unit in chunk.units]
+        if not all(np.isfinite(band.sum()) for band in bands):
+            raise ValueError("a block of the Hamiltonian is not finite with these constants")
+        return bands
 
     @cached_property
     def _of_unit(self) -> Floats:
@@ -361,39 +392,24 @@ def _element(j: Floats, k: Floats, q: int, n: int) -> Floats:
 
 
 def _diagonalised(bands: Sequence[Floats], chunk: _Chunk, space: Workspace) -> tuple[Floats, Floats]:
-    """Eigenvalues (blocks, size), rising, and eigenvectors (blocks, size, size) in columns, padded with zeros.
-
-    Tridiagonal blocks too are solved by numpy's dense routine where scipy.linalg is not loaded: loading it takes as long as 500 iterations
-    of a fit to 5,000 lines gain by it. Only where BLAS has one thread: several of them wait for each other on small blocks.
-    """
-    if not all(np.isfinite(band.sum()) for band in bands):
-        raise ValueError("a block of the Hamiltonian is not finite with these constants")
+    """Eigenvalues (blocks, size), rising, and eigenvectors (blocks, size, size) in columns, padded with zeros."""
     count, size = bands[0].shape
-    energies, vectors = np.zeros((count, size)), space.array("vectors", count, size, size)
-    least = chunk.sizes[0]
+    vectors, least = space.array("vectors", count, size, size), chunk.sizes[0]
     vectors[:, least:, :] = vectors[:, :, least:] = 0.0
-    if len(bands) <= 2 and ("scipy.linalg" in sys.modules or os.environ.get("OPENBLAS_NUM_THREADS") != "1"):
+    if len(bands) <= 2 and not _dense():
+        energies = np.zeros((count, size))
         _tridiagonal(bands, chunk.sizes, energies, vectors)
-    else:
-        _banded(bands, chunk, energies, vectors, space)
-    return energies, vectors
+        return energies, vectors
+    return _banded(bands, chunk, space, vectors), vectors
 
 
-def _order_beyond_the_turn(diagonal: Floats, sizes: Sequence[int], energies: Floats, vectors: Floats) -> None:
-    """States beyond the K where the diagonal (blocks, size) ceases to rise come last, by their mean K; the arrays are changed.
+def _dense() -> bool:
+    """Whether tridiagonal blocks too are solved by numpy's dense routine: where scipy.linalg is not loaded.
 
-    Constants that describe K up to 20 may bring the states of K = 60 down among those: the series has left the molecule there. Such a
-    state is mostly beyond the turn, and the labels of the others are the ranks among themselves, whatever it does.
+    Loading it takes as long as 500 iterations of a fit to 5,000 lines gain by it. Only where BLAS has one thread: several of them wait for
+    each other on small blocks.
     """
-    size = np.asarray(sizes)
-    turn = np.where(np.arange(diagonal.shape[1]) < size[:, None], diagonal, -np.inf).argmax(axis=1)
-    for b in np.flatnonzero((turn > 0) & (turn < size - 1)).tolist():
-        n = sizes[b]
-        share = vectors[b, :n, :n] ** 2
-        beyond = share[turn[b] + 1 :].sum(axis=0) > 0.5
-        order = np.lexsort((np.where(beyond, np.arange(n) @ share, 0.0), beyond))
-        energies[b, :n] = energies[b, order]
-        vectors[b, :n, :n] = vectors[b, :n, order].T
+    return "scipy.linalg" not in sys.modules and os.environ.get("OPENBLAS_NUM_THREADS") == "1"
 
 
 def _tridiagonal(bands: Sequence[Floats], sizes: Sequence[int], energies: Floats, vectors: Floats) -> None:
@@ -411,31 +427,32 @@ def _tridiagonal(bands: Sequence[Floats], sizes: Sequence[int], energies: Floats
         vectors[b, :n, :n] = states
 
 
-def _banded(bands: Sequence[Floats], chunk: _Chunk, energies: Floats, vectors: Floats, space: Workspace) -> None:
-    """Blocks of one size at a time, by LAPACK's dense routine, which reads the lower triangle."""
-    whole = space.array("matrices", int(chunk.offsets[-1]))
+def _banded(bands: Sequence[Floats], chunk: _Chunk, space: Workspace, vectors: Floats | None = None) -> Floats:
+    """Eigenvalues, infinite beyond a block, by LAPACK's dense routine, which reads the lower triangle; blocks of one size at a time.
+
+    Eigenvectors are put into `vectors` where it is given; without them it takes a third of the time.
+    """
+    energies, whole = np.full(bands[0].shape, np.inf), space.array("matrices", int(chunk.offsets[-1]))
     whole.fill(0.0)
     for band, (inside, places) in zip(bands, chunk.bands, strict=False):
         whole[places] = band.take(inside)
     for first, stop, n in chunk.runs:
         matrices = whole[chunk.offsets[first] : chunk.offsets[stop]].reshape(stop - first, n, n)
-        energies[first:stop, :n], vectors[first:stop, :n, :n] = np.linalg.eigh(matrices)
+        if vectors is None:
+            energies[first:stop, :n] = np.linalg.eigvalsh(matrices)
+        else:
+            energies[first:stop, :n], vectors[first:stop, :n, :n] = np.linalg.eigh(matrices)
+    return energies
 
 
 def _expectations(chunk: _Chunk, vectors: Floats, space: Workspace) -> Floats:
     """⟨unit⟩ (labels, units) of the labelled states."""
-    count, size, _ = vectors.shape
-    place = chunk.rank
-    if chunk.states is not None:
-        most, place = chunk.states.shape[1], chunk.slot
-        rows = size * size * np.arange(count)[:, None, None] + size * np.arange(size)[:, None]
-        chosen = space.array("chosen", count, size, most)
-        vectors = vectors.ravel().take(rows + chunk.states[:, None, :], out=chosen, mode="clip")
+    size = vectors.shape[1]
     products = np.multiply(vectors, vectors, out=space.array("products", *vectors.shape))
     total = np.matmul(products.transpose(0, 2, 1), chunk.units[0])
     for d, unit in enumerate(chunk.units[1:], 1):
         if d < size:
-            products = space.array("products", count, size - d, vectors.shape[2])
+            products = space.array("products", len(vectors), size - d, vectors.shape[2])
             np.multiply(vectors[:, :-d, :], vectors[:, d:, :], out=products)
             total += 2.0 * np.matmul(products.transpose(0, 2, 1), unit[:, :-d])
-    return np.asarray(total[chunk.block, place])
+    return np.asarray(total[chunk.block, chunk.rank if chunk.states is None else chunk.slot])

@@ -227,7 +227,18 @@ class TransitionTable(Table):
 
 
 def weights_of_levels(levels: Levels, weights: SpinWeights) -> Ints:
-    """Spin weights of levels, summed over the components of each row, by other weights than they were solved with."""
+    """Spin weights of levels, summed over the components of each row, by other weights than they were solved with.
+
+    Beside a total spin I of two nuclei the weights are those of even I; levels of odd I have those of the other class.
+    """
+    quanta = levels.quanta
+    if "i_tot" in quanta and "i_sym" not in quanta and weights.rule != "none":
+        of_even, of_odd = (_of_rotation(levels, own) for own in (weights, weights.exchanged()))
+        return np.where(quanta["i_tot"] % 2 == 0, of_even, of_odd)
+    return _of_rotation(levels, weights)
+
+
+def _of_rotation(levels: Levels, weights: SpinWeights) -> Ints:
     quanta = levels.quanta
     if "irrep" in quanta:
         of = {name: weights.of_irrep(name) for name in np.unique(quanta["irrep"]).tolist()}

@@ -97,7 +97,7 @@ class Lines(TransitionTable):
     def warnings(self) -> tuple[str, ...]:
         """Limits of the levels behind the lines and of the errors of frequencies."""
         known = set(self.covariance_used.names) if self.covariance_used else set()
-        exact = [name for name in self.top.constants.values if name not in known]
+        exact = [name for name in self._parameters if name not in known and ("(" not in name or "(" in "".join(known))]
         partly = f"errors of frequencies take {', '.join(exact)} as exact: their uncertainty is not known"
         beyond = f"{self.untrusted} lines of levels beyond the reach of the distortion constants are left out"
         found = () if self._tabulated else warnings_of(self.top, self.levels)
@@ -125,10 +125,16 @@ class Lines(TransitionTable):
         """
         if self.covariance is None and self.top.level_table is not None:
             return None
-        known = self.covariance or self.top.covariance
-        if known is None and self.top.independent_errors:
+        if self.covariance is not None:
+            return self.covariance
+        if self.top.covariance is None and self.top.independent_errors:
             return Covariance.of_uncertainties(self.top.constants)
-        return known
+        return self.top.covariance.of(self._parameters) if self.top.covariance else None
+
+    @cached_property
+    def _parameters(self) -> tuple[str, ...]:
+        """The names of all parameters of the levels' effects; a fit may have had more, such as those of spins."""
+        return tuple(dict.fromkeys(name for effect in self.levels.effects for name in effect.parameters(self.top)))
 
     @property
     def error_mhz(self) -> Floats | None:
@@ -143,7 +149,7 @@ class Lines(TransitionTable):
         """Which uncertainties the errors of frequencies come from, None where there are none."""
         if self.covariance is None and self.top.level_table is not None:
             return "none: the energies are from a table"
-        if covariance := self.covariance or self.top.covariance:
+        if (self.covariance or self.top.covariance) and (covariance := self.covariance_used):
             return f"covariance of {', '.join(covariance.names)}"
         known = self.top.constants.uncertainties
         if known and self.covariance_used is None:

@@ -22,10 +22,10 @@ def without_spins(top: Top, effects: Sequence[QuantumEffect]) -> tuple[tuple[Qua
     """The effects that need no spin, and Π(2I+1) over the nuclear spins that the others couple.
 
     With an unpaired electron nothing is left out: its couplings are too large for this, and the factor is 1. Likewise with three
-    equivalent nuclei of one total spin, since each K has its own number of their functions.
+    equivalent nuclei of one total spin, since each K has its own number of their functions, and with two whose weights go by it.
     """
     spins = {spin.name: spin for effect in effects for spin in effect.spins(top)}
     of_total = sum(bool(spin.total) for spin in spins.values())
-    if of_total == 3 or any(spin.electron for spin in spins.values()):
+    if of_total == 3 or (of_total and top.spin_weights.rule != "none") or any(spin.electron for spin in spins.values()):
         return tuple(effects), 1
     return tuple(effect for effect in effects if not effect.spins(top)), prod(spin.twice + 1 for spin in spins.values())

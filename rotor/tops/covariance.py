@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -58,6 +58,21 @@ class Covariance:
         if not np.allclose(np.diag(matrix), 1.0):
             raise ValueError("a correlation matrix has 1 on its diagonal; is this a covariance?")
         return cls(tuple(names), matrix * np.outer(sigma, sigma))
+
+    def of(self, names: Collection[str]) -> Covariance | None:
+        """The part of those constants that are among some names, the others left aside; None where there is none.
+
+        >>> Covariance(("B", "D"), np.diag([4.0, 1.0])).of({"D", "H"}).names
+        ('D',)
+        """
+        rows = [i for i, name in enumerate(self.names) if name in names]
+        if not rows:
+            return None
+        return (
+            self
+            if len(rows) == len(self.names)
+            else Covariance(tuple(self.names[i] for i in rows), self.matrix_mhz2[np.ix_(rows, rows)])
+        )
 
     @property
     def correlations(self) -> Floats:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rotor.cli.shared import inputs
 
@@ -12,8 +12,6 @@ if TYPE_CHECKING:
     from rotor.fit.choose import Suggestion, Trial
     from rotor.fit.fit import Fit, FitOptions
     from rotor.formats.fit_request import FitAnswer, FitRequest
-
-_WORTH_MEASURING = 1e-2  # S μ² of a line with μ = 1 D, below which it is not suggested
 
 
 @dataclass(frozen=True)
@@ -94,40 +92,10 @@ def _suggestions(request: FitRequest, fit: Fit, name: str | None) -> list[Sugges
 
         upper, lower = unmeasured_lines(request.spfit.file, fit.lines)
         return suggest_lines(fit, name, upper, lower, error_mhz=error, model=request.model)[:20]
-    upper, lower = _unmeasured(fit)
+    from rotor.fit.unmeasured import unmeasured
+
+    upper, lower = unmeasured(fit)
     return suggest_lines(fit, fit.named.own_name(name), upper, lower, error_mhz=error)[:20]
-
-
-def _unmeasured(fit: Fit) -> tuple[Any, Any]:
-    """Labels of lines of the kinds, frequencies and J that were measured, without those that are measured."""
-    import numpy as np
-
-    from rotor.spectra.lines import line_list
-    from rotor.tops.top import Top
-
-    measured = fit.lines
-    top = Top.from_constants(fit.named, dipole_abc_debye=_components(fit))
-    jmax = int(max(measured.upper[:, 0].max(), measured.lower[:, 0].max()))
-    seen_mhz = (float(measured.frequency_mhz.min()) * 0.99, float(measured.frequency_mhz.max()) * 1.01)
-    lines = line_list(top, jmax=jmax, min_lgint=None, q=1.0, range_mhz=seen_mhz)
-    strong = lines.strength_debye2 > _WORTH_MEASURING
-    labels = np.stack([lines.levels.quanta[name] for name in measured.names], axis=1)
-    upper, lower = labels[lines.upper[strong]], labels[lines.lower[strong]]
-    known = {(*u, *low) for u, low in zip(measured.upper.tolist(), measured.lower.tolist(), strict=True)}
-    new = np.array([(*u, *low) not in known for u, low in zip(upper.tolist(), lower.tolist(), strict=True)], dtype=bool)
-    return upper[new], lower[new]
-
-
-def _components(fit: Fit) -> tuple[float, float, float]:
-    """1 D along each axis whose lines occur among those measured, by the parities of Ka and Kc."""
-    kind = fit.named.kind
-    if kind != "asymmetric":
-        return (0.0, 0.0, 1.0) if kind == "oblate" else (1.0, 0.0, 0.0)
-    change = (fit.lines.upper[:, 1:] - fit.lines.lower[:, 1:]) % 2
-    kinds = {(0, 1): 0, (1, 1): 1, (1, 0): 2}
-    found = {kinds.get((int(ka), int(kc)), 0) for ka, kc in change}
-    a, b, c = (float(axis in found) for axis in range(3))
-    return a, b, c
 
 
 def _bootstrap(request: FitRequest, fit: Fit, samples: int, seed: int) -> tuple[list[float], int]:

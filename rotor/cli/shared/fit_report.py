@@ -13,8 +13,8 @@ from rotor.cli.shared.output import (
 if TYPE_CHECKING:
     from rotor.fit.choose import Suggestion, Trial
     from rotor.fit.fit import Fit
+    from rotor.fit.top_constants import ConstantSet
     from rotor.formats.fit_request import FitAnswer
-    from rotor.tops.constants import Constants
 
 
 _AFTER = ("undetermined", "changed_states", "notes")  # facts that come behind the parameters
@@ -51,7 +51,7 @@ def record(
     }
 
 
-def _constants_record(constants: Constants | None) -> dict[str, Any]:
+def _constants_record(constants: ConstantSet | None) -> dict[str, Any]:
     names = ("kind", "reduction", "representation", "constants_mhz", "uncertainties_mhz")
     if constants is None:
         return dict.fromkeys(names)
@@ -142,7 +142,7 @@ def suggestion_table(fit: Fit, suggestions: Sequence[Suggestion]) -> Table:
     columns = ["upper - lower", "frequency (MHz)", "error", "error of the constant, after/before"]
     rows = [
         [
-            f"{' '.join(map(str, one.upper))} - {' '.join(map(str, one.lower))}",
+            f"{fit.lines.label_text(one.upper)} - {fit.lines.label_text(one.lower)}",
             f"{one.frequency_mhz:.4f}",
             f"{one.error_mhz:.4f}",
             f"{one.error_ratio:.4f}",

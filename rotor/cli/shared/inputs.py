@@ -51,7 +51,7 @@ class Input:
         None, metavar="TEXT", help='Constants of spins: "chi_aa(14N)=-4.22 chi_bb-cc(14N)=1.1 MHz" (MHz).'
     )
     spins: str | None = option(
-        None, metavar="LIST", help='Sizes and order of the spins: "S=1/2 14N=1"; isotopes have their own.'
+        None, metavar="LIST", help='Sizes and order of the spins: "S=1/2 14N"; "35Cl_1+35Cl_2" have a total spin.'
     )
     state_constants: str | None = option(
         None,

@@ -21,7 +21,8 @@
     DJ = { value = 34.8, uncertainty = 0.1, source = "..." }
 
     [covariance]                        # of constants that were fitted together: their correlation coefficients, row by row as
-    names = ["A", "DJ"]                 # far as the diagonal; the standard errors are the uncertainties above
+    names = ["A", "DJ"]                 # far as the diagonal; the standard errors are the uncertainties. Constants of states and
+                                        # spins by their full names: "B[1]", "G_c[0,1]", "chi_aa(14N)"
     correlations = [[1.0], [0.3, 1.0]]
 
     [dipole]                            # along the principal axes a, b, c
@@ -52,7 +53,7 @@
     unit = "MHz"                        # [constants]
     names = ["0+", "0-"]
     "E[1]" = 23785.9
-    "B[1]" = 298041.5
+    "B[1]" = { value = 298041.5, uncertainty = 0.3 }
     symmetry = "C2v"                    # which couplings may stand together; Cs(ab) with the plane, C2(b) with the axis
     weights = { 0 = { 0even = 0, 0odd = 4, 1 = 1, 2 = 1 }, 1 = { 0even = 4, 0odd = 0, 1 = 1, 2 = 1 } }
     dipoles = { 0 = [0, 0, 0], 1 = [0, 0, 0], "0,1" = [0, 0, 1.47] }  # (μa, μb, μc) in D; else that of [dipole] in each
@@ -62,6 +63,7 @@
 
     [spins.14N]
     chi_aa = { value = -4.22324, uncertainty = 0.00108 }
+    "chi_aa[1]" = -0.05                 # more in state 1 alone
 
     [levels]                            # energies that count instead of those of the constants where the table has them:
     file = "../levels/H2O.csv"          # columns j, ka, kc, energy_mhz, error_mhz
@@ -246,6 +248,8 @@ def parse_molecule_file(
     dipole = dipole_of(tables.get("dipole"))
     molecule = geometry(tables.get("geometry"), top.text("name", default_name), dipole, tables.get("dipole"))
     polarizability = polarizability_of(tables.get("polarizability"), constants, molecule)
+    states = states_of(tables.get("states"), constants)
+    spins = spins_of_table(tables.get("spins"), molecule)
     return MoleculeFile(
         name=top.text("name", default_name),
         names=top.texts("names"),
@@ -261,8 +265,8 @@ def parse_molecule_file(
         levels=level_table_of(tables.get("levels"), folder),
         serves=served_of(tables.get("serves")),
         unverified=frozenset().union(*(unverified_in(name, table) for name, table in tables.items())),
-        covariance=covariance_of(tables.get("covariance"), constants),
-        states=states_of(tables.get("states"), constants),
-        spin_constants=spins_of_table(tables.get("spins"), molecule),
+        covariance=covariance_of(tables.get("covariance"), constants, states, spins),
+        states=states,
+        spin_constants=spins,
         magnetic=magnetic_of_table(tables.get("magnetic"), kind_of(constants, molecule)),
     )

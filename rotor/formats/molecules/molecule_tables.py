@@ -18,6 +18,7 @@ from rotor.molecules.molecule import ELECTRONIC, Molecule
 from rotor.tops.constants import Constants
 from rotor.tops.covariance import Covariance
 from rotor.tops.kind import kind_from_moments
+from rotor.tops.spins.spin_constants import SpinConstants
 from rotor.tops.spins.spin_weights import SpinWeights
 from rotor.tops.states.level_table import LevelTable
 from rotor.tops.states.state_constants import StateConstants
@@ -237,26 +238,26 @@ def constants_of(table: TableReader | None) -> Constants | None:
     for name, item in table.content.items():
         if name in ("unit", "source", "reduction", "representation", "kind", "unverified"):
             continue
-        one = TableReader(table.place, name, item if isinstance(item, dict) else {"value": item})
-        one.refuse_unknown(("value", "uncertainty", "source", "unverified"))
-        values[name] = one.quantity("value", one.content.get("value"), unit, "MHz")
-        if "uncertainty" in one.content:
-            uncertainties[name] = one.quantity("uncertainty", one.content["uncertainty"], unit, "MHz")
-        if "source" in one.content:
-            sources[name] = one.text("source")
+        values[name], error = uncertain_number(table, name, unit)
+        if error is not None:
+            uncertainties[name] = error
+        if isinstance(item, dict) and "source" in item:
+            sources[name] = TableReader(table.place, name, item).text("source")
     try:
         return Constants(**settings, uncertainties=uncertainties, sources=sources, **values)  # type: ignore[arg-type]
     except ValueError as reason:
         raise ValueError(f"{table.place}: {reason}") from None
 
 
-def covariance_of(table: TableReader | None, constants: Constants | None) -> Covariance | None:
-    """From the lower triangle of the correlations and the uncertainties of the constants."""
+def covariance_of(
+    table: TableReader | None, *parts: Constants | StateConstants | SpinConstants | None
+) -> Covariance | None:
+    """From the lower triangle of the correlations and the uncertainties of the constants, those of states and spins too."""
     if table is None:
         return None
     table.refuse_unknown(("source", "names", "correlations"))
     names = table.texts("names")
-    known = constants.uncertainties if constants is not None else {}
+    known = {name: error for part in parts if part is not None for name, error in part.uncertainties.items()}
     lost = [name for name in names if name not in known]
     if lost or not names:
         raise table.error("names", f"{', '.join(lost) or 'none'}: expected constants of the file with an uncertainty")
@@ -357,10 +358,12 @@ def states_of(table: TableReader | None, constants: Constants | None) -> StateCo
     if constants is None:
         raise ValueError(f"{table.place}: states beyond the one of [constants], which is missing")
     known = ("source", "unverified", "unit", "names", "symmetry", "weights", "dipoles")
-    unit, values = table.text("unit", "MHz"), {}
-    for key, value in table.content.items():
+    unit, values, errors = table.text("unit", "MHz"), dict[str, float](), dict[str, float]()
+    for key in table.content:
         if key not in known:
-            values[key] = table.quantity(key, value, unit, "MHz")
+            values[key], error = uncertain_number(table, key, unit)
+            if error is not None:
+                errors[key] = error
     weights = {_state(table, v): _weights_of_state(table, one, constants) for v, one in _part(table, "weights").items()}
     dipoles = {}
     for pair, moment in _part(table, "dipoles").items():
@@ -370,10 +373,21 @@ def states_of(table: TableReader | None, constants: Constants | None) -> StateCo
         dipoles[b, a] = (float(moment[0]), float(moment[1]), float(moment[2]))
     try:
         return StateConstants(
-            values, table.texts("names"), weights, dipoles, table.text("source"), table.text("symmetry")
+            values, table.texts("names"), weights, dipoles, table.text("source"), table.text("symmetry"), errors
         )
     except ValueError as reason:
         raise ValueError(f"{table.place}: {reason}") from None
+
+
+def uncertain_number(table: TableReader, key: str, unit: str) -> tuple[float, float | None]:
+    """Value and standard deviation in MHz of an entry that is a number, text with a unit, or a table of value and uncertainty."""
+    item = table.content[key]
+    one = TableReader(table.place, key, item if isinstance(item, dict) else {"value": item})
+    one.refuse_unknown(("value", "uncertainty", "source", "unverified"))
+    value = one.quantity("value", one.content.get("value"), unit, "MHz")
+    if "uncertainty" not in one.content:
+        return value, None
+    return value, one.quantity("uncertainty", one.content["uncertainty"], unit, "MHz")
 
 
 def _part(table: TableReader, key: str) -> Table:

@@ -11,7 +11,7 @@ from rotor.formats.atomic_write import open_atomic
 from rotor.formats.magnetic_table import magnetic_table
 from rotor.formats.molecules.level_table import write_level_table
 from rotor.formats.molecules.molecule_file import MoleculeFile
-from rotor.formats.molecules.spin_table import spin_tables
+from rotor.formats.molecules.spin_table import spin_tables, uncertain_entry
 from rotor.tops.states.state_constants import StateConstants
 
 
@@ -78,8 +78,9 @@ def _states(states: StateConstants | None) -> dict[str, Any]:
         return {}
     weights = {str(v): one.to_mapping() for v, one in states.weights.items()}
     dipoles = {",".join(map(str, sorted(set(pair)))): list(moment) for pair, moment in states.dipoles.items()}
+    values = {name: uncertain_entry(value, states.uncertainties.get(name)) for name, value in states.values.items()}
     more = {"names": list(states.names), "symmetry": states.symmetry, "weights": weights, "dipoles": dipoles}
-    return {"unit": "MHz", **states.values, **{key: value for key, value in more.items() if value}}
+    return {"unit": "MHz", **values, **{key: value for key, value in more.items() if value}}
 
 
 def _geometry(molecule: MoleculeFile) -> dict[str, Any]:

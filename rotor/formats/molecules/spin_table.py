@@ -8,6 +8,7 @@
     atom = 3                            # which atom of [geometry]; may be left out where one alone is that isotope
     chi_aa = { value = 1.9543, uncertainty = 0.0012 }
     chi_bb-cc = 5.7476                  # the difference; names are those of rotor.quantum.effects
+    "chi_aa[1]" = 0.02                  # what state 1 has more of it: without a number a constant belongs to every state
 
     [spins.S]                           # any other name needs its spin
     spin = "1/2"
@@ -15,6 +16,10 @@
 
     [spins."S,14N"]                     # what belongs to two spins
     b_F = 12.5
+
+    [spins.35Cl_1]                      # of two or three equivalent nuclei, the last ones: they are coupled to a total spin I first,
+    total = "I"                         # and last to the rest; quantum numbers I and F in place of F1 and F. Of two each has its
+    chi_aa = -40.0                      # constants, of three on a threefold axis the first alone, or the first and the second together
 
 The spins are coupled in the order in which they stand here.
 """
@@ -24,14 +29,14 @@ from __future__ import annotations
 from collections.abc import Collection
 from typing import TYPE_CHECKING, Any
 
-from rotor.formats.molecules.molecule_tables import TableReader
+from rotor.formats.molecules.molecule_tables import TableReader, uncertain_number
 from rotor.tops.spins.spin_constants import SpinConstants, parse_spins, spin_text, spins_of, twice_of
 
 if TYPE_CHECKING:
     from rotor.molecules.molecule import Molecule
 
 _OF_TABLE = ("unit", "source", "unverified")
-_OF_SPIN = ("spin", "atom", "source", "unverified")
+_OF_SPIN = ("spin", "atom", "total", "source", "unverified")
 
 
 def spins_of_table(table: TableReader | None, molecule: Molecule | None) -> SpinConstants | None:
@@ -46,19 +51,19 @@ def spins_of_table(table: TableReader | None, molecule: Molecule | None) -> Spin
     values: dict[str, float] = {}
     errors: dict[str, float] = {}
     for key, part in parts.items():
-        for symbol, item in part.content.items():
+        for symbol in part.content:
             if symbol in _OF_SPIN:
                 continue
-            name = f"{symbol}({key.replace(' ', '')})"
-            one = TableReader(part.place, symbol, item if isinstance(item, dict) else {"value": item})
-            one.refuse_unknown(("value", "uncertainty", "source", "unverified"))
-            values[name] = one.quantity("value", one.content.get("value"), unit, "MHz")
-            if "uncertainty" in one.content:
-                errors[name] = one.quantity("uncertainty", one.content["uncertainty"], unit, "MHz")
+            before, bracket, state = symbol.partition("[")
+            name = f"{before}({key.replace(' ', '')}){bracket}{state}"
+            values[name], error = uncertain_number(part, symbol, unit)
+            if error is not None:
+                errors[name] = error
     sources = {name: part.text("source") for name, part in parts.items() if "source" in part.content}
     atoms = {name: number for name, part in parts.items() if (number := _atom(part, name, molecule)) is not None}
+    totals = {name: part.text("total") for name, part in parts.items() if "total" in part.content}
     try:
-        return SpinConstants(values, twice, table.text("source"), errors, sources, atoms)
+        return SpinConstants(values, twice, table.text("source"), errors, sources, atoms, totals)
     except ValueError as reason:
         raise ValueError(f"{table.place}: {reason}") from None
 
@@ -105,14 +110,23 @@ def spin_tables(constants: SpinConstants | None, unverified: Collection[str]) ->
     tables: dict[str, dict[str, Any]] = {"spins": {**marked, "unit": "MHz"}}
     for name, twice in constants.twice.items():
         tables[name] = {"spin": None if _is_isotope(name, twice) else spin_text(twice)}
-        tables[name] |= {"atom": constants.atoms.get(name), "source": constants.sources.get(name)}
+        tables[name] |= {
+            "atom": constants.atoms.get(name),
+            "total": constants.totals.get(name),
+            "source": constants.sources.get(name),
+        }
         tables[name]["unverified"] = True if f"spins.{name}" in unverified else None
     for name, value in constants.values.items():
         key = ",".join(spins_of(name))
-        error = constants.uncertainties.get(name)
         tables.setdefault(key, {"source": constants.sources.get(key)})
-        tables[key][name.partition("(")[0]] = value if error is None else {"value": value, "uncertainty": error}
+        symbol = name.partition("(")[0] + name.partition(")")[2]
+        tables[key][symbol] = uncertain_entry(value, constants.uncertainties.get(name))
     return tables
+
+
+def uncertain_entry(value: float, error: float | None) -> float | dict[str, float]:
+    """A number as a file has it, with its standard deviation where it has one."""
+    return value if error is None else {"value": value, "uncertainty": error}
 
 
 def _is_isotope(name: str, twice: int) -> bool:

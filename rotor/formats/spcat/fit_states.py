@@ -22,20 +22,19 @@ from rotor.formats.spcat.l_doubled import functions_of_l, named_by_l
 from rotor.formats.spcat.text.int_file import IntensityFile, Request
 from rotor.formats.spcat.text.par import ParameterFile
 from rotor.formats.spcat.unresolved import HIGHEST_SEARCHED, excluded_parameters, refuse_far_f, spelled_out
-from rotor.quantum.estimates.effect_units import unit_levels
+from rotor.quantum.estimates.effect_units import Functions, unit_levels
+from rotor.quantum.estimates.labelled_spins import found_with_spins
 from rotor.quantum.estimates.state_units import state_units
 from rotor.quantum.estimates.unit_blocks import UnitBlocks, joined
 from rotor.quantum.labelled import LevelModel, MissingLevelsError
 from rotor.quantum.levels import Levels
-from rotor.quantum.spins.levels import levels_of_f, unmixed_levels
+from rotor.quantum.spins.levels import levels_of_f
 from rotor.quantum.wang.rotation import solve_rotation
 
 if TYPE_CHECKING:
     from rotor.quantum.estimates.contracted import ContractedLevels
 
 _NO_REQUEST = IntensityFile("", Request(), ())
-_MOST_ELEMENTS = 1e7  # of vectors over all functions of the F that are solved at a time
-_LARGE = 400  # functions of an F from which on blocks may be contracted
 _AT_ZERO = 1e-30  # MHz: a free parameter that starts at 0 must not be left out of the Hamiltonian
 
 
@@ -164,16 +163,6 @@ def levels_in_blocks(group: Group, angular: Sequence[int]) -> Levels:
     return named_by_l(levels, pairs, str(levels.representation)) if pairs else levels
 
 
-def _named_functions(group: Group, angular: Sequence[int]) -> Levels:
-    """Levels in blocks for their names alone: with spins the functions, which have the names of the states and need not be solved.
-
-    Of three equivalent nuclei the levels, solved: their functions are no products.
-    """
-    if group.spins and group.states[0].equivalent < 3:
-        return unmixed_levels(group.top, (group.effect,), angular)[0]
-    return levels_in_blocks(group, angular)
-
-
 def _with_labels(group: Group, form: Format, labels: Ints, names: Sequence[str], values: Floats) -> list[_Solved]:
     """The labels that lie in the group, found in its levels by the quantum numbers that the file prints; some F at a time."""
     here = _of_group(group, form, labels)
@@ -186,17 +175,8 @@ def _with_labels(group: Group, form: Format, labels: Ints, names: Sequence[str],
     if _direct(group, form):
         return _of_states(group, form, labels, here, names, values)
     twice = 2 * total - sum(group.spins) % 2
-    every = distinct(twice)
-    size = len(group.states) * int(np.prod([spin + 1 for spin in group.spins]))
-    if group.spins and group.states[0].equivalent < 3 and size * int(every.max() + 1) > _LARGE:
-        contracted = _contracted(group, form, labels, here, every, names, values)
-        if contracted is not None:
-            return [contracted]
-    pieces = np.split(every, np.flatnonzero(np.diff(np.cumsum((size * (every + 1.0)) ** 2) // _MOST_ELEMENTS)) + 1)
-    found = [
-        _of_some_f(group, form, labels, here[np.isin(twice, some)], some.tolist(), names, values) for some in pieces
-    ]
-    return [one for one in found if one is not None]
+    find = _of_spins if group.spins else _of_blocks
+    return find(group, form, labels, here, twice, names, values)
 
 
 def _direct(group: Group, form: Format) -> bool:
@@ -224,21 +204,19 @@ def _of_states(
     return [_Solved(here[found], columns, joined([(blocks, order, every)], len(found)))]
 
 
-def _contracted(
-    group: Group, form: Format, labels: Ints, here: Ints, every: Ints, names: Sequence[str], values: Floats
-) -> _Solved | None:
-    """The labels at the places `here`, each among the functions near it; None where the blocks had better be solved whole."""
-    from rotor.quantum.estimates.contracted import contracted_levels
-
-    levels, plan = unmixed_levels(group.top, (group.effect,), every.tolist())
-    rows = _rows_of(group, levels, form, labels[here])
-    found = rows >= 0
-    if not found.any():
-        return None
+def _of_spins(
+    group: Group, form: Format, labels: Ints, here: Ints, twice: Ints, names: Sequence[str], values: Floats
+) -> list[_Solved]:
+    """The labels at the places `here`, of so many doubled F, of states with spins."""
     columns, start = _columns_of(group, names, values)
     own = tuple(group.effect.parameters(group.top))
-    blocks = contracted_levels(group.top, (group.effect,), plan, levels, rows[found], own, start)
-    return None if blocks is None else _Solved(here[found], columns, blocks)
+
+    def rows_of(levels: Levels, chosen: Ints) -> Ints:
+        return _rows_of(group, levels, form, labels[here[chosen]])
+
+    functions = partial(_functions_of, group) if group.effect.pairs else None
+    found = found_with_spins(group.top, (group.effect,), own, start, twice, rows_of, functions)
+    return [_Solved(here[one.rows], columns, one.blocks) for one in found]
 
 
 def _rows_of(group: Group, levels: Levels, form: Format, labels: Ints) -> Ints:
@@ -256,27 +234,24 @@ def _columns_of(group: Group, names: Sequence[str], values: Floats) -> tuple[Int
     return columns, np.where(values == 0, _AT_ZERO, values)[columns]
 
 
-def _of_some_f(
-    group: Group,
-    form: Format,
-    labels: Ints,
-    here: Ints,
-    angular: Sequence[int],
-    names: Sequence[str],
-    values: Floats,
-) -> _Solved | None:
-    """The labels at the places `here` among the levels of some doubled F; None without any."""
-    levels = _named_functions(group, angular)
+def _of_blocks(
+    group: Group, form: Format, labels: Ints, here: Ints, twice: Ints, names: Sequence[str], values: Floats
+) -> list[_Solved]:
+    """The labels at the places `here`, of so many doubled J, of states without spins."""
+    levels = levels_in_blocks(group, distinct(twice).tolist())
     rows = _rows_of(group, levels, form, labels[here])
     found = rows >= 0
     if not found.any():
-        return None
+        return []
     own = tuple(group.effect.parameters(group.top))
     columns, start = _columns_of(group, names, values)
-    pairs = group.effect.pairs
-    functions = partial(functions_of_l, pairs=pairs, representation=str(levels.representation)) if pairs else None
-    blocks = unit_levels(group.top, levels, rows[found], own, start, functions)
-    return _Solved(here[found], columns, blocks)
+    functions = _functions_of(group, levels) if group.effect.pairs else None
+    return [_Solved(here[found], columns, unit_levels(group.top, levels, rows[found], own, start, functions))]
+
+
+def _functions_of(group: Group, levels: Levels) -> Functions:
+    """The functions by which levels of l-doubled states are called."""
+    return partial(functions_of_l, pairs=group.effect.pairs, representation=str(levels.representation))
 
 
 def _of_group(group: Group, form: Format, labels: Ints) -> Ints:

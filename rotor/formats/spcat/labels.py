@@ -30,6 +30,7 @@ from rotor.quantum.wang.basis import WangBlock, names_of
 BY_DIAG = (1, 2, 4, 5)  # those that need another naming than that of levels
 _OF_WANG = (0, 2)  # whose groups are Wang blocks
 _BY_DIAGONAL = (2, 5)
+_CLEAR = 0.5  # a share above it is the largest
 _EQUAL = 1e-11  # of the largest energy: the two functions of one K have one diagonal element but for round-off
 
 
@@ -49,6 +50,11 @@ def named_by(levels: Levels, diag: int, oblate: bool) -> Levels:
         return levels
     tables, shares = [], []
     for block in levels.blocks:
+        clear = _of_clear_parts(block, oblate, str(levels.representation)) if diag == 0 else None
+        if clear is not None:
+            tables.append(clear[0])
+            shares.append(clear[1])
+            continue
         functions = functions_of(block, str(levels.representation))
         energies = -block.energies_mhz if oblate else block.energies_mhz
         at = places(functions, energies, diag)
@@ -68,6 +74,24 @@ def named_by(levels: Levels, diag: int, oblate: bool) -> Levels:
 def _coupled(block: object) -> bool:
     """Whether a block without spins holds several Wang blocks."""
     return isinstance(block, CoupledBlock) and len(block.parts) > 1
+
+
+def _of_clear_parts(block: object, oblate: bool, representation: str) -> tuple[Ints, Floats] | None:
+    """Names v, Ka, Kc by DIAG 0 and shares where every state has more than half of it in one Wang block; None elsewhere."""
+    if not isinstance(block, CoupledBlock):
+        return None
+    of_parts = np.add.reduceat(block.vectors**2, [part.start for part in block.parts], axis=0)
+    of_state, shares = of_parts.argmax(axis=0), of_parts.max(axis=0)
+    sizes = [part.basis.size for part in block.parts]
+    if shares.min() <= _CLEAR or (np.bincount(of_state, minlength=len(sizes)) != sizes).any():
+        return None
+    names = np.empty((len(shares), 3), dtype=np.int64)
+    for place, part in enumerate(block.parts):
+        ka, kc = names_of(part.basis, representation)
+        order = np.argsort(kc if representation == "IIIl" else ka)
+        rows = np.flatnonzero(of_state == place)  # by energy
+        names[rows[::-1] if oblate else rows] = np.column_stack([np.full_like(ka, part.v), ka, kc])[order]
+    return names, shares
 
 
 def _shares_of_groups(functions: Functions, at: Ints, diag: int) -> Floats:

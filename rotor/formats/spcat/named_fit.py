@@ -13,9 +13,11 @@ import numpy as np
 
 from rotor.arrays import Floats
 from rotor.fit.fit import Fit
+from rotor.fit.top_constants import TopConstants
 from rotor.formats.spcat.codes import constants_and_matrix
 from rotor.formats.spcat.fit_input import packed_correlations
 from rotor.formats.spcat.model import parameter_file
+from rotor.formats.spcat.named_parameters import named_parameters
 from rotor.formats.spcat.text.par import Parameter, ParameterFile
 from rotor.tops.top import Top
 
@@ -30,11 +32,15 @@ def named_file(fit: Fit, title: str, *, variances: bool) -> ParameterFile:
 
     Raises ValueError where a fitted combination of constants, or an a-priori error, has no parameter of its own there.
     """
-    top = Top.from_constants(fit.named, name=title)
-    highest = int(max(fit.lines.upper[:, 0].max(), fit.lines.lower[:, 0].max()))
-    file = parameter_file(top, kmax=min(max(highest, _KNMAX), 359))
-    _, matrix = constants_and_matrix(file)
-    back = np.linalg.pinv(matrix) @ fit.parameters.matrix  # SPFIT's parameters by the free ones
+    highest = max(int(fit.lines.upper[:, 0].max()), int(fit.lines.lower[:, 0].max()), _KNMAX)
+    if isinstance(fit.named, TopConstants):
+        file, codes = named_parameters(fit.named, title, min(highest, 359))
+        matrix: Floats = np.asarray(np.linalg.pinv(codes), dtype=np.float64)
+    else:
+        file = parameter_file(Top.from_constants(fit.named, name=title), kmax=min(highest, 359))
+        matrix = constants_and_matrix(file)[1]
+        codes = np.asarray(np.linalg.pinv(matrix), dtype=np.float64)
+    back = codes @ fit.parameters.matrix  # SPFIT's parameters by the free ones
     back[np.abs(back) < _ROUND_OFF] = 0.0
     if int(back.any(axis=1).sum()) == len(fit.parameters.names):
         parameters, free = _one_for_one(fit, file.parameters, back, variances)
@@ -43,7 +49,8 @@ def named_file(fit: Fit, title: str, *, variances: bool) -> ParameterFile:
     numbers = iter(range(len(free)))
     columns = [-1 if p.error == _HELD else next(numbers) for p in parameters if not p.constrained]
     rest = packed_correlations(_correlations(fit, free), columns) if variances else ""
-    header = replace(file.header, npar=len(parameters), nline=len(fit.lines), nitr=100)
+    count = len(fit.lines) if file.header.nline > 0 else -len(fit.lines)
+    header = replace(file.header, npar=len(parameters), nline=count, nitr=100)
     return replace(file, header=header, parameters=tuple(parameters), rest=rest)
 
 

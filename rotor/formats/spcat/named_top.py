@@ -1,8 +1,9 @@
 """A .par or .var file with spins and several states as a top of named constants: chi_aa(14N), B[1], G_c[0,1], ...
 
 The files know sizes of spins and no isotopes: a spin is called after the isotope that labels such as chi_aa(14N) name, where its size
-is that, else by its place in SPIND, I1, I2, ...; electrons are no spins of another kind there. What has no name here (a total spin of
-equivalent nuclei, l-doubled states, terms outside orthorhombic symmetry in one state, spin-orbit terms) is refused with its meaning;
+is that, else by its place in SPIND, I1, I2, ...; electrons are no spins of another kind there. Nuclei of one total spin (IAX below 0)
+have it by the name I. What has no name here (l-doubled states, terms outside orthorhombic symmetry in one state, spin-orbit terms) is
+refused with its meaning;
 `rotor.formats.spcat.predict` computes the files themselves.
 """
 
@@ -16,13 +17,14 @@ from math import gcd
 import numpy as np
 
 from rotor.arrays import Floats
-from rotor.formats.spcat.codes import HELD_BELOW, constants_of, is_linear, join_code, split_code
+from rotor.formats.spcat.codes import AXES, HELD_BELOW, constants_of, is_linear, join_code, split_code
 from rotor.formats.spcat.dipole_codes import dipoles_of
 from rotor.formats.spcat.file_effect import CodedLine, coded_lines
 from rotor.formats.spcat.file_model import allowed
 from rotor.formats.spcat.model import weights_of
 from rotor.formats.spcat.series import is_constant, is_series
 from rotor.formats.spcat.states import StateOptions, states_of
+from rotor.formats.spcat.symmetry import halved_across
 from rotor.formats.spcat.text.int_file import IntensityFile
 from rotor.formats.spcat.text.par import Options, Parameter, ParameterFile
 from rotor.quantum.spins.operators import Cosines, CosinesWithN, Scalar
@@ -87,7 +89,7 @@ def named_top(file: ParameterFile, intensities: IntensityFile | None = None, *, 
         spin_weights=weights[0],
         symmetry_checked=False,
         states=_states(constants, energies, couplings, weights, dipoles),
-        spin_constants=_spins(rows, states, turned, errors),
+        spin_constants=_spins(rows, states, turned, first.nvib < 0, errors),
     )
 
 
@@ -97,7 +99,9 @@ def _refuse(file: ParameterFile, states: tuple[StateOptions, ...], intensities: 
     reasons = {
         "FF, EX, TYP 90 to 99: a Fourier or Euler series": any(is_series(d) or is_constant(d) for d in digits),
         f"IXX = {first.ixx}: a sum of angular momenta that is held for conserved": first.ixx != 0,
-        f"IAX = {first.iax}: a total spin of equivalent nuclei": any(s.i_tot for s in states),
+        f"IAX = {first.iax}: a total spin of three nuclei with unlike weights": any(
+            s.equivalent == 3 and s.plus != s.minus for s in states
+        ),
         f"EWT = {first.ewt}: an l-doubled state": any(s.l_code for s in states),
         f"XOPT = {first.xopt}: NEWLZ, NOFC or G12": first.xopt >= 10,
         "KNMIN: a range of K that does not begin with 0": any(s.kmin for s in states),
@@ -189,8 +193,11 @@ def _weights(file: ParameterFile, states: tuple[StateOptions, ...], symmetric: b
     found, divisors = [], []
     for v, state in enumerate(states):
         option = replace(_option_of(file, v), vsym=0, spind=-1 if file.options[0].spind < 0 else 1)
-        option = replace(option, nvib=-1 if file.options[0].nvib < 0 else 1)
-        if state.fold in (3, 5) and state.plus != state.minus:
+        option = replace(option, nvib=-1 if file.options[0].nvib < 0 else 1, iax=abs(option.iax))
+        if state.equivalent == 3:
+            found.append(SpinWeights())  # with their spins all levels are of A species
+            divisors.append(2 * max(state.plus, 1))
+        elif state.fold in (3, 5) and state.plus != state.minus:
             if not symmetric:
                 raise ValueError(f"IAX = {state.iax} of an asymmetric top with unlike WTPL and WTMN {NO_NAME}")
             e = state.e_weight if min(state.plus, state.minus) > 0 else state.e_weight / 2
@@ -296,15 +303,16 @@ def _element(matrix: Floats, letters: str) -> float:
 
 
 def _spins(
-    rows: list[tuple[CodedLine, Parameter]], states: tuple[StateOptions, ...], turned: bool, errors: bool
+    rows: list[tuple[CodedLine, Parameter]], states: tuple[StateOptions, ...], turned: bool, oblate: bool, errors: bool
 ) -> SpinConstants | None:
     sizes, called = states[0].spins, _names_of_spins(rows, states[0].spins)
+    equivalent = states[0].equivalent
     sums: dict[tuple[str, str], _Sum] = {}
     for line, parameter in rows:
         if line.operator.rotor is None:
             continue
         try:
-            kind, matrix = _tensor(line)
+            kind, matrix = _tensor(_of_one(line, states[0], oblate))
         except ValueError as reason:
             raise ValueError(f"parameter {parameter.code}: {reason}") from None
         o, value = line.operator, parameter.value
@@ -324,7 +332,14 @@ def _spins(
                 spreads[symbol + rest] = error
     if not sizes:
         return None
-    return SpinConstants(values, dict(zip(called, sizes, strict=True)), uncertainties=spreads)
+    totals = dict.fromkeys(called[len(called) - equivalent :], "I")
+    return SpinConstants(values, dict(zip(called, sizes, strict=True)), uncertainties=spreads, totals=totals)
+
+
+def _of_one(line: CodedLine, state: StateOptions, oblate: bool) -> CodedLine:
+    """A line with what it is of one nucleus: the parts that change K of one of three equivalent nuclei count half there."""
+    of_three = state.equivalent == 3 and max(line.operator.spins, default=0) > len(state.spins) - 3
+    return line._replace(operator=halved_across(line.operator, AXES["IIIl" if oblate else "Ir"])) if of_three else line
 
 
 def _names_of_spins(rows: list[tuple[CodedLine, Parameter]], sizes: tuple[int, ...]) -> list[str]:

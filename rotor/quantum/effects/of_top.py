@@ -31,6 +31,7 @@ def spin_effects(top: Top) -> tuple[QuantumEffect, ...]:
     if top.spin_constants is None:
         return ()
     _refuse_like_nuclei(top)
+    _refuse_unknown_states(top)
     return _effects(top.spin_constants)
 
 
@@ -42,7 +43,10 @@ def _effects(constants: SpinConstants) -> tuple[QuantumEffect, ...]:
     from rotor.quantum.spins.terms import Spin
 
     kinds: tuple[type[SpinEffect], ...] = (NuclearQuadrupole, SpinRotation, SpinSpin)
-    spins = tuple(Spin(name, twice, name.startswith("S")) for name, twice in constants.twice.items())
+    spins = tuple(
+        Spin(name, twice, name.startswith("S"), constants.totals.get(name, ""))
+        for name, twice in constants.twice.items()
+    )
     values: dict[type[SpinEffect], dict[str, float]] = {}
     for name, value in constants.values.items():
         known = [one for kind in kinds for one in kind.symbols]
@@ -54,10 +58,27 @@ def _effects(constants: SpinConstants) -> tuple[QuantumEffect, ...]:
     return tuple(kind(values[kind], spins) for kind in kinds if kind in values)
 
 
+def _refuse_unknown_states(top: Top) -> None:
+    """ValueError for a constant of a spin in a state that the top has not."""
+    from rotor.quantum.effects.spin_effect import parse_name
+
+    assert top.spin_constants is not None
+    count = 1 if top.states is None else top.states.count
+    for name in top.spin_constants.values:
+        states = parse_name(name).states
+        if states and states[1] >= count:
+            raise ValueError(
+                f"{name}: there is no state {states[1]}; {top.name or 'this top'} has {count}, counted from 0"
+            )
+
+
 def _refuse_like_nuclei(top: Top) -> None:
-    """Nuclei that are coupled one by one must not be in the spin weights too."""
+    """Nuclei that are coupled one by one must not be in the spin weights too; with a total spin of two these are what I leaves of them."""
     assert top.spin_constants is not None
     labels = [name.partition("_")[0] for name in top.spin_constants.twice]
+    if len(top.spin_constants.totals) == 2:
+        top.spin_weights.exchanged()  # raises where an exchange of two nuclei does not tell the classes apart
+        labels = [name.partition("_")[0] for name in top.spin_constants.twice if name not in top.spin_constants.totals]
     like = [label for label in dict.fromkeys(labels) if labels.count(label) > 1]
     if like and top.spin_weights.rule != "none":
         raise ValueError(

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from rotor.molecules.molecule import Molecule
 
 _ITEM = re.compile(
-    r"(?P<name>[A-Za-z][\w-]*\([^()]*\))\s*=\s*(?P<number>[-+−]?[\d.]+(?:[eEdD][-+]?\d+)?)(?P<gap>\s*)(?P<unit>[A-Za-z][\w-]*(?![\w(-]))?"
+    r"(?P<name>[A-Za-z][\w-]*\([^()]*\)(?:\[\d+\])?)\s*=\s*(?P<number>[-+−]?[\d.]+(?:[eEdD][-+]?\d+)?)(?P<gap>\s*)(?P<unit>[A-Za-z][\w-]*(?![\w(-]))?"
 )
 _ISOTOPE = re.compile(r"(\d+[A-Z][a-z]?|D|T)(?:_\w+)?")
 
@@ -33,8 +33,9 @@ class SpinConstants:
     """Values in MHz by name, the spins in the order in which they are coupled, and where the values are from.
 
     twice: twice every spin, by its name. uncertainties: in MHz, of the constants that have one. sources: of single spins.
-    atoms: the numbers of the nuclei in the geometry, counted from 1, by spin. ValueError for a spin that is none, and for
-    constants of a spin that is not listed.
+    atoms: the numbers of the nuclei in the geometry, counted from 1, by spin. totals: the name of the total spin, such as "I", of two
+    or three equivalent nuclei that are coupled to it first, by spin. ValueError for a spin that is none, and for constants of a spin
+    that is not listed.
     """
 
     values: Mapping[str, float]
@@ -43,13 +44,14 @@ class SpinConstants:
     uncertainties: Mapping[str, float] = field(default_factory=dict)
     sources: Mapping[str, str] = field(default_factory=dict)
     atoms: Mapping[str, int] = field(default_factory=dict)
+    totals: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         plain = ({_in_short(name): value for name, value in one.items()} for one in (self.values, self.uncertainties))
         values, errors = without_trace(*plain)
         object.__setattr__(self, "values", values)
         object.__setattr__(self, "uncertainties", errors)
-        for name in ("values", "twice", "uncertainties", "sources", "atoms"):
+        for name in ("values", "twice", "uncertainties", "sources", "atoms", "totals"):
             object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
         for name, twice in self.twice.items():
             if twice < 1:
@@ -61,12 +63,18 @@ class SpinConstants:
                     f"spin {name} = {spin_text(twice)}: the isotope has {spin_text(twice_of(name))}; leave its spin out, or give it "
                     "another name"
                 )
+        _refuse_totals(self.totals, self.twice)
         for name in self.values:
             for spin in spins_of(name):
                 if spin not in self.twice:
                     raise ValueError(f"{name}: spin {spin} is not among {', '.join(self.twice) or 'none'}")
             if name.startswith("chi_") and any(self.twice[spin] < 2 for spin in spins_of(name)):
                 raise ValueError(f"{name}: a spin of 1/2 has no quadrupole moment; that needs a spin of 1 or more")
+        pairs: dict[tuple[str, ...], str] = {}
+        for name in self.values:
+            first = pairs.setdefault((name.partition("(")[0], name.partition(")")[2], *sorted(spins_of(name))), name)
+            if first != name:
+                raise ValueError(f"{first} and {name} are one constant of two spins; give it once")
         for name, error in self.uncertainties.items():
             if name not in self.values or not error >= 0:
                 raise ValueError(
@@ -74,16 +82,20 @@ class SpinConstants:
                 )
 
     def __reduce__(self) -> tuple[type[SpinConstants], tuple[Any, ...]]:
-        plain = (dict(self.uncertainties), dict(self.sources), dict(self.atoms))
+        plain = (dict(self.uncertainties), dict(self.sources), dict(self.atoms), dict(self.totals))
         return type(self), (dict(self.values), dict(self.twice), self.source, *plain)
 
     def of(self, spin: str) -> dict[str, float]:
-        """The constants of one spin alone, by name without the spin.
+        """The constants of one spin alone in every state, by name without the spin.
 
         >>> SpinConstants.parse("chi_aa(14N)=-4.22MHz C_bb(14N)=2kHz T_aa(14N,D)=2kHz").of("14N")
         {'chi_aa': -4.22, 'C_bb': 0.002}
         """
-        return {name.partition("(")[0]: value for name, value in self.values.items() if spins_of(name) == (spin,)}
+        return {
+            name.partition("(")[0]: value
+            for name, value in self.values.items()
+            if spins_of(name) == (spin,) and "[" not in name
+        }
 
     @classmethod
     def parse(cls, text: str, spins: str | None = None, source: str = "") -> SpinConstants:
@@ -116,8 +128,10 @@ class SpinConstants:
             if name in values:
                 raise ValueError(f"{text!r}: {name} is given twice; leave one out")
             values[name] = parse_quantity(f"{item['number']} {item['unit'] or shared}", "MHz")
-        given = parse_spins(spins) if spins else {}
-        return cls(values, given | {s: twice_of(s) for s in _named(values) if s not in given}, source)
+        given, totals = parse_coupled(spins or "")
+        every: dict[str, int] = {**given, **{s: twice_of(s) for s in _named(values) if s not in given}}
+        ordered = {name: every[name] for name in sorted(every, key=lambda name: name in totals)}
+        return cls(values, ordered, source, totals=totals)
 
 
 def without_trace(
@@ -229,6 +243,44 @@ def spin_text(twice: int) -> str:
     ('3/2', '1')
     """
     return f"{twice}/2" if twice % 2 else str(twice // 2)
+
+
+def _refuse_totals(totals: Mapping[str, str], twice: Mapping[str, int]) -> None:
+    """ValueError for a total spin of other than the last two or three spins of one size."""
+    if not totals:
+        return
+    last = list(twice)[-len(totals) :]
+    if (
+        len(totals) not in (2, 3)
+        or set(totals) != set(last)
+        or len(set(totals.values())) > 1
+        or not all(totals.values())
+        or len({twice[name] for name in last}) > 1
+    ):
+        raise ValueError(
+            f"total spin of {', '.join(totals)}: expected one total of two or three equivalent nuclei of one size, the last ones among "
+            f"{', '.join(twice)}"
+        )
+
+
+def parse_coupled(text: str) -> tuple[dict[str, int], dict[str, str]]:
+    """Twice the spins by name, and of those that are coupled to a total I first its name, from "14N 35Cl_1+35Cl_2".
+
+    >>> parse_coupled("S=1/2 1H_1+1H_2=1/2")
+    ({'S': 1, '1H_1': 1, '1H_2': 1}, {'1H_1': 'I', '1H_2': 'I'})
+    """
+    found, totals = dict[str, int](), dict[str, str]()
+    for part in text.replace(",", " ").split():
+        names, equals, value = part.partition("=")
+        together = names.split("+")
+        for name in together:
+            if not name:
+                raise ValueError(f"{text!r}: expected spins such as S=1/2 14N or 35Cl_1+35Cl_2; {part!r} is none")
+            if name in found:
+                raise ValueError(f"{text!r}: spin {name} is given twice; once is enough")
+            found |= parse_spins(f"{name}={value}") if equals else {name: twice_of(name)}
+        totals |= dict.fromkeys(together, "I") if len(together) > 1 else {}
+    return found, totals
 
 
 def parse_spins(text: str) -> dict[str, int]:

@@ -59,6 +59,27 @@ class SpinWeights:
         """The weights by class name, as `from_mapping` takes them; empty for the rule "none"."""
         return {} if self.rule == "none" else dict(zip(self.classes, self.values, strict=True))
 
+    def exchanged(self) -> SpinWeights:
+        """The weights with the two classes exchanged that half a turn tells apart, as levels of odd total spin of two nuclei have them.
+
+        Raises ValueError for weights that are not those of half a turn about one axis.
+
+        >>> SpinWeights.from_mapping({"ee": 1, "eo": 1, "oe": 0, "oo": 0}).exchanged().to_mapping()
+        {'ee': 0, 'eo': 0, 'oe': 1, 'oo': 1}
+        """
+        given = self.to_mapping()
+        if self.rule in ("none", "J"):
+            return SpinWeights(self.rule, self.classes, self.values[::-1])
+        for odd in (("oe", "oo"), ("eo", "oe"), ("eo", "oo")) if self.rule == "KaKc" else ():
+            sides = [{w for name, w in given.items() if (name in odd) == side} for side in (False, True)]
+            if len(sides[0]) == len(sides[1]) == 1:
+                (even,), (other,) = sides
+                return SpinWeights(self.rule, self.classes, tuple(even if n in odd else other for n in self.classes))
+        raise ValueError(
+            f"spin weights {given} beside a total spin of two nuclei: expected those of half a turn about one axis, such as ee = eo = 1 "
+            "and oe = oo = 0, of levels of even total spin; those of odd total spin have them exchanged"
+        )
+
     @property
     def mean(self) -> float:
         """The weight of one component averaged over many levels: what the classical limit of Q carries."""

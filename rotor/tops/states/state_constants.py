@@ -46,7 +46,7 @@ class StateConstants:
     names: by number from 0 on, such as "0+", "0-". weights: of states, 0 among them, that differ from the top's. dipoles: (μa, μb, μc)
     in debye by pairs (v', v), within states and between them; a state that is not named has the top's dipole, and no pair that is not
     named has one. symmetry: a group of which the states are, such as "C2v" or "Cs(ab)", with the plane or the axis; "" where none is
-    declared.
+    declared. uncertainties: in MHz, of the constants that have one.
 
     Raises ValueError for names without a state, for a coupling or dipole of a state that has no constants, and for two couplings that
     the declared symmetry does not allow together.
@@ -61,14 +61,25 @@ class StateConstants:
     dipoles: Mapping[tuple[int, int], Vector] = field(default_factory=dict)
     source: str = ""
     symmetry: str = ""
+    uncertainties: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         pairs = {(max(pair), min(pair)): _vector(vector) for pair, vector in self.dipoles.items()}
-        for name, content in (("values", self.values), ("weights", self.weights), ("dipoles", pairs)):
+        tables: dict[str, Mapping[Any, Any]] = {"values": self.values, "uncertainties": self.uncertainties}
+        for name, content in (tables | {"weights": self.weights, "dipoles": pairs}).items():
             object.__setattr__(self, name, MappingProxyType(dict(content)))
+        for name, error in self.uncertainties.items():
+            if name not in self.values or not error >= 0:
+                raise ValueError(
+                    f"uncertainty {error:g} of {name}: expected a number of at least 0 and a constant that is there"
+                )
         self._refuse_unknown_states()
+        found: dict[tuple[str, tuple[int, ...]], str] = {}
         for name in self.couplings:
             kind_of_coupling(name)
+            first = found.setdefault((name.partition("[")[0].strip(), states_of_name(name)), name)
+            if first != name:
+                raise ValueError(f"{first} and {name} are one coupling; give it once")
         if self.symmetry and self.symmetry not in GROUPS:
             raise ValueError(f"symmetry {self.symmetry!r} of states: expected one of {', '.join(GROUPS)}")
         if self.symmetry:
@@ -76,7 +87,7 @@ class StateConstants:
 
     def __reduce__(self) -> tuple[Any, ...]:
         content = (dict(self.values), self.names, dict(self.weights), dict(self.dipoles), self.source, self.symmetry)
-        return type(self), content
+        return type(self), (*content, dict(self.uncertainties))
 
     @property
     def count(self) -> int:

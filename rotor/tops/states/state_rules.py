@@ -34,11 +34,22 @@ def refuse_incomplete_states(states: StateConstants, kind: str, constants: Const
         strange = [name for name in states.of_state(v) if name not in known and not powers_of_spelled(name)]
         if strange:
             raise ValueError(f"{strange[0]}[{v}]: a state of this {kind} top has {', '.join(known)}")
+        if kind == "asymmetric" and constants.reduction is None:
+            _refuse_reduced(states, v)
         missing = [name for name in rigid if name not in states.of_state(v)]
         if missing:
             raise ValueError(
                 f"state {states.name_of(v)}: no {', '.join(f'{name}[{v}]' for name in missing)}; each state has constants of its own"
             )
+
+
+def _refuse_reduced(states: StateConstants, v: int) -> None:
+    """ValueError for distortion of a further state where the first does not say in which reduction."""
+    reduced = [name for name in states.of_state(v) if name not in ("E", "A", "B", "C") and not powers_of_spelled(name)]
+    if reduced:
+        raise ValueError(
+            f'{reduced[0]}[{v}]: the constants of the first state are rigid and say no reduction; give it to them, reduction = "A" or "S"'
+        )
 
 
 def refuse_forbidden_couplings(states: StateConstants, symmetry: Symmetry, frame: PrincipalFrame) -> None:

@@ -1,0 +1,194 @@
+"""All constants of a top with further states and with spins, under one set of names, as a fit takes them.
+
+    A, DeltaJ              of the top's own state, as in `rotor.tops.constants`
+    E[1], A[1], DeltaJ[1]  of state 1
+    G_c[0,1], W[0,1]       between states 0 and 1, see `rotor.quantum.effects.interactions`
+    chi_aa(14N)            of spins, in every state; chi_aa(14N)[1] what state 1 has more of it
+
+They are the names of the parameters of `rotor.quantum.effects.of_top.effects_of`, in the same order.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from types import MappingProxyType
+from typing import Any
+
+from rotor.quantum.effect import QuantumEffect
+from rotor.quantum.effects.of_top import effects_of
+from rotor.quantum.effects.spin_effect import parse_name
+from rotor.quantum.levels import Levels
+from rotor.quantum.solve import solve_levels
+from rotor.tops.constants import Constants
+from rotor.tops.spins.spin_constants import SpinConstants, spins_of
+from rotor.tops.states.state_constants import StateConstants, states_of_name
+from rotor.tops.top import Top
+from rotor.tops.uncertain_numbers import write_number
+
+
+@dataclass(frozen=True, eq=False)
+class TopConstants:
+    """The constants of a top by name; those of spins where `hyperfine` says so.
+
+    values, uncertainties : in MHz, by names as above. Raises ValueError, as the effects do, for names that are none.
+
+    >>> from rotor.tops.spins.spin_constants import SpinConstants
+    >>> top = Top.from_constants("A=9 B=3 C=2 GHz", spin_constants=SpinConstants.parse("chi_aa(14N)=-4 MHz"))
+    >>> constants = TopConstants(top, hyperfine=True)
+    >>> constants.own_name("Δ_J"), dict(constants.values)
+    ('DeltaJ', {'A': 9000.0, 'B': 3000.0, 'C': 2000.0, 'chi_aa(14N)': -4.0})
+    >>> constants.replace(**{"chi_ab(14N)": 1.0})["chi_ab(14N)"]
+    1.0
+    """
+
+    top: Top
+    hyperfine: bool = False
+
+    def __post_init__(self) -> None:
+        self.effects  # noqa: B018  every name is checked when the set is made
+
+    @property
+    def kind(self) -> str:
+        """Of the top."""
+        return self.top.kind
+
+    @property
+    def reduction(self) -> str | None:
+        """Of the top's own constants, and of those of its states."""
+        return self.top.constants.reduction
+
+    @property
+    def representation(self) -> str | None:
+        """Of the top's own constants, and of those of its states."""
+        return self.top.constants.representation
+
+    @cached_property
+    def effects(self) -> tuple[QuantumEffect, ...]:
+        """What the Hamiltonian consists of."""
+        return effects_of(self.top, self.hyperfine)
+
+    @cached_property
+    def values(self) -> Mapping[str, float]:
+        """Every constant in MHz."""
+        return MappingProxyType(
+            {self.own_name(name): value for part in self._parts for name, value in part.values.items()}
+        )
+
+    @cached_property
+    def uncertainties(self) -> Mapping[str, float]:
+        """One standard deviation in MHz of the constants that have one."""
+        found = {self.own_name(name): error for part in self._parts for name, error in part.uncertainties.items()}
+        return MappingProxyType(found)
+
+    @property
+    def _parts(self) -> list[Constants | StateConstants | SpinConstants]:
+        spins = self.top.spin_constants if self.hyperfine else None
+        return [part for part in (self.top.constants, self.top.states, spins) if part is not None]
+
+    @cached_property
+    def _first_levels(self) -> Levels:
+        return solve_levels(self.top, 1, effects=self.effects)
+
+    @property
+    def quanta(self) -> tuple[str, ...]:
+        """The quantum numbers of a level: those of the rotation, then v, then the sums with spins."""
+        names = self._first_levels.quanta_names
+        rotation = [name for name in ("n", "j", "k", "ka", "kc") if name in names]
+        if rotation[0] == "n" and "j" in rotation:  # the sum with the spin of an electron
+            rotation.remove("j")
+        return (*rotation, *(["v"] if "v" in names else []), *(n for n in names if n != "v" and n not in rotation))
+
+    @property
+    def halves(self) -> frozenset[str]:
+        """Those of them that are half-integers, and stored as twice their value."""
+        return self._first_levels.halves
+
+    def __getitem__(self, name: str) -> float:
+        return self.values[self.own_name(name)]
+
+    def __contains__(self, name: str) -> bool:
+        return self.own_name(name) in self.values
+
+    def own_name(self, name: str) -> str:
+        """How this set spells a name; ValueError for one that is written as none is.
+
+        >>> TopConstants(Top.from_constants("A=9 B=3 C=2 GHz")).own_name("G_c[1,0]")
+        'G_c[0,1]'
+        """
+        if "(" in name:
+            return parse_name(name).text
+        if "[" not in name:
+            return self.top.constants.own_name(name)
+        states, head = states_of_name(name), name.partition("[")[0].strip()
+        return parse_name(name).text if len(states) == 2 else f"{self.top.constants.own_name(head)}[{states[0]}]"
+
+    def replace(self, **changes: Any) -> TopConstants:
+        """A changed set: constants that it lacks are added, those set to None left out.
+
+        A changed constant loses its uncertainty, unless `uncertainties` has the whole table of them. Raises ValueError for a state or a
+        spin that the top has not, and for names that states or spins do not have.
+        """
+        given: Mapping[str, float] | None = changes.pop("uncertainties", None)
+        new = {self.own_name(name): value for name, value in changes.items()}
+        for name in new:
+            self._refuse_unknown(name)
+        values = {name: value for name, value in {**self.values, **new}.items() if value is not None}
+        known = self.uncertainties if given is None else {self.own_name(name): error for name, error in given.items()}
+        errors = {
+            name: error for name, error in known.items() if name in values and (given is not None or name not in new)
+        }
+        return self._of(values, errors)
+
+    def _of(self, values: Mapping[str, float], errors: Mapping[str, float]) -> TopConstants:
+        """A set with these values and uncertainties, and all else of this one."""
+        top = self.top
+        gone = {name: None for name in top.constants.values if name not in values}
+        own = top.constants.replace(**_plain(values), **gone, uncertainties=_plain(errors))
+        states, spins = top.states, top.spin_constants
+        if states is not None:
+            states = replace(states, values=_of_states(values), uncertainties=_of_states(errors))
+        if spins is not None and self.hyperfine:
+            spins = replace(spins, values=_of_spins(values), uncertainties=_of_spins(errors))
+        made = replace(top, constants=own, states=states, spin_constants=spins, covariance=None, level_table=None)
+        return TopConstants(made, self.hyperfine)
+
+    def _refuse_unknown(self, name: str) -> None:
+        """ValueError for a state or a spin that the set has not."""
+        states = parse_name(name).states if "(" in name else states_of_name(name) if "[" in name else None
+        count = 1 if self.top.states is None else self.top.states.count
+        if states and max(states) >= count:
+            raise ValueError(
+                f"{name}: there is no state {max(states)}; the constants to start from have {count}, counted from 0"
+            )
+        if "(" in name:
+            known = self.top.spin_constants.twice if self.top.spin_constants is not None and self.hyperfine else {}
+            lost = [spin for spin in spins_of(name) if spin not in known]
+            if lost:
+                raise ValueError(
+                    f"{name}: there is no spin {lost[0]}; the constants to start from have {', '.join(known) or 'none'}"
+                )
+
+    def text(self, unit: str = "MHz") -> str:
+        """The constants in one line, uncertainty in brackets."""
+        spreads = self.uncertainties
+        items = (f"{name}={write_number(value, spreads.get(name), unit)}" for name, value in self.values.items())
+        return f"{' '.join(items)} {unit}"
+
+
+ConstantSet = Constants | TopConstants
+
+
+def _plain(table: Mapping[str, float]) -> dict[str, float]:
+    """What belongs to the top's own state alone."""
+    return {name: value for name, value in table.items() if "[" not in name and "(" not in name}
+
+
+def _of_states(table: Mapping[str, float]) -> dict[str, float]:
+    """What belongs to further states and pairs of states, without spins."""
+    return {name: value for name, value in table.items() if "[" in name and "(" not in name}
+
+
+def _of_spins(table: Mapping[str, float]) -> dict[str, float]:
+    return {name: value for name, value in table.items() if "(" in name}

@@ -1,0 +1,157 @@
+"""Named constants of states and spins as SPFIT's parameters: which codes stand for a name, and with which factors.
+
+| name | codes, in the basis Ir (axes a, b, c) |
+|---|---|
+| A[1], DeltaJ[1], E[1] | those of state 0 with V1 = V2 = 1; the energy is the code 11 |
+| G_a, G_b, G_c; F_bc, F_ac, F_ab; W, W_pm2 | TYP 20, 40, 60; 21, 41, 61; 0, 4 between two states |
+| chi_aa | 1.5 times TYP 1 with the spin twice; chi_bb-cc ¼ times TYP 4, in the basis IIIl of TYP 3 and 4; chi_ab TYP 61 |
+| C_aa, eps_aa, C_iso, C_bb-cc | TYP 1 with the spin, 0, and ½ times 4 |
+| J, b_F; T_aa; D_aa, lambda | TYP 0 with two spins; as chi_aa; as chi_aa times 2S(2S-1) |
+
+Powers J, K, S in a name are NSQ, KSQ, NS. A name without a state has V1 = V2 = 9 (99, 999).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from rotor.arrays import Floats
+from rotor.fit.top_constants import TopConstants
+from rotor.formats.spcat.codes import AXES, Digits, constants_and_matrix, join_code, parameters_of, split_code
+from rotor.formats.spcat.model import options_of
+from rotor.formats.spcat.text.par import Header, ParameterFile
+from rotor.quantum.effects.hyperfine import NuclearQuadrupole
+from rotor.quantum.effects.spin_effect import ParameterName, parse_name
+from rotor.quantum.effects.spin_rotation import SpinRotation
+from rotor.quantum.effects.spin_spin import SpinSpin
+from rotor.quantum.spins.operators import Cosines, CosinesWithN
+from rotor.quantum.spins.scheme import Scheme, scheme_of
+from rotor.quantum.spins.terms import SpinTerm
+from rotor.tops.constants import Constants
+from rotor.tops.spins.spin_weights import SpinWeights
+
+_BETWEEN = {
+    "G_a": 20,
+    "G_b": 40,
+    "G_c": 60,
+    "F_bc": 21,
+    "F_ac": 41,
+    "F_ab": 61,
+    "W": 0,
+    "W_pm2": 4,
+    "W_pm4": 5,
+    "W_pm6": 6,
+}
+_CROSS = {(1, 2): 21, (0, 2): 41, (0, 1): 61}
+_KINDS = (NuclearQuadrupole, SpinRotation, SpinSpin)
+_FIXED = 1e-37
+
+Codes = dict[int, dict[str, float]]  # value of a code by named constants: what each has to be multiplied with
+
+
+def codes_of_names(constants: TopConstants) -> Codes:
+    """Of every code that a file of the top has, which constants its value is made of, and how much of each.
+
+    Raises ValueError for constants in another representation than Ir and IIIl.
+    """
+    if constants.kind == "asymmetric" and constants.representation not in AXES:
+        raise ValueError(
+            f"constants in representation {constants.representation}: SPFIT's files have Ir and IIIl alone; convert them first"
+        )
+    return _of_own_states(constants) | _of_pairs_and_spins(constants)
+
+
+def is_oblate(constants: Constants) -> bool:
+    """Whether c is the axis z of the basis."""
+    return constants.kind == "oblate" or constants.representation == "IIIl"
+
+
+def _scheme(constants: TopConstants) -> Scheme | None:
+    found = scheme_of(constants.top, constants.effects)
+    return found if found.spins else None
+
+
+def _states(constants: TopConstants) -> int:
+    return 1 if constants.top.states is None else constants.top.states.count
+
+
+def _of_own_states(constants: TopConstants) -> Codes:
+    """Of the rotation in every state: what each parameter of a file of that state alone is made of."""
+    top, out, states = constants.top, Codes(), _states(constants)
+    for v in range(states):
+        values: dict[str, Any] = dict(top.constants.values) if v == 0 or top.states is None else top.states.of_state(v)
+        if v:
+            out[join_code(Digits(0, 0, 0, 0, 0, 0, 0, 0, v, v), states)] = {f"E[{v}]": 1.0}
+            values.pop("E", None)
+        own = Constants(
+            kind=constants.kind, reduction=constants.reduction, representation=constants.representation, **values
+        )
+        option = options_of(own, SpinWeights(), 1)
+        file = ParameterFile("", Header(npar=1), (option,), parameters_of(own))
+        known, matrix = constants_and_matrix(file)
+        back = np.linalg.inv(matrix)
+        for parameter, row in zip(file.parameters, back, strict=True):
+            code = join_code(split_code(parameter.code)._replace(v1=v, v2=v), states)
+            suffix = f"[{v}]" if v else ""
+            out[code] = {f"{name}{suffix}": float(f) for name, f in zip(known.values, row, strict=True) if f}
+    return out
+
+
+def _of_pairs_and_spins(constants: TopConstants) -> Codes:
+    out, scheme, oblate = Codes(), _scheme(constants), is_oblate(constants.top.constants)
+    terms = {
+        term.name: term
+        for effect in constants.effects
+        if isinstance(effect, _KINDS)
+        for term in effect.spin_terms(constants.top)
+    }
+    for name in constants.values:
+        found: dict[Digits, float] = {}
+        if name in terms and scheme is not None:
+            found = _of_spins(parse_name(name), terms[name], scheme, constants, oblate)
+        elif "," in name:
+            parts = parse_name(name)
+            assert parts.states is not None
+            typ, (low, high) = _BETWEEN[parts.symbol], parts.states
+            sign = -1.0 if oblate and parts.symbol.startswith("G") else 1.0
+            found = {Digits(0, 0, 0, 0, 0, typ, parts.nz2, parts.n2, low, high): sign}
+        for digits, factor in found.items():
+            out.setdefault(join_code(digits, _states(constants)), {})[name] = factor
+    return out
+
+
+def _of_spins(
+    parts: ParameterName, term: SpinTerm, scheme: Scheme, constants: TopConstants, oblate: bool
+) -> dict[Digits, float]:
+    """The codes of a constant of spins, by the matrix c_ij that it multiplies."""
+    states, places = _states(constants), [scheme.place(spin) + 1 for spin in term.spins]
+    i1, i2 = max(places), (min(places) if len(places) == 2 else 0)
+    wild = 0 if states == 1 else 10 ** (1 if states <= 9 else 2 if states <= 99 else 3) - 1
+    v1, v2 = (wild, wild) if parts.states is None else (max(parts.states), min(parts.states))
+    base = Digits(0, 0, i2, i1, parts.ns, 0, parts.nz2, parts.n2, v2, v1)
+    rotor = term.rotor
+    if not isinstance(rotor, Cosines | CosinesWithN):
+        return {base: term.factor}
+    of_three = scheme.equivalent == 3 and max(places) > len(scheme.spins) - 3
+    found = _of_matrix(np.array(rotor.components, dtype=float), isinstance(rotor, CosinesWithN), oblate, of_three)
+    return {base._replace(typ=typ): term.factor * factor for typ, factor in found.items()}
+
+
+def _of_matrix(c: Floats, whole: bool, oblate: bool, of_three: bool) -> dict[int, float]:
+    """TYP and factors of Σ c_ij: of all of the matrix, or of its traceless part, which TYP 1, 2 or 3 of z and TYP 4 make up.
+
+    of_three: of one of three equivalent spins the parts that change K count twice, see `symmetry.halved_across`.
+    """
+    x, y, z = ("abc".index(axis) for axis in AXES["IIIl" if oblate else "Ir"])
+    diagonal, times = np.diag(c), 2.0 if of_three else 1.0
+    mean, across = float(diagonal[x] + diagonal[y]) / 2, times * float(diagonal[x] - diagonal[y]) / 4
+    found = {typ: times * float(c[i, k]) for (i, k), typ in _CROSS.items()}
+    if not whole:
+        found |= {z + 1: float(diagonal[z]) - mean, 4: across}
+    elif of_three or diagonal[0] == diagonal[1] == diagonal[2] or diagonal[x] == -diagonal[y]:
+        found |= {0: mean, z + 1: float(diagonal[z]) - mean, 4: across}
+    else:
+        found |= {i + 1: float(diagonal[i]) for i in range(3)}
+    return {typ: factor for typ, factor in found.items() if abs(factor) > 1e-12}
