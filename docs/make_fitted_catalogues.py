@@ -94,8 +94,9 @@ Why some cannot be lower:
   So it is one frequency, or its error of 0.03 MHz, that keeps Ka ≤ 1 from 1.7, five that keep any model from 1, and for Ka > 1 the
   levels of a quasilinear top, which are no Watson series. Lines with Ka > 1 are all a-type R branches, which do not fix their levels
   against those of Ka = 0 and 1: A and D_K, H_K, ... stay one combination.
-- **SO2** up to J = 92 needs off-diagonal terms of tenth and diagonal ones of twelfth order; up to J = 40 the lines are met within their
-  errors. A model built one step at a time is no exhaustive search.
+- **SO2** up to J = 92 needs off-diagonal terms of tenth and diagonal ones of twelfth order; then all lines are met within their errors.
+  With these the states of K around 90 come down among the measured ones, and the labels pass them over (docs/fit.md). A model
+  built one step at a time is no exhaustive search.
 """
 
 

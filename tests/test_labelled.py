@@ -92,7 +92,7 @@ def test_overlaps_see_a_state_that_has_become_another():
 
 
 def test_a_series_that_diverges_at_high_k_leaves_the_labels_of_low_k_as_they_are():
-    """D_K bends the diagonal down from K = 12 on: states of K = 18 and 20 lie among those of K = 4, which a cut at K = 14 does not have."""
+    """D_K bends the diagonal down from K = 12 on: states of K = 18 and 20 lie among those of low K; a cut at K = 14 knows none."""
     constants = Constants(A=30.0, B=5.0, C=4.9, DK=0.0863, reduction="S")
     labels = np.array([[20, ka, 20 - ka] for ka in range(7)] + [[20, ka, 21 - ka] for ka in range(1, 7)])
     whole, cut = level_model(constants, labels), level_model(constants, labels, kmax=14)

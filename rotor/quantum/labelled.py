@@ -26,6 +26,7 @@ from rotor.arrays import Floats, Ints, Workspace
 from rotor.quantum.effects.watson import operators_by_name
 from rotor.quantum.label_blocks import Chunk, chunks_of, occurring_blocks
 from rotor.quantum.wang.tridiagonal import vectors_of_values
+from rotor.quantum.wang.turn import order_beyond_the_turn, turned
 from rotor.tops.constants import Constants
 from rotor.tops.operators import REPRESENTATIONS
 
@@ -193,20 +194,21 @@ class WangBlocks(LevelModel):
 
     def _solved(self, chunk: Chunk, coefficients: Floats) -> tuple[Floats, Floats]:
         """Eigenvalues (blocks, size) and eigenvectors (blocks, size, size) with the coefficients of the terms, in the order of labels."""
-        return self._in_order(self._bands(chunk, coefficients), chunk)
+        return self._in_order(chunk, self._bands(chunk, coefficients))
 
-    def _in_order(self, bands: Sequence[Floats], chunk: Chunk) -> tuple[Floats, Floats]:
+    def _in_order(self, chunk: Chunk, bands: Sequence[Floats]) -> tuple[Floats, Floats]:
         energies, vectors = _diagonalised(bands, chunk, self._space)
         if self.rise:
-            _order_beyond_the_turn(self.rise * bands[0], chunk.sizes, energies, vectors)
+            order_beyond_the_turn(self.rise * bands[0], chunk.sizes, energies, vectors)
         return energies, vectors
 
     def _labelled(self, chunk: Chunk, coefficients: Floats) -> tuple[Floats, Floats]:
         """Eigenvalues (blocks, size), and the eigenvectors of the labelled states (blocks, size, most labels), or of all states."""
         bands, states = self._bands(chunk, coefficients), chunk.states
         if states is None:
-            return self._in_order(bands, chunk)
-        if len(bands) == 2 and _dense() and not (self.rise and _turns(self.rise * bands[0], chunk.sizes).any()):
+            return self._in_order(chunk, bands)
+        by_energy = not self.rise or not len(turned(self.rise * bands[0], chunk.sizes)[0])
+        if len(bands) == 2 and _dense() and by_energy:
             energies = _banded(bands, chunk, self._space)
             found = vectors_of_values(bands[0], bands[1], energies, chunk.block, chunk.rank, self._space)
             if found is not None:
@@ -214,7 +216,7 @@ class WangBlocks(LevelModel):
                 chosen.fill(0.0)
                 chosen.transpose(1, 0, 2)[:, chunk.block, chunk.slot] = found
                 return energies, chosen
-        energies, vectors = self._in_order(bands, chunk)
+        energies, vectors = self._in_order(chunk, bands)
         count, size, most = len(vectors), vectors.shape[1], states.shape[1]
         rows = size * size * np.arange(count)[:, None, None] + size * np.arange(size)[:, None]
         chosen = self._space.array("chosen", count, size, most)
@@ -258,29 +260,6 @@ def _dense() -> bool:
     each other on small blocks.
     """
     return "scipy.linalg" not in sys.modules and os.environ.get("OPENBLAS_NUM_THREADS") == "1"
-
-
-def _order_beyond_the_turn(diagonal: Floats, sizes: Sequence[int], energies: Floats, vectors: Floats) -> None:
-    """States beyond the K where the diagonal (blocks, size) ceases to rise come last, by their mean K; the arrays are changed.
-
-    Constants that describe K up to 20 may bring the states of K = 60 down among those: the series has left the molecule there. Such a
-    state is mostly beyond the turn, and the labels of the others are the ranks among themselves, whatever it does.
-    """
-    turn = _turns(diagonal, sizes)
-    for b in np.flatnonzero(turn).tolist():
-        n = sizes[b]
-        share = vectors[b, :n, :n] ** 2
-        beyond = share[turn[b] + 1 :].sum(axis=0) > 0.5
-        order = np.lexsort((np.where(beyond, np.arange(n) @ share, 0.0), beyond))
-        energies[b, :n] = energies[b, order]
-        vectors[b, :n, :n] = vectors[b, :n, order].T
-
-
-def _turns(diagonal: Floats, sizes: Sequence[int]) -> Ints:
-    """The place in each block where the diagonal (blocks, size) ceases to rise, 0 where it rises to the end or not at all."""
-    size = np.asarray(sizes)
-    turn = np.where(np.arange(diagonal.shape[1]) < size[:, None], diagonal, -np.inf).argmax(axis=1)
-    return np.where(turn < size - 1, turn, 0)
 
 
 def _tridiagonal(bands: Sequence[Floats], sizes: Sequence[int], energies: Floats, vectors: Floats) -> None:
