@@ -18,8 +18,8 @@ from typing import Any
 
 import numpy as np
 
-from rotor.fit.assignment import Assignments, assignments
-from rotor.fit.fit import Fit, FitOptions, _labels, fit_lines
+from rotor.fit.assignment import Assignments, assignments, levels_in
+from rotor.fit.fit import Fit, FitOptions, fit_lines
 from rotor.fit.parameters import Parameters, parameters
 from rotor.fit.search import Search
 from rotor.quantum.labelled import LevelModel, level_model
@@ -57,7 +57,7 @@ def lines_of(constants: Constants, count: int, jmax: int = 60) -> Assignments:
 
 def iteration_ms(lines: Assignments, free: Parameters, model: LevelModel, repeats: int) -> float:
     """The fastest of some iterations, processor time."""
-    _, upper, lower = _labels(lines)
+    _, upper, lower = levels_in(lines)
     used = np.ones(len(lines), dtype=bool)
     search = Search(lines, model, free, FitOptions(), upper, lower, lines.error_mhz, used)
 
@@ -88,7 +88,7 @@ def one_state() -> list[dict[str, Any]]:
     for count in (500, 5_000, 25_000):
         lines = lines_of(TRUE, count)
         free = parameters(TRUE, list(TRUE.values))
-        model = level_model(TRUE, _labels(lines)[0])
+        model = level_model(TRUE, levels_in(lines)[0])
         rows.append(
             {"case": "15 constants, J ≤ 60", "lines": count, "iteration_ms": iteration_ms(lines, free, model, 20)}
         )

@@ -186,14 +186,14 @@ def iteration(folder: Path) -> float:
     import numpy as np
     from bench_fit import fastest
 
-    from rotor.fit.fit import _labels
+    from rotor.fit.assignment import levels_in
     from rotor.fit.search import Search
     from rotor.formats.spcat.fit_input import read_fit
     from rotor.quantum.labelled import level_model
     from rotor.statistics.least_squares import _Linear, _State
 
     asked = read_fit(folder / "case.par")
-    labels, upper, lower = _labels(asked.lines)
+    labels, upper, lower = levels_in(asked.lines)
     model = asked.model(labels) if asked.model else level_model(asked.constants, labels, kmax=asked.options.kmax)
     used = np.ones(len(asked.lines), dtype=bool)
     start = asked.parameters.start
