@@ -229,5 +229,5 @@ def _joined(pieces: list[tuple[int, WangBlock, Ints | None, Floats]], representa
         wangs.append(np.full(basis.size, place))
         ns.append(np.full(basis.size, basis.j))
     amplitudes = np.concatenate([vectors for *_, vectors in pieces])
-    columns = [np.concatenate(each) for each in (names, ks, groups, wangs)]
-    return Functions(*columns, amplitudes, np.concatenate(ns))
+    k, pattern, wang, n = (np.concatenate(each) for each in (ks, groups, wangs, ns))
+    return Functions(np.concatenate(names), k, pattern, wang, amplitudes, n)
