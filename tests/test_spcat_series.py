@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from full_matrix_rotor import momenta
 
-from rotor.formats.spcat.file_effect import coded_lines
 from rotor.formats.spcat.file_model import groups_of
+from rotor.formats.spcat.hamiltonian.file_effect import coded_lines
 from rotor.formats.spcat.predict import predict
 from rotor.formats.spcat.text.int_file import IntensityFile, Request, read_int
 from rotor.formats.spcat.text.par import read_par

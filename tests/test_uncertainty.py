@@ -10,7 +10,7 @@ import pytest
 
 import rotor
 from rotor.formats.line_tables import catalogue
-from rotor.formats.spcat.codes import constants_of
+from rotor.formats.spcat.hamiltonian.codes import constants_of
 from rotor.formats.spcat.text.cat import read_cat
 from rotor.formats.spcat.text.par import read_par
 from rotor.quantum.estimates.uncertainty import level_errors

@@ -13,15 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Ints
-from rotor.formats.spcat.codes import AXES
-from rotor.formats.spcat.dipole_codes import NOT_YET, DipoleCode, Dipoles, dipoles_of, moment_of
-from rotor.formats.spcat.file_effect import CodedLine, FileEffect, Vector, coded_lines
-from rotor.formats.spcat.l_doubled import Pair, named_by_l, pairs_of
-from rotor.formats.spcat.l_spins import named_by_l_with_spins
-from rotor.formats.spcat.labels import BY_DIAG, named_by
-from rotor.formats.spcat.series import Series, series_of
-from rotor.formats.spcat.states import StateOptions, states_of
-from rotor.formats.spcat.symmetry import (
+from rotor.formats.spcat.hamiltonian.codes import AXES
+from rotor.formats.spcat.hamiltonian.dipole_codes import NOT_YET, DipoleCode, Dipoles, dipoles_of, moment_of
+from rotor.formats.spcat.hamiltonian.file_effect import CodedLine, FileEffect, Vector, coded_lines
+from rotor.formats.spcat.hamiltonian.l_doubled import Pair, named_by_l, pairs_of
+from rotor.formats.spcat.hamiltonian.l_spins import named_by_l_with_spins
+from rotor.formats.spcat.hamiltonian.labels import BY_DIAG, named_by
+from rotor.formats.spcat.hamiltonian.series import Series, series_of
+from rotor.formats.spcat.hamiltonian.states import StateOptions, states_of
+from rotor.formats.spcat.hamiltonian.symmetry import (
     exchange_of,
     forbidden,
     halved_across,

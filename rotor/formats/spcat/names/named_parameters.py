@@ -10,7 +10,7 @@ import numpy as np
 from rotor.arrays import Floats
 from rotor.fit.top_constants import TopConstants
 from rotor.formats.spcat.model import options_of
-from rotor.formats.spcat.named_codes import codes_of_names
+from rotor.formats.spcat.names.named_codes import codes_of_names
 from rotor.formats.spcat.text.par import Header, Options, Parameter, ParameterFile
 from rotor.tops.spins.spin_constants import SpinConstants
 from rotor.tops.spins.spin_weights import SpinWeights

@@ -19,7 +19,14 @@ import numpy as np
 
 from rotor.arrays import Floats
 from rotor.fit.top_constants import TopConstants
-from rotor.formats.spcat.codes import AXES, Digits, constants_and_matrix, join_code, parameters_of, split_code
+from rotor.formats.spcat.hamiltonian.codes import (
+    AXES,
+    Digits,
+    constants_and_matrix,
+    join_code,
+    parameters_of,
+    split_code,
+)
 from rotor.formats.spcat.model import options_of
 from rotor.formats.spcat.text.par import Header, ParameterFile
 from rotor.quantum.effects.hyperfine import NuclearQuadrupole

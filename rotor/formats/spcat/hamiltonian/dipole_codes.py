@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from math import pi
 from typing import NamedTuple
 
-from rotor.formats.spcat.series import Series
+from rotor.formats.spcat.hamiltonian.series import Series
 from rotor.formats.spcat.text.int_file import Dipole
 from rotor.quantum.moments import DEBYE_PER_BOHR_MAGNETON, Moment
 
