@@ -188,7 +188,7 @@ def iteration(folder: Path) -> float:
 
     from rotor.fit.assignment import levels_in
     from rotor.fit.search import Search
-    from rotor.formats.spcat.fit_input import read_fit
+    from rotor.formats.spcat.fits.fit_input import read_fit
     from rotor.quantum.labelled import level_model
     from rotor.statistics.least_squares import _Linear, _State
 

@@ -18,7 +18,7 @@ from rotor.fit.publication import publication_table
 from rotor.fit.report import report_text
 from rotor.fit.resampling import bootstrap
 from rotor.formats.assigned_lines import read_assigned_lines
-from rotor.formats.spcat.fit_input import fitted_file, read_fit
+from rotor.formats.spcat.fits.fit_input import fitted_file, read_fit
 from rotor.plots.fit import fit_figure
 from rotor.tops.constants import Constants
 

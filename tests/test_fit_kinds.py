@@ -18,12 +18,12 @@ from fit_kinds import ERROR_MHZ, Kind, lin_text, lines_of, parameter_file, start
 from rotor.fit.assignment import assignments, merged
 from rotor.fit.choose import suggest_lines
 from rotor.fit.fit import fit_lines
-from rotor.formats.spcat.fit_input import fitted_file, read_fit, spfit_input
-from rotor.formats.spcat.fit_states import FileLevels
+from rotor.formats.spcat.fits.fit_input import fitted_file, read_fit, spfit_input
+from rotor.formats.spcat.fits.fit_states import FileLevels
+from rotor.formats.spcat.fits.unmeasured import unmeasured_lines
+from rotor.formats.spcat.fits.unresolved import excluded_parameters
 from rotor.formats.spcat.text.lin import read_lin
 from rotor.formats.spcat.text.par import read_par
-from rotor.formats.spcat.unmeasured import unmeasured_lines
-from rotor.formats.spcat.unresolved import excluded_parameters
 
 THREE = """10099 14500.1 A
 20099 4200.2 B

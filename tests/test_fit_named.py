@@ -22,10 +22,10 @@ from rotor.fit.top_constants import TopConstants
 from rotor.fit.top_levels import top_levels
 from rotor.formats.assigned_lines import read_assigned_lines, write_assigned_lines
 from rotor.formats.fit_request import answer_fit, fit_of_lines
-from rotor.formats.spcat.fit_input import spfit_input
-from rotor.formats.spcat.fit_states import groups_for_fit, levels_in_blocks
-from rotor.formats.spcat.named_fit import named_file
-from rotor.formats.spcat.named_parameters import named_parameters
+from rotor.formats.spcat.fits.fit_input import spfit_input
+from rotor.formats.spcat.fits.fit_states import groups_for_fit, levels_in_blocks
+from rotor.formats.spcat.fits.named_fit import named_file
+from rotor.formats.spcat.names.named_parameters import named_parameters
 from rotor.formats.spcat.text.lin import read_lin
 from rotor.quantum.estimates.derivatives import level_derivatives
 from rotor.quantum.solve import solve_levels

@@ -14,8 +14,8 @@ import pytest
 from rotor.fit.fit import fit_lines
 from rotor.fit.resampling import bootstrap
 from rotor.formats.spcat.file_quanta import format_of
-from rotor.formats.spcat.fit_input import error_factor, fitted_file, read_fit, spfit_input
-from rotor.formats.spcat.fit_states import FileLevels, groups_for_fit, names_of_quanta
+from rotor.formats.spcat.fits.fit_input import error_factor, fitted_file, read_fit, spfit_input
+from rotor.formats.spcat.fits.fit_states import FileLevels, groups_for_fit, names_of_quanta
 from rotor.formats.spcat.predict import predict
 from rotor.formats.spcat.text.cat import read_cat
 from rotor.formats.spcat.text.int_file import read_int

@@ -13,8 +13,8 @@ from rotor.fit.choose import choose_constants
 from rotor.fit.fit import Fit, FitOptions, fit_lines
 from rotor.fit.parameters import parameters
 from rotor.fit.resampling import bootstrap
-from rotor.formats.spcat.fit_input import fitted_file, spfit_input
-from rotor.formats.spcat.named_fit import named_file
+from rotor.formats.spcat.fits.fit_input import fitted_file, spfit_input
+from rotor.formats.spcat.fits.named_fit import named_file
 from rotor.formats.spcat.text.par import read_par
 from rotor.formats.spcat.variances import constants_covariance
 from rotor.spectra.lines import line_list
@@ -166,7 +166,7 @@ def test_a_held_parameter_of_a_par_file_stays_in_the_var(tmp_path):
     j = made.levels.quanta["j"]
     rows = zip(j[made.upper].tolist(), j[made.lower].tolist(), made.frequency_mhz.tolist(), strict=True)
     (tmp_path / "co.lin").write_text("".join(f"{u:3d}{low:3d}{'':30s} {f:15.4f} 0.003\n" for u, low, f in rows))
-    from rotor.formats.spcat.fit_input import read_fit
+    from rotor.formats.spcat.fits.fit_input import read_fit
 
     asked = read_fit(tmp_path / "co.par")
     fit = fit_lines(asked.lines, asked.constants, asked.parameters, replace(asked.options, poor_rms=1e9))

@@ -7,9 +7,9 @@ import pytest
 from full_matrix_rotor import momenta
 
 from rotor.formats.spcat.file_model import groups_of
-from rotor.formats.spcat.l_doubled import Pair, pairs_of
+from rotor.formats.spcat.hamiltonian.l_doubled import Pair, pairs_of
+from rotor.formats.spcat.hamiltonian.states import states_of
 from rotor.formats.spcat.predict import predict
-from rotor.formats.spcat.states import states_of
 from rotor.formats.spcat.text.int_file import read_int
 from rotor.formats.spcat.text.par import read_par
 

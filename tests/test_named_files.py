@@ -12,8 +12,8 @@ import rotor
 from rotor.cli import run
 from rotor.formats.spcat.file_model import groups_of
 from rotor.formats.spcat.model import intensity_file
-from rotor.formats.spcat.named_parameters import named_parameter_file
-from rotor.formats.spcat.named_top import named_top
+from rotor.formats.spcat.names.named_parameters import named_parameter_file
+from rotor.formats.spcat.names.named_top import named_top
 from rotor.formats.spcat.predict import predict
 from rotor.formats.spcat.text.int_file import IntensityFile, read_int
 from rotor.formats.spcat.text.par import ParameterFile, format_par, read_par

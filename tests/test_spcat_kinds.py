@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rotor.formats.spcat.dipole_codes import moment_of, split_dipole
 from rotor.formats.spcat.file_model import groups_of, left_out
-from rotor.formats.spcat.operators import operator_of
+from rotor.formats.spcat.hamiltonian.dipole_codes import moment_of, split_dipole
+from rotor.formats.spcat.hamiltonian.operators import operator_of
 from rotor.formats.spcat.predict import levels_of_file, predict
 from rotor.formats.spcat.text.cat import format_lines, read_cat
 from rotor.formats.spcat.text.catalogue import Catalogue
@@ -138,7 +138,7 @@ def test_moments_that_do_not_compute_are_named(code, says):
 
 def test_operators_of_n_are_hermitian_and_obey_time_reversal():
     """All of TYP 12 to 79: Hermitian (with i where odd), and even ones real, odd ones imaginary, as J of the table of phases."""
-    from rotor.formats.spcat.codes import AXES, split_code
+    from rotor.formats.spcat.hamiltonian.codes import AXES, split_code
 
     for axes, representation in ((AXES["Ir"], "Ir"), (AXES["IIIl"], "IIIl")):
         for typ in (*range(12, 18), *range(20, 28), *range(40, 48), *range(60, 68)):
@@ -153,7 +153,7 @@ def test_operators_of_n_are_hermitian_and_obey_time_reversal():
 
 def test_low_orders_are_cartesian_products():
     """TYP 21, 41, 61 are NbNc + NcNb, ...; 20, 40, 60 i times Na, Nb, Nc, -i in the oblate basis (as SPCAT's levels say)."""
-    from rotor.formats.spcat.codes import AXES, split_code
+    from rotor.formats.spcat.hamiltonian.codes import AXES, split_code
     from rotor.quantum.wang.j_operators import anticommutator, components
 
     for axes, representation in ((AXES["Ir"], "Ir"), (AXES["IIIl"], "IIIl")):

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rotor.formats.spcat import fit_states
-from rotor.formats.spcat.fit_states import FileLevels
+from rotor.formats.spcat.fits import fit_states
+from rotor.formats.spcat.fits.fit_states import FileLevels
 from rotor.formats.spcat.text.par import read_par
 from rotor.quantum.estimates.unit_blocks import UnitBlocks
 

@@ -12,9 +12,9 @@ from rotor.fit.top_constants import TopConstants
 from rotor.formats.molecules.molecule_file import parse_molecule_file
 from rotor.formats.molecules.molecule_writer import molecule_file_text
 from rotor.formats.read_write import top_of_file
-from rotor.formats.spcat.fit_states import groups_for_fit, levels_in_blocks
-from rotor.formats.spcat.named_parameters import named_parameter_file, named_parameters
-from rotor.formats.spcat.named_top import named_top
+from rotor.formats.spcat.fits.fit_states import groups_for_fit, levels_in_blocks
+from rotor.formats.spcat.names.named_parameters import named_parameter_file, named_parameters
+from rotor.formats.spcat.names.named_top import named_top
 from rotor.formats.spcat.text.par import format_par, read_par
 from rotor.quantum.effects.of_top import effects_of
 from rotor.quantum.solve import solve_levels

@@ -10,7 +10,7 @@ import pytest
 
 import rotor
 from rotor.formats.line_tables import catalogue
-from rotor.formats.spcat.codes import constants_of
+from rotor.formats.spcat.hamiltonian.codes import constants_of
 from rotor.formats.spcat.text.cat import read_cat
 from rotor.formats.spcat.text.par import read_par
 from rotor.quantum.estimates.uncertainty import level_errors
@@ -141,3 +141,23 @@ def test_a_stranger_among_the_names_is_refused():
     lines = line_list(top, jmax=2, covariance=Covariance(("A",), np.eye(1)))
     with pytest.raises(ValueError, match="no parameter A here"):
         _ = lines.error_mhz
+
+
+def test_constants_of_spins_beside_a_covariance_count_by_their_own_uncertainties():
+    """The lines 1 - 0 of a linear molecule with I = 1: F' = 2, 1, 0 move by -eqQ/20, eqQ/4, -eqQ/2 (Casimir), B by 2."""
+    from rotor.quantum.effects.of_top import effects_of
+    from rotor.tops.spins.spin_constants import SpinConstants
+
+    spins = SpinConstants({"chi_aa(14N)": -4.0}, {"14N": 2}, uncertainties={"chi_aa(14N)": 0.2})
+    covariance = Covariance(("B",), np.array([[0.01**2]]))
+    top = Top(Constants(B=6000.0), dipole_abc_debye=(1.0, 0.0, 0.0), spin_constants=spins, covariance=covariance)
+    lines = line_list(top, jmax=1, effects=effects_of(top, True))
+    f_upper = lines.levels.quanta["f"][lines.upper].tolist()
+    expected = {2: 0.2 / 20, 1: 0.2 / 4, 0: 0.2 / 2}
+    assert len(lines) == 3
+    for f, error in zip(f_upper, lines.error_mhz.tolist(), strict=True):
+        assert error == pytest.approx(np.hypot(0.02, expected[f]), rel=2e-3)  # of χ²/B, which is left out here
+    assert lines.errors_from == "covariance of B; uncertainties of chi_aa(14N), uncorrelated"
+    plain = line_list(top, jmax=1)
+    assert plain.error_mhz == pytest.approx([0.02])
+    assert plain.errors_from == "covariance of B"

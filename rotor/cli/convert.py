@@ -83,8 +83,8 @@ def top_with_errors(source: str) -> Top:
         return inputs.read_top(Input(source))
 
     from rotor.formats.read_write import read_spcat_top
-    from rotor.formats.spcat.codes import constants_of
-    from rotor.formats.spcat.states import has_one_state
+    from rotor.formats.spcat.hamiltonian.codes import constants_of
+    from rotor.formats.spcat.hamiltonian.states import has_one_state
     from rotor.formats.spcat.text.par import read_par
 
     file, top = read_par(path), read_spcat_top(path, errors=True)
@@ -125,7 +125,7 @@ def writer_of(top: Top, source: str, target: str, kmax: int) -> Writer:
         intensities = _intensities(top, kmax)
         return lambda path: write_int(intensities, path)
 
-    from rotor.formats.spcat.named_parameters import named_parameter_file
+    from rotor.formats.spcat.names.named_parameters import named_parameter_file
     from rotor.formats.spcat.text.par import write_par
 
     moments = [top.dipole_abc_debye or (0.0, 0.0, 0.0), *(top.states.dipoles.values() if top.states else ())]

@@ -23,8 +23,8 @@ from rotor.fit.publication import publication_table
 from rotor.fit.report import fit_facts, report_text
 from rotor.fit.top_constants import ConstantSet, TopConstants
 from rotor.formats.assigned_lines import QUANTA, names_sums, read_assigned_lines
-from rotor.formats.spcat.fit_input import SpfitInput, fitted_file, read_fit
-from rotor.formats.spcat.named_fit import named_file
+from rotor.formats.spcat.fits.fit_input import SpfitInput, fitted_file, read_fit
+from rotor.formats.spcat.fits.named_fit import named_file
 from rotor.formats.spcat.text.par import ParameterFile
 from rotor.quantum.labelled import LevelModel
 from rotor.statistics.least_squares import Progress
@@ -222,7 +222,7 @@ def with_more_lines(request: FitRequest, path: str) -> FitRequest:
 
 def report_of(answer: FitAnswer) -> str:
     """The report of a fit with what it was read from, and of SPFIT's files every parameter."""
-    from rotor.formats.spcat.fit_table import parameter_section
+    from rotor.formats.spcat.fits.fit_table import parameter_section
 
     request, read = answer.request, answer.request.files
     files = [Path(one).name for one in (read.source, read.lin, read.merge) if one]
@@ -238,7 +238,7 @@ def report_of(answer: FitAnswer) -> str:
 
 def table_of(answer: FitAnswer, form: str, *, scaled: bool = False) -> str:
     """The table of a publication; ValueError as `publication_table`."""
-    from rotor.formats.spcat.fit_table import publication_rows
+    from rotor.formats.spcat.fits.fit_table import publication_rows
 
     spfit = answer.request.spfit
     rows = publication_rows(spfit, answer.fit) if spfit and answer.fit.constants is None else ()

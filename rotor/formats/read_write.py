@@ -133,9 +133,9 @@ def read_spcat_top(path: Path, *, errors: bool = False) -> Top:
 
     errors: of files with spins or several states, whether errors of parameters become uncertainties.
     """
+    from rotor.formats.spcat.hamiltonian.states import has_one_state
     from rotor.formats.spcat.model import top_of
-    from rotor.formats.spcat.named_top import named_top
-    from rotor.formats.spcat.states import has_one_state
+    from rotor.formats.spcat.names.named_top import named_top
     from rotor.formats.spcat.text.int_file import read_int
     from rotor.formats.spcat.text.par import read_par
 

@@ -24,7 +24,7 @@ from rotor.checks import require_positive, require_whole
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.estimates.convergence import warnings_of
-from rotor.quantum.estimates.uncertainty import level_spread, line_errors
+from rotor.quantum.estimates.uncertainty import known_covariance, level_spread, line_errors, source_of_errors
 from rotor.quantum.levels import Levels, TransitionTable
 from rotor.quantum.quanta import heading
 from rotor.quantum.solve import solve_levels
@@ -119,17 +119,8 @@ class Lines(TransitionTable):
 
     @property
     def covariance_used(self) -> Covariance | None:
-        """The covariance given, else the top's, else the uncertainties of the constants where these may count as uncorrelated.
-
-        None for a top whose energies are in a table: they do not follow from its constants.
-        """
-        if self.covariance is None and self.top.level_table is not None:
-            return None
-        if self.covariance is not None:
-            return self.covariance
-        if self.top.covariance is None and self.top.independent_errors:
-            return Covariance.of_uncertainties(self.top.constants)
-        return self.top.covariance.of(self._parameters) if self.top.covariance else None
+        """The covariance given, else what the top knows, see `uncertainty.known_covariance`."""
+        return self.covariance or known_covariance(self.top, self._parameters)
 
     @cached_property
     def _parameters(self) -> tuple[str, ...]:
@@ -147,14 +138,7 @@ class Lines(TransitionTable):
     @property
     def errors_from(self) -> str | None:
         """Which uncertainties the errors of frequencies come from, None where there are none."""
-        if self.covariance is None and self.top.level_table is not None:
-            return "none: the energies are from a table"
-        if (self.covariance or self.top.covariance) and (covariance := self.covariance_used):
-            return f"covariance of {', '.join(covariance.names)}"
-        known = self.top.constants.uncertainties
-        if known and self.covariance_used is None:
-            return "none: the constants are from a fit whose correlations are not known"
-        return f"uncertainties of {', '.join(known)}, uncorrelated" if known else None
+        return source_of_errors(self.top, self._parameters, self.covariance)
 
     @property
     def provenance(self) -> dict[str, Any]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -73,6 +73,17 @@ class Covariance:
             if len(rows) == len(self.names)
             else Covariance(tuple(self.names[i] for i in rows), self.matrix_mhz2[np.ix_(rows, rows)])
         )
+
+    def beside(self, uncertainties_mhz: Mapping[str, float]) -> Covariance:
+        """With further constants that are correlated with none, by their standard deviations.
+
+        >>> Covariance(("B",), np.diag([4.0])).beside({"chi_aa(14N)": 3.0}).matrix_mhz2.tolist()
+        [[4.0, 0.0], [0.0, 9.0]]
+        """
+        count, own = len(self.names), [s**2 for s in uncertainties_mhz.values()]
+        matrix = np.zeros((count + len(own),) * 2)
+        matrix[:count, :count], matrix[count:, count:] = self.matrix_mhz2, np.diag(own)
+        return Covariance((*self.names, *uncertainties_mhz), matrix)
 
     @property
     def correlations(self) -> Floats:

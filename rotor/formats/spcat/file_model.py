@@ -13,15 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Ints
-from rotor.formats.spcat.codes import AXES
-from rotor.formats.spcat.dipole_codes import NOT_YET, DipoleCode, Dipoles, dipoles_of, moment_of
-from rotor.formats.spcat.file_effect import CodedLine, FileEffect, Vector, coded_lines
-from rotor.formats.spcat.l_doubled import Pair, named_by_l, pairs_of
-from rotor.formats.spcat.l_spins import named_by_l_with_spins
-from rotor.formats.spcat.labels import BY_DIAG, named_by
-from rotor.formats.spcat.series import Series, series_of
-from rotor.formats.spcat.states import StateOptions, states_of
-from rotor.formats.spcat.symmetry import (
+from rotor.formats.spcat.hamiltonian.codes import AXES
+from rotor.formats.spcat.hamiltonian.dipole_codes import NOT_YET, DipoleCode, Dipoles, dipoles_of, moment_of
+from rotor.formats.spcat.hamiltonian.file_effect import CodedLine, FileEffect, Vector, coded_lines
+from rotor.formats.spcat.hamiltonian.l_doubled import Pair, named_by_l, pairs_of
+from rotor.formats.spcat.hamiltonian.l_spins import named_by_l_with_spins
+from rotor.formats.spcat.hamiltonian.labels import BY_DIAG, named_by
+from rotor.formats.spcat.hamiltonian.series import Series, series_of
+from rotor.formats.spcat.hamiltonian.states import StateOptions, states_of
+from rotor.formats.spcat.hamiltonian.symmetry import (
     exchange_of,
     forbidden,
     halved_across,
@@ -208,7 +208,7 @@ def allowed(
         folded = line.typ in (1, 2, 3) and any(_turns_alone(states[v], line) for pair in concerned for v in pair)
         axes = AXES["IIIl" if oblate else "Ir"]
         found.append(line._replace(operator=symmetric_part(line.operator, axes)) if folded else line)
-    return found, reasons
+    return found, list(dict.fromkeys(reasons))  # a line of the file may be one for each state
 
 
 def _turns_alone(state: StateOptions, line: CodedLine) -> bool:

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Ints
 from rotor.formats.spcat.file_model import Group
+from rotor.formats.spcat.hamiltonian.states import is_odd
 from rotor.formats.spcat.pattern_numbers import pattern_numbers
-from rotor.formats.spcat.states import is_odd
 from rotor.formats.spcat.text.par import ParameterFile
 from rotor.quantum.levels import Levels
 

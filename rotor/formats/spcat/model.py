@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from functools import reduce
 from math import gcd
 
-from rotor.formats.spcat.codes import NOT_YET, constants_of, is_linear, parameters_of, state_digits
+from rotor.formats.spcat.hamiltonian.codes import NOT_YET, constants_of, is_linear, parameters_of, state_digits
 from rotor.formats.spcat.text.int_file import Dipole, IntensityFile, Request
 from rotor.formats.spcat.text.par import Header, Options, ParameterFile
 from rotor.tops.constants import Constants

@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 from rotor import units
 from rotor.formats.line_tables import catalogue
 from rotor.formats.spcat import wavenumbers
-from rotor.formats.spcat.codes import is_linear
 from rotor.formats.spcat.file_lines import LEAST_MHZ, equally_weighted
-from rotor.formats.spcat.labels import BY_DIAG
+from rotor.formats.spcat.hamiltonian.codes import is_linear
+from rotor.formats.spcat.hamiltonian.labels import BY_DIAG
+from rotor.formats.spcat.hamiltonian.states import is_plain
 from rotor.formats.spcat.model import FOLD, common_weight, top_of
 from rotor.formats.spcat.predict_states import levels_of_files, predicted
-from rotor.formats.spcat.states import is_plain
 from rotor.formats.spcat.text.catalogue import Catalogue
 from rotor.formats.spcat.text.egy import LevelList
 from rotor.formats.spcat.text.fields import QUANTUM_RANGE

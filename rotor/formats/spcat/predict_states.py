@@ -14,7 +14,6 @@ import numpy as np
 
 from rotor import units
 from rotor.arrays import Floats, Ints, end_to_end
-from rotor.formats.spcat.codes import constants_of, split_code
 from rotor.formats.spcat.file_lines import (
     LEAST_MHZ,
     as_catalogue,
@@ -25,6 +24,7 @@ from rotor.formats.spcat.file_lines import (
 )
 from rotor.formats.spcat.file_model import Group, groups_of, left_out, line_names
 from rotor.formats.spcat.file_quanta import Format, format_of
+from rotor.formats.spcat.hamiltonian.codes import constants_of, split_code
 from rotor.formats.spcat.text.catalogue import Catalogue
 from rotor.formats.spcat.text.egy import LevelList
 from rotor.formats.spcat.text.int_file import IntensityFile, Request

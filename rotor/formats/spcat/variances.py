@@ -11,7 +11,7 @@ from itertools import takewhile
 import numpy as np
 
 from rotor.arrays import Floats
-from rotor.formats.spcat.codes import HELD_BELOW, constants_and_matrix
+from rotor.formats.spcat.hamiltonian.codes import HELD_BELOW, constants_and_matrix
 from rotor.formats.spcat.text.par import Parameter, ParameterFile
 from rotor.tops.covariance import Covariance
 

@@ -9,6 +9,7 @@ length of the row d F, so that a list of lines needs the rows of its levels only
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -53,3 +54,37 @@ def line_errors(spread: Floats, upper: NDArray[np.integer], lower: NDArray[np.in
         difference = spread[upper[here]] - spread[lower[here]]
         out[here] = np.sqrt(np.einsum("ij,ij->i", difference, difference))
     return out
+
+
+def known_covariance(top: Top, parameters: Collection[str]) -> Covariance | None:
+    """What a top knows of the errors of these parameters: its covariance, else uncertainties that may count as uncorrelated.
+
+    Constants of spins that the covariance does not have count by their own uncertainties, uncorrelated. None for a top whose energies
+    are in a table, since they do not follow from its constants, and where correlations of the constants are not known.
+    """
+    if top.level_table is not None:
+        return None
+    if top.covariance is None:
+        found = Covariance.of_uncertainties(top.constants) if top.independent_errors else None
+    else:
+        found = top.covariance.of(parameters)
+    spins = top.spin_constants.uncertainties if top.spin_constants else {}
+    if found is None:
+        return None
+    alone = {name: error for name, error in spins.items() if error and name in parameters and name not in found.names}
+    return found.beside(alone) if alone else found
+
+
+def source_of_errors(top: Top, parameters: Collection[str], given: Covariance | None) -> str | None:
+    """Which uncertainties the errors of frequencies come from, in words, None where there are none; given: in place of what the top has."""
+    if given is None and top.level_table is not None:
+        return "none: the energies are from a table"
+    used = given or known_covariance(top, parameters)
+    if used is None:
+        known = top.constants.uncertainties and top.covariance is None
+        return "none: the constants are from a fit whose correlations are not known" if known else None
+    together = given or (top.covariance.of(parameters) if top.covariance else None)
+    alone = [name for name in used.names if together is None or name not in together.names]
+    texts = [f"covariance of {', '.join(together.names)}"] if together else []
+    texts += [f"uncertainties of {', '.join(alone)}, uncorrelated"] if alone else []
+    return "; ".join(texts)

@@ -27,7 +27,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rotor.arrays import Floats, Ints
-from rotor.formats.spcat.states import StateOptions
+from rotor.formats.spcat.hamiltonian.states import StateOptions
 from rotor.quantum.coupled import CoupledBlock, Part
 from rotor.quantum.levels import Levels
 from rotor.quantum.spins.operators import AxialState, Basis

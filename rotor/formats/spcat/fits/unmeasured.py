@@ -10,7 +10,7 @@ from rotor.arrays import Floats, Ints
 from rotor.fit.assignment import Assignments
 from rotor.formats.spcat.file_model import Group
 from rotor.formats.spcat.file_quanta import Format, format_of, quanta_of
-from rotor.formats.spcat.fit_states import groups_for_fit, levels_in_blocks
+from rotor.formats.spcat.fits.fit_states import groups_for_fit, levels_in_blocks
 from rotor.formats.spcat.text.par import ParameterFile
 from rotor.quantum.spins.levels import unmixed_levels
 

@@ -10,11 +10,11 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
-from rotor.formats.spcat.codes import AXES, Digits, split_code, state_digits
-from rotor.formats.spcat.l_doubled import Pair, couplings_with_pairs
-from rotor.formats.spcat.l_spins import spin_terms_with_pairs
-from rotor.formats.spcat.operators import CodedOperator, energy_of_k, operator_of, plain_of_j
-from rotor.formats.spcat.series import (
+from rotor.formats.spcat.hamiltonian.codes import AXES, Digits, split_code, state_digits
+from rotor.formats.spcat.hamiltonian.l_doubled import Pair, couplings_with_pairs
+from rotor.formats.spcat.hamiltonian.l_spins import spin_terms_with_pairs
+from rotor.formats.spcat.hamiltonian.operators import CodedOperator, energy_of_k, operator_of, plain_of_j
+from rotor.formats.spcat.hamiltonian.series import (
     Series,
     is_constant,
     is_series,

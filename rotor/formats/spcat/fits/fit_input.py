@@ -20,8 +20,8 @@ from rotor.fit.assignment import Assignments, assignments
 from rotor.fit.fit import Fit, FitOptions
 from rotor.fit.parameters import Parameters
 from rotor.formats.assigned_lines import QUANTA
-from rotor.formats.spcat.codes import HELD_BELOW, constants_and_matrix
-from rotor.formats.spcat.states import is_plain
+from rotor.formats.spcat.hamiltonian.codes import HELD_BELOW, constants_and_matrix
+from rotor.formats.spcat.hamiltonian.states import is_plain
 from rotor.formats.spcat.text.fields import BLANK
 from rotor.formats.spcat.text.lin import LineList, note_of_defaults, note_of_remarks, read_lin, with_defaults
 from rotor.formats.spcat.text.par import Header, Parameter, ParameterFile, read_par
@@ -89,7 +89,7 @@ def _quanta_names(file: ParameterFile) -> tuple[str, ...]:
     if is_plain(file, None):
         return QUANTA[constants_and_matrix(file)[0].kind]
     from rotor.formats.spcat.file_quanta import format_of
-    from rotor.formats.spcat.fit_states import groups_for_fit, names_of_quanta
+    from rotor.formats.spcat.fits.fit_states import groups_for_fit, names_of_quanta
 
     return names_of_quanta(format_of(file, groups_for_fit(file)))
 
@@ -110,7 +110,7 @@ def spfit_input(file: ParameterFile, lines: LineList, source: str = "") -> Spfit
         names, kmax = tuple(constants.values), _kmax(file, constants)
     else:
         from rotor.formats.spcat.file_model import line_names
-        from rotor.formats.spcat.fit_states import FileLevels
+        from rotor.formats.spcat.fits.fit_states import FileLevels
 
         matrix, names = np.eye(len(file.parameters)), line_names(file)
         model = partial(FileLevels.of, file)
@@ -136,7 +136,7 @@ def spfit_input(file: ParameterFile, lines: LineList, source: str = "") -> Spfit
     )
     notes += _notes(file, options, model is None, assigned)
     if model is not None:
-        from rotor.formats.spcat.at_zero import stay_at_zero
+        from rotor.formats.spcat.fits.at_zero import stay_at_zero
 
         if stay := stay_at_zero(file):
             notes.append(

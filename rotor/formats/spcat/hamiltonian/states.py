@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Ints
-from rotor.formats.spcat.codes import split_code
+from rotor.formats.spcat.hamiltonian.codes import split_code
 from rotor.formats.spcat.text.int_file import IntensityFile
 from rotor.formats.spcat.text.par import Options, ParameterFile
 

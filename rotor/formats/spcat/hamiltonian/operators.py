@@ -27,7 +27,7 @@ from math import sqrt
 
 import numpy as np
 
-from rotor.formats.spcat.codes import Digits
+from rotor.formats.spcat.hamiltonian.codes import Digits
 from rotor.quantum.effects.interactions import with_powers
 from rotor.quantum.effects.spin_effect import ParameterName, matrix_of
 from rotor.quantum.spins.operators import Cosines, CosinesWithN, Matrix, Rotor, Scalar, Vector

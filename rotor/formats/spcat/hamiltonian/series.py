@@ -28,8 +28,8 @@ from math import pi
 import numpy as np
 
 from rotor.arrays import Floats
-from rotor.formats.spcat.codes import Digits, split_code, state_digits
-from rotor.formats.spcat.operators import CodedOperator, operator_of, order_of, plain_of_j
+from rotor.formats.spcat.hamiltonian.codes import Digits, split_code, state_digits
+from rotor.formats.spcat.hamiltonian.operators import CodedOperator, operator_of, order_of, plain_of_j
 from rotor.formats.spcat.text.par import Parameter, ParameterFile
 from rotor.quantum.states import OperatorOfJ
 from rotor.quantum.wang.j_operators import JOperator
@@ -249,7 +249,7 @@ def _by_elements(of: OperatorOfJ, factor: Factor, whole: complex) -> OperatorOfJ
 def symmetry_type(d: Digits, oblate: bool) -> int:
     """The TYP of an operator of the same species and ΔK as a term of a series.
 
-    >>> from rotor.formats.spcat.codes import split_code
+    >>> from rotor.formats.spcat.hamiltonian.codes import split_code
     >>> [symmetry_type(split_code(code), False) for code in (1_000_400_00, 11_000_000_00, 11_000_400_00, 11_002_000_00, 92_00_00)]
     [4, 20, 21, 0, 4]
     """

@@ -14,10 +14,10 @@ import numpy as np
 from rotor.arrays import Floats
 from rotor.fit.fit import Fit
 from rotor.fit.top_constants import TopConstants
-from rotor.formats.spcat.codes import constants_and_matrix
-from rotor.formats.spcat.fit_input import packed_correlations
+from rotor.formats.spcat.fits.fit_input import packed_correlations
+from rotor.formats.spcat.hamiltonian.codes import constants_and_matrix
 from rotor.formats.spcat.model import parameter_file
-from rotor.formats.spcat.named_parameters import named_parameters
+from rotor.formats.spcat.names.named_parameters import named_parameters
 from rotor.formats.spcat.text.par import Parameter, ParameterFile
 from rotor.tops.top import Top
 

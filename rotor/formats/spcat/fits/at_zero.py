@@ -9,10 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from rotor.formats.spcat.codes import HELD_BELOW, split_code, state_digits
-from rotor.formats.spcat.l_doubled import pairs_of
-from rotor.formats.spcat.series import is_constant, is_series
-from rotor.formats.spcat.states import states_of
+from rotor.formats.spcat.hamiltonian.codes import HELD_BELOW, split_code, state_digits
+from rotor.formats.spcat.hamiltonian.l_doubled import pairs_of
+from rotor.formats.spcat.hamiltonian.series import is_constant, is_series
+from rotor.formats.spcat.hamiltonian.states import states_of
 from rotor.formats.spcat.text.par import Parameter, ParameterFile
 
 _SYMMETRIES = range(4)  # of the group of twofold rotations; an operator of symmetry s leads from t to s ^ t

@@ -17,14 +17,14 @@ from math import gcd
 import numpy as np
 
 from rotor.arrays import Floats
-from rotor.formats.spcat.codes import AXES, HELD_BELOW, constants_of, is_linear, join_code, split_code
-from rotor.formats.spcat.dipole_codes import dipoles_of
-from rotor.formats.spcat.file_effect import CodedLine, coded_lines
 from rotor.formats.spcat.file_model import allowed
+from rotor.formats.spcat.hamiltonian.codes import AXES, HELD_BELOW, constants_of, is_linear, join_code, split_code
+from rotor.formats.spcat.hamiltonian.dipole_codes import dipoles_of
+from rotor.formats.spcat.hamiltonian.file_effect import CodedLine, coded_lines
+from rotor.formats.spcat.hamiltonian.series import is_constant, is_series
+from rotor.formats.spcat.hamiltonian.states import StateOptions, states_of
+from rotor.formats.spcat.hamiltonian.symmetry import halved_across
 from rotor.formats.spcat.model import weights_of
-from rotor.formats.spcat.series import is_constant, is_series
-from rotor.formats.spcat.states import StateOptions, states_of
-from rotor.formats.spcat.symmetry import halved_across
 from rotor.formats.spcat.text.int_file import IntensityFile
 from rotor.formats.spcat.text.par import Options, Parameter, ParameterFile
 from rotor.quantum.spins.operators import Cosines, CosinesWithN, Scalar

@@ -15,13 +15,13 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from rotor.arrays import Floats, Ints, distinct
-from rotor.formats.spcat.at_zero import left_at_zero
 from rotor.formats.spcat.file_model import Group, groups_of, line_names
 from rotor.formats.spcat.file_quanta import Format, format_of, quanta_of
-from rotor.formats.spcat.l_doubled import functions_of_l, named_by_l
+from rotor.formats.spcat.fits.at_zero import left_at_zero
+from rotor.formats.spcat.fits.unresolved import HIGHEST_SEARCHED, excluded_parameters, refuse_far_f, spelled_out
+from rotor.formats.spcat.hamiltonian.l_doubled import functions_of_l, named_by_l
 from rotor.formats.spcat.text.int_file import IntensityFile, Request
 from rotor.formats.spcat.text.par import ParameterFile
-from rotor.formats.spcat.unresolved import HIGHEST_SEARCHED, excluded_parameters, refuse_far_f, spelled_out
 from rotor.quantum.estimates.effect_units import Functions, unit_levels
 from rotor.quantum.estimates.labelled_spins import found_with_spins
 from rotor.quantum.estimates.state_units import state_units

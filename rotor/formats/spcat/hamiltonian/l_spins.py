@@ -13,7 +13,7 @@ from math import sqrt
 import numpy as np
 
 from rotor.arrays import Floats, Ints
-from rotor.formats.spcat.l_doubled import Pair, functions_of_parts
+from rotor.formats.spcat.hamiltonian.l_doubled import Pair, functions_of_parts
 from rotor.quantum.levels import Levels
 from rotor.quantum.spins.blocks import SpinBlock
 from rotor.quantum.spins.operators import Cosines, CosinesWithN, Matrix, Rotor

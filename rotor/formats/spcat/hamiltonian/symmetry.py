@@ -11,9 +11,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from rotor.formats.spcat.l_doubled import Pair
-from rotor.formats.spcat.operators import CodedOperator
-from rotor.formats.spcat.states import StateOptions
+from rotor.formats.spcat.hamiltonian.l_doubled import Pair
+from rotor.formats.spcat.hamiltonian.operators import CodedOperator
+from rotor.formats.spcat.hamiltonian.states import StateOptions
 from rotor.quantum.spins.operators import Cosines, CosinesWithN, Matrix
 
 _SPECIES = ((0, 0), (0, 1), (1, 1), (1, 0))  # A, Ba, Bb, Bc by parities of Ka and Kc

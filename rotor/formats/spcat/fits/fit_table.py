@@ -6,8 +6,17 @@ from collections.abc import Sequence
 
 from rotor.fit.fit import Fit
 from rotor.fit.publication import Row, value_text
-from rotor.formats.spcat.codes import A_REDUCTION, LINEAR, S_REDUCTION, SYMMETRIC, Digits, Named, is_linear, split_code
-from rotor.formats.spcat.fit_input import SpfitInput
+from rotor.formats.spcat.fits.fit_input import SpfitInput
+from rotor.formats.spcat.hamiltonian.codes import (
+    A_REDUCTION,
+    LINEAR,
+    S_REDUCTION,
+    SYMMETRIC,
+    Digits,
+    Named,
+    is_linear,
+    split_code,
+)
 from rotor.formats.spcat.text.par import Parameter, ParameterFile
 
 _RIGID = (Named("A", 10000, 1), Named("B", 20000, 1), Named("C", 30000, 1))

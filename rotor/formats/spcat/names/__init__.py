@@ -1,0 +1,1 @@
+"""SPFIT's files and named constants, both ways."""
