@@ -1,7 +1,7 @@
 """Corners of fits: N = 0 among large blocks of spins, a-priori values of 0, constants that the lines do not determine.
 
-Errors of lines from a .var file of rotor were compared with those of SPCAT (compiled from its public source): with one constant of 9, or
-A of a symmetric top, left undetermined they are those of the fit with it held, in every printed digit.
+Errors of lines by SPCAT (compiled from its public source) from the .var files of these fits, A and DK of a symmetric top or energies of
+states not determined, are those of the fits with these constants held: 144 and 582 lines, in every printed digit.
 """
 
 from __future__ import annotations

@@ -84,7 +84,10 @@ def name_text(name: str, form: str) -> str:
 
 @dataclass(frozen=True)
 class Row:
-    """A constant of the table: name, value and standard error in MHz (None: held; infinite: not determined), what it follows where it is tied, its states."""
+    """A constant of the table: name, value and standard error in MHz, what it follows where it is tied, its states.
+
+    error : None of a constant that is held, infinite of one that is not determined.
+    """
 
     name: str
     value: float
