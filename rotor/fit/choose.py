@@ -130,9 +130,9 @@ def _without(fit: Fit, name: str, options: FitOptions | None) -> Trial | None:
 
 def _same_priors(fit: Fit, made: Parameters) -> Parameters:
     known = dict(zip(fit.parameters.names, fit.parameters.prior.tolist(), strict=True))
-    start = dict(zip(fit.parameters.names, fit.parameters.start.tolist(), strict=True))
+    centre = dict(zip(fit.parameters.names, fit.parameters.expected.tolist(), strict=True))
     prior = np.array([known.get(name, np.inf) for name in made.names])
-    at = np.array([start[n] if np.isfinite(p) else s for n, p, s in zip(made.names, prior, made.start, strict=True)])
+    at = np.array([centre[n] if np.isfinite(p) else s for n, p, s in zip(made.names, prior, made.start, strict=True)])
     return replace(made, prior=prior, start=at)
 
 

@@ -127,8 +127,18 @@ def covariance_of(parameters: Parameters, statistics: Regression) -> Covariance:
         raise ValueError(
             f"the lines do not determine {lost}: there is no covariance; hold it or give an a-priori error"
         )
-    rows = np.flatnonzero(parameters.matrix.any(axis=1))
-    matrix = parameters.matrix[rows] @ statistics.covariance @ parameters.matrix[rows].T
+    found = covariance_of_determined(parameters, statistics)
+    return found or Covariance((), np.zeros((0, 0)))
+
+
+def covariance_of_determined(parameters: Parameters, statistics: Regression) -> Covariance | None:
+    """The same without the constants that follow from a free parameter that is not determined; None where no other is there."""
+    open_ = ~np.isfinite(statistics.errors)
+    rows = np.flatnonzero(parameters.matrix.any(axis=1) & ~parameters.matrix[:, open_].any(axis=1))
+    if not len(rows):
+        return None
+    own = np.where(np.isfinite(statistics.covariance), statistics.covariance, 0.0)  # those that are not have no part
+    matrix = parameters.matrix[rows] @ own @ parameters.matrix[rows].T
     return Covariance(tuple(parameters.constant_names[i] for i in rows), (matrix + matrix.T) / 2)
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -28,7 +28,7 @@ class Parameters:
     """Free parameters and how the constants follow from them.
 
     names (n,) : of the free parameters. start (n,) : their values before the fit, MHz. prior (n,) : a-priori standard errors in
-    MHz, infinite where there are none; they count from `start`
+    MHz, infinite where there are none. centre (n,) : the a-priori values, MHz, where they are not `start`
     constant_names (c,) ; base (c,), matrix (c, n) : constants = base + matrix @ parameters
     """
 
@@ -38,6 +38,12 @@ class Parameters:
     constant_names: tuple[str, ...]
     base: Floats
     matrix: Floats
+    centre: Floats | None = None
+
+    @property
+    def expected(self) -> Floats:
+        """A-priori values (n,), MHz, from which the errors `prior` count."""
+        return self.start if self.centre is None else self.centre
 
     def constants_of(self, parameters: Floats) -> Floats:
         """The constants (c,) in MHz."""
@@ -64,12 +70,14 @@ class Parameters:
         keep = [k for k in range(len(self.names)) if k != i]
         return Parameters(
             tuple(self.names[k] for k in keep), self.start[keep], self.prior[keep], self.constant_names, self.base,
-            self.matrix[:, keep],
+            self.matrix[:, keep], self.expected[keep],
         )  # fmt: skip
 
     def moved(self, start: Floats) -> Parameters:
-        """The same from another start; a-priori values stay where they were only if none is finite."""
-        return Parameters(self.names, np.asarray(start), self.prior, self.constant_names, self.base, self.matrix)
+        """The same from another start; a-priori values stay where they are."""
+        start = np.asarray(start, dtype=np.float64)
+        centre = np.where(np.isfinite(self.prior), self.expected, start)
+        return replace(self, start=start, centre=centre)
 
 
 def parameters(
