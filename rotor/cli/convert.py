@@ -15,6 +15,7 @@ from rotor.cli.shared.options import argument, grouped, option
 from rotor.cli.shared.output import Files, Writer, deliver, json_text, note
 
 if TYPE_CHECKING:
+    from rotor.formats.molecules.molecule_file import MoleculeFile
     from rotor.formats.spcat.text.int_file import IntensityFile
     from rotor.tops.top import Top
 
@@ -51,6 +52,7 @@ def command(context: typer.Context, options: Options) -> None:
     content = {**describe(top, source, context.obj), "files": files.names}
     done = f"{source} → {target}: {top.constants.text()}{_further(top)}"
     writers = {"TARGET": writer_of(top, source, target, options.kmax)}
+    _note_of_options(top, source, target, options.kmax)
     deliver(files, writers, lambda: json_text(content), lambda: print(done))
 
 
@@ -113,6 +115,7 @@ def writer_of(top: Top, source: str, target: str, kmax: int) -> Writer:
             magnetic=top.magnetic,
             sources=sources,
         )
+        _refuse_unreadable(file, source)
         return lambda path: write_molecule_file(file, path)
 
     if top.level_table is not None:
@@ -134,6 +137,46 @@ def writer_of(top: Top, source: str, target: str, kmax: int) -> Writer:
         note(f"a {Path(target).suffix} file has no place for the dipole ({dipole} D); it belongs into an .int file")
     parameters = named_parameter_file(top, kmax)
     return lambda path: write_par(parameters, path)
+
+
+def _refuse_unreadable(file: MoleculeFile, source: str) -> None:
+    """ValueError where a .toml of this top would be refused when it is read, such as for dipoles that the spin weights forbid."""
+    from rotor.formats.molecules.molecule_file import parse_molecule_file
+    from rotor.formats.molecules.molecule_writer import molecule_file_text
+    from rotor.formats.read_write import top_of_file
+
+    try:
+        top_of_file(parse_molecule_file(molecule_file_text(file), "TARGET"))
+    except ValueError as reason:
+        raise ValueError(
+            f"{source}: a .toml of it would be refused when it is read: {reason}; leave out of the source what is named here (a dipole "
+            "that joins levels of unlike weight makes no line unless they mix), or predict from the files themselves"
+        ) from None
+
+
+def _note_of_options(top: Top, source: str, target: str, kmax: int) -> None:
+    """A note on what of the options of SPFIT's files is not taken along and comes back otherwise: DIAG, KNMAX, NLINE."""
+    path = Path(source)
+    if path.suffix.lower() == ".int":
+        from rotor.formats.spcat.predict import parameters_beside
+
+        path = parameters_beside(path)
+    if path.suffix.lower() not in (".par", ".var") or not path.is_file() or target.lower().endswith(".int"):
+        return
+    from rotor.formats.spcat.text.par import read_par
+
+    file, kind = read_par(path), top.constants.kind
+    written = {"DIAG": 3 if kind == "asymmetric" else 0, "KNMAX": 0 if kind == "linear" else kmax, "NLINE": 1}
+    knmax = min(line.knmax for line in file.options)
+    given = {"DIAG": file.options[0].diag, "KNMAX": knmax, "NLINE": file.header.nline}
+    lost = [f"{name} = {value}" for name, value in given.items() if value != written[name]]
+    if lost:
+        others = ", ".join(f"{name} = {value}" for name, value in written.items())
+        what = "are not part of a .toml" if target.lower().endswith(".toml") else "are not taken along"
+        note(
+            f"{', '.join(lost)} of {path.name} {what}: a .par or .var written of these constants has {others}; "
+            "K above KNMAX is left out by SPCAT (--kmax)"
+        )
 
 
 def _intensities(top: Top, highest: int) -> IntensityFile:

@@ -157,7 +157,9 @@ def command(
     writers |= save_scene("spectrum", answer.request, outputs, given, tag=tag)
     if prediction is not None:
         writers["--cat"] = _program_catalogue(prediction, content)
-        writers["--egy"] = _program_levels(prediction, content, str(given.source), options.as_spcat)
+    if prediction is not None and "--egy" in files.paths:
+        with answering():
+            writers["--egy"] = _program_levels(prediction, content, str(given.source), options.as_spcat)
     deliver(
         files,
         writers,
@@ -275,15 +277,15 @@ def _program_catalogue(prediction: Prediction, content: dict[str, Any]) -> Write
 
 
 def _program_levels(prediction: Prediction, content: dict[str, Any], source: str, as_spcat: bool) -> Writer:
-    """The levels as SPCAT lists them."""
+    """What writes the levels as SPCAT lists them; they are computed here, before any file is begun."""
     from rotor.formats.provenance import record_of, write_beside
     from rotor.formats.spcat.predict import levels_of_file
     from rotor.formats.spcat.text.egy import write_egy
 
+    found = prediction.levels
+    levels = levels_of_file(source, as_spcat=as_spcat) if found is None else found
+
     def write(path: Path) -> None:
-        levels = prediction.levels
-        if levels is None:
-            levels = levels_of_file(source, as_spcat=as_spcat)
         write_egy(levels, path)
         record = record_of(prediction.lines, {"command": content["command"], "input": content["input"]})
         write_beside(path, record | {"levels": len(levels)})

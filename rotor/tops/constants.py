@@ -10,7 +10,7 @@ from __future__ import annotations
 import difflib
 import math
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
@@ -338,6 +338,14 @@ def _spread(name: str, value: float | str) -> float:
     return spread
 
 
+class AxisOrderError(ValueError):
+    """Rotational constants whose names are not in the order of their values; given: names and values."""
+
+    def __init__(self, given: str, names: Sequence[str]) -> None:
+        super().__init__(f"{given}: the names follow the order {' >= '.join(names)}; exchange them")
+        self.given = given
+
+
 def _refuse_disorder(kind: str, values: Mapping[str, float]) -> None:
     rigid = {name: values[name] for name in RIGID if name in values}
     for name, value in rigid.items():
@@ -349,7 +357,7 @@ def _refuse_disorder(kind: str, values: Mapping[str, float]) -> None:
             )
     if list(rigid.values()) != sorted(rigid.values(), reverse=True):
         given = ", ".join(f"{name} = {value!r}" for name, value in rigid.items())
-        raise ValueError(f"{given} MHz: the names follow the order {' >= '.join(rigid)}; exchange them")
+        raise AxisOrderError(f"{given} MHz", list(rigid))
 
 
 def _rebuilt(settings: dict[str, Any], values: dict[str, Any]) -> Constants:

@@ -52,6 +52,8 @@ def _state(table: TableReader, text: str) -> int:
 
 
 def _weights_of_state(table: TableReader, classes: Any, constants: Constants) -> SpinWeights:
+    if classes == {}:  # what the rule "none" is written as: all levels of this state alike
+        return SpinWeights()
     weights = spin_weights_of(TableReader(f"{table.place}", "weights", classes), constants)
     if weights.to_mapping() != classes:
         raise ValueError(

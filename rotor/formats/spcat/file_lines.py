@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -286,24 +287,32 @@ def _rising(frequency_mhz: Floats) -> Ints | slice:
     return rising_order(frequency_mhz)
 
 
-def as_level_list(solved: list[tuple[Group, Levels]], form: Format) -> LevelList:
-    """The levels of all groups as an .egy file has them, ±K apart; block and rank count the blocks here."""
+def as_level_list(
+    solved: list[tuple[Group, Levels]], form: Format, spreads: Sequence[Floats | None] | None = None
+) -> LevelList:
+    """The levels of all groups as an .egy file has them, ±K apart; block is 1 and rank counts by F and energy, other than in the program.
+
+    spreads: (levels, k) of each group in MHz; the lengths of their rows are the errors of the energies, which are 0 without them.
+    """
     tables = []
-    for group, levels in solved:
+    for (group, levels), spread in zip(solved, spreads or [None] * len(solved), strict=True):
+        error = np.zeros(len(levels)) if spread is None else np.linalg.norm(spread, axis=1) / units.MHZ_PER_CM
         for negative in (False, True) if (levels.components > 1).any() else (False,):
             rows = np.flatnonzero((levels.weight > 0) & (levels.components > int(negative)))
             mixing = np.ones(len(levels)) if levels.mixing is None else levels.mixing
             g = levels.multiplicity * (levels.weight // levels.components)
             quanta = quanta_of(group, levels, form, negative)
-            tables.append((levels.energy_mhz[rows] / units.MHZ_PER_CM, mixing[rows], g[rows], quanta[rows]))
-    energy, mixing, g, quanta = (np.concatenate([table[i] for table in tables]) for i in range(4))
+            tables.append(
+                (levels.energy_mhz[rows] / units.MHZ_PER_CM, error[rows], mixing[rows], g[rows], quanta[rows])
+            )
+    energy, error, mixing, g, quanta = (np.concatenate([table[i] for table in tables]) for i in range(5))
     order = np.lexsort((energy, quanta[:, -1] if form.spins else quanta[:, 0]))
     n = len(order)
     return LevelList(
         block=np.ones(n, dtype=np.int32),
         rank=np.arange(1, n + 1, dtype=np.int32),
         energy_cm=energy[order],
-        error_cm=np.zeros(n),
+        error_cm=error[order],
         mixing=mixing[order],
         degeneracy=g[order].astype(np.int32),
         quanta=quanta[order].astype(np.int16),

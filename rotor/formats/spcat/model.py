@@ -18,17 +18,21 @@ _EVEN = {1: ("ee", "eo"), 2: ("ee", "oo"), 3: ("ee", "oe")}
 FOLD = {6: 3, 9: 5}  # IAX of tops with one kind of E levels
 
 
-def weights_of(options: Options) -> SpinWeights:
+NO_NAME = "cannot be said by the named constants of a top; predict from the files themselves"
+
+
+def weights_of(options: Options, symmetric: bool = True) -> SpinWeights:
     """The spin weights of an option line, reduced by their common divisor; Q in the .int file may carry it still.
 
     IAX 1, 2, 3: WTPL and WTMN for rotational states even and odd under a half turn about a, b, c. IAX 6, 9: WTPL
-    where K is a multiple of 3 or 5, EWT elsewhere. An odd last digit of VSYM exchanges WTPL and WTMN.
+    where K is a multiple of 3 or 5, EWT elsewhere; where they differ, at K = 0 by the parity of J, of a symmetric top alone. An
+    odd last digit of VSYM exchanges WTPL and WTMN.
     """
     plus, minus = (options.wtpl, options.wtmn) if options.vsym % 2 == 0 else (options.wtmn, options.wtpl)
     if options.iax in FOLD:
-        return _fold_weights(options, plus, minus)
+        return _fold_weights(options, plus, minus, symmetric)
     if options.iax not in _EVEN:
-        raise ValueError(f"IAX = {options.iax}: spin weights other than by IAX 1, 2, 3, 6 or 9 {NOT_YET}")
+        raise ValueError(f"IAX = {options.iax}: spin weights other than by IAX 1, 2, 3, 6 or 9: these {NO_NAME}")
     if plus == minus:
         return SpinWeights()
     if is_linear(options):
@@ -39,21 +43,45 @@ def weights_of(options: Options) -> SpinWeights:
         along = 1 if options.nvib > 0 else 3
         if options.iax != along:
             raise ValueError(
-                f"IAX = {options.iax} in a symmetric top: weights that tell the two states of one K {NOT_YET}"
+                f"IAX = {options.iax} in a symmetric top: weights that tell the two states of one K: these {NO_NAME}"
             )
         return SpinWeights.from_mapping({"0": plus, "1": minus})
     even = _EVEN[options.iax]
     return SpinWeights.from_mapping({name: plus if name in even else minus for name in ("ee", "eo", "oe", "oo")})
 
 
-def _fold_weights(options: Options, plus: int, minus: int) -> SpinWeights:
+def _fold_weights(options: Options, plus: int, minus: int, symmetric: bool) -> SpinWeights:
     fold = FOLD[options.iax]
-    if plus != minus:
-        raise ValueError(f"IAX = {options.iax}, WTPL = {plus}, WTMN = {minus}: weights by J at K = 0 {NOT_YET}")
     factor = 100 if options.ewt >= 0 else 1000
     if abs(options.ewt) >= factor - 1:
         raise ValueError(f"EWT = {options.ewt}: l-doubled states, and E levels without a weight, {_plural(NOT_YET)}")
-    return SpinWeights.from_mapping({str(k): abs(options.ewt) if k else plus for k in range(fold)})
+    if plus == minus:
+        return SpinWeights.from_mapping({str(k): abs(options.ewt) if k else plus for k in range(fold)})
+    if not symmetric:
+        raise ValueError(f"IAX = {options.iax} of an asymmetric top with unlike WTPL and WTMN {NO_NAME}")
+    raw = fold_parts(fold, plus, minus, abs(options.ewt))
+    names = ["0even", "0odd", *(str(k) for k in range(1, fold))]
+    return SpinWeights.from_mapping(dict(zip(names, (max(w, 0) for w in raw), strict=True)))
+
+
+def fold_parts(fold: int, plus: int, minus: int, e_weight: int) -> list[int]:
+    """Twice the weights of K = 0 with J even and odd and of the E levels; where one of the first is 0, half of the E levels are there.
+
+    Parameters
+    ----------
+    fold : int
+        n of the axis.
+    plus, minus : int
+        WTPL and WTMN.
+    e_weight : int
+        Weight of E levels in EWT.
+
+    Returns
+    -------
+    list of int
+        0even, 0odd, 1, ..., n - 1.
+    """
+    return [2 * plus, 2 * minus, *[2 * e_weight if min(plus, minus) > 0 else e_weight] * (fold - 1)]
 
 
 def _plural(text: str) -> str:
@@ -135,7 +163,7 @@ def top_of(parameters: ParameterFile, intensities: IntensityFile | None = None) 
     oblate_basis = parameters.options[0].nvib < 0
     if dipole and (constants.kind, oblate_basis) in (("prolate", True), ("oblate", False)):
         dipole = dipole[::-1]
-    weights = weights_of(parameters.options[0])
+    weights = weights_of(parameters.options[0], constants.kind in ("prolate", "oblate"))
     name = parameters.title
     return Top.from_constants(
         constants, dipole_abc_debye=dipole, spin_weights=weights, name=name, symmetry_checked=False

@@ -94,7 +94,7 @@ def predicted(
     lines = _lines(parameters, solved, transitions, form, request, q)
     if factor is not None:
         lines = replace(lines, given_spread=np.concatenate([one for one in spreads if one is not None]))
-    return made, lines, q, as_level_list(solved, form), notes
+    return made, lines, q, as_level_list(solved, form, spreads), notes
 
 
 def _solved(groups: list[Group], request: Request, form: Format) -> list[tuple[Group, Levels]]:
@@ -129,7 +129,8 @@ def levels_of_files(parameters: ParameterFile, intensities: IntensityFile, *, as
     Returns
     -------
     LevelList
-        Energies in cm⁻¹ from the zero of the Hamiltonian, degeneracies with the weights of the file.
+        Energies in cm⁻¹ from the zero of the Hamiltonian, their errors by the covariance of the file, degeneracies with the weights
+        of the file.
 
     Raises
     ------
@@ -139,7 +140,9 @@ def levels_of_files(parameters: ParameterFile, intensities: IntensityFile, *, as
     groups = groups_of(parameters, intensities, as_spcat=as_spcat)
     form = format_of(parameters, groups)
     groups = _with_levels(groups, intensities.request)
-    return as_level_list(_solved(groups, intensities.request, form), form)
+    solved = _solved(groups, intensities.request, form)
+    factor, known = variance_factor(parameters), line_names(parameters)
+    return as_level_list(solved, form, [level_spreads(group, levels, known, factor) for group, levels in solved])
 
 
 def _with_levels(groups: list[Group], request: Request) -> list[Group]:

@@ -24,17 +24,16 @@ from rotor.formats.spcat.hamiltonian.file_effect import CodedLine, coded_lines
 from rotor.formats.spcat.hamiltonian.series import is_constant, is_series
 from rotor.formats.spcat.hamiltonian.states import StateOptions, states_of
 from rotor.formats.spcat.hamiltonian.symmetry import halved_across
-from rotor.formats.spcat.model import weights_of
+from rotor.formats.spcat.model import NO_NAME, fold_parts, weights_of
 from rotor.formats.spcat.text.int_file import IntensityFile
 from rotor.formats.spcat.text.par import Options, Parameter, ParameterFile
 from rotor.quantum.spins.operators import Cosines, CosinesWithN, Scalar
-from rotor.tops.constants import Constants
+from rotor.tops.constants import AxisOrderError, Constants
 from rotor.tops.spins.spin_constants import SpinConstants, twice_of
 from rotor.tops.spins.spin_weights import SpinWeights
 from rotor.tops.states.state_constants import StateConstants
 from rotor.tops.top import Top
 
-NO_NAME = "cannot be said by the named constants of a top; predict from the files themselves"
 _BETWEEN = {20: "G_a", 40: "G_b", 60: "G_c", 21: "F_bc", 41: "F_ac", 61: "F_ab"}
 _LADDERS = {0: "W", 1: "W_pm2", 2: "W_pm4", 3: "W_pm6"}
 _PAIRS = {"ab": (0, 1), "ac": (0, 2), "bc": (1, 2)}
@@ -76,7 +75,7 @@ def named_top(file: ParameterFile, intensities: IntensityFile | None = None, *, 
         option = replace(option, nvib=-1 if first.nvib < 0 else 1, vsym=0, text="")
         energies.append(sum(p.value for p in parameters if not any(split_code(p.code)[:8])))
         plain = tuple(p for p in parameters if any(split_code(p.code)[:8]))
-        constants.append(constants_of(replace(file, options=(option,), parameters=plain), errors=errors))
+        constants.append(_constants_of_state(v, replace(file, options=(option,), parameters=plain), errors))
     _refuse_unlike(constants)
     turned = (constants[0].kind, first.nvib < 0) in (("prolate", True), ("oblate", False))
     weights = _weights(file, states, constants[0].kind in ("prolate", "oblate"))
@@ -112,6 +111,16 @@ def _refuse(file: ParameterFile, states: tuple[StateOptions, ...], intensities: 
     for what, found in reasons.items():
         if found:
             raise ValueError(f"{what} {NO_NAME}")
+
+
+def _constants_of_state(v: int, file: ParameterFile, errors: bool) -> Constants:
+    """The constants of one state; ValueError, with its number, for those whose order is not that of the axes, A >= B >= C."""
+    try:
+        return constants_of(file, errors=errors)
+    except AxisOrderError as reason:
+        raise ValueError(
+            f"state {v}: {reason.given}; axes in another order than A >= B >= C {NO_NAME} (.int)"
+        ) from None
 
 
 def _refuse_unlike(constants: list[Constants]) -> None:
@@ -198,13 +207,9 @@ def _weights(file: ParameterFile, states: tuple[StateOptions, ...], symmetric: b
             found.append(SpinWeights())  # with their spins all levels are of A species
             divisors.append(2 * max(state.plus, 1))
         elif state.fold in (3, 5) and state.plus != state.minus:
-            if not symmetric:
-                raise ValueError(f"IAX = {state.iax} of an asymmetric top with unlike WTPL and WTMN {NO_NAME}")
-            e = state.e_weight if min(state.plus, state.minus) > 0 else state.e_weight / 2
-            raw = [2 * state.plus, 2 * state.minus, *[round(2 * e)] * (state.fold - 1)]
-            names = ["0even", "0odd", *(str(k) for k in range(1, state.fold))]
-            found.append(SpinWeights.from_mapping(dict(zip(names, (max(w, 0) for w in raw), strict=True))))
-            divisors.append(gcd(*raw))
+            option = replace(option, iax=state.iax, wtpl=state.plus, wtmn=state.minus, ewt=-state.e_weight)
+            found.append(weights_of(option, symmetric))
+            divisors.append(gcd(*fold_parts(state.fold, state.plus, state.minus, state.e_weight)))
         else:
             found.append(weights_of(option))
             divisors.append(2 * (gcd(state.plus, state.minus) if not is_linear(option) else max(state.plus, 1)))

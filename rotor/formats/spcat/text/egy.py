@@ -33,8 +33,9 @@ class Level(NamedTuple):
 class LevelList:
     """Levels, columns of equal length n.
 
-    block, rank (n,): where in the program's Hamiltonian. energy_cm, error_cm (n,): cm⁻¹. mixing (n,): share of the
-    state that gives the label. degeneracy (n,): of M and of nuclear spins. quanta (n, w): -32768 where there is none.
+    block, rank (n,): where in the program's Hamiltonian; of levels computed here they are not those of the program (`level_list`;
+    of an .int file block 1 and the rank by F and energy). energy_cm, error_cm (n,): cm⁻¹. mixing (n,): share of the state that
+    gives the label. degeneracy (n,): of M and of nuclear spins. quanta (n, w): -32768 where there is none.
     texts: what was read that is not written so from the numbers: derivatives and vectors among the levels, other
     spacing; it begins with what stands before the level. rest: what follows the last level.
     """
@@ -140,7 +141,8 @@ def format_level(level: Level) -> str:
 
 
 def _plain_text(level: Level) -> str:
-    numbers = f"{level.energy_cm:17.6f} {level.error_cm:17.6f} {level.mixing:10.6f} {level.degeneracy:4d}"
+    energy = round(level.energy_cm, 6) + 0.0  # 0.0 where round-off below zero would print as -0.000000
+    numbers = f"{energy:17.6f} {level.error_cm:17.6f} {level.mixing:10.6f} {level.degeneracy:4d}"
     return f"{level.block:6d} {level.rank:4d} {numbers}:" + "".join(f"{q:3d}" for q in level.quanta) + "\n"
 
 

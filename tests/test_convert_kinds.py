@@ -1,0 +1,184 @@
+"""`rotor convert` of SPFIT's files of every kind: what it writes is read again as the same top, or it refuses with a remedy.
+
+What is lost is noted. The lists of levels of `rotor spectrum --egy` have their errors."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import rotor
+from rotor.cli import run
+from rotor.cli.convert import _note_of_options, top_with_errors
+from rotor.formats.spcat.names.named_parameters import named_parameter_file
+from rotor.formats.spcat.text.egy import format_egy, read_egy
+from rotor.formats.spcat.text.int_file import read_int
+from rotor.formats.spcat.text.par import format_par, read_par
+
+ORACLES = Path(__file__).parent / "oracles"
+KINDS = sorted(path.parent for path in ORACLES.glob("**/*.int") if path.with_suffix(".var").exists())
+REMEDY = re.compile(r"predict from the files? (themselves|itself)|(is|are) read but not computed yet")
+
+
+def copied(kind: str, folder: Path) -> Path:
+    """The .int of a kind in a folder where it may be changed, its .var beside it."""
+    source = next(path for path in KINDS if path.name == kind)
+    for suffix in (".int", ".var"):
+        shutil.copy(next(source.glob(f"*{suffix}")), folder / f"{kind}{suffix}")
+    return folder / f"{kind}.int"
+
+
+def values_of(top) -> dict[str, float]:
+    further = [top.states.values if top.states else {}, top.spin_constants.values if top.spin_constants else {}]
+    return {**top.constants.values, **further[0], **further[1]}
+
+
+@pytest.mark.parametrize("folder", KINDS, ids=lambda path: path.name)
+def test_what_is_written_is_read_as_the_same_top(folder, tmp_path, capsys):
+    given, written = copied(folder.name, tmp_path), tmp_path / "x.toml"
+    code = run(["convert", str(given), str(written)])
+    if code == 2:
+        assert REMEDY.search(capsys.readouterr().err)
+        assert not written.exists()
+        return
+    assert code == 0
+    again, top = rotor.read(written), top_with_errors(str(given))
+    assert values_of(again) == pytest.approx(values_of(top), rel=1e-14)  # digits of a double in decimal
+    assert again.spin_weights == top.spin_weights
+    assert again.dipole_abc_debye == top.dipole_abc_debye
+    if top.states:
+        assert dict(again.states.weights) == dict(top.states.weights)
+        assert dict(again.states.dipoles) == dict(top.states.dipoles)
+    back = named_parameter_file(again, 20)
+    assert read_par(format_par(back)).options == back.options
+
+
+def test_a_state_without_weights_beside_one_with_them_comes_back(tmp_path):
+    given = copied("weights_of_states_i_tot", tmp_path)
+    lines = [line for line in given.read_text().splitlines(True) if line.split()[:2] != ["1", "1.29"]]
+    given.write_text("".join(lines))
+    assert run(["convert", str(given), str(tmp_path / "x.toml")]) == 0
+    weights = rotor.read(tmp_path / "x.toml").states.weights
+    assert weights[1].rule == "none"
+    assert weights[0].to_mapping() == {"ee": 1, "eo": 3, "oe": 3, "oo": 1}
+
+
+def test_dipoles_that_the_weights_forbid_are_refused_before_anything_is_written(tmp_path, capsys):
+    given = copied("dipoles_between", tmp_path)
+    assert run(["convert", str(given), str(tmp_path / "x.toml")]) == 2
+    said = capsys.readouterr().err
+    assert "μa = 1.3 D, μb = 0.7 D" in said
+    assert "leave out of the source what is named here" in said
+    assert not (tmp_path / "x.toml").exists()
+
+
+def test_axes_in_another_order_are_refused_with_the_state(tmp_path, capsys):
+    given = copied("near_sphere_states", tmp_path)
+    assert run(["convert", str(given), str(tmp_path / "x.toml")]) == 2
+    said = capsys.readouterr().err
+    assert "state 1: A = 7297.2, B = 7228.2, C = 7270.8 MHz" in said
+    assert "predict from the files themselves" in said
+    assert "exchange" not in said
+
+
+def test_what_of_the_option_line_is_lost_is_noted(tmp_path, capsys):
+    given = copied("water_diag1", tmp_path)
+    assert run(["convert", str(given), str(tmp_path / "x.toml")]) == 0
+    said = capsys.readouterr().err
+    assert "note: DIAG = 1, KNMAX = 20, NLINE = 0 of water_diag1.var are not part of a .toml" in said
+    assert "DIAG = 3, KNMAX = 99, NLINE = 1" in said
+    assert run(["convert", str(tmp_path / "x.toml"), str(tmp_path / "y.var"), "--kmax", "20"]) == 0
+    capsys.readouterr()
+    _note_of_options(rotor.read(tmp_path / "x.toml"), str(tmp_path / "y.var"), "z.toml", 20)
+    assert "KNMAX" not in capsys.readouterr().err  # all three come back
+
+
+SYMMETRIC = "inversion\n2 1 1\ns -1 1 0 20 0 {iax} {plus} {minus} 0 2 0 0\n100 298000.0 1\n1000 -111000.0 1\n"
+
+
+@pytest.mark.parametrize(("plus", "minus", "named"), [(0, 4, [0, 4, 1, 1]), (4, 4, [2, 1, 1]), (3, 1, [3, 1, 2, 2])])
+def test_weights_by_j_at_k_0_have_names_in_one_state_too(plus, minus, named, tmp_path):
+    path = tmp_path / "a.par"
+    path.write_text(SYMMETRIC.format(iax=6, plus=plus, minus=minus))
+    weights = rotor.read(path).spin_weights
+    assert list(weights.to_mapping().values()) == named
+    assert weights.classes[0] == ("0" if plus == minus else "0even")
+
+
+def test_weights_of_other_folds_are_refused_with_the_files_as_remedy(tmp_path):
+    (tmp_path / "a.par").write_text(SYMMETRIC.format(iax=10, plus=4, minus=0))
+    with pytest.raises(ValueError, match=r"IAX = 10: .* predict from the files themselves"):
+        rotor.read(tmp_path / "a.par")
+
+
+# two states, one nucleus with I = 1: SPCAT (Pickett's C source, compiled; FLAGS = 111) lists these energies, errors (cm-1), quanta
+QUADRUPOLE = """maxv
+ 9 1 1
+a 3 3 0 18 0 1 1 1 0 1 0
+ 10099 30000.0 1e-2 /A
+ 20099 9000.0 1e-3 /B
+ 30099 8000.0 1e-3 /C
+ 11 60000. 1
+ 22 120000. 1
+ 600001 50. 1
+ 110010099 -3. 0.1
+ 110040099 0.4 0.1
+ 200012 30. 1
+"""
+LISTED = {
+    (1, 0, 1, 0, 0): (0.567091, 0.000001), (1, 1, 0, 0, 0): (1.300897, 0.000003), (1, 1, 1, 0, 0): (1.267511, 0.000003),
+    (1, 0, 1, 1, 0): (2.568479, 0.000033), (1, 1, 0, 1, 0): (3.302281, 0.000034),
+}  # fmt: skip
+
+
+def test_levels_of_an_int_file_have_the_errors_of_spcat(tmp_path):
+    (tmp_path / "a.var").write_text(QUADRUPOLE)
+    (tmp_path / "a.int").write_text("maxv\n11 99001 1000.0 0 2 -9 -9 9999. 300. 1\n 1 1.0\n 111 1.0\n")
+    assert run(["spectrum", str(tmp_path / "a.int"), "--egy", str(tmp_path / "a.egy")]) == 0
+    levels = read_egy(tmp_path / "a.egy")
+    found = {tuple(quanta): i for i, quanta in enumerate(levels.quanta.tolist())}
+    for quanta, (energy, error) in LISTED.items():
+        row = found[quanta]
+        assert levels.energy_cm[row] == pytest.approx(energy, abs=1.1e-6)  # the last printed digit
+        assert levels.error_cm[row] == pytest.approx(error, abs=1.1e-6)  # the last printed digit
+    assert (np.asarray(levels.error_cm) > 0).sum() > 10
+
+
+def test_levels_of_one_state_have_errors_too(tmp_path):
+    """J = 1 of CO: E = 2B - 4D, so that its error is twice that of B."""
+    (tmp_path / "a.var").write_text("CO\n1 1 1\nl -1 1 0 0\n100 57635.968 0.5\n")
+    (tmp_path / "a.int").write_text("CO\n0 1 1000.0 0 1 -9 -9 9999. 300.\n 1 0.1\n")
+    assert run(["spectrum", str(tmp_path / "a.int"), "--egy", str(tmp_path / "a.egy")]) == 0
+    levels = read_egy(tmp_path / "a.egy")
+    assert levels.error_cm.tolist() == pytest.approx([0, 1.0 / 29979.2458], abs=6e-7)  # MHz in cm⁻¹, digits of print
+
+
+def test_round_off_below_zero_prints_as_zero():
+    levels = read_egy(b"     1    1         -0.000001          0.000000   1.000000    1:  0  0  0\n")
+    object.__setattr__(levels, "energy_cm", np.array([-3e-13]))
+    assert b"-0.000000" not in format_egy(levels)
+
+
+def test_levels_that_cannot_be_computed_leave_no_file(tmp_path, monkeypatch):
+    from rotor.formats.spcat import predict
+
+    def failing(*args, **options):
+        raise ValueError("no levels")
+
+    monkeypatch.setattr(predict, "levels_of_file", failing)
+    given = copied("ocs", tmp_path)
+    names = ["a.cat", "a.egy"]
+    code = run(["spectrum", str(given), "--cat", str(tmp_path / names[0]), "--egy", str(tmp_path / names[1])])
+    assert code != 0
+    assert not [name for name in names if (tmp_path / name).exists()]
+
+
+def test_the_file_of_a_kind_is_read(tmp_path):
+    """The kinds of this page are many, so that no pattern above passes on an empty list."""
+    assert len(KINDS) > 50
+    assert read_par(copied("co", tmp_path).with_suffix(".var")).parameters
+    assert read_int(tmp_path / "co.int").dipoles
