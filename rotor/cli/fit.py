@@ -44,7 +44,7 @@ Examples:
   rotor fit lines.csv --start constants.toml --free A,B,C,DeltaJ --out fitted
   rotor fit c060503.cat.gz --constants "B=6081 D=0.001 H=0 MHz" --free B,D,H
   rotor fit lines.csv --start states.toml --free "A,B,C,E[1],A[1],B[1],C[1],G_c[0,1],chi_aa(14N)" --out fitted
-  rotor fit lines.lin --start water --free A,B,C --try DeltaJ,DeltaJK,DeltaK
+  rotor fit lines.lin --start water --free A,B,C --try DJ,DJK,DK
   rotor fit lines.csv --start constants.toml --free A,B,C,DeltaK,deltaJ --prior DeltaK=0.02 --tie "deltaK=0.5*deltaJ" --plot rest.png"""
 
 MOST_SAMPLES = 100_000  # of a bootstrap: each is a fit
