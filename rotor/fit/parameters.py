@@ -79,6 +79,29 @@ class Parameters:
         centre = np.where(np.isfinite(self.prior), self.expected, start)
         return replace(self, start=start, centre=centre)
 
+    def with_free(self, constants: ConstantSet, added: Sequence[str]) -> Parameters:
+        """The same with more free constants, ties and a-priori errors as they are.
+
+        constants : the set with the added ones, which start from it. Raises ValueError for one that is free or tied already.
+        """
+        names, own = tuple(constants.values), [_known(name, constants, "free") for name in added]
+        moving = {name for name, row in zip(self.constant_names, self.matrix, strict=True) if row.any()}
+        if taken := [name for name in own if name in moving]:
+            raise ValueError(f"{taken[0]} is free or tied already; leave it out, or take the tie away")
+        held = dict(zip(self.constant_names, self.base.tolist(), strict=True))
+        rows = dict(zip(self.constant_names, self.matrix, strict=True))
+        none = np.zeros(len(self.names))
+        first = np.array([rows.get(name, none) for name in names]).reshape(len(names), len(self.names))
+        return Parameters(
+            names=(*self.names, *own),
+            start=np.append(self.start, [constants[name] for name in own]),
+            prior=np.append(self.prior, np.full(len(own), np.inf)),
+            centre=np.append(self.expected, [constants[name] for name in own]),
+            constant_names=names,
+            base=np.array([0.0 if name in own else held.get(name, constants[name]) for name in names]),
+            matrix=np.column_stack([first, *(np.array([one == name for one in names], dtype=float) for name in own)]),
+        )
+
 
 def parameters(
     constants: ConstantSet,
