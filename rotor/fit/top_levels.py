@@ -125,7 +125,7 @@ def _of_spins(begin: TopConstants, columns: dict[str, Ints], labels: Ints, names
         starts = np.cumsum([0, *(len(own) for _, own, _ in whole)])
         moved = [(one[0], np.arange(a, b), every) for one, a, b in zip(whole, starts, starts[1:], strict=False)]
         parts.append((rows, joined(moved, len(rows))))
-    parts += [(one.rows, one.blocks) for one in found if isinstance(one.blocks, ContractedLevels)]
+    parts += [(one.rows, one.blocks) for one in found if not isinstance(one.blocks, UnitBlocks)]
     return TopLevels(names, len(labels), tuple(parts))
 
 
