@@ -5,7 +5,7 @@
 | 0 | the Wang block of one state v and one coupling pattern, by the largest shares | energy, as K rises |
 | 1 | one function each, by the largest shares | |
 | 2 | as 0 | energy, as the diagonal elements rise |
-| 3 | all functions of one v and pattern | energy, as K, then the other K rises |
+| 3 | all functions of one v and pattern | energy, as K rises, of one K as the other of Ka and Kc falls |
 | 4 | as 3 | ⟨K²⟩, those of one K by energy |
 | 5 | as 3 | energy, as the diagonal elements rise |
 
@@ -156,9 +156,10 @@ def _ranks(diagonal: Floats) -> Floats:
 
 
 def _in_order_of_k(functions: Functions) -> Floats:
-    """A number for each function that rises with K, then with the number of its Wang block."""
+    """A number for each function that rises with K, then as the other of Ka and Kc falls, so that tau or -tau rises."""
     order = np.empty(len(functions.k))
-    order[np.lexsort((functions.wang, functions.k))] = np.arange(len(functions.k))
+    other = functions.names[:, 1:3].sum(axis=1) - functions.k
+    order[np.lexsort((functions.wang, -other, functions.k))] = np.arange(len(functions.k))
     return order
 
 
