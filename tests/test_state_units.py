@@ -140,3 +140,16 @@ def test_mixed_levels_have_the_names_of_the_prediction(diag, sign, start, monkey
                 patched.setattr(fit_states, "_direct", lambda group, form: False)
             model = FileLevels.of(replace(file, parameters=tuple(moved)), labels)
         assert model.levels(values)[0] == pytest.approx(levels.energy_mhz, abs=1e-4)  # MHz, round-off of 1e6
+
+
+def test_states_that_hardly_mix_have_one_name_by_diag_0_and_3():
+    """Several Wang blocks of one state in a block, whose levels of one K are in the order of energy that each Wang block has."""
+    text = STRONG.replace("5200.0", "5.2").replace("2100.0", "2.1").replace("1700.0", "1.7").replace("7300.0", "7.3")
+    text = text.replace("1900.0", "1.9").replace("900.0 1E+36 /Gb03", "0.9 1E+36 /Gb03").replace("5800.2", "3800.2")
+    names = []
+    for diag in (0, 3):
+        levels = groups_for_fit(read_par(text.format(diag=diag, sign="").encode()))[0].levels((0, 10))
+        assert any(len(block.parts) > len({part.v for part in block.parts}) for block in levels.blocks)
+        order = np.argsort(levels.energy_mhz)
+        names.append(np.column_stack([levels.quanta[name] for name in ("j", "ka", "kc", "v")])[order])
+    assert (names[0] == names[1]).all()
