@@ -19,13 +19,16 @@ Ka + Kc = N for N even and N + 1 for N odd, of K odd the other way round.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum.coupled import CoupledBlock
+from rotor.quantum.estimates.unit_matrices import Follows, NamedFunctions, Naming
 from rotor.quantum.levels import Levels
 from rotor.quantum.spins.blocks import SpinBlock
 from rotor.quantum.spins.parts import assigned
@@ -34,6 +37,7 @@ from rotor.quantum.wang.basis import WangBlock, names_of
 BY_DIAG = (1, 2, 4, 5)  # those that need another naming than that of levels
 _OF_WANG = (0, 2)  # whose groups are Wang blocks
 _BY_DIAGONAL = (2, 5)
+_ANEW = (2, 4, 5)  # whose order of names depends on the constants
 _CLEAR = 0.5  # a share above it is the largest
 _EQUAL = 1e-11  # of the largest energy: the two functions of one K have one diagonal element but for round-off
 
@@ -84,6 +88,25 @@ def named_by(levels: Levels, diag: int, oblate: bool) -> Levels:
         for column, name in enumerate([name for name in quanta if name not in ("v", "n", "ka", "kc")], 4):
             quanta[name] = table[:, column] if name in levels.halves else table[:, column] // 2
     return replace(levels, quanta=quanta, mixing=np.concatenate(shares))
+
+
+def naming_by(diag: int, oblate: bool) -> Naming:
+    """The same names of states without spins, for constants that change."""
+    return partial(_named_functions, diag, oblate)
+
+
+def _named_functions(
+    diag: int, oblate: bool, blocks: Sequence[tuple[int, WangBlock]], representation: str
+) -> NamedFunctions:
+    pieces = [(v, basis, None, np.empty((basis.size, 0))) for v, basis in blocks]
+    functions = _joined(pieces, representation)
+    groups = np.arange(len(functions.k)) if diag == 1 else functions.wang if diag in _OF_WANG else functions.pattern
+
+    def namer(matrix: Floats, energies: Floats, vectors: Floats) -> Ints:
+        at = places(functions._replace(amplitudes=vectors), -energies if oblate else energies, diag)
+        return functions.names[at]
+
+    return NamedFunctions(groups, namer, Follows.NOTHING if diag in _ANEW else Follows.GROUPS)
 
 
 def _needs_names(block: object, diag: int) -> bool:
@@ -216,7 +239,7 @@ def _of_spin_block(block: SpinBlock, representation: str) -> Functions:
     return _joined(pieces, representation)
 
 
-def _joined(pieces: list[tuple[int, WangBlock, Ints | None, Floats]], representation: str) -> Functions:
+def _joined(pieces: Sequence[tuple[int, WangBlock, Ints | None, Floats]], representation: str) -> Functions:
     names, ks, groups, wangs, ns, known = [], [], [], [], [], dict[tuple[int, ...], int]()
     for place, (v, basis, pattern, _) in enumerate(pieces):
         ka, kc = names_of(basis, representation)
