@@ -23,7 +23,9 @@ from rotor.fit.top_constants import TopConstants
 from rotor.fit.top_levels import top_levels
 from rotor.formats.assigned_lines import write_assigned_lines
 from rotor.formats.fit_request import answer_fit, fit_of_lines, write_fitted_toml
+from rotor.formats.spcat.fits.fit_input import HELD, fitted_file, spfit_input
 from rotor.formats.spcat.fits.named_fit import named_file
+from rotor.formats.spcat.text.lin import read_lin
 from rotor.formats.spcat.text.par import ParameterFile
 from rotor.formats.spcat.variances import constants_covariance, variance_factor
 from rotor.quantum.estimates import contracted, labelled_spins
@@ -125,7 +127,7 @@ def test_the_var_file_holds_what_is_not_determined():
         warnings.simplefilter("error")
         file, other = (named_file(one, "", variances=True) for one in (fit, held))
     errors = {p.code: p.error for p in file.parameters}
-    assert errors[1000] == errors[2000] == 1e-37
+    assert errors[1000] == errors[2000] == HELD
     assert "nan" not in file.rest
     names = ("B", "DJ", "DJK")
     ours, theirs = (constants_covariance(one).of(names) for one in (file, other))
@@ -158,8 +160,20 @@ def test_the_var_file_holds_what_is_not_determined_of_states(ties):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         file, other = (named_file(one, "", variances=True) for one in (fit, held))
-    assert {p.error for p in file.parameters if p.code in (11, 22)} == {1e-37}
+    assert {p.error for p in file.parameters if p.code in (11, 22)} == {HELD}
     assert covariance_by_code(file) == pytest.approx(covariance_by_code(other), rel=1e-4, abs=1e-12)  # of 7 decimals
+
+
+def test_the_var_file_of_spfits_input_holds_what_is_not_determined(folder):
+    states = StateConstants.parse("E[1]=1000 A[1]=8990 B[1]=3003 C[1]=2501 E[2]=2000 A[2]=8980 B[2]=3006 C[2]=2502 MHz")
+    start = TopConstants(Top.from_constants("A=9000 B=3000 C=2500", states=states), False)
+    fit = fit_lines(state_lines(start), start, parameters(start, ["A", "B", "C", "E[1]"]))
+    write_assigned_lines(fit.lines, "case.lin")
+    asked = spfit_input(named_file(fit, "", variances=False), read_lin("case.lin", 4))
+    other = fit_lines(asked.lines, asked.constants, asked.parameters, asked.options, model=asked.model)
+    ours, theirs = named_file(fit, "", variances=True), fitted_file(asked, other, variances=True)
+    assert [p.error for p in theirs.parameters if p.code == 11] == [HELD]
+    assert covariance_by_code(theirs) == pytest.approx(covariance_by_code(ours), rel=1e-4, abs=1e-12)  # of 7 decimals
 
 
 def covariance_by_code(file: ParameterFile) -> dict[tuple[int, int], float]:
