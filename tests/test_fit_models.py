@@ -19,7 +19,7 @@ from rotor.fit.parameters import parameters, with_names
 from rotor.fit.report import report_text
 from rotor.fit.resampling import bootstrap
 from rotor.fit.top_constants import TopConstants
-from rotor.formats.assigned_lin import note_of_lin
+from rotor.formats.assigned_lin import as_lin, note_of_lin
 from rotor.formats.assigned_lines import read_assigned_lines, write_assigned_lines
 from rotor.plots.fit import fit_figure
 from rotor.spectra.lines import line_list
@@ -198,6 +198,9 @@ def test_lines_of_one_frequency_that_are_no_blend_are_none_in_a_lin(tmp_path):
 def test_lines_that_nothing_parts_are_named():
     seen = assignments(("j",), [[1], [2], [3]], [[0], [1], [2]], [100.0, 100.0, 300.0], 0.1)
     assert not note_of_lin(seen)
+    last = assignments(("j",), [[1], [2], [3], [4]], [[0], [1], [2], [3]], [200.0, 300.0, 100.0, 100.0], 0.1)
+    assert not note_of_lin(last)  # nothing stands behind them that parts them, but before
+    assert as_lin(last).frequency.tolist() == [100.0, 200.0, 300.0, 100.0]
     assert note_of_lin(seen.take(np.array([0, 1])))[0].startswith("1 lines of the same frequency as the line before")
 
 

@@ -85,7 +85,7 @@ def _in_order(lines: Assignments) -> list[_Blend]:
             waiting.remove(ready)
             made.append(ready)
     for blend in waiting:
-        fits = (i for i in range(len(made)) if not _meetings([*made[max(i - 1, 0) : i], blend, made[i]]))
+        fits = (i for i in range(len(made) + 1) if not _meetings([*made[max(i - 1, 0) : i], blend, *made[i : i + 1]]))
         made.insert(next(fits, len(made)), blend)
     return made
 
