@@ -23,8 +23,9 @@ from rotor.fit.top_constants import TopConstants
 from rotor.fit.top_levels import top_levels
 from rotor.formats.assigned_lines import write_assigned_lines
 from rotor.formats.fit_request import answer_fit, fit_of_lines, write_fitted_toml
-from rotor.formats.spcat.fits.fit_input import HELD, fitted_file, spfit_input
+from rotor.formats.spcat.fits.fit_input import fitted_file, spfit_input
 from rotor.formats.spcat.fits.named_fit import named_file
+from rotor.formats.spcat.hamiltonian.codes import FIXED
 from rotor.formats.spcat.text.lin import read_lin
 from rotor.formats.spcat.text.par import ParameterFile
 from rotor.formats.spcat.variances import constants_covariance, variance_factor
@@ -127,7 +128,7 @@ def test_the_var_file_holds_what_is_not_determined():
         warnings.simplefilter("error")
         file, other = (named_file(one, "", variances=True) for one in (fit, held))
     errors = {p.code: p.error for p in file.parameters}
-    assert errors[1000] == errors[2000] == HELD
+    assert errors[1000] == errors[2000] == FIXED
     assert "nan" not in file.rest
     names = ("B", "DJ", "DJK")
     ours, theirs = (constants_covariance(one).of(names) for one in (file, other))
@@ -160,7 +161,7 @@ def test_the_var_file_holds_what_is_not_determined_of_states(ties):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         file, other = (named_file(one, "", variances=True) for one in (fit, held))
-    assert {p.error for p in file.parameters if p.code in (11, 22)} == {HELD}
+    assert {p.error for p in file.parameters if p.code in (11, 22)} == {FIXED}
     assert covariance_by_code(file) == pytest.approx(covariance_by_code(other), rel=1e-4, abs=1e-12)  # of 7 decimals
 
 
@@ -172,7 +173,7 @@ def test_the_var_file_of_spfits_input_holds_what_is_not_determined(folder):
     asked = spfit_input(named_file(fit, "", variances=False), read_lin("case.lin", 4))
     other = fit_lines(asked.lines, asked.constants, asked.parameters, asked.options, model=asked.model)
     ours, theirs = named_file(fit, "", variances=True), fitted_file(asked, other, variances=True)
-    assert [p.error for p in theirs.parameters if p.code == 11] == [HELD]
+    assert [p.error for p in theirs.parameters if p.code == 11] == [FIXED]
     assert covariance_by_code(theirs) == pytest.approx(covariance_by_code(ours), rel=1e-4, abs=1e-12)  # of 7 decimals
 
 

@@ -20,7 +20,7 @@ from rotor.fit.assignment import Assignments, assignments
 from rotor.fit.fit import Fit, FitOptions
 from rotor.fit.parameters import Parameters
 from rotor.formats.assigned_lines import QUANTA
-from rotor.formats.spcat.hamiltonian.codes import HELD_BELOW, constants_and_matrix
+from rotor.formats.spcat.hamiltonian.codes import FIXED, HELD_BELOW, constants_and_matrix
 from rotor.formats.spcat.hamiltonian.states import is_plain
 from rotor.formats.spcat.text.fields import BLANK
 from rotor.formats.spcat.text.lin import LineList, note_of_defaults, note_of_remarks, read_lin, with_defaults
@@ -29,7 +29,6 @@ from rotor.formats.spcat.variances import FREE_ABOVE
 from rotor.quantum.labelled import LevelModel
 from rotor.tops.constants import Constants
 
-HELD = 1e-37  # MHz: the a-priori error of what is held
 _NO_ERRTST = 1e6  # what SPFIT takes for an ERRTST of 0 or less
 
 
@@ -320,7 +319,7 @@ def fitted_file(asked: SpfitInput, fit: Fit, *, variances: bool) -> ParameterFil
         value = parameter.value if column < 0 else float(fit.values[column]) * ratio
         error = parameter.error
         if variances and column >= 0:
-            error = float(errors[column]) * abs(ratio) if np.isfinite(fit.errors[column]) else HELD
+            error = float(errors[column]) * abs(ratio) if np.isfinite(fit.errors[column]) else FIXED
         made.append(replace(parameter, value=value, error=error))
     leaders = [c for p, c in zip(asked.file.parameters, asked.columns, strict=True) if not p.constrained]
     rest = correlation_text(fit, leaders) if variances else ""

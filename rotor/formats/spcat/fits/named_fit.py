@@ -15,8 +15,8 @@ import numpy as np
 from rotor.arrays import Floats
 from rotor.fit.fit import Fit
 from rotor.fit.top_constants import TopConstants
-from rotor.formats.spcat.fits.fit_input import HELD, packed_correlations
-from rotor.formats.spcat.hamiltonian.codes import constants_and_matrix
+from rotor.formats.spcat.fits.fit_input import packed_correlations
+from rotor.formats.spcat.hamiltonian.codes import FIXED, constants_and_matrix
 from rotor.formats.spcat.model import parameter_file
 from rotor.formats.spcat.names.named_parameters import named_parameters
 from rotor.formats.spcat.text.par import Parameter, ParameterFile
@@ -48,7 +48,7 @@ def named_file(fit: Fit, title: str, *, variances: bool) -> ParameterFile:
     else:
         parameters, free = _tied(fit, file.parameters, back, matrix, variances)
     numbers = iter(range(len(free)))
-    columns = [-1 if p.error == HELD else next(numbers) for p in parameters if not p.constrained]
+    columns = [-1 if p.error == FIXED else next(numbers) for p in parameters if not p.constrained]
     rest = packed_correlations(_correlations(fit, free), columns) if variances else ""
     count = len(fit.lines) if file.header.nline > 0 else -len(fit.lines)
     header = replace(file.header, npar=len(parameters), nline=count, nitr=100)
@@ -70,7 +70,7 @@ def _correlations(fit: Fit, rows: Floats) -> Floats:
 def _error(fit: Fit, row: Floats, variances: bool) -> float:
     """Estimated of the lines, or a priori, of a combination (n,) of the free constants; in the .var file held if not determined."""
     if variances and not _is_determined(fit, row):
-        return HELD
+        return FIXED
     if variances:
         return float(np.sqrt(_covariance(fit, row[None])[0, 0]))
     known = fit.parameters.prior[row != 0]
@@ -92,10 +92,10 @@ def _one_for_one(
     """As many parameters move as constants are free. Parameters, and those that are not held (m, n) by the free constants."""
     moved = np.atleast_1d(back.any(axis=1))
     made = [
-        replace(p, error=_error(fit, row, variances) if moves else HELD)
+        replace(p, error=_error(fit, row, variances) if moves else FIXED)
         for p, row, moves in zip(given, back, moved.tolist(), strict=True)
     ]
-    return made, np.array([row for p, row in zip(made, back, strict=True) if p.error != HELD]).reshape(
+    return made, np.array([row for p, row in zip(made, back, strict=True) if p.error != FIXED]).reshape(
         -1, back.shape[1]
     )
 
@@ -122,8 +122,8 @@ def _tied(
             share = _share(fit, back, k)
             made.append(replace(given[k], value=share, error=_error(fit, back[k], variances), constrained=k != leader))
             if abs(given[k].value - share) > _DIFFERENCE * abs(share):
-                behind.append(replace(given[k], value=given[k].value - share, error=HELD, label="difference"))
-    held = [replace(p, error=HELD) for p, row in zip(given, back, strict=True) if not row.any()]
+                behind.append(replace(given[k], value=given[k].value - share, error=FIXED, label="difference"))
+    held = [replace(p, error=FIXED) for p, row in zip(given, back, strict=True) if not row.any()]
     return [*made, *behind, *held], np.array(free).reshape(-1, back.shape[1])
 
 
