@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 from full_matrix_rotor import momenta
 
-from rotor.formats.spcat.file_model import groups_of
+from rotor.formats.spcat.file_model import groups_of, left_out
 from rotor.formats.spcat.hamiltonian.file_effect import coded_lines
 from rotor.formats.spcat.predict import predict
 from rotor.formats.spcat.text.int_file import IntensityFile, Request, read_int
 from rotor.formats.spcat.text.par import read_par
+from rotor.units import MHZ_PER_CM
 
 ABC = ((10000, 30000.123), (20000, 9000.2), (30000, 7500.7))
 RHO = 0.37
@@ -118,3 +119,22 @@ def test_moments_of_other_kinds_with_errors_of_constants():
     file = read_par(b"a case\n 1 1 1\na -1 1 0 0 0 1 1 1 0 1 0\n 100 6081.5 1e-3 /B\n")
     found = predict(file, asked).catalogue
     assert found.error_mhz == pytest.approx(2e-3 * np.arange(1, 6))  # σ(ν) = 2 (J + 1) σ(B)
+
+
+def test_constants_of_series_are_pure_numbers_in_files_with_wavenumbers():
+    """FLAGS 1000 changes the unit of parameters, not ρ, a and b."""
+    given = (*ABC, (910000, RHO), (1_000_000_000, 55.5), (911000, 2e-3), (910100, 3e-4), (100_000_002_000, -9.0))
+    pure = {910000, 911000, 910100}
+    in_cm = tuple((code, value if code in pure else value / MHZ_PER_CM) for code, value in given)
+    text = "a case\n{} 41 14000 0 5 -30 -30 {} 300\n 1 1.0\n"
+    plain = predict(_file(given), read_int(text.format(0, 99999).encode())).catalogue
+    found = predict(_file(in_cm), read_int(text.format(1000, 99999).encode())).catalogue
+    plain = plain.take(plain.frequency_mhz > 0.02)  # 5e-7 cm⁻¹ prints as 0 and is left out
+    assert len(found) == len(plain) > 20
+    assert found.frequency_mhz * MHZ_PER_CM == pytest.approx(plain.frequency_mhz, abs=1e-6)  # round-off
+
+
+def test_a_note_on_a_parameter_stands_once():
+    options = "a 1 3 0 20 0 2 1 3 0 1 0\n"
+    file = _file((*((code + 99, value) for code, value in ABC), (910099, RHO), (1_000_210_099, 3.0)), options)
+    assert len(left_out(file)) == 1

@@ -208,7 +208,7 @@ def allowed(
         folded = line.typ in (1, 2, 3) and any(_turns_alone(states[v], line) for pair in concerned for v in pair)
         axes = AXES["IIIl" if oblate else "Ir"]
         found.append(line._replace(operator=symmetric_part(line.operator, axes)) if folded else line)
-    return found, reasons
+    return found, list(dict.fromkeys(reasons))  # a line of the file may be one for each state
 
 
 def _turns_alone(state: StateOptions, line: CodedLine) -> bool:

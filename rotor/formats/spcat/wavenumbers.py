@@ -11,6 +11,8 @@ import math
 from dataclasses import replace
 
 from rotor import units
+from rotor.formats.spcat.hamiltonian.codes import HELD_BELOW, split_code
+from rotor.formats.spcat.hamiltonian.series import is_constant
 from rotor.formats.spcat.text.catalogue import Catalogue, Layout
 from rotor.formats.spcat.text.int_file import IntensityFile, Request
 from rotor.formats.spcat.text.par import Parameter, ParameterFile
@@ -27,11 +29,14 @@ def parameters_in_mhz(file: ParameterFile) -> ParameterFile:
     >>> parameters_in_mhz(read_par(b"CO\\n 1 0 0 0\\nl -1 1 0 0\\n 100 1.9225 1e-37\\n")).parameters[0].value.__round__(3)
     57635.1
     """
-    return replace(file, parameters=tuple(_in_mhz(parameter) for parameter in file.parameters))
+    states = max(abs(file.options[0].nvib), 1)
+    return replace(file, parameters=tuple(_in_mhz(parameter, states) for parameter in file.parameters))
 
 
-def _in_mhz(parameter: Parameter) -> Parameter:
-    held = parameter.error is None or parameter.error < 1e-30  # 1e-37: not fitted
+def _in_mhz(parameter: Parameter, states: int) -> Parameter:
+    if is_constant(split_code(parameter.code, states)):  # ρ, a and b of a series are pure numbers
+        return parameter
+    held = parameter.error is None or parameter.error < HELD_BELOW
     error = parameter.error if held else parameter.error * units.MHZ_PER_CM  # type: ignore[operator]
     return replace(parameter, value=parameter.value * units.MHZ_PER_CM, error=error, text="")
 

@@ -331,12 +331,12 @@ def _rigid_parameters(constants: Constants) -> tuple[Parameter, ...]:
     spread = constants.uncertainties
     if constants.kind == "asymmetric":
         names = _RIGID_NAMES["asymmetric"].items()
-        return tuple(Parameter(code, constants[name], spread.get(name, _FIXED), name) for code, name in names)
+        return tuple(Parameter(code, constants[name], spread.get(name, FIXED), name) for code, name in names)
     b = constants["B"]
-    lines = [Parameter(100, b, spread.get("B", _FIXED), "B")]
+    lines = [Parameter(100, b, spread.get("B", FIXED), "B")]
     axis = {"prolate": "A", "oblate": "C"}.get(constants.kind)
     if axis:
-        lines.insert(0, Parameter(1000, constants[axis] - b, spread.get(axis, _FIXED), f"{axis}-B"))
+        lines.insert(0, Parameter(1000, constants[axis] - b, spread.get(axis, FIXED), f"{axis}-B"))
     return tuple(lines)
 
 
@@ -348,14 +348,14 @@ def _distortion_parameters(constants: Constants) -> tuple[Parameter, ...]:
         Parameter(
             item.code,
             item.sign * constants[item.name],
-            spread.get(item.name, _FIXED),
+            spread.get(item.name, FIXED),
             f"{'-' if item.sign < 0 else ''}{item.name}",
         )
         for item in vocabulary
         if item.name in constants
     )
     return named + tuple(
-        Parameter(_code_of_spelled(name), constants[name], spread.get(name, _FIXED), name) for name in unnamed
+        Parameter(_code_of_spelled(name), constants[name], spread.get(name, FIXED), name) for name in unnamed
     )
 
 
@@ -367,5 +367,5 @@ def _code_of_spelled(name: str) -> int:
     return code_of_term(*powers)
 
 
-_FIXED = 1e-37
+FIXED = 1e-37  # the error of a parameter that is not fitted
 HELD_BELOW = 1e-30  # an error so small says that a parameter was not fitted

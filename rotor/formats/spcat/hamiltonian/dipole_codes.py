@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from math import pi
 from typing import NamedTuple
 
+from rotor.formats.spcat.hamiltonian.codes import state_digits
 from rotor.formats.spcat.hamiltonian.series import Series
 from rotor.formats.spcat.text.int_file import Dipole
 from rotor.quantum.moments import DEBYE_PER_BOHR_MAGNETON, Moment
@@ -31,7 +32,7 @@ def split_dipole(code: int, states: int) -> DipoleCode:
     >>> split_dipole(50001, 1), split_dipole(113, 2)
     (DipoleCode(typ=5, spin=0, states=(0, 0), axis=1), DipoleCode(typ=0, spin=0, states=(1, 1), axis=3))
     """
-    step = 10 ** (1 if states <= 9 else 2 if states <= 99 else 3)
+    step = 10 ** state_digits(states)
     rest, axis = divmod(abs(code), 10)
     rest, v1 = divmod(rest, step)
     rest, v2 = divmod(rest, step)

@@ -26,6 +26,7 @@ from rotor.formats.spcat.hamiltonian.codes import (
     join_code,
     parameters_of,
     split_code,
+    state_digits,
 )
 from rotor.formats.spcat.model import options_of
 from rotor.formats.spcat.text.par import Header, ParameterFile
@@ -53,7 +54,6 @@ _BETWEEN = {
 }
 _CROSS = {(1, 2): 21, (0, 2): 41, (0, 1): 61}
 _KINDS = (NuclearQuadrupole, SpinRotation, SpinSpin)
-_FIXED = 1e-37
 
 Codes = dict[int, dict[str, float]]  # value of a code by named constants: what each has to be multiplied with
 
@@ -125,8 +125,14 @@ def _of_pairs_and_spins(constants: TopConstants) -> Codes:
             sign = -1.0 if oblate and parts.symbol.startswith("G") else 1.0
             found = {Digits(0, 0, 0, 0, 0, typ, parts.nz2, parts.n2, low, high): sign}
         for digits, factor in found.items():
-            out.setdefault(join_code(digits, _states(constants)), {})[name] = factor
+            out.setdefault(_code(name, digits, _states(constants)), {})[name] = factor
     return out
+
+
+def _code(name: str, digits: Digits, states: int) -> int:
+    if digits.nsq > 9 or digits.ksq > 9:
+        raise ValueError(f"{name}: SPFIT's codes have powers of N² and of Nz² up to 9 (J and K to the power 18)")
+    return join_code(digits, states)
 
 
 def _of_spins(
@@ -135,7 +141,7 @@ def _of_spins(
     """The codes of a constant of spins, by the matrix c_ij that it multiplies."""
     states, places = _states(constants), [scheme.place(spin) + 1 for spin in term.spins]
     i1, i2 = max(places), (min(places) if len(places) == 2 else 0)
-    wild = 0 if states == 1 else 10 ** (1 if states <= 9 else 2 if states <= 99 else 3) - 1
+    wild = 0 if states == 1 else 10 ** state_digits(states) - 1
     v1, v2 = (wild, wild) if parts.states is None else (max(parts.states), min(parts.states))
     base = Digits(0, 0, i2, i1, parts.ns, 0, parts.nz2, parts.n2, v2, v1)
     rotor = term.rotor

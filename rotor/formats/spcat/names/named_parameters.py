@@ -9,14 +9,13 @@ import numpy as np
 
 from rotor.arrays import Floats
 from rotor.fit.top_constants import TopConstants
+from rotor.formats.spcat.hamiltonian.codes import FIXED
 from rotor.formats.spcat.model import options_of
 from rotor.formats.spcat.names.named_codes import codes_of_names
 from rotor.formats.spcat.text.par import Header, Options, Parameter, ParameterFile
 from rotor.tops.spins.spin_constants import SpinConstants
 from rotor.tops.spins.spin_weights import SpinWeights
 from rotor.tops.top import Top
-
-_FIXED = 1e-37
 
 
 def named_parameter_file(top: Top, kmax: int) -> ParameterFile:
@@ -49,8 +48,8 @@ def named_parameters(constants: TopConstants, title: str, kmax: int) -> tuple[Pa
 def _error(factors: Mapping[str, float], known: Mapping[str, float]) -> float:
     """√Σ (factor · error)², as if the errors were independent."""
     if not set(factors) <= set(known):
-        return _FIXED
-    return float(np.sqrt(sum((factor * known[name]) ** 2 for name, factor in factors.items()))) or _FIXED
+        return FIXED
+    return float(np.sqrt(sum((factor * known[name]) ** 2 for name, factor in factors.items()))) or FIXED
 
 
 def _label(factors: Mapping[str, float]) -> str:
