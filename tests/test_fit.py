@@ -327,7 +327,7 @@ def test_merging_keeps_blends_and_says_what_was_twice():
     both, notes = merged(one, other)
     assert both.upper[:, 0].tolist() == [1, 2, 3]
     assert both.blend.tolist() == [0, 0, 2]
-    assert notes == ["2 - 1: in both, once in the result"]
+    assert notes == ["1 lines are in both, once in the result, the first: 2 - 1"]
     assert duplicates(merged(one, assignments(("j",), [[1]], [[0]], [101.0], 0.1))[0]) == [(0, 2)]
 
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from rotor.formats.spcat.fits import fit_states
-from rotor.formats.spcat.fits.fit_states import FileLevels
+from rotor.formats.spcat.fits.fit_states import FileLevels, groups_for_fit
 from rotor.formats.spcat.text.par import read_par
 from rotor.quantum.estimates.unit_blocks import UnitBlocks
 
@@ -97,3 +99,57 @@ def test_blocks_of_many_sizes_give_what_each_gives_alone(monkeypatch):
     assert len(blocks._labelled) == len(blocks.tracked) > 12
     assert together[0] == pytest.approx(alone[0], rel=1e-13)  # order of sums
     assert together[1] == pytest.approx(alone[1], abs=1e-12 * np.abs(alone[1]).max())  # order of sums
+
+
+STRONG = """four states
+  16  100   20    0    0.0  1.0E+06  1.0 1.0
+a 1 {sign}4 0 40 0 1 1 1 0 1 {diag}
+10099 6500.1 1E+36 /A
+20099 5800.2 1E+36 /B
+30099 3100.3 1E+36 /C
+299 -1.1e-3 1E+36 /-DJ
+11 9000.0 1E+36 /E1
+22 12600.0 1E+36 /E2
+33 31000.0 1E+36 /E3
+10011 -55.5 1E+36 /dA1
+20022 -4.5 1E+36 /dB2
+30033 3.5 1E+36 /dC3
+1 5200.0 1E+36 /W01
+400001 2100.0 1E+36 /Gb01
+200012 1700.0 1E+36 /Ga12
+23 7300.0 1E+36 /W23
+600023 1900.0 1E+36 /Gc23
+400003 900.0 1E+36 /Gb03
+"""
+
+
+@pytest.mark.parametrize("start", [1.0, 1.02])
+@pytest.mark.parametrize(("diag", "sign"), [(0, ""), (0, "-"), (1, ""), (2, ""), (3, ""), (3, "-"), (4, ""), (5, "")])
+def test_mixed_levels_have_the_names_of_the_prediction(diag, sign, start, monkeypatch):
+    """Every level to J = 11 of four states that no overlap tells apart, from the constants themselves and from 2 % off."""
+    file = read_par(STRONG.format(diag=diag, sign=sign).encode())
+    levels = groups_for_fit(file)[0].levels((0, 22))
+    labels = np.column_stack([levels.quanta[name] for name in ("j", "ka", "kc", "v")])
+    assert levels.mixing is not None
+    assert levels.mixing.min() < 0.4
+    values = np.array([p.value for p in file.parameters])
+    moved = [replace(p, value=p.value * (start if i % 2 else 2 - start)) for i, p in enumerate(file.parameters)]
+    for direct in (True, False):
+        with monkeypatch.context() as patched:
+            if not direct:
+                patched.setattr(fit_states, "_direct", lambda group, form: False)
+            model = FileLevels.of(replace(file, parameters=tuple(moved)), labels)
+        assert model.levels(values)[0] == pytest.approx(levels.energy_mhz, abs=1e-4)  # MHz, round-off of 1e6
+
+
+def test_states_that_hardly_mix_have_one_name_by_diag_0_and_3():
+    """Several Wang blocks of one state in a block, whose levels of one K are in the order of energy that each Wang block has."""
+    text = STRONG.replace("5200.0", "5.2").replace("2100.0", "2.1").replace("1700.0", "1.7").replace("7300.0", "7.3")
+    text = text.replace("1900.0", "1.9").replace("900.0 1E+36 /Gb03", "0.9 1E+36 /Gb03").replace("5800.2", "3800.2")
+    names = []
+    for diag in (0, 3):
+        levels = groups_for_fit(read_par(text.format(diag=diag, sign="").encode()))[0].levels((0, 10))
+        assert any(len(block.parts) > len({part.v for part in block.parts}) for block in levels.blocks)
+        order = np.argsort(levels.energy_mhz)
+        names.append(np.column_stack([levels.quanta[name] for name in ("j", "ka", "kc", "v")])[order])
+    assert (names[0] == names[1]).all()

@@ -44,8 +44,8 @@ Examples:
   rotor fit lines.csv --start constants.toml --free A,B,C,DeltaJ --out fitted
   rotor fit c060503.cat.gz --constants "B=6081 D=0.001 H=0 MHz" --free B,D,H
   rotor fit lines.csv --start states.toml --free "A,B,C,E[1],A[1],B[1],C[1],G_c[0,1],chi_aa(14N)" --out fitted
-  rotor fit lines.lin --start water --free A,B,C --try DeltaJ,DeltaJK,DeltaK
-  rotor fit lines.csv --start constants.toml --free A,B,C --prior DeltaK=0.02 --tie "deltaK=0.5*deltaJ" --plot rest.png"""
+  rotor fit lines.lin --start water --free A,B,C --try DJ,DJK,DK
+  rotor fit lines.csv --start constants.toml --free A,B,C,DeltaK,deltaJ --prior DeltaK=0.02 --tie "deltaK=0.5*deltaJ" --plot rest.png"""
 
 MOST_SAMPLES = 100_000  # of a bootstrap: each is a fit
 
@@ -143,6 +143,11 @@ def command(context: typer.Context, given: Options) -> None:
     _refuse_par(files, answer)
     content = record(answer, context.obj, steps, extras)
     content["files"] = files.names
+    if (given.save_lines or "").lower().endswith(".lin"):
+        from rotor.formats.assigned_lin import note_of_lin
+
+        for text in note_of_lin(fit.lines):
+            note(text)
     writers = _writers(answer, content, scaled=given.table_errors == "scatter") | _saved(answer, given)
     deliver(files, writers, lambda: json_text(content), lambda: _show(request, fit, steps, extras))
     if not fit.converged:

@@ -76,6 +76,10 @@ def command(context: typer.Context, given: Options) -> None:
     strange = [name for name in chosen if name not in METHODS]
     if strange or len(set(chosen)) < len(chosen):
         raise ValueError(f"--method {given.method}: expected each of {', '.join(METHODS)} once at most")
+    if given.check and chosen == ["rs"]:
+        raise ValueError(
+            "--check goes with r0, rm1, rm2 or re, which are fitted to all isotopologues; add one to --method"
+        )
     files, source = Files.of(given), given.source
     if not source.lower().endswith(".toml"):
         raise ValueError(

@@ -209,7 +209,7 @@ def merged(first: Assignments, second: Assignments, *, same_within_mhz: float = 
     if first.names != second.names:
         raise ValueError(f"lines by {', '.join(first.names)} and by {', '.join(second.names)} cannot be merged")
     here = {_key(first, i): i for i in range(len(first))}
-    chosen, notes = [], list[str]()
+    chosen, notes, same = [], list[str](), list[int]()
     for i in range(len(second)):
         twin = here.get(_key(second, i))
         if twin is None:
@@ -217,10 +217,12 @@ def merged(first: Assignments, second: Assignments, *, same_within_mhz: float = 
             continue
         apart = abs(first.frequency_mhz[twin] - second.frequency_mhz[i])
         if apart <= same_within_mhz:
-            notes.append(f"{second.text(i)}: in both, once in the result")
+            same.append(i)
         else:
             notes.append(f"{second.text(i)}: in both, {apart:.4f} MHz apart; both stay")
             chosen.append(i)
+    if same:
+        notes.insert(0, f"{len(same)} lines are in both, once in the result, the first: {second.text(same[0])}")
     more = second.take(np.array(chosen, dtype=np.int64))
     shift = int(first.blend.max(initial=-1)) + 1
     fields = ("upper", "lower", "frequency_mhz", "error_mhz", "weight", "wavenumber")

@@ -20,7 +20,7 @@ import numpy as np
 from rotor.arrays import Floats, Ints
 from rotor.fit.assignment import Assignments
 from rotor.fit.criteria import aicc, cross_validated_rms, f_test
-from rotor.fit.first_values import beside_zero, weighted_derivatives
+from rotor.fit.first_values import beside_zero, search_of, weighted_derivatives
 from rotor.fit.fit import Fit, FitOptions, fit_lines
 from rotor.fit.orders import order_of
 from rotor.fit.parameters import Parameters, parameters, with_names
@@ -85,12 +85,14 @@ def try_constants(fit: Fit, candidates: Sequence[str], options: FitOptions | Non
     Returns
     -------
     list of Trial
-        By F, the largest of those added first; A, B, C and the E of a state are never left out.
+        By F, the largest of those added first; A, B, C, the E of a state, and a constant with an a-priori error (which
+        is a measurement of it) are never left out. Ties and a-priori errors stay; what is tied to a constant that is left out
+        follows it to 0.
 
     Raises
     ------
     ValueError
-        For a name that the kind of top or the reduction does not have.
+        For a name that the kind of top or the reduction does not have, and for a constant that is tied.
     """
     options = replace(options or FitOptions(), pass_interrupt=True)
     constants = with_names(fit.named, [name for name in candidates if name not in fit.parameters.names])
@@ -98,7 +100,8 @@ def try_constants(fit: Fit, candidates: Sequence[str], options: FitOptions | Non
     for name in candidates:
         own = constants.own_name(name)
         if own in fit.parameters.names:
-            if own.partition("[")[0] not in ("A", "B", "C", "E"):
+            known = np.isfinite(fit.parameters.prior[fit.parameters.names.index(own)])
+            if own.partition("[")[0] not in ("A", "B", "C", "E") and not known:
                 out.append(_without(fit, own, options))
         else:
             out.append(_with(fit, constants, own, options))
@@ -106,11 +109,11 @@ def try_constants(fit: Fit, candidates: Sequence[str], options: FitOptions | Non
 
 
 def _with(fit: Fit, constants: ConstantSet, name: str, options: FitOptions | None) -> Trial | None:
-    free = [*fit.parameters.names, name]
     others = [other for other in constants.values if other not in fit.named.values and other != name]
     own, _ = beside_zero(constants.replace(**dict.fromkeys(others)), [name], fit.lines, options)
+    more = fit.parameters.moved(fit.values).with_free(own, [name])
     try:
-        found = fit_lines(fit.lines, own, _same_priors(fit, parameters(own, free)), options)
+        found = fit_lines(fit.lines, own, more, options)
     except ValueError:  # more constants than lines
         return None
     ratio, chance = f_test(fit, found)
@@ -118,22 +121,14 @@ def _with(fit: Fit, constants: ConstantSet, name: str, options: FitOptions | Non
 
 
 def _without(fit: Fit, name: str, options: FitOptions | None) -> Trial | None:
-    own = fit.named.replace(**{name: 0.0})
-    free = [other for other in fit.parameters.names if other != name]
+    rest = fit.parameters.moved(fit.values).without(name)
+    constants = dict(zip(rest.constant_names, rest.constants_of(rest.start).tolist(), strict=True))
     try:
-        found = fit_lines(fit.lines, own, _same_priors(fit, parameters(own, free)), options)
+        found = fit_lines(fit.lines, fit.named.replace(**constants), rest, options)
     except ValueError:
         return None
     ratio, chance = f_test(found, fit)
     return _trial(name, False, fit, found, ratio, chance)
-
-
-def _same_priors(fit: Fit, made: Parameters) -> Parameters:
-    known = dict(zip(fit.parameters.names, fit.parameters.prior.tolist(), strict=True))
-    start = dict(zip(fit.parameters.names, fit.parameters.start.tolist(), strict=True))
-    prior = np.array([known.get(name, np.inf) for name in made.names])
-    at = np.array([start[n] if np.isfinite(p) else s for n, p, s in zip(made.names, prior, made.start, strict=True)])
-    return replace(made, prior=prior, start=at)
 
 
 def _trial(name: str, added: bool, before: Fit, found: Fit, ratio: float, chance: float) -> Trial:
@@ -153,7 +148,7 @@ def _trial(name: str, added: bool, before: Fit, found: Fit, ratio: float, chance
 def choose_constants(
     lines: Assignments,
     constants: ConstantSet,
-    base: Sequence[str],
+    base: Sequence[str] | Parameters,
     candidates: Sequence[str],
     options: FitOptions | None = None,
     *,
@@ -171,8 +166,8 @@ def choose_constants(
     lines : Assignments
     constants : Constants or TopConstants
         Where the fit starts; candidates start from 0 unless they are in it.
-    base : sequence of str
-        Constants that are always free.
+    base : sequence of str or Parameters
+        Constants that are always free; as parameters of the same constants with their ties and a-priori errors, which stay.
     candidates : sequence of str
     options : FitOptions, optional
     by_order : bool
@@ -186,12 +181,14 @@ def choose_constants(
     (Fit, list of Trial)
         The last fit, and the steps that were taken. After a KeyboardInterrupt these are the model so far, which has not converged.
     """
-    start = with_names(constants, base)
-    fit = fit_lines(lines, start, parameters(start, base), _patient(options))
+    start = constants if isinstance(base, Parameters) else with_names(constants, base)
+    free = base if isinstance(base, Parameters) else parameters(start, base)
+    fit = fit_lines(lines, start, free, _patient(options))
     fixed, taken = tuple(fit.parameters.names), list[Trial]()
     known = with_names(start, [name for name in candidates if name not in start])  # refuses names that there are not
     names = dict.fromkeys(known.own_name(name) for name in candidates)
     orders = {name: order_of(name, known) for name in names if name not in fixed}
+    free.with_free(known, list(orders))  # refuses constants that are tied
 
     different = sorted(set(orders.values()))
     groups = [{order} for order in different] if by_order else [set(different)]
@@ -263,15 +260,15 @@ def promised(fit: Fit, names: Sequence[str], options: FitOptions | None = None) 
     What is left of the derivatives x by a new constant beside those of the fit, x - J J⁺ x, decreases χ² by (x · r)²/(x · x); two
     of them by b A⁻¹ b with b = x · r and A their products. A constant that the others make up promises 0.
     """
-    count = len(fit.groups)
-    own = weighted_derivatives(fit, fit.parameters.names, options)[:count]
-    columns = weighted_derivatives(fit, names, options)[:count]
+    search = search_of(fit.lines, fit.named, fit.parameters, options or FitOptions(), fit.used)
+    own, columns = search.weighted(fit.values)[1], weighted_derivatives(fit, names, options)
+    columns = np.vstack([columns, np.zeros((len(own) - len(columns), len(names)))])  # a-priori values know no other
     size = np.linalg.norm(columns, axis=0)
     columns = columns / np.where(size > 0, size, 1.0)
     basis = np.linalg.qr(own / np.where(np.linalg.norm(own, axis=0) > 0, np.linalg.norm(own, axis=0), 1.0))[0]
     for _ in range(2):  # once more for the digits that the first time cancels
         columns = columns - basis @ (basis.T @ columns)
-    products, along = columns.T @ columns, columns.T @ fit.residuals[:count]
+    products, along = columns.T @ columns, columns.T @ fit.residuals
     own_size = np.diag(products).copy()
     seen = own_size > _MADE_UP
     alone = np.where(seen, along**2 / np.where(seen, own_size, 1.0), 0.0)
@@ -297,7 +294,7 @@ def _pair(fit: Fit, one: str, other: str, options: FitOptions) -> Trial | None:
     """Two constants together, judged as one step; None where the lines are too few."""
     constants, _ = beside_zero(with_names(fit.named, [one, other]), [one, other], fit.lines, options)
     try:
-        free = _same_priors(fit, parameters(constants, [*fit.parameters.names, one, other]))
+        free = fit.parameters.moved(fit.values).with_free(constants, [one, other])
         both = fit_lines(fit.lines, constants, free, options)
     except ValueError:
         return None

@@ -40,7 +40,8 @@ class Fit:
     lines : as given. constants : the fitted set with its standard errors, None where the parameters are not named constants (SPFIT's
     codes with spins or several states). parameters : what was fitted, `values` (n,) at the end
     calculated_mhz (lines,) : each line; blended_mhz (lines,) : the mean of its blend. calculated_errors_mhz (lines,) : of the
-    prediction, from the stated errors. used (lines,) : whether a line counted; left_out : why not, by line
+    prediction, from the stated errors. line_errors_mhz (lines,) : the errors of the lines as they counted, the default one among them;
+    0 where there is none. used (lines,) : whether a line counted; left_out : why not, by line
     residuals (u,), jacobian's statistics : of the measured frequencies that counted, blends as one, in order of `groups`
     minimum : how the search ended. converged, reason : whether this is a result, and the sentence that says why or why not
     changed_states : levels that are another state than at the start, as text. notes : what must be known
@@ -53,6 +54,7 @@ class Fit:
     calculated_mhz: Floats
     blended_mhz: Floats
     calculated_errors_mhz: Floats
+    line_errors_mhz: Floats
     used: NDArray[np.bool_]
     left_out: dict[int, str]
     residuals: Floats
@@ -127,8 +129,18 @@ def covariance_of(parameters: Parameters, statistics: Regression) -> Covariance:
         raise ValueError(
             f"the lines do not determine {lost}: there is no covariance; hold it or give an a-priori error"
         )
-    rows = np.flatnonzero(parameters.matrix.any(axis=1))
-    matrix = parameters.matrix[rows] @ statistics.covariance @ parameters.matrix[rows].T
+    found = covariance_of_determined(parameters, statistics)
+    return found or Covariance((), np.zeros((0, 0)))
+
+
+def covariance_of_determined(parameters: Parameters, statistics: Regression) -> Covariance | None:
+    """The same without the constants that follow from a free parameter that is not determined; None where no other is there."""
+    open_ = ~np.isfinite(statistics.errors)
+    rows = np.flatnonzero(parameters.matrix.any(axis=1) & ~parameters.matrix[:, open_].any(axis=1))
+    if not len(rows):
+        return None
+    own = np.where(np.isfinite(statistics.covariance), statistics.covariance, 0.0)  # those that are not have no part
+    matrix = parameters.matrix[rows] @ own @ parameters.matrix[rows].T
     return Covariance(tuple(parameters.constant_names[i] for i in rows), (matrix + matrix.T) / 2)
 
 
@@ -256,6 +268,7 @@ def _finished(
         calculated_mhz=calculated,
         blended_mhz=search.group.spread_back(search.group.mean(calculated), calculated),
         calculated_errors_mhz=_prediction_errors(jacobian, statistics),
+        line_errors_mhz=_line_errors(search),
         used=search.used,
         left_out=left_out,
         residuals=residuals,
@@ -290,6 +303,11 @@ def _constants(
         return constants.replace(**new, uncertainties={**chosen, **errors}), ""
     except ValueError as error:
         return constants, str(error)
+
+
+def _line_errors(search: Search) -> Floats:
+    without = (search.lines.error_mhz == 0) & (search.options.default_error_mhz is None)
+    return np.where(without, 0.0, search.sigma)
 
 
 def _prediction_errors(jacobian: Floats, statistics: Regression) -> Floats:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -28,7 +28,7 @@ class Parameters:
     """Free parameters and how the constants follow from them.
 
     names (n,) : of the free parameters. start (n,) : their values before the fit, MHz. prior (n,) : a-priori standard errors in
-    MHz, infinite where there are none; they count from `start`
+    MHz, infinite where there are none. centre (n,) : the a-priori values, MHz, where they are not `start`
     constant_names (c,) ; base (c,), matrix (c, n) : constants = base + matrix @ parameters
     """
 
@@ -38,6 +38,12 @@ class Parameters:
     constant_names: tuple[str, ...]
     base: Floats
     matrix: Floats
+    centre: Floats | None = None
+
+    @property
+    def expected(self) -> Floats:
+        """A-priori values (n,), MHz, from which the errors `prior` count."""
+        return self.start if self.centre is None else self.centre
 
     def constants_of(self, parameters: Floats) -> Floats:
         """The constants (c,) in MHz."""
@@ -64,12 +70,37 @@ class Parameters:
         keep = [k for k in range(len(self.names)) if k != i]
         return Parameters(
             tuple(self.names[k] for k in keep), self.start[keep], self.prior[keep], self.constant_names, self.base,
-            self.matrix[:, keep],
+            self.matrix[:, keep], self.expected[keep],
         )  # fmt: skip
 
     def moved(self, start: Floats) -> Parameters:
-        """The same from another start; a-priori values stay where they were only if none is finite."""
-        return Parameters(self.names, np.asarray(start), self.prior, self.constant_names, self.base, self.matrix)
+        """The same from another start; a-priori values stay where they are."""
+        start = np.asarray(start, dtype=np.float64)
+        centre = np.where(np.isfinite(self.prior), self.expected, start)
+        return replace(self, start=start, centre=centre)
+
+    def with_free(self, constants: ConstantSet, added: Sequence[str]) -> Parameters:
+        """The same with more free constants, ties and a-priori errors as they are.
+
+        constants : the set with the added ones, which start from it. Raises ValueError for one that is free or tied already.
+        """
+        names, own = tuple(constants.values), [_known(name, constants, "free") for name in added]
+        moving = {name for name, row in zip(self.constant_names, self.matrix, strict=True) if row.any()}
+        if taken := [name for name in own if name in moving]:
+            raise ValueError(f"{taken[0]} is free or tied already; leave it out, or take the tie away")
+        held = dict(zip(self.constant_names, self.base.tolist(), strict=True))
+        rows = dict(zip(self.constant_names, self.matrix, strict=True))
+        none = np.zeros(len(self.names))
+        first = np.array([rows.get(name, none) for name in names]).reshape(len(names), len(self.names))
+        return Parameters(
+            names=(*self.names, *own),
+            start=np.append(self.start, [constants[name] for name in own]),
+            prior=np.append(self.prior, np.full(len(own), np.inf)),
+            centre=np.append(self.expected, [constants[name] for name in own]),
+            constant_names=names,
+            base=np.array([0.0 if name in own else held.get(name, constants[name]) for name in names]),
+            matrix=np.column_stack([first, *(np.array([one == name for one in names], dtype=float) for name in own)]),
+        )
 
 
 def parameters(

@@ -8,6 +8,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 
+import numpy as np
+
 from rotor.fit.fit import Fit
 
 FORMS = ("text", "markdown", "latex")
@@ -82,7 +84,10 @@ def name_text(name: str, form: str) -> str:
 
 @dataclass(frozen=True)
 class Row:
-    """A constant of the table: name, value and standard error in MHz (None: held), what it follows where it is tied, its states."""
+    """A constant of the table: name, value and standard error in MHz, what it follows where it is tied, its states.
+
+    error : None of a constant that is held, infinite of one that is not determined.
+    """
 
     name: str
     value: float
@@ -141,8 +146,9 @@ def _rows(fit: Fit) -> list[Row]:
     if fit.constants is None:
         numbers = zip(fit.parameters.names, fit.values.tolist(), fit.errors.tolist(), strict=True)
         return [Row(name, value, error) for name, value, error in numbers]
-    errors = fit.constants.uncertainties
-    tied = _tied(fit)
+    tied, moves = _tied(fit), np.atleast_1d(fit.parameters.matrix.any(axis=1))
+    lost = {name: math.inf for name, moved in zip(fit.parameters.constant_names, moves.tolist(), strict=True) if moved}
+    errors = {**lost, **fit.constants.uncertainties}
     return [Row(name, value, errors.get(name), tied.get(name, "")) for name, value in fit.constants.values.items()]
 
 
@@ -163,7 +169,9 @@ def _cells(row: Row, factor: float, digits: int, form: str, with_states: bool) -
     unit, size = unit_of(row.value, row.error if row.error and math.isfinite(row.error) else None)
     known = row.error is not None and math.isfinite(row.error)
     text = (
-        f"{row.value / size:.12g}" if not row.error else value_text(row.value / size, row.error * factor / size, digits)
+        value_text(row.value / size, row.error * factor / size, digits)
+        if row.error and known
+        else f"{row.value / size:.12g}"
     )
     remark = (
         "held"

@@ -209,7 +209,7 @@ def _lines(fit: Fit) -> list[str]:
     in_blend = (blended[lines.blend] & fit.used).tolist()
     leverages = dict(zip(fit.groups.tolist(), fit.statistics.leverages.tolist(), strict=False))
     unit = np.where(lines.wavenumber, 29979.2458, 1.0)
-    difference, error = fit.difference_mhz, lines.error_mhz
+    difference, error = fit.difference_mhz, fit.line_errors_mhz
     numbers = (lines.frequency_mhz, fit.calculated_mhz, difference, error, fit.calculated_errors_mhz)
     columns = [(column / unit).tolist() for column in numbers]
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -22,8 +22,8 @@ def bootstrap(
 ) -> tuple[Floats, Floats]:
     """Parameters of fits to lines drawn anew with replacement, and their standard deviations.
 
-    Measured frequencies are drawn, blends as one. Samples that determine fewer constants are drawn again, at most ten
-    times as many.
+    Measured frequencies are drawn, blends as one. Samples that determine fewer constants, or whose search does not converge, are
+    drawn again, at most ten times as many.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ def bootstrap(
     rng : numpy.random.Generator
         Draws the lines.
     options : FitOptions, optional
-        Of each fit.
+        Of each fit; it has as many iterations as a fit has without options, or more.
     model : callable, optional
         As in `fit_lines`.
 
@@ -43,12 +43,12 @@ def bootstrap(
     values : (samples, n) array
         MHz; of fewer samples where a KeyboardInterrupt came, with two or more done.
     deviations : (n,) array
-        Standard deviations, MHz.
+        Standard deviations, MHz; infinite for what the lines of the fit do not determine.
 
     Raises
     ------
     ValueError
-        Where ten times as many samples are not enough.
+        Where ten times as many samples are not enough: how many determine fewer constants, and how many do not converge.
 
     Notes
     -----
@@ -58,8 +58,11 @@ def bootstrap(
     groups = fit.lines.blend[fit.groups]
     members = {int(b): np.flatnonzero((fit.lines.blend == b) & fit.used) for b in groups}
     at = fit.parameters.moved(fit.values)
-    own = replace(options or FitOptions(), poor_rms=1e12, pass_interrupt=True)  # no sample is judged by its rms
+    asked = options or FitOptions()
+    most = max(asked.most_iterations, FitOptions().most_iterations)
+    own = replace(asked, poor_rms=1e12, most_iterations=most, pass_interrupt=True)  # no sample is judged by its rms
     out: list[Floats] = []
+    fewer = astray = 0
 
     def sample() -> Fit:
         drawn = rng.choice(groups, size=len(groups)).tolist()
@@ -72,7 +75,11 @@ def bootstrap(
     try:
         for _ in range(10 * samples):
             one = sample()
-            if one.statistics.rank == fit.statistics.rank:
+            if one.statistics.rank != fit.statistics.rank:
+                fewer += 1
+            elif not one.converged:
+                astray += 1
+            else:
                 out.append(one.values)
             if len(out) == samples:
                 break
@@ -82,7 +89,8 @@ def bootstrap(
         samples = len(out)
     if len(out) < samples:
         raise ValueError(
-            f"only {len(out)} of {10 * samples} samples determine all constants; too few lines for a bootstrap"
+            f"only {len(out)} of {10 * samples} samples determine all constants and converge ({fewer} determine fewer, {astray} do "
+            "not converge); too few lines for a bootstrap, or a fit far from linear"
         )
     found = np.array(out)
-    return found, np.asarray(found.std(axis=0, ddof=1))
+    return found, np.where(np.isfinite(fit.errors), found.std(axis=0, ddof=1), np.inf)

@@ -187,7 +187,7 @@ class Search:
         behind[np.arange(len(known)), known] = 1 / prior
         if not len(known) and not len(spread):
             return residuals, rows
-        held = (self.parameters.start - values)[known] / prior
+        held = (self.parameters.expected - values)[known] / prior
         return np.concatenate([residuals, spread, held]), np.vstack([rows, of_spread, behind])
 
     def _apart(self, calculated: Floats, jacobian: Floats) -> tuple[Floats, Floats]:

@@ -8,21 +8,23 @@ of a symmetric top, E = Σ c ∂E/∂c, which is exact.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
 from rotor.fit.top_constants import ConstantSet, TopConstants
-from rotor.quantum.estimates.contracted import ContractedLevels
 from rotor.quantum.estimates.derivatives import level_derivatives
-from rotor.quantum.estimates.labelled_spins import found_with_spins
 from rotor.quantum.estimates.state_units import state_units
 from rotor.quantum.estimates.unit_blocks import UnitBlocks, joined
 from rotor.quantum.labelled import ClosedForm, LevelModel, MissingLevelsError, level_model
 from rotor.quantum.levels import Levels
 from rotor.quantum.quanta import value_text
 from rotor.quantum.solve import solve_levels
+
+if TYPE_CHECKING:
+    from rotor.quantum.estimates.contracted import ContractedLevels
 
 _AT_ZERO = 1e-30  # MHz: a free constant that starts at 0 must not be left out of the Hamiltonian
 
@@ -101,6 +103,8 @@ def _of_states(begin: TopConstants, columns: dict[str, Ints], labels: Ints, name
 
 
 def _of_spins(begin: TopConstants, columns: dict[str, Ints], labels: Ints, names: tuple[str, ...]) -> LevelModel:
+    from rotor.quantum.estimates.labelled_spins import found_with_spins  # with all that spins need
+
     total = begin.quanta[-1]
     doubled = columns[total] if total in begin.halves else 2 * columns[total]
     asked = {name: np.abs(column) if name == "k" else column for name, column in columns.items()}
@@ -121,7 +125,7 @@ def _of_spins(begin: TopConstants, columns: dict[str, Ints], labels: Ints, names
         starts = np.cumsum([0, *(len(own) for _, own, _ in whole)])
         moved = [(one[0], np.arange(a, b), every) for one, a, b in zip(whole, starts, starts[1:], strict=False)]
         parts.append((rows, joined(moved, len(rows))))
-    parts += [(one.rows, one.blocks) for one in found if isinstance(one.blocks, ContractedLevels)]
+    parts += [(one.rows, one.blocks) for one in found if not isinstance(one.blocks, UnitBlocks)]
     return TopLevels(names, len(labels), tuple(parts))
 
 

@@ -25,10 +25,10 @@ from typing import Any
 import numpy as np
 
 from rotor.fit.assignment import Assignments, assignments
+from rotor.formats.assigned_lin import as_lin
 from rotor.formats.atomic_write import open_atomic
 from rotor.formats.spcat.text.fields import BLANK
 from rotor.formats.spcat.text.lin import (
-    line_list,
     note_of_defaults,
     note_of_remarks,
     read_lin,
@@ -358,12 +358,12 @@ def _first_of_each(upper: np.ndarray, lower: np.ndarray, frequency: np.ndarray) 
 def write_assigned_lines(lines: Assignments, path: str | os.PathLike[str]) -> None:
     """Write assigned lines as .lin or .csv; an existing file is replaced at the end or not at all.
 
-    In a .lin a blend is lines of one frequency behind each other, so that the lines of a blend are put together; wavenumbers
-    stand with a negative error.
+    In a .lin a blend is lines of one frequency behind each other, so that the lines of a blend are put together, and others of one
+    frequency apart; see `rotor.formats.assigned_lin`. Wavenumbers stand with a negative error.
     """
     text = os.fspath(path).lower()
     if text.endswith(".lin"):
-        return write_lin(_as_lin(lines), path)
+        return write_lin(as_lin(lines), path)
     if not text.endswith(".csv"):
         raise ValueError(f"{path}: assigned lines are written as .lin or .csv")
     labels = [f"{name}_{side}" for side in ("upper", "lower") for name in lines.names]
@@ -387,24 +387,3 @@ def write_assigned_lines(lines: Assignments, path: str | os.PathLike[str]) -> No
                 row.append(lines.widths_mhz.get(int(lines.blend[i]), ""))
             writer.writerow([*row, *([lines.comments[i]] if lines.comments else [])])
     return None
-
-
-def _with_widths(lines: Assignments) -> Assignments:
-    """Lines in order of their blends, and behind each blend of known width one more, whose error is the width."""
-    last = np.flatnonzero(np.append(np.diff(lines.blend) != 0, True))
-    wide = [i for i in last.tolist() if int(lines.blend[i]) in lines.widths_mhz]
-    rows = np.sort(np.concatenate([np.arange(len(lines)), np.array(wide, dtype=np.int64)]), kind="stable")
-    found = lines.take(rows)
-    second = np.flatnonzero(np.append(False, rows[1:] == rows[:-1]))
-    found.error_mhz[second] = [lines.widths_mhz[int(lines.blend[i])] for i in wide]
-    return found
-
-
-def _as_lin(lines: Assignments):  # type: ignore[no-untyped-def]
-    ordered = _with_widths(lines.take(np.argsort(lines.blend, kind="stable")))
-    halves = np.array([name in ordered.halves for name in ordered.names])
-    upper, lower = (np.where(halves, (side + 1) // 2, side) for side in (ordered.upper, ordered.lower))
-    made = line_list(upper, lower, ordered.frequency_mhz, ordered.error_mhz, ordered.weight)
-    unit = np.where(ordered.wavenumber, 1 / MHZ_PER_CM, 1.0)
-    sign = np.where(ordered.wavenumber, -1.0, 1.0)
-    return replace(made, frequency=ordered.frequency_mhz * unit, error=sign * ordered.error_mhz * unit)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from rotor.arrays import Floats, Ints
 from rotor.fit.assignment import Assignments, merged
 from rotor.fit.first_values import beside_zero
-from rotor.fit.fit import Fit, FitOptions, fit_lines
+from rotor.fit.fit import Fit, FitOptions, covariance_of_determined, fit_lines
 from rotor.fit.parameters import Parameters, parameters, with_names
 from rotor.fit.publication import publication_table
 from rotor.fit.report import fit_facts, report_text
@@ -178,14 +178,22 @@ def fit_of_lines(
     try:
         begin = with_names(has, names)
     except ValueError as error:
-        raise ValueError(f"free: {error}") from None
+        more = (
+            "; constants of states are written as E[1] and A[1], of pairs of states as G_c[0,1], of spins as chi_aa(14N)"
+            if isinstance(has, TopConstants) and not any(sign in str(error).partition(":")[0] for sign in "[(")
+            else ""
+        )
+        raise ValueError(f"free: {error}{more}") from None
     for tie in ties:  # a constant that follows another need not be in the start
         try:
             begin = with_names(begin, [tie.partition("=")[0].strip()] if "=" in tie else [])
         except ValueError as error:
             raise ValueError(f"tie {tie!r}: {error}") from None
     made = parameters(begin, names, ties=ties, priors_mhz=priors)
-    begin, moved = beside_zero(begin, made.names, read)
+    known = np.isfinite(made.prior)  # what has an a-priori value stays at it
+    begin, moved = beside_zero(
+        begin, [name for name, has_one in zip(made.names, known, strict=True) if not has_one], read
+    )
     if moved:
         made = parameters(begin, names, ties=ties, priors_mhz=priors)
         said = ", ".join(f"{name} at {value:.3g} MHz" for name, value in moved.items())
@@ -254,15 +262,16 @@ def write_fitted_toml(answer: FitAnswer, path: str | os.PathLike[str]) -> None:
     from rotor.formats.molecules.molecule_writer import write_molecule_file
 
     request, fit = answer.request, answer.fit
+    lost = "; ".join(one.text for one in fit.statistics.undetermined)
     doubt = "" if fit.converged else f"NOT CONVERGED ({fit.reason}): "
     origin = (
         f"{doubt}fitted by rotor to {int(fit.used.sum())} lines of {Path(request.files.source).name}, weighted by their "
         f"errors; weighted rms {fit.weighted_rms:.4g}; errors from the stated errors of the lines"
+        + (f"; not determined by these lines and left at the start: {lost}" if lost else "")
     )
     start = request.files.start or ""
     own = start.lower().endswith(".toml") and Path(start).exists()
     file = read_molecule_file(start) if own else _file_of(request, path)
-    covariance = None if fit.statistics.undetermined else fit.covariance
     sources = {**file.sources, "constants": origin}
     named, states, spins = fit.named, file.states, file.spin_constants
     if isinstance(named, TopConstants):
@@ -274,7 +283,7 @@ def write_fitted_toml(answer: FitAnswer, path: str | os.PathLike[str]) -> None:
     made = replace(
         file,
         constants=named,
-        covariance=covariance,
+        covariance=covariance_of_determined(fit.parameters, fit.statistics),
         states=states,
         spin_constants=spins,
         levels=None,

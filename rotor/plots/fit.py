@@ -73,7 +73,7 @@ def plot_fit(
 
 
 def _draw(axes: Any, fit: Fit, x: np.ndarray[Any, Any]) -> None:
-    error = np.where(fit.lines.error_mhz > 0, fit.lines.error_mhz, np.nan)
+    error = np.where(fit.line_errors_mhz > 0, fit.line_errors_mhz, np.nan)
     y = fit.difference_mhz / error
     used = fit.used
     axes.axhspan(-1, 1, color=GREY, alpha=0.12, linewidth=0)

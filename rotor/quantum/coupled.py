@@ -8,7 +8,7 @@ one, so that the sum of all these overlaps is largest.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import accumulate
 from typing import TYPE_CHECKING, NamedTuple
@@ -311,7 +311,7 @@ def connected_parts(count: int, edges: Iterable[tuple[int, int]]) -> list[list[i
     return [[i for i in range(count) if group[i] == g] for g in dict.fromkeys(group)]
 
 
-def parts_of(members: list[tuple[int, WangBlock]]) -> tuple[Part, ...]:
+def parts_of(members: Sequence[tuple[int, WangBlock]]) -> tuple[Part, ...]:
     starts = accumulate((basis.size for _, basis in members), initial=0)
     return tuple(Part(v, basis, start) for (v, basis), start in zip(members, starts, strict=False))
 

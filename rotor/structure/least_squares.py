@@ -341,13 +341,6 @@ def _result(problem: _Problem, minimum: Minimum) -> FittedStructure:
     scale = float(np.sqrt(minimum.residuals @ minimum.residuals / free)) if free > 0 else np.nan
     covariance = linear.covariance * (scale**2 if (problem.sigma == 1).all() else 1.0)
 
-    directions = problem.directions(x)
-    shape = slice(0, problem.shape_count)
-    values = []
-    for one in _worth_giving(problem, x):
-        gradient = one.gradient(x) @ directions
-        spread = _spread(gradient, covariance[shape, shape])
-        values.append(Value(one.name, one.atoms, one.value(x), spread * one.factor, one.unit))
     vibrational = [
         Value(
             name,
@@ -368,7 +361,7 @@ def _result(problem: _Problem, minimum: Minimum) -> FittedStructure:
     return FittedStructure(
         method=problem.method,
         molecule=_in_parent_frame(family, x),
-        values=tuple(values),
+        values=_values(problem, x, covariance),
         vibrational=tuple(vibrational),
         moments=moments,
         rms_u_angstrom2=float(np.sqrt(differences @ differences / len(differences))),
@@ -378,6 +371,16 @@ def _result(problem: _Problem, minimum: Minimum) -> FittedStructure:
         minimum=minimum,
         notes=_notes(problem, linear.condition, free),
     )
+
+
+def _values(problem: _Problem, x: Floats, covariance: Floats) -> tuple[Value, ...]:
+    """Bonds and angles of the geometry x with their errors."""
+    directions, shape = problem.directions(x), slice(0, problem.shape_count)
+    values = []
+    for one in _worth_giving(problem, x):
+        spread = _spread(one.gradient(x) @ directions, covariance[shape, shape])
+        values.append(Value(one.name, one.atoms, one.value(x), spread * one.factor, one.unit))
+    return tuple(values)
 
 
 def _worth_giving(problem: _Problem, x: Floats) -> list[Named]:

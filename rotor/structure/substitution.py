@@ -18,7 +18,6 @@ from rotor.molecules.symmetry.point_group import symmetry_of
 from rotor.structure.coordinates import Named, bonds_and_angles
 from rotor.structure.family import PLANAR_WITHIN_ANGSTROM, Family, Species
 from rotor.structure.kraitchman import PAIRS, Substituted, kraitchman
-from rotor.tops.top import Top
 
 ON_AXIS_ANGSTROM = 1e-3  # of the figure axis of a symmetric top: an atom so near is on it
 
@@ -185,15 +184,3 @@ def _value(one: Named, positions: Floats, errors: Floats) -> Value:
     gradient = alone.gradient(filled).reshape(positions.shape)
     spread = np.sqrt(np.sum((gradient * np.nan_to_num(errors)) ** 2))
     return Value(one.name, one.atoms, alone.value(filled), float(spread) * one.factor, one.unit)
-
-
-def planarity(family: Family) -> Floats:
-    """Inertial defects I_c - I_a - I_b (species,) in u Å²; nan where a constant is missing."""
-    return np.array([one.moments @ np.array([-1.0, -1.0, 1.0]) for one in family.species])
-
-
-def parent_frame_axes(family: Family) -> Floats:
-    """Axes a, b, c of the parent's start geometry as rows (3, 3)."""
-    frame = Top.from_molecule(family.molecule).frame
-    assert frame is not None  # a top of a molecule has one
-    return frame.axes

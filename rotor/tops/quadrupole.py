@@ -25,6 +25,7 @@ def computed_couplings(molecule: Molecule, frame: PrincipalFrame) -> SpinConstan
     What is below 1 kHz, or 1e-3 of the largest element, counts as 0 off the diagonal and in χ_bb - χ_cc.
 
     >>> from rotor.geometry.inertia import point_masses, principal_frame
+    >>> from rotor.molecules.molecule import Molecule
     >>> chi = np.diag([2.4, 2.4, -4.8])
     >>> hcn = Molecule(("H", "C", "N"), [[0, 0, -1.06], [0, 0, 0], [0, 0, 1.15]], quadrupole_mhz={3: chi})
     >>> frame = principal_frame(point_masses(hcn.masses_u, hcn.positions_angstrom))

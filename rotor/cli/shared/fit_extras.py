@@ -43,7 +43,7 @@ def extras_of(answer: FitAnswer, tried: Sequence[str] | None, suggest: str | Non
 def chosen(request: FitRequest, candidates: Sequence[str], by_order: bool) -> tuple[FitAnswer, list[Trial]]:
     """The fit of the constants that the lines call for, and the steps that led to it; after an interrupt those found so far."""
     from rotor.fit.choose import choose_constants
-    from rotor.fit.parameters import parameters, with_names
+    from rotor.fit.parameters import with_names
     from rotor.formats.fit_request import FitAnswer, answer_fit
 
     if request.spfit is not None:
@@ -56,13 +56,14 @@ def chosen(request: FitRequest, candidates: Sequence[str], by_order: bool) -> tu
             f"--choose: {', '.join(idle)} is free already, part of the base of the model; choose from others"
         )
     with inputs.named("--choose"):
-        with_names(request.constants, candidates)
+        known = with_names(request.constants, candidates)
+        request.parameters.with_free(known, list(dict.fromkeys(map(own_name, candidates))))
     fit, steps = choose_constants(
-        request.lines, request.constants, request.parameters.names, candidates, request.options, by_order=by_order
+        request.lines, request.constants, request.parameters, candidates, request.options, by_order=by_order
     )
     if fit.minimum.status == "interrupted":
         return FitAnswer(request, fit), steps
-    free = parameters(fit.named, fit.parameters.names)
+    free = fit.parameters.moved(fit.values)
     return answer_fit(replace(request, constants=fit.named, parameters=free)), steps
 
 
@@ -83,7 +84,7 @@ def _suggestions(request: FitRequest, fit: Fit, name: str | None) -> list[Sugges
 
     from rotor.fit.choose import suggest_lines
 
-    error = float(np.median(fit.lines.error_mhz[fit.used]))
+    error = float(np.median(fit.line_errors_mhz[fit.used]))
     own = name if fit.constants is None else fit.constants.own_name(name)
     if own not in fit.parameters.names:
         raise ValueError(f"--suggest: {name} is not among the free parameters {', '.join(fit.parameters.names)}")

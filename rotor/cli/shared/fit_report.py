@@ -91,7 +91,7 @@ def _line_records(fit: Fit) -> list[dict[str, Any]]:
             "upper": lines.upper[i],
             "lower": lines.lower[i],
             "frequency_mhz": lines.frequency_mhz[i],
-            "error_mhz": lines.error_mhz[i],
+            "error_mhz": fit.line_errors_mhz[i],
             "calculated_mhz": fit.calculated_mhz[i],
             "difference_mhz": difference[i],
             "calculated_error_mhz": fit.calculated_errors_mhz[i],

@@ -44,7 +44,7 @@ def _in_mhz(parameter: Parameter, states: int) -> Parameter:
 def request_in_mhz(file: IntensityFile) -> IntensityFile:
     """The same request with its limits as they are in MHz.
 
-    >>> request_in_mhz(IntensityFile("", Request(flags=1001, fqlim_ghz=100.0), ())).request.fqlim_ghz
+    >>> round(request_in_mhz(IntensityFile("", Request(flags=1001, fqlim_ghz=100.0), ())).request.fqlim_ghz, 6)
     2997.92458
     """
     asked: Request = file.request

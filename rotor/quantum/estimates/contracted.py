@@ -97,7 +97,10 @@ class _Solved(NamedTuple):
 
 @dataclass(frozen=True)
 class ContractedLevels:
-    """Labelled levels for other values of the parameters; see `levels`."""
+    """Labelled levels for other values of the parameters; see `levels`.
+
+    rotations : of the blocks on which a parameter acts; N = 0 of the lowest state has none, and the energy 0.
+    """
 
     count: int
     rotors: dict[int, RotorBlock]
@@ -124,8 +127,10 @@ class ContractedLevels:
 
     def _solved(self, values_mhz: Floats) -> _Solved:
         energies, vectors = {}, {}
-        for number, unit in self.rotations.items():
-            energies[number], vectors[number] = _eigen(unit.matrix(values_mhz))
+        for number, rotor in self.rotors.items():
+            size = len(rotor.energies_mhz)
+            unit = self.rotations.get(number)
+            energies[number], vectors[number] = _eigen(unit.matrix(values_mhz) if unit else np.zeros((size, size)))
         operators = {
             (i, k): {channel: vectors[i].T @ unit.matrix(values_mhz) @ vectors[k] for channel, unit in units.items()}
             for (i, k), units in self.couplings.items()
@@ -139,9 +144,9 @@ class ContractedLevels:
         for part in block.parts:
             own = vectors[part.place].reshape(part.repeats, -1, vectors.shape[1])
             turned.append(np.matmul(solved.vectors[part.number], own))
-            unit = self.rotations[part.number]
-            pairs = np.einsum("pet,pet->te", turned[-1][:, unit.rows], turned[-1][:, unit.columns])
-            out[:, unit.parameters] += pairs @ unit.factors
+            if unit := self.rotations.get(part.number):
+                pairs = np.einsum("pet,pet->te", turned[-1][:, unit.rows], turned[-1][:, unit.columns])
+                out[:, unit.parameters] += pairs @ unit.factors
         for a, up in enumerate(block.parts):
             for b, low in enumerate(block.parts[: a + 1]):
                 for channel, unit in self.couplings.get((up.number, low.number), {}).items():

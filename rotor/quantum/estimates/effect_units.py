@@ -13,13 +13,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rotor.arrays import Floats, Ints, distinct
-from rotor.quantum.coupled import CoupledBlock, names_of_states, parameter_matrix
+from rotor.quantum.coupled import CoupledBlock, parameter_matrix
 from rotor.quantum.effect import QuantumEffect
-from rotor.quantum.estimates.state_units import WangElements, wang_elements
+from rotor.quantum.estimates.state_units import WangElements, by_overlaps, wang_elements
 from rotor.quantum.estimates.unit_blocks import UnitBlocks, tracked_blocks
 from rotor.quantum.estimates.unit_matrices import (
     Elements,
+    NamedFunctions,
     Namer,
+    Naming,
     UnitBlock,
     WeightedElements,
     elements_of,
@@ -50,6 +52,7 @@ def unit_levels(
     names: Sequence[str],
     values_mhz: Floats,
     functions: Functions | None = None,
+    naming: Naming | None = None,
 ) -> UnitBlocks:
     """The blocks in which the rows of levels lie, for other values of the parameters.
 
@@ -67,6 +70,8 @@ def unit_levels(
     functions : callable, optional
         Of coupled blocks: the functions (n, n) in rows by which the states are called, and their names v, Ka, Kc (n, 3), where these
         are not the functions of the basis; the levels have these names.
+    naming : callable, optional
+        Of blocks without spins: how the states get their names, which the levels have; by overlaps where it is None.
 
     Returns
     -------
@@ -83,7 +88,7 @@ def unit_levels(
     of_row = np.searchsorted(starts, rows, side="right") - 1
     numbers = distinct(of_row).tolist()
     blocks = [levels.blocks[number] for number in numbers]
-    makers = _Makers(top, levels, names, blocks, functions)
+    makers = _Makers(top, levels, names, blocks, functions, naming)
     units = [makers.unit(block) for block in blocks]
     inside = [np.flatnonzero(of_row == number) for number in numbers]
 
@@ -91,14 +96,15 @@ def unit_levels(
         """Labels of the block by their names, which are those that the levels have."""
         block, own = blocks[place], inside[place]
         state_of = {tuple(name): state for state, name in enumerate(found.tolist())}
-        asked = _quanta(levels)[rows[own]] if functions else _names(block)[rows[own] - block.start]
+        asked = _quanta(levels)[rows[own]] if functions or naming else _names(block)[rows[own] - block.start]
         return own, np.array([state_of[tuple(name)] for name in asked.tolist()])
 
     return tracked_blocks(units, len(rows), find, values_mhz)
 
 
 def _quanta(levels: Levels) -> Ints:
-    return np.stack([levels.quanta[name] for name in ("v", "ka", "kc")], axis=1)
+    v = levels.quanta.get("v", np.zeros(len(levels), dtype=np.int64))
+    return np.stack([v, levels.quanta["ka"], levels.quanta["kc"]], axis=1)
 
 
 def _names(block: Any) -> Ints:
@@ -110,9 +116,15 @@ class _Makers:
     """Unit matrices of solved blocks of any kind, with what they share."""
 
     def __init__(
-        self, top: Top, levels: Levels, names: Sequence[str], blocks: Sequence[Any], functions: Functions | None
+        self,
+        top: Top,
+        levels: Levels,
+        names: Sequence[str],
+        blocks: Sequence[Any],
+        functions: Functions | None,
+        naming: Naming | None,
     ) -> None:
-        self._functions = functions
+        self._functions, self._naming = functions, naming
         self._top, self._effects, self._names = top, levels.effects, tuple(names)
         self._representation = str(levels.representation)
         self._spins = _SpinUnits(top, levels.effects, self._names, blocks) if isinstance(blocks[0], SpinBlock) else None
@@ -134,6 +146,8 @@ class _Makers:
                     if found is not None:
                         dense[place] = dense[place] + found if place in dense else found
         units = {place: elements_of(matrix) for place, matrix in dense.items()}
+        if self._naming:
+            return _named(units, self._naming([(0, block.basis)], self._representation))
         return unit_block(units, np.zeros(block.basis.size, dtype=np.int64), _by_rank)
 
     def _coupled(self, block: CoupledBlock) -> UnitBlock:
@@ -144,12 +158,12 @@ class _Makers:
                 units[place] = elements_of(found)
         if self._functions:
             return _turned(units, *self._functions(block))
-        sub_blocks = np.repeat(np.arange(len(block.parts)), [part.basis.size for part in block.parts])
+        named = self._naming or by_overlaps
+        return _named(units, named([(part.v, part.basis) for part in block.parts], self._representation))
 
-        def namer(matrix: Floats, energies: Floats, vectors: Floats) -> Ints:
-            return names_of_states(block.parts, matrix, vectors, self._representation)[0]  # it reads the lower triangle
 
-        return unit_block(units, sub_blocks, namer)
+def _named(units: Units, named: NamedFunctions) -> UnitBlock:
+    return unit_block(units, named.sub_blocks, named.namer, follows=named.follows)
 
 
 def _turned(units: Units, functions: Floats, names: Ints) -> UnitBlock:

@@ -17,7 +17,7 @@ from rotor.arrays import Floats, Ints, distinct
 from rotor.quantum.coupled import NOTHING, Part, connected_parts, names_of_functions, names_of_states, parts_of
 from rotor.quantum.effect import QuantumEffect, k_limits_of
 from rotor.quantum.estimates.unit_blocks import UnitBlocks, tracked_blocks
-from rotor.quantum.estimates.unit_matrices import UnitBlock, members_of, numbered
+from rotor.quantum.estimates.unit_matrices import Follows, NamedFunctions, Naming, UnitBlock, members_of, numbered
 from rotor.quantum.label_blocks import unit_diagonals
 from rotor.quantum.states import OperatorOfJ, State
 from rotor.quantum.wang.basis import WangBlock, limited, wang_blocks
@@ -114,7 +114,12 @@ def _of_effect(effect: QuantumEffect, top: Top, name: str) -> OperatorOfJ:
 
 
 def state_units(
-    top: Top, effects: Sequence[QuantumEffect], names: Sequence[str], labels: Ints, values_mhz: Floats
+    top: Top,
+    effects: Sequence[QuantumEffect],
+    names: Sequence[str],
+    labels: Ints,
+    values_mhz: Floats,
+    naming: Naming | None = None,
 ) -> UnitBlocks:
     """The blocks in which labels lie, for any values of the parameters.
 
@@ -130,6 +135,8 @@ def state_units(
         J, v, Ka, Kc.
     values_mhz : (parameters,) array
         At which states are named.
+    naming : callable, optional
+        How the states of connected Wang blocks get their names; by overlaps, see `names_of_states`, where it is None.
 
     Returns
     -------
@@ -141,7 +148,7 @@ def state_units(
     ValueError
         For a Hamiltonian that is not finite, or not invariant under time reversal.
     """
-    representation, limits = representation_of(top), k_limits_of(top, effects)
+    representation, limits, named = representation_of(top), k_limits_of(top, effects), naming or by_overlaps
     terms = _Terms.of(top, effects, names, representation)
     of_j = {j: np.flatnonzero(labels[:, 0] == j) for j in distinct(labels[:, 0][labels[:, 0] >= 0]).tolist()}
     whole = {j: wang_blocks(j, representation) for j in of_j}
@@ -162,7 +169,9 @@ def state_units(
                 place = dict(zip(members, parts, strict=True))
                 found = [_shifted(elements[part.basis], part, terms.first[part.v]) for part in parts]
                 found += [_between(one, place[i], place[k]) for i, k, one in links if i in place]
-                blocks.append(_block(found, parts, mix, representation))
+                blocks.append(
+                    _block(found, mix, parts[-1].place.stop, named([vertices[j][i] for i in members], representation))
+                )
                 inside.append(rows)
 
     def find(number: int, made: Ints) -> tuple[Ints, Ints]:
@@ -261,15 +270,23 @@ def _between(elements: WangElements, up: Part, low: Part) -> WangElements:
     return WangElements(rows[lower], columns[lower], elements.units[lower], elements.values[lower])
 
 
-def _block(found: Sequence[WangElements], parts: tuple[Part, ...], mix: Floats, representation: str) -> UnitBlock:
+def _block(found: Sequence[WangElements], mix: Floats, size: int, named: NamedFunctions) -> UnitBlock:
     rows, columns, units, values = (np.concatenate(column) for column in zip(*found, strict=True))
-    size = parts[-1].place.stop
     places, of_place = numbered(rows * size + columns, size * size)
     used, of_unit = numbered(units, len(mix))
     factors = np.zeros((len(places), len(used)))
     np.add.at(factors, (of_place, of_unit), values)
     of_used = mix[used]
     parameters = np.flatnonzero(of_used.any(axis=0))
+    members = members_of(named.sub_blocks)
+    return UnitBlock(
+        size, *np.divmod(places, size), factors, of_used[:, parameters], parameters, members, named.namer, named.follows
+    )
+
+
+def by_overlaps(blocks: Sequence[Vertex], representation: str) -> NamedFunctions:
+    """Names of states by their overlaps with those of each Wang block by itself."""
+    parts = parts_of(blocks)
     sub_blocks = np.repeat(np.arange(len(parts)), [part.basis.size for part in parts])
 
     def namer(matrix: Floats, energies: Floats, vectors: Floats) -> Ints:
@@ -277,6 +294,4 @@ def _block(found: Sequence[WangElements], parts: tuple[Part, ...], mix: Floats, 
             return names_of_functions(parts, representation)
         return names_of_states(parts, matrix, vectors, representation)[0]  # of the matrix the lower triangle is read
 
-    return UnitBlock(
-        size, *np.divmod(places, size), factors, of_used[:, parameters], parameters, members_of(sub_blocks), namer
-    )
+    return NamedFunctions(sub_blocks, namer, Follows.MOSTLY)

@@ -8,7 +8,7 @@ Blocks of one size stand side by side, padded, so that new constants cost some p
 
 more products for the states that have a label. A state is named by the sub-block (a Wang block of one state v, and one pattern of
 coupling) that has most of it, and within a sub-block by the order of energy. As long as these are what they were at the start, state n
-stays state n; where they are not, the names are made anew.
+stays state n; where they are not, the names are made anew; see `Follows` for what is looked at.
 """
 
 from __future__ import annotations
@@ -23,12 +23,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints, Workspace
-from rotor.quantum.estimates.unit_matrices import Namer, UnitBlock
+from rotor.quantum.estimates.unit_matrices import Follows, Namer, UnitBlock
 
 _AT_ONCE = 1 << 18  # numbers of the largest array of blocks side by side: 2 MB, which stays in the cache of a core
 
 _CLEAR = 0.8  # share of a sub-block in a state, above which it and the rank by energy in it make the name
 _LIKE = 1.5  # sizes of blocks that stand side by side
+
+_FIRST = 0.5  # share above which a state has its sub-block before all others
 
 _ALIKE = 1e-13  # of the width of a block: energies that differ less are one, such as doublets of high K
 
@@ -266,7 +268,7 @@ class _Labelled:
         """The states that have the labels now; names are made anew where a state is mostly in another sub-block, and where sub-blocks
         share one now or did so at the start: names are those of these constants, whatever the way to them was."""
         leading, shares = self.stack.leading(solved)
-        moved = self._unclear_at_start | self._unclear(shares)
+        moved = self._unclear_at_start | self._unclear(leading, shares)
         if (self._below & (leading != self.leading)).any():
             moved |= ((self._ranks(leading) != self._at_start) & (self.rows >= 0)).any(axis=1)
         if not moved.any():
@@ -280,12 +282,40 @@ class _Labelled:
 
     @cached_property
     def _unclear_at_start(self) -> NDArray[np.bool_]:
-        return self._unclear(np.stack([_filled(one.start.shares, self.stack.size) for one in self.tracked]))
+        return self._unclear(
+            self.leading, np.stack([_filled(one.start.shares, self.stack.size) for one in self.tracked])
+        )
 
-    def _unclear(self, shares: Floats) -> NDArray[np.bool_]:
-        """Blocks (blocks,) with a labelled state that no sub-block has most of: its sub-block and rank do not make its name."""
-        own = np.take_along_axis(shares, self.states, axis=1)
-        return np.asarray(((own < _CLEAR) & (self.rows >= 0)).any(axis=1))
+    def _unclear(self, leading: Ints, shares: Floats) -> NDArray[np.bool_]:
+        """Blocks (blocks,) with a labelled state whose sub-block and rank among those that lead do not make its name."""
+        mostly, groups = self._follow(Follows.MOSTLY), self._follow(Follows.GROUPS)
+        found = self._follow(Follows.NOTHING)
+        if mostly.any():
+            own = np.take_along_axis(shares, self.states, axis=1)
+            found = found | (mostly & ((own < _CLEAR) & (self.rows >= 0)).any(axis=1))
+        return found | (groups & self._shared(leading, shares)) if groups.any() else found
+
+    def _follow(self, what: Follows) -> NDArray[np.bool_]:
+        return np.asarray(self._follows == what.value)
+
+    @cached_property
+    def _follows(self) -> Ints:
+        return np.array([one.block.follows.value for one in self.tracked])
+
+    def _shared(self, leading: Ints, shares: Floats) -> NDArray[np.bool_]:
+        """Blocks (blocks,) in which sub-blocks lead other numbers of states than they have functions, so that some states up to the
+        highest with a label may be given to another one than leads."""
+        sizes = self.stack.members.sum(axis=2)
+        shared = (_counts(leading, self._inside, sizes.shape[1]) != sizes).any(axis=1)
+        if shared.any():
+            first = self._inside & (shares > _FIRST)
+            over = (_counts(leading, first, sizes.shape[1]) > sizes).any(axis=1)
+            shared &= over | (self._below & ~first).any(axis=1)
+        return np.asarray(shared)
+
+    @cached_property
+    def _inside(self) -> NDArray[np.bool_]:
+        return np.asarray(np.arange(self.stack.size) < self.stack.sizes[:, None])
 
     @cached_property
     def _below(self) -> NDArray[np.bool_]:
@@ -303,6 +333,13 @@ class _Labelled:
         own = np.take_along_axis(leading, self.states, axis=1)
         below = np.arange(self.stack.size) < self.states[:, :, None]
         return np.asarray(own * self.stack.size + ((leading[:, None, :] == own[:, :, None]) & below).sum(axis=2))
+
+
+def _counts(leading: Ints, chosen: NDArray[np.bool_], parts: int) -> Ints:
+    """How many of the chosen states (blocks, size) each sub-block leads, (blocks, parts)."""
+    blocks = len(leading)
+    numbers = (leading + parts * np.arange(blocks)[:, None])[chosen]
+    return np.bincount(numbers, minlength=blocks * parts).reshape(blocks, parts)
 
 
 def _states_of(made: Ints, names: Ints) -> Ints:

@@ -5,14 +5,40 @@ The O_i are taken as their elements that are not zero, the same places for all p
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from enum import Enum
 from typing import NamedTuple
 
 import numpy as np
 
 from rotor.arrays import Floats, Ints
+from rotor.quantum.wang.basis import WangBlock
 
 Namer = Callable[[Floats, Floats, Floats], Ints]  # matrix, energies, vectors -> names (n, columns) of the states
+
+
+class Follows(Enum):
+    """From what it is known that a state still has its name, without making the names anew.
+
+    MOSTLY : from the sub-block that has at least 0.8 of it, and its rank by energy in that
+    GROUPS : names are given by sub-blocks, the largest shares first, each as many as it has functions, and by energy in these
+    NOTHING : names are always made anew
+    """
+
+    MOSTLY = 1
+    GROUPS = 2
+    NOTHING = 3
+
+
+class NamedFunctions(NamedTuple):
+    """How states get names after functions: the number of the sub-block of every function (functions,), and by what rule."""
+
+    sub_blocks: Ints
+    namer: Namer
+    follows: Follows
+
+
+Naming = Callable[[Sequence[tuple[int, WangBlock]], str], NamedFunctions]  # states and Wang blocks, representation
 
 
 class UnitBlock(NamedTuple):
@@ -21,6 +47,7 @@ class UnitBlock(NamedTuple):
     mix (units, parameters) : how much of each unit matrix a parameter has
     members (sub-blocks, functions) : 1 where a function is in a sub-block
     namer : names of all states, where they must be made
+    follows : what tells that names are as they were
     """
 
     size: int
@@ -31,6 +58,7 @@ class UnitBlock(NamedTuple):
     parameters: Ints
     members: Floats
     namer: Namer
+    follows: Follows = Follows.MOSTLY
 
 
 class Elements(NamedTuple):
@@ -60,7 +88,11 @@ class WeightedElements(NamedTuple):
 
 
 def unit_block(
-    units: dict[int, Elements], sub_blocks: Ints, namer: Namer, more: WeightedElements | None = None
+    units: dict[int, Elements],
+    sub_blocks: Ints,
+    namer: Namer,
+    more: WeightedElements | None = None,
+    follows: Follows = Follows.MOSTLY,
 ) -> UnitBlock:
     """From the unit matrix of every parameter that acts in the block.
 
@@ -73,6 +105,7 @@ def unit_block(
     namer : callable
     more : WeightedElements, optional
         Elements of other parameters, a column for every number.
+    follows : Follows, optional
 
     Returns
     -------
@@ -90,9 +123,8 @@ def unit_block(
         factors[of_place[start:stop], column] = units[column].values
     numbers = np.flatnonzero(factors.any(axis=0))
     rows, columns = np.divmod(places, size)
-    return UnitBlock(
-        size, rows, columns, factors[:, numbers], np.eye(len(numbers)), numbers, members_of(sub_blocks), namer
-    )
+    mix, members = np.eye(len(numbers)), members_of(sub_blocks)
+    return UnitBlock(size, rows, columns, factors[:, numbers], mix, numbers, members, namer, follows)
 
 
 def numbered(values: Ints, count: int) -> tuple[Ints, Ints]:

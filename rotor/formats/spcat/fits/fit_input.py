@@ -29,6 +29,7 @@ from rotor.formats.spcat.variances import FREE_ABOVE
 from rotor.quantum.labelled import LevelModel
 from rotor.tops.constants import Constants
 
+HELD = 1e-37  # MHz: the a-priori error of what is held
 _NO_ERRTST = 1e6  # what SPFIT takes for an ERRTST of 0 or less
 
 
@@ -134,15 +135,20 @@ def spfit_input(file: ParameterFile, lines: LineList, source: str = "") -> Spfit
         kmax=kmax,
         leave_out_missing=True,
     )
-    notes += _notes(file, options, model is None, assigned)
-    if model is not None:
-        from rotor.formats.spcat.fits.at_zero import stay_at_zero
-
-        if stay := stay_at_zero(file):
-            notes.append(
-                f"{', '.join(stay)}: at 0 they change no level to first order, and stay there; give other starts"
-            )
+    notes += _notes(file, options, model is None, assigned) + ([] if model is None else _at_zero(file))
     return SpfitInput(file, assigned, constants, parameters, options, columns, ratios, tuple(notes), model)
+
+
+def _at_zero(file: ParameterFile) -> list[str]:
+    """What is to be known of free parameters that a search from 0 does not move."""
+    from rotor.formats.spcat.fits.at_zero import stay_at_zero
+
+    stay = stay_at_zero(file)
+    return (
+        [f"{', '.join(stay)}: at 0 they change no level to first order, and stay there; give other starts"]
+        if stay
+        else []
+    )
 
 
 def _largest_error(header: Header) -> float:
@@ -304,14 +310,17 @@ def error_factor(fit: Fit, header: Header) -> float:
 
 
 def fitted_file(asked: SpfitInput, fit: Fit, *, variances: bool) -> ParameterFile:
-    """The .par file after the fit (a-priori errors as they were), or the .var file (estimated errors and V of C = D V Vᵀ D)."""
+    """The .par file after the fit (a-priori errors as they were), or the .var file (estimated errors and V of C = D V Vᵀ D).
+
+    In the .var file what the lines do not determine is held.
+    """
     errors = fit.errors * error_factor(fit, asked.file.header)
     made = []
     for parameter, column, ratio in zip(asked.file.parameters, asked.columns, asked.ratios, strict=True):
         value = parameter.value if column < 0 else float(fit.values[column]) * ratio
         error = parameter.error
         if variances and column >= 0:
-            error = float(errors[column]) * abs(ratio)
+            error = float(errors[column]) * abs(ratio) if np.isfinite(fit.errors[column]) else HELD
         made.append(replace(parameter, value=value, error=error))
     leaders = [c for p, c in zip(asked.file.parameters, asked.columns, strict=True) if not p.constrained]
     rest = correlation_text(fit, leaders) if variances else ""

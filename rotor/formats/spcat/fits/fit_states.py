@@ -20,6 +20,7 @@ from rotor.formats.spcat.file_quanta import Format, format_of, quanta_of
 from rotor.formats.spcat.fits.at_zero import left_at_zero
 from rotor.formats.spcat.fits.unresolved import HIGHEST_SEARCHED, excluded_parameters, refuse_far_f, spelled_out
 from rotor.formats.spcat.hamiltonian.l_doubled import functions_of_l, named_by_l
+from rotor.formats.spcat.hamiltonian.labels import named_by, naming_by
 from rotor.formats.spcat.text.int_file import IntensityFile, Request
 from rotor.formats.spcat.text.par import ParameterFile
 from rotor.quantum.estimates.effect_units import Functions, unit_levels
@@ -154,13 +155,15 @@ def _together(parts: Sequence[_Solved], count: int) -> list[_Solved]:
 
 
 def levels_in_blocks(group: Group, angular: Sequence[int]) -> Levels:
-    """The levels of the doubled F, or J, that are listed, in blocks."""
+    """The levels of the doubled F, or J, that are listed, in blocks; those without spins by the names that DIAG gives."""
     if group.spins:
         return levels_of_f(group.top, (group.effect,), angular, None, None)
     j = [value // 2 for value in angular]
     levels = solve_rotation(group.top, (group.effect,), min(j), max(j), in_blocks=True)
     pairs = group.effect.pairs
-    return named_by_l(levels, pairs, str(levels.representation)) if pairs else levels
+    if pairs:
+        return named_by_l(levels, pairs, str(levels.representation))
+    return named_by(levels, group.diag, group.oblate)
 
 
 def _with_labels(group: Group, form: Format, labels: Ints, names: Sequence[str], values: Floats) -> list[_Solved]:
@@ -194,7 +197,8 @@ def _of_states(
     own = tuple(group.effect.parameters(group.top))
     columns, start = _columns_of(group, names, values)
     asked = np.column_stack([labels[here, 0], v, labels[here, 1:3]])
-    blocks = state_units(group.top, (group.effect,), own, asked, start)
+    naming = naming_by(group.diag, group.oblate)
+    blocks = state_units(group.top, (group.effect,), own, asked, start, naming)
     found = np.sort(blocks.found)
     if not len(found):
         return []
@@ -246,7 +250,9 @@ def _of_blocks(
     own = tuple(group.effect.parameters(group.top))
     columns, start = _columns_of(group, names, values)
     functions = _functions_of(group, levels) if group.effect.pairs else None
-    return [_Solved(here[found], columns, unit_levels(group.top, levels, rows[found], own, start, functions))]
+    naming = naming_by(group.diag, group.oblate) if functions is None and "kc" in levels.quanta else None
+    blocks = unit_levels(group.top, levels, rows[found], own, start, functions, naming)
+    return [_Solved(here[found], columns, blocks)]
 
 
 def _functions_of(group: Group, levels: Levels) -> Functions:

@@ -2,7 +2,8 @@
 
 SPFIT's parameters are not always the constants (A - B of a symmetric top), so that errors and correlations are carried over. A
 constant that follows another one, c = r p + d, is a parameter that retains its ratio to p (a code with a minus sign, behind p), and
-for d one more of the same code that is held: parameters of one code add up.
+for d one more of the same code that is held: parameters of one code add up. In the .var file what the lines do not determine is held,
+and with it every parameter that it is a part of.
 """
 
 from __future__ import annotations
@@ -14,14 +15,14 @@ import numpy as np
 from rotor.arrays import Floats
 from rotor.fit.fit import Fit
 from rotor.fit.top_constants import TopConstants
-from rotor.formats.spcat.fits.fit_input import packed_correlations
+from rotor.formats.spcat.fits.fit_input import HELD, packed_correlations
 from rotor.formats.spcat.hamiltonian.codes import constants_and_matrix
 from rotor.formats.spcat.model import parameter_file
 from rotor.formats.spcat.names.named_parameters import named_parameters
 from rotor.formats.spcat.text.par import Parameter, ParameterFile
 from rotor.tops.top import Top
 
-_FREE, _HELD = 1e36, 1e-37  # a-priori errors of a .par file, MHz
+_FREE = 1e36  # MHz: the a-priori error of what is free
 _ROUND_OFF = 1e-9  # of the coefficients of parameters by the free constants, which are ratios
 _KNMAX = 99  # above what is measured: SPCAT leaves higher K out of what it predicts, without a word
 _DIFFERENCE = 1e-12  # of a tied parameter, below which it has no constant difference
@@ -47,7 +48,7 @@ def named_file(fit: Fit, title: str, *, variances: bool) -> ParameterFile:
     else:
         parameters, free = _tied(fit, file.parameters, back, matrix, variances)
     numbers = iter(range(len(free)))
-    columns = [-1 if p.error == _HELD else next(numbers) for p in parameters if not p.constrained]
+    columns = [-1 if p.error == HELD else next(numbers) for p in parameters if not p.constrained]
     rest = packed_correlations(_correlations(fit, free), columns) if variances else ""
     count = len(fit.lines) if file.header.nline > 0 else -len(fit.lines)
     header = replace(file.header, npar=len(parameters), nline=count, nitr=100)
@@ -55,7 +56,7 @@ def named_file(fit: Fit, title: str, *, variances: bool) -> ParameterFile:
 
 
 def _covariance(fit: Fit, rows: Floats) -> Floats:
-    """Of combinations (m, n) of the free constants; what is not determined counts as known."""
+    """Of combinations (m, n) of the free constants that are determined."""
     own = np.where(np.isfinite(fit.statistics.covariance), fit.statistics.covariance, 0.0)
     return np.asarray(rows @ own @ rows.T)
 
@@ -67,7 +68,9 @@ def _correlations(fit: Fit, rows: Floats) -> Floats:
 
 
 def _error(fit: Fit, row: Floats, variances: bool) -> float:
-    """Estimated of the lines, or a priori, of a combination (n,) of the free constants."""
+    """Estimated of the lines, or a priori, of a combination (n,) of the free constants; in the .var file held if not determined."""
+    if variances and not _is_determined(fit, row):
+        return HELD
     if variances:
         return float(np.sqrt(_covariance(fit, row[None])[0, 0]))
     known = fit.parameters.prior[row != 0]
@@ -79,22 +82,28 @@ def _error(fit: Fit, row: Floats, variances: bool) -> float:
     return float(known[0] * np.abs(row[row != 0][0]))
 
 
+def _is_determined(fit: Fit, row: Floats) -> bool:
+    return bool(np.isfinite(fit.errors[row != 0]).all())
+
+
 def _one_for_one(
     fit: Fit, given: tuple[Parameter, ...], back: Floats, variances: bool
 ) -> tuple[list[Parameter], Floats]:
-    """As many parameters move as constants are free. Parameters, and the free ones (n, n) by the free constants."""
+    """As many parameters move as constants are free. Parameters, and those that are not held (m, n) by the free constants."""
     moved = np.atleast_1d(back.any(axis=1))
     made = [
-        replace(p, error=_error(fit, row, variances) if moves else _HELD)
+        replace(p, error=_error(fit, row, variances) if moves else HELD)
         for p, row, moves in zip(given, back, moved.tolist(), strict=True)
     ]
-    return made, back[moved]
+    return made, np.array([row for p, row in zip(made, back, strict=True) if p.error != HELD]).reshape(
+        -1, back.shape[1]
+    )
 
 
 def _tied(
     fit: Fit, given: tuple[Parameter, ...], back: Floats, matrix: Floats, variances: bool
 ) -> tuple[list[Parameter], Floats]:
-    """Each parameter that moves follows one free constant. Parameters, and the free ones (n, n) by the free constants.
+    """Each parameter that moves follows one free constant. Parameters, and those that are not held (m, n) by the free constants.
 
     matrix : the constants by the parameters.
     """
@@ -107,14 +116,15 @@ def _tied(
         leader = max(rows, key=lambda k: abs(own[k]))
         if len(rows) > 1 and not _share(fit, back, leader):
             raise ValueError(f"{name} is 0, and SPFIT has no ratio to a parameter that is 0")
-        free.append(back[leader])
+        if not variances or _is_determined(fit, back[leader]):
+            free.append(back[leader])
         for k in sorted(rows, key=lambda k: (k != leader, k)):
             share = _share(fit, back, k)
             made.append(replace(given[k], value=share, error=_error(fit, back[k], variances), constrained=k != leader))
             if abs(given[k].value - share) > _DIFFERENCE * abs(share):
-                behind.append(replace(given[k], value=given[k].value - share, error=_HELD, label="difference"))
-    held = [replace(p, error=_HELD) for p, row in zip(given, back, strict=True) if not row.any()]
-    return [*made, *behind, *held], np.array(free)
+                behind.append(replace(given[k], value=given[k].value - share, error=HELD, label="difference"))
+    held = [replace(p, error=HELD) for p, row in zip(given, back, strict=True) if not row.any()]
+    return [*made, *behind, *held], np.array(free).reshape(-1, back.shape[1])
 
 
 def _share(fit: Fit, back: Floats, k: int) -> float:

@@ -5,23 +5,30 @@
 | 0 | the Wang block of one state v and one coupling pattern, by the largest shares | energy, as K rises |
 | 1 | one function each, by the largest shares | |
 | 2 | as 0 | energy, as the diagonal elements rise |
-| 3 | all functions of one v and pattern | energy, as K, then the other K rises |
+| 3 | all functions of one v and pattern | energy, as K rises; of one K the function with Ka + Kc = N + 1 first |
 | 4 | as 3 | ⟨K²⟩, those of one K by energy |
 | 5 | as 3 | energy, as the diagonal elements rise |
 
-Levels with spins have the names of 0 already, those of one Wang block too; of states that are coupled they are given here (elsewhere
-in this package such levels are named by their overlaps with the levels of each state). In an oblate basis energy falls as K rises.
+Levels with spins have the names of 0 already, and those of 3 where no two Wang blocks of one v and pattern are connected; those of one
+Wang block too; of states that are coupled they are given here (elsewhere in this package such levels are named by their overlaps with
+the levels of each state). In an oblate basis energy falls as K rises.
+
+Of equal diagonal elements (the two functions of one K ≥ 3, often) the program takes that of its earlier Wang block: of K even that with
+Ka + Kc = N for N even and N + 1 for N odd, of K odd the other way round.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum.coupled import CoupledBlock
+from rotor.quantum.estimates.unit_matrices import Follows, NamedFunctions, Naming
 from rotor.quantum.levels import Levels
 from rotor.quantum.spins.blocks import SpinBlock
 from rotor.quantum.spins.parts import assigned
@@ -30,27 +37,39 @@ from rotor.quantum.wang.basis import WangBlock, names_of
 BY_DIAG = (1, 2, 4, 5)  # those that need another naming than that of levels
 _OF_WANG = (0, 2)  # whose groups are Wang blocks
 _BY_DIAGONAL = (2, 5)
+_ANEW = (2, 4, 5)  # whose order of names depends on the constants
 _CLEAR = 0.5  # a share above it is the largest
 _EQUAL = 1e-11  # of the largest energy: the two functions of one K have one diagonal element but for round-off
 
 
 class Functions(NamedTuple):
-    """The functions of a block: names v, Ka, Kc, pattern (n, columns), K, group, Wang block (n,), amplitudes (n, states)."""
+    """The functions of a block: names v, Ka, Kc, pattern (n, columns), K, group, Wang block (n,), amplitudes (n, states).
+
+    n: rotation N. A Wang block of K even or odd is known by Ka + Kc - N, 0 or 1.
+    """
 
     names: Ints
     k: Ints
     pattern: Ints
     wang: Ints
     amplitudes: Floats
+    n: Ints
+
+    @property
+    def above(self) -> Ints:
+        """Ka + Kc - N, (n,)."""
+        return np.asarray(self.names[:, 1] + self.names[:, 2] - self.n)
 
 
 def named_by(levels: Levels, diag: int, oblate: bool) -> Levels:
     """The same levels of an asymmetric top with the names that DIAG gives; those that have them already as they are."""
-    if "kc" not in levels.quanta or not (diag in BY_DIAG or any(_coupled(block) for block in levels.blocks)):
+    if "kc" not in levels.quanta or not (diag in BY_DIAG or any(_needs_names(block, diag) for block in levels.blocks)):
         return levels
     tables, shares = [], []
     for block in levels.blocks:
         clear = _of_clear_parts(block, oblate, str(levels.representation)) if diag == 0 else None
+        if diag == 3 and isinstance(block, SpinBlock) and not _connects_wang_blocks(block):
+            clear = block.labels, block.mixing
         if clear is not None:
             tables.append(clear[0])
             shares.append(clear[1])
@@ -71,9 +90,43 @@ def named_by(levels: Levels, diag: int, oblate: bool) -> Levels:
     return replace(levels, quanta=quanta, mixing=np.concatenate(shares))
 
 
-def _coupled(block: object) -> bool:
-    """Whether a block without spins holds several Wang blocks."""
+def naming_by(diag: int, oblate: bool) -> Naming:
+    """The same names of states without spins, for constants that change."""
+    return partial(_named_functions, diag, oblate)
+
+
+def _named_functions(
+    diag: int, oblate: bool, blocks: Sequence[tuple[int, WangBlock]], representation: str
+) -> NamedFunctions:
+    pieces = [(v, basis, None, np.empty((basis.size, 0))) for v, basis in blocks]
+    functions = _joined(pieces, representation)
+    groups = np.arange(len(functions.k)) if diag == 1 else functions.wang if diag in _OF_WANG else functions.pattern
+
+    def namer(matrix: Floats, energies: Floats, vectors: Floats) -> Ints:
+        at = places(functions._replace(amplitudes=vectors), -energies if oblate else energies, diag)
+        return functions.names[at]
+
+    return NamedFunctions(groups, namer, Follows.NOTHING if diag in _ANEW else Follows.GROUPS)
+
+
+def _needs_names(block: object, diag: int) -> bool:
+    """Whether a block without spins holds several Wang blocks, or one with spins several of one v and pattern and DIAG is 3."""
+    if isinstance(block, SpinBlock):
+        return diag == 3 and _connects_wang_blocks(block)
     return isinstance(block, CoupledBlock) and len(block.parts) > 1
+
+
+def _connects_wang_blocks(block: SpinBlock) -> bool:
+    """Whether several Wang blocks of one v and pattern are in a block with spins; no block where only some functions exist."""
+    if block.allowed is not None:
+        return False
+    held = [
+        (own.v, number)
+        for part in block.parts
+        for own in part.rotor.parts
+        for number in range(part.patterns.start, part.patterns.stop)
+    ]
+    return len(set(held)) < len(held)
 
 
 def _of_clear_parts(block: object, oblate: bool, representation: str) -> tuple[Ints, Floats] | None:
@@ -110,17 +163,30 @@ def places(functions: Functions, energies: Floats, diag: int) -> Ints:
     count = int(groups.max()) + 1
     of_group = np.stack([shares[groups == g].sum(axis=0) for g in range(count)])
     of_state = assigned(of_group, np.bincount(groups, minlength=count))
-    rising = _ranks(shares @ energies) if diag in _BY_DIAGONAL else _in_order_of_k(functions)
+    ranks = _ranks(shares @ energies) if diag in _BY_DIAGONAL else None
     found = np.empty(len(energies), dtype=np.int64)
     for g in range(count):
         members, states = np.flatnonzero(groups == g), np.flatnonzero(of_state == g)
         if diag == 4:
             found[states] = _by_k2(functions, members, states, shares, energies)
         else:
-            found[states[np.argsort(energies[states], kind="stable")]] = members[
-                np.argsort(rising[members], kind="stable")
-            ]
+            rising = _in_order_of_k(functions, members) if ranks is None else _by_diagonal(functions, members, ranks)
+            found[states[np.argsort(energies[states], kind="stable")]] = rising
     return found
+
+
+def _by_diagonal(functions: Functions, members: Ints, ranks: Floats) -> Ints:
+    """The functions of a group as their diagonal elements rise, of equal ones as a selection sort that exchanges leaves them.
+
+    It begins with the Wang block of Ka + Kc - N = 0 where N + K is even, 1 where it is odd.
+    """
+    wang = (functions.n + functions.k + functions.above)[members] % 2
+    order = members[np.lexsort((functions.k[members], wang))]
+    left = ranks[order]
+    for place in range(len(order) - 1):
+        least = place + int(left[place:].argmin())
+        left[[place, least]], order[[place, least]] = left[[least, place]], order[[least, place]]
+    return order
 
 
 def _ranks(diagonal: Floats) -> Floats:
@@ -132,23 +198,21 @@ def _ranks(diagonal: Floats) -> Floats:
     return ranks
 
 
-def _in_order_of_k(functions: Functions) -> Floats:
-    """A number for each function that rises with K, then with the number of its Wang block."""
-    order = np.empty(len(functions.k))
-    order[np.lexsort((functions.wang, functions.k))] = np.arange(len(functions.k))
-    return order
+def _in_order_of_k(functions: Functions, members: Ints) -> Ints:
+    """The functions of a group as K rises, of one K that with Ka + Kc = N + 1 first."""
+    return np.asarray(members[np.lexsort((-functions.above[members], functions.k[members]))])
 
 
 def _by_k2(functions: Functions, members: Ints, states: Ints, shares: Floats, energies: Floats) -> Ints:
     """⟨K²⟩ of the part of each state in the group, over its size; states of one K by energy."""
     own = shares[np.ix_(members, states)]
     k2 = (functions.k[members].astype(float) ** 2) @ own / own.sum(axis=0)
-    by_k2, by_tau = np.argsort(k2, kind="stable"), np.lexsort((functions.wang[members], functions.k[members]))
-    ks, found = functions.k[members][by_tau], np.empty(len(states), dtype=np.int64)
+    by_k2, by_tau = np.argsort(k2, kind="stable"), _in_order_of_k(functions, members)
+    ks, found = functions.k[by_tau], np.empty(len(states), dtype=np.int64)
     for k in np.unique(ks):
         run = np.flatnonzero(ks == k)
         here = by_k2[run]
-        found[here[np.argsort(energies[states[here]], kind="stable")]] = members[by_tau[run]]
+        found[here[np.argsort(energies[states[here]], kind="stable")]] = by_tau[run]
     return found
 
 
@@ -175,8 +239,8 @@ def _of_spin_block(block: SpinBlock, representation: str) -> Functions:
     return _joined(pieces, representation)
 
 
-def _joined(pieces: list[tuple[int, WangBlock, Ints | None, Floats]], representation: str) -> Functions:
-    names, ks, groups, wangs, known = [], [], [], [], dict[tuple[int, ...], int]()
+def _joined(pieces: Sequence[tuple[int, WangBlock, Ints | None, Floats]], representation: str) -> Functions:
+    names, ks, groups, wangs, ns, known = [], [], [], [], [], dict[tuple[int, ...], int]()
     for place, (v, basis, pattern, _) in enumerate(pieces):
         ka, kc = names_of(basis, representation)
         order = np.argsort(kc if representation == "IIIl" else ka, kind="stable")
@@ -186,7 +250,7 @@ def _joined(pieces: list[tuple[int, WangBlock, Ints | None, Floats]], representa
         key = (v, *(() if pattern is None else tuple(pattern.tolist())))
         groups.append(np.full(basis.size, known.setdefault(key, len(known))))
         wangs.append(np.full(basis.size, place))
+        ns.append(np.full(basis.size, basis.j))
     amplitudes = np.concatenate([vectors for *_, vectors in pieces])
-    return Functions(
-        np.concatenate(names), np.concatenate(ks), np.concatenate(groups), np.concatenate(wangs), amplitudes
-    )
+    k, pattern, wang, n = (np.concatenate(each) for each in (ks, groups, wangs, ns))
+    return Functions(np.concatenate(names), k, pattern, wang, amplitudes, n)

@@ -250,7 +250,8 @@ def symmetry_type(d: Digits, oblate: bool) -> int:
     """The TYP of an operator of the same species and ΔK as a term of a series.
 
     >>> from rotor.formats.spcat.hamiltonian.codes import split_code
-    >>> [symmetry_type(split_code(code), False) for code in (1_000_400_00, 11_000_000_00, 11_000_400_00, 11_002_000_00, 92_00_00)]
+    >>> codes = (1_000_040_000, 11_000_000_000, 11_000_040_000, 11_000_200_000, 920_000)
+    >>> [symmetry_type(split_code(code), False) for code in codes]
     [4, 20, 21, 0, 4]
     """
     typ = (3 + (d.typ - 90) // 2 if d.typ >= 92 else 0) if d.typ >= 90 else d.typ

@@ -1,0 +1,106 @@
+"""Assigned lines in the order of a .lin file, where neighbours of one frequency and error are a blend.
+
+The lines of a blend stand together there, and the width of a blend as one more line behind them. Lines of one frequency that are no
+blend need another line between them; see `rotor.formats.spcat.text.lin.LineList.blends` for the rule.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rotor.fit.assignment import Assignments
+from rotor.formats.spcat.text.lin import LineList, line_list
+from rotor.units import MHZ_PER_CM
+
+
+@dataclass(frozen=True)
+class _Blend:
+    """A blend by its number, with frequency and error in the units of the file, how many lines it has, and whether it has a width."""
+
+    number: int
+    frequency: float
+    error: float
+    count: int
+    wide: bool
+
+    def runs_into(self, second: _Blend) -> bool:
+        """Whether a blend behind this one is read as part of it, or as its width; twice the limits, for round-off in the text."""
+        if self.wide or abs(self.frequency - second.frequency) > 2e-14 * abs(second.frequency) + 2e-8:
+            return False
+        as_width = self.count > 1 and second.error * self.error > 2 * self.error**2
+        return as_width or abs(self.error - second.error) < 2e-7
+
+
+def as_lin(lines: Assignments) -> LineList:
+    """The lines as a .lin file has them; half-integers are rounded up, wavenumbers have a negative error."""
+    numbers, places = np.unique(lines.blend, return_inverse=True)
+    order = np.array([one.number for one in _in_order(lines)], dtype=np.int64)
+    rank = np.empty(len(numbers), dtype=np.int64)
+    rank[np.searchsorted(numbers, order)] = np.arange(len(numbers))
+    ordered = _with_widths(lines.take(np.argsort(rank[places.reshape(-1)], kind="stable")))
+    halves = np.array([name in ordered.halves for name in ordered.names])
+    upper, lower = (np.where(halves, (side + 1) // 2, side) for side in (ordered.upper, ordered.lower))
+    made = line_list(upper, lower, ordered.frequency_mhz, ordered.error_mhz, ordered.weight)
+    unit = np.where(ordered.wavenumber, 1 / MHZ_PER_CM, 1.0)
+    sign = np.where(ordered.wavenumber, -1.0, 1.0)
+    return replace(made, frequency=ordered.frequency_mhz * unit, error=sign * ordered.error_mhz * unit)
+
+
+def note_of_lin(lines: Assignments) -> list[str]:
+    """What is to be known of these lines in a .lin file: those of one frequency that no other line parts are one blend there."""
+    pairs = _meetings(_in_order(lines))
+    if not pairs:
+        return []
+    return [
+        f"{pairs} lines of the same frequency as the line before them are a blend with it in a .lin file, for want of others to put "
+        "between them; a .csv file has them apart"
+    ]
+
+
+def _blends(lines: Assignments) -> list[_Blend]:
+    numbers, first, counts = np.unique(lines.blend, return_index=True, return_counts=True)
+    unit = np.where(lines.wavenumber, 1 / MHZ_PER_CM, 1.0)
+    frequency, error = lines.frequency_mhz * unit, lines.error_mhz * unit * np.where(lines.wavenumber, -1.0, 1.0)
+    columns = (numbers, frequency[first], error[first], counts)
+    return [
+        _Blend(n, f, e, count, n in lines.widths_mhz)
+        for n, f, e, count in zip(*(column.tolist() for column in columns), strict=True)
+    ]
+
+
+def _in_order(lines: Assignments) -> list[_Blend]:
+    """The blends by their numbers, but where one would run into the next this one stands behind the first that parts them, or before."""
+    made, waiting = list[_Blend](), list[_Blend]()
+    for blend in _blends(lines):
+        if made and made[-1].runs_into(blend):
+            waiting.append(blend)
+            continue
+        made.append(blend)
+        ready = next((one for one in waiting if not blend.runs_into(one)), None)
+        if ready is not None:
+            waiting.remove(ready)
+            made.append(ready)
+    for blend in waiting:
+        fits = (i for i in range(len(made) + 1) if not _meetings([*made[max(i - 1, 0) : i], blend, *made[i : i + 1]]))
+        made.insert(next(fits, len(made)), blend)
+    return made
+
+
+def _meetings(order: Sequence[_Blend]) -> int:
+    """How many blends run into the next one."""
+    return sum(first.runs_into(second) for first, second in itertools.pairwise(order))
+
+
+def _with_widths(lines: Assignments) -> Assignments:
+    """Lines in order of their blends, and behind each blend of known width one more, whose error is the width."""
+    last = np.flatnonzero(np.append(np.diff(lines.blend) != 0, True))
+    wide = [i for i in last.tolist() if int(lines.blend[i]) in lines.widths_mhz]
+    rows = np.sort(np.concatenate([np.arange(len(lines)), np.array(wide, dtype=np.int64)]), kind="stable")
+    found = lines.take(rows)
+    second = np.flatnonzero(np.append(False, rows[1:] == rows[:-1]))
+    found.error_mhz[second] = [lines.widths_mhz[int(lines.blend[i])] for i in wide]
+    return found
