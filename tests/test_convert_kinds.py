@@ -61,11 +61,17 @@ def test_what_is_written_is_read_as_the_same_top(source, tmp_path, capsys):
     assert read_par(format_par(back)).options == back.options
 
 
-def test_a_state_without_weights_beside_one_with_them_comes_back(tmp_path):
+def test_a_state_without_weights_beside_one_with_them_comes_back(tmp_path, capsys):
     given = copied("weights_of_states_i_tot", tmp_path)
     lines = [line for line in given.read_text().splitlines(True) if line.split()[:2] != ["1", "1.29"]]
     given.write_text("".join(lines))
+    assert run(["convert", str(given), str(tmp_path / "x.toml")]) == 2
+    assert "mixes levels of nuclear-spin weights 3 and 1" in capsys.readouterr().err
+    beside = given.with_suffix(".var")
+    file = read_par(beside)
+    beside.write_bytes(format_par(replace(file, parameters=tuple(p for p in file.parameters if p.value != 1e-6))))
     assert run(["convert", str(given), str(tmp_path / "x.toml")]) == 0
+    assert run(["convert", str(tmp_path / "x.toml"), str(tmp_path / "y.var")]) == 0
     weights = rotor.read(tmp_path / "x.toml").states.weights
     assert weights[1].rule == "none"
     assert weights[0].to_mapping() == {"ee": 1, "eo": 3, "oe": 3, "oo": 1}

@@ -140,13 +140,13 @@ def writer_of(top: Top, source: str, target: str, kmax: int) -> Writer:
 
 
 def _refuse_unreadable(file: MoleculeFile, source: str) -> None:
-    """ValueError where a .toml of this top would be refused when it is read, such as for dipoles that the spin weights forbid."""
+    """ValueError where a .toml of this top would be refused when read, as for dipoles or couplings that the spin weights forbid."""
     from rotor.formats.molecules.molecule_file import parse_molecule_file
     from rotor.formats.molecules.molecule_writer import molecule_file_text
     from rotor.formats.read_write import top_of_file
 
     try:
-        top_of_file(parse_molecule_file(molecule_file_text(file), "TARGET"))
+        inputs.refuse_weights_of_another_kind(top_of_file(parse_molecule_file(molecule_file_text(file), "TARGET")))
     except ValueError as reason:
         raise ValueError(
             f"{source}: a .toml of it would be refused when it is read: {reason}; leave out of the source what is named here (a dipole "

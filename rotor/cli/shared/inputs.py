@@ -256,7 +256,7 @@ def read_top(given: Input) -> Top:
         raise ValueError("--spins: says how large the spins of --spin-constants are; give those too")
     if given.state_constants is not None:
         top = _with_states(top, given.state_constants)
-    _refuse_weights_of_another_kind(top)
+    refuse_weights_of_another_kind(top)
     for text in top.notes:
         note(text)
     return top
@@ -367,7 +367,8 @@ def _with_dipole_of_input(top: Top, dipole_debye: tuple[float, float, float]) ->
     return top.with_dipole((top.frame.axes @ dipole_debye).tolist(), "given in the frame of the input (--dipole)")
 
 
-def _refuse_weights_of_another_kind(top: Top) -> None:
+def refuse_weights_of_another_kind(top: Top) -> None:
+    """ValueError where the levels of lowest J show spin weights of another kind of top, or a coupling of unlike weights."""
     from rotor.quantum.solve import solve_levels
 
     solve_levels(top, 1, vectors=False)
