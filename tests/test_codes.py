@@ -5,7 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rotor.formats.spcat.hamiltonian import codes, model
+from rotor.formats.spcat import model
+from rotor.formats.spcat.hamiltonian import codes
 from rotor.formats.spcat.text.egy import read_egy
 from rotor.formats.spcat.text.int_file import Dipole, IntensityFile, Request, read_int
 from rotor.formats.spcat.text.par import Options, Parameter, ParameterFile, format_par, read_par

@@ -23,7 +23,7 @@ def test_recovers_the_rotation_of_a_cloud(turn, seed):
     fit = superpose(cloud, rotate(exp(turn), cloud) + shift, weights=rng.uniform(0.5, 2.0, 8))
     assert distance(fit.quaternion, exp(turn)) < 1e-13  # the covariance of eight points is well conditioned
     assert np.allclose(fit.translation, shift, atol=1e-13)
-    assert fit.rmsd < 1e-14
+    assert fit.rmsd < 3e-14  # rounding of coordinates of size 5, once for the turn and once for the shift
     assert np.allclose(fit.apply(cloud), rotate(exp(turn), cloud) + shift, atol=1e-13)
 
 
@@ -33,7 +33,7 @@ def test_planar_cloud_gives_a_proper_rotation(turn, seed):
     cloud = rng.normal(size=(6, 3)) * [1.0, 1.0, 0.0]
     fit = superpose(cloud, rotate(exp(turn), cloud))
     assert np.linalg.det(fit.rotation) == pytest.approx(1.0, abs=16 * EPS)
-    assert fit.rmsd < 1e-14  # rounding of coordinates of size 3
+    assert fit.rmsd < 3e-14  # rounding of coordinates of size 3
     if fit.unique:
         assert distance(fit.quaternion, exp(turn)) < 1e-8  # six points may lie nearly on a line
 
