@@ -228,10 +228,6 @@ def test_weights_of_other_option_lines():
     [
         (Options(iax=-6), "IAX = -6"),
         (Options(iax=4, wtmn=3), "IAX = 4"),
-        (
-            Options(iax=6, wtpl=0, wtmn=4, ewt=2),
-            "WTPL = 0, WTMN = 4: weights by J at K = 0",
-        ),
         (Options(iax=6, ewt=102), "EWT = 102: l-doubled"),
         (Options(iax=6, ewt=99), "EWT = 99"),
         (Options(iax=2, wtmn=3, spind=-1), "IAX = 2 in a symmetric top"),
@@ -240,6 +236,14 @@ def test_weights_of_other_option_lines():
 def test_weights_that_are_not_computed_yet_are_refused(options, words):
     with pytest.raises(ValueError, match=words):
         model.weights_of(options)
+
+
+def test_weights_of_a_threefold_axis_with_one_class_missing():
+    """NH3 of one inversion state: K = 0 has odd J; half of the E levels are there, at twice their weight (SPFIT's documentation)."""
+    found = model.weights_of(Options(iax=6, wtpl=0, wtmn=4, ewt=2)).to_mapping()
+    assert found == {"0even": 0, "0odd": 4, "1": 1, "2": 1}
+    with pytest.raises(ValueError, match="IAX = 6 of an asymmetric top"):
+        model.weights_of(Options(iax=6, wtpl=0, wtmn=4, ewt=2), False)
 
 
 # There and back
