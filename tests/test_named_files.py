@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -189,3 +190,26 @@ def test_lines_of_a_file_are_shown_with_its_names(capsys):
         run(["spectrum", str(ORACLES / "kinds" / "o2" / "o2.int"), "--top", "1"]) == 0
     )  # magnetic moments have no name
     assert "effects   those of the parameters of the files" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("name", ["NH3", "formamide", "CH3CN"])
+def test_molecules_of_the_library_with_spins_are_converted(name, call, folder):
+    """Atoms have numbers in a geometry alone, which a file of constants does not have."""
+    code, _, said = call("convert", name, "found.toml")
+    assert code == 0, said
+    assert "atom" not in (folder / "found.toml").read_text(encoding="utf-8")
+    assert rotor.read(str(folder / "found.toml")).spin_constants.values == rotor.read(name).spin_constants.values
+
+
+def test_a_report_does_not_show_constants_that_the_file_does_not_have(call, folder):
+    """l-doubled states with series have no named constants: neither A, B, C nor what would follow from them is printed."""
+    for suffix in ("int", "var"):
+        shutil.copy(
+            Path(__file__).parent / "oracles" / "kinds" / "fourier_l_doubled" / f"fourier_l_doubled.{suffix}",
+            folder / f"e.{suffix}",
+        )
+    code, out, _ = call("spectrum", "e.int", "--top", "0")
+    assert code == 0
+    assert "constants     those of the file, which have no names here" in out
+    assert "classical limit" not in out
+    assert "κ" not in out

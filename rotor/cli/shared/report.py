@@ -119,6 +119,7 @@ def weights_text(mapping: Mapping[str, int]) -> str:
     return ", ".join(f"{name} {weight}" for name, weight in mapping.items()) or "not given: 1 for every level"
 
 
-def q_text(record: Mapping[str, Any]) -> str:
-    """Q and what is known about it."""
-    return f"{record['q']:.6g}, {record['source']}; classical limit {record['classical']:.6g}"
+def q_text(record: Mapping[str, Any], classical: bool = True) -> str:
+    """Q and what is known about it; classical: whether the constants of the top give its classical limit."""
+    limit = f"; classical limit {record['classical']:.6g}" if classical else ""
+    return f"{record['q']:.6g}, {record['source']}{limit}"

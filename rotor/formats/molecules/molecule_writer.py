@@ -67,7 +67,8 @@ def molecule_file_text(molecule: MoleculeFile, levels_file: str = "") -> str:
         if table:
             marks = {"source": molecule.sources.get(name), "unverified": True if name in molecule.unverified else None}
             parts.append("\n".join([f"[{name}]", *_lines({**marks, **table})]))
-    for name, table in spin_tables(molecule.spin_constants, molecule.unverified).items():
+    spins = spin_tables(molecule.spin_constants, molecule.unverified, molecule.molecule is not None)
+    for name, table in spins.items():
         heading = name if name == "spins" else f"spins.{_key(name)}"
         parts.append("\n".join([f"[{heading}]", *_lines(table)]))
     return "\n\n".join(parts) + "\n"

@@ -99,10 +99,12 @@ def _own_name(label: str) -> tuple[str, ...]:
     return {"2H": ("D",), "3H": ("T",)}.get(label, ())
 
 
-def spin_tables(constants: SpinConstants | None, unverified: Collection[str]) -> dict[str, dict[str, Any]]:
+def spin_tables(
+    constants: SpinConstants | None, unverified: Collection[str], geometry: bool = True
+) -> dict[str, dict[str, Any]]:
     """The tables that a molecule file is written with, by name: that of all spins, and one for each.
 
-    unverified: names of tables that are marked so.
+    unverified: names of tables that are marked so. geometry: whether the file has one, to which the numbers of atoms belong.
     """
     if constants is None:
         return {}
@@ -111,7 +113,7 @@ def spin_tables(constants: SpinConstants | None, unverified: Collection[str]) ->
     for name, twice in constants.twice.items():
         tables[name] = {"spin": None if _is_isotope(name, twice) else spin_text(twice)}
         tables[name] |= {
-            "atom": constants.atoms.get(name),
+            "atom": constants.atoms.get(name) if geometry else None,
             "total": constants.totals.get(name),
             "source": constants.sources.get(name),
         }
