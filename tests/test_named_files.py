@@ -80,15 +80,15 @@ def test_lines_of_named_constants_are_those_of_the_files(name):
     file, light = files(name)
     top = named_top(file, light)
     asked = replace(light, request=replace(light.request, fend=3, str0=-20.0, str1=-20.0))
-    wanted = predict(file, asked).lines
+    expected = predict(file, asked).lines
     lines = line_list(top, jmax=5, effects=effects_of(top, True), min_lgint=None, temperature_k=300.0)
     chosen = np.maximum(lines.levels.multiplicity[lines.upper], lines.levels.multiplicity[lines.lower]) <= 7
     strong = lambda one, rows: one.strength_debye2[rows] > 1e-6  # noqa: E731
-    mine, theirs = np.flatnonzero(chosen), np.arange(len(wanted.frequency_mhz))
-    mine, theirs = mine[strong(lines, mine)], theirs[strong(wanted, theirs)]
+    mine, theirs = np.flatnonzero(chosen), np.arange(len(expected.frequency_mhz))
+    mine, theirs = mine[strong(lines, mine)], theirs[strong(expected, theirs)]
     assert len(mine) == len(theirs) > 20
     ours = np.sort(np.rec.fromarrays([lines.frequency_mhz[mine].round(5), lines.strength_debye2[mine]]))
-    files_ = np.sort(np.rec.fromarrays([wanted.frequency_mhz[theirs].round(5), wanted.strength_debye2[theirs]]))
+    files_ = np.sort(np.rec.fromarrays([expected.frequency_mhz[theirs].round(5), expected.strength_debye2[theirs]]))
     np.testing.assert_allclose(ours["f0"], files_["f0"], rtol=0, atol=2e-5)  # two roundings to 1e-5
     np.testing.assert_allclose(
         np.sort(ours["f1"]), np.sort(files_["f1"]), rtol=1e-6, atol=0
@@ -99,10 +99,10 @@ def test_codes_and_values_come_back():
     """What the tensors of a file are called here goes into the same codes."""
     file, light = files("formamide_quad")
     again = named_parameter_file(named_top(file, light), 12)
-    wanted = {p.code % 10**10: p.value for p in file.parameters}
+    expected = {p.code % 10**10: p.value for p in file.parameters}
     found = {p.code: p.value for p in again.parameters}
     for code in (110010000, 110040000):
-        assert found[code] == pytest.approx(wanted[code], rel=1e-14)  # factors 3/2 and 1/4
+        assert found[code] == pytest.approx(expected[code], rel=1e-14)  # factors 3/2 and 1/4
     assert again.options[0].spind == 3
 
 

@@ -8,6 +8,7 @@ import re
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -140,7 +141,7 @@ def command(context: typer.Context, given: Options) -> None:
     tried = None if given.try_ is None else _names("--try", given.try_)
     extras = extras_of(answer, tried, given.suggest, given.bootstrap, given.seed)
     _refuse_constants(files, fit)
-    _refuse_par(files, answer)
+    spfit = _spfit_writers(files, answer)
     content = record(answer, context.obj, steps, extras)
     content["files"] = files.names
     if (given.save_lines or "").lower().endswith(".lin"):
@@ -148,7 +149,7 @@ def command(context: typer.Context, given: Options) -> None:
 
         for text in note_of_lin(fit.lines):
             note(text)
-    writers = _writers(answer, content, scaled=given.table_errors == "scatter") | _saved(answer, given)
+    writers = _writers(answer, content, scaled=given.table_errors == "scatter") | spfit | _saved(answer, given)
     deliver(files, writers, lambda: json_text(content), lambda: _show(request, fit, steps, extras))
     if not fit.converged:
         more = "; --iterations allows more" if fit.minimum.status == "too many iterations" else ""
@@ -166,18 +167,19 @@ def _refuse_constants(files: Files, fit: Fit) -> None:
         note(f"not converged: {', '.join(left)} are not written")
 
 
-def _refuse_par(files: Files, answer: FitAnswer) -> None:
-    """What has no parameters in SPFIT's files goes into the others alone."""
+def _spfit_writers(files: Files, answer: FitAnswer) -> dict[str, Writer]:
+    """The writers of SPFIT's files; a fit that has no parameters there goes into the others alone."""
     from rotor.formats.fit_request import fitted_par
+    from rotor.formats.spcat.text.par import write_par
 
     names = [name for name in ("--out .par", "--out .var") if name in files.paths]
     try:
-        if names:
-            fitted_par(answer, variances=True)
-            fitted_par(answer, variances=False)
+        made = {name: fitted_par(answer, variances=name == "--out .var") for name in names}
     except ValueError as error:
         left = ", ".join(files.paths.pop(name).name for name in names)
         note(f"{left} are not written: {error}")
+        return {}
+    return {name: partial(write_par, file) for name, file in made.items()}
 
 
 def _refuse_unsaved(given: Options) -> None:
@@ -355,7 +357,7 @@ def _progress() -> Any:
 
 def _writers(answer: FitAnswer, content: dict[str, Any], *, scaled: bool) -> dict[str, Writer]:
     from rotor.formats.assigned_lines import write_assigned_lines
-    from rotor.formats.fit_request import report_of, table_of, write_fitted_par, write_fitted_toml
+    from rotor.formats.fit_request import report_of, table_of, write_fitted_toml
 
     request, fit = answer.request, answer.fit
 
@@ -368,8 +370,6 @@ def _writers(answer: FitAnswer, content: dict[str, Any], *, scaled: bool) -> dic
     return {
         "--out .fit": lambda path: write_text(path, report_of(answer)),
         "--out .toml": lambda path: write_fitted_toml(answer, path),
-        "--out .par": lambda path: write_fitted_par(answer, path, variances=False),
-        "--out .var": lambda path: write_fitted_par(answer, path, variances=True),
         "--table": lambda path: write_text(path, table_of(answer, form[path.suffix.lower()], scaled=scaled)),
         "--save-lines": lambda path: write_assigned_lines(fit.lines, path),
         "--plot": picture,

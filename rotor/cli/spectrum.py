@@ -332,7 +332,11 @@ def _show(answer: SpectrumAnswer, content: dict[str, Any], range_text: str | Non
     from rotor.cli.shared import report
 
     lines = answer.lines
-    print(report.heading(lines.top) if _is_named(lines) else f"{lines.top.name}: levels of the file's own parameters")
+    print(
+        report.heading(lines.top)
+        if spcat.has_named_constants(lines)
+        else f"{lines.top.name}: levels of the file's own parameters"
+    )
     show_facts(_facts(lines, content))
     if len(lines) == 0:
         print(f"\nno lines: {_why_none(answer, range_text)}")
@@ -358,24 +362,21 @@ def _facts(lines: Lines, content: dict[str, Any]) -> list[tuple[str, str]]:
     return [
         (
             "constants",
-            report.constants_text(top) if _is_named(lines) else "those of the file, which have no names here",
+            report.constants_text(top)
+            if spcat.has_named_constants(lines)
+            else "those of the file, which have no names here",
         ),
         ("dipole", dipole),
         ("spin weights", weights),
         *report.states_facts(top)[:MOST_FACTS_OF_STATES],
         ("temperature", f"{lines.temperature_k:g} K"),
-        ("Q", report.q_text(content["q"], classical=_is_named(lines))),
+        ("Q", report.q_text(content["q"], classical=spcat.has_named_constants(lines))),
         ("J max", f"{lines.jmax}: {content['jmax_source']}"),
         ("cut", cut + _range_text(lines.range_mhz)),
         *_hyperfine_facts(content["hyperfine"]),
         ("lines", _count_text(lines)),
         *_layer_facts(content),
     ]
-
-
-def _is_named(lines: Lines) -> bool:
-    """Whether the constants of the top make the levels; those of an .int file may have codes alone."""
-    return all(effect.name for effect in lines.levels.effects)
 
 
 def _hyperfine_facts(used: dict[str, Any] | None) -> list[tuple[str, str]]:

@@ -18,15 +18,13 @@ from rotor.fit.top_constants import ConstantSet, TopConstants
 from rotor.quantum.estimates.derivatives import level_derivatives
 from rotor.quantum.estimates.state_units import state_units
 from rotor.quantum.estimates.unit_blocks import UnitBlocks, joined
-from rotor.quantum.labelled import ClosedForm, LevelModel, MissingLevelsError, level_model
+from rotor.quantum.labelled import AT_ZERO_MHZ, ClosedForm, LevelModel, MissingLevelsError, level_model
 from rotor.quantum.levels import Levels
 from rotor.quantum.quanta import value_text
 from rotor.quantum.solve import solve_levels
 
 if TYPE_CHECKING:
     from rotor.quantum.estimates.contracted import ContractedLevels
-
-_AT_ZERO = 1e-30  # MHz: a free constant that starts at 0 must not be left out of the Hamiltonian
 
 
 @dataclass(frozen=True)
@@ -60,7 +58,7 @@ def top_levels(constants: TopConstants, labels: Ints) -> LevelModel:
     names, form = tuple(constants.values), constants.quanta
     if labels.shape[1] != len(form):
         raise ValueError(f"{labels.shape[1]} quantum numbers for each state; these constants have {', '.join(form)}")
-    begin = constants.replace(**{name: _AT_ZERO for name, value in constants.values.items() if value == 0})
+    begin = constants.replace(**{name: AT_ZERO_MHZ for name, value in constants.values.items() if value == 0})
     columns = {name: labels[:, i] for i, name in enumerate(form)}
     unsigned = [i for i, name in enumerate(form) if name != "k"]
     _refuse(constants, labels, np.asarray((labels[:, unsigned] < 0).any(axis=1)))

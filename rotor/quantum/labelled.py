@@ -30,6 +30,8 @@ from rotor.quantum.wang.turn import order_beyond_the_turn, turned
 from rotor.tops.constants import Constants
 from rotor.tops.operators import REPRESENTATIONS
 
+AT_ZERO_MHZ = 1e-30  # in place of 0: a free constant that starts there must not be left out of the Hamiltonian
+
 
 class MissingLevelsError(ValueError):
     """Labels that no level has: their places (n,) among those asked for."""

@@ -30,7 +30,7 @@ from collections.abc import Collection
 from typing import TYPE_CHECKING, Any
 
 from rotor.formats.molecules.molecule_tables import TableReader, uncertain_number
-from rotor.tops.spins.spin_constants import SpinConstants, parse_spins, spin_text, spins_of, twice_of
+from rotor.tops.spins.spin_constants import SpinConstants, is_isotope, parse_spins, spin_text, spins_of, twice_of
 
 if TYPE_CHECKING:
     from rotor.molecules.molecule import Molecule
@@ -111,7 +111,7 @@ def spin_tables(
     marked = {"source": constants.source or None, "unverified": True if "spins" in unverified else None}
     tables: dict[str, dict[str, Any]] = {"spins": {**marked, "unit": "MHz"}}
     for name, twice in constants.twice.items():
-        tables[name] = {"spin": None if _is_isotope(name, twice) else spin_text(twice)}
+        tables[name] = {"spin": None if is_isotope(name, twice) else spin_text(twice)}
         tables[name] |= {
             "atom": constants.atoms.get(name) if geometry else None,
             "total": constants.totals.get(name),
@@ -129,10 +129,3 @@ def spin_tables(
 def uncertain_entry(value: float, error: float | None) -> float | dict[str, float]:
     """A number as a file has it, with its standard deviation where it has one."""
     return value if error is None else {"value": value, "uncertainty": error}
-
-
-def _is_isotope(name: str, twice: int) -> bool:
-    try:
-        return twice_of(name) == twice
-    except ValueError:
-        return False

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Ints
-from rotor.formats.spcat.hamiltonian.codes import AXES
-from rotor.formats.spcat.hamiltonian.dipole_codes import NOT_YET, DipoleCode, Dipoles, dipoles_of, moment_of
+from rotor.formats.spcat.hamiltonian.codes import NOT_YET, basis_axes
+from rotor.formats.spcat.hamiltonian.dipole_codes import DipoleCode, Dipoles, dipoles_of, moment_of
 from rotor.formats.spcat.hamiltonian.file_effect import CodedLine, FileEffect, Vector, coded_lines
 from rotor.formats.spcat.hamiltonian.l_doubled import Pair, named_by_l, pairs_of
 from rotor.formats.spcat.hamiltonian.l_spins import named_by_l_with_spins
@@ -206,7 +206,7 @@ def allowed(
             reasons.append(f"parameter {line.name.partition('#')[0]} is left out, as SPCAT does: {why[0]}")
             continue
         folded = line.typ in (1, 2, 3) and any(_turns_alone(states[v], line) for pair in concerned for v in pair)
-        axes = AXES["IIIl" if oblate else "Ir"]
+        axes = basis_axes(oblate)
         found.append(line._replace(operator=symmetric_part(line.operator, axes)) if folded else line)
     return found, list(dict.fromkeys(reasons))  # a line of the file may be one for each state
 
@@ -219,32 +219,25 @@ def _turns_alone(state: StateOptions, line: CodedLine) -> bool:
 
 def _of_both_components(dipoles: Dipoles, pairs: list[Pair]) -> Dipoles:
     """Dipoles of l-doubled states: that of the one with K l > 0 is that of both."""
-    firsts, seconds = {pair.first: pair.second for pair in pairs}, {pair.second: pair.first for pair in pairs}
-    found: Dipoles = {}
-    for (low, high), moment in dipoles.items():
-        if low != high and {low, high} & (set(firsts) | set(seconds)):
-            raise ValueError(f"a dipole between states {low} and {high}, of which one is l-doubled, {NOT_YET}")
-        if low in seconds:
-            continue
-        found[low, high] = moment
-        if low in firsts:
-            found[firsts[low], firsts[low]] = moment
-    return found
+    return {own: moment for states, moment in dipoles.items() for own in _at_components(states, pairs)}
 
 
 def _others_of_both(others: list[tuple[Dipole, DipoleCode]], pairs: list[Pair]) -> list[tuple[Dipole, DipoleCode]]:
     """Moments of other kinds likewise."""
+    return [
+        (dipole, code._replace(states=own)) for dipole, code in others for own in _at_components(code.states, pairs)
+    ]
+
+
+def _at_components(states: tuple[int, int], pairs: list[Pair]) -> list[tuple[int, int]]:
+    """Between which states a moment of a file acts: that of the l-doubled one with K l > 0 on both, of the other on none."""
     firsts, seconds = {pair.first: pair.second for pair in pairs}, {pair.second for pair in pairs}
-    found = []
-    for dipole, code in others:
-        low, high = code.states
-        if low != high and {low, high} & ({*firsts} | seconds):
-            raise ValueError(f"dipole {dipole.code}: a moment between states of which one is l-doubled {NOT_YET}")
-        if low not in seconds:
-            found.append((dipole, code))
-        if low in firsts:
-            found.append((dipole, code._replace(states=(firsts[low], firsts[low]))))
-    return found
+    low, high = states
+    if low != high and {low, high} & (set(firsts) | seconds):
+        raise ValueError(f"a dipole between states {low} and {high}, of which one is l-doubled, {NOT_YET}")
+    if low in seconds:
+        return []
+    return [states, (firsts[low], firsts[low])] if low in firsts else [states]
 
 
 def _connected(count: int, pairs: Iterable[tuple[int, int]]) -> list[list[int]]:
@@ -311,7 +304,7 @@ def _group(
         of = {state.number: state for state in states}
         usable = tuple(part for line in usable for part in _by_exchange(line, of))
     if states[0].equivalent == 3:
-        usable = tuple(_of_three(line, len(spins), AXES["IIIl" if oblate else "Ir"]) for line in usable)
+        usable = tuple(_of_three(line, len(spins), basis_axes(oblate)) for line in usable)
     pairs = tuple(Pair(here[pair.first], here[pair.second]) for pair in doubled if pair.first in here)
     kind = _kind(states, usable, oblate, first.spind < 0)
     limits = {} if kind in ("linear", "prolate", "oblate") else _limits(states, as_spcat)
@@ -320,9 +313,7 @@ def _group(
         Spin(f"I{place}", twice, total="I_tot" if place > others else "") for place, twice in enumerate(spins, 1)
     )
     _check_three(states[0], others, first)
-    effect = FileEffect(
-        usable, numbers, coupled, moments, limits, beside, first.ixx, pairs, AXES["IIIl" if oblate else "Ir"]
-    )
+    effect = FileEffect(usable, numbers, coupled, moments, limits, beside, first.ixx, pairs, basis_axes(oblate))
     if pairs:  # raises for what is not allowed between l-doubled states, before any level is solved
         effect.spin_terms(_ANY_TOP)
         effect.couplings(_ANY_TOP)

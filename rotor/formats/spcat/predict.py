@@ -71,10 +71,7 @@ def levels_of_file(path: str | os.PathLike[str], *, as_spcat: bool = False) -> L
     """The levels that belong to an .int file as SPCAT lists them in its .egy file, from FBGN to FEND; see `predict_file`."""
     parameters, intensities = read_par(parameters_beside(path)), read_int(path)
     if intensities.request.flags >= wavenumbers.FROM:
-        parameters, intensities = (
-            wavenumbers.parameters_in_mhz(parameters),
-            wavenumbers.request_in_mhz(intensities),
-        )
+        parameters, intensities = wavenumbers.files_in_mhz(parameters, intensities)
     return levels_of_files(parameters, intensities, as_spcat=as_spcat)
 
 
@@ -116,8 +113,8 @@ def predict(
     ------
     ValueError
         For an empty range of F, for a Q or a temperature that is not above 0, and for what is read but not computed
-        yet, by its meaning: internal rotation, Euler series, some cases of l-doubled states and of spins of equivalent
-        nuclei in a total spin.
+        yet, by its meaning: series with spins, operators of odd order within one state, some cases of l-doubled states and of
+        spins of equivalent nuclei in a total spin.
 
     Examples
     --------
@@ -135,12 +132,7 @@ def predict(
             "highest that two characters of a catalogue can say"
         )
     if request.flags >= wavenumbers.FROM:
-        in_mhz = predict(
-            wavenumbers.parameters_in_mhz(parameters),
-            wavenumbers.request_in_mhz(intensities),
-            own_q=own_q,
-            as_spcat=as_spcat,
-        )
+        in_mhz = predict(*wavenumbers.files_in_mhz(parameters, intensities), own_q=own_q, as_spcat=as_spcat)
         return replace(in_mhz, catalogue=wavenumbers.catalogue_in_cm(in_mhz.catalogue), request=request)
     if not (own_q or (math.isfinite(request.qrot) and request.qrot > 0)):
         raise ValueError(f"QROT = {request.qrot}: a partition function is a number above 0")

@@ -83,8 +83,7 @@ def predicted(
     groups = _with_levels(groups, request)
     solved = _solved(groups, request, form)
     transitions = [transitions_of(group, levels, request, q) for group, levels in solved]
-    factor, names = variance_factor(parameters), line_names(parameters)
-    spreads = [level_spreads(group, levels, names, factor) for group, levels in solved]
+    spreads = _spreads(solved, parameters)
     pieces = [
         (lines_of(group, levels, found, form, request, q, spread), form.qnfmt(group.spins))
         for (group, levels), found, spread in zip(solved, transitions, spreads, strict=True)
@@ -92,8 +91,9 @@ def predicted(
     made = as_catalogue(pieces, form, request.tag, 2 if all(s.linear for g in groups for s in g.states) else 3)
     notes = _notes(parameters, groups, request, as_spcat)
     lines = _lines(parameters, solved, transitions, form, request, q)
-    if factor is not None:
-        lines = replace(lines, given_spread=np.concatenate([one for one in spreads if one is not None]))
+    known = [one for one in spreads if one is not None]
+    if known:
+        lines = replace(lines, given_spread=np.concatenate(known))
     return made, lines, q, as_level_list(solved, form, spreads), notes
 
 
@@ -117,32 +117,19 @@ def _up_to(maxv: int, group: Group, levels: Levels) -> Levels:
 def levels_of_files(parameters: ParameterFile, intensities: IntensityFile, *, as_spcat: bool = False) -> LevelList:
     """The levels of an .int file from FBGN to FEND as SPCAT lists them, whether they have names of this package or not.
 
-    Parameters
-    ----------
-    parameters : ParameterFile
-        The .var or .par file.
-    intensities : IntensityFile
-        The .int file.
-    as_spcat : bool, optional
-        Whether K beyond KNMAX is left out of the basis.
-
-    Returns
-    -------
-    LevelList
-        Energies in cm⁻¹ from the zero of the Hamiltonian, their errors by the covariance of the file, degeneracies with the weights
-        of the file.
-
-    Raises
-    ------
-    ValueError
-        As `predict.predict` does.
+    Energies in cm⁻¹ from the zero of the Hamiltonian, their errors by the covariance of the file, degeneracies with the weights of the
+    file. Raises ValueError as `predict.predict` does.
     """
     groups = groups_of(parameters, intensities, as_spcat=as_spcat)
     form = format_of(parameters, groups)
-    groups = _with_levels(groups, intensities.request)
-    solved = _solved(groups, intensities.request, form)
-    factor, known = variance_factor(parameters), line_names(parameters)
-    return as_level_list(solved, form, [level_spreads(group, levels, known, factor) for group, levels in solved])
+    solved = _solved(_with_levels(groups, intensities.request), intensities.request, form)
+    return as_level_list(solved, form, _spreads(solved, parameters))
+
+
+def _spreads(solved: list[tuple[Group, Levels]], parameters: ParameterFile) -> list[Floats | None]:
+    """What the covariance of the file makes of the levels of each group."""
+    factor, names = variance_factor(parameters), line_names(parameters)
+    return [level_spreads(group, levels, names, factor) for group, levels in solved]
 
 
 def _with_levels(groups: list[Group], request: Request) -> list[Group]:

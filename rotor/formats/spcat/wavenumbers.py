@@ -22,6 +22,11 @@ _LEAST_CM = 5e-7
 _DECIMALS = (6, 6, 4, 4)
 
 
+def files_in_mhz(parameters: ParameterFile, intensities: IntensityFile) -> tuple[ParameterFile, IntensityFile]:
+    """Both files in MHz."""
+    return parameters_in_mhz(parameters), request_in_mhz(intensities)
+
+
 def parameters_in_mhz(file: ParameterFile) -> ParameterFile:
     """The same parameters with values and errors in MHz.
 

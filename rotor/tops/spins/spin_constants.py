@@ -236,6 +236,14 @@ def twice_of(spin: str) -> int:
     return round(2 * isotope(match[1]).spin)
 
 
+def is_isotope(name: str, twice: int) -> bool:
+    """Whether a name is that of an isotope whose nucleus has this spin, doubled."""
+    try:
+        return twice_of(name) == twice
+    except ValueError:
+        return False
+
+
 def spin_text(twice: int) -> str:
     """How large a spin is, as text.
 

@@ -9,11 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from rotor.formats.spcat.hamiltonian.codes import HELD_BELOW, split_code, state_digits
+from rotor.formats.spcat.hamiltonian.codes import Digits, is_held, split_code
 from rotor.formats.spcat.hamiltonian.l_doubled import pairs_of
 from rotor.formats.spcat.hamiltonian.series import is_constant, is_series
 from rotor.formats.spcat.hamiltonian.states import states_of
-from rotor.formats.spcat.text.par import Parameter, ParameterFile
+from rotor.formats.spcat.text.par import ParameterFile
 
 _SYMMETRIES = range(4)  # of the group of twofold rotations; an operator of symmetry s leads from t to s ^ t
 _OF_TYP = 20  # TYP 20, 40 and 60 begin the operators of the symmetry of N_a, N_b and N_c
@@ -24,34 +24,33 @@ Place = tuple[int, int, int]  # of the two states and the symmetry of an operato
 
 def left_at_zero(file: ParameterFile) -> frozenset[int]:
     """The places of parameters of value 0 that are held, or connect what nothing else connects and so stay at 0."""
-    places = [_place(file, parameter) for parameter in file.parameters]
+    places = _places(file)
     known = _sets(place for place, p in zip(places, file.parameters, strict=True) if place and p.value)
     apart = [place is not None and _joins_sets(place, known) for place in places]
     return frozenset(
-        i for i, p in enumerate(file.parameters) if not p.value and (p.constrained or _is_held(p) or apart[i])
+        i for i, p in enumerate(file.parameters) if not p.value and (p.constrained or is_held(p) or apart[i])
     )
 
 
 def stay_at_zero(file: ParameterFile) -> list[str]:
     """Labels of the free ones among them."""
     found = [file.parameters[i] for i in sorted(left_at_zero(file))]
-    return [p.label or str(p.code) for p in found if not (p.constrained or _is_held(p))]
+    return [p.label or str(p.code) for p in found if not (p.constrained or is_held(p))]
 
 
-def _is_held(parameter: Parameter) -> bool:
-    return parameter.error is not None and parameter.error < HELD_BELOW
-
-
-def _place(file: ParameterFile, parameter: Parameter) -> Place | None:
-    """The states and the symmetry of an operator of certain states without spins; None of others."""
+def _places(file: ParameterFile) -> list[Place | None]:
+    """The states and the symmetry of the operator of each parameter of certain states without spins; None of others."""
     states = states_of(file)
-    digits, wild = split_code(parameter.code, len(states)), 10 ** state_digits(len(states)) - 1
-    if any(state.spins for state in states) or pairs_of(states) or is_series(digits) or is_constant(digits):
-        return None
+    if any(state.spins for state in states) or pairs_of(states):
+        return [None] * len(file.parameters)
+    return [_place(split_code(parameter.code, len(states)), len(states)) for parameter in file.parameters]
+
+
+def _place(digits: Digits, states: int) -> Place | None:
     low, high = sorted((digits.v1, digits.v2))
-    if high == wild or high >= len(states) or digits.typ >= _HIGHEST_TYP:
+    if is_series(digits) or is_constant(digits) or digits.typ >= _HIGHEST_TYP:
         return None
-    return low, high, digits.typ // _OF_TYP
+    return None if high >= states else (low, high, digits.typ // _OF_TYP)
 
 
 def _sets(places: Iterable[Place]) -> dict[tuple[int, int], tuple[int, int]]:

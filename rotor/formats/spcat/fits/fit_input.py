@@ -20,7 +20,7 @@ from rotor.fit.assignment import Assignments, assignments
 from rotor.fit.fit import Fit, FitOptions
 from rotor.fit.parameters import Parameters
 from rotor.formats.assigned_lines import QUANTA
-from rotor.formats.spcat.hamiltonian.codes import FIXED, HELD_BELOW, constants_and_matrix
+from rotor.formats.spcat.hamiltonian.codes import FIXED, constants_and_matrix, is_held
 from rotor.formats.spcat.hamiltonian.states import is_plain
 from rotor.formats.spcat.text.fields import BLANK
 from rotor.formats.spcat.text.lin import LineList, note_of_defaults, note_of_remarks, read_lin, with_defaults
@@ -170,7 +170,7 @@ def _roles(parameters: Sequence[Parameter]) -> tuple[list[bool], list[bool]]:
     if parameters and parameters[0].constrained:
         raise ValueError(f"parameter -{parameters[0].code}: the first one has none before it to keep a ratio to")
     ties = [p.constrained for p in parameters]
-    held = [not tied and p.error is not None and p.error < HELD_BELOW for p, tied in zip(parameters, ties, strict=True)]
+    held = [not tied and is_held(p) for p, tied in zip(parameters, ties, strict=True)]
     return held, ties
 
 

@@ -27,7 +27,7 @@ from rotor.quantum.estimates.effect_units import Functions, unit_levels
 from rotor.quantum.estimates.labelled_spins import found_with_spins
 from rotor.quantum.estimates.state_units import state_units
 from rotor.quantum.estimates.unit_blocks import UnitBlocks, joined
-from rotor.quantum.labelled import LevelModel, MissingLevelsError
+from rotor.quantum.labelled import AT_ZERO_MHZ, LevelModel, MissingLevelsError
 from rotor.quantum.levels import Levels
 from rotor.quantum.spins.levels import levels_of_f
 from rotor.quantum.wang.rotation import solve_rotation
@@ -36,13 +36,12 @@ if TYPE_CHECKING:
     from rotor.quantum.estimates.contracted import ContractedLevels
 
 _NO_REQUEST = IntensityFile("", Request(), ())
-_AT_ZERO = 1e-30  # MHz: a free parameter that starts at 0 must not be left out of the Hamiltonian
 
 
 def groups_for_fit(file: ParameterFile) -> list[Group]:
     """The groups of connected states with every parameter line in that may leave 0 in a fit; K limited as SPFIT does."""
     left = left_at_zero(file)
-    nonzero = tuple(p if i in left else replace(p, value=p.value or _AT_ZERO) for i, p in enumerate(file.parameters))
+    nonzero = tuple(p if i in left else replace(p, value=p.value or AT_ZERO_MHZ) for i, p in enumerate(file.parameters))
     return groups_of(replace(file, parameters=nonzero), _NO_REQUEST, as_spcat=True)
 
 
@@ -235,7 +234,7 @@ def _rows_of(group: Group, levels: Levels, form: Format, labels: Ints) -> Ints:
 def _columns_of(group: Group, names: Sequence[str], values: Floats) -> tuple[Ints, Floats]:
     """Which parameters a group has, and their values."""
     columns = np.array([names.index(name) for name in group.effect.parameters(group.top)])
-    return columns, np.where(values == 0, _AT_ZERO, values)[columns]
+    return columns, np.where(values == 0, AT_ZERO_MHZ, values)[columns]
 
 
 def _of_blocks(

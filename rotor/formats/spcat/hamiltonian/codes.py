@@ -30,6 +30,11 @@ NOT_YET = "is read but not computed yet"
 AXES = {basis: axes_of(basis) for basis in ("Ir", "IIIl")}  # x, y, z of the two bases
 
 
+def basis_axes(oblate: bool) -> str:
+    """The axes at x, y, z of a file: those of IIIl where NVIB is negative, else of Ir."""
+    return AXES["IIIl" if oblate else "Ir"]
+
+
 class Digits(NamedTuple):
     """The fields of a code."""
 
@@ -369,3 +374,8 @@ def _code_of_spelled(name: str) -> int:
 
 FIXED = 1e-37  # the error of a parameter that is not fitted
 HELD_BELOW = 1e-30  # an error so small says that a parameter was not fitted
+
+
+def is_held(parameter: Parameter) -> bool:
+    """Whether the error of a parameter says that it is not fitted."""
+    return parameter.error is not None and parameter.error < HELD_BELOW

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from math import pi
 from typing import NamedTuple
 
-from rotor.formats.spcat.hamiltonian.codes import state_digits
-from rotor.formats.spcat.hamiltonian.series import Series
+from rotor.formats.spcat.hamiltonian.codes import NOT_YET, state_digits
+from rotor.formats.spcat.hamiltonian.series import Series, angles_by_k
 from rotor.formats.spcat.text.int_file import Dipole
 from rotor.quantum.moments import DEBYE_PER_BOHR_MAGNETON, Moment
 
@@ -61,7 +60,6 @@ def dipoles_of(dipoles: Iterable[Dipole], states: int) -> tuple[Dipoles, list[tu
 
 FOURIER = (7, 8)
 _POWERS = {3: "J", 4: "K", 5: "[J]", 9: "JJ", 10: "[[J]]"}  # TYP of electric moments
-NOT_YET = "is read but not computed yet"
 
 
 def moment_of(
@@ -136,10 +134,9 @@ def _cosine_of(dipole: Dipole, code: DipoleCode, states: tuple[int, int], series
     if code.typ != 7 or code.axis == 0 or series.nofc or odd:
         more = " of one K (NOFC)" if series.nofc else ", with signs by K (G12)" if odd else ""
         raise ValueError(f"dipole {dipole.code}: {_meaning(code)}{more} {NOT_YET}")
-    low, high = (series.rho.get(v, 0.0) for v in code.states)
-    each = pi / 3 * (code.spin - 0.5 * ((low < 0) != (high < 0)))
+    low, high = angles_by_k(code.spin, series, code.states)
     along = (float(code.axis == 1), float(code.axis == 2), float(code.axis == 3))
-    return Moment(dipole.value, states, along, cosine=(each * abs(high), each * abs(low)))
+    return Moment(dipole.value, states, along, cosine=(high, low))
 
 
 def _meaning(code: DipoleCode) -> str:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
-from rotor.formats.spcat.hamiltonian.codes import AXES, Digits, split_code, state_digits
+from rotor.formats.spcat.hamiltonian.codes import AXES, Digits, basis_axes, split_code, state_digits
 from rotor.formats.spcat.hamiltonian.l_doubled import Pair, couplings_with_pairs
 from rotor.formats.spcat.hamiltonian.l_spins import spin_terms_with_pairs
 from rotor.formats.spcat.hamiltonian.operators import CodedOperator, energy_of_k, operator_of, plain_of_j
@@ -106,7 +106,7 @@ def coded_lines(file: ParameterFile, states: int, pairs: Sequence[Pair] = ()) ->
 
 
 def _refuse_phases(options: Options) -> None:
-    if not 0 <= options.xopt < 80 or options.xopt % 10 not in (0, 8):
+    if not 0 <= options.xopt < 80 or options.phase not in (0, 8):
         raise ValueError(
             f"XOPT = {options.xopt}: expected PHASE + 10 NEWLZ + 20 NOFC + 40 G12 with a PHASE of 0 or 8; a forced phase of another "
             "kind is read but not computed yet"
@@ -114,7 +114,7 @@ def _refuse_phases(options: Options) -> None:
 
 
 def _plain_line(digits: Digits, states: tuple[int, int] | None, options: Options) -> CodedLine:
-    operator = operator_of(digits, AXES["IIIl" if options.nvib < 0 else "Ir"])
+    operator = operator_of(digits, basis_axes(options.nvib < 0))
     return CodedLine("", 0.0, operator, states, digits.v2 > digits.v1, digits.typ)
 
 
@@ -123,7 +123,7 @@ def _of_series(
 ) -> list[CodedLine]:
     """A term of a series: of every state one with the constants of each."""
     oblate = options.nvib < 0
-    typ, axes = symmetry_type(digits, oblate), AXES["IIIl" if oblate else "Ir"]
+    typ, axes = symmetry_type(digits, oblate), basis_axes(oblate)
     every = [states] if states else [(v, v) for v in range(count)]
     return [CodedLine("", 0.0, term_of(digits, axes, series, own), own, digits.v2 > digits.v1, typ) for own in every]
 
@@ -144,7 +144,7 @@ def _within_pairs(line: CodedLine, digits: Digits, pairs: Sequence[Pair], option
                 "time reversal changes the sign of the operator, so that it can connect different states only"
             )
         return line
-    v, newlz = states[0], bool(options.xopt // 10 & 1)
+    v, newlz = states[0], options.newlz
     if newlz and v in firsts and 80 <= digits.typ < 90:
         return _half_difference(line, digits, firsts[v], options)
     if newlz and line.operator.odd != (v in firsts) and not 80 <= digits.typ < 90:

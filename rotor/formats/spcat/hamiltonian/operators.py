@@ -27,7 +27,7 @@ from math import sqrt
 
 import numpy as np
 
-from rotor.formats.spcat.hamiltonian.codes import Digits
+from rotor.formats.spcat.hamiltonian.codes import NOT_YET, Digits
 from rotor.quantum.effects.interactions import with_powers
 from rotor.quantum.effects.spin_effect import ParameterName, matrix_of
 from rotor.quantum.spins.operators import Cosines, CosinesWithN, Matrix, Rotor, Scalar, Vector
@@ -37,6 +37,19 @@ from rotor.tops.operators import Operators
 
 ODD = {20: "a", 40: "b", 60: "c"}  # change sign under time reversal
 CROSS = {21: "bc", 41: "ac", 61: "ab"}
+TYPES_BETWEEN = {  # of what connects two states without a spin, by name
+    "G_a": 20,
+    "G_b": 40,
+    "G_c": 60,
+    "F_bc": 21,
+    "F_ac": 41,
+    "F_ab": 61,
+    "W": 0,
+    "W_pm2": 4,
+    "W_pm4": 5,
+    "W_pm6": 6,
+}
+PAIRS = {letters: ("abc".index(letters[0]), "abc".index(letters[1])) for letters in sorted(CROSS.values())}
 REFUSED = {
     "commutator": "a commutator of a spin term with Nz²",
     "own": "the energy of one K with a spin",
@@ -200,9 +213,6 @@ def _with_spins(d: Digits, spins: tuple[int, ...], axes: str) -> CodedOperator:
         return replace(powered, rotor=Cosines(vector), odd=True)
     matrix = _matrix(d.typ, axes)
     return replace(powered, rotor=CosinesWithN(matrix) if len(spins) == 1 else Cosines(matrix))
-
-
-NOT_YET = "is read but not computed yet"
 
 
 def _matrix(typ: int, axes: str) -> Matrix:

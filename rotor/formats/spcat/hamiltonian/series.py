@@ -28,13 +28,12 @@ from math import pi
 import numpy as np
 
 from rotor.arrays import Floats
-from rotor.formats.spcat.hamiltonian.codes import Digits, split_code, state_digits
+from rotor.formats.spcat.hamiltonian.codes import NOT_YET, Digits, split_code, state_digits
 from rotor.formats.spcat.hamiltonian.operators import CodedOperator, operator_of, order_of, plain_of_j
 from rotor.formats.spcat.text.par import Parameter, ParameterFile
 from rotor.quantum.states import OperatorOfJ
 from rotor.quantum.wang.j_operators import JOperator
 
-NOT_YET = "is read but not computed yet"
 Factor = Callable[[int, Floats, Floats], Floats]  # of J, K' and K''
 _PAIR_TYPES = (*range(12), 20)  # TYP of what may have a series within l-doubled states
 
@@ -82,8 +81,8 @@ def series_of(file: ParameterFile, states: int, pairs: Iterable[tuple[int, int]]
     ValueError
         For a code with TYP 91 to 99 that names no constant.
     """
-    flags, wild = file.options[0].xopt // 10, 10 ** state_digits(states) - 1
-    found = Series(nofc=bool(flags & 2), g12=bool(flags & 4))
+    options, wild = file.options[0], 10 ** state_digits(states) - 1
+    found = Series(nofc=options.nofc, g12=options.g12)
     for parameter in file.parameters:
         d = split_code(parameter.code, states)
         if not is_constant(d):
@@ -162,12 +161,18 @@ def harmonic(ff: int) -> tuple[bool, int]:
     return half % 2 == 1, ff - 10 * ((half + 1) // 2)
 
 
-def _fourier(n: int, sine: bool, series: Series, states: tuple[int, int]) -> Factor:
+def angles_by_k(n: int, series: Series, states: tuple[int, int]) -> tuple[float, float]:
+    """α' and α of the angle α'K' + αK'' of a Fourier term between two states."""
     up, low = (series.rho.get(v, 0.0) for v in states)
-    times = n - 0.5 * ((up < 0) != (low < 0))
+    each = pi / 3 * (n - 0.5 * ((up < 0) != (low < 0)))
+    return each * abs(up), each * abs(low)
+
+
+def _fourier(n: int, sine: bool, series: Series, states: tuple[int, int]) -> Factor:
+    up, low = angles_by_k(n, series, states)
 
     def factor(j: int, above: Floats, below: Floats) -> Floats:
-        angle = times * pi / 3 * (abs(up) * above + abs(low) * below)
+        angle = up * above + low * below
         turned = np.where(np.minimum(abs(above), abs(below)) % 2 == 1, -1.0, 1.0) if series.g12 and n % 2 else 1.0
         return np.asarray(turned * (np.where(above == -below, 0.0, np.sin(angle)) if sine else np.cos(angle)))
 

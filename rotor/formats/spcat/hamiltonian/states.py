@@ -7,18 +7,17 @@ differs there (H. M. Pickett, documentation of SPFIT and SPCAT, "line 3, option 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Ints
-from rotor.formats.spcat.hamiltonian.codes import split_code
+from rotor.formats.spcat.hamiltonian.codes import NOT_YET, split_code
 from rotor.formats.spcat.text.int_file import IntensityFile
 from rotor.formats.spcat.text.par import Options, ParameterFile
 
-_NOT_YET = "is read but not computed yet"
 SPECIES = {"ee": "A", "eo": "a", "oo": "b", "oe": "c"}  # of the rotational function, by parities of Ka and Kc
 
 
@@ -145,16 +144,21 @@ def doubled_spins(spind: int) -> tuple[int, ...]:
 def states_of(file: ParameterFile) -> tuple[StateOptions, ...]:
     """The options of every state; ValueError for an axis of weights that is not computed yet, and l-doubled states."""
     first = file.options[0]
+    return tuple(_state(v, options_of_state(file, v), first) for v in range(max(abs(first.nvib), 1)))
+
+
+def options_of_state(file: ParameterFile, v: int) -> Options:
+    """The option line of a state; where it has none of its own, the first, of which the digits of VSYM say who exchanges weights."""
+    first = file.options[0]
+    own = [line for line in file.options[1:] if abs(line.nvib) == v]
+    if own:
+        return own[-1]
     digits = str(max(first.vsym, 0))[::-1]
-    found = []
-    for v in range(max(abs(first.nvib), 1)):
-        own = [line for line in file.options[1:] if abs(line.nvib) == v]
-        swapped = not file.options[1:] and v < len(digits) and int(digits[v]) % 2 == 1
-        found.append(_state(v, own[-1] if own else first, first, swapped))
-    return tuple(found)
+    swapped = not file.options[1:] and v < len(digits) and int(digits[v]) % 2 == 1
+    return replace(first, wtpl=first.wtmn, wtmn=first.wtpl) if swapped else first
 
 
-def _state(v: int, line: Options, first: Options, swapped: bool) -> StateOptions:
+def _state(v: int, line: Options, first: Options) -> StateOptions:
     factor = 100 if first.ewt >= 0 else 1000
     code, weight = divmod(abs(line.ewt), factor)
     iax, spins = abs(line.iax), doubled_spins(line.spind)
@@ -163,15 +167,14 @@ def _state(v: int, line: Options, first: Options, swapped: bool) -> StateOptions
     if line.iax < 0:
         _check_total(v, line, spins, (code % 10, weight))
     kmax = line.knmax if 0 <= line.knmax <= 359 else 359
-    plus, minus = (line.wtmn, line.wtpl) if swapped else (line.wtpl, line.wtmn)
     return StateOptions(
         v,
         spins,
         line.knmin,
         max(kmax, line.knmin),
         iax,
-        plus,
-        minus,
+        line.wtpl,
+        line.wtmn,
         weight,
         code % 10,
         line.iax < 0 and len(spins) > 1,
@@ -196,7 +199,7 @@ def _check_total(v: int, line: Options, spins: tuple[int, ...], e_species: tuple
         )
     if fold == 3 and e_species[0]:
         raise ValueError(
-            f"EWT = {line.ewt} of state {v}: an l-doubled state with a total spin of three nuclei {_NOT_YET}"
+            f"EWT = {line.ewt} of state {v}: an l-doubled state with a total spin of three nuclei {NOT_YET}"
         )
     if fold == 3 and e_species[1]:
         raise ValueError(

@@ -22,12 +22,14 @@ from rotor.fit.top_constants import TopConstants
 from rotor.formats.spcat.hamiltonian.codes import (
     AXES,
     Digits,
+    basis_axes,
     constants_and_matrix,
     join_code,
     parameters_of,
     split_code,
     state_digits,
 )
+from rotor.formats.spcat.hamiltonian.operators import CROSS, PAIRS, TYPES_BETWEEN
 from rotor.formats.spcat.model import options_of
 from rotor.formats.spcat.text.par import Header, ParameterFile
 from rotor.quantum.effects.hyperfine import NuclearQuadrupole
@@ -40,19 +42,7 @@ from rotor.quantum.spins.terms import SpinTerm
 from rotor.tops.constants import Constants
 from rotor.tops.spins.spin_weights import SpinWeights
 
-_BETWEEN = {
-    "G_a": 20,
-    "G_b": 40,
-    "G_c": 60,
-    "F_bc": 21,
-    "F_ac": 41,
-    "F_ab": 61,
-    "W": 0,
-    "W_pm2": 4,
-    "W_pm4": 5,
-    "W_pm6": 6,
-}
-_CROSS = {(1, 2): 21, (0, 2): 41, (0, 1): 61}
+_CROSS = {PAIRS[letters]: typ for typ, letters in CROSS.items()}
 _KINDS = (NuclearQuadrupole, SpinRotation, SpinSpin)
 
 Codes = dict[int, dict[str, float]]  # value of a code by named constants: what each has to be multiplied with
@@ -121,7 +111,7 @@ def _of_pairs_and_spins(constants: TopConstants) -> Codes:
         elif "," in name:
             parts = parse_name(name)
             assert parts.states is not None
-            typ, (low, high) = _BETWEEN[parts.symbol], parts.states
+            typ, (low, high) = TYPES_BETWEEN[parts.symbol], parts.states
             sign = -1.0 if oblate and parts.symbol.startswith("G") else 1.0
             found = {Digits(0, 0, 0, 0, 0, typ, parts.nz2, parts.n2, low, high): sign}
         for digits, factor in found.items():
@@ -157,7 +147,7 @@ def _of_matrix(c: Floats, whole: bool, oblate: bool, of_three: bool) -> dict[int
 
     of_three: of one of three equivalent spins the parts that change K count twice, see `symmetry.halved_across`.
     """
-    x, y, z = ("abc".index(axis) for axis in AXES["IIIl" if oblate else "Ir"])
+    x, y, z = ("abc".index(axis) for axis in basis_axes(oblate))
     diagonal, times = np.diag(c), 2.0 if of_three else 1.0
     mean, across = float(diagonal[x] + diagonal[y]) / 2, times * float(diagonal[x] - diagonal[y]) / 4
     found = {typ: times * float(c[i, k]) for (i, k), typ in _CROSS.items()}

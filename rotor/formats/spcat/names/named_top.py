@@ -18,25 +18,25 @@ import numpy as np
 
 from rotor.arrays import Floats
 from rotor.formats.spcat.file_model import allowed
-from rotor.formats.spcat.hamiltonian.codes import AXES, HELD_BELOW, constants_of, is_linear, join_code, split_code
+from rotor.formats.spcat.hamiltonian.codes import HELD_BELOW, basis_axes, constants_of, is_linear, join_code, split_code
 from rotor.formats.spcat.hamiltonian.dipole_codes import dipoles_of
 from rotor.formats.spcat.hamiltonian.file_effect import CodedLine, coded_lines
+from rotor.formats.spcat.hamiltonian.operators import PAIRS, TYPES_BETWEEN
 from rotor.formats.spcat.hamiltonian.series import is_constant, is_series
-from rotor.formats.spcat.hamiltonian.states import StateOptions, states_of
+from rotor.formats.spcat.hamiltonian.states import StateOptions, options_of_state, states_of
 from rotor.formats.spcat.hamiltonian.symmetry import halved_across
 from rotor.formats.spcat.model import NO_NAME, fold_parts, weights_of
 from rotor.formats.spcat.text.int_file import IntensityFile
 from rotor.formats.spcat.text.par import Options, Parameter, ParameterFile
 from rotor.quantum.spins.operators import Cosines, CosinesWithN, Scalar
 from rotor.tops.constants import AxisOrderError, Constants
-from rotor.tops.spins.spin_constants import SpinConstants, twice_of
+from rotor.tops.spins.spin_constants import SpinConstants, is_isotope
 from rotor.tops.spins.spin_weights import SpinWeights
 from rotor.tops.states.state_constants import StateConstants
 from rotor.tops.top import Top
 
-_BETWEEN = {20: "G_a", 40: "G_b", 60: "G_c", 21: "F_bc", 41: "F_ac", 61: "F_ab"}
-_LADDERS = {0: "W", 1: "W_pm2", 2: "W_pm4", 3: "W_pm6"}
-_PAIRS = {"ab": (0, 1), "ac": (0, 2), "bc": (1, 2)}
+_BETWEEN = {typ: symbol for symbol, typ in TYPES_BETWEEN.items() if typ >= 20}
+_LADDERS = {max(typ - 3, 0): symbol for symbol, typ in TYPES_BETWEEN.items() if typ < 20}  # by n of N₊^2n + N₋^2n
 
 
 def named_top(file: ParameterFile, intensities: IntensityFile | None = None, *, errors: bool = False) -> Top:
@@ -71,7 +71,7 @@ def named_top(file: ParameterFile, intensities: IntensityFile | None = None, *, 
     letter, own = _letter(file, rows), _own_parameters(rows, len(states))
     constants, energies = [], []
     for v, parameters in enumerate(own):
-        option = replace(_option_of(file, v), chr=letter, spind=-1 if first.spind < 0 else 1)
+        option = replace(options_of_state(file, v), chr=letter, spind=-1 if first.spind < 0 else 1)
         option = replace(option, nvib=-1 if first.nvib < 0 else 1, vsym=0, text="")
         energies.append(sum(p.value for p in parameters if not any(split_code(p.code)[:8])))
         plain = tuple(p for p in parameters if any(split_code(p.code)[:8]))
@@ -127,17 +127,6 @@ def _refuse_unlike(constants: list[Constants]) -> None:
     kinds = list(dict.fromkeys(one.kind for one in constants))
     if len(kinds) > 1:
         raise ValueError(f"states of the kinds {' and '.join(kinds)} in one file: a top has one kind of constants")
-
-
-def _option_of(file: ParameterFile, v: int) -> Options:
-    """The option line of a state; where it has none of its own, the first, of which the digits of VSYM say who exchanges weights."""
-    first = file.options[0]
-    own = [line for line in file.options[1:] if abs(line.nvib) == v]
-    if own:
-        return own[-1]
-    digits = str(max(first.vsym, 0))[::-1]
-    swapped = not file.options[1:] and v < len(digits) and int(digits[v]) % 2 == 1
-    return replace(first, wtpl=first.wtmn, wtmn=first.wtpl) if swapped else first
 
 
 def _letter(file: ParameterFile, rows: list[tuple[CodedLine, Parameter]]) -> str:
@@ -201,7 +190,7 @@ def _weights(file: ParameterFile, states: tuple[StateOptions, ...], symmetric: b
     """The weights of every state; ValueError where a common divisor of one state is none of another."""
     found, divisors = [], []
     for v, state in enumerate(states):
-        option = replace(_option_of(file, v), vsym=0, spind=-1 if file.options[0].spind < 0 else 1)
+        option = replace(options_of_state(file, v), vsym=0, spind=-1 if file.options[0].spind < 0 else 1)
         option = replace(option, nvib=-1 if file.options[0].nvib < 0 else 1, iax=abs(option.iax))
         if state.equivalent == 3:
             found.append(SpinWeights())  # with their spins all levels are of A species
@@ -292,7 +281,7 @@ def _letters(kind: str, total: Floats) -> list[str]:
         return [""]
     if kind == "C" and np.allclose(total, total[0, 0] * np.eye(3), rtol=0, atol=1e-14 * np.abs(total).max()):
         return ["iso"]
-    names = ["aa", "bb", "cc", *_PAIRS] if kind == "C" else ["aa", "bb-cc", *_PAIRS]
+    names = ["aa", "bb", "cc", *PAIRS] if kind == "C" else ["aa", "bb-cc", *PAIRS]
     return [name for name in names if abs(_element(total, name)) > 1e-14 * np.abs(total).max()]
 
 
@@ -301,8 +290,8 @@ def _element(matrix: Floats, letters: str) -> float:
         return float(matrix)
     if letters == "bb-cc":
         return float(matrix[1, 1] - matrix[2, 2])
-    if letters in _PAIRS:
-        return float(matrix[_PAIRS[letters]])
+    if letters in PAIRS:
+        return float(matrix[PAIRS[letters]])
     place = "abc".index(letters[0]) if letters != "iso" else 0
     return float(matrix[place, place])
 
@@ -344,7 +333,7 @@ def _spins(
 def _of_one(line: CodedLine, state: StateOptions, oblate: bool) -> CodedLine:
     """A line with what it is of one nucleus: the parts that change K of one of three equivalent nuclei count half there."""
     of_three = state.equivalent == 3 and max(line.operator.spins, default=0) > len(state.spins) - 3
-    return line._replace(operator=halved_across(line.operator, AXES["IIIl" if oblate else "Ir"])) if of_three else line
+    return line._replace(operator=halved_across(line.operator, basis_axes(oblate))) if of_three else line
 
 
 def _names_of_spins(rows: list[tuple[CodedLine, Parameter]], sizes: tuple[int, ...]) -> list[str]:
@@ -354,16 +343,9 @@ def _names_of_spins(rows: list[tuple[CodedLine, Parameter]], sizes: tuple[int, .
         places, inside = set(line.operator.spins), re.search(r"\(([^(),]+)\)", parameter.label)
         if inside and len(places) == 1 and (name := inside[1].strip()) not in found:
             place = min(places) - 1
-            if name.startswith("S") or _is_isotope(name, sizes[place]):
+            if name.startswith("S") or is_isotope(name, sizes[place]):
                 found[place] = name
     return found
-
-
-def _is_isotope(name: str, twice: int) -> bool:
-    try:
-        return twice_of(name) == twice
-    except ValueError:
-        return False
 
 
 def _once(states: Iterable[int]) -> list[int]:

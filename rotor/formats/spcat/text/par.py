@@ -56,6 +56,26 @@ class Options:
     xopt: int = 0
     text: str = field(default="", compare=False)
 
+    @property
+    def phase(self) -> int:
+        """PHASE of XOPT = PHASE + 10 NEWLZ + 20 NOFC + 40 G12."""
+        return self.xopt % 10
+
+    @property
+    def newlz(self) -> bool:
+        """NEWLZ of XOPT: Lz is named in the codes of l-doubled states."""
+        return bool(self.xopt // 10 & 1)
+
+    @property
+    def nofc(self) -> bool:
+        """NOFC of XOPT: FF names a K, not a term of a Fourier series."""
+        return bool(self.xopt // 10 & 2)
+
+    @property
+    def g12(self) -> bool:
+        """G12 of XOPT: odd Fourier terms change sign where K is odd."""
+        return bool(self.xopt // 10 & 4)
+
 
 @dataclass(frozen=True)
 class Parameter:
