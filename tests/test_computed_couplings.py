@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 from test_outputs import TURN, table
 
 import rotor
-from rotor.molecules.molecule import Molecule
+from rotor.molecules.molecule import Molecule, couplings_mhz
 from rotor.molecules.nuclei import isotope
 from rotor.molecules.readers.read import read_molecule
 from rotor.quantum.effects.of_top import effects_of
@@ -223,3 +224,24 @@ def test_gradients_of_another_geometry_are_left_out(tmp_path):
     molecule = read_molecule(path)
     assert not molecule.quadrupole_mhz
     assert any("belong to another geometry" in note for note in molecule.notes)
+
+
+# Field gradients, a.u., at the geometries of data/molecules: PySCF 2.14.0, RKS B3LYP/def2-TZVPP, (3 r rᵀ - r²)/r⁵ of nuclei less electrons
+PYSCF = {
+    ("HCN", 3): np.diag([0.53862, 0.53862, -1.07724]),
+    ("CH3Cl", 2): np.diag([-2.040865, -2.040865, 4.08173]),
+    ("HCONH2", 3): np.array([[0.43812, -0.01421, 0.0], [-0.01421, 0.42608, 0.0], [0.0, 0.0, -0.8642]]),
+}
+
+
+@pytest.mark.parametrize("name", [name for name, _ in PYSCF])
+def test_computed_gradients_give_the_measured_couplings(name):
+    """Signs and sizes along the principal axes; that functional makes couplings of 14N 5 to 10 % too large, those of Cl 5 %."""
+    top = rotor.read(name)
+    gradients = {atom: gradient for (molecule, atom), gradient in PYSCF.items() if molecule == name}
+    with_them = replace(top.molecule, quadrupole_mhz=couplings_mhz(gradients, top.molecule.nuclei))
+    found = Top.from_molecule(with_them).spin_constants.values
+    measured = {key: value for key, value in top.spin_constants.values.items() if key.startswith("chi")}
+    assert {"chi_aa", "chi_bb-cc"} & {key.partition("(")[0] for key in measured}
+    for key, value in measured.items():
+        assert found[key] == pytest.approx(value, abs=0.11 * max(abs(one) for one in measured.values())), key
