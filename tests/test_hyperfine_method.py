@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -186,3 +187,22 @@ def test_unresolved_components_are_one_line(capsys):
     assert "components" in out
     assert "21206.4546" in out
     assert "21207.3340" not in out
+
+
+def test_levels_beyond_the_reach_of_the_constants_make_no_lines_with_spins_either():
+    """A series that turns down near J = 25: its levels far below 0 would take the whole population."""
+    plain = Top.from_constants("A=72000 B=11400 C=9800 DJ=0.5 DJK=-1 HJ=-0.01 MHz", dipole_abc_debye=(3.6, 0, 0))
+    top = replace(plain, spin_constants=SpinConstants.parse("chi_aa(14N)=2 chi_bb-cc(14N)=5.7 MHz"))
+    bare = line_list(plain, jmax=40, min_lgint=None, q=1.0)
+    split = line_list(top, jmax=40, min_lgint=None, q=1.0, effects=effects_of(top, True))
+    assert solve_levels(plain, 40).energy_mhz.min() < -1e6
+    assert split.untrusted > bare.untrusted > 0
+    rows = [np.flatnonzero(lines.levels.weight > 0) for lines in (bare, split)]
+    bare_kept, split_kept = (
+        {tuple(q[:3]) for q in lines.levels.quanta_of(r).tolist()} for lines, r in zip((bare, split), rows, strict=True)
+    )
+    assert bare_kept == split_kept
+    low = line_list(top, jmax=2, min_lgint=None, q=1.0, effects=effects_of(top, True))
+    ends = [np.hstack([one.quanta(one.upper), one.quanta(one.lower)]).tolist() for one in (low, split)]
+    of_split = [ends[1].index(quanta) for quanta in ends[0]]
+    assert split.lgint[of_split] == pytest.approx(low.lgint, abs=1e-12)  # the same arithmetic
