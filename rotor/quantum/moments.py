@@ -26,7 +26,7 @@ class Moment(NamedTuple):
     spin: of a magnetic moment, the spin's name, "" the rotation. tensor: c of a magnetic moment that is not isotropic. cosine: of an
     electric one α', α of the two states where an element is multiplied by cos(α'K' + αK), a Fourier term of internal rotation.
     turned: of an electric one the axis g, where it stands for C2g times itself, i times what it is in functions of other phases; by_order:
-    whether it has the factor i from the second of `states` to the first, -i the other way round.
+    whether it has the factor i from the higher state to the lower one, -i the other way round.
     """
 
     value_debye: float

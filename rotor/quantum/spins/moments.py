@@ -165,9 +165,10 @@ def _factor(powers: str, left: RotorPart, right: RotorPart) -> Floats:
 
 def _sign(moment: Moment, left: RotorPart, right: RotorPart) -> int:
     """Of what is turned, and of what depends on the order of the states."""
-    import os
-    turned = character(left.basis, moment.turned) if moment.turned and isinstance(left.basis, WangBlock) and not os.environ.get("NOCH") else 1
-    return -turned if moment.by_order and (left.v, right.v) == moment.states[::-1] else turned
+    turned = character(left.basis, moment.turned) if moment.turned and isinstance(left.basis, WangBlock) else 1
+    if not moment.by_order:
+        return turned
+    return -turned if (left.v < right.v) == bool(moment.turned) else turned  # of both i · i = -1
 
 
 def _cosine(moment: Moment, left: RotorPart, right: RotorPart) -> Floats:

@@ -236,7 +236,9 @@ class FileEffect(QuantumEffect):
                 found += self._with_pairs(line, states)
             elif operator.of_j is not None:
                 pairs = [states] if states else [(v, v) for v in range(len(self.numbers))]
-                of = half_turned(operator.of_j, self.turned) if self._is_turned(line) else operator.of_j
+                of = operator.of_j
+                if self._is_turned(line):
+                    of = half_turned(of, self.turned, operator.odd)
                 found += [Coupling(line.name, *pair, of) for pair in pairs]
             elif states and states[0] != states[1]:
                 assert operator.plain is not None
@@ -271,13 +273,13 @@ class FileEffect(QuantumEffect):
             if o.rotor is not None:
                 names = tuple(self.coupled[place - 1].name for place in o.spins)
                 bra, ket = states or (EVERY_STATE, EVERY_STATE)
-                rotor = o.rotor
+                rotor, factor = o.rotor, 1.0
                 if self._is_turned(line):
                     assert isinstance(rotor, Cosines | CosinesWithN)
-                    rotor = HalfTurned(rotor, self.turned)
+                    rotor, factor = HalfTurned(rotor, self.turned), 1.0 if o.odd else -1.0  # as `half_turned`
                 elif o.odd and bra == ket:  # of an l-doubled pair, between its components
                     ket = next(pair.second if bra == pair.first else pair.first for pair in self.pairs if bra in pair)
-                term = SpinTerm(line.name, names, rotor, 1.0, o.n2, o.nz2, o.ns, bra, ket)
+                term = SpinTerm(line.name, names, rotor, factor, o.n2, o.nz2, o.ns, bra, ket)
                 for part in self._by_exchange(term, line.exchange):
                     found += self._at_pairs(line, states, part)
         return tuple(found)

@@ -128,10 +128,13 @@ def turned_axis(used: Iterable[str], odd: frozenset[str]) -> str:
     )
 
 
-def half_turned(of: OperatorOfJ, axis: str) -> OperatorOfJ:
-    """C2g times an operator; of one that has its factor i, where it is odd under θ, and that C2g turns around."""
+def half_turned(of: OperatorOfJ, axis: str, odd: bool) -> OperatorOfJ:
+    """What stands for an operator O that C2g turns around, in functions that θ C2g leaves as they are.
+
+    Of an odd O, given as i O, it is i C2g O; of an even one, which has the factor i between two states, i C2g i O = -C2g O.
+    """
 
     def operator(j: int, representation: str) -> JOperator:
-        return half_turn(j, representation, axis) @ of(j, representation)
+        return (1.0 if odd else -1.0) * (half_turn(j, representation, axis) @ of(j, representation))
 
     return operator
