@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from rotor.arrays import Floats, Ints
+from rotor.arrays import Floats, Ints, Workspace
 from rotor.quantum.spins.blocks import Exist, Plan, SpinBlock, parts_of_f
 from rotor.quantum.spins.many_f import MOST, Frame, Group, Tables, between, frame_of, functions_of, groups_of, tables_of
 from rotor.quantum.spins.method import FIRST_ORDER
@@ -92,9 +92,10 @@ def _solved(
     matrices: dict[int, list[tuple[int, Floats]]] = {}
     groups: dict[int, Group] = {}
     zeros = [float(parts[0].rotor.energies_mhz[0]) for _, parts in members]  # taken out for the sake of digits
+    spaces = [Workspace() for _ in acting]
     for group, numbers in groups_of(members, frame):
         own_zeros = np.array([zeros[number] for number in numbers])
-        for number, matrix in zip(numbers, _hamiltonians(group, acting, frame, own_zeros), strict=True):
+        for number, matrix in zip(numbers, _hamiltonians(group, acting, frame, own_zeros, spaces), strict=True):
             groups[number] = group
             matrices.setdefault(len(matrix), []).append((number, matrix))
     out: list[tuple[Group, Floats, Floats]] = [None] * len(members)  # type: ignore[list-item]
@@ -109,17 +110,20 @@ def _solved(
 
 
 def _hamiltonians(
-    group: Group, acting: Sequence[tuple[Tables, Floats]], frame: Frame, zeros: Floats
+    group: Group, acting: Sequence[tuple[Tables, Floats]], frame: Frame, zeros: Floats, spaces: Sequence[Workspace]
 ) -> Iterator[Floats]:
-    """The Hamiltonians of a group, (functions, functions) of each block, energies from `zeros` on, in the lower triangle."""
+    """The Hamiltonians of a group, (functions, functions) of each block, energies from `zeros` on, in the lower triangle.
+
+    spaces: one for each of the operators.
+    """
     every = [
-        functions_of(between(group, group, group.twice_f, 0, tables, coefficients, frame))
-        for tables, coefficients in acting
+        functions_of(between(group, group, group.twice_f, 0, tables, coefficients, frame, own))
+        for (tables, coefficients), own in zip(acting, spaces, strict=True)
     ]
-    diagonal = np.zeros((len(zeros), group.states, group.columns))
+    diagonal = np.zeros((len(zeros), group.columns, group.states))
     for slot in group.slots:
         own = frame.energies_mhz[slot.kind][frame.of_n(group.twice_f, slot), : group.states]
-        diagonal[:, : own.shape[1], slot.columns] = (own - zeros[:, None])[:, :, None]
+        diagonal[:, slot.columns, : own.shape[1]] = (own - zeros[:, None])[:, None]
     for place, functions in enumerate(group.functions):
         chosen = functions[:, None], functions
         matrix = every[0][place][chosen] if every else np.zeros((len(functions), len(functions)))
