@@ -2,7 +2,8 @@
 
 Blocks of different F that hold the same kinds of solved blocks of the rotation, at the same N - F and with the same coupling patterns,
 make a group. A function of a group has a column (a kind of block and a pattern, the same number for all F) and a state of that
-block: function = column · states + state. What a block lacks, since its N is low or its states are fewer, are zeros. Elements of the rotation stand in tables by N, coefficients of coupling in tables by F.
+block: function = column · states + state. What a block lacks, since its N is low or its states are fewer, are zeros. Elements of
+the rotation stand in tables by N, coefficients of coupling in tables by F.
 """
 
 from __future__ import annotations

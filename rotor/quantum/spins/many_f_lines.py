@@ -92,8 +92,8 @@ def _states(group: Group, blocks: Sequence[SpinBlock], levels: int) -> States:
         vectors[place, functions, :size] = block.vectors
         rows[place, :size] = range(block.start, block.start + size)
     heights = [group.heights[group.places[block.twice_f]] for block in blocks]
-    vectors = vectors.reshape(len(blocks), group.columns, group.states, -1)
-    return States(group, {block.twice_f: place for place, block in enumerate(blocks)}, vectors, rows, sizes, heights)
+    of_columns = vectors.reshape(len(blocks), group.columns, group.states, -1)
+    return States(group, {block.twice_f: place for place, block in enumerate(blocks)}, of_columns, rows, sizes, heights)
 
 
 def _between(
@@ -107,7 +107,10 @@ def _between(
     lefts, rights = [up.places[f + step] for f in twice_f], [low.places[f] for f in twice_f]
     for some in _of_like_size([low.sizes[place] for place in rights]):
         left, right = _places(lefts[some]), _places(rights[some])
-        height, width = max(up.heights[place] for place in lefts[some]), max(low.heights[place] for place in rights[some])
+        height, width = (
+            max(up.heights[place] for place in lefts[some]),
+            max(low.heights[place] for place in rights[some]),
+        )
         ups, lows = max(up.sizes[place] for place in lefts[some]), max(low.sizes[place] for place in rights[some])
         elements = functions_of(whole[some, :, :height, :, :width])
         bra = up.vectors[left, :, :height, :ups].reshape(len(elements), -1, ups)
