@@ -62,7 +62,11 @@ def transitions_of(group: Group, levels: Levels, request: Request, q: float) -> 
         none = np.zeros(0, dtype=np.int32)
         return Transitions(np.zeros(0), np.zeros(0), none, none)
     found = all_transitions(
-        levels, dict(group.effect.moments), cut=_wide_cut(levels, request, q), moments=group.effect.others
+        levels,
+        dict(group.effect.moments),
+        (0.0, request.fqlim_ghz * 1e3),
+        cut=_wide_cut(levels, request, q),
+        moments=group.effect.others,
     )
     exists = np.ones(len(found.lower), dtype=bool)
     if (levels.weight <= 0).any():

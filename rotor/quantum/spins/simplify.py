@@ -17,9 +17,8 @@ import numpy as np
 
 from rotor.arrays import Floats
 from rotor.quantum.effect import QuantumEffect
-from rotor.quantum.spins.blocks import Plan, coefficients_of
+from rotor.quantum.spins.blocks import Operators, Plan, coefficients_of
 from rotor.quantum.spins.method import EXACT, FIRST_ORDER, N_DIAGONAL, HyperfineMethod, Used
-from rotor.quantum.spins.rotor import Channel
 
 
 def simplified(plan: Plan, effects: Sequence[QuantumEffect], every_f: Sequence[int]) -> Plan:
@@ -32,7 +31,7 @@ def simplified(plan: Plan, effects: Sequence[QuantumEffect], every_f: Sequence[i
             f"method {asked.method} with a total spin of three nuclei: they are computed by the exact one alone"
         )
     if asked.method == EXACT or plan.shared.scheme.equivalent == 3:
-        return plan.with_method(Used(EXACT, 0.0, asked.tolerance_mhz), plan.operators)
+        return plan.with_method(Used(EXACT, 0.0, asked.tolerance_mhz))
     other_n, same_n = largest_shifts(plan, every_f)
     estimates = {FIRST_ORDER: 2 * (other_n + same_n), N_DIAGONAL: 2 * other_n, EXACT: 0.0}
     chosen = asked.method
@@ -42,14 +41,15 @@ def simplified(plan: Plan, effects: Sequence[QuantumEffect], every_f: Sequence[i
     return plan.with_method(used, _remaining(plan, chosen))
 
 
-def _remaining(plan: Plan, method: str) -> dict[tuple[int, int], dict[Channel, Floats]]:
+def _remaining(plan: Plan, method: str) -> Operators | None:
+    """The operators that a method has; None for all of them."""
     blocks = plan.blocks
     if method == N_DIAGONAL:
         return {pair: found for pair, found in plan.operators.items() if blocks[pair[0]].n == blocks[pair[1]].n}
     if method == FIRST_ORDER:
         alone = {pair: found for pair, found in plan.operators.items() if pair[0] == pair[1]}
         return {pair: {c: np.diag(np.diag(x)) for c, x in found.items()} for pair, found in alone.items()}
-    return plan.operators
+    return None
 
 
 def largest_shifts(plan: Plan, every_f: Sequence[int]) -> tuple[float, float]:
