@@ -60,7 +60,9 @@ class EmissionRequest:
             require_positive("columns_per_cm2", column, "1/cm²")
         require_positive("least_depth", self.least_depth)
         if self.effects and len(self.effects) != len(self.tops):
-            raise ValueError(f"effects: {len(self.effects)} given for {len(self.tops)} molecules; expected those of each")
+            raise ValueError(
+                f"effects: {len(self.effects)} given for {len(self.tops)} molecules; expected those of each"
+            )
         first, last = self.range_mhz
         if not 0 < first < last or math.isinf(last):
             raise ValueError(f"range_mhz: {first:g} to {last:g} MHz: expected a finite range above 0 that rises")
@@ -150,8 +152,13 @@ class EmissionAnswer(TextOf):
                     "constants_source": top.source,
                 }
                 for name, column, q, quanta, used, top in zip(
-                    request.names, request.columns_per_cm2, self.partition_functions, self.quanta, self.hyperfine,
-                    request.tops, strict=True,
+                    request.names,
+                    request.columns_per_cm2,
+                    self.partition_functions,
+                    self.quanta,
+                    self.hyperfine,
+                    request.tops,
+                    strict=True,
                 )
             ],
             "source": source,
@@ -206,9 +213,7 @@ def _lines_of(top: Top, source: Source, request: EmissionRequest, effects: tuple
     width = request.range_mhz[0] * source.fwhm_km_s / _KM_PER_S
     depth_per_area = float(gaussian(np.zeros(1), width)[0]) * source.column_per_cm2 * NM2_IN_CM2
     least = math.log10(request.least_depth / depth_per_area)
-    return line_list(
-        top, temperature_k=source.excitation_k, min_lgint=least, range_mhz=(first, last), effects=effects
-    )
+    return line_list(top, temperature_k=source.excitation_k, min_lgint=least, range_mhz=(first, last), effects=effects)
 
 
 def _line_table(number: int, lines: Lines, source: Source) -> EmissionLines:

@@ -5,7 +5,8 @@ S(i, f) = (3/2) Σ_{M' M p} |⟨f M'|α_2p(space)|i M⟩|²,     Σ_f S(i, f) = 
 the elastic term f = i among them, so that S = (2J+1) b γ² with the coefficients b of G. Placzek and E. Teller, Z. Phys. 81,
 209 (1933). Sums over M', M and p leave the squares of the reduced elements in `quantum.tensors`.
 
-Of levels with spins the polarizability touches none, so that each spin of the chain N + I₁ = F₁, F₁ + I₂ = F₂, ... multiplies the element by
+Of levels with spins the polarizability touches none, so that each spin of the chain N + I₁ = F₁, F₁ + I₂ = F₂, ... multiplies the
+element by
 
     ⟨F₁' (N' I)‖T²‖F₁ (N I)⟩ = (-1)^(N'+I+F₁+2) √((2F₁'+1)(2F₁+1)) {N' F₁' I; F₁ N 2} ⟨N'‖T²‖N⟩
 
@@ -232,7 +233,9 @@ def _inelastic(levels: Levels, found: RamanTransitions) -> RamanTransitions:
     numbers = np.column_stack([levels.quanta[name] for name in levels.quanta if name not in spins])
     _, level = np.unique(numbers, axis=0, return_inverse=True)
     other = level[found.lower] != level[found.upper]
-    return RamanTransitions(found.strength_angstrom6[other], found.lower[other], found.upper[other], found.weight[other])
+    return RamanTransitions(
+        found.strength_angstrom6[other], found.lower[other], found.upper[other], found.weight[other]
+    )
 
 
 def _once(up: Block, low: Block) -> NDArray[np.bool_]:

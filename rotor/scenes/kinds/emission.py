@@ -69,9 +69,7 @@ def _effects(scene: EmissionScene, tops: Sequence[Top]) -> tuple[tuple[QuantumEf
         msgspec.structs.replace(asked, hyperfine=False, hyperfine_method="exact") if any(known) and not has else asked
         for has in known
     ]
-    return tuple(
-        kind.effects_of(top, own, one) for top, own, one in zip(tops, each, scene.molecules, strict=True)
-    )
+    return tuple(kind.effects_of(top, own, one) for top, own, one in zip(tops, each, scene.molecules, strict=True))
 
 
 def _range(seen: EmissionConditions) -> tuple[float, float]:
