@@ -150,9 +150,9 @@ def groups_of(file: ParameterFile, intensities: IntensityFile, *, as_spcat: bool
     lines = coded_lines(file, len(states), doubled)
     lines = real_ones(allowed(lines, states, doubled, oblate)[0], phases.odd, members)[0]
     dipoles, others = _of_both_components(dipoles, doubled), _others_of_both(others, doubled)
-    if not phases.odd and not others:
-        if not any(_has_elements(pair, mu, states, doubled) for pair, mu in dipoles.items()):
-            dipoles |= {(high, low): (-a, -b, -c) for (low, high), (a, b, c) in dipoles.items() if low != high}
+    elements = (_has_elements(pair, mu, states, doubled) for pair, mu in dipoles.items())
+    if not phases.odd and not others and not any(elements):
+        dipoles |= {(high, low): (-a, -b, -c) for (low, high), (a, b, c) in dipoles.items() if low != high}
     pairs = [line.states for line in lines if line.states] + list(dipoles) + [code.states for _, code in others]
     _refuse_missing_spins(lines, states)
     light = Light(dipoles, others, series_of(file, len(states), doubled), phases)
@@ -176,8 +176,12 @@ def _within_states(
 ) -> list[tuple[int, bool]]:
     """The axes of the electric moments within one state that join levels of one weight, and whether they are commutators."""
     plain = [(v, axis, False) for (v, w), mu in dipoles.items() for axis, value in enumerate(mu, 1) if v == w and value]
-    plain += [(code.states[0], code.axis, code.typ == 5) for _, code in others if code.axis and len(set(code.states)) == 1]
-    return [(axis, odd) for v, axis, odd in plain if v in members or some_weights_agree(20 * axis, states[v], states[v])]
+    plain += [
+        (code.states[0], code.axis, code.typ == 5) for _, code in others if code.axis and len(set(code.states)) == 1
+    ]
+    return [
+        (axis, odd) for v, axis, odd in plain if v in members or some_weights_agree(20 * axis, states[v], states[v])
+    ]
 
 
 def left_out(file: ParameterFile) -> list[str]:
@@ -320,7 +324,9 @@ def _group(
     here = {v: place for place, v in enumerate(numbers)}
     moments = {(here[b], here[a]): mu for (a, b), mu in light.dipoles.items() if a in here and b in here}
     beside = tuple(
-        moment_of(dipole, code, (here[code.states[1]], here[code.states[0]]), len(spins), oblate, as_spcat, light.series)
+        moment_of(
+            dipole, code, (here[code.states[1]], here[code.states[0]]), len(spins), oblate, as_spcat, light.series
+        )
         for dipole, code in light.others
         if set(code.states) <= set(here)
     )

@@ -150,7 +150,9 @@ def _half_difference(line: CodedLine, digits: Digits, first: int, options: Optio
     return line._replace(operator=CodedOperator(of_j=of_k, odd=True), states=(first, first))
 
 
-def real_ones(lines: Sequence[CodedLine], odd: frozenset[str], doubled: frozenset[int]) -> tuple[list[CodedLine], list[str]]:
+def real_ones(
+    lines: Sequence[CodedLine], odd: frozenset[str], doubled: frozenset[int]
+) -> tuple[list[CodedLine], list[str]]:
     """The lines without those within one state that are imaginary, and a sentence for each of these."""
     found, reasons = list[CodedLine](), list[str]()
     for line in lines:

@@ -93,9 +93,18 @@ def phases_of(file: ParameterFile, states: int, doubled: frozenset[int]) -> Phas
 
 
 def with_dipoles(phases: Phases, dipoles: Iterable[tuple[int, bool]], oblate: bool, as_spcat: bool) -> Phases:
-    """The phases of dipoles between states, by those within states: their axis, 1 to 3, and whether they are commutators.
+    """The phases of dipoles between states, by those within states.
 
-    as_spcat: phases along axes that are not settled are those that leave most dipoles real, as the program has it in SPCAT alone.
+    Parameters
+    ----------
+    phases : the phases that the parameters settle
+    dipoles : of each dipole its axis, 1 to 3 for a, b, c, and whether it is a commutator
+    oblate : whether the basis is oblate
+    as_spcat : phases along axes that are not settled are those that leave most dipoles real, as the program has it in SPCAT alone
+
+    Returns
+    -------
+    The phases with which dipoles are computed.
     """
     axes, given = AXES_OF_PHASE[oblate], list(dipoles)
     least, found = len(given), (phases.odd, False)
