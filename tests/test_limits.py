@@ -10,12 +10,14 @@ from scipy import constants
 
 import rotor
 from rotor.molecules.nuclei import data_folder, isotope
+from rotor.molecules.readers.read import read_molecule
 from rotor.quantum.effects.hyperfine import NuclearQuadrupole
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.estimates.limits import VIBRATION_CM, VIBRATION_POWER, model_limits, model_sizes, populated_j
 from rotor.quantum.solve import solve_levels
 from rotor.quantum.spins import Spin
 from rotor.quantum.spins.splittings import GRADIENT_MHZ_PER_BARN, GRADIENTS, splitting_nuclei
+from rotor.tops.top import Top
 from rotor.units import MHZ_PER_CM
 
 
@@ -204,3 +206,11 @@ def test_couplings_of_an_electron_with_known_constants_are_left_out_by_size():
     assert not {"spin-rotation", "spin-spin", "nuclear quadrupole"} & {
         one.name for one in model_limits(top, 22, effects_of(top, True))
     }
+
+
+@pytest.mark.parametrize(("isotopes", "size_mhz"), [("N=14N", 24000.0), ("H=2H", 1600.0), ("2=2H,3=2H", 24000.0)])
+def test_inversion_of_heavy_ammonia_is_slower(isotopes, size_mhz):
+    """Measured at (J, K) = (1, 1): 23.7 GHz of NH3, 1.59 GHz of ND3; one hydrogen left counts as NH3."""
+    top = Top.from_molecule(read_molecule("SMILES:N", isotopes=isotopes))
+    (found,) = [limit for limit in model_limits(top, 5, SEMI_RIGID) if limit.name == "inversion"]
+    assert found.size_mhz == size_mhz
