@@ -100,16 +100,44 @@ def test_q_is_the_catalogue_s(temperature_k):
 
 def test_quadrupole_components_of_the_first_rotational_line():
     """1(0)-0(0) by F of 14N, table 1 of Cazzoli et al., each the mean of what protons split by up to 0.06 MHz."""
-    with_rotation = SpinConstants.parse("chi_cc(14N)=-4.08983MHz C_aa(14N)=6.774kHz C_bb(14N)=6.774kHz")  # its table 2
     measured = {1: (572497.1247 + 572497.1565) / 2, 2: (572498.3391 + 572498.3885 + 572498.3979) / 3, 0: 572500.1913}
-    assert dict(AMMONIA.spin_constants.values) == {"chi_cc(14N)": -4.08983}
-    top = replace(AMMONIA, spin_constants=with_rotation)
+    top = AMMONIA
     lines = line_list(top, jmax=1, effects=effects_of(top, hyperfine=True), range_mhz=(5e5, 6e5), min_lgint=None)
     found = dict(zip(lines.levels.quanta["f"][lines.upper].tolist(), lines.frequency_mhz.tolist(), strict=True))
     for f, frequency in measured.items():
-        assert found[f] == pytest.approx(
-            frequency, abs=0.03
-        )  # half of what the protons split; no number is taken from these lines
+        assert found[f] == pytest.approx(frequency, abs=0.03)  # half of what the protons split
+
+
+GROUPS = {  # kHz from the centre, of components F1' - F1'' that protons part by up to 0.06 MHz, and the frequencies that parts them
+    (1, 1): ((-1540.8, -600.7, 0.0, 600.0, 1541.5), (-1000, -300, 300, 1000)),
+    (2, 2): ((-2059.4, -1295.5, 0.0, 1294.7, 2059.4), (-1700, -300, 300, 1700)),
+}
+
+
+@pytest.mark.parametrize("quanta", GROUPS)
+def test_quadrupole_groups_of_inversion_lines(quanta):
+    """Five groups of (1,1) and (2,2), 18 and 21 components with relative strengths in velocities to 0.1 m/s (8 Hz).
+
+    Read in pyspeckit/spectrum/models/ammonia_constants.py of the repository pyspeckit/pyspeckit (commit 1aa2a44), where they stand
+    without a reference; lines first resolved by S. G. Kukolich, Phys. Rev. 156 (1967) 83. Here the mean of each group, by strength. (3,3)
+    is not compared: its protons have a total spin of 3/2 and move the groups by 7 kHz.
+    """
+    found, edges = GROUPS[quanta]
+    j = quanta[0]
+    lines = line_list(AMMONIA, jmax=j, effects=effects_of(AMMONIA, True), range_mhz=(23e3, 24e3), min_lgint=None)
+    rows = (lines.quanta(lines.upper)[:, 1:3] == quanta).all(axis=1)
+    strength = lines.strength_debye2[rows]
+    offsets = (lines.frequency_mhz[rows] - np.average(lines.frequency_mhz[rows], weights=strength)) * 1e3
+    group = np.digitize(offsets, edges)
+    means = [np.average(offsets[group == i], weights=strength[group == i]) for i in range(5)]
+    assert means == pytest.approx(
+        found, abs=1.3
+    )  # both sides of a pair differ by 0.8: what protons do to the means is left out
+    bare = replace(AMMONIA, spin_constants=SpinConstants.parse("chi_cc(14N)=-4.08983MHz"))
+    plain = line_list(bare, jmax=j, effects=effects_of(bare, True), range_mhz=(23e3, 24e3), min_lgint=None)
+    assert (
+        np.abs(np.sort(plain.frequency_mhz[rows]) - np.sort(lines.frequency_mhz[rows])).max() > 5e-3
+    )  # spin-rotation shows
 
 
 def test_levels_with_spins_are_those_of_the_table():

@@ -207,10 +207,18 @@ def _of_nuclei(top: Top, j: int, effects: Sequence[QuantumEffect], known: Collec
         found.append(Limit("nuclear quadrupole", size, _split_text(nuclei)))
     if top.molecule is None:
         return found
-    magnetic = sorted({one.label for one in top.molecule.nuclei if one.spin > 0})
-    if magnetic and not {"spin-rotation", "spin-spin"} & set(known):
+    magnetic = sorted({one.label for one in top.molecule.nuclei if one.spin > 0} - _with_magnetic_constants(top))
+    elsewhere = top.spin_constants is None and {"spin-rotation", "spin-spin"} & set(known)
+    if magnetic and not elsewhere:
         found.append(Limit("magnetic coupling of nuclear spins", None, f"{', '.join(magnetic)}: small splittings"))
     return found
+
+
+def _with_magnetic_constants(top: Top) -> set[str]:
+    """Isotopes of which a constant other than χ is known, such as C_aa(14N) or b_F(S,1H_2)."""
+    values = top.spin_constants.values if top.spin_constants else {}
+    inside = [name.partition("(")[2].rstrip(")").split(",") for name in values if not name.startswith("chi")]
+    return {spin.partition("_")[0] for spins in inside for spin in spins}
 
 
 def _split_text(nuclei: Sequence[Splitting]) -> str:
