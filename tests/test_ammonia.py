@@ -15,6 +15,8 @@ import pytest
 
 import rotor
 from rotor import units
+from rotor.formats.line_tables import catalogue
+from rotor.formats.molecules.level_table import read_level_table, write_level_table
 from rotor.quantum.effects.of_top import effects_of
 from rotor.quantum.solve import solve_levels
 from rotor.spectra.lines import line_list
@@ -172,8 +174,37 @@ def test_states_go_with_the_constants_of_this_isotopologue_alone():
     assert isotopologue(AMMONIA, {"H": "2H"}).top.states is None
 
 
-def test_lines_without_a_level_table_have_errors_of_none():
-    assert line_list(AMMONIA, jmax=2).error_mhz is None
+def test_errors_of_lines_are_those_of_the_table():
+    """5 kHz of inversion lines, in which the whole errors of 3 MHz are shared; none of levels beyond J = 10; spins change nothing."""
+    lines = line_list(AMMONIA, jmax=12, range_mhz=(0.0, 600e3), min_lgint=None)
+    assert lines.errors_from == "the table of energies"
+    up, low = lines.quanta(lines.upper), lines.quanta(lines.lower)
+    inside = (up[:, 1] <= 10) & (low[:, 1] <= 10)
+    np.testing.assert_array_equal(np.isnan(lines.error_mhz), ~inside)
+    inversion = inside & (up[:, 1:] == low[:, 1:]).all(axis=1)
+    assert lines.error_mhz[inversion] == pytest.approx(0.0035 * np.sqrt(2))
+    found = {tuple(q): row for row, q in enumerate(np.hstack([up, low]).tolist())}
+    for (j, k), frequency in INVERSION.items():
+        row = found[1, j, k, 0, j, k]
+        assert abs(lines.frequency_mhz[row] - frequency) < 1.01 * lines.error_mhz[row]  # the worst, (3,2), is the 5 kHz
+    rotation = found[0, 1, 0, 1, 0, 0]
+    assert lines.error_mhz[rotation] == pytest.approx(3.0 * np.sqrt(2))
+    split = line_list(AMMONIA, jmax=2, effects=effects_of(AMMONIA, True), range_mhz=(23e3, 24e3), min_lgint=None)
+    assert split.error_mhz == pytest.approx(0.0035 * np.sqrt(2))
+    assert line_list(replace(AMMONIA, level_table=None), jmax=2).error_mhz is None
+    assert (catalogue(lines).error_mhz[~inside] == 0).all()  # where it is not known
+
+
+def test_a_table_with_own_errors_is_written_and_read(tmp_path):
+    path = tmp_path / "levels.csv"
+    write_level_table(AMMONIA.level_table, path)
+    again = read_level_table(path)
+    for name, column in AMMONIA.level_table.columns.items():
+        np.testing.assert_array_equal(again.columns[name], column)
+    path.write_text(path.read_text().replace("own_error_mhz", "note"))
+    assert read_level_table(path).own_error_mhz is None
+    with pytest.raises(ValueError, match="expected a table with own_error_mhz"):
+        read_level_table(path).line_errors(np.array([0]), np.array([1]))
 
 
 # ND3
