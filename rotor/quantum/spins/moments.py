@@ -110,7 +110,9 @@ class SpinMoments:
             found = tensor_elements(up, low, self._tensor(moment.along_abc, 1))
             if found is None:
                 return None
-            return found * (_sign(moment, left, right) * _factor(moment.powers, left, right) * _cosine(moment, left, right))
+            return found * (
+                _sign(moment, left, right) * _factor(moment.powers, left, right) * _cosine(moment, left, right)
+            )
         if moment.tensor is not None and not moment.spin:
             return CosinesWithN(moment.tensor).elements(up, low, self.representation)
         if moment.tensor is not None:

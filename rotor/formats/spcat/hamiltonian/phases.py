@@ -118,7 +118,9 @@ def turned_axis(used: Iterable[str], odd: frozenset[str]) -> str:
     ('c', 'c', 'b')
     """
     axes = sorted(set(used) - {""})
-    for g in ("", "c", "b", "a"):
+    for g in sorted(
+        ("", "c", "b", "a"), key=lambda g: odd != odd_of_turned(g)
+    ):  # first that which fits the axes not used too
         if all((axis in odd) == (g not in ("", axis)) for axis in axes):
             return g
     along = ", ".join(f"{axis} {'odd' if axis in odd else 'even'}" for axis in axes)
@@ -126,6 +128,15 @@ def turned_axis(used: Iterable[str], odd: frozenset[str]) -> str:
         f"operators along {along} under time reversal: no phases of the basis make all of them real. That is read but not computed; "
         "leave out those along one axis"
     )
+
+
+def odd_of_turned(g: str) -> frozenset[str]:
+    """The axes along which odd operators are real where time reversal goes with half a turn about g.
+
+    >>> sorted(odd_of_turned("b")), sorted(odd_of_turned(""))
+    (['a', 'c'], [])
+    """
+    return frozenset("abc") - {g} if g else frozenset()
 
 
 def half_turned(of: OperatorOfJ, axis: str, odd: bool) -> OperatorOfJ:
