@@ -93,9 +93,23 @@ def phases_of(file: ParameterFile, states: int, doubled: frozenset[int]) -> Phas
 
 
 def with_dipoles(phases: Phases, dipoles: Iterable[tuple[int, bool]], oblate: bool, as_spcat: bool) -> Phases:
-    """The phases of dipoles between states, by those within states: their axis, 1 to 3, and whether they are commutators.
+    """The phases of dipoles between states too, by those within states.
 
-    as_spcat: phases along axes that are not settled are those that leave most dipoles real, as the program has it in SPCAT alone.
+    Parameters
+    ----------
+    phases : Phases
+        Of the parameters.
+    dipoles : iterable of (int, bool)
+        Of the dipoles within states: their axis, 1 to 3, and whether they are commutators with N².
+    oblate : bool
+        Whether z is the c axis.
+    as_spcat : bool
+        Whether phases along axes that are not settled are those that leave most dipoles real, as the program has it in SPCAT alone.
+
+    Returns
+    -------
+    Phases
+        With `between_i`.
     """
     axes, given = AXES_OF_PHASE[oblate], list(dipoles)
     least, found = len(given), (phases.odd, False)
