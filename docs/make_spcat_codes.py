@@ -112,8 +112,8 @@ five kinds of Euler terms. All are equal but for shares of strength of levels th
 which the program computes as if TYP were 0: here n = 10 FC + I1, as documented. Without NEWLZ it passes over TYP 80 to 89 of the state
 with K l ≤ 0. Of 330 further inputs of one or two states, many with one term alone, 256 are equal, 48 were refused then (an odd
 operator within one state, see below), and 26 differ. With the first-order energies of the roll-over left out of the program and its
-search for a free place set right (one input) all names and energies of the 26 are equal, four inputs in every line; the other 22 differ in strengths
-alone, of levels that nearly coincide (inferred).
+search for a free place set right (one input) all names and energies of the 26 are equal, four inputs in every line; the other 22
+differ in strengths alone, of levels that nearly coincide (inferred).
 
 ### Phases: odd operators within one state, PHASE
 
