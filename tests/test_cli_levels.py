@@ -21,7 +21,7 @@ from rotor.plots.levels import ladders, plot_levels
 from rotor.quantum.request import LevelsRequest, answer_levels
 
 KEYS = {
-    "jmin", "jmax", "kmin", "kmax", "max_energy_mhz", "quantum_numbers", "level_count", "ground_mhz", "levels", "files",
+    "jmin", "jmax", "kmin", "kmax", "max_energy_mhz", "quantum_numbers", "level_count", "ground_mhz", "hyperfine", "levels", "files",
 }  # fmt: skip
 
 

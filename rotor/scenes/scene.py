@@ -253,6 +253,7 @@ class EmissionScene(Scene, frozen=True, tag="emission"):
     """Lines of a source of several molecules, as a radio telescope sees them."""
 
     molecules: Annotated[list[EmittingMolecule], said("one or more")]
+    effects: QuantumEffects = QuantumEffects()
     conditions: EmissionConditions = EmissionConditions()
     observables: EmissionObservables = EmissionObservables()
     outputs: EmissionOutputs = EmissionOutputs()

@@ -43,6 +43,9 @@ class MoleculeSection(Section, frozen=True):
     spin_weights: Annotated[dict[str, int] | None, said("of the levels", {"ee": 1, "eo": 3, "oe": 3, "oo": 1})] = None
     spin_constants: Annotated[str | None, said("of nuclear and electron spins (MHz)", "chi_aa(14N)=-4.22 MHz")] = None
     spins: Annotated[str | None, said("sizes and order of the spins", "14N=1")] = None
+    state_constants: Annotated[
+        str | None, said("further states and what couples them (MHz)", "E[1]=120GHz B[1]=10GHz W[0,1]=3 MHz")
+    ] = None
     calculator: Annotated[str | None, said("ASE calculator that refines the geometry first", "xtb")] = None
     hessian: Annotated[str | None, said("file of the Hessian that quartic distortion follows from", "hessian.txt")] = (
         None
