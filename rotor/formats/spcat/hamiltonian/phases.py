@@ -128,7 +128,7 @@ def turned_axis(used: Iterable[str], odd: frozenset[str]) -> str:
 
     Raises ValueError where no half turn fits: the Hamiltonian is complex in every choice of phases.
 
-    >>> turned_axis("a", frozenset("a")), turned_axis("ac", frozenset("a")), turned_axis("abc", frozenset("ac"))
+    >>> turned_axis("a", frozenset("a")), turned_axis("ac", frozenset("a")), turned_axis("a", frozenset("ac"))
     ('c', 'c', 'b')
     """
     axes = sorted(set(used) - {""})
