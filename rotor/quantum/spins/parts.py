@@ -43,7 +43,7 @@ def named_states(rotor: RotorBlock, vectors: Floats) -> Ints:
     shares = np.stack([(vectors[part.place] ** 2).sum(axis=0) for part in rotor.parts])
     of_state = assigned(shares, np.array([len(part.names) for part in rotor.parts]))
     labels = np.empty((len(of_state), 3), dtype=np.int64)
-    labels[np.argsort(of_state, kind="stable")] = np.concatenate(rotor.names)
+    labels[np.argsort(of_state, kind="stable")] = np.concatenate([part.names for part in rotor.parts])
     return labels
 
 
@@ -117,11 +117,11 @@ def names_of_tables(tables: Sequence[tuple[Ints, Sequence[SpinPart]]]) -> tuple[
     found, sizes, rows, first = list[Ints](), list[int](), list[int](), 0
     for every, parts in tables:
         for part in parts:
-            start, stop = first + part.patterns.start, first + part.patterns.stop
-            for names in part.rotor.names:
-                found += [names] * (stop - start)
-                rows += range(start, stop)
-                sizes += [len(names)] * (stop - start)
+            own, count = range(first + part.patterns.start, first + part.patterns.stop), part.repeats
+            for one in part.rotor.parts:
+                found += [one.names] * count
+                rows += own
+                sizes += [len(one.names)] * count
         first += len(every)
     out = np.empty((sum(sizes), 3 + tables[0][0].shape[1]), dtype=np.int64)
     np.concatenate(found, out=out[:, :3])
