@@ -10,7 +10,7 @@ import numpy as np
 from rotor.arrays import Floats, Indices, Workspace
 from rotor.quantum.spins.blocks import SpinBlock
 from rotor.quantum.spins.contraction import MOST_RANK, tensors_of_stacks
-from rotor.quantum.spins.many_f import Frame, Group, Tables, are_connected, between, functions_of, tables_of
+from rotor.quantum.spins.many_f import Frame, Group, Tables, between, functions_of, tables_of
 from rotor.quantum.spins.pattern_tables import tensors_by_f
 from rotor.quantum.tensors import Tensors, rank_of
 
@@ -67,11 +67,13 @@ def amplitudes_of_groups(blocks: Sequence[SpinBlock], tensors: Tensors, levels: 
     frame: Frame = shared.cache["frame"]
     tables = tables_of(tensors_of_stacks(shared.stacks or [], tensors), frame)
     every = [_states(group, own, levels) for group, own in _by_group(blocks)]
-    space = Workspace()
+    space, connected = Workspace(), {(left, right) for left, right, _ in tables}
     for step in range(0, 2 * rank + 1, 2):
         coefficients = tensors_by_f(shared.scheme, rank, step, frame.twice_f[0], frame.twice_f[-1])
         for place, low in enumerate(every):
             for up in every[place:] if step == 0 else every:
+                if not any((left, right) in connected for left in up.group.kinds for right in low.group.kinds):
+                    continue
                 yield from _between(up, low, step, rank, tables, coefficients, frame, space)
 
 
@@ -86,11 +88,12 @@ def _by_group(blocks: Sequence[SpinBlock]) -> list[tuple[Group, list[SpinBlock]]
 def _states(group: Group, blocks: Sequence[SpinBlock], levels: int) -> States:
     sizes = [len(block.energies_mhz) for block in blocks]
     vectors = np.zeros((len(blocks), group.columns * group.states, max(sizes)))
-    rows = np.full((len(blocks), max(sizes)), levels, dtype=np.int32)
+    starts, counts = np.array([block.start for block in blocks], dtype=np.int32), np.array(sizes)
+    every = np.arange(max(sizes), dtype=np.int32)
+    rows = np.where(every < counts[:, None], starts[:, None] + every, np.int32(levels))
     for place, (block, size) in enumerate(zip(blocks, sizes, strict=True)):
         functions = group.functions[group.places[block.twice_f]]
         vectors[place, functions, :size] = block.vectors
-        rows[place, :size] = range(block.start, block.start + size)
     heights = [group.heights[group.places[block.twice_f]] for block in blocks]
     of_columns = vectors.reshape(len(blocks), group.columns, group.states, -1)
     return States(group, {block.twice_f: place for place, block in enumerate(blocks)}, of_columns, rows, sizes, heights)
@@ -101,7 +104,7 @@ def _between(
 ) -> Iterator[Rows]:
     """Between two groups, F' = F + step, doubled."""
     twice_f = [f for f in low.places if f + step in up.places and 2 * f + step >= 2 * rank]
-    if not twice_f or not are_connected((up.group, low.group), step, tables):
+    if not twice_f:
         return
     whole = between(up.group, low.group, twice_f, step, tables, coefficients, frame, space)
     lefts, rights = [up.places[f + step] for f in twice_f], [low.places[f] for f in twice_f]
