@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -57,11 +56,6 @@ class Group:
     def columns(self) -> int:
         """Number of columns."""
         return int(self.slots[-1].columns.stop)
-
-    @cached_property
-    def kinds(self) -> frozenset[int]:
-        """The kinds of its blocks of the rotation."""
-        return frozenset(slot.kind for slot in self.slots)
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,6 +176,12 @@ def _group(key: Key, members: Sequence[tuple[int, Sequence[SpinPart], Key]], fra
 def _key(own: Sequence[int], parts: Sequence[SpinPart], frame: Frame) -> Key:
     """Where the columns of a block stand."""
     return tuple((frame.cells[own[part.patterns.start]], frame.kinds[part.number]) for part in parts)
+
+
+def are_connected(of_both: tuple[Group, Group], step: int, tables: Tables) -> bool:
+    """Whether there are elements between two groups whose F differ by `step`, doubled."""
+    up, low = of_both
+    return any((a.kind, b.kind, (step + a.rise - b.rise) // 2) in tables for a in up.slots for b in low.slots)
 
 
 def between(

@@ -10,7 +10,7 @@ import numpy as np
 from rotor.arrays import Floats, Indices, Workspace
 from rotor.quantum.spins.blocks import SpinBlock
 from rotor.quantum.spins.contraction import MOST_RANK, tensors_of_stacks
-from rotor.quantum.spins.many_f import Frame, Group, Tables, between, functions_of, tables_of
+from rotor.quantum.spins.many_f import Frame, Group, Tables, are_connected, between, functions_of, tables_of
 from rotor.quantum.spins.pattern_tables import tensors_by_f
 from rotor.quantum.tensors import Tensors, rank_of
 
@@ -67,13 +67,11 @@ def amplitudes_of_groups(blocks: Sequence[SpinBlock], tensors: Tensors, levels: 
     frame: Frame = shared.cache["frame"]
     tables = tables_of(tensors_of_stacks(shared.stacks or [], tensors), frame)
     every = [_states(group, own, levels) for group, own in _by_group(blocks)]
-    space, connected = Workspace(), {(left, right) for left, right, _ in tables}
+    space = Workspace()
     for step in range(0, 2 * rank + 1, 2):
         coefficients = tensors_by_f(shared.scheme, rank, step, frame.twice_f[0], frame.twice_f[-1])
         for place, low in enumerate(every):
             for up in every[place:] if step == 0 else every:
-                if not any((left, right) in connected for left in up.group.kinds for right in low.group.kinds):
-                    continue
                 yield from _between(up, low, step, rank, tables, coefficients, frame, space)
 
 
@@ -104,7 +102,7 @@ def _between(
 ) -> Iterator[Rows]:
     """Between two groups, F' = F + step, doubled."""
     twice_f = [f for f in low.places if f + step in up.places and 2 * f + step >= 2 * rank]
-    if not twice_f:
+    if not twice_f or not are_connected((up.group, low.group), step, tables):
         return
     whole = between(up.group, low.group, twice_f, step, tables, coefficients, frame, space)
     lefts, rights = [up.places[f + step] for f in twice_f], [low.places[f] for f in twice_f]
