@@ -90,9 +90,7 @@ class Outputs:
     save_scene: str | None = save_scene_option()
 
 
-@grouped(
-    given=("dipole", "calculator", "hessian", "spin_constants", "spins", "state_constants"), picture=("plot_scale",)
-)
+@grouped(given=("dipole", "calculator", "hessian", "spin_constants", "spins", *inputs.STATES), picture=("plot_scale",))
 def command(
     context: typer.Context, given: Input, pulses: Pulses, options: Options, outputs: Outputs, picture: ViewOptions
 ) -> None:

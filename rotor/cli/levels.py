@@ -74,7 +74,7 @@ class Outputs:
     save_scene: str | None = save_scene_option()
 
 
-@grouped(given=("dipole", "dipole_abc"), picture=("plot_scale",))
+@grouped(given=("dipole", "dipole_abc", "state_dipoles"), picture=("plot_scale",))
 def command(
     context: typer.Context,
     given: Input,

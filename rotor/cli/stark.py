@@ -138,7 +138,7 @@ class Outputs:
     save_scene: str | None = save_scene_option()
 
 
-@grouped(given=("spin_weights", "calculator", "hessian", "state_constants"), picture=("plot_scale",))
+@grouped(given=("spin_weights", "calculator", "hessian", *inputs.STATES), picture=("plot_scale",))
 def command(
     context: typer.Context,
     given: Input,

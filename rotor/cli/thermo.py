@@ -74,7 +74,7 @@ class Outputs:
     save_scene: str | None = save_scene_option()
 
 
-@grouped(given=("dipole", "dipole_abc", "calculator", "hessian"))
+@grouped(given=("dipole", "dipole_abc", "state_dipoles", "calculator", "hessian"))
 def command(
     context: typer.Context,
     given: Input,

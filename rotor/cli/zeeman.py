@@ -99,7 +99,7 @@ class Outputs:
 
 
 @grouped(
-    given=("dipole", "dipole_abc", "spin_weights", "calculator", "hessian", "state_constants"), picture=("plot_scale",)
+    given=("dipole", "dipole_abc", "spin_weights", "calculator", "hessian", *inputs.STATES), picture=("plot_scale",)
 )
 def command(context: typer.Context, given: Input, options: Options, outputs: Outputs, picture: ViewOptions) -> None:
     """Levels in a static magnetic field: energies, labels and magnetic moments of every M, with nuclear spins where asked."""
