@@ -87,6 +87,11 @@ in the other three it does not: the pairs of levels looked at there are 3e-10 to
 1.3e-7 MHz, and round-off mixes them here. The place that counts as free depends on the order in which the program's diagonalization
 leaves the states, so that those names follow no rule that could be repeated here.
 
+A code with I1 = 0 and I2 > 0, "commutator with i N²", is refused within one state. With TYP 41 and 61 the program's elements of ΔN = 1
+have the magnitudes of ½i [N², S_k], but the product of ⟨2₀₂|H|1₁₁⟩, ⟨2₂₀|H|1₁₁⟩ and ⟨2₀₂|H|2₂₀⟩, which no choice of phases changes, has the
+other sign in both bases (its listing of the matrix, EGYFLG 5); TYP 20, 40 and 60 do nothing, TYP 21 has the parity of an operator
+between states. What the two orders of a spin-rotation constant differ by has the name C_ab-ba here, and no code.
+
 The partition function that the program writes to its .out file, and its .str file, were not compared.
 
 16 of the later inputs were then spelled in 144 other ways (tabs, carriage returns, D exponents, missing errors and labels, long
@@ -169,7 +174,7 @@ def other_rows() -> list[str]:
     cases = [
         ("NS 1 to 4: powers of N·S, alone", 1_000_000), ("NS 1 to 4 with one spin", 11_010_000), ("NS 5: N_z S_z, alone", 5_000_000),
         ("NS 5 with another operator", 15_010_000), ("NS with TYP 20 and above", 1_210_000),
-        ("I1 = 0, I2 > 0: commutator with Nz²", 100_010_000), ("FF: Fourier term, with NOFC that of one K", 1_000_010_000),
+        ("I1 = 0, I2 > 0: commutator with N²", 100_010_000), ("FF: Fourier term, with NOFC that of one K", 1_000_010_000),
         ("FF with a spin", 1_010_010_000), ("EX 1 to 5: Euler series", 100_000_010_000), ("EX with a spin", 100_010_010_000),
     ]  # fmt: skip
     rows = [f"| {name} | {operator_answer(code)} |" for name, code in cases]

@@ -25,6 +25,8 @@ class Moment(NamedTuple):
     none, "J" ½{N², }, "JJ" ½{N⁴, }, "K" ½{Nz², }, "[J]" ½[N², ], "[[J]]" ¼[N², [N², ]]; of a magnetic one "3K-J" ½(3Nz² - N²).
     spin: of a magnetic moment, the spin's name, "" the rotation. tensor: c of a magnetic moment that is not isotropic. cosine: of an
     electric one α', α of the two states where an element is multiplied by cos(α'K' + αK), a Fourier term of internal rotation.
+    turned: of an electric one the axis g, where it stands for C2g times itself, i times what it is in functions of other phases; by_order:
+    whether it has the factor i from the higher state to the lower one, -i the other way round.
     """
 
     value_debye: float
@@ -34,6 +36,13 @@ class Moment(NamedTuple):
     spin: str = ""
     tensor: Matrix | None = None
     cosine: tuple[float, float] | None = None
+    turned: str = ""
+    by_order: bool = False
+
+    @property
+    def imaginary(self) -> bool:
+        """Whether its elements are imaginary where those of a plain dipole within one state are real: their squares add up."""
+        return bool(self.turned) != self.by_order
 
     @property
     def electric(self) -> bool:

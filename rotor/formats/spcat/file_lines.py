@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,7 +62,11 @@ def transitions_of(group: Group, levels: Levels, request: Request, q: float) -> 
         none = np.zeros(0, dtype=np.int32)
         return Transitions(np.zeros(0), np.zeros(0), none, none)
     found = all_transitions(
-        levels, dict(group.effect.moments), cut=_wide_cut(levels, request, q), moments=group.effect.others
+        levels,
+        dict(group.effect.moments),
+        (0.0, request.fqlim_ghz * 1e3),
+        cut=_wide_cut(levels, request, q),
+        moments=group.effect.others,
     )
     exists = np.ones(len(found.lower), dtype=bool)
     if (levels.weight <= 0).any():
@@ -287,11 +291,16 @@ def _rising(frequency_mhz: Floats) -> Ints | slice:
     return rising_order(frequency_mhz)
 
 
+_EVERY = 99  # quantum numbers; no file has as many
+_RANKS = 9999  # the largest number of four digits
+
+
 def as_level_list(
     solved: list[tuple[Group, Levels]], form: Format, spreads: Sequence[Floats | None] | None = None
 ) -> LevelList:
-    """The levels of all groups as an .egy file has them, ±K apart; block is 1 and rank counts by F and energy, other than in the program.
+    """The levels of all groups as an .egy file has them, ±K apart, with all quantum numbers, however many there are.
 
+    Blocks count 9999 levels each, by F and energy, other than in the program.
     spreads: (levels, k) of each group in MHz; the lengths of their rows are the errors of the energies, which are 0 without them.
     """
     tables = []
@@ -301,19 +310,21 @@ def as_level_list(
             rows = np.flatnonzero((levels.weight > 0) & (levels.components > int(negative)))
             mixing = np.ones(len(levels)) if levels.mixing is None else levels.mixing
             g = levels.multiplicity * (levels.weight // levels.components)
-            quanta = quanta_of(group, levels, form, negative)
+            quanta = quanta_of(group, levels, replace(form, most=_EVERY), negative)[rows]
+            pattern = quanta_of(group, levels, form, negative)[rows, -2] if form.aggregate else quanta[:, 0]
             tables.append(
-                (levels.energy_mhz[rows] / units.MHZ_PER_CM, error[rows], mixing[rows], g[rows], quanta[rows])
+                (levels.energy_mhz[rows] / units.MHZ_PER_CM, error[rows], mixing[rows], g[rows], quanta, pattern)
             )
-    energy, error, mixing, g, quanta = (np.concatenate([table[i] for table in tables]) for i in range(5))
+    energy, error, mixing, g, quanta, pattern = (np.concatenate([table[i] for table in tables]) for i in range(6))
     order = np.lexsort((energy, quanta[:, -1] if form.spins else quanta[:, 0]))
-    n = len(order)
+    block, rank = np.divmod(np.arange(len(order), dtype=np.int32), _RANKS)
     return LevelList(
-        block=np.ones(n, dtype=np.int32),
-        rank=np.arange(1, n + 1, dtype=np.int32),
+        block=block + 1,
+        rank=rank + 1,
         energy_cm=energy[order],
         error_cm=error[order],
         mixing=mixing[order],
         degeneracy=g[order].astype(np.int32),
         quanta=quanta[order].astype(np.int16),
+        pattern=pattern[order].astype(np.int16) if form.aggregate else None,
     )

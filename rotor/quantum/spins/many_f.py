@@ -2,8 +2,8 @@
 
 Blocks of different F that hold the same kinds of solved blocks of the rotation, at the same N - F and with the same coupling patterns,
 make a group. A function of a group has a column (a kind of block and a pattern, the same number for all F) and a state of that
-block, whose number counts first: function = state · columns + column. What a block lacks, since its N is low or its
-states are fewer, are zeros. Elements of the rotation stand in tables by N, coefficients of coupling in tables by F.
+block: function = column · states + state. What a block lacks, since its N is low or its states are fewer, are zeros. Elements of
+the rotation stand in tables by N, coefficients of coupling in tables by F.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rotor.arrays import Floats, Ints
+from rotor.arrays import Floats, Ints, Workspace
 from rotor.quantum.spins.contraction import Contracted, Stack
 from rotor.quantum.spins.parts import SpinPart
 
@@ -37,12 +37,13 @@ class Slot(NamedTuple):
 class Group:
     """Blocks of rising F, doubled; functions: of every block where its functions stand, in the order of its parts.
 
-    states: the largest number of states of a block of the rotation. places: of a doubled F among the blocks.
+    states: the largest number of states of a block of the rotation; heights: that of each block. places: of a doubled F among the blocks.
     """
 
     slots: tuple[Slot, ...]
     twice_f: list[int]
     states: int
+    heights: list[int]
     functions: list[Ints]
     places: dict[int, int] = field(repr=False)
 
@@ -169,10 +170,11 @@ def _group(
             order += at.tolist()
         orders.append(order)
     states = int(columns.max())
-    every = np.arange(start)[:, None] + np.arange(states) * start
+    every = np.arange(start * states).reshape(start, states)
     there = np.arange(states) < columns[:, :, None]
     functions = [every[order][there[place, order]] for place, order in enumerate(orders)]
-    return Group(tuple(slots), twice_f, states, functions, {f: place for place, f in enumerate(twice_f)})
+    places = {f: place for place, f in enumerate(twice_f)}
+    return Group(tuple(slots), twice_f, states, columns.max(axis=1).tolist(), functions, places)
 
 
 def _key(own: Ints, parts: Sequence[SpinPart], frame: Frame, cells: Sequence[Cell]) -> Key:
@@ -187,8 +189,9 @@ def are_connected(of_both: tuple[Group, Group], step: int, tables: Tables) -> bo
 
 
 def between(
-    up: Group, low: Group, twice_f: Sequence[int], step: int, tables: Tables, coefficients: Floats, frame: Frame
-) -> Floats:
+    up: Group, low: Group, twice_f: Sequence[int], step: int, tables: Tables, coefficients: Floats, frame: Frame,
+    space: Workspace,
+) -> Floats:  # fmt: skip
     """c(F) ⟨r'‖X‖r⟩ between two groups, with F' = F + step.
 
     Parameters
@@ -205,18 +208,15 @@ def between(
         By all F of the frame.
     frame : Frame
         Of both groups.
+    space : Workspace
+        The array stands in it until the next one.
 
     Returns
     -------
-    (F, states', columns', states, columns) array
-        Functions are counted as `functions_of` does.
+    (F, columns', states', columns, states) array
     """
-    # the longest axes last where a slot has several columns: short innermost loops take most of the time
-    alone = up.columns == len(up.slots) and low.columns == len(low.slots)
-    shape = len(twice_f), up.states, up.columns, low.states, low.columns
-    order = (0, 1, 2, 3, 4) if alone else (2, 4, 0, 1, 3)
-    out = np.zeros([shape[axis] for axis in order])
-    view = out.transpose(np.argsort(order).tolist())
+    out = space.array("elements", len(twice_f), up.columns, up.states, low.columns, low.states)
+    out.fill(0.0)
     own = coefficients[frame.of_f(twice_f)]
     for right in low.slots:
         places = frame.of_n(twice_f, right)
@@ -226,14 +226,14 @@ def between(
                 element = table[places, : up.states, : low.states]
                 _, rows, columns = element.shape
                 np.multiply(
-                    element[:, :, None, :, None],
-                    own[:, None, left.patterns, None, right.patterns],
-                    out=view[:, :rows, left.columns, :columns, right.columns],
+                    element[:, None, :, None, :],
+                    own[:, left.patterns, None, right.patterns, None],
+                    out=out[:, left.columns, :rows, right.columns, :columns],
                 )
-    return view
+    return out
 
 
 def functions_of(elements: Floats) -> Floats:
-    """Elements (F, states', columns', states, columns) as (F, functions', functions); a view where columns come last in memory."""
-    count, states_up, columns_up, states, columns = elements.shape
-    return elements.reshape(count, states_up * columns_up, states * columns)
+    """Elements (F, columns', states', columns, states) as (F, functions', functions)."""
+    count, columns_up, states_up, columns, states = elements.shape
+    return elements.reshape(count, columns_up * states_up, columns * states)

@@ -50,14 +50,52 @@ def named_states(rotor: RotorBlock, vectors: Floats) -> Ints:
 def labels_of(parts: tuple[SpinPart, ...], named: tuple[Ints, Ints], vectors: Floats) -> tuple[Ints, Floats]:
     """Names (n, 3 + pattern) of the states of a block, energies rising, and the shares of the sub-blocks that give them."""
     names, sizes = named
+    labels, mixing = labels_of_alike([parts], names[None], sizes[None], vectors[None])
+    return labels[0], mixing[0]
+
+
+def labels_of_alike(
+    every: Sequence[tuple[SpinPart, ...]], names: Ints, sizes: Ints, vectors: Floats
+) -> tuple[Ints, Floats]:
+    """The same of blocks of n states each with as many sub-blocks.
+
+    Parameters
+    ----------
+    every : sequence of tuple of SpinPart
+        The parts of each block.
+    names : (blocks, n, 3 + pattern) array
+        Of the levels that the sub-blocks name, see `names_of_tables`.
+    sizes : (blocks, sub-blocks) array
+        How many each names.
+    vectors : (blocks, n, n) array
+        Eigenvectors in columns.
+
+    Returns
+    -------
+    labels : (blocks, n, 3 + pattern) array
+        Of the states, energies rising.
+    mixing : (blocks, n) array
+        Shares of the sub-blocks that name them.
+    """
+    (count, subs), n = sizes.shape, names.shape[1]
     inside = vectors
-    if any(len(part.rotor.parts) > 1 for part in parts):
-        inside = np.concatenate([_over_functions(part, vectors) for part in parts])
-    table = np.add.reduceat(inside * inside, np.cumsum(sizes) - sizes, axis=0)
-    of_state = assigned(table, sizes)
+    if any(len(part.rotor.parts) > 1 for parts in every for part in parts):
+        inside = np.stack(
+            [
+                np.concatenate([_over_functions(part, own) for part in parts])
+                for parts, own in zip(every, vectors, strict=True)
+            ]
+        )
+    block = np.arange(count)[:, None]
+    starts = np.cumsum(sizes, axis=1) - sizes + n * block
+    shares = np.add.reduceat((inside * inside).reshape(count * n, n), starts.ravel(), axis=0).reshape(count, subs, n)
+    of_state = shares.argmax(axis=1)
+    found = np.bincount((of_state + subs * block).ravel(), minlength=count * subs).reshape(count, subs)
+    for place in np.flatnonzero((found != sizes).any(axis=1)).tolist():
+        of_state[place] = assigned(shares[place], sizes[place])
     labels = np.empty_like(names)
-    labels[np.argsort(of_state, kind="stable")] = names
-    return labels, np.asarray(table[of_state, np.arange(len(of_state))])
+    labels[block, np.argsort(of_state, axis=1, kind="stable")] = names
+    return labels, np.asarray(shares[block, of_state, np.arange(n)])
 
 
 def _over_functions(part: SpinPart, vectors: Floats) -> Floats:
@@ -110,14 +148,17 @@ def assigned(shares: Floats, capacity: Ints) -> Ints:
 
 
 def _largest_first(shares: Floats, capacity: Ints) -> Ints:
-    found, left = np.full(shares.shape[1], -1), capacity.copy()
+    count = shares.shape[1]
+    found, left, missing = [-1] * count, capacity.tolist(), count
     every = np.argsort(-shares, axis=None, kind="stable")
     for start in range(0, len(every), _AT_A_TIME):
-        subs, states = np.divmod(every[start : start + _AT_A_TIME], shares.shape[1])
-        free = (found[states] < 0) & (left[subs] > 0)  # of what was decided before
-        for sub, state in zip(subs[free].tolist(), states[free].tolist(), strict=True):
+        subs, states = np.divmod(every[start : start + _AT_A_TIME], count)
+        if start:  # many are decided before
+            free = (np.array(found)[states] < 0) & (np.array(left)[subs] > 0)
+            subs, states = subs[free], states[free]
+        for sub, state in zip(subs.tolist(), states.tolist(), strict=True):
             if found[state] < 0 and left[sub]:
-                found[state], left[sub] = sub, left[sub] - 1
-        if not left.any():
-            break
-    return found
+                found[state], left[sub], missing = sub, left[sub] - 1, missing - 1
+                if not missing:
+                    return np.array(found)
+    return np.array(found)

@@ -67,10 +67,10 @@ def in_wang_functions(plan: Plan) -> Plan:
 
     Raises ValueError for a rotation without a threefold axis.
     """
-    blocks, operators = [], dict(plan.operators)
+    blocks = []
     turned = {
         pair: {c: plan.blocks[pair[0]].vectors @ x @ plan.blocks[pair[1]].vectors.T for c, x in found.items()}
-        for pair, found in operators.items()
+        for pair, found in plan.operators.items()
     }
     for number, block in enumerate(plan.blocks):
         own = (block.vectors * block.energies_mhz) @ block.vectors.T
@@ -78,7 +78,7 @@ def in_wang_functions(plan: Plan) -> Plan:
         found = turned.setdefault((number, number), {})
         found[_ALONE] = own + found[_ALONE] if _ALONE in found else own
         blocks.append(RotorBlock(block.n, block.parts, np.diag(own).copy(), np.eye(len(own))))
-    return replace(plan, shared=replace(plan.shared, stacks=stacks_of(blocks)), blocks=blocks, operators=turned)
+    return replace(plan, shared=replace(plan.shared, stacks=stacks_of(blocks)), blocks=blocks, given=turned)
 
 
 def _check_axis(block: RotorBlock, matrix: Floats) -> None:
