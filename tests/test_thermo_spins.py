@@ -118,3 +118,12 @@ def test_the_answer_counts_the_effects():
     assert "nuclear quadrupole" in {one["name"] for one in split["effects"] if one["present"]}
     plain = answer_thermo(ThermoRequest(replace(top, spin_constants=None), (1.0,))).facts()
     assert plain["hyperfine"] is None
+
+
+def test_constants_of_zero_leave_the_rotation_times_the_functions():
+    """No splitting, a frozen rotation: 0/0 is no error, and nothing is summed."""
+    found = functions(rod("chi_aa(14N)=0 MHz"), [1e-3, 1e-2, 1.0])
+    assert found.q_rot[:2] == pytest.approx([3.0, 3.0], rel=1e-14)  # exp of a logarithm
+    assert found.hyperfine is not None
+    assert found.hyperfine["summed_up_to_k"] is None
+    assert np.isfinite(found.relative_error).all()

@@ -116,20 +116,25 @@ def times_functions(rotation: LevelSums, functions: int, ground_k: float, size_m
     """
     above, x2 = (rotation.ground_k - ground_k) / rotation.temperatures_k, _squared(size_mhz, rotation.temperatures_k)
     energy = rotation.energy_over_rt + above
-    with np.errstate(divide="ignore"):  # where the rotation is frozen, all of C_v is that of the spins
+    with np.errstate(divide="ignore", over="ignore"):  # where the rotation is frozen, all of C_v is that of the spins
         return replace(
             rotation,
             ground_k=ground_k,
             q=functions * rotation.q * np.exp(-above),
             energy_over_rt=energy,
             error_q=rotation.error_q + x2 / 2,
-            error_energy=rotation.error_energy + x2 / energy,
-            error_cv=rotation.error_cv + x2 / rotation.cv_over_r,
+            error_energy=rotation.error_energy + _over(x2, energy),
+            error_cv=rotation.error_cv + _over(x2, rotation.cv_over_r),
         )
 
 
 def _squared(size_mhz: float, temperatures_k: Floats) -> Floats:
     return np.asarray((size_mhz / (units.MHZ_PER_K * temperatures_k)) ** 2)
+
+
+def _over(x2: Floats, value: Floats) -> Floats:
+    """What splittings may change, over a function; nothing where there are none."""
+    return np.asarray(np.divide(x2, value, out=np.zeros_like(x2), where=x2 > 0))
 
 
 def _worst(sums: LevelSums) -> Floats:
