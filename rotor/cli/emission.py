@@ -26,6 +26,7 @@ from rotor.cli.shared.output import (
 )
 from rotor.cli.shared.plot_options import PlotOptions
 from rotor.cli.shared.save_scene import molecule_of, save_made, save_scene_option
+from rotor.table import counted
 
 if TYPE_CHECKING:
     from rotor.scenes.scene import EmissionScene
@@ -292,7 +293,7 @@ def _table(answer: EmissionAnswer, shown: int) -> Table:
         )
         for i in rows
     ]
-    title = f"the {len(rows)} brightest lines" if len(rows) < len(lines) else "all lines"
+    title = f"the {counted(len(rows), 'brightest line')}" if len(rows) < len(lines) else "all lines"
     columns = (
         "molecule", "at rest (MHz)", "observed (MHz)", "upper", "lower", "E_u (K)", "A (1/s)", "g_u", "τ", "T_B (K)", "∫T_B dv (K km/s)",
     )  # fmt: skip

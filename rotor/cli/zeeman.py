@@ -32,6 +32,7 @@ from rotor.cli.shared.plot_options import ViewOptions, view_of
 from rotor.cli.shared.report import model_facts
 from rotor.cli.shared.save_scene import save_scene, save_scene_option
 from rotor.cli.shared.sources import with_sources
+from rotor.table import counted
 
 if TYPE_CHECKING:
     from rotor.plots.view import View
@@ -229,7 +230,7 @@ def _facts(answer: ZeemanAnswer, content: dict[str, Any]) -> list[tuple[str, str
     facts = [
         ("constants", report.constants_text(answer.request.top)),
         ("g", _tensor_text(content["g_abc"])),
-        ("field", f"{first:g} to {last:g} T along Z, {count} values"),
+        ("field", f"{first:g} to {last:g} T along Z, {counted(count, 'value')}"),
     ]
     if content["magnetisability_abc"] is not None:
         facts.append(("magnetisability", f"{_tensor_text(content['magnetisability_abc'])} 1e-6 erg/(G² mol)"))

@@ -180,7 +180,7 @@ _OF_ROTATION = ("v", "n", "k", "ka", "kc", "irrep", "m")
 
 
 def merged_text(quanta: Quanta, rows: Ints, halves: Collection[str] = ()) -> str:
-    r"""Levels of one rotational level as a plot names them where they cannot be told apart: all values of the sum that differs.
+    r"""Levels of one rotational level as a plot names them where their steps overlap: all values of the sum that differs.
 
     Up to four values of one sum are listed, of more the first and the last one; where several sums differ the last one's range stands
     with how many levels there are.
