@@ -39,6 +39,7 @@ from rotor.spectra.intensity import (
     population,
 )
 from rotor.spectra.transitions import all_transitions
+from rotor.table import counted
 from rotor.thermo import PartitionFunction, VibrationalStates, partition_function
 from rotor.thermo.trusted_levels import are_trusted, in_level_table
 from rotor.tops.covariance import Covariance
@@ -100,7 +101,10 @@ class Lines(TransitionTable):
         known = set(self.covariance_used.names) if self.covariance_used else set()
         exact = [name for name in self._parameters if name not in known and ("(" not in name or "(" in "".join(known))]
         partly = f"errors of frequencies take {', '.join(exact)} as exact: their uncertainty is not known"
-        beyond = f"{self.untrusted} lines of levels beyond the reach of the distortion constants are left out"
+        verb = "is" if self.untrusted == 1 else "are"
+        beyond = (
+            f"{counted(self.untrusted, 'line')} of levels beyond the reach of the distortion constants {verb} left out"
+        )
         found = () if self._tabulated else warnings_of(self.top, self.levels)
         found += (beyond,) if self.untrusted else ()
         return found + ((partly,) if known and exact else ())
@@ -236,7 +240,7 @@ class Lines(TransitionTable):
     def _title(self) -> str:
         name = self.top.name or "a top"
         extent = f", {self.frequency_mhz.min():.4f} to {self.frequency_mhz.max():.4f} MHz" if len(self) else ""
-        return f"{len(self)} lines of {name} at {self.temperature_k:g} K, J up to {self.jmax}{extent}"
+        return f"{counted(len(self), 'line')} of {name} at {self.temperature_k:g} K, J up to {self.jmax}{extent}"
 
     def _texts(self, rows: NDArray[np.int64]) -> dict[str, list[str]]:
         few = self.where(rows)

@@ -34,6 +34,7 @@ from rotor.quantum.estimates.derivatives import level_derivatives
 from rotor.quantum.levels import Levels
 from rotor.spectra.lines import Lines
 from rotor.spectra.transitions import Transitions
+from rotor.table import counted
 from rotor.thermo import PartitionFunction
 from rotor.tops.top import Top
 
@@ -293,7 +294,7 @@ def _notes(parameters: ParameterFile, groups: list[Group], request: Request, as_
     """What SPCAT does in silence with these files, and what is done here."""
     found, notes = len(parameters.parameters), []
     if parameters.header.npar > found:
-        notes.append(f"NPAR = {parameters.header.npar}, but {found} parameters stand in the file: those are used")
+        notes.append(f"NPAR = {parameters.header.npar}, but the file has {counted(found, 'parameter')}: all count")
     notes += left_out(parameters)
     for group in groups:
         highest = request.fend + sum(group.spins) // 2
