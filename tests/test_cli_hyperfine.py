@@ -10,6 +10,10 @@ import pytest
 ROD = ("--constants", "B=44.316 GHz", "--polarizability", "3.9,2.0", "--temperature", "5")
 CHI = ("--spin-constants", "chi_aa(14N)=-4.7 MHz")
 STATES = ("--constants", "A=50 B=44 C=40 GHz", "--state-constants", "E[1]=100 A[1]=49 B[1]=44 C[1]=39 GHz")
+PAIR = (
+    "--constants", "A=30 B=20 C=15 GHz", "--spin-weights", "ee=1,eo=3,oe=3,oo=1", "--spins", "14N_1+14N_2", "--spin-constants",
+    "chi_aa(14N_1)=1 chi_aa(14N_2)=1", "--temperature", "5",
+)  # fmt: skip
 SPLIT = "88.62:88.64GHz"
 
 
@@ -63,12 +67,24 @@ def test_raman_lines_with_spins(call):
     assert content(call, "raman", *ROD, *CHI, "--no-hyperfine")["lines"] == whole["lines"]
 
 
+def test_thermo_counts_the_functions_of_spins(call):
+    words = ("thermo", "HCN", "--temperature", "1,300")
+    whole, split = content(call, *words), content(call, *words, "--hyperfine")
+    for one, many in zip(whole["functions"], split["functions"], strict=True):
+        assert many["q_rot"] == pytest.approx(3 * one["q_rot"], rel=1e-6)  # δ/kT = 2e-4 at 1 K, its square
+        assert many["cv_over_r"] == pytest.approx(one["cv_over_r"], rel=1e-6)
+    assert split["hyperfine"]["spin_functions"] == 3
+    assert split["spin_factor"] == pytest.approx(3 * whole["spin_factor"])
+    assert "Q counts 3 functions of the spins" in call(*words, "--hyperfine")[1]
+
+
 @pytest.mark.parametrize(
     "words",
     [
         ("emission", "HCN", "--range", SPLIT, "--hyperfine"),
         ("raman", *ROD, *CHI, "--hyperfine-method", "auto", "--hyperfine-tolerance", "1 MHz"),
         ("levels", *STATES, "--jmax", "2"),
+        ("thermo", "HCN", "--hyperfine", "--hyperfine-method", "first-order", "--temperature", "0.01,1,300"),
     ],
 )
 def test_a_saved_scene_gives_the_same(call, tmp_path, words):
@@ -94,6 +110,11 @@ REFUSED = [
     (("emission", "HCN", "--range", SPLIT, "--hyperfine-method", "auto"), "nothing is split"),
     (("emission", "HCN", "--range", SPLIT, "--spins", "14N=1"), "--spins: says how large the spins"),
     (("emission", "HCN", "--range", SPLIT, "--spin-constants", "chi_aa(14N)"), "--spin-constants"),
+    (("thermo", "CO", "--hyperfine"), "no constants of spins are known"),
+    (("thermo", "HCN", "--hyperfine-method", "auto"), "nothing is split"),
+    (("thermo", "HCN", "--hyperfine", "--hyperfine-method", "1"), "--hyperfine-method: '1': expected one of"),
+    (("thermo", "HCN", "--hyperfine", "--hyperfine-tolerance", "nan"), "--hyperfine-tolerance"),
+    (("thermo", *PAIR, "--species", "ortho"), "--species: 'ortho': with nuclei that are coupled to a total spin"),
     (("raman", "CO2", "--hyperfine"), "no constants of spins are known"),
     (("raman", "CO2", "--hyperfine-method", "first-order"), "nothing is split"),
     (("raman", *ROD, "--spin-constants", "chi_aa(12C)=1"), "12C"),

@@ -26,6 +26,7 @@ from rotor.cli.shared.output import (
 )
 from rotor.cli.shared.plot_options import PlotOptions
 from rotor.cli.shared.save_scene import molecule_of, save_made, save_scene_option
+from rotor.table import counted
 
 if TYPE_CHECKING:
     from rotor.scenes.scene import EmissionScene
@@ -45,7 +46,7 @@ NAMES = {
     "least_depth": "--least-depth",
 }  # fmt: skip  # field of the request -> option
 _OF_ONE = {
-    "isotope": "--isotope", "spin_constants": "--spin-constants", "spins": "--spins", "state_constants": "--state-constants",
+    "isotope": "--isotope", "spin_constants": "--spin-constants", "spins": "--spins", **inputs.STATES,
 }  # fmt: skip  # what belongs to a single molecule
 
 
@@ -66,6 +67,16 @@ class Options:
     state_constants: str | None = option(
         None, metavar="TEXT", help='Further states of a single molecule: "E[1]=120GHz B[1]=... W[0,1]=3 MHz" (MHz).'
     )
+    state_dipoles: str | None = option(
+        None, metavar="TEXT", help='Its dipoles in and between states, axes a, b, c: "[0,1] 0,0,1.47" (D).'
+    )
+    state_weights: str | None = option(
+        None, metavar="TEXT", help='Its spin weights of states: "[0] even=1,odd=3 [1] even=3,odd=1".'
+    )
+    state_symmetry: str | None = option(
+        None, metavar="GROUP", help="Group of its states, whose couplings are checked by it: C2v, Cs(ab), ..."
+    )
+    state_names: str | None = option(None, metavar="LIST", help="Names of all its states, from 0 on: 0+,0-.")
     column: str = option("1e14", metavar="N", help="Column density, one for all or one each: 1e14,3e13 (1/cm²).")
     excitation: str = option("100", metavar="T", help="Excitation temperature of rotation (K).")
     background: str = option("2.725", metavar="T", help="Temperature behind the source (K).")
@@ -282,7 +293,7 @@ def _table(answer: EmissionAnswer, shown: int) -> Table:
         )
         for i in rows
     ]
-    title = f"the {len(rows)} brightest lines" if len(rows) < len(lines) else "all lines"
+    title = f"the {counted(len(rows), 'brightest line')}" if len(rows) < len(lines) else "all lines"
     columns = (
         "molecule", "at rest (MHz)", "observed (MHz)", "upper", "lower", "E_u (K)", "A (1/s)", "g_u", "τ", "T_B (K)", "∫T_B dv (K km/s)",
     )  # fmt: skip

@@ -28,6 +28,7 @@ from rotor.cli.shared.output import (
 from rotor.cli.shared.plot_options import ViewOptions, view_of
 from rotor.cli.shared.save_scene import save_scene, save_scene_option
 from rotor.cli.shared.sources import source_facts
+from rotor.table import counted
 
 if TYPE_CHECKING:
     from rotor.plots.view import View
@@ -74,7 +75,7 @@ class Outputs:
     save_scene: str | None = save_scene_option()
 
 
-@grouped(given=("dipole", "dipole_abc"), picture=("plot_scale",))
+@grouped(given=("dipole", "dipole_abc", "state_dipoles"), picture=("plot_scale",))
 def command(
     context: typer.Context,
     given: Input,
@@ -199,6 +200,6 @@ def _table(answer: LevelsAnswer, options: Options) -> Table:
             labels, energy.tolist(), columns["weight"][rows].tolist(), columns["degeneracy"][rows].tolist(), strict=True
         )
     ]
-    title = f"the {len(rows)} lowest levels" if len(rows) < len(table) else "all levels"
+    title = f"the {counted(len(rows), 'lowest level')}" if len(rows) < len(table) else "all levels"
     head = (quanta.headings(table.levels.quanta_names), f"E ({options.unit})", "spin weight", "g")
     return Table(f"{title}, in order of energy", head, cells)

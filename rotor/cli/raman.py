@@ -29,6 +29,7 @@ from rotor.cli.shared.output import (
 from rotor.cli.shared.plot_options import ViewOptions, view_of
 from rotor.cli.shared.save_scene import save_scene, save_scene_option
 from rotor.cli.shared.sources import source_facts
+from rotor.table import counted
 
 if TYPE_CHECKING:
     from rotor.plots.view import View
@@ -73,7 +74,7 @@ class Outputs:
     save_scene: str | None = save_scene_option()
 
 
-@grouped(given=("dipole", "dipole_abc", "calculator", "hessian"))
+@grouped(given=("dipole", "dipole_abc", "state_dipoles", "calculator", "hessian"))
 def command(
     context: typer.Context,
     given: Input,
@@ -232,5 +233,5 @@ def _table(lines: RamanLines, rows: Any) -> Table:
     formats = (wavenumber, "{:.4e}", "{:.4f}", wavenumber, "{}", "{:.5g}")
     cells = [[form.format(x) for x in column] for form, column in zip(formats, shown.columns.values(), strict=False)]
     labels = [shown.levels.labels(states) for states in (shown.initial, shown.final)]
-    title = f"the {len(shown)} strongest lines" if len(shown) < len(lines) else "all lines"
+    title = f"the {counted(len(shown), 'strongest line')}" if len(shown) < len(lines) else "all lines"
     return Table(f"{title}, in order of shift (states: {names})", columns, list(zip(*cells, *labels, strict=True)))

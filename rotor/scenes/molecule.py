@@ -140,12 +140,13 @@ def _with_spins(top: Top, molecule: MoleculeSection) -> Top:
 
 
 def _with_states(top: Top, molecule: MoleculeSection) -> Top:
-    if molecule.state_constants is None:
-        return top
-    from rotor.tops.states.state_constants import StateConstants
+    from rotor.tops.states.state_texts import KEYS, with_state_texts
 
-    text = molecule.state_constants
-    return replace(top, states=named("molecule.state_constants", lambda: StateConstants.parse(text, GIVEN)))
+    texts = {name: getattr(molecule, name) for name in KEYS}
+    try:
+        return with_state_texts(top, texts, GIVEN)
+    except ValueError as error:
+        raise ValueError(f"molecule.{error}") from None
 
 
 def with_tensor(top: Top, numbers: list[float]) -> Top:

@@ -155,6 +155,7 @@ class ThermoScene(Scene, frozen=True, tag="thermo"):
     """Partition function, entropy and heat capacity of rotation."""
 
     molecule: Annotated[str | MoleculeSection, said("a name, a file, SMILES:..., or a table")]
+    effects: QuantumEffects = QuantumEffects()
     accuracy: Annotated[str | float | None, said("of Q, U and C_v", "0.1 %")] = None
     conditions: ThermoConditions = ThermoConditions()
     observables: ThermoObservables = ThermoObservables()

@@ -34,6 +34,7 @@ from rotor.quantum.wang.basis import wang_blocks
 from rotor.quantum.wang.rotation import hamiltonian
 from rotor.quantum.wang.wang_matrix import JMatrix, block_bands
 from rotor.spectra.lines import Lines, line_list
+from rotor.table import counted
 from rotor.thermo import PartitionFunction, partition_function
 from rotor.tops.top import Top
 
@@ -252,7 +253,7 @@ def _notes(parameters: ParameterFile, top: Top, request: Request) -> list[str]:
     options, found = parameters.options[0], len(parameters.parameters)
     notes = []
     if parameters.header.npar > found:
-        notes.append(f"NPAR = {parameters.header.npar}, but {found} parameters stand in the file: those are used")
+        notes.append(f"NPAR = {parameters.header.npar}, but the file has {counted(found, 'parameter')}: all count")
     if not is_linear(options) and options.knmax < request.fend:
         notes.append(
             f"KNMAX = {options.knmax} is below FEND = {request.fend}: SPCAT leaves K > {options.knmax} out of its basis "
