@@ -28,6 +28,7 @@ from rotor.formats.spcat.hamiltonian.symmetry import (
     halved_across,
     l_values,
     some_weights_agree,
+    species_pairs,
     symmetric_part,
 )
 from rotor.formats.spcat.text.int_file import Dipole, IntensityFile
@@ -355,7 +356,13 @@ def _group(
     if light.phases.odd:
         fixed = light.phases._replace(odd=odd_of_turned(turned)) if turned else light.phases
         moments, beside = _turned_moments(moments, beside, turned, with_dipoles(fixed, light.own_axes, oblate, False))
-    effect = FileEffect(usable, numbers, coupled, moments, limits, beside, first.ixx, pairs, basis_axes(oblate), turned)
+    second = {pair.second for pair in pairs}
+    every = [(v, w) for v in range(len(states)) for w in range(v, len(states))]
+    found = {(v, w): species_pairs(states[v], states[w], (v in second, w in second)) for v, w in every}
+    apart = {both: species for both, species in found.items() if species is not None}
+    effect = FileEffect(
+        usable, numbers, coupled, moments, limits, beside, first.ixx, pairs, basis_axes(oblate), turned, apart
+    )
     if pairs:  # raises for what is not allowed between l-doubled states, before any level is solved
         effect.spin_terms(_ANY_TOP)
         effect.couplings(_ANY_TOP)
