@@ -103,7 +103,9 @@ def predicted(
     return made, lines, q, as_level_list(solved, form, spreads), notes
 
 
-UNDIAGONALIZED_NOTE = "DIAG is below 0: SPCAT diagonalizes nothing then and lists diagonal elements; here are eigenvalues"
+UNDIAGONALIZED_NOTE = (
+    "DIAG is below 0: SPCAT diagonalizes nothing then and lists diagonal elements; here are eigenvalues"
+)
 
 
 def refuse_undiagonalized(diag: int) -> None:
