@@ -21,7 +21,12 @@ from rotor.formats.spcat.hamiltonian.codes import is_linear
 from rotor.formats.spcat.hamiltonian.labels import BY_DIAG
 from rotor.formats.spcat.hamiltonian.states import is_plain
 from rotor.formats.spcat.model import FOLD, common_weight, top_of
-from rotor.formats.spcat.predict_states import levels_of_files, predicted
+from rotor.formats.spcat.predict_states import (
+    UNDIAGONALIZED_NOTE,
+    levels_of_files,
+    predicted,
+    refuse_undiagonalized,
+)
 from rotor.formats.spcat.text.catalogue import Catalogue
 from rotor.formats.spcat.text.egy import LevelList
 from rotor.formats.spcat.text.fields import QUANTUM_RANGE
@@ -147,6 +152,8 @@ def predict(
         made, of_states, q, levels, notes = predicted(parameters, intensities, own_q=own_q, as_spcat=as_spcat)
         return Prediction(made, of_states, q, request, tuple(notes), levels)
 
+    if as_spcat and top.kind == "asymmetric":
+        refuse_undiagonalized(options.diag)
     top = replace(top, covariance=constants_covariance(parameters))
     common = common_weight(options)
     q = summed_q(top, options, request.temperature_k).q if own_q else request.qrot
@@ -259,6 +266,8 @@ def _notes(parameters: ParameterFile, top: Top, request: Request) -> list[str]:
             f"KNMAX = {options.knmax} is below FEND = {request.fend}: SPCAT leaves K > {options.knmax} out of its basis "
             f"without a word; here every K to J is in it, so levels with K near {options.knmax} and above differ"
         )
+    if top.kind == "asymmetric" and options.diag < 0:
+        notes.append(UNDIAGONALIZED_NOTE)
     if top.kind == "asymmetric" and options.diag == 0:
         j = _diagonal_rolls_over(top, request.fend)
         if j is not None:

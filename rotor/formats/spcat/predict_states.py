@@ -79,6 +79,8 @@ def predicted(
     """
     request = intensities.request
     groups = groups_of(parameters, intensities, as_spcat=as_spcat)
+    if as_spcat and any(group.spins or group.top.kind == "asymmetric" for group in groups):
+        refuse_undiagonalized(parameters.options[0].diag)
     form = format_of(parameters, groups)
     q = summed_q(groups, request.temperature_k).q if own_q else request.qrot
     groups = _with_levels(groups, request)
@@ -99,6 +101,20 @@ def predicted(
     if with_spread:
         lines = replace(lines, given_spread=np.concatenate(with_spread))
     return made, lines, q, as_level_list(solved, form, spreads), notes
+
+
+UNDIAGONALIZED_NOTE = (
+    "DIAG is below 0: SPCAT diagonalizes nothing then and lists diagonal elements; here are eigenvalues"
+)
+
+
+def refuse_undiagonalized(diag: int) -> None:
+    """ValueError for DIAG below 0, which asks for diagonal elements in place of eigenvalues."""
+    if diag < 0:
+        raise ValueError(
+            f"DIAG = {diag}: diagonal elements in place of eigenvalues, which is read but not computed; give DIAG = 0, or leave "
+            "--as-spcat out for eigenvalues"
+        )
 
 
 def _solved(groups: list[Group], request: Request, form: Format) -> list[tuple[Group, Levels]]:
@@ -295,7 +311,9 @@ def _notes(parameters: ParameterFile, groups: list[Group], request: Request, as_
     found, notes = len(parameters.parameters), []
     if parameters.header.npar > found:
         notes.append(f"NPAR = {parameters.header.npar}, but the file has {counted(found, 'parameter')}: all count")
-    notes += left_out(parameters)
+    notes += left_out(parameters, as_spcat=as_spcat)
+    if parameters.options[0].diag < 0 and not as_spcat:
+        notes.append(UNDIAGONALIZED_NOTE)
     for group in groups:
         highest = request.fend + sum(group.spins) // 2
         for state in group.states:
