@@ -83,9 +83,11 @@ def states_facts(top: Top) -> list[tuple[str, str]]:
 
 def heading(top: Top) -> str:
     """Name, formula and kind in one line."""
-    from rotor.formats.molecules.library import written_formula
+    formula = formula_of(top)
+    if formula:  # the library, which takes some ms to load, may write it in another way
+        from rotor.formats.molecules.library import written_formula
 
-    formula = written_formula(top.name, formula_of(top) or "")
+        formula = written_formula(top.name, formula)
     names = ", ".join(dict.fromkeys(filter(None, (top.name, formula)))) or "constants"
     kappa = f" (κ = {top.kappa:.4f})" if top.kind == "asymmetric" and top.kappa is not None else ""
     return f"{names}: {KINDS[top.kind]}{kappa}"
