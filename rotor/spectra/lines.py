@@ -28,6 +28,7 @@ from rotor.quantum.estimates.uncertainty import known_covariance, level_spread, 
 from rotor.quantum.levels import Levels, TransitionTable
 from rotor.quantum.quanta import heading
 from rotor.quantum.solve import solve_levels
+from rotor.quantum.tabulated import tabulated_line_errors
 from rotor.spectra.intensity import (
     EINSTEIN_PER_MHZ3,
     INTENSITY_NM2_MHZ,
@@ -133,11 +134,13 @@ class Lines(TransitionTable):
 
     @property
     def error_mhz(self) -> Floats | None:
-        """One standard deviation of every frequency, from the uncertainty of the constants; None where it is unknown.
+        """One standard deviation of every frequency, from the uncertainty of the constants or of a level table; None where it is unknown.
 
-        Neglected: what the Hamiltonian leaves out. Constants without an uncertainty count as exact.
+        Neglected: what the Hamiltonian leaves out. Constants without an uncertainty count as exact. nan: a level is not in the table.
         """
-        return None if self.spread is None else line_errors(self.spread, self.upper, self.lower)
+        if self.spread is None:
+            return tabulated_line_errors(self.top, self.levels, self.upper, self.lower)
+        return line_errors(self.spread, self.upper, self.lower)
 
     @property
     def errors_from(self) -> str | None:

@@ -73,7 +73,9 @@ def lines_table(lines: Lines, rows: Any, depth: Any = None) -> Table:
     names = quanta.headings(lines.quanta_names)
     values = shown.columns
     present = [column for column in _COLUMNS if column.name in values]
-    cells = [[column.form.format(x) for x in values[column.name]] for column in present]
+    cells = [
+        ["" if x != x else column.form.format(x) for x in values[column.name]] for column in present
+    ]  # nan: not known
     headings = [column.heading for column in present]
     if depth is not None:
         headings.append("τ")

@@ -25,7 +25,10 @@ Quanta = NDArray[np.int16]
 
 @dataclass(frozen=True)
 class GroupLines:
-    """The lines of one group, one component of a K doublet each: columns (n,) and quantum numbers (n, width)."""
+    """The lines of one group, one component of a K doublet each: columns (n,) and quantum numbers (n, width).
+
+    found: the transitions that they belong to.
+    """
 
     frequency_mhz: Floats
     intensity: Floats
@@ -34,6 +37,7 @@ class GroupLines:
     upper: Quanta
     lower: Quanta
     error_mhz: Floats
+    found: Transitions
 
 
 _COLUMNS = ("frequency_mhz", "intensity", "energy_lower_mhz", "g_upper", "upper", "lower", "error_mhz")
@@ -77,6 +81,10 @@ def transitions_of(group: Group, levels: Levels, request: Request, q: float) -> 
         exists &= equally_weighted(levels, found.upper, found.lower)
     order = rising_order(found.frequency_mhz)  # what is in order is put in order quickly later on
     rows = order if exists.all() else order[exists[order]]
+    return _rows(found, rows)
+
+
+def _rows(found: Transitions, rows: Ints) -> Transitions:
     return Transitions(*(getattr(found, name)[rows] for name in ("frequency_mhz", "strength_debye2", "upper", "lower")))
 
 
@@ -192,14 +200,16 @@ def lines_of(
     """
     intensity = _intensity(group, levels, found, request, q)
     there = within(request, found.frequency_mhz, intensity)
-    chosen = slice(None) if there.all() else np.flatnonzero(there)
-    up, low = found.upper[chosen], found.lower[chosen]
+    if not there.all():
+        chosen = np.flatnonzero(there)
+        found, intensity = _rows(found, chosen), intensity[chosen]
+    up, low = found.upper, found.lower
     error = np.zeros(len(up)) if spread is None else np.linalg.norm(spread[up] - spread[low], axis=1)
     g_upper = (levels.multiplicity * (levels.weight // levels.components))[up]
-    columns = (found.frequency_mhz[chosen], intensity[chosen], levels.energy_mhz[low], error)
+    columns = (found.frequency_mhz, intensity, levels.energy_mhz[low], error)
     index, upper, lower = _one_component_each(group, levels, form, up, low)
     frequency, strength, energy, error = (column[index] for column in columns)
-    return GroupLines(frequency, strength, energy, g_upper[index], upper, lower, error)
+    return GroupLines(frequency, strength, energy, g_upper[index], upper, lower, error, found)
 
 
 def _intensity(group: Group, levels: Levels, found: Transitions, request: Request, q: float) -> Floats:

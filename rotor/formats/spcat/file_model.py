@@ -19,7 +19,7 @@ from rotor.formats.spcat.hamiltonian.file_effect import CodedLine, FileEffect, V
 from rotor.formats.spcat.hamiltonian.l_doubled import Pair, named_by_l, pairs_of
 from rotor.formats.spcat.hamiltonian.l_spins import named_by_l_with_spins
 from rotor.formats.spcat.hamiltonian.labels import BY_DIAG, named_by
-from rotor.formats.spcat.hamiltonian.phases import Phases, axis_of, phases_of, turned_axis, with_dipoles
+from rotor.formats.spcat.hamiltonian.phases import Phases, axis_of, odd_of_turned, phases_of, turned_axis, with_dipoles
 from rotor.formats.spcat.hamiltonian.series import Series, series_of
 from rotor.formats.spcat.hamiltonian.states import StateOptions, states_of
 from rotor.formats.spcat.hamiltonian.symmetry import (
@@ -144,18 +144,17 @@ def groups_of(file: ParameterFile, intensities: IntensityFile, *, as_spcat: bool
     members, oblate = frozenset(v for pair in doubled for v in pair), first.nvib < 0
     dipoles, others = dipoles_of(intensities.dipoles, len(states))
     phases = phases_of(file, len(states), members)
-    if phases.odd:
-        given = _within_states(dipoles, others, states, members)
-        phases = with_dipoles(phases, given, oblate, as_spcat)
+    own_axes = _within_states(dipoles, others, states, members)
+    phases = with_dipoles(phases, own_axes, oblate, as_spcat) if phases.odd else phases
     lines = coded_lines(file, len(states), doubled)
     lines = real_ones(allowed(lines, states, doubled, oblate)[0], phases.odd, members)[0]
     dipoles, others = _of_both_components(dipoles, doubled), _others_of_both(others, doubled)
-    elements = (_has_elements(pair, mu, states, doubled) for pair, mu in dipoles.items())
-    if not phases.odd and not others and not any(elements):
+    own = any(_has_elements(pair, mu, states, doubled) for pair, mu in dipoles.items())
+    if not phases.odd and not others and not own:
         dipoles |= {(high, low): (-a, -b, -c) for (low, high), (a, b, c) in dipoles.items() if low != high}
     pairs = [line.states for line in lines if line.states] + list(dipoles) + [code.states for _, code in others]
     _refuse_missing_spins(lines, states)
-    light = Light(dipoles, others, series_of(file, len(states), doubled), phases)
+    light = Light(dipoles, others, series_of(file, len(states), doubled), phases, own_axes)
     return [
         _group([states[v] for v in numbers], lines, light, first, as_spcat, file.title, doubled)
         for numbers in _connected(len(states), [*pairs, *doubled])
@@ -163,12 +162,13 @@ def groups_of(file: ParameterFile, intensities: IntensityFile, *, as_spcat: bool
 
 
 class Light(NamedTuple):
-    """The dipoles of a file by pairs of states, moments of other kinds, constants of its series, and its phases."""
+    """The dipoles of a file by pairs of states, moments of other kinds, constants of its series, its phases; `_within_states`."""
 
     dipoles: Dipoles
     others: list[tuple[Dipole, DipoleCode]]
     series: Series
     phases: Phases
+    own_axes: list[tuple[int, bool]]
 
 
 def _within_states(
@@ -348,8 +348,13 @@ def _group(
     )
     _check_three(states[0], others, first)
     turned = turned_axis([axis_of(line.typ) for line in usable], light.phases.odd)
-    if turned:
-        moments, beside = _turned_moments(moments, beside, turned, light.phases)
+    if turned and doubled:
+        raise ValueError(
+            f"operators that are odd under time reversal within one state, or PHASE, with l-doubled states: {NOT_YET}"
+        )
+    if light.phases.odd:
+        fixed = light.phases._replace(odd=odd_of_turned(turned)) if turned else light.phases
+        moments, beside = _turned_moments(moments, beside, turned, with_dipoles(fixed, light.own_axes, oblate, False))
     effect = FileEffect(usable, numbers, coupled, moments, limits, beside, first.ixx, pairs, basis_axes(oblate), turned)
     if pairs:  # raises for what is not allowed between l-doubled states, before any level is solved
         effect.spin_terms(_ANY_TOP)
@@ -375,7 +380,7 @@ def _turned_moments(
             by_order = moment.states[0] != moment.states[1] and phases.has_i(axis)
             across = "" if "abc"[axis - 1] == turned else turned
             if value and not across and not by_order and moment in every[: len(moments)]:
-                plain[moment.states] = along
+                plain[moment.states] = tuple(np.add(along, plain.get(moment.states, (0.0, 0.0, 0.0))).tolist())
             elif value:
                 others.append(moment._replace(along_abc=along, turned=across, by_order=by_order))
     return plain, tuple(others)

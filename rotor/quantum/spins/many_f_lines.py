@@ -86,11 +86,12 @@ def _by_group(blocks: Sequence[SpinBlock]) -> list[tuple[Group, list[SpinBlock]]
 def _states(group: Group, blocks: Sequence[SpinBlock], levels: int) -> States:
     sizes = [len(block.energies_mhz) for block in blocks]
     vectors = np.zeros((len(blocks), group.columns * group.states, max(sizes)))
-    rows = np.full((len(blocks), max(sizes)), levels, dtype=np.int32)
+    starts, counts = np.array([block.start for block in blocks], dtype=np.int32), np.array(sizes)
+    every = np.arange(max(sizes), dtype=np.int32)
+    rows = np.where(every < counts[:, None], starts[:, None] + every, np.int32(levels))
     for place, (block, size) in enumerate(zip(blocks, sizes, strict=True)):
         functions = group.functions[group.places[block.twice_f]]
         vectors[place, functions, :size] = block.vectors
-        rows[place, :size] = range(block.start, block.start + size)
     heights = [group.heights[group.places[block.twice_f]] for block in blocks]
     of_columns = vectors.reshape(len(blocks), group.columns, group.states, -1)
     return States(group, {block.twice_f: place for place, block in enumerate(blocks)}, of_columns, rows, sizes, heights)

@@ -176,13 +176,13 @@ def _functions(plan: Plan, every: Ints, parts: list[SpinPart], rows: list[Row]) 
 
 
 def _along(plan: Plan) -> int:
-    """Which of Ka and Kc is K: 0 or 1."""
+    """Which of v, Ka and Kc is K: 1 or 2."""
     axis = axes_of(plan.shared.representation)[2]
     if axis == "b":
         raise ValueError(
             f"representation {plan.shared.representation}: the threefold axis is a or c, the z of the basis"
         )
-    return 0 if axis == "a" else 1
+    return 1 if axis == "a" else 2
 
 
 def _names_of_sub_block(part: RotorPart, chosen: Ints, pattern: Ints, residue: int) -> Ints:
@@ -191,7 +191,7 @@ def _names_of_sub_block(part: RotorPart, chosen: Ints, pattern: Ints, residue: i
     named = pattern.copy()
     if residue == 1:
         named[-3] += ODD_E - EVEN_E
-    return np.column_stack([np.full(len(own), part.v), own, np.tile(named, (len(own), 1))])
+    return np.column_stack([own, np.tile(named, (len(own), 1))])
 
 
 def _matrix(plan: Plan, every: Ints, parts: list[SpinPart], rows: list[Row], functions: Functions) -> Floats:

@@ -128,7 +128,7 @@ def half_turn(j: int, representation: str, axis: str) -> JOperator:
     """C2a, C2b or C2c, whose characters in Wang's functions are those of `basis`, over |J k⟩.
 
     >>> half_turn(1, "Ir", "a").matrix.real.diagonal().tolist(), half_turn(1, "Ir", "b").matrix.real[0].tolist()
-    ([-1.0, 1.0, -1.0], [-0.0, 0.0, -1.0])
+    ([-1.0, 1.0, -1.0], [0.0, 0.0, -1.0])
     """
     k = np.arange(-j, j + 1)
     along = axes_of(representation).index(axis)

@@ -153,17 +153,46 @@ def _half_difference(line: CodedLine, digits: Digits, first: int, options: Optio
 def real_ones(
     lines: Sequence[CodedLine], odd: frozenset[str], doubled: frozenset[int]
 ) -> tuple[list[CodedLine], list[str]]:
-    """The lines without those within one state that are imaginary, and a sentence for each of these."""
+    """The lines without those within one state that are imaginary in the phases of a file, and why these are left out.
+
+    Parameters
+    ----------
+    lines : sequence of CodedLine
+        Parameters that compute.
+    odd : frozenset of str
+        The axes along which operators within one state are odd, see `phases`.
+    doubled : frozenset of int
+        l-doubled states, whose odd operators act with the sign of l.
+
+    Returns
+    -------
+    lines : list of CodedLine
+        Those that act.
+    reasons : list of str
+        A sentence for each that is left out.
+
+    Raises
+    ------
+    ValueError
+        For an odd operator that every half turn leaves as it is, which is imaginary in all phases.
+    """
     found, reasons = list[CodedLine](), list[str]()
     for line in lines:
         axis, between = axis_of(line.typ), bool(line.states and line.states[0] != line.states[1])
-        if not axis or between or (line.states and line.states[0] in doubled) or line.operator.odd == (axis in odd):
+        own = not between and not (line.states and line.states[0] in doubled)
+        code = line.name.partition("#")[0]
+        if own and not axis and line.operator.odd:
+            raise ValueError(
+                f"parameter {code}: time reversal changes the sign of the operator and no half turn does, so that it can connect "
+                "different states only"
+            )
+        if not own or not axis or line.operator.odd == (axis in odd):
             found.append(line)
             continue
-        kind = ("even", "odd") if axis in odd else ("odd", "even")
+        kind, others = ("even", "odd") if axis in odd else ("odd", "even")
         reasons.append(
-            f"parameter {line.name.partition('#')[0]} is left out, as SPCAT does: it is {kind[0]} under time reversal, those of one "
-            f"state along {axis} are {kind[1]} ones here (XOPT, PHASE)"
+            f"parameter {code} is left out, as SPCAT does: it is {kind} under time reversal; within one state those along {axis} are "
+            f"{others} ones here (by their number, or by PHASE of XOPT)"
         )
     return found, list(dict.fromkeys(reasons))
 

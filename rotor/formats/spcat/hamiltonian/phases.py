@@ -93,18 +93,23 @@ def phases_of(file: ParameterFile, states: int, doubled: frozenset[int]) -> Phas
 
 
 def with_dipoles(phases: Phases, dipoles: Iterable[tuple[int, bool]], oblate: bool, as_spcat: bool) -> Phases:
-    """The phases of dipoles between states, by those within states.
+    """The phases of dipoles between states too, by those within states.
 
     Parameters
     ----------
-    phases : the phases that the parameters settle
-    dipoles : of each dipole its axis, 1 to 3 for a, b, c, and whether it is a commutator
-    oblate : whether the basis is oblate
-    as_spcat : phases along axes that are not settled are those that leave most dipoles real, as the program has it in SPCAT alone
+    phases : Phases
+        Of the parameters.
+    dipoles : iterable of (int, bool)
+        Of the dipoles within states: their axis, 1 to 3, and whether they are commutators with N².
+    oblate : bool
+        Whether z is the c axis.
+    as_spcat : bool
+        Whether phases along axes that are not settled are those that leave most dipoles real, as the program has it in SPCAT alone.
 
     Returns
     -------
-    The phases with which dipoles are computed.
+    Phases
+        With `between_i`.
     """
     axes, given = AXES_OF_PHASE[oblate], list(dipoles)
     least, found = len(given), (phases.odd, False)
@@ -123,11 +128,13 @@ def turned_axis(used: Iterable[str], odd: frozenset[str]) -> str:
 
     Raises ValueError where no half turn fits: the Hamiltonian is complex in every choice of phases.
 
-    >>> turned_axis("a", frozenset("a")), turned_axis("ac", frozenset("a")), turned_axis("abc", frozenset("ac"))
+    >>> turned_axis("a", frozenset("a")), turned_axis("ac", frozenset("a")), turned_axis("a", frozenset("ac"))
     ('c', 'c', 'b')
     """
     axes = sorted(set(used) - {""})
-    for g in ("", "c", "b", "a"):
+    for g in sorted(
+        ("", "c", "b", "a"), key=lambda g: odd != odd_of_turned(g)
+    ):  # first that which fits the axes not used too
         if all((axis in odd) == (g not in ("", axis)) for axis in axes):
             return g
     along = ", ".join(f"{axis} {'odd' if axis in odd else 'even'}" for axis in axes)
@@ -135,6 +142,15 @@ def turned_axis(used: Iterable[str], odd: frozenset[str]) -> str:
         f"operators along {along} under time reversal: no phases of the basis make all of them real. That is read but not computed; "
         "leave out those along one axis"
     )
+
+
+def odd_of_turned(g: str) -> frozenset[str]:
+    """The axes along which odd operators are real where time reversal goes with half a turn about g.
+
+    >>> sorted(odd_of_turned("b")), sorted(odd_of_turned(""))
+    (['a', 'c'], [])
+    """
+    return frozenset("abc") - {g} if g else frozenset()
 
 
 def half_turned(of: OperatorOfJ, axis: str, odd: bool) -> OperatorOfJ:
