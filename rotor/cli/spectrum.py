@@ -304,6 +304,7 @@ def _draw(answer: SpectrumAnswer, path: Path, record: dict[str, Any], drawn: dic
 
 def _show(answer: SpectrumAnswer, content: dict[str, Any], range_text: str | None, whole_sources: bool) -> None:
     from rotor.cli.shared import report
+    from rotor.quantum.quanta import headings, of_rotation
 
     lines = answer.lines
     print(
@@ -316,7 +317,7 @@ def _show(answer: SpectrumAnswer, content: dict[str, Any], range_text: str | Non
         print(f"\nno lines: {_why_none(answer, range_text)}")
     elif content["patterns"] is not None:
         print()
-        show_table(patterns_table(content["patterns"]))
+        show_table(patterns_table(content["patterns"], headings(of_rotation(lines.levels.quanta))))
     elif len(content["strongest"]):
         print()
         show_table(lines_table(lines, content["strongest"], content["optical_depth"]))
