@@ -308,7 +308,7 @@ def _show(answer: SpectrumAnswer, content: dict[str, Any], range_text: str | Non
     lines = answer.lines
     print(
         report.heading(lines.top)
-        if spcat.has_named_constants(lines)
+        if lines.levels.of_named_constants
         else f"{lines.top.name}: levels of the file's own parameters"
     )
     show_facts(_facts(lines, content))
@@ -331,20 +331,21 @@ def _facts(lines: Lines, content: dict[str, Any]) -> list[tuple[str, str]]:
 
     top = lines.top
     cut = "none: every allowed line" if content["min_lgint"] is None else f"lgint above {content['min_lgint']:g}"
-    weights = report.weights_text(content["spin_weights"])
+    own = content["spin_weights"]
+    weights = "those of the file" if own is None else report.weights_text(own)
     dipole = report.vector_text(top.dipole_abc_debye)
     return [
         (
             "constants",
             report.constants_text(top)
-            if spcat.has_named_constants(lines)
+            if lines.levels.of_named_constants
             else "those of the file, which have no names here",
         ),
         ("dipole", dipole),
         ("spin weights", weights),
         *report.states_facts(top)[:MOST_FACTS_OF_STATES],
         ("temperature", f"{lines.temperature_k:g} K"),
-        ("Q", report.q_text(content["q"], classical=spcat.has_named_constants(lines))),
+        ("Q", report.q_text(content["q"], classical=lines.levels.of_named_constants)),
         ("J max", f"{lines.jmax}: {content['jmax_source']}"),
         ("cut", cut + _range_text(lines.range_mhz)),
         *hyperfine_lines(content["hyperfine"]),
