@@ -7,7 +7,9 @@ from __future__ import annotations
 
 import math
 import os
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -48,8 +50,7 @@ class Prediction:
     catalogue: as the program would list it, in cm⁻¹ where FLAGS says so, E″ from the Hamiltonian's zero, degeneracies with the
     weights as the file has them. lines: the same lines before K doublets were parted, weights reduced, E″ from the lowest level.
     q: the partition function used, as a file counts it: unreduced weights, energies from the Hamiltonian's zero.
-    request: line 2 of the .int file. notes: what the program would have passed over in silence. levels: as the program would list
-    them, where the file has spins or several states.
+    request: line 2 of the .int file. notes: what the program would have passed over in silence. listing: what makes `levels`.
     """
 
     catalogue: Catalogue
@@ -57,7 +58,12 @@ class Prediction:
     q: float
     request: Request
     notes: tuple[str, ...] = ()
-    levels: LevelList | None = None
+    listing: Callable[[], LevelList] | None = field(default=None, repr=False)
+
+    @cached_property
+    def levels(self) -> LevelList | None:
+        """The levels as the program would list them, where the file has spins or several states; made when they are asked for."""
+        return None if self.listing is None else self.listing()
 
 
 def predict_file(path: str | os.PathLike[str], *, own_q: bool = False, as_spcat: bool = False) -> Prediction:
@@ -144,8 +150,8 @@ def predict(
     left_out = as_spcat and options.knmax < request.fend and not is_linear(options)
     top = None if left_out or others_names else _named_top(parameters, intensities)
     if top is None:
-        made, of_states, q, levels, notes = predicted(parameters, intensities, own_q=own_q, as_spcat=as_spcat)
-        return Prediction(made, of_states, q, request, tuple(notes), levels)
+        made, of_states, q, listing, notes = predicted(parameters, intensities, own_q=own_q, as_spcat=as_spcat)
+        return Prediction(made, of_states, q, request, tuple(notes), listing)
 
     top = replace(top, covariance=constants_covariance(parameters))
     common = common_weight(options)
