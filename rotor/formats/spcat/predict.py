@@ -151,7 +151,7 @@ def predict(
     top = None if left_out or others_names else _named_top(parameters, intensities)
     if top is None:
         made, of_states, q, listing, notes = predicted(parameters, intensities, own_q=own_q, as_spcat=as_spcat)
-        return Prediction(made, of_states, q, request, tuple(notes), listing)
+        return Prediction(made, of_states, q, request, (*notes, *_not_written(request)), listing)
 
     top = replace(top, covariance=constants_covariance(parameters))
     common = common_weight(options)
@@ -162,7 +162,7 @@ def predict(
         lines=lines,
         q=q,
         request=request,
-        notes=tuple(_notes(parameters, top, request)),
+        notes=(*_notes(parameters, top, request), *_not_written(request)),
     )
 
 
@@ -277,6 +277,16 @@ def _notes(parameters: ParameterFile, top: Top, request: Request) -> list[str]:
             f"IAX = {options.iax} in a symmetric top: the two lines of a K doublet are listed as one, with |K|"
         )
     return notes
+
+
+def _not_written(request: Request) -> list[str]:
+    """What FLAGS ask for and is not made here: the tens say whether SPCAT writes a .str file."""
+    if request.flags // 10 % 10 == 0:
+        return []
+    return [
+        f"FLAGS = {request.flags} asks for a .str file, which is not written here: the signs of its transition dipoles follow from the "
+        "phases of SPCAT's diagonalization; strengths of lines are in --csv and --json"
+    ]
 
 
 def _diagonal_rolls_over(top: Top, jmax: int) -> int | None:
