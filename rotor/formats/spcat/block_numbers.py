@@ -10,7 +10,7 @@ In a block sub-blocks stand in order of pattern, v, species, each with its K ris
 called after. Species 0 to 3 are A, Bx, By, Bz, with x, y, z = c, b, a, or a, b, c where NVIB is negative. Found by comparison with the
 program's .out and .egy files.
 
-Not known here: l-doubled states and total spins of equivalent nuclei. Those levels have block 1 and count by F and energy.
+Not known here: l-doubled states and total spins of equivalent nuclei. Their levels count by F and energy, 9999 to a block.
 """
 
 from __future__ import annotations
@@ -53,7 +53,20 @@ class Blocks:
     rises: dict[int, Ints]
 
     def numbers(self, levels: Sequence[SubBlock], n: Ints, k: Ints, twice_f: Ints) -> tuple[Ints, Ints]:
-        """Block and place of levels by sub-block, N, |K| and doubled F."""
+        """Block and place of levels.
+
+        Parameters
+        ----------
+        levels : sequence of SubBlock
+            That of each of n levels.
+        n, k, twice_f : (n,) arrays of int
+            N, |K| and doubled F.
+
+        Returns
+        -------
+        block, rank : (n,) arrays of int
+            As in the first two columns of an .egy file.
+        """
         starts = {f: self._starts(f) for f in sorted(set(twice_f.tolist()))}
         block, rank = list[int](), list[int]()
         for sub, own_n, own_k, f in zip(levels, n.tolist(), k.tolist(), twice_f.tolist(), strict=True):

@@ -313,7 +313,7 @@ def as_level_list(
     spreads: Sequence[Floats | None] | None = None,
     blocks: Blocks | None = None,
 ) -> LevelList:
-    """The levels of all groups as an .egy file has them, ±K apart, by block and place in it, with all quantum numbers, however many there are.
+    """The levels of all groups as an .egy file has them, ±K apart, by block and place in it, with all their quantum numbers.
 
     Parameters
     ----------
