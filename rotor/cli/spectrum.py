@@ -163,6 +163,7 @@ def _settings(options: Options, usual_k: str) -> dict[str, Any]:
     from rotor.units import parse_range
 
     def whole_range(text: str) -> tuple[float, float]:
+        """First and last frequency in MHz."""
         return parse_range(text, "MHz")
 
     settings: dict[str, Any] = {
@@ -243,6 +244,7 @@ def _program_catalogue(prediction: Prediction, content: dict[str, Any]) -> Write
     from rotor.formats.spcat.text.cat import write_cat
 
     def write(path: Path) -> None:
+        """The file, with what it was made from."""
         write_cat(prediction.catalogue, path)
         record = record_of(prediction.lines, {"command": content["command"], "input": content["input"]})
         write_beside(path, record | {"q": prediction.q, "lines": len(prediction.catalogue)})
@@ -260,6 +262,7 @@ def _program_levels(prediction: Prediction, content: dict[str, Any], source: str
     levels = levels_of_file(source, as_spcat=as_spcat) if found is None else found
 
     def write(path: Path) -> None:
+        """The file, with what it was made from."""
         write_egy(levels, path)
         record = record_of(prediction.lines, {"command": content["command"], "input": content["input"]})
         write_beside(path, record | {"levels": len(levels)})
@@ -283,6 +286,7 @@ def _writers(
     record = {"command": content["command"], "input": content["input"], **numbers}
 
     def table(path: Path) -> None:
+        """The table as a file."""
         rotor.write(answer.lines, path, settings=record)
 
     return {

@@ -62,7 +62,7 @@ class Group:
 class Frame:
     """What all groups of a calculation share: the doubled F, the lowest N, kinds and sizes of blocks of the rotation by number, their
     energies (N, states) by kind, for each F the numbers of its patterns among those of the highest F, counted by their distances
-    from F, and the n_pattern of each of these."""
+    from F, and 2(N - F) with the class of each of these."""
 
     twice_f: list[int]
     lowest: int
@@ -124,10 +124,10 @@ def tables_of(found: Sequence[Contracted], frame: Frame) -> Tables:
 
 def groups_of(members: Sequence[tuple[int, Sequence[SpinPart]]], frame: Frame) -> list[tuple[Group, list[int]]]:
     """Blocks, given by their doubled F and parts, in groups, each with the numbers of its blocks."""
-    keys = [_layout(frame.patterns[f], parts, frame) for f, parts in members]
+    layouts = [_layout(frame.patterns[f], parts, frame) for f, parts in members]
     found: list[tuple[Layout, dict[int, int]]] = []
     for number in sorted(range(len(members)), key=lambda number: -members[number][0]):
-        f, layout = members[number][0], keys[number]
+        f, layout = members[number][0], layouts[number]
         for known, by_f in found:
             if f not in by_f and (layout == known or set(layout) <= set(known)):
                 by_f[f] = number
@@ -136,7 +136,7 @@ def groups_of(members: Sequence[tuple[int, Sequence[SpinPart]]], frame: Frame) -
             found.append((layout, {f: number}))
     return [
         (
-            _group(layout, [(f, members[by_f[f]][1], keys[by_f[f]]) for f in sorted(by_f)], frame),
+            _group(layout, [(f, members[by_f[f]][1], layouts[by_f[f]]) for f in sorted(by_f)], frame),
             [by_f[f] for f in sorted(by_f)],
         )
         for layout, by_f in found
@@ -144,7 +144,7 @@ def groups_of(members: Sequence[tuple[int, Sequence[SpinPart]]], frame: Frame) -
 
 
 def _group(layout: Layout, members: Sequence[tuple[int, Sequence[SpinPart], Layout]], frame: Frame) -> Group:
-    """The group of a layout; members: doubled F, rising, parts and keys of its blocks."""
+    """The group of a layout; members: doubled F, rising, parts and layouts of its blocks."""
     rotations, start = list[RotationColumns](), 0
     for n_pattern, kind in layout:
         first, count = frame.n_patterns.index(n_pattern), frame.n_patterns.count(n_pattern)
@@ -152,15 +152,15 @@ def _group(layout: Layout, members: Sequence[tuple[int, Sequence[SpinPart], Layo
         start += count
     counts = [rotation.columns.stop - rotation.columns.start for rotation in rotations]
     columns, orders = np.zeros((len(members), start), dtype=np.int64), list[Any]()
-    for place, (f, parts, own_key) in enumerate(members):
+    for place, (f, parts, own_layout) in enumerate(members):
         own, sizes = frame.patterns[f], [frame.sizes[part.number] for part in parts]
-        if len(own) == len(frame.n_patterns) and own_key == layout:
+        if len(own) == len(frame.n_patterns) and own_layout == layout:
             columns[place] = np.repeat(sizes, counts)
             orders.append(slice(None))
             continue
         order = list[int]()
-        for part, size, of_slot in zip(parts, sizes, own_key, strict=True):
-            rotation = rotations[layout.index(of_slot)]
+        for part, size, of_columns in zip(parts, sizes, own_layout, strict=True):
+            rotation = rotations[layout.index(of_columns)]
             at = [pattern + rotation.columns.start - rotation.patterns.start for pattern in own[part.patterns]]
             columns[place, at] = size
             order += at
