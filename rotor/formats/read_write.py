@@ -137,13 +137,15 @@ def _read_path(path: Path, isotopes: Isotopes | None) -> Any:
 def read_spcat_top(path: Path, *, errors: bool = False) -> Top:
     """The top of a .par or .var file, with the dipole of the .int file beside it; or of an .int file likewise.
 
-    errors: of files with spins or several states, whether errors of parameters become uncertainties.
+    Constants in cm⁻¹ (FLAGS of the .int file) become MHz. errors: of files with spins or several states, whether errors of parameters
+    become uncertainties.
     """
     from rotor.formats.spcat.hamiltonian.states import has_one_state
     from rotor.formats.spcat.model import top_of
     from rotor.formats.spcat.names.named_top import named_top
     from rotor.formats.spcat.text.int_file import read_int
     from rotor.formats.spcat.text.par import read_par
+    from rotor.formats.spcat.wavenumbers import FROM, files_in_mhz
 
     intensities = path.with_suffix(".int")
     parameters = path
@@ -153,6 +155,8 @@ def read_spcat_top(path: Path, *, errors: bool = False) -> Top:
         if parameters == path:
             raise ValueError(f"{path}: an .int file has no constants; its .var or .par must stand beside it")
     file, light = read_par(parameters), read_int(intensities) if intensities.exists() else None
+    if light is not None and light.request.flags >= FROM:
+        file, light = files_in_mhz(file, light)
     return top_of(file, light) if has_one_state(file) else named_top(file, light, errors=errors)
 
 

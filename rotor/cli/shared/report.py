@@ -46,6 +46,8 @@ def model_facts(content: Mapping[str, Any]) -> list[tuple[str, str]]:
         f"at J = {content['sizes_at_j']}: " + ", ".join(present) if present else "those of the parameters of the files"
     )
     facts = [("effects", sizes)]
+    if content.get("constants_reason"):
+        return [*facts, ("left out", "not estimated: sizes follow from named constants")]
     limits = [with_option(Limit(**one).sentence, content["command"]) for one in content["limits"]]
     unknown = (
         NOTHING_KNOWN if not content.get("spins") else NOTHING_KNOWN.replace("nuclear spins", "further nuclear spins")

@@ -6,14 +6,16 @@ The other files go through `predict`, with constants by their names.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from rotor import units
 from rotor.arrays import Floats, Ints, end_to_end
+from rotor.formats.spcat.block_numbers import blocks_of
 from rotor.formats.spcat.file_lines import (
     LEAST_MHZ,
     as_catalogue,
@@ -45,7 +47,7 @@ _LAST = 2000
 
 def predicted(
     parameters: ParameterFile, intensities: IntensityFile, *, own_q: bool = False, as_spcat: bool = False
-) -> tuple[Catalogue, Lines, float, LevelList, list[str]]:
+) -> tuple[Catalogue, Lines, float, Callable[[], LevelList], list[str]]:
     """The prediction of files with spins, several states or other operators; see `predict.predict`.
 
     Parameters
@@ -67,8 +69,8 @@ def predicted(
         The same lines before K doublets were parted.
     q : float
         As the file counts it.
-    levels : LevelList
-        As the program would list them.
+    levels : callable
+        What makes the list of levels as the program would write it.
     notes : list of str
         What the program passes over in silence.
 
@@ -100,7 +102,18 @@ def predicted(
     with_spread = [one for one in spreads if one is not None]
     if with_spread:
         lines = replace(lines, given_spread=np.concatenate(with_spread))
-    return made, lines, q, as_level_list(solved, form, spreads), notes
+    plain = [(group, replace(levels, blocks=())) for group, levels in solved]
+    return made, lines, q, partial(_level_list, parameters, plain, form, spreads), notes
+
+
+def _level_list(
+    parameters: ParameterFile,
+    solved: list[tuple[Group, Levels]],
+    form: Format,
+    spreads: Sequence[Floats | None],
+) -> LevelList:
+    """The levels as the program lists them, with its numbers of blocks and places."""
+    return as_level_list(solved, form, spreads, blocks_of(parameters, [group for group, _ in solved]))
 
 
 UNDIAGONALIZED_NOTE = (
@@ -143,7 +156,7 @@ def levels_of_files(parameters: ParameterFile, intensities: IntensityFile, *, as
     groups = groups_of(parameters, intensities, as_spcat=as_spcat)
     form = format_of(parameters, groups)
     solved = _solved(_with_levels(groups, intensities.request), intensities.request, form)
-    return as_level_list(solved, form, _spreads(solved, parameters))
+    return _level_list(parameters, solved, form, _spreads(solved, parameters))
 
 
 def _spreads(solved: list[tuple[Group, Levels]], parameters: ParameterFile) -> list[Floats | None]:

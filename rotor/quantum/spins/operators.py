@@ -30,7 +30,8 @@ from typing import NamedTuple
 import numpy as np
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.tensors import BodyTensor, block_elements, body_tensor, coupling
+from rotor.quantum.symmetric_top_elements import coupling
+from rotor.quantum.tensors import BodyTensor, block_elements, body_tensor
 from rotor.quantum.wang.basis import WangBlock, character
 from rotor.quantum.wang.wang_matrix import JMatrix, block_bands, scalar_energy
 from rotor.tops.operators import Operators, Powers
