@@ -7,7 +7,9 @@ import pytest
 
 from rotor.cli import run
 from rotor.quantum.effects.of_top import effects_of, spin_effects
+from rotor.quantum.solve import solve_levels
 from rotor.spectra.lines import line_list
+from rotor.spectra.request import SpectrumRequest, answer_spectrum
 from rotor.thermo import partition_function
 from rotor.thermo.spin_factor import without_spins
 from rotor.tops.spins.spin_constants import SpinConstants, parse_spins, spins_of, twice_of
@@ -162,3 +164,45 @@ def test_a_unit_at_one_constant_does_not_serve_the_others():
     ):
         SpinConstants.parse("chi_aa(14N)=-4.22 C_bb(14N)=1.8kHz")
     assert SpinConstants.parse("chi_aa(14N)=-4.22 C_bb(14N)=1.8 MHz").values["C_bb(14N)"] == 1.8
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("chi_bb-cc(14N)=2 MHz", r"chi_bb-cc\(14N\) = 2 MHz: a linear molecule has none"),
+        ("chi_aa(14N)=2 chi_ab(14N)=1 MHz", r"chi_ab\(14N\) = 1 MHz: a linear molecule has none"),
+        (
+            "C_bb(1H)=2 MHz",
+            r"C_bb\(1H\) = 2 MHz and C_cc\(1H\) = 0 MHz: alike in a linear molecule; .* C_iso\(1H\) alone",
+        ),
+        ("C_bb(1H)=2 C_cc(1H)=1 MHz", "alike in a linear molecule"),
+    ],
+)
+def test_tensors_that_a_linear_molecule_cannot_have_are_refused(text, says):
+    top = Top.from_constants("B=9400 MHz", spin_constants=SpinConstants.parse(text))
+    with pytest.raises(ValueError, match=says):
+        effects_of(top, True)
+
+
+def test_perpendicular_spin_rotation_of_a_linear_molecule_is_the_scalar():
+    """N has no component along the axis."""
+    texts = ("C_bb(1H)=2 C_cc(1H)=2 MHz", "C_iso(1H)=2 MHz")
+    tops = [Top.from_constants("B=9400 MHz", spin_constants=SpinConstants.parse(text)) for text in texts]
+    found = [solve_levels(top, 2, effects=effects_of(top, True)).energy_mhz for top in tops]
+    assert found[0] == pytest.approx(found[1], abs=1e-9)  # round-off of 56 GHz
+
+
+@pytest.mark.parametrize("spins", ["X=1/3", "X=0.75", "X=-1", "X=3/4", "X"])
+def test_spins_that_are_no_multiple_of_a_half_are_refused_by_their_rule(spins, capsys):
+    words = ["spectrum", "--constants", "B=9400 MHz", "--dipole-abc", "1,0,0", "--spin-constants", "C_iso(X)=1kHz"]
+    assert run([*words, f"--spins={spins}"]) == 2
+    assert "--spins: " in (error := capsys.readouterr().err)
+    assert "1/2" in error
+
+
+def test_the_classical_limit_counts_the_spins_that_q_counts():
+    top = Top.from_constants(
+        "B=3000 MHz", dipole_abc_debye=(1, 0, 0), spin_constants=SpinConstants.parse("chi_aa(14N)=-4 MHz")
+    )
+    found = answer_spectrum(SpectrumRequest(top, jmax=2, effects=effects_of(top, True))).facts()["q"]
+    assert found["classical"] == pytest.approx(found["q"], rel=1e-3)  # B/3kT of 1.6e-4

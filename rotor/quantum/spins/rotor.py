@@ -131,7 +131,10 @@ def _all_axial(top: Top, effects: tuple[QuantumEffect, ...], terms: Terms) -> bo
     axis = "a" if top.kind == "prolate" else "c"
     if k_limits_of(top, effects) or any(n for _, _, n in hamiltonian(top, effects)):
         return False
-    channels = channels_of(terms, scheme_of(top, effects))  # C_bb and C_cc are axial together where they are equal
+    scheme = scheme_of(top, effects)
+    if scheme.equivalent == 3:  # their total needs functions with a sign
+        return False
+    channels = channels_of(terms, scheme)  # C_bb and C_cc are axial together where they are equal
     if not all(is_axial(piece.rotor, axis) for pieces in channels.values() for piece in pieces):
         return False
     own = (effect.j_operator(top, name, 1, "Ir") for effect in effects for name in effect.parameters(top))
