@@ -12,6 +12,7 @@ from rotor.spectra.lines import line_list
 from rotor.spectra.request import SpectrumRequest, answer_spectrum
 from rotor.thermo import partition_function
 from rotor.thermo.spin_factor import without_spins
+from rotor.tops.constants import Constants
 from rotor.tops.spins.spin_constants import SpinConstants, parse_spins, spins_of, twice_of
 from rotor.tops.spins.spin_weights import SpinWeights
 from rotor.tops.top import Top
@@ -206,3 +207,42 @@ def test_the_classical_limit_counts_the_spins_that_q_counts():
     )
     found = answer_spectrum(SpectrumRequest(top, jmax=2, effects=effects_of(top, True))).facts()["q"]
     assert found["classical"] == pytest.approx(found["q"], rel=1e-3)  # B/3kT of 1.6e-4
+
+
+NAMED = {"A": "9.4 GHz", "B": 3100.0, "C": 2500.0, "chi_aa(14N)": -4.2, "eps_aa(S)": "0.3 GHz"}
+
+
+def test_a_mapping_divides_into_constants_spins_and_states():
+    top = Top.from_constants(
+        NAMED | {"E[1]": "5 GHz", "A[1]": 9300, "B[1]": 3000, "C[1]": 2400, "chi_aa(14N)[1]": -4.1, "G_c[0,1]": 450},
+        spins="S=1/2",
+    )
+    assert top.constants.text() == "A=9400.0 B=3100.0 C=2500.0 MHz"
+    assert dict(top.spin_constants.values) == {"chi_aa(14N)": -4.2, "eps_aa(S)": 300.0, "chi_aa(14N)[1]": -4.1}
+    assert (top.states.values["E[1]"], top.states.couplings) == (5000.0, ("G_c[0,1]",))
+
+
+def test_constants_of_spins_as_text_or_mapping_are_the_same():
+    found = [
+        Top.from_constants("A=9.4 B=3.1 C=2.5 GHz", spin_constants=given, spins="S=1/2").spin_constants
+        for given in ("chi_aa(14N)=-4.2 eps_aa(S)=300 MHz", {"chi_aa(14N)": -4.2, "eps_aa(S)": "0.3 GHz"})
+    ]
+    assert [dict(one.values) for one in found] == [{"chi_aa(14N)": -4.2, "eps_aa(S)": 300.0}] * 2
+    assert list(found[0].twice) == ["S", "14N"]
+
+
+def test_what_a_mapping_refuses():
+    with pytest.raises(ValueError, match="say how large it is, such as S=1/2"):
+        Top.from_constants(NAMED)
+    with pytest.raises(ValueError, match="spin_constants: given by name among the constants and again"):
+        Top.from_constants(NAMED, spin_constants="chi_aa(14N)=1 MHz", spins="S=1/2")
+    with pytest.raises(ValueError, match="go to a Top, as spin_constants and states"):
+        Constants(A=9400.0, B=3100.0, C=2500.0, chi_aa=3.0)
+
+
+def test_the_public_names_make_hyperfine_lines():
+    import rotor
+
+    lines = rotor.line_list("HCN", jmax=1, effects=rotor.effects_of("HCN", True, "first-order"))
+    assert lines.levels.quanta_names[-1] == "f"
+    assert rotor.SpinConstants is SpinConstants

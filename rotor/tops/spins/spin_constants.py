@@ -127,10 +127,19 @@ class SpinConstants:
             if name in values:
                 raise ValueError(f"{text!r}: {name} is given twice; leave one out")
             values[name] = parse_quantity(f"{item['number']} {item['unit'] or shared}", "MHz")
+        return cls.from_values(values, spins, source)
+
+    @classmethod
+    def from_values(cls, values_mhz: Mapping[str, float], spins: str | None = None, source: str = "") -> SpinConstants:
+        """From values in MHz by name; spins as for `parse`.
+
+        >>> dict(SpinConstants.from_values({"eps_aa(S)": 300.0, "b_F(S,1H)": 40.0}, "S=1/2").twice)
+        {'S': 1, '1H': 1}
+        """
         given, totals = parse_coupled(spins or "")
-        every: dict[str, int] = {**given, **{s: twice_of(s) for s in _named(values) if s not in given}}
+        every: dict[str, int] = {**given, **{s: twice_of(s) for s in _named(values_mhz) if s not in given}}
         ordered = {name: every[name] for name in sorted(every, key=lambda name: name in totals)}
-        return cls(values, ordered, source, totals=totals)
+        return cls(values_mhz, ordered, source, totals=totals)
 
 
 def refuse_other_nuclei(constants: SpinConstants, molecule: Molecule | None) -> None:
