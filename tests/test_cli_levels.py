@@ -175,3 +175,15 @@ def test_levels_with_the_spins_of_the_library(call, folder):
     code, _, error = call("levels", "water", "--hyperfine")
     assert code == 2
     assert "no constants of spins are known" in error
+
+
+def test_levels_of_one_f_pattern_share_a_label():
+    """The F of formamide's levels lie within 3e-5 cm-1 of each other."""
+    from rotor.plots.levels import levels_figure
+
+    top = rotor.read("formamide")
+    table = answer_levels(LevelsRequest(top, jmax=1, effects=rotor.effects_of(top, True))).table
+    texts = {text.get_text() for text in levels_figure(table, top).axes[0].texts}
+    assert "$1_{0,1}$, $F$ = 0, 1, 2" in texts
+    assert "$0_{0,0}, F{=}1$" in texts
+    assert not any("F{=}0" in text for text in texts)

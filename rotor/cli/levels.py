@@ -172,7 +172,7 @@ def _facts(answer: LevelsAnswer, content: dict[str, Any]) -> list[tuple[str, str
         asked += f", K from {request.kmin or 0} to {request.jmax if request.kmax is None else request.kmax}"
     if request.max_energy_mhz is not None:
         asked += f", up to {request.max_energy_mhz:g} MHz"
-    ground = f"{content['ground_mhz']:.4f} MHz above the Hamiltonian's zero"
+    ground = f"{round(content['ground_mhz'], 4) + 0.0:.4f} MHz above the Hamiltonian's zero"
     return [
         ("constants", report.constants_text(top)),
         ("spin weights", weights),

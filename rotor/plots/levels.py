@@ -24,7 +24,7 @@ from rotor.plots.picture import (
     styled,
 )
 from rotor.plots.view import WHOLE, View, show_part
-from rotor.quantum.quanta import heading, state_text
+from rotor.quantum.quanta import heading, state_text, value_text
 from rotor.quantum.request import SelectedLevels
 from rotor.tops.top import Top
 
@@ -167,19 +167,41 @@ def _draw(axes: Any, column: Ints, energy: Floats, exists: NDArray[np.bool_]) ->
 
 
 def _label(figure: Any, axes: Any, table: SelectedLevels, column: Ints, energy: Floats) -> None:
-    """The quantum numbers of each level right of its step, from the lowest up, wherever no other label stands."""
+    """The quantum numbers of each level right of its step, from the lowest up; levels too close for two labels share one."""
     if len(table) > 20 * MOST_LABELS:
         return
     figure.canvas.draw()  # places the axes, so that sizes in pixels are known
-    last: dict[int, float] = {}
     pixels = axes.transData.transform(np.stack([column, energy], axis=1))[:, 1]
     height = 5.8 * figure.dpi / 72.0  # of a label: capitals of 6 points
-    labelled = 0
+    for rows in _together(column, pixels, energy, height)[:MOST_LABELS]:
+        text = _text(table, table.rows[rows])
+        at = int(column[rows[0]]) + HALF_WIDTH + 0.03
+        axes.text(at, energy[rows[0]], text, fontsize=6, color=GREY, va="center", clip_on=True)
+
+
+def _together(column: Ints, pixels: Floats, energy: Floats, height: float) -> list[list[int]]:
+    """Rows of each column that lie within `height` above the first of them, by its energy."""
+    found: list[list[int]] = []
+    last: dict[int, list[int]] = {}
     for row in np.argsort(energy, kind="stable").tolist():
-        ladder = int(column[row])
-        if labelled == MOST_LABELS or pixels[row] - last.get(ladder, -np.inf) < height:
+        rows = last.get(int(column[row]))
+        if rows is not None and pixels[row] - pixels[rows[0]] < height:
+            rows.append(row)
             continue
-        last[ladder] = float(pixels[row])
-        labelled += 1
-        text = state_text(table.levels.quanta, int(table.rows[row]), table.levels.halves)
-        axes.text(ladder + HALF_WIDTH + 0.03, energy[row], text, fontsize=6, color=GREY, va="center", clip_on=True)
+        last[int(column[row])] = [row]
+        found.append(last[int(column[row])])
+    return found
+
+
+def _text(table: SelectedLevels, rows: Ints) -> str:
+    """The label of the first of some levels; of several of one rotational state all F, of others none."""
+    quanta, halves = table.levels.quanta, table.levels.halves
+    if "f" not in quanta or len(rows) == 1:
+        return state_text(quanta, int(rows[0]), halves)
+    rotation = {name: quanta[name] for name in quanta if name in ("v", "n", "k", "ka", "kc")}
+    every_f = sorted({int(f) for f in quanta["f"][rows]})
+    text = state_text(rotation, int(rows[0]), halves)
+    if len(every_f) == 1 or any(np.ptp(values[rows]) for values in rotation.values()):
+        return text
+    values = [value_text(f, "f" in halves) for f in every_f]
+    return f"{text}, $F$ = {', '.join(values) if len(values) < 4 else f'{values[0]} to {values[-1]}'}"
