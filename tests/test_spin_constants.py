@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from rotor.cli import run
+from rotor.formats.molecules.molecule_file import parse_molecule_file
 from rotor.quantum.effects.of_top import effects_of, spin_effects
 from rotor.quantum.solve import solve_levels
 from rotor.spectra.lines import line_list
@@ -246,3 +247,22 @@ def test_the_public_names_make_hyperfine_lines():
     lines = rotor.line_list("HCN", jmax=1, effects=rotor.effects_of("HCN", True, "first-order"))
     assert lines.levels.quanta_names[-1] == "f"
     assert rotor.SpinConstants is SpinConstants
+
+
+def test_a_file_says_spins_as_text_or_number(tmp_path):
+    head = "constants = { A = 9400.0, B = 3100.0, C = 2500.0 }\n[spins.X]\nC_iso = 0.003\n"
+    found = [
+        parse_molecule_file(f"{head}spin = {size}").spin_constants.twice["X"] for size in ('"3/2"', "1.5", "2", '"2"')
+    ]
+    assert found == [3, 3, 4, 4]
+    for size in ("0.75", '"1/3"', "-1"):
+        with pytest.raises(ValueError, match="each a multiple of 1/2"):
+            parse_molecule_file(f"{head}spin = {size}")
+
+
+def test_a_quadrupole_of_a_spin_of_a_half_in_a_file_is_named(tmp_path, capsys):
+    (tmp_path / "a.int").write_text("a\n00 91 100.0 0 3 -12. -12. 100 300.\n 001 1.0\n")
+    options = "a\n 4 1 1 0 0 1. 1. 1. 1.\n'a' 2 1 0 9 0 1 1 1 0 -1 0\n"
+    (tmp_path / "a.var").write_text(options + "10000 9400. 0\n20000 3100. 0\n30000 2500. 0\n110010000 -6. 0\n")
+    assert run(["spectrum", str(tmp_path / "a.int")]) == 2
+    assert "parameter 110010000: spin I1 of 1/2 has no quadrupole moment" in capsys.readouterr().err

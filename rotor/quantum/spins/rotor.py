@@ -163,11 +163,25 @@ def _rotor_block(block: SolvedBlock | CoupledBlock, representation: str) -> Roto
 
 
 def valued_terms(top: Top, effects: Iterable[QuantumEffect]) -> Terms:
-    """Every spin term of the effects with the value of its parameter times its factor, zeros left out."""
+    """Every spin term of the effects with the value of its parameter times its factor, zeros left out.
+
+    Raises ValueError for a quadrupole coupling of a spin of 1/2.
+    """
     found = []
     for effect in effects:
-        values = effect.parameters(top)
-        found += [(values[term.name] * term.factor, term) for term in effect.spin_terms(top)]
+        values, twice = effect.parameters(top), {spin.name: spin.twice for spin in effect.spins(top)}
+        for term in effect.spin_terms(top):
+            if (
+                values[term.name]
+                and len(term.spins) == 2
+                and term.spins[0] == term.spins[1]
+                and twice[term.spins[0]] < 2
+            ):
+                raise ValueError(
+                    f"parameter {term.name.partition('#')[0]}: spin {term.spins[0]} of 1/2 has no quadrupole moment; that needs a spin of "
+                    "1 or more"
+                )
+            found.append((values[term.name] * term.factor, term))
     return [(value, term) for value, term in found if value]
 
 
