@@ -320,7 +320,8 @@ def line_list(
 
     Notes
     -----
-    Neglected: all but electric dipole, nuclear hyperfine structure, vibrational states, dependence of μ on J.
+    Neglected: all but electric dipole, dependence of μ on J, and what the effects do not contain: nuclear hyperfine structure
+    comes with `effects=rotor.effects_of(top, True)`, of the constants of spins that the top has.
 
     Examples
     --------

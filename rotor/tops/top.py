@@ -29,6 +29,7 @@ from rotor.tops.constants import Constants
 from rotor.tops.covariance import Covariance
 from rotor.tops.kind import KindOfTop, kind_from_moments, kind_with_symmetry
 from rotor.tops.magnetic import MagneticTensors
+from rotor.tops.named_values import constants_of_names, fields_of_texts
 from rotor.tops.operators import KINDS
 from rotor.tops.quadrupole import computed_couplings
 from rotor.tops.spins.spin_constants import SpinConstants
@@ -159,6 +160,7 @@ class Top:
         *,
         dipole_abc_debye: ArrayLike | None = None,
         spin_weights: SpinWeights | dict[str, int] | None = None,
+        spins: str | None = None,
         **others: Any,
     ) -> Top:
         """A top from named constants, or from their text such as "A=835840.288 B=435351.717 C=278138.7 MHz".
@@ -166,13 +168,16 @@ class Top:
         Parameters
         ----------
         constants : Constants, mapping or str
-            A mapping has numbers in MHz or texts with a unit by name: `{"A": "9.2 GHz", "B": 3000, "C": 2500}`.
+            A mapping has numbers in MHz or texts with a unit by name: `{"A": "9.2 GHz", "B": 3000, "C": 2500}`, constants of
+            spins and of further states too: `{..., "chi_aa(14N)": -4.2, "E[1]": "5 GHz", ..., "G_c[0,1]": 450}`.
         dipole_abc_debye : (3,) array, optional
             Along the principal axes.
         spin_weights : SpinWeights or dict of str to int, optional
             Nuclear-spin weights; 1 for all by default.
+        spins : str, optional
+            How large spins are that are not called after isotopes, "S=1/2", and which are coupled first, "35Cl_1+35Cl_2".
         others : object
-            Any further field of `Top`.
+            Any further field of `Top`; `spin_constants` and `states` as texts or mappings too.
 
         Returns
         -------
@@ -187,11 +192,13 @@ class Top:
         if isinstance(constants, str):
             constants = Constants.parse(constants)
         if not isinstance(constants, Constants):
-            values: dict[str, Any] = {name: units.parse_quantity(value, "MHz") for name, value in constants.items()}
-            constants = Constants(**values)
+            constants, found = constants_of_names(constants, spins)
+            if twice := ", ".join(found.keys() & others.keys()):
+                raise ValueError(f"{twice}: given by name among the constants and again; give each once")
+            others |= found
         if not isinstance(spin_weights, SpinWeights):
             spin_weights = SpinWeights.from_mapping(spin_weights) if spin_weights else SpinWeights()
-        return cls(constants, dipole_vector(dipole_abc_debye), spin_weights, **others)
+        return cls(constants, dipole_vector(dipole_abc_debye), spin_weights, **fields_of_texts(others, spins))
 
     @classmethod
     def from_molecule(

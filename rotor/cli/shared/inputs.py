@@ -292,7 +292,10 @@ def _with_states(top: Top, given: Input) -> Top:
 
 
 def _spin_constants(text: str, spins: str | None, top: Top) -> SpinConstants:
-    from rotor.tops.spins.spin_constants import SpinConstants, refuse_other_nuclei
+    from rotor.tops.spins.spin_constants import SpinConstants, parse_coupled, refuse_other_nuclei
+
+    if spins is not None:
+        parsed("--spins", spins, parse_coupled)
 
     def read(value: str) -> SpinConstants:
         """Constants of spins that the molecule has."""
