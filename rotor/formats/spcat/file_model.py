@@ -307,6 +307,8 @@ def _group(
         usable = tuple(_of_three(line, len(spins), basis_axes(oblate)) for line in usable)
     pairs = tuple(Pair(here[pair.first], here[pair.second]) for pair in doubled if pair.first in here)
     kind = _kind(states, usable, oblate, first.spind < 0)
+    if kind in ("prolate", "oblate") and beside:
+        kind = "asymmetric"  # |N K⟩ does not tell K from -K, which such moments turn into each other or leave alone
     limits = {} if kind in ("linear", "prolate", "oblate") else _limits(states, as_spcat)
     others = len(spins) - states[0].equivalent  # which are not coupled to a total
     coupled = tuple(

@@ -179,6 +179,32 @@ def _fourier(n: int, sine: bool, series: Series, states: tuple[int, int]) -> Fac
     return factor
 
 
+def factor_of_k(n: int, sine: bool, series: Series, states: tuple[int, int]) -> Factor:
+    """What a Fourier term multiplies an element with: of one K with NOFC; ½(K' + K'') for the sine of n = 0, as the program has it.
+
+    Parameters
+    ----------
+    n : int
+        The harmonic.
+    sine : bool
+        A sine, else a cosine.
+    series : Series
+        The constants of the file.
+    states : (int, int)
+        Of K' and of K''.
+
+    Returns
+    -------
+    callable
+        Of J, K' and K''.
+    """
+    if sine and n == 0:
+        return lambda j, above, below: (above + below) / 2
+    if n and series.nofc:
+        return _sampled(n, sine)
+    return _fourier(n, sine, series, states)
+
+
 def _sampled(n: int, sine: bool) -> Factor:
     def factor(j: int, above: Floats, below: Floats) -> Floats:
         twice = above + below
