@@ -18,8 +18,8 @@ import numpy as np
 
 from rotor.arrays import Floats
 from rotor.quantum.moments import Word, Written
-from rotor.quantum.spins.operators import AxialState, Basis
-from rotor.quantum.tensors import Complexes, phase_exponent, spherical_components, symmetric_top_elements
+from rotor.quantum.spins.operators import Basis, functions_of
+from rotor.quantum.tensors import Complexes, spherical_components, symmetric_top_elements
 from rotor.quantum.wang.basis import WangBlock
 from rotor.quantum.wang.j_operators import components
 
@@ -57,26 +57,12 @@ def written_elements(
         between = -between if (up.j - low.j) % 2 else between
     else:
         between = _matrix(moment, up.j, low.j, representation)
-    own = _functions(up).conj().T @ between @ _functions(low)
+    own = functions_of(up).conj().T @ between @ functions_of(low)
     found = own.imag if moment.electric and isinstance(up, WangBlock) else own.real
     return np.asarray(found) if np.abs(found).max(initial=0.0) > _NOTHING * np.abs(between).max(initial=1.0) else None
 
 
 _NOTHING = 1e-13  # of the largest element of |N k⟩: round-off of a product of a few numbers
-
-
-@lru_cache(maxsize=64)
-def _functions(basis: Basis) -> Complexes:
-    """The functions of a basis over |N k⟩, k rising from -N, in columns."""
-    if isinstance(basis, AxialState):
-        if basis.axial_k:
-            raise ValueError(f"functions |N K⟩ with K = {basis.axial_k}: a written moment needs Wang functions")
-        return np.asarray(np.eye(2 * basis.j + 1, dtype=np.complex128)[:, [basis.j]])
-    out = np.zeros((2 * basis.j + 1, basis.size), dtype=np.complex128)
-    for column, k in enumerate(basis.k.tolist()):
-        out[basis.j + k, column] = np.sqrt(0.5) if k else 1.0
-        out[basis.j - k, column] = basis.sign * np.sqrt(0.5) if k else 1.0
-    return out * 1j ** phase_exponent(basis)
 
 
 @lru_cache(maxsize=512)
