@@ -29,6 +29,16 @@ class Workspace:
         return self._taken[name][:size].reshape(shape)
 
 
+def hold_freed_memory() -> None:
+    """Lets the C library hold up to 32 MB of what calculations free, for those that come next, instead of giving it to the system.
+
+    glibc returns free memory above twice the size of the largest array that was freed so far (mallopt(3), M_MMAP_THRESHOLD and
+    M_TRIM_THRESHOLD), and the system clears each page that is taken anew. An array that is never touched is enough to raise that
+    size, as any large calculation does. Elsewhere nothing changes.
+    """
+    np.empty(1 << 24, dtype=np.uint8)
+
+
 def distinct(values: NDArray[Any]) -> NDArray[Any]:
     """The values of an array, each once, rising. `np.unique` does the same, but loads numpy.ma for it, 30 ms.
 

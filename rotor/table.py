@@ -13,6 +13,15 @@ EXTRA = 'python -m pip install "molrotor[tables]"'
 _SHOWN = 6  # rows of a table that its text shows: the first and the last half of them
 
 
+def counted(count: int, one: str, several: str = "") -> str:
+    """A number with what it counts, in the singular or the plural; several: the plural where it is not one with an s.
+
+    >>> counted(1, "line"), counted(0, "line"), counted(2, "frequency", "frequencies"), counted(1, "line is", "lines are")
+    ('1 line', '0 lines', '2 frequencies', '1 line is')
+    """
+    return f"{count} {one if count == 1 else several or one + 's'}"
+
+
 class Table(ABC):
     """A thing with columns of equal length, by their names with unit.
 
@@ -55,7 +64,7 @@ class Table(ABC):
 
     def _title(self) -> str:
         """One line that says what the table is."""
-        return f"{type(self).__name__}, {len(self)} rows"
+        return f"{type(self).__name__}, {counted(len(self), 'row')}"
 
     def _texts(self, rows: NDArray[np.int64]) -> dict[str, list[str]]:
         """Some rows as text, by the headings of the columns that are worth showing."""

@@ -17,11 +17,13 @@ from rotor.formats.spcat.text.egy import read_egy
 from rotor.formats.spcat.text.int_file import read_int
 from rotor.formats.spcat.text.level_list import level_list
 from rotor.formats.spcat.text.par import read_par
-from rotor.plots.levels import ladders, plot_levels
+from rotor.plots.levels import ladders, levels_figure, plot_levels
+from rotor.plots.view import View
+from rotor.quantum.effects.of_top import effects_of
 from rotor.quantum.request import LevelsRequest, answer_levels
 
 KEYS = {
-    "jmin", "jmax", "kmin", "kmax", "max_energy_mhz", "quantum_numbers", "level_count", "ground_mhz", "levels", "files",
+    "jmin", "jmax", "kmin", "kmax", "max_energy_mhz", "quantum_numbers", "level_count", "ground_mhz", "hyperfine", "levels", "files",
 }  # fmt: skip
 
 
@@ -175,3 +177,13 @@ def test_levels_with_the_spins_of_the_library(call, folder):
     code, _, error = call("levels", "water", "--hyperfine")
     assert code == 2
     assert "no constants of spins are known" in error
+
+
+@pytest.mark.parametrize(("limits", "expected"), [(None, {"$1_{0,1}, F{=}0,1,2$"}), ((21195.0, 21220.0), {0, 1, 2})])
+def test_overlapping_levels_of_spins_have_one_label(limits, expected):
+    """Steps that cannot be told apart have all values of F at one label; where the view parts them each has its own."""
+    top = rotor.read("formamide")
+    table = answer_levels(LevelsRequest(top, jmax=1, effects=effects_of(top, True))).table
+    figure = levels_figure(table, top, unit="MHz", view=View(vertical=limits))
+    texts = {text.get_text() for text in figure.axes[0].texts if "$1_{0,1}" in text.get_text()}
+    assert texts == {one if isinstance(one, str) else f"$1_{{0,1}}, F{{=}}{one}$" for one in expected}

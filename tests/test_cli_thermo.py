@@ -22,7 +22,7 @@ OF_VIBRATION = ["q_vib", "cv_vib_over_r"]
 OF_GAS = ["gas_cp_j_per_mol_k", "gas_entropy_j_per_mol_k", "gas_enthalpy_j_per_mol", "gas_gibbs_j_per_mol_k"]
 KEYS = {
     "rotational_temperatures_k", "classical_above_k", "classical_tolerance", "classical_corrections", "species",
-    "species_known", "fractions", "symmetry_number_counted", "spin_factor", "jmax", "relative_error", "vibrations",
+    "species_known", "fractions", "symmetry_number_counted", "hyperfine", "spin_factor", "jmax", "relative_error", "vibrations",
     "pressure_bar", "functions", "files",
 }  # fmt: skip
 

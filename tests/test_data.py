@@ -28,7 +28,7 @@ MOLECULES = {path.stem: read_molecule_file(path) for path in sorted(folders()[-1
 every = pytest.mark.parametrize("molecule", MOLECULES.values(), ids=MOLECULES)
 measured = pytest.mark.parametrize("stem", [stem for stem, molecule in MOLECULES.items() if molecule.catalogue])
 
-LIBRARY = """H2, N2, O2, CO, CO2, HCN, N2O, HC3N, HC5N, HCP, C2H2, OCS, HCl, CH4, CD4, SF6, CCl4, NH3, PH3, CH3F, CH3Cl, CH3I,
+LIBRARY = """H2, N2, O2, CO, CO2, HCN, N2O, HC3N, HC5N, HCP, C2H2, OCS, HCl, CH4, CD4, SF6, CCl4, NH3, ND3, PH3, CH3F, CH3Cl, CH3I,
 CH3CN, CH3CCH, CHCl3, benzene, SO3, H2O, HDO, D2O, H2S, H2CO, H2CS, SO2, O3, HCOOH, HNCO, formamide, ketene, ethylene,
 ethylene oxide, propylene oxide, vinyl cyanide, furan, pyridine, benzonitrile, indole, glycolaldehyde, camphor"""
 WANTED = [name.strip() for name in LIBRARY.split(",")]

@@ -93,7 +93,7 @@ def test_a_fit_far_from_the_lines_never_says_that_it_is_done(fitted):
     early = fit_lines(fitted.lines, perturbed(TRUE, 0.05), parameters(perturbed(TRUE, 0.05), list(TRUE.values)),
                       FitOptions(most_iterations=1))  # fmt: skip
     assert not early.converged
-    assert "1 iterations were not enough" in early.reason or "weighted rms" in early.reason
+    assert "1 iteration was not enough" in early.reason or "weighted rms" in early.reason
 
 
 def test_few_iterations_are_enough_where_nothing_is_left(fitted):
@@ -107,7 +107,7 @@ def test_few_iterations_are_enough_where_nothing_is_left(fitted):
     far = perturbed(TRUE, 0.01)
     stopped = fit_lines(fitted.lines, far, parameters(far, list(TRUE.values)), FitOptions(most_iterations=1))
     assert not stopped.converged
-    assert "were not enough" in stopped.reason
+    assert "was not enough" in stopped.reason
 
 
 def test_the_covariance_goes_into_errors_of_lines(fitted):
@@ -327,7 +327,7 @@ def test_merging_keeps_blends_and_says_what_was_twice():
     both, notes = merged(one, other)
     assert both.upper[:, 0].tolist() == [1, 2, 3]
     assert both.blend.tolist() == [0, 0, 2]
-    assert notes == ["1 lines are in both, once in the result, the first: 2 - 1"]
+    assert notes == ["1 line is in both, once in the result, the first: 2 - 1"]
     assert duplicates(merged(one, assignments(("j",), [[1]], [[0]], [101.0], 0.1))[0]) == [(0, 2)]
 
 

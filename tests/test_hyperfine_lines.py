@@ -1,7 +1,8 @@
 """Hyperfine components measured in laboratories, met by the library's constants and by those of published fits.
 
 The samples in tests/oracles/hyperfine are cut by the script there: CH3CN (CDMS fit, references in its line list), CsF (CDMS fit of
-the lines of Zorn et al.), CH3Cl (c050007) and HNCO (c043002) of JPL; HCN as data/molecules/HCN.toml says.
+the lines of Zorn et al.), CH3Cl (c050007) and HNCO (c043002) of JPL; HCN as data/molecules/HCN.toml says; where
+the others are from says the README there.
 """
 
 from __future__ import annotations
@@ -14,7 +15,10 @@ import numpy as np
 import pytest
 
 import rotor
+from rotor import units
+from rotor.molecules.nuclei import isotope
 from rotor.quantum.effects.of_top import effects_of
+from rotor.quantum.solve import solve_levels
 from rotor.spectra.lines import Lines, line_list
 from rotor.tops.constants import Constants
 from rotor.tops.spins.spin_constants import SpinConstants
@@ -22,6 +26,9 @@ from rotor.tops.top import Top
 
 SAMPLES = Path(__file__).parent / "oracles" / "hyperfine"
 Quanta = tuple[int, ...]
+DIPOLES_KHZ_ANGSTROM3 = (  # μ0 (g μ_N)²/4πh of two protons, 120.12
+    1e-7 * (isotope("1H").g_factor * units.NUCLEAR_MAGNETON_MHZ_PER_T * 1e6) ** 2 * units.PLANCK_J_S * 1e30 * 1e-3
+)
 
 
 @dataclass(frozen=True)
@@ -145,8 +152,6 @@ def test_caesium_fluoride():
     top = Top.from_constants(
         Constants(B=5490.0), dipole_abc_debye=(7.9, 0, 0), spin_constants=SpinConstants.parse(text)
     )
-    from rotor.quantum.solve import solve_levels
-
     levels = solve_levels(top, 1, effects=effects_of(top, True))
     names = list(levels.quanta)
     assert names == ["n", "f1", "f"]
@@ -162,3 +167,78 @@ def test_caesium_fluoride():
     assert np.sqrt(np.mean(np.square(off))) == pytest.approx(
         0.85537, abs=2e-3
     )  # that of the published fit, energies to 1e-9
+
+
+# Lines of a list of rest frequencies, and the largest |observed - calculated| in kHz. Its frequencies have three decimals of MHz.
+REST_FREQUENCIES = {"formamide": ("hconh2", 3.3), "vinyl cyanide": ("ch2chcn", 2.0), "HC5N": ("hc5n", 1.0)}
+
+
+@pytest.mark.parametrize("name", REST_FREQUENCIES)
+def test_rest_frequencies(name):
+    """Formamide: χ of Kryvda et al., B - C of CDMS; vinyl cyanide likewise from elsewhere; HC5N: χ is from these, the centre is not."""
+    sample, most_khz = REST_FREQUENCIES[name]
+    found = measured(sample)
+    off_khz = np.array([line.error_mhz for line in found]) * in_errors(rotor.read(name), found) * 1e3
+    assert len(off_khz) in (3, 6)
+    assert np.abs(off_khz).max() < most_khz  # found here: 3.2, 1.9, 0.9; the compilation's errors are not known
+    assert np.abs(off_khz).max() > 0.3 * most_khz
+
+
+@pytest.mark.parametrize(("sample", "name"), [("hconh2", "formamide"), ("ch2chcn", "vinyl cyanide")])
+def test_rest_frequencies_need_the_sign_and_size_of_chi(sample, name):
+    """With χ of the other sign, 6 % more or b and c exchanged, the same lines are missed by more than 10 kHz."""
+    top, found = rotor.read(name), measured(sample)
+    aa, bc = (top.spin_constants.values[key] for key in ("chi_aa(14N)", "chi_bb-cc(14N)"))
+    for values in ((-aa, -bc), (1.06 * aa, 1.06 * bc), (aa, -bc)):
+        changed = replace(
+            top.spin_constants, values={"chi_aa(14N)": values[0], "chi_bb-cc(14N)": values[1]}, uncertainties={}
+        )
+        off = in_errors(replace(top, spin_constants=changed), found) * 2  # kHz
+        assert np.ptp(off) > 10
+
+
+# Formaldehyde, 1(1,0)-1(1,1) and 2(1,1)-2(1,2): kHz from 4829.65996 and 14488.47881 MHz, by (J, F upper, F lower). K. D. Tucker, G. R.
+# Tomasevich and P. Thaddeus, Astrophys. J. 169 (1971) 429 and 174 (1972) 463, to about 0.1 kHz (abstract of the first), read in
+# pyspeckit/spectrum/models/formaldehyde.py of the repository pyspeckit/pyspeckit (commit 0139a1a).
+FORMALDEHYDE = {
+    (1, 1, 0): -18.53, (1, 0, 1): -1.34, (1, 2, 2): -0.35, (1, 2, 1): 4.05, (1, 1, 2): 6.48, (1, 1, 1): 11.08,
+    (2, 1, 1): -19.97, (2, 1, 2): -7.03, (2, 2, 1): -2.20, (2, 3, 2): 0.12, (2, 3, 3): 0.89, (2, 2, 2): 10.74, (2, 2, 3): 11.51,
+}  # fmt: skip
+
+
+def _formaldehyde_khz(constants: np.ndarray) -> np.ndarray:
+    """The same from C_aa, C_bb, C_cc of either proton and μ0 (g μ_N)²/4πr³h, kHz, with their total spin of 1."""
+    *c, d = (float(value) for value in constants)
+    text = " ".join(f"C_{k}{k}(1H_{i})={v!r}" for i in (1, 2) for k, v in zip("abc", c, strict=True))
+    spins = SpinConstants.parse(f"{text} T_aa(1H_1,1H_2)={d!r} T_bb(1H_1,1H_2)={-2 * d!r} kHz", "1H_1+1H_2")
+    top = replace(rotor.read("H2CO"), spin_constants=spins)
+    levels = solve_levels(top, 2, effects=effects_of(top, True))
+    energy = {
+        (j, f, side): levels.energy_mhz[levels.find(n=j, ka=1, kc=j - 1 + side, i_tot=1, f=f)]
+        for j in (1, 2)
+        for f in range(j - 1, j + 2)
+        for side in (0, 1)
+    }
+    return np.array([(energy[j, up, 0] - energy[j, low, 1]) * 1e3 for j, up, low in FORMALDEHYDE])
+
+
+def test_formaldehyde():
+    """13 components by three spin-rotation constants, two centres and the protons' distance, which comes out as that of the molecule."""
+    seen, j = np.array(list(FORMALDEHYDE.values())), np.array([key[0] for key in FORMALDEHYDE])
+    start = np.array([-3.4, 1.8, -2.8, 17.5])
+    here = _formaldehyde_khz(start)
+    slopes = np.array(
+        [_formaldehyde_khz(start + step) - here for step in np.eye(4)]
+    ).T  # linear: |E| of ΔN = 1 is 7e7 times larger
+    design = np.hstack([slopes, j[:, None] == [1, 2]])
+    step, *_ = np.linalg.lstsq(design, seen - here, rcond=None)
+    left = seen - here - design @ step
+    assert np.sqrt(left @ left / (len(seen) - 6)) < 0.12  # kHz; the laboratory's 0.1
+    found = start + step[:4]
+    covariance = np.linalg.inv(design.T @ design) * 0.1**2
+    assert (np.abs(found[:3]) > 10 * np.sqrt(np.diag(covariance))[:3]).all()
+    r = np.cbrt(DIPOLES_KHZ_ANGSTROM3 / found[3])
+    protons = rotor.read("H2CO").molecule.positions_angstrom[2:]
+    assert r == pytest.approx(
+        np.linalg.norm(protons[0] - protons[1]), rel=0.012
+    )  # 1.899 Å; r_e is 1.886, vibration makes r larger

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -186,3 +187,50 @@ def test_unresolved_components_are_one_line(capsys):
     assert "components" in out
     assert "21206.4546" in out
     assert "21207.3340" not in out
+
+
+def test_levels_beyond_the_reach_of_the_constants_make_no_lines_with_spins_either():
+    """A series that turns down near J = 25: its levels far below 0 would take the whole population."""
+    plain = Top.from_constants("A=72000 B=11400 C=9800 DJ=0.5 DJK=-1 HJ=-0.01 MHz", dipole_abc_debye=(3.6, 0, 0))
+    top = replace(plain, spin_constants=SpinConstants.parse("chi_aa(14N)=2 chi_bb-cc(14N)=5.7 MHz"))
+    bare = line_list(plain, jmax=40, min_lgint=None, q=1.0)
+    split = line_list(top, jmax=40, min_lgint=None, q=1.0, effects=effects_of(top, True))
+    assert solve_levels(plain, 40).energy_mhz.min() < -1e6
+    assert split.untrusted > bare.untrusted > 0
+    rows = [np.flatnonzero(lines.levels.weight > 0) for lines in (bare, split)]
+    bare_kept, split_kept = (
+        {tuple(q[:3]) for q in lines.levels.quanta_of(r).tolist()} for lines, r in zip((bare, split), rows, strict=True)
+    )
+    assert bare_kept == split_kept
+    low = line_list(top, jmax=2, min_lgint=None, q=1.0, effects=effects_of(top, True))
+    ends = [np.hstack([one.quanta(one.upper), one.quanta(one.lower)]).tolist() for one in (low, split)]
+    of_split = [ends[1].index(quanta) for quanta in ends[0]]
+    assert split.lgint[of_split] == pytest.approx(low.lgint, abs=1e-12)  # the same arithmetic
+
+
+def random_tops(seed: int, count: int):
+    """Tops with one to three nuclei whose K doublets or other levels nearly coincide, and the highest N worth comparing."""
+    draw = np.random.default_rng(seed)
+    for _ in range(count):
+        low = 10 ** draw.uniform(3, 4.5)
+        near = low * (1 + 10 ** draw.uniform(-6, -2))
+        abc = ((low * draw.uniform(2, 10), near, low), (2 * near, 2 * low, 1.01 * low))[draw.integers(2)]
+        names = draw.choice(["35Cl", "14N", "D"], draw.integers(1, 4), replace=False)
+        size = 10 ** draw.uniform(-1, 2)
+        parts = [(name, part) for name in names for part in ("aa", "bb-cc", "ab", "bc")]
+        text = " ".join(f"chi_{part}({name})={size * draw.normal():.9g}" for name, part in parts)
+        top = Top.from_constants(dict(zip("ABC", abc, strict=True)), spin_constants=SpinConstants.parse(text + " MHz"))
+        yield top, (6, 3, 1)[len(names) - 1]
+
+
+def test_the_estimate_holds_where_levels_nearly_coincide():
+    """What levels of one F, in order of energy, do at least differ by; lines may differ by twice as much."""
+    for top, nmax in random_tops(13, 6):
+        exact = solve_levels(top, nmax, effects=effects_of(top, True))
+        for method in ("N-diagonal", "first-order"):
+            simple = solve_levels(top, nmax, effects=effects_of(top, True, method))
+            used = used_method(simple)
+            assert used is not None
+            order = [np.lexsort((levels.energy_mhz, levels.multiplicity)) for levels in (exact, simple)]
+            shift = simple.energy_mhz[order[1]] - exact.energy_mhz[order[0]]
+            assert shift.max() - shift.min() <= used.estimate_mhz

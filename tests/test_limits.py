@@ -10,12 +10,15 @@ from scipy import constants
 
 import rotor
 from rotor.molecules.nuclei import data_folder, isotope
+from rotor.molecules.readers.read import read_molecule
 from rotor.quantum.effects.hyperfine import NuclearQuadrupole
+from rotor.quantum.effects.of_top import effects_of
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.estimates.limits import VIBRATION_CM, VIBRATION_POWER, model_limits, model_sizes, populated_j
 from rotor.quantum.solve import solve_levels
 from rotor.quantum.spins import Spin
 from rotor.quantum.spins.splittings import GRADIENT_MHZ_PER_BARN, GRADIENTS, splitting_nuclei
+from rotor.tops.top import Top
 from rotor.units import MHZ_PER_CM
 
 
@@ -109,6 +112,18 @@ def test_largest_first_and_unknown_spin_before_all(source):
     assert ("electron spin" in dict(found)) == (source == "NO") == (found[0][1] is None)
 
 
+@pytest.mark.parametrize(
+    ("source", "magnetic"),
+    [("NH3", "1H: small splittings"), ("HCONH2", "14N, 1H: small splittings"), ("HCN", "1H: small splittings")],
+)
+def test_nuclei_without_magnetic_constants_are_left_out(source, magnetic):
+    """C of 14N is known of two; that of protons is not, which split lines of NH3 by 0.06 MHz."""
+    top = rotor.read(source)
+    for effects in (SEMI_RIGID, effects_of(top, True)):
+        (found,) = [one for one in model_limits(top, 3, effects) if one.name == "magnetic coupling of nuclear spins"]
+        assert found.text == magnetic
+
+
 def test_the_size_of_distortion_is_that_of_a_harmonic_diatomic_molecule():
     """Lines ν = 2B(J+1) - 4D(J+1)³ with D = 4B³/ω²."""
     b = 57_600.0
@@ -155,12 +170,17 @@ def test_reports_end_with_the_limits(call, verb):
     given = ("HCN", "--polarizability", "3,2") if verb == "raman" else ("HCN",)
     code, out, _ = call(verb, *given)
     assert code == 0
-    last = out.rstrip().splitlines()[-3:]
+    last = out.rstrip().splitlines()[-4:]
     assert last[0].startswith("effects   at J = ")
     assert last[1].startswith("left out  nuclear quadrupole: about 4 MHz; 14N splits J = 1 by 3.53 MHz: rotor")
     assert last[2].lstrip().startswith("spin-rotation: about 0.")  # C of 14N is known
+    assert last[3].lstrip() == "magnetic coupling of nuclear spins: not estimated; 1H: small splittings"
     printed = json.loads(call(verb, *given, "--json", "-")[1])
-    assert [one["name"] for one in printed["limits"]] == ["nuclear quadrupole", "spin-rotation"]
+    assert [one["name"] for one in printed["limits"]] == [
+        "nuclear quadrupole",
+        "spin-rotation",
+        "magnetic coupling of nuclear spins",
+    ]
     assert {one["name"]: one["present"] for one in printed["effects"]}["nuclear quadrupole"] is False
 
 
@@ -204,3 +224,11 @@ def test_couplings_of_an_electron_with_known_constants_are_left_out_by_size():
     assert not {"spin-rotation", "spin-spin", "nuclear quadrupole"} & {
         one.name for one in model_limits(top, 22, effects_of(top, True))
     }
+
+
+@pytest.mark.parametrize(("isotopes", "size_mhz"), [("N=14N", 24000.0), ("H=2H", 1600.0), ("2=2H,3=2H", 24000.0)])
+def test_inversion_of_heavy_ammonia_is_slower(isotopes, size_mhz):
+    """Measured at (J, K) = (1, 1): 23.7 GHz of NH3, 1.59 GHz of ND3; one hydrogen left counts as NH3."""
+    top = Top.from_molecule(read_molecule("SMILES:N", isotopes=isotopes))
+    (found,) = [limit for limit in model_limits(top, 5, SEMI_RIGID) if limit.name == "inversion"]
+    assert found.size_mhz == size_mhz

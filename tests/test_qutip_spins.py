@@ -21,11 +21,12 @@ from rotor.tops.top import Top
 
 TOP_N = 3
 ABC = (9400.0, 3100.0, 2500.0)
-TENSORS = {  # symmetric; chi, T and D traceless
+TENSORS = {  # symmetric but one of spin-rotation; chi, T and D traceless
     "large": np.array([[-57.0, 60.3, 5.5], [60.3, 26.4, -8.2], [5.5, -8.2, 30.6]]),
     "small": np.array([[1.93, 1.1, -0.4], [1.1, -3.0, 0.7], [-0.4, 0.7, 1.07]]),
     "dipolar": np.array([[-4.7, 4.0, 1.5], [4.0, 3.0, -2.0], [1.5, -2.0, 1.7]]),
     "electron": np.array([[300.0, 45.0, -12.0], [45.0, -120.0, 9.0], [-12.0, 9.0, 90.0]]),
+    "skew": np.array([[300.0, 245.0, -112.0], [-155.0, -120.0, 99.0], [88.0, -81.0, 90.0]]),
     "triplet": np.array([[5900.0, 300.0, 80.0], [300.0, -2500.0, 40.0], [80.0, 40.0, -3400.0]]),
 }
 CASES = {  # spins, one-spin terms (kind, spin, tensor), two-spin terms (spins, scalar, tensor)
@@ -34,6 +35,8 @@ CASES = {  # spins, one-spin terms (kind, spin, tensor), two-spin terms (spins, 
     "three nuclei, 1, 1/2 and 1/2": ({"14N": 2, "1H": 1, "19F": 1}, [("chi", "14N", "small"), ("C", "1H", "dipolar")],
                                      [("14N", "1H", 5.0, "dipolar"), ("1H", "19F", -4.0, "small")]),
     "S = 1/2 and I = 1": ({"S": 1, "14N": 2}, [("eps", "S", "electron"), ("chi", "14N", "small")], [("S", "14N", 140.0, "dipolar")]),
+    "S = 1/2, the two orders unlike": ({"S": 1}, [("eps", "S", "skew")], []),
+    "I = 1, the two orders unlike": ({"14N": 2}, [("chi", "14N", "small"), ("C", "14N", "skew")], []),
     "S = 1 and I = 1/2": ({"S": 2, "1H": 1}, [("D", "S", "triplet"), ("eps", "S", "electron")], [("S", "1H", 90.0, "dipolar")]),
 }  # fmt: skip
 
@@ -45,6 +48,8 @@ def _named(name: str) -> SpinConstants:
         m = TENSORS[tensor]
         for i, k in ((0, 1), (0, 2), (1, 2)):
             values[f"{kind}_{'abc'[i]}{'abc'[k]}({spin})"] = m[i, k]
+            if m[k, i] != m[i, k]:
+                values[f"{kind}_{'abc'[k]}{'abc'[i]}({spin})"] = m[k, i]
         for i in range(3):
             values[f"{kind}_{'abc'[i] * 2}({spin})"] = m[i, i]
     for one, two, scalar, _ in pairs:
@@ -104,8 +109,10 @@ def _direct(name: str, twice_f: int) -> tuple[np.ndarray, float]:
     return np.linalg.eigvalsh(own), float(np.abs(np.linalg.norm(total[np.ix_(here, here)], 2)))
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", CASES)
+SLOW = [pytest.param(name, marks=[] if "orders" in name else pytest.mark.slow) for name in CASES]
+
+
+@pytest.mark.parametrize("name", SLOW)
 def test_levels(name):
     constants = _named(name)
     top = Top.from_constants(dict(zip("ABC", ABC, strict=True)), spin_constants=constants)
@@ -118,3 +125,13 @@ def test_levels(name):
         np.testing.assert_allclose(found, slow, rtol=0, atol=1e-14 * size + 1e-9)  # round-off of energies up to 1e5 MHz
         compared += len(slow)
     assert compared >= 12
+
+
+def test_a_difference_of_two_orders_moves_levels_and_its_sign_counts():
+    """In second order, and in first beside the symmetric part of another element with the same ΔN."""
+    energies = []
+    for sign in (0.0, 1.0, -1.0):
+        values = {"eps_aa(S)": 300.0, "eps_ab(S)": 45.0, "eps_ab-ba(S)": sign * 200.0}
+        top = Top.from_constants(dict(zip("ABC", ABC, strict=True)), spin_constants=SpinConstants(values, {"S": 1}))
+        energies.append(np.sort(solve_levels(top, TOP_N, effects=effects_of(top, True)).energy_mhz))
+    assert min(np.abs(energies[i] - energies[k]).max() for i, k in ((0, 1), (0, 2), (1, 2))) > 0.5

@@ -140,7 +140,7 @@ def test_parquet_needs_neither_pandas_nor_polars(tmp_path):
         "rotor.write(rotor.line_list(rotor.read('NH3'), jmax=4), sys.argv[1])\n"
     )
     subprocess.run([sys.executable, "-c", code, str(tmp_path / "a.parquet")], check=True)
-    assert pl.read_parquet(tmp_path / "a.parquet").columns[:2] == ["frequency_mhz", "lgint"]
+    assert pl.read_parquet(tmp_path / "a.parquet").columns[:3] == ["frequency_mhz", "error_mhz", "lgint"]
 
 
 def test_texts_of_tables_are_short():

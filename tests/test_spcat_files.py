@@ -310,7 +310,7 @@ def test_lines_that_do_not_fit_are_refused():
 
 def test_the_content_of_an_energy_file():
     levels = read_egy(SAMPLES / "h2co_part.egy")
-    assert levels.level(1) == (6, 1, 10.700143, 0.0, 1.0, 9, (1, 1, 0))
+    assert levels.level(1) == (6, 1, 10.700143, 0.0, 1.0, 9, (1, 1, 0), None)
     assert (len(levels), levels.texts) == (81, {})
 
 

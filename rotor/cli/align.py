@@ -27,6 +27,7 @@ from rotor.cli.shared.pulse_inputs import Pulses, pulses_of
 from rotor.cli.shared.report import model_facts
 from rotor.cli.shared.save_scene import save_scene, save_scene_option
 from rotor.cli.shared.sources import with_sources
+from rotor.table import counted
 
 if TYPE_CHECKING:
     from rotor.alignment.align import AlignmentTrace
@@ -90,9 +91,7 @@ class Outputs:
     save_scene: str | None = save_scene_option()
 
 
-@grouped(
-    given=("dipole", "calculator", "hessian", "spin_constants", "spins", "state_constants"), picture=("plot_scale",)
-)
+@grouped(given=("dipole", "calculator", "hessian", "spin_constants", "spins", *inputs.STATES), picture=("plot_scale",))
 def command(
     context: typer.Context, given: Input, pulses: Pulses, options: Options, outputs: Outputs, picture: ViewOptions
 ) -> None:
@@ -263,7 +262,7 @@ def _facts(trace: AlignmentTrace, content: dict[str, Any]) -> list[tuple[str, st
         ("pulses", "; ".join(_pulse_text(pulse) for pulse in trace.pulses)),
         ("gas", _ensemble_text(trace)),
         ("J max", str(trace.jmax)),
-        ("method", f"{trace.method}, {sum(trace.steps)} steps"),
+        ("method", f"{trace.method}, {counted(sum(trace.steps), 'step')}"),
         ("accuracy", accuracy),
     ]
 

@@ -10,6 +10,7 @@ import typer
 
 from rotor.checks import require_whole
 from rotor.cli.shared import inputs, plot_options
+from rotor.cli.shared.hyperfine import HyperfineOptions, effects_of_each, hyperfine_lines
 from rotor.cli.shared.inputs import Input, json_option
 from rotor.cli.shared.options import argument, file_option, grouped, option
 from rotor.cli.shared.output import (
@@ -25,6 +26,7 @@ from rotor.cli.shared.output import (
 )
 from rotor.cli.shared.plot_options import PlotOptions
 from rotor.cli.shared.save_scene import molecule_of, save_made, save_scene_option
+from rotor.table import counted
 
 if TYPE_CHECKING:
     from rotor.scenes.scene import EmissionScene
@@ -35,6 +37,7 @@ EXAMPLES = """\b
 Examples:
   rotor emission CO --range 115.1:115.4GHz --column 1e17 --excitation 20 --width 2
   rotor emission CH3CN HC3N SO2 --band ALMA6 --column 1e15,3e14,1e15 --excitation 100 --width 5 --plot core.png
+  rotor emission HCN --range 88.62:88.64GHz --hyperfine --width 0.3 --excitation 10
   rotor emission CO --isotope C=13C --band ALMA3 --column 1e16 --excitation 10 --velocity 5.6 --csv co.csv"""
 
 NAMES = {
@@ -42,6 +45,9 @@ NAMES = {
     "filling": "--filling", "velocity_km_s": "--velocity", "fwhm_km_s": "--width", "range_mhz": "--range",
     "least_depth": "--least-depth",
 }  # fmt: skip  # field of the request -> option
+_OF_ONE = {
+    "isotope": "--isotope", "spin_constants": "--spin-constants", "spins": "--spins", **inputs.STATES,
+}  # fmt: skip  # what belongs to a single molecule
 
 
 @dataclass(frozen=True)
@@ -52,6 +58,25 @@ class Options:
     isotope: list[str] | None = option(
         None, metavar="1=2H", help="Another isotope, by atom number or element, of a single molecule; repeatable."
     )
+    spin_constants: str | None = option(
+        None, metavar="TEXT", help='Constants of spins, of a single molecule: "chi_aa(14N)=-4.22 MHz" (MHz).'
+    )
+    spins: str | None = option(
+        None, metavar="LIST", help='Sizes and order of its spins: "S=1/2 14N"; "35Cl_1+35Cl_2" have a total spin.'
+    )
+    state_constants: str | None = option(
+        None, metavar="TEXT", help='Further states of a single molecule: "E[1]=120GHz B[1]=... W[0,1]=3 MHz" (MHz).'
+    )
+    state_dipoles: str | None = option(
+        None, metavar="TEXT", help='Its dipoles in and between states, axes a, b, c: "[0,1] 0,0,1.47" (D).'
+    )
+    state_weights: str | None = option(
+        None, metavar="TEXT", help='Its spin weights of states: "[0] even=1,odd=3 [1] even=3,odd=1".'
+    )
+    state_symmetry: str | None = option(
+        None, metavar="GROUP", help="Group of its states, whose couplings are checked by it: C2v, Cs(ab), ..."
+    )
+    state_names: str | None = option(None, metavar="LIST", help="Names of all its states, from 0 on: 0+,0-.")
     column: str = option("1e14", metavar="N", help="Column density, one for all or one each: 1e14,3e13 (1/cm²).")
     excitation: str = option("100", metavar="T", help="Excitation temperature of rotation (K).")
     background: str = option("2.725", metavar="T", help="Temperature behind the source (K).")
@@ -77,7 +102,9 @@ class Outputs:
 
 
 @grouped()
-def command(context: typer.Context, options: Options, outputs: Outputs, picture: PlotOptions) -> None:
+def command(
+    context: typer.Context, options: Options, spins: HyperfineOptions, outputs: Outputs, picture: PlotOptions
+) -> None:
     """Brightness temperature of a source in local thermodynamic equilibrium."""
     require_whole("--top", options.top_lines, 0)
     if not options.sources:
@@ -85,7 +112,7 @@ def command(context: typer.Context, options: Options, outputs: Outputs, picture:
     files = Files.of(outputs)
     drawn = plot_options.settings_of(picture, files)
     with inputs.fields_as_options(**NAMES):
-        request = _request(options)
+        request = _request(options, spins)
     from rotor.spectra.emission_request import answer_emission
 
     with answering():
@@ -99,27 +126,32 @@ def command(context: typer.Context, options: Options, outputs: Outputs, picture:
     deliver(files, writers, lambda: json_with_rows(answer.lines, "lines", content), show)
 
 
-def _request(options: Options) -> EmissionRequest:
+def _request(options: Options, spins: HyperfineOptions) -> EmissionRequest:
     from rotor.spectra.emission_request import EmissionRequest
 
     source, range_mhz = _source(options), _range(options)
-    if options.isotope and len(_sources(options)) > 1:
-        raise ValueError("--isotope: expected with a single molecule; which of several is meant is not said")
-    tops = tuple(
-        inputs.with_some_dipole(inputs.read_top(Input(one, isotope=options.isotope))) for one in _sources(options)
-    )
+    for name, text in _OF_ONE.items():
+        if getattr(options, name) and len(_sources(options)) > 1:
+            raise ValueError(f"{text}: expected with a single molecule; which of several is meant is not said")
+    tops = tuple(inputs.with_some_dipole(inputs.read_top(one)) for one in _inputs(options))
     columns = _columns(options.column)
     if len(columns) == 1:
         columns *= len(tops)
-    return EmissionRequest(tops, columns, source, range_mhz, options.least_depth)
+    effects = effects_of_each(tops, spins, options.spin_constants)
+    return EmissionRequest(tops, columns, source, range_mhz, options.least_depth, effects)
+
+
+def _inputs(options: Options) -> list[Input]:
+    """Which molecules are meant."""
+    of_one = {name: getattr(options, name) for name in _OF_ONE}
+    return [Input(one, **of_one) for one in _sources(options)]
 
 
 def _scene(request: EmissionRequest, options: Options, folder: Path) -> EmissionScene:
     """The scene that a file in a folder holds."""
     from rotor.scenes.kinds.emission import saved_molecules
 
-    given = [Input(one, isotope=options.isotope) for one in _sources(options)]
-    return saved_molecules(request, [molecule_of(one, request, folder) for one in given])
+    return saved_molecules(request, [molecule_of(one, request, folder) for one in _inputs(options)])
 
 
 def _sources(options: Options) -> list[str]:
@@ -185,6 +217,7 @@ def _writers(answer: EmissionAnswer, content: dict[str, Any], drawn: dict[str, A
 
 def _show(answer: EmissionAnswer, shown: int) -> None:
     from rotor.cli.shared.sources import short_source
+    from rotor.quantum.quanta import headings
 
     request, source = answer.request, answer.request.source
     print(
@@ -198,8 +231,12 @@ def _show(answer: EmissionAnswer, shown: int) -> None:
             f"{len(answer.lines)}, {source.fwhm_km_s:g} km/s wide, source at {source.velocity_km_s:g} km/s (radio convention)",
         ),
     ]
-    for name, column, q in zip(request.names, request.columns_per_cm2, answer.partition_functions, strict=True):
-        facts.append((name, f"N = {column:.4g} /cm², Q = {q:.6g}"))
+    each = zip(request.names, request.columns_per_cm2, answer.partition_functions, answer.quanta, strict=True)
+    for name, column, q, quanta in each:
+        facts.append((name, f"N = {column:.4g} /cm², Q = {q:.6g}; upper, lower: {headings(quanta)}"))
+    for name, used in zip(request.names, answer.hyperfine, strict=True):
+        of_which = f"{name}: " if len(request.names) > 1 else ""
+        facts += [(title, of_which + text) for title, text in hyperfine_lines(used)]
     if len(answer.lines):
         at, peak = answer.spectrum.brightness_k.argmax(), answer.spectrum
         facts.append(
@@ -223,13 +260,14 @@ def _show(answer: EmissionAnswer, shown: int) -> None:
 
 def _limits(answer: EmissionAnswer) -> list[tuple[str, str]]:
     """What is left out: of the source, and the largest of each molecule."""
+    from rotor.cli.shared.report import with_option
     from rotor.quantum.estimates.limits import model_limits, populated_j
 
     request = answer.request
     facts = [("left out", "departures from one excitation temperature; structure of the source in the beam")]
     for name, top, effects in zip(request.names, request.tops, answer.effects, strict=True):
         limits = model_limits(top, populated_j(top, request.source.excitation_k), effects)
-        facts += [("", f"{name}: {limit.sentence}") for limit in limits[:1]]
+        facts += [("", f"{name}: {with_option(limit.sentence, 'rotor emission')}") for limit in limits[:1]]
     return facts
 
 
@@ -255,7 +293,7 @@ def _table(answer: EmissionAnswer, shown: int) -> Table:
         )
         for i in rows
     ]
-    title = f"the {len(rows)} brightest lines" if len(rows) < len(lines) else "all lines"
+    title = f"the {counted(len(rows), 'brightest line')}" if len(rows) < len(lines) else "all lines"
     columns = (
         "molecule", "at rest (MHz)", "observed (MHz)", "upper", "lower", "E_u (K)", "A (1/s)", "g_u", "τ", "T_B (K)", "∫T_B dv (K km/s)",
     )  # fmt: skip

@@ -47,7 +47,7 @@ class Options:
 
 @grouped(
     given=(
-        "sources", "constants", "isotope", "spin_weights", "state_constants", "calculator", "hessian", "symmetry_tolerance",
+        "sources", "constants", "isotope", "spin_weights", *inputs.STATES, "calculator", "hessian", "symmetry_tolerance",
     )
 )  # fmt: skip
 def command(context: typer.Context, given: Input, options: Options) -> None:

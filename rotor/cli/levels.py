@@ -10,6 +10,7 @@ import typer
 
 from rotor.checks import require_one_of, require_whole
 from rotor.cli.shared import inputs
+from rotor.cli.shared.hyperfine import HyperfineOptions, effects_asked, hyperfine_lines
 from rotor.cli.shared.inputs import Input, json_option
 from rotor.cli.shared.options import file_option, grouped, option
 from rotor.cli.shared.output import (
@@ -27,6 +28,7 @@ from rotor.cli.shared.output import (
 from rotor.cli.shared.plot_options import ViewOptions, view_of
 from rotor.cli.shared.save_scene import save_scene, save_scene_option
 from rotor.cli.shared.sources import source_facts
+from rotor.table import counted
 
 if TYPE_CHECKING:
     from rotor.plots.view import View
@@ -57,11 +59,6 @@ class Options:
     max_energy: str | None = option(
         None, metavar="E", help="Highest energy above the lowest level that exists (MHz; 10cm-1, 50K)."
     )
-    hyperfine: bool | None = option(
-        None,
-        "--hyperfine/--no-hyperfine",
-        help="Split levels by the spins of nuclei; by default where --spin-constants are given.",
-    )
     unit: str = option("cm-1", metavar="UNIT", help="Of the table and the diagram: MHz, cm-1 or K.")
     top_levels: int = option(60, "--top", metavar="N", help="How many of the lowest levels are shown.")
 
@@ -78,10 +75,16 @@ class Outputs:
     save_scene: str | None = save_scene_option()
 
 
-@grouped(given=("dipole", "dipole_abc"), picture=("plot_scale",))
-def command(context: typer.Context, given: Input, options: Options, outputs: Outputs, picture: ViewOptions) -> None:
+@grouped(given=("dipole", "dipole_abc", "state_dipoles"), picture=("plot_scale",))
+def command(
+    context: typer.Context,
+    given: Input,
+    options: Options,
+    spins: HyperfineOptions,
+    outputs: Outputs,
+    picture: ViewOptions,
+) -> None:
     """Energy levels: quantum numbers, energies, degeneracies, term diagram."""
-    from rotor.quantum.effects.of_top import effects_of
     from rotor.quantum.request import LevelsRequest, answer_levels
 
     require_whole("--top", options.top_levels, 0)
@@ -90,9 +93,7 @@ def command(context: typer.Context, given: Input, options: Options, outputs: Out
     view = view_of(picture, files)
     with inputs.fields_as_options(**NAMES):
         top = inputs.read_top(given)
-        if given.spin_constants is not None if options.hyperfine is None else options.hyperfine:
-            settings["effects"] = effects_of(top, hyperfine=True)
-        request = LevelsRequest(top, **settings)
+        request = LevelsRequest(top, **settings, effects=effects_asked(top, spins, given.spin_constants))
     with answering():
         answer = answer_levels(request)
     for warning in answer.warnings:
@@ -178,6 +179,7 @@ def _facts(answer: LevelsAnswer, content: dict[str, Any]) -> list[tuple[str, str
         ("spin weights", weights),
         ("levels", f"{len(answer.table)}: {asked}"),
         ("lowest", f"{ground}: energies count from there"),
+        *hyperfine_lines(content["hyperfine"]),
     ]
 
 
@@ -198,6 +200,6 @@ def _table(answer: LevelsAnswer, options: Options) -> Table:
             labels, energy.tolist(), columns["weight"][rows].tolist(), columns["degeneracy"][rows].tolist(), strict=True
         )
     ]
-    title = f"the {len(rows)} lowest levels" if len(rows) < len(table) else "all levels"
+    title = f"the {counted(len(rows), 'lowest level')}" if len(rows) < len(table) else "all levels"
     head = (quanta.headings(table.levels.quanta_names), f"E ({options.unit})", "spin weight", "g")
     return Table(f"{title}, in order of energy", head, cells)

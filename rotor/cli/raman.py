@@ -11,6 +11,7 @@ import typer
 from rotor.checks import require_between, require_whole
 from rotor.cli.shared import gas_layer, inputs
 from rotor.cli.shared.gas_layer import Vibration
+from rotor.cli.shared.hyperfine import HyperfineOptions, effects_asked, hyperfine_lines
 from rotor.cli.shared.inputs import Input, json_option
 from rotor.cli.shared.options import file_option, grouped, option
 from rotor.cli.shared.output import (
@@ -28,6 +29,7 @@ from rotor.cli.shared.output import (
 from rotor.cli.shared.plot_options import ViewOptions, view_of
 from rotor.cli.shared.save_scene import save_scene, save_scene_option
 from rotor.cli.shared.sources import source_facts
+from rotor.table import counted
 
 if TYPE_CHECKING:
     from rotor.plots.view import View
@@ -39,6 +41,7 @@ EXAMPLES = """\b
 Examples:
   rotor raman N2
   rotor raman CO2 --laser 488 --temperature 500 --csv co2.csv --plot co2.png
+  rotor raman HCN --polarizability 3.9,2.0 --temperature 10 --hyperfine
   rotor raman --constants "B=1.98958 cm-1" --polarizability 2.22,1.53 --spin-weights even=2,odd=1"""
 
 NAMES = {
@@ -71,11 +74,12 @@ class Outputs:
     save_scene: str | None = save_scene_option()
 
 
-@grouped(given=("dipole", "dipole_abc", "calculator", "hessian"))
+@grouped(given=("dipole", "dipole_abc", "state_dipoles", "calculator", "hessian"))
 def command(
     context: typer.Context,
     given: Input,
     options: Options,
+    spins: HyperfineOptions,
     vibration: Vibration,
     outputs: Outputs,
     picture: ViewOptions,
@@ -89,7 +93,7 @@ def command(
     view = view_of(picture, files, "cm-1")
     top = with_polarizability(inputs.read_top(given), options.polarizability)
     with inputs.fields_as_options(**NAMES):
-        request = RamanRequest(top, **settings)
+        request = RamanRequest(top, **settings, effects=effects_asked(top, spins, given.spin_constants))
     with answering():
         answer = answer_raman(request)
         content = _content(answer, given, context.obj, options.top_lines)
@@ -210,6 +214,7 @@ def _facts(lines: RamanLines, content: dict[str, Any]) -> list[tuple[str, str]]:
         ("Q", report.q_text(content["q"])),
         ("J max", f"{lines.jmax}: {content['jmax_source']}"),
         ("cut", cut),
+        *hyperfine_lines(content["hyperfine"]),
         (
             "lines",
             f"{len(lines)}, together {content['band_cross_section_cm2_per_sr']:.4g} cm²/sr" if len(lines) else "none",
@@ -224,8 +229,9 @@ def _table(lines: RamanLines, rows: Any) -> Table:
     shown = lines.where(rows)
     names = quanta.headings(lines.quanta_names)
     columns = ("shift (cm-1)", "dσ/dΩ (cm²/sr)", "λ (nm)", "E (cm-1)", "g", "S (Å⁶)", "from", "to")
-    formats = ("{:.4f}", "{:.4e}", "{:.4f}", "{:.4f}", "{}", "{:.5g}")
+    wavenumber = "{:.6f}" if "f" in lines.quanta_names else "{:.4f}"  # spins move levels by some 1e-5 cm⁻¹
+    formats = (wavenumber, "{:.4e}", "{:.4f}", wavenumber, "{}", "{:.5g}")
     cells = [[form.format(x) for x in column] for form, column in zip(formats, shown.columns.values(), strict=False)]
     labels = [shown.levels.labels(states) for states in (shown.initial, shown.final)]
-    title = f"the {len(shown)} strongest lines" if len(shown) < len(lines) else "all lines"
+    title = f"the {counted(len(shown), 'strongest line')}" if len(shown) < len(lines) else "all lines"
     return Table(f"{title}, in order of shift (states: {names})", columns, list(zip(*cells, *labels, strict=True)))

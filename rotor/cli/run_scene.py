@@ -24,6 +24,7 @@ from rotor.cli.shared.output import (
     show_facts,
     show_table,
 )
+from rotor.table import counted
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -219,5 +220,7 @@ def _say_point(record: Mapping[str, Any]) -> None:
 
 
 def _show_sweep(result: SweepResult, record: str) -> None:
-    print(f"a sweep of {len(result)} points, {result.computed} of them computed now; the others are from {record}")
+    print(
+        f"a sweep of {counted(len(result), 'point')}, {result.computed} computed now; what was done before is from {record}"
+    )
     show_table(_some_rows(result))

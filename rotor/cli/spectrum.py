@@ -13,6 +13,7 @@ from rotor.checks import require_whole
 from rotor.cli.shared import gas_layer, inputs, plot_options
 from rotor.cli.shared import spcat_request as spcat
 from rotor.cli.shared.gas_layer import Layer, Vibration
+from rotor.cli.shared.hyperfine import HyperfineOptions, effects_asked, hyperfine_lines
 from rotor.cli.shared.inputs import Input, json_option
 from rotor.cli.shared.line_tables import lines_table, pattern_records, patterns_table
 from rotor.cli.shared.options import file_option, grouped, option
@@ -33,7 +34,6 @@ from rotor.cli.shared.sources import source_facts
 
 if TYPE_CHECKING:
     from rotor.formats.spcat.predict import Prediction
-    from rotor.quantum.effect import QuantumEffect
     from rotor.spectra.lines import Lines
     from rotor.spectra.request import SpectrumAnswer, SpectrumRequest
     from rotor.tops.top import Top
@@ -70,17 +70,6 @@ class Options:
     profile: str | None = option(None, metavar="NAME", help="sticks, gaussian, lorentzian or voigt.")
     fwhm: str | None = option(None, metavar="W", help="Full width at half maximum (MHz); by default Doppler's.")
     untrusted: bool = option(False, "--untrusted", help="List lines of levels beyond the reach of the constants too.")
-    hyperfine: bool | None = option(
-        None,
-        "--hyperfine/--no-hyperfine",
-        help="Split lines by the spins of nuclei; by default where --spin-constants are given.",
-    )
-    hyperfine_method: str = option(
-        "exact",
-        metavar="NAME",
-        help="exact, N-diagonal, first-order, or auto: the cheapest that keeps --hyperfine-tolerance.",
-    )
-    hyperfine_tolerance: str = option("0.1kHz", metavar="D", help="How far auto may be off exact lines (MHz).")
     resolution: str | None = option(
         None, metavar="D", help="Show components of one rotational line that are closer (MHz) as one line."
     )
@@ -114,6 +103,7 @@ def command(
     context: typer.Context,
     given: Input,
     options: Options,
+    spins: HyperfineOptions,
     vibration: Vibration,
     layer: Layer,
     outputs: Outputs,
@@ -141,7 +131,7 @@ def command(
             answer, tag = spcat.answer_of(prediction, shape), prediction.request.tag
         else:
             top = inputs.with_some_dipole(inputs.read_top(given))
-            settings |= {"effects": _effects(top, given, options)}
+            settings |= {"effects": effects_asked(top, spins, given.spin_constants)}
             answer, tag = _answer(top, settings), options.tag
     _refuse_nothing_to_draw(answer, files, options.range_)
     for warning in answer.lines.warnings:
@@ -194,22 +184,6 @@ def _shape(options: Options, layer: Layer) -> dict[str, Any]:
     """Profile, width and layer of gas from the texts of the options."""
     fwhm = inputs.positive("--fwhm", options.fwhm, "MHz") if options.fwhm else None
     return {"profile": options.profile, "fwhm_mhz": fwhm, "layer": gas_layer.layer_of(layer)}
-
-
-def _effects(top: Top, given: Input, options: Options) -> tuple[QuantumEffect, ...]:
-    from rotor.quantum.effects.of_top import effects_of
-
-    asked = given.spin_constants is not None if options.hyperfine is None else options.hyperfine
-    method, tolerance = (
-        options.hyperfine_method,
-        inputs.positive("--hyperfine-tolerance", options.hyperfine_tolerance, "MHz"),
-    )
-    if method != "exact" and not asked:
-        raise ValueError(
-            f"--hyperfine-method {method}: without --hyperfine or --spin-constants no line is split; add one of them"
-        )
-    with inputs.fields_as_options(hyperfine="--hyperfine-method"):
-        return effects_of(top, asked, method, tolerance)
 
 
 def _answer(top: Top, settings: dict[str, Any]) -> SpectrumAnswer:
@@ -373,23 +347,9 @@ def _facts(lines: Lines, content: dict[str, Any]) -> list[tuple[str, str]]:
         ("Q", report.q_text(content["q"], classical=spcat.has_named_constants(lines))),
         ("J max", f"{lines.jmax}: {content['jmax_source']}"),
         ("cut", cut + _range_text(lines.range_mhz)),
-        *_hyperfine_facts(content["hyperfine"]),
+        *hyperfine_lines(content["hyperfine"]),
         ("lines", _count_text(lines)),
         *_layer_facts(content),
-    ]
-
-
-def _hyperfine_facts(used: dict[str, Any] | None) -> list[tuple[str, str]]:
-    """Which method split the lines, and by how much it may differ from the exact one."""
-    if used is None:
-        return []
-    if used["method"] == "exact":
-        return [("hyperfine", "exact: all N that a tensor connects")]
-    return [
-        (
-            "hyperfine",
-            f"{used['method']}: differs from exact by less than {1000 * used['estimate_mhz']:.2g} kHz, estimated",
-        )
     ]
 
 

@@ -34,6 +34,7 @@ from rotor.cli.shared.plot_options import ViewOptions, view_of
 from rotor.cli.shared.report import model_facts
 from rotor.cli.shared.save_scene import save_scene, save_scene_option
 from rotor.cli.shared.sources import with_sources
+from rotor.table import counted
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -138,7 +139,7 @@ class Outputs:
     save_scene: str | None = save_scene_option()
 
 
-@grouped(given=("spin_weights", "calculator", "hessian", "state_constants"), picture=("plot_scale",))
+@grouped(given=("spin_weights", "calculator", "hessian", *inputs.STATES), picture=("plot_scale",))
 def command(
     context: typer.Context,
     given: Input,
@@ -350,7 +351,7 @@ def _facts(top: Top, content: dict[str, Any]) -> list[tuple[str, str]]:
     facts = [
         ("constants", report.constants_text(top)),
         ("dipole", report.vector_text(top.dipole_abc_debye)),
-        ("field", f"{first:g} to {last:g} kV/cm {_along(content['field_direction'])}, {count} values"),
+        ("field", f"{first:g} to {last:g} kV/cm {_along(content['field_direction'])}, {counted(count, 'value')}"),
     ]
     if content["intensity_w_per_cm2"]:
         facts.append(("laser", f"{content['intensity_w_per_cm2']:g} W/cm² along Z"))

@@ -25,6 +25,7 @@ from rotor.cli.shared.output import (
     show_table,
     write_text,
 )
+from rotor.table import counted
 
 if TYPE_CHECKING:
     from rotor.formats.family_file import FamilyFile
@@ -243,7 +244,7 @@ def _writers(file: FamilyFile, answer: Answer, content: dict[str, Any]) -> dict[
 
 def _show(file: FamilyFile, answer: Answer) -> None:
     family = file.family
-    print(f"{family.name}: {len(family.species)} isotopologues, {family.top.kind} top")
+    print(f"{family.name}: {counted(len(family.species), 'isotopologue')}, {family.top.kind} top")
     if answer.planar:
         show_table(_planar_table(answer.planar))
     if answer.substitution:
@@ -256,7 +257,7 @@ def _show(file: FamilyFile, answer: Answer) -> None:
             [
                 (
                     "moments",
-                    f"{len(one.moments)}, {one.degrees_of_freedom} degrees of freedom, rms {one.rms_u_angstrom2:.3g} u Å²",
+                    f"{len(one.moments)}, {counted(one.degrees_of_freedom, 'degree')} of freedom, rms {one.rms_u_angstrom2:.3g} u Å²",
                 ),
                 ("worst", f"I_{worst.axis} of {worst.species}: obs - calc {worst.difference:+.3g} u Å²"),
                 ("search", one.minimum.reason),

@@ -12,6 +12,7 @@ import typer
 
 from rotor.cli.shared import gas_layer, inputs
 from rotor.cli.shared.gas_layer import Vibration
+from rotor.cli.shared.hyperfine import HyperfineOptions, effects_asked
 from rotor.cli.shared.inputs import Input, json_option
 from rotor.cli.shared.options import file_option, grouped, option
 from rotor.cli.shared.output import (
@@ -41,6 +42,7 @@ EXAMPLES = """\b
 Examples:
   rotor thermo water
   rotor thermo water --temperature 10:1000K:100 --csv water.csv --plot water.png
+  rotor thermo HCN --hyperfine --temperature 0.0001,0.001,0.01,0.1,1
   rotor thermo H2 --species ortho --temperature 5:300K:60 --plot ortho.png
   rotor thermo water --gas --pressure 1bar --vibration 1595,3657,3756 --temperature 298.15"""
 
@@ -72,11 +74,12 @@ class Outputs:
     save_scene: str | None = save_scene_option()
 
 
-@grouped(given=("dipole", "dipole_abc", "calculator", "hessian"))
+@grouped(given=("dipole", "dipole_abc", "state_dipoles", "calculator", "hessian"))
 def command(
     context: typer.Context,
     given: Input,
     options: Options,
+    spins: HyperfineOptions,
     vibration: Vibration,
     outputs: Outputs,
     picture: ViewOptions,
@@ -88,7 +91,8 @@ def command(
     files = Files.of(outputs)
     view = view_of(picture, files, "K")
     with inputs.fields_as_options(**NAMES):
-        request = ThermoRequest(inputs.read_top(given), **settings)
+        top = inputs.read_top(given)
+        request = ThermoRequest(top, **settings, effects=effects_asked(top, spins, given.spin_constants))
     with answering():
         answer = answer_thermo(request, sum_progress())
         content = _content(answer, given, context.obj)
@@ -185,8 +189,18 @@ def _facts(functions: ThermoFunctions, content: dict[str, Any]) -> list[tuple[st
         ("classical Q", _onset_text(content["classical_tolerance"], content["classical_above_k"])),
         ("corrected", f"classical Q times exp of the logarithm of 1 {series}, to that order"),
         ("sums", f"{_summed_to(content['jmax'])}, Q, U and C_v to {content['relative_error']:.0e} of themselves"),
+        *_spin_facts(content["hyperfine"]),
         ("vibration", content["vibrations"] or "left out: no states given"),
     ]
+
+
+def _spin_facts(used: dict[str, Any] | None) -> list[tuple[str, str]]:
+    """How many functions of spins Q counts, and where their splittings are in it."""
+    if used is None:
+        return []
+    up_to, size = used["summed_up_to_k"], f"splittings of {used['splitting_mhz']:.2g} MHz"
+    where = "too small to count" if up_to is None else f"summed level by level up to {up_to:g} K"
+    return [("hyperfine", f"Q counts {used['spin_functions']:.6g} functions of the spins; {size}, {where}")]
 
 
 def _onset_text(tolerance: float, above_k: float | None) -> str:

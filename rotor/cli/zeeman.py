@@ -32,6 +32,7 @@ from rotor.cli.shared.plot_options import ViewOptions, view_of
 from rotor.cli.shared.report import model_facts
 from rotor.cli.shared.save_scene import save_scene, save_scene_option
 from rotor.cli.shared.sources import with_sources
+from rotor.table import counted
 
 if TYPE_CHECKING:
     from rotor.plots.view import View
@@ -99,7 +100,7 @@ class Outputs:
 
 
 @grouped(
-    given=("dipole", "dipole_abc", "spin_weights", "calculator", "hessian", "state_constants"), picture=("plot_scale",)
+    given=("dipole", "dipole_abc", "spin_weights", "calculator", "hessian", *inputs.STATES), picture=("plot_scale",)
 )
 def command(context: typer.Context, given: Input, options: Options, outputs: Outputs, picture: ViewOptions) -> None:
     """Levels in a static magnetic field: energies, labels and magnetic moments of every M, with nuclear spins where asked."""
@@ -229,7 +230,7 @@ def _facts(answer: ZeemanAnswer, content: dict[str, Any]) -> list[tuple[str, str
     facts = [
         ("constants", report.constants_text(answer.request.top)),
         ("g", _tensor_text(content["g_abc"])),
-        ("field", f"{first:g} to {last:g} T along Z, {count} values"),
+        ("field", f"{first:g} to {last:g} T along Z, {counted(count, 'value')}"),
     ]
     if content["magnetisability_abc"] is not None:
         facts.append(("magnetisability", f"{_tensor_text(content['magnetisability_abc'])} 1e-6 erg/(G² mol)"))

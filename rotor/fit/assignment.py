@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum.quanta import value_text
-from rotor.table import Table
+from rotor.table import Table, counted
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -222,7 +222,10 @@ def merged(first: Assignments, second: Assignments, *, same_within_mhz: float = 
             notes.append(f"{second.text(i)}: in both, {apart:.4f} MHz apart; both stay")
             chosen.append(i)
     if same:
-        notes.insert(0, f"{len(same)} lines are in both, once in the result, the first: {second.text(same[0])}")
+        notes.insert(
+            0,
+            f"{counted(len(same), 'line is', 'lines are')} in both, once in the result, the first: {second.text(same[0])}",
+        )
     more = second.take(np.array(chosen, dtype=np.int64))
     shift = int(first.blend.max(initial=-1)) + 1
     fields = ("upper", "lower", "frequency_mhz", "error_mhz", "weight", "wavenumber")

@@ -28,6 +28,7 @@ from rotor.fit.top_constants import ConstantSet
 from rotor.fit.top_levels import model_of
 from rotor.quantum.labelled import LevelModel
 from rotor.statistics.least_squares import INTERRUPTED
+from rotor.table import counted
 
 CHANCE = 0.01  # of an F so large by accident, above which a constant is not taken
 _MOST_STEPS = 40
@@ -201,7 +202,10 @@ def choose_constants(
         last = taken[-1].fit if taken else fit
         ended = replace(last.minimum, status=INTERRUPTED)
         return replace(
-            last, minimum=ended, converged=False, reason=f"interrupted after {len(taken)} steps of the choice"
+            last,
+            minimum=ended,
+            converged=False,
+            reason=f"interrupted after {counted(len(taken), 'step')} of the choice",
         ), taken
     return taken[-1].fit if taken else fit, taken
 

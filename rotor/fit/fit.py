@@ -27,6 +27,7 @@ from rotor.fit.top_levels import model_of
 from rotor.quantum.labelled import LevelModel, MissingLevelsError
 from rotor.statistics.least_squares import BENT, EXHAUSTED, Minimum, Progress
 from rotor.statistics.regression import Regression, regression
+from rotor.table import counted
 from rotor.tops.covariance import Covariance
 
 NEARLY_THERE = 0.01  # standard errors: a next step below it is no news where no more iterations are allowed
@@ -343,7 +344,8 @@ def _verdict(fit: Fit, disorder: str, options: FitOptions) -> tuple[bool, str]:
     reason = minimum.reason
     if near:
         count = len(minimum.iterations)
-        reason = f"ended after {count} iterations, as many as allowed: the next step would be {minimum.distance:.1e} standard errors"
+        done, left = counted(count, "iteration"), f"{minimum.distance:.1e} standard errors"
+        reason = f"ended after {done}, as many as allowed: the next step would be {left}"
     if not fit.degrees_of_freedom:
         reason += (
             "; 0 degrees of freedom: as many frequencies as they determine constants, so that nothing checks these, and there "
@@ -361,7 +363,8 @@ def _of_twice(lines: Assignments, pairs: Sequence[tuple[int, int]]) -> str:
     apart = np.abs(lines.frequency_mhz[first] - lines.frequency_mhz[second])
     worst = int(np.argmax(apart))
     return (
-        f"{len(pairs)} lines stand twice in the list, the first: {lines.text(int(second[0]))}; the largest difference is "
+        f"{counted(len(pairs), 'line stands', 'lines stand')} twice in the list, "
+        f"the first: {lines.text(int(second[0]))}; the largest difference is "
         f"{apart[worst]:.4g} MHz, of {lines.text(int(second[worst]))}"
     )
 
@@ -379,7 +382,9 @@ def _unlikely(lines: Assignments) -> list[str]:
         some = np.flatnonzero(rows)
         if len(some):
             first = f"line {lines.number(int(some[0]))}, {lines.text(int(some[0]))}"
-            out.append(f"{len(some)} lines that no dipole moment makes, {first}: {why}; are the labels right?")
+            out.append(
+                f"{counted(len(some), 'line')} that no dipole moment makes, {first}: {why}; are the labels right?"
+            )
     return out
 
 
@@ -399,7 +404,7 @@ def _notes(fit: Fit) -> list[str]:
     if fit.changed_states:
         some = ", ".join(fit.changed_states[:5]) + (", ..." if len(fit.changed_states) > 5 else "")
         notes.append(
-            f"{len(fit.changed_states)} levels are mostly another state than at the start (by overlap): {some}"
+            f"{counted(len(fit.changed_states), 'level is', 'levels are')} mostly another state than at the start (by overlap): {some}"
         )
     twice = duplicates(lines)
     if twice:

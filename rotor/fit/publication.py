@@ -11,6 +11,7 @@ from decimal import Decimal
 import numpy as np
 
 from rotor.fit.fit import Fit
+from rotor.table import counted
 
 FORMS = ("text", "markdown", "latex")
 _UNITS = (("MHz", 1.0), ("kHz", 1e-3), ("Hz", 1e-6), ("mHz", 1e-9), ("μHz", 1e-12), ("nHz", 1e-15), ("pHz", 1e-18))
@@ -195,7 +196,10 @@ def _facts(fit: Fit, scaled: bool) -> list[tuple[str, str]]:
         form = f"{fit.constants.reduction}-reduction, {fit.constants.representation}"
     return [
         ("Hamiltonian", form),
-        ("lines", f"{int(fit.used.sum())} of {len(fit.lines)}, {len(fit.groups)} frequencies, J up to {j}"),
+        (
+            "lines",
+            f"{int(fit.used.sum())} of {len(fit.lines)}, {counted(len(fit.groups), 'frequency', 'frequencies')}, J up to {j}",
+        ),
         ("rms", f"{fit.rms_mhz():.4g} MHz" if math.isfinite(fit.rms_mhz()) else f"{fit.rms_mhz(True):.4g} cm-1"),
         ("weighted rms", f"{fit.weighted_rms:.4g}"),
         ("errors", "one standard deviation, " + ("scaled by the scatter" if scaled else "from the stated line errors")),

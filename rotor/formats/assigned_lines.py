@@ -35,6 +35,7 @@ from rotor.formats.spcat.text.lin import (
     with_defaults,
     write_lin,
 )
+from rotor.table import counted
 from rotor.units import MHZ_PER_CM
 
 SUFFIXES = (".lin", ".csv", ".cat", ".cat.gz")
@@ -116,7 +117,9 @@ def _of_lin(path: str | os.PathLike[str], names: Sequence[str]) -> tuple[Assignm
     notes = [note_of_defaults(lines)] if lines.defaulted else []
     notes += note_of_remarks(lines, blends)
     if not used.all():
-        notes.append(f"{int((~used).sum())} lines that give the width of a blend do not count")
+        notes.append(
+            f"{counted(int((~used).sum()), 'line that gives', 'lines that give')} the width of a blend: not counted"
+        )
     for i in np.flatnonzero(used).tolist():
         count = len(lines.measured(i).quanta) // 2
         if count != len(names):
@@ -299,7 +302,7 @@ def _of_catalogue(path: str | os.PathLike[str], names: Sequence[str]) -> tuple[A
         first, frequency, error = _centres(upper, lower, frequency, error, weight)
         notes.append(
             f"{len(split)} components of spins are put together by rotational line, at their mean by intensity: "
-            f"{len(first)} lines"
+            f"{counted(len(first), 'line')}"
         )
     groups = [(round(float(f), 6), round(float(e), 6)) for f, e in zip(frequency, error, strict=True)]
     order = {key: i for i, key in enumerate(dict.fromkeys(groups))}

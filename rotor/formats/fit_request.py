@@ -28,7 +28,7 @@ from rotor.formats.spcat.fits.named_fit import named_file
 from rotor.formats.spcat.text.par import ParameterFile
 from rotor.quantum.labelled import LevelModel
 from rotor.statistics.least_squares import Progress
-from rotor.table import Table
+from rotor.table import Table, counted
 from rotor.tops.top import Top
 from rotor.version import version
 
@@ -265,7 +265,7 @@ def write_fitted_toml(answer: FitAnswer, path: str | os.PathLike[str]) -> None:
     lost = "; ".join(one.text for one in fit.statistics.undetermined)
     doubt = "" if fit.converged else f"NOT CONVERGED ({fit.reason}): "
     origin = (
-        f"{doubt}fitted by rotor to {int(fit.used.sum())} lines of {Path(request.files.source).name}, weighted by their "
+        f"{doubt}fitted by rotor to {counted(int(fit.used.sum()), 'line')} of {Path(request.files.source).name}, weighted by their "
         f"errors; weighted rms {fit.weighted_rms:.4g}; errors from the stated errors of the lines"
         + (f"; not determined by these lines and left at the start: {lost}" if lost else "")
     )

@@ -36,7 +36,7 @@ Settings = Mapping[str, Any]
 def catalogue(lines: Lines, tag: int = 0) -> Catalogue:
     """The lines as a catalogue of the 80-column format.
 
-    Lines of zero strength have no logarithm and are left out; ERR is 0 where no uncertainty of a constant is known.
+    Lines of zero strength have no logarithm and are left out; ERR is 0 where no uncertainty is known.
     Raises ValueError for a tag that has no place in its six digits, and for quantum numbers that the format has not.
     """
     lgint = lines.lgint
@@ -49,7 +49,7 @@ def catalogue(lines: Lines, tag: int = 0) -> Catalogue:
         "g_upper": lines.g_upper,
     }
     if (error := lines.error_mhz) is not None:
-        numbers["error_mhz"] = error
+        numbers["error_mhz"] = np.nan_to_num(error, nan=0.0)
     quanta, qnfmt = as_printed(lines.levels.quanta, lines.levels.halves)
     linear = lines.levels.kind == "linear"
     return catalogue_of(numbers, quanta[lines.upper], quanta[lines.lower], qnfmt, tag, linear=linear)

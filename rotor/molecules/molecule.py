@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from rotor.arrays import Floats, Ints
 from rotor.molecules.nuclei import Isotope, isotope
-from rotor.units import DEBYE_PER_E_ANGSTROM
+from rotor.units import DEBYE_PER_E_ANGSTROM, QUADRUPOLE_MHZ_PER_BARN_AU
 
 _UNTURNED = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
@@ -42,7 +42,9 @@ class Molecule:
     polarizability_angstrom3 : (3, 3) symmetric array in the same frame, polarizability volume in Å³. None: not known
     polarizability_source : where the polarizability is from
     quadrupole_mhz : (3, 3) traceless quadrupole couplings χ in MHz in the same frame, by the number of the atom, counted from 1
-    quadrupole_source : where they are from
+    field_gradients_au : (3, 3) traceless second derivatives of the electric potential at the nuclei, Eh/(e a0²), in the same frame, by
+        the number of the atom. They stay when isotopes change, so that a nucleus gets its coupling where the other one has none
+    quadrupole_source : where couplings and gradients are from
     name, source : what it is called, where the geometry is from
     uncertainty : typical relative error of the rotational constants that follow from the geometry. None: not known
     notes : what a user must know
@@ -68,6 +70,7 @@ class Molecule:
     polarizability_angstrom3: Floats | None = None
     polarizability_source: str = ""
     quadrupole_mhz: Mapping[int, Floats] = field(default_factory=dict)
+    field_gradients_au: Mapping[int, Floats] = field(default_factory=dict)
     quadrupole_source: str = ""
     name: str = ""
     source: str = ""
@@ -82,7 +85,8 @@ class Molecule:
             if getattr(self, key) is not None:
                 object.__setattr__(self, key, _checked(getattr(self, key), shape, key))
         _refuse_lopsided(self.polarizability_angstrom3)
-        object.__setattr__(self, "quadrupole_mhz", _checked_couplings(self.quadrupole_mhz, len(nuclei)))
+        for key in ("quadrupole_mhz", "field_gradients_au"):
+            object.__setattr__(self, key, _checked_tensors(getattr(self, key), len(nuclei), key))
         charge = float(_checked(self.charge, (), "charge"))
         if not charge.is_integer():
             raise ValueError(f"charge {charge:g}: expected a whole number of elementary charges")
@@ -194,6 +198,7 @@ class Molecule:
             dipole_debye=None if dipole is None else r @ dipole,
             polarizability_angstrom3=None if alpha is None else r @ alpha @ r.T,
             quadrupole_mhz={atom: r @ chi @ r.T for atom, chi in self.quadrupole_mhz.items()},
+            field_gradients_au={atom: r @ q @ r.T for atom, q in self.field_gradients_au.items()},
         )
 
 
@@ -230,28 +235,46 @@ def _checked(values: ArrayLike, shape: tuple[int, ...], what: str) -> Floats:
     return array
 
 
-def _checked_couplings(couplings: Mapping[int, Floats], atoms: int) -> dict[int, Floats]:
-    """Read-only copies, symmetric and without a trace."""
+def _checked_tensors(tensors: Mapping[int, Floats], atoms: int, key: str) -> dict[int, Floats]:
+    """Symmetric traceless tensors by the number of the atom, as read-only arrays."""
     found = {}
-    for atom, given in couplings.items():
+    for atom, given in tensors.items():
         if not 1 <= atom <= atoms:
-            raise ValueError(f"quadrupole_mhz of atom {atom}: the atoms are numbered from 1 to {atoms}")
-        chi = _checked(given, (3, 3), f"quadrupole_mhz of atom {atom}")
-        least = 1e-6 * max(1.0, float(np.abs(chi).max()))
-        if abs(np.trace(chi)) > least or np.abs(chi - chi.T).max() > least:
-            raise ValueError(f"quadrupole_mhz of atom {atom}: {chi.tolist()} is not symmetric and traceless; χ is")
-        found[atom] = chi
+            raise ValueError(f"{key} of atom {atom}: the atoms are numbered from 1 to {atoms}")
+        tensor = _checked(given, (3, 3), f"{key} of atom {atom}")
+        least = 1e-6 * max(1.0, float(np.abs(tensor).max()))
+        if abs(np.trace(tensor)) > least or np.abs(tensor - tensor.T).max() > least:
+            raise ValueError(f"{key} of atom {atom}: {tensor.tolist()} is not symmetric and traceless; it must be")
+        found[atom] = tensor
+    return found
+
+
+def couplings_mhz(gradients_au: Mapping[int, Floats], nuclei: Sequence[Isotope]) -> dict[int, Floats]:
+    """χ = e Q q/h in MHz of the nuclei with a spin of 1 or more and a known Q, from field gradients q in Eh/(e a0²).
+
+    q is the second derivative of the potential, positive along the axis to a positive charge (W. Gordy and R. L. Cook, Microwave
+    Molecular Spectra, 3rd ed., chapter IX).
+
+    >>> from rotor.molecules.nuclei import isotope
+    >>> couplings_mhz({1: np.diag([0.5, 0.5, -1.0])}, (isotope("14N"),))[1][2, 2].round(4)
+    np.float64(-4.8027)
+    """
+    found = {}
+    for atom, gradient in gradients_au.items():
+        nucleus = nuclei[atom - 1]
+        if nucleus.quadrupole_barn and nucleus.spin >= 1:
+            found[atom] = QUADRUPOLE_MHZ_PER_BARN_AU * nucleus.quadrupole_barn * gradient
     return found
 
 
 def _scaled_couplings(molecule: Molecule, nuclei: Sequence[Isotope]) -> dict[int, Floats]:
-    """χ Q'/Q for other isotopes: the gradient of the field stays. Nuclei without a known Q have none."""
-    found = {}
+    """χ Q'/Q for other isotopes, or that of the gradient, which stays. Nuclei without a known Q have none."""
+    found = couplings_mhz(molecule.field_gradients_au, nuclei)
     for atom, chi in molecule.quadrupole_mhz.items():
         old, new = molecule.nuclei[atom - 1], nuclei[atom - 1]
         if old == new:
             found[atom] = chi
-        elif old.quadrupole_barn and new.quadrupole_barn and new.spin >= 1:
+        elif atom not in found and old.quadrupole_barn and new.quadrupole_barn and new.spin >= 1:
             found[atom] = chi * (new.quadrupole_barn / old.quadrupole_barn)
     return found
 

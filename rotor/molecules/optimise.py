@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from rotor.molecules.molecule import Molecule
+from rotor.table import counted
 from rotor.units import DEBYE_PER_E_ANGSTROM
 
 MOST_FORCE_EV_PER_ANGSTROM = 1e-3  # on any atom, where an optimisation is done
@@ -93,7 +94,7 @@ def refine(
             f"{name} did not bring {molecule.formula} to a minimum in {most_steps} steps: a force of {left:.3g} eV/Å is "
             f"left, expected at most {most_force_ev_per_angstrom:g}; start nearer, or allow more steps or a larger force"
         )
-    note = f"geometry refined with {name} by BFGS in {search.get_number_of_steps()} steps; largest force left {left:.2g} eV/Å"
+    note = f"geometry refined with {name} by BFGS in {counted(search.get_number_of_steps(), 'step')}; largest force left {left:.2g} eV/Å"
     return _refined(molecule, atoms, name, note)
 
 

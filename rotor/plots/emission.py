@@ -12,6 +12,7 @@ from rotor.plots.names import SPACE, Peak, name_peaks
 from rotor.plots.picture import GREY, PALETTE, checked_suffix, name_of_top, new_figure, save, styled
 from rotor.plots.spectrum import UNITS, thinned
 from rotor.plots.view import Limits, View, show_part
+from rotor.quantum.quanta import line_text
 from rotor.spectra.emission_request import EmissionAnswer
 
 MOST_TRIED = 100  # lines, from the brightest down, for which a name is tried
@@ -116,13 +117,22 @@ def _name(axes: Any, answer: EmissionAnswer, mhz: float) -> None:
         Peak(
             float(lines.observed_mhz[row]) / mhz,
             float(heights[row]),
-            f"{lines.upper[row]} – {lines.lower[row]}",
+            _line_name(answer, row),
             PALETTE[int(lines.molecule[row]) % len(PALETTE)] if several else GREY,
         )
         for row in np.argsort(-lines.brightness_k, kind="stable")[:MOST_TRIED].tolist()
     ]
     x, y = thinned(spectrum.frequency_mhz / mhz, spectrum.brightness_k)
     name_peaks(axes, peaks, np.stack([x, y], axis=1)[y > 0])
+
+
+def _line_name(answer: EmissionAnswer, row: int) -> str:
+    """A line as other pictures name it: sums with spins after both rotational levels, with their names."""
+    lines = answer.lines
+    names, values = answer.quanta[int(lines.molecule[row])], (lines.upper[row].split(), lines.lower[row].split())
+    if any(len(each) != len(names) for each in values):
+        return f"{lines.upper[row]} – {lines.lower[row]}"
+    return line_text({name: np.array(pair) for name, *pair in zip(names, *values, strict=True)}, 0, 1)
 
 
 def _title(answer: EmissionAnswer) -> str:

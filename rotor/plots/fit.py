@@ -10,6 +10,7 @@ import numpy as np
 
 from rotor.fit.fit import Fit
 from rotor.plots.picture import BLUE, GREY, ORANGE, checked_suffix, new_figure, save, styled
+from rotor.table import counted
 
 _HEADINGS = {
     "j": "J of the upper state",
@@ -42,7 +43,8 @@ def fit_figure(fit: Fit, title: str = "") -> Any:
 
 def _title(fit: Fit, title: str) -> str:
     status = "" if fit.converged else ", NOT CONVERGED"
-    return f"{title or fit.lines.source}: weighted rms {fit.weighted_rms:.3g}, {len(fit.groups)} frequencies{status}"
+    count = counted(len(fit.groups), "frequency", "frequencies")
+    return f"{title or fit.lines.source}: weighted rms {fit.weighted_rms:.3g}, {count}{status}"
 
 
 def plot_fit(

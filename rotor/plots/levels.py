@@ -24,7 +24,7 @@ from rotor.plots.picture import (
     styled,
 )
 from rotor.plots.view import WHOLE, View, show_part
-from rotor.quantum.quanta import heading, state_text
+from rotor.quantum.quanta import heading, merged_text, of_rotation
 from rotor.quantum.request import SelectedLevels
 from rotor.tops.top import Top
 
@@ -167,19 +167,31 @@ def _draw(axes: Any, column: Ints, energy: Floats, exists: NDArray[np.bool_]) ->
 
 
 def _label(figure: Any, axes: Any, table: SelectedLevels, column: Ints, energy: Floats) -> None:
-    """The quantum numbers of each level right of its step, from the lowest up, wherever no other label stands."""
+    """The quantum numbers of each level right of its step, from the lowest up, wherever no other label stands.
+
+    What spins make of one rotational level has one label where the steps overlap, with all values of F.
+    """
     if len(table) > 20 * MOST_LABELS:
         return
     figure.canvas.draw()  # places the axes, so that sizes in pixels are known
     last: dict[int, float] = {}
     pixels = axes.transData.transform(np.stack([column, energy], axis=1))[:, 1]
     height = 5.8 * figure.dpi / 72.0  # of a label: capitals of 6 points
-    labelled = 0
+    labelled, alike = 0, _rotational_levels(table)
+    unnamed = np.ones(len(table), dtype=bool)
     for row in np.argsort(energy, kind="stable").tolist():
         ladder = int(column[row])
         if labelled == MOST_LABELS or pixels[row] - last.get(ladder, -np.inf) < height:
             continue
         last[ladder] = float(pixels[row])
         labelled += 1
-        text = state_text(table.levels.quanta, int(table.rows[row]), table.levels.halves)
+        merged = np.flatnonzero(unnamed & (alike == alike[row]) & (np.abs(pixels - pixels[row]) < height))
+        unnamed[merged] = False
+        text = merged_text(table.levels.quanta, table.rows[merged], table.levels.halves)
         axes.text(ladder + HALF_WIDTH + 0.03, energy[row], text, fontsize=6, color=GREY, va="center", clip_on=True)
+
+
+def _rotational_levels(table: SelectedLevels) -> Ints:
+    """A number for each level, the same for what spins make of one rotational level."""
+    numbers = np.stack([column[table.rows] for column in of_rotation(table.levels.quanta).values()], axis=1)
+    return np.asarray(np.unique(numbers, axis=0, return_inverse=True)[1]).ravel()

@@ -12,7 +12,7 @@ from rotor.plots.names import SPACE, Peak, name_peaks
 from rotor.plots.picture import BLUE, GREY, MOST_VECTOR_STICKS, checked_suffix, name_of_top, new_figure, save, styled
 from rotor.plots.spectrum import MOST_DECADES, VISIBLE
 from rotor.plots.view import WHOLE, View, show_part
-from rotor.quantum.quanta import state_text
+from rotor.quantum.quanta import state_text, without_nuclei
 from rotor.spectra.raman import RamanLines
 
 MOST_TRIED = 100  # lines, from the strongest down, for which a name is tried
@@ -96,6 +96,7 @@ def _frame(axes: Any, lines: RamanLines, view: View) -> None:
 def _name(axes: Any, lines: RamanLines) -> None:
     """Names of the strongest lines, the initial level first."""
     heights, shifts, levels = lines.cross_section_cm2_per_sr, lines.shift_cm, lines.levels
+    quanta = without_nuclei(levels.quanta)  # what nuclear spins part, by some 1e-4 cm⁻¹, is one line in the picture
     first, last = sorted(axes.get_xlim())
     inside = np.flatnonzero((shifts >= first) & (shifts <= last))
     strongest = inside[np.argsort(-heights[inside], kind="stable")][:MOST_TRIED]
@@ -103,9 +104,7 @@ def _name(axes: Any, lines: RamanLines) -> None:
         Peak(
             float(shifts[row]),
             float(heights[row]),
-            " → ".join(
-                state_text(levels.quanta, int(side[row]), levels.halves) for side in (lines.initial, lines.final)
-            ),
+            " → ".join(state_text(quanta, int(side[row]), levels.halves) for side in (lines.initial, lines.final)),
         )
         for row in strongest.tolist()
     ]

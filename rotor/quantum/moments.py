@@ -56,7 +56,9 @@ class Moment(NamedTuple):
     spin: of a magnetic moment, the spin's name, "" the rotation. tensor: c of a magnetic moment that is not isotropic. cosine: of an
     electric one α', α of the two states where an element is multiplied by cos(α'K' + αK), a Fourier term of internal rotation.
     written: a moment of another form, in place of all these but `spin`. Of a spin: along_abc is half of {φ, N} of rank 2 with the spin,
-    turned stands for the factor i of a tensor with the spin, from the second of the states to the first.
+    with_i stands for the factor i of a tensor with the spin, from the second of the states to the first.
+    turned: of an electric one the axis g, where it stands for C2g times itself, i times what it is in functions of other phases; by_order:
+    whether it has the factor i from the higher state to the lower one, -i the other way round.
     """
 
     value_debye: float
@@ -67,9 +69,16 @@ class Moment(NamedTuple):
     tensor: Matrix | None = None
     cosine: tuple[float, float] | None = None
     written: Written | None = None
-    turned: bool = False
+    with_i: bool = False
+    turned: str = ""
+    by_order: bool = False
+
+    @property
+    def imaginary(self) -> bool:
+        """Whether its elements are imaginary where those of a plain dipole within one state are real: their squares add up."""
+        return bool(self.turned) != self.by_order
 
     @property
     def electric(self) -> bool:
         """Whether it is a part of the electric dipole, or adds to one in amplitude."""
-        return self.along_abc is not None or self.turned or (self.written is not None and self.written.electric)
+        return self.along_abc is not None or self.with_i or (self.written is not None and self.written.electric)

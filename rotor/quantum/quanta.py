@@ -166,7 +166,46 @@ def of_rotation(quanta: Quanta) -> dict[str, NDArray[Any]]:
     return {name: column for name, column in quanta.items() if name in _OF_ROTATION or "n" not in quanta}
 
 
+def without_nuclei(quanta: Quanta) -> dict[str, NDArray[Any]]:
+    """The quantum numbers without sums with nuclear spins; those with electron spins, j after n, stay.
+
+    >>> list(without_nuclei({"n": np.array([1]), "j": np.array([3]), "f1": np.array([3]), "f": np.array([2])}))
+    ['n', 'j']
+    """
+    rotation = of_rotation(quanta)
+    return {name: column for name, column in quanta.items() if name in rotation or name.startswith("j")}
+
+
 _OF_ROTATION = ("v", "n", "k", "ka", "kc", "irrep", "m")
+
+
+def merged_text(quanta: Quanta, rows: Ints, halves: Collection[str] = ()) -> str:
+    r"""Levels of one rotational level as a plot names them where their steps overlap: all values of the sum that differs.
+
+    Up to four values of one sum are listed, of more the first and the last one; where several sums differ the last one's range stands
+    with how many levels there are.
+
+    >>> merged_text({"n": np.array([1, 1, 1]), "f": np.array([1, 0, 2])}, np.arange(3))
+    '$1, F{=}0,1,2$'
+    >>> print(merged_text({"n": np.array([2] * 6), "f": np.arange(-1, 11, 2)}, np.arange(1, 6), halves={"f"}))
+    $2, F{=}1/2\ldots9/2$
+    >>> print(merged_text({"n": np.array([1] * 3), "f1": np.array([1, 3, 3]), "f": np.array([0, 1, 2])}, np.arange(3), {"f1"}))
+    $1, F{=}0\ldots2\;(3)$
+    """
+    differing = [name for name, column in quanta.items() if len(np.unique(column[rows])) > 1]
+    text = {
+        name: value_text(column[rows[0]], name in halves)
+        for name, column in quanta.items()
+        if name not in differing[:-1]
+    }
+    if differing:
+        last = differing[-1]
+        values = [value_text(value, last in halves) for value in np.unique(quanta[last][rows]).tolist()]
+        listed = len(values) <= 4 and len(differing) == 1
+        text[last] = ",".join(values) if listed else f"{values[0]}\\ldots{values[-1]}"
+        if len(differing) > 1:
+            text[last] += f"\\;({len(rows)})"
+    return _as_mathtext(text)
 
 
 def state_text(quanta: Quanta, row: int, halves: Collection[str] = ()) -> str:
@@ -179,7 +218,10 @@ def state_text(quanta: Quanta, row: int, halves: Collection[str] = ()) -> str:
     >>> state_text({"j": np.array([7])}, 0)
     '7'
     """
-    text = {name: value_text(column[row], name in halves) for name, column in quanta.items()}
+    return _as_mathtext({name: value_text(column[row], name in halves) for name, column in quanta.items()})
+
+
+def _as_mathtext(text: dict[str, str]) -> str:
     total = text.pop("n", None) or text.pop("j")
     below = [text.pop(name) for name in ("k", "ka", "kc", "irrep") if name in text]
     before = f"v{{=}}{text.pop('v')}\\;" if "v" in text else ""

@@ -18,6 +18,7 @@ from rotor.quantum.estimates.convergence import warnings_of
 from rotor.quantum.estimates.limits import limit_facts
 from rotor.quantum.levels import Levels
 from rotor.quantum.solve import solve_levels
+from rotor.quantum.spins.method import hyperfine_facts
 from rotor.table import Table, TextOf
 from rotor.tops.facts import top_facts
 
@@ -137,6 +138,7 @@ class LevelsAnswer(TextOf):
             "quantum_numbers": list(self.table.levels.quanta_names),
             "level_count": len(self.table),
             "ground_mhz": self.table.ground_mhz,
+            "hyperfine": hyperfine_facts(request.top, self.table.levels),
             "notes": [*request.top.notes, *self.warnings],
             **limit_facts(request.top, max(request.jmax, 1), self.table.levels.effects),
         }

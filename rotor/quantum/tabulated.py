@@ -6,6 +6,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor.arrays import Floats, Ints
 from rotor.quantum.coupled import CoupledBlock
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.watson import SEMI_RIGID
@@ -36,12 +40,41 @@ def _is_own(top: Top, effects: Sequence[QuantumEffect]) -> bool:
     return [dict(effect.parameters(top)) for effect in others] == known
 
 
+def tabulated_line_errors(
+    top: Top, levels: Levels, upper: NDArray[np.int32], lower: NDArray[np.int32]
+) -> Floats | None:
+    """One standard deviation of lines between levels of the top's table; spins count as exact.
+
+    Parameters
+    ----------
+    top : the molecule, with its table of levels
+    levels : what was solved
+    upper, lower : rows of levels, (lines,)
+
+    Returns
+    -------
+    (lines,) in MHz, nan where a level is not in the table; None where no table holds for these levels, or where it
+    does not know what errors have in common.
+    """
+    table = top.level_table
+    if table is None or table.own_error_mhz is None or not _is_own(top, levels.effects):
+        return None
+    quanta = _labels_of_table(levels)
+    rows = table.rows_of({name: quanta[name] for name in table.quanta})
+    return table.line_errors(rows[upper], rows[lower])
+
+
+def _labels_of_table(levels: Levels) -> dict[str, Ints]:
+    """Quanta of levels by the names of a table, k of a symmetric top in Wang functions and j of one with spins among them."""
+    quanta = dict(levels.quanta)
+    if "k" not in quanta and "ka" in quanta:
+        quanta["k"] = quanta["kc" if levels.kind == "oblate" else "ka"]
+    return quanta | {"j": levels.rotational}
+
+
 def with_tabulated_energies(levels: Levels, table: LevelTable) -> Levels:
     """The same levels, and the same states, with the energies of a table where it has the level."""
-    quanta = dict(levels.quanta)
-    if "k" not in quanta and "ka" in quanta:  # of a symmetric top in Wang functions
-        quanta["k"] = quanta["kc" if levels.kind == "oblate" else "ka"]
-    energy, _ = tabulated_energies(table, quanta, levels.energy_mhz)
+    energy, _ = tabulated_energies(table, _labels_of_table(levels), levels.energy_mhz)
     blocks = tuple(
         replace(block, energies_mhz=energy[block.start : block.start + len(block.energies_mhz)])
         for block in levels.blocks

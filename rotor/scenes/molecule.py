@@ -49,7 +49,7 @@ def top_of(molecule: MoleculeSection, folder: str | os.PathLike[str] = ".") -> T
     if molecule.spin_weights is not None:
         weights = molecule.spin_weights
         top = named("molecule.spin_weights", lambda: top.with_weights(weights, GIVEN))
-    return _with_spins(top, molecule)
+    return _with_states(_with_spins(top, molecule), molecule)
 
 
 def _bare(molecule: MoleculeSection, folder: str | os.PathLike[str]) -> Top:
@@ -137,6 +137,16 @@ def _with_spins(top: Top, molecule: MoleculeSection) -> Top:
     constants = named("molecule.spin_constants", lambda: SpinConstants.parse(text, spins, GIVEN))
     named("molecule.spin_constants", lambda: refuse_other_nuclei(constants, top.molecule))
     return replace(top, spin_constants=constants)
+
+
+def _with_states(top: Top, molecule: MoleculeSection) -> Top:
+    from rotor.tops.states.state_texts import KEYS, with_state_texts
+
+    texts = {name: getattr(molecule, name) for name in KEYS}
+    try:
+        return with_state_texts(top, texts, GIVEN)
+    except ValueError as error:
+        raise ValueError(f"molecule.{error}") from None
 
 
 def with_tensor(top: Top, numbers: list[float]) -> Top:

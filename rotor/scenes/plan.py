@@ -281,7 +281,6 @@ def _raman(request: Any) -> Plan:
 
 
 def _thermo(request: Any) -> Plan:
-    from rotor.quantum.effects.watson import SEMI_RIGID
     from rotor.quantum.estimates.limits import populated_j
     from rotor.thermo.request import answer_thermo
 
@@ -294,13 +293,13 @@ def _thermo(request: Any) -> Plan:
     j = populated_j(top, hottest)
     return Plan(
         kind="thermo",
-        effects=effect_texts(top, j, SEMI_RIGID),
-        good=good_numbers(top, SEMI_RIGID),
+        effects=effect_texts(top, j, found[-1].effects),
+        good=good_numbers(top, found[-1].effects),
         parts=(("method", f"{summed}, to {request.relative_error:g} of Q, U and C_v"),),
         counts={"temperatures": len(request.temperatures_k)},
         seconds=seconds,
         memory_mb=peak_mb(lambda: answer_thermo(request)),
-        left_out=(*left_out.of_levels(top, j, SEMI_RIGID), *vibration),
+        left_out=(*left_out.of_levels(top, j, found[-1].effects), *vibration),
     )
 
 

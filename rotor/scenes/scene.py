@@ -155,6 +155,7 @@ class ThermoScene(Scene, frozen=True, tag="thermo"):
     """Partition function, entropy and heat capacity of rotation."""
 
     molecule: Annotated[str | MoleculeSection, said("a name, a file, SMILES:..., or a table")]
+    effects: QuantumEffects = QuantumEffects()
     accuracy: Annotated[str | float | None, said("of Q, U and C_v", "0.1 %")] = None
     conditions: ThermoConditions = ThermoConditions()
     observables: ThermoObservables = ThermoObservables()
@@ -253,6 +254,7 @@ class EmissionScene(Scene, frozen=True, tag="emission"):
     """Lines of a source of several molecules, as a radio telescope sees them."""
 
     molecules: Annotated[list[EmittingMolecule], said("one or more")]
+    effects: QuantumEffects = QuantumEffects()
     conditions: EmissionConditions = EmissionConditions()
     observables: EmissionObservables = EmissionObservables()
     outputs: EmissionOutputs = EmissionOutputs()

@@ -43,6 +43,15 @@ class MoleculeSection(Section, frozen=True):
     spin_weights: Annotated[dict[str, int] | None, said("of the levels", {"ee": 1, "eo": 3, "oe": 3, "oo": 1})] = None
     spin_constants: Annotated[str | None, said("of nuclear and electron spins (MHz)", "chi_aa(14N)=-4.22 MHz")] = None
     spins: Annotated[str | None, said("sizes and order of the spins", "14N=1")] = None
+    state_constants: Annotated[
+        str | None, said("further states and what couples them (MHz)", "E[1]=120GHz B[1]=10GHz W[0,1]=3 MHz")
+    ] = None
+    state_dipoles: Annotated[
+        str | None, said("in and between states, along a, b, c (D)", "[1] 0,0,1.3 [0,1] 0,0,1.47")
+    ] = None
+    state_weights: Annotated[str | None, said("spin weights of states", "[0] even=1,odd=3 [1] even=3,odd=1")] = None
+    state_symmetry: Annotated[str | None, said("group of the states, by which couplings are checked", "C2v")] = None
+    state_names: Annotated[str | None, said("of all states, from 0 on", "0+,0-")] = None
     calculator: Annotated[str | None, said("ASE calculator that refines the geometry first", "xtb")] = None
     hessian: Annotated[str | None, said("file of the Hessian that quartic distortion follows from", "hessian.txt")] = (
         None

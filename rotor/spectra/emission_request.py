@@ -16,6 +16,9 @@ import numpy as np
 from rotor import units
 from rotor.arrays import Floats, Ints
 from rotor.checks import require_positive
+from rotor.quantum.effect import QuantumEffect
+from rotor.quantum.effects.watson import SEMI_RIGID
+from rotor.quantum.spins.method import hyperfine_facts
 from rotor.spectra.emission import Emission, Source, emission, planck_k, source_grid
 from rotor.spectra.lines import Lines, line_list
 from rotor.spectra.opacity import NM2_IN_CM2
@@ -23,7 +26,6 @@ from rotor.spectra.profiles import gaussian
 from rotor.table import Table, TextOf
 
 if TYPE_CHECKING:
-    from rotor.quantum.effect import QuantumEffect
     from rotor.tops.top import Top
 
 LEAST_DEPTH = 1e-6  # lines of less are left out
@@ -38,7 +40,8 @@ class EmissionRequest:
 
     tops: of the molecules, each with its dipole. columns_per_cm2: of each, all levels and spin species together. source: excitation,
     background, filling, velocity and width; its own column is not used. range_mhz: as observed. least_depth: optical depth at
-    the centre of a line below which it is left out.
+    the centre of a line below which it is left out. effects: what the Hamiltonian of each molecule consists of; none: the
+    semi-rigid one of each.
     """
 
     tops: tuple[Top, ...]
@@ -46,6 +49,7 @@ class EmissionRequest:
     source: Source
     range_mhz: tuple[float, float]
     least_depth: float = LEAST_DEPTH
+    effects: tuple[tuple[QuantumEffect, ...], ...] = ()
 
     def __post_init__(self) -> None:
         if not self.tops or len(self.tops) != len(self.columns_per_cm2):
@@ -55,6 +59,10 @@ class EmissionRequest:
         for column in self.columns_per_cm2:
             require_positive("columns_per_cm2", column, "1/cm²")
         require_positive("least_depth", self.least_depth)
+        if self.effects and len(self.effects) != len(self.tops):
+            raise ValueError(
+                f"effects: {len(self.effects)} given for {len(self.tops)} molecules; expected those of each"
+            )
         first, last = self.range_mhz
         if not 0 < first < last or math.isinf(last):
             raise ValueError(f"range_mhz: {first:g} to {last:g} MHz: expected a finite range above 0 that rises")
@@ -111,7 +119,11 @@ class EmissionLines(Table):
 
 @dataclass(frozen=True, repr=False)
 class EmissionAnswer(TextOf):
-    """The spectrum of all molecules together, of each, and their lines; effects: what the Hamiltonian of each consists of."""
+    """The spectrum of all molecules together, of each, and their lines.
+
+    effects: what the Hamiltonian of each consists of. hyperfine: how its spins were treated, by the keys of docs/command_line.md;
+    None of a molecule without. quanta: the names of its quantum numbers, in the order of the labels of lines.
+    """
 
     shown = "lines"
 
@@ -122,6 +134,8 @@ class EmissionAnswer(TextOf):
     partition_functions: tuple[float, ...]
     effects: tuple[tuple[QuantumEffect, ...], ...]
     notes: tuple[str, ...]
+    hyperfine: tuple[dict[str, Any] | None, ...]
+    quanta: tuple[tuple[str, ...], ...]
 
     def facts(self) -> dict[str, Any]:
         """Everything but the tables, by the keys of docs/command_line.md."""
@@ -129,9 +143,22 @@ class EmissionAnswer(TextOf):
         del source["column_per_cm2"]
         return {
             "molecules": [
-                {"name": name, "column_per_cm2": column, "q": q, "constants_source": top.source}
-                for name, column, q, top in zip(
-                    request.names, request.columns_per_cm2, self.partition_functions, request.tops, strict=True
+                {
+                    "name": name,
+                    "column_per_cm2": column,
+                    "q": q,
+                    "quantum_numbers": list(quanta),
+                    "hyperfine": used,
+                    "constants_source": top.source,
+                }
+                for name, column, q, quanta, used, top in zip(
+                    request.names,
+                    request.columns_per_cm2,
+                    self.partition_functions,
+                    self.quanta,
+                    self.hyperfine,
+                    request.tops,
+                    strict=True,
                 )
             ],
             "source": source,
@@ -154,26 +181,29 @@ def answer_emission(request: EmissionRequest) -> EmissionAnswer:
     (1, 5.532)
     """
     grid = source_grid(*request.range_mhz, request.source)
-    parts, tables, sums, effects = [], [], [], []
+    parts, tables, sums, effects, hyperfine, quanta = [], [], [], [], [], []
     notes: list[str] = []
     for number, (top, column) in enumerate(zip(request.tops, request.columns_per_cm2, strict=True)):
         source = replace(request.source, column_per_cm2=column)
-        lines = _lines_of(top, source, request)
+        lines = _lines_of(top, source, request, request.effects[number] if request.effects else SEMI_RIGID)
         notes += lines.warnings
         parts.append(emission(lines, source, grid))
         tables.append(_line_table(number, lines, source))
         sums.append(float(lines.q))
         effects.append(tuple(lines.levels.effects))
+        hyperfine.append(hyperfine_facts(top, lines.levels))
+        quanta.append(tuple(lines.quanta_names))
     depth = np.sum([part.optical_depth for part in parts], axis=0)
     source = replace(request.source, column_per_cm2=sum(request.columns_per_cm2))
     contrast = source.filling * (planck_k(grid, source.excitation_k) - planck_k(grid, source.background_k))
     total = Emission(grid, depth, contrast * -np.expm1(-depth), source)
     return EmissionAnswer(
-        request, total, tuple(parts), _joined(tables), tuple(sums), tuple(effects), tuple(dict.fromkeys(notes))
-    )
+        request, total, tuple(parts), _joined(tables), tuple(sums), tuple(effects), tuple(dict.fromkeys(notes)),
+        tuple(hyperfine), tuple(quanta),
+    )  # fmt: skip
 
 
-def _lines_of(top: Top, source: Source, request: EmissionRequest) -> Lines:
+def _lines_of(top: Top, source: Source, request: EmissionRequest, effects: tuple[QuantumEffect, ...]) -> Lines:
     """Lines whose centre is observed in the range, deep enough to count.
 
     The optical depth of a Gaussian at its centre is N I 2 √(ln 2/π)/Δν; the narrowest Δν, at the first frequency, gives the cut.
@@ -183,7 +213,7 @@ def _lines_of(top: Top, source: Source, request: EmissionRequest) -> Lines:
     width = request.range_mhz[0] * source.fwhm_km_s / _KM_PER_S
     depth_per_area = float(gaussian(np.zeros(1), width)[0]) * source.column_per_cm2 * NM2_IN_CM2
     least = math.log10(request.least_depth / depth_per_area)
-    return line_list(top, temperature_k=source.excitation_k, min_lgint=least, range_mhz=(first, last))
+    return line_list(top, temperature_k=source.excitation_k, min_lgint=least, range_mhz=(first, last), effects=effects)
 
 
 def _line_table(number: int, lines: Lines, source: Source) -> EmissionLines:

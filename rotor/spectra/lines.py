@@ -28,6 +28,7 @@ from rotor.quantum.estimates.uncertainty import known_covariance, level_spread, 
 from rotor.quantum.levels import Levels, TransitionTable
 from rotor.quantum.quanta import heading
 from rotor.quantum.solve import solve_levels
+from rotor.quantum.tabulated import tabulated_line_errors
 from rotor.spectra.intensity import (
     EINSTEIN_PER_MHZ3,
     INTENSITY_NM2_MHZ,
@@ -38,6 +39,7 @@ from rotor.spectra.intensity import (
     population,
 )
 from rotor.spectra.transitions import all_transitions
+from rotor.table import counted
 from rotor.thermo import PartitionFunction, VibrationalStates, partition_function
 from rotor.thermo.trusted_levels import are_trusted, in_level_table
 from rotor.tops.covariance import Covariance
@@ -99,7 +101,10 @@ class Lines(TransitionTable):
         known = set(self.covariance_used.names) if self.covariance_used else set()
         exact = [name for name in self._parameters if name not in known and ("(" not in name or "(" in "".join(known))]
         partly = f"errors of frequencies take {', '.join(exact)} as exact: their uncertainty is not known"
-        beyond = f"{self.untrusted} lines of levels beyond the reach of the distortion constants are left out"
+        verb = "is" if self.untrusted == 1 else "are"
+        beyond = (
+            f"{counted(self.untrusted, 'line')} of levels beyond the reach of the distortion constants {verb} left out"
+        )
         found = () if self._tabulated else warnings_of(self.top, self.levels)
         found += (beyond,) if self.untrusted else ()
         return found + ((partly,) if known and exact else ())
@@ -129,11 +134,13 @@ class Lines(TransitionTable):
 
     @property
     def error_mhz(self) -> Floats | None:
-        """One standard deviation of every frequency, from the uncertainty of the constants; None where it is unknown.
+        """One standard deviation of every frequency, from the uncertainty of the constants or of a level table; None where it is unknown.
 
-        Neglected: what the Hamiltonian leaves out. Constants without an uncertainty count as exact.
+        Neglected: what the Hamiltonian leaves out. Constants without an uncertainty count as exact. nan: a level is not in the table.
         """
-        return None if self.spread is None else line_errors(self.spread, self.upper, self.lower)
+        if self.spread is None:
+            return tabulated_line_errors(self.top, self.levels, self.upper, self.lower)
+        return line_errors(self.spread, self.upper, self.lower)
 
     @property
     def errors_from(self) -> str | None:
@@ -233,7 +240,7 @@ class Lines(TransitionTable):
     def _title(self) -> str:
         name = self.top.name or "a top"
         extent = f", {self.frequency_mhz.min():.4f} to {self.frequency_mhz.max():.4f} MHz" if len(self) else ""
-        return f"{len(self)} lines of {name} at {self.temperature_k:g} K, J up to {self.jmax}{extent}"
+        return f"{counted(len(self), 'line')} of {name} at {self.temperature_k:g} K, J up to {self.jmax}{extent}"
 
     def _texts(self, rows: NDArray[np.int64]) -> dict[str, list[str]]:
         few = self.where(rows)

@@ -12,6 +12,7 @@ from rotor.checks import require_between, require_positive, require_top, require
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.estimates.limits import limit_facts, populated_j
+from rotor.quantum.spins.method import hyperfine_facts
 from rotor.spectra.intensity import largest
 from rotor.spectra.raman import (
     DEFAULT_LASER_NM,
@@ -105,11 +106,12 @@ class RamanAnswer(TextOf):
             "laser_nm": lines.laser_nm,
             "anisotropy_angstrom3": anisotropy_angstrom3(lines.top),
             "band_cross_section_cm2_per_sr": band_cross_section(lines),
-            "q": partition_facts(lines.top, lines.partition),
+            "q": partition_facts(lines.top, lines.partition, lines.levels.effects),
             "jmax": lines.jmax,
             "jmax_source": self.jmax_source,
             "min_relative": self.request.min_relative,
             "line_count": len(lines),
+            "hyperfine": hyperfine_facts(lines.top, lines.levels),
             **limit_facts(lines.top, populated_j(lines.top, lines.temperature_k), lines.levels.effects),
         }
 

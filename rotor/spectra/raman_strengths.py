@@ -4,12 +4,23 @@ S(i, f) = (3/2) Σ_{M' M p} |⟨f M'|α_2p(space)|i M⟩|²,     Σ_f S(i, f) = 
 
 the elastic term f = i among them, so that S = (2J+1) b γ² with the coefficients b of G. Placzek and E. Teller, Z. Phys. 81,
 209 (1933). Sums over M', M and p leave the squares of the reduced elements in `quantum.tensors`.
+
+Of levels with spins the polarizability touches none, so that each spin of the chain N + I₁ = F₁, F₁ + I₂ = F₂, ... multiplies the
+element by
+
+    ⟨F₁' (N' I)‖T²‖F₁ (N I)⟩ = (-1)^(N'+I+F₁+2) √((2F₁'+1)(2F₁+1)) {N' F₁' I; F₁ N 2} ⟨N'‖T²‖N⟩
+
+(A. R. Edmonds, Angular Momentum in Quantum Mechanics, 1957, eq. 7.1.7; `spins.coupling.tensor_coefficients`). Summed over all F of two
+rotational levels that is Π(2I+1) times the strength without spins, since Σ (2F'+1)(2F+1) {N' F' I; F N 2}² = 2I+1. What nuclear
+spins make of the elastic line, components within one rotational level, belongs to Rayleigh's line and is not listed; what electron
+spins part is.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -58,20 +69,41 @@ def raman_transitions(
 
     Selection rules: ΔJ = 2 for a linear molecule; ΔJ = 1, 2 and ΔK = 0 for a symmetric top with an axial tensor; ΔJ = 0,
     1, 2 for an asymmetric top, between species of (Ka, Kc) parity that the tensor's elements connect (the same species
-    for the diagonal ones); none for a spherical top. Levels must start at J = 0. spin_weights: those of the levels.
+    for the diagonal ones); none for a spherical top. Levels must start at J = 0. spin_weights: those of the levels. With spins
+    rules are those of N, and of every sum with a spin likewise.
     Raises ValueError for a spherical top whose tensor is anisotropic, and for one that is not axial with spin weights by
     K, which need an axis.
     """
     tensor = np.asarray(polarizability_abc, dtype=float)
-    if levels.representation is not None:
-        return _joined(list(_of_blocks(levels, tensor)))
     if levels.kind == "spherical":
         if anisotropy_squared(tensor) > (ROUND_OFF * np.linalg.norm(tensor)) ** 2:
             raise ValueError("a spherical top's polarizability is isotropic, and this one is not; check the tensor")
         return _joined([])
+    if levels.representation is not None:
+        if levels.blocks and _is_axial(levels.blocks[0]):
+            _refuse_without_axis(levels, tensor)
+        return _inelastic(levels, _joined(list(_of_blocks(levels, tensor))))
     if levels.kind == "linear":
         return _linear(levels, tensor)
     return _symmetric(levels, tensor, spin_weights)
+
+
+def _is_axial(block: Any) -> bool:
+    """Whether states with spins are made of functions of one sign of K, each of which stands for both."""
+    from rotor.quantum.spins.blocks import SpinBlock
+    from rotor.quantum.spins.operators import AxialState
+
+    return isinstance(block, SpinBlock) and isinstance(block.parts[0].rotor.parts[0].basis, AxialState)
+
+
+def _refuse_without_axis(levels: Levels, tensor: Floats) -> None:
+    """ValueError where a tensor connects different K, whose elements of both signs would add up."""
+    z = "abc".index(axes_of(str(levels.representation))[2])
+    along = 1.5 * (tensor[z, z] - np.trace(tensor) / 3)
+    if abs(anisotropy_squared(tensor) - along**2) > (ROUND_OFF * np.linalg.norm(tensor)) ** 2:
+        raise ValueError(
+            f"a {levels.kind} top with spins: expected a polarizability with its axis, along {'abc'[z]}; check the tensor"
+        )
 
 
 def _joined(pieces: list[RamanTransitions]) -> RamanTransitions:
@@ -184,9 +216,26 @@ def _of_blocks(levels: Levels, tensor: Floats) -> Iterator[RamanTransitions]:
     """Between solved blocks; several states have the polarizability of the first, and none connects two of them."""
     anisotropic = body_tensor(tensor, 2, str(levels.representation))
     tensors = {(v, v): anisotropic for v in np.unique(levels.quanta.get("v", np.zeros(1, dtype=np.int64))).tolist()}
-    existing = (block for block in levels.blocks if levels.weight[block.start] > 0)
+    existing = [
+        block
+        for block in levels.blocks
+        if (levels.weight[block.start : block.start + len(block.energies_mhz)] > 0).any()
+    ]
     for up, low in reduced.connected_pairs(existing, tensors):
         yield _between(levels, up, low, 1.5 * reduced.amplitudes(up, low, tensors) ** 2)
+
+
+def _inelastic(levels: Levels, found: RamanTransitions) -> RamanTransitions:
+    """The lines without those between components that nuclear spins make of one level."""
+    if "f" not in levels.quanta:
+        return found
+    spins = [name for name in levels.quanta if name in ("i_sym", "i_tot") or name.startswith("f")]
+    numbers = np.column_stack([levels.quanta[name] for name in levels.quanta if name not in spins])
+    _, level = np.unique(numbers, axis=0, return_inverse=True)
+    other = level[found.lower] != level[found.upper]
+    return RamanTransitions(
+        found.strength_angstrom6[other], found.lower[other], found.upper[other], found.weight[other]
+    )
 
 
 def _once(up: Block, low: Block) -> NDArray[np.bool_]:

@@ -198,7 +198,7 @@ class SpectrumAnswer(TextOf):
         return {
             **top_facts(lines.top),
             "temperature_k": lines.temperature_k,
-            "q": partition_facts(lines.top, lines.partition),
+            "q": partition_facts(lines.top, lines.partition, lines.levels.effects),
             "jmax": lines.jmax,
             "jmax_source": self.jmax_source,
             "min_lgint": self.request.min_lgint,

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor.arrays import Floats, Indices
+from rotor.arrays import Floats, Indices, Workspace
 from rotor.quantum.levels import Block, Levels, SolvedBlock
 from rotor.quantum.moments import Moment
 from rotor.quantum.reduced import amplitudes, connected_pairs, pairs_where, wang_columns
@@ -216,37 +216,29 @@ def _of_groups(
     if not can_be_stacked(blocks, tensors) or not (needed > 0).all():
         return None
     found = amplitudes_of_groups(blocks, tensors, len(levels))  # type: ignore[arg-type]
-    extended = np.append(levels.energy_mhz, 0.0), np.append(needed, np.inf)
-    candidates = (_candidates_of_many(*extended, of_f, range_mhz) for of_f in found)
-    return _joined([_with_frequencies(levels, *batch, range_mhz, cut) for batch in _batches(candidates)])
+    energies, needed = np.append(levels.energy_mhz, 0.0), np.append(needed, np.inf)
+    space = Workspace()
+    return _joined([_of_many(energies, needed, of_f, range_mhz, cut, space) for of_f in found])
 
 
-def _candidates_of_many(
-    energies: Floats,
-    needed: Floats,
-    of_f: ManyF,
-    range_mhz: tuple[float, float],
-) -> Rows:
-    """`_candidates` of blocks of many F; beyond the levels of an F amplitudes are 0."""
+def _of_many(
+    energies: Floats, needed: Floats, of_f: ManyF, range_mhz: tuple[float, float], cut: IntensityCut, space: Workspace
+) -> Transitions:
+    """The lines between blocks of many F in a range and above a cut, see `_chosen`; beyond the levels of an F amplitudes are 0."""
     up, low, amplitude, alike = of_f
-    of_up, of_low = needed[up], needed[low]
-    frequency = energies[up][:, :, None] - energies[low][:, None, :]
-    np.abs(frequency, out=frequency)
     strength = np.multiply(amplitude, amplitude, out=amplitude)
-    least = min(of_up.min(), of_low.min())
-    keep = frequency * strength >= least
-    if range_mhz != EVERYTHING:
-        keep &= (frequency >= range_mhz[0]) & (frequency <= range_mhz[1])
+    difference = space.array("difference", *amplitude.shape)
+    np.subtract(energies[up][:, :, None], energies[low][:, None, :], out=difference)
+    reach = np.multiply(difference, strength, out=space.array("reach", *amplitude.shape))
+    keep = np.abs(reach, out=reach) >= min(needed[up].min(), needed[low].min())
     if alike:
         keep &= up[:, :, None] > low[:, None, :]
     places = np.flatnonzero(keep)
     above = places // low.shape[1]
     below = above // up.shape[1] * low.shape[1] + places - above * low.shape[1]
-    if least < max(of_up.max(), of_low.max()):  # of few states alone
-        exact = np.minimum(of_up.ravel()[above], of_low.ravel()[below])
-        chosen = np.flatnonzero(frequency.ravel()[places] * strength.ravel()[places] >= exact)
-        places, above, below = places[chosen], above[chosen], below[chosen]
-    return up.ravel()[above], low.ravel()[below], strength.ravel()[places]
+    return _in_order_of_energy(
+        up.ravel()[above], low.ravel()[below], difference.ravel()[places], strength.ravel()[places], range_mhz, cut
+    )
 
 
 def _batches(pieces: Iterable[Rows]) -> Iterator[Rows]:
@@ -274,6 +266,14 @@ def _with_frequencies(
 ) -> Transitions:  # fmt: skip
     """Lines between rows of levels, in whatever order of both, those that are in the range and reach the cut."""
     difference = levels.energy_mhz[first] - levels.energy_mhz[second]
+    return _in_order_of_energy(first, second, difference, strength, range_mhz, cut)
+
+
+def _in_order_of_energy(
+    first: Indices, second: Indices, difference: Floats, strength: Floats, range_mhz: tuple[float, float],
+    cut: IntensityCut | None,
+) -> Transitions:  # fmt: skip
+    """Lines with the energies of the first states less those of the second, those that are in the range and reach the cut."""
     falls = difference < 0
     upper, lower = np.where(falls, second, first), np.where(falls, first, second)
     found = Transitions(np.abs(difference), strength, upper, lower)

@@ -21,6 +21,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rotor.arrays import Floats
+from rotor.table import counted
 
 Evaluate = Callable[[Floats], tuple[Floats, Floats]]  # p (n,) -> r (m,), J (m, n)
 Progress = Callable[["Iteration"], None]
@@ -93,10 +94,10 @@ class Minimum:
         count, left = len(self.iterations), f"{self.distance:.1e} standard errors"
         bends = ", of which χ² allows none: it bends upwards" if self.distance > BENT * max(1.0, self.rms) else ""
         return {
-            CONVERGED: f"converged after {count} iterations: the next step would be {left}{bends}",
+            CONVERGED: f"converged after {counted(count, 'iteration')}: the next step would be {left}{bends}",
             STALLED: f"no step decreases the residuals, although {left} seem to be left",
-            EXHAUSTED: f"{count} iterations were not enough: the next step would be {left}",
-            INTERRUPTED: f"interrupted after {count} iterations: the next step would be {left}",
+            EXHAUSTED: f"{counted(count, 'iteration was', 'iterations were')} not enough: the next step would be {left}",
+            INTERRUPTED: f"interrupted after {counted(count, 'iteration')}: the next step would be {left}",
         }[self.status]
 
 

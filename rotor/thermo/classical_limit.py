@@ -140,14 +140,14 @@ class ClassicalLimit:
 
 
 def classical_limit(top: Top, weights: SpinWeights | None = None) -> ClassicalLimit:
-    """The classical limit of a top, with the mean of its spin weights or of others.
+    """The classical limit of a top, with the mean of its spin weights (those of its first state, beside which others count) or of others.
 
     >>> from rotor.tops.top import Top
     >>> limit = classical_limit(Top.from_constants("B=57635.968 MHz"))
     >>> round(3 * limit.a, 4), round(float(limit.q([300.0])[0]), 2)  # Θ in K
     (2.7661, 108.46)
     """
-    of = weights or top.spin_weights
+    of = weights or _first_weights(top)
     a, b, c = rotational_temperatures_k(top)
     period = max(int(name) for name in of.classes if name.isdecimal()) + 1 if of.rule == "K" else _PERIODS[of.rule]
     if top.kind == "linear":
@@ -157,12 +157,17 @@ def classical_limit(top: Top, weights: SpinWeights | None = None) -> ClassicalLi
     return ClassicalLimit(3, of.mean, scale, *corrections, (a, b), period, _other_states(top))
 
 
+def _first_weights(top: Top) -> SpinWeights:
+    """The spin weights of the first state, or of all."""
+    return top.spin_weights if top.states is None else top.states.weights.get(0, top.spin_weights)
+
+
 def _other_states(top: Top) -> tuple[tuple[float, float], ...]:
     """How much each further state counts beside the first, by its mean weight and its A, B, C, and its energy over k in K."""
     states = top.states
     if states is None:
         return ()
-    volume, mean = math.prod(top.rotational_constants_mhz), states.weights.get(0, top.spin_weights).mean
+    volume, mean = math.prod(top.rotational_constants_mhz), _first_weights(top).mean
     found = []
     for v in range(1, states.count):
         own = states.of_state(v)

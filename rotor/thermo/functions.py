@@ -27,6 +27,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from rotor import units
 from rotor.arrays import Floats
+from rotor.quantum.effect import QuantumEffect
+from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.table import Table
 from rotor.thermo.classical_limit import classical_limit
 from rotor.thermo.level_sums import LevelSums, Progress, checked_temperatures, level_sums, lowest_level_k
@@ -67,7 +69,8 @@ class ThermoFunctions(Table):
     sum. q_rot_classical, cv_over_r_classical: the classical limit. q_rot_corrected, cv_over_r_corrected: that with its
     first quantum corrections and distortion, NaN where these are large. jmax, relative_error: of the sums (-1 where the
     classical limit with corrections was taken); the largest error of Q, U and C_v. vibrations, q_vib, cv_vib_over_r: where
-    vibrational states are given. gas: with translation.
+    vibrational states are given. gas: with translation. hyperfine: how
+    spins were counted, by the keys of docs/command_line.md; None without spins.
     """
 
     top: Top
@@ -90,6 +93,7 @@ class ThermoFunctions(Table):
     q_vib: Floats | None = None
     cv_vib_over_r: Floats | None = None
     gas: IdealGas | None = None
+    hyperfine: dict[str, Any] | None = None
 
     def __len__(self) -> int:
         return len(self.temperature_k)
@@ -97,18 +101,22 @@ class ThermoFunctions(Table):
     @property
     def provenance(self) -> dict[str, Any]:
         """What the functions were made from: the top and its sources, species, vibration, pressure, errors of the sums."""
-        return self.top.provenance | {
-            "species": self.species,
-            "fractions": dict(self.fractions),
-            "symmetry_number": self.symmetry_number,
-            "spin_factor": self.spin_factor,
-            "vibrations": self.vibrations.text if self.vibrations is not None else None,
-            "pressure_bar": self.gas.pressure_bar if self.gas is not None else None,
-            "mass_u": self.gas.mass_u if self.gas is not None else None,
-            "jmax": int(self.jmax.max()),
-            "relative_error": float(self.relative_error.max()),
-            "rows": len(self),
-        }
+        return (
+            self.top.provenance
+            | {
+                "species": self.species,
+                "fractions": dict(self.fractions),
+                "symmetry_number": self.symmetry_number,
+                "spin_factor": self.spin_factor,
+                "vibrations": self.vibrations.text if self.vibrations is not None else None,
+                "pressure_bar": self.gas.pressure_bar if self.gas is not None else None,
+                "mass_u": self.gas.mass_u if self.gas is not None else None,
+                "jmax": int(self.jmax.max()),
+                "relative_error": float(self.relative_error.max()),
+                "rows": len(self),
+            }
+            | ({} if self.hyperfine is None else {"hyperfine": self.hyperfine})
+        )
 
     @property
     def columns(self) -> dict[str, NDArray[Any]]:
@@ -146,6 +154,7 @@ def thermodynamic_functions(
     pressure_bar: float | None = None,
     relative_error: float = 1e-6,
     progress: Progress | None = None,
+    effects: Sequence[QuantumEffect] = SEMI_RIGID,
 ) -> ThermoFunctions:
     """Partition function, energy, entropy and heat capacity of a top at many temperatures, quantum and classical.
 
@@ -160,6 +169,7 @@ def thermodynamic_functions(
     relative_error : of Q, U and C_v, asked; larger, up to 10 %, where levels count that the distortion constants do not
         serve: `ThermoFunctions.relative_error` says what was reached.
     progress : called as `progress(j, last)` as a long sum goes on.
+    effects : what the Hamiltonian consists of; with spins Q counts their functions, see `rotor.thermo.spin_sums`.
 
     Returns
     -------
@@ -179,8 +189,12 @@ def thermodynamic_functions(
     """
     parts, fractions = _parts(top, species)
     temperatures = checked_temperatures(temperatures_k)
-    sums = level_sums(top, list(parts.values()), temperatures, relative_error, progress=progress)
-    rotation = _rotation(top, species, parts, fractions, sums)
+    effects = tuple(effects)
+    if any(effect.spins(top) for effect in effects):
+        rotation = _with_spins(top, species, parts, fractions, temperatures, relative_error, effects, progress)
+    else:
+        sums = level_sums(top, list(parts.values()), temperatures, relative_error, progress=progress, effects=effects)
+        rotation = _rotation(top, species, parts, fractions, sums, effects)
     return _with_gas(_with_vibration(rotation, vibrations), pressure_bar)
 
 
@@ -204,20 +218,61 @@ def _tunnelling_components(top: Top) -> int:
     return len(top.states.weights) if top.states is not None and 0 in top.states.weights else 1
 
 
+def refuse_species_of_totals(top: Top, species: str, effects: Sequence[QuantumEffect]) -> None:
+    """ValueError for a single species, or a frozen mixture, of a top with nuclei that are coupled to a total spin."""
+    if species != "equilibrium" and any(spin.total for effect in effects for spin in effect.spins(top)):
+        raise ValueError(
+            f"species: {species!r}: with nuclei that are coupled to a total spin species are not separated; expected equilibrium"
+        )
+
+
+def _with_spins(
+    top: Top,
+    species: str,
+    parts: dict[str, SpinWeights],
+    fractions: dict[str, float],
+    temperatures: Floats,
+    relative_error: float,
+    effects: tuple[QuantumEffect, ...],
+    progress: Progress | None,
+) -> ThermoFunctions:
+    """The functions of rotation with spins."""
+    from rotor.quantum.spins.method import EXACT, HyperfineMethod
+    from rotor.thermo.spin_factor import spin_functions
+    from rotor.thermo.spin_sums import spin_sums
+
+    refuse_species_of_totals(top, species, effects)
+    found = spin_sums(top, list(parts.values()), temperatures, relative_error, effects, progress)
+    counted = found.split.any()
+    method = next((one.method for one in effects if isinstance(one, HyperfineMethod)), EXACT)
+    hyperfine = {
+        "spin_functions": spin_functions(top, effects),
+        "splitting_mhz": found.splitting_mhz,
+        "summed_up_to_k": float(temperatures[found.split].max()) if counted else None,
+        "method": method,
+    }
+    return replace(_rotation(top, species, parts, fractions, found.sums, effects), hyperfine=hyperfine)
+
+
 def _rotation(
     top: Top,
     species: str,
     parts: dict[str, SpinWeights],
     fractions: dict[str, float],
     sums: list[LevelSums],
+    effects: tuple[QuantumEffect, ...] = SEMI_RIGID,
 ) -> ThermoFunctions:
-    """The functions of rotation alone."""
-    ground_k, temperatures = lowest_level_k(top, [top.spin_weights])[0], sums[0].temperatures_k
+    """The functions of rotation alone, with the functions of spins where the effects have some."""
+    from rotor.thermo.spin_factor import spin_functions
+
+    ground_k, temperatures = lowest_level_k(top, [top.spin_weights], effects)[0], sums[0].temperatures_k
     shares = np.array(list(fractions.values()) or [1.0])
     ln_q, mean, cv = _mixed(sums, ground_k, shares)
 
     means = np.array([one.mean for one in parts.values()])
-    limit = replace(classical_limit(top), mean_weight=float(np.exp(shares @ np.log(means / shares))))
+    mean_weight = float(np.exp(shares @ np.log(means / shares)))
+    limit = replace(classical_limit(top), mean_weight=mean_weight * spin_functions(top, effects))
+    of_nuclei = mean_weight * spin_functions(top, effects, electrons=False)
     corrected_q, _, corrected_cv = limit.corrected(temperatures)
     symmetry_number = top.symmetry.symmetry_number if top.symmetry else implied_symmetry_number(top.spin_weights)
     return ThermoFunctions(
@@ -225,7 +280,7 @@ def _rotation(
         species=species,
         fractions=fractions,
         symmetry_number=symmetry_number,
-        spin_factor=limit.mean_weight * symmetry_number * _tunnelling_components(top),
+        spin_factor=of_nuclei * symmetry_number * _tunnelling_components(top),
         temperature_k=temperatures,
         q_rot=np.exp(ln_q),
         q_rot_classical=limit.q(temperatures),

@@ -171,9 +171,11 @@ def _as_sums(temperatures: Floats, ground_k: float, parts: Floats) -> LevelSums:
     return LevelSums(temperatures, ground_k, q, energy, cv, jmax.astype(np.int64), error_q, error_energy, error_cv)
 
 
-def lowest_level_k(top: Top, weights: Sequence[SpinWeights]) -> list[float]:
+def lowest_level_k(
+    top: Top, weights: Sequence[SpinWeights], effects: Sequence[QuantumEffect] = SEMI_RIGID
+) -> list[float]:
     """E/k of the lowest level that exists by each set of spin weights, from the Hamiltonian's zero, in K."""
-    return [energy for energy, _ in _Ladder(top, tuple(weights)).ground]
+    return [energy for energy, _ in _Ladder(top, tuple(weights), tuple(effects)).ground]
 
 
 def _last_j(top: Top, temperatures: Floats, relative_error: float) -> Floats:

@@ -5,9 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+from rotor.quantum.effect import QuantumEffect
+from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.thermo.classical_limit import classical_partition_function
 from rotor.thermo.level_sums import AT_WORST, Progress, refusal
 from rotor.thermo.partition import PartitionFunction, partition_function, partition_functions
+from rotor.thermo.spin_factor import spin_functions
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
@@ -15,12 +18,14 @@ if TYPE_CHECKING:
 _KEYS = ("temperature_k", "q", "classical", "jmax", "relative_error", "source")
 
 
-def partition_facts(top: Top, partition: PartitionFunction) -> dict[str, Any]:
-    """Q at one temperature beside its classical limit, by the keys of docs/command_line.md."""
+def partition_facts(
+    top: Top, partition: PartitionFunction, effects: Sequence[QuantumEffect] = SEMI_RIGID
+) -> dict[str, Any]:
+    """Q at one temperature beside its classical limit, by the keys of docs/command_line.md; both count the spins of the effects."""
     return {
         "temperature_k": partition.temperature_k,
         "q": partition.q,
-        "classical": classical_partition_function(top, partition.temperature_k),
+        "classical": spin_functions(top, effects) * classical_partition_function(top, partition.temperature_k),
         "jmax": partition.jmax,
         "relative_error": partition.relative_error,
         "source": partition.source,

@@ -8,12 +8,19 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from rotor.checks import require_positive, require_top
+from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.of_top import effects_of
+from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.estimates.limits import limit_facts, populated_j
 from rotor.table import TextOf
 from rotor.thermo.classical_limit import classical_limit, rotational_temperatures_k
 from rotor.thermo.classical_onset import classical_above_if_known
-from rotor.thermo.functions import ThermoFunctions, species_names, thermodynamic_functions
+from rotor.thermo.functions import (
+    ThermoFunctions,
+    refuse_species_of_totals,
+    species_names,
+    thermodynamic_functions,
+)
 from rotor.thermo.level_sums import Progress
 from rotor.thermo.vibration import VibrationalStates
 from rotor.tops.facts import top_facts
@@ -33,7 +40,7 @@ class ThermoRequest:
 
     temperatures_k: above 0 K, in any order. species: see `species_names`. vibrations: vibrational states; None leaves
     vibration out. pressure_bar: of the ideal gas, whose functions are then given too; the top must have a mass.
-    relative_error: of Q, U and C_v.
+    relative_error: of Q, U and C_v. effects: what the Hamiltonian consists of, spins among it where Q is to count them.
     """
 
     top: Top
@@ -42,6 +49,7 @@ class ThermoRequest:
     vibrations: VibrationalStates | None = None
     pressure_bar: float | None = None
     relative_error: float = 1e-6
+    effects: tuple[QuantumEffect, ...] = SEMI_RIGID
 
     def __post_init__(self) -> None:
         require_top(self.top)
@@ -54,6 +62,7 @@ class ThermoRequest:
         if self.species not in known:
             only = "; its levels are all of one nuclear-spin species" if len(known) == 1 else ""
             raise ValueError(f"species: {self.species!r}: {self.top.name or 'this top'} has {', '.join(known)}{only}")
+        refuse_species_of_totals(self.top, self.species, self.effects)
         if self.pressure_bar is not None:
             require_positive("pressure_bar", self.pressure_bar, "bar")
             if self.top.mass_u is None:
@@ -68,6 +77,12 @@ class ThermoAnswer(TextOf):
 
     request: ThermoRequest
     functions: ThermoFunctions
+
+    @property
+    def effects(self) -> tuple[QuantumEffect, ...]:
+        """What the Hamiltonian consists of, further states of the top among it."""
+        asked = self.request.effects
+        return effects_of(self.request.top, hyperfine=False) if asked == SEMI_RIGID else asked
 
     @cached_property
     def classical_above_k(self) -> float | None:
@@ -94,9 +109,8 @@ class ThermoAnswer(TextOf):
             "relative_error": float(functions.relative_error.max()),
             "vibrations": vibrations.text if vibrations is not None else None,
             "pressure_bar": gas.pressure_bar if gas is not None else None,
-            **limit_facts(
-                top, populated_j(top, float(functions.temperature_k.max())), effects_of(top, hyperfine=False)
-            ),
+            "hyperfine": functions.hyperfine,
+            **limit_facts(top, populated_j(top, float(functions.temperature_k.max())), self.effects),
         }
 
 
@@ -116,5 +130,6 @@ def answer_thermo(request: ThermoRequest, progress: Progress | None = None) -> T
         pressure_bar=request.pressure_bar,
         relative_error=request.relative_error,
         progress=progress,
+        effects=request.effects,
     )
     return ThermoAnswer(request, functions)

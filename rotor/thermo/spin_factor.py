@@ -29,3 +29,16 @@ def without_spins(top: Top, effects: Sequence[QuantumEffect]) -> tuple[tuple[Qua
     if of_total == 3 or (of_total and top.spin_weights.rule != "none") or any(spin.electron for spin in spins.values()):
         return tuple(effects), 1
     return tuple(effect for effect in effects if not effect.spins(top)), prod(spin.twice + 1 for spin in spins.values())
+
+
+def spin_functions(top: Top, effects: Sequence[QuantumEffect], electrons: bool = True) -> float:
+    """How many functions of spins a rotational state has on average beside its spin weight: Π(2I+1), a third of it where three
+    equivalent nuclei are coupled to one total spin, of whose functions every K has those of its own symmetry.
+
+    electrons: whether theirs count too.
+    """
+    spins = {spin.name: spin for effect in effects for spin in effect.spins(top)}
+    together = sum(bool(spin.total) for spin in spins.values())
+    return prod(spin.twice + 1 for spin in spins.values() if electrons or not spin.electron) / (
+        3 if together == 3 else 1
+    )

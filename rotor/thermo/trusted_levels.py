@@ -10,6 +10,7 @@ B (J(J+1) - Ka² - Kc²), is missed.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -76,19 +77,33 @@ def trusted_energies_mhz(top: Top, levels: Levels) -> tuple[Floats, Floats]:
 
 
 def are_trusted(top: Top, levels: Levels) -> NDArray[np.bool_]:
-    """Which levels (n,) are energies of a molecule; all of a rigid top, and of one with spins or further states.
+    """Which levels (n,) are energies of a molecule; all of a rigid top, and of one with further states.
 
-    Of a top with a level table those that the table has.
+    Of a top with a level table those that the table has; with spins those of a rotational level that is trusted without them.
     """
-    plain = not {"v", "f", "irrep"} & levels.quanta.keys()
-    if not plain or not centrifugal_operators(top.constants):
+    if {"v", "irrep"} & levels.quanta.keys() or not centrifugal_operators(top.constants):
         return np.ones(len(levels), dtype=np.bool_)
+    if "n" in levels.quanta:
+        return _of_trusted_rotation(top, levels)
     if (tabulated := in_level_table(top, levels)) is not None:
         return tabulated
     rigid = rigid_energies_mhz(top, levels)
     if not _untrusted(levels, levels.energy_mhz, rigid).any():
         return np.ones(len(levels), dtype=np.bool_)
     return ~_untrusted(levels, levels.energy_mhz, _simpler_mhz(top, levels, rigid)[0])
+
+
+def _of_trusted_rotation(top: Top, levels: Levels) -> NDArray[np.bool_]:
+    """Which levels with spins (n,) belong to a trusted rotational level; solved without spins only where energies look wrong."""
+    energy = np.where(
+        levels.rotational > 0, levels.energy_mhz, 0.0
+    )  # N = 0 has no distortion; spins may move it up or down
+    if top.level_table is None and not _untrusted(levels, energy, rigid_energies_mhz(top, levels)).any():
+        return np.ones(len(levels), dtype=np.bool_)
+    bare = replace(top, spin_constants=None)
+    rotation = solve_levels(bare, int(levels.rotational.max()), jmin=int(levels.rotational.min()), vectors=False)
+    names = {name: levels.quanta[name] for name in ("ka", "kc", "k") if name in rotation.quanta}
+    return np.asarray(are_trusted(bare, rotation)[rotation.rows_of(j=levels.quanta["n"], **names)])
 
 
 def in_level_table(top: Top, levels: Levels) -> NDArray[np.bool_] | None:

@@ -12,6 +12,7 @@ from rotor.cli.shared import inputs
 from rotor.cli.shared.inputs import Input
 from rotor.cli.shared.options import option
 from rotor.cli.shared.output import ComputationError, note
+from rotor.table import counted
 
 if TYPE_CHECKING:
     import numpy as np
@@ -201,14 +202,16 @@ def comparison_facts(record: dict[str, Any]) -> list[tuple[str, str]]:
     if record["temperature_k"] is not None:
         facts.insert(1, ("temperature", f"{record['temperature_k']:g} K: {record['temperature_source']}"))
     if record["other_states"]:
-        facts.append(("not compared", f"{record['other_states']} lines of states that one side has no number for"))
+        facts.append(
+            ("not compared", f"{counted(record['other_states'], 'line')} of states that one side has no number for")
+        )
     units = {"frequency_mhz": "MHz", "lgint": "", "energy_lower_cm": "cm-1"}
     for name in DIFFERENCES:
         if record[name]:
             text = "median |difference| {median:.6g}, largest {largest:.6g}, mean difference {mean:.6g}"
             facts.append((name, f"{text.format(**record[name])} {units[name]}".rstrip()))
     if record["degeneracies_that_differ"] is not None:
-        facts.append(("degeneracy", f"differs in {record['degeneracies_that_differ']} lines"))
+        facts.append(("degeneracy", f"differs in {counted(record['degeneracies_that_differ'], 'line')}"))
     if record["measured"]:
         met = record["measured"]
         text = (

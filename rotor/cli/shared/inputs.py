@@ -26,6 +26,12 @@ MOST_LOG10 = 300  # of an intensity that a double can hold
 MOST_TIMES = 10_000_000
 
 
+STATES = {
+    name: "--" + name.replace("_", "-")
+    for name in ("state_constants", "state_dipoles", "state_weights", "state_symmetry", "state_names")
+}  # fields of Input that are about further states, with their options
+
+
 def json_option() -> Any:
     """The field of a group for the JSON that every verb can write."""
     return option(None, "--json", metavar="FILE", help="Everything printed, as JSON; - is standard output.")
@@ -58,6 +64,16 @@ class Input:
         metavar="TEXT",
         help='Further states and couplings: "E[1]=120GHz A[1]=... G_c[0,1]=450 W[0,1]=3 MHz" (MHz).',
     )
+    state_dipoles: str | None = option(
+        None, metavar="TEXT", help='Dipoles in and between states, axes a, b, c: "[1] 0,0,1.3 [0,1] 0,0,1.47" (D).'
+    )
+    state_weights: str | None = option(
+        None, metavar="TEXT", help='Spin weights of states: "[0] even=1,odd=3 [1] even=3,odd=1"; none: all alike.'
+    )
+    state_symmetry: str | None = option(
+        None, metavar="GROUP", help="Group of the states, whose couplings are checked by it: C2v, Cs(ab), C2(c), ..."
+    )
+    state_names: str | None = option(None, metavar="LIST", help="Names of all states, from 0 on: 0+,0-.")
     calculator: str | None = option(
         None, metavar="NAME", help="Refine the geometry with an ASE calculator of that name, such as xtb or psi4."
     )
@@ -254,21 +270,22 @@ def read_top(given: Input) -> Top:
         top = replace(top, spin_constants=_spin_constants(given.spin_constants, given.spins, top))
     elif given.spins is not None:
         raise ValueError("--spins: says how large the spins of --spin-constants are; give those too")
-    if given.state_constants is not None:
-        top = _with_states(top, given.state_constants)
+    top = _with_states(top, given)
     refuse_weights_of_another_kind(top)
     for text in top.notes:
         note(text)
     return top
 
 
-def _with_states(top: Top, text: str) -> Top:
-    from rotor.tops.states.state_constants import StateConstants
+def _with_states(top: Top, given: Input) -> Top:
+    """The top with the states of the options, and what is to be said of their couplings among its notes."""
+    if any(getattr(given, name) is not None for name in STATES):
+        from rotor.tops.states.state_texts import with_state_texts
 
-    def read(value: str) -> Top:
-        return replace(top, states=StateConstants.parse(value, "given (--state-constants)"))
-
-    return parsed("--state-constants", text, read)
+        with fields_as_options(**STATES):
+            top = with_state_texts(top, {name: getattr(given, name) for name in STATES}, "given (--state-constants)")
+    notes = () if top.states is None else tuple(text for text in top.states.notes if text not in top.notes)
+    return replace(top, notes=(*top.notes, *notes)) if notes else top
 
 
 def _spin_constants(text: str, spins: str | None, top: Top) -> SpinConstants:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rotor.cli.shared.output import Table
+from rotor.table import counted
 
 if TYPE_CHECKING:
     from rotor.spectra.lines import Lines
@@ -62,12 +63,14 @@ def lines_table(lines: Lines, rows: Any, depth: Any = None) -> Table:
     names = quanta.headings(lines.quanta_names)
     values = shown.columns
     present = [column for column in _COLUMNS if column.name in values]
-    cells = [[column.form.format(x) for x in values[column.name]] for column in present]
+    cells = [
+        ["" if x != x else column.form.format(x) for x in values[column.name]] for column in present
+    ]  # nan: not known
     headings = [column.heading for column in present]
     if depth is not None:
         headings.append("τ")
         cells.append([f"{x:.3e}" for x in depth[rows]])
     labels = [shown.levels.labels(states) for states in (shown.upper, shown.lower)]
     columns = (*headings, "upper", "lower")
-    title = f"the {len(shown)} strongest lines" if len(shown) < len(lines) else "all lines"
+    title = f"the {counted(len(shown), 'strongest line')}" if len(shown) < len(lines) else "all lines"
     return Table(f"{title}, in order of frequency (states: {names})", columns, list(zip(*cells, *labels, strict=True)))

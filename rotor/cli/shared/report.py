@@ -19,6 +19,8 @@ KINDS = {
     "asymmetric": "asymmetric top",
 }
 
+WITH_HYPERFINE = ("spectrum", "levels", "emission", "raman", "thermo", "stark", "zeeman")  # verbs with that option
+
 NOTHING_SEEN = "nothing that the molecule shows signs of; further states of vibration are not those of these constants"
 NOTHING_KNOWN = "of constants alone, nuclear spins and motions of large amplitude are not known; a geometry shows them"
 
@@ -37,18 +39,26 @@ def describe(top: Top, text: str, command: str) -> dict[str, Any]:
 
 def model_facts(content: Mapping[str, Any]) -> list[tuple[str, str]]:
     """What the model has and what it leaves out, largest first, from the keys of `rotor.quantum.estimates.limits.limit_facts`."""
-    from rotor.quantum.estimates.beyond import COMPUTE, Limit
+    from rotor.quantum.estimates.beyond import Limit
 
     present = [f"{one['name']} {one['size_mhz']:.2g} MHz" for one in content["effects"] if one["present"]]
     sizes = (
         f"at J = {content['sizes_at_j']}: " + ", ".join(present) if present else "those of the parameters of the files"
     )
     facts = [("effects", sizes)]
-    limits = [Limit(**one).sentence.replace(COMPUTE, "rotor spectrum --hyperfine") for one in content["limits"]]
+    limits = [with_option(Limit(**one).sentence, content["command"]) for one in content["limits"]]
     unknown = (
         NOTHING_KNOWN if not content.get("spins") else NOTHING_KNOWN.replace("nuclear spins", "further nuclear spins")
     )
     return facts + left_out_facts(limits or [NOTHING_SEEN if content["mass_u"] is not None else unknown])
+
+
+def with_option(sentence: str, command: str) -> str:
+    """A sentence about spins that are left out, with the option that adds them: of this verb if it has one, else of rotor spectrum."""
+    from rotor.quantum.estimates.beyond import COMPUTE
+
+    verb = next((word for word in command.split()[1:2] if word in WITH_HYPERFINE), "spectrum")
+    return sentence.replace(COMPUTE, f"rotor {verb} --hyperfine")
 
 
 def left_out_facts(sentences: Sequence[str]) -> list[tuple[str, str]]:

@@ -115,6 +115,7 @@ def molecule_of(given: Input, request: Any, folder: Path, polarizability: bool =
         spin_weights=None if given.spin_weights is None else inputs.weights("--spin-weights", given.spin_weights),
         spin_constants=given.spin_constants,
         spins=given.spins,
+        **{name: getattr(given, name) for name in inputs.STATES},
         calculator=given.calculator,
         hessian=hessian,
         symmetry_tolerance=given.symmetry_tolerance,

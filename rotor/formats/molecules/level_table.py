@@ -1,4 +1,4 @@
-"""Reads and writes a table of level energies: a .csv with a column for each quantum number, energy_mhz and error_mhz."""
+"""Reads and writes a table of level energies: a .csv with a column for each quantum number, energy_mhz, error_mhz, maybe own_error_mhz."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from rotor.formats.atomic_write import open_atomic
 from rotor.tops.states.level_table import LevelTable
 
 _NUMBERS = ("energy_mhz", "error_mhz")
+_OWN = "own_error_mhz"
 _QUANTA = ("v", "j", "ka", "kc", "k")
 
 
@@ -32,7 +33,7 @@ def read_level_table(path: str | os.PathLike[str], source: str = "") -> LevelTab
         raise ValueError(
             f"{path}: expected the columns j (v, k, ka, kc), energy_mhz, error_mhz; found {', '.join(names) or 'none'}"
         )
-    columns: dict[str, list[float]] = {name: [] for name in (*quanta, *_NUMBERS)}
+    columns: dict[str, list[float]] = {name: [] for name in (*quanta, *_NUMBERS, *([_OWN] if _OWN in names else []))}
     for (number, _), row in zip(lines[1:], rows[1:], strict=True):
         for name, values in columns.items():
             try:
@@ -41,7 +42,8 @@ def read_level_table(path: str | os.PathLike[str], source: str = "") -> LevelTab
                 raise ValueError(f"{path}, line {number}: {name} is no number: {','.join(row)!r}") from None
     try:
         labels = {name: np.array(columns[name], dtype=np.int64) for name in quanta}
-        return LevelTable(labels, np.array(columns["energy_mhz"]), np.array(columns["error_mhz"]), source)
+        own = np.array(columns[_OWN]) if _OWN in columns else None
+        return LevelTable(labels, np.array(columns["energy_mhz"]), np.array(columns["error_mhz"]), source, own)
     except ValueError as reason:
         raise ValueError(f"{path}: {reason}") from None
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +25,10 @@ Quanta = NDArray[np.int16]
 
 @dataclass(frozen=True)
 class GroupLines:
-    """The lines of one group, one component of a K doublet each: columns (n,) and quantum numbers (n, width)."""
+    """The lines of one group, one component of a K doublet each: columns (n,) and quantum numbers (n, width).
+
+    found: the transitions that they belong to.
+    """
 
     frequency_mhz: Floats
     intensity: Floats
@@ -34,6 +37,7 @@ class GroupLines:
     upper: Quanta
     lower: Quanta
     error_mhz: Floats
+    found: Transitions
 
 
 _COLUMNS = ("frequency_mhz", "intensity", "energy_lower_mhz", "g_upper", "upper", "lower", "error_mhz")
@@ -62,7 +66,11 @@ def transitions_of(group: Group, levels: Levels, request: Request, q: float) -> 
         none = np.zeros(0, dtype=np.int32)
         return Transitions(np.zeros(0), np.zeros(0), none, none)
     found = all_transitions(
-        levels, dict(group.effect.moments), cut=_wide_cut(levels, request, q), moments=group.effect.others
+        levels,
+        dict(group.effect.moments),
+        (0.0, request.fqlim_ghz * 1e3),
+        cut=_wide_cut(levels, request, q),
+        moments=group.effect.others,
     )
     exists = np.ones(len(found.lower), dtype=bool)
     if (levels.weight <= 0).any():
@@ -73,6 +81,10 @@ def transitions_of(group: Group, levels: Levels, request: Request, q: float) -> 
         exists &= equally_weighted(levels, found.upper, found.lower)
     order = rising_order(found.frequency_mhz)  # what is in order is put in order quickly later on
     rows = order if exists.all() else order[exists[order]]
+    return _rows(found, rows)
+
+
+def _rows(found: Transitions, rows: Ints) -> Transitions:
     return Transitions(*(getattr(found, name)[rows] for name in ("frequency_mhz", "strength_debye2", "upper", "lower")))
 
 
@@ -188,14 +200,16 @@ def lines_of(
     """
     intensity = _intensity(group, levels, found, request, q)
     there = within(request, found.frequency_mhz, intensity)
-    chosen = slice(None) if there.all() else np.flatnonzero(there)
-    up, low = found.upper[chosen], found.lower[chosen]
+    if not there.all():
+        chosen = np.flatnonzero(there)
+        found, intensity = _rows(found, chosen), intensity[chosen]
+    up, low = found.upper, found.lower
     error = np.zeros(len(up)) if spread is None else np.linalg.norm(spread[up] - spread[low], axis=1)
     g_upper = (levels.multiplicity * (levels.weight // levels.components))[up]
-    columns = (found.frequency_mhz[chosen], intensity[chosen], levels.energy_mhz[low], error)
+    columns = (found.frequency_mhz, intensity, levels.energy_mhz[low], error)
     index, upper, lower = _one_component_each(group, levels, form, up, low)
     frequency, strength, energy, error = (column[index] for column in columns)
-    return GroupLines(frequency, strength, energy, g_upper[index], upper, lower, error)
+    return GroupLines(frequency, strength, energy, g_upper[index], upper, lower, error, found)
 
 
 def _intensity(group: Group, levels: Levels, found: Transitions, request: Request, q: float) -> Floats:
@@ -287,11 +301,16 @@ def _rising(frequency_mhz: Floats) -> Ints | slice:
     return rising_order(frequency_mhz)
 
 
+_EVERY = 99  # quantum numbers; no file has as many
+_RANKS = 9999  # the largest number of four digits
+
+
 def as_level_list(
     solved: list[tuple[Group, Levels]], form: Format, spreads: Sequence[Floats | None] | None = None
 ) -> LevelList:
-    """The levels of all groups as an .egy file has them, ±K apart; block is 1 and rank counts by F and energy, other than in the program.
+    """The levels of all groups as an .egy file has them, ±K apart, with all quantum numbers, however many there are.
 
+    Blocks count 9999 levels each, by F and energy, other than in the program.
     spreads: (levels, k) of each group in MHz; the lengths of their rows are the errors of the energies, which are 0 without them.
     """
     tables = []
@@ -301,19 +320,21 @@ def as_level_list(
             rows = np.flatnonzero((levels.weight > 0) & (levels.components > int(negative)))
             mixing = np.ones(len(levels)) if levels.mixing is None else levels.mixing
             g = levels.multiplicity * (levels.weight // levels.components)
-            quanta = quanta_of(group, levels, form, negative)
+            quanta = quanta_of(group, levels, replace(form, most=_EVERY), negative)[rows]
+            pattern = quanta_of(group, levels, form, negative)[rows, -2] if form.aggregate else quanta[:, 0]
             tables.append(
-                (levels.energy_mhz[rows] / units.MHZ_PER_CM, error[rows], mixing[rows], g[rows], quanta[rows])
+                (levels.energy_mhz[rows] / units.MHZ_PER_CM, error[rows], mixing[rows], g[rows], quanta, pattern)
             )
-    energy, error, mixing, g, quanta = (np.concatenate([table[i] for table in tables]) for i in range(5))
+    energy, error, mixing, g, quanta, pattern = (np.concatenate([table[i] for table in tables]) for i in range(6))
     order = np.lexsort((energy, quanta[:, -1] if form.spins else quanta[:, 0]))
-    n = len(order)
+    block, rank = np.divmod(np.arange(len(order), dtype=np.int32), _RANKS)
     return LevelList(
-        block=np.ones(n, dtype=np.int32),
-        rank=np.arange(1, n + 1, dtype=np.int32),
+        block=block + 1,
+        rank=rank + 1,
         energy_cm=energy[order],
         error_cm=error[order],
         mixing=mixing[order],
         degeneracy=g[order].astype(np.int32),
         quanta=quanta[order].astype(np.int16),
+        pattern=pattern[order].astype(np.int16) if form.aggregate else None,
     )

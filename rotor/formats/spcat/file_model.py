@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 from rotor.arrays import Ints
 from rotor.formats.spcat.hamiltonian.codes import NOT_YET, basis_axes
 from rotor.formats.spcat.hamiltonian.dipole_codes import DipoleCode, Dipoles, dipoles_of, moment_of
-from rotor.formats.spcat.hamiltonian.file_effect import CodedLine, FileEffect, Vector, coded_lines
+from rotor.formats.spcat.hamiltonian.file_effect import CodedLine, FileEffect, Vector, coded_lines, real_ones
 from rotor.formats.spcat.hamiltonian.l_doubled import Pair, named_by_l, pairs_of
 from rotor.formats.spcat.hamiltonian.l_spins import named_by_l_with_spins
 from rotor.formats.spcat.hamiltonian.labels import BY_DIAG, named_by
+from rotor.formats.spcat.hamiltonian.phases import Phases, axis_of, odd_of_turned, phases_of, turned_axis, with_dipoles
 from rotor.formats.spcat.hamiltonian.series import Series, series_of
 from rotor.formats.spcat.hamiltonian.states import StateOptions, states_of
 from rotor.formats.spcat.hamiltonian.symmetry import (
@@ -32,6 +33,7 @@ from rotor.formats.spcat.hamiltonian.symmetry import (
 from rotor.formats.spcat.text.int_file import Dipole, IntensityFile
 from rotor.formats.spcat.text.par import Options, ParameterFile
 from rotor.quantum.levels import Levels
+from rotor.quantum.moments import Moment
 from rotor.quantum.solve import solve_levels
 from rotor.quantum.spins.levels import levels_of_f
 from rotor.quantum.spins.operators import is_axial
@@ -139,18 +141,46 @@ def groups_of(file: ParameterFile, intensities: IntensityFile, *, as_spcat: bool
     states = states_of(file)
     first = file.options[0]
     doubled = pairs_of(states)
-    lines = coded_lines(file, len(states), doubled)
-    lines = allowed(lines, states, doubled, first.nvib < 0)[0]
+    members, oblate = frozenset(v for pair in doubled for v in pair), first.nvib < 0
     dipoles, others = dipoles_of(intensities.dipoles, len(states))
+    phases = phases_of(file, len(states), members)
+    own_axes = _within_states(dipoles, others, states, members)
+    phases = with_dipoles(phases, own_axes, oblate, as_spcat) if phases.odd else phases
+    lines = coded_lines(file, len(states), doubled)
+    lines = real_ones(allowed(lines, states, doubled, oblate)[0], phases.odd, members)[0]
     dipoles, others = _of_both_components(dipoles, doubled), _others_of_both(others, doubled)
-    if not others and not any(_has_elements(pair, mu, states, doubled) for pair, mu in dipoles.items()):
+    own = any(_has_elements(pair, mu, states, doubled) for pair, mu in dipoles.items())
+    if not phases.odd and not others and not own:
         dipoles |= {(high, low): (-a, -b, -c) for (low, high), (a, b, c) in dipoles.items() if low != high}
     pairs = [line.states for line in lines if line.states] + list(dipoles) + [code.states for _, code in others]
     _refuse_missing_spins(lines, states)
-    light = (dipoles, others, series_of(file, len(states), doubled))
+    light = Light(dipoles, others, series_of(file, len(states), doubled), phases, own_axes)
     return [
         _group([states[v] for v in numbers], lines, light, first, as_spcat, file.title, doubled)
         for numbers in _connected(len(states), [*pairs, *doubled])
+    ]
+
+
+class Light(NamedTuple):
+    """The dipoles of a file by pairs of states, moments of other kinds, constants of its series, its phases; `_within_states`."""
+
+    dipoles: Dipoles
+    others: list[tuple[Dipole, DipoleCode]]
+    series: Series
+    phases: Phases
+    own_axes: list[tuple[int, bool]]
+
+
+def _within_states(
+    dipoles: Dipoles, others: list[tuple[Dipole, DipoleCode]], states: tuple[StateOptions, ...], members: frozenset[int]
+) -> list[tuple[int, bool]]:
+    """The axes of the electric moments within one state that join levels of one weight, and whether they are commutators."""
+    plain = [(v, axis, False) for (v, w), mu in dipoles.items() for axis, value in enumerate(mu, 1) if v == w and value]
+    plain += [
+        (code.states[0], code.axis, code.typ == 5) for _, code in others if code.axis and len(set(code.states)) == 1
+    ]
+    return [
+        (axis, odd) for v, axis, odd in plain if v in members or some_weights_agree(20 * axis, states[v], states[v])
     ]
 
 
@@ -158,7 +188,9 @@ def left_out(file: ParameterFile) -> list[str]:
     """A sentence for every parameter that the declared symmetry forbids."""
     states, oblate = states_of(file), file.options[0].nvib < 0
     doubled = pairs_of(states)
-    return allowed(coded_lines(file, len(states), doubled), states, doubled, oblate)[1]
+    members = frozenset(v for pair in doubled for v in pair)
+    lines, reasons = allowed(coded_lines(file, len(states), doubled), states, doubled, oblate)
+    return reasons + real_ones(lines, phases_of(file, len(states), members).odd, members)[1]
 
 
 def _has_elements(pair: tuple[int, int], mu: Vector, states: tuple[StateOptions, ...], doubled: list[Pair]) -> bool:
@@ -278,7 +310,7 @@ def _by_exchange(line: CodedLine, of: Mapping[int, StateOptions]) -> list[CodedL
 def _group(
     states: list[StateOptions],
     lines: list[CodedLine],
-    light: tuple[Dipoles, list[tuple[Dipole, DipoleCode]], Series],
+    light: Light,
     first: Options,
     as_spcat: bool,
     title: str,
@@ -290,10 +322,12 @@ def _group(
     if any((state.spins, state.equivalent) != (spins, states[0].equivalent) for state in states):
         raise ValueError(f"states {numbers} are connected and have different spins: that is read but not computed yet")
     here = {v: place for place, v in enumerate(numbers)}
-    moments = {(here[b], here[a]): mu for (a, b), mu in light[0].items() if a in here and b in here}
+    moments = {(here[b], here[a]): mu for (a, b), mu in light.dipoles.items() if a in here and b in here}
     beside = tuple(
-        moment_of(dipole, code, (here[code.states[1]], here[code.states[0]]), len(spins), oblate, as_spcat, light[2])
-        for dipole, code in light[1]
+        moment_of(
+            dipole, code, (here[code.states[1]], here[code.states[0]]), len(spins), oblate, as_spcat, light.series
+        )
+        for dipole, code in light.others
         if set(code.states) <= set(here)
     )
     own = tuple(line for line in lines if line.states is None or set(line.states) <= set(here))
@@ -315,13 +349,48 @@ def _group(
         Spin(f"I{place}", twice, total="I_tot" if place > others else "") for place, twice in enumerate(spins, 1)
     )
     _check_three(states[0], others, first)
-    effect = FileEffect(usable, numbers, coupled, moments, limits, beside, first.ixx, pairs, basis_axes(oblate))
+    turned = turned_axis([axis_of(line.typ) for line in usable], light.phases.odd)
+    if turned and doubled:
+        raise ValueError(
+            f"operators that are odd under time reversal within one state, or PHASE, with l-doubled states: {NOT_YET}"
+        )
+    if light.phases.odd:
+        fixed = light.phases._replace(odd=odd_of_turned(turned)) if turned else light.phases
+        moments, beside = _turned_moments(moments, beside, turned, with_dipoles(fixed, light.own_axes, oblate, False))
+    effect = FileEffect(usable, numbers, coupled, moments, limits, beside, first.ixx, pairs, basis_axes(oblate), turned)
     if pairs:  # raises for what is not allowed between l-doubled states, before any level is solved
         effect.spin_terms(_ANY_TOP)
         effect.couplings(_ANY_TOP)
     top = Top(_STANDS_FOR[kind, oblate], dipole_abc_debye=moments.get((0, 0), (0.0, 0.0, 0.0)), name=title)
     kmax = states[0].kmax if as_spcat and kind in ("prolate", "oblate") else _EVERY_K
     return Group(tuple(states), top, effect, oblate, kmax, first.diag)
+
+
+def _turned_moments(
+    moments: dict[tuple[int, int], Vector], beside: tuple[Moment, ...], turned: str, phases: Phases
+) -> tuple[dict[tuple[int, int], Vector], tuple[Moment, ...]]:
+    """The moments in functions that time reversal with half a turn about an axis leaves as they are: those along it, and the others
+    apart, each component by itself."""
+    if any(moment.written or moment.with_i or (moment.along_abc and moment.spin) for moment in beside):
+        raise ValueError(
+            "moments of second and third order, of a sine and of a spin with operators that are odd under time reversal within one "
+            f"state, or PHASE: {NOT_YET}"
+        )
+    every = [*(Moment(1.0, states, along) for states, along in moments.items()), *beside]
+    plain, others = dict[tuple[int, int], Vector](), list[Moment]()
+    for moment in every:
+        if moment.along_abc is None:
+            others.append(moment)
+            continue
+        for axis, value in enumerate(moment.along_abc, 1):
+            along = (value * (axis == 1), value * (axis == 2), value * (axis == 3))
+            by_order = moment.states[0] != moment.states[1] and phases.has_i(axis)
+            across = "" if "abc"[axis - 1] == turned else turned
+            if value and not across and not by_order and moment in every[: len(moments)]:
+                plain[moment.states] = tuple(np.add(along, plain.get(moment.states, (0.0, 0.0, 0.0))).tolist())
+            elif value:
+                others.append(moment._replace(along_abc=along, turned=across, by_order=by_order))
+    return plain, tuple(others)
 
 
 def _of_three(line: CodedLine, spins: int, axes: str) -> CodedLine:

@@ -34,6 +34,7 @@ from rotor.quantum.wang.basis import wang_blocks
 from rotor.quantum.wang.rotation import hamiltonian
 from rotor.quantum.wang.wang_matrix import JMatrix, block_bands
 from rotor.spectra.lines import Lines, line_list
+from rotor.table import counted
 from rotor.thermo import PartitionFunction, partition_function
 from rotor.tops.top import Top
 
@@ -141,11 +142,12 @@ def predict(
         intensities = replace(intensities, request=request)
     others_names = options.diag in BY_DIAG and options.spind > 0 and not is_linear(options)
     left_out = as_spcat and options.knmax < request.fend and not is_linear(options)
-    if not is_plain(parameters, intensities) or left_out or others_names:
+    top = None if left_out or others_names else _named_top(parameters, intensities)
+    if top is None:
         made, of_states, q, levels, notes = predicted(parameters, intensities, own_q=own_q, as_spcat=as_spcat)
         return Prediction(made, of_states, q, request, tuple(notes), levels)
 
-    top = replace(top_of(parameters, intensities), covariance=constants_covariance(parameters))
+    top = replace(top, covariance=constants_covariance(parameters))
     common = common_weight(options)
     q = summed_q(top, options, request.temperature_k).q if own_q else request.qrot
     lines = _lines_asked_for(top, request, q / common)
@@ -156,6 +158,21 @@ def predict(
         request=request,
         notes=tuple(_notes(parameters, top, request)),
     )
+
+
+def _named_top(parameters: ParameterFile, intensities: IntensityFile) -> Top | None:
+    """The top by the names of its constants, None where it has to be solved by the codes of the file.
+
+    That is so for spins, states and other operators, for constants that do not follow A >= B >= C, and where the sign of SPIND asks for
+    quantum numbers of the other kind: N and K of an asymmetric top, N, Ka and Kc of a symmetric or linear one.
+    """
+    if not is_plain(parameters, intensities):
+        return None
+    try:
+        top = top_of(parameters, intensities)
+    except ValueError:  # without names; what no file may have is refused there too
+        return None
+    return top if (top.kind in ("asymmetric", "spherical")) == (parameters.options[0].spind > 0) else None
 
 
 def summed_q(top: Top, options: Options, temperature_k: float) -> PartitionFunction:
@@ -236,7 +253,7 @@ def _notes(parameters: ParameterFile, top: Top, request: Request) -> list[str]:
     options, found = parameters.options[0], len(parameters.parameters)
     notes = []
     if parameters.header.npar > found:
-        notes.append(f"NPAR = {parameters.header.npar}, but {found} parameters stand in the file: those are used")
+        notes.append(f"NPAR = {parameters.header.npar}, but the file has {counted(found, 'parameter')}: all count")
     if not is_linear(options) and options.knmax < request.fend:
         notes.append(
             f"KNMAX = {options.knmax} is below FEND = {request.fend}: SPCAT leaves K > {options.knmax} out of its basis "

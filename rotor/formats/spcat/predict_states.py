@@ -34,6 +34,7 @@ from rotor.quantum.estimates.derivatives import level_derivatives
 from rotor.quantum.levels import Levels
 from rotor.spectra.lines import Lines
 from rotor.spectra.transitions import Transitions
+from rotor.table import counted
 from rotor.thermo import PartitionFunction
 from rotor.tops.top import Top
 
@@ -84,16 +85,19 @@ def predicted(
     solved = _solved(groups, request, form)
     transitions = [transitions_of(group, levels, request, q) for group, levels in solved]
     spreads = _spreads(solved, parameters)
-    pieces = [
-        (lines_of(group, levels, found, form, request, q, spread), form.qnfmt(group.spins))
+    listed = [
+        lines_of(group, levels, found, form, request, q, spread)
         for (group, levels), found, spread in zip(solved, transitions, spreads, strict=True)
     ]
+    pieces = [(own, form.qnfmt(group.spins)) for own, (group, _) in zip(listed, solved, strict=True)]
     made = as_catalogue(pieces, form, request.tag, 2 if all(s.linear for g in groups for s in g.states) else 3)
     notes = _notes(parameters, groups, request, as_spcat)
+    if all((levels.components == 1).all() for _, levels in solved):
+        transitions = [own.found for own in listed]  # which are within the limits
     lines = _lines(parameters, solved, transitions, form, request, q)
-    known = [one for one in spreads if one is not None]
-    if known:
-        lines = replace(lines, given_spread=np.concatenate(known))
+    with_spread = [one for one in spreads if one is not None]
+    if with_spread:
+        lines = replace(lines, given_spread=np.concatenate(with_spread))
     return made, lines, q, as_level_list(solved, form, spreads), notes
 
 
@@ -224,6 +228,8 @@ def _lines(
         range_mhz=(LEAST_MHZ, request.fqlim_ghz * 1e3),
         given_partition=PartitionFunction(t, q * above, None, math.nan, "given"),
     )
+    if (levels.components == 1).all():
+        return lines.sorted()
     chosen = within(request, lines.frequency_mhz, lines.intensity_nm2_mhz / levels.components[lines.lower])
     return (lines if chosen.all() else lines.where(chosen)).sorted()
 
@@ -288,7 +294,7 @@ def _notes(parameters: ParameterFile, groups: list[Group], request: Request, as_
     """What SPCAT does in silence with these files, and what is done here."""
     found, notes = len(parameters.parameters), []
     if parameters.header.npar > found:
-        notes.append(f"NPAR = {parameters.header.npar}, but {found} parameters stand in the file: those are used")
+        notes.append(f"NPAR = {parameters.header.npar}, but the file has {counted(found, 'parameter')}: all count")
     notes += left_out(parameters)
     for group in groups:
         highest = request.fend + sum(group.spins) // 2

@@ -21,6 +21,7 @@ from rotor.geometry.superposition import Superposition, superpose
 from rotor.molecules.molecule import Molecule
 from rotor.molecules.nuclei import isotope, isotope_of_mass
 from rotor.molecules.readers.cfour_orca import read_plain, reads_itself, unread
+from rotor.molecules.readers.field_gradients import with_field_gradients
 from rotor.molecules.readers.ground_state import dipole_lines, is_excited, printed_dipole
 from rotor.molecules.readers.programs import (
     Output,
@@ -87,6 +88,7 @@ def read_output(path: Path | str) -> Molecule:
     molecule = _geometry(data, str(path), program.name if plain else f"{program.name}, read with cclib")
     molecule = _with_dipole(molecule, data, output)
     molecule = with_quadrupole(_with_polarizability(molecule, data, output), output)
+    molecule = with_field_gradients(molecule, output)
     return replace(molecule, notes=(*molecule.notes, *unread(output), *_disagreement(molecule, data, output)))
 
 

@@ -17,6 +17,7 @@ from rotor.arrays import Floats
 from rotor.molecules.mmff_dipole import CHARGES_SOURCE, charges_note, mmff_dipole
 from rotor.molecules.molecule import Molecule
 from rotor.molecules.nuclei import isotope
+from rotor.table import counted
 
 # Median relative errors of rotational constants against experiment (the smallest constant of each molecule; NIST
 # CCCBDB 22; tests/test_smiles.py measures them again): 55 molecules of carbon with H, N, O, F, S, Cl, Br by MMFF94, of
@@ -122,7 +123,7 @@ def conformers(text: str, count: int = CONFORMERS) -> tuple[Conformer, ...]:
         if not np.isfinite(energy):  # its optimisation did not converge
             continue
         molecule = from_rdkit(mol, conformer=place, name=text)
-        source = f"SMILES {text}: {field} geometry, of {len(energies)} conformers" if field else "one atom"
+        source = f"SMILES {text}: {field} geometry, of {counted(len(energies), 'conformer')}" if field else "one atom"
         one = Conformer(replace(molecule, source=source, uncertainty=typical, notes=(*doubts, *molecule.notes)), energy)
         if not any(_same_conformer(one, other) for other in distinct):
             distinct.append(one)

@@ -139,10 +139,10 @@ class SpinEffect(QuantumEffect):
 
 
 def matrix_of(letters: str) -> Matrix:
-    """The matrix c_ij along a, b, c that a component stands for: aa, ab (both orders), bb-cc, and iso for the unit matrix.
+    """The matrix c_ij along a, b, c that a component stands for: aa, ab (both orders), ab-ba, bb-cc, and iso for the unit matrix.
 
-    >>> matrix_of("ab")
-    ((0.0, 1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    >>> matrix_of("ab"), matrix_of("ab-ba")[:2]
+    (((0.0, 1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 0.0)), ((0.0, 1.0, 0.0), (-1.0, 0.0, 0.0)))
     """
     rows = [[0.0] * 3 for _ in range(3)]
     if letters == "iso":
@@ -150,7 +150,9 @@ def matrix_of(letters: str) -> Matrix:
     else:
         for sign, pair in zip((1.0, -1.0), letters.split("-"), strict=False):
             i, k = ("abc".index(letter) for letter in pair)
-            rows[i][k] = rows[k][i] = sign
+            rows[i][k] = sign
+            if "-" not in letters:
+                rows[k][i] = sign
     return tuple(tuple(row) for row in rows)  # type: ignore[return-value]
 
 

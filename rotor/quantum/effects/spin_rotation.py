@@ -4,7 +4,11 @@
 
 (J. M. Brown and T. J. Sears, J. Mol. Spectrosc. 75, 111 (1979) for electrons; W. Gordy and R. L. Cook, Microwave Molecular
 Spectra, 3rd ed., eq. 9.139 for nuclei, with the sign +I·C·J). Parameters: C_aa, C_bb, C_cc, C_ab (the two orders
-alike), C_iso for a scalar C N·S, and the same with eps; gamma is eps_iso. Note the sign: catalogues that write -I·C·J give -C.
+alike), C_ab-ba for what they differ by, C_iso for a scalar C N·S, and the same with eps; gamma is eps_iso. Note the sign: catalogues
+that write -I·C·J give -C.
+
+C_ab multiplies ½{S_a, N_b} + ½{S_b, N_a}, C_ab-ba ½{S_a, N_b} - ½{S_b, N_a} = i/2 [N², S_c] (a, b, c in cyclic order), so that the
+element of the tensor with the spin along a is C_ab + C_ab-ba. The difference connects N with N ± 1 alone: its first order is zero.
 """
 
 from __future__ import annotations
@@ -19,7 +23,7 @@ from rotor.quantum.spins.operators import CosinesWithN
 if TYPE_CHECKING:
     from rotor.tops.top import Top
 
-COMPONENTS = ("iso", "aa", "bb", "cc", "bb-cc", "bb-aa", "ab", "ac", "bc")
+COMPONENTS = ("iso", "aa", "bb", "cc", "bb-cc", "bb-aa", "ab", "ac", "bc", "ab-ba", "ac-ca", "bc-cb")
 
 
 def _symbol(letters: str) -> Symbol:

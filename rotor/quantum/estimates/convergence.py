@@ -20,6 +20,7 @@ from rotor.quantum.effects.watson import SEMI_RIGID, Rigid, rigid_operators
 from rotor.quantum.levels import Levels, SolvedBlock
 from rotor.quantum.wang.rotation import hamiltonian
 from rotor.quantum.wang.wang_matrix import JMatrix, block_bands, scalar_energy
+from rotor.table import counted
 from rotor.tops.operators import Operators
 
 if TYPE_CHECKING:
@@ -162,8 +163,8 @@ def _mixture(levels: Levels) -> str:
     lowest, total = int(np.argmin(levels.mixing)), "N" if "n" in levels.quanta else "J"
     name, first = levels.labels(np.array([lowest]))[0].strip(), int(levels.rotational[mixed].min())
     return (
-        f"{int(mixed.sum())} levels from {total} = {first} on are mixed by more than 50 %: what they are called after has less than "
-        f"half of them (least {levels.mixing[lowest]:.0%}: {name})"
+        f"{counted(int(mixed.sum()), 'level')} from {total} = {first} on {'is' if mixed.sum() == 1 else 'are'} mixed by more than 50 %: "
+        f"what names a level has less than half of it (least {levels.mixing[lowest]:.0%}: {name})"
     )
 
 
@@ -195,7 +196,7 @@ def _disorder(top: Top, levels: Levels) -> str:
         return ""
     first = min(j for j, _ in found)
     return (
-        f"in {len(found)} blocks from J = {first} on the order of energies is not that of the rigid top: Ka and Kc count "
+        f"in {counted(len(found), 'block')} from J = {first} on the order of energies is not that of the rigid top: Ka and Kc count "
         "states there and say nothing about the motion"
     )
 

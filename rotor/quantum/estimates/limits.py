@@ -6,7 +6,7 @@
 | constants of a geometry alone | error of the geometry, centrifugal distortion | δB/B · 2B(J+1); 4D(J+1)³, D = 4B³/ν² |
 | the same | vibration-rotation difference, B_e - B_0 | δB/B (`zero_point`) · 2B(J+1) |
 | a methyl group beside atoms off its axis | internal rotation | A - E difference of lines (`internal_rotation`); at most F |
-| a pyramidal nitrogen with two hydrogens | inversion | at most about 24 GHz, that of ammonia |
+| a pyramidal nitrogen with two hydrogens | inversion | at most about 24 GHz, that of NH3; 1.6 GHz, that of ND3, where they are heavy |
 | an odd number of electrons, an odd electronic state | electron spin | not estimated |
 | nuclei with spin | spin-rotation and spin-spin coupling | not estimated |
 
@@ -46,7 +46,10 @@ _MULTIPLETS = (
 )
 ZERO_POINT = "vibration-rotation difference"
 OF_SPINS = frozenset({"nuclear quadrupole", "magnetic coupling of nuclear spins", ELECTRON_SPIN})
-AMMONIA_MHZ = 24_000.0  # the splitting of NH3, see docs/limitations.md
+AMMONIA_MHZ, HEAVY_AMMONIA_MHZ = (
+    24_000.0,
+    1_600.0,
+)  # the splittings of NH3 and ND3, see docs/limitations.md and data/molecules
 
 
 def populated_j(top: Top, temperature_k: float) -> int:
@@ -204,10 +207,18 @@ def _of_nuclei(top: Top, j: int, effects: Sequence[QuantumEffect], known: Collec
         found.append(Limit("nuclear quadrupole", size, _split_text(nuclei)))
     if top.molecule is None:
         return found
-    magnetic = sorted({one.label for one in top.molecule.nuclei if one.spin > 0})
-    if magnetic and not {"spin-rotation", "spin-spin"} & set(known):
+    magnetic = sorted({one.label for one in top.molecule.nuclei if one.spin > 0} - _with_magnetic_constants(top))
+    elsewhere = top.spin_constants is None and {"spin-rotation", "spin-spin"} & set(known)
+    if magnetic and not elsewhere:
         found.append(Limit("magnetic coupling of nuclear spins", None, f"{', '.join(magnetic)}: small splittings"))
     return found
+
+
+def _with_magnetic_constants(top: Top) -> set[str]:
+    """Isotopes of which a constant other than χ is known, such as C_aa(14N) or b_F(S,1H_2)."""
+    values = top.spin_constants.values if top.spin_constants else {}
+    inside = [name.partition("(")[2].rstrip(")").split(",") for name in values if not name.startswith("chi")]
+    return {spin.partition("_")[0] for spins in inside for spin in spins}
 
 
 def _split_text(nuclei: Sequence[Splitting]) -> str:
@@ -230,9 +241,9 @@ def _of_geometry(top: Top, molecule: Molecule, j: int, present: set[str]) -> lis
     found, bonds = [], bonded_atoms(molecule)
     if groups := methyl_groups(molecule, bonds):
         found.append(_internal_rotation(top, groups, j))
-    if _pyramidal_nitrogens(molecule, bonds) and "interacting states" not in present:
+    if (nitrogens := _pyramidal_nitrogens(molecule, bonds)) and "interacting states" not in present:
         text = "nitrogen is pyramidal: its levels are pairs that this leaves out; the size is ammonia's, heavier groups have less"
-        found.append(Limit("inversion", AMMONIA_MHZ, text, at_most=True))
+        found.append(Limit("inversion", max(_inversion_mhz(molecule, near) for near in nitrogens), text, at_most=True))
     electrons = sum(one.element_number for one in molecule.nuclei) - molecule.charge
     if (electrons % 2 or molecule.electronic == "odd") and "spin-rotation" not in present:
         found.append(Limit(ELECTRON_SPIN, None, _MULTIPLETS))
@@ -283,14 +294,19 @@ def _rotor_text(top: Top, what: str, group: MethylGroup, shifts: LineShifts, j: 
     )
 
 
-def _pyramidal_nitrogens(molecule: Molecule, bonds: Sequence[Ints]) -> int:
-    """Nitrogens with three neighbours, two of them hydrogens, that are not flat."""
+def _pyramidal_nitrogens(molecule: Molecule, bonds: Sequence[Ints]) -> list[Ints]:
+    """The neighbours of nitrogens that have three, two of them hydrogens, and are not flat."""
     from rotor.quantum.estimates.methyl_groups import is_flat
 
-    count, x = 0, molecule.positions_angstrom
+    found, x = [], molecule.positions_angstrom
     for atom, near in enumerate(bonds):
         hydrogens = sum(molecule.symbols[i] == "H" for i in near.tolist())
-        if molecule.symbols[atom] != "N" or len(near) != 3 or hydrogens < 2:
-            continue
-        count += not is_flat(x, atom, near)
-    return count
+        if molecule.symbols[atom] == "N" and len(near) == 3 and hydrogens >= 2 and not is_flat(x, atom, near):
+            found.append(near)
+    return found
+
+
+def _inversion_mhz(molecule: Molecule, near: Ints) -> float:
+    """The splitting of NH3, or that of ND3 where every hydrogen at the nitrogen is a heavy one."""
+    heavy = all(molecule.mass_numbers[i] > 1 for i in near.tolist())
+    return HEAVY_AMMONIA_MHZ if heavy else AMMONIA_MHZ

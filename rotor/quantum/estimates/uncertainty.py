@@ -78,7 +78,8 @@ def known_covariance(top: Top, parameters: Collection[str]) -> Covariance | None
 def source_of_errors(top: Top, parameters: Collection[str], given: Covariance | None) -> str | None:
     """Which uncertainties the errors of frequencies come from, in words, None where there are none; given: in place of what the top has."""
     if given is None and top.level_table is not None:
-        return "none: the energies are from a table"
+        unknown = top.level_table.own_error_mhz is None
+        return "none: the energies are from a table" if unknown else "the table of energies"
     used = given or known_covariance(top, parameters)
     if used is None:
         known = top.constants.uncertainties and top.covariance is None

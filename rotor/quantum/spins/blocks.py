@@ -23,6 +23,7 @@ from rotor.arrays import Floats, Ints
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.spins.contraction import Contracted, Stack, by_numbers, operators_of_stacks, stacks_of
 from rotor.quantum.spins.coupling import coefficients, for_every_f, n_dot_s
+from rotor.quantum.spins.families import families_of, links_of_pairs, links_of_stacks
 from rotor.quantum.spins.many_f import Group
 from rotor.quantum.spins.method import FIRST_ORDER, Used
 from rotor.quantum.spins.operators import AxialState
@@ -47,6 +48,7 @@ if TYPE_CHECKING:
 
 _FEW = 100  # patterns of an F; of more the coefficients are made when they are needed
 Exist = Callable[[Ints], NDArray[np.bool_]]
+Operators = dict[tuple[int, int], dict[Channel, Floats]]
 
 
 @dataclass(frozen=True)
@@ -98,30 +100,35 @@ class SpinBlock:
 
 @dataclass(frozen=True)
 class Plan:
-    """Solved rotation, operators of every channel by pairs of blocks (i ≥ k), and which blocks are connected.
+    """Solved rotation, operators of every channel, and which blocks they connect.
 
-    families: members (block, class), the class 1 of functions that change sign with the exchange of two equivalent spins.
-    contracted: the same operators in stacks, each with the channels that share it, where they were made so.
+    families: members (block, class), see `families`. contracted: the operators in stacks, each with the channels that share it, where
+    they were made so. given: the operators by pairs of blocks (i ≥ k), where they were not, or where some are left out.
     """
 
     shared: Shared
     blocks: list[RotorBlock]
-    operators: dict[tuple[int, int], dict[Channel, Floats]]
     families: list[list[tuple[int, int]]]
     contracted: list[tuple[list[Contracted], list[Channel]]] | None = field(default=None, repr=False)
+    given: Operators | None = field(default=None, repr=False)
+
+    @cached_property
+    def operators(self) -> Operators:
+        """Operators of every channel by pairs of blocks (i ≥ k)."""
+        return _by_pairs(self.contracted or []) if self.given is None else self.given
 
     @cached_property
     def grouped(self) -> dict[tuple[int, int], list[tuple[Floats, list[Channel]]]]:
         """Each matrix between two blocks once, with the channels that share it."""
         return {pair: _by_operator(found) for pair, found in self.operators.items()}
 
-    def with_method(self, used: Used, operators: dict[tuple[int, int], dict[Channel, Floats]]) -> Plan:
-        """The same rotation with some of the operators, and what that is called."""
+    def with_method(self, used: Used, operators: Operators | None = None) -> Plan:
+        """The same rotation with some of the operators, all by default, and what that is called."""
         shared = replace(self.shared, used=used)
-        if operators is self.operators:
+        if operators is None:
             return replace(self, shared=shared)
-        families = _families(len(self.blocks), operators, max(self.shared.scheme.equivalent, 1))
-        return Plan(shared, self.blocks, operators, families)
+        families = families_of(len(self.blocks), links_of_pairs(operators), max(self.shared.scheme.equivalent, 1))
+        return Plan(shared, self.blocks, families, given=operators)
 
 
 def plan_of(top: Top, effects: tuple[QuantumEffect, ...], nmin: int, nmax: int, executor: Executor | None) -> Plan:
@@ -148,34 +155,38 @@ def plan_of(top: Top, effects: tuple[QuantumEffect, ...], nmin: int, nmax: int, 
     distinct = {first: channels[first] for first in firsts.values()}
     reach = 0 if "n" in scheme.conserved else 2
     stacks = None if _are_axial(blocks) else stacks_of(blocks)
-    contracted = None
+    count, classes = len(blocks), max(scheme.equivalent, 1)
+    shared = Shared(scheme, representation, stacks)
     if stacks is None:
         between = {
             (i, k): operators_between(blocks[i], blocks[k], distinct, representation) for i, k in _near(blocks, reach)
         }
-    else:
-        found = {c: operators_of_stacks(stacks, min(reach, c.rank), x, representation) for c, x in distinct.items()}
-        contracted = [(found[c], [other for other, first in firsts.items() if first == c]) for c in distinct]
-        between = _by_pairs(found)
-    operators = {
-        pair: {channel: own[first] for channel, first in firsts.items() if first in own}
-        for pair, own in between.items()
-        if own
-    }
-    families = _families(len(blocks), operators, max(scheme.equivalent, 1))
-    return Plan(Shared(scheme, representation, stacks), blocks, operators, families, contracted)
+        operators = {
+            pair: {channel: own[first] for channel, first in firsts.items() if first in own}
+            for pair, own in between.items()
+            if own
+        }
+        return Plan(shared, blocks, families_of(count, links_of_pairs(operators), classes), given=operators)
+    contracted = [
+        (
+            operators_of_stacks(stacks, min(reach, channel.rank), pieces, representation),
+            [other for other, first in firsts.items() if first == channel],
+        )
+        for channel, pieces in distinct.items()
+    ]
+    return Plan(shared, blocks, families_of(count, links_of_stacks(contracted), classes), contracted)
 
 
 def _are_axial(blocks: list[RotorBlock]) -> bool:
     return isinstance(blocks[0].parts[0].basis, AxialState)
 
 
-def _by_pairs(of_channels: dict[Channel, list[Contracted]]) -> dict[tuple[int, int], dict[Channel, Floats]]:
-    """The same by pairs of blocks."""
-    out: dict[tuple[int, int], dict[Channel, Floats]] = {}
-    for channel, found in of_channels.items():
+def _by_pairs(contracted: list[tuple[list[Contracted], list[Channel]]]) -> Operators:
+    """Operators in stacks by pairs of blocks."""
+    out: Operators = {}
+    for found, channels in contracted:
         for pair, operator in by_numbers(found).items():
-            out.setdefault(pair, {})[channel] = operator
+            out.setdefault(pair, {}).update(dict.fromkeys(channels, operator))
     return out
 
 
@@ -222,29 +233,6 @@ def operators_between(
     acting = [channel for channel in channels if abs(up.n - low.n) <= channel.rank <= up.n + low.n]
     found = {channel: in_both_orders(up, low, channels[channel], representation) for channel in acting}
     return {channel: operator for channel, operator in found.items() if operator is not None}
-
-
-def _families(
-    count: int, operators: dict[tuple[int, int], dict[Channel, Floats]], classes: int
-) -> list[list[tuple[int, int]]]:
-    """Blocks and classes that operators connect, each family in rising order."""
-    above = list(range(count * classes))
-
-    def root(i: int) -> int:
-        while above[i] != i:
-            above[i] = above[above[i]]
-            i = above[i]
-        return i
-
-    for (i, k), found in operators.items():
-        for changed in {int(channel.exchange < 0) for channel in found}:
-            for own in range(classes):
-                low, high = sorted((root(i * classes + own), root(k * classes + (own ^ changed))))
-                above[high] = low
-    members: dict[int, list[tuple[int, int]]] = {}
-    for i in range(count * classes):
-        members.setdefault(root(i), []).append(divmod(i, classes))
-    return list(members.values())
 
 
 def solve_f(plan: Plan, twice_f: int, exist: Exist | None = None) -> list[SpinBlock]:

@@ -196,6 +196,15 @@ def tensors_of_stacks(stacks: Sequence[Stack], tensors: Tensors) -> list[Contrac
     return [found for found in (*back, *there) if found is not None]
 
 
+def acting_numbers(found: Sequence[Contracted]) -> list[tuple[int, int]]:
+    """The numbers of every pair of blocks between which there are elements that are not zero."""
+    out: list[tuple[int, int]] = []
+    for up, low, pairs, matrices in found:
+        acting = matrices.any(axis=(1, 2))
+        out += zip(up.numbers[pairs.up][acting].tolist(), low.numbers[pairs.low][acting].tolist(), strict=True)
+    return out
+
+
 def by_numbers(found: Sequence[Contracted]) -> dict[tuple[int, int], Floats]:
     """The (n', n) elements of every pair of blocks by their numbers, those that are zero left out."""
     out = {}

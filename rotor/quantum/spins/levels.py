@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rotor.arrays import Ints
+from rotor.arrays import Ints, hold_freed_memory
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.levels import Levels, weights_of_levels
 from rotor.quantum.spins.blocks import Exist, Plan, Shared, SpinBlock, functions_of_f, plan_of, prepare, solve_f
@@ -83,6 +83,7 @@ def levels_of_f(
     Levels
         Energies in MHz with eigenvectors and labels.
     """
+    hold_freed_memory()
     lowest, highest = _range_of_n(top, effects, every_f)
     plan = simplified(plan_of(top, effects, lowest, highest, executor), effects, every_f)
     solve = solve_f

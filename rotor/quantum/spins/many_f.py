@@ -2,25 +2,30 @@
 
 Blocks of different F that hold the same kinds of solved blocks of the rotation, at the same N - F and with the same coupling patterns,
 make a group. A function of a group has a column (a kind of block and a pattern, the same number for all F) and a state of that
-block, whose number counts first: function = state · columns + column. What a block lacks, since its N is low or its
-states are fewer, are zeros. Elements of the rotation stand in tables by N, coefficients of coupling in tables by F.
+block: function = column · states + state. What a block lacks, since its N is low or its states are fewer, are zeros. Elements of
+the rotation stand in tables by N, coefficients of coupling in tables by F.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from rotor.arrays import Floats, Ints
+from rotor.arrays import Floats, Ints, Workspace
 from rotor.quantum.spins.contraction import Contracted, Stack
 from rotor.quantum.spins.parts import SpinPart
 
 MOST = 160  # functions of a block up to which many F are done at once: of larger ones each has arithmetic enough for itself
 Tables = dict[tuple[int, int, int], Floats]
 """Elements (N, states', states) by the kinds of both blocks and N' - N, by the N of the second from the lowest on."""
+
+Cell = tuple[int, int]
+"""2(N - F) and class of patterns."""
+Key = tuple[tuple[Cell, int], ...]
+"""The cell and the kind of each slot."""
 
 
 class Slot(NamedTuple):
@@ -37,12 +42,13 @@ class Slot(NamedTuple):
 class Group:
     """Blocks of rising F, doubled; functions: of every block where its functions stand, in the order of its parts.
 
-    states: the largest number of states of a block of the rotation. places: of a doubled F among the blocks.
+    states: the largest number of states of a block of the rotation; heights: that of each block. places: of a doubled F among the blocks.
     """
 
     slots: tuple[Slot, ...]
     twice_f: list[int]
     states: int
+    heights: list[int]
     functions: list[Ints]
     places: dict[int, int] = field(repr=False)
 
@@ -55,32 +61,32 @@ class Group:
 @dataclass(frozen=True, eq=False)
 class Frame:
     """What all groups of a calculation share: the doubled F, the lowest N, kinds and sizes of blocks of the rotation by number, their
-    energies (N, states) by kind, and for each F the numbers of its patterns among those of the highest F, counted by their
-    distances from F."""
+    energies (N, states) by kind, for each F the numbers of its patterns among those of the highest F, counted by their distances
+    from F, and the cell of each of these."""
 
     twice_f: list[int]
     lowest: int
     kinds: list[int]
     sizes: list[int]
     energies_mhz: dict[int, Floats]
-    patterns: dict[int, Ints]
-    every: Ints
+    patterns: dict[int, list[int]]
+    cells: list[Cell]
 
-    def of_f(self, twice_f: Sequence[int]) -> slice | Ints:
+    def of_f(self, twice_f: Sequence[int]) -> slice | list[int]:
         """The places of some rising F in tables by F."""
         return _places((twice_f[0] - self.twice_f[0]) // 2, twice_f, len(self.twice_f))
 
-    def of_n(self, twice_f: Sequence[int], slot: Slot) -> slice | Ints:
+    def of_n(self, twice_f: Sequence[int], slot: Slot) -> slice | list[int]:
         """The places in tables by N of the N that a slot has at some rising F; any where that is beyond the table."""
         count = len(self.energies_mhz[slot.kind])
         return _places((twice_f[0] + slot.rise) // 2 - self.lowest, twice_f, count)
 
 
-def _places(first: int, twice_f: Sequence[int], count: int) -> slice | Ints:
+def _places(first: int, twice_f: Sequence[int], count: int) -> slice | list[int]:
     """Places that rise with F from the first on, among so many: a slice where all are there and no F is left out."""
     if first >= 0 and first + len(twice_f) <= count and twice_f[-1] - twice_f[0] == 2 * (len(twice_f) - 1):
         return slice(first, first + len(twice_f))
-    return np.asarray(np.clip(first + (np.asarray(twice_f) - twice_f[0]) // 2, 0, count - 1))
+    return [min(max(first + (f - twice_f[0]) // 2, 0), count - 1) for f in twice_f]
 
 
 def frame_of(stacks: Sequence[Stack], places: dict[int, Ints], every: Ints) -> Frame:
@@ -99,7 +105,9 @@ def frame_of(stacks: Sequence[Stack], places: dict[int, Ints], every: Ints) -> F
         for number, n, size, own in members:
             kinds[number], sizes[number] = stack.kind, size
             of_kind[n - lowest, :size] = own
-    return Frame(list(places), lowest, kinds, sizes, energies, places, every)
+    patterns = {f: own.tolist() for f, own in places.items()}
+    cells = [(rise, of) for rise, of in every[:, [0, -1]].tolist()]
+    return Frame(list(places), lowest, kinds, sizes, energies, patterns, cells)
 
 
 def tables_of(found: Sequence[Contracted], frame: Frame) -> Tables:
@@ -114,19 +122,12 @@ def tables_of(found: Sequence[Contracted], frame: Frame) -> Tables:
     return out
 
 
-Cell = tuple[int, int]
-"""2(N - F) and class of patterns."""
-Key = tuple[tuple[Cell, int], ...]
-"""The cell and the kind of each slot."""
-
-
 def groups_of(members: Sequence[tuple[int, Sequence[SpinPart]]], frame: Frame) -> list[tuple[Group, list[int]]]:
     """Blocks, given by their doubled F and parts, in groups, each with the numbers of its blocks."""
-    cells: list[Cell] = [(rise, of) for rise, of in frame.every[:, [0, -1]].tolist()]
+    keys = [_key(frame.patterns[f], parts, frame) for f, parts in members]
     found: list[tuple[Key, dict[int, int]]] = []
     for number in sorted(range(len(members)), key=lambda number: -members[number][0]):
-        f, parts = members[number]
-        key = _key(frame.patterns[f], parts, frame, cells)
+        f, key = members[number][0], keys[number]
         for known, by_f in found:
             if f not in by_f and (key == known or set(key) <= set(known)):
                 by_f[f] = number
@@ -134,50 +135,47 @@ def groups_of(members: Sequence[tuple[int, Sequence[SpinPart]]], frame: Frame) -
         else:
             found.append((key, {f: number}))
     return [
-        (_group(key, by_f, members, frame, cells), sorted(by_f.values(), key=lambda i: members[i][0]))
+        (
+            _group(key, [(f, members[by_f[f]][1], keys[by_f[f]]) for f in sorted(by_f)], frame),
+            [by_f[f] for f in sorted(by_f)],
+        )
         for key, by_f in found
     ]
 
 
-def _group(
-    key: Key,
-    by_f: Mapping[int, int],
-    members: Sequence[tuple[int, Sequence[SpinPart]]],
-    frame: Frame,
-    cells: Sequence[Cell],
-) -> Group:
+def _group(key: Key, members: Sequence[tuple[int, Sequence[SpinPart], Key]], frame: Frame) -> Group:
+    """The group of a key; members: doubled F, rising, parts and keys of its blocks."""
     slots, start = list[Slot](), 0
     for cell, kind in key:
-        first, count = cells.index(cell), cells.count(cell)
+        first, count = frame.cells.index(cell), frame.cells.count(cell)
         slots.append(Slot(cell[0], kind, slice(first, first + count), slice(start, start + count)))
         start += count
-    twice_f = sorted(by_f)
-    columns, orders = np.zeros((len(twice_f), start), dtype=np.int64), list[Any]()
     counts = [slot.columns.stop - slot.columns.start for slot in slots]
-    for place, f in enumerate(twice_f):
-        own, parts = frame.patterns[f], members[by_f[f]][1]
-        sizes = [frame.sizes[part.number] for part in parts]
-        if len(own) == len(cells) and _key(own, parts, frame, cells) == key:
+    columns, orders = np.zeros((len(members), start), dtype=np.int64), list[Any]()
+    for place, (f, parts, own_key) in enumerate(members):
+        own, sizes = frame.patterns[f], [frame.sizes[part.number] for part in parts]
+        if len(own) == len(frame.cells) and own_key == key:
             columns[place] = np.repeat(sizes, counts)
             orders.append(slice(None))
             continue
         order = list[int]()
-        for part, size in zip(parts, sizes, strict=True):
-            slot = slots[key.index((cells[own[part.patterns.start]], frame.kinds[part.number]))]
-            at = own[part.patterns] + (slot.columns.start - slot.patterns.start)
+        for part, size, of_slot in zip(parts, sizes, own_key, strict=True):
+            slot = slots[key.index(of_slot)]
+            at = [pattern + slot.columns.start - slot.patterns.start for pattern in own[part.patterns]]
             columns[place, at] = size
-            order += at.tolist()
+            order += at
         orders.append(order)
-    states = int(columns.max())
-    every = np.arange(start)[:, None] + np.arange(states) * start
+    states, twice_f = int(columns.max()), [f for f, _, _ in members]
+    every = np.arange(start * states).reshape(start, states)
     there = np.arange(states) < columns[:, :, None]
     functions = [every[order][there[place, order]] for place, order in enumerate(orders)]
-    return Group(tuple(slots), twice_f, states, functions, {f: place for place, f in enumerate(twice_f)})
+    places = {f: place for place, f in enumerate(twice_f)}
+    return Group(tuple(slots), twice_f, states, columns.max(axis=1).tolist(), functions, places)
 
 
-def _key(own: Ints, parts: Sequence[SpinPart], frame: Frame, cells: Sequence[Cell]) -> Key:
+def _key(own: Sequence[int], parts: Sequence[SpinPart], frame: Frame) -> Key:
     """Where the columns of a block stand."""
-    return tuple((cells[own[part.patterns.start]], frame.kinds[part.number]) for part in parts)
+    return tuple((frame.cells[own[part.patterns.start]], frame.kinds[part.number]) for part in parts)
 
 
 def are_connected(of_both: tuple[Group, Group], step: int, tables: Tables) -> bool:
@@ -187,8 +185,9 @@ def are_connected(of_both: tuple[Group, Group], step: int, tables: Tables) -> bo
 
 
 def between(
-    up: Group, low: Group, twice_f: Sequence[int], step: int, tables: Tables, coefficients: Floats, frame: Frame
-) -> Floats:
+    up: Group, low: Group, twice_f: Sequence[int], step: int, tables: Tables, coefficients: Floats, frame: Frame,
+    space: Workspace,
+) -> Floats:  # fmt: skip
     """c(F) ⟨r'‖X‖r⟩ between two groups, with F' = F + step.
 
     Parameters
@@ -205,18 +204,15 @@ def between(
         By all F of the frame.
     frame : Frame
         Of both groups.
+    space : Workspace
+        The array stands in it until the next one.
 
     Returns
     -------
-    (F, states', columns', states, columns) array
-        Functions are counted as `functions_of` does.
+    (F, columns', states', columns, states) array
     """
-    # the longest axes last where a slot has several columns: short innermost loops take most of the time
-    alone = up.columns == len(up.slots) and low.columns == len(low.slots)
-    shape = len(twice_f), up.states, up.columns, low.states, low.columns
-    order = (0, 1, 2, 3, 4) if alone else (2, 4, 0, 1, 3)
-    out = np.zeros([shape[axis] for axis in order])
-    view = out.transpose(np.argsort(order).tolist())
+    out = space.array("elements", len(twice_f), up.columns, up.states, low.columns, low.states)
+    out.fill(0.0)
     own = coefficients[frame.of_f(twice_f)]
     for right in low.slots:
         places = frame.of_n(twice_f, right)
@@ -226,14 +222,14 @@ def between(
                 element = table[places, : up.states, : low.states]
                 _, rows, columns = element.shape
                 np.multiply(
-                    element[:, :, None, :, None],
-                    own[:, None, left.patterns, None, right.patterns],
-                    out=view[:, :rows, left.columns, :columns, right.columns],
+                    element[:, None, :, None, :],
+                    own[:, left.patterns, None, right.patterns, None],
+                    out=out[:, left.columns, :rows, right.columns, :columns],
                 )
-    return view
+    return out
 
 
 def functions_of(elements: Floats) -> Floats:
-    """Elements (F, states', columns', states, columns) as (F, functions', functions); a view where columns come last in memory."""
-    count, states_up, columns_up, states, columns = elements.shape
-    return elements.reshape(count, states_up * columns_up, states * columns)
+    """Elements (F, columns', states', columns, states) as (F, functions', functions)."""
+    count, columns_up, states_up, columns, states = elements.shape
+    return elements.reshape(count, columns_up * states_up, columns * states)

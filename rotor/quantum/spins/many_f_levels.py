@@ -6,19 +6,30 @@ Each block is then solved by itself, with the matrix that `blocks` makes of it, 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
-from rotor.arrays import Floats, Ints
+from rotor.arrays import Floats, Ints, Workspace
 from rotor.quantum.spins.blocks import Exist, Plan, SpinBlock, parts_of_f
 from rotor.quantum.spins.many_f import MOST, Frame, Group, Tables, between, frame_of, functions_of, groups_of, tables_of
 from rotor.quantum.spins.method import FIRST_ORDER
-from rotor.quantum.spins.parts import SpinPart, labels_of, names_of_tables
+from rotor.quantum.spins.parts import SpinPart, labels_of_alike, names_of_tables
 from rotor.quantum.spins.pattern_tables import couplings_by_f, pattern_table
 
 _FEW = 100  # patterns of an F
 Member = tuple[int, tuple[SpinPart, ...]]
 """A block before it is solved: doubled F, parts."""
+
+
+class Solved(NamedTuple):
+    """A block solved with others: energies in MHz, eigenvectors, labels and mixing as in `SpinBlock`."""
+
+    group: Group
+    energies_mhz: Floats
+    vectors: Floats
+    labels: Ints
+    mixing: Floats
 
 
 def solve_many_f(plan: Plan, every_f: Sequence[int], exist: Exist | None = None) -> list[SpinBlock] | None:
@@ -55,15 +66,10 @@ def solve_many_f(plan: Plan, every_f: Sequence[int], exist: Exist | None = None)
         each = [couplings_by_f(shared.scheme, channel, every_f[0], every_f[-1]) for channel in channels]
         acting.append((tables_of(contracted, frame), each[0] if len(each) == 1 else np.add.reduce(each)))
     out, start = [], 0
-    for (f, parts), own, of_names in zip(
-        members, _solved(members, acting, frame), zip(names, sizes, strict=True), strict=True
-    ):
-        group, energies, vectors = own
-        labels, mixing = labels_of(parts, of_names, vectors)
-        out.append(
-            SpinBlock(f, table.patterns[f], parts, energies, vectors, labels, mixing, shared, start, group=group)
-        )
-        start += len(energies)
+    for (f, parts), own in zip(members, _solved(members, names, sizes, acting, frame), strict=True):
+        results = own.energies_mhz, own.vectors, own.labels, own.mixing
+        out.append(SpinBlock(f, table.patterns[f], parts, *results, shared, start, group=own.group))
+        start += len(own.energies_mhz)
     return out
 
 
@@ -86,40 +92,52 @@ def _existing(
 
 
 def _solved(
-    members: Sequence[Member], acting: Sequence[tuple[Tables, Floats]], frame: Frame
-) -> list[tuple[Group, Floats, Floats]]:
-    """The group, energies and eigenvectors of every block; blocks of one size are solved in one call."""
-    matrices: dict[int, list[tuple[int, Floats]]] = {}
+    members: Sequence[Member],
+    names: Sequence[Ints],
+    sizes: Sequence[Ints],
+    acting: Sequence[tuple[Tables, Floats]],
+    frame: Frame,
+) -> list[Solved]:
+    """Every block solved and named; those of one size are solved in one call."""
+    matrices: dict[tuple[int, int], list[tuple[int, Floats]]] = {}
     groups: dict[int, Group] = {}
     zeros = [float(parts[0].rotor.energies_mhz[0]) for _, parts in members]  # taken out for the sake of digits
+    spaces = [Workspace() for _ in acting]
     for group, numbers in groups_of(members, frame):
         own_zeros = np.array([zeros[number] for number in numbers])
-        for number, matrix in zip(numbers, _hamiltonians(group, acting, frame, own_zeros), strict=True):
+        for number, matrix in zip(numbers, _hamiltonians(group, acting, frame, own_zeros, spaces), strict=True):
             groups[number] = group
-            matrices.setdefault(len(matrix), []).append((number, matrix))
-    out: list[tuple[Group, Floats, Floats]] = [None] * len(members)  # type: ignore[list-item]
+            matrices.setdefault((len(matrix), len(sizes[number])), []).append((number, matrix))
+    out: list[Solved] = [None] * len(members)  # type: ignore[list-item]
     for alike in matrices.values():
         every = np.stack([matrix for _, matrix in alike])
         if not np.isfinite(every).all():
             raise ValueError("a block of the Hamiltonian overflows: N max is too high for these constants")
         energies, vectors = np.linalg.eigh(every)  # reads the lower triangle
-        for (number, _), own, states in zip(alike, energies, vectors, strict=True):
-            out[number] = groups[number], own + zeros[number], states
+        numbers = [number for number, _ in alike]
+        own_names, own_sizes = (np.stack([named[number] for number in numbers]) for named in (names, sizes))
+        labels, mixing = labels_of_alike([members[number][1] for number in numbers], own_names, own_sizes, vectors)
+        energies += np.array([zeros[number] for number in numbers])[:, None]
+        for place, number in enumerate(numbers):
+            out[number] = Solved(groups[number], energies[place], vectors[place], labels[place], mixing[place])
     return out
 
 
 def _hamiltonians(
-    group: Group, acting: Sequence[tuple[Tables, Floats]], frame: Frame, zeros: Floats
+    group: Group, acting: Sequence[tuple[Tables, Floats]], frame: Frame, zeros: Floats, spaces: Sequence[Workspace]
 ) -> Iterator[Floats]:
-    """The Hamiltonians of a group, (functions, functions) of each block, energies from `zeros` on, in the lower triangle."""
+    """The Hamiltonians of a group, (functions, functions) of each block, energies from `zeros` on, in the lower triangle.
+
+    spaces: one for each of the operators.
+    """
     every = [
-        functions_of(between(group, group, group.twice_f, 0, tables, coefficients, frame))
-        for tables, coefficients in acting
+        functions_of(between(group, group, group.twice_f, 0, tables, coefficients, frame, own))
+        for (tables, coefficients), own in zip(acting, spaces, strict=True)
     ]
-    diagonal = np.zeros((len(zeros), group.states, group.columns))
+    diagonal = np.zeros((len(zeros), group.columns, group.states))
     for slot in group.slots:
         own = frame.energies_mhz[slot.kind][frame.of_n(group.twice_f, slot), : group.states]
-        diagonal[:, : own.shape[1], slot.columns] = (own - zeros[:, None])[:, :, None]
+        diagonal[:, slot.columns, : own.shape[1]] = (own - zeros[:, None])[:, None]
     for place, functions in enumerate(group.functions):
         chosen = functions[:, None], functions
         matrix = every[0][place][chosen] if every else np.zeros((len(functions), len(functions)))

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rotor.arrays import Floats, Indices
+from rotor.arrays import Floats, Indices, Workspace
 from rotor.quantum.spins.blocks import SpinBlock
 from rotor.quantum.spins.contraction import MOST_RANK, tensors_of_stacks
 from rotor.quantum.spins.many_f import Frame, Group, Tables, are_connected, between, functions_of, tables_of
@@ -27,15 +27,15 @@ class Rows(NamedTuple):
 
 
 class States(NamedTuple):
-    """The blocks of a group that are there: places of the doubled F, eigenvectors (F, functions, states), rows of levels (F, states),
-    how many states each has, and how many of the rotation."""
+    """The blocks of a group that are there: places of the doubled F, eigenvectors (F, columns, states of the rotation, states), rows of
+    levels (F, states), how many states each has, and how many of the rotation."""
 
     group: Group
     places: dict[int, int]
     vectors: Floats
     rows: Indices
     sizes: list[int]
-    ends: list[int]
+    heights: list[int]
 
 
 def can_be_stacked(blocks: Sequence[object], tensors: Tensors) -> bool:
@@ -60,17 +60,19 @@ def amplitudes_of_groups(blocks: Sequence[SpinBlock], tensors: Tensors, levels: 
     Yields
     ------
     Rows
-        Rows of levels and amplitudes, zero beyond a block; alike: whether every block is taken with itself.
+        Rows of levels and amplitudes, zero beyond a block; alike: whether every block is taken with itself. The amplitudes may
+        be changed, and stand until the next ones.
     """
     shared, rank = blocks[0].shared, rank_of(tensors)
     frame: Frame = shared.cache["frame"]
     tables = tables_of(tensors_of_stacks(shared.stacks or [], tensors), frame)
     every = [_states(group, own, levels) for group, own in _by_group(blocks)]
+    space = Workspace()
     for step in range(0, 2 * rank + 1, 2):
         coefficients = tensors_by_f(shared.scheme, rank, step, frame.twice_f[0], frame.twice_f[-1])
         for place, low in enumerate(every):
             for up in every[place:] if step == 0 else every:
-                yield from _between(up, low, step, rank, tables, coefficients, frame)
+                yield from _between(up, low, step, rank, tables, coefficients, frame, space)
 
 
 def _by_group(blocks: Sequence[SpinBlock]) -> list[tuple[Group, list[SpinBlock]]]:
@@ -83,34 +85,39 @@ def _by_group(blocks: Sequence[SpinBlock]) -> list[tuple[Group, list[SpinBlock]]
 
 def _states(group: Group, blocks: Sequence[SpinBlock], levels: int) -> States:
     sizes = [len(block.energies_mhz) for block in blocks]
-    vectors = np.zeros((len(blocks), group.states * group.columns, max(sizes)))
-    rows = np.full((len(blocks), max(sizes)), levels, dtype=np.int32)
-    ends = []
+    vectors = np.zeros((len(blocks), group.columns * group.states, max(sizes)))
+    starts, counts = np.array([block.start for block in blocks], dtype=np.int32), np.array(sizes)
+    every = np.arange(max(sizes), dtype=np.int32)
+    rows = np.where(every < counts[:, None], starts[:, None] + every, np.int32(levels))
     for place, (block, size) in enumerate(zip(blocks, sizes, strict=True)):
         functions = group.functions[group.places[block.twice_f]]
         vectors[place, functions, :size] = block.vectors
-        rows[place, :size] = range(block.start, block.start + size)
-        ends.append(int(functions.max()) // group.columns + 1)
-    return States(group, {block.twice_f: place for place, block in enumerate(blocks)}, vectors, rows, sizes, ends)
+    heights = [group.heights[group.places[block.twice_f]] for block in blocks]
+    of_columns = vectors.reshape(len(blocks), group.columns, group.states, -1)
+    return States(group, {block.twice_f: place for place, block in enumerate(blocks)}, of_columns, rows, sizes, heights)
 
 
 def _between(
-    up: States, low: States, step: int, rank: int, tables: Tables, coefficients: Floats, frame: Frame
+    up: States, low: States, step: int, rank: int, tables: Tables, coefficients: Floats, frame: Frame, space: Workspace
 ) -> Iterator[Rows]:
     """Between two groups, F' = F + step, doubled."""
     twice_f = [f for f in low.places if f + step in up.places and 2 * f + step >= 2 * rank]
     if not twice_f or not are_connected((up.group, low.group), step, tables):
         return
-    whole = between(up.group, low.group, twice_f, step, tables, coefficients, frame)
+    whole = between(up.group, low.group, twice_f, step, tables, coefficients, frame, space)
     lefts, rights = [up.places[f + step] for f in twice_f], [low.places[f] for f in twice_f]
     for some in _of_like_size([low.sizes[place] for place in rights]):
         left, right = _places(lefts[some]), _places(rights[some])
-        height, width = max(up.ends[place] for place in lefts[some]), max(low.ends[place] for place in rights[some])
-        elements = functions_of(whole[some, :height, :, :width])
-        height, width = height * up.group.columns, width * low.group.columns
+        height, width = (
+            max(up.heights[place] for place in lefts[some]),
+            max(low.heights[place] for place in rights[some]),
+        )
         ups, lows = max(up.sizes[place] for place in lefts[some]), max(low.sizes[place] for place in rights[some])
-        moved = np.matmul(elements, low.vectors[right, :width, :lows])
-        found = np.matmul(up.vectors[left, :height, :ups].transpose(0, 2, 1), moved)
+        elements = functions_of(whole[some, :, :height, :, :width])
+        bra = up.vectors[left, :, :height, :ups].reshape(len(elements), -1, ups)
+        ket = low.vectors[right, :, :width, :lows].reshape(len(elements), -1, lows)
+        moved = np.matmul(elements, ket, out=space.array("moved", len(elements), bra.shape[1], lows))
+        found = np.matmul(bra.transpose(0, 2, 1), moved, out=space.array("found", len(elements), ups, lows))
         yield Rows(up.rows[left, :ups], low.rows[right, :lows], found, up is low and not step)
 
 

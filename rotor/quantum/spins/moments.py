@@ -27,6 +27,7 @@ from rotor.quantum.spins.rotor import RotorBlock, RotorPart
 from rotor.quantum.spins.scheme import Scheme
 from rotor.quantum.spins.written_moments import written_elements
 from rotor.quantum.tensors import BodyTensor, body_tensor
+from rotor.quantum.wang.basis import WangBlock, character
 
 
 @dataclass(frozen=True)
@@ -40,8 +41,9 @@ class SpinMoments:
 
     def amplitudes(self, up: SpinBlock, low: SpinBlock) -> Floats:
         """The square roots of line strengths between all states of two blocks, (n_up, n_low)."""
-        electric, magnetic = (self._sum(up, low, kind) for kind in (True, False))
-        return np.asarray(np.hypot(electric, magnetic))
+        kinds = dict.fromkeys((moment.electric, moment.imaginary) for moment in self.moments)
+        sums = [self._sum(up, low, kind) for kind in kinds]
+        return np.asarray(sums[0] if len(sums) == 1 else np.sqrt(sum(each * each for each in sums)))
 
     def connected(self, up: SpinBlock, low: SpinBlock) -> bool:
         """Whether one of the moments has an element between two blocks."""
@@ -54,10 +56,11 @@ class SpinMoments:
             for source in low.parts
         )
 
-    def _sum(self, up: SpinBlock, low: SpinBlock, electric: bool) -> Floats:
+    def _sum(self, up: SpinBlock, low: SpinBlock, kind: tuple[bool, bool]) -> Floats:
+        """Of the moments that interfere with each other: electric or not, real or imaginary."""
         moved = np.zeros((up.vectors.shape[0], low.vectors.shape[1]))
         for place, moment in enumerate(self.moments):
-            if moment.electric == electric:
+            if (moment.electric, moment.imaginary) == kind:
                 t = self._coefficients(moment, up.twice_f, low.twice_f)
                 for target in up.parts:
                     for source in low.parts:
@@ -113,12 +116,16 @@ class SpinMoments:
             return None if found is None else found * _stretch(up.j, low.j)
         if moment.along_abc is not None:
             found = tensor_elements(up, low, self._tensor(moment.along_abc, 1))
-            return None if found is None else found * _factor(moment.powers, left, right) * _cosine(moment, left, right)
+            if found is None:
+                return None
+            return found * (
+                _sign(moment, left, right) * _factor(moment.powers, left, right) * _cosine(moment, left, right)
+            )
         if moment.tensor is not None and not moment.spin:
             return CosinesWithN(moment.tensor).elements(up, low, self.representation)
         if moment.tensor is not None:
             found = tensor_elements(up, low, self._tensor(moment.tensor, 2))
-            back = moment.turned and left.v != right.v and (left.v, right.v) != moment.states
+            back = moment.with_i and left.v != right.v and (left.v, right.v) != moment.states
             return -found if found is not None and back else found
         if up != low:
             return None
@@ -171,6 +178,14 @@ def _factor(powers: str, left: RotorPart, right: RotorPart) -> Floats:
     return np.array(
         {"": 1.0, "J": (m + n) / 2, "JJ": (m**2 + n**2) / 2, "[J]": (n - m) / 2, "[[J]]": (m - n) ** 2 / 4}[powers]
     )
+
+
+def _sign(moment: Moment, left: RotorPart, right: RotorPart) -> int:
+    """Of what is turned, and of what depends on the order of the states."""
+    turned = character(left.basis, moment.turned) if moment.turned and isinstance(left.basis, WangBlock) else 1
+    if not moment.by_order:
+        return turned
+    return -turned if (left.v < right.v) == bool(moment.turned) else turned  # of both i · i = -1
 
 
 def _cosine(moment: Moment, left: RotorPart, right: RotorPart) -> Floats:

@@ -32,7 +32,7 @@ import numpy as np
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum.tensors import BodyTensor, Complexes, block_elements, body_tensor, coupling, phase_exponent
-from rotor.quantum.wang.basis import WangBlock
+from rotor.quantum.wang.basis import WangBlock, character
 from rotor.quantum.wang.wang_matrix import JMatrix, block_bands, scalar_energy
 from rotor.tops.operators import Operators, Powers
 
@@ -193,7 +193,28 @@ def functions_of(basis: Basis) -> Complexes:
     return np.asarray(out * 1j ** phase_exponent(basis))
 
 
-Rotor = Scalar | Cosines | CosinesWithN | ByElements
+@dataclass(frozen=True)
+class HalfTurned:
+    """C2g times an operator that half a turn about g, one of a, b, c, turns around: what stands for it in functions that θ C2g
+    leaves as they are, θ being time reversal. Of an operator that θ turns around too it is Hermitian within one state."""
+
+    of: Cosines | CosinesWithN | ByElements
+    axis: str
+    odd = False
+
+    @property
+    def rank(self) -> int:
+        """That of the operator."""
+        return self.of.rank
+
+    def elements(self, up: Basis, low: Basis, representation: str) -> Floats | None:
+        """The real reduced matrix between two blocks, None where it is zero."""
+        found = self.of.elements(up, low, representation)
+        assert isinstance(up, WangBlock)
+        return None if found is None else character(up, self.axis) * found
+
+
+Rotor = Scalar | Cosines | CosinesWithN | ByElements | HalfTurned
 
 
 @lru_cache(maxsize=256)
@@ -217,6 +238,8 @@ def is_axial(rotor: Rotor, axis: str) -> bool:
     >>> is_axial(Cosines(((1.0, 0, 0), (0, -0.5, 0), (0, 0, -0.5))), "a")
     True
     """
+    if isinstance(rotor, HalfTurned):
+        return False
     if isinstance(rotor, Scalar):
         return all(n == 0 for (_, _, n), _ in rotor.operators)
     if isinstance(rotor, ByElements):
@@ -237,16 +260,17 @@ def summed(weighted: Iterable[tuple[float, Rotor]]) -> list[tuple[float, Rotor]]
     """
     sums: dict[object, list[Floats]] = {}
     for value, rotor in weighted:
-        whole = isinstance(rotor, Scalar | ByElements)
-        key: object = rotor if whole else (type(rotor), rotor.rank)
-        components = np.array(1.0 if isinstance(rotor, Scalar | ByElements) else rotor.components)
+        alone = isinstance(rotor, Scalar | ByElements | HalfTurned)
+        key: object = rotor if alone else (type(rotor), rotor.rank)
+        components = np.array(1.0 if isinstance(rotor, Scalar | ByElements | HalfTurned) else rotor.components)
         sums.setdefault(key, []).append(value * components)
     out: list[tuple[float, Rotor]] = []
     for key, parts in sums.items():
         total = np.sum(parts, axis=0)
         total = np.where(np.abs(total) > _CANCELS * np.abs(parts).sum(axis=0), total, 0.0)
         if total.any():
-            out.append((float(total), key) if isinstance(key, Scalar | ByElements) else (1.0, key[0](_nested(total))))  # type: ignore[index]
+            alone = isinstance(key, Scalar | ByElements | HalfTurned)
+            out.append((float(total), key) if alone else (1.0, key[0](_nested(total))))  # type: ignore[index,arg-type]
     return out
 
 

@@ -43,21 +43,56 @@ def named_states(rotor: RotorBlock, vectors: Floats) -> Ints:
     shares = np.stack([(vectors[part.place] ** 2).sum(axis=0) for part in rotor.parts])
     of_state = assigned(shares, np.array([len(part.names) for part in rotor.parts]))
     labels = np.empty((len(of_state), 3), dtype=np.int64)
-    labels[np.argsort(of_state, kind="stable")] = np.concatenate(rotor.names)
+    labels[np.argsort(of_state, kind="stable")] = np.concatenate([part.names for part in rotor.parts])
     return labels
 
 
 def labels_of(parts: tuple[SpinPart, ...], named: tuple[Ints, Ints], vectors: Floats) -> tuple[Ints, Floats]:
     """Names (n, 3 + pattern) of the states of a block, energies rising, and the shares of the sub-blocks that give them."""
     names, sizes = named
+    labels, mixing = labels_of_alike([parts], names[None], sizes[None], vectors[None])
+    return labels[0], mixing[0]
+
+
+def labels_of_alike(
+    every: Sequence[tuple[SpinPart, ...]], names: Ints, sizes: Ints, vectors: Floats
+) -> tuple[Ints, Floats]:
+    """The same of blocks of n states each with as many sub-blocks.
+
+    Parameters
+    ----------
+    every : sequence of tuple of SpinPart
+        The parts of each block.
+    names : (blocks, n, 3 + pattern) array
+        Of the levels that the sub-blocks name, see `names_of_tables`.
+    sizes : (blocks, sub-blocks) array
+        How many each names.
+    vectors : (blocks, n, n) array
+        Eigenvectors in columns.
+
+    Returns
+    -------
+    labels : (blocks, n, 3 + pattern) array
+        Of the states, energies rising.
+    mixing : (blocks, n) array
+        Shares of the sub-blocks that name them.
+    """
+    (count, subs), n = sizes.shape, names.shape[1]
     inside = vectors
-    if any(len(part.rotor.parts) > 1 for part in parts):
-        inside = np.concatenate([_over_functions(part, vectors) for part in parts])
-    table = np.add.reduceat(inside * inside, np.cumsum(sizes) - sizes, axis=0)
-    of_state = assigned(table, sizes)
+    if any(len(part.rotor.parts) > 1 for parts in every for part in parts):
+        inside = np.stack(
+            [
+                np.concatenate([_over_functions(part, own) for part in parts])
+                for parts, own in zip(every, vectors, strict=True)
+            ]
+        )
+    block = np.arange(count)[:, None]
+    starts = np.cumsum(sizes, axis=1) - sizes + n * block
+    shares = np.add.reduceat((inside * inside).reshape(count * n, n), starts.ravel(), axis=0).reshape(count, subs, n)
+    of_state = assigned_alike(shares, sizes)
     labels = np.empty_like(names)
-    labels[np.argsort(of_state, kind="stable")] = names
-    return labels, np.asarray(table[of_state, np.arange(len(of_state))])
+    labels[block, np.argsort(of_state, axis=1, kind="stable")] = names
+    return labels, np.asarray(shares[block, of_state, np.arange(n)])
 
 
 def _over_functions(part: SpinPart, vectors: Floats) -> Floats:
@@ -79,11 +114,11 @@ def names_of_tables(tables: Sequence[tuple[Ints, Sequence[SpinPart]]]) -> tuple[
     found, sizes, rows, first = list[Ints](), list[int](), list[int](), 0
     for every, parts in tables:
         for part in parts:
-            start, stop = first + part.patterns.start, first + part.patterns.stop
-            for names in part.rotor.names:
-                found += [names] * (stop - start)
-                rows += range(start, stop)
-                sizes += [len(names)] * (stop - start)
+            own, count = range(first + part.patterns.start, first + part.patterns.stop), part.repeats
+            for one in part.rotor.parts:
+                found += [one.names] * count
+                rows += own
+                sizes += [len(one.names)] * count
         first += len(every)
     out = np.empty((sum(sizes), 3 + tables[0][0].shape[1]), dtype=np.int64)
     np.concatenate(found, out=out[:, :3])
@@ -100,24 +135,47 @@ def assigned(shares: Floats, capacity: Ints) -> Ints:
     found = shares.argmax(axis=0)
     if (np.bincount(found, minlength=len(capacity)) == capacity).all():
         return np.asarray(found)
-    clear = shares[found, np.arange(len(found))] > 0.5  # before all others; where they fit in, they are decided
-    left = capacity - np.bincount(found[clear], minlength=len(capacity))
-    if (left < 0).any():
-        return _largest_first(shares, capacity)
-    rest, subs = np.flatnonzero(~clear), np.flatnonzero(left > 0)
-    found[rest] = subs[_largest_first(shares[np.ix_(subs, rest)], left[subs])]
-    return np.asarray(found)
+    return np.asarray(assigned_alike(shares[None], capacity[None])[0])
 
 
-def _largest_first(shares: Floats, capacity: Ints) -> Ints:
-    found, left = np.full(shares.shape[1], -1), capacity.copy()
-    every = np.argsort(-shares, axis=None, kind="stable")
-    for start in range(0, len(every), _AT_A_TIME):
-        subs, states = np.divmod(every[start : start + _AT_A_TIME], shares.shape[1])
-        free = (found[states] < 0) & (left[subs] > 0)  # of what was decided before
-        for sub, state in zip(subs[free].tolist(), states[free].tolist(), strict=True):
-            if found[state] < 0 and left[sub]:
-                found[state], left[sub] = sub, left[sub] - 1
-        if not left.any():
+def assigned_alike(shares: Floats, capacity: Ints) -> Ints:
+    """The same of blocks with as many states and sub-blocks, (blocks, states): shares (blocks, sub-blocks, states)."""
+    count, subs, n = shares.shape
+    first = subs * np.arange(count)[:, None]
+    found = shares.argmax(axis=1)
+    done = np.all(_number_of(found + first, capacity) == capacity, axis=1, keepdims=True)
+    if done.all():
+        return np.asarray(found)
+    clear = (
+        np.take_along_axis(shares, found[:, None], 1)[:, 0] > 0.5
+    )  # before all others; where they fit in, they are decided
+    clear |= done
+    clear &= np.all(_number_of((found + first)[clear], capacity) <= capacity, axis=1, keepdims=True)
+    left = capacity - _number_of((found + first)[clear], capacity)
+    block, sub, state = np.nonzero((left > 0)[:, :, None] & ~clear[:, None])
+    found[~clear] = -1
+    decided = _largest_first(
+        shares[block, sub, state], subs * block + sub, n * block + state, left.ravel(), found.ravel()
+    )
+    return np.asarray(np.where(clear, found, decided.reshape(count, n) - first))
+
+
+def _number_of(named: Ints, like: Ints) -> Ints:
+    """How often each sub-block occurs, in the shape of `like`."""
+    return np.bincount(named.ravel(), minlength=like.size).reshape(like.shape)
+
+
+def _largest_first(shares: Floats, subs: Ints, states: Ints, left: Ints, found: Ints) -> Ints:
+    """The sub-block of each state that has none, found < 0, the largest share first while there are places left."""
+    order = np.argsort(-shares, kind="stable")
+    of_state, places, missing = found.tolist(), left.tolist(), int((found < 0).sum())
+    for start in range(0, len(order), _AT_A_TIME):
+        some = order[start : start + _AT_A_TIME]
+        if start:  # many are decided before
+            some = some[(np.array(of_state)[states[some]] < 0) & (np.array(places)[subs[some]] > 0)]
+        for sub, state in zip(subs[some].tolist(), states[some].tolist(), strict=True):
+            if of_state[state] < 0 and places[sub]:
+                of_state[state], places[sub], missing = sub, places[sub] - 1, missing - 1
+        if not missing:
             break
-    return found
+    return np.array(of_state)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -21,7 +20,7 @@ from rotor.quantum.spins.operators import EVERY_STATE, AxialState, Basis, Rotor,
 from rotor.quantum.spins.scheme import Scheme, scheme_of
 from rotor.quantum.spins.terms import SpinTerm
 from rotor.quantum.tabulated import as_tabulated
-from rotor.quantum.wang.basis import names_of
+from rotor.quantum.wang.basis import WangBlock, names_of
 from rotor.quantum.wang.rotation import hamiltonian, solve_rotation
 
 if TYPE_CHECKING:
@@ -37,7 +36,7 @@ class RotorPart(NamedTuple):
     v: int
     basis: Basis
     place: slice
-    names: Ints  # Ka and Kc of the functions in order of energy, (size, 2); K and 0 of |N K⟩
+    names: Ints  # v, Ka and Kc of the functions in order of energy, (size, 3); v, K and 0 of |N K⟩
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,11 +47,6 @@ class RotorBlock:
     parts: tuple[RotorPart, ...]
     energies_mhz: Floats
     vectors: Floats
-
-    @cached_property
-    def names(self) -> list[Ints]:
-        """v, Ka and Kc of the functions of each part in order of energy, (size, 3)."""
-        return [np.column_stack([np.full(len(part.names), part.v), part.names]) for part in self.parts]
 
 
 class Channel(NamedTuple):
@@ -122,7 +116,7 @@ def solved_rotor(
     if "ka" not in levels.quanta or not isinstance(levels.blocks[0], SolvedBlock):
         return [_rotor_block(block, representation) for block in levels.blocks], representation
     names = np.column_stack(
-        [levels.quanta["ka"], levels.quanta["kc"]]
+        [np.zeros(len(levels), dtype=np.int64), levels.quanta["ka"], levels.quanta["kc"]]
     )  # of states in order of energy, as those of functions are
     return [_of_one_state(block, names) for block in levels.blocks], representation
 
@@ -140,7 +134,7 @@ def _all_axial(top: Top, effects: tuple[QuantumEffect, ...], terms: Terms) -> bo
 
 
 def _axial_block(v: int, n: int, k: int, energy_mhz: float) -> RotorBlock:
-    part = RotorPart(v, AxialState(n, k), slice(0, 1), np.array([[k, 0]]))
+    part = RotorPart(v, AxialState(n, k), slice(0, 1), np.array([[v, k, 0]]))
     return RotorBlock(n, (part,), np.array([energy_mhz]), np.ones((1, 1)))
 
 
@@ -155,8 +149,13 @@ def _rotor_block(block: SolvedBlock | CoupledBlock, representation: str) -> Roto
         n, where = block.j, [(part.v, part.basis, part.place) for part in block.parts]
     else:
         n, where = block.basis.j, [(0, block.basis, slice(0, block.basis.size))]
-    parts = (RotorPart(v, basis, place, np.stack(names_of(basis, representation), axis=1)) for v, basis, place in where)
+    parts = (RotorPart(v, basis, place, _names(v, basis, representation)) for v, basis, place in where)
     return RotorBlock(n, tuple(parts), block.energies_mhz, block.vectors)
+
+
+def _names(v: int, basis: WangBlock, representation: str) -> Ints:
+    ka, kc = names_of(basis, representation)
+    return np.column_stack([np.full(len(ka), v), ka, kc])
 
 
 def valued_terms(top: Top, effects: Iterable[QuantumEffect]) -> Terms:

@@ -67,10 +67,10 @@ def in_wang_functions(plan: Plan) -> Plan:
 
     Raises ValueError for a rotation without a threefold axis.
     """
-    blocks, operators = [], dict(plan.operators)
+    blocks = []
     turned = {
         pair: {c: plan.blocks[pair[0]].vectors @ x @ plan.blocks[pair[1]].vectors.T for c, x in found.items()}
-        for pair, found in operators.items()
+        for pair, found in plan.operators.items()
     }
     for number, block in enumerate(plan.blocks):
         own = (block.vectors * block.energies_mhz) @ block.vectors.T
@@ -78,7 +78,7 @@ def in_wang_functions(plan: Plan) -> Plan:
         found = turned.setdefault((number, number), {})
         found[_ALONE] = own + found[_ALONE] if _ALONE in found else own
         blocks.append(RotorBlock(block.n, block.parts, np.diag(own).copy(), np.eye(len(own))))
-    return replace(plan, shared=replace(plan.shared, stacks=stacks_of(blocks)), blocks=blocks, operators=turned)
+    return replace(plan, shared=replace(plan.shared, stacks=stacks_of(blocks)), blocks=blocks, given=turned)
 
 
 def _check_axis(block: RotorBlock, matrix: Floats) -> None:
@@ -176,13 +176,13 @@ def _functions(plan: Plan, every: Ints, parts: list[SpinPart], rows: list[Row]) 
 
 
 def _along(plan: Plan) -> int:
-    """Which of Ka and Kc is K: 0 or 1."""
+    """Which of v, Ka and Kc is K: 1 or 2."""
     axis = axes_of(plan.shared.representation)[2]
     if axis == "b":
         raise ValueError(
             f"representation {plan.shared.representation}: the threefold axis is a or c, the z of the basis"
         )
-    return 0 if axis == "a" else 1
+    return 1 if axis == "a" else 2
 
 
 def _names_of_sub_block(part: RotorPart, chosen: Ints, pattern: Ints, residue: int) -> Ints:
@@ -191,7 +191,7 @@ def _names_of_sub_block(part: RotorPart, chosen: Ints, pattern: Ints, residue: i
     named = pattern.copy()
     if residue == 1:
         named[-3] += ODD_E - EVEN_E
-    return np.column_stack([np.full(len(own), part.v), own, np.tile(named, (len(own), 1))])
+    return np.column_stack([own, np.tile(named, (len(own), 1))])
 
 
 def _matrix(plan: Plan, every: Ints, parts: list[SpinPart], rows: list[Row], functions: Functions) -> Floats:

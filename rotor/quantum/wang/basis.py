@@ -48,6 +48,16 @@ def _species(j: int, first_k: int, sign: int, axes: str) -> str:
     return _parity(character["a"]) + _parity(character["c"])
 
 
+def character(block: WangBlock, axis: str) -> int:
+    """1 or -1 under half a turn about a, b or c.
+
+    >>> [character(WangBlock(1, "eo", 0, 1, 1), axis) for axis in "abc"]
+    [1, -1, -1]
+    """
+    of_a, of_c = (1 if parity == "e" else -1 for parity in block.species)
+    return {"a": of_a, "b": of_a * of_c, "c": of_c}[axis]
+
+
 def wang_blocks(j: int, representation: str) -> list[WangBlock]:
     """The non-empty blocks of `j`, in the order ee, eo, oe, oo.
 

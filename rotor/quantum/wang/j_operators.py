@@ -124,6 +124,20 @@ def components(j: int, representation: str) -> Mapping[str, JOperator]:
     return MappingProxyType(dict(zip(axes_of(representation), (along_x, along_y, j_z(j)), strict=True)))
 
 
+def half_turn(j: int, representation: str, axis: str) -> JOperator:
+    """C2a, C2b or C2c, whose characters in Wang's functions are those of `basis`, over |J k⟩.
+
+    >>> half_turn(1, "Ir", "a").matrix.real.diagonal().tolist(), half_turn(1, "Ir", "b").matrix.real[0].tolist()
+    ([-1.0, 1.0, -1.0], [0.0, 0.0, -1.0])
+    """
+    k = np.arange(-j, j + 1)
+    along = axes_of(representation).index(axis)
+    if along == 2:
+        return JOperator(j, {0: (1.0 - 2.0 * (k % 2)).astype(np.complex128)})
+    signs = 1.0 - 2.0 * ((j + along * k) % 2)  # |k⟩ becomes ±|-k⟩
+    return JOperator(j, {-2 * int(each): np.where(k == each, signs, 0).astype(np.complex128) for each in k})
+
+
 def phase(block: WangBlock) -> complex:
     """The factor that makes a Wang function invariant under time reversal: 1, or i where s differs from (-1)^K.
 
@@ -138,12 +152,30 @@ def between_blocks(up: WangBlock, low: WangBlock, operator: JOperator) -> Comple
 
     |K s⟩ = (|K⟩ + s|-K⟩)/√2 for K > 0, |0⟩ for K = 0.
     """
+    if len(operator.bands) > _FEW_BANDS:
+        return _of_whole_matrix(up, low, operator.matrix)
     out = np.zeros((up.size, low.size), dtype=np.complex128)
     for q, band in operator.bands.items():
         if (low.first_k + q - up.first_k) % 2 == 0:  # K in steps of 2
             for rows, columns, at, factor in _places(up, low, q):
                 out[rows, columns] += band[at] * factor  # a column occurs once
     return out
+
+
+_FEW_BANDS = 24  # more stand in operators times half a turn across z alone, which have all
+
+
+def _of_whole_matrix(up: WangBlock, low: WangBlock, matrix: Complexes) -> Complexes:
+    """The same from the full matrix over k."""
+    sides = []
+    for block in (up, low):
+        function = np.zeros((len(matrix), block.size))
+        places = np.arange(block.size)
+        amplitude = np.where(block.k == 0, 1.0, np.sqrt(0.5))
+        function[block.j - block.k, places] = block.sign * amplitude
+        function[block.j + block.k, places] = amplitude
+        sides.append(function)
+    return np.asarray(np.conj(phase(up)) * phase(low) * (sides[0].T @ matrix @ sides[1]))
 
 
 @lru_cache(maxsize=4096)

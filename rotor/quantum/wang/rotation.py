@@ -20,7 +20,14 @@ from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.levels import Levels, SolvedBlock, weights_of_levels
 from rotor.quantum.wang.basis import WangBlock, limited, names_of, wang_blocks
 from rotor.quantum.wang.spherical_top import DIMENSION, is_cubic, scalar_and_tensor, tensor_eigenvalues
-from rotor.quantum.wang.wang_matrix import JMatrix, block_bands, diagonalise_all, lowest_energies, scalar_energy
+from rotor.quantum.wang.wang_matrix import (
+    JMatrix,
+    block_bands,
+    diagonalise_all,
+    lowest_energies,
+    matrices_of,
+    scalar_energy,
+)
 from rotor.tops.operators import AXIAL_REPRESENTATION, Operators
 from rotor.tops.spins.spin_weights import SpinWeights
 
@@ -291,7 +298,9 @@ def _solve(
     limits: tuple[int, int] | None = None, below_mhz: float = math.inf,
 ) -> list[tuple[WangBlock, Floats, Floats]]:  # fmt: skip
     """The Wang blocks of some J solved: (block, energies in MHz, eigenvectors) by J in the order ee, eo, oe, oo; K within `limits`."""
-    pieces = [piece for j in js for piece in _matrices_of_j(operators, j, representation, limits)]
+    every = list(js)
+    of_each = zip(every, matrices_of(operators, every), strict=True)
+    pieces = [piece for j, of_j in of_each for piece in _blocks_of_j(operators, j, of_j, representation, limits)]
     if below_mhz < math.inf and not vectors:
         return [(block, lowest_energies(bands, below_mhz - scalar) + scalar, _NONE) for block, scalar, bands in pieces]
     solved = diagonalise_all([bands for _, _, bands in pieces], vectors)
@@ -301,12 +310,11 @@ def _solve(
     ]
 
 
-def _matrices_of_j(
-    operators: Operators, j: int, representation: str, limits: tuple[int, int] | None
+def _blocks_of_j(
+    operators: Operators, j: int, of_j: JMatrix, representation: str, limits: tuple[int, int] | None
 ) -> list[tuple[WangBlock, float, list[Floats]]]:
     """The Wang blocks of one J: (block, the scalar part of the energy, the diagonals of the rest)."""
-    scalar, of_j = scalar_energy(operators, j), JMatrix(operators, j)
-    out = []
+    scalar, out = scalar_energy(operators, j), []
     whole = wang_blocks(j, representation)
     for block in whole if limits is None else [part for b in whole if (part := limited(b, *limits))]:
         out.append((block, scalar, block_bands(of_j, block)))

@@ -11,18 +11,20 @@ with the phases of J∓ (body-fixed) real and positive.
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor.arrays import Floats
+from rotor.arrays import Floats, Ints
 from rotor.quantum.wang.basis import WangBlock
 from rotor.tops.operators import Operators
 
 FEW = 20  # of so many eigenvalues a bisection to one takes no longer than the finding of all
 AT_ONCE = 32  # rows up to which matrices of one size are solved together
+J_AT_ONCE = 32  # whose matrix elements are computed together
 _NONE: Floats = np.zeros((0, 0))
+_ROOT_2 = float(np.sqrt(2))
 SMALL = 100  # rows of a tridiagonal block up to which scipy.linalg, 0.2 s to load, is not loaded for it
 
 
@@ -33,15 +35,15 @@ def scalar_energy(operators: Operators, j: int) -> float:
 
 
 class JMatrix:
-    """Matrix elements of all |J K⟩ of one J, from which its four Wang blocks are cut; the scalar part left out."""
+    """Matrix elements of all |J K⟩ of one J, from which its four Wang blocks are cut; the scalar part left out.
 
-    def __init__(self, operators: Operators, j: int) -> None:
-        self.order = max((n for _, _, n in operators), default=0)
+    elements: those that `matrices_of` computed for many J.
+    """
+
+    def __init__(self, operators: Operators, j: int, elements: list[Floats] | None = None) -> None:
+        self.order = _order(operators)
         self._margin = 2 * self.order  # K starts at -margin, so that folded elements are at hand
-        k = np.arange(-self._margin, j + 1)
-        steps = _ladder_steps(j, np.arange(-self._margin, j + self._margin + 1))
-        with np.errstate(over="ignore", invalid="ignore"):  # said where the block is diagonalised
-            self._elements = [_elements(operators, j, k, n, steps) for n in range(self.order + 1)]
+        self._elements = _elements(operators, [j])[0] if elements is None else elements
 
     def element(self, k: NDArray[np.int64], n: int) -> NDArray[np.float64]:
         """⟨K+2n|H|K⟩ for K from -2 `order` to J; zero where K + 2n is beyond J."""
@@ -57,31 +59,47 @@ class JMatrix:
         return self._elements[n][first : first + 2 * (block.size - n) : 2].copy()
 
 
-def _ladder_steps(j: int, k: NDArray[np.int64]) -> NDArray[np.float64]:
-    """√(J(J+1) - K(K+1)), what J₊ makes of |J K⟩; zero outside the of_j."""
-    return np.asarray(np.sqrt(np.maximum((j - k) * (j + k + 1), 0)))
+def matrices_of(operators: Operators, js: Sequence[int]) -> Iterator[JMatrix]:
+    """The matrix elements of each J, computed for some J together."""
+    for first in range(0, len(js), J_AT_ONCE):
+        some = js[first : first + J_AT_ONCE]
+        for j, elements in zip(some, _elements(operators, some), strict=True):
+            yield JMatrix(operators, j, elements)
 
 
-def _elements(
-    operators: Operators, j: int, k: NDArray[np.int64], n: int, steps: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """⟨K+2n|H|K⟩ = ½[P((K+2n)²) + P(K²)] times the ladder, P(y) = Σ_q y^q Σ_p c X^p."""
-    x = float(j * (j + 1))
+def _order(operators: Operators) -> int:
+    return max((n for _, _, n in operators), default=0)
+
+
+def _elements(operators: Operators, js: Sequence[int]) -> list[list[Floats]]:
+    """⟨K+2n|H|K⟩ of each J by n, for K from -2 `order` to J."""
+    order, highest = _order(operators), max(js)
+    k, j = np.arange(-2 * order, highest + 2 * order + 1), np.array(js)[:, None]
+    steps = np.sqrt(np.maximum((j - k) * (j + k + 1), 0))  # what J₊ makes of |J K⟩; zero beyond K = J
+    with np.errstate(over="ignore", invalid="ignore"):  # said where the block is diagonalised
+        of_n = [_of_order(operators, js, k[: len(k) - 2 * order], n, steps) for n in range(order + 1)]
+    return [[own[row, : 2 * order + one + 1] for own in of_n] for row, one in enumerate(js)]
+
+
+def _of_order(operators: Operators, js: Sequence[int], k: Ints, n: int, steps: Floats) -> Floats:
+    """⟨K+2n|H|K⟩ = ½[P((K+2n)²) + P(K²)] times the ladder, P(y) = Σ_q y^q Σ_p c X^p, (J, K)."""
     powers = [(p, q, c) for (p, q, order), c in operators.items() if order == n and (n or q)]
-    coefficients = np.zeros(1 + max((q for _, q, _ in powers), default=0))
-    for p, q, c in powers:
-        coefficients[-1 - q] += c * x**p
+    coefficients = np.zeros((len(js), 1 + max((q for _, q, _ in powers), default=0)))
+    for row, j in enumerate(js):
+        x = float(j * (j + 1))
+        for p, q, c in powers:
+            coefficients[row, -1 - q] += c * x**p
 
     squares = np.arange(k[0], k[-1] + 2 * n + 1.0) ** 2
-    values = np.full(len(squares), coefficients[0])
-    for coefficient in coefficients[1:].tolist():
+    values = np.repeat(coefficients[:, :1], len(squares), axis=1)
+    for column in range(1, coefficients.shape[1]):
         values *= squares
-        values += coefficient
+        values += coefficients[:, column, None]
     if n == 0:
         return values
-    total = 0.5 * (values[: len(k)] + values[2 * n :])
+    total = 0.5 * (values[:, : len(k)] + values[:, 2 * n :])
     for i in range(2 * n):
-        total *= steps[i : i + len(k)]
+        total *= steps[:, i : i + len(k)]
     return np.asarray(total)
 
 
@@ -94,7 +112,7 @@ def block_bands(of_j: JMatrix, block: WangBlock) -> list[NDArray[np.float64]]:
     bands = [of_j.band(block, n) for n in range(min(of_j.order, block.size - 1) + 1)]
     if block.first_k == 0:
         for band in bands[1:]:
-            band[0] *= np.sqrt(2)
+            band[0] *= _ROOT_2
 
     last = block.first_k + 2 * (block.size - 1)
     for n in range(1, of_j.order + 1):

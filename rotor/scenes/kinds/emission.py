@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+import msgspec
 
 from rotor.scenes import kind
 from rotor.scenes.kind import Kind, Where, Writer
@@ -15,9 +18,14 @@ from rotor.scenes.sections import (
     EmissionObservables,
     EmittingMolecule,
     MoleculeSection,
+    QuantumEffects,
 )
 from rotor.spectra.emission import Source, band_mhz
 from rotor.spectra.emission_request import EmissionAnswer, EmissionLines, EmissionRequest, answer_emission
+
+if TYPE_CHECKING:
+    from rotor.quantum.effect import QuantumEffect
+    from rotor.tops.top import Top
 
 _NAMES = {
     "columns_per_cm2": "molecules.column", "column_per_cm2": "molecules.column", "excitation_k": "conditions.excitation",
@@ -49,7 +57,19 @@ def request(scene: EmissionScene, folder: Where = ".") -> EmissionRequest:
             ),
             _range(seen),
             scene.observables.least_depth,
+            _effects(scene, tops),
         )
+
+
+def _effects(scene: EmissionScene, tops: Sequence[Top]) -> tuple[tuple[QuantumEffect, ...], ...]:
+    """The Hamiltonian of each molecule; with hyperfine those are split whose constants of spins are known, of which there is one."""
+    asked = scene.effects
+    known = [top.spin_constants is not None for top in tops]
+    each = [
+        msgspec.structs.replace(asked, hyperfine=False, hyperfine_method="exact") if any(known) and not has else asked
+        for has in known
+    ]
+    return tuple(kind.effects_of(top, own, one) for top, own, one in zip(tops, each, scene.molecules, strict=True))
 
 
 def _range(seen: EmissionConditions) -> tuple[float, float]:
@@ -116,8 +136,12 @@ def saved_molecules(asked: EmissionRequest, molecules: Sequence[MoleculeSection]
         EmittingMolecule(**{name: getattr(one, name) for name in one.__struct_fields__}, column=column)
         for one, column in zip(molecules, asked.columns_per_cm2, strict=True)
     ]
+    saved_each = [kind.saved_effects(own, top) for own, top in zip(asked.effects, asked.tops, strict=False)]
+    effects = next((one for one in saved_each if one.hyperfine is not None), QuantumEffects())
+
     return EmissionScene(
         molecules=given,
+        effects=effects,
         conditions=EmissionConditions(
             excitation=f"{source.excitation_k!r} K",
             background=f"{source.background_k!r} K",

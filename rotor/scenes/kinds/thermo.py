@@ -35,6 +35,7 @@ def request(scene: ThermoScene, folder: Where = ".") -> ThermoRequest:
             vibrations=kind.vibrations(scene.vibration),
             pressure_bar=pressure,
             relative_error=scene.numerics.relative_error,
+            effects=kind.effects_of(top, scene.effects, molecule),
         )
 
 
@@ -81,6 +82,7 @@ def saved(asked: ThermoRequest, molecule: MoleculeSection | None) -> ThermoScene
     assert molecule is not None
     return ThermoScene(
         molecule=molecule,
+        effects=kind.saved_effects(asked.effects, asked.top),
         conditions=ThermoConditions(
             temperature=list(asked.temperatures_k),
             pressure=None if asked.pressure_bar is None else f"{asked.pressure_bar!r} bar",

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from rotor.tops.top import Top
 
 LETTERS = ("aa", "bb", "cc", "ab", "ac", "bc")
+DIFFERENCES = ("ab-ba", "ac-ca", "bc-cb")
 TURNED_DEGREES = 0.1  # from which axes count as turned where a tensor off the diagonal is not known
 
 
@@ -160,15 +161,23 @@ def _turned_rotation(own: Mapping[str, float], change: _Change, g_ratio: float) 
     """Spin-rotation constants with the new moments of inertia; of a linear molecule C_iso alone goes with B."""
     if set(own) == {"C_iso"}:
         return {"C_iso": own["C_iso"] * g_ratio * float(change.moments[1] / change.new_moments[1])}
-    if not set(own) <= {f"C_{letters}" for letters in LETTERS}:
+    if not set(own) <= {f"C_{letters}" for letters in (*LETTERS, *DIFFERENCES)}:
         return {}
     tensor = np.zeros((3, 3))
     for name, value in own.items():
-        i, k = ("abc".index(letter) for letter in name.removeprefix("C_"))
-        tensor[i, k] = tensor[k, i] = value
+        i, k = ("abc".index(letter) for letter in name[2:4])
+        tensor[i, k] += value
+        if i != k:
+            tensor[k, i] += -value if "-" in name else value
     electrons = change.rotation @ (tensor * change.moments) @ change.rotation.T
     with np.errstate(divide="ignore", invalid="ignore"):
         new = np.where(change.new_moments > 0, electrons / change.new_moments, 0.0) * g_ratio
-    new = (new + new.T) / 2
-    found = {letters: float(new["abc".index(letters[0]), "abc".index(letters[1])]) for letters in LETTERS}
+    mean, half = (new + new.T) / 2, (new - new.T) / 2
+    found = {letters: _element(mean, letters) for letters in LETTERS}
+    if any("-" in name for name in own):  # else C_ab stands for both orders
+        found |= {letters: _element(half, letters) for letters in DIFFERENCES}
     return {f"C_{letters}": value for letters, value in found.items() if abs(value) > 1e-9 * float(np.abs(new).max())}
+
+
+def _element(tensor: Floats, letters: str) -> float:
+    return float(tensor["abc".index(letters[0]), "abc".index(letters[1])])

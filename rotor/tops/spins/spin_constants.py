@@ -12,11 +12,11 @@ import re
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from math import hypot
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from rotor.molecules.nuclei import isotope
+from rotor.tops.spins.tensor_elements import plain_elements
 from rotor.units import parse_quantity
 
 if TYPE_CHECKING:
@@ -47,8 +47,7 @@ class SpinConstants:
     totals: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        plain = ({_in_short(name): value for name, value in one.items()} for one in (self.values, self.uncertainties))
-        values, errors = without_trace(*plain)
+        values, errors = plain_elements(self.values, self.uncertainties)
         object.__setattr__(self, "values", values)
         object.__setattr__(self, "uncertainties", errors)
         for name in ("values", "twice", "uncertainties", "sources", "atoms", "totals"):
@@ -134,48 +133,6 @@ class SpinConstants:
         return cls(values, ordered, source, totals=totals)
 
 
-def without_trace(
-    values: Mapping[str, float], errors: Mapping[str, float]
-) -> tuple[dict[str, float], dict[str, float]]:
-    """Two or three diagonal elements of a traceless tensor (chi, T, D) as its aa and bb-cc; other names as they are.
-
-    One alone stays: the other two are minus half of it each. ValueError for three that do not add up to 0, within 1e-3 of the largest
-    (published elements are rounded), and for a difference beside two of them.
-
-    >>> without_trace({"chi_aa(14N)": 2.0, "chi_cc(14N)": -3.5}, {})[0]
-    {'chi_aa(14N)': 2.0, 'chi_bb-cc(14N)': 5.0}
-    """
-    out, left = dict(values), dict(errors)
-    for tensor, spins in dict.fromkeys(
-        (n.partition("_")[0], n.partition("(")[2]) for n in values if n[:2] in ("ch", "T_", "D_")
-    ):
-        names = {letters: f"{tensor}_{letters}({spins}" for letters in ("aa", "bb", "cc")}
-        found = {letters: values[name] for letters, name in names.items() if name in values}
-        if len(found) < 2:
-            continue
-        difference = [n for n in values if n.startswith(f"{tensor}_") and "-" in n and n.endswith(f"({spins}")]
-        trace = sum(found.values()) if len(found) == 3 else 0.0
-        if abs(trace) > 1e-3 * max(map(abs, found.values())):
-            raise ValueError(
-                f"{tensor}({spins}: aa + bb + cc = {trace:g} MHz; the tensor is traceless, check the elements"
-            )
-        if difference:
-            raise ValueError(
-                f"{', '.join(difference)} beside {', '.join(found)}: give aa and a difference, or the elements alone"
-            )
-        aa, bb, cc = (found.get(letters, -sum(found.values())) - trace / 3 for letters in names)
-        spread = {letters: left.pop(name) for letters, name in names.items() if name in left}
-        for name in names.values():
-            out.pop(name, None)
-        out |= {names["aa"]: aa, f"{tensor}_bb-cc({spins}": bb - cc}
-        if len(spread) == len(found):
-            left |= {
-                names["aa"]: spread.get("aa", hypot(*spread.values())),
-                f"{tensor}_bb-cc({spins}": hypot(*spread.values()),
-            }
-    return out, left
-
-
 def refuse_other_nuclei(constants: SpinConstants, molecule: Molecule | None) -> None:
     """ValueError where a spin is called after an isotope that the molecule has not, or has not so often.
 
@@ -193,11 +150,6 @@ def refuse_other_nuclei(constants: SpinConstants, molecule: Molecule | None) -> 
                 f"{count} {'spin is' if count == 1 else 'spins are'} called after {number}{symbol}, and "
                 f"{molecule.formula} has {has}; give another isotope with --isotope, or the spin another name and its size"
             )
-
-
-def _in_short(name: str) -> str:
-    """chi_bb_minus_cc(14N) as chi_bb-cc(14N)."""
-    return re.sub(r"^([A-Za-z]+_[abc]{2})_minus_([abc]{2})", r"\1-\2", name)
 
 
 def _without_spin(text: str) -> str:

@@ -23,6 +23,8 @@ class LevelTable(Table):
     energy_mhz : (n,), E/h in MHz from the level J = 0
     error_mhz : (n,), one standard deviation in MHz
     source : where the energies are from
+    own_error_mhz : (n,), the part of the error that other states `v` of the same rotation do not share; None where it is not known, and
+        then no line has an error: those of two energies of one table are correlated
 
     Raises ValueError for columns of different length, a level that is there twice, and energies that are not finite.
 
@@ -35,14 +37,15 @@ class LevelTable(Table):
     energy_mhz: Floats
     error_mhz: Floats
     source: str = ""
+    own_error_mhz: Floats | None = None
     _sorted: tuple[Ints, Ints, Ints] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         lengths = {name: len(column) for name, column in self.columns.items()}
         if len(set(lengths.values())) != 1 or not len(self.energy_mhz):
             raise ValueError(f"columns of a level table have one length above 0; found {lengths}")
-        for name in ("energy_mhz", "error_mhz"):
-            if not np.isfinite(getattr(self, name)).all():
+        for name in self.columns.keys() - self.quanta.keys():
+            if not np.isfinite(self.columns[name]).all():
                 raise ValueError(f"{name} of a level table: expected finite numbers")
         stacked = np.stack([np.asarray(column, dtype=np.int64) for column in self.quanta.values()])
         if stacked.min() < 0:
@@ -61,8 +64,10 @@ class LevelTable(Table):
 
     @property
     def columns(self) -> dict[str, NDArray[np.generic]]:
-        """Quantum numbers, energy and error by name."""
-        return dict(self.quanta) | {"energy_mhz": self.energy_mhz, "error_mhz": self.error_mhz}
+        """Quantum numbers, energy and error by name, and the own part of the error where it is known."""
+        out: dict[str, NDArray[np.generic]] = dict(self.quanta)
+        out |= {"energy_mhz": self.energy_mhz, "error_mhz": self.error_mhz}
+        return out if self.own_error_mhz is None else out | {"own_error_mhz": self.own_error_mhz}
 
     def rows_of(self, quanta: Mapping[str, Ints]) -> Ints:
         """The row (m,) of each labelled level, -1 where the table has none; labels by the names that the table has."""
@@ -72,6 +77,23 @@ class LevelTable(Table):
         key = np.ravel_multi_index(tuple(np.where(inside, asked, 0)), tuple(sizes.tolist()))
         place = np.minimum(np.searchsorted(keys, key), len(keys) - 1)
         return np.where(inside & (keys[place] == key), order[place], -1)
+
+    def line_errors(self, upper: Ints, lower: Ints) -> Floats:
+        """One standard deviation of lines between rows (m,) of the table in MHz, nan where a row is -1.
+
+        Of two states of one rotation the own parts count, of others the whole errors, as if uncorrelated. Raises ValueError for a table
+        that does not know own parts.
+        """
+        if self.own_error_mhz is None:
+            raise ValueError("errors of lines between levels of a table: expected a table with own_error_mhz")
+        rotation = np.stack([column for name, column in self.quanta.items() if name != "v"], axis=1)
+        alike = (rotation[upper] == rotation[lower]).all(axis=1)
+        error = np.where(
+            alike,
+            np.hypot(*(self.own_error_mhz[i] for i in (upper, lower))),
+            np.hypot(*(self.error_mhz[i] for i in (upper, lower))),
+        )
+        return np.where((upper >= 0) & (lower >= 0), error, np.nan)
 
 
 def tabulated_energies(

@@ -117,6 +117,31 @@ class StateConstants:
         return replace(self, dipoles=changed)
 
     @property
+    def notes(self) -> tuple[str, ...]:
+        """What is to be said of couplings that exist together without a symmetry only, where none is declared.
+
+        Two kinds of coupling have a group that allows both, such as Cs(ab) G_c and W; three have C1 and Ci alone.
+
+        >>> values = {"E[1]": 5.0, "B[1]": 3.0, "G_b[0,1]": 1.0, "G_c[0,1]": 1.0, "W[0,1]": 1.0}
+        >>> StateConstants(values).notes[0].partition(":")[0]
+        'G_b[0,1], G_c[0,1] and W[0,1] join the same two states'
+        """
+        if self.symmetry:
+            return ()
+        of_pairs: dict[tuple[int, ...], dict[str, str]] = {}
+        for name in self.couplings:
+            of_pairs.setdefault(self._states[name], {}).setdefault(kind_of_coupling(name), name)
+        found = []
+        for kinds in of_pairs.values():
+            if len(kinds) > 2:
+                *others, last = kinds.values()
+                found.append(
+                    f"{', '.join(others)} and {last} join the same two states: such couplings exist together in C1 and Ci only; where "
+                    "the molecule has a symmetry, declare it for the states, and they are refused"
+                )
+        return tuple(found)
+
+    @property
     def _states(self) -> dict[str, tuple[int, ...]]:
         return {name: states_of_name(name) for name in self.values}
 

@@ -27,6 +27,7 @@ from rotor.formats.spcat.text.lin import LineList, note_of_defaults, note_of_rem
 from rotor.formats.spcat.text.par import Header, Parameter, ParameterFile, read_par
 from rotor.formats.spcat.variances import FREE_ABOVE
 from rotor.quantum.labelled import LevelModel
+from rotor.table import counted
 from rotor.tops.constants import Constants
 
 _NO_ERRTST = 1e6  # what SPFIT takes for an ERRTST of 0 or less
@@ -234,7 +235,8 @@ def _assigned(lines: LineList, names: Sequence[str], header: Header, source: str
     if len(lines) and not used.any():
         raise ValueError(f"NLINE = {header.nline}: no line counts; give as many as the .lin file has, {len(lines)}")
     if not used.all():
-        notes.append(f"NLINE = {abs(header.nline)}: {len(lines) - int(used.sum())} lines behind it do not count")
+        beyond = counted(len(lines) - int(used.sum()), "line behind it does", "lines behind it do")
+        notes.append(f"NLINE = {abs(header.nline)}: {beyond} not count")
     widths = _widths(lines, blends, used, header)
     used &= blends >= 0
     upper, lower = lines.states()
@@ -275,7 +277,7 @@ def _notes(file: ParameterFile, options: FitOptions, plain: bool, lines: Assignm
     notes = []
     if file.header.npar > len(file.parameters):
         notes.append(
-            f"NPAR = {file.header.npar}, but {len(file.parameters)} parameters stand in the file: those are used"
+            f"NPAR = {file.header.npar}, but the file has {counted(len(file.parameters), 'parameter')}: all count"
         )
     below = [p.label or str(p.code) for p in file.parameters if not p.constrained and (p.error or 0.0) < 0]
     if below:

@@ -167,7 +167,7 @@ def _of_spin(
                 return Moment(value, states, powers="3K-J", spin=spin)
             return Moment(value, states, spin=spin, written=Written(words_of(6, 0, oblate, of_spin=True), False))
         tensor = tensor_of(code.typ, code.axis, oblate)
-        return Moment(value, states[::-1], tensor=tensor, spin=spin, turned=code.axis > 0)
+        return Moment(value, states[::-1], tensor=tensor, spin=spin, with_i=code.axis > 0)
     raise ValueError(f"dipole {dipole.code}: {_meaning(code)} {NOT_YET}")
 
 

@@ -14,6 +14,7 @@ from rotor.formats.spcat.hamiltonian.codes import AXES, Digits, basis_axes, spli
 from rotor.formats.spcat.hamiltonian.l_doubled import Pair, couplings_with_pairs
 from rotor.formats.spcat.hamiltonian.l_spins import spin_terms_with_pairs
 from rotor.formats.spcat.hamiltonian.operators import CodedOperator, energy_of_k, operator_of, plain_of_j
+from rotor.formats.spcat.hamiltonian.phases import axis_of, half_turned
 from rotor.formats.spcat.hamiltonian.series import (
     Series,
     is_constant,
@@ -27,7 +28,7 @@ from rotor.formats.spcat.text.par import Options, ParameterFile
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.moments import Moment
 from rotor.quantum.spins import Scheme, Spin
-from rotor.quantum.spins.operators import EVERY_STATE
+from rotor.quantum.spins.operators import EVERY_STATE, ByElements, Cosines, CosinesWithN, HalfTurned
 from rotor.quantum.spins.terms import SpinTerm
 from rotor.quantum.states import Coupling, OperatorOfJ, State
 from rotor.tops.operators import Operators
@@ -80,7 +81,8 @@ def coded_lines(file: ParameterFile, states: int, pairs: Sequence[Pair] = ()) ->
         Naming the line, for what does not compute: an unknown operator or state, a violation of time reversal.
     """
     options, wild = file.options[0], 10 ** state_digits(states) - 1
-    _refuse_phases(options)
+    if not 0 <= options.xopt < 80:
+        raise ValueError(f"XOPT = {options.xopt}: expected PHASE + 10 NEWLZ + 20 NOFC + 40 G12, 0 to 79")
     series = series_of(file, states, pairs)
     found: list[CodedLine] = []
     for place, parameter in enumerate(file.parameters, 1):
@@ -103,14 +105,6 @@ def coded_lines(file: ParameterFile, states: int, pairs: Sequence[Pair] = ()) ->
             raise ValueError(f"parameter {parameter.code}{label}: {error}") from None
         found += [line._replace(name=f"{parameter.code}#{place}", value=parameter.value) for line in lines]
     return found
-
-
-def _refuse_phases(options: Options) -> None:
-    if not 0 <= options.xopt < 80 or options.phase not in (0, 8):
-        raise ValueError(
-            f"XOPT = {options.xopt}: expected PHASE + 10 NEWLZ + 20 NOFC + 40 G12 with a PHASE of 0 or 8; a forced phase of another "
-            "kind is read but not computed yet"
-        )
 
 
 def _plain_line(digits: Digits, states: tuple[int, int] | None, options: Options) -> CodedLine:
@@ -139,10 +133,6 @@ def _within_pairs(line: CodedLine, digits: Digits, pairs: Sequence[Pair], option
     if states:
         refuse_within_pairs(digits, states, members)
     if not states or states[0] != states[1] or states[0] not in members:
-        if line.operator.odd and (not states or states[0] == states[1]):
-            raise ValueError(
-                "time reversal changes the sign of the operator, so that it can connect different states only"
-            )
         return line
     v, newlz = states[0], options.newlz
     if newlz and v in firsts and 80 <= digits.typ < 90:
@@ -160,6 +150,53 @@ def _half_difference(line: CodedLine, digits: Digits, first: int, options: Optio
     return line._replace(operator=CodedOperator(of_j=of_k, odd=True), states=(first, first))
 
 
+def real_ones(
+    lines: Sequence[CodedLine], odd: frozenset[str], doubled: frozenset[int]
+) -> tuple[list[CodedLine], list[str]]:
+    """The lines without those within one state that are imaginary in the phases of a file, and why these are left out.
+
+    Parameters
+    ----------
+    lines : sequence of CodedLine
+        Parameters that compute.
+    odd : frozenset of str
+        The axes along which operators within one state are odd, see `phases`.
+    doubled : frozenset of int
+        l-doubled states, whose odd operators act with the sign of l.
+
+    Returns
+    -------
+    lines : list of CodedLine
+        Those that act.
+    reasons : list of str
+        A sentence for each that is left out.
+
+    Raises
+    ------
+    ValueError
+        For an odd operator that every half turn leaves as it is, which is imaginary in all phases.
+    """
+    found, reasons = list[CodedLine](), list[str]()
+    for line in lines:
+        axis, between = axis_of(line.typ), bool(line.states and line.states[0] != line.states[1])
+        own = not between and not (line.states and line.states[0] in doubled)
+        code = line.name.partition("#")[0]
+        if own and not axis and line.operator.odd:
+            raise ValueError(
+                f"parameter {code}: time reversal changes the sign of the operator and no half turn does, so that it can connect "
+                "different states only"
+            )
+        if not own or not axis or line.operator.odd == (axis in odd):
+            found.append(line)
+            continue
+        kind, others = ("even", "odd") if axis in odd else ("odd", "even")
+        reasons.append(
+            f"parameter {code} is left out, as SPCAT does: it is {kind} under time reversal; within one state those along {axis} are "
+            f"{others} ones here (by their number, or by PHASE of XOPT)"
+        )
+    return found, list(dict.fromkeys(reasons))
+
+
 @dataclass(frozen=True, eq=False)
 class FileEffect(QuantumEffect):
     """What the parameter lines of a file add up to for some of its states, which are numbered here from 0.
@@ -167,6 +204,7 @@ class FileEffect(QuantumEffect):
     lines: with the file's numbers of states. numbers: the states taken, in their order here. coupled: the spins by place. moments:
     dipoles in debye by pairs of numbers here. limits: least and largest K of states, by number here. others: moments of other kinds.
     ixx: which sums of angular momenta are conserved, bit by bit from N on. pairs: l-doubled states, by number here. axes: those at x, y, z.
+    turned: the axis g of `phases` whose half turn goes with time reversal, where an operator within one state is odd under it.
     """
 
     name: ClassVar[str] = ""
@@ -181,6 +219,7 @@ class FileEffect(QuantumEffect):
     ixx: int = 0
     pairs: tuple[Pair, ...] = ()
     axes: str = AXES["Ir"]
+    turned: str = ""
 
     @cached_property
     def _own(self) -> tuple[tuple[CodedLine, tuple[int, int] | None], ...]:
@@ -228,11 +267,18 @@ class FileEffect(QuantumEffect):
                 found += self._with_pairs(line, states)
             elif operator.of_j is not None:
                 pairs = [states] if states else [(v, v) for v in range(len(self.numbers))]
-                found += [Coupling(line.name, *pair, operator.of_j) for pair in pairs]
+                of = operator.of_j
+                if self._is_turned(line):
+                    of = half_turned(of, self.turned, operator.odd)
+                found += [Coupling(line.name, *pair, of) for pair in pairs]
             elif states and states[0] != states[1]:
                 assert operator.plain is not None
                 found.append(Coupling(line.name, *states, plain_of_j(operator.plain)))
         return tuple(found)
+
+    def _is_turned(self, line: CodedLine) -> bool:
+        """Whether half a turn about the axis of the phases changes the sign of a line's operator."""
+        return bool(self.turned) and axis_of(line.typ) not in ("", self.turned)
 
     def _with_pairs(self, line: CodedLine, states: tuple[int, int]) -> list[Coupling]:
         operator = line.operator
@@ -258,9 +304,13 @@ class FileEffect(QuantumEffect):
             if o.rotor is not None:
                 names = tuple(self.coupled[place - 1].name for place in o.spins)
                 bra, ket = states or (EVERY_STATE, EVERY_STATE)
-                if o.odd and bra == ket:  # of an l-doubled pair, between its components
+                rotor, factor = o.rotor, 1.0
+                if self._is_turned(line):
+                    assert isinstance(rotor, ByElements | Cosines | CosinesWithN)
+                    rotor, factor = HalfTurned(rotor, self.turned), 1.0 if o.odd else -1.0  # as `half_turned`
+                elif o.odd and bra == ket:  # of an l-doubled pair, between its components
                     ket = next(pair.second if bra == pair.first else pair.first for pair in self.pairs if bra in pair)
-                term = SpinTerm(line.name, names, o.rotor, 1.0, o.n2, o.nz2, o.ns, bra, ket)
+                term = SpinTerm(line.name, names, rotor, factor, o.n2, o.nz2, o.ns, bra, ket)
                 for part in self._by_exchange(term, line.exchange):
                     found += self._at_pairs(line, states, part)
         return tuple(found)

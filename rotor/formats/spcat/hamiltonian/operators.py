@@ -51,7 +51,7 @@ TYPES_BETWEEN = {  # of what connects two states without a spin, by name
 }
 PAIRS = {letters: ("abc".index(letters[0]), "abc".index(letters[1])) for letters in sorted(CROSS.values())}
 REFUSED = {
-    "commutator": "a commutator of a spin term with Nz²",
+    "commutator": "a commutator of a spin term with N² (the program's is not ½i[N², S], which C_ab-ba names here)",
     "own": "the energy of one K with a spin",
     "series": "a term of a series without the constants of its file",
     "szsz": "N_z S_z together with another operator",

@@ -172,10 +172,10 @@ def over_k(rotor: Rotor) -> OverK:
         return rotor.matrix
     if isinstance(rotor, Scalar):
         return lambda m, n, representation: _of_powers(rotor, m, n)
+    assert isinstance(rotor, Cosines | CosinesWithN)
     c = np.array(rotor.components, dtype=float)
     if isinstance(rotor, CosinesWithN):
         return lambda m, n, representation: _with_n(c, (m, n, representation))
-    assert isinstance(rotor, Cosines)
     if rotor.rank == 2:
         c = (c + c.T) / 2 - np.eye(3) * np.trace(c) / 3
     factor = 1j if rotor.rank == 1 else 1.0

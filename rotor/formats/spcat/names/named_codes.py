@@ -6,6 +6,7 @@
 | G_a, G_b, G_c; F_bc, F_ac, F_ab; W, W_pm2 | TYP 20, 40, 60; 21, 41, 61; 0, 4 between two states |
 | chi_aa | 1.5 times TYP 1 with the spin twice; chi_bb-cc ¼ times TYP 4, in the basis IIIl of TYP 3 and 4; chi_ab TYP 61 |
 | C_aa, eps_aa, C_iso, C_bb-cc | TYP 1 with the spin, 0, and ½ times 4 |
+| C_ab-ba, eps_ab-ba | none |
 | J, b_F; T_aa; D_aa, lambda | TYP 0 with two spins; as chi_aa; as chi_aa times 2S(2S-1) |
 
 Powers J, K, S in a name are NSQ, KSQ, NS. A name without a state has V1 = V2 = 9 (99, 999).
@@ -137,6 +138,11 @@ def _of_spins(
     rotor = term.rotor
     if not isinstance(rotor, Cosines | CosinesWithN):
         return {base: term.factor}
+    if np.any(np.array(rotor.components) != np.array(rotor.components).T) and rotor.rank == 1:
+        raise ValueError(
+            f"{parts.text}: no code of SPFIT says what the two orders of a spin-rotation constant differ by (its commutators with N², "
+            "I1 = 0 and I2 > 0, are other operators); leave it out, or stay with .toml"
+        )
     of_three = scheme.equivalent == 3 and max(places) > len(scheme.spins) - 3
     found = _of_matrix(np.array(rotor.components, dtype=float), isinstance(rotor, CosinesWithN), oblate, of_three)
     return {base._replace(typ=typ): term.factor * factor for typ, factor in found.items()}

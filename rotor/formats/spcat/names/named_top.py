@@ -20,8 +20,9 @@ from rotor.arrays import Floats
 from rotor.formats.spcat.file_model import allowed
 from rotor.formats.spcat.hamiltonian.codes import HELD_BELOW, basis_axes, constants_of, is_linear, join_code, split_code
 from rotor.formats.spcat.hamiltonian.dipole_codes import dipoles_of
-from rotor.formats.spcat.hamiltonian.file_effect import CodedLine, coded_lines
+from rotor.formats.spcat.hamiltonian.file_effect import CodedLine, coded_lines, real_ones
 from rotor.formats.spcat.hamiltonian.operators import PAIRS, TYPES_BETWEEN
+from rotor.formats.spcat.hamiltonian.phases import axis_of, phases_of
 from rotor.formats.spcat.hamiltonian.series import is_constant, is_series
 from rotor.formats.spcat.hamiltonian.states import StateOptions, options_of_state, states_of
 from rotor.formats.spcat.hamiltonian.symmetry import halved_across
@@ -64,6 +65,10 @@ def named_top(file: ParameterFile, intensities: IntensityFile | None = None, *, 
     states, first = states_of(file), file.options[0]
     _refuse(file, states, intensities)
     lines, left_out = allowed(coded_lines(file, len(states)), states, [], first.nvib < 0)
+    odd = phases_of(file, len(states), frozenset()).odd
+    left_out += real_ones(lines, odd, frozenset())[1]
+    if odd and any(axis_of(line.typ) for line in lines):
+        raise ValueError(f"operators within one state that are odd under time reversal, or a PHASE for them, {NO_NAME}")
     if left_out:
         raise ValueError(f"{left_out[0]}; leave it out of the file, or predict from the files themselves")
     rows = [(line, file.parameters[int(line.name.partition("#")[2]) - 1]) for line in lines]

@@ -27,6 +27,7 @@ class Level(NamedTuple):
     mixing: float
     degeneracy: int
     quanta: tuple[int, ...]
+    pattern: int | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,6 +37,8 @@ class LevelList:
     block, rank (n,): where in the program's Hamiltonian; of levels computed here they are not those of the program (`level_list`;
     of an .int file block 1 and the rank by F and energy). energy_cm, error_cm (n,): cm⁻¹. mixing (n,): share of the state that
     gives the label. degeneracy (n,): of M and of nuclear spins. quanta (n, w): -32768 where there is none.
+    pattern (n,): the number that stands for the coupling pattern in a .cat file of more than six quanta, in brackets before all of
+    them here; -32768 where there is none.
     texts: what was read that is not written so from the numbers: derivatives and vectors among the levels, other
     spacing; it begins with what stands before the level. rest: what follows the last level.
     """
@@ -49,6 +52,7 @@ class LevelList:
     quanta: NDArray[np.int16]
     texts: Mapping[int, str] = field(default_factory=dict)
     rest: str = ""
+    pattern: NDArray[np.int16] | None = None
 
     def __len__(self) -> int:
         return len(self.block)
@@ -57,7 +61,10 @@ class LevelList:
         """The numbers of one level."""
         columns = (self.block, self.rank, self.energy_cm, self.error_cm, self.mixing, self.degeneracy)
         quanta = tuple(q for q in self.quanta[index].tolist() if q != BLANK)
-        return Level._make([*(column[index].item() for column in columns), quanta])
+        pattern = BLANK if self.pattern is None else int(self.pattern[index])
+        return Level._make(
+            [*(column[index].item() for column in columns), quanta, None if pattern == BLANK else pattern]
+        )
 
 
 _FIELDS = (
@@ -99,7 +106,9 @@ def _level_list(levels: list[Level], texts: dict[int, str], rest: str) -> LevelL
     columns = list(zip(*(level[:6] for level in levels), strict=True)) or [()] * 6
     whole = [np.array(columns[i], dtype=np.int32) for i in (0, 1, 5)]
     real = [np.array(columns[i], dtype=np.float64) for i in (2, 3, 4)]
-    return LevelList(whole[0], whole[1], real[0], real[1], real[2], whole[2], quanta, texts, rest)
+    pattern = np.array([BLANK if level.pattern is None else level.pattern for level in levels], dtype=np.int16)
+    known = pattern if (pattern != BLANK).any() else None
+    return LevelList(whole[0], whole[1], real[0], real[1], real[2], whole[2], quanta, texts, rest, known)
 
 
 def read_level(line: Line) -> Level:
@@ -115,10 +124,14 @@ def read_level(line: Line) -> Level:
             raise line.error(start, f"{name} reads {text[start:stop]!r}; {error}") from None
         if isinstance(numbers[-1], int) and abs(numbers[-1]) > 2**31 - 1:
             raise line.error(start, f"{name} = {numbers[-1]} is too large")
-    start = _COLON + 1
+    start, pattern = _COLON + 1, None
     if text[start : start + 1] == "(" and text[start + 4 : start + 5] == ")":
-        start += 5  # the spin quantum number that stands in brackets where there are more than six quanta
-    return Level._make([*numbers, _quanta(line, start)])
+        try:
+            pattern = read_whole(text[start + 1 : start + 4])
+        except ValueError as error:
+            raise line.error(start, f"the number in brackets reads {text[start : start + 5]!r}; {error}") from None
+        start += 5
+    return Level._make([*numbers, _quanta(line, start), pattern])
 
 
 def _quanta(line: Line, first: int) -> tuple[int, ...]:
@@ -143,7 +156,8 @@ def format_level(level: Level) -> str:
 def _plain_text(level: Level) -> str:
     energy = round(level.energy_cm, 6) + 0.0  # 0.0 where round-off below zero would print as -0.000000
     numbers = f"{energy:17.6f} {level.error_cm:17.6f} {level.mixing:10.6f} {level.degeneracy:4d}"
-    return f"{level.block:6d} {level.rank:4d} {numbers}:" + "".join(f"{q:3d}" for q in level.quanta) + "\n"
+    pattern = "" if level.pattern is None else f"({level.pattern:3d})"
+    return f"{level.block:6d} {level.rank:4d} {numbers}:{pattern}" + "".join(f"{q:3d}" for q in level.quanta) + "\n"
 
 
 def format_egy(levels: LevelList) -> bytes:

@@ -68,7 +68,9 @@ class Word(NamedTuple):
     column: int
 
 
-def read_words(line: Line, start: int, count: int, remark_from: int | None = None) -> tuple[list[Word], int]:
+def read_words(
+    line: Line, start: int, count: int, remark_from: int | None = None, *, abutting: bool = False
+) -> tuple[list[Word], int]:
     """At most `count` numbers from column `start` on, and where what follows them begins.
 
     Parameters
@@ -81,6 +83,9 @@ def read_words(line: Line, start: int, count: int, remark_from: int | None = Non
     remark_from : int, optional
         Behind so many numbers words may stand in place of a number, without a slash before them: they end the list. A letter that
         looks like a digit (O.5, l0) is no such word.
+    abutting : bool, optional
+        A number may begin with its point or sign where another ends, as fixed columns that are full leave them: 0.01000.0 is 0.01000
+        and .0, as the field's programs read it.
 
     Returns
     -------
@@ -114,7 +119,7 @@ def read_words(line: Line, start: int, count: int, remark_from: int | None = Non
         if remark_from is not None and len(words) >= remark_from and _REMARK.match(text, at):
             break
         match = _NUMBER.match(text, at)
-        if not match or not _ends(text, match.end()):
+        if not match or not (_ends(text, match.end()) or (abutting and text[match.end()] in "+-.")):
             wrong = re.split(r"[\s,/]", text[at:], maxsplit=1)[0]
             raise line.error(
                 at, f"{wrong!r} is no number; numbers are parted by blanks or commas, a comment begins with /"

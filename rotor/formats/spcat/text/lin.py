@@ -21,6 +21,7 @@ from rotor.arrays import distinct
 from rotor.formats.atomic_write import open_atomic
 from rotor.formats.spcat.text.fields import BLANK, read_whole
 from rotor.formats.spcat.text.freeform import Line, encode, number, read_lines, read_words
+from rotor.table import counted
 from rotor.units import MHZ_PER_CM
 
 QUANTA_FIELDS = 12  # at least
@@ -250,7 +251,8 @@ def note_of_remarks(lines: LineList, blends: NDArray[np.int64]) -> list[str]:
 def note_of_defaults(lines: LineList) -> str:
     """What a user must know of lines that lack something."""
     return (
-        f"{len(lines.defaulted)} lines lack quantum numbers or an error: SPFIT's defaults are taken (F as the sum before it, "
+        f"{counted(len(lines.defaulted), 'line lacks', 'lines lack')} quantum numbers or an error: "
+        f"SPFIT's defaults are taken (F as the sum before it, "
         f"others 0; {NO_ERROR_MHZ} MHz)"
     )
 

@@ -12,7 +12,7 @@ from rotor.formats.atomic_write import open_atomic
 from rotor.formats.packed import name_of
 from rotor.formats.spcat.text.freeform import Line, encode, number, read_code, read_lines, read_words, spell, whole
 
-_LETTER = re.compile(r"[ \t]*([A-Za-z])?")
+_LETTER = re.compile(r"[ \t]*(?:'([A-Za-z])'|([A-Za-z])?)")  # some write it in apostrophes
 _DIGIT = re.compile(r"[0-9]")
 
 
@@ -142,7 +142,7 @@ def _title(line: Line) -> str:
 
 
 def _header(line: Line) -> Header:
-    words, _ = read_words(line, 0, len(_HEADER))
+    words, _ = read_words(line, 0, len(_HEADER), abutting=True)
     values: dict[str, Any] = {"npar": whole(line, words, 0, "NPAR")}
     for index, (name, default) in enumerate(_HEADER.items()):
         if isinstance(default, int):
@@ -164,7 +164,7 @@ def _options(line: Line, defaults: Options = Options()) -> Options:
     values = {
         name: whole(line, words, index, name.upper(), getattr(defaults, name)) for index, name in enumerate(_OPTIONS)
     }
-    return Options(chr=(letter[1] if letter else None) or defaults.chr, **values, text=line.text)
+    return Options(chr=(letter and (letter[1] or letter[2])) or defaults.chr, **values, text=line.text)
 
 
 def _parameter(line: Line) -> Parameter:

@@ -1,0 +1,67 @@
+"""Which solved blocks of the rotation belong together, since operators with spins connect them.
+
+Two equivalent spins make two classes of each block: of functions that keep (0) and that change (1) their sign with the exchange of
+both. An operator that changes sign with the exchange joins one class to the other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+
+from rotor.arrays import Floats
+from rotor.quantum.spins.contraction import Contracted, acting_numbers
+from rotor.quantum.spins.rotor import Channel
+
+Link = tuple[int, int, int]
+"""Two blocks that an operator connects, and 1 where that changes sign with the exchange."""
+
+
+def links_of_pairs(operators: Mapping[tuple[int, int], Mapping[Channel, Floats]]) -> Iterator[Link]:
+    """The links of operators by pairs of blocks."""
+    for (i, k), found in operators.items():
+        for changed in {int(channel.exchange < 0) for channel in found}:
+            yield i, k, changed
+
+
+def links_of_stacks(contracted: Iterable[tuple[Sequence[Contracted], Sequence[Channel]]]) -> Iterator[Link]:
+    """The links of the same operators in stacks, each with the channels that share it."""
+    for found, channels in contracted:
+        kinds = {int(channel.exchange < 0) for channel in channels}
+        for i, k in acting_numbers(found):
+            for changed in kinds:
+                yield i, k, changed
+
+
+def families_of(count: int, links: Iterable[Link], classes: int) -> list[list[tuple[int, int]]]:
+    """Members (block, class) that links connect, each family in rising order.
+
+    Parameters
+    ----------
+    count : int
+        Number of blocks.
+    links : iterable of Link
+        What connects them.
+    classes : int
+        1, or 2 with two equivalent spins, or 3.
+
+    Returns
+    -------
+    list of list of (int, int)
+        Every block and class once, by the lowest member of each family.
+    """
+    above = list(range(count * classes))
+
+    def root(i: int) -> int:
+        while above[i] != i:
+            above[i] = above[above[i]]
+            i = above[i]
+        return i
+
+    for i, k, changed in links:
+        for own in range(classes):
+            low, high = sorted((root(i * classes + own), root(k * classes + (own ^ changed))))
+            above[high] = low
+    members: dict[int, list[tuple[int, int]]] = {}
+    for i in range(count * classes):
+        members.setdefault(root(i), []).append(divmod(i, classes))
+    return list(members.values())

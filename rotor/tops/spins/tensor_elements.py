@@ -1,0 +1,112 @@
+"""Elements of tensors of spins as they are published, in the form in which this package has them: each independent one once.
+
+| given | read as |
+|---|---|
+| chi_bb_minus_cc | chi_bb-cc |
+| two or three of chi_aa, chi_bb, chi_cc, and of T and D | chi_aa and chi_bb-cc: these tensors have no trace |
+| C_ba alone | C_ab: one order stands for both |
+| C_ab and C_ba, also of eps, each with its powers | C_ab = ½(C_ab + C_ba), C_ab-ba = ½(C_ab - C_ba) |
+
+The two orders: C_ab multiplies ½{S_a, N_b}, the axis of the spin first, as in I·C·J. J. M. Brown and T. J. Sears (J. Mol. Spectrosc. 75,
+111 (1979)) have N first in their eps. chi, T and D are symmetric: there chi_ba is chi_ab.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from math import hypot
+
+_TWO_ORDERS = re.compile(r"(?P<tensor>C|eps)_(?P<axes>ba|ca|cb)(?P<rest>(?:_[JKS]+)?\(.*)")
+_SYMMETRIC = re.compile(r"(?P<tensor>chi|T|D)_(?P<axes>ba|ca|cb)(?P<rest>(?:_[JKS]+)?\(.*)")
+
+
+def plain_elements(
+    values: Mapping[str, float], errors: Mapping[str, float]
+) -> tuple[dict[str, float], dict[str, float]]:
+    """Values and uncertainties in MHz by the names of this package, from those of the table above.
+
+    >>> plain_elements({"C_ab(H)": 3.0, "C_ba(H)": 1.0, "chi_bb_minus_cc(D)": 2.0}, {})[0]
+    {'C_ab(H)': 2.0, 'chi_bb-cc(D)': 2.0, 'C_ab-ba(H)': 1.0}
+    """
+    short = ({_in_short(name): value for name, value in one.items()} for one in (values, errors))
+    return without_trace(*in_both_orders(*(dict(one) for one in short)))
+
+
+def without_trace(
+    values: Mapping[str, float], errors: Mapping[str, float]
+) -> tuple[dict[str, float], dict[str, float]]:
+    """Two or three diagonal elements of a traceless tensor (chi, T, D) as its aa and bb-cc; other names as they are.
+
+    One alone stays: the other two are minus half of it each. ValueError for three that do not add up to 0, within 1e-3 of the largest
+    (published elements are rounded), and for a difference beside two of them.
+
+    >>> without_trace({"chi_aa(14N)": 2.0, "chi_cc(14N)": -3.5}, {})[0]
+    {'chi_aa(14N)': 2.0, 'chi_bb-cc(14N)': 5.0}
+    """
+    out, left = dict(values), dict(errors)
+    for tensor, spins in dict.fromkeys(
+        (n.partition("_")[0], n.partition("(")[2]) for n in values if n[:2] in ("ch", "T_", "D_")
+    ):
+        names = {letters: f"{tensor}_{letters}({spins}" for letters in ("aa", "bb", "cc")}
+        found = {letters: values[name] for letters, name in names.items() if name in values}
+        if len(found) < 2:
+            continue
+        difference = [n for n in values if n.startswith(f"{tensor}_") and "-" in n and n.endswith(f"({spins}")]
+        trace = sum(found.values()) if len(found) == 3 else 0.0
+        if abs(trace) > 1e-3 * max(map(abs, found.values())):
+            raise ValueError(
+                f"{tensor}({spins}: aa + bb + cc = {trace:g} MHz; the tensor is traceless, check the elements"
+            )
+        if difference:
+            raise ValueError(
+                f"{', '.join(difference)} beside {', '.join(found)}: give aa and a difference, or the elements alone"
+            )
+        aa, bb, cc = (found.get(letters, -sum(found.values())) - trace / 3 for letters in names)
+        spread = {letters: left.pop(name) for letters, name in names.items() if name in left}
+        for name in names.values():
+            out.pop(name, None)
+        out |= {names["aa"]: aa, f"{tensor}_bb-cc({spins}": bb - cc}
+        if len(spread) == len(found):
+            left |= {
+                names["aa"]: spread.get("aa", hypot(*spread.values())),
+                f"{tensor}_bb-cc({spins}": hypot(*spread.values()),
+            }
+    return out, left
+
+
+def in_both_orders(values: dict[str, float], errors: dict[str, float]) -> tuple[dict[str, float], dict[str, float]]:
+    """C_ab and C_ba as their mean and half their difference; C_ba alone as C_ab, which then stands for both.
+
+    Raises ValueError where chi, T or D, which are symmetric, are given in both orders, and C_ab-ba beside them.
+
+    >>> in_both_orders({"eps_ca(S)": 3.0}, {"eps_ca(S)": 0.1})
+    ({'eps_ac(S)': 3.0}, {'eps_ac(S)': 0.1})
+    """
+    out, left = dict(values), dict(errors)
+    for name in values:
+        match = _TWO_ORDERS.fullmatch(name) or _SYMMETRIC.fullmatch(name)
+        if match is None:
+            continue
+        tensor, axes, rest = match["tensor"], match["axes"], match["rest"]
+        other = f"{tensor}_{axes[::-1]}{rest}"
+        difference = f"{tensor}_{axes[::-1]}-{axes}{rest}"
+        if other not in values:
+            out = {(other if key == name else key): value for key, value in out.items()}
+            left = {(other if key == name else key): value for key, value in left.items()}
+            continue
+        if tensor in ("chi", "T", "D"):
+            raise ValueError(f"{other} and {name} are one constant, {tensor} is symmetric; give it once")
+        if difference in values:
+            raise ValueError(f"{difference} beside {other} and {name}: give {other} and {difference}, or both orders")
+        first, second = values[other], out.pop(name)
+        out[other], out[difference] = (first + second) / 2, (first - second) / 2
+        spread = [left.pop(one) for one in (other, name) if one in left]
+        if len(spread) == 2:
+            left[other] = left[difference] = hypot(*spread) / 2
+    return out, left
+
+
+def _in_short(name: str) -> str:
+    """chi_bb_minus_cc(14N) as chi_bb-cc(14N)."""
+    return re.sub(r"^([A-Za-z]+_[abc]{2})_minus_([abc]{2})", r"\1-\2", name)

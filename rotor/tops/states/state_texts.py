@@ -1,0 +1,152 @@
+"""Further states from texts, as the command line and scenes give them; the same as the table [states] of a molecule file.
+
+constants   E[1]=23785.9 A[1]=... W[0,1]=3 MHz
+names       0+,0-                                   one for each state, from 0 on
+symmetry    C2v                                     or another of `state_constants.GROUPS`: of which the states are
+weights     [0] even=1,odd=3  [1] even=3,odd=1      spin weights of states that differ from the top's; "none": all levels alike
+dipoles     [1] 0,0,1.30  [0,1] 0,0,1.47 D          along a, b, c, within a state or between two
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING, TypeVar
+
+from rotor.tops.spins.spin_weights import SpinWeights
+from rotor.tops.states.state_constants import StateConstants, Vector
+from rotor.units import parse_grid
+
+if TYPE_CHECKING:
+    from rotor.tops.top import Top
+
+T = TypeVar("T")
+KEYS = ("state_constants", "state_names", "state_symmetry", "state_weights", "state_dipoles")
+_ITEM = re.compile(r"\[(?P<states>[^\[\]]*)\]\s*=?\s*(?P<text>[^\[\]]+)")
+
+
+def with_state_texts(top: Top, texts: Mapping[str, str | None], source: str) -> Top:
+    """A top with further states, or with other names, weights, dipoles or another symmetry of those that it has.
+
+    Weights and dipoles that are not named stay as they are.
+
+    Parameters
+    ----------
+    top : Top
+    texts : mapping of str to str or None
+        By `KEYS`; what is None or missing is not given.
+    source : str
+        Where the constants are from, where they are given here.
+
+    Returns
+    -------
+    Top
+
+    Raises
+    ------
+    ValueError
+        Where a text is none of its kind, or belongs to states that the top has not; it begins with the key.
+
+    Examples
+    --------
+    >>> from rotor.tops.top import Top
+    >>> top = Top.from_constants("A=9 B=8 C=7 GHz")
+    >>> states = {"state_constants": "E[1]=5 A[1]=9 B[1]=8 C[1]=7 GHz", "state_dipoles": "[0,1] 0,0,1.47"}
+    >>> dict(with_state_texts(top, states, "given").states.dipoles)
+    {(1, 0): (0.0, 0.0, 1.47)}
+    """
+    given = {key: text for key in KEYS if (text := texts.get(key)) is not None}
+    if not given:
+        return top
+    states, first = top.states, next(iter(given))
+    if "state_constants" in given:
+        states = _of("state_constants", lambda: StateConstants.parse(given["state_constants"], source))
+    if states is None:
+        raise ValueError(f"{first}: there is one state here; further ones need their constants too")
+    for key, text in given.items():
+        if key != "state_constants":
+            states = _of(key, partial(_changed, states, key, text, top))
+    whole = states
+    return _of(first, lambda: replace(top, states=whole))
+
+
+def _changed(states: StateConstants, key: str, text: str, top: Top) -> StateConstants:
+    """The states with what one text says of them."""
+    if key == "state_names":
+        return replace(states, names=tuple(name.strip() for name in text.split(",")))
+    if key == "state_symmetry":
+        return replace(states, symmetry=text.strip())
+    if key == "state_weights":
+        return replace(states, weights={**states.weights, **weights_of_text(text, top)})
+    return replace(states, dipoles={**states.dipoles, **dipoles_of_text(text)})
+
+
+def _of(key: str, make: Callable[[], T]) -> T:
+    try:
+        return make()
+    except ValueError as error:
+        raise ValueError(f"{key}: {error}") from None
+
+
+def dipoles_of_text(text: str) -> dict[tuple[int, int], Vector]:
+    """Dipoles in debye by pairs of states, from `[1] 0,0,1.3 [0,1] 0,0,1.47`.
+
+    >>> dipoles_of_text("[1]=0,0,1.3 [0,1]=0,0,1.47 D")
+    {(1, 1): (0.0, 0.0, 1.3), (1, 0): (0.0, 0.0, 1.47)}
+    """
+    found: dict[tuple[int, int], Vector] = {}
+    for states, part in _items(text, "[0,1] 0,0,1.47", 2):
+        numbers = parse_grid(part, "D").tolist() if ":" not in part else []
+        if len(numbers) != 3:
+            raise ValueError(f"{part!r}: expected three numbers, along a, b, c in D")
+        pair = (states[-1], states[0])
+        if pair in found:
+            raise ValueError(f"{text!r}: the states {list(states)} are given twice; leave one out")
+        found[pair] = (numbers[0], numbers[1], numbers[2])
+    return found
+
+
+def weights_of_text(text: str, top: Top) -> dict[int, SpinWeights]:
+    """Spin weights by state, from `[0] even=1,odd=3 [1] even=3,odd=1`; "none" where all levels of a state are alike."""
+    found: dict[int, SpinWeights] = {}
+    for (state,), part in _items(text, "[1] even=3,odd=1", 1):
+        if state in found:
+            raise ValueError(f"{text!r}: state {state} is given twice; leave one out")
+        found[state] = SpinWeights() if part == "none" else _weights(part)
+        rule = found[state].rule
+        if "none" not in (rule, top.spin_weights.rule) and rule != top.spin_weights.rule:
+            raise ValueError(
+                f"{part!r}: weights by {rule}, and those of the top go by {top.spin_weights.rule}; expected one rule"
+            )
+    return found
+
+
+def _weights(text: str) -> SpinWeights:
+    given: dict[str, int] = {}
+    for item in text.split(","):
+        name, equals, number = (part.strip() for part in item.partition("="))
+        if not (name and equals and number.isdecimal()) or name in given:
+            raise ValueError(f"{item.strip()!r}: expected class=number, each class once, such as even=1, or none")
+        given[name] = int(number)
+    weights = SpinWeights.from_mapping(given)
+    if weights.to_mapping() != given:
+        raise ValueError(f"{text!r}: expected numbers without a common divisor, as those of state 0 have")
+    return weights
+
+
+def _items(text: str, example: str, most: int) -> list[tuple[tuple[int, ...], str]]:
+    """Numbers of states, rising, and what follows them."""
+    found = list(_ITEM.finditer(text))
+    if not found or _ITEM.sub("", text).strip(" ,;"):
+        raise ValueError(f"{text!r}: expected the state in square brackets and its value, such as {example}")
+    return [(_states(one["states"], example, most), one["text"].strip(" ,;")) for one in found]
+
+
+def _states(text: str, example: str, most: int) -> tuple[int, ...]:
+    parts = [part.strip() for part in text.split(",")]
+    if len(parts) > most or not all(part.isdecimal() for part in parts):
+        what = "the number of a state" if most == 1 else "the number of a state, or of two"
+        raise ValueError(f"[{text}]: expected {what}, 0 for the top's own, such as {example}")
+    return tuple(sorted(map(int, parts)))

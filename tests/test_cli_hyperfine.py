@@ -1,0 +1,132 @@
+"""`--hyperfine` and the options that belong to it, in every verb that has spins."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+ROD = ("--constants", "B=44.316 GHz", "--polarizability", "3.9,2.0", "--temperature", "5")
+CHI = ("--spin-constants", "chi_aa(14N)=-4.7 MHz")
+STATES = ("--constants", "A=50 B=44 C=40 GHz", "--state-constants", "E[1]=100 A[1]=49 B[1]=44 C[1]=39 GHz")
+PAIR = (
+    "--constants", "A=30 B=20 C=15 GHz", "--spin-weights", "ee=1,eo=3,oe=3,oo=1", "--spins", "14N_1+14N_2", "--spin-constants",
+    "chi_aa(14N_1)=1 chi_aa(14N_2)=1", "--temperature", "5",
+)  # fmt: skip
+SPLIT = "88.62:88.64GHz"
+
+
+def content(call, *words: str) -> dict:
+    code, out, _ = call(*words, "--json", "-")
+    assert code == 0
+    return json.loads(out)
+
+
+def test_levels_by_the_cheapest_method(call):
+    words = ("levels", "formamide", "--jmax", "2", "--hyperfine")
+    exact = content(call, *words)
+    cheap = content(call, *words, "--hyperfine-method", "auto", "--hyperfine-tolerance", "1 MHz")
+    assert (exact["hyperfine"]["method"], cheap["hyperfine"]["method"]) == ("exact", "first-order")
+    energies = [sorted(one["energy_mhz"] for one in each["levels"]) for each in (exact, cheap)]
+    apart = [abs(a - b) for a, b in zip(*energies, strict=True)]
+    assert 0 < max(apart) < cheap["hyperfine"]["estimate_mhz"] < 1.0
+
+
+def test_emission_of_components_adds_up_to_the_line_without_spins(call):
+    """Integrals of thin lines: Σ over F is the line without spins, at the mean of its components."""
+    words = ("emission", "HCN", "--range", SPLIT, "--column", "1e10", "--excitation", "10")
+    whole, split = content(call, *words), content(call, *words, "--hyperfine")
+    (line,), parts = whole["lines"], split["lines"]
+    assert [one["upper"] for one in parts] == ["1 1", "1 2", "1 0"]
+    assert sum(one["integrated_k_km_s"] for one in parts) == pytest.approx(
+        line["integrated_k_km_s"], rel=1e-3
+    )  # 1.5 MHz of ν
+    assert split["molecules"][0]["q"] == pytest.approx(3 * whole["molecules"][0]["q"], rel=1e-9)  # the factor 2I+1
+    mean = np.average([one["frequency_mhz"] for one in parts], weights=[one["optical_depth"] for one in parts])
+    assert mean == pytest.approx(line["frequency_mhz"], abs=0.05)  # MHz: spin-rotation and second order
+    assert split["molecules"][0]["hyperfine"]["method"] == "exact"
+    assert whole["molecules"][0]["hyperfine"] is None
+
+
+def test_emission_of_several_molecules_splits_those_with_spins(call):
+    code, out, err = call("emission", "CO", "HCN", "--range", "88:116GHz", "--hyperfine")
+    assert code == 0
+    assert "no constants of spins are known of carbon monoxide" in err
+    assert "upper, lower: J\n" in out
+    assert "upper, lower: N F\n" in out
+
+
+def test_raman_lines_with_spins(call):
+    whole, split = content(call, "raman", *ROD), content(call, "raman", *ROD, *CHI)
+    assert split["band_cross_section_cm2_per_sr"] == pytest.approx(
+        whole["band_cross_section_cm2_per_sr"], rel=1e-4
+    )  # the cut
+    assert split["q"]["q"] == pytest.approx(3 * whole["q"]["q"], rel=1e-9)
+    assert split["q"]["classical"] == pytest.approx(3 * whole["q"]["classical"], rel=1e-12)
+    assert content(call, "raman", *ROD, *CHI, "--no-hyperfine")["lines"] == whole["lines"]
+
+
+def test_thermo_counts_the_functions_of_spins(call):
+    words = ("thermo", "HCN", "--temperature", "1,300")
+    whole, split = content(call, *words), content(call, *words, "--hyperfine")
+    for one, many in zip(whole["functions"], split["functions"], strict=True):
+        assert many["q_rot"] == pytest.approx(3 * one["q_rot"], rel=1e-6)  # δ/kT = 2e-4 at 1 K, its square
+        assert many["cv_over_r"] == pytest.approx(one["cv_over_r"], rel=1e-6)
+    assert split["hyperfine"]["spin_functions"] == 3
+    assert split["spin_factor"] == pytest.approx(3 * whole["spin_factor"])
+    assert "Q counts 3 functions of the spins" in call(*words, "--hyperfine")[1]
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("emission", "HCN", "--range", SPLIT, "--hyperfine"),
+        ("raman", *ROD, *CHI, "--hyperfine-method", "auto", "--hyperfine-tolerance", "1 MHz"),
+        ("levels", *STATES, "--jmax", "2"),
+        ("thermo", "HCN", "--hyperfine", "--hyperfine-method", "first-order", "--temperature", "0.01,1,300"),
+    ],
+)
+def test_a_saved_scene_gives_the_same(call, tmp_path, words):
+    scene, first, second = (tmp_path / name for name in ("s.toml", "a.csv", "b.csv"))
+    assert call(*words, "--csv", str(first), "--save-scene", str(scene))[0] == 0
+    text = scene.read_text(encoding="utf-8").replace("a.csv", "b.csv")
+    scene.write_text(text, encoding="utf-8")
+    assert call("run", str(scene), "--out", str(tmp_path))[0] == 0
+    plain = [path.read_text(encoding="utf-8").splitlines() for path in (first, second)]
+    assert [[row for row in rows if not row.startswith("#")] for rows in plain[:1]] == [
+        [row for row in rows if not row.startswith("#")] for rows in plain[1:]
+    ]
+
+
+REFUSED = [
+    (("levels", "CO", "--hyperfine"), "no constants of spins are known"),
+    (("levels", "formamide", "--hyperfine-method", "auto"), "without --hyperfine or --spin-constants nothing is split"),
+    (("levels", "formamide", "--hyperfine", "--hyperfine-method", "exakt"), "--hyperfine-method: 'exakt': expected one of"),
+    (("levels", "formamide", "--hyperfine", "--hyperfine-tolerance", "0"), "--hyperfine-tolerance"),
+    (("levels", "formamide", "--hyperfine", "--hyperfine-tolerance", "1 K s"), "--hyperfine-tolerance"),
+    (("emission", "CO", "--range", SPLIT, "--hyperfine"), "no constants of spins are known"),
+    (("emission", "CO", "HCN", "--range", SPLIT, *CHI), "--spin-constants: expected with a single molecule"),
+    (("emission", "HCN", "--range", SPLIT, "--hyperfine-method", "auto"), "nothing is split"),
+    (("emission", "HCN", "--range", SPLIT, "--spins", "14N=1"), "--spins: says how large the spins"),
+    (("emission", "HCN", "--range", SPLIT, "--spin-constants", "chi_aa(14N)"), "--spin-constants"),
+    (("thermo", "CO", "--hyperfine"), "no constants of spins are known"),
+    (("thermo", "HCN", "--hyperfine-method", "auto"), "nothing is split"),
+    (("thermo", "HCN", "--hyperfine", "--hyperfine-method", "1"), "--hyperfine-method: '1': expected one of"),
+    (("thermo", "HCN", "--hyperfine", "--hyperfine-tolerance", "nan"), "--hyperfine-tolerance"),
+    (("thermo", *PAIR, "--species", "ortho"), "--species: 'ortho': with nuclei that are coupled to a total spin"),
+    (("raman", "CO2", "--hyperfine"), "no constants of spins are known"),
+    (("raman", "CO2", "--hyperfine-method", "first-order"), "nothing is split"),
+    (("raman", *ROD, "--spin-constants", "chi_aa(12C)=1"), "12C"),
+    (("raman", *ROD, *CHI, "--hyperfine-method", "none"), "expected one of auto, exact"),
+    (("raman", *ROD, *CHI, "--hyperfine-tolerance", "-1"), "--hyperfine-tolerance"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("words", "why"), REFUSED)
+def test_wrong_input_is_one_line_and_exit_code_2(call, words, why):
+    code, out, err = call(*words)
+    assert (code, out) == (2, "")
+    (line,) = [row for row in err.splitlines() if not row.startswith("note:")]
+    assert line.startswith("error: ")
+    assert why in line

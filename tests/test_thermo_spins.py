@@ -1,0 +1,129 @@
+"""Thermodynamic functions with spins: Schottky anomalies in closed form, the product against the sum over split levels, species."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rotor import units
+from rotor.quantum.effects.of_top import effects_of
+from rotor.thermo.functions import ThermoFunctions, thermodynamic_functions
+from rotor.thermo.level_sums import level_sums, lowest_level_k
+from rotor.thermo.request import ThermoRequest, answer_thermo
+from rotor.thermo.spin_sums import spin_sums, times_functions
+from rotor.tops.spins.spin_constants import SpinConstants
+from rotor.tops.top import Top
+
+CHI = -4.7  # MHz, of 14N in a linear molecule
+KELVIN = 1 / units.MHZ_PER_K
+
+
+def rod(constants: str = f"chi_aa(14N)={CHI} MHz", spins: str | None = None, **others) -> Top:
+    return Top.from_constants("B=44.316 GHz", spin_constants=SpinConstants.parse(constants, spins), **others)
+
+
+def functions(top: Top, temperatures, **others) -> ThermoFunctions:
+    return thermodynamic_functions(top, temperatures, effects=effects_of(top, True), **others)
+
+
+def casimir(j: int, f: int, twice_i: int = 2) -> float:
+    """E_F in units of χ: -[3C(C+1)/4 - I(I+1)J(J+1)] / [2I(2I-1)(2J-1)(2J+3)], C = F(F+1) - I(I+1) - J(J+1)."""
+    i = twice_i / 2
+    c = f * (f + 1) - i * (i + 1) - j * (j + 1)
+    return -(0.75 * c * (c + 1) - i * (i + 1) * j * (j + 1)) / (2 * i * (2 * i - 1) * (2 * j - 1) * (2 * j + 3))
+
+
+def test_schottky_anomaly_of_a_species_that_is_left_in_j_1():
+    """Of a rotor of odd J alone F = 0, 1, 2 of J = 1 are all that there is below 1 K: their closed form, exact in N to 1e-4 MHz."""
+    top = rod(spin_weights={"even": 0, "odd": 1})
+    temperatures = np.array([0.2, 1.0, 5.0, 100.0]) * abs(CHI) * KELVIN
+    found = functions(top, temperatures)
+    energies = CHI * KELVIN * np.array([casimir(1, f) for f in (0, 1, 2)])
+    x = (energies - energies.min())[:, None] / temperatures
+    terms = np.array([1, 3, 5])[:, None] * np.exp(-x)
+    q = terms.sum(axis=0)
+    mean, square = (terms * x).sum(axis=0) / q, (terms * x * x).sum(axis=0) / q
+    assert found.q_rot == pytest.approx(q, rel=1e-4)  # second order in χ: χ²/B = 5e-4 MHz of 4.7
+    assert found.cv_over_r == pytest.approx(square - mean**2, rel=1e-3)
+    assert found.cv_over_r[0] > 0.3
+    assert found.hyperfine is not None
+    assert found.hyperfine["summed_up_to_k"] == temperatures[-1]
+
+
+@pytest.mark.parametrize("species", ["equilibrium", "normal", "ortho"])
+def test_far_above_the_splittings_spins_are_a_factor(species):
+    """Π(2I+1) of Q and R ln of it in S; U and C_v are those of the rotation, δ/kT = 1e-6."""
+    top = rod(spin_weights={"even": 1, "odd": 3})
+    temperatures = [5.0, 50.0, 300.0]
+    plain, split = (
+        thermodynamic_functions(top, temperatures, species=species),
+        functions(top, temperatures, species=species),
+    )
+    assert split.q_rot == pytest.approx(3 * plain.q_rot, rel=1e-5)
+    assert split.q_rot_classical == pytest.approx(3 * plain.q_rot_classical, rel=1e-12)
+    assert split.spin_factor == pytest.approx(3 * plain.spin_factor, rel=1e-12)
+    gas = 8.314462618
+    assert split.entropy_j_per_mol_k - plain.entropy_j_per_mol_k == pytest.approx([gas * np.log(3)] * 3, rel=1e-4)
+    assert split.cv_over_r == pytest.approx(plain.cv_over_r, rel=1e-6)
+
+
+def test_the_product_is_as_good_as_it_says():
+    """At δ/kT from 0.002 to 0.02 the factor against the sum over split levels."""
+    top = rod("chi_aa(127I)=-1900 MHz")
+    effects = effects_of(top, True)
+    temperatures, weights = np.array([5.0, 20.0, 50.0]), [top.spin_weights]
+    exact = level_sums(top, weights, temperatures, 1e-10, effects=effects)[0]
+    ground = lowest_level_k(top, weights, effects)[0]
+    product = times_functions(level_sums(top, weights, temperatures, 1e-10)[0], 6, ground, 1900.0)
+    assert product.ground_k == exact.ground_k
+    for name, error in (("q", "error_q"), ("energy_over_rt", "error_energy"), ("cv_over_r", "error_cv")):
+        off, said = np.abs(getattr(product, name) / getattr(exact, name) - 1), getattr(product, error)
+        assert (off < said).all()
+        assert (said < 1000 * off).all()  # the mean of δ² over F and J is some hundredths of the largest
+
+
+def test_split_levels_are_summed_where_the_factor_is_not_good_enough():
+    top = rod("chi_aa(127I)=-1900 MHz")
+    found = spin_sums(top, [top.spin_weights], np.array([1.0, 20.0, 300.0, 900.0]), 1e-6, effects_of(top, True))
+    assert found.split.tolist() == [True, True, False, False]
+    exact = level_sums(top, [top.spin_weights], [300.0], 1e-9, effects=effects_of(top, True))[0]
+    assert found.sums[0].q[2] == pytest.approx(float(exact.q[0]), rel=1e-6)
+
+
+def test_an_electron_spin_counts_in_the_classical_limit_but_not_as_a_nuclear_function():
+    top = rod("gamma(S)=100 MHz", "S=1/2")
+    found, plain = functions(top, [300.0]), thermodynamic_functions(top, [300.0])
+    assert found.q_rot == pytest.approx(2 * plain.q_rot, rel=1e-4)
+    assert found.q_rot_classical == pytest.approx(2 * plain.q_rot_classical, rel=1e-12)
+    assert found.spin_factor == plain.spin_factor
+    assert found.q_rot == pytest.approx(found.q_rot_corrected, rel=1e-4)
+
+
+def test_species_of_nuclei_with_a_total_spin_are_refused():
+    weights = {"ee": 1, "eo": 3, "oe": 3, "oo": 1}
+    constants = SpinConstants.parse("chi_aa(14N_1)=1 chi_aa(14N_2)=1 MHz", "14N_1+14N_2")
+    top = Top.from_constants("A=30 B=20 C=15 GHz", spin_weights=weights, spin_constants=constants)
+    with pytest.raises(ValueError, match="species are not separated; expected equilibrium"):
+        functions(top, [10.0], species="ortho")
+
+
+def test_the_answer_counts_the_effects():
+    top = rod()
+    split = answer_thermo(ThermoRequest(top, (1.0,), effects=effects_of(top, True))).facts()
+    assert split["hyperfine"] == {
+        "spin_functions": 3, "splitting_mhz": pytest.approx(4.7), "summed_up_to_k": None, "method": "exact"
+    }  # fmt: skip
+    assert "nuclear quadrupole" in {one["name"] for one in split["effects"] if one["present"]}
+    plain = answer_thermo(ThermoRequest(replace(top, spin_constants=None), (1.0,))).facts()
+    assert plain["hyperfine"] is None
+
+
+def test_constants_of_zero_leave_the_rotation_times_the_functions():
+    """No splitting, a frozen rotation: 0/0 is no error, and nothing is summed."""
+    found = functions(rod("chi_aa(14N)=0 MHz"), [1e-3, 1e-2, 1.0])
+    assert found.q_rot[:2] == pytest.approx([3.0, 3.0], rel=1e-14)  # exp of a logarithm
+    assert found.hyperfine is not None
+    assert found.hyperfine["summed_up_to_k"] is None
+    assert np.isfinite(found.relative_error).all()
