@@ -361,6 +361,8 @@ def _group(
         usable = tuple(_of_three(line, len(spins), basis_axes(oblate)) for line in usable)
     pairs = tuple(Pair(here[pair.first], here[pair.second]) for pair in doubled if pair.first in here)
     kind = _kind(states, usable, oblate, first.spind < 0)
+    if kind in ("prolate", "oblate") and beside:
+        kind = "asymmetric"  # |N K⟩ does not tell K from -K, which such moments turn into each other or leave alone
     limits = {} if kind in ("linear", "prolate", "oblate") else _limits(states, as_spcat)
     others = len(spins) - states[0].equivalent  # which are not coupled to a total
     coupled = tuple(
@@ -395,6 +397,11 @@ def _turned_moments(
 ) -> tuple[dict[tuple[int, int], Vector], tuple[Moment, ...]]:
     """The moments in functions that time reversal with half a turn about an axis leaves as they are: those along it, and the others
     apart, each component by itself."""
+    if any(moment.written or moment.with_i or (moment.along_abc and moment.spin) for moment in beside):
+        raise ValueError(
+            "moments of second and third order, of a sine and of a spin with operators that are odd under time reversal within one "
+            f"state, or PHASE: {NOT_YET}"
+        )
     every = [*(Moment(1.0, states, along) for states, along in moments.items()), *beside]
     plain, others = dict[tuple[int, int], Vector](), list[Moment]()
     for moment in every:

@@ -264,8 +264,9 @@ def _functions_of(group: Group, levels: Levels) -> Functions:
     pairs, representation = group.effect.pairs, str(levels.representation)
 
     def functions(block: CoupledBlock | SpinBlock) -> tuple[Floats, Ints]:
-        found = functions_with_spins if isinstance(block, SpinBlock) else functions_of_l
-        return found(block, pairs, representation)  # type: ignore[operator]
+        if isinstance(block, SpinBlock):
+            return functions_with_spins(block, pairs, representation)
+        return functions_of_l(block, pairs, representation)
 
     return functions
 

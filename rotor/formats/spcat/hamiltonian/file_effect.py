@@ -32,7 +32,7 @@ from rotor.quantum.coupled import NOTHING
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.moments import Moment
 from rotor.quantum.spins import Scheme, Spin
-from rotor.quantum.spins.operators import EVERY_STATE, BetweenSpecies, Cosines, CosinesWithN, HalfTurned
+from rotor.quantum.spins.operators import EVERY_STATE, BetweenSpecies, ByElements, Cosines, CosinesWithN, HalfTurned
 from rotor.quantum.spins.terms import SpinTerm
 from rotor.quantum.states import Coupling, OperatorOfJ, State
 from rotor.quantum.wang.basis import wang_blocks
@@ -282,9 +282,9 @@ class FileEffect(QuantumEffect):
             elif states and states[0] != states[1]:
                 assert operator.plain is not None
                 found.append(Coupling(line.name, *states, plain_of_j(operator.plain)))
-        return tuple(self._kept_apart(coupling) for coupling in found)
+        return tuple(self._without_forbidden(coupling) for coupling in found)
 
-    def _kept_apart(self, coupling: Coupling) -> Coupling:
+    def _without_forbidden(self, coupling: Coupling) -> Coupling:
         """A coupling without elements between levels of unequal weights."""
         pairs = self.apart.get((coupling.bra, coupling.ket))
         if pairs is None:
@@ -330,7 +330,7 @@ class FileEffect(QuantumEffect):
                 bra, ket = states or (EVERY_STATE, EVERY_STATE)
                 rotor, factor = o.rotor, 1.0
                 if self._is_turned(line):
-                    assert isinstance(rotor, Cosines | CosinesWithN)
+                    assert isinstance(rotor, ByElements | Cosines | CosinesWithN)
                     rotor, factor = HalfTurned(rotor, self.turned), 1.0 if o.odd else -1.0  # as `half_turned`
                 elif o.odd and bra == ket:  # of an l-doubled pair, between its components
                     ket = next(pair.second if bra == pair.first else pair.first for pair in self.pairs if bra in pair)
