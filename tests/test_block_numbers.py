@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from oracle_cases import SAMPLES
 
+from rotor.formats.spcat.block_numbers import _reach
+from rotor.formats.spcat.hamiltonian.codes import Digits
 from rotor.formats.spcat.predict import levels_of_file, predict
 from rotor.formats.spcat.text.egy import read_egy
 from rotor.formats.spcat.text.int_file import read_int
@@ -63,6 +65,14 @@ def test_patterns_of_spins_stand_in_order_of_n():
     found = numbers(made("a 3 1 0 20 0 1 1 1 0 1 0", "110010099 2 0\n", 1))
     own = [row for row in found if row[0] == 5]
     assert [(row[1], *row[3:]) for row in own] == [(1, 0, 0, 0, 1), (2, 2, 0, 2, 1), (3, 2, 2, 0, 1)]
+
+
+@pytest.mark.parametrize(
+    ("ff", "typ", "species"), [(0, 0, 0), (0, 60, 1), (3, 60, 1), (12, 0, 3), (12, 60, 2), (21, 60, 1), (31, 60, 2)]
+)
+def test_a_sine_has_the_other_species(ff, typ, species):
+    """cos(2πFF ρK/3) is even in K, a sine (FF 11 to 20, 31 to 40) odd: times Bz of N."""
+    assert _reach(Digits(0, ff, 0, 0, 0, typ, 0, 0, 1, 0), 2, False).species == species
 
 
 def test_a_file_of_transition_dipoles_is_refused_by_name():
