@@ -190,7 +190,7 @@ def test_sines_of_internal_rotation():
 
 
 def test_weights_forbid_elements():
-    """Two states of weights 5, 3 and 3, 3 by the parity of Ka: i g Nb joins levels of weight 3 alone, those of Ka odd of the first state."""
+    """Two states of weights 5, 3 and 3, 3 by the parity of Ka: i g Nb joins levels of weight 3 alone, of the first state Ka odd."""
     j, g, energy = 5, 90.0, 300.0
     lines = "".join(f"{code} {value!r} 0\n" for code, value in (*ABC, (11, energy), (400001, g)))
     options = "a 1 2 0 40 0 1 5 3 -1 1 0\na 1 1 0 40 0 1 3 3 0 1 0\n"
