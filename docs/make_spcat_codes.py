@@ -129,6 +129,11 @@ and more elements between unequal totals are wrong in the program: a loop of its
 other total. With that step set right the energies of CHCl3-like levels with F = 1 agree to 1e-6 cm⁻¹; beyond, some of its names go to
 levels of forbidden species, since it names by the order of energy in blocks that hold those too.
 
+Spin terms of more than second order (TYP 5 to 79, one spin, one twice, two; in two states where they are odd), of one K, with powers of
+N·S, and times Fourier and Euler terms, were compared on 170 inputs in both bases. All are equal but for shares of levels that
+nearly coincide. TYP 20, 40, 60 with two spins are I1·I2 times Na, Nb, Nc, as the program has them.
+TYP 12 to 19 were half of the program's before.
+
 Series (FF, EX, TYP 90 to 99) were compared on 40 more inputs: one and two states, l-doubled pairs, ρ of unlike signs, NOFC, G12, NEWLZ,
 five kinds of Euler terms. All are equal but for shares of strength of levels that nearly coincide, and moments of TYP 7 with FC above 0,
 which the program computes as if TYP were 0: here n = 10 FC + I1, as documented. Without NEWLZ it passes over TYP 80 to 89 of the state

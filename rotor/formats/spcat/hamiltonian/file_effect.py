@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 import numpy as np
 
-from rotor.formats.spcat.hamiltonian.codes import AXES, Digits, basis_axes, split_code, state_digits
+from rotor.formats.spcat.hamiltonian.codes import AXES, NOT_YET, Digits, basis_axes, split_code, state_digits
 from rotor.formats.spcat.hamiltonian.l_doubled import Pair, couplings_with_pairs
 from rotor.formats.spcat.hamiltonian.l_spins import spin_terms_with_pairs
 from rotor.formats.spcat.hamiltonian.operators import CodedOperator, energy_of_k, operator_of, plain_of_j
@@ -370,6 +370,11 @@ class FileEffect(QuantumEffect):
     def _at_pairs(self, line: CodedLine, states: tuple[int, int] | None, term: SpinTerm) -> list[SpinTerm]:
         if not states or set(states).isdisjoint(v for pair in self.pairs for v in pair):
             return [term]
+        if isinstance(term.rotor, ByElements):
+            code = line.name.partition("#")[0]
+            raise ValueError(
+                f"parameter {code}: a spin term of higher order or of a series, of l-doubled states, {NOT_YET}"
+            )
         try:
             return spin_terms_with_pairs(term, states, line.reversed_, self.pairs, self.axes)
         except ValueError as error:
