@@ -203,6 +203,7 @@ def _writers(answer: EmissionAnswer, content: dict[str, Any], drawn: dict[str, A
     record = {key: content[key] for key in keys}
 
     def draw(path: Path) -> None:
+        """The picture as a file."""
         from rotor.plots.emission import plot_emission
 
         plot_emission(answer, path, provenance=record, **drawn)

@@ -139,9 +139,11 @@ def _writers(answer: LevelsAnswer, content: dict[str, Any], unit: str, view: Vie
     provenance = {"command": content["command"], "input": content["input"]}
 
     def table(path: Path) -> None:
+        """The table as a file."""
         rotor.write(answer.table, path, settings=provenance)
 
     def draw(path: Path) -> None:
+        """The picture as a file."""
         from rotor.plots.levels import plot_levels
 
         plot_levels(answer.table, answer.request.top, path, unit=unit, view=view, provenance=provenance)

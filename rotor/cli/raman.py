@@ -166,11 +166,13 @@ def _writers(lines: RamanLines, content: dict[str, Any], view: View) -> dict[str
     provenance = {"command": content["command"], "input": content["input"]}
 
     def table(path: Path) -> None:
+        """The table as a file."""
         import rotor
 
         rotor.write(lines, path, settings=provenance)
 
     def draw(path: Path) -> None:
+        """The picture as a file."""
         from rotor.plots.raman import plot_raman
 
         plot_raman(lines, path, view=view, provenance={"command": provenance["command"]})

@@ -135,11 +135,13 @@ def _writers(answer: ThermoAnswer, content: dict[str, Any], view: View) -> dict[
     provenance = {"command": content["command"], "input": content["input"]}
 
     def table(path: Path) -> None:
+        """The table as a file."""
         import rotor
 
         rotor.write(answer.functions, path, settings=provenance)
 
     def draw(path: Path) -> None:
+        """The picture as a file."""
         from rotor.plots.heat_capacity import Panel, curve_temperatures, plot_heat_capacity
         from rotor.plots.picture import name_of_top
         from rotor.thermo.request import answer_thermo

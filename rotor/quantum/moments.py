@@ -1,8 +1,10 @@
 """Moments that make lines besides the dipole of a state: dipoles that depend on the rotation, and magnetic moments.
 
     electric    Σ_i μ_i φ_pi, with half anticommutators or commutators of N² and Nz² (Herman-Wallis corrections)
+    written     Σ c N_i ... φ_pk ... N_l, a sum of products of one direction cosine with components of N, each with its factor c
     magnetic    g μB N_p, g μB S_p of one spin, or g μB Σ_ij c_ij φ_pi S_j (j along the molecule), c symmetric and traceless;
                 g μB Σ_ij c_ij ½{φ_pi, N_j}
+    of a spin   Σ_q ½{φ_p, N_q} S_q with the part of rank 2 alone, φ = Σ_i μ_i φ_i; i Σ_ij c_ij φ_pi S_j between two states
 
 p is a direction in space, i and j are a, b, c. Electric and magnetic moments do not interfere in a level of good parity: their
 strengths are added.
@@ -10,12 +12,40 @@ strengths are added.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
+
+from rotor.arrays import Floats
 
 DEBYE_PER_BOHR_MAGNETON = 0.009274  # as SPCAT has it; 9.2740101e-3 by CODATA 2018
 
 Vector = tuple[float, float, float]
 Matrix = tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]
+
+
+FactorOfK = Callable[[int, Floats, Floats], Floats]  # of J, K' and K''
+
+
+class Word(NamedTuple):
+    """c N_i ... φ_pk ... N_l with i ... to the left and ... l to the right of the cosine along k; without a cosine c N_i ... alone."""
+
+    factor: complex
+    left: str
+    cosine: str
+    right: str
+
+
+class Written(NamedTuple):
+    """A moment as a sum of words, from the second of its states to the first.
+
+    electric: whether it is a part of the electric dipole. commutator: ½[N², ] of the whole. of_k: what an element from K'' to K' is
+    multiplied with, signs of K counted. A moment of the spin `Moment.spin` has words without a cosine.
+    """
+
+    words: tuple[Word, ...]
+    electric: bool
+    commutator: bool = False
+    of_k: FactorOfK | None = None
 
 
 class Moment(NamedTuple):
@@ -25,6 +55,8 @@ class Moment(NamedTuple):
     none, "J" ½{N², }, "JJ" ½{N⁴, }, "K" ½{Nz², }, "[J]" ½[N², ], "[[J]]" ¼[N², [N², ]]; of a magnetic one "3K-J" ½(3Nz² - N²).
     spin: of a magnetic moment, the spin's name, "" the rotation. tensor: c of a magnetic moment that is not isotropic. cosine: of an
     electric one α', α of the two states where an element is multiplied by cos(α'K' + αK), a Fourier term of internal rotation.
+    written: a moment of another form, in place of all these but `spin`. Of a spin: along_abc is half of {φ, N} of rank 2 with the spin,
+    with_i stands for the factor i of a tensor with the spin, from the second of the states to the first.
     turned: of an electric one the axis g, where it stands for C2g times itself, i times what it is in functions of other phases; by_order:
     whether it has the factor i from the higher state to the lower one, -i the other way round.
     """
@@ -36,6 +68,8 @@ class Moment(NamedTuple):
     spin: str = ""
     tensor: Matrix | None = None
     cosine: tuple[float, float] | None = None
+    written: Written | None = None
+    with_i: bool = False
     turned: str = ""
     by_order: bool = False
 
@@ -46,5 +80,5 @@ class Moment(NamedTuple):
 
     @property
     def electric(self) -> bool:
-        """Whether it is a part of the electric dipole."""
-        return self.along_abc is not None
+        """Whether it is a part of the electric dipole, or adds to one in amplitude."""
+        return self.along_abc is not None or self.with_i or (self.written is not None and self.written.electric)

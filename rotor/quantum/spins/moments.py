@@ -25,6 +25,7 @@ from rotor.quantum.spins.operators import AxialState, CosinesWithN, tensor_eleme
 from rotor.quantum.spins.parts import SpinPart
 from rotor.quantum.spins.rotor import RotorBlock, RotorPart
 from rotor.quantum.spins.scheme import Scheme
+from rotor.quantum.spins.written_moments import written_elements
 from rotor.quantum.tensors import BodyTensor, body_tensor
 from rotor.quantum.wang.basis import WangBlock, character
 
@@ -79,7 +80,7 @@ class SpinMoments:
         return found
 
     def _rank(self, moment: Moment) -> int:
-        return 1 if not moment.spin else 0 if moment.tensor is None else 2
+        return 1 if not moment.spin else 0 if moment.tensor is None and moment.along_abc is None else 2
 
     def _element(self, place: int, target: SpinPart, source: SpinPart) -> Floats | None:
         """The element of the rotation, over both signs of K of axial states."""
@@ -106,7 +107,14 @@ class SpinMoments:
 
     def _between(self, moment: Moment, left: RotorPart, right: RotorPart) -> Floats | None:
         up, low = left.basis, right.basis
-        if moment.electric:
+        if moment.written is not None:
+            turned = left.v != right.v and (left.v, right.v) != moment.states
+            found = written_elements(moment.written, up, low, self.representation, turned)
+            return found * _factor(moment.powers, left, right) if found is not None and moment.powers else found
+        if moment.along_abc is not None and moment.spin:
+            found = tensor_elements(up, low, self._tensor(moment.along_abc, 1))
+            return None if found is None else found * _stretch(up.j, low.j)
+        if moment.along_abc is not None:
             found = tensor_elements(up, low, self._tensor(moment.along_abc, 1))
             if found is None:
                 return None
@@ -116,7 +124,9 @@ class SpinMoments:
         if moment.tensor is not None and not moment.spin:
             return CosinesWithN(moment.tensor).elements(up, low, self.representation)
         if moment.tensor is not None:
-            return tensor_elements(up, low, self._tensor(moment.tensor, 2))
+            found = tensor_elements(up, low, self._tensor(moment.tensor, 2))
+            back = moment.with_i and left.v != right.v and (left.v, right.v) != moment.states
+            return -found if found is not None and back else found
         if up != low:
             return None
         n = low.j
@@ -152,6 +162,11 @@ def with_dipoles(
     """Plain dipoles by pairs of states as moments, before the others."""
     plain = [Moment(1.0, states, along) for states, along in dipoles.items() if any(along)]
     return (*plain, *(moment for moment in moments if moment.value_debye))
+
+
+def _stretch(up: int, low: int) -> float:
+    """What the elements of φ are multiplied with for {φ, N} of rank 2; 0 between N = 0 and 1 alone."""
+    return sqrt(max(0.375 * ((up + low + 1) ** 2 - 4) * (1 - (up - low) ** 2 / 4), 0.0))
 
 
 def _factor(powers: str, left: RotorPart, right: RotorPart) -> Floats:

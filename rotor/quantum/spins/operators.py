@@ -10,6 +10,7 @@ X^K is made of direction cosines φ_pi between space-fixed p and molecule-fixed 
 | `Cosines` of a vector | Σ_i c_i φ_pi, K = 1 | spin-orbit, between states |
 | `Cosines` of a matrix | T² of the symmetric traceless c_ij, K = 2 | quadrupole, dipolar spin-spin |
 | `CosinesWithN` | Σ_ij c_ij ½{φ_pi, N_j}, K = 1 | spin-rotation |
+| `ByElements` | any, by its elements over |N k⟩ | higher orders, series |
 
 The last one is no tensor of the molecule alone. With c = c0 1 + c_s + c_a, symmetric and traceless, antisymmetric with the vector
 v_k = c_ij,
@@ -21,7 +22,7 @@ v_k = c_ij,
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import lru_cache
 from math import sqrt
@@ -30,7 +31,8 @@ from typing import NamedTuple
 import numpy as np
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.tensors import BodyTensor, block_elements, body_tensor, coupling
+from rotor.quantum.symmetric_top_elements import coupling
+from rotor.quantum.tensors import BodyTensor, Complexes, block_elements, body_tensor, phase_exponent
 from rotor.quantum.wang.basis import WangBlock, character
 from rotor.quantum.wang.wang_matrix import JMatrix, block_bands, scalar_energy
 from rotor.tops.operators import Operators, Powers
@@ -150,11 +152,54 @@ class CosinesWithN:
 
 
 @dataclass(frozen=True)
+class ByElements:
+    """Any operator by its reduced elements over |N'k'⟩ and |N k⟩; of rank 0 plain ones within N.
+
+    matrix: of N', N and the representation, (2N' + 1, 2N + 1). odd: time reversal changes the sign once spins are contracted with it; the
+    elements have the factor i of the operator then.
+    """
+
+    rank: int
+    matrix: Callable[[int, int, str], Complexes]
+    odd: bool = False
+
+    def elements(self, up: Basis, low: Basis, representation: str) -> Floats | None:
+        """The real reduced matrix between two blocks, None where it is zero."""
+        if not abs(up.j - low.j) <= self.rank <= up.j + low.j:
+            return None
+        between = self.matrix(up.j, low.j, representation)
+        found = (functions_of(up).conj().T @ between @ functions_of(low)).real
+        return found if np.abs(found).max(initial=0.0) > _NOTHING * np.abs(between).max(initial=0.0) else None
+
+
+_NOTHING = 1e-13  # of the largest element over |N k⟩: round-off of a product of a few numbers
+
+
+@lru_cache(maxsize=256)
+def functions_of(basis: Basis) -> Complexes:
+    """The functions of a basis over |N k⟩, k rising from -N, in columns; of |N K⟩ that with K = 0 alone.
+
+    Raises ValueError for |N K⟩ with K > 0, which stands for -K too.
+    """
+    if isinstance(basis, AxialState):
+        if basis.axial_k:
+            raise ValueError(
+                f"functions |N K⟩ with K = {basis.axial_k}, which stand for -K too: Wang functions are needed"
+            )
+        return np.asarray(np.eye(2 * basis.j + 1, dtype=np.complex128)[:, [basis.j]])
+    out = np.zeros((2 * basis.j + 1, basis.size), dtype=np.complex128)
+    for column, k in enumerate(basis.k.tolist()):
+        out[basis.j + k, column] = np.sqrt(0.5) if k else 1.0
+        out[basis.j - k, column] = basis.sign * np.sqrt(0.5) if k else 1.0
+    return np.asarray(out * 1j ** phase_exponent(basis))
+
+
+@dataclass(frozen=True)
 class HalfTurned:
     """C2g times an operator that half a turn about g, one of a, b, c, turns around: what stands for it in functions that θ C2g
     leaves as they are, θ being time reversal. Of an operator that θ turns around too it is Hermitian within one state."""
 
-    of: Cosines | CosinesWithN
+    of: Cosines | CosinesWithN | ByElements
     axis: str
     odd = False
 
@@ -170,7 +215,32 @@ class HalfTurned:
         return None if found is None else character(up, self.axis) * found
 
 
-Rotor = Scalar | Cosines | CosinesWithN | HalfTurned
+@dataclass(frozen=True)
+class BetweenSpecies:
+    """An operator without its elements between Wang blocks of other species than the pairs given."""
+
+    of: Cosines | CosinesWithN | ByElements | HalfTurned
+    pairs: frozenset[tuple[str, str]]
+
+    @property
+    def odd(self) -> bool:
+        """As of the operator."""
+        return self.of.odd
+
+    @property
+    def rank(self) -> int:
+        """That of the operator."""
+        return self.of.rank
+
+    def elements(self, up: Basis, low: Basis, representation: str) -> Floats | None:
+        """The real reduced matrix between two blocks, None where it is zero."""
+        assert isinstance(up, WangBlock)
+        assert isinstance(low, WangBlock)
+        return self.of.elements(up, low, representation) if (up.species, low.species) in self.pairs else None
+
+
+Rotor = Scalar | Cosines | CosinesWithN | ByElements | HalfTurned | BetweenSpecies
+_ALONE = Scalar | ByElements | HalfTurned | BetweenSpecies  # which are not added to others
 
 
 @lru_cache(maxsize=256)
@@ -194,10 +264,12 @@ def is_axial(rotor: Rotor, axis: str) -> bool:
     >>> is_axial(Cosines(((1.0, 0, 0), (0, -0.5, 0), (0, 0, -0.5))), "a")
     True
     """
-    if isinstance(rotor, HalfTurned):
+    if isinstance(rotor, HalfTurned | BetweenSpecies):
         return False
     if isinstance(rotor, Scalar):
         return all(n == 0 for (_, _, n), _ in rotor.operators)
+    if isinstance(rotor, ByElements):
+        return False
     c = np.array(rotor.components, dtype=float)
     across = (1, 2) if axis == "a" else (0, 1)
     return (
@@ -214,16 +286,16 @@ def summed(weighted: Iterable[tuple[float, Rotor]]) -> list[tuple[float, Rotor]]
     """
     sums: dict[object, list[Floats]] = {}
     for value, rotor in weighted:
-        alone = isinstance(rotor, Scalar | HalfTurned)
+        alone = isinstance(rotor, _ALONE)
         key: object = rotor if alone else (type(rotor), rotor.rank)
-        components = np.array(1.0 if isinstance(rotor, Scalar | HalfTurned) else rotor.components)
+        components = np.array(1.0 if isinstance(rotor, _ALONE) else rotor.components)
         sums.setdefault(key, []).append(value * components)
     out: list[tuple[float, Rotor]] = []
     for key, parts in sums.items():
         total = np.sum(parts, axis=0)
         total = np.where(np.abs(total) > _CANCELS * np.abs(parts).sum(axis=0), total, 0.0)
         if total.any():
-            alone = isinstance(key, Scalar | HalfTurned)
+            alone = isinstance(key, _ALONE)
             out.append((float(total), key) if alone else (1.0, key[0](_nested(total))))  # type: ignore[index,arg-type]
     return out
 

@@ -6,9 +6,10 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 from rotor.formats.spcat.hamiltonian.codes import NOT_YET, state_digits
-from rotor.formats.spcat.hamiltonian.series import Series, angles_by_k
+from rotor.formats.spcat.hamiltonian.moment_words import imaginary, tensor_of, words_of
+from rotor.formats.spcat.hamiltonian.series import Series, angles_by_k, factor_of_k
 from rotor.formats.spcat.text.int_file import Dipole
-from rotor.quantum.moments import DEBYE_PER_BOHR_MAGNETON, Moment
+from rotor.quantum.moments import DEBYE_PER_BOHR_MAGNETON, Moment, Written
 
 Dipoles = dict[tuple[int, int], tuple[float, float, float]]
 
@@ -59,7 +60,8 @@ def dipoles_of(dipoles: Iterable[Dipole], states: int) -> tuple[Dipoles, list[tu
 
 
 FOURIER = (7, 8)
-_POWERS = {3: "J", 4: "K", 5: "[J]", 9: "JJ", 10: "[[J]]"}  # TYP of electric moments
+_POWERS = {3: "J", 5: "[J]", 9: "JJ", 10: "[[J]]"}  # TYP with powers of N² of TYP 0
+_WRITTEN = (0, 1, 2, 3, 4, 6, 9, 10, 11, 12)
 
 
 def moment_of(
@@ -75,11 +77,13 @@ def moment_of(
 
     | TYP, I1, SYM | moment |
     |---|---|
-    | 3, 4, 5, 9, 10; 0; 1, 2, 3 | {N², φ}/2, {Nz², φ}/2, [N², φ]/2, {N⁴, φ}/2, [N², [N², φ]]/4, in D |
-    | 7; n; 1, 2, 3 | φ times a cosine of K, a Fourier term of internal rotation (`series`), in D |
-    | 0; 0 or a spin; 0 | N, or that spin, in Bohr magnetons |
-    | 1; 0; 0 | ½(2 φ_z N_z - φ_x N_x - φ_y N_y), in Bohr magnetons; with `as_spcat` TYP 0 too: the program has this for N |
-    | 1; a spin; 0 | S ½(3 Nz² - N²), in Bohr magnetons, as the program computes it (documented: φ_z S_z - ½ φ_x S_x - ½ φ_y S_y) |
+    | 3, 5, 9, 10 | ½{N², φ}, ½[N², φ], ½{N⁴, φ}, ¼[N², [N², φ]], or of N or a spin in place of φ but for 5 |
+    | 0, 1, 2, 4, 6, 11, 12 | see `moment_words` |
+    | 7; n; any | TYP 0 times a cosine of K, a Fourier term of internal rotation (`series`) |
+    | 8; n; any | i times TYP 0 times a sine of K; with n = 0 ½i{Nz, TYP 0}, as the program has it |
+
+    SYM 1 to 3 in D, SYM 0 in Bohr magnetons, with TYP 8 in D, as documented, but in Bohr magnetons with `as_spcat`. A moment between
+    two states leads from the one with the higher number to the other.
 
     Parameters
     ----------
@@ -88,13 +92,13 @@ def moment_of(
     code : DipoleCode
         Its code in parts.
     states : (int, int)
-        As numbered in its group.
+        As numbered in its group, the higher of the file first.
     spins : int
         How many spins SPIND names.
     oblate : bool, optional
         Whether z is the c axis.
     as_spcat : bool, optional
-        Whether N is what the program computes for it.
+        Whether a moment is what the program computes for it where that differs: N, spins with TYP 1 and 2.
     series : Series, optional
         The constants of Fourier series of the file.
 
@@ -108,44 +112,94 @@ def moment_of(
     ValueError
         With what it stands for, for any other code.
     """
+    if not as_spcat and states[0] == states[1] and _is_turned(code):
+        raise ValueError(f"dipole {dipole.code}: {_TURNED}")
     if code.typ in FOURIER:
-        return _cosine_of(dipole, code, states, series or Series())
+        return _fourier_of(dipole, code, states, series or Series(), oblate, as_spcat)
     if code.spin > spins:
         raise ValueError(f"dipole {dipole.code}: spin {code.spin} is not among the {spins} that SPIND names")
-    if code.axis == 0 and code.states[0] == code.states[1]:
-        magnetons = dipole.value * DEBYE_PER_BOHR_MAGNETON
-        spin = f"I{code.spin}" if code.spin else ""
-        if not spin and (code.typ == 1 or (code.typ == 0 and as_spcat)):
-            a, c = (-0.5, 1.0) if oblate else (1.0, -0.5)
-            return Moment(magnetons, states, tensor=((a, 0.0, 0.0), (0.0, -0.5, 0.0), (0.0, 0.0, c)))
-        if code.typ == 0:
-            return Moment(magnetons, states, spin=spin)
-        if code.typ == 1 and spin:
-            return Moment(magnetons, states, powers="3K-J", spin=spin)
-    if code.axis in (1, 2, 3) and code.spin == 0 and code.typ in _POWERS:
-        along = (float(code.axis == 1), float(code.axis == 2), float(code.axis == 3))
-        return Moment(dipole.value, states, along, _POWERS[code.typ])
+    if code.axis > 3:
+        raise ValueError(
+            f"dipole {dipole.code}: SYM = {code.axis}; expected 0 for magnetic moments, 1, 2, 3 for a, b, c"
+        )
+    value = dipole.value * (1.0 if code.axis else DEBYE_PER_BOHR_MAGNETON)
+    if code.spin:
+        return _of_spin(dipole, code, states, value, oblate, as_spcat)
+    if as_spcat and not code.axis and code.typ in (10, 11):  # without elements there
+        value = 0.0
+    if as_spcat and code.typ == 12 and code.axis == (3 if oblate else 1) and states[0] == states[1]:
+        value = 0.0
+    powers = _POWERS.get(code.typ, "")
+    if code.axis and powers and (powers != "[J]" or states[0] == states[1]):
+        return Moment(value, states, _along(code.axis), powers)
+    if (code.typ == 5 and code.axis) or code.typ in _WRITTEN:
+        words = words_of(0 if powers else code.typ, code.axis, oblate, as_spcat=as_spcat)
+        commutator = code.typ in (5, 11)
+        written = Written(words, bool(code.axis), commutator)
+        return Moment(value, states[::-1], powers="" if commutator else powers, written=written)
     raise ValueError(f"dipole {dipole.code}: {_meaning(code)} {NOT_YET}")
 
 
-def _cosine_of(dipole: Dipole, code: DipoleCode, states: tuple[int, int], series: Series) -> Moment:
-    """A component of the dipole times cos(2π n (ρ'K' + ρ''K'')/2 / 3); states: as numbered in the group, the higher of the file first."""
-    odd = series.g12 and code.spin % 2
-    if code.typ != 7 or code.axis == 0 or series.nofc or odd:
-        more = " of one K (NOFC)" if series.nofc else ", with signs by K (G12)" if odd else ""
-        raise ValueError(f"dipole {dipole.code}: {_meaning(code)}{more} {NOT_YET}")
-    low, high = angles_by_k(code.spin, series, code.states)
-    along = (float(code.axis == 1), float(code.axis == 2), float(code.axis == 3))
-    return Moment(dipole.value, states, along, cosine=(high, low))
+_TURNED = "time reversal would change the sign of this moment in one state, so that it leads between two alone, V2 ≠ V1"
+
+
+def _is_turned(code: DipoleCode) -> bool:
+    """Whether a moment is anti-Hermitian, so that it has no place within one state: i{φ, N}, i sine, i{Nz, }, [N², ] of second order."""
+    return code.typ in (8, 11) or (code.typ in (1, 2) and code.axis > 0) or (code.typ == 12 and code.axis == 0)
+
+
+def _along(axis: int) -> tuple[float, float, float]:
+    return (float(axis == 1), float(axis == 2), float(axis == 3))
+
+
+def _of_spin(
+    dipole: Dipole, code: DipoleCode, states: tuple[int, int], value: float, oblate: bool, as_spcat: bool
+) -> Moment:
+    spin = f"I{code.spin}"
+    if code.axis == 0 and code.typ in (0, 3, 4, 6, 9):
+        words = words_of(0 if code.typ in _POWERS else code.typ, 0, oblate, of_spin=True)
+        return Moment(value, states, powers=_POWERS.get(code.typ, ""), spin=spin, written=Written(words, False))
+    if code.typ == 0 and code.axis == (3 if oblate else 1):
+        return Moment(value, states[::-1], _along(code.axis), spin=spin)
+    if code.typ in (1, 2):
+        if code.axis == 0 and as_spcat:
+            if code.typ == 1:
+                return Moment(value, states, powers="3K-J", spin=spin)
+            return Moment(value, states, spin=spin, written=Written(words_of(6, 0, oblate, of_spin=True), False))
+        tensor = tensor_of(code.typ, code.axis, oblate)
+        return Moment(value, states[::-1], tensor=tensor, spin=spin, with_i=code.axis > 0)
+    raise ValueError(f"dipole {dipole.code}: {_meaning(code)} {NOT_YET}")
+
+
+def _fourier_of(
+    dipole: Dipole, code: DipoleCode, states: tuple[int, int], series: Series, oblate: bool, as_spcat: bool
+) -> Moment:
+    """TYP 0 times a function of K; states: as numbered in the group, the higher of the file first."""
+    sine, n = code.typ == 8, code.spin
+    if code.axis > 3:
+        raise ValueError(
+            f"dipole {dipole.code}: SYM = {code.axis}; expected 0 for magnetic moments, 1, 2, 3 for a, b, c"
+        )
+    plain = code.axis and not sine and not series.nofc and not (series.g12 and n % 2)
+    if plain:
+        low, high = angles_by_k(n, series, code.states)
+        return Moment(dipole.value, states, _along(code.axis), cosine=(high, low))
+    in_debye = bool(code.axis) or (sine and not as_spcat)
+    value = dipole.value * (1.0 if in_debye else DEBYE_PER_BOHR_MAGNETON)
+    words = words_of(0, code.axis, oblate, as_spcat=as_spcat)
+    if sine:
+        words = tuple(word._replace(factor=imaginary(oblate) * word.factor) for word in words)
+    of_k = factor_of_k(n, sine, series, code.states)
+    return Moment(value, states[::-1], written=Written(words, bool(code.axis), of_k=of_k))
 
 
 def _meaning(code: DipoleCode) -> str:
     kinds = {1: "a moment of second order", 2: "a moment of second order", 6: "a moment of third order"}
-    kinds |= {7: "a moment times a cosine of internal rotation", 8: "a moment times a sine of internal rotation"}
     what = kinds.get(code.typ, f"a moment of TYP {code.typ}")
-    if code.axis == 0 and code.typ in (0, *_POWERS):
-        between = code.states[0] != code.states[1]
-        what = "a magnetic moment between two states" if between else "a magnetic moment with powers of N² or Nz²"
-    elif code.typ in (0, *_POWERS):
+    if code.axis == 0 and code.typ in (0, 4, *_POWERS):
+        what = (
+            "the moment of l_z of an l-doubled state" if code.typ == 5 else "a magnetic moment with powers of N² or Nz²"
+        )
+    elif code.typ in (0, 4, *_POWERS):
         what = "a moment along an axis"
     return what + (f" that acts on spin {code.spin}" if code.spin else "")

@@ -23,11 +23,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from math import sqrt
 
 import numpy as np
 
 from rotor.formats.spcat.hamiltonian.codes import NOT_YET, Digits
+from rotor.formats.spcat.hamiltonian.spin_operators import factor_below, order_of, shape_of, tensor_with_spins
 from rotor.quantum.effects.interactions import with_powers
 from rotor.quantum.effects.spin_effect import ParameterName, matrix_of
 from rotor.quantum.spins.operators import Cosines, CosinesWithN, Matrix, Rotor, Scalar, Vector
@@ -131,15 +131,6 @@ def _plain(d: Digits, axes: str) -> Operators:
     return {(p + 1, q, 0): 0.5, (p, q + 1, 0): -0.5, (p, q, 1): 0.25 if place == 0 else -0.25}
 
 
-def order_of(typ: int) -> int:
-    """L, the rank of the tensor of TYP 11 + n (2n + 1), and of 20 + n, 40 + n, 60 + n (n + 1).
-
-    >>> order_of(12), order_of(21), order_of(62)
-    (3, 2, 3)
-    """
-    return 2 * (typ - 11) + 1 if typ < 20 else typ % 20 + 1
-
-
 def _of_j(d: Digits, axes: str) -> OperatorOfJ:
     """With half anticommutators of the powers, and the factor i, in an oblate basis -i, of what is odd under time reversal."""
     powers, odd = ParameterName("", d.nsq, d.ksq), order_of(d.typ) % 2
@@ -163,22 +154,18 @@ def _tensor_of_n(typ: int, of: Mapping[str, JOperator], z: str) -> JOperator:
     With X, Y, Z = Nc, Nb, Na (prolate) or Na, Nb, Nc (oblate), E = (X + iY)^K and {A, B} = AB + BA,
 
         K = L:      ½ (E + E†), or (E - E†)/2i
-        K = L - 1:  ¼ √(2L) {Z, E + E†}, or {Z, E - E†}/i in its place;  Z where L = 1
+        K = L - 1:  ¼ √(2L) {Z, E + E†}, or {Z, E - E†}/i in its place;  Z where L = 1;  twice that for TYP 12 to 19
 
     the tensor T^L_K(N) normalised as N^L times the spherical harmonic C^L_K, over the C^L_L of its stretched component. Which of the two
     follows from the species: the one along X has X, {Y, Z}, ..., along Y Y, {X, Z}, ..., along Z Z, {X, Y}, ...
     """
     x, y = ("c", "b") if z == "a" else ("a", "b")
-    order, ladder = order_of(typ), of[x] + 1j * of[y]
-    along = "" if typ < 20 else {x: "x", y: "y", z: "z"}["abc"[typ // 20 - 1]]
-    k = order - (order % 2 if along in ("z", "") else 1 - order % 2)
+    order, (k, cosine) = order_of(typ), shape_of(typ, z)
     if k == 0:
         return of[z]
-    raised = ladder**k
-    lowered = (of[x] - 1j * of[y]) ** k
-    cosine = along == ("x" if k == order else "y") or (along == "z" and k < order)
+    raised, lowered = (of[x] + 1j * of[y]) ** k, (of[x] - 1j * of[y]) ** k
     pair = raised + lowered if cosine else -1j * (raised - lowered)
-    return 0.5 * pair if k == order else 0.25 * sqrt(2 * order) * anticommutator(of[z], pair)
+    return 0.5 * pair if k == order else factor_below(typ) * anticommutator(of[z], pair)
 
 
 def plain_of_j(operators: Operators) -> OperatorOfJ:
@@ -205,9 +192,13 @@ def _with_spins(d: Digits, spins: tuple[int, ...], axes: str) -> CodedOperator:
         if spins[0] == spins[1]:
             raise ValueError(f"the square of one spin, a constant, {NOT_YET}")
         return replace(powered, rotor=Scalar())
+    if len(spins) == 2 and d.typ in ODD and spins[0] == spins[1]:
+        raise ValueError(f"the square of one spin, a constant, times N {NOT_YET}")
+    if d.typ > 4 and d.typ not in CROSS and (len(spins) == 2 or d.typ not in ODD):
+        acting = 0 if d.typ in ODD else len(spins)  # of rank 0: I1·I2 times N
+        found = tensor_with_spins(d.typ, acting, axes)
+        return replace(powered, rotor=found, odd=found.odd)
     if d.typ in ODD:
-        if len(spins) == 2:
-            raise ValueError(f"a vector product of two spins {NOT_YET}")
         sign = 1.0 if axes[2] == "a" else -1.0  # as of Na, Nb, Nc between states
         vector: Vector = tuple(sign * float(axis == ODD[d.typ]) for axis in "abc")  # type: ignore[assignment]
         return replace(powered, rotor=Cosines(vector), odd=True)
@@ -224,6 +215,4 @@ def _matrix(typ: int, axes: str) -> Matrix:
     if typ == 4:  # N₊² + N₋² = 2 (Nx² - Ny²)
         plain = matrix_of(f"{axes[0] * 2}-{axes[1] * 2}")
         return tuple(tuple(2 * value for value in row) for row in plain)  # type: ignore[return-value]
-    if typ in CROSS:
-        return matrix_of(CROSS[typ])
-    raise ValueError(f"a spin term of more than second order {NOT_YET}")
+    return matrix_of(CROSS[typ])

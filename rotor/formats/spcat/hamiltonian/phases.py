@@ -20,8 +20,8 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 from rotor.formats.spcat.hamiltonian.codes import Digits, split_code, state_digits
-from rotor.formats.spcat.hamiltonian.operators import order_of
 from rotor.formats.spcat.hamiltonian.series import harmonic, is_constant, symmetry_type
+from rotor.formats.spcat.hamiltonian.spin_operators import order_of
 from rotor.formats.spcat.text.par import ParameterFile
 from rotor.quantum.states import OperatorOfJ
 from rotor.quantum.wang.j_operators import JOperator, half_turn

@@ -29,7 +29,8 @@ import numpy as np
 
 from rotor.arrays import Floats
 from rotor.formats.spcat.hamiltonian.codes import NOT_YET, Digits, split_code, state_digits
-from rotor.formats.spcat.hamiltonian.operators import CodedOperator, operator_of, order_of, plain_of_j
+from rotor.formats.spcat.hamiltonian.operators import CodedOperator, operator_of, plain_of_j
+from rotor.formats.spcat.hamiltonian.spin_operators import order_of
 from rotor.formats.spcat.text.par import Parameter, ParameterFile
 from rotor.quantum.states import OperatorOfJ
 from rotor.quantum.wang.j_operators import JOperator
@@ -177,6 +178,32 @@ def _fourier(n: int, sine: bool, series: Series, states: tuple[int, int]) -> Fac
         return np.asarray(turned * (np.where(above == -below, 0.0, np.sin(angle)) if sine else np.cos(angle)))
 
     return factor
+
+
+def factor_of_k(n: int, sine: bool, series: Series, states: tuple[int, int]) -> Factor:
+    """What a Fourier term multiplies an element with: of one K with NOFC; ½(K' + K'') for the sine of n = 0, as the program has it.
+
+    Parameters
+    ----------
+    n : int
+        The harmonic.
+    sine : bool
+        A sine, else a cosine.
+    series : Series
+        The constants of the file.
+    states : (int, int)
+        Of K' and of K''.
+
+    Returns
+    -------
+    callable
+        Of J, K' and K''.
+    """
+    if sine and n == 0:
+        return lambda j, above, below: (above + below) / 2
+    if n and series.nofc:
+        return _sampled(n, sine)
+    return _fourier(n, sine, series, states)
 
 
 def _sampled(n: int, sine: bool) -> Factor:

@@ -1,0 +1,208 @@
+"""Spin terms of more than second order and spin terms of series, by their elements over |N k⟩.
+
+The operator of a TYP is a tensor T^L_K made of N (`operators`, X, Y, Z as there). With a spin one N is replaced by it, with two spins
+two are. With φ± = φ_x ± iφ_y of the direction cosines that are contracted with the spins,
+
+    K = L        A = N₊^L,  φ₊ N₊^(L-1),  φ₊ φ₊ N₊^(L-2)       of no, one, two spins (φ₊ and N₊ commute)
+    K = L - 1    ±[N₋, A]/L in place of {Z, N₊^(L-1)},  Z and φ_z where L = 1
+
+since [N₋, N₊^L] = ±L {Z, N₊^(L-1)}, + where X, Y, Z are right-handed, and the other component of any such tensor follows likewise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import lru_cache
+from math import sqrt
+
+import numpy as np
+
+from rotor.arrays import Floats
+from rotor.quantum.spins.operators import ByElements, Cosines, CosinesWithN, Rotor, Scalar
+from rotor.quantum.symmetric_top_elements import symmetric_top_elements
+from rotor.quantum.tensors import Complexes, spherical_components
+from rotor.quantum.wang.j_operators import components, identity, lowering, raising
+
+FactorOfBoth = Callable[[int, int, Floats, Floats], Floats]  # of N', N, K', K
+OverK = Callable[[int, int, str], Complexes]  # of N', N and the representation
+
+
+def order_of(typ: int) -> int:
+    """L, the rank of the tensor of TYP 3 + n (2n), 11 + n (2n + 1), and of 20 + n, 40 + n, 60 + n (n + 1).
+
+    >>> order_of(5), order_of(12), order_of(21), order_of(62)
+    (4, 3, 2, 3)
+    """
+    if typ < 12:
+        return 2 * (typ - 3)
+    return 2 * (typ - 11) + 1 if typ < 20 else typ % 20 + 1
+
+
+def factor_below(typ: int) -> float:
+    """Of {Z, N₊^(L-1)} with its conjugate: ¼ √(2L), for TYP 12 to 19 twice that."""
+    return sqrt(2 * order_of(typ)) * (0.5 if typ < 20 else 0.25)
+
+
+def shape_of(typ: int, z: str) -> tuple[int, bool]:
+    """K of the tensor of TYP 12 to 79, and whether it is E + E† (else (E - E†)/i): by its species, see `operators._tensor_of_n`."""
+    x, y = ("c", "b") if z == "a" else ("a", "b")
+    order = order_of(typ)
+    along = "" if typ < 20 else {x: "x", y: "y", z: "z"}["abc"[typ // 20 - 1]]
+    k = order - (order % 2 if along in ("z", "") else 1 - order % 2)
+    return k, along == ("x" if k == order else "y") or (along == "z" and k < order)
+
+
+@lru_cache(maxsize=256)
+def tensor_with_spins(typ: int, spins: int, axes: str) -> ByElements:
+    """The operator of TYP 5 to 79 with one or two different spins; with its factor i, in an oblate basis -i, where L is odd.
+
+    Raises ValueError for TYP 20, 40, 60 with two spins, a scalar of them, which is of another rank.
+    """
+    order = order_of(typ)
+    rank = min(order, spins)
+    if typ < 12:
+        frame = (axes[0], axes[1], axes[2])
+        return ByElements(rank, lambda m, n, rep: _with_conjugate(order, order, rank, True, frame, (m, n, rep)))
+    k, cosine = shape_of(typ, axes[2])
+    frame = ("c", "b", "a") if axes[2] == "a" else ("a", "b", "c")
+    factor = (0.5 if k == order else factor_below(typ)) * _imaginary(axes, order % 2 == 1)
+
+    def matrix(m: int, n: int, representation: str) -> Complexes:
+        if order == 1 and k == 0:
+            return _imaginary(axes, True) * _vector(frame[2], rank, (m, n, representation))
+        return factor * _with_conjugate(order, k, rank, cosine, frame, (m, n, representation))
+
+    return ByElements(rank, matrix, order % 2 == 1)
+
+
+def _imaginary(axes: str, odd: bool) -> complex:
+    if not odd:
+        return 1.0
+    return 1j if axes[2] == "a" else -1j
+
+
+Where = tuple[int, int, str]  # N', N, representation
+
+
+def _with_conjugate(
+    order: int, k: int, rank: int, cosine: bool, frame: tuple[str, str, str], where: Where
+) -> Complexes:
+    """E + E†, or (E - E†)/i, with spins in place of some N; {Z, E} in place of E where K = L - 1."""
+    right = 1.0 if "".join(frame) in ("abc", "bca", "cab") else -1.0
+    up, down = (_stretched(order, rank, frame, sign, where) for sign in (1, -1))
+    if k < order:
+        up = right / order * _commutator(frame, -1, up, where)
+        down = -right / order * _commutator(frame, 1, down, where)
+    return np.asarray(up + down if cosine else -1j * (up - down))
+
+
+def _stretched(order: int, rank: int, frame: tuple[str, str, str], sign: int, where: Where) -> Complexes:
+    """A of the module text, or with - in place of +."""
+    _, n, representation = where
+    return np.asarray(_ladder_of_cosines(rank, frame, sign, where) @ _n(frame, sign, n, representation, order - rank))
+
+
+def _ladder_of_cosines(rank: int, frame: tuple[str, str, str], sign: int, where: Where) -> Complexes:
+    m, n, representation = where
+    x, y, _ = frame
+    if rank == 0:
+        return np.eye(2 * n + 1, dtype=np.complex128) if m == n else np.zeros((2 * m + 1, 2 * n + 1), np.complex128)
+    if rank == 1:
+        return _vector(x, 1, where) + sign * 1j * _vector(y, 1, where)
+    i, k = "abc".index(x), "abc".index(y)
+    found = np.zeros((2, 3, 3))
+    found[0, i, i], found[0, k, k], found[1, i, k], found[1, k, i] = 1.0, -1.0, 1.0, 1.0
+    real, imaginary = (symmetric_top_elements(m, n, spherical_components(one, 2, representation)) for one in found)
+    return np.asarray(real + sign * 1j * imaginary)
+
+
+def _vector(axis: str, rank: int, where: Where) -> Complexes:
+    """φ along an axis, of rank 0 N."""
+    m, n, representation = where
+    if rank == 0:
+        square = components(n, representation)[axis].matrix
+        return square if m == n else np.zeros((2 * m + 1, 2 * n + 1), dtype=np.complex128)
+    along = [float(axis == one) for one in "abc"]
+    return symmetric_top_elements(m, n, spherical_components(along, 1, representation))
+
+
+@lru_cache(maxsize=1024)
+def _n(frame: tuple[str, str, str], sign: int, n: int, representation: str, power: int) -> Complexes:
+    """(N_x ± iN_y) to a power."""
+    of = components(n, representation)
+    return ((of[frame[0]] + sign * 1j * of[frame[1]]) ** power).matrix
+
+
+def _commutator(frame: tuple[str, str, str], sign: int, operator: Complexes, where: Where) -> Complexes:
+    m, n, representation = where
+    left, right = (_n(frame, sign, j, representation, 1) for j in (m, n))
+    return np.asarray(left @ operator - operator @ right)
+
+
+def multiplied(rotor: Rotor, factor: FactorOfBoth, whole: complex, odd: bool) -> ByElements:
+    """An operator times a number, its elements times a function.
+
+    Parameters
+    ----------
+    rotor : Rotor
+        The operator.
+    factor : callable
+        Of N', N, K' and K.
+    whole : complex
+        The number.
+    odd : bool
+        Whether time reversal changes the sign of what results.
+
+    Returns
+    -------
+    ByElements
+        By its elements over |N k⟩.
+    """
+    base = over_k(rotor)
+
+    def matrix(m: int, n: int, representation: str) -> Complexes:
+        above, below = np.arange(-m, m + 1.0)[:, None], np.arange(-n, n + 1.0)[None, :]
+        return np.asarray(whole * factor(m, n, above, below) * base(m, n, representation))
+
+    return ByElements(rotor.rank, lru_cache(maxsize=256)(matrix), odd)
+
+
+def over_k(rotor: Rotor) -> OverK:
+    """The elements of an operator over |N k⟩."""
+    if isinstance(rotor, ByElements):
+        return rotor.matrix
+    if isinstance(rotor, Scalar):
+        return lambda m, n, representation: _of_powers(rotor, m, n)
+    assert isinstance(rotor, Cosines | CosinesWithN)
+    c = np.array(rotor.components, dtype=float)
+    if isinstance(rotor, CosinesWithN):
+        return lambda m, n, representation: _with_n(c, (m, n, representation))
+    if rotor.rank == 2:
+        c = (c + c.T) / 2 - np.eye(3) * np.trace(c) / 3
+    factor = 1j if rotor.rank == 1 else 1.0
+    return lambda m, n, rep: factor * symmetric_top_elements(m, n, spherical_components(c, rotor.rank, rep))
+
+
+def _of_powers(rotor: Scalar, m: int, n: int) -> Complexes:
+    total = np.zeros((2 * m + 1, 2 * n + 1), dtype=np.complex128)
+    if m != n:
+        return total
+    square = np.diag(np.arange(-n, n + 1.0) ** 2)
+    for (p, q, power), value in rotor.operators:
+        ladder = (raising(n) ** (2 * power) + lowering(n) ** (2 * power) if power else identity(n)).matrix
+        k = np.linalg.matrix_power(square, q)
+        total += value * (n * (n + 1.0)) ** p * (k @ ladder + ladder @ k) / 2
+    return total
+
+
+def _with_n(c: Floats, where: Where) -> Complexes:
+    """Σ c_ij ½{φ_i, N_j}."""
+    m, n, representation = where
+    total = np.zeros((2 * m + 1, 2 * n + 1), dtype=np.complex128)
+    up, low = components(m, representation), components(n, representation)
+    for i, one in enumerate("abc"):
+        cosine = _vector(one, 1, where)
+        for k, other in enumerate("abc"):
+            if c[i, k]:
+                total += c[i, k] / 2 * (cosine @ low[other].matrix + up[other].matrix @ cosine)
+    return total
